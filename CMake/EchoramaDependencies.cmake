@@ -1,0 +1,10 @@
+# What the kernels need; VTK and ParaView are found by their stacks.
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(TBB REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(nlohmann_json 3 REQUIRED)
+find_package(Threads REQUIRED)
+if(ECHORAMA_TESTING)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+endif()

@@ -1,0 +1,126 @@
+# echorama_add_room(NAME
+#   [KERNEL_DEPENDS room...]      rooms whose kernels ours call
+#   [KERNEL_LIBRARIES target...]  further libraries, private to the kernels
+#   [KERNEL_SUBDIRECTORIES dir...] where the kernels lie, default: the room's own folder
+#   [CLASSES class...]            vtk classes, by path without extension
+#   [VTK_LIBRARIES target...])    further libraries, private to the vtk classes
+#
+# A room is two layers. Kernels (every .cxx whose name does not begin with vtk) become lib<Echorama><NAME>Kernels,
+# which links no VTK; the vtk classes become the VTK module Echorama::NAME over it. Tests and benchmarks are found by
+# their place and name: Testing/Test*.cxx (GoogleTest), Testing/Test*.py (wrapped classes),
+# Benchmarks/Benchmark*.cxx.
+function(echorama_add_room name)
+  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES")
+  if(NOT ECHORAMA_STACK STREQUAL "paraview")
+    _echorama_add_kernels(${name})
+  endif()
+  if(NOT ECHORAMA_STACK STREQUAL "kernels" AND room_CLASSES)
+    _echorama_add_classes(${name})
+  endif()
+  if(NOT ECHORAMA_STACK STREQUAL "paraview")
+    _echorama_add_tests(${name})
+  endif()
+endfunction()
+
+macro(_echorama_add_kernels name)
+  if(NOT room_KERNEL_SUBDIRECTORIES)
+    set(room_KERNEL_SUBDIRECTORIES .)
+  endif()
+  set(kernels)
+  set(headers)
+  foreach(directory IN LISTS room_KERNEL_SUBDIRECTORIES)
+    file(GLOB found CONFIGURE_DEPENDS ${directory}/*.cxx)
+    list(APPEND kernels ${found})
+    file(GLOB found CONFIGURE_DEPENDS ${directory}/*.h)
+    list(APPEND headers ${found})
+  endforeach()
+  list(FILTER kernels EXCLUDE REGEX "/vtk[^/]*$")
+  list(FILTER headers EXCLUDE REGEX "/vtk[^/]*$")
+
+  set(target ${name}Kernels)
+  add_library(${target} SHARED ${kernels})
+  add_library(Echorama::${target} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME Echorama${target} VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
+    # Kernels have no export macros: their whole interface is public.
+    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama>)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  target_link_libraries(${target} PUBLIC Eigen3::Eigen PRIVATE ${room_KERNEL_LIBRARIES})
+  foreach(other IN LISTS room_KERNEL_DEPENDS)
+    target_link_libraries(${target} PUBLIC Echorama::${other}Kernels)
+  endforeach()
+  echorama_compile_options(${target})
+  install(TARGETS ${target} EXPORT EchoramaKernels LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  foreach(header IN LISTS headers)
+    file(RELATIVE_PATH place ${PROJECT_SOURCE_DIR} ${header})
+    get_filename_component(place ${place} DIRECTORY)
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/echorama/${place})
+  endforeach()
+  set_property(GLOBAL APPEND PROPERTY ECHORAMA_KERNEL_TARGETS ${target})
+endmacro()
+
+macro(_echorama_add_classes name)
+  vtk_module_add_module(Echorama::${name} CLASSES ${room_CLASSES})
+  vtk_module_link(Echorama::${name} PUBLIC Echorama::${name}Kernels PRIVATE ${room_VTK_LIBRARIES})
+  # Classes may lie in subfolders (Core/Pipeline); they are included by their bare names all the same.
+  set(directories)
+  foreach(class IN LISTS room_CLASSES)
+    get_filename_component(directory ${class} DIRECTORY)
+    list(APPEND directories ${directory})
+  endforeach()
+  list(REMOVE_DUPLICATES directories)
+  foreach(directory IN LISTS directories)
+    vtk_module_include(Echorama::${name} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/${directory}>
+      $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama/${directory}>)
+  endforeach()
+  _vtk_module_real_target(module_target Echorama::${name})
+  echorama_compile_options(${module_target})
+endmacro()
+
+macro(_echorama_add_tests name)
+  if(ECHORAMA_TESTING)
+    file(GLOB tests CONFIGURE_DEPENDS Testing/Test*.cxx)
+    if(tests)
+      add_executable(${name}Tests ${tests})
+      target_link_libraries(${name}Tests PRIVATE Echorama::${name}Kernels ${room_KERNEL_LIBRARIES} GTest::gtest_main)
+      target_compile_definitions(${name}Tests PRIVATE ECHORAMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+      echorama_compile_options(${name}Tests)
+      gtest_discover_tests(${name}Tests TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
+        PROPERTIES LABELS kernel TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+    endif()
+    if(ECHORAMA_STACK STREQUAL "vtk")
+      file(GLOB tests CONFIGURE_DEPENDS Testing/Test*.py)
+      foreach(test IN LISTS tests)
+        echorama_add_python_test(${test})
+      endforeach()
+    endif()
+  endif()
+  if(ECHORAMA_BENCHMARKS)
+    file(GLOB benchmarks CONFIGURE_DEPENDS Benchmarks/Benchmark*.cxx)
+    foreach(benchmark IN LISTS benchmarks)
+      echorama_add_benchmark(${benchmark} ${name})
+    endforeach()
+  endif()
+endmacro()
+
+# echorama_add_benchmark(FILE ROOM): one program per file; the vtk stack's may use VTK as the peer.
+function(echorama_add_benchmark file name)
+  get_filename_component(target ${file} NAME_WE)
+  add_executable(${target} ${file})
+  target_link_libraries(${target} PRIVATE Echorama::${name}Kernels TBB::tbb nlohmann_json::nlohmann_json)
+  if(ECHORAMA_STACK STREQUAL "vtk")
+    target_link_libraries(${target} PRIVATE ${VTK_LIBRARIES})
+    target_compile_definitions(${target} PRIVATE ECHORAMA_WITH_VTK)
+  endif()
+  target_compile_definitions(${target} PRIVATE ECHORAMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  echorama_compile_options(${target})
+  set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/benchmarks)
+endfunction()
+
+# echorama_add_python_test(FILE [args...]): a test on the wrapped classes; exit status 77 means skipped.
+function(echorama_add_python_test file)
+  get_filename_component(test ${file} NAME_WE)
+  add_test(NAME Python.${test} COMMAND ${ECHORAMA_PYTHON} ${file} ${ARGN})
+  set_tests_properties(Python.${test} PROPERTIES LABELS python TIMEOUT 600 SKIP_RETURN_CODE 77
+    ENVIRONMENT "PYTHONPATH=${ECHORAMA_PYTHON_PATH}:${PROJECT_SOURCE_DIR}/Testing;ECHORAMA_SOURCE_DIR=${PROJECT_SOURCE_DIR};ECHORAMA_BUILD_DIR=${CMAKE_BINARY_DIR}")
+endfunction()

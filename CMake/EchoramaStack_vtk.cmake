@@ -1,0 +1,38 @@
+# The VTK 9.1 stack: kernels, modules, Python package, programs, installation.
+find_package(VTK 9.1 REQUIRED COMPONENTS
+  CommonCore CommonDataModel CommonExecutionModel CommonTransforms CommonMath CommonSystem CommonColor CommonMisc
+  FiltersCore FiltersGeneral FiltersSources IOCore IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
+  InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
+  RenderingVolumeOpenGL2 RenderingImage Python WrappingPythonCore WrappingTools)
+include(EchoramaDependencies)
+set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH
+set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages)
+set(ECHORAMA_PYTHON_PATH ${CMAKE_BINARY_DIR}/${ECHORAMA_PYTHON_PACKAGES})
+
+set(module_files ${ECHORAMA_ROOMS})
+list(TRANSFORM module_files PREPEND ${PROJECT_SOURCE_DIR}/)
+list(TRANSFORM module_files APPEND /vtk.module)
+vtk_module_scan(MODULE_FILES ${module_files} PROVIDES_MODULES modules WANT_BY_DEFAULT ON HIDE_MODULES_FROM_CACHE ON
+  ENABLE_TESTS OFF)
+vtk_module_build(MODULES ${modules} PACKAGE Echorama INSTALL_EXPORT Echorama
+  VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
+  HEADERS_DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/echorama
+  CMAKE_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama)
+vtk_module_wrap_python(MODULES ${modules} INSTALL_EXPORT EchoramaPython PYTHON_PACKAGE echorama
+  MODULE_DESTINATION ${ECHORAMA_PYTHON_PACKAGES} CMAKE_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama
+  BUILD_STATIC OFF TARGET Echorama::Python)
+include(EchoramaPythonPackage)
+
+# The kernels, for the ParaView stack (from this build tree) and for other projects (installed).
+get_property(kernel_targets GLOBAL PROPERTY ECHORAMA_KERNEL_TARGETS)
+export(TARGETS ${kernel_targets} NAMESPACE Echorama:: FILE ${CMAKE_BINARY_DIR}/EchoramaKernels-targets.cmake)
+install(EXPORT EchoramaKernels NAMESPACE Echorama:: FILE EchoramaKernels-targets.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama)
+include(EchoramaPackage)
+
+if(EXISTS ${PROJECT_SOURCE_DIR}/Applications/CMakeLists.txt)
+  add_subdirectory(Applications)
+endif()
+if(ECHORAMA_TESTING)
+  add_subdirectory(Testing)
+endif()

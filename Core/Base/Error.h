@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <stdexcept>
+#include <string>
+
+namespace echorama {
+
+/// Why a kernel did not return a value. The message is a whole sentence that names the file or parameter and the reason.
+class Error : public std::runtime_error {
+public:
+  enum class Kind {
+    InvalidParameter, ///< a parameter is outside its documented range
+    BadInput,         ///< the data cannot be worked on: wrong sizes, nothing valid, constant, not finite
+    BadFile,          ///< a file is not what it says it is
+    FileSystem,       ///< a path cannot be read or written
+    NotPossible,      ///< the question has no answer: no overlap, too little overlap, singular system
+    TooLarge,         ///< the result would not fit in memory
+    Cancelled,        ///< the caller's Progress asked to stop
+  };
+
+  Error(Kind kind, const std::string& message) : std::runtime_error(message), kind_(kind) {}
+  Kind GetKind() const { return kind_; }
+
+private:
+  Kind kind_;
+};
+
+} // namespace echorama

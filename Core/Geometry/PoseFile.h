@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ImageGeometry.h"
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// One line of a pose file: a volume, the geometry it had when the pose was found, and where it belongs.
+struct VolumePose {
+  std::string file;                      ///< as given; made relative to the JSON's folder when written, resolved when read
+  std::optional<ImageGeometry> geometry; ///< of the file as it stands; always written
+  Pose volumeToWorld = Pose::Identity(); ///< from the physical space of the file as it stands (identity: where the file says)
+};
+
+/// Poses on disk: {"schema": "echorama-poses-1", "unit": "mm", "frame": "LPS", "volumes": [{"file": .., "geometry":
+/// {"origin", "spacing", "direction", "dimensions"}, "VolumeToWorld": [[4 numbers] x 4]}, ...]}.
+/// \throws Error(FileSystem) when the file cannot be opened, Error(BadFile) that names file, volume and field when it is
+/// not JSON, of another schema, unit or frame, lacks a field, or a matrix is not rigid.
+std::vector<VolumePose> ReadPoses(const std::string& path);
+
+/// Writes under a temporary name and renames, so that a failure leaves what was there.
+void WritePoses(const std::string& path, const std::vector<VolumePose>& poses);
+
+/// The pose of the volume \a file with \a geometry: matched by resolved path, else, when no path matches, by file name
+/// if that is unique.
+/// \throws Error(BadInput) when there is none, or when its recorded geometry differs (so that nothing is moved twice).
+const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry);
+
+} // namespace echorama

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundAcquisition
+ * @brief what is known of how a volume was acquired, as named field data
+ *
+ * | field          | values                                                                                   |
+ * | -------------- | ---------------------------------------------------------------------------------------- |
+ * | ProbeGeometry  | 6 doubles: fan angle (degrees), fan width (mm), sweep angle, sweep width, depth from, to  |
+ * | ProbeToWorld   | 16 doubles, row by row: from the probe frame to the world, mm                             |
+ * | TimeStamp      | 1 double, seconds                                                                         |
+ * | Seed           | 1 unsigned 64-bit number: the seed of a synthetic volume                                  |
+ * | Scene          | a string: what a synthetic volume shows, enough to make it again                          |
+ *
+ * Nobody else spells these names. It has no state.
+ */
+#ifndef vtkUltrasoundAcquisition_h
+#define vtkUltrasoundAcquisition_h
+
+#include "EchoramaCoreModule.h"
+#include "vtkObject.h"
+
+#ifndef __VTK_WRAP__
+#include "Core/Geometry/ProbeGeometry.h"
+#include "Core/Geometry/RigidTransform.h"
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+#endif
+
+class vtkDataObject;
+class vtkMatrix4x4;
+
+class ECHORAMACORE_EXPORT vtkUltrasoundAcquisition : public vtkObject
+{
+public:
+  static vtkUltrasoundAcquisition* New();
+  vtkTypeMacro(vtkUltrasoundAcquisition, vtkObject);
+
+  ///@{
+  /** Names of the fields. */
+  static const char* ProbeGeometryName() { return "ProbeGeometry"; }
+  static const char* ProbeToWorldName() { return "ProbeToWorld"; }
+  static const char* TimeStampName() { return "TimeStamp"; }
+  static const char* SeedName() { return "Seed"; }
+  static const char* SceneName() { return "Scene"; }
+  ///@}
+
+  /** Copies ProbeToWorld into \a pose. Returns false, and leaves \a pose alone, when the data has none. */
+  static bool GetProbeToWorld(vtkDataObject* data, vtkMatrix4x4* pose);
+
+#ifndef __VTK_WRAP__
+  /** Every field name, in the order of the table. */
+  static std::vector<std::string> Names();
+
+  static std::optional<echorama::ProbeGeometry> ProbeGeometryOf(vtkDataObject* data);
+  static void SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& geometry);
+  static std::optional<echorama::Pose> ProbeToWorldOf(vtkDataObject* data);
+  static void SetProbeToWorld(vtkDataObject* data, const echorama::Pose& pose);
+  static std::optional<double> TimeStampOf(vtkDataObject* data);
+  static void SetTimeStamp(vtkDataObject* data, double seconds);
+  static std::optional<std::uint64_t> SeedOf(vtkDataObject* data);
+  static void SetSeed(vtkDataObject* data, std::uint64_t seed);
+  static std::optional<std::string> SceneOf(vtkDataObject* data);
+  static void SetScene(vtkDataObject* data, const std::string& scene);
+#endif
+
+protected:
+  vtkUltrasoundAcquisition() = default;
+  ~vtkUltrasoundAcquisition() override = default;
+
+private:
+  vtkUltrasoundAcquisition(const vtkUltrasoundAcquisition&) = delete;
+  void operator=(const vtkUltrasoundAcquisition&) = delete;
+};
+
+#endif

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundVolume.h"
+
+#include "vtkAlgorithm.h"
+#include "vtkCompositeDataSet.h"
+#include "vtkDataObjectTree.h"
+#include "vtkDataObjectTreeIterator.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMatrix3x3.h"
+#include "vtkMatrix4x4.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkUltrasoundAcquisition.h"
+
+#include <cstring>
+#include <new>
+
+using echorama::Error;
+
+vtkStandardNewMacro(vtkUltrasoundVolume);
+
+//----------------------------------------------------------------------------
+vtkDataArray* vtkUltrasoundVolume::GetIntensity(vtkImageData* volume)
+{
+  vtkPointData* arrays = volume ? volume->GetPointData() : nullptr;
+  vtkDataArray* named = arrays ? arrays->GetArray(IntensityName()) : nullptr;
+  return named || !arrays ? named : arrays->GetScalars();
+}
+
+//----------------------------------------------------------------------------
+vtkDataArray* vtkUltrasoundVolume::GetValidRegion(vtkImageData* volume)
+{
+  return volume ? volume->GetPointData()->GetArray(ValidRegionName()) : nullptr;
+}
+
+//----------------------------------------------------------------------------
+std::array<int, 3> vtkUltrasoundVolume::DimensionsOf(vtkImageData* image)
+{
+  std::array<int, 3> dimensions;
+  image->GetDimensions(dimensions.data());
+  return dimensions;
+}
+
+//----------------------------------------------------------------------------
+echorama::ImageGeometry vtkUltrasoundVolume::GeometryOf(vtkImageData* volume)
+{
+  echorama::ImageGeometry geometry;
+  geometry.dimensions = DimensionsOf(volume);
+  volume->GetSpacing(geometry.spacing.data());
+  volume->GetOrigin(geometry.origin.data());
+  geometry.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(volume->GetDirectionMatrix()->GetData());
+  const int* extent = volume->GetExtent();
+  const Eigen::Vector3d first(extent[0], extent[2], extent[4]);
+  geometry.origin += geometry.direction * geometry.spacing.cwiseProduct(first);
+  return geometry;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::SetGeometry(vtkImageData* volume, const echorama::ImageGeometry& geometry)
+{
+  volume->SetDimensions(geometry.dimensions.data());
+  volume->SetOrigin(geometry.origin.data());
+  volume->SetSpacing(geometry.spacing.data());
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = geometry.direction;
+  volume->SetDirectionMatrix(direction.data());
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::SetGeometry(vtkInformation* information, const echorama::ImageGeometry& geometry)
+{
+  const int extent[6] = { 0, geometry.dimensions[0] - 1, 0, geometry.dimensions[1] - 1, 0, geometry.dimensions[2] - 1 };
+  information->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
+  information->Set(vtkDataObject::ORIGIN(), geometry.origin.data(), 3);
+  information->Set(vtkDataObject::SPACING(), geometry.spacing.data(), 3);
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = geometry.direction;
+  information->Set(vtkDataObject::DIRECTION(), direction.data(), 9);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::Move(vtkImageData* volume, const echorama::Pose& pose)
+{
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> before(volume->GetDirectionMatrix()->GetData());
+  const Eigen::Vector3d origin = pose * Eigen::Map<const Eigen::Vector3d>(volume->GetOrigin());
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = pose.linear() * before;
+  volume->SetOrigin(origin.data());
+  volume->SetDirectionMatrix(direction.data());
+  if (const auto probe = vtkUltrasoundAcquisition::ProbeToWorldOf(volume))
+  {
+    vtkUltrasoundAcquisition::SetProbeToWorld(volume, pose * *probe);
+  }
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundVolume::Move(vtkImageData* volume, vtkMatrix4x4* matrix)
+{
+  echorama::Pose pose;
+  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+  if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
+    pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+  {
+    vtkGenericWarningMacro("vtkUltrasoundVolume::Move: the matrix is not a rigid transform; the volume was not moved");
+    return false;
+  }
+  Move(volume, pose);
+  return true;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::RefuseType(vtkDataArray* intensity)
+{
+  throw Error(Error::Kind::BadInput,
+    std::string("voxels of type ") + intensity->GetDataTypeAsString() +
+      " are not supported; use unsigned char, short, unsigned short, float or double");
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundVolume::Input vtkUltrasoundVolume::CheckInput(vtkAlgorithm* filter, vtkImageData* image, const std::string& name)
+{
+  const auto fail = [&name](const std::string& reason) { throw Error(Error::Kind::BadInput, name + ": " + reason); };
+  Input input;
+  input.Image = image;
+  input.Name = name;
+  input.ValidRegion = GetValidRegion(image);
+  // The filter's choice counts when somebody made one; the default choice of vtkImageAlgorithm (the active scalars) gives
+  // way to the array that is named Intensity.
+  vtkInformation* choice = filter->GetInputArrayInformation(0);
+  const bool chosen = choice && choice->Has(vtkDataObject::FIELD_NAME());
+  input.Intensity = chosen ? image->GetPointData()->GetArray(choice->Get(vtkDataObject::FIELD_NAME())) : GetIntensity(image);
+  if (!input.Intensity)
+  {
+    fail(chosen ? std::string("it has no point array named ") + choice->Get(vtkDataObject::FIELD_NAME())
+                : std::string("it has no intensities (a point array named Intensity, or active scalars)"));
+  }
+  if (input.Intensity->GetNumberOfComponents() != 1)
+  {
+    fail("its intensities have " + std::to_string(input.Intensity->GetNumberOfComponents()) + " components; one is needed");
+  }
+  try
+  {
+    Dispatch(input.Intensity, [](auto) {});
+  }
+  catch (const Error& error)
+  {
+    fail(error.what());
+  }
+  GeometryOf(image).Check(name);
+  if (input.Intensity->GetNumberOfTuples() != image->GetNumberOfPoints())
+  {
+    fail("its intensities are not one per voxel");
+  }
+  if (input.ValidRegion &&
+    (input.ValidRegion->GetDataType() != VTK_UNSIGNED_CHAR || input.ValidRegion->GetNumberOfComponents() != 1 ||
+      input.ValidRegion->GetNumberOfTuples() != image->GetNumberOfPoints()))
+  {
+    fail("its ValidRegion is not one unsigned char per voxel");
+  }
+  return input;
+}
+
+//----------------------------------------------------------------------------
+std::vector<vtkUltrasoundVolume::Input> vtkUltrasoundVolume::CollectInputs(vtkAlgorithm* filter, vtkInformationVector* port)
+{
+  std::vector<Input> inputs;
+  const auto add = [&inputs, filter](vtkImageData* image, const char* name) {
+    inputs.push_back(CheckInput(filter, image, name && *name ? name : "volume " + std::to_string(inputs.size() + 1)));
+  };
+  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection)
+  {
+    vtkDataObject* data = vtkDataObject::GetData(port, connection);
+    if (vtkImageData* image = vtkImageData::SafeDownCast(data))
+    {
+      add(image, nullptr);
+    }
+    else if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data))
+    {
+      const auto leaf = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
+      leaf->VisitOnlyLeavesOn();
+      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem())
+      {
+        if (vtkImageData* leafImage = vtkImageData::SafeDownCast(leaf->GetCurrentDataObject()))
+        {
+          vtkInformation* meta = leaf->HasCurrentMetaData() ? leaf->GetCurrentMetaData() : nullptr;
+          add(leafImage, meta ? meta->Get(vtkCompositeDataSet::NAME()) : nullptr);
+        }
+      }
+    }
+  }
+  return inputs;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundVolume::Run(
+  vtkAlgorithm* filter, vtkInformationVector* outputs, const std::function<void(const echorama::Progress&)>& body)
+{
+  const auto failed = [outputs]() {
+    for (int port = 0; outputs && port < outputs->GetNumberOfInformationObjects(); ++port)
+    {
+      if (vtkDataObject* output = vtkDataObject::GetData(outputs, port))
+      {
+        output->Initialize();
+      }
+    }
+    return 0;
+  };
+  const echorama::Progress progress([filter](double fraction) {
+    filter->UpdateProgress(fraction);
+    return !filter->GetAbortExecute();
+  });
+  try
+  {
+    body(progress);
+    return 1;
+  }
+  catch (const Error& error)
+  {
+    if (error.GetKind() != Error::Kind::Cancelled)
+    {
+      vtkErrorWithObjectMacro(filter, << error.what());
+    }
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorWithObjectMacro(filter, "there is not enough memory for the result");
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorWithObjectMacro(filter, << error.what());
+  }
+  return failed();
+}

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// The harness of the benchmarks: each prints one JSON object per line, time and error side by side, ours and the peer's.
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <sys/resource.h>
+#include <vector>
+
+namespace echorama::benchmark {
+
+/// Seconds of one call.
+template <class Function>
+double Seconds(const Function& function)
+{
+  const auto start = std::chrono::steady_clock::now();
+  function();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Median seconds of \a runs calls, after one that is not counted. Time ours and the peer in turn (see Duel) where the
+/// ratio matters: machines are shared.
+template <class Function>
+double MedianSeconds(const Function& function, int runs = 5)
+{
+  function();
+  std::vector<double> seconds;
+  for (int run = 0; run < runs; ++run)
+    seconds.push_back(Seconds(function));
+  std::nth_element(seconds.begin(), seconds.begin() + runs / 2, seconds.end());
+  return seconds[runs / 2];
+}
+
+/// Median seconds of two functions that run in turn, A B A B ..., after one warm-up each.
+template <class A, class B>
+std::pair<double, double> Duel(const A& a, const B& b, int runs = 5)
+{
+  a();
+  b();
+  std::vector<double> first, second;
+  for (int run = 0; run < runs; ++run) {
+    first.push_back(Seconds(a));
+    second.push_back(Seconds(b));
+  }
+  std::nth_element(first.begin(), first.begin() + runs / 2, first.end());
+  std::nth_element(second.begin(), second.begin() + runs / 2, second.end());
+  return {first[runs / 2], second[runs / 2]};
+}
+
+/// Largest memory of this process so far, MB.
+inline double PeakMb()
+{
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss / 1024.0;
+}
+
+/// One line of output. Further keys are welcome.
+inline void Report(const std::string& bench, const std::string& testCase, const std::string& method, double seconds, double error,
+                   const std::string& errorUnit, nlohmann::ordered_json more = {})
+{
+  nlohmann::ordered_json line{{"bench", bench}, {"case", testCase}, {"method", method}, {"seconds", seconds}, {"error", error},
+                              {"error_unit", errorUnit}, {"peak_mb", PeakMb()}};
+  if (more.is_object())
+    line.update(more);
+  std::cout << line.dump() << std::endl;
+}
+
+} // namespace echorama::benchmark
