@@ -45,6 +45,8 @@ macro(_echorama_add_kernels name)
     CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama>)
   target_compile_features(${target} PUBLIC cxx_std_17)
+  # Eigen's alignment would follow each compiler call's instruction set; the interface must not.
+  target_compile_definitions(${target} PUBLIC EIGEN_MAX_ALIGN_BYTES=16)
   target_link_libraries(${target} PUBLIC Eigen3::Eigen PRIVATE ${room_KERNEL_LIBRARIES})
   foreach(other IN LISTS room_KERNEL_DEPENDS)
     target_link_libraries(${target} PUBLIC Echorama::${other}Kernels)
