@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Progress is reported by the calling thread alone, because callbacks end in Python or a user interface. It takes part
 // in the loop, so it comes by often enough.
 #include "Core/Base/Parallel.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Base/Error.h"
 #include <cmath>

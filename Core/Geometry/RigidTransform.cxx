@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Series replace the quotients sin(a)/a and its kin near a = 0; near a = pi the axis is read from the symmetric part of
 // the rotation (through the quaternion), because the antisymmetric part vanishes there.
 #include "Core/Geometry/RigidTransform.h"

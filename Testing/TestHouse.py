@@ -1,0 +1,59 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rules of the house that a compiler does not keep: layers, one threading library, and that no filter is half furnished."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
+build = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"])
+rooms = ["Core", "Readers", "Tracking", "Filters", "Widgets"]
+complaints = []
+
+
+def ours(pattern):
+    for room in rooms:
+        yield from sorted((source / room).rglob(pattern))
+
+
+def text_of(paths):
+    return "\n".join(path.read_text(errors="replace") for path in paths)
+
+
+for path in [*ours("*.h"), *ours("*.cxx")]:
+    name = path.relative_to(source)
+    text = path.read_text()
+    if "SPDX-License-Identifier: BSD-3-Clause" not in text[:200]:
+        complaints.append(f"{name}: no licence line")
+    if path.parent.name in ("Testing", "Benchmarks"):
+        continue
+    if not path.name.startswith("vtk") and re.search(r'#include [<"]vtk', text):
+        complaints.append(f"{name}: a kernel includes VTK")
+    if re.search(r"#include <(tbb|oneapi|thread>|omp)", text) and name != pathlib.Path("Core/Base/Parallel.cxx"):
+        complaints.append(f"{name}: names a threading library; use Core/Base/Parallel.h")
+    if re.search(r"\b(mt19937|std::rand|srand|random_device)\b", text):
+        complaints.append(f"{name}: randomness that is not Core/Base/Random.h")
+
+for library in sorted((build / "lib").glob("libEchorama*Kernels.so")):
+    needed = subprocess.run(["readelf", "-d", library], capture_output=True, text=True, check=True).stdout
+    if "libvtk" in needed:
+        complaints.append(f"{library.name}: kernels link VTK")
+
+tests = text_of([*ours("Testing/*.py"), *ours("Testing/*.cxx"), *sorted((source / "Testing").glob("*.py"))])
+pages = text_of(sorted((source / "Documentation").rglob("*.md")))
+for path in ours("vtk*.cxx"):
+    header = path.with_suffix(".h").read_text()
+    name = path.stem
+    if "vtkStandardNewMacro" not in path.read_text() or not re.search(rf"class \w+ {name} : public vtk\w*(Algorithm|Writer)\b", header):
+        continue
+    if not path.with_suffix(".xml").exists():
+        complaints.append(f"{name}: no ParaView XML beside it")
+    if name not in tests:
+        complaints.append(f"{name}: no test names it")
+    if name not in pages:
+        complaints.append(f"{name}: no page of Documentation names it")
+
+print("\n".join(complaints) or "the house is in order")
+sys.exit(1 if complaints else 0)
