@@ -1,0 +1,26 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The ParaView pipeline gives the same volume on two MPI ranks (symmetric, each with its piece) as on one."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy
+
+script = str(pathlib.Path(__file__).resolve().parent / "TestPipeline.py")
+with tempfile.TemporaryDirectory() as folder:
+    results = []
+    for ranks, screen in ((1, 123), (2, 124)):
+        out = f"{folder}/{ranks}.npz"
+        start = ["xvfb-run", "-n", str(screen), "mpirun", "-np", str(ranks), "pvbatch", script, out]
+        run = subprocess.run(start, capture_output=True, text=True)
+        print(run.stdout, run.stderr)
+        if run.returncode == 77 or "skipped:" in run.stdout:
+            sys.exit(77)
+        assert run.returncode == 0, f"{ranks} rank(s): exit status {run.returncode}"
+        results.append(dict(numpy.load(out)))
+one, two = results
+for key in one:
+    assert numpy.array_equal(one[key], two[key]), f"{key} differs between one rank and two"
+print("one rank and two agree, to the last bit")
