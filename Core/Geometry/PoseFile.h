@@ -10,17 +10,19 @@ namespace echorama {
 /// One line of a pose file: a volume, the geometry it had when the pose was found, and where it belongs.
 struct VolumePose {
   std::string file;                      ///< as given; made relative to the JSON's folder when written, resolved when read
-  std::optional<ImageGeometry> geometry; ///< of the file as it stands; always written
+  std::optional<ImageGeometry> geometry; ///< of the file as it stands; needed for writing
   Pose volumeToWorld = Pose::Identity(); ///< from the physical space of the file as it stands (identity: where the file says)
 };
 
 /// Poses on disk: {"schema": "echorama-poses-1", "unit": "mm", "frame": "LPS", "volumes": [{"file": .., "geometry":
-/// {"origin", "spacing", "direction", "dimensions"}, "VolumeToWorld": [[4 numbers] x 4]}, ...]}.
+/// {"origin": [3], "spacing": [3], "direction": [[3] x 3], "dimensions": [3]}, "VolumeToWorld": [[4 numbers] x 4]}, ...]}.
+/// Matrices are lists of rows. "geometry" may be missing; keys that are not named here are ignored.
 /// \throws Error(FileSystem) when the file cannot be opened, Error(BadFile) that names file, volume and field when it is
-/// not JSON, of another schema, unit or frame, lacks a field, or a matrix is not rigid.
+/// not JSON, of another schema, unit or frame, lacks a field, names a volume twice, or a matrix is not rigid.
 std::vector<VolumePose> ReadPoses(const std::string& path);
 
-/// Writes under a temporary name and renames, so that a failure leaves what was there.
+/// Writes under a temporary name and renames, so that a failure leaves what was there. Numbers come back to the last bit.
+/// \throws Error(InvalidParameter) when a volume has no file, no geometry or a pose that is not rigid, Error(FileSystem).
 void WritePoses(const std::string& path, const std::vector<VolumePose>& poses);
 
 /// The pose of the volume \a file with \a geometry: matched by resolved path, else, when no path matches, by file name

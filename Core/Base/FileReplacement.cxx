@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Renaming within one folder is atomic, so one file needs no more than that. A set of files is made consistent by order:
+// predecessors leave first (the main file before its companions), the new companions arrive, the main file arrives last.
+#include "Core/Base/FileReplacement.h"
+#include "Core/Base/Error.h"
+#include <atomic>
+#include <filesystem>
+#include <system_error>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+[[noreturn]] void Fail(const std::string& path, const std::string& reason)
+{
+  throw Error(Error::Kind::FileSystem, path + ": " + reason);
+}
+
+// A name beside the target that nobody else uses. The extension stays at the end, because writers look at it.
+std::string NameBeside(const fs::path& target, const char* purpose)
+{
+  static std::atomic<unsigned> counter{0};
+  return (target.parent_path() /
+          ("." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" + target.filename().string()))
+      .string();
+}
+
+} // namespace
+
+FileReplacement::~FileReplacement()
+{
+  std::error_code ignored;
+  for (const Item& item : items_)
+    if (!item.temporary.empty())
+      fs::remove(item.temporary, ignored);
+}
+
+std::string FileReplacement::Stage(const std::string& path)
+{
+  if (path.empty())
+    Fail("(no file name)", "a file name is needed");
+  std::error_code error;
+  fs::path target = path;
+  if (fs::is_symlink(target, error))
+    target = fs::weakly_canonical(target, error);
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error))
+    Fail(path, "there is no folder " + folder.string());
+  if (fs::exists(target, error) && !fs::is_regular_file(target, error))
+    Fail(path, "it is there and is not a plain file");
+  if (access(folder.c_str(), W_OK) != 0)
+    Fail(path, "the folder " + folder.string() + " cannot be written");
+  items_.push_back({NameBeside(target, "part"), target.string(), {}, false});
+  return items_.back().temporary;
+}
+
+void FileReplacement::Remove(const std::string& path) { items_.insert(items_.begin(), {{}, path, {}, false}); }
+
+void FileReplacement::Commit()
+{
+  std::error_code error;
+  const bool alone = items_.size() == 1 && !items_.front().temporary.empty();
+  if (!alone) {
+    for (auto item = items_.rbegin(); item != items_.rend(); ++item)
+      if (fs::is_regular_file(item->target, error)) {
+        const std::string aside = NameBeside(item->target, "old");
+        fs::rename(item->target, aside, error);
+        if (error) {
+          RollBack();
+          Fail(item->target, "it cannot be replaced (" + error.message() + ")");
+        }
+        item->aside = aside;
+      }
+  }
+  for (Item& item : items_) {
+    if (item.temporary.empty())
+      continue;
+    fs::rename(item.temporary, item.target, error);
+    if (error) {
+      const std::string reason = error.message();
+      RollBack();
+      Fail(item.target, "the finished file cannot be put in place (" + reason + ")");
+    }
+    item.placed = true;
+  }
+  for (const Item& item : items_)
+    if (!item.aside.empty())
+      fs::remove(item.aside, error);
+  items_.clear();
+}
+
+void FileReplacement::RollBack()
+{
+  std::error_code ignored;
+  for (Item& item : items_) {
+    if (item.placed)
+      fs::remove(item.target, ignored);
+    if (!item.aside.empty())
+      fs::rename(item.aside, item.target, ignored);
+    item.placed = false;
+    item.aside.clear();
+  }
+}
+
+} // namespace echorama

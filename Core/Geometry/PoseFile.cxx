@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// JSON prints the shortest digits that give a double back, so poses survive any number of rounds unchanged. All checks
+// are made on reading, with the place in the file in the message: a pose file is written by people and scripts too.
+#include "Core/Geometry/PoseFile.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+namespace echorama {
+namespace {
+
+constexpr const char* Schema = "echorama-poses-1";
+
+// Where we are in the file, for messages.
+class Place {
+public:
+  explicit Place(std::string name) : name_(std::move(name)) {}
+  Place In(const std::string& part) const { return Place(name_ + ", " + part); }
+  [[noreturn]] void Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, name_ + ": " + reason); }
+
+  const ordered_json& Member(const ordered_json& object, const char* key) const
+  {
+    if (!object.is_object() || !object.contains(key))
+      Fail(std::string("\"") + key + "\" is missing");
+    return object.at(key);
+  }
+
+  double Number(const ordered_json& value) const
+  {
+    if (!value.is_number())
+      Fail("a number is needed, not " + value.dump());
+    return value.get<double>(); // JSON has no NaN; overflowing numbers are refused by the parser
+  }
+
+  template <int Size>
+  Eigen::Matrix<double, Size, 1> Vector(const ordered_json& value) const
+  {
+    if (!value.is_array() || value.size() != Size)
+      Fail("a list of " + std::to_string(Size) + " numbers is needed");
+    Eigen::Matrix<double, Size, 1> vector;
+    for (int i = 0; i < Size; ++i)
+      vector[i] = Number(value[static_cast<std::size_t>(i)]);
+    return vector;
+  }
+
+  template <int Size>
+  Eigen::Matrix<double, Size, Size> Rows(const ordered_json& value) const
+  {
+    if (!value.is_array() || value.size() != Size)
+      Fail("a list of " + std::to_string(Size) + " rows is needed");
+    Eigen::Matrix<double, Size, Size> matrix;
+    for (int i = 0; i < Size; ++i)
+      matrix.row(i) = Vector<Size>(value[static_cast<std::size_t>(i)]);
+    return matrix;
+  }
+
+  void Need(const ordered_json& object, const char* key, const std::string& wanted) const
+  {
+    const ordered_json& value = Member(object, key);
+    if (!value.is_string() || value.get<std::string>() != wanted)
+      Fail(std::string("\"") + key + "\" is " + value.dump() + "; \"" + wanted + "\" is needed");
+  }
+
+private:
+  std::string name_;
+};
+
+template <class Derived>
+ordered_json RowsOf(const Eigen::MatrixBase<Derived>& matrix)
+{
+  ordered_json rows = ordered_json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    ordered_json row = ordered_json::array();
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+      row.push_back(matrix(i, j));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+ordered_json ListOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+ImageGeometry ReadGeometry(const ordered_json& value, const Place& place)
+{
+  ImageGeometry geometry;
+  geometry.origin = place.In("origin").Vector<3>(place.Member(value, "origin"));
+  geometry.spacing = place.In("spacing").Vector<3>(place.Member(value, "spacing"));
+  geometry.direction = place.In("direction").Rows<3>(place.Member(value, "direction"));
+  const Eigen::Vector3d dimensions = place.In("dimensions").Vector<3>(place.Member(value, "dimensions"));
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(dimensions[axis] >= 1.0 && dimensions[axis] <= 2147483647.0 && dimensions[axis] == std::floor(dimensions[axis])))
+      place.In("dimensions").Fail("positive whole numbers are needed");
+    geometry.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(dimensions[axis]);
+  }
+  try {
+    geometry.Check("geometry");
+  } catch (const Error& error) {
+    place.Fail(error.what());
+  }
+  return geometry;
+}
+
+fs::path Resolved(const fs::path& path)
+{
+  std::error_code error;
+  const fs::path resolved = fs::weakly_canonical(fs::absolute(path), error);
+  return error ? fs::absolute(path).lexically_normal() : resolved;
+}
+
+} // namespace
+
+std::vector<VolumePose> ReadPoses(const std::string& path)
+{
+  std::error_code error;
+  std::ifstream stream(path);
+  if (!stream || fs::is_directory(path, error))
+    throw Error(Error::Kind::FileSystem, path + ": the file cannot be read");
+  const Place file(path);
+  ordered_json root;
+  try {
+    root = ordered_json::parse(stream);
+  } catch (const nlohmann::json::exception& problem) {
+    file.Fail(std::string("it is not JSON (") + problem.what() + ")");
+  }
+  file.Need(root, "schema", Schema);
+  file.Need(root, "unit", "mm");
+  file.Need(root, "frame", "LPS");
+  const ordered_json& volumes = file.Member(root, "volumes");
+  if (!volumes.is_array())
+    file.Fail("\"volumes\" is not a list");
+
+  const fs::path folder = fs::absolute(path).parent_path();
+  std::vector<VolumePose> poses;
+  std::set<std::string> seen;
+  for (const ordered_json& volume : volumes) {
+    const Place place = file.In("volume " + std::to_string(poses.size() + 1));
+    const ordered_json& name = place.Member(volume, "file");
+    if (!name.is_string() || name.get<std::string>().empty())
+      place.Fail("\"file\" is not a file name");
+    VolumePose pose;
+    pose.file = (folder / name.get<std::string>()).lexically_normal().string(); // an absolute name replaces the folder
+    if (!seen.insert(Resolved(pose.file).string()).second)
+      place.Fail(name.get<std::string>() + " is named twice");
+    if (volume.contains("geometry"))
+      pose.geometry = ReadGeometry(volume["geometry"], place.In("geometry"));
+    const Place matrixPlace = place.In("VolumeToWorld");
+    const Eigen::Matrix4d matrix = matrixPlace.Rows<4>(place.Member(volume, "VolumeToWorld"));
+    if (!IsRotation(matrix.topLeftCorner<3, 3>()) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+      matrixPlace.Fail("the matrix is not rigid (a rotation, a translation, and 0 0 0 1 below)");
+    pose.volumeToWorld.matrix() = matrix;
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
+{
+  const fs::path folder = Resolved(fs::absolute(path)).parent_path();
+  ordered_json volumes = ordered_json::array();
+  for (const VolumePose& pose : poses) {
+    const auto fail = [&](const std::string& reason) {
+      throw Error(Error::Kind::InvalidParameter, path + ", volume " + std::to_string(volumes.size() + 1) + ": " + reason);
+    };
+    if (pose.file.empty())
+      fail("it has no file name");
+    if (!pose.geometry)
+      fail("its geometry is not given");
+    if (!IsRotation(pose.volumeToWorld.linear()) || !pose.volumeToWorld.translation().allFinite())
+      fail("its pose is not rigid");
+    const ImageGeometry& g = *pose.geometry;
+    const fs::path relative = Resolved(pose.file).lexically_relative(folder);
+    volumes.push_back({{"file", (relative.empty() ? Resolved(pose.file) : relative).generic_string()},
+                       {"geometry",
+                        {{"origin", ListOf(g.origin)},
+                         {"spacing", ListOf(g.spacing)},
+                         {"direction", RowsOf(g.direction)},
+                         {"dimensions", g.dimensions}}},
+                       {"VolumeToWorld", RowsOf(pose.volumeToWorld.matrix())}});
+  }
+  const ordered_json root{{"schema", Schema}, {"unit", "mm"}, {"frame", "LPS"}, {"volumes", volumes}};
+
+  FileReplacement replacement;
+  std::ofstream stream(replacement.Stage(path));
+  try {
+    stream << root.dump(2) << '\n';
+  } catch (const nlohmann::json::exception&) {
+    throw Error(Error::Kind::InvalidParameter, path + ": a file name is not UTF-8");
+  }
+  stream.close();
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+  replacement.Commit();
+}
+
+const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry)
+{
+  const VolumePose* found = nullptr;
+  const fs::path resolved = Resolved(file);
+  for (const VolumePose& pose : poses)
+    if (Resolved(pose.file) == resolved)
+      found = &pose;
+  if (!found) {
+    for (const VolumePose& pose : poses)
+      if (fs::path(pose.file).filename() == resolved.filename()) {
+        if (found)
+          throw Error(Error::Kind::BadInput, file + ": the poses name several files " + resolved.filename().string() +
+                                                 ", and none in this folder");
+        found = &pose;
+      }
+  }
+  if (!found)
+    throw Error(Error::Kind::BadInput, file + ": the poses do not name this volume");
+  if (found->geometry && !found->geometry->AgreesWith(geometry))
+    throw Error(Error::Kind::BadInput, file + ": its geometry is not the one that the poses were found for "
+                                              "(has it been moved or resampled since?)");
+  return *found;
+}
+
+} // namespace echorama

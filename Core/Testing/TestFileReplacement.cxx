@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <map>
+#include <sstream>
+#include <unistd.h>
+
+using namespace echorama;
+namespace fs = std::filesystem;
+
+namespace {
+
+class FileReplacementTest : public ::testing::Test {
+protected:
+  void SetUp() override
+  {
+    folder = fs::temp_directory_path() / ("echorama-replace-" + std::to_string(getpid()));
+    fs::create_directories(folder);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+  std::string Path(const std::string& name) const { return (folder / name).string(); }
+  static void Put(const std::string& path, const std::string& text) { std::ofstream(path) << text; }
+  /// Every file in the folder, by name.
+  std::map<std::string, std::string> Contents() const
+  {
+    std::map<std::string, std::string> contents;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      std::stringstream text;
+      if (entry.is_regular_file())
+        text << std::ifstream(entry.path()).rdbuf();
+      contents[entry.path().filename().string()] = text.str();
+    }
+    return contents;
+  }
+  using Files = std::map<std::string, std::string>;
+  fs::path folder;
+};
+
+} // namespace
+
+TEST_F(FileReplacementTest, NothingHappensWithoutCommit)
+{
+  Put(Path("a.txt"), "old");
+  {
+    FileReplacement replacement;
+    const std::string temporary = replacement.Stage(Path("a.txt"));
+    EXPECT_EQ(fs::path(temporary).extension(), ".txt");
+    EXPECT_EQ(fs::path(temporary).parent_path(), folder);
+    Put(temporary, "new");
+  }
+  EXPECT_EQ(Contents(), (Files{{"a.txt", "old"}}));
+}
+
+TEST_F(FileReplacementTest, ASetIsReplacedAndStaleCompanionsGo)
+{
+  Put(Path("a"), "old");
+  Put(Path("stale"), "old");
+  FileReplacement replacement;
+  Put(replacement.Stage(Path("b")), "companion");
+  Put(replacement.Stage(Path("a")), "new");
+  replacement.Remove(Path("stale"));
+  replacement.Remove(Path("never there"));
+  replacement.Commit();
+  EXPECT_EQ(Contents(), (Files{{"a", "new"}, {"b", "companion"}}));
+}
+
+TEST_F(FileReplacementTest, AFailureHalfwayRollsBack)
+{
+  Put(Path("a"), "old");
+  Put(Path("b"), "old companion");
+  Put(Path("stale"), "old");
+  {
+    FileReplacement replacement;
+    Put(replacement.Stage(Path("b")), "companion");
+    replacement.Stage(Path("a")); // never written, so it cannot be put in place
+    replacement.Remove(Path("stale"));
+    EXPECT_THROW(replacement.Commit(), Error);
+  }
+  EXPECT_EQ(Contents(), (Files{{"a", "old"}, {"b", "old companion"}, {"stale", "old"}}));
+}
+
+TEST_F(FileReplacementTest, ASymbolicLinkIsFollowed)
+{
+  Put(Path("real"), "old");
+  fs::create_symlink("real", Path("link"));
+  FileReplacement replacement;
+  Put(replacement.Stage(Path("link")), "new");
+  replacement.Commit();
+  EXPECT_TRUE(fs::is_symlink(Path("link")));
+  EXPECT_EQ(Contents(), (Files{{"real", "new"}, {"link", "new"}}));
+}
+
+TEST_F(FileReplacementTest, RefusesPlacesWhereNoFileCanBe)
+{
+  FileReplacement replacement;
+  EXPECT_THROW(replacement.Stage(""), Error);
+  EXPECT_THROW(replacement.Stage(folder.string()), Error) << "a folder";
+  EXPECT_THROW(replacement.Stage(Path("missing/a")), Error);
+  EXPECT_THROW(replacement.Stage("/dev/full"), Error) << "a device";
+  EXPECT_TRUE(Contents().empty());
+}
