@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundAcquisition.h"
 
+#include "Core/Base/NumberText.h"
+
 #include "vtkDataObject.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -10,11 +12,15 @@
 #include "vtkStringArray.h"
 #include "vtkTypeUInt64Array.h"
 
+#include <sstream>
+
 vtkStandardNewMacro(vtkUltrasoundAcquisition);
 
 namespace
 {
 constexpr double DegreesPerRadian = 57.29577951308232;
+const char* const ProbeGeometryComponents[] = { "FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees", "SweepWidthMm", "DepthMinMm",
+  "DepthMaxMm" };
 
 // The numbers of a field, or nothing when the field is missing, too short or not finite.
 std::optional<std::vector<double>> NumbersOf(vtkDataObject* data, const char* name, int count)
@@ -49,6 +55,40 @@ void SetNumbers(vtkDataObject* data, const char* name, const std::vector<double>
   array->InsertNextTuple(numbers.data());
   data->GetFieldData()->AddArray(array); // replaces one of the same name
 }
+
+// A string in quotes, on one line.
+std::string Quoted(const std::string& plain)
+{
+  std::string text = "\"";
+  for (const char c : plain)
+  {
+    text += c == '\n' ? "\\n" : c == '\r' ? "\\r" : c == '\\' ? "\\\\" : std::string(1, c);
+  }
+  return text + "\"";
+}
+
+std::optional<std::string> Unquoted(const std::string& text)
+{
+  if (text.size() < 2 || text.front() != '"' || text.back() != '"')
+  {
+    return {};
+  }
+  std::string plain;
+  for (std::size_t i = 1; i + 1 < text.size(); ++i)
+  {
+    if (text[i] != '\\')
+    {
+      plain += text[i];
+      continue;
+    }
+    if (++i + 1 >= text.size())
+    {
+      return {};
+    }
+    plain += text[i] == 'n' ? '\n' : text[i] == 'r' ? '\r' : text[i];
+  }
+  return plain;
+}
 }
 
 //----------------------------------------------------------------------------
@@ -78,10 +118,9 @@ std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf
 //----------------------------------------------------------------------------
 void vtkUltrasoundAcquisition::SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& g)
 {
-  static const char* const components[] = { "FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees", "SweepWidthMm", "DepthMinMm",
-    "DepthMaxMm" };
   SetNumbers(data, ProbeGeometryName(),
-    { g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax }, components);
+    { g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax },
+    ProbeGeometryComponents);
 }
 
 //----------------------------------------------------------------------------
@@ -166,4 +205,75 @@ void vtkUltrasoundAcquisition::SetScene(vtkDataObject* data, const std::string& 
   array->SetName(SceneName());
   array->InsertNextValue(scene);
   data->GetFieldData()->AddArray(array);
+}
+
+//----------------------------------------------------------------------------
+std::vector<std::pair<std::string, std::string>> vtkUltrasoundAcquisition::ToText(vtkDataObject* data)
+{
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (const char* name : { ProbeGeometryName(), ProbeToWorldName(), TimeStampName() })
+  {
+    vtkDataArray* array = data->GetFieldData()->GetArray(name);
+    std::string text;
+    for (vtkIdType i = 0; array && i < array->GetNumberOfValues(); ++i)
+    {
+      const int components = array->GetNumberOfComponents();
+      text += (i ? " " : "") + echorama::NumberText(array->GetComponent(i / components, static_cast<int>(i % components)));
+    }
+    if (array)
+    {
+      texts.emplace_back(name, text);
+    }
+  }
+  if (const auto seed = SeedOf(data))
+  {
+    texts.emplace_back(SeedName(), echorama::NumberText(*seed));
+  }
+  if (const auto scene = SceneOf(data))
+  {
+    texts.emplace_back(SceneName(), Quoted(*scene));
+  }
+  return texts;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAcquisition::SetFromText(vtkDataObject* data, const std::string& name, const std::string& text)
+{
+  std::uint64_t seed = 0;
+  if (name == SeedName())
+  {
+    const bool good = echorama::ParseNumber(text, seed);
+    if (good)
+    {
+      SetSeed(data, seed);
+    }
+    return good;
+  }
+  if (name == SceneName())
+  {
+    const auto scene = Unquoted(text);
+    if (scene)
+    {
+      SetScene(data, *scene);
+    }
+    return scene.has_value();
+  }
+
+  std::vector<double> numbers;
+  std::istringstream words(text);
+  for (std::string word; words >> word;)
+  {
+    numbers.push_back(0.0);
+    if (!echorama::ParseNumber(word, numbers.back()) || !std::isfinite(numbers.back()))
+    {
+      return false;
+    }
+  }
+  const std::size_t wanted = name == ProbeGeometryName() ? 6 : name == ProbeToWorldName() ? 16 : name == TimeStampName() ? 1 : 0;
+  if (wanted == 0 || numbers.size() != wanted)
+  {
+    return false;
+  }
+  SetNumbers(data, name.c_str(), numbers, name == ProbeGeometryName() ? ProbeGeometryComponents : nullptr);
+  return true;
 }

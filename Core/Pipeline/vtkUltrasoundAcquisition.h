@@ -25,6 +25,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 #endif
 
@@ -63,6 +64,12 @@ public:
   static void SetSeed(vtkDataObject* data, std::uint64_t seed);
   static std::optional<std::string> SceneOf(vtkDataObject* data);
   static void SetScene(vtkDataObject* data, const std::string& scene);
+
+  /** The fields that \a data has, by name, each as one line of text that gives it back to the last bit. */
+  static std::vector<std::pair<std::string, std::string>> ToText(vtkDataObject* data);
+
+  /** Sets the field \a name from such a line. Returns false when there is no such field or the text does not fit it. */
+  static bool SetFromText(vtkDataObject* data, const std::string& name, const std::string& text);
 #endif
 
 protected:

@@ -38,9 +38,10 @@ public:
   vtkTypeMacro(vtkUltrasoundVolume, vtkObject);
 
   ///@{
-  /** Names of the two point arrays. */
+  /** Names of the two point arrays, and of a third that says which volume each voxel of a stitched one came from. */
   static const char* IntensityName() { return "Intensity"; }
   static const char* ValidRegionName() { return "ValidRegion"; }
+  static const char* ProvenanceName() { return "Provenance"; }
   ///@}
 
   /**
