@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The scene is a short list, so a look-up is a loop from the last body (which counts most) to the first, with a test
+// against the body's box before the distance to it: some 20 comparisons for most points.
+#include "PhantomScene.h"
+#include "Core/Base/Error.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace echorama {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Eigen::Vector3d;
+
+constexpr const char* schemaName = "echorama-phantom-1";
+
+std::string NameOf(const PhantomScene& scene, std::size_t index)
+{
+  const std::string& name = scene.inclusions[index].name;
+  return "inclusion " + std::to_string(index + 1) + (name.empty() ? "" : " (" + name + ")");
+}
+
+// A smooth curve through the given points (Catmull-Rom), as a path of short pieces.
+std::vector<Vector3d> Curve(const std::vector<Vector3d>& through)
+{
+  constexpr int pieces = 5;
+  const auto at = [&through](std::ptrdiff_t i) {
+    return through[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i, 0, static_cast<std::ptrdiff_t>(through.size()) - 1))];
+  };
+  std::vector<Vector3d> path{through.front()};
+  for (std::ptrdiff_t i = 0; i + 1 < static_cast<std::ptrdiff_t>(through.size()); ++i)
+    for (int piece = 1; piece <= pieces; ++piece) {
+      const double t = static_cast<double>(piece) / pieces;
+      const Vector3d a = at(i - 1), b = at(i), c = at(i + 1), d = at(i + 2);
+      path.push_back(b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a))));
+    }
+  return path;
+}
+
+Inclusion Body(const char* name, const Ellipsoid& shape, double db, double wallMm = 0.0, double wallDb = 0.0)
+{
+  return {name, shape, db, wallMm, wallDb, 0.0};
+}
+
+Inclusion Vessel(const char* name, const std::vector<Vector3d>& through, double radius, double wallMm, double wallDb)
+{
+  return {name, Tube{Curve(through), radius}, Inclusion::anechoicDb, wallMm, wallDb, 0.0};
+}
+
+Json ToJson(const Vector3d& v)
+{
+  return Json::array({v.x(), v.y(), v.z()});
+}
+
+// The value of |scaled| - 1 over its own gradient; the centre has none.
+double DistanceFromAxes(const Vector3d& radii, const Vector3d& local)
+{
+  const Vector3d scaled = local.cwiseQuotient(radii);
+  const double slope = scaled.cwiseQuotient(radii).norm();
+  return slope > 0.0 ? scaled.norm() * (scaled.norm() - 1.0) / slope : -radii.minCoeff();
+}
+
+// The reader: every failure names the place.
+[[noreturn]] void Refuse(const std::string& place, const std::string& reason)
+{
+  throw Error(Error::Kind::BadInput, "phantom scene: " + place + " " + reason);
+}
+
+const Json& Field(const Json& parent, const char* key, const std::string& place)
+{
+  const auto found = parent.find(key);
+  if (found == parent.end())
+    Refuse(place, std::string("has no \"") + key + "\"");
+  return *found;
+}
+
+double NumberFrom(const Json& value, const std::string& place)
+{
+  if (!value.is_number())
+    Refuse(place, "is not a number");
+  return value.get<double>();
+}
+
+Vector3d VectorFrom(const Json& value, const std::string& place)
+{
+  if (!value.is_array() || value.size() != 3)
+    Refuse(place, "is not a list of three numbers");
+  return {NumberFrom(value[0], place), NumberFrom(value[1], place), NumberFrom(value[2], place)};
+}
+
+Inclusion InclusionFrom(const Json& value, const std::string& place)
+{
+  if (!value.is_object())
+    Refuse(place, "is not an object");
+  Inclusion inclusion;
+  if (const auto name = value.find("name"); name != value.end()) {
+    if (!name->is_string())
+      Refuse(place, "has a name that is not a string");
+    inclusion.name = name->get<std::string>();
+  }
+  const auto ellipsoid = value.find("ellipsoid"), tube = value.find("tube");
+  if ((ellipsoid != value.end()) == (tube != value.end()))
+    Refuse(place, "must have either \"ellipsoid\" or \"tube\"");
+  if (ellipsoid != value.end()) {
+    if (!ellipsoid->is_object())
+      Refuse(place + ", ellipsoid", "is not an object");
+    Ellipsoid shape;
+    shape.centre = VectorFrom(Field(*ellipsoid, "centre", place), place + ", centre");
+    shape.radii = VectorFrom(Field(*ellipsoid, "radii", place), place + ", radii");
+    if (const auto rotation = ellipsoid->find("rotation"); rotation != ellipsoid->end())
+      shape.rotation = VectorFrom(*rotation, place + ", rotation");
+    inclusion.shape = shape;
+  } else {
+    if (!tube->is_object())
+      Refuse(place + ", tube", "is not an object");
+    Tube shape;
+    const Json& path = Field(*tube, "path", place);
+    if (!path.is_array())
+      Refuse(place + ", path", "is not a list of points");
+    for (const Json& point : path)
+      shape.path.push_back(VectorFrom(point, place + ", path"));
+    shape.radius = NumberFrom(Field(*tube, "radius", place), place + ", radius");
+    inclusion.shape = std::move(shape);
+  }
+  const std::pair<const char*, double*> numbers[] = {{"echogenicityDb", &inclusion.echogenicityDb},
+                                                     {"wallMm", &inclusion.wallMm},
+                                                     {"wallDb", &inclusion.wallDb},
+                                                     {"attenuationDbPerMm", &inclusion.attenuationDbPerMm}};
+  for (const auto& [key, number] : numbers)
+    if (const auto found = value.find(key); found != value.end())
+      *number = NumberFrom(*found, place + ", " + key);
+  return inclusion;
+}
+
+} // namespace
+
+void PhantomScene::Check() const
+{
+  for (std::size_t i = 0; i < inclusions.size(); ++i) {
+    const Inclusion& inclusion = inclusions[i];
+    const auto require = [this, i](bool good, const char* what) {
+      if (!good)
+        throw Error(Error::Kind::InvalidParameter, "phantom scene: " + NameOf(*this, i) + ": " + what);
+    };
+    const auto isLevel = [](double db) { return db >= Inclusion::anechoicDb && db <= 60.0; };
+    require(isLevel(inclusion.echogenicityDb), "the echogenicity must be in [-120, 60] dB");
+    require(inclusion.wallMm >= 0.0 && std::isfinite(inclusion.wallMm), "the wall must be at least 0 mm thick");
+    require(isLevel(inclusion.wallDb), "the echogenicity of the wall must be in [-120, 60] dB");
+    require(inclusion.attenuationDbPerMm >= 0.0 && inclusion.attenuationDbPerMm <= 1000.0,
+            "the attenuation must be in [0, 1000] dB/mm");
+    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape)) {
+      require(ellipsoid->centre.allFinite(), "the centre is not finite");
+      require(ellipsoid->rotation.allFinite(), "the rotation is not finite");
+      require(ellipsoid->radii.allFinite() && ellipsoid->radii.minCoeff() > 0.0, "the radii must be positive");
+    } else {
+      const Tube& tube = std::get<Tube>(inclusion.shape);
+      require(tube.path.size() >= 2, "a tube needs at least two points");
+      require(std::all_of(tube.path.begin(), tube.path.end(), [](const Vector3d& p) { return p.allFinite(); }),
+              "a point of the path is not finite");
+      require(tube.radius > 0.0 && std::isfinite(tube.radius), "the radius must be positive");
+      require(inclusion.attenuationDbPerMm == 0.0, "only ellipsoids can attenuate");
+    }
+  }
+}
+
+PhantomScene DefaultScene()
+{
+  PhantomScene scene;
+  auto& add = scene.inclusions;
+  add.push_back(Body("muscle", {{0, 0, 2}, {190, 150, 13}, {0.02, 0.03, 0}}, -4, 1.2, 9));
+  add.push_back(Body("organ", {{-10, 3, 64}, {92, 54, 41}, {0.05, 0.12, 0.15}}, 5, 1.6, 13));
+  add.push_back(Body("kidney", {{66, 18, 84}, {28, 18, 17}, {0.2, -0.35, 0.5}}, -6, 1.4, 12));
+  add.push_back(Body("kidney sinus", {{65, 18, 84}, {14, 7, 7}, {0.2, -0.35, 0.5}}, 10));
+  add.push_back(Body("dark lesion", {{-18, -17, 76}, {15, 13, 11}, {0.3, 0.2, 0.1}}, -8));
+  add.push_back(Body("bright lesion", {{29, -15, 36}, {12, 10, 9}, {0, 0.4, 0.2}}, 13));
+  add.push_back(Body("small bright lesion", {{-46, 6, 84}, {7, 6, 6}, {0, 0, 0}}, 14));
+  add.push_back(Vessel("portal vein", {{-105, -14, 84}, {-60, -4, 70}, {-14, 4, 60}, {26, 2, 56}, {60, -8, 52}, {105, -26, 58}},
+                       6.5, 1.4, 11));
+  add.push_back(Vessel("portal branch", {{-14, 4, 60}, {-8, 20, 50}, {2, 38, 40}, {6, 62, 34}}, 4.5, 0, 0));
+  add.push_back(Vessel("left vein", {{-54, -56, 30}, {-42, -24, 42}, {-36, 8, 50}, {-26, 40, 78}, {-24, 66, 100}}, 5.0, 0, 0));
+  add.push_back(Vessel("right vein", {{50, -62, 92}, {44, -22, 80}, {50, 14, 66}, {74, 56, 52}}, 4.0, 0, 0));
+  add.push_back(Vessel("caval vein", {{22, -80, 84}, {16, -30, 88}, {4, 20, 86}, {-2, 80, 92}}, 8.0, 1.4, 10));
+  add.push_back(Body("gall bladder", {{-80, -16, 56}, {17, 9, 10}, {0, 0.5, 0.3}}, Inclusion::anechoicDb, 1.4, 10));
+  add.push_back(Body("cyst", {{-60, 22, 42}, {11, 10, 9}, {0, 0, 0}}, Inclusion::anechoicDb));
+  add.push_back(Body("deep cyst", {{34, 32, 82}, {9, 12, 8}, {0, 0.3, 0}}, Inclusion::anechoicDb));
+  add.push_back(Body("small cyst", {{72, -16, 32}, {8, 7, 6}, {0, 0, 0}}, Inclusion::anechoicDb));
+  add.push_back(Body("cyst beneath the capsule", {{-10, -10, 35}, {7, 8, 6}, {0, 0, 0}}, Inclusion::anechoicDb));
+  for (const Vector3d& place : {Vector3d(-6, -34, 56), Vector3d(46, 8, 34), Vector3d(-74, 8, 92), Vector3d(-4, 22, 70),
+                                Vector3d(-30, 30, 32), Vector3d(88, -2, 70)})
+    add.push_back(Body("grain", {place, {1.5, 1.5, 1.5}, {0, 0, 0}}, 24));
+  add.push_back(Body("stone", {{8, 10, 32}, {4.5, 3.6, 2.8}, {0, 0.2, 0.4}}, 22));
+  add.back().attenuationDbPerMm = 7.0;
+  return scene;
+}
+
+std::string SceneToJson(const PhantomScene& scene)
+{
+  Json list = Json::array();
+  for (const Inclusion& inclusion : scene.inclusions) {
+    Json item{{"name", inclusion.name}};
+    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape))
+      item["ellipsoid"] = {
+          {"centre", ToJson(ellipsoid->centre)}, {"radii", ToJson(ellipsoid->radii)}, {"rotation", ToJson(ellipsoid->rotation)}};
+    else {
+      const Tube& tube = std::get<Tube>(inclusion.shape);
+      Json path = Json::array();
+      for (const Vector3d& point : tube.path)
+        path.push_back(ToJson(point));
+      item["tube"] = {{"path", path}, {"radius", tube.radius}};
+    }
+    item["echogenicityDb"] = inclusion.echogenicityDb;
+    item["wallMm"] = inclusion.wallMm;
+    item["wallDb"] = inclusion.wallDb;
+    item["attenuationDbPerMm"] = inclusion.attenuationDbPerMm;
+    list.push_back(std::move(item));
+  }
+  return Json{{"schema", schemaName}, {"inclusions", std::move(list)}}.dump();
+}
+
+PhantomScene SceneFromJson(const std::string& text)
+{
+  const Json root = Json::parse(text, nullptr, false);
+  if (!root.is_object())
+    Refuse("the text", "is not a JSON object");
+  const Json& schema = Field(root, "schema", "the text");
+  if (schema != schemaName)
+    Refuse("the text", std::string("has a schema other than \"") + schemaName + "\"");
+  const Json& list = Field(root, "inclusions", "the text");
+  if (!list.is_array())
+    Refuse("\"inclusions\"", "is not a list");
+  PhantomScene scene;
+  for (const Json& item : list)
+    scene.inclusions.push_back(InclusionFrom(item, "inclusion " + std::to_string(scene.inclusions.size() + 1)));
+  scene.Check();
+  return scene;
+}
+
+double SignedDistance(const Ellipsoid& ellipsoid, const Vector3d& point)
+{
+  return DistanceFromAxes(ellipsoid.radii, ExpRotation(-ellipsoid.rotation) * (point - ellipsoid.centre));
+}
+
+double SignedDistance(const Tube& tube, const Vector3d& point)
+{
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < tube.path.size(); ++i) {
+    const Vector3d along = tube.path[i + 1] - tube.path[i], from = point - tube.path[i];
+    const double length = along.squaredNorm();
+    const double t = length > 0.0 ? std::clamp(from.dot(along) / length, 0.0, 1.0) : 0.0;
+    nearest = std::min(nearest, (from - t * along).squaredNorm());
+  }
+  return std::sqrt(nearest) - tube.radius;
+}
+
+SceneLookup::SceneLookup(const PhantomScene& scene)
+{
+  for (auto inclusion = scene.inclusions.rbegin(); inclusion != scene.inclusions.rend(); ++inclusion) {
+    Body body{{},
+              inclusion->shape,
+              Eigen::Matrix3d::Identity(),
+              inclusion->wallMm,
+              inclusion->echogenicityDb,
+              inclusion->wallDb,
+              std::pow(10.0, inclusion->echogenicityDb / 20.0),
+              std::pow(10.0, inclusion->wallDb / 20.0)};
+    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&body.shape)) {
+      body.worldToAxes = ExpRotation(-ellipsoid->rotation);
+      // Half the box of a turned ellipsoid: the length of each row of (axes times radii).
+      const Vector3d half = (body.worldToAxes.transpose() * ellipsoid->radii.asDiagonal()).rowwise().norm();
+      body.box = Eigen::AlignedBox3d(ellipsoid->centre - half, ellipsoid->centre + half);
+    } else {
+      const Tube& tube = std::get<Tube>(body.shape);
+      for (const Vector3d& point : tube.path)
+        body.box.extend(point);
+      body.box.min().array() -= tube.radius;
+      body.box.max().array() += tube.radius;
+    }
+    bodies_.push_back(std::move(body));
+  }
+}
+
+const SceneLookup::Body* SceneLookup::BodyAt(const Vector3d& point, bool& inWall) const
+{
+  for (const Body& body : bodies_) {
+    if (!body.box.contains(point))
+      continue;
+    const auto* ellipsoid = std::get_if<Ellipsoid>(&body.shape);
+    const double distance = ellipsoid ? DistanceFromAxes(ellipsoid->radii, body.worldToAxes * (point - ellipsoid->centre))
+                                      : SignedDistance(std::get<Tube>(body.shape), point);
+    if (distance < 0.0) {
+      inWall = distance > -body.wallMm;
+      return &body;
+    }
+  }
+  return nullptr;
+}
+
+double SceneLookup::EchogenicityAt(const Vector3d& point) const
+{
+  bool inWall = false;
+  const Body* body = BodyAt(point, inWall);
+  return !body ? 0.0 : inWall ? body->wallDb : body->db;
+}
+
+double SceneLookup::AmplitudeAt(const Vector3d& point) const
+{
+  bool inWall = false;
+  const Body* body = BodyAt(point, inWall);
+  return !body ? 1.0 : inWall ? body->wallAmplitude : body->amplitude;
+}
+
+} // namespace echorama

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/RigidTransform.h"
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace echorama {
+
+/// An ellipsoid in the world.
+struct Ellipsoid {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< mm
+  Eigen::Vector3d radii = Eigen::Vector3d::Ones();    ///< mm, > 0, along its own axes
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero(); ///< rotation vector (axis times angle, radians) of its own axes
+};
+
+/// Everything within a radius of a line through points: a vessel. The ends are round.
+struct Tube {
+  std::vector<Eigen::Vector3d> path; ///< mm, at least two points
+  double radius = 1.0;               ///< mm, > 0
+};
+
+/// A body in the scene. How loud it echoes is given in dB beside the background.
+struct Inclusion {
+  /// Echogenicity of clear fluid: nothing comes back.
+  static constexpr double anechoicDb = -120.0;
+
+  std::string name;
+  std::variant<Ellipsoid, Tube> shape;
+  double echogenicityDb = 0.0;     ///< [-120, 60]
+  double wallMm = 0.0;             ///< thickness of the wall, the outermost part of the body; 0: none
+  double wallDb = 0.0;             ///< echogenicity of the wall, [-120, 60]
+  double attenuationDbPerMm = 0.0; ///< how much of the echo a mm of the body on its way takes, there and back; ellipsoids only
+};
+
+/// What lies in the world: a background of 0 dB and bodies in it. Where bodies overlap the later one counts.
+struct PhantomScene {
+  std::vector<Inclusion> inclusions;
+
+  /// Throws Error(InvalidParameter) that names the inclusion and the number which is out of range or not finite.
+  void Check() const;
+};
+
+/// An invented piece of abdomen below a probe at the origin that looks along +z: an organ with a capsule, under a layer of
+/// muscle; curved and branching vessels, cysts, bright and dark lesions, a kidney-like body, grains, and a stone that casts
+/// a shadow. No symmetry. About 200 x 130 x 110 mm: room for three or four overlapping views.
+PhantomScene DefaultScene();
+
+/// Only background: uniform speckle.
+inline PhantomScene UniformScene()
+{
+  return {};
+}
+
+/// {"schema": "echorama-phantom-1", "inclusions": [{"name": .., "ellipsoid": {"centre": [3], "radii": [3], "rotation": [3]}
+/// or "tube": {"path": [[3], ...], "radius": ..}, "echogenicityDb": .., "wallMm": .., "wallDb": .., "attenuationDbPerMm":
+/// ..}, ...]}; millimetres, rotation in radians. Numbers are written so that they come back bit by bit.
+std::string SceneToJson(const PhantomScene& scene);
+
+/// Reads it back; the numbers besides the shape may be missing (0), other keys are ignored.
+/// \throws Error(BadInput) that names the inclusion and the field when it is not such a text, and what Check() throws.
+PhantomScene SceneFromJson(const std::string& text);
+
+/// Distance in mm from \a point to the surface, negative inside. Exact for tubes; for ellipsoids exact on the surface and
+/// good to first order near it.
+double SignedDistance(const Ellipsoid& ellipsoid, const Eigen::Vector3d& point);
+double SignedDistance(const Tube& tube, const Eigen::Vector3d& point);
+
+/// Answers for many points what lies there. Keeps a copy of the scene, which must pass Check().
+class SceneLookup {
+public:
+  explicit SceneLookup(const PhantomScene& scene);
+
+  /// Echogenicity in dB at a point of the world.
+  double EchogenicityAt(const Eigen::Vector3d& point) const;
+
+  /// The same as a factor on amplitudes, 10^(dB / 20).
+  double AmplitudeAt(const Eigen::Vector3d& point) const;
+
+private:
+  struct Body {
+    Eigen::AlignedBox3d box;
+    std::variant<Ellipsoid, Tube> shape;
+    Eigen::Matrix3d worldToAxes; // of an ellipsoid
+    double wallMm, db, wallDb, amplitude, wallAmplitude;
+  };
+  /// The body that counts at the point and whether the point is in its wall; nullptr: background.
+  const Body* BodyAt(const Eigen::Vector3d& point, bool& inWall) const;
+
+  std::vector<Body> bodies_; // the one that counts most comes first
+};
+
+} // namespace echorama

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundPhantomSource
+ * @brief a synthetic ultrasound volume of a known scene, seen from a known place
+ *
+ * No input. Output: a vtkImageData with `Intensity` (unsigned char, log-compressed B-mode), `ValidRegion` (1 inside the fan),
+ * and the field data `ProbeGeometry`, `ProbeToWorld`, `Seed` and `Scene`. Its geometry is the pose: the grid is aligned
+ * to the axes of the probe.
+ *
+ * The scene lies in the world and its scatterers are fixed to it, so volumes of the same scene and seed from different
+ * poses show the same tissue, and share speckle as far as their viewing angles are near. That makes them test data for
+ * alignment and blending whose truth is known.
+ *
+ * Fails, with a message that names the number, for a probe geometry without volume or with beams that cross, a pose that is
+ * not rigid, a scene that cannot be read, or a volume that is too large.
+ *
+ * @sa echorama::PhantomParameters, echorama::SimulateEchoes (the model and its limits)
+ */
+#ifndef vtkUltrasoundPhantomSource_h
+#define vtkUltrasoundPhantomSource_h
+
+#include "EchoramaFiltersSynthesisModule.h"
+#include "vtkUltrasoundImageAlgorithm.h"
+
+#ifndef __VTK_WRAP__
+#include "Filters/Synthesis/Phantom.h"
+#endif
+
+class vtkMatrix4x4;
+
+class ECHORAMAFILTERSSYNTHESIS_EXPORT vtkUltrasoundPhantomSource : public vtkUltrasoundImageAlgorithm
+{
+public:
+  static vtkUltrasoundPhantomSource* New();
+  vtkTypeMacro(vtkUltrasoundPhantomSource, vtkUltrasoundImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * Seed of the tissue: where the scatterers lie and how strong they are. Views with one seed see the same. At least 0.
+   * Default 1.
+   */
+  vtkSetClampMacro(Seed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
+  vtkGetMacro(Seed, vtkTypeInt64);
+  ///@}
+
+  ///@{
+  /** Edge of the cubic voxels in mm, > 0. Default 1. */
+  vtkSetMacro(SpacingMm, double);
+  vtkGetMacro(SpacingMm, double);
+  ///@}
+
+  ///@{
+  /** Gain of this volume in dB, in [-200, 200]. Default 0. */
+  vtkSetClampMacro(GainDb, double, -200.0, 200.0);
+  vtkGetMacro(GainDb, double);
+  ///@}
+
+  ///@{
+  /** How many dB the 255 steps of grey span, in [10, 200]. Default 60. */
+  vtkSetClampMacro(DynamicRangeDb, double, 10.0, 200.0);
+  vtkGetMacro(DynamicRangeDb, double);
+  ///@}
+
+  ///@{
+  /** Mean grey of the background at a gain of 0 dB, in [0, 255]. Default 100. */
+  vtkSetClampMacro(BackgroundGrey, double, 0.0, 255.0);
+  vtkGetMacro(BackgroundGrey, double);
+  ///@}
+
+  ///@{
+  /** Whether attenuating bodies (the stone of the default scene) cast shadows. Default on. */
+  vtkSetMacro(Shadows, bool);
+  vtkGetMacro(Shadows, bool);
+  vtkBooleanMacro(Shadows, bool);
+  ///@}
+
+  ///@{
+  /** Wavelength in tissue in mm, in [0.05, 10]. Default 0.6 (2.6 MHz). The longer, the longer speckle stays alike as the
+   * probe turns. */
+  vtkSetClampMacro(WavelengthMm, double, 0.05, 10.0);
+  vtkGetMacro(WavelengthMm, double);
+  ///@}
+
+  ///@{
+  /**
+   * The head: angle of the fan (degrees, below 180; default 65) and its radius (mm, at least 0; default 40), angle of the
+   * sweep (degrees, above 0 and below 180; default 55) and its radius (mm, at least 0; default 30).
+   */
+  vtkSetMacro(FanAngle, double);
+  vtkGetMacro(FanAngle, double);
+  vtkSetMacro(FanRadius, double);
+  vtkGetMacro(FanRadius, double);
+  vtkSetMacro(SweepAngle, double);
+  vtkGetMacro(SweepAngle, double);
+  vtkSetMacro(SweepRadius, double);
+  vtkGetMacro(SweepRadius, double);
+  ///@}
+
+  ///@{
+  /** First and last depth along the beams, mm from the face. Default 5 and 100. */
+  vtkSetMacro(DepthMin, double);
+  vtkGetMacro(DepthMin, double);
+  vtkSetMacro(DepthMax, double);
+  vtkGetMacro(DepthMax, double);
+  ///@}
+
+  ///@{
+  /** Where the middle of the probe's face lies in the world, mm. Default (0, 0, 0). */
+  vtkSetVector3Macro(Position, double);
+  vtkGetVector3Macro(Position, double);
+  ///@}
+
+  ///@{
+  /** How the probe is turned: axis times angle, in degrees. Default (0, 0, 0): it looks along +z, its fan along x. */
+  vtkSetVector3Macro(Orientation, double);
+  vtkGetVector3Macro(Orientation, double);
+  ///@}
+
+  /**
+   * Sets Position and Orientation from a rigid transform. Any other matrix is refused with an error, and nothing changes.
+   */
+  void SetProbeToWorld(vtkMatrix4x4* probeToWorld);
+
+  /** The pose that Position and Orientation make. */
+  void GetProbeToWorld(vtkMatrix4x4* probeToWorld);
+
+  ///@{
+  /**
+   * The scene as JSON text, as it stands in the field data `Scene` of our volumes (see Documentation/filters/PhantomSource.md).
+   * Empty (default): the default scene.
+   */
+  vtkSetStringMacro(Scene);
+  vtkGetStringMacro(Scene);
+  ///@}
+
+  ///@{
+  /**
+   * Adds a body to the scene: \a echogenicityDb beside the background of 0 dB, in [-120, 60], -120 for clear fluid. Later
+   * bodies count where they overlap. Lengths in mm, world coordinates.
+   */
+  void AddEllipsoid(const double centre[3], const double radii[3], double echogenicityDb);
+  void AddTube(const double from[3], const double to[3], double radius, double echogenicityDb);
+  ///@}
+
+  /** Leaves only the background, to begin a scene of one's own. */
+  void ClearScene();
+
+#ifndef __VTK_WRAP__
+  /** The kernel's parameters for the present properties; throws echorama::Error when the scene cannot be read. */
+  echorama::PhantomParameters Parameters() const;
+
+  /** Sets Position, Orientation and GainDb. */
+  void SetView(const echorama::Pose& probeToWorld, double gainDb);
+#endif
+
+protected:
+  vtkUltrasoundPhantomSource();
+  ~vtkUltrasoundPhantomSource() override;
+
+  int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+#ifndef __VTK_WRAP__
+  void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
+#endif
+
+private:
+#ifndef __VTK_WRAP__
+  void Add(echorama::Inclusion inclusion);
+#endif
+
+  vtkTypeInt64 Seed;
+  double SpacingMm;
+  double GainDb;
+  double DynamicRangeDb;
+  double BackgroundGrey;
+  bool Shadows;
+  double WavelengthMm;
+  double FanAngle;
+  double FanRadius;
+  double SweepAngle;
+  double SweepRadius;
+  double DepthMin;
+  double DepthMax;
+  double Position[3];
+  double Orientation[3];
+  char* Scene;
+
+  vtkUltrasoundPhantomSource(const vtkUltrasoundPhantomSource&) = delete;
+  void operator=(const vtkUltrasoundPhantomSource&) = delete;
+};
+
+#endif
