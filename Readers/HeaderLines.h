@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/NumberText.h"
+#include "Readers/ImageHeader.h"
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace echorama {
+
+/// The lines of a text header and the numbers in them, for the parsers of the two formats. Every complaint names the file.
+class HeaderLines {
+public:
+  /// \throws Error(FileSystem) when the file cannot be opened.
+  explicit HeaderLines(const std::string& path);
+
+  /// The next line without its end. \returns false at the end of the file.
+  /// \throws Error(BadFile) when the line holds control characters (binary data) or is longer than a million bytes.
+  bool Next(std::string& line);
+
+  /// Bytes read so far: where the voxels begin, after the last line of a header.
+  std::int64_t Position() const { return position_; }
+
+  /// Error(BadFile): the file and the reason.
+  [[noreturn]] void Fail(const std::string& reason) const;
+  /// The same, with the number of the line that was read last.
+  [[noreturn]] void FailHere(const std::string& reason) const;
+
+  /// \a text as \a count finite numbers that are separated by blanks.
+  template <class T>
+  std::vector<T> Numbers(const std::string& key, std::string_view text, std::size_t count) const
+  {
+    const std::vector<std::string_view> words = Words(text);
+    if (words.size() != count)
+      Fail(key + " holds " + std::to_string(words.size()) + " values; " + std::to_string(count) + " are needed");
+    std::vector<T> numbers(count);
+    for (std::size_t i = 0; i < count; ++i)
+      if (!ParseNumber(words[i], numbers[i]) || numbers[i] - numbers[i] != T(0)) // the difference is NaN unless finite
+        Fail(key + " holds \"" + std::string(words[i]) + "\", which is not a " +
+             (std::is_integral_v<T> ? "whole number that fits" : "finite number"));
+    return numbers;
+  }
+
+  /// As Numbers, for sizes: whole numbers from 0 to 2^31 - 1.
+  std::vector<int> Sizes(const std::string& key, std::string_view text, std::size_t count) const;
+
+  static std::string_view Trimmed(std::string_view text);
+  static std::vector<std::string_view> Words(std::string_view text);
+
+private:
+  std::string path_;
+  std::ifstream stream_;
+  std::int64_t position_ = 0;
+  std::int64_t line_ = 0;
+};
+
+/// Makes a header's geometry from what a file says of its \a axes (2 or 3) axes: a third axis for images, and slices in
+/// reverse where the axes are left-handed.
+void PlaceAxes(ImageHeader& header, int axes);
+
+/// \a file as named by the header at \a path: relative to its folder.
+std::string DetachedPath(const std::string& path, const std::string& file);
+
+void ParseMetaImage(ImageHeader& header);
+void ParseNrrd(ImageHeader& header);
+
+} // namespace echorama

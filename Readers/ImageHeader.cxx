@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Both formats are lines of text before (or beside) the voxels. What they share is here: telling files apart, lines and
+// numbers with the place in every complaint, and the step from "axes as the file has them" to a rigid pose. The fields of
+// each are in MetaImageHeader.cxx and NrrdHeader.cxx. Numbers are read and written without the locale: ParaView's
+// interface sets one, and "0,5" would end a number at its zero.
+#include "Readers/ImageHeader.h"
+#include "Core/Base/Error.h"
+#include "Readers/HeaderLines.h"
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <limits>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+constexpr std::size_t LongestLine = 1000000;
+constexpr const char* Blanks = " \t\r\v\f";
+
+std::string LowerExtension(const std::string& path)
+{
+  std::string extension = fs::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension;
+}
+
+// Whether a text has a line "key = ..." (the key at the beginning of the text or of a line).
+bool HasKey(const std::string& text, const std::string& key)
+{
+  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+    const std::size_t after = text.find_first_not_of(Blanks, at + key.size());
+    if ((at == 0 || text[at - 1] == '\n') && after != std::string::npos && text[after] == '=')
+      return true;
+  }
+  return false;
+}
+
+} // namespace
+
+FileFormat FormatOfContent(const std::string& path)
+{
+  const auto fail = [&path](Error::Kind kind, const std::string& reason) { throw Error(kind, path + ": " + reason); };
+  std::error_code error;
+  if (path.empty())
+    throw Error(Error::Kind::FileSystem, "no file name was given");
+  if (!fs::exists(path, error))
+    fail(Error::Kind::FileSystem, "there is no such file");
+  if (fs::is_directory(path, error))
+    fail(Error::Kind::FileSystem, "it is a folder, not a file");
+  std::ifstream stream(path, std::ios::binary);
+  std::string start(4096, '\0');
+  if (!stream)
+    fail(Error::Kind::FileSystem, "it cannot be opened (is reading permitted?)");
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  start.resize(static_cast<std::size_t>(stream.gcount()));
+  if (start.empty())
+    fail(stream.bad() ? Error::Kind::FileSystem : Error::Kind::BadFile, stream.bad() ? "it cannot be read" : "the file is empty");
+
+  if (start.compare(0, 4, "NRRD") == 0)
+    return FileFormat::Nrrd;
+  if (start.find("<VTKFile") != std::string::npos && start.find("ImageData") != std::string::npos)
+    return FileFormat::VtkXmlImage;
+  if (HasKey(start, "NDims") || HasKey(start, "ObjectType"))
+    return FileFormat::MetaImage;
+  return FileFormat::Unknown;
+}
+
+FileFormat FormatOfName(const std::string& path)
+{
+  const std::string extension = LowerExtension(path);
+  if (extension == ".mha" || extension == ".mhd")
+    return FileFormat::MetaImage;
+  if (extension == ".nrrd" || extension == ".nhdr")
+    return FileFormat::Nrrd;
+  return extension == ".vti" ? FileFormat::VtkXmlImage : FileFormat::Unknown;
+}
+
+std::uint64_t ImageHeader::ByteCount() const { return geometry.VoxelCount() * components * SizeOf(type); }
+
+ImageHeader ReadImageHeader(const std::string& path)
+{
+  ImageHeader header;
+  header.path = path;
+  header.format = FormatOfContent(path);
+  if (header.format == FileFormat::MetaImage)
+    ParseMetaImage(header);
+  else if (header.format == FileFormat::Nrrd)
+    ParseNrrd(header);
+  else
+    throw Error(Error::Kind::BadFile, path + ": the content is neither MetaImage nor NRRD");
+  return header;
+}
+
+HeaderLines::HeaderLines(const std::string& path) : path_(path), stream_(path, std::ios::binary)
+{
+  if (!stream_)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be opened");
+}
+
+bool HeaderLines::Next(std::string& line)
+{
+  line.clear();
+  ++line_;
+  std::streambuf& bytes = *stream_.rdbuf();
+  for (int c = bytes.sbumpc(); c != std::char_traits<char>::eof(); c = bytes.sbumpc()) {
+    ++position_;
+    if (c == '\n')
+      return true;
+    if ((c < 32 && c != '\t' && c != '\r') || line.size() == LongestLine)
+      FailHere("the header is not text here (truncated or of another type?)");
+    if (c != '\r')
+      line.push_back(static_cast<char>(c));
+  }
+  return !line.empty();
+}
+
+void HeaderLines::Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, path_ + ": " + reason); }
+
+void HeaderLines::FailHere(const std::string& reason) const
+{
+  throw Error(Error::Kind::BadFile, path_ + ", line " + std::to_string(line_) + ": " + reason);
+}
+
+std::vector<int> HeaderLines::Sizes(const std::string& key, std::string_view text, std::size_t count) const
+{
+  std::vector<int> sizes;
+  for (const long long size : Numbers<long long>(key, text, count)) {
+    if (size < 0 || size > std::numeric_limits<int>::max())
+      Fail(key + " holds " + std::to_string(size) + ", which is not a possible size");
+    sizes.push_back(static_cast<int>(size));
+  }
+  return sizes;
+}
+
+std::string_view HeaderLines::Trimmed(std::string_view text)
+{
+  const std::size_t first = text.find_first_not_of(Blanks);
+  return first == std::string_view::npos ? std::string_view() : text.substr(first, text.find_last_not_of(Blanks) - first + 1);
+}
+
+std::vector<std::string_view> HeaderLines::Words(std::string_view text)
+{
+  std::vector<std::string_view> words;
+  for (std::size_t at = text.find_first_not_of(Blanks); at != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(Blanks, at), text.size());
+    words.push_back(text.substr(at, end - at));
+    at = text.find_first_not_of(Blanks, end);
+  }
+  return words;
+}
+
+void PlaceAxes(ImageHeader& header, int axes)
+{
+  ImageGeometry& g = header.geometry;
+  if (axes == 2) {
+    g.dimensions[2] = 1;
+    g.spacing[2] = 1.0;
+    g.direction.col(2) = g.direction.col(0).cross(g.direction.col(1));
+  } else if (g.direction.determinant() < 0.0) {
+    g.origin += g.direction.col(2) * (g.spacing[2] * (g.dimensions[2] - 1));
+    g.direction.col(2) = -g.direction.col(2);
+    header.reverseSlices = g.dimensions[2] > 1;
+    if (header.reverseSlices)
+      header.notes.push_back("the axes in the file are left-handed: the slices were taken in reverse, so that the pose is a rigid one");
+  }
+}
+
+std::string DetachedPath(const std::string& path, const std::string& file)
+{
+  return (fs::path(path).parent_path() / file).string(); // an absolute name replaces the folder
+}
+
+} // namespace echorama

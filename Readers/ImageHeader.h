@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ImageGeometry.h"
+#include "Readers/VoxelType.h"
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace echorama {
+
+/// What a file is, told from its first bytes; its name is not asked.
+enum class FileFormat { Unknown, MetaImage, Nrrd, VtkXmlImage };
+
+/// \throws Error(FileSystem) when the path is missing, a folder or cannot be read, Error(BadFile) when the file is empty.
+FileFormat FormatOfContent(const std::string& path);
+
+/// What the extension of a name asks for: .mha .mhd, .nrrd .nhdr, .vti (in any case of letters).
+FileFormat FormatOfName(const std::string& path);
+
+/// "key = value" of a MetaImage header, "key:=value" of a NRRD header; line breaks inside values are escaped in files.
+using HeaderField = std::pair<std::string, std::string>;
+
+/// The header of a MetaImage (.mha, .mhd) or NRRD (.nrrd, .nhdr) file: what the voxels are, where they lie in the world
+/// and where in the file.
+///
+/// The geometry is that of the voxels in memory, in mm and LPS: NRRD's RAS and LAS spaces and other units of length are
+/// converted, and where the axes of a file are left-handed the slices are taken in reverse (see reverseSlices), because
+/// the geometry of a volume is a rigid pose. A 2D image is one slice. Row i of a MetaImage's TransformMatrix is the
+/// direction of axis i, as ITK writes it; a NRRD's space directions are direction times spacing.
+struct ImageHeader {
+  enum class Encoding { Raw, Zlib, Text };
+
+  std::string path;                  ///< the file that was asked for
+  FileFormat format = FileFormat::Unknown;
+  ImageGeometry geometry;            ///< not yet checked: tracked sequences hold frames of 0 x 0 pixels
+  bool reverseSlices = false;        ///< the last axis runs backwards in the file
+  VoxelType type = VoxelType::UInt8;
+  bool typeIsKnown = true;           ///< false: the file names a type that holds no numbers (MET_OTHER, block)
+  std::uint64_t components = 1;      ///< numbers per voxel
+  bool bigEndian = false;
+  Encoding encoding = Encoding::Raw;
+  std::string dataPath;              ///< the file that holds the voxels; often \a path itself
+  std::int64_t dataOffset = 0;       ///< bytes before the voxels in that file; -1: they are its last bytes
+  std::uint64_t skipDecoded = 0;     ///< bytes to drop after decompression
+  std::vector<HeaderField> fields;   ///< everything else that the header holds, in its order
+  std::vector<std::string> notes;    ///< what was missing and assumed, or lost: sentences for people
+
+  std::uint64_t ByteCount() const;   ///< of the voxels; the geometry must have been checked
+};
+
+/// Reads the header of a MetaImage or NRRD file; the voxels are not touched.
+/// \throws Error(FileSystem) as FormatOfContent, Error(BadFile) that names the file and the line or field.
+ImageHeader ReadImageHeader(const std::string& path);
+
+/// The header of a file with these voxels, up to and including the last byte before them.
+/// \param dataFile the detached data file as it shall be named, or empty when the voxels follow in the same file
+/// \param compressedSizeAt where the size of the compressed voxels is to be put (20 characters), 0 when nowhere
+std::string MetaImageHeaderText(const ImageHeader& header, const std::string& dataFile, std::size_t& compressedSizeAt);
+std::string NrrdHeaderText(const ImageHeader& header, const std::string& dataFile);
+
+/// Whether headers of both formats can hold a field so that it comes back the same: a key of letters, digits and _ . -
+/// that the formats do not use themselves, and a value of one line without blanks at its ends.
+bool CanHold(const HeaderField& field);
+
+} // namespace echorama

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Voxels go from the file straight into the caller's memory; swapping bytes and reversing slices happen in place. What a
+// header promises is compared with what the disk holds first: a lying header must not make us ask for terabytes.
+#include "Readers/VolumeFile.h"
+#include "Core/Base/Error.h"
+#include "Readers/Compression.h"
+#include "Readers/HeaderLines.h"
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+constexpr std::uint64_t ChunkBytes = 1 << 24;
+
+[[noreturn]] void FailFile(const std::string& path, const std::string& reason)
+{
+  throw Error(Error::Kind::BadFile, path + ": " + reason);
+}
+
+// Bytes that this machine can give without swapping.
+double FreeMemory()
+{
+  std::ifstream stream("/proc/meminfo");
+  std::string word;
+  while (stream >> word)
+    if (double kilobytes = 0.0; word == "MemAvailable:" && stream >> kilobytes)
+      return kilobytes * 1024.0;
+  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+}
+
+std::uint64_t SizeOfFile(const std::string& path)
+{
+  std::error_code error;
+  if (!fs::exists(path, error))
+    throw Error(Error::Kind::FileSystem, path + ": there is no such file, though the header names it");
+  if (!fs::is_regular_file(path, error))
+    throw Error(Error::Kind::FileSystem, path + ": it is not a plain file");
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error)
+    throw Error(Error::Kind::FileSystem, path + ": " + error.message());
+  return size;
+}
+
+std::string DimensionsText(const ImageGeometry& g)
+{
+  return std::to_string(g.dimensions[0]) + " x " + std::to_string(g.dimensions[1]) + " x " + std::to_string(g.dimensions[2]);
+}
+
+void ReadRaw(std::istream& stream, const ImageHeader& header, char* out, const Progress& progress)
+{
+  const std::uint64_t total = header.ByteCount();
+  for (std::uint64_t done = 0; done < total;) {
+    const std::uint64_t chunk = std::min(ChunkBytes, total - done);
+    stream.read(out + done, static_cast<std::streamsize>(chunk));
+    done += static_cast<std::uint64_t>(stream.gcount());
+    if (!stream)
+      FailFile(header.dataPath, "the data end early, after " + std::to_string(done) + " of " + std::to_string(total) + " bytes");
+    progress(static_cast<double>(done) / static_cast<double>(total));
+  }
+}
+
+template <class T>
+void ReadText(std::istream& stream, const ImageHeader& header, T* out, const Progress& progress)
+{
+  const std::size_t count = header.geometry.VoxelCount();
+  std::string word;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(stream >> word))
+      FailFile(header.dataPath, "the data end early, after " + std::to_string(i) + " of " + std::to_string(count) + " numbers");
+    // Some programs write whole numbers with a decimal point.
+    double real = 0.0;
+    if (!ParseNumber(word, out[i])) {
+      if (!ParseNumber(word, real) || std::is_floating_point_v<T> || real != std::floor(real) ||
+          !(real >= static_cast<double>(std::numeric_limits<T>::lowest()) && std::fabs(real) < 9e15 &&
+            real <= static_cast<double>(std::numeric_limits<T>::max())))
+        FailFile(header.dataPath, "voxel " + std::to_string(i + 1) + " is \"" + word.substr(0, 40) + "\", which its type cannot hold");
+      out[i] = static_cast<T>(real);
+    }
+    if (i % 1000000 == 0)
+      progress(static_cast<double>(i) / static_cast<double>(count));
+  }
+  if (stream >> word)
+    FailFile(header.dataPath, "it holds more numbers than its dimensions (" + DimensionsText(header.geometry) + ") say");
+}
+
+template <std::size_t Size>
+void SwapBytes(char* bytes, std::size_t count)
+{
+  for (std::size_t i = 0; i < count; ++i, bytes += Size)
+    std::reverse(bytes, bytes + Size);
+}
+
+void SwapBytes(char* bytes, std::size_t size, std::size_t count)
+{
+  if (size == 2)
+    SwapBytes<2>(bytes, count);
+  else if (size == 4)
+    SwapBytes<4>(bytes, count);
+  else if (size == 8)
+    SwapBytes<8>(bytes, count);
+}
+
+void ReverseSlices(char* bytes, std::size_t slice, int slices)
+{
+  for (std::size_t front = 0, back = static_cast<std::size_t>(slices) - 1; front < back; ++front, --back)
+    std::swap_ranges(bytes + front * slice, bytes + (front + 1) * slice, bytes + back * slice);
+}
+
+bool IsDetached(const std::string& path)
+{
+  std::string extension = fs::path(path).extension().string();
+  return extension.size() == 4 ? std::tolower(extension[3]) == 'd' && std::tolower(extension[1]) == 'm'
+                               : extension.size() == 5 && std::tolower(extension[1]) == 'n' && std::tolower(extension[2]) == 'h';
+}
+
+} // namespace
+
+void CheckMemory(const std::string& path, double bytes)
+{
+  const double free = FreeMemory();
+  if (!(bytes <= free))
+    throw Error(Error::Kind::TooLarge, path + ": its voxels need " + NumberText(std::ceil(bytes / 1e6)) + " MB, and only " +
+                                           NumberText(std::floor(free / 1e6)) + " MB of memory are free");
+}
+
+void CheckVolume(const ImageHeader& header)
+{
+  const std::string& path = header.path;
+  if (std::any_of(header.fields.begin(), header.fields.end(),
+                  [](const HeaderField& field) { return field.first.compare(0, 9, "Seq_Frame") == 0; }))
+    FailFile(path, "it is a tracked sequence of 2D frames, not a volume");
+  if (!header.typeIsKnown)
+    FailFile(path, "its voxels are of a type that is not supported");
+  if (header.components != 1)
+    FailFile(path, "it has " + std::to_string(header.components) + " numbers per voxel; one is needed");
+  try {
+    header.geometry.Check(path);
+  } catch (const Error& error) {
+    throw Error(Error::Kind::BadFile, error.what());
+  }
+  const double voxels = static_cast<double>(header.geometry.VoxelCount()), bytes = voxels * static_cast<double>(SizeOf(header.type));
+  const std::uint64_t fileBytes = SizeOfFile(header.dataPath);
+  const std::uint64_t offset = static_cast<std::uint64_t>(std::max<std::int64_t>(0, header.dataOffset));
+  const double there = fileBytes > offset ? static_cast<double>(fileBytes - offset) : 0.0;
+  const std::string says = "its dimensions (" + DimensionsText(header.geometry) + ") need " + NumberText(bytes) + " bytes";
+  switch (header.encoding) {
+  case ImageHeader::Encoding::Raw:
+    if (there < bytes)
+      FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": it is truncated or the dimensions are wrong");
+    if (there > bytes && header.dataOffset >= 0)
+      FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": the dimensions or the type are wrong");
+    break;
+  case ImageHeader::Encoding::Zlib:
+    if (there * static_cast<double>(LargestCompressionRatio) < bytes)
+      FailFile(header.dataPath, says + ", more than " + NumberText(there) + " compressed bytes can hold");
+    break;
+  case ImageHeader::Encoding::Text:
+    if ((there + 1.0) / 2.0 < voxels)
+      FailFile(header.dataPath, "its dimensions (" + DimensionsText(header.geometry) + ") need more numbers than " + NumberText(there) +
+                                    " characters can hold");
+    break;
+  }
+  CheckMemory(path, bytes);
+}
+
+void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progress)
+{
+  const std::uint64_t bytes = header.ByteCount();
+  char* const out = static_cast<char*>(voxels);
+  std::ifstream stream(header.dataPath, std::ios::binary);
+  if (header.dataOffset < 0)
+    stream.seekg(-static_cast<std::streamoff>(bytes), std::ios::end);
+  else
+    stream.seekg(header.dataOffset);
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, header.dataPath + ": it cannot be opened (is reading permitted?)");
+
+  switch (header.encoding) {
+  case ImageHeader::Encoding::Raw: ReadRaw(stream, header, out, progress); break;
+  case ImageHeader::Encoding::Zlib: Decompress(stream, header.dataPath, header.skipDecoded, voxels, bytes, progress); break;
+  case ImageHeader::Encoding::Text:
+    DispatchVoxelType(header.type, [&](auto zero) { ReadText(stream, header, static_cast<decltype(zero)*>(voxels), progress); });
+    break;
+  }
+  const std::size_t size = SizeOf(header.type), slices = static_cast<std::size_t>(header.geometry.dimensions[2]);
+  if (header.encoding != ImageHeader::Encoding::Text && header.bigEndian != HostIsBigEndian)
+    SwapBytes(out, size, header.geometry.VoxelCount());
+  if (header.reverseSlices)
+    ReverseSlices(out, bytes / slices, header.geometry.dimensions[2]);
+}
+
+void WriteVolume(const std::string& path, ImageHeader header, const void* voxels, bool compress, FileReplacement& files,
+                 const Progress& progress)
+{
+  header.format = FormatOfName(path);
+  if (header.format != FileFormat::MetaImage && header.format != FileFormat::Nrrd)
+    throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd or .nhdr");
+  header.geometry.Check(path);
+  for (const HeaderField& field : header.fields)
+    if (!CanHold(field))
+      throw Error(Error::Kind::InvalidParameter, path + ": the header cannot hold the field \"" + field.first + "\"");
+  header.encoding = compress ? ImageHeader::Encoding::Zlib : ImageHeader::Encoding::Raw;
+  header.bigEndian = HostIsBigEndian;
+  const bool meta = header.format == FileFormat::MetaImage, detached = IsDetached(path);
+  const std::string dataFile = detached ? fs::path(path).stem().string() + (!compress ? ".raw" : meta ? ".zraw" : ".raw.gz") : "";
+
+  std::ofstream dataStream;
+  if (detached)
+    dataStream.open(files.Stage(DetachedPath(path, dataFile)), std::ios::binary);
+  std::ofstream stream(files.Stage(path), std::ios::binary);
+  std::size_t sizeAt = 0;
+  stream << (meta ? MetaImageHeaderText(header, dataFile, sizeAt) : NrrdHeaderText(header, dataFile));
+
+  std::ofstream& target = detached ? dataStream : stream;
+  const std::uint64_t bytes = header.ByteCount();
+  if (compress) {
+    const std::uint64_t size = Compress(target, meta ? CompressedForm::Zlib : CompressedForm::Gzip, voxels, bytes, progress);
+    if (sizeAt > 0) {
+      stream.seekp(static_cast<std::streamoff>(sizeAt));
+      stream << size;
+    }
+  } else
+    for (std::uint64_t done = 0; done < bytes && target; done += ChunkBytes) {
+      target.write(static_cast<const char*>(voxels) + done, static_cast<std::streamsize>(std::min(ChunkBytes, bytes - done)));
+      progress(static_cast<double>(done) / static_cast<double>(bytes));
+    }
+  stream.close();
+  if (detached)
+    dataStream.close();
+  if (!stream || !target)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?); what was there is left as it was");
+}
+
+std::string CompanionPath(const std::string& path, const std::string& array)
+{
+  const fs::path main = path;
+  return (main.parent_path() / (main.stem().string() + "." + array + main.extension().string())).string();
+}
+
+} // namespace echorama

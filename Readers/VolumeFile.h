@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/FileReplacement.h"
+#include "Core/Base/Progress.h"
+#include "Readers/ImageHeader.h"
+#include <string>
+
+namespace echorama {
+
+/// Checks, before anything is allocated, that the file can be read as one volume: numbers, one per voxel, a geometry that
+/// is a pose (ImageGeometry::Check), frames that are not a tracked sequence, as many bytes as its dimensions say (for
+/// compressed data: as many as could decompress to that), and memory enough for them.
+/// \throws Error(BadFile) or Error(TooLarge) that names the file, Error(FileSystem) when a detached data file is missing.
+void CheckVolume(const ImageHeader& header);
+
+/// Throws Error(TooLarge) when \a bytes are more than the memory that this machine has free.
+void CheckMemory(const std::string& path, double bytes);
+
+/// Reads the voxels into ByteCount() bytes at \a voxels, in this machine's byte order and the header's geometry.
+/// CheckVolume must have passed.
+/// \throws Error(BadFile) that names the file when the data end early, go on too long or are damaged, Error(Cancelled).
+void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progress = {});
+
+/// Writes a volume as MetaImage or NRRD, whichever \a path names; .mhd and .nhdr get their voxels in a file beside them
+/// (.raw; compressed .zraw, .raw.gz). Uses geometry, type and fields of \a header. The files appear when \a files is
+/// committed; the main file is staged last.
+/// \throws Error(InvalidParameter) when the name has none of these extensions or a field cannot be held (CanHold),
+/// Error(BadInput) for a geometry that is none, Error(FileSystem) when the disk is full, Error(Cancelled).
+void WriteVolume(const std::string& path, ImageHeader header, const void* voxels, bool compress, FileReplacement& files,
+                 const Progress& progress = {});
+
+/// The path of a file's companion that holds another array of the same voxels: NAME.ValidRegion.mha beside NAME.mha.
+std::string CompanionPath(const std::string& path, const std::string& array);
+
+} // namespace echorama

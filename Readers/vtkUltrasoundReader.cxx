@@ -1,0 +1,402 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundReader.h"
+
+#include "Readers/BorderZeros.h"
+#include "Readers/ImageHeader.h"
+#include "Readers/VolumeFile.h"
+
+#include "vtkCallbackCommand.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundAcquisition.h"
+#include "vtkUnsignedCharArray.h"
+#include "vtkXMLImageDataReader.h"
+
+#include <algorithm>
+#include <filesystem>
+
+using echorama::Error;
+using echorama::FileFormat;
+using echorama::HeaderField;
+using echorama::ImageHeader;
+using echorama::VoxelType;
+
+vtkStandardNewMacro(vtkUltrasoundReader);
+
+namespace
+{
+const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
+
+int VtkTypeOf(VoxelType type)
+{
+  static const int types[] = { VTK_SIGNED_CHAR, VTK_UNSIGNED_CHAR, VTK_SHORT, VTK_UNSIGNED_SHORT, VTK_INT, VTK_UNSIGNED_INT,
+    VTK_TYPE_INT64, VTK_TYPE_UINT64, VTK_FLOAT, VTK_DOUBLE };
+  return types[static_cast<int>(type)];
+}
+
+// The voxels of a file as a data array; they are read into its memory directly.
+vtkSmartPointer<vtkDataArray> ReadArray(const ImageHeader& header, const char* name, const echorama::Progress& progress)
+{
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VtkTypeOf(header.type)));
+  array->SetName(name);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(header.geometry.VoxelCount()));
+  echorama::ReadVoxels(header, array->GetVoidPointer(0), progress);
+  return array;
+}
+
+// The file NAME.array.ext beside NAME.ext, with the same geometry as the volume, or nullptr when there is none.
+vtkSmartPointer<vtkDataArray> ReadCompanion(
+  const std::string& path, const char* array, vtkImageData* volume, const echorama::Progress& progress)
+{
+  const std::string companion = echorama::CompanionPath(path, array);
+  std::error_code ignored;
+  if (!std::filesystem::exists(companion, ignored))
+  {
+    return nullptr;
+  }
+  const ImageHeader header = echorama::ReadImageHeader(companion);
+  echorama::CheckVolume(header);
+  if (!header.geometry.AgreesWith(vtkUltrasoundVolume::GeometryOf(volume)))
+  {
+    throw Error(Error::Kind::BadFile,
+      companion + ": its geometry is not that of " + path + "; remove it if it belongs to an earlier file of this name");
+  }
+  return ReadArray(header, array, progress);
+}
+
+// A valid region as the contract wants it: 1 or 0 in unsigned chars.
+vtkSmartPointer<vtkDataArray> AsValidRegion(vtkDataArray* array)
+{
+  const vtkIdType count = array->GetNumberOfTuples();
+  const auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
+  valid->SetName(vtkUltrasoundVolume::ValidRegionName());
+  valid->SetNumberOfTuples(count);
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    valid->SetValue(i, array->GetComponent(i, 0) != 0.0 ? 1 : 0);
+  }
+  return valid;
+}
+
+// Collects what an object inside complains of, instead of printing it.
+class Complaints
+{
+public:
+  explicit Complaints(vtkObject* object)
+    : Object(object)
+  {
+    this->Command->SetClientData(this);
+    this->Command->SetCallback([](vtkObject*, unsigned long, void* self, void* text) {
+      std::string& collected = static_cast<Complaints*>(self)->Text;
+      if (collected.empty() && text) // the first says what went wrong, the others follow from it
+      {
+        collected = static_cast<const char*>(text);
+      }
+    });
+    object->AddObserver(vtkCommand::ErrorEvent, this->Command);
+  }
+  ~Complaints() { this->Object->RemoveObserver(this->Command); }
+
+  // The complaint without VTK's "ERROR: In file, line" and its line breaks; empty when there was none.
+  std::string Sentence() const
+  {
+    const std::size_t pointer = this->Text.find("): ");
+    std::string sentence = this->Text.empty() || pointer == std::string::npos ? this->Text : this->Text.substr(pointer + 3);
+    while (!sentence.empty() && std::isspace(static_cast<unsigned char>(sentence.back())))
+    {
+      sentence.pop_back();
+    }
+    std::replace(sentence.begin(), sentence.end(), '\n', ' ');
+    return sentence;
+  }
+
+private:
+  vtkSmartPointer<vtkObject> Object;
+  vtkNew<vtkCallbackCommand> Command;
+  std::string Text;
+};
+
+// Reads what a .vti file says of itself, and refuses sizes that cannot be.
+echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string& path)
+{
+  reader->SetFileName(path.c_str());
+  const Complaints complaints(reader);
+  reader->UpdateInformation();
+  vtkInformation* information = reader->GetOutputInformation(0);
+  if (reader->GetErrorCode() != 0 || !complaints.Sentence().empty() ||
+    !information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()))
+  {
+    throw Error(Error::Kind::BadFile, path + ": it cannot be read as a VTK image file (" + complaints.Sentence() + ")");
+  }
+  int extent[6];
+  information->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
+  echorama::ImageGeometry geometry;
+  Eigen::Vector3d first;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const long long size = static_cast<long long>(extent[2 * axis + 1]) - extent[2 * axis] + 1;
+    if (size < 1 || size > VTK_INT_MAX)
+    {
+      throw Error(Error::Kind::BadFile, path + ": its WholeExtent is empty or overflows");
+    }
+    geometry.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(size);
+    first[axis] = extent[2 * axis];
+  }
+  information->Get(vtkDataObject::ORIGIN(), geometry.origin.data());
+  information->Get(vtkDataObject::SPACING(), geometry.spacing.data());
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = Eigen::Matrix3d::Identity();
+  if (information->Has(vtkDataObject::DIRECTION()))
+  {
+    information->Get(vtkDataObject::DIRECTION(), direction.data());
+  }
+  geometry.direction = direction;
+  geometry.origin += geometry.direction * geometry.spacing.cwiseProduct(first);
+  try
+  {
+    geometry.Check(path);
+  }
+  catch (const Error& error)
+  {
+    throw Error(Error::Kind::BadFile, error.what());
+  }
+  // Compressed or not, a file does not hold ten thousand times its bytes.
+  const double voxels = static_cast<double>(geometry.VoxelCount());
+  if (voxels > 1e4 * static_cast<double>(std::filesystem::file_size(path)))
+  {
+    throw Error(Error::Kind::BadFile, path + ": its WholeExtent needs more voxels than the file can hold");
+  }
+  echorama::CheckMemory(path, voxels);
+  return geometry;
+}
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundReader::vtkUltrasoundReader()
+{
+  this->SetNumberOfInputPorts(0);
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundReader::~vtkUltrasoundReader()
+{
+  this->SetFileName(nullptr);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
+  os << indent << "Notes: " << this->GetNotes() << "\n";
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundReader::CanReadFile(const char* fileName)
+{
+  try
+  {
+    return fileName && echorama::FormatOfContent(fileName) != FileFormat::Unknown ? 1 : 0;
+  }
+  catch (const Error&)
+  {
+    return 0;
+  }
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundReader::GetNotes() const
+{
+  std::string text;
+  for (const std::string& note : this->Notes)
+  {
+    text += (text.empty() ? "" : "\n") + note;
+  }
+  return text;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  return vtkUltrasoundVolume::Run(this, nullptr, [this, outputs](const echorama::Progress&) {
+    const std::string path = this->FileName ? this->FileName : "";
+    const FileFormat format = echorama::FormatOfContent(path);
+    if (format == FileFormat::Unknown)
+    {
+      throw Error(Error::Kind::BadFile, path + ": the content is none of MetaImage, NRRD and VTK image file");
+    }
+    if (format == FileFormat::VtkXmlImage)
+    {
+      const vtkNew<vtkXMLImageDataReader> reader;
+      vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), OpenXml(reader, path));
+      return;
+    }
+    const ImageHeader header = echorama::ReadImageHeader(path);
+    echorama::CheckVolume(header);
+    vtkInformation* out = outputs->GetInformationObject(0);
+    vtkUltrasoundVolume::SetGeometry(out, header.geometry);
+    vtkDataObject::SetPointDataActiveScalarInfo(out, VtkTypeOf(header.type), 1);
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, const echorama::Progress& progress)
+{
+  this->Notes.clear();
+  const std::string path = this->FileName ? this->FileName : "";
+  if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage)
+  {
+    this->ReadXml(output);
+  }
+  else
+  {
+    this->ReadHeaderFile(output, progress.Part(0.0, 0.7));
+  }
+  this->FindValidRegion(output, progress.Part(0.7, 0.9));
+  this->FindProvenance(output, progress.Part(0.9, 1.0));
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::ReadHeaderFile(vtkImageData* output, const echorama::Progress& progress)
+{
+  const ImageHeader header = echorama::ReadImageHeader(this->FileName);
+  echorama::CheckVolume(header);
+  this->Notes = header.notes;
+  vtkUltrasoundVolume::SetGeometry(output, header.geometry);
+  output->GetPointData()->SetScalars(ReadArray(header, vtkUltrasoundVolume::IntensityName(), progress));
+
+  const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
+  for (const HeaderField& field : header.fields)
+  {
+    const std::string& name = field.first;
+    if (name.compare(0, FieldPrefix.size(), FieldPrefix) == 0)
+    {
+      if (!vtkUltrasoundAcquisition::SetFromText(output, name.substr(FieldPrefix.size()), field.second))
+      {
+        this->Notes.push_back("the header's " + name + " could not be understood and was left out");
+      }
+    }
+    else if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end())
+    {
+      this->Notes.push_back("the header's " + name + " is not ours, though it has the name of one of our fields; it was left out");
+    }
+    else
+    {
+      const vtkNew<vtkStringArray> text;
+      text->SetName(name.c_str());
+      text->InsertNextValue(field.second);
+      output->GetFieldData()->AddArray(text);
+    }
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::ReadXml(vtkImageData* output)
+{
+  const std::string path = this->FileName;
+  const auto fail = [&path](const std::string& reason) { throw Error(Error::Kind::BadFile, path + ": " + reason); };
+  const vtkNew<vtkXMLImageDataReader> reader;
+  OpenXml(reader, path);
+  {
+    const Complaints complaints(reader);
+    reader->Update();
+    if (reader->GetErrorCode() != 0 || !complaints.Sentence().empty())
+    {
+      fail("the data are truncated or damaged (" + complaints.Sentence() + ")");
+    }
+  }
+  output->ShallowCopy(reader->GetOutput());
+  vtkUltrasoundVolume::SetGeometry(output, vtkUltrasoundVolume::GeometryOf(output)); // extents from zero
+  output->GetFieldData()->RemoveArray("TimeValue");
+
+  vtkPointData* arrays = output->GetPointData();
+  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output);
+  for (int i = 0; !intensity && i < arrays->GetNumberOfArrays(); ++i)
+  {
+    const std::string name = arrays->GetArrayName(i) ? arrays->GetArrayName(i) : "";
+    if (name != vtkUltrasoundVolume::ValidRegionName() && name != vtkUltrasoundVolume::ProvenanceName())
+    {
+      intensity = arrays->GetArray(i);
+    }
+  }
+  if (!intensity)
+  {
+    fail("it has no point array that could be the intensities");
+  }
+  if (intensity->GetNumberOfComponents() != 1)
+  {
+    fail("it has " + std::to_string(intensity->GetNumberOfComponents()) + " numbers per voxel; one is needed");
+  }
+  if (intensity->GetNumberOfTuples() != output->GetNumberOfPoints())
+  {
+    fail("its intensities are not one per voxel");
+  }
+  const std::string name = intensity->GetName() ? intensity->GetName() : "";
+  if (name != vtkUltrasoundVolume::IntensityName())
+  {
+    this->Notes.push_back("the array " + name + " was taken as the intensities");
+    const auto renamed = vtkSmartPointer<vtkDataArray>::Take(intensity->NewInstance());
+    renamed->ShallowCopy(intensity);
+    renamed->SetName(vtkUltrasoundVolume::IntensityName());
+    arrays->RemoveArray(name.c_str());
+    arrays->AddArray(renamed);
+  }
+  arrays->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::FindValidRegion(vtkImageData* output, const echorama::Progress& progress)
+{
+  vtkPointData* arrays = output->GetPointData();
+  vtkSmartPointer<vtkDataArray> found = vtkUltrasoundVolume::GetValidRegion(output);
+  if (found && found->GetNumberOfTuples() != output->GetNumberOfPoints())
+  {
+    throw Error(Error::Kind::BadFile, std::string(this->FileName) + ": its ValidRegion is not one number per voxel");
+  }
+  if (!found)
+  {
+    found = ReadCompanion(this->FileName, vtkUltrasoundVolume::ValidRegionName(), output, progress);
+  }
+  if (found)
+  {
+    arrays->AddArray(AsValidRegion(found));
+    return;
+  }
+
+  const vtkNew<vtkUnsignedCharArray> valid;
+  valid->SetName(vtkUltrasoundVolume::ValidRegionName());
+  valid->SetNumberOfTuples(output->GetNumberOfPoints());
+  const auto target = vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output);
+  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output);
+  std::int64_t missing = 0;
+  switch (intensity->GetDataType())
+  {
+    vtkTemplateMacro(missing = echorama::ValidFromBorderZeros(
+                       vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, output), target));
+  }
+  arrays->AddArray(valid);
+  if (missing > 0)
+  {
+    this->Notes.push_back("the valid region was guessed: everything but the zeros connected to the border (" +
+      std::to_string(missing) + " voxels) is taken as real");
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::FindProvenance(vtkImageData* output, const echorama::Progress& progress)
+{
+  if (!output->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName()))
+  {
+    if (const auto array = ReadCompanion(this->FileName, vtkUltrasoundVolume::ProvenanceName(), output, progress))
+    {
+      output->GetPointData()->AddArray(array);
+    }
+  }
+}

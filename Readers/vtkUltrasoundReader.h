@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundReader
+ * @brief reads a volume with its pose: .mha, .mhd, .nrrd, .nhdr, .vti
+ *
+ * Output: one vtkImageData whose origin, spacing and direction are those of the file (mm, LPS), with the point arrays
+ * `Intensity` (whatever the file called it; the active scalars) and `ValidRegion` (unsigned char, 1 or 0), and with what the
+ * file says of the acquisition as field data (vtkUltrasoundAcquisition). Other lines of a header come as field data too, one
+ * string each, under their own names. VTK's readers of MetaImage and NRRD lose the direction; this one does not.
+ *
+ * The content decides what a file is, not its extension. `ValidRegion` is, in this order: the array of that name (.vti);
+ * the file `NAME.ValidRegion.mha` beside `NAME.mha` (any extension, the same for both), whose geometry must agree; everything
+ * but the zeros connected to the border of the grid and voxels that are not numbers. `NAME.Provenance.mha` is carried as the
+ * point array `Provenance`. GetNotes() says what was assumed or lost.
+ *
+ * A 2D image is a volume of one slice. Where the axes of a file are left-handed the slices are taken in reverse, so that the
+ * geometry is a rigid pose. The header alone is read until voxels are asked for.
+ *
+ * Refused, with a message that names file and reason: files that are truncated, empty, damaged or of another type; sizes that
+ * do not fit the data or the memory; a spacing that is not positive; a direction that is singular or sheared; numbers that are
+ * not finite; several numbers per voxel; tracked sequences of 2D frames.
+ *
+ * @sa vtkUltrasoundWriter
+ */
+#ifndef vtkUltrasoundReader_h
+#define vtkUltrasoundReader_h
+
+#include "EchoramaReadersModule.h"
+#include "vtkUltrasoundImageAlgorithm.h"
+
+#include <string> // for the notes
+#include <vector> // for the notes
+
+class vtkXMLImageDataReader;
+
+class ECHORAMAREADERS_EXPORT vtkUltrasoundReader : public vtkUltrasoundImageAlgorithm
+{
+public:
+  static vtkUltrasoundReader* New();
+  vtkTypeMacro(vtkUltrasoundReader, vtkUltrasoundImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /** The file to read. Default: none. */
+  vtkSetFilePathMacro(FileName);
+  vtkGetFilePathMacro(FileName);
+  ///@}
+
+  /**
+   * 1 when \a fileName is there and begins like a file that this class reads, else 0. The voxels are not looked at.
+   */
+  static int CanReadFile(const char* fileName);
+
+  /**
+   * What the last update had to assume, or could not keep, one sentence per line. Empty when the file said everything.
+   */
+  std::string GetNotes() const;
+
+protected:
+  vtkUltrasoundReader();
+  ~vtkUltrasoundReader() override;
+
+  int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+#ifndef __VTK_WRAP__
+  void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
+#endif
+
+  char* FileName = nullptr;
+
+private:
+  vtkUltrasoundReader(const vtkUltrasoundReader&) = delete;
+  void operator=(const vtkUltrasoundReader&) = delete;
+
+#ifndef __VTK_WRAP__
+  void ReadHeaderFile(vtkImageData* output, const echorama::Progress& progress);
+  void ReadXml(vtkImageData* output);
+  void FindValidRegion(vtkImageData* output, const echorama::Progress& progress);
+  void FindProvenance(vtkImageData* output, const echorama::Progress& progress);
+
+  std::vector<std::string> Notes;
+#endif
+};
+
+#endif

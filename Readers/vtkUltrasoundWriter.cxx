@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundWriter.h"
+
+#include "Readers/BorderZeros.h"
+#include "Readers/ImageHeader.h"
+#include "Readers/VolumeFile.h"
+
+#include "vtkCellData.h"
+#include "vtkErrorCode.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundVolume.h"
+#include "vtkUnsignedCharArray.h"
+#include "vtkXMLImageDataWriter.h"
+
+#include <algorithm>
+
+using echorama::Error;
+using echorama::FileFormat;
+using echorama::FileReplacement;
+using echorama::ImageHeader;
+using echorama::VoxelType;
+
+vtkStandardNewMacro(vtkUltrasoundWriter);
+
+namespace
+{
+const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
+
+template <class T>
+constexpr VoxelType VoxelTypeOf()
+{
+  if constexpr (std::is_floating_point_v<T>)
+  {
+    return sizeof(T) == 4 ? VoxelType::Float32 : VoxelType::Float64;
+  }
+  constexpr VoxelType types[] = { VoxelType::Int8, VoxelType::UInt8, VoxelType::Int16, VoxelType::UInt16, VoxelType::Int32,
+    VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64 };
+  constexpr int power = sizeof(T) == 1 ? 0 : sizeof(T) == 2 ? 1 : sizeof(T) == 4 ? 2 : 3;
+  return types[2 * power + (std::is_signed_v<T> ? 0 : 1)];
+}
+
+VoxelType TypeOf(vtkDataArray* array)
+{
+  switch (array->GetDataType())
+  {
+    vtkTemplateMacro(return VoxelTypeOf<VTK_TT>());
+    default:
+      throw Error(Error::Kind::BadInput, std::string("voxels of type ") + array->GetDataTypeAsString() + " cannot be written");
+  }
+}
+
+// Whether the reader would find every voxel real without being told.
+bool LooksValidEverywhere(vtkImageData* input, vtkDataArray* intensity)
+{
+  const vtkNew<vtkUnsignedCharArray> guess;
+  guess->SetNumberOfTuples(input->GetNumberOfPoints());
+  const auto target = vtkUltrasoundVolume::ViewOf<unsigned char>(guess, input);
+  std::int64_t missing = 0;
+  switch (intensity->GetDataType())
+  {
+    vtkTemplateMacro(
+      missing = echorama::ValidFromBorderZeros(vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, input), target));
+  }
+  return missing == 0;
+}
+
+// The valid region of a volume, 1 or 0, or nullptr when its file can be left out.
+vtkSmartPointer<vtkDataArray> ValidRegionToWrite(vtkImageData* input, vtkDataArray* intensity)
+{
+  const vtkIdType count = input->GetNumberOfPoints();
+  vtkDataArray* given = vtkUltrasoundVolume::GetValidRegion(input);
+  const auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
+  valid->SetNumberOfTuples(count);
+  bool everywhere = true;
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    const bool real = !given || given->GetComponent(i, 0) != 0.0;
+    valid->SetValue(i, real ? 1 : 0);
+    everywhere = everywhere && real;
+  }
+  return everywhere && LooksValidEverywhere(input, intensity) ? nullptr : valid;
+}
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundWriter::~vtkUltrasoundWriter()
+{
+  this->SetFileName(nullptr);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
+  os << indent << "UseCompression: " << this->UseCompression << "\n";
+  os << indent << "Notes: " << this->GetNotes() << "\n";
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundWriter::GetNotes() const
+{
+  std::string text;
+  for (const std::string& note : this->Notes)
+  {
+    text += (text.empty() ? "" : "\n") + note;
+  }
+  return text;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundWriter::FillInputPortInformation(int, vtkInformation* information)
+{
+  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundWriter::Write()
+{
+  // When the input fails, WriteData() is never called and the superclass reports success.
+  this->Written = false;
+  this->Notes.clear();
+  this->Superclass::Write();
+  return this->Written ? 1 : 0;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::WriteData()
+{
+  this->SetErrorCode(vtkErrorCode::NoError);
+  this->Notes.clear();
+  this->Written = vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
+    const std::string path = this->FileName ? this->FileName : "";
+    if (path.empty())
+    {
+      throw Error(Error::Kind::InvalidParameter, "no file name was given");
+    }
+    vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
+    if (!input)
+    {
+      throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
+    }
+    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
+    vtkUltrasoundVolume::GeometryOf(input).Check(path);
+    if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints())
+    {
+      throw Error(Error::Kind::BadInput, path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
+    }
+    if (intensity->GetNumberOfComponents() != 1)
+    {
+      throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
+    }
+
+    FileReplacement files;
+    switch (echorama::FormatOfName(path))
+    {
+      case FileFormat::MetaImage:
+      case FileFormat::Nrrd:
+        this->WriteHeaderFile(input, files, progress);
+        break;
+      case FileFormat::VtkXmlImage:
+        this->WriteXml(input, files);
+        break;
+      case FileFormat::Unknown:
+        throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd, .nhdr or .vti");
+    }
+    files.Commit();
+  }) != 0;
+  if (!this->Written)
+  {
+    this->SetErrorCode(vtkErrorCode::UnknownError);
+  }
+  else if (!this->Notes.empty())
+  {
+    vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& files, const echorama::Progress& progress)
+{
+  const std::string path = this->FileName;
+  const bool compress = this->UseCompression != 0;
+  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
+  ImageHeader header;
+  header.geometry = vtkUltrasoundVolume::GeometryOf(input);
+
+  // Files beside the main one, which is staged last; those of an earlier volume of this name must not stay.
+  const auto writeBeside = [&](const char* name, vtkDataArray* array) {
+    const std::string companion = echorama::CompanionPath(path, name);
+    if (!array)
+    {
+      files.Remove(companion);
+      return;
+    }
+    header.type = TypeOf(array);
+    echorama::WriteVolume(companion, header, array->GetVoidPointer(0), compress, files, progress.Part(0.0, 0.2));
+  };
+  writeBeside(vtkUltrasoundVolume::ValidRegionName(), ValidRegionToWrite(input, intensity));
+  vtkDataArray* provenance = input->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName());
+  const bool single = provenance && provenance->GetNumberOfComponents() == 1 &&
+    provenance->GetNumberOfTuples() == input->GetNumberOfPoints();
+  writeBeside(vtkUltrasoundVolume::ProvenanceName(), single ? provenance : nullptr);
+
+  // Field data: the acquisition, and lines that a header brought.
+  for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(input))
+  {
+    header.fields.emplace_back(FieldPrefix + name, text);
+  }
+  const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
+  std::vector<std::string> lost;
+  vtkFieldData* fields = input->GetFieldData();
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i)
+  {
+    vtkAbstractArray* array = fields->GetAbstractArray(i);
+    const std::string name = array->GetName() ? array->GetName() : "";
+    if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end())
+    {
+      continue;
+    }
+    vtkStringArray* text = vtkStringArray::SafeDownCast(array);
+    if (text && text->GetNumberOfValues() == 1 && echorama::CanHold({ name, text->GetValue(0) }))
+    {
+      header.fields.emplace_back(name, text->GetValue(0));
+    }
+    else
+    {
+      lost.push_back("field " + name);
+    }
+  }
+  for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i)
+  {
+    vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
+    const std::string name = array->GetName() ? array->GetName() : "";
+    if (array != intensity && name != vtkUltrasoundVolume::ValidRegionName() && (array != provenance || !single))
+    {
+      lost.push_back("point array " + name);
+    }
+  }
+  for (int i = 0; i < input->GetCellData()->GetNumberOfArrays(); ++i)
+  {
+    lost.push_back(std::string("cell array ") + input->GetCellData()->GetArrayName(i));
+  }
+  for (const std::string& what : lost)
+  {
+    this->Notes.push_back("the format cannot hold the " + what + "; .vti can");
+  }
+
+  header.type = TypeOf(intensity);
+  echorama::WriteVolume(path, header, intensity->GetVoidPointer(0), compress, files, progress.Part(0.2, 1.0));
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::WriteXml(vtkImageData* input, FileReplacement& files)
+{
+  const std::string path = this->FileName;
+  const std::string temporary = files.Stage(path);
+  const vtkNew<vtkImageData> whole;
+  whole->ShallowCopy(input);
+  vtkUltrasoundVolume::SetGeometry(whole, vtkUltrasoundVolume::GeometryOf(input)); // extents from zero
+  const vtkNew<vtkXMLImageDataWriter> writer;
+  writer->SetInputData(whole);
+  writer->SetFileName(temporary.c_str());
+  writer->SetHeaderTypeToUInt64();
+  writer->EncodeAppendedDataOff();
+  if (!this->UseCompression)
+  {
+    writer->SetCompressorTypeToNone();
+  }
+  if (!writer->Write() || writer->GetErrorCode() != vtkErrorCode::NoError)
+  {
+    throw Error(Error::Kind::FileSystem,
+      path + ": it cannot be written (" + vtkErrorCode::GetStringFromErrorCode(writer->GetErrorCode()) +
+        "); what was there is left as it was");
+  }
+}

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundWriter
+ * @brief writes a volume so that vtkUltrasoundReader gives it back: .mha, .mhd, .nrrd, .nhdr, .vti
+ *
+ * Input 0: vtkImageData with intensities (the array `Intensity`, else the active scalars; any type of number).
+ * The extension chooses the format. Pose and acquisition (vtkUltrasoundAcquisition) are kept by all of them; numbers come
+ * back to the last bit, but for .nrrd, which stores spacing and direction as a product. .vti holds all arrays and field
+ * data in one file. The others hold the intensities; `ValidRegion` and `Provenance` go to files beside them
+ * (`NAME.ValidRegion.mha`), and field data that are single strings go to the header. What cannot be held is listed by
+ * GetNotes() and in a warning. The file of the valid region is left out where every voxel is real and the reader would
+ * see that without it; one that stood there before is removed.
+ *
+ * Everything is written under temporary names in the same folder and renamed at the end, all together: after an error, a
+ * full disk or an abort, what was there before is there unchanged.
+ *
+ * Errors, with the file and the reason: an extension that is not one of the five, a folder that is missing or not writable,
+ * a full disk, more than one number per voxel, a geometry that is not a pose.
+ *
+ * @sa vtkUltrasoundReader
+ */
+#ifndef vtkUltrasoundWriter_h
+#define vtkUltrasoundWriter_h
+
+#include "EchoramaReadersModule.h"
+#include "vtkWriter.h"
+
+#include <string> // for the notes
+#include <vector> // for the notes
+
+#ifndef __VTK_WRAP__
+#include "Core/Base/FileReplacement.h"
+#include "Core/Base/Progress.h"
+#endif
+
+class vtkImageData;
+
+class ECHORAMAREADERS_EXPORT vtkUltrasoundWriter : public vtkWriter
+{
+public:
+  static vtkUltrasoundWriter* New();
+  vtkTypeMacro(vtkUltrasoundWriter, vtkWriter);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /** The file to write. Default: none. */
+  vtkSetFilePathMacro(FileName);
+  vtkGetFilePathMacro(FileName);
+  ///@}
+
+  ///@{
+  /** Whether voxels are compressed (zlib, without loss). Default: on. */
+  vtkSetMacro(UseCompression, vtkTypeBool);
+  vtkGetMacro(UseCompression, vtkTypeBool);
+  vtkBooleanMacro(UseCompression, vtkTypeBool);
+  ///@}
+
+  /**
+   * Updates the input and writes it. Returns 1 when the file is there, complete; 0 after any error, also of the input.
+   */
+  int Write() override;
+
+  /** What the last Write() could not keep, one sentence per line. */
+  std::string GetNotes() const;
+
+protected:
+  vtkUltrasoundWriter() = default;
+  ~vtkUltrasoundWriter() override;
+
+  int FillInputPortInformation(int port, vtkInformation* information) override;
+  void WriteData() override;
+
+  char* FileName = nullptr;
+  vtkTypeBool UseCompression = 1;
+
+private:
+  vtkUltrasoundWriter(const vtkUltrasoundWriter&) = delete;
+  void operator=(const vtkUltrasoundWriter&) = delete;
+
+#ifndef __VTK_WRAP__
+  void WriteHeaderFile(vtkImageData* input, echorama::FileReplacement& files, const echorama::Progress& progress);
+  void WriteXml(vtkImageData* input, echorama::FileReplacement& files);
+
+  std::vector<std::string> Notes;
+  bool Written = false;
+#endif
+};
+
+#endif
