@@ -109,13 +109,13 @@ public:
   ScattererSource(const PhantomParameters& p, const BeamGrid& grid)
     : p_(p), grid_(grid), scene_(p.scene), worldToProbe_(p.probeToWorld.inverse()), cell_(std::cbrt(1.0 / p.scatterersPerMm3))
   {
-    const double far =
-        3.0 * std::max({2.0 * p.pulseSigmaMm, grid.LateralSigma(p.probe.depthMax), grid.ElevationSigma(p.probe.depthMax)});
+    far_ = 3.0 * std::max({2.0 * p.pulseSigmaMm, grid.LateralSigma(p.probe.depthMax), grid.ElevationSigma(p.probe.depthMax)});
     boxInProbe_ = BoxAround(p.probe);
-    boxInProbe_.min().array() -= far;
-    boxInProbe_.max().array() += far;
+    boxInProbe_.min().array() -= far_;
+    boxInProbe_.max().array() += far_;
     const Eigen::AlignedBox3d box = BoxAround(p.probe, p.probeToWorld);
-    const Eigen::Array3d first = ((box.min().array() - far) / cell_).floor(), last = ((box.max().array() + far) / cell_).floor();
+    const Eigen::Array3d first = ((box.min().array() - far_) / cell_).floor(),
+                         last = ((box.max().array() + far_) / cell_).floor();
     if (!((last - first + 1.0).prod() <= maxCells))
       throw Error(Error::Kind::TooLarge,
                   "the phantom would need more than 2^28 scatterers; choose fewer scatterers per mm^3 or a "
@@ -152,6 +152,8 @@ private:
     // Beam coordinates that go on beyond the edges of the fan: echoes from just outside reach in.
     const ProbeArc fan = p_.probe.Fan(), sweep = p_.probe.Sweep();
     const ProbeArc::Place plane = sweep.PlaceOf(point.y(), point.z());
+    if ((std::abs(plane.along) - 0.5) * sweep.Span(plane.depth) > far_)
+      return;
     const ProbeArc::Place beam = fan.PlaceOf(point.x(), plane.depth);
     const double fanSpan = fan.Span(beam.depth), sweepSpan = sweep.Span(plane.depth);
     if (!(fanSpan > 0.0 && sweepSpan > 0.0))
@@ -190,6 +192,7 @@ private:
   SceneLookup scene_;
   Pose worldToProbe_;
   double cell_;
+  double far_; // no echo reaches further across, mm
   Eigen::AlignedBox3d boxInProbe_;
   Eigen::Array3i first_, count_;
 };

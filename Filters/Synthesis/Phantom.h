@@ -30,7 +30,7 @@ struct PhantomParameters {
   double lateralGrowth = 0.008;   ///< its growth per mm of depth, in [0, 1]
   double elevationSigmaMm = 0.9;  ///< of the beam along the sweep at depth 0, in [0.05, 20]
   double elevationGrowth = 0.012; ///< its growth per mm of depth, in [0, 1]
-  double scatterersPerMm3 = 2.0;  ///< in [0.01, 100]
+  double scatterersPerMm3 = 1.5;  ///< in [0.01, 100]
 
   /// Throws Error(InvalidParameter) that names the number that is out of its range; also for a probe whose sweep is a single
   /// plane, or whose beams start at or behind the sweep axis.
