@@ -1,0 +1,156 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pictures of a benchmark: plot_benchmark.py IN.jsonl OUT.png
+
+IN.jsonl holds one JSON object per line, as Testing/Benchmark.h writes them. Each case becomes a panel of error against
+seconds, both logarithmic: the nearer to the lower left corner, the better. Lines that count successes over a minimum
+overlap (keys "t" and "within_1mm") become one more panel of success against t.
+"""
+import json
+import math
+import pathlib
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+OURS = "#0b5e8a"
+PEERS = ["#8a8a8a", "#b0763b", "#6f8f5f", "#9a6f9a", "#5f6f8f"]
+MARKERS = "osD^vP*X<>hp"
+PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer")
+
+
+def is_ours(method):
+    return not any(word in method.lower() for word in PEER_WORDS)
+
+
+def number(line, key):
+    """The finite number under a key, else None."""
+    value = line.get(key)
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
+
+
+def read(path):
+    lines = []
+    for count, text in enumerate(pathlib.Path(path).read_text().splitlines(), 1):
+        if not text.strip():
+            continue
+        try:
+            line = json.loads(text)
+        except ValueError as problem:
+            sys.exit(f"plot_benchmark: {path}, line {count} is not JSON: {problem}")
+        if not isinstance(line, dict):
+            sys.exit(f"plot_benchmark: {path}, line {count} is not a JSON object")
+        lines.append(line)
+    if not lines:
+        sys.exit(f"plot_benchmark: {path} holds no lines")
+    return lines
+
+
+def is_success(line):
+    return number(line, "t") is not None and number(line, "within_1mm") is not None
+
+
+def grouped(lines, key):
+    groups = {}
+    for line in lines:
+        groups.setdefault(str(line.get(key, "")), []).append(line)
+    return groups
+
+
+def looks(methods):
+    """One marker and colour per method, the same in every panel; ours are blue and drawn on top."""
+    looks, peers = {}, 0
+    for index, method in enumerate(methods):
+        ours = is_ours(method)
+        looks[method] = {"marker": MARKERS[index % len(MARKERS)], "color": OURS if ours else PEERS[peers % len(PEERS)],
+                         "markersize": 11 if ours else 8, "zorder": 3 if ours else 2,
+                         "linestyle": "none", "markeredgecolor": "white", "label": method}
+        peers += not ours
+    return looks
+
+
+def draw_panel(axes, case, lines, looks):
+    points = [(str(line.get("method", "")), number(line, "seconds"), number(line, "error")) for line in lines]
+    points = [(method, seconds, abs(error)) for method, seconds, error in points if seconds and seconds > 0 and error is not None]
+    positive = [error for _, _, error in points if error > 0]
+    # A logarithm has no zero: exact results stand on a line of their own, below all others.
+    exact = len(positive) < len(points)
+    floor = min(positive) / (10 if exact else 1) if positive else 1
+    for method, seconds, error in points:
+        axes.plot(seconds, max(error, floor), **looks[method])
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_title(case, fontsize=10)
+    axes.set_xlabel("seconds")
+    units = sorted({str(line["error_unit"]) for line in lines if line.get("error_unit")})
+    axes.set_ylabel("error" + (f" ({', '.join(units)})" if units else ""))
+    if not points:
+        axes.text(0.5, 0.5, "nothing to draw", transform=axes.transAxes, ha="center")
+        return
+    seconds = [point[1] for point in points]
+    axes.set_xlim(min(seconds) / 3, max(seconds) * 3)
+    axes.set_ylim(floor / 3, max(positive, default=floor) * 5)
+    if exact:
+        axes.axhline(floor, color="#bbbbbb", linewidth=0.8, linestyle=":", zorder=1)
+        axes.text(0.99, floor, "exact", transform=axes.get_yaxis_transform(), fontsize=9, color="#777777", ha="right", va="bottom")
+    if not positive:
+        axes.tick_params(axis="y", which="both", left=False, labelleft=False)
+
+
+def draw_success(axes, lines):
+    for index, (case, of_case) in enumerate(sorted(grouped(lines, "case").items())):
+        of_case = sorted(of_case, key=lambda line: line["t"])
+        runs = [number(line, "runs") or number(line, "trials") or 1 for line in of_case]
+        share = [100 * line["within_1mm"] / run for line, run in zip(of_case, runs)]
+        axes.plot([line["t"] for line in of_case], share, marker=MARKERS[index % len(MARKERS)], label=case,
+                  color=OURS if index == 0 else PEERS[(index - 1) % len(PEERS)])
+    axes.set_title("success against the minimum overlap", fontsize=10)
+    axes.set_xlabel("minimum overlap t")
+    axes.set_ylabel("runs within 1 mm (%)")
+    axes.set_ylim(-4, 104)
+    axes.legend(fontsize=8, frameon=False)
+
+
+def main():
+    if len(sys.argv) != 3:
+        sys.exit("usage: plot_benchmark.py IN.jsonl OUT.png")
+    lines = read(sys.argv[1])
+    success = [line for line in lines if is_success(line)]
+    cases = grouped([line for line in lines if not is_success(line)], "case")
+    panels = len(cases) + bool(success)
+    columns = min(panels, 3)
+    rows = math.ceil(panels / columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(max(6.0, 4.5 * columns), 3.6 * rows + 0.6), squeeze=False)
+    axes = list(axes.flat)
+    for spare in axes[panels:]:
+        spare.set_visible(False)
+    look = looks(dict.fromkeys(str(line.get("method", "")) for line in lines))
+    for (case, of_case), panel in zip(cases.items(), axes):
+        draw_panel(panel, case, of_case, look)
+    if success:
+        draw_success(axes[panels - 1], success)
+    for panel in axes[:panels]:
+        panel.grid(True, which="major", color="#e6e6e6", linewidth=0.8)
+        panel.set_axisbelow(True)
+        for side in ("top", "right"):
+            panel.spines[side].set_visible(False)
+    drawn = dict.fromkeys(str(line.get("method", "")) for of_case in cases.values() for line in of_case)
+    legend_columns = min(len(drawn), columns + 1) or 1
+    legend_inches = 0.25 * math.ceil(len(drawn) / legend_columns)
+    height = figure.get_figheight()
+    figure.tight_layout(rect=(0, legend_inches / height, 1, 1 - 0.3 / height))
+    if drawn:
+        figure.legend(handles=[plt.Line2D([], [], **look[method]) for method in drawn], loc="lower center",
+                      ncol=legend_columns, fontsize=9, frameon=False)
+    figure.suptitle(", ".join(dict.fromkeys(str(line.get("bench", "")) for line in lines)), fontsize=12)
+    out = pathlib.Path(sys.argv[2])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(out, dpi=110)
+    print(out)
+
+
+if __name__ == "__main__":
+    main()
