@@ -64,7 +64,8 @@ endmacro()
 macro(_echorama_add_classes name)
   vtk_module_add_module(Echorama::${name} CLASSES ${room_CLASSES})
   vtk_module_link(Echorama::${name} PUBLIC Echorama::${name}Kernels PRIVATE ${room_VTK_LIBRARIES})
-  # Classes may lie in subfolders (Core/Pipeline); they are included by their bare names all the same.
+  # Classes may lie in subfolders (Core/Pipeline); they are included by their bare names all the same. Installed, they lie in
+  # one folder.
   set(directories)
   foreach(class IN LISTS room_CLASSES)
     get_filename_component(directory ${class} DIRECTORY)
@@ -72,8 +73,7 @@ macro(_echorama_add_classes name)
   endforeach()
   list(REMOVE_DUPLICATES directories)
   foreach(directory IN LISTS directories)
-    vtk_module_include(Echorama::${name} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/${directory}>
-      $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama/${directory}>)
+    vtk_module_include(Echorama::${name} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/${directory}>)
   endforeach()
   _vtk_module_real_target(module_target Echorama::${name})
   echorama_compile_options(${module_target})

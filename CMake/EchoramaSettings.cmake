@@ -11,8 +11,9 @@ set(BUILD_SHARED_LIBS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
 set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
-# Installed libraries find each other wherever the tree is put: kernels lie in lib, the plugin below it.
-set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/..;$ORIGIN/../../..;$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+# Installed libraries find each other wherever the tree is put: kernels lie in lib, the plugin below it, programs in bin, the
+# Python package in python3/dist-packages/echorama.
+set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/..;$ORIGIN/../../..;$ORIGIN/../${CMAKE_INSTALL_LIBDIR};$ORIGIN/../../../${CMAKE_INSTALL_LIBDIR}")
 
 find_program(ECHORAMA_CCACHE ccache)
 if(ECHORAMA_CCACHE)

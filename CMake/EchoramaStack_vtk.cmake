@@ -1,9 +1,10 @@
 # The VTK 9.1 stack: kernels, modules, Python package, programs, installation.
-find_package(VTK 9.1 REQUIRED COMPONENTS
+set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks for the same
   CommonCore CommonDataModel CommonExecutionModel CommonTransforms CommonMath CommonSystem CommonColor CommonMisc
   FiltersCore FiltersGeneral FiltersSources IOCore IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
-  RenderingVolumeOpenGL2 RenderingImage Python WrappingPythonCore WrappingTools)
+  RenderingVolumeOpenGL2 RenderingImage)
+find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} Python WrappingPythonCore WrappingTools)
 include(EchoramaDependencies)
 set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH
 set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages)
