@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The fan and the sweep are the same map, used twice: (beam, depth) to a point (x, rho) of the fan's plane, then (plane of
 // the sweep, rho) to (y, z). Written with the radius, the map loses all digits as a face becomes flat (the centre moves
-// to infinity); written with the curvature, as it becomes a point. So each is used where its number is at most 1, and the
-// depth in the curved form is (h^2 - 1) / (k (h + 1)) with the 1 cancelled by hand, h being the distance from the centre
-// in radii.
+// to infinity); written with the curvature, as it becomes a point. So the curvature is a quotient c / u with neither
+// above 1. From the centre of curvature, in units of the radius times u, a point lies at (c x, u + c z), and its distance
+// h = hypot(c x, u + c z) gives the depth (h - u) / c = (h^2 - u^2) / (c (h + u)), in which c cancels by hand.
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
@@ -14,18 +14,12 @@ namespace {
 
 constexpr double twoPi = 6.283185307179586;
 
-// A face that bends by less is straight to all digits, and dividing by its angle could underflow.
+// A face that bends by less is straight to all digits, and dividing by its angle would lose some.
 constexpr double straight = 1e-100;
 
 double Sinc(double a)
 {
   return a == 0.0 ? 1.0 : std::sin(a) / a;
-}
-
-// The lengths of a geometry are small or large beside this, mm.
-double SizeOf(const ProbeGeometry& g)
-{
-  return std::abs(g.depthMin) + std::abs(g.depthMax) + g.fanWidth + g.sweepWidth;
 }
 
 // Clamps a place to the face; false when it is further than \a slack mm off it.
@@ -45,22 +39,23 @@ Eigen::Vector2d ProbeArc::PointOf(const Place& place) const
   return {arc * Sinc(turn) + place.depth * std::sin(turn), -arc * std::sin(half) * Sinc(half) + place.depth * std::cos(turn)};
 }
 
+ProbeArc::Bend ProbeArc::GetBend() const
+{
+  if (width > angle)
+    return {angle / width, 1.0};
+  return {1.0, angle > 0.0 ? width / angle : 0.0};
+}
+
 ProbeArc::Place ProbeArc::PlaceOf(double across, double outward, bool behind) const
 {
-  const double side = behind ? -1.0 : 1.0;
-  if (width > angle) {
-    const double k = angle / width;
-    const double a = k * across, b = 1.0 + k * outward, h = std::hypot(a, b);
-    Place place;
-    place.along = angle < straight ? across / width : std::atan2(side * a, side * b) / angle;
-    place.depth = behind ? -(h + 1.0) / k : (k * across * across + (2.0 + k * outward) * outward) / (1.0 + h);
-    return place;
-  }
-  if (angle == 0.0) // neither angle nor width: a single normal
-    return {0.0, outward};
-  const double radius = width / angle;
-  const double h = std::hypot(across, radius + outward);
-  return {std::atan2(side * across, side * (radius + outward)) / angle, side * h - radius};
+  if (angle < straight)
+    return {width > 0.0 ? across / width : 0.0, outward};
+  const auto [c, u] = GetBend();
+  const double a = c * across, b = u + c * outward, h = std::hypot(a, b);
+  if (behind)
+    return {std::atan2(-a, -b) / angle, -(h + u) / c};
+  const double depth = h + u > 0.0 ? (a * across + (u + b) * outward) / (h + u) : 0.0;
+  return {std::atan2(a, b) / angle, depth};
 }
 
 ProbeGeometry ProbeGeometry::Convex(double fanAngle, double fanRadius, double sweepAngle, double sweepRadius, double depthMin,
@@ -77,6 +72,22 @@ ProbeGeometry ProbeGeometry::Linear(double fanWidth, double sweepWidth, double d
 ProbeGeometry ProbeGeometry::Phased(double fanAngle, double sweepAngle, double depthMin, double depthMax)
 {
   return {fanAngle, 0.0, sweepAngle, 0.0, depthMin, depthMax};
+}
+
+bool ProbeGeometry::IsPlane() const
+{
+  return sweepWidth == 0.0 && sweepAngle < straight;
+}
+
+bool ProbeGeometry::ReachesBehindAxis() const
+{
+  const double lowest = std::min(Fan().PointOf({0.5, depthMin}).y(), Fan().PointOf({0.5, depthMax}).y());
+  return Sweep().Span(lowest) < -1e-9 * Size(); // a fan that ends on the axis does not
+}
+
+double ProbeGeometry::Size() const
+{
+  return std::abs(depthMin) + std::abs(depthMax) + fanWidth + sweepWidth;
 }
 
 void ProbeGeometry::Check() const
@@ -97,17 +108,13 @@ void ProbeGeometry::Check() const
   if (!std::isfinite(depthMin) || !std::isfinite(depthMax) || !(depthMax > depthMin))
     fail("the depths go from " + std::to_string(depthMin) + " to " + std::to_string(depthMax) +
          " mm; the last must be greater than the first");
-  if (fanAngle == 0.0 && fanWidth == 0.0)
+  if (fanWidth == 0.0 && fanAngle < straight)
     fail("angle and width of the fan are both 0; that leaves a single beam");
-  const double slack = 1e-9 * SizeOf(*this);
-  if (Fan().Span(depthMin) < -slack)
+  if (Fan().Span(depthMin) < -1e-9 * Size())
     fail("the first depth, " + std::to_string(depthMin) + " mm, lies behind the centre of the fan's arc, where beams cross");
   // Below half a turn the plane that reaches a point is told by its angle alone.
-  if (sweepAngle >= 0.5 * twoPi) {
-    const double lowest = std::min(Fan().PointOf({0.5, depthMin}).y(), Fan().PointOf({0.5, depthMax}).y());
-    if (Sweep().Span(lowest) < -slack)
-      fail("the fan reaches behind the sweep axis and the sweep is half a turn or more, so that beams cross");
-  }
+  if (sweepAngle >= 0.5 * twoPi && ReachesBehindAxis())
+    fail("the fan reaches behind the sweep axis and the sweep is half a turn or more, so that beams cross");
 }
 
 Eigen::Vector3d PointOf(const ProbeGeometry& geometry, const BeamPoint& beam)
@@ -128,12 +135,10 @@ std::optional<BeamPoint> BeamPointAt(const ProbeGeometry& geometry, const Eigen:
   if (!point.allFinite())
     return {};
   const ProbeArc fan = geometry.Fan(), sweep = geometry.Sweep();
-  const double slack = tolerance * SizeOf(geometry);
+  const double slack = tolerance * geometry.Size();
   if (geometry.IsPlane() && std::abs(point.y()) > slack)
     return {};
   for (const bool behind : {false, true}) {
-    if (behind && geometry.sweepAngle < straight)
-      break;
     ProbeArc::Place plane = sweep.PlaceOf(point.y(), point.z(), behind);
     if (!ClampToFace(sweep, plane, slack))
       continue;

@@ -34,6 +34,13 @@ struct ProbeArc {
   /// middle of the face. \a along is not limited to [-0.5, 0.5].
   Place PlaceOf(double across, double outward, bool behind = false) const;
 
+  /// The curvature angle / width as a quotient of two numbers of which the greater is 1: (curvature, 1) of a face with a
+  /// radius above 1 mm, (1, radius) of one below, so that neither a flat face nor a point is infinite.
+  struct Bend {
+    double curvature = 0.0, unit = 1.0;
+  };
+  Bend GetBend() const;
+
   /// How many mm a whole unit of \a along is at this depth; negative behind the centre of curvature.
   double Span(double depth) const { return width + angle * depth; }
 };
@@ -65,7 +72,13 @@ struct ProbeGeometry {
   ProbeArc Sweep() const { return {sweepAngle, sweepWidth}; }
 
   /// Whether the sweep is a single plane (angle and width 0): a 2D image in the plane y = 0.
-  bool IsPlane() const { return sweepAngle == 0.0 && sweepWidth == 0.0; }
+  bool IsPlane() const;
+
+  /// Whether the fan reaches behind the sweep axis, so that a plane of the sweep finds some of its samples on the other side.
+  bool ReachesBehindAxis() const;
+
+  /// The sum of depths and widths, mm: what tolerances are relative to.
+  double Size() const;
 
   /// Throws Error(InvalidParameter) naming the field that is out of range; also when angle and width of the fan are both
   /// 0, and when two beams could reach one point from opposite sides of the sweep axis, so that the inverse has no single
