@@ -52,6 +52,12 @@ struct ImageHeader {
 /// \throws Error(FileSystem) as FormatOfContent, Error(BadFile) that names the file and the line or field.
 ImageHeader ReadImageHeader(const std::string& path);
 
+/// Checks the numbers of a .vti file that say where its voxels lie (Origin, Spacing, Direction): VTK's parser silently puts
+/// others in the place of those that it cannot read.
+/// \returns notes on those that are missing
+/// \throws Error(BadFile) when there is no ImageData element, or a number is missing or not finite.
+std::vector<std::string> CheckVtkXmlGeometry(const std::string& path);
+
 /// The header of a file with these voxels, up to and including the last byte before them.
 /// \param dataFile the detached data file as it shall be named, or empty when the voxels follow in the same file
 /// \param compressedSizeAt where the size of the compressed voxels is to be put (20 characters), 0 when nowhere

@@ -38,11 +38,12 @@ double FreeMemory()
   return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
 }
 
-std::uint64_t SizeOfFile(const std::string& path)
+std::uint64_t SizeOfData(const ImageHeader& header)
 {
+  const std::string& path = header.dataPath;
   std::error_code error;
   if (!fs::exists(path, error))
-    throw Error(Error::Kind::FileSystem, path + ": there is no such file, though the header names it");
+    throw Error(Error::Kind::FileSystem, path + ": there is no such file, though " + header.path + " names it");
   if (!fs::is_regular_file(path, error))
     throw Error(Error::Kind::FileSystem, path + ": it is not a plain file");
   const std::uintmax_t size = fs::file_size(path, error);
@@ -149,7 +150,7 @@ void CheckVolume(const ImageHeader& header)
     throw Error(Error::Kind::BadFile, error.what());
   }
   const double voxels = static_cast<double>(header.geometry.VoxelCount()), bytes = voxels * static_cast<double>(SizeOf(header.type));
-  const std::uint64_t fileBytes = SizeOfFile(header.dataPath);
+  const std::uint64_t fileBytes = SizeOfData(header);
   const std::uint64_t offset = static_cast<std::uint64_t>(std::max<std::int64_t>(0, header.dataOffset));
   const double there = fileBytes > offset ? static_cast<double>(fileBytes - offset) : 0.0;
   const std::string says = "its dimensions (" + DimensionsText(header.geometry) + ") need " + NumberText(bytes) + " bytes";

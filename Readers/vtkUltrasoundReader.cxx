@@ -127,6 +127,7 @@ private:
 // Reads what a .vti file says of itself, and refuses sizes that cannot be.
 echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string& path)
 {
+  echorama::CheckVtkXmlGeometry(path);
   reader->SetFileName(path.c_str());
   const Complaints complaints(reader);
   reader->UpdateInformation();
@@ -304,6 +305,7 @@ void vtkUltrasoundReader::ReadXml(vtkImageData* output)
   const auto fail = [&path](const std::string& reason) { throw Error(Error::Kind::BadFile, path + ": " + reason); };
   const vtkNew<vtkXMLImageDataReader> reader;
   OpenXml(reader, path);
+  this->Notes = echorama::CheckVtkXmlGeometry(path);
   {
     const Complaints complaints(reader);
     reader->Update();
@@ -317,16 +319,16 @@ void vtkUltrasoundReader::ReadXml(vtkImageData* output)
   output->GetFieldData()->RemoveArray("TimeValue");
 
   vtkPointData* arrays = output->GetPointData();
-  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output);
-  for (int i = 0; !intensity && i < arrays->GetNumberOfArrays(); ++i)
+  const auto isIntensity = [](vtkDataArray* array) {
+    const std::string name = array && array->GetName() ? array->GetName() : "";
+    return array && name != vtkUltrasoundVolume::ValidRegionName() && name != vtkUltrasoundVolume::ProvenanceName();
+  };
+  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output); // the array of that name, else the active one
+  for (int i = 0; !isIntensity(intensity) && i < arrays->GetNumberOfArrays(); ++i)
   {
-    const std::string name = arrays->GetArrayName(i) ? arrays->GetArrayName(i) : "";
-    if (name != vtkUltrasoundVolume::ValidRegionName() && name != vtkUltrasoundVolume::ProvenanceName())
-    {
-      intensity = arrays->GetArray(i);
-    }
+    intensity = arrays->GetArray(i);
   }
-  if (!intensity)
+  if (!isIntensity(intensity))
   {
     fail("it has no point array that could be the intensities");
   }

@@ -1,0 +1,293 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""vtkUltrasoundWriter: what is written comes back, VTK's own readers agree, and a failure leaves what was there."""
+import math
+import os
+import resource
+import signal
+import tempfile
+import unittest
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkLogger, vtkStringArray, vtkTypeUInt64Array
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkIOImage import vtkMetaImageReader, vtkNrrdReader
+
+from echorama import vtkUltrasoundReader, vtkUltrasoundWriter
+
+extensions = ["mha", "mhd", "nrrd", "nhdr", "vti"]
+c, s = math.cos(0.3), math.sin(0.3)
+oblique = [0, -1, 0, c, 0, s, -s, 0, c]  # a rotation, row by row
+
+
+def array(image, name, values):
+    data = numpy_to_vtk(np.ascontiguousarray(values).ravel(), deep=True)
+    data.SetName(name)
+    image.GetPointData().AddArray(data)
+    return data
+
+
+def field(image, name, values, kind=vtkDoubleArray):
+    data = kind()
+    data.SetName(name)
+    if kind is vtkDoubleArray:
+        data.SetNumberOfComponents(len(values))
+        data.InsertNextTuple(values)
+    else:
+        for value in values:
+            data.InsertNextValue(value)
+    image.GetFieldData().AddArray(data)
+
+
+def volume(dtype=np.uint8, dims=(5, 4, 3)):
+    image = vtkImageData()
+    image.SetDimensions(dims)
+    image.SetSpacing(0.1, 1 / 3, 0.7)
+    image.SetOrigin(1 / 3, -1e5 / 7, 1e-3)
+    image.SetDirectionMatrix(oblique)
+    random = np.random.default_rng(1)
+    count = int(np.prod(dims))
+    array(image, "Intensity", random.integers(0, 100, count).astype(dtype))
+    image.GetPointData().SetActiveScalars("Intensity")
+    return image
+
+
+class Writer(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.messages = []
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def files(self):
+        return sorted(os.listdir(self.folder.name))
+
+    def writer(self, name, image=None, compress=True):
+        writer = vtkUltrasoundWriter()
+        self.messages = []
+
+        def note(_, __, text):
+            self.messages.append(text)
+        note.CallDataType = "string0"
+        writer.AddObserver("ErrorEvent", note)
+        writer.AddObserver("WarningEvent", note)
+        writer.SetFileName(self.path(name))
+        writer.SetUseCompression(compress)
+        if image:
+            writer.SetInputData(image)
+        return writer
+
+    def write(self, name, image, compress=True):
+        writer = self.writer(name, image, compress)
+        self.assertEqual(writer.Write(), 1, self.messages)
+        return writer.GetNotes()
+
+    def read(self, name):
+        reader = vtkUltrasoundReader()
+        reader.SetFileName(self.path(name))
+        reader.Update()
+        return reader.GetOutput(), reader.GetNotes()
+
+    @staticmethod
+    def values(image, name):
+        return vtk_to_numpy(image.GetPointData().GetArray(name))
+
+    def test_everything_comes_back(self):
+        probe_to_world = [1 / 3, *np.random.default_rng(2).normal(size=15)]
+        scene = 'two "lines"\nand a \\ at the end \\ '
+        for extension in extensions:
+            for compress in [True, False]:
+                with self.subTest(extension=extension, compress=compress):
+                    image = volume(np.float32)
+                    mask = (np.arange(60) % 3 != 0).astype(np.uint8)
+                    array(image, "ValidRegion", mask)
+                    array(image, "Provenance", np.arange(60, dtype=np.int16))
+                    field(image, "ProbeToWorld", probe_to_world)
+                    field(image, "ProbeGeometry", [70.1, 0.1, 60, 12, 1 / 3, 120])
+                    field(image, "TimeStamp", [1700000000.123456])
+                    field(image, "Seed", [2**64 - 3], vtkTypeUInt64Array)
+                    field(image, "Scene", [scene], vtkStringArray)
+                    field(image, "Modality", ["MET_MOD_US"], vtkStringArray)
+                    name = "a." + extension
+                    self.assertEqual(self.write(name, image, compress), "")
+                    back, notes = self.read(name)
+                    self.assertEqual(notes, "")
+                    self.assertEqual(back.GetDimensions(), (5, 4, 3))
+                    self.assertEqual(back.GetOrigin(), image.GetOrigin())
+                    direction = [back.GetDirectionMatrix().GetData()[i] for i in range(9)]
+                    if extension in ("nrrd", "nhdr"):  # these store the product of both
+                        np.testing.assert_allclose(back.GetSpacing(), image.GetSpacing(), rtol=1e-15)
+                        np.testing.assert_allclose(direction, oblique, atol=1e-15)
+                    else:
+                        self.assertEqual(back.GetSpacing(), image.GetSpacing())
+                        self.assertEqual(direction, oblique)
+                    for array_name in ["Intensity", "ValidRegion", "Provenance"]:
+                        wanted, got = self.values(image, array_name), self.values(back, array_name)
+                        self.assertEqual(wanted.dtype, got.dtype)
+                        self.assertTrue((wanted == got).all())
+                    fields = back.GetFieldData()
+                    self.assertEqual([fields.GetArray("ProbeToWorld").GetComponent(0, i) for i in range(16)], probe_to_world)
+                    self.assertEqual(fields.GetArray("ProbeGeometry").GetComponent(0, 0), 70.1)
+                    self.assertEqual(fields.GetArray("TimeStamp").GetValue(0), 1700000000.123456)
+                    self.assertEqual(fields.GetArray("Seed").GetValue(0), 2**64 - 3)
+                    self.assertEqual(fields.GetAbstractArray("Scene").GetValue(0), scene)
+                    self.assertEqual(fields.GetAbstractArray("Modality").GetValue(0), "MET_MOD_US")
+                    self.assertEqual(fields.GetNumberOfArrays(), 6)
+
+    def test_every_type_of_number(self):
+        for extension in extensions:
+            for dtype in [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, np.float32, np.float64]:
+                with self.subTest(extension=extension, dtype=dtype):
+                    image = volume(dtype)
+                    self.write("a." + extension, image)
+                    back, _ = self.read("a." + extension)
+                    self.assertTrue((self.values(back, "Intensity") == self.values(image, "Intensity")).all())
+                    self.assertEqual(self.values(back, "Intensity").dtype, dtype)
+
+    def test_the_valid_region_comes_back_whatever_it_is(self):
+        zeros = np.zeros(60, np.uint8)
+        some = np.array([0, 1] * 30, np.uint8)
+        ones = np.ones(60, np.uint8)
+        for intensity in [zeros, some, ones]:
+            for mask in [None, zeros, some, ones]:
+                image = volume()
+                array(image, "Intensity", intensity)
+                if mask is not None:
+                    array(image, "ValidRegion", mask)
+                self.write("a.mha", image)
+                back, _ = self.read("a.mha")
+                wanted = ones if mask is None else mask
+                self.assertTrue((self.values(back, "ValidRegion") == wanted).all())
+        self.assertEqual(self.files(), ["a.mha"], "all ones over all ones needs no second file")
+
+    def test_files_of_an_earlier_volume_do_not_stay(self):
+        image = volume()
+        array(image, "ValidRegion", np.zeros(60, np.uint8))
+        array(image, "Provenance", np.zeros(60, np.uint8))
+        self.write("a.nrrd", image)
+        self.assertEqual(self.files(), ["a.Provenance.nrrd", "a.ValidRegion.nrrd", "a.nrrd"])
+        later = volume()
+        array(later, "Intensity", np.ones(60, np.uint8))
+        self.write("a.nrrd", later)
+        self.assertEqual(self.files(), ["a.nrrd"])
+
+    def test_vtk_reads_the_same_voxels(self):
+        for extension, reader, compress in [("mha", vtkMetaImageReader(), True), ("mha", vtkMetaImageReader(), False),
+                                            ("mhd", vtkMetaImageReader(), True), ("mhd", vtkMetaImageReader(), False),
+                                            ("nrrd", vtkNrrdReader(), False), ("nhdr", vtkNrrdReader(), False)]:
+            with self.subTest(extension=extension, compress=compress):
+                image = volume(np.int16, (50, 40, 30))
+                field(image, "ProbeToWorld", [1 / 3] * 16)
+                self.write("b." + extension, image, compress)
+                reader.SetFileName(self.path("b." + extension))
+                reader.Update()
+                theirs = reader.GetOutput()
+                self.assertEqual(theirs.GetDimensions(), (50, 40, 30))
+                np.testing.assert_allclose(theirs.GetSpacing(), image.GetSpacing(), rtol=1e-5)
+                np.testing.assert_allclose(theirs.GetOrigin(), image.GetOrigin(), rtol=1e-5)
+                self.assertTrue((vtk_to_numpy(theirs.GetPointData().GetScalars()) == self.values(image, "Intensity")).all())
+
+    def test_extents_are_folded_into_the_origin(self):
+        image = volume()
+        image.SetExtent(10, 14, -3, 0, 7, 9)
+        for extension in extensions:
+            self.write("a." + extension, image)
+            back, _ = self.read("a." + extension)
+            self.assertEqual(back.GetExtent(), (0, 4, 0, 3, 0, 2))
+            first, same = [0] * 3, [0] * 3
+            image.TransformIndexToPhysicalPoint(10, -3, 7, first)
+            back.TransformIndexToPhysicalPoint(0, 0, 0, same)
+            np.testing.assert_allclose(same, first, rtol=1e-14)
+
+    def test_2d_images(self):
+        image = volume(np.uint8, (6, 5, 1))
+        for extension in extensions:
+            self.write("a." + extension, image)
+            back, _ = self.read("a." + extension)
+            self.assertEqual(back.GetDimensions(), (6, 5, 1))
+            self.assertTrue((self.values(back, "Intensity") == self.values(image, "Intensity")).all())
+
+    def test_what_cannot_be_held_is_said(self):
+        image = volume()
+        array(image, "Elasticity", np.zeros(60))
+        field(image, "Numbers", [1.0, 2.0])
+        field(image, "Story", ["two\nlines"], vtkStringArray)
+        for extension in extensions[:4]:
+            notes = self.write("a." + extension, image)
+            for name in ["Elasticity", "Numbers", "Story"]:
+                self.assertIn(name, notes)
+            self.assertIn("Elasticity", " ".join(self.messages))
+        self.assertEqual(self.write("a.vti", image), "")
+        back, _ = self.read("a.vti")
+        self.assertIsNotNone(back.GetPointData().GetArray("Elasticity"))
+        self.assertIsNotNone(back.GetFieldData().GetArray("Numbers"))
+
+    def refused(self, writer, *words):
+        before = self.files()
+        self.assertEqual(writer.Write(), 0)
+        message = " ".join(self.messages)
+        for word in words:
+            self.assertIn(word, message)
+        self.assertEqual(self.files(), before)
+
+    def test_what_is_refused(self):
+        self.refused(self.writer("a.png", volume()), "a.png", ".mha")
+        self.refused(self.writer("missing/a.mha", volume()), "missing", "folder")
+        os.mkdir(self.path("folder.mha"))
+        self.refused(self.writer("folder.mha", volume()), "folder.mha", "plain file")
+        writer = self.writer("a.mha", volume())
+        writer.SetFileName(None)
+        self.refused(writer, "no file name")
+        image = volume()
+        image.SetSpacing(1, 0, 1)
+        self.refused(self.writer("a.mha", image), "spacing")
+        image = volume()
+        image.SetDirectionMatrix(1, 0.5, 0, 0, 1, 0, 0, 0, 1)
+        self.refused(self.writer("a.mha", image), "direction")
+        image = vtkImageData()
+        image.SetDimensions(2, 2, 2)
+        self.refused(self.writer("a.mha", image), "no intensities")
+        image.AllocateScalars(3, 3)
+        self.refused(self.writer("a.mha", image), "several numbers")
+
+    def test_a_failed_input_writes_nothing(self):
+        self.write("a.mha", volume())
+        reader = vtkUltrasoundReader()
+        reader.SetFileName(self.path("missing.mha"))
+        writer = self.writer("a.mha")
+        writer.SetInputConnection(reader.GetOutputPort())
+        self.assertEqual(writer.Write(), 0)
+        back, _ = self.read("a.mha")
+        self.assertEqual(back.GetNumberOfPoints(), 60)
+
+    def test_a_full_disk_leaves_what_was_there(self):
+        old = volume(np.uint8, (60, 60, 60))
+        new = volume(np.uint8, (60, 60, 60))
+        noise = np.random.default_rng(3).integers(0, 256, 216000).astype(np.uint8)
+        array(new, "Intensity", noise)
+        array(new, "ValidRegion", noise % 2)
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        for extension in extensions:
+            for compress in [True, False]:
+                with self.subTest(extension=extension, compress=compress):
+                    name = "a." + extension
+                    self.write(name, old)
+                    writer = self.writer(name, new, compress)
+                    resource.setrlimit(resource.RLIMIT_FSIZE, (150000, limits[1]))
+                    try:
+                        self.refused(writer, self.path("a."), "written")
+                    finally:
+                        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+                    back, _ = self.read(name)
+                    self.assertTrue((self.values(back, "Intensity") == self.values(old, "Intensity")).all())
+
+
+if __name__ == "__main__":
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # errors and warnings are expected here
+    unittest.main()

@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/NumberText.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Base/Random.h"
+#include "Readers/Compression.h"
+#include "Readers/Testing/TemporaryFolder.h"
+#include "Readers/VolumeFile.h"
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <zlib.h>
+
+using namespace echorama;
+using namespace echorama::testing;
+
+namespace {
+
+class VolumeFile : public TemporaryFolder {
+protected:
+  void Write(const std::string& name, const ImageHeader& header, const void* voxels, bool compress = true) const
+  {
+    FileReplacement files;
+    WriteVolume(Path(name), header, voxels, compress, files);
+    files.Commit();
+  }
+  template <class T>
+  std::vector<T> Read(const std::string& name) const
+  {
+    const ImageHeader header = ReadImageHeader(Path(name));
+    CheckVolume(header);
+    std::vector<T> voxels(header.geometry.VoxelCount());
+    EXPECT_EQ(header.ByteCount(), voxels.size() * sizeof(T));
+    ReadVoxels(header, voxels.data());
+    return voxels;
+  }
+};
+
+const VoxelType AllTypes[] = {VoxelType::Int8,   VoxelType::UInt8, VoxelType::Int16,  VoxelType::UInt16,  VoxelType::Int32,
+                              VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64, VoxelType::Float32, VoxelType::Float64};
+
+ImageHeader Oblique(VoxelType type)
+{
+  ImageHeader header;
+  header.type = type;
+  header.geometry.dimensions = {5, 4, 3};
+  header.geometry.origin = {1.0 / 3.0, -1e5 / 7.0, 1e-3};
+  header.geometry.spacing = {0.1, 1.0 / 3.0, 0.7};
+  header.geometry.direction = ExpRotation({0.3, -1.2, 2.0});
+  header.fields = {{"Echorama_TimeStamp", "0.1"}, {"Modality", "MET_MOD_US"}};
+  return header;
+}
+
+// Values of every size, the extremes of T and (for real numbers) NaN among them.
+template <class T>
+std::vector<T> Values(std::size_t count)
+{
+  Random random(5, sizeof(T));
+  std::vector<T> values(count);
+  for (T& value : values)
+    value = std::is_floating_point_v<T> ? static_cast<T>(random.Normal() * 1e3) : static_cast<T>(random.Bits());
+  values[0] = std::numeric_limits<T>::lowest();
+  values[1] = std::numeric_limits<T>::max();
+  if (std::is_floating_point_v<T>)
+    values[2] = std::numeric_limits<T>::quiet_NaN();
+  return values;
+}
+
+template <class T>
+bool SameBits(const std::vector<T>& a, const std::vector<T>& b)
+{
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+std::string Zlib(const std::string& plain)
+{
+  uLongf size = compressBound(static_cast<uLong>(plain.size()));
+  std::string packed(size, '\0');
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(plain.data()),
+           static_cast<uLong>(plain.size()));
+  packed.resize(size);
+  return packed;
+}
+
+} // namespace
+
+TEST_F(VolumeFile, EveryTypeFormatAndCompressionComesBack)
+{
+  for (const VoxelType type : AllTypes)
+    for (const char* name : {"a.mha", "a.mhd", "a.nrrd", "a.nhdr"})
+      for (const bool compressed : {true, false})
+        DispatchVoxelType(type, [&](auto zero) {
+          using T = decltype(zero);
+          SCOPED_TRACE(std::string(name) + (compressed ? " compressed " : " plain ") + std::to_string(static_cast<int>(type)));
+          const ImageHeader wanted = Oblique(type);
+          const std::vector<T> voxels = Values<T>(60);
+          Write(name, wanted, voxels.data(), compressed);
+          EXPECT_TRUE(SameBits(Read<T>(name), voxels));
+          const ImageHeader header = ReadImageHeader(Path(name));
+          EXPECT_EQ(header.type, type);
+          EXPECT_EQ(header.fields, wanted.fields);
+          EXPECT_TRUE(header.notes.empty());
+          EXPECT_EQ(header.geometry.dimensions, wanted.geometry.dimensions);
+          EXPECT_EQ(header.geometry.origin, wanted.geometry.origin);
+          if (header.format == FileFormat::MetaImage) {
+            EXPECT_EQ(header.geometry.spacing, wanted.geometry.spacing);
+            EXPECT_EQ(header.geometry.direction, wanted.geometry.direction);
+          } else { // NRRD stores their product
+            EXPECT_LT((header.geometry.spacing - wanted.geometry.spacing).norm(), 1e-15);
+            EXPECT_LT((header.geometry.direction - wanted.geometry.direction).norm(), 1e-15);
+          }
+        });
+}
+
+TEST_F(VolumeFile, BothByteOrdersOfEveryType)
+{
+  const char* metaNames[] = {"MET_CHAR", "MET_UCHAR",     "MET_SHORT",      "MET_USHORT", "MET_INT",
+                             "MET_UINT", "MET_LONG_LONG", "MET_ULONG_LONG", "MET_FLOAT",  "MET_DOUBLE"};
+  const char* nrrdNames[] = {"signed char", "uchar",         "short",  "unsigned short int", "int32_t",
+                             "uint",        "long long int", "uint64", "float",              "double"};
+  for (const VoxelType type : AllTypes)
+    for (const bool big : {true, false})
+      DispatchVoxelType(type, [&](auto zero) {
+        using T = decltype(zero);
+        const std::vector<T> voxels = Values<T>(8);
+        std::string bytes;
+        for (const T value : voxels) {
+          char one[sizeof(T)];
+          std::memcpy(one, &value, sizeof(T));
+          if (big == (__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__))
+            std::reverse(one, one + sizeof(T));
+          bytes.append(one, sizeof(T));
+        }
+        const int t = static_cast<int>(type);
+        Put("a.mha", std::string("NDims = 3\nDimSize = 2 2 2\nElementType = ") + metaNames[t] +
+                         "\nElementByteOrderMSB = " + (big ? "True" : "False") + "\nElementDataFile = LOCAL\n" + bytes);
+        EXPECT_TRUE(SameBits(Read<T>("a.mha"), voxels)) << metaNames[t] << big;
+        Put("a.nrrd", std::string("NRRD0001\ntype: ") + nrrdNames[t] + "\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: " +
+                          (big ? "big" : "little") + "\n\n" + bytes);
+        EXPECT_TRUE(SameBits(Read<T>("a.nrrd"), voxels)) << nrrdNames[t] << big;
+      });
+}
+
+TEST_F(VolumeFile, VoxelsMayLieElsewhere)
+{
+  const std::string bytes = "abcdefgh", meta = "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\n",
+                    nrrd = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\n";
+  const std::vector<char> wanted(bytes.begin(), bytes.end());
+  std::filesystem::create_directories(folder / "sub");
+  Put("sub/plain.raw", bytes);
+  Put("sub/late.raw", "12345" + bytes);
+  Put("sub/lines.raw", "one\ntwo\n12" + bytes);
+  Put("sub/late.gz", Zlib("12345" + bytes));
+  Put("a.mhd", meta + "ElementDataFile = sub/plain.raw\n");
+  EXPECT_EQ(Read<char>("a.mhd"), wanted);
+  Put("a.mhd", meta + "ElementDataFile = " + Path("sub/plain.raw"));
+  EXPECT_EQ(Read<char>("a.mhd"), wanted) << "an absolute path, no end of line";
+  Put("a.mhd", meta + "HeaderSize = 5\nElementDataFile = sub/late.raw\n");
+  EXPECT_EQ(Read<char>("a.mhd"), wanted);
+  Put("a.mhd", meta + "HeaderSize = -1\nElementDataFile = sub/late.raw\n");
+  EXPECT_EQ(Read<char>("a.mhd"), wanted);
+  Put("a.nhdr", nrrd + "encoding: raw\nline skip: 2\nbyte skip: 2\ndata file: sub/lines.raw\n");
+  EXPECT_EQ(Read<char>("a.nhdr"), wanted);
+  Put("a.nhdr", nrrd + "encoding: raw\nbyteskip: -1\ndatafile: sub/late.raw\n\n");
+  EXPECT_EQ(Read<char>("a.nhdr"), wanted);
+  Put("a.nhdr", nrrd + "encoding: gzip\nbyte skip: 5\ndata file: sub/late.gz\n");
+  EXPECT_EQ(Read<char>("a.nhdr"), wanted) << "bytes are skipped after decompression";
+}
+
+TEST_F(VolumeFile, VoxelsAsText)
+{
+  const std::string start = "NDims = 3\nDimSize = 2 2 1\nBinaryData = False\nElementType = ", local = "\nElementDataFile = LOCAL\n";
+  Put("a.mha", start + "MET_SHORT" + local + "1 -32768\n32767 4.0\n");
+  EXPECT_EQ(Read<short>("a.mha"), (std::vector<short>{1, -32768, 32767, 4}));
+  Put("a.nrrd", "NRRD0001\ntype: float\ndimension: 2\nsizes: 2 2\nencoding: ascii\n\n0.5 -1e3\nnan 7");
+  const std::vector<float> floats = Read<float>("a.nrrd");
+  EXPECT_EQ(floats[0], 0.5f);
+  EXPECT_EQ(floats[1], -1000.f);
+  EXPECT_TRUE(std::isnan(floats[2]));
+
+  const auto refused = [&](const std::string& type, const std::string& numbers, const std::string& words) {
+    const std::string path = Put("b.mha", start + type + local + numbers);
+    ExpectRefused([&] { Read<short>("b.mha"); }, Error::Kind::BadFile, path, words);
+  };
+  refused("MET_SHORT", "1 2 3", "characters can hold");
+  refused("MET_SHORT", "1000 2000 3000", "after 3 of 4");
+  refused("MET_SHORT", "1 2 3 4 5", "more numbers");
+  refused("MET_SHORT", "1 2 3 32768", "32768");
+  refused("MET_SHORT", "1 2 3 4.5", "4.5");
+  refused("MET_SHORT", "1 2 3 four", "four");
+}
+
+TEST_F(VolumeFile, CompressionIsOrdinaryAndIndependentOfThreads)
+{
+  // Several blocks, the last one shorter; runs and noise, so that blocks refer to their predecessors.
+  std::string plain;
+  Random random(3);
+  while (plain.size() < 5500000)
+    plain += random.Bits() % 2 ? std::string(random.Bits() % 300, 'a') : NumberText(random.Uniform());
+  for (const CompressedForm form : {CompressedForm::Zlib, CompressedForm::Gzip}) {
+    std::string packed[2];
+    for (const int threads : {1, 2}) {
+      const ThreadLimit limit(threads);
+      std::stringstream stream;
+      const std::uint64_t size = Compress(stream, form, plain.data(), plain.size());
+      packed[threads - 1] = stream.str();
+      EXPECT_EQ(size, packed[threads - 1].size());
+    }
+    EXPECT_EQ(packed[0], packed[1]);
+    EXPECT_LT(packed[0].size(), plain.size() / 2);
+    // zlib itself reads it in one go, checksum and all.
+    z_stream z{};
+    ASSERT_EQ(inflateInit2(&z, form == CompressedForm::Gzip ? 31 : 15), Z_OK);
+    std::string out(plain.size() + 1, '\0');
+    z.next_in = reinterpret_cast<Bytef*>(packed[0].data());
+    z.avail_in = static_cast<uInt>(packed[0].size());
+    z.next_out = reinterpret_cast<Bytef*>(out.data());
+    z.avail_out = static_cast<uInt>(out.size());
+    EXPECT_EQ(inflate(&z, Z_FINISH), Z_STREAM_END);
+    EXPECT_EQ(z.avail_in, 0u);
+    EXPECT_EQ(out.substr(0, z.total_out), plain);
+    inflateEnd(&z);
+    std::stringstream stream(packed[0]);
+    std::string back(plain.size(), '\0');
+    Decompress(stream, "test", 0, back.data(), back.size());
+    EXPECT_EQ(back, plain);
+  }
+  // A gzip file of two members.
+  std::stringstream two;
+  Compress(two, CompressedForm::Gzip, plain.data(), 1000);
+  Compress(two, CompressedForm::Gzip, plain.data() + 1000, 500);
+  std::string back(1500, '\0');
+  Decompress(two, "test", 0, back.data(), back.size());
+  EXPECT_EQ(back, plain.substr(0, 1500));
+}
+
+TEST_F(VolumeFile, DamagedCompressedDataAreRefused)
+{
+  const std::string start = "NDims = 3\nDimSize = 10 10 20\nElementType = MET_UCHAR\nCompressedData = True\nElementDataFile = LOCAL\n";
+  std::string plain;
+  Random random(11);
+  for (int i = 0; i < 2000; ++i)
+    plain.push_back(static_cast<char>(random.Bits()));
+  const std::string packed = Zlib(plain);
+  const auto refused = [&](const std::string& data, const std::string& words) {
+    const std::string path = Put("a.mha", start + data);
+    ExpectRefused([&] { Read<char>("a.mha"); }, Error::Kind::BadFile, path, words);
+  };
+  Put("a.mha", start + packed);
+  EXPECT_EQ(Read<char>("a.mha"), std::vector<char>(plain.begin(), plain.end()));
+  refused("", "compressed bytes can hold");
+  refused(packed.substr(0, 1), "compressed bytes can hold");
+  for (const std::size_t length : {std::size_t{2}, packed.size() / 2, packed.size() - 4, packed.size() - 1})
+    refused(packed.substr(0, length), "end early");
+  refused(Zlib(plain.substr(0, 1999)), "end early");
+  refused(Zlib(plain + "x"), "more than the dimensions say");
+  std::string damaged = packed;
+  damaged[damaged.size() - 2] = static_cast<char>(damaged[damaged.size() - 2] ^ 1);
+  refused(damaged, "damaged");
+  refused(plain, "damaged");
+  // Dimensions out of all proportion are refused before any memory is asked for.
+  const std::string path = Put("b.mha", "NDims = 3\nDimSize = 100000 100000 100000\nElementType = MET_DOUBLE\n"
+                                        "CompressedData = True\nElementDataFile = LOCAL\n" + packed);
+  ExpectRefused([&] { CheckVolume(ReadImageHeader(path)); }, Error::Kind::BadFile, path, "compressed bytes can hold");
+}
+
+TEST_F(VolumeFile, MoreThanTheMemoryIsRefused)
+{
+  ExpectRefused([] { CheckMemory("big.mha", 1e17); }, Error::Kind::TooLarge, "big.mha", "memory");
+  EXPECT_NO_THROW(CheckMemory("small.mha", 1e6));
+  // A sparse file holds what its header says, and still would not fit.
+  const std::string path = Put("a.mhd", "NDims = 3\nDimSize = 20000 20000 20000\nElementType = MET_UCHAR\nElementDataFile = a.raw\n");
+  Put("a.raw", "");
+  std::error_code error;
+  std::filesystem::resize_file(Path("a.raw"), 8000000000000u, error);
+  if (error)
+    GTEST_SKIP() << "this file system holds no sparse files of 8 TB";
+  ExpectRefused([&] { CheckVolume(ReadImageHeader(path)); }, Error::Kind::TooLarge, path, "memory");
+}
+
+TEST_F(VolumeFile, AFullDiskLeavesWhatWasThere)
+{
+  ImageHeader header;
+  header.geometry.dimensions = {100, 100, 100};
+  const std::vector<unsigned char> old(1000000, 7);
+  std::vector<unsigned char> fresh(1000000);
+  Random random(1);
+  for (unsigned char& value : fresh)
+    value = static_cast<unsigned char>(random.Bits());
+  for (const char* name : {"a.mha", "b.mhd", "c.nrrd", "d.nhdr"})
+    for (const bool compressed : {true, false}) {
+      SCOPED_TRACE(name);
+      Write(name, header, old.data(), compressed);
+      const int files = FileCount();
+      {
+        const FullDisk full(300000);
+        ExpectRefused([&] { Write(name, header, fresh.data(), compressed); }, Error::Kind::FileSystem, Path(name), "full");
+      }
+      EXPECT_EQ(FileCount(), files);
+      EXPECT_EQ(Read<unsigned char>(name), old);
+    }
+}
+
+TEST_F(VolumeFile, WhatCannotBeWritten)
+{
+  const std::vector<unsigned char> voxels(60);
+  const ImageHeader good = Oblique(VoxelType::UInt8);
+  const auto refused = [&](const std::string& name, const ImageHeader& header, Error::Kind kind, const std::string& words) {
+    ExpectRefused([&] { Write(name, header, voxels.data()); }, kind, Path(name), words);
+    EXPECT_EQ(FileCount(), 0);
+  };
+  refused("a.png", good, Error::Kind::InvalidParameter, ".mha");
+  refused("a", good, Error::Kind::InvalidParameter, ".mha");
+  refused("missing/a.mha", good, Error::Kind::FileSystem, "folder");
+  ImageHeader bad = good;
+  bad.geometry.direction.col(0) *= 2.0;
+  refused("a.mha", bad, Error::Kind::BadInput, "direction");
+  bad = good;
+  bad.fields.emplace_back("NDims", "2");
+  refused("a.nrrd", bad, Error::Kind::InvalidParameter, "NDims");
+}
+
+TEST_F(VolumeFile, StopsOnRequest)
+{
+  ImageHeader header;
+  header.geometry.dimensions = {256, 256, 600};
+  const std::vector<unsigned char> voxels(256 * 256 * 600, 3);
+  Write("a.mha", header, voxels.data());
+  const Progress stop([](double fraction) { return fraction < 0.4; });
+  std::vector<unsigned char> back(voxels.size());
+  EXPECT_THROW(ReadVoxels(ReadImageHeader(Path("a.mha")), back.data(), stop), Error);
+  {
+    FileReplacement files;
+    EXPECT_THROW(WriteVolume(Path("b.mha"), header, voxels.data(), true, files, stop), Error);
+    EXPECT_THROW(WriteVolume(Path("b.mha"), header, voxels.data(), false, files, stop), Error);
+  }
+  EXPECT_EQ(FileCount(), 1);
+}
+
+TEST_F(VolumeFile, CompanionsHaveTheNameInTheMiddle)
+{
+  EXPECT_EQ(CompanionPath("/x/a.b.mha", "ValidRegion"), "/x/a.b.ValidRegion.mha");
+  EXPECT_EQ(CompanionPath("a.nrrd", "Provenance"), "a.Provenance.nrrd");
+}
