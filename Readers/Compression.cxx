@@ -75,7 +75,8 @@ std::uint64_t Compress(std::ostream& stream, CompressedForm form, const void* in
                                         static_cast<double>(first + count) / static_cast<double>(blocks));
     ParallelFor(count, part, [&](std::ptrdiff_t i) {
       const std::uint64_t begin = static_cast<std::uint64_t>(first + i) * BlockBytes;
-      batch[static_cast<std::size_t>(i)] = CompressBlock(all, begin, std::min(begin + BlockBytes, bytes), first + i + 1 == blocks, form);
+      batch[static_cast<std::size_t>(i)] =
+          CompressBlock(all, begin, std::min(begin + BlockBytes, bytes), first + i + 1 == blocks, form);
     });
     for (std::ptrdiff_t i = 0; i < count; ++i) {
       const std::uint64_t begin = static_cast<std::uint64_t>(first + i) * BlockBytes;
@@ -114,7 +115,9 @@ void Decompress(std::istream& stream, const std::string& name, std::uint64_t ski
                        " bytes: the file is truncated or its dimensions are wrong");
     }
     // What is dropped comes first, then the voxels, then a byte that must not come.
-    const std::uint64_t room = skip > 0 ? std::min<std::uint64_t>(skip, dropped.size()) : bytes > 0 ? std::min(bytes, LargestPiece) : 1;
+    const std::uint64_t room = skip > 0    ? std::min<std::uint64_t>(skip, dropped.size())
+                               : bytes > 0 ? std::min(bytes, LargestPiece)
+                                           : 1;
     z.next_out = skip > 0 ? dropped.data() : bytes > 0 ? next : &beyond;
     z.avail_out = static_cast<uInt>(room);
     const int status = inflate(&z, Z_NO_FLUSH);

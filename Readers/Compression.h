@@ -19,7 +19,8 @@ enum class CompressedForm { Zlib, Gzip };
 /// Compresses \a bytes bytes at \a in to \a stream, in parallel. The result is one ordinary zlib or gzip stream that
 /// every reader takes; it does not depend on the number of threads.
 /// \returns the bytes written. Whether they arrived is for the caller to ask the stream.
-std::uint64_t Compress(std::ostream& stream, CompressedForm form, const void* in, std::uint64_t bytes, const Progress& progress = {});
+std::uint64_t Compress(std::ostream& stream, CompressedForm form, const void* in, std::uint64_t bytes,
+                       const Progress& progress = {});
 
 /// No deflate stream holds more than this many bytes per compressed byte.
 constexpr std::uint64_t LargestCompressionRatio = 1032;

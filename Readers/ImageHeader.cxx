@@ -77,7 +77,10 @@ FileFormat FormatOfName(const std::string& path)
   return extension == ".vti" ? FileFormat::VtkXmlImage : FileFormat::Unknown;
 }
 
-std::uint64_t ImageHeader::ByteCount() const { return geometry.VoxelCount() * components * SizeOf(type); }
+std::uint64_t ImageHeader::ByteCount() const
+{
+  return geometry.VoxelCount() * components * SizeOf(type);
+}
 
 ImageHeader ReadImageHeader(const std::string& path)
 {
@@ -146,7 +149,10 @@ bool HeaderLines::Next(std::string& line)
   return !line.empty();
 }
 
-void HeaderLines::Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, path_ + ": " + reason); }
+void HeaderLines::Fail(const std::string& reason) const
+{
+  throw Error(Error::Kind::BadFile, path_ + ": " + reason);
+}
 
 void HeaderLines::FailHere(const std::string& reason) const
 {
@@ -193,7 +199,8 @@ void PlaceAxes(ImageHeader& header, int axes)
     g.direction.col(2) = -g.direction.col(2);
     header.reverseSlices = g.dimensions[2] > 1;
     if (header.reverseSlices)
-      header.notes.push_back("the axes in the file are left-handed: the slices were taken in reverse, so that the pose is a rigid one");
+      header.notes.push_back(
+          "the axes in the file are left-handed: the slices were taken in reverse, so that the pose is a rigid one");
   }
 }
 

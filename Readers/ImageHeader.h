@@ -30,22 +30,22 @@ using HeaderField = std::pair<std::string, std::string>;
 struct ImageHeader {
   enum class Encoding { Raw, Zlib, Text };
 
-  std::string path;                  ///< the file that was asked for
+  std::string path; ///< the file that was asked for
   FileFormat format = FileFormat::Unknown;
-  ImageGeometry geometry;            ///< not yet checked: tracked sequences hold frames of 0 x 0 pixels
-  bool reverseSlices = false;        ///< the last axis runs backwards in the file
+  ImageGeometry geometry;     ///< not yet checked: tracked sequences hold frames of 0 x 0 pixels
+  bool reverseSlices = false; ///< the last axis runs backwards in the file
   VoxelType type = VoxelType::UInt8;
-  bool typeIsKnown = true;           ///< false: the file names a type that holds no numbers (MET_OTHER, block)
-  std::uint64_t components = 1;      ///< numbers per voxel
+  bool typeIsKnown = true;      ///< false: the file names a type that holds no numbers (MET_OTHER, block)
+  std::uint64_t components = 1; ///< numbers per voxel
   bool bigEndian = false;
   Encoding encoding = Encoding::Raw;
-  std::string dataPath;              ///< the file that holds the voxels; often \a path itself
-  std::int64_t dataOffset = 0;       ///< bytes before the voxels in that file; -1: they are its last bytes
-  std::uint64_t skipDecoded = 0;     ///< bytes to drop after decompression
-  std::vector<HeaderField> fields;   ///< everything else that the header holds, in its order
-  std::vector<std::string> notes;    ///< what was missing and assumed, or lost: sentences for people
+  std::string dataPath;            ///< the file that holds the voxels; often \a path itself
+  std::int64_t dataOffset = 0;     ///< bytes before the voxels in that file; -1: they are its last bytes
+  std::uint64_t skipDecoded = 0;   ///< bytes to drop after decompression
+  std::vector<HeaderField> fields; ///< everything else that the header holds, in its order
+  std::vector<std::string> notes;  ///< what was missing and assumed, or lost: sentences for people
 
-  std::uint64_t ByteCount() const;   ///< of the voxels; the geometry must have been checked
+  std::uint64_t ByteCount() const; ///< of the voxels; the geometry must have been checked
 };
 
 /// Reads the header of a MetaImage or NRRD file; the voxels are not touched.

@@ -19,22 +19,43 @@ struct TypeName {
 };
 // The first name of each type is the one that we write.
 constexpr TypeName TypeNames[] = {
-    {"MET_CHAR", VoxelType::Int8},         {"MET_UCHAR", VoxelType::UInt8},  {"MET_SHORT", VoxelType::Int16},
-    {"MET_USHORT", VoxelType::UInt16},     {"MET_INT", VoxelType::Int32},    {"MET_UINT", VoxelType::UInt32},
-    {"MET_LONG", VoxelType::Int32},        {"MET_ULONG", VoxelType::UInt32}, {"MET_LONG_LONG", VoxelType::Int64},
+    {"MET_CHAR", VoxelType::Int8},         {"MET_UCHAR", VoxelType::UInt8},   {"MET_SHORT", VoxelType::Int16},
+    {"MET_USHORT", VoxelType::UInt16},     {"MET_INT", VoxelType::Int32},     {"MET_UINT", VoxelType::UInt32},
+    {"MET_LONG", VoxelType::Int32},        {"MET_ULONG", VoxelType::UInt32},  {"MET_LONG_LONG", VoxelType::Int64},
     {"MET_ULONG_LONG", VoxelType::UInt64}, {"MET_FLOAT", VoxelType::Float32}, {"MET_DOUBLE", VoxelType::Float64}};
 
 // Older names of a key, and the name under which we keep it.
-const std::map<std::string, std::string> Synonyms = {
-    {"Position", "Offset"},          {"Origin", "Offset"},           {"Rotation", "TransformMatrix"},
-    {"Orientation", "TransformMatrix"}, {"ElementByteOrderMSB", "BinaryDataByteOrderMSB"}};
+const std::map<std::string, std::string> Synonyms = {{"Position", "Offset"},
+                                                     {"Origin", "Offset"},
+                                                     {"Rotation", "TransformMatrix"},
+                                                     {"Orientation", "TransformMatrix"},
+                                                     {"ElementByteOrderMSB", "BinaryDataByteOrderMSB"}};
 
 // The keys that say what and where the voxels are. They are not passed on: the geometry holds what they say.
-const std::set<std::string> OwnKeys = {
-    "ObjectType", "ObjectSubType", "NDims", "BinaryData", "BinaryDataByteOrderMSB", "CompressedData", "CompressedDataSize",
-    "TransformMatrix", "Offset", "CenterOfRotation", "AnatomicalOrientation", "ElementSpacing", "ElementSize", "DimSize",
-    "ElementType", "ElementNumberOfChannels", "HeaderSize", "DistanceUnits", "Kinds", "ElementMin", "ElementMax",
-    "ElementToIntensityFunctionSlope", "ElementToIntensityFunctionOffset", "ElementDataFile"};
+const std::set<std::string> OwnKeys = {"ObjectType",
+                                       "ObjectSubType",
+                                       "NDims",
+                                       "BinaryData",
+                                       "BinaryDataByteOrderMSB",
+                                       "CompressedData",
+                                       "CompressedDataSize",
+                                       "TransformMatrix",
+                                       "Offset",
+                                       "CenterOfRotation",
+                                       "AnatomicalOrientation",
+                                       "ElementSpacing",
+                                       "ElementSize",
+                                       "DimSize",
+                                       "ElementType",
+                                       "ElementNumberOfChannels",
+                                       "HeaderSize",
+                                       "DistanceUnits",
+                                       "Kinds",
+                                       "ElementMin",
+                                       "ElementMax",
+                                       "ElementToIntensityFunctionSlope",
+                                       "ElementToIntensityFunctionOffset",
+                                       "ElementDataFile"};
 
 class Values {
 public:
@@ -182,7 +203,8 @@ void ParseMetaImage(ImageHeader& header)
 std::string MetaImageHeaderText(const ImageHeader& header, const std::string& dataFile, std::size_t& compressedSizeAt)
 {
   const ImageGeometry& g = header.geometry;
-  const auto type = std::find_if(std::begin(TypeNames), std::end(TypeNames), [&](const TypeName& t) { return t.type == header.type; });
+  const auto type =
+      std::find_if(std::begin(TypeNames), std::end(TypeNames), [&](const TypeName& t) { return t.type == header.type; });
   const bool compressed = header.encoding == ImageHeader::Encoding::Zlib;
   std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = ";
   text += header.bigEndian ? "True\n" : "False\n";
@@ -196,7 +218,8 @@ std::string MetaImageHeaderText(const ImageHeader& header, const std::string& da
   text += "TransformMatrix = " + Joined(g.direction.data(), 9) + "\n"; // Eigen stores columns: axis after axis
   text += "Offset = " + Joined(g.origin.data(), 3) + "\nCenterOfRotation = 0 0 0\n";
   text += "ElementSpacing = " + Joined(g.spacing.data(), 3) + "\n";
-  text += "DimSize = " + NumberText(g.dimensions[0]) + " " + NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\n";
+  text +=
+      "DimSize = " + NumberText(g.dimensions[0]) + " " + NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\n";
   text += std::string("ElementType = ") + type->name + "\n";
   for (const auto& [key, value] : header.fields)
     text += key + " = " + value + "\n";
@@ -210,8 +233,8 @@ bool CanHold(const HeaderField& field)
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.' || c == '-';
   });
   return plain && !OwnKeys.count(key) && !Synonyms.count(key) && key.size() + value.size() < 900000 &&
-    HeaderLines::Trimmed(value).size() == value.size() &&
-    std::none_of(value.begin(), value.end(), [](unsigned char c) { return c < 32 && c != '\t'; });
+         HeaderLines::Trimmed(value).size() == value.size() &&
+         std::none_of(value.begin(), value.end(), [](unsigned char c) { return c < 32 && c != '\t'; });
 }
 
 } // namespace echorama

@@ -15,33 +15,40 @@
 namespace echorama {
 namespace {
 
-const std::map<std::string, VoxelType> Types = {
-    {"signedchar", VoxelType::Int8}, {"int8", VoxelType::Int8}, {"int8_t", VoxelType::Int8},
-    {"uchar", VoxelType::UInt8}, {"unsignedchar", VoxelType::UInt8}, {"uint8", VoxelType::UInt8}, {"uint8_t", VoxelType::UInt8},
-    {"short", VoxelType::Int16}, {"shortint", VoxelType::Int16}, {"signedshort", VoxelType::Int16},
-    {"signedshortint", VoxelType::Int16}, {"int16", VoxelType::Int16}, {"int16_t", VoxelType::Int16},
-    {"ushort", VoxelType::UInt16}, {"unsignedshort", VoxelType::UInt16}, {"unsignedshortint", VoxelType::UInt16},
-    {"uint16", VoxelType::UInt16}, {"uint16_t", VoxelType::UInt16},
-    {"int", VoxelType::Int32}, {"signedint", VoxelType::Int32}, {"int32", VoxelType::Int32}, {"int32_t", VoxelType::Int32},
-    {"uint", VoxelType::UInt32}, {"unsignedint", VoxelType::UInt32}, {"uint32", VoxelType::UInt32}, {"uint32_t", VoxelType::UInt32},
-    {"longlong", VoxelType::Int64}, {"longlongint", VoxelType::Int64}, {"signedlonglong", VoxelType::Int64},
-    {"signedlonglongint", VoxelType::Int64}, {"int64", VoxelType::Int64}, {"int64_t", VoxelType::Int64},
-    {"ulonglong", VoxelType::UInt64}, {"unsignedlonglong", VoxelType::UInt64}, {"unsignedlonglongint", VoxelType::UInt64},
-    {"uint64", VoxelType::UInt64}, {"uint64_t", VoxelType::UInt64},
-    {"float", VoxelType::Float32}, {"double", VoxelType::Float64}};
+// All names of each type, blanks dropped; the first is the one that we write.
+const std::vector<std::pair<VoxelType, std::string>> TypeNames = {
+    {VoxelType::Int8, "int8 int8_t signedchar"},
+    {VoxelType::UInt8, "uint8 uint8_t uchar unsignedchar"},
+    {VoxelType::Int16, "int16 int16_t short shortint signedshort signedshortint"},
+    {VoxelType::UInt16, "uint16 uint16_t ushort unsignedshort unsignedshortint"},
+    {VoxelType::Int32, "int32 int32_t int signedint"},
+    {VoxelType::UInt32, "uint32 uint32_t uint unsignedint"},
+    {VoxelType::Int64, "int64 int64_t longlong longlongint signedlonglong signedlonglongint"},
+    {VoxelType::UInt64, "uint64 uint64_t ulonglong unsignedlonglong unsignedlonglongint"},
+    {VoxelType::Float32, "float"},
+    {VoxelType::Float64, "double"}};
 
-const char* NameOf(VoxelType type)
+std::string NameOf(VoxelType type)
 {
-  static const char* const names[] = {"int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float", "double"};
-  return names[static_cast<int>(type)];
+  const std::string& names = TypeNames[static_cast<std::size_t>(type)].second;
+  return names.substr(0, names.find(' '));
+}
+
+std::optional<VoxelType> TypeNamed(const std::string& name)
+{
+  for (const auto& [type, names] : TypeNames)
+    for (const std::string_view word : HeaderLines::Words(names))
+      if (word == name)
+        return type;
+  return {};
 }
 
 // Millimetres of a unit, or nothing when we do not know it.
 std::optional<double> Millimetres(const std::string& unit)
 {
-  static const std::map<std::string, double> lengths = {{"", 1.0}, {"mm", 1.0}, {"millimeter", 1.0}, {"millimetre", 1.0},
-                                                        {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"\xC2\xB5m", 1e-3},
-                                                        {"\xCE\xBCm", 1e-3}, {"microns", 1e-3}, {"micron", 1e-3}};
+  static const std::map<std::string, double> lengths = {
+      {"", 1.0},    {"mm", 1.0},         {"millimeter", 1.0}, {"millimetre", 1.0}, {"cm", 10.0},    {"m", 1000.0},
+      {"um", 1e-3}, {"\xC2\xB5m", 1e-3}, {"\xCE\xBCm", 1e-3}, {"microns", 1e-3},   {"micron", 1e-3}};
   const auto found = lengths.find(unit);
   return found == lengths.end() ? std::nullopt : std::optional<double>(found->second);
 }
@@ -203,7 +210,8 @@ private:
         if (words[axis] != "domain" && words[axis] != "space" && words[axis] != "???" && words[axis] != "none")
           vectors[axis].reset();
     }
-    for (std::size_t axis = all; axis-- > 0 && all - static_cast<std::size_t>(std::count(vectors.begin(), vectors.end(), Vector())) > 3;)
+    for (std::size_t axis = all;
+         axis-- > 0 && all - static_cast<std::size_t>(std::count(vectors.begin(), vectors.end(), Vector())) > 3;)
       if (sizes[axis] == 1)
         vectors[axis].reset(); // a fourth axis of one sample adds nothing
 
@@ -275,22 +283,24 @@ private:
         use(static_cast<Eigen::Index>(i), words[axes[i]]);
       return true;
     };
-    if (!perAxis("spacings", "spacings", [&](Eigen::Index i, std::string_view word) { g.spacing[i] = lines_.Numbers<double>("spacings", word, 1)[0]; }))
+    if (!perAxis("spacings", "spacings",
+                 [&](Eigen::Index i, std::string_view word) { g.spacing[i] = lines_.Numbers<double>("spacings", word, 1)[0]; }))
       header_.notes.push_back("the file has no spacing: 1 mm was assumed");
-    if (!perAxis("axismins", "axis mins", [&](Eigen::Index i, std::string_view word) { g.origin[i] = lines_.Numbers<double>("axis mins", word, 1)[0]; }))
+    if (!perAxis("axismins", "axis mins",
+                 [&](Eigen::Index i, std::string_view word) { g.origin[i] = lines_.Numbers<double>("axis mins", word, 1)[0]; }))
       header_.notes.push_back("the file has no origin: 0 0 0 was assumed");
     else
       // The minimum is the edge of the first sample where samples are cells.
       for (const char* field : {"centers", "centerings"})
-        perAxis(field, field, [&](Eigen::Index i, std::string_view word) { g.origin[i] += word == "cell" ? 0.5 * g.spacing[i] : 0.0; });
+        perAxis(field, field,
+                [&](Eigen::Index i, std::string_view word) { g.origin[i] += word == "cell" ? 0.5 * g.spacing[i] : 0.0; });
   }
 
   void ParseType()
   {
-    const auto type = Types.find(Plain(Need("type")));
-    header_.typeIsKnown = type != Types.end();
-    if (header_.typeIsKnown)
-      header_.type = type->second;
+    const std::optional<VoxelType> type = TypeNamed(Plain(Need("type")));
+    header_.typeIsKnown = type.has_value();
+    header_.type = type.value_or(VoxelType::UInt8);
     const std::string encoding = Plain(Need("encoding"));
     if (encoding == "raw")
       header_.encoding = ImageHeader::Encoding::Raw;
@@ -353,16 +363,21 @@ std::string VectorText(const Eigen::Vector3d& v)
 
 } // namespace
 
-void ParseNrrd(ImageHeader& header) { Nrrd(header).Parse(); }
+void ParseNrrd(ImageHeader& header)
+{
+  Nrrd(header).Parse();
+}
 
 std::string NrrdHeaderText(const ImageHeader& header, const std::string& dataFile)
 {
   const ImageGeometry& g = header.geometry;
-  std::string text = std::string("NRRD0004\ntype: ") + NameOf(header.type) + "\ndimension: 3\nspace: left-posterior-superior\nsizes: " +
-      NumberText(g.dimensions[0]) + " " + NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\nspace directions:";
+  std::string text = std::string("NRRD0004\ntype: ") + NameOf(header.type) +
+                     "\ndimension: 3\nspace: left-posterior-superior\nsizes: " + NumberText(g.dimensions[0]) + " " +
+                     NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\nspace directions:";
   for (int axis = 0; axis < 3; ++axis)
     text += " " + VectorText(g.direction.col(axis) * g.spacing[axis]);
-  text += "\nkinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: " + VectorText(g.origin) + "\nencoding: ";
+  text +=
+      "\nkinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: " + VectorText(g.origin) + "\nencoding: ";
   text += header.encoding == ImageHeader::Encoding::Zlib ? "gzip" : "raw";
   text += header.bigEndian ? "\nendian: big\n" : "\nendian: little\n";
   for (const auto& [key, value] : header.fields)

@@ -84,7 +84,8 @@ void ReadText(std::istream& stream, const ImageHeader& header, T* out, const Pro
       if (!ParseNumber(word, real) || std::is_floating_point_v<T> || real != std::floor(real) ||
           !(real >= static_cast<double>(std::numeric_limits<T>::lowest()) && std::fabs(real) < 9e15 &&
             real <= static_cast<double>(std::numeric_limits<T>::max())))
-        FailFile(header.dataPath, "voxel " + std::to_string(i + 1) + " is \"" + word.substr(0, 40) + "\", which its type cannot hold");
+        FailFile(header.dataPath,
+                 "voxel " + std::to_string(i + 1) + " is \"" + word.substr(0, 40) + "\", which its type cannot hold");
       out[i] = static_cast<T>(real);
     }
     if (i % 1000000 == 0)
@@ -149,7 +150,8 @@ void CheckVolume(const ImageHeader& header)
   } catch (const Error& error) {
     throw Error(Error::Kind::BadFile, error.what());
   }
-  const double voxels = static_cast<double>(header.geometry.VoxelCount()), bytes = voxels * static_cast<double>(SizeOf(header.type));
+  const double voxels = static_cast<double>(header.geometry.VoxelCount()),
+               bytes = voxels * static_cast<double>(SizeOf(header.type));
   const std::uint64_t fileBytes = SizeOfData(header);
   const std::uint64_t offset = static_cast<std::uint64_t>(std::max<std::int64_t>(0, header.dataOffset));
   const double there = fileBytes > offset ? static_cast<double>(fileBytes - offset) : 0.0;
@@ -167,8 +169,8 @@ void CheckVolume(const ImageHeader& header)
     break;
   case ImageHeader::Encoding::Text:
     if ((there + 1.0) / 2.0 < voxels)
-      FailFile(header.dataPath, "its dimensions (" + DimensionsText(header.geometry) + ") need more numbers than " + NumberText(there) +
-                                    " characters can hold");
+      FailFile(header.dataPath, "its dimensions (" + DimensionsText(header.geometry) + ") need more numbers than " +
+                                    NumberText(there) + " characters can hold");
     break;
   }
   CheckMemory(path, bytes);
@@ -187,8 +189,12 @@ void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progres
     throw Error(Error::Kind::FileSystem, header.dataPath + ": it cannot be opened (is reading permitted?)");
 
   switch (header.encoding) {
-  case ImageHeader::Encoding::Raw: ReadRaw(stream, header, out, progress); break;
-  case ImageHeader::Encoding::Zlib: Decompress(stream, header.dataPath, header.skipDecoded, voxels, bytes, progress); break;
+  case ImageHeader::Encoding::Raw:
+    ReadRaw(stream, header, out, progress);
+    break;
+  case ImageHeader::Encoding::Zlib:
+    Decompress(stream, header.dataPath, header.skipDecoded, voxels, bytes, progress);
+    break;
   case ImageHeader::Encoding::Text:
     DispatchVoxelType(header.type, [&](auto zero) { ReadText(stream, header, static_cast<decltype(zero)*>(voxels), progress); });
     break;

@@ -14,16 +14,26 @@ template <class Functor>
 auto DispatchVoxelType(VoxelType type, Functor&& functor)
 {
   switch (type) {
-  case VoxelType::Int8: return functor(std::int8_t{});
-  case VoxelType::UInt8: return functor(std::uint8_t{});
-  case VoxelType::Int16: return functor(std::int16_t{});
-  case VoxelType::UInt16: return functor(std::uint16_t{});
-  case VoxelType::Int32: return functor(std::int32_t{});
-  case VoxelType::UInt32: return functor(std::uint32_t{});
-  case VoxelType::Int64: return functor(std::int64_t{});
-  case VoxelType::UInt64: return functor(std::uint64_t{});
-  case VoxelType::Float32: return functor(float{});
-  case VoxelType::Float64: break;
+  case VoxelType::Int8:
+    return functor(std::int8_t{});
+  case VoxelType::UInt8:
+    return functor(std::uint8_t{});
+  case VoxelType::Int16:
+    return functor(std::int16_t{});
+  case VoxelType::UInt16:
+    return functor(std::uint16_t{});
+  case VoxelType::Int32:
+    return functor(std::int32_t{});
+  case VoxelType::UInt32:
+    return functor(std::uint32_t{});
+  case VoxelType::Int64:
+    return functor(std::int64_t{});
+  case VoxelType::UInt64:
+    return functor(std::uint64_t{});
+  case VoxelType::Float32:
+    return functor(float{});
+  case VoxelType::Float64:
+    break;
   }
   return functor(double{});
 }

@@ -21,6 +21,7 @@
 #include "vtkXMLImageDataReader.h"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 
 using echorama::Error;

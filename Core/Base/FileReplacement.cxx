@@ -22,8 +22,8 @@ namespace {
 std::string NameBeside(const fs::path& target, const char* purpose)
 {
   static std::atomic<unsigned> counter{0};
-  return (target.parent_path() /
-          ("." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" + target.filename().string()))
+  return (target.parent_path() / ("." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" +
+                                  target.filename().string()))
       .string();
 }
 
@@ -56,7 +56,10 @@ std::string FileReplacement::Stage(const std::string& path)
   return items_.back().temporary;
 }
 
-void FileReplacement::Remove(const std::string& path) { items_.insert(items_.begin(), {{}, path, {}, false}); }
+void FileReplacement::Remove(const std::string& path)
+{
+  items_.insert(items_.begin(), {{}, path, {}, false});
+}
 
 void FileReplacement::Commit()
 {

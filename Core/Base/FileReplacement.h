@@ -33,7 +33,7 @@ private:
   struct Item {
     std::string temporary; ///< empty: to be removed
     std::string target;
-    std::string aside;     ///< where the predecessor waits during Commit
+    std::string aside; ///< where the predecessor waits during Commit
     bool placed = false;
   };
   void RollBack();

@@ -84,7 +84,10 @@ ordered_json RowsOf(const Eigen::MatrixBase<Derived>& matrix)
   return rows;
 }
 
-ordered_json ListOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+ordered_json ListOf(const Eigen::Vector3d& v)
+{
+  return {v.x(), v.y(), v.z()};
+}
 
 ImageGeometry ReadGeometry(const ordered_json& value, const Place& place)
 {
@@ -209,8 +212,8 @@ const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::strin
     for (const VolumePose& pose : poses)
       if (fs::path(pose.file).filename() == resolved.filename()) {
         if (found)
-          throw Error(Error::Kind::BadInput, file + ": the poses name several files " + resolved.filename().string() +
-                                                 ", and none in this folder");
+          throw Error(Error::Kind::BadInput,
+                      file + ": the poses name several files " + resolved.filename().string() + ", and none in this folder");
         found = &pose;
       }
   }

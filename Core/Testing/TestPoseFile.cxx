@@ -72,7 +72,8 @@ ImageGeometry SomeGeometry(std::uint64_t seed)
   return g;
 }
 
-std::string Document(const std::string& volume, const std::string& head = R"("schema":"echorama-poses-1","unit":"mm","frame":"LPS")")
+std::string Document(const std::string& volume,
+                     const std::string& head = R"("schema":"echorama-poses-1","unit":"mm","frame":"LPS")")
 {
   return "{" + head + R"(,"volumes":[)" + volume + "]}";
 }
@@ -168,7 +169,8 @@ TEST_F(PoseFile, RefusesWhatIsNotAPoseFile)
     return Document(R"({"file":"a.mha","geometry":)" + geometry + R"(,"VolumeToWorld":)" + Identity + "}");
   };
   const std::string direction = R"("direction":[[1,0,0],[0,1,0],[0,0,1]])";
-  EXPECT_NO_THROW(ReadPoses(Write(withGeometry(R"({"origin":[0,0,0],"spacing":[1,1,1],"dimensions":[2,2,2],)" + direction + "}"))));
+  EXPECT_NO_THROW(
+      ReadPoses(Write(withGeometry(R"({"origin":[0,0,0],"spacing":[1,1,1],"dimensions":[2,2,2],)" + direction + "}"))));
   ExpectRefused(withGeometry(R"({"origin":[0,0,0],"spacing":[1,0,1],"dimensions":[2,2,2],)" + direction + "}"), "spacing");
   ExpectRefused(withGeometry(R"({"origin":[0,0],"spacing":[1,1,1],"dimensions":[2,2,2],)" + direction + "}"), "origin");
   ExpectRefused(withGeometry(R"({"origin":[0,0,0],"spacing":[1,1,1],"dimensions":[2,2.5,2],)" + direction + "}"), "dimensions");

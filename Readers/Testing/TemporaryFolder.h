@@ -17,7 +17,8 @@ class TemporaryFolder : public ::testing::Test {
 protected:
   void SetUp() override
   {
-    folder = std::filesystem::temp_directory_path() /
+    folder =
+        std::filesystem::temp_directory_path() /
         (std::string("echorama-") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + std::to_string(getpid()));
     std::filesystem::create_directories(folder);
   }

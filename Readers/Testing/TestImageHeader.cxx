@@ -28,18 +28,12 @@ protected:
 /// A MetaImage of 2 x 3 x 4 bytes in which single lines are replaced ("" drops the line).
 std::string Meta(const Fields& changes = {}, const std::string& data = std::string(24, 'x'))
 {
-  const std::vector<HeaderField> lines = {{"ObjectType", "Image"},
-                                          {"NDims", "3"},
-                                          {"BinaryData", "True"},
-                                          {"BinaryDataByteOrderMSB", "False"},
-                                          {"CompressedData", "False"},
-                                          {"TransformMatrix", "0 1 0 -1 0 0 0 0 1"},
-                                          {"Offset", "10 20 -30.5"},
-                                          {"CenterOfRotation", "0 0 0"},
-                                          {"ElementSpacing", "0.25 0.5 2"},
-                                          {"DimSize", "2 3 4"},
-                                          {"ElementType", "MET_UCHAR"},
-                                          {"ElementDataFile", "LOCAL"}};
+  const std::vector<HeaderField> lines = {{"ObjectType", "Image"},          {"NDims", "3"},
+                                          {"BinaryData", "True"},           {"BinaryDataByteOrderMSB", "False"},
+                                          {"CompressedData", "False"},      {"TransformMatrix", "0 1 0 -1 0 0 0 0 1"},
+                                          {"Offset", "10 20 -30.5"},        {"CenterOfRotation", "0 0 0"},
+                                          {"ElementSpacing", "0.25 0.5 2"}, {"DimSize", "2 3 4"},
+                                          {"ElementType", "MET_UCHAR"},     {"ElementDataFile", "LOCAL"}};
   std::string text;
   for (const auto& [key, value] : lines) {
     const auto change = changes.find(key);
@@ -158,9 +152,9 @@ TEST_F(ImageHeaderTest, NrrdSpacesBecomeLps)
   ExpectTheUsualGeometry(Read("ras.nrrd", Nrrd({{"space", "right-anterior-superior"},
                                                 {"space directions", "(0,-0.25,0) (0.5,0,0) (0,0,2)"},
                                                 {"space origin", "(-10,-20,-30.5)"}})));
-  const ImageHeader las = Read("las.nrrd", Nrrd({{"space", "LAS"},
-                                                 {"space directions", "( 0, -0.25 ,0) (-0.5,0,0)  (0,0,2)"},
-                                                 {"space origin", "(10,-20,-30.5)"}}));
+  const ImageHeader las = Read(
+      "las.nrrd",
+      Nrrd({{"space", "LAS"}, {"space directions", "( 0, -0.25 ,0) (-0.5,0,0)  (0,0,2)"}, {"space origin", "(10,-20,-30.5)"}}));
   ExpectTheUsualGeometry(las);
   EXPECT_TRUE(las.notes.empty());
   const ImageHeader none = Read("none.nrrd", Nrrd({{"space", ""}, {"space dimension", "3"}}));
@@ -174,8 +168,8 @@ TEST_F(ImageHeaderTest, NrrdUnitsSpacingsAndCells)
   EXPECT_EQ(metres.geometry.spacing, Eigen::Vector3d(250, 500, 2000));
   EXPECT_EQ(metres.geometry.origin, Eigen::Vector3d(10000, 20000, -30500));
 
-  const Fields plain{{"space", ""}, {"space directions", ""}, {"space origin", ""}, {"spacings", "0.25 0.5 2"},
-                     {"axis mins", "10 20 -30.5"}};
+  const Fields plain{
+      {"space", ""}, {"space directions", ""}, {"space origin", ""}, {"spacings", "0.25 0.5 2"}, {"axis mins", "10 20 -30.5"}};
   const ImageHeader nodes = Read("n.nrrd", Nrrd(plain));
   EXPECT_EQ(nodes.geometry.spacing, Eigen::Vector3d(0.25, 0.5, 2));
   EXPECT_EQ(nodes.geometry.origin, Eigen::Vector3d(10, 20, -30.5));
@@ -204,29 +198,36 @@ TEST_F(ImageHeaderTest, LeftHandedAxesAreTakenInReverse)
 
 TEST_F(ImageHeaderTest, ImagesAreOneSlice)
 {
-  const ImageHeader meta = Read("a.mha", Meta({{"NDims", "2"}, {"TransformMatrix", "0 1 1 0"}, {"Offset", "5 6"},
-                                               {"CenterOfRotation", ""}, {"ElementSpacing", "0.5 2"}, {"DimSize", "4 6"}}));
+  const ImageHeader meta = Read("a.mha", Meta({{"NDims", "2"},
+                                               {"TransformMatrix", "0 1 1 0"},
+                                               {"Offset", "5 6"},
+                                               {"CenterOfRotation", ""},
+                                               {"ElementSpacing", "0.5 2"},
+                                               {"DimSize", "4 6"}}));
   EXPECT_EQ(meta.geometry.dimensions, (std::array<int, 3>{4, 6, 1}));
   EXPECT_EQ(meta.geometry.spacing, Eigen::Vector3d(0.5, 2, 1));
   EXPECT_EQ(meta.geometry.direction.col(2), Eigen::Vector3d(0, 0, -1)) << "right-handed";
   CheckVolume(meta);
   // A slice that lies obliquely in space.
-  const ImageHeader nrrd = Read("a.nrrd", Nrrd({{"dimension", "2"}, {"sizes", "4 6"}, {"kinds", "domain domain"},
-                                                {"space directions", "(0,0,0.5) (0,2,0)"}}));
+  const ImageHeader nrrd =
+      Read("a.nrrd",
+           Nrrd({{"dimension", "2"}, {"sizes", "4 6"}, {"kinds", "domain domain"}, {"space directions", "(0,0,0.5) (0,2,0)"}}));
   EXPECT_EQ(nrrd.geometry.dimensions, (std::array<int, 3>{4, 6, 1}));
   EXPECT_EQ(nrrd.geometry.spacing, Eigen::Vector3d(0.5, 2, 1));
   EXPECT_EQ(nrrd.geometry.direction.col(0), Eigen::Vector3d(0, 0, 1));
   EXPECT_EQ(nrrd.geometry.direction.col(2), Eigen::Vector3d(-1, 0, 0));
   CheckVolume(nrrd);
   // A fourth axis of one sample is no axis.
-  CheckVolume(Read("b.nrrd", Nrrd({{"dimension", "4"}, {"sizes", "1 2 3 4"}, {"kinds", "vector domain domain domain"},
+  CheckVolume(Read("b.nrrd", Nrrd({{"dimension", "4"},
+                                   {"sizes", "1 2 3 4"},
+                                   {"kinds", "vector domain domain domain"},
                                    {"space directions", "none (0,0.25,0) (-0.5,0,0) (0,0,2)"}})));
 }
 
 TEST_F(ImageHeaderTest, SequencesAreReadAsHeadersAndRefusedAsVolumes)
 {
   const std::string text = "Seq_Frame0000_Timestamp = 1.5\nSeq_Frame0001_Timestamp = 2.5\n" +
-      Meta({{"DimSize", "0 0 2"}, {"ElementType", "MET_OTHER"}}, "");
+                           Meta({{"DimSize", "0 0 2"}, {"ElementType", "MET_OTHER"}}, "");
   const ImageHeader header = Read("a.mha", text);
   EXPECT_EQ(header.geometry.dimensions, (std::array<int, 3>{0, 0, 2}));
   EXPECT_EQ(header.fields.size(), 2u);
@@ -307,11 +308,17 @@ TEST_F(ImageHeaderTest, NrrdsThatAreRefused)
   Refused("a.nrrd", Nrrd({{"byte skip", "-2"}}), "byte skip");
   Refused("a.nrrd", Nrrd({{"byte skip", "9223372036854775807"}}), "byte skip");
   Refused("a.nrrd", Nrrd({{"line skip", "5"}}), "line skip");
-  Refused("a.nrrd", Nrrd({{"dimension", "4"}, {"sizes", "3 2 3 4"}, {"kinds", "vector domain domain domain"},
-                          {"space directions", "none (0,0.25,0) (-0.5,0,0) (0,0,2)"}}),
+  Refused("a.nrrd",
+          Nrrd({{"dimension", "4"},
+                {"sizes", "3 2 3 4"},
+                {"kinds", "vector domain domain domain"},
+                {"space directions", "none (0,0.25,0) (-0.5,0,0) (0,0,2)"}}),
           "3 numbers per voxel");
-  Refused("a.nrrd", Nrrd({{"dimension", "4"}, {"sizes", "2 3 4 5"}, {"kinds", "domain domain domain time"},
-                          {"space directions", "(0,0.25,0) (-0.5,0,0) (0,0,2) none"}}),
+  Refused("a.nrrd",
+          Nrrd({{"dimension", "4"},
+                {"sizes", "2 3 4 5"},
+                {"kinds", "domain domain domain time"},
+                {"space directions", "(0,0.25,0) (-0.5,0,0) (0,0,2) none"}}),
           "axis 4");
   std::string twice = Nrrd();
   twice.insert(9, "type: uchar\n");

@@ -115,8 +115,8 @@ TEST_F(VolumeFile, BothByteOrdersOfEveryType)
 {
   const char* metaNames[] = {"MET_CHAR", "MET_UCHAR",     "MET_SHORT",      "MET_USHORT", "MET_INT",
                              "MET_UINT", "MET_LONG_LONG", "MET_ULONG_LONG", "MET_FLOAT",  "MET_DOUBLE"};
-  const char* nrrdNames[] = {"signed char", "uchar",         "short",  "unsigned short int", "int32_t",
-                             "uint",        "long long int", "uint64", "float",              "double"};
+  const char* nrrdNames[] = {"signed char", "uchar", "short", "unsigned short int", "int32_t", "uint", "long long int",
+                             "uint64",      "float", "double"};
   for (const VoxelType type : AllTypes)
     for (const bool big : {true, false})
       DispatchVoxelType(type, [&](auto zero) {
@@ -134,8 +134,8 @@ TEST_F(VolumeFile, BothByteOrdersOfEveryType)
         Put("a.mha", std::string("NDims = 3\nDimSize = 2 2 2\nElementType = ") + metaNames[t] +
                          "\nElementByteOrderMSB = " + (big ? "True" : "False") + "\nElementDataFile = LOCAL\n" + bytes);
         EXPECT_TRUE(SameBits(Read<T>("a.mha"), voxels)) << metaNames[t] << big;
-        Put("a.nrrd", std::string("NRRD0001\ntype: ") + nrrdNames[t] + "\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: " +
-                          (big ? "big" : "little") + "\n\n" + bytes);
+        Put("a.nrrd", std::string("NRRD0001\ntype: ") + nrrdNames[t] +
+                          "\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: " + (big ? "big" : "little") + "\n\n" + bytes);
         EXPECT_TRUE(SameBits(Read<T>("a.nrrd"), voxels)) << nrrdNames[t] << big;
       });
 }
@@ -168,7 +168,8 @@ TEST_F(VolumeFile, VoxelsMayLieElsewhere)
 
 TEST_F(VolumeFile, VoxelsAsText)
 {
-  const std::string start = "NDims = 3\nDimSize = 2 2 1\nBinaryData = False\nElementType = ", local = "\nElementDataFile = LOCAL\n";
+  const std::string start = "NDims = 3\nDimSize = 2 2 1\nBinaryData = False\nElementType = ",
+                    local = "\nElementDataFile = LOCAL\n";
   Put("a.mha", start + "MET_SHORT" + local + "1 -32768\n32767 4.0\n");
   EXPECT_EQ(Read<short>("a.mha"), (std::vector<short>{1, -32768, 32767, 4}));
   Put("a.nrrd", "NRRD0001\ntype: float\ndimension: 2\nsizes: 2 2\nencoding: ascii\n\n0.5 -1e3\nnan 7");
@@ -235,7 +236,8 @@ TEST_F(VolumeFile, CompressionIsOrdinaryAndIndependentOfThreads)
 
 TEST_F(VolumeFile, DamagedCompressedDataAreRefused)
 {
-  const std::string start = "NDims = 3\nDimSize = 10 10 20\nElementType = MET_UCHAR\nCompressedData = True\nElementDataFile = LOCAL\n";
+  const std::string start =
+      "NDims = 3\nDimSize = 10 10 20\nElementType = MET_UCHAR\nCompressedData = True\nElementDataFile = LOCAL\n";
   std::string plain;
   Random random(11);
   for (int i = 0; i < 2000; ++i)
@@ -259,7 +261,8 @@ TEST_F(VolumeFile, DamagedCompressedDataAreRefused)
   refused(plain, "damaged");
   // Dimensions out of all proportion are refused before any memory is asked for.
   const std::string path = Put("b.mha", "NDims = 3\nDimSize = 100000 100000 100000\nElementType = MET_DOUBLE\n"
-                                        "CompressedData = True\nElementDataFile = LOCAL\n" + packed);
+                                        "CompressedData = True\nElementDataFile = LOCAL\n" +
+                                            packed);
   ExpectRefused([&] { CheckVolume(ReadImageHeader(path)); }, Error::Kind::BadFile, path, "compressed bytes can hold");
 }
 
@@ -268,7 +271,8 @@ TEST_F(VolumeFile, MoreThanTheMemoryIsRefused)
   ExpectRefused([] { CheckMemory("big.mha", 1e17); }, Error::Kind::TooLarge, "big.mha", "memory");
   EXPECT_NO_THROW(CheckMemory("small.mha", 1e6));
   // A sparse file holds what its header says, and still would not fit.
-  const std::string path = Put("a.mhd", "NDims = 3\nDimSize = 20000 20000 20000\nElementType = MET_UCHAR\nElementDataFile = a.raw\n");
+  const std::string path =
+      Put("a.mhd", "NDims = 3\nDimSize = 20000 20000 20000\nElementType = MET_UCHAR\nElementDataFile = a.raw\n");
   Put("a.raw", "");
   std::error_code error;
   std::filesystem::resize_file(Path("a.raw"), 8000000000000u, error);
