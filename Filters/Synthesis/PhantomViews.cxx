@@ -27,7 +27,7 @@ struct Counts {
 
 double OverlapFraction(const ProbeGeometry& probe, const Pose& pose)
 {
-  constexpr int n = 64;
+  constexpr int n = 48;
   const Eigen::AlignedBox3d box = BoxAround(probe);
   const Pose back = pose.inverse();
   const Counts counts = ParallelSum<Counts>(n, 4, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -58,7 +58,7 @@ std::vector<PhantomView> PhantomViews(const ProbeGeometry& probe, int count, dou
   Twist perMm;
   perMm << 1.0, 0.2, 0.0, 0.0004, -0.0022, 0.0009;
   double near = 0.0, far = BoxAround(probe).sizes().x();
-  for (int step = 0; step < 12; ++step) {
+  for (int step = 0; step < 10; ++step) {
     const double middle = 0.5 * (near + far);
     (OverlapFraction(probe, Exp(perMm * middle)) > overlap ? near : far) = middle;
   }

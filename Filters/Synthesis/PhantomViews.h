@@ -22,7 +22,7 @@ struct PhantomView {
 /// \throws Error(InvalidParameter) for anything else, and what ProbeGeometry::Check() throws.
 std::vector<PhantomView> PhantomViews(const ProbeGeometry& probe, int count, double overlap = 0.55);
 
-/// The fraction of what \a probe sees at the identity that it also sees at \a pose, by counting points of a 64^3 grid.
+/// The fraction of what \a probe sees at the identity that it also sees at \a pose, by counting points of a 48^3 grid.
 double OverlapFraction(const ProbeGeometry& probe, const Pose& pose);
 
 /// A known error of placement: a move by \a mm in a random direction after a turn by \a degrees about a random axis

@@ -231,14 +231,14 @@ TEST(Phantom, SpeckleOfAPointDecorrelatesWithTheViewingAngle)
 {
   PhantomParameters p;
   p.scene = UniformScene();
-  p.probe = ProbeGeometry::Convex(40 * degree, 40.0, 24 * degree, 35.0, 30.0, 70.0);
+  p.probe = ProbeGeometry::Convex(26 * degree, 40.0, 18 * degree, 35.0, 36.0, 64.0);
   p.scatterersPerMm3 = 3.0;
   // Points near the middle of the volume; the probe turns about that middle, in the plane of the fan.
   const Vector3d middle(0, 0, 50);
   std::vector<Vector3d> points;
   Random random(11);
   for (int i = 0; i < 3000; ++i)
-    points.push_back(middle + Vector3d(random.Uniform(-6, 6), random.Uniform(-8, 8), random.Uniform(-8, 8)));
+    points.push_back(middle + Vector3d(random.Uniform(-6, 6), random.Uniform(-8, 8), random.Uniform(-7, 7)));
   const auto at = [&](double degrees) {
     return SpeckleCorrelation(p, Pose::Identity(), MotionAbout(middle, {0, degrees * degree, 0}, Vector3d::Zero()), points);
   };
