@@ -1,0 +1,124 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The demo: overlapping volumes in, one stitched volume and a report that a person understands out.
+
+demo.py --program ECHORAMA --out FOLDER [-- VOLUME...]
+
+Without volumes it makes three of a phantom, knocked out of place by a known amount, so that the alignment can be scored.
+./run demo calls it. It needs the Python package echorama, and a screen (xvfb-run provides one).
+"""
+import argparse
+import json
+import os
+import pathlib
+import shlex
+import subprocess
+import sys
+
+import numpy as np
+
+
+class StepFailed(Exception):
+    """A step of the demo could not be done; says which and why."""
+
+
+class Steps:
+    """Runs subcommands of the program, one after the other, and keeps what they said."""
+
+    def __init__(self, program):
+        self.program = program
+        self.done = []  # (what it did, command line, seconds)
+
+    def run(self, what, *arguments):
+        arguments = [str(argument) for argument in arguments]
+        print(f"  {what} ...", file=sys.stderr, flush=True)
+        try:
+            # Progress and messages of the program go to our own standard error as they come.
+            answer = subprocess.run([self.program, *arguments, "--json"], stdout=subprocess.PIPE, text=True)
+        except OSError as problem:
+            raise StepFailed(f"{what}: {self.program} does not start: {problem.strerror}") from problem
+        try:
+            result = json.loads(answer.stdout)
+        except ValueError:
+            result = {}
+        if answer.returncode != 0 or not result:
+            reason = result.get("error", f"echorama {arguments[0]} ended with status {answer.returncode}")
+            raise StepFailed(f"{what}: {reason}")
+        self.done.append((what, shlex.join(["echorama", *arguments]), float(result.get("seconds", 0))))
+        return result
+
+
+def short(path):
+    """The path from here when it lies below, else as it is."""
+    relative = os.path.relpath(path)
+    return pathlib.Path(path if relative.startswith("..") else relative)
+
+
+def files_of(pose_file):
+    return [short(pose_file.parent / volume["file"]) for volume in json.loads(pose_file.read_text())["volumes"]]
+
+
+def scores(result, files):
+    """The score of each file in mm, from what the subcommand score printed."""
+    of_file = {pathlib.Path(volume["file"]).resolve(): volume["mean_mm"] for volume in result["volumes"]}
+    return [of_file[file.resolve()] for file in files]
+
+
+def write_identities(path, files):
+    volumes = [{"file": os.path.relpath(file, path.parent), "VolumeToWorld": np.eye(4).tolist()} for file in files]
+    path.write_text(json.dumps({"schema": "echorama-poses-1", "unit": "mm", "frame": "LPS", "volumes": volumes}, indent=1) + "\n")
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Align, score, stitch and show three volumes of a phantom, or your own.")
+    parser.add_argument("--program", required=True, help="the program echorama")
+    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for the results")
+    parser.add_argument("--quick", action="store_true", help="a coarse phantom and small pictures, for tests")
+    parser.add_argument("volumes", nargs="*", help="overlapping volumes (default: three of a phantom)")
+    options = parser.parse_args()
+    if len(options.volumes) == 1:
+        parser.error("one volume cannot be aligned: name two or more, or none for the phantom")
+    try:
+        demo(options)
+    except StepFailed as failure:
+        print(f"demo: {failure}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def demo(options):
+    steps = Steps(options.program)
+    out = short(options.out)
+    out.mkdir(parents=True, exist_ok=True)
+    truth_file = None
+    if options.volumes:
+        files = [short(volume) for volume in options.volumes]
+    else:
+        steps.run("making three volumes of a phantom, knocked out of place", "phantom", "-o", out / "phantom",
+                  *(["--spacing", 2] if options.quick else []))
+        truth_file = out / "phantom" / "truth.json"
+        files = files_of(truth_file)
+
+    steps.run("aligning", "align", *files, "-o", out / "poses.json")
+    before = after = None
+    if truth_file:
+        write_identities(out / "start.json", files)
+        before = scores(steps.run("scoring where they lay", "score", out / "start.json", "--truth", truth_file), files)
+        after = scores(steps.run("scoring where they lie now", "score", out / "poses.json", "--truth", truth_file), files)
+    steps.run("stitching", "stitch", *files, "--poses", out / "poses.json", "-o", out / "stitched.mha")
+
+    if not os.environ.get("DISPLAY"):
+        raise StepFailed("drawing: there is no screen (DISPLAY is not set); start the demo under xvfb-run")
+    print("  drawing ...", file=sys.stderr, flush=True)
+    try:
+        from report import write_report
+
+        report = write_report(out, steps, files, truth_file, before, after, options.quick)
+    except (ImportError, OSError, ValueError, RuntimeError, MemoryError) as problem:
+        raise StepFailed(f"drawing: {problem}") from problem
+    print(report.summary)
+    print(f"report    {report.path.resolve()}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
