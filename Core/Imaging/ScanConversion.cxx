@@ -252,6 +252,12 @@ Eigen::AlignedBox3d BoxOf(const ProbeGeometry& g)
   return box;
 }
 
+void CheckPose(const Pose& probeToWorld)
+{
+  if (!IsRotation(probeToWorld.linear()) || !probeToWorld.translation().allFinite())
+    throw Error(Error::Kind::BadInput, "scan conversion: the pose of the probe is not rigid");
+}
+
 // The beam volume, the grid and how one lies in the other: all that the rows share.
 class Converter {
 public:
@@ -432,6 +438,7 @@ double SampleSpacing(const std::array<int, 3>& n, const ProbeGeometry& g)
 ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& probeToWorld, double spacingMm, std::size_t maxVoxels)
 {
   geometry.Check();
+  CheckPose(probeToWorld);
   if (!(spacingMm > 0.0) || !std::isfinite(spacingMm))
     throw Error(Error::Kind::InvalidParameter, "scan conversion: the spacing must be positive");
   const Eigen::AlignedBox3d box = BoxOf(geometry);
@@ -443,8 +450,9 @@ ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& prob
   const double voxels = (cells.array() + 1.0).prod();
   if (!(voxels <= static_cast<double>(maxVoxels)) || !(cells.maxCoeff() < std::numeric_limits<int>::max()))
     throw Error(Error::Kind::TooLarge, "scan conversion: a grid of " + std::to_string(spacingMm) + " mm would have " +
-                                           std::to_string(voxels) + " voxels, more than " + std::to_string(maxVoxels) +
-                                           "; choose a larger spacing");
+                                           std::to_string(voxels * 1e-6) + " million voxels, more than the " +
+                                           std::to_string(static_cast<double>(maxVoxels) * 1e-6) +
+                                           " million that are allowed; choose a larger spacing");
   grid.origin = box.center() - 0.5 * spacingMm * cells;
   const Eigen::Vector3i size = cells.cast<int>() + Eigen::Vector3i::Ones();
   grid.dimensions = {size[0], size[1], size[2]};
@@ -461,8 +469,7 @@ void ScanConvert(VolumeView<const T> beams, const ProbeGeometry& geometry, const
 {
   CheckBeamVolume(beams.Dimensions(), geometry);
   grid.Check("the grid of the scan conversion");
-  if (!IsRotation(probeToWorld.linear()) || !probeToWorld.translation().allFinite())
-    throw Error(Error::Kind::BadInput, "scan conversion: the pose of the probe is not rigid");
+  CheckPose(probeToWorld);
   if (intensity.Dimensions() != grid.dimensions || valid.Dimensions() != grid.dimensions)
     throw Error(Error::Kind::BadInput, "scan conversion: the output does not have the dimensions of its grid");
 

@@ -24,7 +24,8 @@ double SampleSpacing(const std::array<int, 3>& dimensions, const ProbeGeometry& 
 /// The smallest grid of cubic voxels around the fan, aligned with the probe's axes: x along the array, y along the sweep, z
 /// into the tissue. Of a single plane it is a 2D image: index axes along the array and into the tissue.
 /// \param spacingMm > 0
-/// \throws Error(InvalidParameter) for the spacing or the geometry, Error(TooLarge) when it exceeds \a maxVoxels.
+/// \throws Error(InvalidParameter) for the spacing or the geometry, Error(BadInput) for a pose that is not rigid,
+/// Error(TooLarge) when it exceeds \a maxVoxels.
 ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& probeToWorld, double spacingMm,
                                  std::size_t maxVoxels);
 
@@ -39,7 +40,8 @@ ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& prob
 /// The cost is lowest on grids whose rows run along the array (ScanConversionGrid), where the sweep is worked out once per
 /// row. Instantiated for the types in VoxelTypes.h.
 /// Source: dissertation 3.4.5 (image formation), by the exact inverse of the geometry in place of scattering samples.
-/// \throws what CheckBeamVolume throws; Error(BadInput) for a grid or views that do not agree; Error(Cancelled).
+/// \throws what CheckBeamVolume throws; Error(BadInput) for a pose that is not rigid, a grid that is none or views that do
+/// not agree with it; Error(Cancelled).
 template <class T>
 void ScanConvert(VolumeView<const T> beams, const ProbeGeometry& geometry, const Pose& probeToWorld, const ImageGeometry& grid,
                  VolumeView<T> intensity, VolumeView<unsigned char> valid, const Progress& progress = {});
