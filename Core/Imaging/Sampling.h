@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Imaging/VolumeView.h"
+#include <algorithm>
 #include <cmath>
 
 namespace echorama {
@@ -31,8 +32,12 @@ public:
     // Written so that NaN is outside.
     if (!(x >= -0.5 && y >= -0.5 && z >= -0.5 && x < n[0] - 0.5 && y < n[1] - 0.5 && z < n[2] - 0.5))
       return -1;
-    const std::ptrdiff_t index = static_cast<std::ptrdiff_t>(z + 0.5) * intensity_.SliceStride() +
-        static_cast<std::ptrdiff_t>(y + 0.5) * intensity_.RowStride() + static_cast<std::ptrdiff_t>(x + 0.5);
+    // The sum of 0.5 and the number just below it rounds to 1, which in a single slice would be a voxel too far.
+    const auto whole = [](double position, int count) {
+      return std::min(static_cast<std::ptrdiff_t>(position + 0.5), static_cast<std::ptrdiff_t>(count - 1));
+    };
+    const std::ptrdiff_t index =
+      whole(z, n[2]) * intensity_.SliceStride() + whole(y, n[1]) * intensity_.RowStride() + whole(x, n[0]);
     return IsReal(index) ? index : -1;
   }
 
