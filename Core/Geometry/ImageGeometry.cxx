@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Base/Error.h"
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 namespace echorama {
 
@@ -79,12 +81,12 @@ ImageGeometry GridAround(const ImageGeometry* volumes, std::size_t count, double
 {
   if (!(spacingMm > 0.0) || !std::isfinite(spacingMm))
     throw Error(Error::Kind::InvalidParameter, "the spacing of the output must be positive");
+  if (count == 0)
+    throw Error(Error::Kind::BadInput, "there are no volumes to lay a grid around");
   Eigen::AlignedBox3d box;
-  bool flat = true;
   for (std::size_t v = 0; v < count; ++v) {
     const Eigen::Affine3d map = volumes[v].IndexToWorld();
     const auto& n = volumes[v].dimensions;
-    flat = flat && n[2] == 1;
     for (int corner = 0; corner < 8; ++corner)
       box.extend(map * Eigen::Vector3d(corner & 1 ? n[0] - 1 : 0, corner & 2 ? n[1] - 1 : 0, corner & 4 ? n[2] - 1 : 0));
   }
@@ -98,13 +100,15 @@ ImageGeometry GridAround(const ImageGeometry* volumes, std::size_t count, double
     size[axis] = std::ceil((box.max()[axis] - box.min()[axis]) / spacingMm - 1e-3) + 1.0;
     voxels *= size[axis];
   }
-  if (!(voxels <= static_cast<double>(maxVoxels)))
-    throw Error(Error::Kind::TooLarge, "the output grid would have " + std::to_string(size[0]) + " x " + std::to_string(size[1]) +
-        " x " + std::to_string(size[2]) + " voxels, more than " + std::to_string(maxVoxels) + "; choose a larger spacing");
+  if (!(voxels <= static_cast<double>(maxVoxels)) ||
+      !(*std::max_element(size.begin(), size.end()) <= std::numeric_limits<int>::max())) {
+    std::ostringstream message;
+    message << "the output grid would have " << size[0] << " x " << size[1] << " x " << size[2] << " voxels, more than "
+            << maxVoxels << " or than an axis can count; choose a larger spacing";
+    throw Error(Error::Kind::TooLarge, message.str());
+  }
   for (int axis = 0; axis < 3; ++axis)
     grid.dimensions[axis] = static_cast<int>(size[axis]);
-  if (flat && size[2] < 1.5)
-    grid.dimensions[2] = 1;
   return grid;
 }
 
