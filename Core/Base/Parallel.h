@@ -37,6 +37,9 @@ void ParallelFor(std::ptrdiff_t count, const Body& body)
 template <class T, class Map>
 T ParallelSum(std::ptrdiff_t count, std::ptrdiff_t grain, const Map& map)
 {
+  if (count <= 0)
+    return T{};
+  grain = grain > 1 ? grain : 1;
   std::vector<T> parts(static_cast<std::size_t>((count + grain - 1) / grain));
   ParallelRanges(count, grain, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     parts[static_cast<std::size_t>(begin / grain)] = map(begin, end);
