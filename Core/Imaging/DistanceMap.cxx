@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One axis after the other. Along x, two sweeps find the nearest voxel of the mask on either side. Along y and z each line
-// g becomes min over j of g(j) + (s (i - j))^2, the lower envelope of parabolas. Sixteen neighbouring lines
-// are gathered side by side into a tile (strides that are powers of two would otherwise fall into the same few cache
-// lines), and a vector instruction works on all of them.
+// One axis after the other: y, x, z. Along y two sweeps count the steps to the mask. After that, each line g along x or z
+// becomes min over j of g(j) + (s (i - j))^2, the lower envelope of parabolas.
 //
-// Within a tile the nearest site is searched outwards from every voxel, up and down, until no site farther on can win:
-// the smallest g beyond is known from a running minimum. Real regions are large and smooth and leave a short search. Where
-// the searches of a tile together take too long, its lines go one by one through the envelope by its stack of parabolas
-// (Meijster, Roerdink and Hesselink 2000; Felzenszwalb and Huttenlocher 2012): the cost stays linear, whatever the mask.
+// Vector instructions work on sixteen voxels at a time. Along x these are neighbours of one row; along z they belong to
+// sixteen lines, gathered side by side into a tile (strides that are powers of two would otherwise fall into the same few
+// cache lines). For every voxel the nearest site is searched outwards, up and down, until no site farther on can win: the
+// smallest g beyond is known from a running minimum. Real regions are large and smooth and leave a short search. Where the
+// searches of a row or tile take too long together, its lines go one by one through the stack of parabolas (Meijster,
+// Roerdink and Hesselink 2000; Felzenszwalb and Huttenlocher 2012): the cost stays linear, whatever the mask.
 //
 // Equal spacings are worked in voxels: floats hold those integers exactly as long as the square of the diagonal is below
-// 2^24. Otherwise a tile computes in double, so that a value is rounded three times at most, once per axis.
+// 2^24. Otherwise lines are worked in double, and a value is rounded to float once per axis.
 #include "DistanceMap.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -21,36 +21,27 @@
 #include <limits>
 #include <vector>
 
-namespace echorama {
-namespace {
+namespace echorama
+{
+namespace
+{
 
-constexpr int Lanes = 16;     // lines side by side
-constexpr int Stride = 4;     // steps of a search between two looks whether it may end; also the margin of a tile
-constexpr int MeanSteps = 96; // steps per voxel, on average over a tile, after which the stack of parabolas is faster
+constexpr int Lanes = 16;      // voxels side by side
+constexpr int Stride = 4;      // steps of a search between two looks whether it may end
+constexpr int MeanSteps = 128; // steps, on average over a line, after which the stack of parabolas is faster
 constexpr float Infinity = std::numeric_limits<float>::infinity();
 
-template <class T>
-struct alignas(64) Block {
+// What vector instructions load at once.
+template <class T> struct alignas(64) Block {
   T value[Lanes];
 };
 
-// Sixteen lines of n voxels and what is needed to work on them.
-template <class T>
-struct Tile {
-  explicit Tile(int n) : count(n), rows(static_cast<std::size_t>(n + 2 * Stride)), up(rows.size()), down(rows.size()), result(rows.size())
-  {
-    for (Block<T>& block : rows)
-      std::fill_n(block.value, Lanes, static_cast<T>(Infinity));
-  }
-
-  int count;
-  std::vector<Block<T>> rows;     // g, with a margin of infinite rows at both ends
-  std::vector<Block<T>> up, down; // the smallest g from a row on upwards, and from a row on downwards
-  std::vector<Block<T>> result;
-
-  T* Row(int i) { return rows[static_cast<std::size_t>(i + Stride)].value; }
-  const T* Result(int i) const { return result[static_cast<std::size_t>(i + Stride)].value; }
-};
+// GCC must not unroll the loops over lanes before it has seen that they are vectors.
+#if defined(__GNUC__) && !defined(__clang__)
+#define ECHORAMA_FOR_LANES(l) _Pragma("GCC unroll 1") for (int l = 0; l < Lanes; ++l)
+#else
+#define ECHORAMA_FOR_LANES(l) for (int l = 0; l < Lanes; ++l)
+#endif
 
 // Numbers that are not negative have the order of their bits as integers.
 [[gnu::always_inline]] inline std::int32_t Bits(float number)
@@ -67,244 +58,328 @@ struct Tile {
   return bits;
 }
 
-// Whether some value exceeds its limit + offset. Written with integers, because a compiler makes vectors of it.
-template <class T>
-[[gnu::always_inline]] inline bool SomeAbove(const Block<T>& values, const Block<T>& limits, T offset)
+// Whether some value exceeds its limit + offset. Written with integers, because a compiler makes vectors of that.
+template <class T> [[gnu::always_inline]] inline bool SomeAbove(const T* values, const T* limits, T offset)
 {
   decltype(Bits(offset)) some = 0;
-#pragma GCC unroll 1
-  for (int l = 0; l < Lanes; ++l)
-    some |= Bits(limits.value[l] + offset) - Bits(values.value[l]);
+  ECHORAMA_FOR_LANES(l)
+  some |= Bits(limits[l] + offset) - Bits(values[l]);
   return some < 0;
 }
 
-template <class T>
-[[gnu::always_inline]] inline void TakeSmaller(Block<T>& values, const Block<T>& others, T offset)
+template <class T> [[gnu::always_inline]] inline void TakeSmaller(T* values, const T* others, T offset)
 {
-#pragma GCC unroll 1
-  for (int l = 0; l < Lanes; ++l) {
-    const T other = others.value[l] + offset;
-    values.value[l] = other < values.value[l] ? other : values.value[l];
+  ECHORAMA_FOR_LANES(l)
+  {
+    const T other = others[l] + offset;
+    values[l] = other < values[l] ? other : values[l];
   }
 }
 
-// The search of every voxel of a tile. squares[d] is the squared length of d steps.
-// Returns false when it has become too long; the result is then not complete.
-template <class T>
-[[gnu::always_inline]] inline bool SearchTile(int n, const Block<T>* rows, Block<T>* up, Block<T>* down, const T* squares, Block<T>* result)
+// Whether nothing in a block is finite.
+template <class T> [[gnu::always_inline]] inline bool AllInfinite(const T* values)
 {
-  rows += Stride;
-  up += Stride;
-  down += Stride;
-  result += Stride;
-  down[0] = rows[0];
-  for (int i = 1; i < n; ++i) {
-    down[i] = rows[i];
-    TakeSmaller(down[i], down[i - 1], T(0));
-  }
-  up[n - 1] = rows[n - 1];
-  for (int i = n - 2; i >= 0; --i) {
-    up[i] = rows[i];
-    TakeSmaller(up[i], up[i + 1], T(0));
-  }
+  const auto infinite = Bits(static_cast<T>(Infinity));
+  decltype(Bits(T(0))) some = 0;
+  ECHORAMA_FOR_LANES(l)
+  some |= Bits(values[l]) - infinite;
+  return some == 0;
+}
+
+// The search. Voxel i of a line and the lanes beside it are at g + Step * i: Step is Lanes in a tile and 1 in a row, where
+// the lanes are the next voxels of the same line. No g from voxel i on upwards is smaller than above says, none from i on
+// downwards smaller than below says; only from voxel first to voxel last something is finite. squares[d] is the squared
+// length of d steps. The result may overwrite above.
+// Returns false when the search has become too long; the result is then not complete.
+template <class T, int Step>
+[[gnu::always_inline]] inline bool SearchLines(int n, int first, int last, const T* g, const T* above, const T* below,
+                                               const T* squares, T* result)
+{
+  constexpr int wide = Step == 1 ? Lanes : 1; // voxels of a line that are worked on together
   std::ptrdiff_t steps = 0;
-  const std::ptrdiff_t mostSteps = static_cast<std::ptrdiff_t>(MeanSteps) * n;
-  for (int i = 0; i < n; ++i) {
-    Block<T> best = rows[i];
-    for (int d = 1; i + d < n && SomeAbove(best, up[i + d], squares[d]); d += Stride) {
-      for (int e = d; e < d + Stride; ++e)
-        TakeSmaller(best, rows[i + e], squares[e]);
+  const std::ptrdiff_t mostSteps = static_cast<std::ptrdiff_t>(MeanSteps) * n / wide;
+  for (int i = 0; i < n; i += wide) {
+    Block<T> best;
+    std::memcpy(best.value, g + static_cast<std::ptrdiff_t>(Step) * i, sizeof(best.value));
+    for (int d = std::max(1, first - (i + wide - 1)); i + d <= last; d += Stride) {
+      const std::ptrdiff_t from = static_cast<std::ptrdiff_t>(Step) * (i + d);
+      if (!SomeAbove(best.value, above + from, squares[d]))
+        break;
+      for (int e = 0; e < Stride; ++e)
+        TakeSmaller(best.value, g + from + Step * e, squares[d + e]);
       steps += Stride;
     }
-    for (int d = 1; i - d >= 0 && SomeAbove(best, down[i - d], squares[d]); d += Stride) {
-      for (int e = d; e < d + Stride; ++e)
-        TakeSmaller(best, rows[i - e], squares[e]);
+    for (int d = std::max(1, i - last); i + wide - 1 - d >= first; d += Stride) {
+      const std::ptrdiff_t from = static_cast<std::ptrdiff_t>(Step) * (i - d);
+      if (!SomeAbove(best.value, below + from, squares[d]))
+        break;
+      for (int e = 0; e < Stride; ++e)
+        TakeSmaller(best.value, g + from - Step * e, squares[d + e]);
       steps += Stride;
     }
-    result[i] = best;
+    std::memcpy(result + static_cast<std::ptrdiff_t>(Step) * i, best.value, sizeof(best.value));
     if (steps > mostSteps)
       return false;
   }
   return true;
 }
 
-ECHORAMA_HOT bool Search(int n, const Block<float>* rows, Block<float>* up, Block<float>* down, const float* squares, Block<float>* result)
+// Sixteen lines: running minima from both ends, then the search.
+template <class T> [[gnu::always_inline]] inline bool SearchSixteen(int n, const T* g, T* above, T* below, const T* squares)
 {
-  return SearchTile(n, rows, up, down, squares, result);
+  std::memcpy(below, g, sizeof(Block<T>));
+  for (std::ptrdiff_t i = 1; i < n; ++i) {
+    std::memcpy(below + i * Lanes, g + i * Lanes, sizeof(Block<T>));
+    TakeSmaller(below + i * Lanes, below + (i - 1) * Lanes, T(0));
+  }
+  std::memcpy(above + (n - std::ptrdiff_t{1}) * Lanes, g + (n - std::ptrdiff_t{1}) * Lanes, sizeof(Block<T>));
+  for (std::ptrdiff_t i = n - 2; i >= 0; --i) {
+    std::memcpy(above + i * Lanes, g + i * Lanes, sizeof(Block<T>));
+    TakeSmaller(above + i * Lanes, above + (i + 1) * Lanes, T(0));
+  }
+  int first = 0, last = n - 1;
+  while (first < n && AllInfinite(g + static_cast<std::ptrdiff_t>(first) * Lanes))
+    ++first;
+  while (last > first && AllInfinite(g + static_cast<std::ptrdiff_t>(last) * Lanes))
+    --last;
+  return SearchLines<T, Lanes>(n, first, last, g, above, below, squares, above);
 }
 
-ECHORAMA_HOT bool Search(int n, const Block<double>* rows, Block<double>* up, Block<double>* down, const double* squares, Block<double>* result)
+// One line: the minima advance by whole blocks, which is a lower bound and costs less.
+template <class T> [[gnu::always_inline]] inline bool SearchOne(int n, const T* g, T* above, T* below, const T* squares)
 {
-  return SearchTile(n, rows, up, down, squares, result);
-}
-
-// The lower envelope of the parabolas of one line, by a stack: site[k] is lowest from voxel from[k] on.
-struct Parabolas {
-  explicit Parabolas(int n) : g(static_cast<std::size_t>(n)), site(g.size()), from(g.size()) {}
-  std::vector<double> g;
-  std::vector<int> site, from;
-};
-
-// Works on lane l of the tile.
-template <class T>
-void Envelope(Tile<T>& tile, int l, double spacing, Parabolas& p)
-{
-  const int n = tile.count;
-  const double square = spacing * spacing;
-  const auto height = [&p, spacing](int i, int j) {
-    const double across = spacing * (i - j);
-    return p.g[static_cast<std::size_t>(j)] + across * across;
+  using Integer = decltype(Bits(T(0)));
+  const auto smallest = [g](int block) {
+    Integer bits = Bits(static_cast<T>(Infinity));
+    ECHORAMA_FOR_LANES(l)
+    {
+      const Integer other = Bits(g[block + l]);
+      bits = other < bits ? other : bits;
+    }
+    T number;
+    std::memcpy(&number, &bits, sizeof(number));
+    return number;
   };
-  std::ptrdiff_t top = -1;
-  for (int j = 0; j < n; ++j) {
-    const double g = p.g[static_cast<std::size_t>(j)] = tile.Row(j)[l];
-    if (g == static_cast<double>(Infinity))
-      continue;
-    while (top >= 0 && height(p.from[top], p.site[top]) > height(p.from[top], j))
-      --top;
-    if (top < 0) {
-      p.site[0] = j;
-      p.from[top = 0] = 0;
-      continue;
-    }
-    // The first voxel where j is lower. The quotient of the integers of equal spacings is never rounded across a voxel.
-    const int below = p.site[top], apart = j - below;
-    const double crossing = below + 0.5 * ((g - p.g[static_cast<std::size_t>(below)]) / (square * apart) + apart);
-    if (crossing < n - 1) {
-      ++top;
-      p.site[top] = j;
-      p.from[top] = static_cast<int>(std::floor(crossing)) + 1;
-    }
+  const int lastBlock = (n - 1) / Lanes * Lanes;
+  int first = 0, last = n - 1;
+  T running = static_cast<T>(Infinity);
+  for (int block = 0; block <= lastBlock; block += Lanes) {
+    running = std::min(running, smallest(block));
+    if (running == static_cast<T>(Infinity))
+      first = block + Lanes;
+    ECHORAMA_FOR_LANES(l)
+    below[block + l] = running;
   }
-  Block<T>* result = tile.result.data() + Stride;
-  for (int i = n - 1; i >= 0; --i) {
-    result[i].value[l] = top < 0 ? static_cast<T>(Infinity) : static_cast<T>(height(i, p.site[top]));
-    if (top > 0 && i == p.from[top])
-      --top;
+  running = static_cast<T>(Infinity);
+  for (int block = lastBlock; block >= 0; block -= Lanes) {
+    running = std::min(running, smallest(block));
+    if (running == static_cast<T>(Infinity))
+      last = block - 1;
+    ECHORAMA_FOR_LANES(l)
+    above[block + l] = running;
   }
+  return SearchLines<T, 1>(n, first, last, g, above, below, squares, above);
 }
 
-// Copies between a volume and a tile: n rows of sixteen voxels (or \a lines, fewer) that lie side by side.
-template <class T>
-[[gnu::always_inline]] inline void GatherRows(int n, const float* voxels, std::ptrdiff_t step, int lines, Block<T>* rows)
+ECHORAMA_HOT bool SearchTile(int n, const float* g, float* above, float* below, const float* squares)
 {
-  if (lines == Lanes) {
-    for (int i = 0; i < n; ++i, voxels += step)
-#pragma GCC unroll 1
-      for (int l = 0; l < Lanes; ++l)
-        rows[i].value[l] = static_cast<T>(voxels[l]);
+  return SearchSixteen(n, g, above, below, squares);
+}
+
+ECHORAMA_HOT bool SearchTile(int n, const double* g, double* above, double* below, const double* squares)
+{
+  return SearchSixteen(n, g, above, below, squares);
+}
+
+ECHORAMA_HOT bool SearchRow(int n, const float* g, float* above, float* below, const float* squares)
+{
+  return SearchOne(n, g, above, below, squares);
+}
+
+ECHORAMA_HOT bool SearchRow(int n, const double* g, double* above, double* below, const double* squares)
+{
+  return SearchOne(n, g, above, below, squares);
+}
+
+// Between the volume and a tile; lanes beyond the volume are infinite.
+template <class T> void Gather(const float* voxels, int lanes, T* row)
+{
+  if (lanes == Lanes) {
+    ECHORAMA_FOR_LANES(l)
+    row[l] = static_cast<T>(voxels[l]);
   } else {
-    for (int i = 0; i < n; ++i, voxels += step)
-      for (int l = 0; l < Lanes; ++l)
-        rows[i].value[l] = l < lines ? static_cast<T>(voxels[l]) : static_cast<T>(Infinity);
+    std::copy_n(voxels, lanes, row);
+    std::fill(row + lanes, row + Lanes, static_cast<T>(Infinity));
   }
 }
 
-template <class T>
-[[gnu::always_inline]] inline void ScatterRows(int n, const Block<T>* rows, double scale, float* voxels, std::ptrdiff_t step, int lines)
+template <class T> void Scatter(const T* row, double scale, int lanes, float* voxels)
 {
-  for (int i = 0; i < n; ++i, voxels += step) {
-    Block<float> row;
-#pragma GCC unroll 1
-    for (int l = 0; l < Lanes; ++l)
-      row.value[l] = static_cast<float>(scale * rows[i].value[l]);
-    if (lines == Lanes)
-      std::memcpy(voxels, row.value, sizeof(row.value));
-    else
-      std::copy_n(row.value, lines, voxels);
+  if (lanes == Lanes) {
+    ECHORAMA_FOR_LANES(l)
+    voxels[l] = static_cast<float>(scale * row[l]);
+  } else {
+    for (int l = 0; l < lanes; ++l)
+      voxels[l] = static_cast<float>(scale * row[l]);
   }
 }
 
-ECHORAMA_HOT void Gather(int n, const float* voxels, std::ptrdiff_t step, int lines, Block<float>* rows)
+// Lines of n voxels to work on: a row along x (step 1) or a tile of sixteen lines along z (step Lanes).
+template <class T> class Lines
 {
-  GatherRows(n, voxels, step, lines, rows);
-}
-
-ECHORAMA_HOT void Gather(int n, const float* voxels, std::ptrdiff_t step, int lines, Block<double>* rows)
-{
-  GatherRows(n, voxels, step, lines, rows);
-}
-
-ECHORAMA_HOT void Scatter(int n, const Block<float>* rows, double scale, float* voxels, std::ptrdiff_t step, int lines)
-{
-  ScatterRows(n, rows, scale, voxels, step, lines);
-}
-
-ECHORAMA_HOT void Scatter(int n, const Block<double>* rows, double scale, float* voxels, std::ptrdiff_t step, int lines)
-{
-  ScatterRows(n, rows, scale, voxels, step, lines);
-}
-
-// Passes over the lines of one axis, after the squared distances within the axes before lie in the output.
-template <class T>
-class AxisPass {
 public:
-  // \a scale multiplies what is written.
-  AxisPass(int n, double spacing, double scale) : spacing_(spacing), scale_(scale), tile_(n), parabolas_(n)
+  Lines(int n, int step, double spacing)
+      : count_(n), step_(step), margin_(step == 1 ? 2 * Lanes : Stride), spacing_(spacing), g_(Blocks()), above_(Blocks()),
+        below_(Blocks())
   {
-    for (int d = 0; d < n + Stride; ++d)
+    for (std::vector<Block<T>>* array : {&g_, &above_, &below_})
+      for (Block<T>& block : *array)
+        std::fill_n(block.value, Lanes, static_cast<T>(Infinity));
+    for (int d = 0; d < n + 2 * Lanes; ++d)
       squares_.push_back(static_cast<T>((spacing * d) * (spacing * d)));
   }
 
-  // Up to sixteen lines that begin at first, first + 1, ...; voxels of a line are step apart.
-  void Work(float* first, int lines, std::ptrdiff_t step)
+  // The lanes at voxel i.
+  T* G(int i) { return At(g_, i); }
+  const T* Result(int i) { return At(above_, i); }
+
+  // Turns g into the result, in the first \a lanes lanes.
+  void Work(int lanes)
   {
-    const int n = tile_.count;
-    Gather(n, first, step, lines, tile_.rows.data() + Stride);
-    if (!Search(n, tile_.rows.data(), tile_.up.data(), tile_.down.data(), squares_.data(), tile_.result.data()))
-      for (int l = 0; l < lines; ++l)
-        Envelope(tile_, l, spacing_, parabolas_);
-    Scatter(n, tile_.result.data() + Stride, scale_, first, step, lines);
+    const bool finished = step_ == 1 ? SearchRow(count_, G(0), At(above_, 0), At(below_, 0), squares_.data())
+                                     : SearchTile(count_, G(0), At(above_, 0), At(below_, 0), squares_.data());
+    for (int l = 0; !finished && l < (step_ == 1 ? 1 : lanes); ++l)
+      Envelope(l);
   }
 
 private:
-  double spacing_, scale_;
-  Tile<T> tile_;
-  Parabolas parabolas_;
+  // A search looks beyond both ends of a line, where everything is infinite.
+  std::size_t Blocks() const
+  {
+    return static_cast<std::size_t>(count_ + 2 * margin_ + Lanes) * static_cast<std::size_t>(step_) / Lanes;
+  }
+  T* At(std::vector<Block<T>>& array, int i) { return array.front().value + static_cast<std::ptrdiff_t>(step_) * (i + margin_); }
+
+  // The lower envelope of the parabolas of one line, by a stack: site_[k] is lowest from voxel from_[k] on.
+  void Envelope(int lane)
+  {
+    site_.resize(static_cast<std::size_t>(count_));
+    from_.resize(site_.size());
+    const double square = spacing_ * spacing_;
+    const auto g = [this, lane](int i) { return static_cast<double>(G(i)[lane]); };
+    const auto height = [&g, this](int i, int j) { return g(j) + (spacing_ * (i - j)) * (spacing_ * (i - j)); };
+    int top = -1;
+    for (int j = 0; j < count_; ++j) {
+      if (g(j) == static_cast<double>(Infinity))
+        continue;
+      while (top >= 0 && height(from_[top], site_[top]) > height(from_[top], j))
+        --top;
+      if (top < 0) {
+        top = 0;
+        site_[0] = j;
+        from_[0] = 0;
+        continue;
+      }
+      // Beyond the crossing j is lower. The quotient of integers (equal spacings) is never rounded across a voxel.
+      const int apart = j - site_[top];
+      const double crossing = site_[top] + 0.5 * ((g(j) - g(site_[top])) / (square * apart) + apart);
+      if (!(crossing < count_ - 1))
+        continue;
+      const int from = std::max(static_cast<int>(std::floor(crossing)), from_[top]) + 1; // rounding may not go back
+      if (from < count_) {
+        ++top;
+        site_[top] = j;
+        from_[top] = from;
+      }
+    }
+    for (int i = count_ - 1; i >= 0; --i) {
+      At(above_, i)[lane] = static_cast<T>(top < 0 ? static_cast<double>(Infinity) : height(i, site_[top]));
+      if (top > 0 && i == from_[top])
+        --top;
+    }
+  }
+
+  int count_, step_, margin_;
+  double spacing_;
+  std::vector<Block<T>> g_, above_, below_; // the result takes the place of above_
   std::vector<T> squares_;
+  std::vector<int> site_, from_;
 };
 
-// The squared distance to the mask within one row. scratch holds 2 n numbers.
-ECHORAMA_HOT void MapRow(const unsigned char* mask, int n, double squaredSpacing, int* scratch, float* out)
+// The sweep along +y: steps since the mask, kept in steps from row to row.
+ECHORAMA_HOT void CountSteps(const unsigned char* mask, int n, float* steps, float* out)
 {
-  const int far = 1 << 30;
-  int* const before = scratch; // the nearest site on the left
-  int* const after = scratch + n;
+  for (int i = 0; i < n; ++i)
+    out[i] = steps[i] = mask[i] != 0 ? 0.0f : steps[i] + 1.0f;
+}
+
+// The sweep along -y over what the first one left: the squared distance along y.
+template <class T> [[gnu::always_inline]] inline void SquareSteps(const float* out, int n, T squaredSpacing, float* steps, T* g)
+{
   for (int i = 0; i < n; ++i) {
-    before[i] = mask[i] != 0 ? i : -far;
-    after[i] = mask[i] != 0 ? i : far;
+    const float back = steps[i] + 1.0f, nearest = out[i] < back ? out[i] : back;
+    steps[i] = nearest;
+    g[i] = squaredSpacing * (static_cast<T>(nearest) * static_cast<T>(nearest));
   }
-  // Minimum and maximum, not branches: random masks would mislead every one of them.
-  int last = -far, next = far;
-  for (int i = 0; i < n; ++i) {
-    before[i] = last = std::max(last, before[i]);
-    after[n - 1 - i] = next = std::min(next, after[n - 1 - i]);
-  }
-  for (int i = 0; i < n; ++i) {
-    const int steps = std::min(i - before[i], after[i] - i);
-    out[i] = steps < n ? static_cast<float>(squaredSpacing * (static_cast<double>(steps) * steps)) : Infinity;
+}
+
+ECHORAMA_HOT void SweepBack(const float* out, int n, float squaredSpacing, float* steps, float* g)
+{
+  SquareSteps(out, n, squaredSpacing, steps, g);
+}
+
+ECHORAMA_HOT void SweepBack(const float* out, int n, double squaredSpacing, float* steps, double* g)
+{
+  SquareSteps(out, n, squaredSpacing, steps, g);
+}
+
+// Along y and x in one slice.
+template <class T> void MapSlice(const unsigned char* mask, int nx, int ny, double squaredSpacingY, Lines<T>& row, float* out)
+{
+  std::vector<float> steps(static_cast<std::size_t>(nx), Infinity);
+  for (int j = 0; j < ny; ++j)
+    CountSteps(mask + static_cast<std::ptrdiff_t>(nx) * j, nx, steps.data(), out + static_cast<std::ptrdiff_t>(nx) * j);
+  std::fill(steps.begin(), steps.end(), Infinity);
+  for (int j = ny - 1; j >= 0; --j) {
+    float* line = out + static_cast<std::ptrdiff_t>(nx) * j;
+    SweepBack(line, nx, static_cast<T>(squaredSpacingY), steps.data(), row.G(0));
+    row.Work(1);
+    std::copy_n(row.Result(0), nx, line);
   }
 }
 
 template <class T>
-void Map(VolumeView<const unsigned char> mask, const Eigen::Vector3d& spacing, double scale, VolumeView<float> out,
+void Map(const unsigned char* mask, const std::array<int, 3>& n, const Eigen::Vector3d& spacing, double scale, float* out,
          const Progress& progress)
 {
-  const auto& n = mask.Dimensions();
-  ParallelFor(n[2], progress.Part(0.0, 0.5), [&](std::ptrdiff_t slice) {
-    const int k = static_cast<int>(slice);
-    std::vector<int> scratch(2 * static_cast<std::size_t>(n[0]));
-    for (int j = 0; j < n[1]; ++j)
-      MapRow(mask.Row(j, k), n[0], spacing.x() * spacing.x(), scratch.data(), out.Row(j, k));
-    AxisPass<T> pass(n[1], spacing.y(), 1.0);
-    for (int i = 0; i < n[0]; i += Lanes)
-      pass.Work(&out(i, 0, k), std::min(Lanes, n[0] - i), out.RowStride());
+  const std::ptrdiff_t sliceStride = static_cast<std::ptrdiff_t>(n[0]) * n[1];
+  const std::ptrdiff_t slices = std::max<std::ptrdiff_t>(1, 65536 / sliceStride);
+  ParallelRanges(n[2], slices, progress.Part(0.0, 0.5), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    Lines<T> row(n[0], 1, spacing.x());
+    for (std::ptrdiff_t k = begin; k < end; ++k)
+      MapSlice(mask + k * sliceStride, n[0], n[1], spacing.y() * spacing.y(), row, out + k * sliceStride);
   });
-  ParallelFor(n[1], progress.Part(0.5, 1.0), [&](std::ptrdiff_t row) {
-    AxisPass<T> pass(n[2], spacing.z(), scale);
-    for (int i = 0; i < n[0]; i += Lanes)
-      pass.Work(&out(i, static_cast<int>(row), 0), std::min(Lanes, n[0] - i), out.SliceStride());
-  });
+  // Several tiles side by side share the pages of memory that they touch.
+  const int together = std::max(1, std::min(8, 4096 / n[2]));
+  const std::ptrdiff_t pieces = (n[0] + together * Lanes - 1) / (together * Lanes), count = n[1] * pieces;
+  ParallelRanges(
+      count, std::max<std::ptrdiff_t>(1, count / 64), progress.Part(0.5, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+        std::vector<Lines<T>> lines(static_cast<std::size_t>(together), Lines<T>(n[2], Lanes, spacing.z()));
+        for (std::ptrdiff_t item = begin; item < end; ++item) {
+          const int first = static_cast<int>(item % pieces) * together * Lanes;
+          const int tiles = std::min(together, (n[0] - first + Lanes - 1) / Lanes);
+          float* const voxels = out + item / pieces * n[0] + first;
+          const auto lanes = [&](int tile) { return std::min(Lanes, n[0] - first - tile * Lanes); };
+          for (int k = 0; k < n[2]; ++k)
+            for (int t = 0; t < tiles; ++t)
+              Gather(voxels + k * sliceStride + t * Lanes, lanes(t), lines[static_cast<std::size_t>(t)].G(k));
+          for (int t = 0; t < tiles; ++t)
+            lines[static_cast<std::size_t>(t)].Work(lanes(t));
+          for (int k = 0; k < n[2]; ++k)
+            for (int t = 0; t < tiles; ++t)
+              Scatter(lines[static_cast<std::size_t>(t)].Result(k), scale, lanes(t), voxels + k * sliceStride + t * Lanes);
+        }
+      });
 }
 
 } // namespace
@@ -312,32 +387,42 @@ void Map(VolumeView<const unsigned char> mask, const Eigen::Vector3d& spacing, d
 void SquaredDistanceMap(VolumeView<const unsigned char> mask, const Eigen::Vector3d& spacing, VolumeView<float> squaredDistance,
                         const Progress& progress)
 {
-  const auto& n = mask.Dimensions();
-  if (n != squaredDistance.Dimensions())
+  if (mask.Dimensions() != squaredDistance.Dimensions())
     throw Error(Error::Kind::InvalidParameter, "mask and distance map differ in shape");
   if (mask.Size() == 0)
     return;
-  double diagonal = 0.0, squaredDiagonal = 0.0; // in voxels, in mm
+  // Axes of one voxel are left out: a 2D image, or a column, is laid out as x and z.
+  std::array<int, 3> n{1, 1, 1};
+  Eigen::Vector3d s = Eigen::Vector3d::Ones();
+  double diagonal = 0.0, diagonalMm = 0.0; // squared
+  int axes = 0;
+  bool equal = true;
   for (int axis = 0; axis < 3; ++axis) {
-    const double length = n[static_cast<std::size_t>(axis)] - 1.0, s = spacing[axis];
-    diagonal += length * length;
-    squaredDiagonal += length * s * length * s;
-    if (!(s > 0.0 && s * s >= std::numeric_limits<float>::min()))
+    const int count = mask.Dimensions()[static_cast<std::size_t>(axis)];
+    if (!(spacing[axis] > 0.0 && spacing[axis] * spacing[axis] >= std::numeric_limits<float>::min()))
       throw Error(Error::Kind::InvalidParameter, "the spacing of a distance map must be positive, and its square a float");
+    if (count == 1)
+      continue;
+    n[static_cast<std::size_t>(axes)] = count;
+    s[axes] = spacing[axis];
+    equal = equal && s[axes] == s[0];
+    diagonal += (count - 1.0) * (count - 1.0);
+    diagonalMm += (count - 1.0) * (count - 1.0) * spacing[axis] * spacing[axis];
+    ++axes;
   }
-  if (!(squaredDiagonal <= std::numeric_limits<float>::max()))
+  if (!(diagonalMm <= std::numeric_limits<float>::max()))
     throw Error(Error::Kind::InvalidParameter, "the spacing is too large: squared distances do not fit a float");
-
-  const auto same = [&](int a, int b) { return spacing[a] == spacing[b]; };
-  if (same(0, 1) && (same(0, 2) || n[2] == 1)) {
-    const double scale = spacing.x() * spacing.x();
-    if (diagonal < 16777216.0)
-      Map<float>(mask, Eigen::Vector3d::Ones(), scale, squaredDistance, progress);
-    else
-      Map<double>(mask, Eigen::Vector3d::Ones(), scale, squaredDistance, progress);
-  } else {
-    Map<double>(mask, spacing, 1.0, squaredDistance, progress);
+  if (axes == 2) {
+    std::swap(n[1], n[2]);
+    std::swap(s[1], s[2]);
   }
+
+  if (!equal)
+    Map<double>(mask.Data(), n, s, 1.0, squaredDistance.Data(), progress);
+  else if (diagonal < 16777216.0)
+    Map<float>(mask.Data(), n, Eigen::Vector3d::Ones(), s[0] * s[0], squaredDistance.Data(), progress);
+  else
+    Map<double>(mask.Data(), n, Eigen::Vector3d::Ones(), s[0] * s[0], squaredDistance.Data(), progress);
 }
 
 } // namespace echorama
