@@ -21,10 +21,8 @@
 #include <limits>
 #include <vector>
 
-namespace echorama
-{
-namespace
-{
+namespace echorama {
+namespace {
 
 constexpr int Lanes = 16;      // voxels side by side
 constexpr int Stride = 4;      // steps of a search between two looks whether it may end
@@ -32,7 +30,8 @@ constexpr int MeanSteps = 128; // steps, on average over a line, after which the
 constexpr float Infinity = std::numeric_limits<float>::infinity();
 
 // What vector instructions load at once.
-template <class T> struct alignas(64) Block {
+template <class T>
+struct alignas(64) Block {
   T value[Lanes];
 };
 
@@ -59,7 +58,8 @@ template <class T> struct alignas(64) Block {
 }
 
 // Whether some value exceeds its limit + offset. Written with integers, because a compiler makes vectors of that.
-template <class T> [[gnu::always_inline]] inline bool SomeAbove(const T* values, const T* limits, T offset)
+template <class T>
+[[gnu::always_inline]] inline bool SomeAbove(const T* values, const T* limits, T offset)
 {
   decltype(Bits(offset)) some = 0;
   ECHORAMA_FOR_LANES(l)
@@ -67,7 +67,8 @@ template <class T> [[gnu::always_inline]] inline bool SomeAbove(const T* values,
   return some < 0;
 }
 
-template <class T> [[gnu::always_inline]] inline void TakeSmaller(T* values, const T* others, T offset)
+template <class T>
+[[gnu::always_inline]] inline void TakeSmaller(T* values, const T* others, T offset)
 {
   ECHORAMA_FOR_LANES(l)
   {
@@ -77,7 +78,8 @@ template <class T> [[gnu::always_inline]] inline void TakeSmaller(T* values, con
 }
 
 // Whether nothing in a block is finite.
-template <class T> [[gnu::always_inline]] inline bool AllInfinite(const T* values)
+template <class T>
+[[gnu::always_inline]] inline bool AllInfinite(const T* values)
 {
   const auto infinite = Bits(static_cast<T>(Infinity));
   decltype(Bits(T(0))) some = 0;
@@ -125,7 +127,8 @@ template <class T, int Step>
 }
 
 // Sixteen lines: running minima from both ends, then the search.
-template <class T> [[gnu::always_inline]] inline bool SearchSixteen(int n, const T* g, T* above, T* below, const T* squares)
+template <class T>
+[[gnu::always_inline]] inline bool SearchSixteen(int n, const T* g, T* above, T* below, const T* squares)
 {
   std::memcpy(below, g, sizeof(Block<T>));
   for (std::ptrdiff_t i = 1; i < n; ++i) {
@@ -146,7 +149,8 @@ template <class T> [[gnu::always_inline]] inline bool SearchSixteen(int n, const
 }
 
 // One line: the minima advance by whole blocks, which is a lower bound and costs less.
-template <class T> [[gnu::always_inline]] inline bool SearchOne(int n, const T* g, T* above, T* below, const T* squares)
+template <class T>
+[[gnu::always_inline]] inline bool SearchOne(int n, const T* g, T* above, T* below, const T* squares)
 {
   using Integer = decltype(Bits(T(0)));
   const auto smallest = [g](int block) {
@@ -202,7 +206,8 @@ ECHORAMA_HOT bool SearchRow(int n, const double* g, double* above, double* below
 }
 
 // Between the volume and a tile; lanes beyond the volume are infinite.
-template <class T> void Gather(const float* voxels, int lanes, T* row)
+template <class T>
+void Gather(const float* voxels, int lanes, T* row)
 {
   if (lanes == Lanes) {
     ECHORAMA_FOR_LANES(l)
@@ -213,7 +218,8 @@ template <class T> void Gather(const float* voxels, int lanes, T* row)
   }
 }
 
-template <class T> void Scatter(const T* row, double scale, int lanes, float* voxels)
+template <class T>
+void Scatter(const T* row, double scale, int lanes, float* voxels)
 {
   if (lanes == Lanes) {
     ECHORAMA_FOR_LANES(l)
@@ -225,12 +231,12 @@ template <class T> void Scatter(const T* row, double scale, int lanes, float* vo
 }
 
 // Lines of n voxels to work on: a row along x (step 1) or a tile of sixteen lines along z (step Lanes).
-template <class T> class Lines
-{
+template <class T>
+class Lines {
 public:
   Lines(int n, int step, double spacing)
-      : count_(n), step_(step), margin_(step == 1 ? 2 * Lanes : Stride), spacing_(spacing), g_(Blocks()), above_(Blocks()),
-        below_(Blocks())
+    : count_(n), step_(step), margin_(step == 1 ? 2 * Lanes : Stride), spacing_(spacing), g_(Blocks()), above_(Blocks()),
+      below_(Blocks())
   {
     for (std::vector<Block<T>>* array : {&g_, &above_, &below_})
       for (Block<T>& block : *array)
@@ -314,7 +320,8 @@ ECHORAMA_HOT void CountSteps(const unsigned char* mask, int n, float* steps, flo
 }
 
 // The sweep along -y over what the first one left: the squared distance along y.
-template <class T> [[gnu::always_inline]] inline void SquareSteps(const float* out, int n, T squaredSpacing, float* steps, T* g)
+template <class T>
+[[gnu::always_inline]] inline void SquareSteps(const float* out, int n, T squaredSpacing, float* steps, T* g)
 {
   for (int i = 0; i < n; ++i) {
     const float back = steps[i] + 1.0f, nearest = out[i] < back ? out[i] : back;
@@ -334,7 +341,8 @@ ECHORAMA_HOT void SweepBack(const float* out, int n, double squaredSpacing, floa
 }
 
 // Along y and x in one slice.
-template <class T> void MapSlice(const unsigned char* mask, int nx, int ny, double squaredSpacingY, Lines<T>& row, float* out)
+template <class T>
+void MapSlice(const unsigned char* mask, int nx, int ny, double squaredSpacingY, Lines<T>& row, float* out)
 {
   std::vector<float> steps(static_cast<std::size_t>(nx), Infinity);
   for (int j = 0; j < ny; ++j)
@@ -423,6 +431,30 @@ void SquaredDistanceMap(VolumeView<const unsigned char> mask, const Eigen::Vecto
     Map<float>(mask.Data(), n, Eigen::Vector3d::Ones(), s[0] * s[0], squaredDistance.Data(), progress);
   else
     Map<double>(mask.Data(), n, Eigen::Vector3d::Ones(), s[0] * s[0], squaredDistance.Data(), progress);
+}
+
+void SquaredDepthMap(VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> squaredDepth,
+                     const Progress& progress)
+{
+  const auto& n = region.Dimensions();
+  Volume<unsigned char> outside(n);
+  std::transform(region.begin(), region.end(), outside.View().begin(), [](unsigned char r) { return r == 0 ? 1 : 0; });
+  SquaredDistanceMap(outside.View(), spacing, squaredDepth, progress.Part(0.0, 0.9));
+  // The nearest voxel beyond the grid lies straight along one of the axes.
+  const auto toRim = [&n, &spacing](int axis, int i) {
+    const int count = n[static_cast<std::size_t>(axis)];
+    const double distance = spacing[axis] * std::min(i + 1, count - i);
+    return count == 1 ? Infinity : static_cast<float>(distance * distance);
+  };
+  ParallelFor(n[2], progress.Part(0.9, 1.0), [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    for (int j = 0; j < n[1]; ++j) {
+      float* const row = squaredDepth.Row(j, k);
+      const float rim = std::min(toRim(1, j), toRim(2, k));
+      for (int i = 0; i < n[0]; ++i)
+        row[i] = std::min({row[i], rim, toRim(0, i)});
+    }
+  });
 }
 
 } // namespace echorama

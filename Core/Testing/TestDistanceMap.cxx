@@ -10,15 +10,15 @@
 
 using namespace echorama;
 
-namespace
-{
+namespace {
 
 using Size = std::array<int, 3>;
 constexpr float Infinity = std::numeric_limits<float>::infinity();
 const Eigen::Vector3d Unit = Eigen::Vector3d::Ones();
 
 // A mask of the voxels where isSite(i, j, k).
-template <class Function> Volume<unsigned char> Mask(const Size& size, const Function& isSite)
+template <class Function>
+Volume<unsigned char> Mask(const Size& size, const Function& isSite)
 {
   Volume<unsigned char> mask(size);
   for (int k = 0; k < size[2]; ++k)
@@ -95,7 +95,7 @@ TEST(DistanceMap, IsBruteForceToRoundingWithAnySpacing)
   std::uint64_t seed = 100;
   for (const Size& size : Sizes)
     for (const double density : {0.3, 0.05, 0.003}) {
-      const Eigen::Vector3d& spacing = spacings[seed * 7 / 3 % 3]; // each density meets each spacing
+      const Eigen::Vector3d& spacing = spacings[(seed + seed / 3) % 3]; // each density meets each spacing
       const auto mask = RandomMask(size, density, seed++);
       EXPECT_LE(WorstUlp(mask, spacing, MapOf(mask, spacing)), 2.0)
           << size[0] << " " << size[1] << " " << size[2] << " at " << density << " with " << spacing.transpose();
@@ -179,6 +179,32 @@ TEST(DistanceMap, LongerThanFloatsCount)
             ASSERT_NEAR(map.View()(i, j, k), square, 2.0);
         }
   }
+}
+
+// The depth is the distance map of the complement with one more layer of outside around the grid.
+TEST(DistanceMap, DepthCountsTheRim)
+{
+  for (const Size& size : {Size{12, 9, 7}, Size{12, 9, 1}, Size{1, 20, 1}, Size{17, 1, 16}})
+    for (const double density : {1.1, 0.9, 0.5, -0.1})
+      for (const Eigen::Vector3d& spacing : {Eigen::Vector3d(Unit), Eigen::Vector3d(0.5, 1.5, 2.0)}) {
+        const auto region = RandomMask(size, density, 11);
+        Volume<float> depth(size);
+        SquaredDepthMap(region.View(), spacing, depth.View());
+        Size margin, wide;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          margin[axis] = size[axis] > 1 ? 1 : 0;
+          wide[axis] = size[axis] + 2 * margin[axis];
+        }
+        const auto inside = [&](int i, int j, int k) {
+          i -= margin[0], j -= margin[1], k -= margin[2];
+          return i >= 0 && j >= 0 && k >= 0 && i < size[0] && j < size[1] && k < size[2] && region.View()(i, j, k) != 0;
+        };
+        const auto expected = MapOf(Mask(wide, [&](int i, int j, int k) { return !inside(i, j, k); }), spacing);
+        for (int k = 0; k < size[2]; ++k)
+          for (int j = 0; j < size[1]; ++j)
+            for (int i = 0; i < size[0]; ++i)
+              ASSERT_EQ(depth.View()(i, j, k), expected.View()(i + margin[0], j + margin[1], k + margin[2]));
+      }
 }
 
 TEST(DistanceMap, SameForAnyNumberOfThreads)
