@@ -8,16 +8,17 @@
 //    whatever the threads. The innermost loop runs along depth over always eight samples, real and imaginary parts side by
 //    side: sixteen floats, for the vector unit. Rows have a margin, so that no sample needs a test.
 // 3. Shadows: beams are straight lines, so the way through an ellipsoid is an interval of depth.
-// 4. Grey: log compression on the beams, then trilinear interpolation in them for each voxel, as scanners do it.
+// 4. Grey: log compression to bytes on the beams, then scan conversion, in the order of a scanner.
 //
 // The sampling follows the point spread: 0.75 of its standard deviation in depth, 0.8 across, where it is narrowest
 // beside the spread of the beams. Cost: one hash (Philox) and one inverse of the geometry per lattice cell in the box, some
-// 40 short vector operations per scatterer, and one inverse of the geometry per voxel.
+// 40 short vector operations per scatterer.
 #include "Phantom.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "Core/Imaging/ScanConversion.h"
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -31,7 +32,8 @@ constexpr int margin = depthTaps - 1;
 constexpr float reach = 2.75f; // standard deviations that an echo reaches across: 33 dB down
 constexpr int planesPerSlab = 4;
 constexpr int layersPerPart = 4;
-constexpr double maxBeamSamples = 268435456.0, maxCells = 268435456.0, maxVoxels = 536870912.0; // 2^28, 2^28, 2^29
+constexpr double maxBeamSamples = 268435456.0, maxCells = 268435456.0; // 2^28
+constexpr std::size_t maxVoxels = 536870912;                           // 2^29
 
 // The samples of beam space.
 struct BeamGrid {
@@ -274,37 +276,20 @@ struct Between {
 };
 
 // Trilinear interpolation in beam space.
-template <class Result, class T>
-Result Interpolate(const VolumeView<const T>& samples, const Between& depth, const Between& fan, const Between& sweep)
+std::complex<double> Interpolate(const VolumeView<const std::complex<float>>& samples, const Between& depth, const Between& fan,
+                                 const Between& sweep)
 {
   const auto along = [&](int beam, int plane) {
-    const T* row = samples.Row(fan.first + beam, sweep.first + plane) + depth.first;
-    return Result(row[0]) + depth.t * (Result(row[1]) - Result(row[0]));
+    const std::complex<float>* row = samples.Row(fan.first + beam, sweep.first + plane) + depth.first;
+    const std::complex<double> a(row[0]), b(row[1]);
+    return a + depth.t * (b - a);
   };
   const auto across = [&](int plane) {
-    const Result a = along(0, plane);
+    const std::complex<double> a = along(0, plane);
     return a + fan.t * (along(1, plane) - a);
   };
-  const Result a = across(0);
+  const std::complex<double> a = across(0);
   return a + sweep.t * (across(1) - a);
-}
-
-// The voxel grid in the probe frame.
-ImageGeometry GridInProbe(const PhantomParameters& p)
-{
-  const Eigen::AlignedBox3d box = BoxAround(p.probe);
-  // Voxel centres on whole multiples of the spacing, so that the probe's axis runs through voxels.
-  const Eigen::Array3d first = (box.min().array() / p.spacingMm).floor(), last = (box.max().array() / p.spacingMm).ceil();
-  const Eigen::Array3d count = last - first + 1.0;
-  if (!(count.prod() <= maxVoxels))
-    throw Error(Error::Kind::TooLarge,
-                "phantom: a spacing of " + std::to_string(p.spacingMm) + " mm gives more than 2^29 voxels; choose a larger one");
-  ImageGeometry grid;
-  for (int axis = 0; axis < 3; ++axis)
-    grid.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(count[axis]);
-  grid.spacing.setConstant(p.spacingMm);
-  grid.origin = p.spacingMm * first.matrix();
-  return grid;
 }
 
 } // namespace
@@ -351,9 +336,8 @@ std::optional<std::complex<double>> BeamEchoes::At(const Eigen::Vector3d& pointI
   if (!beam)
     return {};
   const auto& n = baseband.Dimensions();
-  return Interpolate<std::complex<double>>(baseband.View(),
-                                           Between((beam->depth - probe.depthMin) / (probe.depthMax - probe.depthMin), n[0]),
-                                           Between(beam->fan + 0.5, n[1]), Between(beam->sweep + 0.5, n[2]));
+  return Interpolate(baseband.View(), Between((beam->depth - probe.depthMin) / (probe.depthMax - probe.depthMin), n[0]),
+                     Between(beam->fan + 0.5, n[1]), Between(beam->sweep + 0.5, n[2]));
 }
 
 BeamEchoes SimulateEchoes(const PhantomParameters& p, const Progress& progress)
@@ -412,50 +396,31 @@ Eigen::AlignedBox3d BoxAround(const ProbeGeometry& probe, const Pose& pose)
 ImageGeometry PhantomGeometry(const PhantomParameters& p)
 {
   p.Check();
-  return GridInProbe(p).Moved(p.probeToWorld);
+  return ScanConversionGrid(p.probe, p.probeToWorld, p.spacingMm, maxVoxels);
 }
 
 void MakePhantom(const PhantomParameters& p, VolumeView<unsigned char> intensity, VolumeView<unsigned char> valid,
                  const Progress& progress)
 {
-  p.Check();
-  const ImageGeometry geometry = GridInProbe(p);
+  const ImageGeometry geometry = PhantomGeometry(p);
   if (intensity.Dimensions() != geometry.dimensions || valid.Dimensions() != geometry.dimensions)
     throw Error(Error::Kind::InvalidParameter, "phantom: the volumes do not have the dimensions of the phantom's geometry");
-  const BeamEchoes echoes = SimulateEchoes(p, progress.Part(0.0, 0.8));
+  const BeamEchoes echoes = SimulateEchoes(p, progress.Part(0.0, 0.85));
   const VolumeView<const std::complex<float>> baseband = echoes.baseband.View();
-  const auto& n = baseband.Dimensions();
 
   // The mean of 20 log10 of a Rayleigh envelope lies 10 gamma / ln 10 = 2.507 dB below that of its mean power.
   const double greyPerDb = 255.0 / p.dynamicRangeDb;
   const double offset = p.backgroundGrey + greyPerDb * (p.gainDb + 2.5068);
-  Volume<float> grey(n);
-  const VolumeView<float> greys = grey.View();
-  ParallelFor(n[2], progress.Part(0.8, 0.85), [&](std::ptrdiff_t plane) {
+  Volume<unsigned char> greys(baseband.Dimensions());
+  const VolumeView<unsigned char> grey = greys.View();
+  ParallelFor(baseband.Slices(), progress.Part(0.85, 0.9), [&](std::ptrdiff_t plane) {
     for (std::ptrdiff_t i = plane * baseband.SliceStride(); i < (plane + 1) * baseband.SliceStride(); ++i) {
       const float power = std::norm(baseband[i]);
       const double value = power > 0.0f ? offset + greyPerDb * 10.0 * std::log10(static_cast<double>(power)) : 0.0;
-      greys[i] = static_cast<float>(std::clamp(value, 0.0, 255.0));
+      grey[i] = static_cast<unsigned char>(std::clamp(value, 0.0, 255.0) + 0.5);
     }
   });
-
-  const VolumeView<const float> samples = greys;
-  const double depths = p.probe.depthMax - p.probe.depthMin;
-  ParallelFor(geometry.dimensions[2], progress.Part(0.85, 1.0), [&](std::ptrdiff_t k) {
-    for (int j = 0; j < geometry.dimensions[1]; ++j) {
-      unsigned char* out = intensity.Row(j, static_cast<int>(k));
-      unsigned char* real = valid.Row(j, static_cast<int>(k));
-      for (int i = 0; i < geometry.dimensions[0]; ++i) {
-        const Eigen::Vector3d point = geometry.origin + p.spacingMm * Eigen::Vector3d(i, j, static_cast<double>(k));
-        const auto beam = BeamPointAt(p.probe, point);
-        real[i] = beam ? 1 : 0;
-        out[i] = beam ? static_cast<unsigned char>(
-                            0.5 + Interpolate<double>(samples, Between((beam->depth - p.probe.depthMin) / depths, n[0]),
-                                                      Between(beam->fan + 0.5, n[1]), Between(beam->sweep + 0.5, n[2])))
-                      : 0;
-      }
-    }
-  });
+  ScanConvert<unsigned char>(grey, p.probe, p.probeToWorld, geometry, intensity, valid, progress.Part(0.9, 1.0));
 }
 
 std::string DescribePhantom(const PhantomParameters& p)

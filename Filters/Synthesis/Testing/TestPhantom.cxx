@@ -425,8 +425,8 @@ TEST(Phantom, RefusesWhatItCannotMake)
   EXPECT_NE(with([](auto& p) { p.spacingMm = 0.0; }).find("spacing"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.spacingMm = -1.0; }).find("spacing"), std::string::npos);
   EXPECT_NE(with([&](auto& p) { p.spacingMm = nan; }).find("spacing"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-3; }).find("2^29"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-300; }).find("2^29"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-3; }).find("larger spacing"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-300; }).find("larger spacing"), std::string::npos);
   EXPECT_NE(with([&](auto& p) { p.probeToWorld.translation().x() = nan; }).find("ProbeToWorld"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probeToWorld.translation().x() = 1e7; }).find("ProbeToWorld"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probeToWorld.linear() *= 2.0; }).find("ProbeToWorld"), std::string::npos);
@@ -434,7 +434,7 @@ TEST(Phantom, RefusesWhatItCannotMake)
   EXPECT_NE(with([&](auto& p) { p.probe.fanAngle = infinity; }).find("probe geometry"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probe.sweepAngle = p.probe.sweepWidth = 0.0; }).find("plane"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probe = ProbeGeometry::Convex(3.0, 40, 1.0, 5, 0, 50); }).find("axis"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.probe.depthMax = 1e9; }).find("2^2"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.probe.depthMax = 1e9; }).find("larger spacing"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.scatterersPerMm3 = 0.0; }).find("scatterers"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.wavelengthMm = 0.0; }).find("wavelength"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.pulseSigmaMm = -1.0; }).find("pulse"), std::string::npos);

@@ -135,7 +135,7 @@ assert at((0, 0, 22)) > 140
 for change, word in (
     (lambda f: f.SetSpacingMm(0), "spacing"),
     (lambda f: f.SetSpacingMm(float("nan")), "spacing"),
-    (lambda f: f.SetSpacingMm(1e-4), "2^29"),
+    (lambda f: f.SetSpacingMm(1e-4), "larger spacing"),
     (lambda f: f.SetDepthMax(3), "depth"),
     (lambda f: f.SetSweepAngle(0), "plane"),
     (lambda f: f.SetFanAngle(-10), "fan"),
