@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Along a row of the grid the position in the volume is a straight line, so the range of voxels within the volume follows
+// from a division per axis, and nothing outside of it is looked at. Inside, the eight neighbours are read and mixed without
+// a branch; when they are all real that is the answer, otherwise (at the rim of a mask, near a NaN) Sampler gives it.
+// Where the volume lies on the grid's own lattice but for a shift, the fractions are the same along the row: that loop has
+// no index arithmetic and runs in vector registers, and a shift by whole voxels copies exactly.
+#include "RowSampler.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+
+namespace {
+
+// Removes the rounding of the chain of matrices, so that whole and half voxels are just that, on every machine.
+double Snapped(double value)
+{
+  constexpr double unit = 1024.0, slack = 1e-11;
+  const double nearest = std::round(value * unit) / unit;
+  return std::abs(value - nearest) <= slack * std::max(1.0, std::abs(value)) ? nearest : value;
+}
+
+template <class A>
+A Mixed(A a, A b, A t)
+{
+  return a + t * (b - a);
+}
+
+} // namespace
+
+GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid)
+{
+  const Eigen::Affine3d indexToGrid = grid.WorldToIndex() * volume.IndexToWorld();
+  const auto& n = volume.dimensions;
+  Eigen::AlignedBox3d hull;
+  for (int corner = 0; corner < 8; ++corner)
+    hull.extend(indexToGrid *
+                Eigen::Vector3d((corner & 1 ? n[0] : 0) - 0.5, (corner & 2 ? n[1] : 0) - 0.5, (corner & 4 ? n[2] : 0) - 0.5));
+  GridBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    // A little wider than the truth: what is outside is found out later.
+    const double first = std::clamp(std::ceil(hull.min()[axis] - 1e-6), 0.0, static_cast<double>(grid.dimensions[axis]));
+    const double last = std::clamp(std::floor(hull.max()[axis] + 1e-6), -1.0, grid.dimensions[axis] - 1.0);
+    box.first[axis] = static_cast<int>(first);
+    box.size[axis] = std::max(0, static_cast<int>(last - first) + 1);
+  }
+  return box;
+}
+
+// A row of the grid in the volume: at grid index i the position is start + i * step.
+template <class T>
+struct RowSampler<T>::Line {
+  Eigen::Vector3d start, step;
+  int begin = 0, end = 0; // grid indices that can lie within the volume
+};
+
+template <class T>
+RowSampler<T>::RowSampler(const PosedVolume<T>& volume, const ImageGeometry& grid)
+  : intensity_(volume.intensity), valid_(volume.valid), sampler_(volume.intensity, volume.valid),
+    gridToIndex_(volume.geometry.WorldToIndex() * grid.IndexToWorld()), box_(BoxOf(volume.geometry, grid))
+{
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 3; ++row)
+      gridToIndex_(row, column) = Snapped(gridToIndex_(row, column));
+  shifted_ = gridToIndex_.linear().col(0) == Eigen::Vector3d::UnitX();
+}
+
+template <class T>
+typename RowSampler<T>::Line RowSampler<T>::LineAt(int j, int k) const
+{
+  Line line;
+  line.step = gridToIndex_.linear().col(0);
+  line.start = gridToIndex_.translation() + gridToIndex_.linear().col(1) * j + gridToIndex_.linear().col(2) * k;
+  double begin = box_.first[0], end = static_cast<double>(box_.first[0]) + box_.size[0];
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = -0.5 - line.start[axis], high = intensity_.Dimensions()[axis] - 0.5 - line.start[axis];
+    if (line.step[axis] == 0.0) {
+      if (!(low <= 0.0 && high > 0.0))
+        end = begin;
+      continue;
+    }
+    const double a = low / line.step[axis], b = high / line.step[axis];
+    // One voxel of slack on both sides against rounding.
+    begin = std::max(begin, std::ceil(std::min(a, b)) - 1.0);
+    end = std::min(end, std::floor(std::max(a, b)) + 2.0);
+  }
+  begin = std::min(begin, static_cast<double>(box_.first[0]) + box_.size[0]);
+  line.begin = static_cast<int>(begin);
+  line.end = static_cast<int>(std::max(begin, end));
+  return line;
+}
+
+template <class T>
+void RowSampler<T>::Inside(int j, int k, unsigned char* inside) const
+{
+  const Line line = LineAt(j, k);
+  std::fill_n(inside, box_.size[0], static_cast<unsigned char>(0));
+  inside -= box_.first[0];
+  const auto& n = intensity_.Dimensions();
+  const auto at = [&line](int i) { return Eigen::Vector3d(line.start + i * line.step); };
+  const auto exact = [&](int i) {
+    const Eigen::Vector3d p = at(i);
+    return static_cast<unsigned char>(sampler_.NearestIndex(p[0], p[1], p[2]) >= 0);
+  };
+  // The first and the last two are looked at closely (see LineAt); those between lie within the grid of the volume.
+  const int begin = std::min(line.begin + 2, line.end), end = std::max(line.end - 2, begin);
+  for (int i = line.begin; i < begin; ++i)
+    inside[i] = exact(i);
+  for (int i = end; i < line.end; ++i)
+    inside[i] = exact(i);
+  if (shifted_ && begin < end) {
+    const Eigen::Vector3d p = at(begin);
+    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(p[2] + 0.5) * intensity_.SliceStride() +
+                                 static_cast<std::ptrdiff_t>(p[1] + 0.5) * intensity_.RowStride() +
+                                 static_cast<std::ptrdiff_t>(p[0] + 0.5) - begin;
+    for (int i = begin; i < end; ++i)
+      inside[i] = sampler_.IsReal(first + i);
+    return;
+  }
+  for (int i = begin; i < end; ++i) {
+    const double x = line.start[0] + i * line.step[0], y = line.start[1] + i * line.step[1], z = line.start[2] + i * line.step[2];
+    // Where a step is all but zero, rounding could reach the next voxel.
+    const std::ptrdiff_t nearest = std::min(static_cast<int>(z + 0.5), n[2] - 1) * intensity_.SliceStride() +
+                                   std::min(static_cast<int>(y + 0.5), n[1] - 1) * intensity_.RowStride() +
+                                   std::min(static_cast<int>(x + 0.5), n[0] - 1);
+    inside[i] = sampler_.IsReal(nearest);
+  }
+}
+
+template <class T>
+template <class A>
+void RowSampler<T>::Values(int j, int k, const unsigned char* inside, A* values) const
+{
+  const Line line = LineAt(j, k);
+  inside -= box_.first[0];
+  values -= box_.first[0];
+  const auto& n = intensity_.Dimensions();
+  const T* const data = intensity_.Data();
+  const unsigned char* const valid = valid_.Data();
+
+  // The voxel below a position on one axis, the step to the next one and the fraction of the way; beyond the rim the rim's
+  // value goes on.
+  struct Neighbours {
+    Neighbours(double position, int count, std::ptrdiff_t stride)
+    {
+      const double last = count - 1.0;
+      const double clamped = position > 0.0 ? (position < last ? position : last) : 0.0;
+      const int index = static_cast<int>(clamped);
+      fraction = static_cast<A>(clamped - index);
+      first = index * stride;
+      step = index + 1 < count ? stride : 0;
+    }
+    std::ptrdiff_t first, step;
+    A fraction;
+  };
+  const auto mixed = [data](std::ptrdiff_t first, std::ptrdiff_t sx, A tx, const Neighbours& y, const Neighbours& z) {
+    const T *const a = data + first, *const b = a + y.step, *const c = a + z.step, *const d = b + z.step;
+    const A lower = Mixed(Mixed(static_cast<A>(a[0]), static_cast<A>(a[sx]), tx),
+                          Mixed(static_cast<A>(b[0]), static_cast<A>(b[sx]), tx), y.fraction);
+    const A upper = Mixed(Mixed(static_cast<A>(c[0]), static_cast<A>(c[sx]), tx),
+                          Mixed(static_cast<A>(d[0]), static_cast<A>(d[sx]), tx), y.fraction);
+    return Mixed(lower, upper, z.fraction);
+  };
+  const auto allReal = [valid](std::ptrdiff_t first, std::ptrdiff_t sx, const Neighbours& y, const Neighbours& z, A value) {
+    if constexpr (std::is_floating_point_v<T>)
+      if (!std::isfinite(value)) // a neighbour that is not finite shows in the mixture
+        return false;
+    if (!valid)
+      return true;
+    const unsigned char *const a = valid + first, *const b = a + y.step, *const c = a + z.step, *const d = b + z.step;
+    return (a[0] & a[sx] & b[0] & b[sx] & c[0] & c[sx] & d[0] & d[sx]) != 0;
+  };
+  const auto precise = [&](int i) {
+    double value = 0.0;
+    sampler_.Linear(line.start[0] + i * line.step[0], line.start[1] + i * line.step[1], line.start[2] + i * line.step[2], value);
+    return static_cast<A>(value);
+  };
+
+  int begin = line.begin;
+  const int end = line.end;
+  if (shifted_) {
+    const Neighbours y(line.start[1], n[1], intensity_.RowStride()), z(line.start[2], n[2], intensity_.SliceStride());
+    const double whole = std::floor(line.start[0]);
+    const A tx = static_cast<A>(line.start[0] - whole);
+    // Voxels whose two neighbours along x exist; those before and after are left to the loop below.
+    const std::ptrdiff_t shift = static_cast<std::ptrdiff_t>(whole), rows = y.first + z.first + shift;
+    const int from = static_cast<int>(std::max<std::ptrdiff_t>(begin, -shift));
+    const int to = static_cast<int>(std::min<std::ptrdiff_t>(end, n[0] - 1 - shift));
+    if (from < to) {
+      for (int i = from; i < to; ++i)
+        values[i] = mixed(rows + i, 1, tx, y, z);
+      for (int i = from; i < to; ++i)
+        if ((inside[i] & 1) && !allReal(rows + i, 1, y, z, values[i]))
+          values[i] = precise(i);
+      for (int i = begin; i < from; ++i)
+        if (inside[i] & 1)
+          values[i] = precise(i);
+      begin = to;
+    }
+  }
+  for (int i = begin; i < end; ++i) {
+    if (!(inside[i] & 1))
+      continue;
+    const Neighbours x(line.start[0] + i * line.step[0], n[0], 1),
+        y(line.start[1] + i * line.step[1], n[1], intensity_.RowStride()),
+        z(line.start[2] + i * line.step[2], n[2], intensity_.SliceStride());
+    const std::ptrdiff_t first = x.first + y.first + z.first;
+    values[i] = mixed(first, x.step, x.fraction, y, z);
+    if (!allReal(first, x.step, y, z, values[i]))
+      values[i] = precise(i);
+  }
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template class RowSampler<T>;                                                                                                  \
+  template void RowSampler<T>::Values<float>(int, int, const unsigned char*, float*) const;                                      \
+  template void RowSampler<T>::Values<double>(int, int, const unsigned char*, double*) const;
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama

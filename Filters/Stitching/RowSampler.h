@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Imaging/Sampling.h"
+#include "RegionMap.h"
+
+namespace echorama {
+
+/// Where in a grid the voxels of a volume can be.
+GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid);
+
+/// Reads a posed volume at the voxels of a grid, one row of the grid at a time. It gives what Sampler gives (Core), and is
+/// several times faster, because neighbours in a row share their work.
+template <class T>
+class RowSampler {
+public:
+  RowSampler(const PosedVolume<T>& volume, const ImageGeometry& grid);
+
+  /// BoxOf the volume.
+  const GridBox& Box() const { return box_; }
+
+  /// Writes 1 where a voxel of the grid lies in the volume (Sampler::NearestIndex) and 0 elsewhere, for the row (j, k) of
+  /// Box(). The grid is indexed as a whole.
+  void Inside(int j, int k, unsigned char* inside) const;
+
+  /// Writes the trilinear value (Sampler::Linear) where bit 0 of \a inside is set, for the same row, and anything
+  /// elsewhere. A is float or, for volumes of doubles, double.
+  template <class A>
+  void Values(int j, int k, const unsigned char* inside, A* values) const;
+
+private:
+  struct Line;
+  Line LineAt(int j, int k) const;
+
+  VolumeView<const T> intensity_;
+  VolumeView<const unsigned char> valid_;
+  Sampler<T> sampler_;
+  Eigen::Affine3d gridToIndex_;
+  bool shifted_; ///< the grid steps along x exactly as the volume does
+  GridBox box_;
+};
+
+} // namespace echorama
