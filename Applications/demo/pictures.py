@@ -66,7 +66,7 @@ def views_through(centre, down, low, high):
 def window_of(volume):
     """Grey levels that become black and white: the same for all pictures of one report."""
     real = volume.intensity[volume.valid]
-    low, high = np.percentile(real[:: max(1, len(real) // 1_000_000)], [0.5, 99.0])
+    low, high = np.percentile(real[:: max(1, len(real) // 1_000_000)], [0.5, 99.5])
     return float(low), float(max(high, low + 1))
 
 

@@ -175,7 +175,7 @@ def write_report(out, steps, files, truth_file, before, after, quick):
     pictures.draw_slices(out / "slices.png", at_first, now, stitched, views, window, step)
     pictures.draw_edges(out / "edges.png", now, stitched, views, window, step)
     pictures.draw_rendering(out / "rendering.png", stitched, centre, down, window)
-    shown = sorted(pairs_after, key=lambda pair: -pair.percent)[: max(1, min(3, len(files) - 1))]
+    shown = sorted(sorted(pairs_after, key=lambda pair: -pair.percent)[: max(1, min(3, len(files) - 1))], key=lambda pair: pair.first)
     overlays = ""
     if shown:
         pictures.draw_overlays(out / "overlays.png", at_first, now, shown, down, low, high, window, step)

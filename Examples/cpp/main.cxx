@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // stitch_volumes [VOLUME...]: reads overlapping volumes (without any: makes two of a phantom), aligns and stitches them, and
-// writes stitched.mha.
+// writes stitched.vti.
 #include <cstdlib>
 #include <iostream>
 #include <vtkImageData.h>
@@ -48,11 +48,11 @@ int main(int argc, char** argv)
               << pose->GetElement(2, 3) << " mm" << std::endl;
   }
   vtkNew<vtkUltrasoundWriter> writer;
-  writer->SetFileName("stitched.mha");
+  writer->SetFileName("stitched.vti");
   writer->SetInputData(stitched);
   if (!writer->Write())
     return EXIT_FAILURE;
   const int* size = stitched->GetDimensions();
-  std::cout << "wrote stitched.mha: " << size[0] << " x " << size[1] << " x " << size[2] << " voxels" << std::endl;
+  std::cout << "wrote stitched.vti: " << size[0] << " x " << size[1] << " x " << size[2] << " voxels" << std::endl;
   return EXIT_SUCCESS;
 }

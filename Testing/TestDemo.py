@@ -1,0 +1,63 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The demo from end to end at a coarse size: what it makes, what its report says, and how it fails."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
+program = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"]) / "bin" / "echorama"
+screen = [] if os.environ.get("DISPLAY") else ["xvfb-run", "-n", "117", "-s", "-screen 0 1280x1024x24"]
+
+
+def demo(out, *arguments, prefix=screen):
+    return subprocess.run([*prefix, "/usr/bin/python3", source / "Applications" / "demo" / "demo.py", "--program", program,
+                           "--out", out, "--quick", *arguments], capture_output=True, text=True)
+
+
+def check(truth, what):
+    if not truth:
+        sys.exit(f"TestDemo: {what}")
+
+
+def check_report(out):
+    for name in ("stitched.mha", "poses.json", "slices.png", "overlays.png", "edges.png", "rendering.png"):
+        check((out / name).stat().st_size > 500, f"{name} is missing or empty")
+    report = (out / "report.html").read_text()
+    outside = re.findall(r"""(?:src|href)\s*=\s*["'](?!data:)[^"']*|url\([^)]*\)|@import[^;]*|<script[^>]*|<link[^>]*""", report)
+    check(not outside, f"the report needs more than itself: {outside}")
+    check(report.count('src="data:image/png;base64,') == 4, "the report does not hold its four pictures")
+    check("$" not in re.sub(r"base64,[^\"]*", "", report), "a place of the template was not filled")
+    return report
+
+
+with tempfile.TemporaryDirectory() as folder:
+    folder = pathlib.Path(folder)
+
+    made = demo(folder / "phantom volumes")
+    check(made.returncode == 0, f"the demo failed:\n{made.stderr}")
+    report = check_report(folder / "phantom volumes")
+    off = re.search(r"off +([\d.]+) mm before, ([\d.]+) mm after", made.stdout)
+    check(off, f"no score in {made.stdout!r}")
+    before, after = float(off[1]), float(off[2])
+    check(before > 5.0, f"the volumes lay only {before} mm off")
+    check(after < 1.0, f"the volumes still lie {after} mm off")
+    check("How far off" in report and f"{off[2]}" in report, "the report does not tell the score")
+    check(str((folder / "phantom volumes" / "report.html").resolve()) in made.stdout, "the demo does not say where its report is")
+
+    volumes = [folder / "phantom volumes" / "phantom" / f"volume_{number}.mha" for number in (1, 2)]
+    own = demo(folder / "own", "--", *volumes)
+    check(own.returncode == 0, f"the demo with volumes of one's own failed:\n{own.stderr}")
+    check("Nobody knows" in check_report(folder / "own"), "the report claims a truth that nobody gave")
+
+    missing = demo(folder / "missing", "--", volumes[0], folder / "no such.mha")
+    check(missing.returncode == 1 and "aligning" in missing.stderr and "no such.mha" in missing.stderr,
+          f"a missing file: status {missing.returncode}, {missing.stderr!r}")
+    check(not (folder / "missing" / "report.html").exists(), "a report in spite of a failure")
+    one = demo(folder / "one", "--", volumes[0])
+    check(one.returncode == 2, f"one volume alone: status {one.returncode}")
+
+print(made.stdout)

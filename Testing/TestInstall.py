@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a stranger does: install, build a project of their own against the install tree, run it, import the Python package."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
+build = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"])
+
+
+def run(*command, cwd=None, environment=None):
+    """The standard output of a command that must succeed. It sees nothing of the build tree."""
+    clean = {key: value for key, value in os.environ.items() if not key.startswith(("ECHORAMA", "PYTHONPATH", "LD_LIBRARY_PATH"))}
+    answer = subprocess.run([str(part) for part in command], cwd=cwd, env={**clean, **(environment or {})},
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if answer.returncode != 0:
+        print(answer.stdout)
+        sys.exit(f"TestInstall: {' '.join(str(part) for part in command)} ended with status {answer.returncode}")
+    return answer.stdout
+
+
+def check(truth, what):
+    if not truth:
+        sys.exit(f"TestInstall: {what}")
+
+
+with tempfile.TemporaryDirectory() as folder:
+    folder = pathlib.Path(folder)
+    prefix, example = folder / "prefix", folder / "example"
+    run("cmake", "--install", build, "--prefix", prefix)
+    # Moved after it was installed: nothing in it may know where it was.
+    prefix = prefix.rename(folder / "moved prefix")
+    shutil.copytree(source / "Examples" / "cpp", folder / "cpp")
+
+    compiler_cache = shutil.which("ccache")
+    run("cmake", "-G", "Ninja", "-S", folder / "cpp", "-B", example, f"-DCMAKE_PREFIX_PATH={prefix}",
+        *([f"-DCMAKE_CXX_COMPILER_LAUNCHER={compiler_cache}"] if compiler_cache else []))
+    run("cmake", "--build", example)
+
+    stitched = run(example / "stitch_volumes", cwd=example)
+    check("wrote stitched.vti" in stitched, f"stitch_volumes said {stitched!r}")
+    check((example / "stitched.vti").stat().st_size > 10_000, "stitched.mha is too small")
+    again = run(example / "stitch_volumes", "stitched.vti", "stitched.mha", cwd=example)
+    check("wrote stitched.vti" in again, f"stitch_volumes with files said {again!r}")
+
+    kernels = run(example / "make_phantom")
+    check("mean grey" in kernels, f"make_phantom said {kernels!r}")
+    needed = run("readelf", "-d", example / "make_phantom")
+    check("libvtk" not in needed, "a program that uses the kernels alone links VTK")
+    loaded = run("ldd", example / "make_phantom")
+    check("libvtk" not in loaded, "the installed kernels load VTK")
+    check(str(build) not in loaded + run("ldd", example / "stitch_volumes"), "a library comes from the build tree")
+
+    program = prefix / "bin" / "echorama"
+    check("echorama" in run(program, "--version"), "the installed program does not say its version")
+
+    packages = next(prefix.rglob("echorama/__init__.py")).parent.parent
+    where = run("/usr/bin/python3", "-c", "import echorama; print(echorama.__file__); echorama.vtkUltrasoundStitcher()",
+                environment={"PYTHONPATH": str(packages)})
+    check(str(prefix) in where, f"Python imported {where}")
+
+print("installed, moved, built against, run and imported")
