@@ -15,11 +15,13 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.ticker import LogLocator, NullFormatter
 
 OURS = "#0b5e8a"
 PEERS = ["#8a8a8a", "#b0763b", "#6f8f5f", "#9a6f9a", "#5f6f8f"]
 MARKERS = "osD^vP*X<>hp"
-PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer")
+# What ours is compared with: other libraries, and the simpler ways of stitching.
+PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer", "average", "feather", "maximum")
 
 
 def is_ours(method):
@@ -93,6 +95,11 @@ def draw_panel(axes, case, lines, looks):
     seconds = [point[1] for point in points]
     axes.set_xlim(min(seconds) / 3, max(seconds) * 3)
     axes.set_ylim(floor / 3, max(positive, default=floor) * 5)
+    for axis, (lowest, highest) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        if highest / lowest < 300:  # so few decades need ticks between them
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     if exact:
         axes.axhline(floor, color="#bbbbbb", linewidth=0.8, linestyle=":", zorder=1)
         axes.text(0.99, floor, "exact", transform=axes.get_yaxis_transform(), fontsize=9, color="#777777", ha="right", va="bottom")
