@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Session.h"
+#include <CLI/App.hpp>
+#include <functional>
+
+namespace echorama {
+
+/// A subcommand: its options, and what it does when it was chosen. It reports failure by throwing; an Error of the kind
+/// InvalidParameter means wrong usage.
+struct Command {
+  CLI::App* options = nullptr;
+  std::function<void(Session&)> run;
+};
+
+// Each adds one subcommand to the program; they lie in files of their own.
+Command InfoCommand(CLI::App& program);
+Command ConvertCommand(CLI::App& program);
+Command AlignCommand(CLI::App& program);
+Command ScoreCommand(CLI::App& program);
+Command StitchCommand(CLI::App& program);
+Command PhantomCommand(CLI::App& program);
+Command ViewCommand(CLI::App& program);
+
+} // namespace echorama

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ImageGeometry.h"
+#include "Core/Geometry/PoseFile.h"
+#include "Session.h"
+#include <string>
+#include <vector>
+#include <vtkImageData.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkSmartPointer.h>
+
+namespace echorama {
+
+/// A volume that came from a file.
+struct LoadedVolume {
+  std::string file;
+  vtkSmartPointer<vtkImageData> image; ///< where the file says, until it is moved
+  ImageGeometry geometry;              ///< of the file as it stands
+  Pose volumeToWorld = Pose::Identity(); ///< how far the image has been moved from there
+};
+
+/// Reads a volume. Throws Error that names the file.
+LoadedVolume LoadVolume(Session&, const std::string& file);
+std::vector<LoadedVolume> LoadVolumes(Session&, const std::vector<std::string>& files);
+
+/// Moves a volume on: its image, and the pose that it has been moved by.
+void MoveVolume(LoadedVolume&, const Pose&);
+
+/// The pose of a volume in the pose file \a path, whose contents are \a poses. Throws Error that names both files when it has
+/// none, or knows the volume with another geometry.
+const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string& path, const LoadedVolume&);
+
+/// Puts each volume where the pose file \a path says; throws as PoseIn. An empty path leaves the volumes where their files say.
+void ApplyPoses(std::vector<LoadedVolume>&, const std::string& path);
+
+/// The volumes as the blocks of one data set, named by their files, so that filters name them in what they report.
+vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>&);
+
+/// Writes \a image to \a path. Returns what the format could not hold, one sentence each.
+std::vector<std::string> SaveVolume(Session&, vtkImageData* image, const std::string& path);
+
+/// JSON of a vector, and of a matrix (a list of rows).
+nlohmann::ordered_json JsonOf(const Eigen::Vector3d&);
+nlohmann::ordered_json JsonOf(const Pose&);
+
+/// "12.3 x 4.5 x 6.7", with \a digits after the point.
+std::string Triple(const Eigen::Vector3d&, const char* separator, int digits);
+
+} // namespace echorama

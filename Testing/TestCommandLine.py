@@ -1,0 +1,373 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The program echorama from end to end: phantom, align, score, stitch, info, convert, view; its manners on the way."""
+import json
+import os
+import pathlib
+import pty
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+import zlib
+
+import numpy
+
+from program_under_test import PROGRAM, blobs, read_mha, run, run_json, snapshot, turned, write_mha, write_poses
+
+work = None     # a folder for all tests
+phantom = None  # the folder of phantom volumes in it
+FILES = ["volume_1.mha", "volume_2.mha", "volume_3.mha"]
+FEWER_POINTS = ["--set", "Points=4000"]  # enough for these volumes, and quick
+
+
+def setUpModule():
+    global work, phantom
+    work = pathlib.Path(tempfile.mkdtemp())
+    phantom = work / "a phantöm"  # a space and a letter beyond ASCII, on purpose
+    done = run("phantom", "-o", phantom, "--spacing", 2.5, "--seed", 5)
+    assert done.returncode == 0, done.stderr
+
+
+def tearDownModule():
+    shutil.rmtree(work)
+
+
+def volumes():
+    return [phantom / name for name in FILES]
+
+
+def truth():
+    return json.loads((phantom / "truth.json").read_text())
+
+
+def affine_of(pose):
+    return numpy.array(pose["VolumeToWorld"])
+
+
+class Usage(unittest.TestCase):
+    def test_help(self):
+        self.assertEqual(run("--help").returncode, 0)
+        self.assertRegex(run("--version").stdout, r"^echorama \d+\.\d+\.\d+\n$")
+        for command in ("info", "convert", "align", "score", "stitch", "phantom", "view"):
+            done = run(command, "--help")
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            self.assertIn("--threads", done.stdout)
+
+    def test_wrong_usage_is_status_2(self):
+        some = volumes()
+        for arguments in ([], ["banana"], ["info"], ["info", some[0], "--banana"], ["info", some[0], "--threads", "-1"],
+                          ["info", some[0], "--threads", "many"], ["convert", some[0]], ["stitch", *some],
+                          ["stitch", *some, "-o", work / "no.mha", "--method", "banana"],
+                          ["stitch", *some, "-o", work / "no.mha", "--sharpness", "-1"],
+                          ["stitch", *some, "-o", work / "no.mha", "--spacing", "-1"], ["align", *some],
+                          ["align", *some, "-o", work / "no.json", "--method", "banana"],
+                          ["align", *some, "-o", work / "no.json", "--fixed", "0"],
+                          ["align", *some, "-o", work / "no.json", "--fixed", "4"],
+                          ["align", *some, "-o", work / "no.json", "--set", "banana=1"],
+                          ["align", *some, "-o", work / "no.json", "--set", "Levels"],
+                          ["align", *some, "-o", work / "no.json", "--set", "Levels=many"],
+                          ["align", *some, "-o", work / "no.json", "--set", "Levels=999"], ["score", phantom / "truth.json"],
+                          ["phantom"], ["phantom", "-o", work / "no", "--count", "0"], ["view"],
+                          ["view", some[0], "--screenshot", work / "no.png", "--size", "1", "1"]):
+            done = run(*arguments)
+            self.assertEqual(done.returncode, 2, f"{arguments}: {done.stderr}")
+            self.assertTrue(done.stderr.startswith("echorama: "), done.stderr)
+            self.assertEqual(done.stdout, "")
+            self.assertEqual(done.stderr.count("\n"), 1)
+        self.assertEqual(sorted(path.name for path in work.iterdir() if path.name.startswith("no")), [])
+
+    def test_errors_as_json(self):
+        for status, arguments in ((1, ["info", work / "missing.mha"]), (2, ["info", "--threads", "-1", "--json"]),
+                                  (2, ["--json"])):
+            done = run(*arguments, *(["--json"] if "--json" not in arguments else []))
+            self.assertEqual(done.returncode, status)
+            self.assertTrue(json.loads(done.stdout)["error"])
+            self.assertTrue(done.stderr.startswith("echorama: "))
+
+
+class Phantom(unittest.TestCase):
+    def test_files(self):
+        self.assertEqual(sorted(path.name for path in phantom.iterdir() if ".ValidRegion." not in path.name), ["truth.json", *FILES])
+        self.assertEqual([volume["file"] for volume in truth()["volumes"]], FILES)
+
+    def test_knock_is_as_told(self):
+        """The first volume stays; the others are turned by 6 degrees and moved by 8 mm about the centre of their valid region."""
+        poses = [affine_of(pose) for pose in truth()["volumes"]]
+        numpy.testing.assert_allclose(poses[0], numpy.eye(4), atol=1e-12)
+        for name, pose in zip(FILES[1:], poses[1:]):
+            self.assertAlmostEqual(numpy.degrees(numpy.arccos((numpy.trace(pose[:3, :3]) - 1) / 2)), 6, places=6)
+            header, _ = read_mha(phantom / name)
+            valid = read_mha(phantom / name.replace(".mha", ".ValidRegion.mha"))[1]
+            index = numpy.argwhere(valid).mean(0)[::-1]
+            numbers = {key: numpy.array(header[key].split(), float) for key in ("TransformMatrix", "Offset", "ElementSpacing")}
+            centre = numbers["Offset"] + numbers["TransformMatrix"].reshape(3, 3).T @ (numbers["ElementSpacing"] * index)
+            self.assertAlmostEqual(numpy.linalg.norm(pose[:3, :3] @ centre + pose[:3, 3] - centre), 8, places=3)
+
+    def test_seed(self):
+        for name, seed, count in (("same", 5, 3), ("other", 6, 2)):
+            run_json("phantom", "-o", work / name, "--spacing", 2.5, "--seed", seed, "--count", count)
+        contents = [{path.name: path.read_bytes() for path in folder.iterdir()} for folder in (phantom, work / "same", work / "other")]
+        self.assertEqual(contents[0], contents[1])
+        self.assertNotEqual(contents[0]["volume_1.mha"], contents[2]["volume_1.mha"])
+        other = json.loads(contents[2]["truth.json"])["volumes"][1]
+        self.assertGreater(abs(affine_of(other) - affine_of(truth()["volumes"][1])).max(), 0.01)
+
+
+class MainJob(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.poses = work / "poses.json"
+        cls.moved = work / "moved"
+        cls.aligned = run_json("align", *volumes(), "-o", cls.poses, "--apply", cls.moved, *FEWER_POINTS)
+
+    def test_align_finds_the_truth(self):
+        still = work / "still.json"
+        write_poses(still, volumes(), [numpy.eye(4)] * 3)
+        before = run_json("score", still, "--truth", phantom / "truth.json")
+        after = run_json("score", self.poses, "--truth", phantom / "truth.json")
+        self.assertGreater(before["score_mm"], 6)
+        self.assertLess(after["score_mm"], 1)
+        self.assertEqual(len(after["volumes"]), 3)
+        perfect = run_json("score", phantom / "truth.json", "--truth", phantom / "truth.json")
+        self.assertLess(perfect["score_mm"], 1e-9)
+
+    def test_score_of_a_known_shift(self):
+        """A volume that is 3 mm off in a known direction scores 3 mm, whatever the other is."""
+        shifted = [affine_of(pose) for pose in truth()["volumes"]]
+        shifted[2] = shifted[2].copy()
+        shifted[2][0, 3] += 3
+        write_poses(work / "shifted.json", volumes(), shifted)
+        score = run_json("score", work / "shifted.json", "--truth", phantom / "truth.json")
+        self.assertAlmostEqual(score["volumes"][2]["mean_mm"], 3, places=6)
+        self.assertAlmostEqual(score["score_mm"], 1.5, places=6)
+
+    def test_pose_file(self):
+        text = json.loads(self.poses.read_text())
+        self.assertEqual((text["schema"], text["unit"], text["frame"]), ("echorama-poses-1", "mm", "LPS"))
+        self.assertEqual([(work / volume["file"]).resolve() for volume in text["volumes"]], [path.resolve() for path in volumes()])
+        numpy.testing.assert_array_equal(affine_of(text["volumes"][0]), numpy.eye(4))
+        for told, written in zip(self.aligned["volumes"], text["volumes"]):
+            self.assertEqual(told["VolumeToWorld"], written["VolumeToWorld"])
+            info = run_json("info", told["file"])["files"][0]
+            for key in ("origin", "spacing", "direction", "dimensions"):
+                numpy.testing.assert_allclose(written["geometry"][key], info[key], atol=1e-12)
+
+    def test_apply_moves_and_changes_nothing_else(self):
+        for name, pose in zip(FILES, self.aligned["volumes"]):
+            before, after = run_json("info", phantom / name)["files"][0], run_json("info", self.moved / name)["files"][0]
+            matrix = numpy.array(pose["VolumeToWorld"])
+            numpy.testing.assert_allclose(after["origin"], matrix[:3, :3] @ before["origin"] + matrix[:3, 3], atol=1e-9)
+            numpy.testing.assert_allclose(after["direction"], matrix[:3, :3] @ before["direction"], atol=1e-12)
+            probe = numpy.array(before["acquisition"]["ProbeToWorld"])
+            numpy.testing.assert_allclose(after["acquisition"]["ProbeToWorld"], matrix @ probe, atol=1e-9)
+            numpy.testing.assert_array_equal(read_mha(phantom / name)[1], read_mha(self.moved / name)[1])
+            mask = name.replace(".mha", ".ValidRegion.mha")
+            numpy.testing.assert_array_equal(read_mha(phantom / mask)[1], read_mha(self.moved / mask)[1])
+
+    def test_start_poses_and_fixed_volume(self):
+        """From the truth the aligner stays there, and the fixed volume is where the start says, to the last bit."""
+        again = run_json("align", *volumes(), "-o", work / "again.json", "--poses", phantom / "truth.json", "--fixed", 2, "--set", "FirstStepMm=1",
+                         "--set", "FirstStepDegrees=1", *FEWER_POINTS)
+        numpy.testing.assert_allclose(again["volumes"][1]["VolumeToWorld"], affine_of(truth()["volumes"][1]), atol=1e-12)
+        self.assertEqual(again["fixed"], 2)
+        self.assertLess(run_json("score", work / "again.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1)
+
+    def test_stitch(self):
+        """Stitched with poses, or from volumes that were moved there: the same."""
+        told = run_json("stitch", *volumes(), "-o", work / "stitched.mha", "--poses", self.poses, "--spacing", 3)
+        self.assertEqual(run("stitch", *[self.moved / name for name in FILES], "-o", work / "stitched_moved.mha", "--spacing", 3).returncode, 0)
+        header, voxels = read_mha(work / "stitched.mha")
+        numpy.testing.assert_array_equal(voxels, read_mha(work / "stitched_moved.mha")[1])
+        self.assertEqual(list(voxels.shape[::-1]), told["dimensions"])
+        numpy.testing.assert_array_equal([float(x) for x in header["ElementSpacing"].split()], [3, 3, 3])
+        self.assertGreater(told["overlap_fraction"], 0.2)
+        for method in ("feather", "average", "maximum"):
+            run_json("stitch", *volumes(), "-o", work / f"{method}.mha", "--poses", self.poses, "--spacing", 3, "--method", method)
+        results = {method: read_mha(work / f"{method}.mha")[1].astype(int) for method in ("feather", "average", "maximum")}
+        self.assertTrue((results["maximum"] >= results["average"]).all())
+        self.assertTrue((results["average"] != results["feather"]).any())
+        run_json("stitch", *volumes(), "-o", work / "blunt.mha", "--poses", self.poses, "--spacing", 3, "--sharpness", 0)
+        self.assertLessEqual(abs(read_mha(work / "blunt.mha")[1].astype(int) - results["average"]).max(), 1)
+
+    def test_threads_change_nothing(self):
+        results = []
+        for threads in (1, 2):
+            folder = work / f"threads{threads}"
+            folder.mkdir()
+            run_json("align", *volumes(), "-o", folder / "poses.json", "--threads", threads, "--set", "Levels=3", *FEWER_POINTS)
+            run_json("stitch", *volumes(), "-o", folder / "stitched.mha", "--poses", folder / "poses.json", "--threads", threads, "--spacing", 3)
+            results.append({path.name: path.read_bytes() for path in folder.iterdir()})
+        self.assertEqual(len(results[0]), 3)
+        self.assertEqual(results[0], results[1])
+
+    def test_view(self):
+        if not shutil.which("xvfb-run"):
+            self.skipTest("xvfb-run is not there")
+        picture = work / "view.png"
+        done = subprocess.run(["xvfb-run", "-n", str(100 + os.getpid() % 800), "-s", "-screen 0 1024x768x24", PROGRAM, "view", *volumes(),
+                               "--poses", self.poses, "--screenshot", picture, "--size", "480", "360", "--json"],
+                              capture_output=True, text=True, timeout=300, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["screenshot"], str(picture))
+        pixels = read_png(picture)
+        self.assertEqual(pixels.shape, (360, 480, 3))
+        # Each quarter shows something, and tinted volumes that overlap: not grey everywhere.
+        for quarter in (pixels[:180, :240], pixels[:180, 240:], pixels[180:, :240], pixels[180:, 240:]):
+            self.assertGreater((quarter.max(axis=2) > 60).mean(), 0.02)
+            self.assertGreater(len(numpy.unique(quarter.reshape(-1, 3), axis=0)), 100)
+        self.assertGreater(numpy.ptp(pixels.astype(int), axis=2).max(), 40)
+
+    def test_view_without_a_display(self):
+        environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+        done = run("view", *volumes(), "--screenshot", work / "none.png", env=environment)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("DISPLAY", done.stderr)
+        self.assertFalse((work / "none.png").exists())
+
+
+def read_png(path):
+    """The pixels [row, column, rgb] of a PNG file of 8 bits, not interlaced."""
+    content, at, data = path.read_bytes(), 8, b""
+    while at < len(content):
+        size, kind = struct.unpack(">I4s", content[at:at + 8])
+        chunk = content[at + 8:at + 8 + size]
+        if kind == b"IHDR":
+            width, height, bits, colour = struct.unpack(">IIBB", chunk[:10])
+            assert bits == 8
+            channels = {2: 3, 6: 4}[colour]
+        elif kind == b"IDAT":
+            data += chunk
+        at += size + 12
+    rows = numpy.frombuffer(zlib.decompress(data), "u1").reshape(height, 1 + width * channels).astype(int)
+    pixels = numpy.zeros((height, width * channels), int)
+    for y in range(height):
+        kind, line, above = rows[y, 0], rows[y, 1:], pixels[y - 1] if y else numpy.zeros(width * channels, int)
+        for x in range(width * channels):
+            left = pixels[y, x - channels] if x >= channels else 0
+            corner = above[x - channels] if x >= channels else 0
+            estimate = left + above[x] - corner
+            paeth = min((abs(estimate - left), 0, left), (abs(estimate - above[x]), 1, above[x]), (abs(estimate - corner), 2, corner))[2]
+            pixels[y, x] = (line[x] + (0, left, above[x], (left + above[x]) // 2, paeth)[kind]) & 255
+    return pixels.reshape(height, width, channels)[:, :, :3].astype("u1")
+
+
+class Files(unittest.TestCase):
+    def test_info(self):
+        path = work / "oblique.mha"
+        voxels = blobs((5, 6, 7)).astype("i2") - 100
+        direction = turned(30) @ turned(20, 0)
+        write_mha(path, voxels, (0.5, 0.75, 1.25), (-10, 20, 30.125), direction)
+        told = run_json("info", path)["files"][0]
+        self.assertEqual(told["dimensions"], [7, 6, 5])
+        self.assertEqual(told["type"], "short")
+        self.assertEqual(told["range"], [voxels.min(), voxels.max()])
+        self.assertAlmostEqual(told["mean"], voxels.mean(), places=9)
+        self.assertEqual(told["valid_fraction"], 1)
+        for key, value in (("spacing", [0.5, 0.75, 1.25]), ("origin", [-10, 20, 30.125]), ("direction", direction)):
+            numpy.testing.assert_allclose(told[key], value, atol=1e-15)
+        text = run("info", path).stdout
+        for words in ("7 x 6 x 5", "short", "0.5000 x 0.7500 x 1.2500", "-10.000, 20.000, 30.125"):
+            self.assertIn(words, text)
+
+    def test_info_of_what_the_phantom_knows(self):
+        told = run_json("info", *volumes(), phantom / "truth.json")
+        self.assertEqual(len(told["files"]), 4)
+        acquisition = told["files"][1]["acquisition"]
+        self.assertEqual(acquisition["Seed"], 5)
+        self.assertLess(acquisition["ProbeGeometry"]["depth_mm"][0], acquisition["ProbeGeometry"]["depth_mm"][1])
+        self.assertEqual(told["files"][3]["poses"][0]["rotation_degrees"], 0)
+
+    def test_convert_round_trips(self):
+        start = phantom / "volume_2.mha"
+        path = start
+        for number, extension in enumerate(("nrrd", "mhd", "vti", "nhdr", "mha")):
+            onward = work / f"round{number}.{extension}"
+            self.assertEqual(run_json("convert", path, onward)["lost"], [])
+            path = onward
+        before, after = run_json("info", start)["files"][0], run_json("info", path)["files"][0]
+        for key in ("dimensions", "type", "range", "mean", "valid_fraction", "has_valid_region", "arrays"):
+            self.assertEqual(before[key], after[key])
+        for key in ("origin", "spacing", "direction"):
+            numpy.testing.assert_allclose(before[key], after[key], atol=1e-9)
+        self.assertEqual(before["acquisition"].keys(), after["acquisition"].keys())
+        numpy.testing.assert_allclose(before["acquisition"]["ProbeToWorld"], after["acquisition"]["ProbeToWorld"], atol=1e-9)
+        numpy.testing.assert_array_equal(read_mha(start)[1], read_mha(path)[1])
+
+    def test_convert_tells_what_is_lost(self):
+        run_json("stitch", *volumes(), "-o", work / "all.vti", "--poses", phantom / "truth.json", "--spacing", 4)
+        lost = run_json("convert", work / "all.vti", work / "less.mha")["lost"]
+        self.assertTrue(any("Coverage" in line for line in lost), lost)
+
+    def test_overwriting_an_old_output_is_fine(self):
+        old = work / "old.mha"
+        old.write_bytes(b"old")
+        run_json("convert", phantom / "volume_1.mha", old)
+        self.assertEqual(run("info", old).returncode, 0)
+
+
+class Manners(unittest.TestCase):
+    def test_messages_stay_off_standard_output(self):
+        """A volume without a valid region makes the reader guess, and say so."""
+        voxels = blobs((6, 6, 6))
+        voxels[:2] = 0
+        write_mha(work / "guess.mha", voxels)
+        done = run("info", work / "guess.mha", "--json")
+        self.assertIn("note: ", done.stderr)
+        self.assertTrue(json.loads(done.stdout)["notes"])
+
+    def test_every_command_tells_seconds(self):
+        told = run_json("convert", phantom / "volume_1.mha", work / "seconds.nrrd")
+        self.assertGreaterEqual(told["seconds"], sum(told["stages"].values()))
+        self.assertGreater(told["stages"]["read"], 0)
+
+    def test_progress_on_a_terminal_alone(self):
+        command = [PROGRAM, "align", *volumes(), "-o", work / "bar.json", "--set", "Levels=2", *FEWER_POINTS]
+        terminal, child = pty.openpty()
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=child)
+        os.close(child)
+        shown = b""
+        while True:
+            try:
+                piece = os.read(terminal, 4096)
+            except OSError:  # the other end is closed
+                break
+            if not piece:
+                break
+            shown += piece
+        os.close(terminal)
+        output = process.communicate(timeout=300)[0]
+        self.assertEqual(process.returncode, 0)
+        self.assertIn(b"align", shown)
+        self.assertIn(b"%", shown)
+        self.assertNotIn(b"%\r\n", shown)  # the bar is wiped, and leaves no line
+        self.assertNotIn(b"\r", output)
+        self.assertNotIn("%", run(*command[1:]).stderr)
+
+    def interrupted(self, signal_number, *arguments):
+        folder = work / "interrupted"
+        folder.mkdir(exist_ok=True)
+        before = snapshot(folder)
+        process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True, cwd=folder)
+        time.sleep(1.5)
+        process.send_signal(signal_number)
+        output, messages = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 1, messages)
+        self.assertIn("stopped on request", messages)
+        self.assertEqual(output, "")
+        self.assertEqual(snapshot(folder), before)
+
+    def test_stopping(self):
+        """Far more work than can be done in the time before the signal; afterwards there is no new file."""
+        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--set", "Samples=7", "--set", "Levels=20",
+                         "--set", "Points=1000000")
+        self.interrupted(signal.SIGTERM, "phantom", "-o", "volumes", "--spacing", "0.5", "--count", "40")
+        self.interrupted(signal.SIGINT, "stitch", *volumes(), "-o", "stitched.mha", "--spacing", "0.4")
+
+
+if __name__ == "__main__":
+    unittest.main()
