@@ -3,14 +3,15 @@
 #   [KERNEL_LIBRARIES target...]  further libraries, private to the kernels
 #   [KERNEL_SUBDIRECTORIES dir...] where the kernels lie, default: the room's own folder
 #   [CLASSES class...]            vtk classes, by path without extension
-#   [VTK_LIBRARIES target...])    further libraries, private to the vtk classes
+#   [VTK_LIBRARIES target...]     further libraries, private to the vtk classes
+#   [BENCHMARK_DEPENDS room...])  other rooms whose kernels the benchmarks use; without them they are left out
 #
 # A room is two layers. Kernels (every .cxx whose name does not begin with vtk) become lib<Echorama><NAME>Kernels,
 # which links no VTK; the vtk classes become the VTK module Echorama::NAME over it. Tests and benchmarks are found by
 # their place and name: Testing/Test*.cxx (GoogleTest), Testing/Test*.py (wrapped classes),
 # Benchmarks/Benchmark*.cxx.
 function(echorama_add_room name)
-  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES;BENCHMARK_DEPENDS")
   if(NOT ECHORAMA_STACK STREQUAL "paraview")
     _echorama_add_kernels(${name})
   endif()
@@ -99,17 +100,28 @@ macro(_echorama_add_tests name)
   endif()
   if(ECHORAMA_BENCHMARKS)
     file(GLOB benchmarks CONFIGURE_DEPENDS Benchmarks/Benchmark*.cxx)
+    string(REPLACE "/" "" rooms "${ECHORAMA_ROOMS}") # the other's targets may come later
+    foreach(other IN LISTS room_BENCHMARK_DEPENDS)
+      if(NOT other IN_LIST rooms)
+        message(STATUS "The benchmarks of ${name} are left out: they need ${other}")
+        set(benchmarks)
+      endif()
+    endforeach()
     foreach(benchmark IN LISTS benchmarks)
-      echorama_add_benchmark(${benchmark} ${name})
+      echorama_add_benchmark(${benchmark} ${name} ${room_BENCHMARK_DEPENDS})
     endforeach()
   endif()
 endmacro()
 
-# echorama_add_benchmark(FILE ROOM): one program per file; the vtk stack's may use VTK as the peer.
+# echorama_add_benchmark(FILE ROOM [other rooms...]): one program per file over the rooms' kernels; the vtk stack's may use
+# VTK as the peer.
 function(echorama_add_benchmark file name)
   get_filename_component(target ${file} NAME_WE)
   add_executable(${target} ${file})
   target_link_libraries(${target} PRIVATE Echorama::${name}Kernels TBB::tbb nlohmann_json::nlohmann_json)
+  foreach(other IN LISTS ARGN)
+    target_link_libraries(${target} PRIVATE Echorama::${other}Kernels)
+  endforeach()
   if(ECHORAMA_STACK STREQUAL "vtk")
     target_link_libraries(${target} PRIVATE ${VTK_LIBRARIES})
     target_compile_definitions(${target} PRIVATE ECHORAMA_WITH_VTK)

@@ -28,16 +28,7 @@ int vtkUltrasoundImageAlgorithm::RequestUpdateExtent(vtkInformation*, vtkInforma
 {
   for (int port = 0; port < this->GetNumberOfInputPorts(); ++port)
   {
-    for (int connection = 0; connection < inputs[port]->GetNumberOfInformationObjects(); ++connection)
-    {
-      vtkInformation* in = inputs[port]->GetInformationObject(connection);
-      if (in->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()))
-      {
-        int whole[6];
-        in->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
-        in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), whole, 6);
-      }
-    }
+    vtkUltrasoundVolume::RequestWhole(inputs[port]);
   }
   return 1;
 }

@@ -193,6 +193,25 @@ std::vector<vtkUltrasoundVolume::Input> vtkUltrasoundVolume::CollectInputs(vtkAl
 }
 
 //----------------------------------------------------------------------------
+void vtkUltrasoundVolume::RequestWhole(vtkInformationVector* port)
+{
+  using Pipeline = vtkStreamingDemandDrivenPipeline;
+  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection)
+  {
+    vtkInformation* in = port->GetInformationObject(connection);
+    in->Set(Pipeline::UPDATE_PIECE_NUMBER(), 0);
+    in->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), 1);
+    in->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+    if (in->Has(Pipeline::WHOLE_EXTENT()))
+    {
+      int whole[6];
+      in->Get(Pipeline::WHOLE_EXTENT(), whole);
+      in->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
+    }
+  }
+}
+
+//----------------------------------------------------------------------------
 int vtkUltrasoundVolume::Run(
   vtkAlgorithm* filter, vtkInformationVector* outputs, const std::function<void(const echorama::Progress&)>& body)
 {

@@ -130,6 +130,12 @@ public:
   }
 
   /**
+   * For RequestUpdateExtent: asks for the whole of every connection of an input port, whether it is cut into extents or
+   * into pieces.
+   */
+  static void RequestWhole(vtkInformationVector* port);
+
+  /**
    * Runs the body of a RequestData. Gives it a Progress that updates the filter's progress and honours its abort flag.
    * Turns errors into vtkErrorMacro of the filter and, on errors and abort alike, empties the outputs, so that nothing
    * half-made leaves the filter. Returns what RequestData should.

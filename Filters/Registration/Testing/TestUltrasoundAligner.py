@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The wrapped aligner and score: motions found, voxels shared, geometry and ProbeToWorld moved, errors that say why."""
+import math
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray
+from vtkmodules.vtkCommonDataModel import vtkImageData, vtkMultiBlockDataSet
+from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
+from echorama.EchoramaCore import vtkUltrasoundAcquisition, vtkUltrasoundVolume
+from echorama.EchoramaFiltersRegistration import vtkUltrasoundAligner, vtkUltrasoundAlignmentScore
+
+rng = np.random.default_rng(4)
+waves = rng.normal(size=(24, 3)) * 0.12
+phases = rng.uniform(0, 2 * math.pi, 24)
+OBLIQUE = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+
+
+def volume(origin, dtype=np.uint8, dims=(44, 40, 36), direction=OBLIQUE):
+    """What a grid sees of one smooth random scene."""
+    image = vtkImageData()
+    image.SetDimensions(dims)
+    image.SetSpacing(2, 2, 2)
+    image.SetOrigin(origin)
+    image.SetDirectionMatrix(direction.ravel())
+    k, j, i = np.meshgrid(*[2.0 * np.arange(n) for n in dims[::-1]], indexing="ij")
+    world = np.stack([i, j, k], -1) @ direction.T + np.array(origin)
+    scene = (120 + 9 * np.cos(world @ waves.T + phases).sum(-1)).clip(1, 254)
+    array = numpy_to_vtk(scene.astype(dtype).ravel(), deep=True)
+    array.SetName("Intensity")
+    image.GetPointData().SetScalars(array)
+    valid = np.ones(dims[::-1], np.uint8)
+    valid[:2] = 0
+    mask = numpy_to_vtk(valid.ravel(), deep=True)
+    mask.SetName("ValidRegion")
+    image.GetPointData().AddArray(mask)
+    probe = vtkDoubleArray()
+    probe.SetName(vtkUltrasoundAcquisition.ProbeToWorldName())
+    probe.SetNumberOfComponents(16)
+    probe.InsertNextTuple([1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1])
+    image.GetFieldData().AddArray(probe)
+    return image
+
+
+def matrix(rows):
+    m = vtkMatrix4x4()
+    m.DeepCopy([float(x) for x in np.asarray(rows).ravel()])
+    return m
+
+
+def numbers(m):
+    return np.array([[m.GetElement(r, c) for c in range(4)] for r in range(4)])
+
+
+def knocked(image, rows):
+    moved = vtkImageData()
+    moved.ShallowCopy(image)
+    assert vtkUltrasoundVolume.Move(moved, matrix(rows))
+    return moved
+
+
+def geometry(image):
+    d = image.GetDirectionMatrix()
+    m = np.eye(4)
+    m[:3, :3] = [[d.GetElement(r, c) for c in range(3)] for r in range(3)]
+    m[:3, 3] = image.GetOrigin()
+    return m
+
+
+def errors_of(algorithm):
+    messages = []
+
+    def note(caller, event, text):
+        messages.append(text)
+
+    note.CallDataType = "string0"
+    algorithm.AddObserver(vtkCommand.ErrorEvent, note)
+    algorithm.GetExecutive().AddObserver(vtkCommand.ErrorEvent, note)
+    algorithm.Update()
+    return " ".join(messages)
+
+
+def aligner(*images):
+    filter = vtkUltrasoundAligner()
+    filter.SetPoints(3000)
+    filter.SetFirstStepMm(5)
+    filter.SetFirstStepDegrees(4)
+    for image in images:
+        filter.AddInputDataObject(0, image)
+    return filter
+
+
+a, b = volume((0, 0, 0)), volume((20, 14, 4), np.float32)
+c, s = math.cos(math.radians(4)), math.sin(math.radians(4))
+push = np.array([[c, 0, s, 2.0], [0, 1, 0, -4.0], [-s, 0, c, 6.0], [0, 0, 0, 1]])
+wrong = knocked(b, push)
+before = geometry(wrong)
+
+# 1. the motion is found; the output is the input, moved, and nothing else is new
+align = aligner(a, wrong)
+align.Update()
+output = align.GetOutput()
+assert output.IsA("vtkMultiBlockDataSet") and output.GetNumberOfBlocks() == 2
+for i, image in enumerate((a, wrong)):
+    block = output.GetBlock(i)
+    assert output.GetMetaData(i).Get(output.NAME()) == f"volume {i + 1}"
+    assert block.GetPointData().GetArray("Intensity") is image.GetPointData().GetArray("Intensity"), "voxels are shared"
+    assert block.GetPointData().GetArray("ValidRegion") is image.GetPointData().GetArray("ValidRegion")
+    pose = matrix(np.zeros((4, 4)))
+    assert align.GetPose(i, pose)
+    pose = numbers(pose)
+    assert np.allclose(geometry(block), pose @ geometry(image), atol=1e-9)
+    written = block.GetFieldData().GetArray(align.VolumeToWorldName())
+    assert np.allclose([written.GetComponent(0, n) for n in range(16)], pose.ravel())
+    probe, was = vtkMatrix4x4(), vtkMatrix4x4()
+    assert vtkUltrasoundAcquisition.GetProbeToWorld(block, probe)
+    assert vtkUltrasoundAcquisition.GetProbeToWorld(image, was)
+    assert np.allclose(numbers(probe), pose @ numbers(was))
+    assert image.GetFieldData().GetArray(align.VolumeToWorldName()) is None, "the input must not change"
+assert np.array_equal(geometry(wrong), before), "the input must not change"
+assert np.array_equal(geometry(output.GetBlock(0)), geometry(a)), "the fixed volume stays"
+assert np.abs(geometry(output.GetBlock(1)) - geometry(b)).max() < 0.5
+assert 0 < align.GetError(1) < 4 and 0.4 < align.GetOverlap(1) < 1 and align.GetError(0) == 0
+assert output.GetBlock(1).GetFieldData().GetArray("AlignmentError").GetValue(0) == align.GetError(1)
+assert output.GetBlock(1).GetFieldData().GetArray("AlignmentOverlap").GetValue(0) == align.GetOverlap(1)
+assert not align.GetPose(2, vtkMatrix4x4()) and align.GetNumberOfVolumes() == 2
+
+# 2. composite input keeps its names; the fixed volume can be another one
+blocks = vtkMultiBlockDataSet()
+blocks.SetBlock(0, wrong)
+blocks.SetBlock(1, a)
+blocks.GetMetaData(0).Set(blocks.NAME(), "left")
+blocks.GetMetaData(1).Set(blocks.NAME(), "right")
+tree = aligner()
+tree.SetInputDataObject(blocks)
+tree.SetFixedVolume(1)
+tree.Update()
+assert [tree.GetOutput().GetMetaData(i).Get(blocks.NAME()) for i in range(2)] == ["left", "right"]
+assert np.array_equal(geometry(tree.GetOutput().GetBlock(1)), geometry(a))
+assert np.allclose(geometry(tree.GetOutput().GetBlock(0)), geometry(output.GetBlock(1)))
+
+# 3. every rank is handed the whole: a request for piece 1 of 2 gives what piece 0 gives
+piece = aligner()
+producers = []
+for image in (a, wrong):
+    producers.append(vtkTrivialProducer())
+    producers[-1].SetOutput(image)
+    piece.AddInputConnection(0, producers[-1].GetOutputPort())
+piece.UpdatePiece(1, 2, 0)
+assert piece.GetOutput().GetNumberOfBlocks() == 2
+for i in range(2):
+    assert piece.GetOutput().GetBlock(i).GetDimensions() == (44, 40, 36)
+    assert np.array_equal(geometry(piece.GetOutput().GetBlock(i)), geometry(output.GetBlock(i)))
+
+# 4. errors: a sentence, an empty output, and a filter that works again afterwards
+assert "two volumes are needed" in errors_of(aligner(a))
+constant = vtkImageData()
+constant.DeepCopy(b)
+constant.GetPointData().GetArray("Intensity").Fill(9)
+failed = aligner(a, constant)
+assert "volume 2: it is constant" in errors_of(failed)
+assert failed.GetOutput().GetNumberOfBlocks() == 0 and failed.GetNumberOfVolumes() == 0
+far = knocked(b, [[1, 0, 0, 900], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+assert "does not overlap" in errors_of(aligner(a, far))
+greedy = aligner(a, wrong)
+greedy.SetMinimumOverlap(0.98)
+assert "98.0%" in errors_of(greedy)
+none = aligner(a, wrong)
+none.SetFixedVolume(2)
+assert "fixed volume must be one of the 2" in errors_of(none)
+even = aligner(a, wrong)
+even.SetSamples(4)
+assert "3, 5 or 7" in errors_of(even)
+even.SetSamples(3)
+even.Update()
+assert even.GetNumberOfVolumes() == 2
+
+# 5. parameters by name
+named = vtkUltrasoundAligner()
+assert named.SetParameter("MinimumOverlap", 0.25) and named.GetMinimumOverlap() == 0.25
+assert named.SetParameter("Levels", 5) and named.GetLevels() == 5
+assert named.SetParameter("Pyramid", 0) and not named.GetPyramid()
+for name, value, expected in (("MinimumOverlap", 2.0, "[0.01, 1]"), ("Levels", 2.5, "whole number"), ("Levels", 0, "[1, 20]"),
+                              ("FirstStepMm", float("nan"), "FirstStepMm"), ("Colour", 1.0, "Repeats")):
+    messages = []
+    note = lambda caller, event, text: messages.append(text)
+    note.CallDataType = "string0"
+    tag = named.AddObserver(vtkCommand.ErrorEvent, note)
+    assert not named.SetParameter(name, value)
+    named.RemoveObserver(tag)
+    assert expected in messages[0], messages
+assert named.GetMinimumOverlap() == 0.25 and named.GetLevels() == 5
+assert named.GetMethod() == "search"
+messages = []
+named.AddObserver(vtkCommand.ErrorEvent, note)
+named.SetMethod("mutual-information")
+assert "mutual-information" in messages[0] and "search" in messages[0]
+named.SetMethod("search")
+assert len(messages) == 1
+
+# 6. abort: no output, and the filter itself reports no error
+stopped = aligner(a, wrong)
+stopped.AddObserver(vtkCommand.ProgressEvent, lambda caller, event: caller.AbortExecuteOn())
+messages = []
+stopped.AddObserver(vtkCommand.ErrorEvent, note)
+stopped.GetExecutive().AddObserver(vtkCommand.ErrorEvent, lambda caller, event: None)
+stopped.Update()
+assert not messages, messages
+assert stopped.GetNumberOfVolumes() == 0 and stopped.GetOutput().GetNumberOfBlocks() == 0
+
+
+# 7. the score
+def score(aligned, truth):
+    filter = vtkUltrasoundAlignmentScore()
+    filter.SetPoints(500)
+    for image in aligned:
+        filter.AddInputDataObject(0, image)
+    for image in truth:
+        filter.AddTruthData(image)
+    return filter
+
+
+shift = knocked(b, [[1, 0, 0, 2], [0, 1, 0, -1], [0, 0, 1, 2], [0, 0, 0, 1]])
+measured = score([a, shift], [a, b])
+measured.Update()
+points = measured.GetOutput()
+assert abs(measured.GetScore() - 3.0) < 1e-12 and measured.GetVolumeScore(0) < 1e-12 and measured.GetNumberOfVolumes() == 2
+assert points.GetNumberOfPoints() == points.GetNumberOfVerts() == 1000
+vectors = points.GetPointData().GetVectors()
+assert vectors.GetName() == "Error" and np.allclose(vectors.GetTuple3(700), (2, -1, 2))
+assert points.GetPointData().GetArray("Volume").GetValue(700) == 1
+assert abs(points.GetFieldData().GetArray("Score").GetValue(0) - 3.0) < 1e-12
+assert abs(points.GetFieldData().GetArray("VolumeMax").GetValue(1) - 3.0) < 1e-12
+inverse = np.linalg.inv(geometry(shift) @ np.diag([2, 2, 2, 1]))
+for p in range(500, 1000, 37):  # of the valid region only: two slices are not real
+    assert (inverse @ np.array([*points.GetPoint(p), 1]))[2] > 1.4
+both = score([output], [blocks])
+both.RemoveAllInputConnections(1)
+both.AddTruthData(a)
+both.AddTruthData(b)
+both.Update()
+assert both.GetScore() < 0.3, both.GetScore()
+
+assert "1 aligned volumes and 2 true ones" in errors_of(score([a], [a, b]))
+small = volume((0, 0, 0), dims=(43, 40, 36))
+bad = score([a, b], [a, small])
+assert "dimensions" in errors_of(bad) and math.isnan(bad.GetScore()) and bad.GetOutput().GetNumberOfPoints() == 0

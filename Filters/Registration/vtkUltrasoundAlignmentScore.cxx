@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundAlignmentScore.h"
+
+#include "AlignmentScore.h"
+#include "ValidPoints.h"
+#include "vtkCellArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundVolume.h"
+
+#include <limits>
+
+using echorama::Error;
+
+vtkStandardNewMacro(vtkUltrasoundAlignmentScore);
+
+namespace
+{
+constexpr double NotANumber = std::numeric_limits<double>::quiet_NaN();
+
+vtkSmartPointer<vtkDoubleArray> NewNumbers(const char* name, int components = 1)
+{
+  auto array = vtkSmartPointer<vtkDoubleArray>::New();
+  array->SetName(name);
+  array->SetNumberOfComponents(components);
+  return array;
+}
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundAlignmentScore::vtkUltrasoundAlignmentScore()
+  : Score(NotANumber)
+{
+  this->SetNumberOfInputPorts(2);
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundAlignmentScore::~vtkUltrasoundAlignmentScore() = default;
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAlignmentScore::FillInputPortInformation(int, vtkInformation* info)
+{
+  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+  info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  info->Set(INPUT_IS_REPEATABLE(), 1);
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAlignmentScore::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
+{
+  vtkUltrasoundVolume::RequestWhole(inputs[0]);
+  vtkUltrasoundVolume::RequestWhole(inputs[1]);
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  this->Score = NotANumber;
+  this->VolumeScores.clear();
+  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+    // 1. what came in
+    const auto aligned = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+    const auto truth = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
+    if (aligned.size() != truth.size())
+    {
+      throw Error(Error::Kind::BadInput,
+        "there are " + std::to_string(aligned.size()) + " aligned volumes and " + std::to_string(truth.size()) +
+          " true ones; one truth per volume is needed");
+    }
+
+    // 2. the kernel
+    std::vector<echorama::ScoredVolume> volumes;
+    for (std::size_t i = 0; i < aligned.size(); ++i)
+    {
+      progress(static_cast<double>(i) / static_cast<double>(aligned.size()));
+      echorama::ScoredVolume volume;
+      volume.aligned = vtkUltrasoundVolume::GeometryOf(aligned[i].Image);
+      volume.truth = vtkUltrasoundVolume::GeometryOf(truth[i].Image);
+      volume.name = aligned[i].Name;
+      vtkUltrasoundVolume::Dispatch(aligned[i].Intensity, [&](auto type) {
+        const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(aligned[i]);
+        volume.indexPoints =
+          echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Points, static_cast<std::uint64_t>(this->Seed));
+      });
+      volumes.push_back(std::move(volume));
+    }
+    const echorama::AlignmentScore score = echorama::ScoreAlignment(volumes, this->FixedVolume);
+
+    // 3. what goes out
+    const auto errors = NewNumbers("Error", 3), mean = NewNumbers("VolumeScore"), rms = NewNumbers("VolumeRms"),
+               median = NewNumbers("VolumeMedian"), percentile = NewNumbers("VolumePercentile95"), max = NewNumbers("VolumeMax"),
+               total = NewNumbers("Score");
+    vtkNew<vtkIntArray> ids;
+    ids->SetName("Volume");
+    vtkNew<vtkStringArray> names;
+    names->SetName("VolumeName");
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    vtkNew<vtkCellArray> vertices;
+    for (std::size_t i = 0; i < score.volumes.size(); ++i)
+    {
+      const echorama::VolumeScore& volume = score.volumes[i];
+      for (std::size_t p = 0; p < volume.points.size(); ++p)
+      {
+        const vtkIdType id = points->InsertNextPoint(volume.points[p].data());
+        vertices->InsertNextCell(1, &id);
+        errors->InsertNextTuple(volume.errors[p].data());
+        ids->InsertNextValue(static_cast<int>(i));
+      }
+      mean->InsertNextValue(volume.mean);
+      rms->InsertNextValue(volume.rms);
+      median->InsertNextValue(volume.median);
+      percentile->InsertNextValue(volume.percentile95);
+      max->InsertNextValue(volume.max);
+      names->InsertNextValue(volumes[i].name);
+      this->VolumeScores.push_back(volume.mean);
+    }
+    this->Score = score.mean;
+    total->InsertNextValue(score.mean);
+
+    vtkInformation* out = outputs->GetInformationObject(0);
+    vtkPolyData* output = vtkPolyData::GetData(out);
+    if (out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER()) <= 0)
+    {
+      output->SetPoints(points);
+      output->SetVerts(vertices);
+      output->GetPointData()->AddArray(ids);
+      output->GetPointData()->SetVectors(errors);
+    }
+    for (vtkDataArray* array : { total.Get(), mean.Get(), rms.Get(), median.Get(), percentile.Get(), max.Get() })
+    {
+      output->GetFieldData()->AddArray(array);
+    }
+    output->GetFieldData()->AddArray(names);
+  });
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAlignmentScore::GetNumberOfVolumes() const
+{
+  return static_cast<int>(this->VolumeScores.size());
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundAlignmentScore::GetVolumeScore(int volume) const
+{
+  return volume >= 0 && volume < this->GetNumberOfVolumes() ? this->VolumeScores[static_cast<std::size_t>(volume)] : NotANumber;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentScore::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "FixedVolume: " << this->FixedVolume << "\n";
+  os << indent << "Points: " << this->Points << "\n";
+  os << indent << "Seed: " << this->Seed << "\n";
+  os << indent << "Score: " << this->Score << "\n";
+}
