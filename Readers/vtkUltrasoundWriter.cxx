@@ -159,6 +159,16 @@ void vtkUltrasoundWriter::WriteData()
     {
       throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
     }
+    vtkUltrasoundVolume::CheckValidRegion(input, path);
+    for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i)
+    {
+      vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
+      if (array->GetNumberOfTuples() != input->GetNumberOfPoints())
+      {
+        throw Error(Error::Kind::BadInput,
+          path + ": the point array " + (array->GetName() ? array->GetName() : "without a name") + " has not one value per voxel");
+      }
+    }
 
     FileReplacement files;
     switch (echorama::FormatOfName(path))

@@ -15,7 +15,8 @@
  * full disk or an abort, what was there before is there unchanged.
  *
  * Errors, with the file and the reason: an extension that is not one of the five, a folder that is missing or not writable,
- * a full disk, more than one number per voxel, a geometry that is not a pose.
+ * a full disk, more than one number per voxel, a geometry that is not a pose, point arrays that do not fit the voxels, a
+ * `ValidRegion` that is not unsigned char.
  *
  * @sa vtkUltrasoundReader
  */
