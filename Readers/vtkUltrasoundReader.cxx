@@ -256,6 +256,7 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
   if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage)
   {
     this->ReadXml(output);
+    progress(0.7); // VTK's reader cannot be stopped, but we can
   }
   else
   {
