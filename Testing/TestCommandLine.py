@@ -130,7 +130,7 @@ class MainJob(unittest.TestCase):
         before = run_json("score", still, "--truth", phantom / "truth.json")
         after = run_json("score", self.poses, "--truth", phantom / "truth.json")
         self.assertGreater(before["score_mm"], 6)
-        self.assertLess(after["score_mm"], 1)
+        self.assertLess(after["score_mm"], 1.25)  # half a voxel
         self.assertEqual(len(after["volumes"]), 3)
         perfect = run_json("score", phantom / "truth.json", "--truth", phantom / "truth.json")
         self.assertLess(perfect["score_mm"], 1e-9)
@@ -174,7 +174,7 @@ class MainJob(unittest.TestCase):
                          "--set", "FirstStepDegrees=1", *FEWER_POINTS)
         numpy.testing.assert_allclose(again["volumes"][1]["VolumeToWorld"], affine_of(truth()["volumes"][1]), atol=1e-12)
         self.assertEqual(again["fixed"], 2)
-        self.assertLess(run_json("score", work / "again.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1)
+        self.assertLess(run_json("score", work / "again.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1.25)
 
     def test_stitch(self):
         """Stitched with poses, or from volumes that were moved there: the same."""
@@ -258,7 +258,7 @@ def read_png(path):
 class Files(unittest.TestCase):
     def test_info(self):
         path = work / "oblique.mha"
-        voxels = blobs((5, 6, 7)).astype("i2") - 100
+        voxels = blobs((5, 6, 7)).astype("i2") - 300  # no zeros: they would be taken for what lies outside
         direction = turned(30) @ turned(20, 0)
         write_mha(path, voxels, (0.5, 0.75, 1.25), (-10, 20, 30.125), direction)
         told = run_json("info", path)["files"][0]

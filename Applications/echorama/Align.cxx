@@ -81,13 +81,17 @@ void Align(Session& session, const AlignOptions& options)
     MoveVolume(volume, pose);
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
     const int number = static_cast<int>(i);
-    session.result["volumes"].push_back({{"file", volume.file}, {"turned_degrees", degrees}, {"moved_mm", mm},
-                                         {"error_grey", aligner->GetError(number)}, {"overlap", aligner->GetOverlap(number)},
+    session.result["volumes"].push_back({{"file", volume.file},
+                                         {"turned_degrees", degrees},
+                                         {"moved_mm", mm},
+                                         {"error_grey", aligner->GetError(number)},
+                                         {"overlap", aligner->GetOverlap(number)},
                                          {"VolumeToWorld", JsonOf(volume.volumeToWorld)}});
     session.Say(volume.file + ": " +
-                (number + 1 == options.fixed ? "fixed"
-                                             : "turned by " + Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
-                                                 " mm, overlap " + Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
+                (number + 1 == options.fixed
+                     ? "fixed"
+                     : "turned by " + Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) + " mm, overlap " +
+                           Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
   }
 
   for (std::size_t i = 0; i < places.size(); ++i)
@@ -111,18 +115,21 @@ Command AlignCommand(CLI::App& program)
   options->add_option("-o,--output", values->output, "Pose file to write")->required();
   options->add_option("--poses", values->start, "Pose file to start from (default: where the volumes say)");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
-    ->check(CLI::Range(1, 1000000))->capture_default_str();
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
   options->add_option("--method", values->method, "How poses are found: search goes through six dimensions from coarse to fine")
-    ->check(CLI::IsMember({"search"}))->capture_default_str();
+      ->check(CLI::IsMember({"search"}))
+      ->capture_default_str();
   const AlignSearchParameters defaults;
-  options->add_option("--set", values->settings,
-                      "A parameter of the method, as NAME=VALUE; again for each. MinimumOverlap=" + Fixed(defaults.minimumOverlap, 1) +
-                        " (share of a volume that must lie in others, 0.01 to 1), Samples=" + std::to_string(defaults.samples) +
-                        " (along each dimension: 3, 5 or 7), Levels=" + std::to_string(defaults.levels) + " (1 to 20), FirstStepMm=" +
-                        Fixed(defaults.firstStepMm, 0) + " (up to 1000), FirstStepDegrees=" + Fixed(defaults.firstStepDegrees, 0) +
-                        " (up to 60), Repeats=" + std::to_string(defaults.repeats) + " (of a level, 0 to 100), Points=" +
-                        std::to_string(defaults.points) + " (compared, 100 to 10000000), Seed=" + std::to_string(defaults.seed) +
-                        ", Pyramid=" + std::to_string(defaults.pyramid) + " (0 or 1)");
+  options->add_option(
+      "--set", values->settings,
+      "A parameter of the method, as NAME=VALUE; again for each. MinimumOverlap=" + Fixed(defaults.minimumOverlap, 1) +
+          " (share of a volume that must lie in others, 0.01 to 1), Samples=" + std::to_string(defaults.samples) +
+          " (along each dimension: 3, 5 or 7), Levels=" + std::to_string(defaults.levels) + " (1 to 20), FirstStepMm=" +
+          Fixed(defaults.firstStepMm, 0) + " (up to 1000), FirstStepDegrees=" + Fixed(defaults.firstStepDegrees, 0) +
+          " (up to 60), Repeats=" + std::to_string(defaults.repeats) + " (of a level, 0 to 100), Points=" +
+          std::to_string(defaults.points) + " (compared, 100 to 10000000), Seed=" + std::to_string(defaults.seed) +
+          ", Pyramid=" + std::to_string(defaults.pyramid) + " (0 or 1)");
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry");
   return {options, [values](Session& session) { Align(session, *values); }};
 }

@@ -44,15 +44,19 @@ void DescribeAcquisition(Session& session, vtkImageData* image, Json& json)
   Json known = Json::object();
   constexpr double degrees = 57.29577951308232;
   if (const auto g = vtkUltrasoundAcquisition::ProbeGeometryOf(image)) {
-    known[vtkUltrasoundAcquisition::ProbeGeometryName()] = {{"fan_degrees", g->fanAngle * degrees}, {"fan_mm", g->fanWidth},
-      {"sweep_degrees", g->sweepAngle * degrees}, {"sweep_mm", g->sweepWidth}, {"depth_mm", {g->depthMin, g->depthMax}}};
+    known[vtkUltrasoundAcquisition::ProbeGeometryName()] = {{"fan_degrees", g->fanAngle * degrees},
+                                                            {"fan_mm", g->fanWidth},
+                                                            {"sweep_degrees", g->sweepAngle * degrees},
+                                                            {"sweep_mm", g->sweepWidth},
+                                                            {"depth_mm", {g->depthMin, g->depthMax}}};
     session.Say("  probe       fan " + Fixed(g->fanAngle * degrees, 1) + " degrees, " + Fixed(g->fanWidth, 1) + " mm; sweep " +
-                Fixed(g->sweepAngle * degrees, 1) + " degrees, " + Fixed(g->sweepWidth, 1) + " mm; depth " + Fixed(g->depthMin, 1) +
-                " to " + Fixed(g->depthMax, 1) + " mm");
+                Fixed(g->sweepAngle * degrees, 1) + " degrees, " + Fixed(g->sweepWidth, 1) + " mm; depth " +
+                Fixed(g->depthMin, 1) + " to " + Fixed(g->depthMax, 1) + " mm");
   }
   if (const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image)) {
     known[vtkUltrasoundAcquisition::ProbeToWorldName()] = JsonOf(*pose);
-    session.Say("  probe at    " + Triple(pose->translation(), ", ", 2) + " mm, looking along " + Triple(pose->linear().col(2), ", ", 3));
+    session.Say("  probe at    " + Triple(pose->translation(), ", ", 2) + " mm, looking along " +
+                Triple(pose->linear().col(2), ", ", 3));
   }
   if (const auto seconds = vtkUltrasoundAcquisition::TimeStampOf(image)) {
     known[vtkUltrasoundAcquisition::TimeStampName()] = *seconds;
@@ -86,7 +90,8 @@ Json DescribeVolume(Session& session, const std::string& file)
   const Eigen::Vector3d size(g.dimensions[0] * g.spacing[0], g.dimensions[1] * g.spacing[1], g.dimensions[2] * g.spacing[2]);
 
   Json json{{"file", file}, {"dimensions", g.dimensions}, {"spacing", JsonOf(g.spacing)}, {"origin", JsonOf(g.origin)}};
-  json["direction"] = {JsonOf(g.direction.row(0).transpose()), JsonOf(g.direction.row(1).transpose()), JsonOf(g.direction.row(2).transpose())};
+  json["direction"] = {JsonOf(g.direction.row(0).transpose()), JsonOf(g.direction.row(1).transpose()),
+                       JsonOf(g.direction.row(2).transpose())};
   json["size_mm"] = JsonOf(size);
   json["centre"] = JsonOf(g.Centre());
   json["type"] = intensity->GetDataTypeAsString();
@@ -106,9 +111,11 @@ Json DescribeVolume(Session& session, const std::string& file)
   session.Say("  size        " + Triple(size, " x ", 1) + " mm");
   session.Say("  origin      " + Triple(g.origin, ", ", 3) + " mm");
   for (int axis = 0; axis < 3; ++axis)
-    session.Say((axis == 0 ? "  direction   " : "              ") + std::string(1, "ijk"[axis]) + " = " + Triple(g.direction.col(axis), ", ", 4));
-  session.Say("  intensity   " + (s.real ? Fixed(s.smallest, 2) + " to " + Fixed(s.largest, 2) + ", mean " + Fixed(s.sum / s.real, 2)
-                                         : std::string("no voxel is real")));
+    session.Say((axis == 0 ? "  direction   " : "              ") + std::string(1, "ijk"[axis]) + " = " +
+                Triple(g.direction.col(axis), ", ", 4));
+  session.Say("  intensity   " + (s.real
+                                      ? Fixed(s.smallest, 2) + " to " + Fixed(s.largest, 2) + ", mean " + Fixed(s.sum / s.real, 2)
+                                      : std::string("no voxel is real")));
   session.Say("  valid       " + Fixed(100.0 * s.real / voxels, 1) + "% of the voxels" +
               (valid ? "" : " (the volume has no valid region)"));
   if (s.notFinite)
@@ -134,8 +141,8 @@ void Info(Session& session, const std::vector<std::string>& files)
 {
   session.result["files"] = Json::array();
   for (const std::string& file : files)
-    session.result["files"].push_back(
-      std::filesystem::path(file).extension() == ".json" ? DescribePoses(session, file) : DescribeVolume(session, file));
+    session.result["files"].push_back(std::filesystem::path(file).extension() == ".json" ? DescribePoses(session, file)
+                                                                                         : DescribeVolume(session, file));
 }
 
 } // namespace

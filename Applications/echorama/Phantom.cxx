@@ -34,7 +34,8 @@ Eigen::Vector3d CentroidOf(vtkImageData* image)
   vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
     using T = decltype(type);
     index = ValidCentroid<T>(vtkUltrasoundVolume::ViewOf<const T>(intensity, image),
-                             vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(image), image), count);
+                             vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(image), image),
+                             count);
   });
   return vtkUltrasoundVolume::GeometryOf(image).IndexToWorld() * index;
 }
@@ -60,12 +61,13 @@ void Phantom(Session& session, const PhantomOptions& options)
     vtkNew<vtkImageData> image;
     image->ShallowCopy(source->GetOutput());
     const Pose knock =
-      i == 0 ? Pose::Identity() : KnockedPose(options.seed, i, options.knockMm, options.knockDegrees, CentroidOf(image));
+        i == 0 ? Pose::Identity() : KnockedPose(options.seed, i, options.knockMm, options.knockDegrees, CentroidOf(image));
     vtkUltrasoundVolume::Move(image, knock);
     const std::string file = folder.Stage(name);
     SaveVolume(session, image, file);
     truth.push_back({file, vtkUltrasoundVolume::GeometryOf(image), knock.inverse()});
-    session.result["volumes"].push_back({{"file", folder.Final(name)}, {"gain_db", views[i].gainDb}, {"VolumeToWorld", JsonOf(knock.inverse())}});
+    session.result["volumes"].push_back(
+        {{"file", folder.Final(name)}, {"gain_db", views[i].gainDb}, {"VolumeToWorld", JsonOf(knock.inverse())}});
     session.Say("wrote " + folder.Final(name));
   }
   WritePoses(truthFile, truth); // relative to the folder, so they stay right when it gets its place
@@ -79,19 +81,30 @@ void Phantom(Session& session, const PhantomOptions& options)
 Command PhantomCommand(CLI::App& program)
 {
   auto values = std::make_shared<PhantomOptions>();
-  CLI::App* options = program.add_subcommand("phantom", "Make overlapping volumes of an invented body, out of place by a known amount");
-  options->add_option("-o,--output", values->folder, "Folder for the volumes and truth.json, the poses that put them back")->required();
+  CLI::App* options =
+      program.add_subcommand("phantom", "Make overlapping volumes of an invented body, out of place by a known amount");
+  options->add_option("-o,--output", values->folder, "Folder for the volumes and truth.json, the poses that put them back")
+      ->required();
   options->add_option("--count", values->count, "How many volumes")->check(CLI::Range(1, 50))->capture_default_str();
   options->add_option("--seed", values->seed, "Seed of tissue and displacements")
-    ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62))->capture_default_str();
-  options->add_option("--spacing", values->spacingMm, "Edge of the voxels, mm")->check(CLI::Range(0.05, 20.0))->capture_default_str();
-  options->add_option("--overlap", values->overlap, "Part that neighbours share")->check(CLI::Range(0.05, 0.95))->capture_default_str();
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62))
+      ->capture_default_str();
+  options->add_option("--spacing", values->spacingMm, "Edge of the voxels, mm")
+      ->check(CLI::Range(0.05, 20.0))
+      ->capture_default_str();
+  options->add_option("--overlap", values->overlap, "Part that neighbours share")
+      ->check(CLI::Range(0.05, 0.95))
+      ->capture_default_str();
   options->add_option("--knock-mm", values->knockMm, "How far each volume but the first is moved, mm")
-    ->check(CLI::Range(0.0, 1000.0))->capture_default_str();
-  options->add_option("--knock-degrees", values->knockDegrees, "How far it is turned about the centre of its valid region, degrees")
-    ->check(CLI::Range(0.0, 180.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  options
+      ->add_option("--knock-degrees", values->knockDegrees, "How far it is turned about the centre of its valid region, degrees")
+      ->check(CLI::Range(0.0, 180.0))
+      ->capture_default_str();
   options->add_option("--format", values->format, "File format")
-    ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))->capture_default_str();
+      ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))
+      ->capture_default_str();
   return {options, [values](Session& session) { Phantom(session, *values); }};
 }
 

@@ -51,7 +51,9 @@ private:
   // "ERROR: In FILE, line N\nvtkClass (0x1234): message\n\n" becomes "message", on one line.
   static std::string Sentence(std::string text)
   {
-    const auto isPrefixed = [&text](const char* word) { return text.compare(0, std::char_traits<char>::length(word), word) == 0; };
+    const auto isPrefixed = [&text](const char* word) {
+      return text.compare(0, std::char_traits<char>::length(word), word) == 0;
+    };
     if (isPrefixed("ERROR: In ") || isPrefixed("Warning: In ") || isPrefixed("Generic Warning: In ")) {
       text.erase(0, text.find('\n') == std::string::npos ? 0 : text.find('\n') + 1);
       const std::size_t name = text.find(" (0x"), end = text.find("): ");
@@ -68,11 +70,17 @@ private:
 };
 vtkStandardNewMacro(GatheringWindow);
 
-GatheringWindow* Window() { return static_cast<GatheringWindow*>(vtkOutputWindow::GetInstance()); }
+GatheringWindow* Window()
+{
+  return static_cast<GatheringWindow*>(vtkOutputWindow::GetInstance());
+}
 
 volatile std::sig_atomic_t interrupted = 0;
 
-extern "C" void Interrupt(int) { interrupted = 1; }
+extern "C" void Interrupt(int)
+{
+  interrupted = 1;
+}
 
 void InstallSignalHandlers()
 {
@@ -109,11 +117,20 @@ Session::~Session()
   vtkOutputWindow::SetInstance(nullptr);
 }
 
-bool Session::Interrupted() { return interrupted != 0; }
+bool Session::Interrupted()
+{
+  return interrupted != 0;
+}
 
-double Session::Seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+double Session::Seconds() const
+{
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
 
-void Session::Say(const std::string& line) { text_ += line + "\n"; }
+void Session::Say(const std::string& line)
+{
+  text_ += line + "\n";
+}
 
 void Session::Note(const std::string& text)
 {
@@ -148,7 +165,8 @@ void Session::Watch(vtkAlgorithm* algorithm, const std::string& stage, const std
   };
   vtkNew<vtkCallbackCommand> command;
   command->SetClientData(const_cast<void*>(static_cast<const void*>(&onProgress)));
-  command->SetCallback([](vtkObject*, unsigned long, void* function, void*) { (*static_cast<decltype(onProgress)*>(function))(); });
+  command->SetCallback(
+      [](vtkObject*, unsigned long, void* function, void*) { (*static_cast<decltype(onProgress)*>(function))(); });
   const unsigned long tag = algorithm ? algorithm->AddObserver(vtkCommand::ProgressEvent, command) : 0;
   const auto end = [&] {
     if (algorithm)
@@ -200,7 +218,7 @@ void Session::ShowProgress(const std::string& label, double fraction)
   constexpr int width = 30;
   const int filled = static_cast<int>(std::lround(fraction * width));
   std::string line = "\r" + label + " [" + std::string(filled, '#') + std::string(width - filled, '.') + "] " +
-    std::to_string(static_cast<int>(fraction * 100.0)) + "%";
+                     std::to_string(static_cast<int>(fraction * 100.0)) + "%";
   const double seconds = std::chrono::duration<double>(now - stageStart_).count();
   if (fraction > 0.02 && seconds > 1.0)
     line += ", " + Fixed(seconds * (1.0 - fraction) / fraction, 0) + " s left";

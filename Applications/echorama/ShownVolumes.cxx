@@ -56,7 +56,8 @@ ShownVolumes::ShownVolumes(const std::vector<LoadedVolume>& volumes)
         if (!sampler.IsReal(v))
           continue;
         sorted_.push_back(static_cast<float>(view[v]));
-        const Eigen::Vector3d index(static_cast<double>(v % view.RowStride()), static_cast<double>(v % view.SliceStride() / view.RowStride()),
+        const Eigen::Vector3d index(static_cast<double>(v % view.RowStride()),
+                                    static_cast<double>(v % view.SliceStride() / view.RowStride()),
                                     static_cast<double>(v / view.SliceStride()));
         box_.extend(map * index);
         middle_ += map * index;
@@ -144,7 +145,8 @@ vtkSmartPointer<vtkImageData> ShownVolumes::Bytes(std::size_t i, const GreyWindo
     reduced.dimensions[axis] = (n[axis] + block[axis] - 1) / block[axis];
     reduced.spacing[axis] *= block[axis];
   }
-  reduced.origin = volume.geometry.IndexToWorld() * Eigen::Vector3d(0.5 * (block[0] - 1), 0.5 * (block[1] - 1), 0.5 * (block[2] - 1));
+  reduced.origin =
+      volume.geometry.IndexToWorld() * Eigen::Vector3d(0.5 * (block[0] - 1), 0.5 * (block[1] - 1), 0.5 * (block[2] - 1));
   auto bytes = vtkSmartPointer<vtkImageData>::New();
   vtkUltrasoundVolume::SetGeometry(bytes, reduced);
   bytes->AllocateScalars(VTK_UNSIGNED_CHAR, 1);

@@ -38,7 +38,8 @@ public:
 
   /// The picture of a plane (one slice of RGBA bytes, placed in the world): the mean of the tinted grey levels of the volumes
   /// that are real there; transparent where none is. Volumes with shown[i] == false are left out.
-  vtkSmartPointer<vtkImageData> Picture(const ImageGeometry& plane, const GreyWindow& window, const std::vector<bool>& shown) const;
+  vtkSmartPointer<vtkImageData> Picture(const ImageGeometry& plane, const GreyWindow& window,
+                                        const std::vector<bool>& shown) const;
 
   /// Bytes for rendering the volume i: 0 where it is not real, else 1 to 255 through the window. Blocks of voxels are
   /// averaged so that no side is longer than \a maxSide.

@@ -89,14 +89,21 @@ Command StitchCommand(CLI::App& program)
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong (default: where they say)");
-  options->add_option("--method", values->method, "How overlaps are blended")->check(CLI::IsMember(MethodNames()))->capture_default_str();
+  options->add_option("--method", values->method, "How overlaps are blended")
+      ->check(CLI::IsMember(MethodNames()))
+      ->capture_default_str();
   options->add_option("--sharpness", values->sharpness, "Exponent b of the weights (method distance): 0 is the plain average")
-    ->check(CLI::Range(0.0, 1000.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
   options->add_option("--spacing", values->spacingMm, "Edge of the voxels in mm (0: the smallest of the volumes)")
-    ->check(CLI::Range(0.0, 1000.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
   options->add_flag("--allow-disjoint", values->allowDisjoint, "Accept volumes that overlap no other");
-  options->add_option("--memory", values->memoryGb, "Refuse what needs more memory than this, GB (0: three quarters of the machine's)")
-    ->check(CLI::Range(0.0, 1e6))->capture_default_str();
+  options
+      ->add_option("--memory", values->memoryGb,
+                   "Refuse what needs more memory than this, GB (0: three quarters of the machine's)")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   return {options, [values](Session& session) { Stitch(session, *values); }};
 }
 

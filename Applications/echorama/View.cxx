@@ -21,14 +21,14 @@
 #include <vtkInteractorStyleTrackballCamera.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
-#include <vtkPNGWriter.h>
 #include <vtkPiecewiseFunction.h>
+#include <vtkPNGWriter.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
+#include <vtkRenderer.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderWindowInteractor.h>
-#include <vtkRenderer.h>
 #include <vtkSmartVolumeMapper.h>
 #include <vtkTextActor.h>
 #include <vtkTextProperty.h>
@@ -110,9 +110,9 @@ private:
   std::vector<std::string> names_;
   GreyWindow grey_;
   std::vector<bool> shown_;
-  Eigen::Matrix3d frame_;      ///< columns: the axes of the planes
-  Eigen::AlignedBox3d box_;    ///< of all volumes, in coordinates of the frame
-  Eigen::Vector3d focus_;      ///< where the planes meet, in coordinates of the frame
+  Eigen::Matrix3d frame_;   ///< columns: the axes of the planes
+  Eigen::AlignedBox3d box_; ///< of all volumes, in coordinates of the frame
+  Eigen::Vector3d focus_;   ///< where the planes meet, in coordinates of the frame
   double pixel_ = 1.0, step_ = 1.0;
 
   vtkNew<vtkRenderWindow> window_;
@@ -287,7 +287,8 @@ ImageGeometry ViewWindow::GridOf(int plane) const
   grid.direction.col(0) = frame_.col(axes.right);
   grid.direction.col(1) = frame_.col(axes.down);
   grid.direction.col(2) = axes.inwardSign * frame_.col(axes.inward);
-  grid.dimensions = {static_cast<int>(box_.sizes()[axes.right] / pixel_ + 1.5), static_cast<int>(box_.sizes()[axes.down] / pixel_ + 1.5), 1};
+  grid.dimensions = {static_cast<int>(box_.sizes()[axes.right] / pixel_ + 1.5),
+                     static_cast<int>(box_.sizes()[axes.down] / pixel_ + 1.5), 1};
   Eigen::Vector3d first = box_.min();
   first[axes.inward] = focus_[axes.inward];
   grid.origin = frame_ * first;
@@ -324,10 +325,13 @@ void ViewWindow::Refresh()
     const double x = focus_[axes.right], y = focus_[axes.down];
     // Lines lie a little before the picture, as seen from the camera.
     const Eigen::Vector3d before = -0.5 * pixel_ * grid.direction.col(2);
-    const auto show = [](vtkActor* actor, vtkPolyData* lines) { static_cast<vtkPolyDataMapper*>(actor->GetMapper())->SetInputData(lines); };
+    const auto show = [](vtkActor* actor, vtkPolyData* lines) {
+      static_cast<vtkPolyDataMapper*>(actor->GetMapper())->SetInputData(lines);
+    };
     show(crosses_[plane][0], Lines({point(x, top) + before, point(x, bottom) + before}, {{0, 1}}));
     show(crosses_[plane][1], Lines({point(left, y) + before, point(right, y) + before}, {{0, 1}}));
-    show(frames_[plane], Lines({point(left, top), point(right, top), point(right, bottom), point(left, bottom)}, {{0, 1}, {1, 2}, {2, 3}, {3, 0}}));
+    show(frames_[plane], Lines({point(left, top), point(right, top), point(right, bottom), point(left, bottom)},
+                               {{0, 1}, {1, 2}, {2, 3}, {3, 0}}));
   }
 }
 
@@ -345,7 +349,8 @@ void ViewWindow::ResetCameras()
     camera->SetPosition(position.data());
     camera->SetViewUp(up.data());
     const double* viewport = views_[plane]->GetViewport();
-    const double aspect = (viewport[2] - viewport[0]) * window_->GetSize()[0] / ((viewport[3] - viewport[1]) * window_->GetSize()[1]);
+    const double aspect =
+        (viewport[2] - viewport[0]) * window_->GetSize()[0] / ((viewport[3] - viewport[1]) * window_->GetSize()[1]);
     camera->SetParallelScale(0.53 * std::max(box_.sizes()[axes.down], box_.sizes()[axes.right] / aspect));
     views_[plane]->ResetCameraClippingRange();
   }
@@ -481,7 +486,9 @@ Command ViewCommand(CLI::App& program)
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong");
   options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window");
   options->add_option("--size", values->size, "Width and height of the window in pixels")
-    ->expected(2)->check(CLI::Range(64, 8192))->capture_default_str();
+      ->expected(2)
+      ->check(CLI::Range(64, 8192))
+      ->capture_default_str();
   return {options, [values](Session& session) { View(session, *values); }};
 }
 

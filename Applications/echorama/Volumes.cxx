@@ -94,7 +94,10 @@ std::vector<std::string> SaveVolume(Session& session, vtkImageData* image, const
   return LinesOf(writer->GetNotes());
 }
 
-nlohmann::ordered_json JsonOf(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+nlohmann::ordered_json JsonOf(const Eigen::Vector3d& v)
+{
+  return {v[0], v[1], v[2]};
+}
 
 nlohmann::ordered_json JsonOf(const Pose& pose)
 {

@@ -14,8 +14,8 @@ namespace echorama {
 /// A volume that came from a file.
 struct LoadedVolume {
   std::string file;
-  vtkSmartPointer<vtkImageData> image; ///< where the file says, until it is moved
-  ImageGeometry geometry;              ///< of the file as it stands
+  vtkSmartPointer<vtkImageData> image;   ///< where the file says, until it is moved
+  ImageGeometry geometry;                ///< of the file as it stands
   Pose volumeToWorld = Pose::Identity(); ///< how far the image has been moved from there
 };
 

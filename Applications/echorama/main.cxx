@@ -45,12 +45,13 @@ int main(int argc, char** argv)
 
   bool json = false;
   int threads = 0;
-  const Command commands[] = {InfoCommand(program), ConvertCommand(program), AlignCommand(program), ScoreCommand(program),
+  const Command commands[] = {InfoCommand(program),   ConvertCommand(program), AlignCommand(program), ScoreCommand(program),
                               StitchCommand(program), PhantomCommand(program), ViewCommand(program)};
   for (const Command& command : commands) {
     command.options->add_flag("--json", json, "Print one JSON object of results and seconds on standard output");
     command.options->add_option("--threads", threads, "Number of threads (0: as many as there are cores)")
-      ->check(CLI::Range(0, 1024))->capture_default_str();
+        ->check(CLI::Range(0, 1024))
+        ->capture_default_str();
   }
 
   try {
