@@ -34,7 +34,7 @@
 #include "vtkMultiBlockDataSetAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "AlignSearch.h" // for the defaults
+#include "Filters/Registration/AlignSearch.h" // for the defaults
 #include <string>
 #include <vector>
 #endif
