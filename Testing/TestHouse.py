@@ -55,5 +55,12 @@ for path in ours("vtk*.cxx"):
     if name not in pages:
         complaints.append(f"{name}: no page of Documentation names it")
 
+# ParaView's Python calls a property by its label, without what is not a letter or digit: "Spacing (mm)" would be Spacingmm.
+for path in ours("vtk*.xml"):
+    for tag in re.findall(r"<\w+Property\b[^>]*>", path.read_text()):
+        name, label = re.search(r'\bname="(\w+)"', tag), re.search(r'\blabel="([^"]*)"', tag)
+        if label and re.sub(r"\W", "", label[1]) != name[1]:
+            complaints.append(f"{path.name}: scripts would not find {name[1]} under the label {label[1]}")
+
 print("\n".join(complaints) or "the house is in order")
 sys.exit(1 if complaints else 0)
