@@ -34,7 +34,7 @@
 #include "vtkMultiBlockDataSetAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "Filters/Registration/AlignSearch.h" // for the defaults
+#include "AlignSearch.h" // for the defaults
 #include <string>
 #include <vector>
 #endif
