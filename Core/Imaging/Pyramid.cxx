@@ -119,7 +119,7 @@ std::vector<PyramidLevel> BuildPyramid(const PosedVolume<T>& volume, const Pyram
   return levels;
 }
 
-#define EchoramaInstantiate(T) \
+#define EchoramaInstantiate(T)                                                                                                   \
   template std::vector<PyramidLevel> BuildPyramid<T>(const PosedVolume<T>&, const PyramidParameters&, const Progress&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate

@@ -16,9 +16,9 @@ struct PyramidLevel {
 
 /// How far a pyramid goes.
 struct PyramidParameters {
-  int levels = 16;           ///< at most so many, the volume itself included; >= 1
-  int smallestSize = 16;     ///< no level whose longest axis has fewer voxels, voxels; >= 1
-  int smallestCount = 1000;  ///< no level with fewer real voxels (the volume itself is always kept); >= 0
+  int levels = 16;          ///< at most so many, the volume itself included; >= 1
+  int smallestSize = 16;    ///< no level whose longest axis has fewer voxels, voxels; >= 1
+  int smallestCount = 1000; ///< no level with fewer real voxels (the volume itself is always kept); >= 0
 };
 
 /// The same volume at falling resolution, the finest first.

@@ -110,7 +110,7 @@ TEST(Pyramid, TreatsMissingChildrenAtOddEndsAsNotReal)
   geometry.dimensions = n;
   const auto coarse = BuildPyramid<short>({volume.View(), {}, geometry}, p).at(1).intensity;
   EXPECT_EQ(coarse.Dimensions(), (std::array<int, 3>{2, 2, 1}));
-  EXPECT_EQ(coarse.View()(1, 0, 0), -5.0f);         // four of eight
+  EXPECT_EQ(coarse.View()(1, 0, 0), -5.0f);        // four of eight
   EXPECT_TRUE(std::isnan(coarse.View()(1, 1, 0))); // two of eight
 }
 
@@ -144,7 +144,9 @@ TEST(Pyramid, DoesNotDependOnTheThreads)
   ASSERT_EQ(one.size(), many.size());
   for (std::size_t l = 0; l < one.size(); ++l) {
     EXPECT_EQ(one[l].realVoxels, many[l].realVoxels);
-    EXPECT_EQ(std::memcmp(one[l].intensity.View().Data(), many[l].intensity.View().Data(), sizeof(float) * one[l].intensity.View().Size()), 0);
+    EXPECT_EQ(std::memcmp(one[l].intensity.View().Data(), many[l].intensity.View().Data(),
+                          sizeof(float) * one[l].intensity.View().Size()),
+              0);
   }
 }
 

@@ -12,10 +12,11 @@ std::vector<AlignSearchResult> AlignInTurn(std::vector<PlacedVolume> volumes, in
   p.Check();
   const std::size_t count = volumes.size();
   if (count < 2)
-    throw Error(Error::Kind::BadInput, "two volumes are needed to align; there " + std::string(count == 1 ? "is one" : "are none"));
+    throw Error(Error::Kind::BadInput,
+                "two volumes are needed to align; there " + std::string(count == 1 ? "is one" : "are none"));
   if (fixed < 0 || static_cast<std::size_t>(fixed) >= count)
     throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(count) +
-        ", numbered from 0; it is " + std::to_string(fixed));
+                                                   ", numbered from 0; it is " + std::to_string(fixed));
 
   std::vector<AlignSearchResult> results(count);
   results[static_cast<std::size_t>(fixed)].volumeToWorld = volumes[static_cast<std::size_t>(fixed)].volumeToWorld;

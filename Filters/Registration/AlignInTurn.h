@@ -12,7 +12,7 @@ namespace echorama {
 /// \returns one result per volume; the fixed one has its own pose, no error, no evaluations and an empty trace.
 /// \throws Error(InvalidParameter) when \a fixed is not a volume, Error(BadInput) for fewer than two volumes, and what
 /// AlignSearch throws.
-std::vector<AlignSearchResult> AlignInTurn(std::vector<PlacedVolume> volumes, int fixed, const AlignSearchParameters& parameters = {},
-                                           const Progress& progress = {});
+std::vector<AlignSearchResult> AlignInTurn(std::vector<PlacedVolume> volumes, int fixed,
+                                           const AlignSearchParameters& parameters = {}, const Progress& progress = {});
 
 } // namespace echorama

@@ -2,9 +2,14 @@
 // The points are drawn once, in the moving volume at full resolution. A level of the search picks, in each volume, the
 // coarsest resolution whose voxels are not larger than its step; there the moving volume is read at the points once,
 // and each of the n^6 poses reads the fixed volumes at the moved points. A pose is one affine map from the points to
-// the fixed voxels. Poses are the parallel tasks; each is summed by one thread in the order of the points.
+// the fixed voxels.
 //
-// Cost: levels * n^6 * points trilinear reads, here about 7 ns each: 8 * 729 * 20,000 take 0.8 s of one thread.
+// What limits the speed is memory: at full resolution the points touch more of the fixed volume than a cache holds. So
+// tasks are blocks of neighbouring points, and all poses pass over a block before the next one is touched; poses of one
+// level differ so little that they read the same voxels. Sums are kept per block and pose and are added in the order of
+// the blocks, whichever thread did them.
+//
+// Cost: rounds * n^6 * points trilinear reads.
 #include "AlignSearch.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -74,7 +79,8 @@ ECHORAMA_HOT void Differences(const Field& field, const Map& m, const float* px,
   const float* voxels = field.voxels;
   const int row = field.nx, slice = field.nx * field.ny;
   const int lastX = field.nx - 2, lastY = field.ny - 2, lastZ = field.nz - 2;
-  const float endX = static_cast<float>(field.nx - 1), endY = static_cast<float>(field.ny - 1), endZ = static_cast<float>(field.nz - 1);
+  const float endX = static_cast<float>(field.nx - 1), endY = static_cast<float>(field.ny - 1),
+              endZ = static_cast<float>(field.nz - 1);
   for (int p = 0; p < count; ++p) {
     const float x = m.xx * px[p] + m.xy * py[p] + m.xz * pz[p] + m.x0;
     const float y = m.yx * px[p] + m.yy * py[p] + m.yz * pz[p] + m.y0;
@@ -87,7 +93,8 @@ ECHORAMA_HOT void Differences(const Field& field, const Map& m, const float* px,
     const float tx = cx - static_cast<float>(i), ty = cy - static_cast<float>(j), tz = cz - static_cast<float>(k);
     const int c = k * slice + j * row + i;
     const float v0 = voxels[c + (tx >= 0.5f ? 1 : 0) + (ty >= 0.5f ? row : 0) + (tz >= 0.5f ? slice : 0)];
-    const int in = (x >= -0.5f) & (y >= -0.5f) & (z >= -0.5f) & (x < endX + 0.5f) & (y < endY + 0.5f) & (z < endZ + 0.5f) & (v0 == v0);
+    const int in =
+        (x >= -0.5f) & (y >= -0.5f) & (z >= -0.5f) & (x < endX + 0.5f) & (y < endY + 0.5f) & (z < endZ + 0.5f) & (v0 == v0);
     const float ux = 1.0f - tx, uy = 1.0f - ty, uz = 1.0f - tz;
     float sum = 0.0f, weights = 0.0f;
     AddCorner(voxels[c], v0, ux * uy * uz, sum, weights);
@@ -112,7 +119,8 @@ Comparison Compare(const std::vector<Field>& fields, const Map* maps, const Poin
   float difference[BlockSize];
   int inside[BlockSize], covered[BlockSize] = {};
   for (std::size_t f = 0; f < fields.size(); ++f) {
-    Differences(fields[f], maps[f], &points.x[begin], &points.y[begin], &points.z[begin], &points.value[begin], count, difference, inside);
+    Differences(fields[f], maps[f], &points.x[begin], &points.y[begin], &points.z[begin], &points.value[begin], count, difference,
+                inside);
     float lanes[Lanes] = {};
     int pairs = 0, p = 0;
     for (; p + Lanes <= count; p += Lanes)
@@ -171,18 +179,25 @@ public:
     for (const Pose& pose : poses)
       for (const Eigen::Affine3d& toIndex : worldToIndex_) {
         const Eigen::Matrix4f m = (toIndex.matrix() * pose.matrix()).cast<float>();
-        maps.push_back({m(0, 0), m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1), m(2, 2), m(2, 3)});
+        maps.push_back(
+            {m(0, 0), m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1), m(2, 2), m(2, 3)});
       }
-    const std::ptrdiff_t blocks = (points.Count() + BlockSize - 1) / BlockSize, share = static_cast<std::ptrdiff_t>(poses.size());
-    std::vector<Comparison> parts(static_cast<std::size_t>(blocks * share)), sums(poses.size());
-    ParallelFor(blocks, progress, [&](std::ptrdiff_t block) {
-      const std::ptrdiff_t begin = block * BlockSize;
-      const int count = static_cast<int>(std::min<std::ptrdiff_t>(BlockSize, points.Count() - begin));
-      for (std::ptrdiff_t i = 0; i < share; ++i)
-        parts[static_cast<std::size_t>(block * share + i)] = Compare(fields_, &maps[static_cast<std::size_t>(i) * fields], points, begin, count);
+    // Neighbouring blocks form a task when there are many, so that the parts of the sums stay few.
+    const std::ptrdiff_t blocks = (points.Count() + BlockSize - 1) / BlockSize, blocksPerTask = (blocks + 63) / 64;
+    const std::ptrdiff_t tasks = (blocks + blocksPerTask - 1) / blocksPerTask;
+    const std::size_t share = poses.size();
+    std::vector<Comparison> parts(static_cast<std::size_t>(tasks) * share), sums(share);
+    ParallelFor(tasks, progress, [&](std::ptrdiff_t task) {
+      Comparison* part = &parts[static_cast<std::size_t>(task) * share];
+      for (std::ptrdiff_t block = task * blocksPerTask; block < std::min(blocks, (task + 1) * blocksPerTask); ++block) {
+        const std::ptrdiff_t begin = block * BlockSize;
+        const int count = static_cast<int>(std::min<std::ptrdiff_t>(BlockSize, points.Count() - begin));
+        for (std::size_t i = 0; i < share; ++i)
+          part[i] += Compare(fields_, &maps[i * fields], points, begin, count);
+      }
     });
     for (std::size_t part = 0; part < parts.size(); ++part)
-      sums[part % poses.size()] += parts[part];
+      sums[part % share] += parts[part];
     return sums;
   }
 
@@ -219,9 +234,11 @@ void CheckVolume(const PlacedVolume& volume)
   const auto& n = finest.geometry.dimensions;
   if (*std::min_element(n.begin(), n.end()) < 2)
     throw Error(Error::Kind::BadInput, volume.name + ": it is not a volume (one voxel thick); the search needs three dimensions");
+  if (finest.geometry.VoxelCount() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+    throw Error(Error::Kind::TooLarge, volume.name + ": the search works on volumes of at most 2^31 voxels");
   if (finest.realVoxels < FewestVoxels)
-    throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) + " of its voxels are real; at least " +
-        std::to_string(FewestVoxels) + " are needed");
+    throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) +
+                                           " of its voxels are real; at least " + std::to_string(FewestVoxels) + " are needed");
   const VolumeView<const float> view = finest.intensity.View();
   const float* first = std::find_if(view.begin(), view.end(), [](float v) { return v == v; });
   if (std::all_of(first, view.end(), [first](float v) { return !(v == v) || v == *first; }))
@@ -316,7 +333,8 @@ AlignSearchResult AlignSearch(const std::vector<PlacedVolume>& fixed, const Plac
       for (std::ptrdiff_t i = 0; i < candidates; ++i) {
         const auto o = OffsetOf(i, n);
         poses.push_back(MotionAbout(centre, stepDegrees * RadiansPerDegree * Eigen::Vector3d(o[0], o[1], o[2]),
-                                    stepMm * Eigen::Vector3d(o[3], o[4], o[5])) * result.volumeToWorld);
+                                    stepMm * Eigen::Vector3d(o[3], o[4], o[5])) *
+                        result.volumeToWorld);
         fromCentre.push_back(FromCentre(poses.back(), drawn.centre));
       }
       const double share = 1.0 / (p.repeats + 1.0), from = level + trace.rounds * share;
@@ -344,15 +362,18 @@ AlignSearchResult AlignSearch(const std::vector<PlacedVolume>& fixed, const Plac
         }
       }
       if (most == 0)
-        throw Error(Error::Kind::NotPossible, moving.name + " does not overlap the volumes it is to be aligned with in any pose that "
-            "the search tried; bring it closer, or make the first step larger");
+        throw Error(Error::Kind::NotPossible, moving.name +
+                                                  " does not overlap the volumes it is to be aligned with in any pose that "
+                                                  "the search tried; bring it closer, or make the first step larger");
       if (best < 0)
         throw Error(Error::Kind::NotPossible, moving.name + ": no pose that the search tried reaches the minimum overlap of " +
-            Percent(p.minimumOverlap) + "; the largest found is " + Percent(static_cast<double>(most) / m));
+                                                  Percent(p.minimumOverlap) + "; the largest found is " +
+                                                  Percent(static_cast<double>(most) / m));
       moved = best != middle;
       if (level + 1 == p.levels && (!moved || trace.rounds == p.repeats) && bestForbidden < bestError)
-        throw Error(Error::Kind::NotPossible, moving.name + ": the search ended at the minimum overlap of " + Percent(p.minimumOverlap) +
-            ", and less overlap would fit better still; lower it if the volumes overlap less than that");
+        throw Error(Error::Kind::NotPossible,
+                    moving.name + ": the search ended at the minimum overlap of " + Percent(p.minimumOverlap) +
+                        ", and less overlap would fit better still; lower it if the volumes overlap less than that");
       result.error = trace.error = bestError;
       result.overlap = trace.overlap = static_cast<double>(compared[static_cast<std::size_t>(best)].covered) / m;
       result.volumeToWorld = poses[static_cast<std::size_t>(best)];

@@ -36,11 +36,11 @@ void Check(const ScoredVolume& volume)
 AlignmentScore ScoreAlignment(const std::vector<ScoredVolume>& volumes, int fixed)
 {
   if (volumes.size() < 2)
-    throw Error(Error::Kind::BadInput, "two volumes are needed to score an alignment; there " +
-        std::string(volumes.empty() ? "are none" : "is one"));
+    throw Error(Error::Kind::BadInput,
+                "two volumes are needed to score an alignment; there " + std::string(volumes.empty() ? "are none" : "is one"));
   if (fixed < 0 || static_cast<std::size_t>(fixed) >= volumes.size())
     throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(volumes.size()) +
-        ", numbered from 0; it is " + std::to_string(fixed));
+                                                   ", numbered from 0; it is " + std::to_string(fixed));
   for (const ScoredVolume& volume : volumes)
     Check(volume);
 

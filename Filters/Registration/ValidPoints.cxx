@@ -70,28 +70,30 @@ Eigen::Vector3d ValidCentroid(VolumeView<const T> intensity, VolumeView<const un
   };
   const Sampler<T> sampler(intensity, valid);
   const auto& n = intensity.Dimensions();
-  const Sums sums = ParallelSum<Sums>(static_cast<std::ptrdiff_t>(n[1]) * n[2], n[1], [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    Sums part;
-    for (std::ptrdiff_t row = begin; row < end; ++row) {
-      Sums line;
-      for (int i = 0; i < n[0]; ++i)
-        if (sampler.IsReal(row * n[0] + i)) {
-          line.x += i;
-          ++line.count;
+  const Sums sums =
+      ParallelSum<Sums>(static_cast<std::ptrdiff_t>(n[1]) * n[2], n[1], [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+        Sums part;
+        for (std::ptrdiff_t row = begin; row < end; ++row) {
+          Sums line;
+          for (int i = 0; i < n[0]; ++i)
+            if (sampler.IsReal(row * n[0] + i)) {
+              line.x += i;
+              ++line.count;
+            }
+          line.y = static_cast<double>(row % n[1]) * static_cast<double>(line.count);
+          line.z = static_cast<double>(row / n[1]) * static_cast<double>(line.count);
+          part += line;
         }
-      line.y = static_cast<double>(row % n[1]) * static_cast<double>(line.count);
-      line.z = static_cast<double>(row / n[1]) * static_cast<double>(line.count);
-      part += line;
-    }
-    return part;
-  });
+        return part;
+      });
   count = sums.count;
   return sums.count > 0 ? Eigen::Vector3d(Eigen::Vector3d(sums.x, sums.y, sums.z) / static_cast<double>(sums.count))
                         : Eigen::Vector3d(Eigen::Vector3d::Zero());
 }
 
-#define EchoramaInstantiate(T) \
-  template std::vector<Eigen::Vector3d> ValidPoints<T>(VolumeView<const T>, VolumeView<const unsigned char>, int, std::uint64_t); \
+#define EchoramaInstantiate(T)                                                                                                   \
+  template std::vector<Eigen::Vector3d> ValidPoints<T>(VolumeView<const T>, VolumeView<const unsigned char>, int,                \
+                                                       std::uint64_t);                                                           \
   template Eigen::Vector3d ValidCentroid<T>(VolumeView<const T>, VolumeView<const unsigned char>, std::ptrdiff_t&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate

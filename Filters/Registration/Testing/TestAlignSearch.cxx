@@ -81,7 +81,7 @@ double Distance(const Pose& a, const Pose& b, const ImageGeometry& geometry)
   for (int corner = 0; corner < 8; ++corner) {
     const auto& n = geometry.dimensions;
     const Eigen::Vector3d p = geometry.IndexToWorld() *
-        Eigen::Vector3d(corner & 1 ? n[0] - 1 : 0, corner & 2 ? n[1] - 1 : 0, corner & 4 ? n[2] - 1 : 0);
+                              Eigen::Vector3d(corner & 1 ? n[0] - 1 : 0, corner & 2 ? n[1] - 1 : 0, corner & 4 ? n[2] - 1 : 0);
     sum += (a * p - b * p).norm() / 8.0;
   }
   return sum;
@@ -244,14 +244,21 @@ TEST_F(AlignSearchTest, RefusesVolumesWithNothingToAlign)
   const Volume<float> grey(movingGeometry.dimensions, 5.0f);
   const auto constant = PyramidOf(grey, movingGeometry);
   const PlacedVolume flat{&constant, Pose::Identity(), "C"};
-  EXPECT_NE(MessageOf([&] { AlignSearch({fixed}, flat, Quick()); }, Error::Kind::BadInput).find("C: it is constant"), std::string::npos);
-  EXPECT_NE(MessageOf([&] { AlignSearch({flat}, moving, Quick()); }, Error::Kind::BadInput).find("C: it is constant"), std::string::npos);
+  EXPECT_NE(MessageOf([&] { AlignSearch({fixed}, flat, Quick()); }, Error::Kind::BadInput).find("C: it is constant"),
+            std::string::npos);
+  EXPECT_NE(MessageOf([&] { AlignSearch({flat}, moving, Quick()); }, Error::Kind::BadInput).find("C: it is constant"),
+            std::string::npos);
 
   Volume<float> nearlyEmpty(movingGeometry.dimensions, std::numeric_limits<float>::quiet_NaN());
   nearlyEmpty.View()(3, 3, 3) = 1.0f;
   nearlyEmpty.View()(4, 3, 3) = 2.0f;
   const auto few = PyramidOf(nearlyEmpty, movingGeometry);
-  EXPECT_NE(MessageOf([&] { AlignSearch({fixed}, {&few, Pose::Identity(), "D"}, Quick()); }, Error::Kind::BadInput).find("only 2"),
+  EXPECT_NE(MessageOf(
+                [&] {
+                  AlignSearch({fixed}, {&few, Pose::Identity(), "D"}, Quick());
+                },
+                Error::Kind::BadInput)
+                .find("only 2"),
             std::string::npos);
 
   const ImageGeometry plane = Box({64, 64, 1}, 1.0, {0.0, 0.0, 0.0});
