@@ -72,7 +72,8 @@ public:
           const auto pa = BuildPyramid(a_.Posed()), pb = BuildPyramid(b_.Posed());
           const Pose found = AlignSearch({{&pa, Pose::Identity(), "A"}}, {&pb, start, "B"}, p).volumeToWorld;
           score = ScoreAlignment({{a_.geometry, a_.geometry, {Eigen::Vector3d::Zero()}, "A"},
-                                  {b_.geometry.Moved(found), b_.geometry, points_, "B"}}).mean;
+                                  {b_.geometry.Moved(found), b_.geometry, points_, "B"}})
+                      .mean;
         } catch (const Error&) {
           ++refused;
         }
