@@ -10,7 +10,7 @@ import tempfile
 
 source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
 program = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"]) / "bin" / "echorama"
-screen = [] if os.environ.get("DISPLAY") else ["xvfb-run", "-n", "117", "-s", "-screen 0 1280x1024x24"]
+screen = [] if os.environ.get("DISPLAY") else ["xvfb-run", "-a", "-n", "117", "-s", "-screen 0 1280x1024x24"]
 
 
 def demo(out, *arguments, prefix=screen):

@@ -18,6 +18,10 @@ import sys
 import numpy as np
 
 
+RESULTS = ["report.html", "stitched.mha", "stitched.ValidRegion.mha", "poses.json", "start.json",
+           "slices.png", "overlays.png", "edges.png", "rendering.png"]
+
+
 class StepFailed(Exception):
     """A step of the demo could not be done; says which and why."""
 
@@ -80,16 +84,20 @@ def main():
         parser.error("one volume cannot be aligned: name two or more, or none for the phantom")
     try:
         demo(options)
-    except StepFailed as failure:
+    except (StepFailed, OSError) as failure:
         print(f"demo: {failure}", file=sys.stderr)
         return 1
     return 0
 
 
 def demo(options):
+    if not os.environ.get("DISPLAY"):
+        raise StepFailed("there is no screen (DISPLAY is not set); start the demo under xvfb-run")
     steps = Steps(options.program)
     out = short(options.out)
     out.mkdir(parents=True, exist_ok=True)
+    for old in RESULTS:  # a step that fails must not leave the report of an earlier run
+        (out / old).unlink(missing_ok=True)
     truth_file = None
     if options.volumes:
         files = [short(volume) for volume in options.volumes]
@@ -107,8 +115,6 @@ def demo(options):
         after = scores(steps.run("scoring where they lie now", "score", out / "poses.json", "--truth", truth_file), files)
     steps.run("stitching", "stitch", *files, "--poses", out / "poses.json", "-o", out / "stitched.mha")
 
-    if not os.environ.get("DISPLAY"):
-        raise StepFailed("drawing: there is no screen (DISPLAY is not set); start the demo under xvfb-run")
     print("  drawing ...", file=sys.stderr, flush=True)
     try:
         from report import write_report
