@@ -25,7 +25,7 @@ namespace echorama {
 namespace {
 
 constexpr int Lanes = 16;      // voxels side by side
-constexpr int Stride = 4;      // steps of a search between two looks whether it may end
+constexpr int Stride = 8;     // steps of a search between two looks whether it may end
 constexpr int MeanSteps = 128; // steps, on average over a line, after which the stack of parabolas is faster
 constexpr float Infinity = std::numeric_limits<float>::infinity();
 
@@ -89,15 +89,16 @@ template <class T>
 }
 
 // The search. Voxel i of a line and the lanes beside it are at g + Step * i: Step is Lanes in a tile and 1 in a row, where
-// the lanes are the next voxels of the same line. No g from voxel i on upwards is smaller than above says, none from i on
-// downwards smaller than below says; only from voxel first to voxel last something is finite. squares[d] is the squared
-// length of d steps. The result may overwrite above.
+// the lanes are the next voxels of the same line. No g from voxel i on upwards is smaller than the limit above says, none
+// from i on downwards smaller than below says; a tile has one limit for Stride voxels. Only from voxel first to voxel last
+// something is finite. squares[d] is the squared length of d steps.
 // Returns false when the search has become too long; the result is then not complete.
 template <class T, int Step>
 [[gnu::always_inline]] inline bool SearchLines(int n, int first, int last, const T* g, const T* above, const T* below,
                                                const T* squares, T* result)
 {
   constexpr int wide = Step == 1 ? Lanes : 1; // voxels of a line that are worked on together
+  const auto limit = [](const T* limits, int i) { return limits + (Step == 1 ? i : i / Stride * Lanes); };
   std::ptrdiff_t steps = 0;
   const std::ptrdiff_t mostSteps = static_cast<std::ptrdiff_t>(MeanSteps) * n / wide;
   for (int i = 0; i < n; i += wide) {
@@ -105,7 +106,7 @@ template <class T, int Step>
     std::memcpy(best.value, g + static_cast<std::ptrdiff_t>(Step) * i, sizeof(best.value));
     for (int d = std::max(1, first - (i + wide - 1)); i + d <= last; d += Stride) {
       const std::ptrdiff_t from = static_cast<std::ptrdiff_t>(Step) * (i + d);
-      if (!SomeAbove(best.value, above + from, squares[d]))
+      if (!SomeAbove(best.value, limit(above, i + d), squares[d]))
         break;
       for (int e = 0; e < Stride; ++e)
         TakeSmaller(best.value, g + from + Step * e, squares[d + e]);
@@ -113,7 +114,7 @@ template <class T, int Step>
     }
     for (int d = std::max(1, i - last); i + wide - 1 - d >= first; d += Stride) {
       const std::ptrdiff_t from = static_cast<std::ptrdiff_t>(Step) * (i - d);
-      if (!SomeAbove(best.value, below + from, squares[d]))
+      if (!SomeAbove(best.value, limit(below, i - d), squares[d]))
         break;
       for (int e = 0; e < Stride; ++e)
         TakeSmaller(best.value, g + from - Step * e, squares[d + e]);
@@ -126,31 +127,34 @@ template <class T, int Step>
   return true;
 }
 
-// Sixteen lines: running minima from both ends, then the search.
+// Sixteen lines: the smallest of every Stride voxels, running minima of these from both ends, then the search.
 template <class T>
-[[gnu::always_inline]] inline bool SearchSixteen(int n, const T* g, T* above, T* below, const T* squares)
+[[gnu::always_inline]] inline bool SearchSixteen(int n, const T* g, T* above, T* below, const T* squares, T* result)
 {
-  std::memcpy(below, g, sizeof(Block<T>));
-  for (std::ptrdiff_t i = 1; i < n; ++i) {
-    std::memcpy(below + i * Lanes, g + i * Lanes, sizeof(Block<T>));
-    TakeSmaller(below + i * Lanes, below + (i - 1) * Lanes, T(0));
+  const std::ptrdiff_t groups = (n + Stride - 1) / Stride;
+  for (std::ptrdiff_t group = 0; group < groups; ++group) { // the margin above the last voxel is infinite
+    Block<T> smallest;
+    std::memcpy(smallest.value, g + group * Stride * Lanes, sizeof(smallest.value));
+    for (int i = 1; i < Stride; ++i)
+      TakeSmaller(smallest.value, g + (group * Stride + i) * Lanes, T(0));
+    std::memcpy(above + group * Lanes, smallest.value, sizeof(smallest.value));
+    if (group > 0)
+      TakeSmaller(smallest.value, below + (group - 1) * Lanes, T(0));
+    std::memcpy(below + group * Lanes, smallest.value, sizeof(smallest.value));
   }
-  std::memcpy(above + (n - std::ptrdiff_t{1}) * Lanes, g + (n - std::ptrdiff_t{1}) * Lanes, sizeof(Block<T>));
-  for (std::ptrdiff_t i = n - 2; i >= 0; --i) {
-    std::memcpy(above + i * Lanes, g + i * Lanes, sizeof(Block<T>));
-    TakeSmaller(above + i * Lanes, above + (i + 1) * Lanes, T(0));
-  }
+  for (std::ptrdiff_t group = groups - 2; group >= 0; --group)
+    TakeSmaller(above + group * Lanes, above + (group + 1) * Lanes, T(0));
   int first = 0, last = n - 1;
   while (first < n && AllInfinite(g + static_cast<std::ptrdiff_t>(first) * Lanes))
     ++first;
   while (last > first && AllInfinite(g + static_cast<std::ptrdiff_t>(last) * Lanes))
     --last;
-  return SearchLines<T, Lanes>(n, first, last, g, above, below, squares, above);
+  return SearchLines<T, Lanes>(n, first, last, g, above, below, squares, result);
 }
 
 // One line: the minima advance by whole blocks, which is a lower bound and costs less.
 template <class T>
-[[gnu::always_inline]] inline bool SearchOne(int n, const T* g, T* above, T* below, const T* squares)
+[[gnu::always_inline]] inline bool SearchOne(int n, const T* g, T* above, T* below, const T* squares, T* result)
 {
   using Integer = decltype(Bits(T(0)));
   const auto smallest = [g](int block) {
@@ -182,27 +186,27 @@ template <class T>
     ECHORAMA_FOR_LANES(l)
     above[block + l] = running;
   }
-  return SearchLines<T, 1>(n, first, last, g, above, below, squares, above);
+  return SearchLines<T, 1>(n, first, last, g, above, below, squares, result);
 }
 
-ECHORAMA_HOT bool SearchTile(int n, const float* g, float* above, float* below, const float* squares)
+ECHORAMA_HOT bool SearchTile(int n, const float* g, float* above, float* below, const float* squares, float* result)
 {
-  return SearchSixteen(n, g, above, below, squares);
+  return SearchSixteen(n, g, above, below, squares, result);
 }
 
-ECHORAMA_HOT bool SearchTile(int n, const double* g, double* above, double* below, const double* squares)
+ECHORAMA_HOT bool SearchTile(int n, const double* g, double* above, double* below, const double* squares, double* result)
 {
-  return SearchSixteen(n, g, above, below, squares);
+  return SearchSixteen(n, g, above, below, squares, result);
 }
 
-ECHORAMA_HOT bool SearchRow(int n, const float* g, float* above, float* below, const float* squares)
+ECHORAMA_HOT bool SearchRow(int n, const float* g, float* above, float* below, const float* squares, float* result)
 {
-  return SearchOne(n, g, above, below, squares);
+  return SearchOne(n, g, above, below, squares, result);
 }
 
-ECHORAMA_HOT bool SearchRow(int n, const double* g, double* above, double* below, const double* squares)
+ECHORAMA_HOT bool SearchRow(int n, const double* g, double* above, double* below, const double* squares, double* result)
 {
-  return SearchOne(n, g, above, below, squares);
+  return SearchOne(n, g, above, below, squares, result);
 }
 
 // Between the volume and a tile; lanes beyond the volume are infinite.
@@ -221,9 +225,9 @@ void Gather(const float* voxels, int lanes, T* row)
 template <class T>
 void Scatter(const T* row, double scale, int lanes, float* voxels)
 {
-  if (lanes == Lanes) {
+  if (lanes == Lanes && scale == 1.0) {
     ECHORAMA_FOR_LANES(l)
-    voxels[l] = static_cast<float>(scale * row[l]);
+    voxels[l] = static_cast<float>(row[l]);
   } else {
     for (int l = 0; l < lanes; ++l)
       voxels[l] = static_cast<float>(scale * row[l]);
@@ -235,8 +239,8 @@ template <class T>
 class Lines {
 public:
   Lines(int n, int step, double spacing)
-    : count_(n), step_(step), margin_(step == 1 ? 2 * Lanes : Stride), spacing_(spacing), g_(Blocks()), above_(Blocks()),
-      below_(Blocks())
+    : count_(n), step_(step), spacing_(spacing), g_(Blocks(n + 2 * Margin())), result_(g_.size()),
+      above_(step == 1 ? g_.size() : g_.size() / Stride), below_(above_.size())
   {
     for (std::vector<Block<T>>* array : {&g_, &above_, &below_})
       for (Block<T>& block : *array)
@@ -247,24 +251,26 @@ public:
 
   // The lanes at voxel i.
   T* G(int i) { return At(g_, i); }
-  const T* Result(int i) { return At(above_, i); }
+  T* Result(int i) { return At(result_, i); }
 
   // Turns g into the result, in the first \a lanes lanes.
   void Work(int lanes)
   {
-    const bool finished = step_ == 1 ? SearchRow(count_, G(0), At(above_, 0), At(below_, 0), squares_.data())
-                                     : SearchTile(count_, G(0), At(above_, 0), At(below_, 0), squares_.data());
+    const bool finished = step_ == 1
+                              ? SearchRow(count_, G(0), At(above_, 0), At(below_, 0), squares_.data(), Result(0))
+                              : SearchTile(count_, G(0), above_.front().value, below_.front().value, squares_.data(), Result(0));
     for (int l = 0; !finished && l < (step_ == 1 ? 1 : lanes); ++l)
       Envelope(l);
   }
 
 private:
   // A search looks beyond both ends of a line, where everything is infinite.
-  std::size_t Blocks() const
+  int Margin() const { return step_ == 1 ? 2 * Lanes : Stride; }
+  std::size_t Blocks(int voxels) const
   {
-    return static_cast<std::size_t>(count_ + 2 * margin_ + Lanes) * static_cast<std::size_t>(step_) / Lanes;
+    return (static_cast<std::size_t>(voxels) * static_cast<std::size_t>(step_) + Lanes - 1) / Lanes;
   }
-  T* At(std::vector<Block<T>>& array, int i) { return array.front().value + static_cast<std::ptrdiff_t>(step_) * (i + margin_); }
+  T* At(std::vector<Block<T>>& array, int i) { return array.front().value + static_cast<std::ptrdiff_t>(step_) * (i + Margin()); }
 
   // The lower envelope of the parabolas of one line, by a stack: site_[k] is lowest from voxel from_[k] on.
   void Envelope(int lane)
@@ -299,15 +305,15 @@ private:
       }
     }
     for (int i = count_ - 1; i >= 0; --i) {
-      At(above_, i)[lane] = static_cast<T>(top < 0 ? static_cast<double>(Infinity) : height(i, site_[top]));
+      Result(i)[lane] = static_cast<T>(top < 0 ? static_cast<double>(Infinity) : height(i, site_[top]));
       if (top > 0 && i == from_[top])
         --top;
     }
   }
 
-  int count_, step_, margin_;
+  int count_, step_;
   double spacing_;
-  std::vector<Block<T>> g_, above_, below_; // the result takes the place of above_
+  std::vector<Block<T>> g_, result_, above_, below_;
   std::vector<T> squares_;
   std::vector<int> site_, from_;
 };
