@@ -32,14 +32,13 @@ using echorama::VoxelType;
 
 vtkStandardNewMacro(vtkUltrasoundReader);
 
-namespace
-{
+namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
 
 int VtkTypeOf(VoxelType type)
 {
-  static const int types[] = { VTK_SIGNED_CHAR, VTK_UNSIGNED_CHAR, VTK_SHORT, VTK_UNSIGNED_SHORT, VTK_INT, VTK_UNSIGNED_INT,
-    VTK_TYPE_INT64, VTK_TYPE_UINT64, VTK_FLOAT, VTK_DOUBLE };
+  static const int types[] = {VTK_SIGNED_CHAR,  VTK_UNSIGNED_CHAR, VTK_SHORT,       VTK_UNSIGNED_SHORT, VTK_INT,
+                              VTK_UNSIGNED_INT, VTK_TYPE_INT64,    VTK_TYPE_UINT64, VTK_FLOAT,          VTK_DOUBLE};
   return types[static_cast<int>(type)];
 }
 
@@ -54,21 +53,19 @@ vtkSmartPointer<vtkDataArray> ReadArray(const ImageHeader& header, const char* n
 }
 
 // The file NAME.array.ext beside NAME.ext, with the same geometry as the volume, or nullptr when there is none.
-vtkSmartPointer<vtkDataArray> ReadCompanion(
-  const std::string& path, const char* array, vtkImageData* volume, const echorama::Progress& progress)
+vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char* array, vtkImageData* volume,
+                                            const echorama::Progress& progress)
 {
   const std::string companion = echorama::CompanionPath(path, array);
   std::error_code ignored;
-  if (!std::filesystem::exists(companion, ignored))
-  {
+  if (!std::filesystem::exists(companion, ignored)) {
     return nullptr;
   }
   const ImageHeader header = echorama::ReadImageHeader(companion);
   echorama::CheckVolume(header);
-  if (!header.geometry.AgreesWith(vtkUltrasoundVolume::GeometryOf(volume)))
-  {
-    throw Error(Error::Kind::BadFile,
-      companion + ": its geometry is not that of " + path + "; remove it if it belongs to an earlier file of this name");
+  if (!header.geometry.AgreesWith(vtkUltrasoundVolume::GeometryOf(volume))) {
+    throw Error(Error::Kind::BadFile, companion + ": its geometry is not that of " + path +
+                                          "; remove it if it belongs to an earlier file of this name");
   }
   return ReadArray(header, array, progress);
 }
@@ -80,19 +77,16 @@ vtkSmartPointer<vtkDataArray> AsValidRegion(vtkDataArray* array)
   const auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
   valid->SetName(vtkUltrasoundVolume::ValidRegionName());
   valid->SetNumberOfTuples(count);
-  for (vtkIdType i = 0; i < count; ++i)
-  {
+  for (vtkIdType i = 0; i < count; ++i) {
     valid->SetValue(i, array->GetComponent(i, 0) != 0.0 ? 1 : 0);
   }
   return valid;
 }
 
 // Collects what an object inside complains of, instead of printing it.
-class Complaints
-{
+class Complaints {
 public:
-  explicit Complaints(vtkObject* object)
-    : Object(object)
+  explicit Complaints(vtkObject* object) : Object(object)
   {
     this->Command->SetClientData(this);
     this->Command->SetCallback([](vtkObject*, unsigned long, void* self, void* text) {
@@ -111,8 +105,7 @@ public:
   {
     const std::size_t pointer = this->Text.find("): ");
     std::string sentence = this->Text.empty() || pointer == std::string::npos ? this->Text : this->Text.substr(pointer + 3);
-    while (!sentence.empty() && std::isspace(static_cast<unsigned char>(sentence.back())))
-    {
+    while (!sentence.empty() && std::isspace(static_cast<unsigned char>(sentence.back()))) {
       sentence.pop_back();
     }
     std::replace(sentence.begin(), sentence.end(), '\n', ' ');
@@ -134,19 +127,16 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
   reader->UpdateInformation();
   vtkInformation* information = reader->GetOutputInformation(0);
   if (reader->GetErrorCode() != 0 || !complaints.Sentence().empty() ||
-    !information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()))
-  {
+      !information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT())) {
     throw Error(Error::Kind::BadFile, path + ": it cannot be read as a VTK image file (" + complaints.Sentence() + ")");
   }
   int extent[6];
   information->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
   echorama::ImageGeometry geometry;
   Eigen::Vector3d first;
-  for (int axis = 0; axis < 3; ++axis)
-  {
+  for (int axis = 0; axis < 3; ++axis) {
     const long long size = static_cast<long long>(extent[2 * axis + 1]) - extent[2 * axis] + 1;
-    if (size < 1 || size > VTK_INT_MAX)
-    {
+    if (size < 1 || size > VTK_INT_MAX) {
       throw Error(Error::Kind::BadFile, path + ": its WholeExtent is empty or overflows");
     }
     geometry.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(size);
@@ -155,30 +145,25 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
   information->Get(vtkDataObject::ORIGIN(), geometry.origin.data());
   information->Get(vtkDataObject::SPACING(), geometry.spacing.data());
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = Eigen::Matrix3d::Identity();
-  if (information->Has(vtkDataObject::DIRECTION()))
-  {
+  if (information->Has(vtkDataObject::DIRECTION())) {
     information->Get(vtkDataObject::DIRECTION(), direction.data());
   }
   geometry.direction = direction;
   geometry.origin += geometry.direction * geometry.spacing.cwiseProduct(first);
-  try
-  {
+  try {
     geometry.Check(path);
-  }
-  catch (const Error& error)
-  {
+  } catch (const Error& error) {
     throw Error(Error::Kind::BadFile, error.what());
   }
   // Compressed or not, a file does not hold ten thousand times its bytes.
   const double voxels = static_cast<double>(geometry.VoxelCount());
-  if (voxels > 1e4 * static_cast<double>(std::filesystem::file_size(path)))
-  {
+  if (voxels > 1e4 * static_cast<double>(std::filesystem::file_size(path))) {
     throw Error(Error::Kind::BadFile, path + ": its WholeExtent needs more voxels than the file can hold");
   }
   echorama::CheckMemory(path, voxels);
   return geometry;
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundReader::vtkUltrasoundReader()
@@ -203,12 +188,9 @@ void vtkUltrasoundReader::PrintSelf(ostream& os, vtkIndent indent)
 //----------------------------------------------------------------------------
 int vtkUltrasoundReader::CanReadFile(const char* fileName)
 {
-  try
-  {
+  try {
     return fileName && echorama::FormatOfContent(fileName) != FileFormat::Unknown ? 1 : 0;
-  }
-  catch (const Error&)
-  {
+  } catch (const Error&) {
     return 0;
   }
 }
@@ -217,8 +199,7 @@ int vtkUltrasoundReader::CanReadFile(const char* fileName)
 std::string vtkUltrasoundReader::GetNotes() const
 {
   std::string text;
-  for (const std::string& note : this->Notes)
-  {
+  for (const std::string& note : this->Notes) {
     text += (text.empty() ? "" : "\n") + note;
   }
   return text;
@@ -230,12 +211,10 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
   return vtkUltrasoundVolume::Run(this, nullptr, [this, outputs](const echorama::Progress&) {
     const std::string path = this->FileName ? this->FileName : "";
     const FileFormat format = echorama::FormatOfContent(path);
-    if (format == FileFormat::Unknown)
-    {
+    if (format == FileFormat::Unknown) {
       throw Error(Error::Kind::BadFile, path + ": the content is none of MetaImage, NRRD and VTK image file");
     }
-    if (format == FileFormat::VtkXmlImage)
-    {
+    if (format == FileFormat::VtkXmlImage) {
       const vtkNew<vtkXMLImageDataReader> reader;
       vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), OpenXml(reader, path));
       return;
@@ -253,13 +232,10 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
 {
   this->Notes.clear();
   const std::string path = this->FileName ? this->FileName : "";
-  if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage)
-  {
+  if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
     this->ReadXml(output);
     progress(0.7); // VTK's reader cannot be stopped, but we can
-  }
-  else
-  {
+  } else {
     this->ReadHeaderFile(output, progress.Part(0.0, 0.7));
   }
   this->FindValidRegion(output, progress.Part(0.7, 0.9));
@@ -276,22 +252,16 @@ void vtkUltrasoundReader::ReadHeaderFile(vtkImageData* output, const echorama::P
   output->GetPointData()->SetScalars(ReadArray(header, vtkUltrasoundVolume::IntensityName(), progress));
 
   const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
-  for (const HeaderField& field : header.fields)
-  {
+  for (const HeaderField& field : header.fields) {
     const std::string& name = field.first;
-    if (name.compare(0, FieldPrefix.size(), FieldPrefix) == 0)
-    {
-      if (!vtkUltrasoundAcquisition::SetFromText(output, name.substr(FieldPrefix.size()), field.second))
-      {
+    if (name.compare(0, FieldPrefix.size(), FieldPrefix) == 0) {
+      if (!vtkUltrasoundAcquisition::SetFromText(output, name.substr(FieldPrefix.size()), field.second)) {
         this->Notes.push_back("the header's " + name + " could not be understood and was left out");
       }
-    }
-    else if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end())
-    {
-      this->Notes.push_back("the header's " + name + " is not ours, though it has the name of one of our fields; it was left out");
-    }
-    else
-    {
+    } else if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end()) {
+      this->Notes.push_back("the header's " + name +
+                            " is not ours, though it has the name of one of our fields; it was left out");
+    } else {
       const vtkNew<vtkStringArray> text;
       text->SetName(name.c_str());
       text->InsertNextValue(field.second);
@@ -311,8 +281,7 @@ void vtkUltrasoundReader::ReadXml(vtkImageData* output)
   {
     const Complaints complaints(reader);
     reader->Update();
-    if (reader->GetErrorCode() != 0 || !complaints.Sentence().empty())
-    {
+    if (reader->GetErrorCode() != 0 || !complaints.Sentence().empty()) {
       fail("the data are truncated or damaged (" + complaints.Sentence() + ")");
     }
   }
@@ -326,25 +295,20 @@ void vtkUltrasoundReader::ReadXml(vtkImageData* output)
     return array && name != vtkUltrasoundVolume::ValidRegionName() && name != vtkUltrasoundVolume::ProvenanceName();
   };
   vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output); // the array of that name, else the active one
-  for (int i = 0; !isIntensity(intensity) && i < arrays->GetNumberOfArrays(); ++i)
-  {
+  for (int i = 0; !isIntensity(intensity) && i < arrays->GetNumberOfArrays(); ++i) {
     intensity = arrays->GetArray(i);
   }
-  if (!isIntensity(intensity))
-  {
+  if (!isIntensity(intensity)) {
     fail("it has no point array that could be the intensities");
   }
-  if (intensity->GetNumberOfComponents() != 1)
-  {
+  if (intensity->GetNumberOfComponents() != 1) {
     fail("it has " + std::to_string(intensity->GetNumberOfComponents()) + " numbers per voxel; one is needed");
   }
-  if (intensity->GetNumberOfTuples() != output->GetNumberOfPoints())
-  {
+  if (intensity->GetNumberOfTuples() != output->GetNumberOfPoints()) {
     fail("its intensities are not one per voxel");
   }
   const std::string name = intensity->GetName() ? intensity->GetName() : "";
-  if (name != vtkUltrasoundVolume::IntensityName())
-  {
+  if (name != vtkUltrasoundVolume::IntensityName()) {
     this->Notes.push_back("the array " + name + " was taken as the intensities");
     const auto renamed = vtkSmartPointer<vtkDataArray>::Take(intensity->NewInstance());
     renamed->ShallowCopy(intensity);
@@ -360,16 +324,13 @@ void vtkUltrasoundReader::FindValidRegion(vtkImageData* output, const echorama::
 {
   vtkPointData* arrays = output->GetPointData();
   vtkSmartPointer<vtkDataArray> found = vtkUltrasoundVolume::GetValidRegion(output);
-  if (found && found->GetNumberOfTuples() != output->GetNumberOfPoints())
-  {
+  if (found && found->GetNumberOfTuples() != output->GetNumberOfPoints()) {
     throw Error(Error::Kind::BadFile, std::string(this->FileName) + ": its ValidRegion is not one number per voxel");
   }
-  if (!found)
-  {
+  if (!found) {
     found = ReadCompanion(this->FileName, vtkUltrasoundVolume::ValidRegionName(), output, progress);
   }
-  if (found)
-  {
+  if (found) {
     arrays->AddArray(AsValidRegion(found));
     return;
   }
@@ -380,26 +341,22 @@ void vtkUltrasoundReader::FindValidRegion(vtkImageData* output, const echorama::
   const auto target = vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output);
   vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output);
   std::int64_t missing = 0;
-  switch (intensity->GetDataType())
-  {
-    vtkTemplateMacro(missing = echorama::ValidFromBorderZeros(
-                       vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, output), target));
+  switch (intensity->GetDataType()) {
+    vtkTemplateMacro(missing =
+                         echorama::ValidFromBorderZeros(vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, output), target));
   }
   arrays->AddArray(valid);
-  if (missing > 0)
-  {
+  if (missing > 0) {
     this->Notes.push_back("the valid region was guessed: everything but the zeros connected to the border (" +
-      std::to_string(missing) + " voxels) is taken as real");
+                          std::to_string(missing) + " voxels) is taken as real");
   }
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundReader::FindProvenance(vtkImageData* output, const echorama::Progress& progress)
 {
-  if (!output->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName()))
-  {
-    if (const auto array = ReadCompanion(this->FileName, vtkUltrasoundVolume::ProvenanceName(), output, progress))
-    {
+  if (!output->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName())) {
+    if (const auto array = ReadCompanion(this->FileName, vtkUltrasoundVolume::ProvenanceName(), output, progress)) {
       output->GetPointData()->AddArray(array);
     }
   }

@@ -33,8 +33,7 @@
 
 class vtkXMLImageDataReader;
 
-class ECHORAMAREADERS_EXPORT vtkUltrasoundReader : public vtkUltrasoundImageAlgorithm
-{
+class ECHORAMAREADERS_EXPORT vtkUltrasoundReader : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundReader* New();
   vtkTypeMacro(vtkUltrasoundReader, vtkUltrasoundImageAlgorithm);

@@ -30,30 +30,27 @@ using echorama::VoxelType;
 
 vtkStandardNewMacro(vtkUltrasoundWriter);
 
-namespace
-{
+namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
 
 template <class T>
 constexpr VoxelType VoxelTypeOf()
 {
-  if constexpr (std::is_floating_point_v<T>)
-  {
+  if constexpr (std::is_floating_point_v<T>) {
     return sizeof(T) == 4 ? VoxelType::Float32 : VoxelType::Float64;
   }
-  constexpr VoxelType types[] = { VoxelType::Int8, VoxelType::UInt8, VoxelType::Int16, VoxelType::UInt16, VoxelType::Int32,
-    VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64 };
+  constexpr VoxelType types[] = {VoxelType::Int8,  VoxelType::UInt8,  VoxelType::Int16, VoxelType::UInt16,
+                                 VoxelType::Int32, VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64};
   constexpr int power = sizeof(T) == 1 ? 0 : sizeof(T) == 2 ? 1 : sizeof(T) == 4 ? 2 : 3;
   return types[2 * power + (std::is_signed_v<T> ? 0 : 1)];
 }
 
 VoxelType TypeOf(vtkDataArray* array)
 {
-  switch (array->GetDataType())
-  {
+  switch (array->GetDataType()) {
     vtkTemplateMacro(return VoxelTypeOf<VTK_TT>());
-    default:
-      throw Error(Error::Kind::BadInput, std::string("voxels of type ") + array->GetDataTypeAsString() + " cannot be written");
+  default:
+    throw Error(Error::Kind::BadInput, std::string("voxels of type ") + array->GetDataTypeAsString() + " cannot be written");
   }
 }
 
@@ -64,10 +61,9 @@ bool LooksValidEverywhere(vtkImageData* input, vtkDataArray* intensity)
   guess->SetNumberOfTuples(input->GetNumberOfPoints());
   const auto target = vtkUltrasoundVolume::ViewOf<unsigned char>(guess, input);
   std::int64_t missing = 0;
-  switch (intensity->GetDataType())
-  {
-    vtkTemplateMacro(
-      missing = echorama::ValidFromBorderZeros(vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, input), target));
+  switch (intensity->GetDataType()) {
+    vtkTemplateMacro(missing =
+                         echorama::ValidFromBorderZeros(vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, input), target));
   }
   return missing == 0;
 }
@@ -80,15 +76,14 @@ vtkSmartPointer<vtkDataArray> ValidRegionToWrite(vtkImageData* input, vtkDataArr
   const auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
   valid->SetNumberOfTuples(count);
   bool everywhere = true;
-  for (vtkIdType i = 0; i < count; ++i)
-  {
+  for (vtkIdType i = 0; i < count; ++i) {
     const bool real = !given || given->GetComponent(i, 0) != 0.0;
     valid->SetValue(i, real ? 1 : 0);
     everywhere = everywhere && real;
   }
   return everywhere && LooksValidEverywhere(input, intensity) ? nullptr : valid;
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundWriter::~vtkUltrasoundWriter()
@@ -109,8 +104,7 @@ void vtkUltrasoundWriter::PrintSelf(ostream& os, vtkIndent indent)
 std::string vtkUltrasoundWriter::GetNotes() const
 {
   std::string text;
-  for (const std::string& note : this->Notes)
-  {
+  for (const std::string& note : this->Notes) {
     text += (text.empty() ? "" : "\n") + note;
   }
   return text;
@@ -138,59 +132,52 @@ void vtkUltrasoundWriter::WriteData()
 {
   this->SetErrorCode(vtkErrorCode::NoError);
   this->Notes.clear();
-  this->Written = vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
-    const std::string path = this->FileName ? this->FileName : "";
-    if (path.empty())
-    {
-      throw Error(Error::Kind::InvalidParameter, "no file name was given");
-    }
-    vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
-    if (!input)
-    {
-      throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
-    }
-    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
-    vtkUltrasoundVolume::GeometryOf(input).Check(path);
-    if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints())
-    {
-      throw Error(Error::Kind::BadInput, path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
-    }
-    if (intensity->GetNumberOfComponents() != 1)
-    {
-      throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
-    }
-    vtkUltrasoundVolume::CheckValidRegion(input, path);
-    for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i)
-    {
-      vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
-      if (array->GetNumberOfTuples() != input->GetNumberOfPoints())
-      {
-        throw Error(Error::Kind::BadInput,
-          path + ": the point array " + (array->GetName() ? array->GetName() : "without a name") + " has not one value per voxel");
-      }
-    }
+  this->Written =
+      vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
+        const std::string path = this->FileName ? this->FileName : "";
+        if (path.empty()) {
+          throw Error(Error::Kind::InvalidParameter, "no file name was given");
+        }
+        vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
+        if (!input) {
+          throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
+        }
+        vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
+        vtkUltrasoundVolume::GeometryOf(input).Check(path);
+        if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints()) {
+          throw Error(Error::Kind::BadInput,
+                      path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
+        }
+        if (intensity->GetNumberOfComponents() != 1) {
+          throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
+        }
+        vtkUltrasoundVolume::CheckValidRegion(input, path);
+        for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
+          vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
+          if (array->GetNumberOfTuples() != input->GetNumberOfPoints()) {
+            throw Error(Error::Kind::BadInput, path + ": the point array " +
+                                                   (array->GetName() ? array->GetName() : "without a name") +
+                                                   " has not one value per voxel");
+          }
+        }
 
-    FileReplacement files;
-    switch (echorama::FormatOfName(path))
-    {
-      case FileFormat::MetaImage:
-      case FileFormat::Nrrd:
-        this->WriteHeaderFile(input, files, progress);
-        break;
-      case FileFormat::VtkXmlImage:
-        this->WriteXml(input, files);
-        break;
-      case FileFormat::Unknown:
-        throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd, .nhdr or .vti");
-    }
-    files.Commit();
-  }) != 0;
-  if (!this->Written)
-  {
+        FileReplacement files;
+        switch (echorama::FormatOfName(path)) {
+        case FileFormat::MetaImage:
+        case FileFormat::Nrrd:
+          this->WriteHeaderFile(input, files, progress);
+          break;
+        case FileFormat::VtkXmlImage:
+          this->WriteXml(input, files);
+          break;
+        case FileFormat::Unknown:
+          throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd, .nhdr or .vti");
+        }
+        files.Commit();
+      }) != 0;
+  if (!this->Written) {
     this->SetErrorCode(vtkErrorCode::UnknownError);
-  }
-  else if (!this->Notes.empty())
-  {
+  } else if (!this->Notes.empty()) {
     vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
   }
 }
@@ -207,8 +194,7 @@ void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& 
   // Files beside the main one, which is staged last; those of an earlier volume of this name must not stay.
   const auto writeBeside = [&](const char* name, vtkDataArray* array) {
     const std::string companion = echorama::CompanionPath(path, name);
-    if (!array)
-    {
+    if (!array) {
       files.Remove(companion);
       return;
     }
@@ -217,51 +203,41 @@ void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& 
   };
   writeBeside(vtkUltrasoundVolume::ValidRegionName(), ValidRegionToWrite(input, intensity));
   vtkDataArray* provenance = input->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName());
-  const bool single = provenance && provenance->GetNumberOfComponents() == 1 &&
-    provenance->GetNumberOfTuples() == input->GetNumberOfPoints();
+  const bool single =
+      provenance && provenance->GetNumberOfComponents() == 1 && provenance->GetNumberOfTuples() == input->GetNumberOfPoints();
   writeBeside(vtkUltrasoundVolume::ProvenanceName(), single ? provenance : nullptr);
 
   // Field data: the acquisition, and lines that a header brought.
-  for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(input))
-  {
+  for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(input)) {
     header.fields.emplace_back(FieldPrefix + name, text);
   }
   const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
   std::vector<std::string> lost;
   vtkFieldData* fields = input->GetFieldData();
-  for (int i = 0; i < fields->GetNumberOfArrays(); ++i)
-  {
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
     vtkAbstractArray* array = fields->GetAbstractArray(i);
     const std::string name = array->GetName() ? array->GetName() : "";
-    if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end())
-    {
+    if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end()) {
       continue;
     }
     vtkStringArray* text = vtkStringArray::SafeDownCast(array);
-    if (text && text->GetNumberOfValues() == 1 && echorama::CanHold({ name, text->GetValue(0) }))
-    {
+    if (text && text->GetNumberOfValues() == 1 && echorama::CanHold({name, text->GetValue(0)})) {
       header.fields.emplace_back(name, text->GetValue(0));
-    }
-    else
-    {
+    } else {
       lost.push_back("field " + name);
     }
   }
-  for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i)
-  {
+  for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
     vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
     const std::string name = array->GetName() ? array->GetName() : "";
-    if (array != intensity && name != vtkUltrasoundVolume::ValidRegionName() && (array != provenance || !single))
-    {
+    if (array != intensity && name != vtkUltrasoundVolume::ValidRegionName() && (array != provenance || !single)) {
       lost.push_back("point array " + name);
     }
   }
-  for (int i = 0; i < input->GetCellData()->GetNumberOfArrays(); ++i)
-  {
+  for (int i = 0; i < input->GetCellData()->GetNumberOfArrays(); ++i) {
     lost.push_back(std::string("cell array ") + input->GetCellData()->GetArrayName(i));
   }
-  for (const std::string& what : lost)
-  {
+  for (const std::string& what : lost) {
     this->Notes.push_back("the format cannot hold the " + what + "; .vti can");
   }
 
@@ -282,14 +258,12 @@ void vtkUltrasoundWriter::WriteXml(vtkImageData* input, FileReplacement& files)
   writer->SetFileName(temporary.c_str());
   writer->SetHeaderTypeToUInt64();
   writer->EncodeAppendedDataOff();
-  if (!this->UseCompression)
-  {
+  if (!this->UseCompression) {
     writer->SetCompressorTypeToNone();
   }
-  if (!writer->Write() || writer->GetErrorCode() != vtkErrorCode::NoError)
-  {
-    throw Error(Error::Kind::FileSystem,
-      path + ": it cannot be written (" + vtkErrorCode::GetStringFromErrorCode(writer->GetErrorCode()) +
-        "); what was there is left as it was");
+  if (!writer->Write() || writer->GetErrorCode() != vtkErrorCode::NoError) {
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (" +
+                                             vtkErrorCode::GetStringFromErrorCode(writer->GetErrorCode()) +
+                                             "); what was there is left as it was");
   }
 }

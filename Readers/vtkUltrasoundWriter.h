@@ -36,8 +36,7 @@
 
 class vtkImageData;
 
-class ECHORAMAREADERS_EXPORT vtkUltrasoundWriter : public vtkWriter
-{
+class ECHORAMAREADERS_EXPORT vtkUltrasoundWriter : public vtkWriter {
 public:
   static vtkUltrasoundWriter* New();
   vtkTypeMacro(vtkUltrasoundWriter, vtkWriter);

@@ -61,8 +61,8 @@ inline double PeakMb()
 inline void Report(const std::string& bench, const std::string& testCase, const std::string& method, double seconds, double error,
                    const std::string& errorUnit, nlohmann::ordered_json more = {})
 {
-  nlohmann::ordered_json line{{"bench", bench}, {"case", testCase}, {"method", method}, {"seconds", seconds}, {"error", error},
-                              {"error_unit", errorUnit}, {"peak_mb", PeakMb()}};
+  nlohmann::ordered_json line{{"bench", bench}, {"case", testCase},        {"method", method},   {"seconds", seconds},
+                              {"error", error}, {"error_unit", errorUnit}, {"peak_mb", PeakMb()}};
   if (more.is_object())
     line.update(more);
   std::cout << line.dump() << std::endl;

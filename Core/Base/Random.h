@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <Eigen/Geometry>
 
 namespace echorama {
 
@@ -14,8 +14,10 @@ namespace echorama {
 class Random {
 public:
   explicit Random(std::uint64_t seed, std::uint64_t item = 0)
-    : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)},
-      counter_{0u, 0u, static_cast<std::uint32_t>(item), static_cast<std::uint32_t>(item >> 32)}
+    : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}, counter_{
+                                                                                          0u, 0u,
+                                                                                          static_cast<std::uint32_t>(item),
+                                                                                          static_cast<std::uint32_t>(item >> 32)}
   {
   }
 

@@ -10,7 +10,8 @@ namespace echorama {
 
 std::size_t ImageGeometry::VoxelCount() const
 {
-  return static_cast<std::size_t>(dimensions[0]) * static_cast<std::size_t>(dimensions[1]) * static_cast<std::size_t>(dimensions[2]);
+  return static_cast<std::size_t>(dimensions[0]) * static_cast<std::size_t>(dimensions[1]) *
+         static_cast<std::size_t>(dimensions[2]);
 }
 
 Eigen::Affine3d ImageGeometry::IndexToWorld() const
@@ -69,7 +70,8 @@ bool ImageGeometry::AgreesWith(const ImageGeometry& other, double tolerance) con
   // Corners suffice: the difference of two affine maps is affine, so it is largest at a corner.
   const Eigen::Affine3d here = IndexToWorld(), there = other.IndexToWorld();
   for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d index(corner & 1 ? dimensions[0] - 1 : 0, corner & 2 ? dimensions[1] - 1 : 0, corner & 4 ? dimensions[2] - 1 : 0);
+    const Eigen::Vector3d index(corner & 1 ? dimensions[0] - 1 : 0, corner & 2 ? dimensions[1] - 1 : 0,
+                                corner & 4 ? dimensions[2] - 1 : 0);
     if (!((here * index - there * index).norm() <= tolerance * spacing.minCoeff()))
       return false;
   }

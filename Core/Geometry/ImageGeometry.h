@@ -13,9 +13,9 @@ namespace echorama {
 /// fastest. A 2D image has dimensions[2] == 1.
 struct ImageGeometry {
   std::array<int, 3> dimensions{0, 0, 0};
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();                ///< centre of the first voxel, mm
-  Eigen::Vector3d spacing = Eigen::Vector3d::Ones();               ///< mm, > 0
-  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();         ///< columns: unit vectors of the index axes
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();        ///< centre of the first voxel, mm
+  Eigen::Vector3d spacing = Eigen::Vector3d::Ones();       ///< mm, > 0
+  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity(); ///< columns: unit vectors of the index axes
 
   std::size_t VoxelCount() const;
   Eigen::Affine3d IndexToWorld() const;

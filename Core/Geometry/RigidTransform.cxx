@@ -97,7 +97,7 @@ double RotationAngle(const Pose& pose)
 bool IsRotation(const Eigen::Matrix3d& M, double tolerance)
 {
   return M.allFinite() && (M.transpose() * M - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= tolerance &&
-    M.determinant() > 0.0;
+         M.determinant() > 0.0;
 }
 
 } // namespace echorama

@@ -25,7 +25,7 @@ namespace echorama {
 namespace {
 
 constexpr int Lanes = 16;      // voxels side by side
-constexpr int Stride = 8;     // steps of a search between two looks whether it may end
+constexpr int Stride = 8;      // steps of a search between two looks whether it may end
 constexpr int MeanSteps = 128; // steps, on average over a line, after which the stack of parabolas is faster
 constexpr float Infinity = std::numeric_limits<float>::infinity();
 

@@ -37,7 +37,7 @@ public:
       return std::min(static_cast<std::ptrdiff_t>(position + 0.5), static_cast<std::ptrdiff_t>(count - 1));
     };
     const std::ptrdiff_t index =
-      whole(z, n[2]) * intensity_.SliceStride() + whole(y, n[1]) * intensity_.RowStride() + whole(x, n[0]);
+        whole(z, n[2]) * intensity_.SliceStride() + whole(y, n[1]) * intensity_.RowStride() + whole(x, n[0]);
     return IsReal(index) ? index : -1;
   }
 

@@ -44,7 +44,9 @@ class Volume {
 public:
   Volume() = default;
   explicit Volume(const std::array<int, 3>& dimensions, T value = T())
-    : data_(static_cast<std::size_t>(dimensions[0]) * static_cast<std::size_t>(dimensions[1]) * static_cast<std::size_t>(dimensions[2]), value),
+    : data_(static_cast<std::size_t>(dimensions[0]) * static_cast<std::size_t>(dimensions[1]) *
+                static_cast<std::size_t>(dimensions[2]),
+            value),
       dimensions_(dimensions)
   {
   }

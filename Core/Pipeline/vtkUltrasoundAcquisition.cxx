@@ -16,40 +16,36 @@
 
 vtkStandardNewMacro(vtkUltrasoundAcquisition);
 
-namespace
-{
+namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
-const char* const ProbeGeometryComponents[] = { "FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees", "SweepWidthMm", "DepthMinMm",
-  "DepthMaxMm" };
+const char* const ProbeGeometryComponents[] = {"FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees",
+                                               "SweepWidthMm",    "DepthMinMm", "DepthMaxMm"};
 
 // The numbers of a field, or nothing when the field is missing, too short or not finite.
 std::optional<std::vector<double>> NumbersOf(vtkDataObject* data, const char* name, int count)
 {
   vtkDataArray* array = data && data->GetFieldData() ? data->GetFieldData()->GetArray(name) : nullptr;
-  if (!array || array->GetNumberOfValues() != count)
-  {
+  if (!array || array->GetNumberOfValues() != count) {
     return {};
   }
   std::vector<double> numbers(count);
   const int components = array->GetNumberOfComponents();
-  for (int i = 0; i < count; ++i)
-  {
+  for (int i = 0; i < count; ++i) {
     numbers[i] = array->GetComponent(i / components, i % components);
-    if (!std::isfinite(numbers[i]))
-    {
+    if (!std::isfinite(numbers[i])) {
       return {};
     }
   }
   return numbers;
 }
 
-void SetNumbers(vtkDataObject* data, const char* name, const std::vector<double>& numbers, const char* const* components = nullptr)
+void SetNumbers(vtkDataObject* data, const char* name, const std::vector<double>& numbers,
+                const char* const* components = nullptr)
 {
   vtkNew<vtkDoubleArray> array;
   array->SetName(name);
   array->SetNumberOfComponents(static_cast<int>(numbers.size()));
-  for (std::size_t i = 0; components && i < numbers.size(); ++i)
-  {
+  for (std::size_t i = 0; components && i < numbers.size(); ++i) {
     array->SetComponentName(static_cast<vtkIdType>(i), components[i]);
   }
   array->InsertNextTuple(numbers.data());
@@ -60,8 +56,7 @@ void SetNumbers(vtkDataObject* data, const char* name, const std::vector<double>
 std::string Quoted(const std::string& plain)
 {
   std::string text = "\"";
-  for (const char c : plain)
-  {
+  for (const char c : plain) {
     text += c == '\n' ? "\\n" : c == '\r' ? "\\r" : c == '\\' ? "\\\\" : std::string(1, c);
   }
   return text + "\"";
@@ -69,40 +64,35 @@ std::string Quoted(const std::string& plain)
 
 std::optional<std::string> Unquoted(const std::string& text)
 {
-  if (text.size() < 2 || text.front() != '"' || text.back() != '"')
-  {
+  if (text.size() < 2 || text.front() != '"' || text.back() != '"') {
     return {};
   }
   std::string plain;
-  for (std::size_t i = 1; i + 1 < text.size(); ++i)
-  {
-    if (text[i] != '\\')
-    {
+  for (std::size_t i = 1; i + 1 < text.size(); ++i) {
+    if (text[i] != '\\') {
       plain += text[i];
       continue;
     }
-    if (++i + 1 >= text.size())
-    {
+    if (++i + 1 >= text.size()) {
       return {};
     }
     plain += text[i] == 'n' ? '\n' : text[i] == 'r' ? '\r' : text[i];
   }
   return plain;
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
 std::vector<std::string> vtkUltrasoundAcquisition::Names()
 {
-  return { ProbeGeometryName(), ProbeToWorldName(), TimeStampName(), SeedName(), SceneName() };
+  return {ProbeGeometryName(), ProbeToWorldName(), TimeStampName(), SeedName(), SceneName()};
 }
 
 //----------------------------------------------------------------------------
 std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf(vtkDataObject* data)
 {
   const auto n = NumbersOf(data, ProbeGeometryName(), 6);
-  if (!n)
-  {
+  if (!n) {
     return {};
   }
   echorama::ProbeGeometry geometry;
@@ -119,16 +109,15 @@ std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf
 void vtkUltrasoundAcquisition::SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& g)
 {
   SetNumbers(data, ProbeGeometryName(),
-    { g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax },
-    ProbeGeometryComponents);
+             {g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax},
+             ProbeGeometryComponents);
 }
 
 //----------------------------------------------------------------------------
 std::optional<echorama::Pose> vtkUltrasoundAcquisition::ProbeToWorldOf(vtkDataObject* data)
 {
   const auto n = NumbersOf(data, ProbeToWorldName(), 16);
-  if (!n)
-  {
+  if (!n) {
     return {};
   }
   echorama::Pose pose;
@@ -140,8 +129,7 @@ std::optional<echorama::Pose> vtkUltrasoundAcquisition::ProbeToWorldOf(vtkDataOb
 bool vtkUltrasoundAcquisition::GetProbeToWorld(vtkDataObject* data, vtkMatrix4x4* matrix)
 {
   const auto pose = ProbeToWorldOf(data);
-  if (!pose)
-  {
+  if (!pose) {
     return false;
   }
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = pose->matrix();
@@ -166,15 +154,14 @@ std::optional<double> vtkUltrasoundAcquisition::TimeStampOf(vtkDataObject* data)
 //----------------------------------------------------------------------------
 void vtkUltrasoundAcquisition::SetTimeStamp(vtkDataObject* data, double seconds)
 {
-  SetNumbers(data, TimeStampName(), { seconds });
+  SetNumbers(data, TimeStampName(), {seconds});
 }
 
 //----------------------------------------------------------------------------
 std::optional<std::uint64_t> vtkUltrasoundAcquisition::SeedOf(vtkDataObject* data)
 {
   vtkDataArray* array = data && data->GetFieldData() ? data->GetFieldData()->GetArray(SeedName()) : nullptr;
-  if (!array || array->GetNumberOfValues() != 1)
-  {
+  if (!array || array->GetNumberOfValues() != 1) {
     return {};
   }
   // Files may bring the seed back as another integer type; a double would lose bits beyond 2^53.
@@ -194,7 +181,7 @@ void vtkUltrasoundAcquisition::SetSeed(vtkDataObject* data, std::uint64_t seed)
 std::optional<std::string> vtkUltrasoundAcquisition::SceneOf(vtkDataObject* data)
 {
   auto* array =
-    vtkStringArray::SafeDownCast(data && data->GetFieldData() ? data->GetFieldData()->GetAbstractArray(SceneName()) : nullptr);
+      vtkStringArray::SafeDownCast(data && data->GetFieldData() ? data->GetFieldData()->GetAbstractArray(SceneName()) : nullptr);
   return array && array->GetNumberOfValues() == 1 ? std::optional<std::string>(array->GetValue(0)) : std::nullopt;
 }
 
@@ -211,26 +198,21 @@ void vtkUltrasoundAcquisition::SetScene(vtkDataObject* data, const std::string& 
 std::vector<std::pair<std::string, std::string>> vtkUltrasoundAcquisition::ToText(vtkDataObject* data)
 {
   std::vector<std::pair<std::string, std::string>> texts;
-  for (const char* name : { ProbeGeometryName(), ProbeToWorldName(), TimeStampName() })
-  {
+  for (const char* name : {ProbeGeometryName(), ProbeToWorldName(), TimeStampName()}) {
     vtkDataArray* array = data->GetFieldData()->GetArray(name);
     std::string text;
-    for (vtkIdType i = 0; array && i < array->GetNumberOfValues(); ++i)
-    {
+    for (vtkIdType i = 0; array && i < array->GetNumberOfValues(); ++i) {
       const int components = array->GetNumberOfComponents();
       text += (i ? " " : "") + echorama::NumberText(array->GetComponent(i / components, static_cast<int>(i % components)));
     }
-    if (array)
-    {
+    if (array) {
       texts.emplace_back(name, text);
     }
   }
-  if (const auto seed = SeedOf(data))
-  {
+  if (const auto seed = SeedOf(data)) {
     texts.emplace_back(SeedName(), echorama::NumberText(*seed));
   }
-  if (const auto scene = SceneOf(data))
-  {
+  if (const auto scene = SceneOf(data)) {
     texts.emplace_back(SceneName(), Quoted(*scene));
   }
   return texts;
@@ -240,20 +222,16 @@ std::vector<std::pair<std::string, std::string>> vtkUltrasoundAcquisition::ToTex
 bool vtkUltrasoundAcquisition::SetFromText(vtkDataObject* data, const std::string& name, const std::string& text)
 {
   std::uint64_t seed = 0;
-  if (name == SeedName())
-  {
+  if (name == SeedName()) {
     const bool good = echorama::ParseNumber(text, seed);
-    if (good)
-    {
+    if (good) {
       SetSeed(data, seed);
     }
     return good;
   }
-  if (name == SceneName())
-  {
+  if (name == SceneName()) {
     const auto scene = Unquoted(text);
-    if (scene)
-    {
+    if (scene) {
       SetScene(data, *scene);
     }
     return scene.has_value();
@@ -261,17 +239,14 @@ bool vtkUltrasoundAcquisition::SetFromText(vtkDataObject* data, const std::strin
 
   std::vector<double> numbers;
   std::istringstream words(text);
-  for (std::string word; words >> word;)
-  {
+  for (std::string word; words >> word;) {
     numbers.push_back(0.0);
-    if (!echorama::ParseNumber(word, numbers.back()) || !std::isfinite(numbers.back()))
-    {
+    if (!echorama::ParseNumber(word, numbers.back()) || !std::isfinite(numbers.back())) {
       return false;
     }
   }
   const std::size_t wanted = name == ProbeGeometryName() ? 6 : name == ProbeToWorldName() ? 16 : name == TimeStampName() ? 1 : 0;
-  if (wanted == 0 || numbers.size() != wanted)
-  {
+  if (wanted == 0 || numbers.size() != wanted) {
     return false;
   }
   SetNumbers(data, name.c_str(), numbers, name == ProbeGeometryName() ? ProbeGeometryComponents : nullptr);

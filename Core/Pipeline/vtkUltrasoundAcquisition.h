@@ -32,8 +32,7 @@
 class vtkDataObject;
 class vtkMatrix4x4;
 
-class ECHORAMACORE_EXPORT vtkUltrasoundAcquisition : public vtkObject
-{
+class ECHORAMACORE_EXPORT vtkUltrasoundAcquisition : public vtkObject {
 public:
   static vtkUltrasoundAcquisition* New();
   vtkTypeMacro(vtkUltrasoundAcquisition, vtkObject);

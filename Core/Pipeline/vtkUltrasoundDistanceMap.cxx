@@ -15,8 +15,7 @@
 
 vtkStandardNewMacro(vtkUltrasoundDistanceMap);
 
-namespace
-{
+namespace {
 // 1 in the region, else 0.
 echorama::Volume<unsigned char> RegionOf(const vtkUltrasoundVolume::Input& input, bool chosen)
 {
@@ -29,15 +28,14 @@ echorama::Volume<unsigned char> RegionOf(const vtkUltrasoundVolume::Input& input
     region = echorama::Volume<unsigned char>(volume.intensity.Dimensions());
     const auto inside = region.View();
     echorama::ParallelRanges(inside.Size(), 65536, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t i = begin; i < end; ++i)
-      {
+      for (std::ptrdiff_t i = begin; i < end; ++i) {
         inside[i] = sampler.IsReal(i) && (!chosen || volume.intensity[i] != T(0)) ? 1 : 0;
       }
     });
   });
   return region;
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundDistanceMap::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
@@ -51,22 +49,17 @@ void vtkUltrasoundDistanceMap::Execute(vtkInformationVector** inputs, vtkImageDa
   output->ShallowCopy(image);
   const auto distance = vtkUltrasoundVolume::ViewOf<float>(AddArray(output, DistanceName(), VTK_FLOAT), output);
   echorama::Volume<float> inside;
-  if (this->Measure == INSIDE)
-  {
+  if (this->Measure == INSIDE) {
     echorama::SquaredDepthMap(region.View(), spacing, distance, progress);
-  }
-  else
-  {
+  } else {
     echorama::SquaredDistanceMap(region.View(), spacing, distance, progress.Part(0.0, this->Measure == SIGNED ? 0.5 : 1.0));
   }
-  if (this->Measure == SIGNED)
-  {
+  if (this->Measure == SIGNED) {
     inside = echorama::Volume<float>(region.Dimensions());
     echorama::SquaredDepthMap(region.View(), spacing, inside.View(), progress.Part(0.5, 1.0));
   }
   echorama::ParallelRanges(distance.Size(), 65536, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (std::ptrdiff_t i = begin; i < end; ++i)
-    {
+    for (std::ptrdiff_t i = begin; i < end; ++i) {
       const bool deep = this->Measure == SIGNED && region.View()[i];
       const float square = deep ? inside.View()[i] : distance[i];
       const float size = this->Squared ? square : std::sqrt(square);

@@ -21,15 +21,13 @@
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
-class ECHORAMACORE_EXPORT vtkUltrasoundDistanceMap : public vtkUltrasoundImageAlgorithm
-{
+class ECHORAMACORE_EXPORT vtkUltrasoundDistanceMap : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundDistanceMap* New();
   vtkTypeMacro(vtkUltrasoundDistanceMap, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum MeasureType
-  {
+  enum MeasureType {
     OUTSIDE = 0, ///< distance to the nearest voxel of the region; 0 inside
     INSIDE = 1,  ///< distance to the nearest voxel outside the region, or beyond the grid; 0 outside
     SIGNED = 2   ///< OUTSIDE less INSIDE: negative inside the region

@@ -12,8 +12,7 @@
 int vtkUltrasoundImageAlgorithm::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   vtkInformation* in = this->GetNumberOfInputPorts() > 0 ? inputs[0]->GetInformationObject(0) : nullptr;
-  if (in)
-  {
+  if (in) {
     vtkInformation* out = outputs->GetInformationObject(0);
     out->CopyEntry(in, vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT());
     out->CopyEntry(in, vtkDataObject::ORIGIN());
@@ -26,8 +25,7 @@ int vtkUltrasoundImageAlgorithm::RequestInformation(vtkInformation*, vtkInformat
 //----------------------------------------------------------------------------
 int vtkUltrasoundImageAlgorithm::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
 {
-  for (int port = 0; port < this->GetNumberOfInputPorts(); ++port)
-  {
+  for (int port = 0; port < this->GetNumberOfInputPorts(); ++port) {
     vtkUltrasoundVolume::RequestWhole(inputs[port]);
   }
   return 1;
@@ -40,8 +38,7 @@ int vtkUltrasoundImageAlgorithm::RequestData(vtkInformation*, vtkInformationVect
     vtkImageData* output = vtkImageData::GetData(outputs);
     this->Execute(inputs, output, progress);
     vtkInformation* out = outputs->GetInformationObject(0);
-    if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT()))
-    {
+    if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT())) {
       int wanted[6];
       out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), wanted);
       output->Crop(wanted); // does nothing when all was wanted
@@ -50,8 +47,8 @@ int vtkUltrasoundImageAlgorithm::RequestData(vtkInformation*, vtkInformationVect
 }
 
 //----------------------------------------------------------------------------
-vtkDataArray* vtkUltrasoundImageAlgorithm::CopyWithNewIntensity(
-  vtkImageData* input, vtkDataArray* intensity, vtkImageData* output, int vtkType)
+vtkDataArray* vtkUltrasoundImageAlgorithm::CopyWithNewIntensity(vtkImageData* input, vtkDataArray* intensity,
+                                                                vtkImageData* output, int vtkType)
 {
   const std::string name = intensity->GetName() ? intensity->GetName() : vtkUltrasoundVolume::IntensityName();
   output->ShallowCopy(input);
@@ -67,5 +64,5 @@ vtkDataArray* vtkUltrasoundImageAlgorithm::AddArray(vtkImageData* output, const 
   fresh->SetName(name);
   fresh->SetNumberOfTuples(output->GetNumberOfPoints());
   output->GetPointData()->AddArray(fresh); // replaces one of the same name
-  return fresh; // the output holds it
+  return fresh;                            // the output holds it
 }

@@ -16,8 +16,7 @@
 #include "vtkImageAlgorithm.h"
 #include "vtkUltrasoundVolume.h" // for kernel types
 
-class ECHORAMACORE_EXPORT vtkUltrasoundImageAlgorithm : public vtkImageAlgorithm
-{
+class ECHORAMACORE_EXPORT vtkUltrasoundImageAlgorithm : public vtkImageAlgorithm {
 public:
   vtkTypeMacro(vtkUltrasoundImageAlgorithm, vtkImageAlgorithm);
 

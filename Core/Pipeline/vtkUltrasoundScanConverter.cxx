@@ -18,8 +18,7 @@ using echorama::Error;
 vtkStandardNewMacro(vtkUltrasoundScanConverter);
 
 // What the input says and the grid that follows from it.
-struct vtkUltrasoundScanConverter::Job
-{
+struct vtkUltrasoundScanConverter::Job {
   vtkUltrasoundVolume::Input Input;
   echorama::ProbeGeometry Probe;
   echorama::Pose ProbeToWorld;
@@ -32,31 +31,27 @@ vtkUltrasoundScanConverter::Job vtkUltrasoundScanConverter::Prepare(vtkInformati
   Job job;
   job.Input = vtkUltrasoundVolume::CheckInput(this, vtkImageData::GetData(inputs[0]), "the beam volume");
   const auto probe = vtkUltrasoundAcquisition::ProbeGeometryOf(job.Input.Image);
-  if (!probe)
-  {
-    throw Error(Error::Kind::BadInput,
-      std::string("the beam volume: it has no field data ") + vtkUltrasoundAcquisition::ProbeGeometryName() +
-        " of 6 finite numbers, so where its samples lie is not known");
+  if (!probe) {
+    throw Error(Error::Kind::BadInput, std::string("the beam volume: it has no field data ") +
+                                           vtkUltrasoundAcquisition::ProbeGeometryName() +
+                                           " of 6 finite numbers, so where its samples lie is not known");
   }
   job.Probe = *probe;
   const char* poseName = vtkUltrasoundAcquisition::ProbeToWorldName();
   const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(job.Input.Image);
-  if (!pose && job.Input.Image->GetFieldData()->GetAbstractArray(poseName))
-  {
+  if (!pose && job.Input.Image->GetFieldData()->GetAbstractArray(poseName)) {
     throw Error(Error::Kind::BadInput, std::string("the beam volume: its field data ") + poseName + " is not 16 finite numbers");
   }
   job.ProbeToWorld = pose.value_or(echorama::Pose::Identity());
   const auto dimensions = vtkUltrasoundVolume::GeometryOf(job.Input.Image).dimensions;
   echorama::CheckBeamVolume(dimensions, job.Probe);
   const double spacing = this->SpacingMm == 0.0 ? echorama::SampleSpacing(dimensions, job.Probe) : this->SpacingMm;
-  job.Grid =
-    echorama::ScanConversionGrid(job.Probe, job.ProbeToWorld, spacing, static_cast<std::size_t>(this->MaximumVoxels));
+  job.Grid = echorama::ScanConversionGrid(job.Probe, job.ProbeToWorld, spacing, static_cast<std::size_t>(this->MaximumVoxels));
   return job;
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundScanConverter::RequestInformation(
-  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+int vtkUltrasoundScanConverter::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   // Field data does not travel with the information of the pipeline.
   int port = 0;
@@ -67,15 +62,15 @@ int vtkUltrasoundScanConverter::RequestInformation(
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundScanConverter::Execute(
-  vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+void vtkUltrasoundScanConverter::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   const Job job = this->Prepare(inputs);
   vtkUltrasoundVolume::SetGeometry(output, job.Grid);
   output->GetFieldData()->ShallowCopy(job.Input.Image->GetFieldData());
   vtkUltrasoundAcquisition::SetProbeToWorld(output, job.ProbeToWorld);
   const char* name = job.Input.Intensity->GetName();
-  vtkDataArray* intensity = AddArray(output, name ? name : vtkUltrasoundVolume::IntensityName(), job.Input.Intensity->GetDataType());
+  vtkDataArray* intensity =
+      AddArray(output, name ? name : vtkUltrasoundVolume::IntensityName(), job.Input.Intensity->GetDataType());
   vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
   output->GetPointData()->SetActiveScalars(intensity->GetName());
 
@@ -84,9 +79,8 @@ void vtkUltrasoundScanConverter::Execute(
     using T = decltype(type);
     const auto view = vtkUltrasoundVolume::ViewOf<T>(intensity, output);
     echorama::ScanConvert<T>(vtkUltrasoundVolume::ViewOf<const T>(job.Input.Intensity, job.Input.Image), job.Probe,
-      job.ProbeToWorld, job.Grid, view, validView, progress.Part(0.0, job.Input.ValidRegion ? 0.5 : 1.0));
-    if (!job.Input.ValidRegion)
-    {
+                             job.ProbeToWorld, job.Grid, view, validView, progress.Part(0.0, job.Input.ValidRegion ? 0.5 : 1.0));
+    if (!job.Input.ValidRegion) {
       return;
     }
     // The mask goes the same way, with NaN where it hides a sample: the kernel then finds the voxels next to one.
@@ -94,13 +88,11 @@ void vtkUltrasoundScanConverter::Execute(
     echorama::Volume<float> hidden(mask.Dimensions()), ignored(job.Grid.dimensions);
     echorama::Volume<unsigned char> real(job.Grid.dimensions);
     std::transform(mask.begin(), mask.end(), hidden.View().begin(),
-      [](unsigned char sample) { return sample ? 0.0f : std::numeric_limits<float>::quiet_NaN(); });
+                   [](unsigned char sample) { return sample ? 0.0f : std::numeric_limits<float>::quiet_NaN(); });
     echorama::ScanConvert<float>(hidden.View(), job.Probe, job.ProbeToWorld, job.Grid, ignored.View(), real.View(),
-      progress.Part(0.5, 1.0));
-    for (std::ptrdiff_t i = 0; i < view.Size(); ++i)
-    {
-      if (!real.View()[i])
-      {
+                                 progress.Part(0.5, 1.0));
+    for (std::ptrdiff_t i = 0; i < view.Size(); ++i) {
+      if (!real.View()[i]) {
         view[i] = T(0);
         validView[i] = 0;
       }

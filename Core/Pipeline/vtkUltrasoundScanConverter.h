@@ -25,8 +25,7 @@
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
-class ECHORAMACORE_EXPORT vtkUltrasoundScanConverter : public vtkUltrasoundImageAlgorithm
-{
+class ECHORAMACORE_EXPORT vtkUltrasoundScanConverter : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundScanConverter* New();
   vtkTypeMacro(vtkUltrasoundScanConverter, vtkUltrasoundImageAlgorithm);

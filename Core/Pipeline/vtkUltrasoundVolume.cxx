@@ -72,7 +72,7 @@ void vtkUltrasoundVolume::SetGeometry(vtkImageData* volume, const echorama::Imag
 //----------------------------------------------------------------------------
 void vtkUltrasoundVolume::SetGeometry(vtkInformation* information, const echorama::ImageGeometry& geometry)
 {
-  const int extent[6] = { 0, geometry.dimensions[0] - 1, 0, geometry.dimensions[1] - 1, 0, geometry.dimensions[2] - 1 };
+  const int extent[6] = {0, geometry.dimensions[0] - 1, 0, geometry.dimensions[1] - 1, 0, geometry.dimensions[2] - 1};
   information->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
   information->Set(vtkDataObject::ORIGIN(), geometry.origin.data(), 3);
   information->Set(vtkDataObject::SPACING(), geometry.spacing.data(), 3);
@@ -88,8 +88,7 @@ void vtkUltrasoundVolume::Move(vtkImageData* volume, const echorama::Pose& pose)
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = pose.linear() * before;
   volume->SetOrigin(origin.data());
   volume->SetDirectionMatrix(direction.data());
-  if (const auto probe = vtkUltrasoundAcquisition::ProbeToWorldOf(volume))
-  {
+  if (const auto probe = vtkUltrasoundAcquisition::ProbeToWorldOf(volume)) {
     vtkUltrasoundAcquisition::SetProbeToWorld(volume, pose * *probe);
   }
 }
@@ -100,8 +99,7 @@ bool vtkUltrasoundVolume::Move(vtkImageData* volume, vtkMatrix4x4* matrix)
   echorama::Pose pose;
   pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
   if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
-    pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-  {
+      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     vtkGenericWarningMacro("vtkUltrasoundVolume::Move: the matrix is not a rigid transform; the volume was not moved");
     return false;
   }
@@ -112,9 +110,8 @@ bool vtkUltrasoundVolume::Move(vtkImageData* volume, vtkMatrix4x4* matrix)
 //----------------------------------------------------------------------------
 void vtkUltrasoundVolume::RefuseType(vtkDataArray* intensity)
 {
-  throw Error(Error::Kind::BadInput,
-    std::string("voxels of type ") + intensity->GetDataTypeAsString() +
-      " are not supported; use unsigned char, short, unsigned short, float or double");
+  throw Error(Error::Kind::BadInput, std::string("voxels of type ") + intensity->GetDataTypeAsString() +
+                                         " are not supported; use unsigned char, short, unsigned short, float or double");
 }
 
 //----------------------------------------------------------------------------
@@ -130,32 +127,25 @@ vtkUltrasoundVolume::Input vtkUltrasoundVolume::CheckInput(vtkAlgorithm* filter,
   vtkInformation* choice = filter->GetInputArrayInformation(0);
   const bool chosen = choice && choice->Has(vtkDataObject::FIELD_NAME());
   input.Intensity = chosen ? image->GetPointData()->GetArray(choice->Get(vtkDataObject::FIELD_NAME())) : GetIntensity(image);
-  if (!input.Intensity)
-  {
+  if (!input.Intensity) {
     fail(chosen ? std::string("it has no point array named ") + choice->Get(vtkDataObject::FIELD_NAME())
                 : std::string("it has no intensities (a point array named Intensity, or active scalars)"));
   }
-  if (input.Intensity->GetNumberOfComponents() != 1)
-  {
+  if (input.Intensity->GetNumberOfComponents() != 1) {
     fail("its intensities have " + std::to_string(input.Intensity->GetNumberOfComponents()) + " components; one is needed");
   }
-  try
-  {
+  try {
     Dispatch(input.Intensity, [](auto) {});
-  }
-  catch (const Error& error)
-  {
+  } catch (const Error& error) {
     fail(error.what());
   }
   GeometryOf(image).Check(name);
-  if (input.Intensity->GetNumberOfTuples() != image->GetNumberOfPoints())
-  {
+  if (input.Intensity->GetNumberOfTuples() != image->GetNumberOfPoints()) {
     fail("its intensities are not one per voxel");
   }
   if (input.ValidRegion &&
-    (input.ValidRegion->GetDataType() != VTK_UNSIGNED_CHAR || input.ValidRegion->GetNumberOfComponents() != 1 ||
-      input.ValidRegion->GetNumberOfTuples() != image->GetNumberOfPoints()))
-  {
+      (input.ValidRegion->GetDataType() != VTK_UNSIGNED_CHAR || input.ValidRegion->GetNumberOfComponents() != 1 ||
+       input.ValidRegion->GetNumberOfTuples() != image->GetNumberOfPoints())) {
     fail("its ValidRegion is not one unsigned char per voxel");
   }
   return input;
@@ -168,21 +158,15 @@ std::vector<vtkUltrasoundVolume::Input> vtkUltrasoundVolume::CollectInputs(vtkAl
   const auto add = [&inputs, filter](vtkImageData* image, const char* name) {
     inputs.push_back(CheckInput(filter, image, name && *name ? name : "volume " + std::to_string(inputs.size() + 1)));
   };
-  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection)
-  {
+  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection) {
     vtkDataObject* data = vtkDataObject::GetData(port, connection);
-    if (vtkImageData* image = vtkImageData::SafeDownCast(data))
-    {
+    if (vtkImageData* image = vtkImageData::SafeDownCast(data)) {
       add(image, nullptr);
-    }
-    else if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data))
-    {
+    } else if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data)) {
       const auto leaf = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
       leaf->VisitOnlyLeavesOn();
-      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem())
-      {
-        if (vtkImageData* leafImage = vtkImageData::SafeDownCast(leaf->GetCurrentDataObject()))
-        {
+      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
+        if (vtkImageData* leafImage = vtkImageData::SafeDownCast(leaf->GetCurrentDataObject())) {
           vtkInformation* meta = leaf->HasCurrentMetaData() ? leaf->GetCurrentMetaData() : nullptr;
           add(leafImage, meta ? meta->Get(vtkCompositeDataSet::NAME()) : nullptr);
         }
@@ -196,14 +180,12 @@ std::vector<vtkUltrasoundVolume::Input> vtkUltrasoundVolume::CollectInputs(vtkAl
 void vtkUltrasoundVolume::RequestWhole(vtkInformationVector* port)
 {
   using Pipeline = vtkStreamingDemandDrivenPipeline;
-  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection)
-  {
+  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection) {
     vtkInformation* in = port->GetInformationObject(connection);
     in->Set(Pipeline::UPDATE_PIECE_NUMBER(), 0);
     in->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), 1);
     in->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-    if (in->Has(Pipeline::WHOLE_EXTENT()))
-    {
+    if (in->Has(Pipeline::WHOLE_EXTENT())) {
       int whole[6];
       in->Get(Pipeline::WHOLE_EXTENT(), whole);
       in->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
@@ -212,14 +194,12 @@ void vtkUltrasoundVolume::RequestWhole(vtkInformationVector* port)
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundVolume::Run(
-  vtkAlgorithm* filter, vtkInformationVector* outputs, const std::function<void(const echorama::Progress&)>& body)
+int vtkUltrasoundVolume::Run(vtkAlgorithm* filter, vtkInformationVector* outputs,
+                             const std::function<void(const echorama::Progress&)>& body)
 {
   const auto failed = [outputs]() {
-    for (int port = 0; outputs && port < outputs->GetNumberOfInformationObjects(); ++port)
-    {
-      if (vtkDataObject* output = vtkDataObject::GetData(outputs, port))
-      {
+    for (int port = 0; outputs && port < outputs->GetNumberOfInformationObjects(); ++port) {
+      if (vtkDataObject* output = vtkDataObject::GetData(outputs, port)) {
         output->Initialize();
       }
     }
@@ -229,24 +209,16 @@ int vtkUltrasoundVolume::Run(
     filter->UpdateProgress(fraction);
     return !filter->GetAbortExecute();
   });
-  try
-  {
+  try {
     body(progress);
     return 1;
-  }
-  catch (const Error& error)
-  {
-    if (error.GetKind() != Error::Kind::Cancelled)
-    {
+  } catch (const Error& error) {
+    if (error.GetKind() != Error::Kind::Cancelled) {
       vtkErrorWithObjectMacro(filter, << error.what());
     }
-  }
-  catch (const std::bad_alloc&)
-  {
+  } catch (const std::bad_alloc&) {
     vtkErrorWithObjectMacro(filter, "there is not enough memory for the result");
-  }
-  catch (const std::exception& error)
-  {
+  } catch (const std::exception& error) {
     vtkErrorWithObjectMacro(filter, << error.what());
   }
   return failed();

@@ -31,8 +31,7 @@ class vtkInformation;
 class vtkInformationVector;
 class vtkMatrix4x4;
 
-class ECHORAMACORE_EXPORT vtkUltrasoundVolume : public vtkObject
-{
+class ECHORAMACORE_EXPORT vtkUltrasoundVolume : public vtkObject {
 public:
   static vtkUltrasoundVolume* New();
   vtkTypeMacro(vtkUltrasoundVolume, vtkObject);
@@ -74,8 +73,7 @@ public:
   static void Move(vtkImageData* volume, const echorama::Pose& pose);
 
   /** A volume that came into a filter. */
-  struct Input
-  {
+  struct Input {
     vtkImageData* Image = nullptr;
     vtkDataArray* Intensity = nullptr;
     vtkDataArray* ValidRegion = nullptr; ///< nullptr: every voxel is real
@@ -105,8 +103,8 @@ public:
   template <class T>
   static echorama::PosedVolume<T> PosedVolumeOf(const Input& input)
   {
-    return { ViewOf<const T>(input.Intensity, input.Image), ViewOf<const unsigned char>(input.ValidRegion, input.Image),
-      GeometryOf(input.Image) };
+    return {ViewOf<const T>(input.Intensity, input.Image), ViewOf<const unsigned char>(input.ValidRegion, input.Image),
+            GeometryOf(input.Image)};
   }
 
   /**
@@ -116,16 +114,15 @@ public:
   template <class Functor>
   static void Dispatch(vtkDataArray* intensity, Functor&& functor)
   {
-    switch (intensity->GetDataType())
-    {
+    switch (intensity->GetDataType()) {
 #define EchoramaDispatchCase(T)                                                                                                  \
   case vtkTypeTraits<T>::VTK_TYPE_ID:                                                                                            \
-    functor(static_cast<T>(0));                                                                                                               \
+    functor(static_cast<T>(0));                                                                                                  \
     return;
       ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaDispatchCase)
 #undef EchoramaDispatchCase
-      default:
-        RefuseType(intensity);
+    default:
+      RefuseType(intensity);
     }
   }
 

@@ -20,8 +20,7 @@
 
 vtkStandardNewMacro(vtkUltrasoundAligner);
 
-namespace
-{
+namespace {
 using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
 void AddField(vtkDataObject* data, const char* name, const double* values, int components)
@@ -32,7 +31,7 @@ void AddField(vtkDataObject* data, const char* name, const double* values, int c
   array->InsertNextTuple(values);
   data->GetFieldData()->AddArray(array);
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundAligner::vtkUltrasoundAligner()
@@ -55,8 +54,7 @@ vtkUltrasoundAligner::~vtkUltrasoundAligner() = default;
 //----------------------------------------------------------------------------
 void vtkUltrasoundAligner::SetMethod(const char* name)
 {
-  if (!name || std::strcmp(name, this->GetMethod()) != 0)
-  {
+  if (!name || std::strcmp(name, this->GetMethod()) != 0) {
     vtkErrorMacro("there is no alignment method named \"" << (name ? name : "") << "\"; the methods are: search");
   }
 }
@@ -64,8 +62,7 @@ void vtkUltrasoundAligner::SetMethod(const char* name)
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
 {
-  struct Parameter
-  {
+  struct Parameter {
     const char* Name;
     double From, To;
     bool Whole;
@@ -74,40 +71,32 @@ bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
   };
   using Self = vtkUltrasoundAligner;
   static const Parameter parameters[] = {
-    { "MinimumOverlap", 0.01, 1.0, false, &Self::SetMinimumOverlap, nullptr },
-    { "Samples", 3, 7, true, nullptr, &Self::SetSamples },
-    { "Levels", 1, 20, true, nullptr, &Self::SetLevels },
-    { "FirstStepMm", 1e-6, 1000.0, false, &Self::SetFirstStepMm, nullptr },
-    { "FirstStepDegrees", 1e-6, 60.0, false, &Self::SetFirstStepDegrees, nullptr },
-    { "Repeats", 0, 100, true, nullptr, &Self::SetRepeats },
-    { "Points", 100, 1e7, true, nullptr, &Self::SetPoints },
-    { "Seed", 0, VTK_INT_MAX, true, nullptr, &Self::SetSeed },
-    { "Pyramid", 0, 1, true, nullptr, nullptr },
+      {"MinimumOverlap", 0.01, 1.0, false, &Self::SetMinimumOverlap, nullptr},
+      {"Samples", 3, 7, true, nullptr, &Self::SetSamples},
+      {"Levels", 1, 20, true, nullptr, &Self::SetLevels},
+      {"FirstStepMm", 1e-6, 1000.0, false, &Self::SetFirstStepMm, nullptr},
+      {"FirstStepDegrees", 1e-6, 60.0, false, &Self::SetFirstStepDegrees, nullptr},
+      {"Repeats", 0, 100, true, nullptr, &Self::SetRepeats},
+      {"Points", 100, 1e7, true, nullptr, &Self::SetPoints},
+      {"Seed", 0, VTK_INT_MAX, true, nullptr, &Self::SetSeed},
+      {"Pyramid", 0, 1, true, nullptr, nullptr},
   };
   std::string names;
-  for (const Parameter& p : parameters)
-  {
+  for (const Parameter& p : parameters) {
     names += (names.empty() ? "" : ", ") + std::string(p.Name);
-    if (!name || std::strcmp(name, p.Name) != 0)
-    {
+    if (!name || std::strcmp(name, p.Name) != 0) {
       continue;
     }
-    if (!(value >= p.From && value <= p.To) || (p.Whole && value != std::floor(value)))
-    {
+    if (!(value >= p.From && value <= p.To) || (p.Whole && value != std::floor(value))) {
       vtkErrorMacro(<< p.Name << " must be " << (p.Whole ? "a whole number" : "a number") << " in [" << p.From << ", " << p.To
                     << "]; it is not " << value);
       return false;
     }
-    if (p.SetReal)
-    {
+    if (p.SetReal) {
       (this->*p.SetReal)(value);
-    }
-    else if (p.SetWhole)
-    {
+    } else if (p.SetWhole) {
       (this->*p.SetWhole)(static_cast<int>(value));
-    }
-    else
-    {
+    } else {
       this->SetPyramid(value != 0.0);
     }
     return true;
@@ -169,8 +158,7 @@ int vtkUltrasoundAligner::RequestData(vtkInformation*, vtkInformationVector** in
     // 1. the resolutions of each volume
     std::vector<std::vector<echorama::PyramidLevel>> pyramids(volumes.size());
     std::vector<echorama::PlacedVolume> placed(volumes.size());
-    for (std::size_t i = 0; i < volumes.size(); ++i)
-    {
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
       const double count = static_cast<double>(volumes.size());
       const auto part = progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count);
       vtkUltrasoundVolume::Dispatch(volumes[i].Intensity, [&](auto type) {
@@ -186,12 +174,10 @@ int vtkUltrasoundAligner::RequestData(vtkInformation*, vtkInformationVector** in
     // 3. the same voxels there
     auto* output = vtkMultiBlockDataSet::GetData(outputs);
     output->SetNumberOfBlocks(static_cast<unsigned int>(volumes.size()));
-    for (std::size_t i = 0; i < volumes.size(); ++i)
-    {
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
       vtkNew<vtkImageData> moved;
       moved->ShallowCopy(volumes[i].Image);
-      if (static_cast<int>(i) != this->FixedVolume)
-      {
+      if (static_cast<int>(i) != this->FixedVolume) {
         vtkUltrasoundVolume::Move(moved, results[i].volumeToWorld);
         AddField(moved, AlignmentErrorName(), &results[i].error, 1);
         AddField(moved, AlignmentOverlapName(), &results[i].overlap, 1);
@@ -222,8 +208,7 @@ int vtkUltrasoundAligner::GetNumberOfVolumes() const
 bool vtkUltrasoundAligner::GetPose(int volume, vtkMatrix4x4* pose) const
 {
   const auto* result = this->ResultOf(volume);
-  if (result)
-  {
+  if (result) {
     const RowMajor rows = result->volumeToWorld.matrix();
     pose->DeepCopy(rows.data());
   }

@@ -34,15 +34,14 @@
 #include "vtkMultiBlockDataSetAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "AlignSearch.h" // for the defaults
+#include "Filters/Registration/AlignSearch.h" // for the defaults
 #include <string>
 #include <vector>
 #endif
 
 class vtkMatrix4x4;
 
-class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAligner : public vtkMultiBlockDataSetAlgorithm
-{
+class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAligner : public vtkMultiBlockDataSetAlgorithm {
 public:
   static vtkUltrasoundAligner* New();
   vtkTypeMacro(vtkUltrasoundAligner, vtkMultiBlockDataSetAlgorithm);

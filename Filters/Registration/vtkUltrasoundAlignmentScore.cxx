@@ -25,8 +25,7 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundAlignmentScore);
 
-namespace
-{
+namespace {
 constexpr double NotANumber = std::numeric_limits<double>::quiet_NaN();
 
 vtkSmartPointer<vtkDoubleArray> NewNumbers(const char* name, int components = 1)
@@ -36,11 +35,10 @@ vtkSmartPointer<vtkDoubleArray> NewNumbers(const char* name, int components = 1)
   array->SetNumberOfComponents(components);
   return array;
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundAlignmentScore::vtkUltrasoundAlignmentScore()
-  : Score(NotANumber)
+vtkUltrasoundAlignmentScore::vtkUltrasoundAlignmentScore() : Score(NotANumber)
 {
   this->SetNumberOfInputPorts(2);
 }
@@ -75,17 +73,14 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
     // 1. what came in
     const auto aligned = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
     const auto truth = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
-    if (aligned.size() != truth.size())
-    {
-      throw Error(Error::Kind::BadInput,
-        "there are " + std::to_string(aligned.size()) + " aligned volumes and " + std::to_string(truth.size()) +
-          " true ones; one truth per volume is needed");
+    if (aligned.size() != truth.size()) {
+      throw Error(Error::Kind::BadInput, "there are " + std::to_string(aligned.size()) + " aligned volumes and " +
+                                             std::to_string(truth.size()) + " true ones; one truth per volume is needed");
     }
 
     // 2. the kernel
     std::vector<echorama::ScoredVolume> volumes;
-    for (std::size_t i = 0; i < aligned.size(); ++i)
-    {
+    for (std::size_t i = 0; i < aligned.size(); ++i) {
       progress(static_cast<double>(i) / static_cast<double>(aligned.size()));
       echorama::ScoredVolume volume;
       volume.aligned = vtkUltrasoundVolume::GeometryOf(aligned[i].Image);
@@ -93,8 +88,8 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
       volume.name = aligned[i].Name;
       vtkUltrasoundVolume::Dispatch(aligned[i].Intensity, [&](auto type) {
         const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(aligned[i]);
-        volume.indexPoints =
-          echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Points, static_cast<std::uint64_t>(this->Seed));
+        volume.indexPoints = echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Points,
+                                                                   static_cast<std::uint64_t>(this->Seed));
       });
       volumes.push_back(std::move(volume));
     }
@@ -111,11 +106,9 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
     vtkNew<vtkCellArray> vertices;
-    for (std::size_t i = 0; i < score.volumes.size(); ++i)
-    {
+    for (std::size_t i = 0; i < score.volumes.size(); ++i) {
       const echorama::VolumeScore& volume = score.volumes[i];
-      for (std::size_t p = 0; p < volume.points.size(); ++p)
-      {
+      for (std::size_t p = 0; p < volume.points.size(); ++p) {
         const vtkIdType id = points->InsertNextPoint(volume.points[p].data());
         vertices->InsertNextCell(1, &id);
         errors->InsertNextTuple(volume.errors[p].data());
@@ -134,15 +127,13 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
 
     vtkInformation* out = outputs->GetInformationObject(0);
     vtkPolyData* output = vtkPolyData::GetData(out);
-    if (out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER()) <= 0)
-    {
+    if (out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER()) <= 0) {
       output->SetPoints(points);
       output->SetVerts(vertices);
       output->GetPointData()->AddArray(ids);
       output->GetPointData()->SetVectors(errors);
     }
-    for (vtkDataArray* array : { total.Get(), mean.Get(), rms.Get(), median.Get(), percentile.Get(), max.Get() })
-    {
+    for (vtkDataArray* array : {total.Get(), mean.Get(), rms.Get(), median.Get(), percentile.Get(), max.Get()}) {
       output->GetFieldData()->AddArray(array);
     }
     output->GetFieldData()->AddArray(names);

@@ -37,8 +37,7 @@
 #include <vector>
 #endif
 
-class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAlignmentScore : public vtkPolyDataAlgorithm
-{
+class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAlignmentScore : public vtkPolyDataAlgorithm {
 public:
   static vtkUltrasoundAlignmentScore* New();
   vtkTypeMacro(vtkUltrasoundAlignmentScore, vtkPolyDataAlgorithm);

@@ -20,19 +20,16 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundStitcher);
 
-namespace
-{
-const char* const METHOD_NAMES[] = { "distance", "feather", "average", "maximum" };
+namespace {
+const char* const METHOD_NAMES[] = {"distance", "feather", "average", "maximum"};
 
 // The smallest of our voxel types that holds the values of both.
 int CommonType(int a, int b)
 {
-  if (a == b || b == VTK_UNSIGNED_CHAR)
-  {
+  if (a == b || b == VTK_UNSIGNED_CHAR) {
     return a;
   }
-  if (a == VTK_UNSIGNED_CHAR)
-  {
+  if (a == VTK_UNSIGNED_CHAR) {
     return b;
   }
   return a == VTK_DOUBLE || b == VTK_DOUBLE ? VTK_DOUBLE : VTK_FLOAT;
@@ -43,23 +40,22 @@ int CommonType(int a, int b)
 bool Announced(vtkInformation* information, echorama::ImageGeometry& geometry)
 {
   if (!information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()) || !information->Has(vtkDataObject::ORIGIN()) ||
-    !information->Has(vtkDataObject::SPACING()) || !information->Has(vtkDataObject::DIRECTION()))
-  {
+      !information->Has(vtkDataObject::SPACING()) || !information->Has(vtkDataObject::DIRECTION())) {
     return false;
   }
   int extent[6];
   information->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
   information->Get(vtkDataObject::ORIGIN(), geometry.origin.data());
   information->Get(vtkDataObject::SPACING(), geometry.spacing.data());
-  geometry.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(information->Get(vtkDataObject::DIRECTION()));
-  for (int axis = 0; axis < 3; ++axis)
-  {
+  geometry.direction =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(information->Get(vtkDataObject::DIRECTION()));
+  for (int axis = 0; axis < 3; ++axis) {
     geometry.dimensions[axis] = extent[2 * axis + 1] - extent[2 * axis] + 1;
   }
   geometry.origin = geometry.IndexToWorld() * Eigen::Vector3d(extent[0], extent[2], extent[4]);
   return true;
 }
-}
+} // namespace
 
 //----------------------------------------------------------------------------
 const char* vtkUltrasoundStitcher::GetMethodName(int method)
@@ -70,10 +66,8 @@ const char* vtkUltrasoundStitcher::GetMethodName(int method)
 //----------------------------------------------------------------------------
 int vtkUltrasoundStitcher::GetMethodFromName(const char* name)
 {
-  for (int method = DISTANCE; name && method <= MAXIMUM; ++method)
-  {
-    if (!std::strcmp(name, METHOD_NAMES[method]))
-    {
+  for (int method = DISTANCE; name && method <= MAXIMUM; ++method) {
+    if (!std::strcmp(name, METHOD_NAMES[method])) {
       return method;
     }
   }
@@ -96,15 +90,13 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
     std::vector<echorama::ImageGeometry> geometries;
     bool typeKnown = true;
     int type = VTK_UNSIGNED_CHAR;
-    for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection)
-    {
+    for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection) {
       vtkInformation* in = inputs[0]->GetInformationObject(connection);
       echorama::ImageGeometry geometry;
-      if (Announced(in, geometry))
-      {
+      if (Announced(in, geometry)) {
         geometries.push_back(geometry);
-        vtkInformation* scalars = vtkDataObject::GetActiveFieldInformation(
-          in, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+        vtkInformation* scalars =
+            vtkDataObject::GetActiveFieldInformation(in, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
         typeKnown = typeKnown && scalars && scalars->Has(vtkDataObject::FIELD_ARRAY_TYPE());
         type = typeKnown ? CommonType(type, scalars->Get(vtkDataObject::FIELD_ARRAY_TYPE())) : type;
         continue;
@@ -113,8 +105,7 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
       int port = 0;
       vtkAlgorithm* producer = this->GetInputAlgorithm(0, connection, port);
       auto* pipeline = vtkStreamingDemandDrivenPipeline::SafeDownCast(producer->GetExecutive());
-      if (in->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()))
-      {
+      if (in->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT())) {
         int whole[6];
         in->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
         in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), whole, 6);
@@ -122,34 +113,30 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
       in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER(), 0);
       in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_PIECES(), 1);
       in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-      if (!pipeline || !pipeline->Update(port))
-      {
+      if (!pipeline || !pipeline->Update(port)) {
         throw Error(Error::Kind::BadInput, "input " + std::to_string(connection + 1) + " could not be made");
       }
       vtkNew<vtkInformationVector> one;
       one->Append(in);
-      for (const vtkUltrasoundVolume::Input& input : vtkUltrasoundVolume::CollectInputs(this, one))
-      {
+      for (const vtkUltrasoundVolume::Input& input : vtkUltrasoundVolume::CollectInputs(this, one)) {
         geometries.push_back(vtkUltrasoundVolume::GeometryOf(input.Image));
         type = CommonType(type, input.Intensity->GetDataType());
       }
     }
     vtkInformation* out = outputs->GetInformationObject(0);
     vtkUltrasoundVolume::SetGeometry(out, echorama::StitchGrid(geometries, this->SpacingMm));
-    if (typeKnown)
-    {
+    if (typeKnown) {
       vtkDataObject::SetPointDataActiveScalarInfo(out, type, 1);
     }
   });
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundStitcher::RequestUpdateExtent(
-  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+int vtkUltrasoundStitcher::RequestUpdateExtent(vtkInformation* request, vtkInformationVector** inputs,
+                                               vtkInformationVector* outputs)
 {
   // The whole of every input, also of those that are cut into pieces and not into extents.
-  for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection)
-  {
+  for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection) {
     vtkInformation* in = inputs[0]->GetInformationObject(connection);
     in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER(), 0);
     in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_PIECES(), 1);
@@ -168,10 +155,9 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   int type = VTK_UNSIGNED_CHAR;
   vtkNew<vtkStringArray> names;
   names->SetName(StitchedVolumesName());
-  for (const vtkUltrasoundVolume::Input& volume : volumes)
-  {
+  for (const vtkUltrasoundVolume::Input& volume : volumes) {
     vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
-      stitched.push_back({ vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name });
+      stitched.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name});
     });
     geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
     type = CommonType(type, volume.Intensity->GetDataType());
@@ -187,11 +173,12 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   const echorama::ImageGeometry grid = echorama::StitchGrid(geometries, this->SpacingMm);
   int announced[6];
   this->GetOutputInformation(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), announced);
-  if (announced[1] + 1 != grid.dimensions[0] || announced[3] + 1 != grid.dimensions[1] || announced[5] + 1 != grid.dimensions[2])
-  {
+  if (announced[1] + 1 != grid.dimensions[0] || announced[3] + 1 != grid.dimensions[1] ||
+      announced[5] + 1 != grid.dimensions[2]) {
     throw Error(Error::Kind::BadInput, "a volume came in with another geometry than its pipeline had announced");
   }
-  echorama::CheckStitch(parameters, geometries, grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)), this->OutputWeights);
+  echorama::CheckStitch(parameters, geometries, grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)),
+                        this->OutputWeights);
   output->Initialize();
   vtkUltrasoundVolume::SetGeometry(output, grid);
   vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), type);
@@ -200,8 +187,7 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
   output->GetFieldData()->AddArray(names);
   std::vector<echorama::VolumeView<float>> weights;
-  for (std::size_t volume = 0; this->OutputWeights && volume < volumes.size(); ++volume)
-  {
+  for (std::size_t volume = 0; this->OutputWeights && volume < volumes.size(); ++volume) {
     vtkDataArray* weight = AddArray(output, ("Weight" + std::to_string(volume)).c_str(), VTK_FLOAT);
     weights.push_back(vtkUltrasoundVolume::ViewOf<float>(weight, output));
   }
@@ -210,9 +196,10 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   vtkUltrasoundVolume::Dispatch(intensity, [&](auto voxel) {
     using T = decltype(voxel);
     echorama::Stitch<T>(parameters, stitched, grid,
-      { vtkUltrasoundVolume::ViewOf<T>(intensity, output), vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output),
-        vtkUltrasoundVolume::ViewOf<unsigned char>(coverage, output), weights },
-      progress);
+                        {vtkUltrasoundVolume::ViewOf<T>(intensity, output),
+                         vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output),
+                         vtkUltrasoundVolume::ViewOf<unsigned char>(coverage, output), weights},
+                        progress);
   });
 }
 

@@ -34,20 +34,13 @@
 #include "Filters/Stitching/Stitch.h"
 #endif
 
-class ECHORAMAFILTERSSTITCHING_EXPORT vtkUltrasoundStitcher : public vtkUltrasoundImageAlgorithm
-{
+class ECHORAMAFILTERSSTITCHING_EXPORT vtkUltrasoundStitcher : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundStitcher* New();
   vtkTypeMacro(vtkUltrasoundStitcher, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum Methods
-  {
-    DISTANCE = 0,
-    FEATHER = 1,
-    AVERAGE = 2,
-    MAXIMUM = 3
-  };
+  enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3 };
 
   ///@{
   /**

@@ -15,8 +15,7 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundPhantomSource);
 
-namespace
-{
+namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
 }
 
@@ -38,8 +37,7 @@ vtkUltrasoundPhantomSource::vtkUltrasoundPhantomSource()
   this->SweepRadius = defaults.probe.sweepWidth / defaults.probe.sweepAngle;
   this->DepthMin = defaults.probe.depthMin;
   this->DepthMax = defaults.probe.depthMax;
-  for (int axis = 0; axis < 3; ++axis)
-  {
+  for (int axis = 0; axis < 3; ++axis) {
     this->Position[axis] = this->Orientation[axis] = 0.0;
   }
   this->Scene = nullptr;
@@ -55,14 +53,14 @@ vtkUltrasoundPhantomSource::~vtkUltrasoundPhantomSource()
 echorama::PhantomParameters vtkUltrasoundPhantomSource::Parameters() const
 {
   echorama::PhantomParameters parameters;
-  if (this->Scene && *this->Scene)
-  {
+  if (this->Scene && *this->Scene) {
     parameters.scene = echorama::SceneFromJson(this->Scene);
   }
-  parameters.probe = echorama::ProbeGeometry::Convex(this->FanAngle / DegreesPerRadian, this->FanRadius,
-    this->SweepAngle / DegreesPerRadian, this->SweepRadius, this->DepthMin, this->DepthMax);
+  parameters.probe =
+      echorama::ProbeGeometry::Convex(this->FanAngle / DegreesPerRadian, this->FanRadius, this->SweepAngle / DegreesPerRadian,
+                                      this->SweepRadius, this->DepthMin, this->DepthMax);
   parameters.probeToWorld.linear() =
-    echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
+      echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
   parameters.probeToWorld.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
   parameters.seed = static_cast<std::uint64_t>(this->Seed);
   parameters.spacingMm = this->SpacingMm;
@@ -90,8 +88,7 @@ void vtkUltrasoundPhantomSource::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
   echorama::Pose pose;
   pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(probeToWorld->GetData());
   if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
-    pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-  {
+      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     vtkErrorMacro("ProbeToWorld is not a rigid transform; the pose was not changed");
     return;
   }
@@ -112,15 +109,12 @@ void vtkUltrasoundPhantomSource::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::Add(echorama::Inclusion inclusion)
 {
-  try
-  {
+  try {
     echorama::PhantomScene scene = this->Parameters().scene;
     scene.inclusions.push_back(std::move(inclusion));
     scene.Check();
     this->SetScene(echorama::SceneToJson(scene).c_str());
-  }
-  catch (const Error& error)
-  {
+  } catch (const Error& error) {
     vtkErrorMacro(<< error.what());
   }
 }
@@ -131,16 +125,16 @@ void vtkUltrasoundPhantomSource::AddEllipsoid(const double centre[3], const doub
   echorama::Ellipsoid ellipsoid;
   ellipsoid.centre = Eigen::Map<const Eigen::Vector3d>(centre);
   ellipsoid.radii = Eigen::Map<const Eigen::Vector3d>(radii);
-  this->Add({ "", ellipsoid, echogenicityDb, 0.0, 0.0, 0.0 });
+  this->Add({"", ellipsoid, echogenicityDb, 0.0, 0.0, 0.0});
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::AddTube(const double from[3], const double to[3], double radius, double echogenicityDb)
 {
   echorama::Tube tube;
-  tube.path = { Eigen::Map<const Eigen::Vector3d>(from), Eigen::Map<const Eigen::Vector3d>(to) };
+  tube.path = {Eigen::Map<const Eigen::Vector3d>(from), Eigen::Map<const Eigen::Vector3d>(to)};
   tube.radius = radius;
-  this->Add({ "", tube, echogenicityDb, 0.0, 0.0, 0.0 });
+  this->Add({"", tube, echogenicityDb, 0.0, 0.0, 0.0});
 }
 
 //----------------------------------------------------------------------------
@@ -169,7 +163,7 @@ void vtkUltrasoundPhantomSource::Execute(vtkInformationVector**, vtkImageData* o
   output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
 
   echorama::MakePhantom(parameters, vtkUltrasoundVolume::ViewOf<unsigned char>(intensity, output),
-    vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output), progress);
+                        vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output), progress);
 
   vtkUltrasoundAcquisition::SetProbeGeometry(output, parameters.probe);
   vtkUltrasoundAcquisition::SetProbeToWorld(output, parameters.probeToWorld);

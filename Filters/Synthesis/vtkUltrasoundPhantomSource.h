@@ -28,8 +28,7 @@
 
 class vtkMatrix4x4;
 
-class ECHORAMAFILTERSSYNTHESIS_EXPORT vtkUltrasoundPhantomSource : public vtkUltrasoundImageAlgorithm
-{
+class ECHORAMAFILTERSSYNTHESIS_EXPORT vtkUltrasoundPhantomSource : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundPhantomSource* New();
   vtkTypeMacro(vtkUltrasoundPhantomSource, vtkUltrasoundImageAlgorithm);
