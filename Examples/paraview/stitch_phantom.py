@@ -35,6 +35,7 @@ view = CreateView("RenderView", ViewSize=[1000, 700])
 display = Show(stitched, view, "UniformGridRepresentation")
 display.Representation = "Volume"
 ColorBy(display, ("POINTS", "Intensity"))
+GetColorTransferFunction("Intensity").ApplyPreset("Grayscale", True)
 view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [120, 350, -60], [0, 0, 60], [0, 0, -1]
 ResetCamera(view)
 SaveScreenshot("stitched.png", view)
