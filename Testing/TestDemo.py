@@ -44,7 +44,7 @@ with tempfile.TemporaryDirectory() as folder:
     check(off, f"no score in {made.stdout!r}")
     before, after = float(off[1]), float(off[2])
     check(before > 5.0, f"the volumes lay only {before} mm off")
-    check(after < 1.0, f"the volumes still lie {after} mm off")
+    check(after < 2.0, f"the volumes still lie {after} mm off")
     check("How far off" in report and f"{off[2]}" in report, "the report does not tell the score")
     check(str((folder / "phantom volumes" / "report.html").resolve()) in made.stdout, "the demo does not say where its report is")
 
