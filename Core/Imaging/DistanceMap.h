@@ -9,7 +9,7 @@ namespace echorama {
 /// centres; 0 on the mask, +infinity everywhere when the mask is empty. 2D images (one slice) work too.
 ///
 /// With spacing 1 every value below 2^24 is the exact integer. With equal spacings it is that integer times the squared
-/// spacing, rounded once. With different spacings it is within 2 ulp.
+/// spacing, rounded once. With different spacings it is within 2.5 ulp.
 /// Linear time for any mask, in parallel; the memory beyond the result is small. (Meijster, Roerdink and Hesselink 2000;
 /// Felzenszwalb and Huttenlocher 2012.)
 /// \param spacing mm, > 0; squared spacing and squared diagonal of the volume must fit a float
