@@ -115,13 +115,23 @@ void vtkUltrasoundVolume::RefuseType(vtkDataArray* intensity)
 }
 
 //----------------------------------------------------------------------------
+vtkDataArray* vtkUltrasoundVolume::CheckValidRegion(vtkImageData* image, const std::string& name)
+{
+  vtkDataArray* valid = GetValidRegion(image);
+  if (valid && (valid->GetDataType() != VTK_UNSIGNED_CHAR || valid->GetNumberOfComponents() != 1 ||
+                valid->GetNumberOfTuples() != image->GetNumberOfPoints())) {
+    throw Error(Error::Kind::BadInput, name + ": its ValidRegion is not one unsigned char per voxel");
+  }
+  return valid;
+}
+
+//----------------------------------------------------------------------------
 vtkUltrasoundVolume::Input vtkUltrasoundVolume::CheckInput(vtkAlgorithm* filter, vtkImageData* image, const std::string& name)
 {
   const auto fail = [&name](const std::string& reason) { throw Error(Error::Kind::BadInput, name + ": " + reason); };
   Input input;
   input.Image = image;
   input.Name = name;
-  input.ValidRegion = GetValidRegion(image);
   // The filter's choice counts when somebody made one; the default choice of vtkImageAlgorithm (the active scalars) gives
   // way to the array that is named Intensity.
   vtkInformation* choice = filter->GetInputArrayInformation(0);
@@ -143,11 +153,7 @@ vtkUltrasoundVolume::Input vtkUltrasoundVolume::CheckInput(vtkAlgorithm* filter,
   if (input.Intensity->GetNumberOfTuples() != image->GetNumberOfPoints()) {
     fail("its intensities are not one per voxel");
   }
-  if (input.ValidRegion &&
-      (input.ValidRegion->GetDataType() != VTK_UNSIGNED_CHAR || input.ValidRegion->GetNumberOfComponents() != 1 ||
-       input.ValidRegion->GetNumberOfTuples() != image->GetNumberOfPoints())) {
-    fail("its ValidRegion is not one unsigned char per voxel");
-  }
+  input.ValidRegion = CheckValidRegion(image, name);
   return input;
 }
 

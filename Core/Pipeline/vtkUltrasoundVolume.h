@@ -88,6 +88,11 @@ public:
    */
   static std::vector<Input> CollectInputs(vtkAlgorithm* filter, vtkInformationVector* port);
 
+  /**
+   * GetValidRegion(); throws echorama::Error(BadInput) that begins with \a name when it is not one unsigned char per voxel.
+   */
+  static vtkDataArray* CheckValidRegion(vtkImageData* volume, const std::string& name);
+
   /** One volume, checked as above. */
   static Input CheckInput(vtkAlgorithm* filter, vtkImageData* image, const std::string& name);
 
