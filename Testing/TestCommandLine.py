@@ -193,6 +193,14 @@ class MainJob(unittest.TestCase):
         run_json("stitch", *volumes(), "-o", work / "blunt.mha", "--poses", self.poses, "--spacing", 3, "--sharpness", 0)
         self.assertLessEqual(abs(read_mha(work / "blunt.mha")[1].astype(int) - results["average"]).max(), 1)
 
+    def test_companions_are_no_volumes(self):
+        """volume_*.mha in a shell names the valid regions too."""
+        done = run("stitch", *sorted(phantom.glob("volume_*.mha")), "-o", work / "globbed.mha", "--poses", self.poses, "--spacing", 3)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("volume_2.ValidRegion.mha: not a volume of its own", done.stderr)
+        run_json("stitch", *volumes(), "-o", work / "named.mha", "--poses", self.poses, "--spacing", 3)
+        numpy.testing.assert_array_equal(read_mha(work / "globbed.mha")[1], read_mha(work / "named.mha")[1])
+
     def test_threads_change_nothing(self):
         results = []
         for threads in (1, 2):

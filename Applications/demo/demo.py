@@ -11,6 +11,7 @@ import argparse
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -100,7 +101,10 @@ def demo(options):
         (out / old).unlink(missing_ok=True)
     truth_file = None
     if options.volumes:
-        files = [short(volume) for volume in options.volumes]
+        # A shell's * finds the companions NAME.ValidRegion.EXT too; they are parts of NAME.EXT.
+        named = {str(short(volume)) for volume in options.volumes}
+        files = [short(volume) for volume in options.volumes
+                 if re.sub(r"\.(ValidRegion|Provenance)(?=\.\w+$)", "", str(short(volume))) not in named - {str(short(volume))}]
     else:
         steps.run("making three volumes of a phantom, knocked out of place", "phantom", "-o", out / "phantom",
                   *(["--spacing", 2] if options.quick else []))

@@ -42,8 +42,9 @@ Pose PoseOf(vtkUltrasoundAligner* aligner, int volume)
   return pose;
 }
 
-void Align(Session& session, const AlignOptions& options)
+void Align(Session& session, AlignOptions options)
 {
+  options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
   if (!options.start.empty())
     inputs.push_back(options.start);

@@ -31,8 +31,9 @@ std::vector<std::string> MethodNames()
   return names;
 }
 
-void Stitch(Session& session, const StitchOptions& options)
+void Stitch(Session& session, StitchOptions options)
 {
+  options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
   if (!options.poses.empty())
     inputs.push_back(options.poses);

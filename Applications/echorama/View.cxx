@@ -442,8 +442,9 @@ void ViewWindow::Start()
   interactor->Start();
 }
 
-void View(Session& session, const ViewOptions& options)
+void View(Session& session, ViewOptions options)
 {
+  options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
   if (!options.poses.empty())
     inputs.push_back(options.poses);

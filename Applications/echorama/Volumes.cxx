@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Volumes.h"
 
+#include "Readers/VolumeFile.h"
+#include <algorithm>
+#include <filesystem>
 #include <sstream>
 #include <vtkCompositeDataSet.h>
 #include <vtkInformation.h>
@@ -44,6 +47,24 @@ std::vector<LoadedVolume> LoadVolumes(Session& session, const std::vector<std::s
   std::vector<LoadedVolume> volumes;
   for (const std::string& file : files)
     volumes.push_back(LoadVolume(session, file));
+  return volumes;
+}
+
+std::vector<std::string> WithoutCompanions(Session& session, const std::vector<std::string>& files)
+{
+  const auto same = [](const std::string& a, const std::string& b) {
+    return std::filesystem::path(a).lexically_normal() == std::filesystem::path(b).lexically_normal();
+  };
+  std::vector<std::string> volumes;
+  for (const std::string& file : files) {
+    const bool companion = std::any_of(files.begin(), files.end(), [&](const std::string& other) {
+      return same(file, CompanionPath(other, "ValidRegion")) || same(file, CompanionPath(other, "Provenance"));
+    });
+    if (companion)
+      session.Note(file + ": not a volume of its own, but a part of one that is named too; left out");
+    else
+      volumes.push_back(file);
+  }
   return volumes;
 }
 

@@ -23,6 +23,10 @@ struct LoadedVolume {
 LoadedVolume LoadVolume(Session&, const std::string& file);
 std::vector<LoadedVolume> LoadVolumes(Session&, const std::vector<std::string>& files);
 
+/// The volumes among \a files: NAME.ValidRegion.EXT and NAME.Provenance.EXT, which a shell's * finds too, belong to NAME.EXT
+/// and are left out, with a note, when that is there.
+std::vector<std::string> WithoutCompanions(Session&, const std::vector<std::string>& files);
+
 /// Moves a volume on: its image, and the pose that it has been moved by.
 void MoveVolume(LoadedVolume&, const Pose&);
 
