@@ -52,7 +52,8 @@ void ImageGeometry::Check(const std::string& name) const
       fail("dimension " + std::to_string(axis) + " is " + std::to_string(dimensions[axis]) + "; it must be at least 1");
     product *= dimensions[axis];
   }
-  if (product > static_cast<double>(std::numeric_limits<std::ptrdiff_t>::max() / 16))
+  constexpr std::ptrdiff_t most = std::numeric_limits<std::ptrdiff_t>::max() / 16; // 16 bytes a voxel are enough for all we do
+  if (product > static_cast<double>(most))
     fail("the product of the dimensions overflows");
   if (!origin.allFinite() || !spacing.allFinite() || !direction.allFinite())
     fail("origin, spacing or direction holds a number that is not finite");
