@@ -132,20 +132,6 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundStitcher::RequestUpdateExtent(vtkInformation* request, vtkInformationVector** inputs,
-                                               vtkInformationVector* outputs)
-{
-  // The whole of every input, also of those that are cut into pieces and not into extents.
-  for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection) {
-    vtkInformation* in = inputs[0]->GetInformationObject(connection);
-    in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER(), 0);
-    in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_PIECES(), 1);
-    in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-  }
-  return this->Superclass::RequestUpdateExtent(request, inputs, outputs);
-}
-
-//----------------------------------------------------------------------------
 void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   // 1. what came in

@@ -109,7 +109,6 @@ protected:
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
-  int RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 #ifndef __VTK_WRAP__
   void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
 #endif
