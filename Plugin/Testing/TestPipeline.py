@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads, aligns and stitches in ParaView: the liver pair, volume B knocked out of place. Also run on two ranks.
 
-Usage: pvbatch TestPipeline.py [OUT.npz]   (OUT: the stitched volume, gathered over the ranks)
+Usage: pvbatch TestPipeline.py [OUT.npz]   (OUT: the stitched volume, gathered over the ranks; then nothing is drawn)
 """
 import os
 import pathlib
@@ -59,8 +59,7 @@ print(f"{ranks} rank(s): {whole.GetDimensions()} voxels, {valid.mean():.3f} of t
 assert intensity[valid > 0].mean() > 10.0
 if len(sys.argv) > 1:
     numpy.savez(sys.argv[1], intensity=intensity, valid=valid, geometry=[*whole.GetOrigin(), *whole.GetSpacing(), *whole.GetDimensions()])
-
-if ranks == 1:
+else:
     view = CreateView("RenderView")
     view.ViewSize = [800, 600]
     shown = Show(stitched, view)

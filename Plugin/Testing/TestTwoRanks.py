@@ -11,9 +11,9 @@ import numpy
 script = str(pathlib.Path(__file__).resolve().parent / "TestPipeline.py")
 with tempfile.TemporaryDirectory() as folder:
     results = []
-    for ranks, screen in ((1, 123), (2, 124)):
+    for ranks in (1, 2):
         out = f"{folder}/{ranks}.npz"
-        start = ["xvfb-run", "-n", str(screen), "mpirun", "-np", str(ranks), "pvbatch", script, out]
+        start = ["mpirun", "-np", str(ranks), "pvbatch", script, out]
         run = subprocess.run(start, capture_output=True, text=True)
         print(run.stdout, run.stderr)
         if run.returncode == 77 or "skipped:" in run.stdout:
