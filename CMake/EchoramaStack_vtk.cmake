@@ -31,9 +31,7 @@ install(EXPORT EchoramaKernels NAMESPACE Echorama:: FILE EchoramaKernels-targets
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama)
 include(EchoramaPackage)
 
-if(EXISTS ${PROJECT_SOURCE_DIR}/Applications/CMakeLists.txt)
-  add_subdirectory(Applications)
-endif()
+add_subdirectory(Applications)
 if(ECHORAMA_TESTING)
   add_subdirectory(Testing)
 endif()

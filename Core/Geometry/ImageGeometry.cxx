@@ -80,39 +80,4 @@ bool ImageGeometry::AgreesWith(const ImageGeometry& other, double tolerance) con
   return (spacing - other.spacing).cwiseAbs().maxCoeff() <= tolerance * spacing.minCoeff();
 }
 
-ImageGeometry GridAround(const ImageGeometry* volumes, std::size_t count, double spacingMm, std::size_t maxVoxels)
-{
-  if (!(spacingMm > 0.0) || !std::isfinite(spacingMm))
-    throw Error(Error::Kind::InvalidParameter, "the spacing of the output must be positive");
-  if (count == 0)
-    throw Error(Error::Kind::BadInput, "there are no volumes to lay a grid around");
-  Eigen::AlignedBox3d box;
-  for (std::size_t v = 0; v < count; ++v) {
-    const Eigen::Affine3d map = volumes[v].IndexToWorld();
-    const auto& n = volumes[v].dimensions;
-    for (int corner = 0; corner < 8; ++corner)
-      box.extend(map * Eigen::Vector3d(corner & 1 ? n[0] - 1 : 0, corner & 2 ? n[1] - 1 : 0, corner & 4 ? n[2] - 1 : 0));
-  }
-  ImageGeometry grid;
-  grid.spacing.setConstant(spacingMm);
-  grid.origin = box.min();
-  double voxels = 1.0;
-  std::array<double, 3> size{};
-  for (int axis = 0; axis < 3; ++axis) {
-    // A thousandth of a voxel of slack, so that rounding does not add an empty layer.
-    size[axis] = std::ceil((box.max()[axis] - box.min()[axis]) / spacingMm - 1e-3) + 1.0;
-    voxels *= size[axis];
-  }
-  if (!(voxels <= static_cast<double>(maxVoxels)) ||
-      !(*std::max_element(size.begin(), size.end()) <= std::numeric_limits<int>::max())) {
-    std::ostringstream message;
-    message << "the output grid would have " << size[0] << " x " << size[1] << " x " << size[2] << " voxels, more than "
-            << maxVoxels << " or than an axis can count; choose a larger spacing";
-    throw Error(Error::Kind::TooLarge, message.str());
-  }
-  for (int axis = 0; axis < 3; ++axis)
-    grid.dimensions[axis] = static_cast<int>(size[axis]);
-  return grid;
-}
-
 } // namespace echorama

@@ -35,10 +35,4 @@ struct ImageGeometry {
   bool AgreesWith(const ImageGeometry& other, double tolerance = 1e-3) const;
 };
 
-/// The axis-aligned box around the grids of several volumes as a grid of cubic voxels of \a spacingMm.
-/// Voxel centres cover every voxel centre of the volumes.
-/// \throws Error(InvalidParameter) when the spacing is not positive, Error(BadInput) when there are no volumes,
-/// Error(TooLarge) when the grid exceeds \a maxVoxels.
-ImageGeometry GridAround(const ImageGeometry* volumes, std::size_t count, double spacingMm, std::size_t maxVoxels);
-
 } // namespace echorama
