@@ -9,7 +9,7 @@
 namespace echorama {
 
 /// What a file is, told from its first bytes; its name is not asked.
-enum class FileFormat { Unknown, MetaImage, Nrrd, VtkXmlImage };
+enum class FileFormat { Unknown, MetaImage, Nrrd, VtkXmlImage, Nifti, Dicom, Kretz, Vdb, ImageStack };
 
 /// \throws Error(FileSystem) when the path is missing, a folder or cannot be read, Error(BadFile) when the file is empty.
 FileFormat FormatOfContent(const std::string& path);

@@ -170,7 +170,7 @@ void vtkUltrasoundWriter::WriteData()
         case FileFormat::VtkXmlImage:
           this->WriteXml(input, files);
           break;
-        case FileFormat::Unknown:
+        default:
           throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd, .nhdr or .vti");
         }
         files.Commit();

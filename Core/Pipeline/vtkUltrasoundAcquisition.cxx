@@ -52,6 +52,24 @@ void SetNumbers(vtkDataObject* data, const char* name, const std::vector<double>
   data->GetFieldData()->AddArray(array); // replaces one of the same name
 }
 
+template <class Transform>
+std::optional<Transform> MatrixOf(vtkDataObject* data, const char* name)
+{
+  const auto n = NumbersOf(data, name, 16);
+  if (!n) {
+    return {};
+  }
+  Transform transform;
+  transform.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n->data());
+  return transform;
+}
+
+void SetMatrix(vtkDataObject* data, const char* name, const Eigen::Matrix4d& matrix)
+{
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix;
+  SetNumbers(data, name, std::vector<double>(rows.data(), rows.data() + 16));
+}
+
 // A string in quotes, on one line.
 std::string Quoted(const std::string& plain)
 {
@@ -85,7 +103,7 @@ std::optional<std::string> Unquoted(const std::string& text)
 //----------------------------------------------------------------------------
 std::vector<std::string> vtkUltrasoundAcquisition::Names()
 {
-  return {ProbeGeometryName(), ProbeToWorldName(), TimeStampName(), SeedName(), SceneName()};
+  return {ProbeGeometryName(), ProbeToWorldName(), ImageToWorldName(), TimeStampName(), SeedName(), SceneName()};
 }
 
 //----------------------------------------------------------------------------
@@ -116,13 +134,7 @@ void vtkUltrasoundAcquisition::SetProbeGeometry(vtkDataObject* data, const echor
 //----------------------------------------------------------------------------
 std::optional<echorama::Pose> vtkUltrasoundAcquisition::ProbeToWorldOf(vtkDataObject* data)
 {
-  const auto n = NumbersOf(data, ProbeToWorldName(), 16);
-  if (!n) {
-    return {};
-  }
-  echorama::Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n->data());
-  return pose;
+  return MatrixOf<echorama::Pose>(data, ProbeToWorldName());
 }
 
 //----------------------------------------------------------------------------
@@ -140,8 +152,19 @@ bool vtkUltrasoundAcquisition::GetProbeToWorld(vtkDataObject* data, vtkMatrix4x4
 //----------------------------------------------------------------------------
 void vtkUltrasoundAcquisition::SetProbeToWorld(vtkDataObject* data, const echorama::Pose& pose)
 {
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = pose.matrix();
-  SetNumbers(data, ProbeToWorldName(), std::vector<double>(rows.data(), rows.data() + 16));
+  SetMatrix(data, ProbeToWorldName(), pose.matrix());
+}
+
+//----------------------------------------------------------------------------
+std::optional<Eigen::Affine3d> vtkUltrasoundAcquisition::ImageToWorldOf(vtkDataObject* data)
+{
+  return MatrixOf<Eigen::Affine3d>(data, ImageToWorldName());
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAcquisition::SetImageToWorld(vtkDataObject* data, const Eigen::Affine3d& imageToWorld)
+{
+  SetMatrix(data, ImageToWorldName(), imageToWorld.matrix());
 }
 
 //----------------------------------------------------------------------------
@@ -198,7 +221,7 @@ void vtkUltrasoundAcquisition::SetScene(vtkDataObject* data, const std::string& 
 std::vector<std::pair<std::string, std::string>> vtkUltrasoundAcquisition::ToText(vtkDataObject* data)
 {
   std::vector<std::pair<std::string, std::string>> texts;
-  for (const char* name : {ProbeGeometryName(), ProbeToWorldName(), TimeStampName()}) {
+  for (const char* name : {ProbeGeometryName(), ProbeToWorldName(), ImageToWorldName(), TimeStampName()}) {
     vtkDataArray* array = data->GetFieldData()->GetArray(name);
     std::string text;
     for (vtkIdType i = 0; array && i < array->GetNumberOfValues(); ++i) {
@@ -245,7 +268,8 @@ bool vtkUltrasoundAcquisition::SetFromText(vtkDataObject* data, const std::strin
       return false;
     }
   }
-  const std::size_t wanted = name == ProbeGeometryName() ? 6 : name == ProbeToWorldName() ? 16 : name == TimeStampName() ? 1 : 0;
+  const bool matrix = name == ProbeToWorldName() || name == ImageToWorldName();
+  const std::size_t wanted = name == ProbeGeometryName() ? 6 : matrix ? 16 : name == TimeStampName() ? 1 : 0;
   if (wanted == 0 || numbers.size() != wanted) {
     return false;
   }

@@ -7,11 +7,13 @@
  * | -------------- | ---------------------------------------------------------------------------------------- |
  * | ProbeGeometry  | 6 doubles: fan angle (degrees), fan width (mm), sweep angle, sweep width, depth from, to  |
  * | ProbeToWorld   | 16 doubles, row by row: from the probe frame to the world, mm                             |
+ * | ImageToWorld   | 16 doubles, row by row: from pixel indices of a 2D frame to the world, mm; affine         |
  * | TimeStamp      | 1 double, seconds                                                                         |
  * | Seed           | 1 unsigned 64-bit number: the seed of a synthetic volume                                  |
  * | Scene          | a string: what a synthetic volume shows, enough to make it again                          |
  *
- * Nobody else spells these names. It has no state.
+ * ImageToWorld is the exact place of a tracked frame, whose pixels may be sheared a little by its calibration; the geometry
+ * of the image is the nearest without shear. A frame whose tracker saw nothing has none. Nobody else spells these names. It has no state.
  */
 #ifndef vtkUltrasoundAcquisition_h
 #define vtkUltrasoundAcquisition_h
@@ -41,6 +43,7 @@ public:
   /** Names of the fields. */
   static const char* ProbeGeometryName() { return "ProbeGeometry"; }
   static const char* ProbeToWorldName() { return "ProbeToWorld"; }
+  static const char* ImageToWorldName() { return "ImageToWorld"; }
   static const char* TimeStampName() { return "TimeStamp"; }
   static const char* SeedName() { return "Seed"; }
   static const char* SceneName() { return "Scene"; }
@@ -57,6 +60,8 @@ public:
   static void SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& geometry);
   static std::optional<echorama::Pose> ProbeToWorldOf(vtkDataObject* data);
   static void SetProbeToWorld(vtkDataObject* data, const echorama::Pose& pose);
+  static std::optional<Eigen::Affine3d> ImageToWorldOf(vtkDataObject* data);
+  static void SetImageToWorld(vtkDataObject* data, const Eigen::Affine3d& imageToWorld);
   static std::optional<double> TimeStampOf(vtkDataObject* data);
   static void SetTimeStamp(vtkDataObject* data, double seconds);
   static std::optional<std::uint64_t> SeedOf(vtkDataObject* data);

@@ -91,6 +91,9 @@ void vtkUltrasoundVolume::Move(vtkImageData* volume, const echorama::Pose& pose)
   if (const auto probe = vtkUltrasoundAcquisition::ProbeToWorldOf(volume)) {
     vtkUltrasoundAcquisition::SetProbeToWorld(volume, pose * *probe);
   }
+  if (const auto image = vtkUltrasoundAcquisition::ImageToWorldOf(volume)) {
+    vtkUltrasoundAcquisition::SetImageToWorld(volume, pose * *image);
+  }
 }
 
 //----------------------------------------------------------------------------

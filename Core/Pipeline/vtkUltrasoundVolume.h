@@ -54,7 +54,7 @@ public:
   static vtkDataArray* GetValidRegion(vtkImageData* volume);
 
   /**
-   * Moves a volume by a rigid transform: its geometry and its `ProbeToWorld` change, its voxels do not.
+   * Moves a volume by a rigid transform: its geometry, its `ProbeToWorld` and its `ImageToWorld` change, its voxels do not.
    * Returns false, with an error message, when the matrix is not rigid.
    */
   static bool Move(vtkImageData* volume, vtkMatrix4x4* pose);
@@ -69,7 +69,7 @@ public:
   /** Sets whole extent (from zero), origin, spacing and direction of an output in RequestInformation. */
   static void SetGeometry(vtkInformation* outputInformation, const echorama::ImageGeometry& geometry);
 
-  /** Moves geometry and `ProbeToWorld`. */
+  /** Moves geometry, `ProbeToWorld` and `ImageToWorld`. */
   static void Move(vtkImageData* volume, const echorama::Pose& pose);
 
   /** A volume that came into a filter. */

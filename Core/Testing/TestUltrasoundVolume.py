@@ -62,8 +62,8 @@ def scalars(kind, name, image):
 
 def test_names():
     expect((Volume.IntensityName(), Volume.ValidRegionName()) == ("Intensity", "ValidRegion"), "arrays")
-    names = [getattr(Acquisition, f + "Name")() for f in ("ProbeGeometry", "ProbeToWorld", "TimeStamp", "Seed", "Scene")]
-    expect(names == ["ProbeGeometry", "ProbeToWorld", "TimeStamp", "Seed", "Scene"], "fields")
+    names = [getattr(Acquisition, f + "Name")() for f in ("ProbeGeometry", "ProbeToWorld", "ImageToWorld", "TimeStamp", "Seed", "Scene")]
+    expect(names == ["ProbeGeometry", "ProbeToWorld", "ImageToWorld", "TimeStamp", "Seed", "Scene"], "fields")
 
 
 def test_arrays_are_found():
@@ -84,6 +84,7 @@ def test_a_move_moves_every_voxel_and_the_probe():
     image = volume()
     image.GetPointData().SetScalars(scalars(vtkFloatArray, "Intensity", image))
     image.GetFieldData().AddArray(field("ProbeToWorld", rows(turn_about_z(30, 4, 5, 6))))
+    image.GetFieldData().AddArray(field("ImageToWorld", rows(turn_about_z(30, 4, 5, 6))))
     before = [image.GetPoint(i) for i in range(image.GetNumberOfPoints())]
     voxels = image.GetPointData().GetScalars()
     pose = turn_about_z(25, -7, 8, 9)
@@ -95,6 +96,7 @@ def test_a_move_moves_every_voxel_and_the_probe():
     vtkMatrix4x4.Multiply4x4(pose, turn_about_z(30, 4, 5, 6), expected)
     expect(Acquisition.GetProbeToWorld(image, found), "ProbeToWorld is there")
     expect(close(rows(found), rows(expected)), "ProbeToWorld moved")
+    expect(close(image.GetFieldData().GetArray("ImageToWorld").GetTuple(0), rows(expected)), "ImageToWorld moved")
 
 
 def test_a_move_without_a_probe_invents_none():
