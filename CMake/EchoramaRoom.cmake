@@ -9,7 +9,7 @@
 # A room is two layers. Kernels (every .cxx whose name does not begin with vtk) become lib<Echorama><NAME>Kernels,
 # which links no VTK; the vtk classes become the VTK module Echorama::NAME over it. Tests and benchmarks are found by
 # their place and name: Testing/Test*.cxx (GoogleTest), Testing/Test*.py (wrapped classes),
-# Benchmarks/Benchmark*.cxx.
+# Benchmarks/Benchmark*.cxx, Fuzzing/Fuzz*.cxx (libFuzzer).
 function(echorama_add_room name)
   cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES;BENCHMARK_DEPENDS")
   if(NOT ECHORAMA_STACK STREQUAL "paraview")
@@ -20,6 +20,9 @@ function(echorama_add_room name)
   endif()
   if(NOT ECHORAMA_STACK STREQUAL "paraview")
     _echorama_add_tests(${name})
+  endif()
+  if(ECHORAMA_FUZZING)
+    _echorama_add_fuzzers(${name})
   endif()
 endfunction()
 
@@ -112,6 +115,27 @@ macro(_echorama_add_tests name)
       echorama_add_benchmark(${benchmark} ${name} ${room_BENCHMARK_DEPENDS})
     endforeach()
   endif()
+endmacro()
+
+# One program per decoder that reads what it should not trust. As a test it runs for ECHORAMA_FUZZ_SECONDS, from the files
+# that Fuzzing/Seeds<Name>.py, if there is one, writes to the folder it is given.
+macro(_echorama_add_fuzzers name)
+  file(GLOB fuzzers CONFIGURE_DEPENDS Fuzzing/Fuzz*.cxx)
+  if(fuzzers)
+    target_compile_options(${name}Kernels PRIVATE -fsanitize=fuzzer-no-link)
+  endif()
+  foreach(fuzzer IN LISTS fuzzers)
+    get_filename_component(target ${fuzzer} NAME_WE)
+    string(REPLACE "Fuzz" "Seeds" seeds ${target})
+    add_executable(${target} ${fuzzer})
+    target_link_libraries(${target} PRIVATE Echorama::${name}Kernels)
+    target_link_options(${target} PRIVATE -fsanitize=fuzzer)
+    echorama_compile_options(${target})
+    set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/fuzzers)
+    add_test(NAME Fuzz.${target} COMMAND ${PROJECT_SOURCE_DIR}/Testing/fuzz.sh $<TARGET_FILE:${target}>
+      ${CMAKE_CURRENT_SOURCE_DIR}/Fuzzing/${seeds}.py ${ECHORAMA_FUZZ_SECONDS})
+    set_tests_properties(Fuzz.${target} PROPERTIES LABELS fuzz TIMEOUT 300)
+  endforeach()
 endmacro()
 
 # echorama_add_benchmark(FILE ROOM [other rooms...]): one program per file over the rooms' kernels; the vtk stack's may use

@@ -67,6 +67,11 @@ FileFormat FormatOfContent(const std::string& path)
   return FileFormat::Unknown;
 }
 
+const char* KnownFormats()
+{
+  return "MetaImage, NRRD and VTK image file";
+}
+
 FileFormat FormatOfName(const std::string& path)
 {
   const std::string extension = LowerExtension(path);

@@ -14,6 +14,9 @@ enum class FileFormat { Unknown, MetaImage, Nrrd, VtkXmlImage, Nifti, Dicom, Kre
 /// \throws Error(FileSystem) when the path is missing, a folder or cannot be read, Error(BadFile) when the file is empty.
 FileFormat FormatOfContent(const std::string& path);
 
+/// The formats by their names, for messages.
+const char* KnownFormats();
+
 /// What the extension of a name asks for: .mha .mhd, .nrrd .nhdr, .vti (in any case of letters).
 FileFormat FormatOfName(const std::string& path);
 

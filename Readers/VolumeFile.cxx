@@ -125,6 +125,28 @@ bool IsDetached(const std::string& path)
                                : extension.size() == 5 && std::tolower(extension[1]) == 'n' && std::tolower(extension[2]) == 'h';
 }
 
+class HeaderVolume : public VolumeSource {
+public:
+  explicit HeaderVolume(const std::string& path) : header_(ReadImageHeader(path))
+  {
+    CheckVolume(header_);
+    content_.path = path;
+    content_.format = header_.format;
+    content_.geometry = header_.geometry;
+    content_.type = header_.type;
+    content_.fields = header_.fields;
+    content_.notes = header_.notes;
+  }
+
+  void Read(std::size_t, void* voxels, unsigned char*, const Progress& progress) override
+  {
+    ReadVoxels(header_, voxels, progress);
+  }
+
+private:
+  ImageHeader header_;
+};
+
 } // namespace
 
 void CheckMemory(const std::string& path, double bytes)
@@ -204,6 +226,11 @@ void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progres
     SwapBytes(out, size, header.geometry.VoxelCount());
   if (header.reverseSlices)
     ReverseSlices(out, bytes / slices, header.geometry.dimensions[2]);
+}
+
+std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path)
+{
+  return std::make_unique<HeaderVolume>(path);
 }
 
 void WriteVolume(const std::string& path, ImageHeader header, const void* voxels, bool compress, FileReplacement& files,

@@ -3,6 +3,8 @@
 #include "Core/Base/FileReplacement.h"
 #include "Core/Base/Progress.h"
 #include "Readers/ImageHeader.h"
+#include "Readers/VolumeSource.h"
+#include <memory>
 #include <string>
 
 namespace echorama {
@@ -20,6 +22,9 @@ void CheckMemory(const std::string& path, double bytes);
 /// CheckVolume must have passed.
 /// \throws Error(BadFile) that names the file when the data end early, go on too long or are damaged, Error(Cancelled).
 void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progress = {});
+
+/// The volume in a MetaImage or NRRD file. \throws what ReadImageHeader and CheckVolume throw.
+std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path);
 
 /// Writes a volume as MetaImage or NRRD, whichever \a path names; .mhd and .nhdr get their voxels in a file beside them
 /// (.raw; compressed .zraw, .raw.gz). Uses geometry, type and fields of \a header. The files appear when \a files is

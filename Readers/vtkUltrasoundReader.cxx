@@ -2,8 +2,8 @@
 #include "vtkUltrasoundReader.h"
 
 #include "Readers/BorderZeros.h"
-#include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VolumeSource.h"
 
 #include "vtkCallbackCommand.h"
 #include "vtkFieldData.h"
@@ -27,7 +27,7 @@
 using echorama::Error;
 using echorama::FileFormat;
 using echorama::HeaderField;
-using echorama::ImageHeader;
+using echorama::VolumeContent;
 using echorama::VoxelType;
 
 vtkStandardNewMacro(vtkUltrasoundReader);
@@ -42,13 +42,12 @@ int VtkTypeOf(VoxelType type)
   return types[static_cast<int>(type)];
 }
 
-// The voxels of a file as a data array; they are read into its memory directly.
-vtkSmartPointer<vtkDataArray> ReadArray(const ImageHeader& header, const char* name, const echorama::Progress& progress)
+// An array for the voxels of a file, which are read into its memory directly.
+vtkSmartPointer<vtkDataArray> NewArray(const VolumeContent& content, const char* name)
 {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VtkTypeOf(header.type)));
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VtkTypeOf(content.type)));
   array->SetName(name);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(header.geometry.VoxelCount()));
-  echorama::ReadVoxels(header, array->GetVoidPointer(0), progress);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(content.geometry.VoxelCount()));
   return array;
 }
 
@@ -61,13 +60,21 @@ vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char*
   if (!std::filesystem::exists(companion, ignored)) {
     return nullptr;
   }
-  const ImageHeader header = echorama::ReadImageHeader(companion);
-  echorama::CheckVolume(header);
-  if (!header.geometry.AgreesWith(vtkUltrasoundVolume::GeometryOf(volume))) {
+  const auto source = echorama::OpenVolume(companion);
+  if (!source->Content().geometry.AgreesWith(vtkUltrasoundVolume::GeometryOf(volume))) {
     throw Error(Error::Kind::BadFile, companion + ": its geometry is not that of " + path +
                                           "; remove it if it belongs to an earlier file of this name");
   }
-  return ReadArray(header, array, progress);
+  auto values = NewArray(source->Content(), array);
+  source->Read(0, values->GetVoidPointer(0), nullptr, progress);
+  return values;
+}
+
+// Which volume of a time series is the one for a time: the last that is not later.
+std::size_t IndexOfTime(const std::vector<double>& times, double time)
+{
+  const auto later = std::upper_bound(times.begin(), times.end(), time);
+  return later == times.begin() ? 0 : static_cast<std::size_t>(later - times.begin()) - 1;
 }
 
 // A valid region as the contract wants it: 1 or 0 in unsigned chars.
@@ -182,6 +189,9 @@ void vtkUltrasoundReader::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
+  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
+  os << indent << "StackSpacingMm: " << this->StackSpacingMm[0] << " " << this->StackSpacingMm[1] << " "
+     << this->StackSpacingMm[2] << "\n";
   os << indent << "Notes: " << this->GetNotes() << "\n";
 }
 
@@ -193,6 +203,15 @@ int vtkUltrasoundReader::CanReadFile(const char* fileName)
   } catch (const Error&) {
     return 0;
   }
+}
+
+//----------------------------------------------------------------------------
+echorama::VolumeReadParameters vtkUltrasoundReader::Parameters() const
+{
+  echorama::VolumeReadParameters parameters;
+  parameters.spacingMm = this->SpacingMm;
+  parameters.stackSpacingMm = Eigen::Vector3d(this->StackSpacingMm);
+  return parameters;
 }
 
 //----------------------------------------------------------------------------
@@ -210,20 +229,23 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
 {
   return vtkUltrasoundVolume::Run(this, nullptr, [this, outputs](const echorama::Progress&) {
     const std::string path = this->FileName ? this->FileName : "";
-    const FileFormat format = echorama::FormatOfContent(path);
-    if (format == FileFormat::Unknown) {
-      throw Error(Error::Kind::BadFile, path + ": the content is none of MetaImage, NRRD and VTK image file");
-    }
-    if (format == FileFormat::VtkXmlImage) {
+    vtkInformation* out = outputs->GetInformationObject(0);
+    out->Remove(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
+    out->Remove(vtkStreamingDemandDrivenPipeline::TIME_RANGE());
+    if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
       const vtkNew<vtkXMLImageDataReader> reader;
-      vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), OpenXml(reader, path));
+      vtkUltrasoundVolume::SetGeometry(out, OpenXml(reader, path));
       return;
     }
-    const ImageHeader header = echorama::ReadImageHeader(path);
-    echorama::CheckVolume(header);
-    vtkInformation* out = outputs->GetInformationObject(0);
-    vtkUltrasoundVolume::SetGeometry(out, header.geometry);
-    vtkDataObject::SetPointDataActiveScalarInfo(out, VtkTypeOf(header.type), 1);
+    const auto source = echorama::OpenVolume(path, this->Parameters());
+    const VolumeContent& content = source->Content();
+    vtkUltrasoundVolume::SetGeometry(out, content.geometry);
+    vtkDataObject::SetPointDataActiveScalarInfo(out, VtkTypeOf(content.type), 1);
+    if (!content.times.empty()) {
+      const double range[2] = {content.times.front(), content.times.back()};
+      out->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), content.times.data(), static_cast<int>(content.times.size()));
+      out->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
+    }
   });
 }
 
@@ -236,23 +258,50 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
     this->ReadXml(output);
     progress(0.7); // VTK's reader cannot be stopped, but we can
   } else {
-    this->ReadHeaderFile(output, progress.Part(0.0, 0.7));
+    this->ReadSource(output, progress.Part(0.0, 0.7));
   }
   this->FindValidRegion(output, progress.Part(0.7, 0.9));
   this->FindProvenance(output, progress.Part(0.9, 1.0));
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundReader::ReadHeaderFile(vtkImageData* output, const echorama::Progress& progress)
+void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progress& progress)
 {
-  const ImageHeader header = echorama::ReadImageHeader(this->FileName);
-  echorama::CheckVolume(header);
-  this->Notes = header.notes;
-  vtkUltrasoundVolume::SetGeometry(output, header.geometry);
-  output->GetPointData()->SetScalars(ReadArray(header, vtkUltrasoundVolume::IntensityName(), progress));
+  const auto source = echorama::OpenVolume(this->FileName, this->Parameters());
+  const VolumeContent& content = source->Content();
+  this->Notes = content.notes;
+  vtkInformation* out = this->GetOutputInformation(0);
+  std::size_t index = 0;
+  if (!content.times.empty()) {
+    if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())) {
+      index = IndexOfTime(content.times, out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP()));
+    }
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), content.times[index]);
+    vtkUltrasoundAcquisition::SetTimeStamp(output, content.times[index]);
+  }
+  vtkUltrasoundVolume::SetGeometry(output, content.geometry);
+  const auto intensity = NewArray(content, vtkUltrasoundVolume::IntensityName());
+  vtkSmartPointer<vtkUnsignedCharArray> valid;
+  if (content.holdsValidRegion) {
+    valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
+    valid->SetName(vtkUltrasoundVolume::ValidRegionName());
+    valid->SetNumberOfTuples(intensity->GetNumberOfTuples());
+    output->GetPointData()->AddArray(valid);
+  }
+  source->Read(index, intensity->GetVoidPointer(0), valid ? valid->GetPointer(0) : nullptr, progress);
+  output->GetPointData()->SetScalars(intensity);
 
+  if (content.probe) {
+    vtkUltrasoundAcquisition::SetProbeGeometry(output, *content.probe);
+  }
+  if (content.probeToWorld) {
+    vtkUltrasoundAcquisition::SetProbeToWorld(output, *content.probeToWorld);
+  }
+  if (content.timeStamp && content.times.empty()) {
+    vtkUltrasoundAcquisition::SetTimeStamp(output, *content.timeStamp);
+  }
   const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
-  for (const HeaderField& field : header.fields) {
+  for (const HeaderField& field : content.fields) {
     const std::string& name = field.first;
     if (name.compare(0, FieldPrefix.size(), FieldPrefix) == 0) {
       if (!vtkUltrasoundAcquisition::SetFromText(output, name.substr(FieldPrefix.size()), field.second)) {

@@ -31,6 +31,12 @@
 #include <string> // for the notes
 #include <vector> // for the notes
 
+#ifndef __VTK_WRAP__
+namespace echorama {
+struct VolumeReadParameters;
+}
+#endif
+
 class vtkXMLImageDataReader;
 
 class ECHORAMAREADERS_EXPORT vtkUltrasoundReader : public vtkUltrasoundImageAlgorithm {
@@ -43,6 +49,24 @@ public:
   /** The file to read. Default: none. */
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
+  ///@}
+
+  ///@{
+  /**
+   * Edge of the voxels, mm, that a file of beams (GE Kretz) is scan-converted to, in [0, 1000]. 0, the default, takes
+   * about as many voxels inside the fan as there are samples.
+   */
+  vtkSetClampMacro(SpacingMm, double, 0.0, 1000.0);
+  vtkGetMacro(SpacingMm, double);
+  ///@}
+
+  ///@{
+  /**
+   * Spacing of a stack of pictures in mm: along x, along y and from picture to picture. Where it is 0, the default, that of
+   * the files is taken, else 1 mm, with a note. Other formats know theirs.
+   */
+  vtkSetVector3Macro(StackSpacingMm, double);
+  vtkGetVector3Macro(StackSpacingMm, double);
   ///@}
 
   /**
@@ -66,13 +90,16 @@ protected:
 #endif
 
   char* FileName = nullptr;
+  double SpacingMm = 0.0;
+  double StackSpacingMm[3] = {0.0, 0.0, 0.0};
 
 private:
   vtkUltrasoundReader(const vtkUltrasoundReader&) = delete;
   void operator=(const vtkUltrasoundReader&) = delete;
 
 #ifndef __VTK_WRAP__
-  void ReadHeaderFile(vtkImageData* output, const echorama::Progress& progress);
+  echorama::VolumeReadParameters Parameters() const;
+  void ReadSource(vtkImageData* output, const echorama::Progress& progress);
   void ReadXml(vtkImageData* output);
   void FindValidRegion(vtkImageData* output, const echorama::Progress& progress);
   void FindProvenance(vtkImageData* output, const echorama::Progress& progress);

@@ -183,7 +183,7 @@ class Reader(unittest.TestCase):
         self.refused("missing.mha", None, "no such file")
         self.refused("", None, "folder")
         self.refused("a.mha", b"", "empty")
-        self.refused("a.mha", b"Dear reader, this is a letter.\n", "none of MetaImage, NRRD and VTK image file")
+        self.refused("a.mha", b"Dear reader, this is a letter.\n", "none of MetaImage, NRRD")
         self.refused("a.mha", meta(bytes(7)), "truncated")
         self.refused("a.mha", meta(bytes(8), "100000 100000 100000"), "truncated or the dimensions are wrong")
         self.refused("a.mha", meta(bytes(8), "2147483647 2147483647 2147483647"), "overflows")

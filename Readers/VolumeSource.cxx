@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The one place that knows which file holds which format. Each format lies in a file of its own.
+#include "Readers/VolumeSource.h"
+#include "Core/Base/Error.h"
+#include "Readers/VolumeFile.h"
+
+namespace echorama {
+
+void VolumeSource::ReadBeams(std::size_t, void*, const Progress&)
+{
+  throw Error(Error::Kind::BadInput, content_.path + ": it holds no beams");
+}
+
+std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters&)
+{
+  switch (FormatOfContent(path)) {
+  case FileFormat::MetaImage:
+  case FileFormat::Nrrd:
+    return OpenHeaderVolume(path);
+  default:
+    throw Error(Error::Kind::BadFile, path + ": the content is none of " + KnownFormats());
+  }
+}
+
+} // namespace echorama
