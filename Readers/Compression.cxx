@@ -63,10 +63,22 @@ std::uint64_t Put(std::ostream& stream, const std::vector<unsigned char>& data)
 
 std::uint64_t Compress(std::ostream& stream, CompressedForm form, const void* in, std::uint64_t bytes, const Progress& progress)
 {
+  return Compress(stream, form, std::string(), in, bytes, progress);
+}
+
+std::uint64_t Compress(std::ostream& stream, CompressedForm form, const std::string& start, const void* in, std::uint64_t bytes,
+                       const Progress& progress)
+{
   const bool gzip = form == CompressedForm::Gzip;
   const auto* all = static_cast<const unsigned char*>(in);
   std::uint64_t written = gzip ? Put(stream, {0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255}) : Put(stream, {0x78, 0x5e});
   uLong checksum = gzip ? crc32(0, nullptr, 0) : adler32(0, nullptr, 0);
+  if (!start.empty()) {
+    const Block block =
+        CompressBlock(reinterpret_cast<const unsigned char*>(start.data()), 0, start.size(), false, form);
+    checksum = block.checksum;
+    written += Put(stream, block.data);
+  }
   const std::ptrdiff_t blocks = static_cast<std::ptrdiff_t>(std::max<std::uint64_t>(1, (bytes + BlockBytes - 1) / BlockBytes));
   for (std::ptrdiff_t first = 0; first < blocks && stream; first += BatchBlocks) {
     std::vector<Block> batch(static_cast<std::size_t>(std::min(BatchBlocks, blocks - first)));
@@ -86,58 +98,98 @@ std::uint64_t Compress(std::ostream& stream, CompressedForm form, const void* in
       written += Put(stream, block.data);
     }
   }
+  const std::uint64_t whole = start.size() + bytes;
   const auto byte = [](std::uint64_t value, int i) { return static_cast<unsigned char>(value >> (8 * i)); };
   if (gzip)
-    return written + Put(stream, {byte(checksum, 0), byte(checksum, 1), byte(checksum, 2), byte(checksum, 3), byte(bytes, 0),
-                                  byte(bytes, 1), byte(bytes, 2), byte(bytes, 3)});
+    return written + Put(stream, {byte(checksum, 0), byte(checksum, 1), byte(checksum, 2), byte(checksum, 3), byte(whole, 0),
+                                  byte(whole, 1), byte(whole, 2), byte(whole, 3)});
   return written + Put(stream, {byte(checksum, 3), byte(checksum, 2), byte(checksum, 1), byte(checksum, 0)});
 }
 
-void Decompress(std::istream& stream, const std::string& name, std::uint64_t skip, void* out, std::uint64_t bytes,
-                const Progress& progress)
-{
-  constexpr std::uint64_t LargestPiece = 1 << 24;
+struct Inflater::State {
+  std::istream& stream;
+  std::string name;
   z_stream z{};
-  if (inflateInit2(&z, 15 + 32) != Z_OK) // zlib or gzip, told by the first bytes
-    throw std::bad_alloc();
-  const std::unique_ptr<z_stream, int (*)(z_streamp)> cleanup(&z, inflateEnd);
-  std::vector<unsigned char> input(1 << 18), dropped(skip > 0 ? 1 << 16 : 0);
-  auto* next = static_cast<unsigned char*>(out);
-  const std::uint64_t total = bytes;
-  unsigned char beyond = 0;
-  while (true) {
+  bool ended = false; // after the checksum of a stream
+  std::vector<unsigned char> input = std::vector<unsigned char>(1 << 18);
+
+  // Inflates up to \a room bytes and counts them in \a made. \returns false when there is no more input.
+  bool Step(unsigned char* out, std::uint64_t room, std::uint64_t& made)
+  {
     if (z.avail_in == 0) {
       stream.read(reinterpret_cast<char*>(input.data()), static_cast<std::streamsize>(input.size()));
       z.avail_in = static_cast<uInt>(stream.gcount());
       z.next_in = input.data();
       if (z.avail_in == 0)
-        Fail(name, "the compressed data end early, after " + std::to_string(total - bytes) + " of " + std::to_string(total) +
-                       " bytes: the file is truncated or its dimensions are wrong");
+        return false;
     }
-    // What is dropped comes first, then the voxels, then a byte that must not come.
-    const std::uint64_t room = skip > 0    ? std::min<std::uint64_t>(skip, dropped.size())
-                               : bytes > 0 ? std::min(bytes, LargestPiece)
-                                           : 1;
-    z.next_out = skip > 0 ? dropped.data() : bytes > 0 ? next : &beyond;
+    if (ended) // another gzip member
+      inflateReset(&z);
+    z.next_out = out;
     z.avail_out = static_cast<uInt>(room);
     const int status = inflate(&z, Z_NO_FLUSH);
-    const std::uint64_t made = room - z.avail_out;
     if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR)
       Fail(name, std::string("the compressed data are damaged (") + (z.msg ? z.msg : "not a zlib or gzip stream") + ")");
-    if (skip > 0)
-      skip -= made;
-    else if (bytes > 0) {
-      bytes -= made;
-      next += made;
-      progress(1.0 - static_cast<double>(bytes) / static_cast<double>(total));
-    } else if (made > 0)
-      Fail(name, "the compressed data hold more than the dimensions say");
-    if (status == Z_STREAM_END) {
-      if (bytes == 0 && skip == 0)
-        return;
-      inflateReset(&z); // another gzip member, or else the end of the file is next
-    }
+    ended = status == Z_STREAM_END;
+    made += room - z.avail_out;
+    return true;
   }
+};
+
+Inflater::Inflater(std::istream& stream, std::string name) : state_(new State{stream, std::move(name)})
+{
+  if (inflateInit2(&state_->z, 15 + 32) != Z_OK) // zlib or gzip, told by the first bytes
+    throw std::bad_alloc();
+}
+
+Inflater::~Inflater()
+{
+  inflateEnd(&state_->z);
+}
+
+std::uint64_t Inflater::Read(void* out, std::uint64_t bytes, const Progress& progress)
+{
+  constexpr std::uint64_t LargestPiece = 1 << 24;
+  std::uint64_t made = 0;
+  while (made < bytes && state_->Step(static_cast<unsigned char*>(out) + made, std::min(bytes - made, LargestPiece), made))
+    progress(static_cast<double>(made) / static_cast<double>(bytes));
+  return made;
+}
+
+Inflater::Ending Inflater::Finish()
+{
+  unsigned char beyond = 0;
+  std::uint64_t made = 0;
+  while (!state_->ended && made == 0)
+    if (!state_->Step(&beyond, 1, made))
+      return Ending::Truncated;
+  return made > 0 ? Ending::MoreFollows : Ending::Complete;
+}
+
+std::uint64_t Inflater::Skip(std::uint64_t bytes)
+{
+  unsigned char dropped[1 << 14];
+  std::uint64_t done = 0;
+  while (done < bytes) {
+    const std::uint64_t piece = std::min<std::uint64_t>(bytes - done, sizeof dropped), made = Read(dropped, piece);
+    done += made;
+    if (made < piece)
+      break;
+  }
+  return done;
+}
+
+void Decompress(std::istream& stream, const std::string& name, std::uint64_t skip, void* out, std::uint64_t bytes,
+                const Progress& progress)
+{
+  Inflater inflater(stream, name);
+  const std::uint64_t made = inflater.Skip(skip) < skip ? 0 : inflater.Read(out, bytes, progress);
+  const Inflater::Ending ending = made < bytes ? Inflater::Ending::Truncated : inflater.Finish();
+  if (ending == Inflater::Ending::MoreFollows)
+    Fail(name, "the compressed data hold more than the dimensions say");
+  if (ending == Inflater::Ending::Truncated)
+    Fail(name, "the compressed data end early, after " + std::to_string(made) + " of " + std::to_string(bytes) +
+                   " bytes: the file is truncated or its dimensions are wrong");
 }
 
 } // namespace echorama

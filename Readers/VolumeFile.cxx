@@ -221,11 +221,17 @@ void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progres
     DispatchVoxelType(header.type, [&](auto zero) { ReadText(stream, header, static_cast<decltype(zero)*>(voxels), progress); });
     break;
   }
-  const std::size_t size = SizeOf(header.type), slices = static_cast<std::size_t>(header.geometry.dimensions[2]);
+  ArrangeVoxels(header, voxels);
+}
+
+void ArrangeVoxels(const ImageHeader& header, void* voxels)
+{
+  char* const bytes = static_cast<char*>(voxels);
   if (header.encoding != ImageHeader::Encoding::Text && header.bigEndian != HostIsBigEndian)
-    SwapBytes(out, size, header.geometry.VoxelCount());
+    SwapBytes(bytes, SizeOf(header.type), header.geometry.VoxelCount());
   if (header.reverseSlices)
-    ReverseSlices(out, bytes / slices, header.geometry.dimensions[2]);
+    ReverseSlices(bytes, header.ByteCount() / static_cast<std::size_t>(header.geometry.dimensions[2]),
+                  header.geometry.dimensions[2]);
 }
 
 std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path)
@@ -278,7 +284,12 @@ void WriteVolume(const std::string& path, ImageHeader header, const void* voxels
 std::string CompanionPath(const std::string& path, const std::string& array)
 {
   const fs::path main = path;
-  return (main.parent_path() / (main.stem().string() + "." + array + main.extension().string())).string();
+  fs::path stem = main.stem(), extension = main.extension();
+  if (stem.extension() == ".nii") { // .nii.gz is one extension
+    extension = ".nii" + extension.string();
+    stem = stem.stem();
+  }
+  return (main.parent_path() / (stem.string() + "." + array + extension.string())).string();
 }
 
 } // namespace echorama

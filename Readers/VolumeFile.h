@@ -26,6 +26,9 @@ void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progres
 /// The volume in a MetaImage or NRRD file. \throws what ReadImageHeader and CheckVolume throw.
 std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path);
 
+/// Puts voxels that were read as they lie in the file into this machine's byte order and the header's order of slices.
+void ArrangeVoxels(const ImageHeader& header, void* voxels);
+
 /// Writes a volume as MetaImage or NRRD, whichever \a path names; .mhd and .nhdr get their voxels in a file beside them
 /// (.raw; compressed .zraw, .raw.gz). Uses geometry, type and fields of \a header. The files appear when \a files is
 /// committed; the main file is staged last.
@@ -34,7 +37,8 @@ std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path);
 void WriteVolume(const std::string& path, ImageHeader header, const void* voxels, bool compress, FileReplacement& files,
                  const Progress& progress = {});
 
-/// The path of a file's companion that holds another array of the same voxels: NAME.ValidRegion.mha beside NAME.mha.
+/// The path of a file's companion that holds another array of the same voxels: NAME.ValidRegion.mha beside NAME.mha,
+/// NAME.ValidRegion.nii.gz beside NAME.nii.gz.
 std::string CompanionPath(const std::string& path, const std::string& array);
 
 } // namespace echorama
