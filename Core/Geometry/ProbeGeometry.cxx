@@ -81,7 +81,8 @@ bool ProbeGeometry::IsPlane() const
 
 bool ProbeGeometry::ReachesBehindAxis() const
 {
-  const double lowest = std::min(Fan().PointOf({0.5, depthMin}).y(), Fan().PointOf({0.5, depthMax}).y());
+  const double outermost = std::abs(fanOffset) + 0.5;
+  const double lowest = std::min(Fan().PointOf({outermost, depthMin}).y(), Fan().PointOf({outermost, depthMax}).y());
   return Sweep().Span(lowest) < -1e-9 * Size(); // a fan that ends on the axis does not
 }
 
@@ -110,6 +111,8 @@ void ProbeGeometry::Check() const
          " mm; the last must be greater than the first");
   if (fanWidth == 0.0 && fanAngle < straight)
     fail("angle and width of the fan are both 0; that leaves a single beam");
+  if (!std::isfinite(fanOffset) || !(fanAngle * (std::abs(fanOffset) + 0.5) <= 0.5 * twoPi))
+    fail("the offset of the fan is " + std::to_string(fanOffset) + " fans; no beam may be turned by more than half a turn");
   if (Fan().Span(depthMin) < -1e-9 * Size())
     fail("the first depth, " + std::to_string(depthMin) + " mm, lies behind the centre of the fan's arc, where beams cross");
   // Below half a turn the plane that reaches a point is told by its angle alone.
@@ -119,14 +122,14 @@ void ProbeGeometry::Check() const
 
 Eigen::Vector3d PointOf(const ProbeGeometry& geometry, const BeamPoint& beam)
 {
-  const Eigen::Vector2d inFan = geometry.Fan().PointOf({beam.fan, beam.depth});
+  const Eigen::Vector2d inFan = geometry.Fan().PointOf({beam.fan + geometry.fanOffset, beam.depth});
   const Eigen::Vector2d inSweep = geometry.Sweep().PointOf({beam.sweep, inFan.y()});
   return {inFan.x(), inSweep.x(), inSweep.y()};
 }
 
 Eigen::Vector3d DirectionOf(const ProbeGeometry& geometry, const BeamPoint& beam)
 {
-  const double phi = geometry.fanAngle * beam.fan, psi = geometry.sweepAngle * beam.sweep;
+  const double phi = geometry.fanAngle * (beam.fan + geometry.fanOffset), psi = geometry.sweepAngle * beam.sweep;
   return {std::sin(phi), std::cos(phi) * std::sin(psi), std::cos(phi) * std::cos(psi)};
 }
 
@@ -143,6 +146,7 @@ std::optional<BeamPoint> BeamPointAt(const ProbeGeometry& geometry, const Eigen:
     if (!ClampToFace(sweep, plane, slack))
       continue;
     ProbeArc::Place beam = fan.PlaceOf(point.x(), plane.depth);
+    beam.along -= geometry.fanOffset;
     const double depth = std::min(std::max(beam.depth, geometry.depthMin), geometry.depthMax);
     if (std::abs(beam.depth - depth) <= slack && ClampToFace(fan, beam, slack))
       return BeamPoint{depth, beam.along, plane.along};

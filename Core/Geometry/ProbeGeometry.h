@@ -59,6 +59,10 @@ struct ProbeGeometry {
   double sweepWidth = 0.0; ///< mm, arc length that the middle of the array travels, >= 0
   double depthMin = 0.0;   ///< mm, first sample; negative (in the housing) down to the centre of the fan's arc
   double depthMax = 100.0; ///< mm, last sample, > depthMin
+  /// How far the middle of the fan lies from the middle of the array's arc, towards +x, in whole fans: 0 for a fan that is
+  /// used from end to end. A scanner that looks with a part of a wider array still turns it about the line below the
+  /// array's middle, so that no pose of a centred fan has the same beams.
+  double fanOffset = 0.0;
 
   /// A curved array swept about an axis: angles in radians, radii in mm (the head parameters of dissertation 3.1.1).
   static ProbeGeometry Convex(double fanAngle, double fanRadius, double sweepAngle, double sweepRadius, double depthMin,
@@ -81,8 +85,9 @@ struct ProbeGeometry {
   double Size() const;
 
   /// Throws Error(InvalidParameter) naming the field that is out of range; also when angle and width of the fan are both
-  /// 0, and when two beams could reach one point from opposite sides of the sweep axis, so that the inverse has no single
-  /// answer: that takes a sweep of half a turn or more whose fan reaches behind the axis.
+  /// 0, when the offset turns a beam beyond half a turn, and when two beams could reach one point from opposite sides of the
+  /// sweep axis, so that the inverse has no single answer: that takes a sweep of half a turn or more whose fan reaches behind the
+  /// axis.
   void Check() const;
 };
 

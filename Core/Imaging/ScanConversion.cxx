@@ -37,7 +37,7 @@ struct FloatArc {
   float curvature, unit; // see ProbeArc::Bend
   float indexPerRadian, middle, last;
 
-  FloatArc(ProbeArc arc, int count)
+  FloatArc(ProbeArc arc, int count, double offset = 0.0)
   {
     if (arc.width > 0.0)
       arc.angle = std::max(arc.angle, leastBend);
@@ -46,7 +46,7 @@ struct FloatArc {
     unit = static_cast<float>(bend.unit);
     indexPerRadian = arc.angle > 0.0 ? static_cast<float>((count - 1) / arc.angle) : 0.0f;
     last = static_cast<float>(count - 1);
-    middle = 0.5f * last;
+    middle = static_cast<float>((0.5 - offset) * (count - 1));
   }
 };
 
@@ -236,17 +236,16 @@ ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaBlend)
 Eigen::AlignedBox3d BoxOf(const ProbeGeometry& g)
 {
   constexpr double quarter = 1.5707963267948966;
-  const auto places = [](double angle) {
-    std::vector<double> along{-0.5, 0.0, 0.5};
-    if (0.5 * angle > quarter) {
-      along.push_back(quarter / angle);
-      along.push_back(-quarter / angle);
-    }
+  const auto places = [](double angle, double offset) {
+    std::vector<double> along{-0.5, 0.5};
+    for (const double turn : {-quarter, 0.0, quarter})
+      if (const double place = turn == 0.0 ? -offset : turn / angle - offset; std::abs(place) < 0.5)
+        along.push_back(place);
     return along;
   };
   Eigen::AlignedBox3d box;
-  for (const double fan : places(g.fanAngle))
-    for (const double sweep : places(g.sweepAngle))
+  for (const double fan : places(g.fanAngle, g.fanOffset))
+    for (const double sweep : places(g.sweepAngle, 0.0))
       for (const double depth : {g.depthMin, g.depthMax})
         box.extend(PointOf(g, {depth, fan, sweep}));
   return box;
@@ -263,7 +262,8 @@ class Converter {
 public:
   Converter(const std::array<int, 3>& beams, const ProbeGeometry& geometry, const Pose& probeToWorld, const ImageGeometry& grid)
     : geometry_(geometry), beams_(beams), gridToProbe_(probeToWorld.inverse() * grid.IndexToWorld()),
-      fan_(geometry.Fan(), beams[1]), sweep_(geometry.Sweep(), beams[2]), box_(BoxOf(geometry)), count_(grid.dimensions[0])
+      fan_(geometry.Fan(), beams[1], geometry.fanOffset), sweep_(geometry.Sweep(), beams[2]), box_(BoxOf(geometry)),
+      count_(grid.dimensions[0])
   {
     const double samplesPerMm = (beams[0] - 1) / (geometry.depthMax - geometry.depthMin);
     range_ = {static_cast<float>(geometry.depthMin), static_cast<float>(samplesPerMm), static_cast<float>(beams[0] - 1)};
@@ -272,12 +272,16 @@ public:
     // Half a voxel's extent across a single plane.
     halfVoxel_ = 0.5 * gridToProbe_.linear().row(1).cwiseAbs().sum();
     reachesBehind_ = geometry.ReachesBehindAxis();
-    // The outermost beam lies at x = fanSlope_ * (u + c rho) for fans up to about a half-plane.
-    const double halfFan = 0.5 + edge / (beams[1] - 1), halfAngle = geometry.fanAngle * halfFan;
-    if (geometry.fanAngle < leastBend)
-      fanSlope_ = geometry.fanWidth * halfFan;
-    else if (halfAngle < 1.5)
-      fanSlope_ = std::tan(halfAngle) / geometry.Fan().GetBend().curvature;
+    // The outermost beams lie at x = slope * (u + c rho) for fans up to about a half-plane.
+    const auto slope = [&geometry](double along, double otherwise) {
+      if (geometry.fanAngle < leastBend)
+        return geometry.fanWidth * along;
+      const double angle = geometry.fanAngle * along;
+      return std::abs(angle) < 1.5 ? std::tan(angle) / geometry.Fan().GetBend().curvature : otherwise;
+    };
+    const double halfFan = 0.5 + edge / (beams[1] - 1);
+    firstSlope_ = slope(geometry.fanOffset - halfFan, firstSlope_);
+    lastSlope_ = slope(geometry.fanOffset + halfFan, lastSlope_);
     // The edge as a fraction of the geometry, for the exact inverse.
     tolerance_ = edge * std::min(1.0 / samplesPerMm, SampleSpacing(beams, geometry)) / geometry.Size();
     // Voxels beyond the samples by less than this are still looked at.
@@ -354,14 +358,17 @@ private:
     const auto [c, u] = geometry_.Fan().GetBend();
     const double rho = place.depth, b = u + c * rho;
     const double deepest = geometry_.depthMax + edge / range_.perMm;
-    double reach = b > 0.0 ? fanSlope_ * b : std::numeric_limits<double>::infinity();
-    if (c > 0.0)
-      reach = std::min(reach, std::sqrt(std::max(0.0, (deepest - rho) * (2.0 * u + c * (deepest + rho)) / c)));
-    if (std::isfinite(reach)) {
-      const double middle = -start.x() / step.x(), half = (reach + 1e-3) / std::abs(step.x());
-      begin = static_cast<int>(std::max<double>(begin, std::ceil(middle - half)));
-      end = static_cast<int>(std::min<double>(end, std::floor(middle + half) + 1.0));
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    double from = b > 0.0 ? firstSlope_ * b : -infinity, to = b > 0.0 ? lastSlope_ * b : infinity;
+    if (c > 0.0) {
+      const double reach = std::sqrt(std::max(0.0, (deepest - rho) * (2.0 * u + c * (deepest + rho)) / c));
+      from = std::max(from, -reach);
+      to = std::min(to, reach);
     }
+    from = (from - 1e-3 - start.x()) / step.x();
+    to = (to + 1e-3 - start.x()) / step.x();
+    begin = static_cast<int>(std::max<double>(begin, std::ceil(std::min(from, to))));
+    end = static_cast<int>(std::min<double>(end, std::floor(std::max(from, to)) + 1.0));
     if (begin >= end) {
       begin = end = 0;
       return;
@@ -405,7 +412,8 @@ private:
   Eigen::AlignedBox3d box_;
   int count_;
   bool alongArray_ = false, reachesBehind_ = false;
-  double halfVoxel_ = 0.0, tolerance_ = 0.0, fanSlope_ = std::numeric_limits<double>::infinity();
+  double halfVoxel_ = 0.0, tolerance_ = 0.0;
+  double firstSlope_ = -std::numeric_limits<double>::infinity(), lastSlope_ = std::numeric_limits<double>::infinity();
 };
 
 } // namespace
@@ -432,7 +440,8 @@ double SampleSpacing(const std::array<int, 3>& n, const ProbeGeometry& g)
   const double depth = (g.depthMax - g.depthMin) / (n[0] - 1), fan = g.Fan().Span(middle) / (n[1] - 1);
   if (g.IsPlane())
     return std::sqrt(depth * fan);
-  return std::cbrt(depth * fan * std::abs(g.Sweep().Span(middle)) / (n[2] - 1));
+  const double rho = g.Fan().PointOf({g.fanOffset, middle}).y();
+  return std::cbrt(depth * fan * std::abs(g.Sweep().Span(rho)) / (n[2] - 1));
 }
 
 ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& probeToWorld, double spacingMm, std::size_t maxVoxels)

@@ -18,8 +18,8 @@ vtkStandardNewMacro(vtkUltrasoundAcquisition);
 
 namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
-const char* const ProbeGeometryComponents[] = {"FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees",
-                                               "SweepWidthMm",    "DepthMinMm", "DepthMaxMm"};
+const char* const ProbeGeometryComponents[] = {"FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees", "SweepWidthMm",
+                                               "DepthMinMm",      "DepthMaxMm", "FanOffset"};
 
 // The numbers of a field, or nothing when the field is missing, too short or not finite.
 std::optional<std::vector<double>> NumbersOf(vtkDataObject* data, const char* name, int count)
@@ -109,7 +109,10 @@ std::vector<std::string> vtkUltrasoundAcquisition::Names()
 //----------------------------------------------------------------------------
 std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf(vtkDataObject* data)
 {
-  const auto n = NumbersOf(data, ProbeGeometryName(), 6);
+  auto n = NumbersOf(data, ProbeGeometryName(), 6);
+  if (!n) {
+    n = NumbersOf(data, ProbeGeometryName(), 7);
+  }
   if (!n) {
     return {};
   }
@@ -120,15 +123,19 @@ std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf
   geometry.sweepWidth = (*n)[3];
   geometry.depthMin = (*n)[4];
   geometry.depthMax = (*n)[5];
+  geometry.fanOffset = n->size() > 6 ? (*n)[6] : 0.0;
   return geometry;
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundAcquisition::SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& g)
 {
-  SetNumbers(data, ProbeGeometryName(),
-             {g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax},
-             ProbeGeometryComponents);
+  std::vector<double> numbers{
+      g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax};
+  if (g.fanOffset != 0.0) {
+    numbers.push_back(g.fanOffset);
+  }
+  SetNumbers(data, ProbeGeometryName(), numbers, ProbeGeometryComponents);
 }
 
 //----------------------------------------------------------------------------
@@ -269,7 +276,8 @@ bool vtkUltrasoundAcquisition::SetFromText(vtkDataObject* data, const std::strin
     }
   }
   const bool matrix = name == ProbeToWorldName() || name == ImageToWorldName();
-  const std::size_t wanted = name == ProbeGeometryName() ? 6 : matrix ? 16 : name == TimeStampName() ? 1 : 0;
+  const bool offset = name == ProbeGeometryName() && numbers.size() == 7;
+  const std::size_t wanted = name == ProbeGeometryName() ? (offset ? 7 : 6) : matrix ? 16 : name == TimeStampName() ? 1 : 0;
   if (wanted == 0 || numbers.size() != wanted) {
     return false;
   }

@@ -5,7 +5,8 @@
  *
  * | field          | values                                                                                   |
  * | -------------- | ---------------------------------------------------------------------------------------- |
- * | ProbeGeometry  | 6 doubles: fan angle (degrees), fan width (mm), sweep angle, sweep width, depth from, to  |
+ * | ProbeGeometry  | 6 doubles: fan angle (degrees), fan width (mm), sweep angle, sweep width, depth from, to; |
+ * |                | a 7th, in whole fans, where the fan is not centred on the array (ProbeGeometry::fanOffset)  |
  * | ProbeToWorld   | 16 doubles, row by row: from the probe frame to the world, mm                             |
  * | ImageToWorld   | 16 doubles, row by row: from pixel indices of a 2D frame to the world, mm; affine         |
  * | TimeStamp      | 1 double, seconds                                                                         |

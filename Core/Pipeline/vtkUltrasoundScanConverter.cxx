@@ -34,7 +34,7 @@ vtkUltrasoundScanConverter::Job vtkUltrasoundScanConverter::Prepare(vtkInformati
   if (!probe) {
     throw Error(Error::Kind::BadInput, std::string("the beam volume: it has no field data ") +
                                            vtkUltrasoundAcquisition::ProbeGeometryName() +
-                                           " of 6 finite numbers, so where its samples lie is not known");
+                                           " of 6 or 7 finite numbers, so where its samples lie is not known");
   }
   job.Probe = *probe;
   const char* poseName = vtkUltrasoundAcquisition::ProbeToWorldName();

@@ -42,6 +42,9 @@ std::vector<Named> Geometries()
           {"phased, starting deep", ProbeGeometry::Phased(90 * degree, 80 * degree, 20, 150)},
           {"flat array, turned", {0.0, 50.0, 60 * degree, 20.0, 0.0, 80.0}},
           {"phased array, moved", {90 * degree, 0.0, 0.0, 40.0, 2.0, 80.0}},
+          {"off centre", {35 * degree, 6.0, 40 * degree, 7.0, 14.0, 60.0, 0.41}},
+          {"far off centre", {60 * degree, 30.0, 50 * degree, 50.0, 0.0, 60.0, -1.4}},
+          {"flat, off centre", {0.0, 20.0, 0.0, 40.0, 0.0, 60.0, 1.3}},
           {"curvature 1e-12", {50e-12, 50.0, 40e-12, 40.0, 0.0, 60.0}},
           {"curvature 1e-160", {50e-160, 50.0, 40e-160, 40.0, 0.0, 60.0}},
           {"curvature 1e-4", {50e-4, 50.0, 40e-4, 40.0, 0.0, 60.0}},
@@ -59,6 +62,22 @@ TEST(ProbeGeometry, IsTheTorusOfItsRadii)
         const Eigen::Vector3d expected = ByRadii(fan * g.fanAngle, 40, sweep * g.sweepAngle, 25, depth);
         EXPECT_LT((PointOf(g, {depth, fan, sweep}) - expected).norm(), 1e-12);
       }
+}
+
+TEST(ProbeGeometry, AnOffsetTakesAPieceOfTheArray)
+{
+  const ProbeGeometry whole = ProbeGeometry::Convex(80 * degree, 40, 60 * degree, 25, 0, 100);
+  ProbeGeometry piece = ProbeGeometry::Convex(20 * degree, 40, 60 * degree, 25, 0, 100);
+  piece.fanOffset = 1.25; // from 15 to 35 degrees
+  EXPECT_NO_THROW(piece.Check());
+  for (const double degrees : {15.0, 22.0, 35.0})
+    for (const double sweep : {-0.5, 0.2, 0.5}) {
+      const BeamPoint inWhole{30.0, degrees / 80.0, sweep}, inPiece{30.0, (degrees - 25.0) / 20.0, sweep};
+      EXPECT_LT((PointOf(whole, inWhole) - PointOf(piece, inPiece)).norm(), 1e-12);
+      EXPECT_LT((DirectionOf(whole, inWhole) - DirectionOf(piece, inPiece)).norm(), 1e-14);
+    }
+  EXPECT_FALSE(BeamPointAt(piece, PointOf(whole, {30.0, 14.9 / 80.0, 0.0})));
+  EXPECT_FALSE(BeamPointAt(piece, PointOf(whole, {30.0, 35.1 / 80.0, 0.0})));
 }
 
 TEST(ProbeGeometry, FlatAndPhasedAreTheirClosedForms)
@@ -253,6 +272,8 @@ TEST(ProbeGeometry, RefusesWhatIsNoProbe)
   for (const double bad : {-200.0, 0.0, nan, inf})
     EXPECT_NE(Refusal(with(&ProbeGeometry::depthMax, bad)).find("depths"), std::string::npos) << bad;
   EXPECT_NE(Refusal(with(&ProbeGeometry::depthMin, -41.0)).find("behind the centre"), std::string::npos);
+  for (const double bad : {2.2, -2.2, nan, inf})
+    EXPECT_NE(Refusal(with(&ProbeGeometry::fanOffset, bad)).find("offset"), std::string::npos) << bad;
   EXPECT_NE(Refusal({0, 0, 1, 10, 0, 100}).find("single beam"), std::string::npos);
 }
 

@@ -34,6 +34,9 @@ std::vector<Case> Cases()
           {"nearly flat", {1e-9, 50, 1e-7, 40, 0, 60}},
           {"slightly bent", {0.05, 50, 0.02, 40, 0, 60}},
           {"phased", ProbeGeometry::Phased(90 * degree, 80 * degree, 0, 100)},
+          {"off centre", {35 * degree, 6.0, 40 * degree, 7.0, 14.0, 60.0, 0.41}},
+          {"off centre, wide", {100 * degree, 30.0, 50 * degree, 20.0, 0.0, 60.0, -0.6}},
+          {"flat, off centre", {0.0, 20.0, 0.0, 40.0, 0.0, 60.0, 1.3}},
           {"flat array, turned", {0.0, 50.0, 60 * degree, 20.0, 0.0, 80.0}},
           {"phased array, moved", {90 * degree, 0.0, 0.0, 40.0, 2.0, 80.0}}};
 }
@@ -351,6 +354,9 @@ TEST(ScanConversion, SampleSpacingKeepsTheNumberOfVoxels)
 {
   const ProbeGeometry flat = ProbeGeometry::Linear(50, 40, 0, 60);
   EXPECT_NEAR(SampleSpacing({601, 51, 11}, flat), std::cbrt(0.1 * 1.0 * 4.0), 1e-12);
+  ProbeGeometry offset = ProbeGeometry::Convex(30 * degree, 10, 1.0, 10, 20, 60);
+  offset.fanOffset = 2.0; // the middle beam leaves at 60 degrees
+  EXPECT_NEAR(SampleSpacing({41, 11, 11}, offset), std::cbrt(50 * 3 * degree * 25 * 0.1), 1e-12);
   EXPECT_NEAR(SampleSpacing({601, 51, 1}, {0, 50, 0, 0, 0, 60}), std::sqrt(0.1), 1e-12);
 }
 

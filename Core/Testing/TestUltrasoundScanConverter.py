@@ -98,6 +98,16 @@ def test_depth_comes_back():
         expect(output.GetFieldData().GetArray(name), f"field data {name} is lost")
 
 
+def test_a_fan_off_centre():
+    # The fan begins in the middle of the array: no voxel lies on the other side.
+    image = beam_volume(geometry=CONVEX + [0.5], pose=None)
+    output, errors = convert(image, SpacingMm=4.0)
+    expect(not errors, errors)
+    xmin, xmax, _, _, _, zmax = output.GetBounds()
+    expect(-2.1 < xmin <= 0.0 and xmax > 60, f"x from {xmin} to {xmax}")
+    expect(output.GetFieldData().GetArray("ProbeGeometry").GetTuple(0)[6] == 0.5, "the offset is lost")
+
+
 def test_types_and_names():
     for kind in (VTK_UNSIGNED_CHAR, VTK_SHORT, VTK_UNSIGNED_SHORT, VTK_FLOAT, VTK_DOUBLE):
         output, errors = convert(beam_volume(value=lambda i, j, k: 7, kind=kind, name="ImageScalars"), SpacingMm=6.0)

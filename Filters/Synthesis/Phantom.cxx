@@ -306,6 +306,8 @@ void PhantomParameters::Check() const
   probe.Check();
   if (probe.IsPlane())
     fail("the sweep of the probe is a single plane; a volume needs an angle or a width of the sweep");
+  if (probe.fanOffset != 0.0)
+    fail("the fan of the probe must be centred on its array");
   // Beams of a fan of half a turn or more, or planes that meet, would show one scatterer twice.
   if (!(probe.fanAngle < pi && probe.sweepAngle < pi))
     fail("fan and sweep must be below 180 degrees");
