@@ -8,32 +8,6 @@
 
 namespace echorama {
 
-/// Reads zlib or gzip data piece by piece; gzip files of several members are read as one.
-class Inflater {
-public:
-  /// \param stream outlives this; \param name the file, for messages
-  Inflater(std::istream& stream, std::string name);
-  ~Inflater();
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-
-  /// Writes the next \a bytes bytes to \a out. \returns how many there were: fewer only where the data end.
-  /// \throws Error(BadFile) when they are damaged, Error(Cancelled).
-  std::uint64_t Read(void* out, std::uint64_t bytes, const Progress& progress = {});
-
-  /// Drops the next \a bytes bytes. \returns and throws as Read.
-  std::uint64_t Skip(std::uint64_t bytes);
-
-  enum class Ending { Complete, Truncated, MoreFollows };
-  /// What comes after the last byte that was read, to be asked once: the checksum and the end of its stream, nothing, or
-  /// another byte (which is lost). Bytes after the end of a stream are not looked at.
-  Ending Finish();
-
-private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
-
 /// Decompresses zlib or gzip data from \a stream straight into \a bytes bytes at \a out, after dropping the first
 /// \a skip; gzip files of several members are read as one. The stream must hold exactly that many bytes.
 /// \param name the file, for messages
@@ -49,9 +23,54 @@ enum class CompressedForm { Zlib, Gzip };
 std::uint64_t Compress(std::ostream& stream, CompressedForm form, const void* in, std::uint64_t bytes,
                        const Progress& progress = {});
 
-/// The same for \a start followed by the \a bytes bytes at \a in: a header and its voxels.
-std::uint64_t Compress(std::ostream& stream, CompressedForm form, const std::string& start, const void* in, std::uint64_t bytes,
-                       const Progress& progress = {});
+/// Decompresses zlib or gzip data piece by piece; gzip files of several members are read as one. Its state can be kept, and
+/// reading gone on from there later, which makes long streams passable backwards.
+class Inflater {
+public:
+  /// The data begin at byte \a begin of \a stream, which must outlive this. \a total: the bytes that they should hold;
+  /// it and \a name, the file, are for messages.
+  Inflater(std::istream& stream, std::int64_t begin, std::string name, std::uint64_t total);
+  ~Inflater();
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  /// The next \a bytes bytes go to \a out (nullptr: they are dropped).
+  /// \throws Error(BadFile) when the data end early or are damaged, after which only Restore() is possible.
+  void Read(void* out, std::uint64_t bytes, const Progress& progress = {});
+
+  /// Checks that nothing is left and that the checksum is right. \throws Error(BadFile) otherwise.
+  void Finish();
+
+  /// Bytes given out (or dropped) so far.
+  std::uint64_t Position() const;
+
+  /// A moment of the stream, about 40 kB.
+  struct State;
+  std::shared_ptr<const State> Save() const;
+  void Restore(const State& state);
+
+private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Compresses piece by piece, in parallel, with the result of Compress() on the whole. Holds 32 MB.
+class Deflater {
+public:
+  /// \a stream must outlive this.
+  Deflater(std::ostream& stream, CompressedForm form);
+  ~Deflater();
+  Deflater(const Deflater&) = delete;
+  Deflater& operator=(const Deflater&) = delete;
+
+  void Append(const void* in, std::uint64_t bytes, const Progress& progress = {});
+  /// \returns the bytes written in all.
+  std::uint64_t Finish(const Progress& progress = {});
+
+private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 /// No deflate stream holds more than this many bytes per compressed byte.
 constexpr std::uint64_t LargestCompressionRatio = 1032;
