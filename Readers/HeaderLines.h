@@ -63,7 +63,17 @@ void PlaceAxes(ImageHeader& header, int axes);
 /// \a file as named by the header at \a path: relative to its folder.
 std::string DetachedPath(const std::string& path, const std::string& file);
 
-void ParseMetaImage(ImageHeader& header);
-void ParseNrrd(ImageHeader& header);
+/// What readers of volumes say of a sequence.
+constexpr const char* NotAVolume = "it is a tracked sequence of frames, not a volume; vtkUltrasoundSequenceReader reads it";
+
+/// Hands a field of a frame to \a axis. \returns false, having done nothing, when the key is that of no frame.
+bool TakeFrameField(const HeaderLines& lines, FrameAxis& axis, std::string_view key, std::string_view value);
+
+/// \param axis nullptr: the file is a volume, else a sequence
+void ParseMetaImage(ImageHeader& header, FrameAxis* axis);
+void ParseNrrd(ImageHeader& header, FrameAxis* axis);
+
+/// A value without line breaks, as NRRD wants it.
+std::string EscapedNrrd(const std::string& text);
 
 } // namespace echorama

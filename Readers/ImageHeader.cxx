@@ -37,6 +37,22 @@ bool HasKey(const std::string& text, const std::string& key)
   return false;
 }
 
+constexpr std::string_view FramePrefix = "Seq_Frame";
+
+ImageHeader ReadHeader(const std::string& path, FrameAxis* axis)
+{
+  ImageHeader header;
+  header.path = path;
+  header.format = FormatOfContent(path);
+  if (header.format == FileFormat::MetaImage)
+    ParseMetaImage(header, axis);
+  else if (header.format == FileFormat::Nrrd)
+    ParseNrrd(header, axis);
+  else
+    throw Error(Error::Kind::BadFile, path + ": the content is neither MetaImage nor NRRD");
+  return header;
+}
+
 } // namespace
 
 FileFormat FormatOfContent(const std::string& path)
@@ -89,16 +105,30 @@ std::uint64_t ImageHeader::ByteCount() const
 
 ImageHeader ReadImageHeader(const std::string& path)
 {
-  ImageHeader header;
-  header.path = path;
-  header.format = FormatOfContent(path);
-  if (header.format == FileFormat::MetaImage)
-    ParseMetaImage(header);
-  else if (header.format == FileFormat::Nrrd)
-    ParseNrrd(header);
-  else
-    throw Error(Error::Kind::BadFile, path + ": the content is neither MetaImage nor NRRD");
-  return header;
+  return ReadHeader(path, nullptr);
+}
+
+ImageHeader ReadSequenceHeader(const std::string& path, FrameAxis& axis)
+{
+  return ReadHeader(path, &axis);
+}
+
+bool IsFrameField(std::string_view key)
+{
+  return key.substr(0, FramePrefix.size()) == FramePrefix;
+}
+
+bool TakeFrameField(const HeaderLines& lines, FrameAxis& axis, std::string_view key, std::string_view value)
+{
+  if (!IsFrameField(key))
+    return false;
+  const std::string_view rest = key.substr(FramePrefix.size());
+  const std::size_t end = rest.find_first_not_of("0123456789");
+  std::int64_t frame = -1;
+  if (end == std::string_view::npos || rest[end] != '_' || end + 1 == rest.size() || !ParseNumber(rest.substr(0, end), frame))
+    lines.FailHere("\"" + std::string(key.substr(0, 60)) + "\" is not the field of a frame");
+  axis.field(frame, rest.substr(end + 1), value);
+  return true;
 }
 
 std::vector<std::string> CheckVtkXmlGeometry(const std::string& path)
@@ -207,6 +237,14 @@ void PlaceAxes(ImageHeader& header, int axes)
       header.notes.push_back(
           "the axes in the file are left-handed: the slices were taken in reverse, so that the pose is a rigid one");
   }
+}
+
+std::string JoinedNumbers(const double* numbers, int count)
+{
+  std::string text;
+  for (int i = 0; i < count; ++i)
+    text += (i ? " " : "") + NumberText(numbers[i]);
+  return text;
 }
 
 std::string DetachedPath(const std::string& path, const std::string& file)

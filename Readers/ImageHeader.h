@@ -2,7 +2,9 @@
 #pragma once
 #include "Core/Geometry/ImageGeometry.h"
 #include "Readers/VoxelType.h"
+#include <functional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -55,11 +57,36 @@ struct ImageHeader {
 /// \throws Error(FileSystem) as FormatOfContent, Error(BadFile) that names the file and the line or field.
 ImageHeader ReadImageHeader(const std::string& path);
 
+/// What of a header makes it that of a sequence of frames.
+struct FrameAxis {
+  std::int64_t frames = 1; ///< samples along the axis of kind list or time; 1 when there is no such axis
+  bool fastest = false;    ///< that axis is the first: the frames are interleaved
+  std::int64_t headerBytes = 0;
+
+  /// Takes the fields of frames, "Seq_Frame0012_Timestamp = 1.5" as (12, "Timestamp", "1.5"), in the order of the file.
+  std::function<void(std::int64_t frame, std::string_view key, std::string_view value)> field;
+};
+
+/// Reads the header of a sequence: as ReadImageHeader, but the geometry is that of one frame, whose size may be 0 x 0, and
+/// fields of frames go to \a axis alone. A MetaImage that does not say Kinds has its frames along the last of its axes.
+/// \throws what ReadImageHeader throws; Error(BadFile) also for a field "Seq_Frame..." that is not one of a frame.
+ImageHeader ReadSequenceHeader(const std::string& path, FrameAxis& axis);
+
+/// Whether a field is one of a frame of a sequence: "Seq_Frame0012_Timestamp".
+bool IsFrameField(std::string_view key);
+
 /// Checks the numbers of a .vti file that say where its voxels lie (Origin, Spacing, Direction): VTK's parser silently puts
 /// others in the place of those that it cannot read.
 /// \returns notes on those that are missing
 /// \throws Error(BadFile) when there is no ImageData element, or a number is missing or not finite.
 std::vector<std::string> CheckVtkXmlGeometry(const std::string& path);
+
+/// The name of a type of numbers in headers of each format.
+const char* MetaImageTypeName(VoxelType type);
+std::string NrrdTypeName(VoxelType type);
+
+/// Numbers with blanks between them.
+std::string JoinedNumbers(const double* numbers, int count);
 
 /// The header of a file with these voxels, up to and including the last byte before them.
 /// \param dataFile the detached data file as it shall be named, or empty when the voxels follow in the same file

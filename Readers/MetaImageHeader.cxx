@@ -90,12 +90,33 @@ private:
   const std::map<std::string, std::string>& values_;
 };
 
-void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const Values& values, int axes)
+// How many of the axes lie in space; the last may count frames.
+int SpatialAxes(const HeaderLines& lines, const Values& values, int axes, FrameAxis* sequence)
 {
-  const std::size_t count = static_cast<std::size_t>(axes);
+  if (!sequence)
+    return axes;
+  const std::string* kinds = values.Find("Kinds");
+  if (!kinds)
+    return axes == 2 ? 2 : axes - 1;
+  const std::vector<std::string_view> words = HeaderLines::Words(*kinds);
+  const auto counts = [](std::string_view kind) { return kind == "list" || kind == "time"; };
+  const auto frames = std::find_if(words.begin(), words.end(), counts);
+  if (frames != words.end() && (words.size() != static_cast<std::size_t>(axes) || frames + 1 != words.end()))
+    lines.Fail("Kinds is \"" + *kinds + "\"; the frames must be along the last of " + std::to_string(axes) + " axes");
+  return frames == words.end() ? axes : axes - 1;
+}
+
+void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const Values& values, int all, FrameAxis* sequence)
+{
+  const int axes = SpatialAxes(lines, values, all, sequence);
+  if (axes != 2 && axes != 3)
+    lines.Fail("it has " + std::to_string(axes) + " axes in space; 2 or 3 are needed");
+  const std::size_t count = static_cast<std::size_t>(all);
   ImageGeometry& g = header.geometry;
   const std::vector<int> sizes = lines.Sizes("DimSize", values.Need("DimSize"), count);
-  std::copy(sizes.begin(), sizes.end(), g.dimensions.begin());
+  std::copy(sizes.begin(), sizes.begin() + axes, g.dimensions.begin());
+  if (sequence && axes < all)
+    sequence->frames = sizes.back();
 
   double unit = 1.0;
   if (const std::string* name = values.Find("DistanceUnits"))
@@ -104,14 +125,16 @@ void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const Values& 
   const char* spacingKey = values.Find("ElementSpacing") ? "ElementSpacing" : "ElementSize";
   if (const std::string* text = values.Find(spacingKey)) {
     const auto spacing = lines.Numbers<double>(spacingKey, *text, count);
-    std::copy(spacing.begin(), spacing.end(), g.spacing.data());
+    std::copy(spacing.begin(), spacing.begin() + axes, g.spacing.data());
     g.spacing *= unit;
   } else
     header.notes.push_back("the file has no spacing: 1 mm was assumed");
 
+  // The space of a file has as many axes as the file, but what lies beyond the third is time.
+  const int inSpace = std::min(all, 3);
   if (const std::string* text = values.Find("Offset")) {
     const auto origin = lines.Numbers<double>("Offset", *text, count);
-    std::copy(origin.begin(), origin.end(), g.origin.data());
+    std::copy(origin.begin(), origin.begin() + inSpace, g.origin.data());
     g.origin *= unit;
   } else
     header.notes.push_back("the file has no origin: 0 0 0 was assumed");
@@ -119,8 +142,8 @@ void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const Values& 
   if (const std::string* text = values.Find("TransformMatrix")) {
     const auto matrix = lines.Numbers<double>("TransformMatrix", *text, count * count);
     for (int axis = 0; axis < axes; ++axis)
-      for (int i = 0; i < axes; ++i)
-        g.direction(i, axis) = matrix[static_cast<std::size_t>(axis * axes + i)];
+      for (int i = 0; i < inSpace; ++i)
+        g.direction(i, axis) = matrix[static_cast<std::size_t>(axis * all + i)];
   } else
     header.notes.push_back("the file has no direction: its axes were taken as those of the world");
   PlaceAxes(header, axes);
@@ -157,17 +180,9 @@ void ParseData(ImageHeader& header, const HeaderLines& lines, const Values& valu
   header.dataOffset = headerSize != 0 ? headerSize : local ? lines.Position() : 0;
 }
 
-std::string Joined(const double* numbers, int count)
-{
-  std::string text;
-  for (int i = 0; i < count; ++i)
-    text += (i ? " " : "") + NumberText(numbers[i]);
-  return text;
-}
-
 } // namespace
 
-void ParseMetaImage(ImageHeader& header)
+void ParseMetaImage(ImageHeader& header, FrameAxis* axis)
 {
   HeaderLines lines(header.path);
   std::map<std::string, std::string> known;
@@ -184,6 +199,8 @@ void ParseMetaImage(ImageHeader& header)
     const std::string value(HeaderLines::Trimmed(std::string_view(line).substr(equals + 1)));
     if (const auto synonym = Synonyms.find(key); synonym != Synonyms.end())
       key = synonym->second;
+    if (axis && TakeFrameField(lines, *axis, key, value))
+      continue;
     if (!OwnKeys.count(key))
       header.fields.emplace_back(key, value);
     else if (const auto [place, fresh] = known.emplace(key, value); !fresh && place->second != value)
@@ -194,17 +211,22 @@ void ParseMetaImage(ImageHeader& header)
   if (const std::string* object = values.Find("ObjectType"); object && *object != "Image")
     lines.Fail("it holds an object of type " + *object + ", not an image");
   const int axes = lines.Numbers<int>("NDims", values.Need("NDims"), 1)[0];
-  if (axes != 2 && axes != 3)
+  if (axes != 2 && axes != 3 && !(axes == 4 && axis))
     lines.Fail("it has " + std::to_string(axes) + " dimensions; 2 or 3 are needed");
-  ParseGeometry(header, lines, values, axes);
+  ParseGeometry(header, lines, values, axes, axis);
   ParseData(header, lines, values);
+  if (axis)
+    axis->headerBytes = lines.Position();
+}
+
+const char* MetaImageTypeName(VoxelType type)
+{
+  return std::find_if(std::begin(TypeNames), std::end(TypeNames), [&](const TypeName& t) { return t.type == type; })->name;
 }
 
 std::string MetaImageHeaderText(const ImageHeader& header, const std::string& dataFile, std::size_t& compressedSizeAt)
 {
   const ImageGeometry& g = header.geometry;
-  const auto type =
-      std::find_if(std::begin(TypeNames), std::end(TypeNames), [&](const TypeName& t) { return t.type == header.type; });
   const bool compressed = header.encoding == ImageHeader::Encoding::Zlib;
   std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = ";
   text += header.bigEndian ? "True\n" : "False\n";
@@ -215,12 +237,12 @@ std::string MetaImageHeaderText(const ImageHeader& header, const std::string& da
     compressedSizeAt = text.size();
     text += std::string(20, ' ') + "\n";
   }
-  text += "TransformMatrix = " + Joined(g.direction.data(), 9) + "\n"; // Eigen stores columns: axis after axis
-  text += "Offset = " + Joined(g.origin.data(), 3) + "\nCenterOfRotation = 0 0 0\n";
-  text += "ElementSpacing = " + Joined(g.spacing.data(), 3) + "\n";
+  text += "TransformMatrix = " + JoinedNumbers(g.direction.data(), 9) + "\n"; // Eigen stores columns: axis after axis
+  text += "Offset = " + JoinedNumbers(g.origin.data(), 3) + "\nCenterOfRotation = 0 0 0\n";
+  text += "ElementSpacing = " + JoinedNumbers(g.spacing.data(), 3) + "\n";
   text +=
       "DimSize = " + NumberText(g.dimensions[0]) + " " + NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\n";
-  text += std::string("ElementType = ") + type->name + "\n";
+  text += std::string("ElementType = ") + MetaImageTypeName(header.type) + "\n";
   for (const auto& [key, value] : header.fields)
     text += key + " = " + value + "\n";
   return text + "ElementDataFile = " + (dataFile.empty() ? "LOCAL" : dataFile) + "\n";

@@ -28,12 +28,6 @@ const std::vector<std::pair<VoxelType, std::string>> TypeNames = {
     {VoxelType::Float32, "float"},
     {VoxelType::Float64, "double"}};
 
-std::string NameOf(VoxelType type)
-{
-  const std::string& names = TypeNames[static_cast<std::size_t>(type)].second;
-  return names.substr(0, names.find(' '));
-}
-
 std::optional<VoxelType> TypeNamed(const std::string& name)
 {
   for (const auto& [type, names] : TypeNames)
@@ -87,17 +81,9 @@ std::string Unescaped(std::string_view text)
   return plain;
 }
 
-std::string Escaped(const std::string& text)
-{
-  std::string escaped;
-  for (const char c : text)
-    escaped += c == '\n' ? "\\n" : c == '\\' ? "\\\\" : std::string(1, c);
-  return escaped;
-}
-
 class Nrrd {
 public:
-  Nrrd(ImageHeader& header) : header_(header), lines_(header.path) {}
+  Nrrd(ImageHeader& header, FrameAxis* sequence) : header_(header), lines_(header.path), sequence_(sequence) {}
 
   void Parse()
   {
@@ -105,6 +91,8 @@ public:
     ParseAxes();
     ParseType();
     ParseData();
+    if (sequence_)
+      sequence_->headerBytes = lines_.Position();
   }
 
 private:
@@ -135,9 +123,11 @@ private:
       if (colon == std::string::npos)
         lines_.FailHere("\"field: value\" or \"key:=value\" is needed");
       const std::string_view before = std::string_view(line).substr(0, colon), after = std::string_view(line).substr(colon + 1);
-      if (!after.empty() && after[0] == '=')
+      if (!after.empty() && after[0] == '=') {
+        if (sequence_ && TakeFrameField(lines_, *sequence_, HeaderLines::Trimmed(before), HeaderLines::Trimmed(after.substr(1))))
+          continue;
         header_.fields.emplace_back(Unescaped(HeaderLines::Trimmed(before)), Unescaped(after.substr(1)));
-      else if (const auto [place, fresh] = fields_.emplace(Plain(before), HeaderLines::Trimmed(after)); !fresh)
+      } else if (const auto [place, fresh] = fields_.emplace(Plain(before), HeaderLines::Trimmed(after)); !fresh)
         lines_.FailHere("\"" + place->first + "\" is given twice");
     }
   }
@@ -189,6 +179,28 @@ private:
     return {1, 1, 1};
   }
 
+  // The axis along which a sequence has its frames; beyond the last when it is none.
+  std::size_t FindFrames(const std::vector<int>& sizes)
+  {
+    const std::string* kinds = Find("kinds");
+    const auto words = kinds ? HeaderLines::Words(*kinds) : std::vector<std::string_view>();
+    const auto found = std::find_if(words.begin(), words.end(), [](auto kind) { return kind == "list" || kind == "time"; });
+    const std::size_t axis = static_cast<std::size_t>(found - words.begin());
+    if (!sequence_) {
+      if (std::any_of(header_.fields.begin(), header_.fields.end(), [](const auto& f) { return IsFrameField(f.first); }))
+        lines_.Fail(NotAVolume);
+      return sizes.size();
+    }
+    if (found == words.end())
+      return sizes.size();
+    if (words.size() != sizes.size() || (axis != 0 && axis + 1 != sizes.size()))
+      lines_.Fail("kinds is \"" + *kinds + "\"; the frames must be along the first or the last of " +
+                  std::to_string(sizes.size()) + " axes");
+    sequence_->frames = sizes[axis];
+    sequence_->fastest = axis == 0;
+    return axis;
+  }
+
   void ParseAxes()
   {
     const int count = lines_.Sizes("dimension", Need("dimension"), 1)[0];
@@ -196,6 +208,8 @@ private:
       lines_.Fail("\"dimension\" is " + std::to_string(count) + "; 1 to 16 are possible");
     const std::size_t all = static_cast<std::size_t>(count);
     const std::vector<int> sizes = lines_.Sizes("sizes", Need("sizes"), all);
+
+    const std::size_t frames = FindFrames(sizes);
 
     // Which axes lie in space.
     std::vector<Vector> vectors(all, Eigen::Vector3d::Zero());
@@ -210,6 +224,8 @@ private:
         if (words[axis] != "domain" && words[axis] != "space" && words[axis] != "???" && words[axis] != "none")
           vectors[axis].reset();
     }
+    if (frames < all)
+      vectors[frames].reset();
     for (std::size_t axis = all;
          axis-- > 0 && all - static_cast<std::size_t>(std::count(vectors.begin(), vectors.end(), Vector())) > 3;)
       if (sizes[axis] == 1)
@@ -217,6 +233,8 @@ private:
 
     std::vector<std::size_t> axes;
     for (std::size_t axis = 0; axis < all; ++axis) {
+      if (axis == frames)
+        continue;
       if (vectors[axis])
         axes.push_back(axis);
       else if (axes.empty() && header_.components == 1)
@@ -353,6 +371,7 @@ private:
 
   ImageHeader& header_;
   HeaderLines lines_;
+  FrameAxis* const sequence_;
   std::map<std::string, std::string> fields_;
 };
 
@@ -363,15 +382,29 @@ std::string VectorText(const Eigen::Vector3d& v)
 
 } // namespace
 
-void ParseNrrd(ImageHeader& header)
+std::string EscapedNrrd(const std::string& text)
 {
-  Nrrd(header).Parse();
+  std::string escaped;
+  for (const char c : text)
+    escaped += c == '\n' ? "\\n" : c == '\\' ? "\\\\" : std::string(1, c);
+  return escaped;
+}
+
+std::string NrrdTypeName(VoxelType type)
+{
+  const std::string& names = TypeNames[static_cast<std::size_t>(type)].second;
+  return names.substr(0, names.find(' '));
+}
+
+void ParseNrrd(ImageHeader& header, FrameAxis* axis)
+{
+  Nrrd(header, axis).Parse();
 }
 
 std::string NrrdHeaderText(const ImageHeader& header, const std::string& dataFile)
 {
   const ImageGeometry& g = header.geometry;
-  std::string text = std::string("NRRD0004\ntype: ") + NameOf(header.type) +
+  std::string text = std::string("NRRD0004\ntype: ") + NrrdTypeName(header.type) +
                      "\ndimension: 3\nspace: left-posterior-superior\nsizes: " + NumberText(g.dimensions[0]) + " " +
                      NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\nspace directions:";
   for (int axis = 0; axis < 3; ++axis)
@@ -381,7 +414,7 @@ std::string NrrdHeaderText(const ImageHeader& header, const std::string& dataFil
   text += header.encoding == ImageHeader::Encoding::Zlib ? "gzip" : "raw";
   text += header.bigEndian ? "\nendian: big\n" : "\nendian: little\n";
   for (const auto& [key, value] : header.fields)
-    text += key + ":=" + Escaped(value) + "\n";
+    text += key + ":=" + EscapedNrrd(value) + "\n";
   return text + (dataFile.empty() ? "\n" : "data file: " + dataFile + "\n");
 }
 
