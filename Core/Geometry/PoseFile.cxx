@@ -2,11 +2,11 @@
 // JSON prints the shortest digits that give a double back, so poses survive any number of rounds unchanged. All checks
 // are made on reading, with the place in the file in the message: a pose file is written by people and scripts too.
 #include "Core/Geometry/PoseFile.h"
-#include "Core/Base/Error.h"
 #include "Core/Base/FileReplacement.h"
+#include "Core/Base/JsonPlace.h"
+#include "Core/Base/TextFile.h"
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <set>
 
 namespace fs = std::filesystem;
@@ -17,79 +17,12 @@ namespace {
 
 constexpr const char* Schema = "echorama-poses-1";
 
-// Where we are in the file, for messages.
-class Place {
-public:
-  explicit Place(std::string name) : name_(std::move(name)) {}
-  Place In(const std::string& part) const { return Place(name_ + ", " + part); }
-  [[noreturn]] void Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, name_ + ": " + reason); }
-
-  const ordered_json& Member(const ordered_json& object, const char* key) const
-  {
-    if (!object.is_object() || !object.contains(key))
-      Fail(std::string("\"") + key + "\" is missing");
-    return object.at(key);
-  }
-
-  double Number(const ordered_json& value) const
-  {
-    if (!value.is_number())
-      Fail("a number is needed, not " + value.dump());
-    return value.get<double>(); // JSON has no NaN; overflowing numbers are refused by the parser
-  }
-
-  template <int Size>
-  Eigen::Matrix<double, Size, 1> Vector(const ordered_json& value) const
-  {
-    if (!value.is_array() || value.size() != Size)
-      Fail("a list of " + std::to_string(Size) + " numbers is needed");
-    Eigen::Matrix<double, Size, 1> vector;
-    for (int i = 0; i < Size; ++i)
-      vector[i] = Number(value[static_cast<std::size_t>(i)]);
-    return vector;
-  }
-
-  template <int Size>
-  Eigen::Matrix<double, Size, Size> Rows(const ordered_json& value) const
-  {
-    if (!value.is_array() || value.size() != Size)
-      Fail("a list of " + std::to_string(Size) + " rows is needed");
-    Eigen::Matrix<double, Size, Size> matrix;
-    for (int i = 0; i < Size; ++i)
-      matrix.row(i) = Vector<Size>(value[static_cast<std::size_t>(i)]);
-    return matrix;
-  }
-
-  void Need(const ordered_json& object, const char* key, const std::string& wanted) const
-  {
-    const ordered_json& value = Member(object, key);
-    if (!value.is_string() || value.get<std::string>() != wanted)
-      Fail(std::string("\"") + key + "\" is " + value.dump() + "; \"" + wanted + "\" is needed");
-  }
-
-private:
-  std::string name_;
-};
-
-template <class Derived>
-ordered_json RowsOf(const Eigen::MatrixBase<Derived>& matrix)
-{
-  ordered_json rows = ordered_json::array();
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    ordered_json row = ordered_json::array();
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
-      row.push_back(matrix(i, j));
-    rows.push_back(row);
-  }
-  return rows;
-}
-
 ordered_json ListOf(const Eigen::Vector3d& v)
 {
   return {v.x(), v.y(), v.z()};
 }
 
-ImageGeometry ReadGeometry(const ordered_json& value, const Place& place)
+ImageGeometry ReadGeometry(const ordered_json& value, const JsonPlace& place)
 {
   ImageGeometry geometry;
   geometry.origin = place.In("origin").Vector<3>(place.Member(value, "origin"));
@@ -120,17 +53,8 @@ fs::path Resolved(const fs::path& path)
 
 std::vector<VolumePose> ReadPoses(const std::string& path)
 {
-  std::error_code error;
-  std::ifstream stream(path);
-  if (!stream || fs::is_directory(path, error))
-    throw Error(Error::Kind::FileSystem, path + ": the file cannot be read");
-  const Place file(path);
-  ordered_json root;
-  try {
-    root = ordered_json::parse(stream);
-  } catch (const nlohmann::json::exception& problem) {
-    file.Fail(std::string("it is not JSON (") + problem.what() + ")");
-  }
+  const JsonPlace file(path);
+  const ordered_json root = file.Parse(ReadTextFile(path));
   file.Need(root, "schema", Schema);
   file.Need(root, "unit", "mm");
   file.Need(root, "frame", "LPS");
@@ -142,7 +66,7 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
   std::vector<VolumePose> poses;
   std::set<std::string> seen;
   for (const ordered_json& volume : volumes) {
-    const Place place = file.In("volume " + std::to_string(poses.size() + 1));
+    const JsonPlace place = file.In("volume " + std::to_string(poses.size() + 1));
     const ordered_json& name = place.Member(volume, "file");
     if (!name.is_string() || name.get<std::string>().empty())
       place.Fail("\"file\" is not a file name");
@@ -152,7 +76,7 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
       place.Fail(name.get<std::string>() + " is named twice");
     if (volume.contains("geometry"))
       pose.geometry = ReadGeometry(volume["geometry"], place.In("geometry"));
-    const Place matrixPlace = place.In("VolumeToWorld");
+    const JsonPlace matrixPlace = place.In("VolumeToWorld");
     const Eigen::Matrix4d matrix = matrixPlace.Rows<4>(place.Member(volume, "VolumeToWorld"));
     if (!IsRotation(matrix.topLeftCorner<3, 3>()) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
       matrixPlace.Fail("the matrix is not rigid (a rotation, a translation, and 0 0 0 1 below)");
@@ -182,9 +106,9 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
                        {"geometry",
                         {{"origin", ListOf(g.origin)},
                          {"spacing", ListOf(g.spacing)},
-                         {"direction", RowsOf(g.direction)},
+                         {"direction", JsonPlace::RowsOf(g.direction)},
                          {"dimensions", g.dimensions}}},
-                       {"VolumeToWorld", RowsOf(pose.volumeToWorld.matrix())}});
+                       {"VolumeToWorld", JsonPlace::RowsOf(pose.volumeToWorld.matrix())}});
   }
   const ordered_json root{{"schema", Schema}, {"unit", "mm"}, {"frame", "LPS"}, {"volumes", volumes}};
 

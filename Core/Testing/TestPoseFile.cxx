@@ -152,6 +152,8 @@ TEST_F(PoseFile, RefusesWhatIsNotAPoseFile)
   ASSERT_EQ(ReadPoses(Write(Document(good))).size(), 1u);
   ExpectRefused("", "JSON");
   ExpectRefused(Document(good).substr(0, 60), "JSON");
+  ExpectRefused(std::string(1000000, '['), "nested");
+  ExpectRefused(Document(std::string(100, '[') + std::string(100, ']')), "nested");
   ExpectRefused("[1,2]", "schema");
   ExpectRefused(Document(good, R"("schema":"echorama-poses-2","unit":"mm","frame":"LPS")"), "schema");
   ExpectRefused(Document(good, R"("schema":"echorama-poses-1","unit":"cm","frame":"LPS")"), "unit");

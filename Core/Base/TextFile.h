@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <cstddef>
+#include <string>
+
+namespace echorama {
+
+/// All of a small file. \throws Error(FileSystem) when it cannot be read or is not a plain file, Error(BadFile) when it has
+/// more than \a limit bytes: then it is something else.
+std::string ReadTextFile(const std::string& path, std::size_t limit = 16 << 20);
+
+} // namespace echorama
