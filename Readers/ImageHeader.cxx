@@ -6,6 +6,7 @@
 #include "Readers/ImageHeader.h"
 #include "Core/Base/Error.h"
 #include "Readers/HeaderLines.h"
+#include "Readers/KretzFile.h"
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -74,6 +75,8 @@ FileFormat FormatOfContent(const std::string& path)
   if (start.empty())
     fail(stream.bad() ? Error::Kind::FileSystem : Error::Kind::BadFile, stream.bad() ? "it cannot be read" : "the file is empty");
 
+  if (LooksLikeKretz(start))
+    return FileFormat::Kretz;
   if (start.compare(0, 4, "NRRD") == 0)
     return FileFormat::Nrrd;
   if (start.find("<VTKFile") != std::string::npos && start.find("ImageData") != std::string::npos)
@@ -85,7 +88,7 @@ FileFormat FormatOfContent(const std::string& path)
 
 const char* KnownFormats()
 {
-  return "MetaImage, NRRD and VTK image file";
+  return "MetaImage, NRRD, GE Kretz and VTK image file";
 }
 
 FileFormat FormatOfName(const std::string& path)

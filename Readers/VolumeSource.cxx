@@ -2,6 +2,7 @@
 // The one place that knows which file holds which format. Each format lies in a file of its own.
 #include "Readers/VolumeSource.h"
 #include "Core/Base/Error.h"
+#include "Readers/KretzFile.h"
 #include "Readers/VolumeFile.h"
 
 namespace echorama {
@@ -11,12 +12,14 @@ void VolumeSource::ReadBeams(std::size_t, void*, const Progress&)
   throw Error(Error::Kind::BadInput, content_.path + ": it holds no beams");
 }
 
-std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters&)
+std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
 {
   switch (FormatOfContent(path)) {
   case FileFormat::MetaImage:
   case FileFormat::Nrrd:
     return OpenHeaderVolume(path);
+  case FileFormat::Kretz:
+    return OpenKretz(path, parameters);
   default:
     throw Error(Error::Kind::BadFile, path + ": the content is none of " + KnownFormats());
   }
