@@ -3,6 +3,7 @@
 // header promises is compared with what the disk holds first: a lying header must not make us ask for terabytes.
 #include "Readers/VolumeFile.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Memory.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
@@ -12,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <unistd.h>
 
 namespace fs = std::filesystem;
 
@@ -25,17 +25,6 @@ constexpr std::uint64_t ChunkBytes = 1 << 24;
 [[noreturn]] void FailFile(const std::string& path, const std::string& reason)
 {
   throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
-
-// Bytes that this machine can give without swapping.
-double FreeMemory()
-{
-  std::ifstream stream("/proc/meminfo");
-  std::string word;
-  while (stream >> word)
-    if (double kilobytes = 0.0; word == "MemAvailable:" && stream >> kilobytes)
-      return kilobytes * 1024.0;
-  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
 }
 
 std::uint64_t SizeOfData(const ImageHeader& header)
