@@ -8,21 +8,43 @@
 
 namespace echorama {
 
-/// How a probe geometry is fitted to a valid region.
-struct ProbeFitParameters {};
+/// How a probe geometry is fitted to a valid region, and what is refused.
+struct ProbeFitParameters {
+  double minimumOverlap = 0.8; ///< fits with less overlap are refused, [0, 1]
+  /// Fits with a greater residual are refused: a part of the region's size, which is the cube root of its volume (the square
+  /// root of the area of a single slice), but never less than a cell of the outline; > 0.
+  double maximumResidual = 0.05;
+  int outlinePoints = 4000; ///< how many points of the outline take part in the last fit, >= 100
+};
 
 /// A probe geometry that was found, and how well it explains the region.
 struct ProbeFit {
-  ProbeGeometry geometry;
+  ProbeGeometry geometry;               ///< depthMin is 0: the face is put at the region's near edge
   Pose probeToWorld = Pose::Identity(); ///< the probe frame of ProbeGeometry in the world of the mask
-  double residualMm = 0.0;              ///< root mean square distance of the region's outline from the model's
-  double overlap = 0.0;                 ///< intersection over union of region and model, [0, 1]
-  std::vector<std::string> notes;       ///< what the region leaves open, sentences for people
+  /// Root mean square distance of the region's outline from the model's surface, mm. The ends of the grid are no outline
+  /// (unless there is no other); all else counts in full, also corners that are missing and ragged edges.
+  double residualMm = 0.0;
+  double typicalMm = 0.0;         ///< median distance of the outline from the model's surface, mm
+  double overlap = 0.0;           ///< intersection over union of region (holes filled) and model within the grid, [0, 1]
+  std::vector<std::string> notes; ///< what the region leaves open, sentences for people
 };
 
 /// Fits the geometry whose fan fills the region: apex, radii, fan and sweep angles, depth range. A mask of one slice
 /// (dimensions[2] == 1) is fitted by a single plane (ProbeGeometry::IsPlane).
-/// \throws Error(BadInput) when nothing is valid, Error(NotPossible) when no fan explains the region, Error(Cancelled).
+///
+/// Nothing is assumed about where the probe is. Where the grid cuts the region (its bottom is often cut flat) the model may go
+/// on beyond. Holes, ragged edges and missing corners cost accuracy, but do not pull the fit (they are outvoted).
+///
+/// What a region cannot tell: where along the beams the face lies. By convention depth 0 is the near edge of the region, so
+/// that fanWidth and sweepWidth are what the first samples span; the radii of the face plus the depth of the first sample are
+/// fanWidth / fanAngle and sweepWidth / sweepAngle. Where region and model look alike from several sides (a box), the depth
+/// runs along the last index axis (of a single slice: the second) and the array along the first, as in a grid made by
+/// ScanConversionGrid with its y and z exchanged. +x of the probe is the side towards which the indices grow. The notes say when
+/// such a choice was made.
+///
+/// The result does not depend on the number of threads. Cost: one pass over the voxels, then some 0.1 s whatever the size.
+/// \throws Error(BadInput) when nothing is valid or mask and geometry do not agree, Error(InvalidParameter),
+/// Error(NotPossible) when no fan explains the region (the message says how far the best one is off), Error(Cancelled).
 ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, const ProbeFitParameters& parameters = {},
                   const Progress& progress = {});
 

@@ -1,0 +1,763 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The surface of a fan has six faces: first and last beam, first and last step of the sweep, first and last sample. In the
+// coordinates of the beams (the exact inverse of the geometry) each is a plane, so the signed distance of a point from the
+// fan is the greatest of six numbers in mm, and cheap.
+//
+// 1. Outline: a few ten thousand points between blocks of voxels (OutlineRegion), thinned evenly.
+// 2. Starts: a fan is symmetric about two planes, so the axes of inertia of the region are those of the probe, unless two
+//    moments agree or a part is missing. They, and they turned by 45 degrees about each, with depth along any of them, times
+//    a few fan and sweep angles, widths from the extent: some thousand models, rated by distance and overlap of a few hundred
+//    points.
+// 3. The best are fitted to the outline by Levenberg-Marquardt with Tukey's weights, whose reach shrinks from a part of the
+//    region's size to about a cell: what no model explains (a missing corner, a ragged edge) is outvoted. The Jacobian is
+//    analytic: a face moves under a parameter by minus its normal times the derivative of its point. Unknowns: the pose (6), fan
+//    angle and width, sweep angle and width, length of the beams. None is infinite for flat faces or points.
+// 4. The best of these are fitted once more with all points; overlap and residual of the winner decide whether it is put out.
+//
+// A point at the end of the grid must not lie outside the model; when it lies inside, the model goes on beyond the grid, which
+// costs next to nothing.
+#include "Core/Geometry/ProbeFit.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/RegionOutline.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+namespace echorama {
+namespace {
+
+constexpr double pi = 3.141592653589793;
+constexpr double degree = pi / 180.0;
+
+constexpr int mostCells = 1 << 18;
+// Ratings (overlap less misfit) that differ by less say the same, and nearly so.
+constexpr double asGood = 0.004, nearlyAsGood = 0.02;
+constexpr double mostHoles = 1.0 / 3.0;                    // of the filled region
+constexpr double leastSeenSide = 0.15, leastSeenEnd = 0.4; // of each side, and of the near or the far end
+constexpr double leastWeight = 0.01;                       // of a point at the end of the grid that is inside the model
+
+// The unknowns: a twist of the probe frame, then the shape.
+enum Unknown { FanAngle = 6, FanWidth, SweepAngle, SweepWidth, Length, unknowns };
+using Vector = Eigen::Matrix<double, unknowns, 1>;
+using Matrix = Eigen::Matrix<double, unknowns, unknowns>;
+
+// Solves a symmetric positive definite system: Cholesky, in this order on every machine.
+Vector Solved(Matrix a, Vector b)
+{
+  for (int j = 0; j < unknowns; ++j)
+    for (int i = j; i < unknowns; ++i) {
+      double sum = a(i, j);
+      for (int k = 0; k < j; ++k)
+        sum -= a(i, k) * a(j, k);
+      a(i, j) = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / a(j, j);
+    }
+  for (int i = 0; i < unknowns; ++i) {
+    for (int k = 0; k < i; ++k)
+      b[i] -= a(i, k) * b[k];
+    b[i] /= a(i, i);
+  }
+  for (int i = unknowns; i-- > 0;) {
+    for (int k = i + 1; k < unknowns; ++k)
+      b[i] -= a(k, i) * b[k];
+    b[i] /= a(i, i);
+  }
+  return b;
+}
+
+struct Model {
+  Pose probeToWorld = Pose::Identity();
+  ProbeGeometry shape; // depthMin = 0
+
+  double Get(int unknown) const { return const_cast<Model*>(this)->Shape(unknown); }
+  double& Shape(int unknown)
+  {
+    return unknown == FanAngle     ? shape.fanAngle
+           : unknown == FanWidth   ? shape.fanWidth
+           : unknown == SweepAngle ? shape.sweepAngle
+           : unknown == SweepWidth ? shape.sweepWidth
+                                   : shape.depthMax;
+  }
+};
+
+enum Face { FanSide, SweepSide, Near, Far, faces };
+
+// A point in the coordinates of the beams, with the face that is nearest when it is inside, or that it is furthest beyond.
+struct Located {
+  ProbeArc::Place sweep, fan; // sweep.depth is the distance from the face in the fan's plane
+  double distance = 0.0;      // mm, negative inside
+  Face face = FanSide;
+};
+
+Located Locate(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe)
+{
+  Located at;
+  const bool plane = shape.IsPlane();
+  at.sweep = plane ? ProbeArc::Place{0.0, inProbe.z()} : shape.Sweep().PlaceOf(inProbe.y(), inProbe.z());
+  at.fan = shape.Fan().PlaceOf(inProbe.x(), at.sweep.depth);
+  const auto beyond = [&at](Face face, double distance) {
+    if (distance > at.distance) {
+      at.distance = distance;
+      at.face = face;
+    }
+  };
+  at.distance = (std::abs(at.fan.along) - 0.5) * std::abs(shape.Fan().Span(at.fan.depth));
+  if (!plane)
+    beyond(SweepSide, (std::abs(at.sweep.along) - 0.5) * std::abs(shape.Sweep().Span(at.sweep.depth)));
+  beyond(Near, shape.depthMin - at.fan.depth);
+  beyond(Far, at.fan.depth - shape.depthMax);
+  return at;
+}
+
+double Sinc(double a)
+{
+  return std::abs(a) < 1e-4 ? 1.0 - a * a / 6.0 : std::sin(a) / a;
+}
+double SincDerivative(double a)
+{
+  return std::abs(a) < 1e-2 ? a * (-1.0 / 3.0 + a * a / 30.0) : (std::cos(a) - std::sin(a) / a) / a;
+}
+
+// How ProbeArc::PointOf moves with the angle and with the width, at a fixed place.
+struct ArcDerivatives {
+  Eigen::Vector2d angle, width;
+};
+ArcDerivatives DerivativesOf(const ProbeArc& arc, const ProbeArc::Place& at)
+{
+  const double s = at.along, turn = arc.angle * s, half = 0.5 * turn;
+  const double sine = std::sin(half), cosine = std::cos(half);
+  ArcDerivatives d;
+  d.width = Eigen::Vector2d(s * Sinc(turn), -s * sine * Sinc(half));
+  d.angle.x() = arc.width * s * s * SincDerivative(turn) + at.depth * s * std::cos(turn);
+  d.angle.y() = -0.5 * arc.width * s * s * (cosine * Sinc(half) + sine * SincDerivative(half)) - at.depth * s * std::sin(turn);
+  return d;
+}
+
+// How the signed distance of a point changes with the unknowns.
+Vector GradientOf(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe, Located at)
+{
+  const double fanSign = at.fan.along < 0.0 ? -1.0 : 1.0, sweepSign = at.sweep.along < 0.0 ? -1.0 : 1.0;
+  // The foot of the point on the face.
+  if (at.face == FanSide)
+    at.fan.along = 0.5 * fanSign;
+  else if (at.face == SweepSide)
+    at.sweep.along = 0.5 * sweepSign;
+  else
+    at.fan.depth = at.face == Near ? shape.depthMin : shape.depthMax;
+  const double phi = shape.fanAngle * at.fan.along, psi = shape.sweepAngle * at.sweep.along;
+  const Eigen::Vector3d outward(0.0, std::sin(psi), std::cos(psi)); // along the middle beam of the plane
+  const Eigen::Vector3d beam = std::sin(phi) * Eigen::Vector3d::UnitX() + std::cos(phi) * outward;
+  Eigen::Vector3d normal = at.face == Far ? beam : Eigen::Vector3d(-beam);
+  if (at.face == FanSide)
+    normal = fanSign * (std::cos(phi) * Eigen::Vector3d::UnitX() - std::sin(phi) * outward);
+  else if (at.face == SweepSide)
+    normal = sweepSign * Eigen::Vector3d(0.0, std::cos(psi), -std::sin(psi));
+
+  Vector gradient;
+  gradient.head<3>() = -normal;
+  gradient.segment<3>(3) = normal.cross(inProbe);
+  const ArcDerivatives fan = DerivativesOf(shape.Fan(), at.fan), sweep = DerivativesOf(shape.Sweep(), at.sweep);
+  const double outwardPart = normal.dot(outward);
+  gradient[FanAngle] = -(normal.x() * fan.angle.x() + outwardPart * fan.angle.y());
+  gradient[FanWidth] = -(normal.x() * fan.width.x() + outwardPart * fan.width.y());
+  gradient[SweepAngle] = -normal.tail<2>().dot(sweep.angle);
+  gradient[SweepWidth] = -normal.tail<2>().dot(sweep.width);
+  gradient[Length] = at.face == Far ? -1.0 : 0.0;
+  return gradient;
+}
+
+using Points = std::vector<RegionOutline::Point>;
+
+// Every n-th of a list, n chosen for at most \a count.
+template <class T>
+std::vector<T> Thinned(const std::vector<T>& all, std::size_t count)
+{
+  if (all.size() <= count)
+    return all;
+  std::vector<T> some;
+  some.reserve(count);
+  const double step = static_cast<double>(all.size()) / static_cast<double>(count);
+  for (std::size_t i = 0; i < count; ++i)
+    some.push_back(all[static_cast<std::size_t>((static_cast<double>(i) + 0.5) * step)]);
+  return some;
+}
+
+// The middle of a cell and how much of it is valid.
+struct Cell {
+  Eigen::Vector3d position;
+  double filled = 0.0;
+};
+
+// Intersection over union of region and model, by cells; one that the surface cuts counts in part.
+double OverlapOf(const Model& model, const std::vector<Cell>& cells, double cellMm)
+{
+  const Pose worldToProbe = model.probeToWorld.inverse();
+  double both = 0.0, either = 0.0;
+  for (const Cell& cell : cells) {
+    const double inside = std::clamp(0.5 - Locate(model.shape, worldToProbe * cell.position).distance / cellMm, 0.0, 1.0);
+    both += std::min(inside, cell.filled);
+    either += std::max(inside, cell.filled);
+  }
+  return either > 0.0 ? both / either : 0.0;
+}
+
+// Mean distance of the outline, each at most \a cap, as a part of it: 0 ... 1. Ends of the grid count when they are outside.
+double MisfitOf(const Model& model, const Points& points, double cap)
+{
+  const Pose worldToProbe = model.probeToWorld.inverse();
+  double sum = 0.0, weights = 0.0;
+  for (const RegionOutline::Point& point : points) {
+    const double distance = Locate(model.shape, worldToProbe * point.position).distance;
+    const double weight = point.atGrid && distance < 0.0 ? leastWeight : 1.0;
+    sum += weight * std::min(std::abs(distance), cap);
+    weights += weight;
+  }
+  return sum / (weights * cap);
+}
+
+// The robust least squares of a model to points, at one reach of Tukey's weight.
+class Problem {
+public:
+  Problem(const Points& points, double reach, bool plane) : points_(points), reach_(reach), plane_(plane) {}
+
+  // The sum that is minimised. With a matrix, also the normal equations.
+  double Evaluate(const Model& model, Matrix* hessian = nullptr, Vector* slope = nullptr) const
+  {
+    const Pose worldToProbe = model.probeToWorld.inverse();
+    double cost = 0.0;
+    if (hessian) {
+      hessian->setZero();
+      slope->setZero();
+    }
+    for (const RegionOutline::Point& point : points_) {
+      const Eigen::Vector3d inProbe = worldToProbe * point.position;
+      const Located at = Locate(model.shape, inProbe);
+      const double kind = point.atGrid && at.distance < 0.0 ? leastWeight : 1.0;
+      const double ratio = at.distance / reach_, remains = std::max(0.0, 1.0 - ratio * ratio);
+      cost += kind * (1.0 - remains * remains * remains);
+      if (!hessian || remains == 0.0)
+        continue;
+      const double weight = kind * remains * remains;
+      const Vector gradient = GradientOf(model.shape, inProbe, at);
+      hessian->selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
+      *slope += (weight * at.distance) * gradient;
+    }
+    return cost;
+  }
+
+  // At most \a steps steps downhill. Returns false when there is nowhere to go.
+  bool Improve(Model& model, int steps) const
+  {
+    double damping = 1e-3;
+    Matrix hessian;
+    Vector slope;
+    double cost = Evaluate(model, &hessian, &slope);
+    for (int step = 0; step < steps; ++step) {
+      bool better = false;
+      double gain = 0.0;
+      for (int trial = 0; trial < 6 && !better; ++trial) {
+        const Model moved = Moved(model, hessian, slope, damping);
+        const double movedCost = Evaluate(moved);
+        better = movedCost < cost;
+        if (better) {
+          gain = cost - movedCost;
+          model = moved;
+          damping = std::max(1e-9, damping * 0.2);
+        } else {
+          damping *= 8.0;
+        }
+      }
+      if (!better || gain < 1e-7 * cost)
+        return better;
+      cost = Evaluate(model, &hessian, &slope);
+    }
+    return true;
+  }
+
+private:
+  bool IsFree(int unknown) const
+  {
+    return !plane_ || unknown == 0 || unknown == 2 || unknown == 4 || unknown == FanAngle || unknown == FanWidth ||
+           unknown == Length;
+  }
+
+  // One damped step. Shape numbers do not fall below 0: one that would is held there and the others are solved for again.
+  Model Moved(const Model& model, const Matrix& hessian, const Vector& slope, double damping) const
+  {
+    std::array<bool, unknowns> held;
+    Vector change = Vector::Zero();
+    for (int unknown = 0; unknown < unknowns; ++unknown)
+      held[unknown] = !IsFree(unknown);
+    for (bool again = true; again;) {
+      again = false;
+      Matrix system = hessian.selfadjointView<Eigen::Lower>();
+      Vector right = -slope;
+      const double least = 1e-12 * (hessian.diagonal().maxCoeff() + 1e-30);
+      for (int unknown = 0; unknown < unknowns; ++unknown) {
+        system(unknown, unknown) += damping * hessian(unknown, unknown) + least;
+        if (held[unknown]) {
+          // What the others see of a number that is clamped: it goes to 0, or stays.
+          right -= system.col(unknown) * change[unknown];
+        }
+      }
+      for (int unknown = 0; unknown < unknowns; ++unknown)
+        if (held[unknown]) {
+          system.row(unknown).setZero();
+          system.col(unknown).setZero();
+          system(unknown, unknown) = 1.0;
+          right[unknown] = change[unknown];
+        }
+      change = Solved(system, right);
+      for (int unknown = FanAngle; unknown < unknowns; ++unknown)
+        if (!held[unknown] && model.Get(unknown) + change[unknown] < 0.0) {
+          held[unknown] = true;
+          change[unknown] = -model.Get(unknown);
+          again = true;
+        }
+      if (again)
+        for (int unknown = 0; unknown < unknowns; ++unknown)
+          if (!held[unknown])
+            change[unknown] = 0.0;
+    }
+    Model moved = model;
+    moved.probeToWorld = model.probeToWorld * Exp(change.head<6>());
+    for (int unknown = FanAngle; unknown < unknowns; ++unknown)
+      if (IsFree(unknown))
+        moved.Shape(unknown) = std::max(0.0, model.Get(unknown) + change[unknown]);
+    moved.shape.fanAngle = std::min(moved.shape.fanAngle, 1.999 * pi);
+    moved.shape.sweepAngle = std::min(moved.shape.sweepAngle, 1.999 * pi);
+    moved.shape.depthMax = std::max(moved.shape.depthMax, 0.5 * model.shape.depthMax);
+    return moved;
+  }
+
+  const Points& points_;
+  double reach_;
+  bool plane_;
+};
+
+// Fits with a reach that shrinks from \a from to \a to, mm.
+void Refine(Model& model, const Points& points, bool plane, double from, double to, int steps)
+{
+  for (double reach = from; reach > 1.5 * to; reach *= 0.5)
+    Problem(points, reach, plane).Improve(model, 4);
+  Problem(points, to, plane).Improve(model, steps);
+}
+
+// All that the search needs to know of a region.
+struct Region {
+  RegionOutline outline;
+  bool plane = false;
+  double size = 0.0;               // mm
+  Eigen::Vector3d centroid;        // mm
+  Eigen::Matrix3d axes;            // of inertia; of a slice the last is its normal
+  std::vector<Cell> cells, sample; // all cells; some of them
+  Points few, some, many;
+
+  double Reach() const { return 1.75 * outline.cellMm; }
+};
+
+Region RegionOf(RegionOutline outline, int outlinePoints)
+{
+  Region region;
+  const auto& n = outline.filled.Dimensions();
+  region.plane = outline.geometry.dimensions[2] == 1;
+  region.size = std::pow(outline.validMm, region.plane ? 1.0 / 2.0 : 1.0 / 3.0);
+  region.cells.reserve(static_cast<std::size_t>(outline.filled.View().Size()));
+  double sum = 0.0;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  const Eigen::Vector3d middle = outline.geometry.Centre();
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) {
+        const double filled = outline.filled.View()(i, j, k);
+        region.cells.push_back({outline.CellPosition(i, j, k), filled});
+        const Eigen::Vector3d at = region.cells.back().position - middle;
+        sum += filled;
+        first += filled * at;
+        second += filled * at * at.transpose();
+      }
+  first /= sum;
+  region.centroid = middle + first;
+  if (region.plane) {
+    // In the plane the starts turn all around.
+    region.axes = outline.geometry.direction;
+  } else {
+    region.axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second / sum - first * first.transpose()).eigenvectors();
+    if (region.axes.determinant() < 0.0)
+      region.axes.col(2) = -region.axes.col(2);
+  }
+  region.sample = Thinned(region.cells, 1500);
+  region.few = Thinned(outline.points, 300);
+  region.some = Thinned(outline.points, std::min(600, outlinePoints));
+  region.many = Thinned(outline.points, static_cast<std::size_t>(outlinePoints));
+  region.outline = std::move(outline);
+  return region;
+}
+
+using Frames = std::vector<Eigen::Matrix3d>; // columns: x, y and z of the probe
+
+// All ways to lay depth, array and sweep along three axes; of a slice, depth and array along the first two.
+Frames FramesAlong(const Eigen::Matrix3d& axes, bool plane)
+{
+  Frames frames;
+  for (int depth = 0; depth < (plane ? 2 : 3); ++depth)
+    for (const double sign : {1.0, -1.0})
+      for (int array = 0; array < (plane ? 2 : 3); ++array)
+        if (array != depth) {
+          const Eigen::Vector3d z = sign * axes.col(depth), x = axes.col(array);
+          frames.emplace_back();
+          frames.back() << x, z.cross(x), z;
+        }
+  return frames;
+}
+
+Frames StartFrames(const Region& region)
+{
+  std::vector<Eigen::Vector3d> turns;
+  if (region.plane)
+    for (int turn = 0; turn < 4; ++turn)
+      turns.emplace_back(0.0, 0.0, turn * pi / 8.0);
+  else
+    for (int axis = -1; axis < 3; ++axis)
+      turns.push_back(axis < 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                               : Eigen::Vector3d(0.25 * pi * Eigen::Vector3d::Unit(axis)));
+  Frames frames;
+  for (const Eigen::Vector3d& turn : turns) {
+    const Frames more = FramesAlong(region.axes * ExpRotation(turn), region.plane);
+    frames.insert(frames.end(), more.begin(), more.end());
+  }
+  return frames;
+}
+
+// The arc of \a angle whose last samples, \a length beyond the first, span \a extent across.
+double WidthFor(double angle, double extent, double length)
+{
+  if (angle == 0.0)
+    return extent;
+  return angle * std::max(0.0, 0.5 * extent / std::sin(std::min(0.5 * angle, 0.5 * pi)) - length);
+}
+
+struct Rated {
+  Model model;
+  double rating = -std::numeric_limits<double>::infinity(); // overlap less misfit
+};
+
+// The starts of one frame: a few fan and sweep angles.
+std::vector<Rated> StartsOf(const Region& region, const Eigen::Matrix3d& frame)
+{
+  const Eigen::Matrix3d toFrame = frame.transpose();
+  std::array<std::vector<double>, 3> along;
+  for (const RegionOutline::Point& point : region.few) {
+    const Eigen::Vector3d at = toFrame * (point.position - region.centroid);
+    for (int a = 0; a < 3; ++a)
+      along[a].push_back(at[a]);
+  }
+  Eigen::Vector3d low, high; // all but a few points lie between
+  for (int a = 0; a < 3; ++a) {
+    const auto quantile = [&values = along[a]](double q) {
+      const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+      std::nth_element(values.begin(), at, values.end());
+      return *at;
+    };
+    low[a] = quantile(0.01);
+    high[a] = quantile(0.99);
+  }
+  const Eigen::Vector3d extent = high - low;
+
+  // Where the middle beam, through the centroid, comes in: of the points near it the first. The near edge of a fan is hollow.
+  double top = std::numeric_limits<double>::infinity();
+  for (const RegionOutline::Point& point : region.few) {
+    const Eigen::Vector3d at = toFrame * (point.position - region.centroid);
+    if (std::abs(at.x()) < 0.1 * extent.x() && (region.plane || std::abs(at.y()) < 0.1 * extent.y()))
+      top = std::min(top, at.z());
+  }
+  top = std::clamp(top, low.z(), high.z() - 0.1 * extent.z());
+  const double length = high.z() - top;
+
+  static constexpr double angles[] = {0.0, 0.35, 0.7, 1.2, 1.9, 2.8};
+  std::vector<Rated> starts;
+  for (const double fan : angles)
+    for (const double sweep : angles) {
+      if (region.plane && sweep > 0.0)
+        continue;
+      Rated start;
+      start.model.shape = {
+          fan, WidthFor(fan, extent.x(), length), sweep, region.plane ? 0.0 : WidthFor(sweep, extent.y(), length), 0.0, length};
+      start.model.probeToWorld.linear() = frame;
+      start.model.probeToWorld.translation() = region.centroid + frame.col(2) * top;
+      start.rating = -MisfitOf(start.model, region.few, 0.1 * region.size);
+      starts.push_back(start);
+    }
+  return starts;
+}
+
+void SortByRating(std::vector<Rated>& list)
+{
+  std::stable_sort(list.begin(), list.end(), [](const Rated& a, const Rated& b) { return a.rating > b.rating; });
+}
+
+// Whether two models are one, to within what a fit leaves.
+bool IsAlike(const Model& a, const Model& b, double size)
+{
+  const Eigen::Matrix3d turn = a.probeToWorld.linear().transpose() * b.probeToWorld.linear();
+  // Turned by half about the middle beam a fan is the same.
+  return turn(2, 2) > std::cos(5.0 * degree) && std::abs(turn(0, 0)) > std::cos(5.0 * degree) &&
+         (a.probeToWorld.translation() - b.probeToWorld.translation()).norm() < 0.05 * size &&
+         std::abs(a.shape.fanAngle - b.shape.fanAngle) < 5.0 * degree &&
+         std::abs(a.shape.sweepAngle - b.shape.sweepAngle) < 5.0 * degree;
+}
+
+std::vector<Rated> Distinct(const std::vector<Rated>& sorted, std::size_t most, double size)
+{
+  std::vector<Rated> kept;
+  for (const Rated& candidate : sorted)
+    if (kept.size() < most &&
+        std::none_of(kept.begin(), kept.end(), [&](const Rated& other) { return IsAlike(candidate.model, other.model, size); }))
+      kept.push_back(candidate);
+  return kept;
+}
+
+// Overlap less misfit, of all cells or of some.
+double RatingOf(const Model& model, const Region& region, const std::vector<Cell>& cells, const Points& points)
+{
+  const double cellMm = region.outline.cellMm;
+  return OverlapOf(model, cells, cellMm) - 0.5 * MisfitOf(model, points, std::max(0.05 * region.size, 2.0 * cellMm));
+}
+
+// The best model, and those that explain the region as well, or nearly so.
+struct Choice {
+  Model best;
+  std::vector<Rated> others; // distinct from it, with their ratings less its own
+};
+
+// How well a model follows the axes of the grid, where the region leaves the choice.
+double ConventionOf(const Model& model, const Region& region)
+{
+  const Eigen::Matrix3d& axes = region.outline.geometry.direction;
+  const Eigen::Matrix3d turn = model.probeToWorld.linear();
+  return turn.col(2).dot(axes.col(region.plane ? 1 : 2)) + 0.3 * std::abs(turn.col(0).dot(axes.col(0)));
+}
+
+Choice Choose(const Region& region, const Progress& progress)
+{
+  // 2. starts
+  const Frames frames = StartFrames(region);
+  std::vector<std::vector<Rated>> perFrame(frames.size());
+  ParallelFor(static_cast<std::ptrdiff_t>(frames.size()), progress.Part(0.0, 0.15),
+              [&](std::ptrdiff_t i) { perFrame[i] = StartsOf(region, frames[i]); });
+  std::vector<Rated> candidates;
+  for (const std::vector<Rated>& starts : perFrame)
+    candidates.insert(candidates.end(), starts.begin(), starts.end());
+  SortByRating(candidates);
+  candidates = Distinct(candidates, region.plane ? 12 : 24, region.size);
+
+  // 3. each to its optimum
+  const auto refineAll = [&](const Progress& part) {
+    ParallelFor(static_cast<std::ptrdiff_t>(candidates.size()), part, [&](std::ptrdiff_t i) {
+      Refine(candidates[i].model, region.some, region.plane, 0.2 * region.size, region.Reach(), 10);
+      candidates[i].rating = RatingOf(candidates[i].model, region, region.sample, region.some);
+    });
+    SortByRating(candidates);
+  };
+  refineAll(progress.Part(0.15, 0.6));
+
+  // The same solid may be a fan seen from elsewhere: all ways to lay the axes of the best.
+  const Rated best = candidates.front();
+  candidates.clear();
+  Eigen::Matrix3d axes = best.model.probeToWorld.linear();
+  if (region.plane)
+    axes.col(1).swap(axes.col(2)); // the normal last
+  for (const Eigen::Matrix3d& frame : FramesAlong(axes, region.plane)) {
+    std::vector<Rated> starts = StartsOf(region, frame);
+    SortByRating(starts);
+    candidates.push_back(starts.front());
+  }
+  refineAll(progress.Part(0.6, 0.8));
+  candidates.insert(candidates.begin(), best);
+  SortByRating(candidates);
+  candidates = Distinct(candidates, 4, region.size);
+  const double bestRating = candidates.front().rating;
+  candidates.erase(std::find_if(candidates.begin(), candidates.end(),
+                                [&](const Rated& candidate) { return candidate.rating < bestRating - 2.0 * nearlyAsGood; }),
+                   candidates.end());
+
+  // 4. the best with all points
+  ParallelFor(static_cast<std::ptrdiff_t>(candidates.size()), progress.Part(0.8, 1.0), [&](std::ptrdiff_t i) {
+    Refine(candidates[i].model, region.many, region.plane, 4.0 * region.Reach(), region.Reach(), 30);
+    candidates[i].rating = RatingOf(candidates[i].model, region, region.cells, region.many);
+  });
+  SortByRating(candidates);
+  auto chosen = candidates.begin();
+  for (auto other = chosen; other != candidates.end(); ++other)
+    if (other->rating > candidates.front().rating - asGood &&
+        ConventionOf(other->model, region) > ConventionOf(chosen->model, region) + 0.05)
+      chosen = other;
+  Choice choice{chosen->model, {}};
+  for (auto other = candidates.begin(); other != candidates.end(); ++other)
+    if (other != chosen && other->rating > chosen->rating - nearlyAsGood)
+      choice.others.push_back({other->model, other->rating - chosen->rating});
+  return choice;
+}
+
+// How well the outline lies on the model.
+struct Residual {
+  double rms = 0.0, median = 0.0; // mm
+};
+
+Residual ResidualOf(const Model& model, const Points& points)
+{
+  const Pose worldToProbe = model.probeToWorld.inverse();
+  const bool onlyGrid = std::all_of(points.begin(), points.end(), [](const auto& point) { return point.atGrid; });
+  std::vector<double> distances;
+  double sum = 0.0;
+  for (const RegionOutline::Point& point : points) {
+    const double distance = Locate(model.shape, worldToProbe * point.position).distance;
+    if (point.atGrid && !onlyGrid && distance < 0.0)
+      continue;
+    distances.push_back(std::abs(distance));
+    sum += distance * distance;
+  }
+  if (distances.empty())
+    return {};
+  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2), distances.end());
+  return {std::sqrt(sum / static_cast<double>(distances.size())), distances[distances.size() / 2]};
+}
+
+std::string Text(const char* format, double value)
+{
+  char text[200];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+// How much of each face of the model the outline touches, of FanSide and SweepSide the lesser of both sides, [0, 1].
+std::array<double, faces> SeenParts(const Model& model, const Region& region)
+{
+  constexpr int across = 6;
+  const int bins = region.plane ? across : across * across;
+  const Pose worldToProbe = model.probeToWorld.inverse();
+  std::vector<std::array<bool, 2>> touched(static_cast<std::size_t>(faces * bins), {false, false});
+  const auto bin = [](double position) { return std::clamp(static_cast<int>(position * across), 0, across - 1); };
+  for (const RegionOutline::Point& point : region.many) {
+    const Located at = Locate(model.shape, worldToProbe * point.position);
+    if (std::abs(at.distance) > region.Reach())
+      continue;
+    const int fan = bin(at.fan.along + 0.5), sweep = region.plane ? 0 : bin(at.sweep.along + 0.5);
+    const int depth = bin(at.fan.depth / model.shape.depthMax);
+    const int first = at.face == FanSide ? depth : fan, second = at.face == SweepSide ? depth : sweep;
+    const bool positive = at.face == FanSide ? at.fan.along > 0.0 : at.face == SweepSide && at.sweep.along > 0.0;
+    touched[static_cast<std::size_t>(at.face * bins + second * across + first)][positive] = true;
+  }
+  std::array<double, faces> seen{};
+  for (int face = 0; face < faces; ++face) {
+    std::array<int, 2> count{0, 0};
+    for (int i = 0; i < bins; ++i)
+      for (const int side : {0, 1})
+        count[side] += touched[static_cast<std::size_t>(face * bins + i)][side];
+    seen[face] = static_cast<double>(face == FanSide || face == SweepSide ? std::min(count[0], count[1]) : count[0]) / bins;
+  }
+  if (region.plane)
+    seen[SweepSide] = 1.0;
+  return seen;
+}
+
+// What the region leaves open, in sentences.
+std::vector<std::string> NotesOn(const Choice& choice, const Region& region, const std::array<double, faces>& seen)
+{
+  const ProbeGeometry& shape = choice.best.shape;
+  const double cell = region.outline.cellMm;
+  std::vector<std::string> notes;
+  if (region.outline.coversGrid)
+    notes.push_back("Every voxel is valid: the fan is the grid, which need not be what the probe saw.");
+  if (region.outline.holesPart > 0.01)
+    notes.push_back(Text("Holes (%.0f%% of the region) were taken as part of it.", 100.0 * region.outline.holesPart));
+  if (region.outline.largestPart < 0.99)
+    notes.push_back(Text("%.0f%% of the region does not hang together with the rest and was left out of the fit.",
+                         100.0 * (1.0 - region.outline.largestPart)));
+
+  const auto unseen = [&](Face face, const char* sentence) {
+    if (seen[face] < 0.5)
+      notes.push_back(Text(sentence, 100.0 * seen[face]));
+  };
+  unseen(Far, "Only %.0f%% of the far end is seen in the outline: the depth may be greater.");
+  unseen(Near, "Only %.0f%% of the near end is seen in the outline: the first depth and the widths are uncertain.");
+  unseen(FanSide, "Only %.0f%% of one side of the fan is seen in the outline: the fan may be wider.");
+  unseen(SweepSide, "Only %.0f%% of one side of the sweep is seen in the outline: the sweep may be wider.");
+
+  bool otherAxis = false, exchanged = false;
+  double exchangedRating = 0.0;
+  for (const Rated& other : choice.others) {
+    const Eigen::Matrix3d turn = choice.best.probeToWorld.linear().transpose() * other.model.probeToWorld.linear();
+    if (turn(2, 2) < std::cos(20.0 * degree)) {
+      otherAxis = true;
+    } else if (std::abs(turn(0, 0)) < 0.7 && !exchanged) {
+      exchanged = true;
+      exchangedRating = other.rating;
+    }
+  }
+  if (otherAxis)
+    notes.push_back("The probe could as well look along another axis of the region; the axes of the grid decided.");
+  if (exchanged)
+    notes.push_back(exchangedRating > -asGood ? "Fan and sweep could as well be exchanged; the axes of the grid decided."
+                                              : "Fan and sweep could be exchanged: that explains the region nearly as well.");
+
+  if (!region.plane && shape.Sweep().Span(0.5 * shape.depthMax) < 4.0 * cell)
+    notes.push_back(Text("The region is only %.3g mm thick along the sweep, too little to tell its angle from its width.",
+                         shape.Sweep().Span(0.5 * shape.depthMax)));
+  if (shape.fanAngle * shape.depthMax < cell)
+    notes.push_back("The beams are parallel, as far as the voxels tell: nothing is known of a radius of the array.");
+  else if (shape.fanWidth < cell)
+    notes.push_back("The beams begin in a point, as far as the voxels tell.");
+  if (!region.plane && shape.fanWidth < cell && shape.sweepWidth < cell)
+    notes.push_back("Fan and sweep begin in one point: their radii cannot be told apart.");
+  notes.push_back("Depth 0 is the near edge of the region: how far the face of the probe lies behind it is not known.");
+  return notes;
+}
+
+} // namespace
+
+ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, const ProbeFitParameters& parameters,
+                  const Progress& progress)
+{
+  if (!(parameters.minimumOverlap >= 0.0 && parameters.minimumOverlap <= 1.0))
+    throw Error(Error::Kind::InvalidParameter, "probe fit: minimumOverlap must be in [0, 1]");
+  if (!(parameters.maximumResidual > 0.0))
+    throw Error(Error::Kind::InvalidParameter, "probe fit: maximumResidual must be greater than 0");
+  if (parameters.outlinePoints < 100)
+    throw Error(Error::Kind::InvalidParameter, "probe fit: outlinePoints must be at least 100");
+
+  const Region region = RegionOf(OutlineRegion(valid, geometry, mostCells, progress.Part(0.0, 0.3)), parameters.outlinePoints);
+  const double cell = region.outline.cellMm;
+  if (region.outline.points.size() < (region.plane ? 40 : 150))
+    throw Error(Error::Kind::NotPossible, "the valid region is too small for a fit: its outline is " +
+                                              std::to_string(region.outline.points.size()) + " voxels long");
+  const Choice choice = Choose(region, progress.Part(0.3, 1.0));
+  const Model& best = choice.best;
+
+  ProbeFit fit;
+  fit.geometry = best.shape;
+  fit.probeToWorld = best.probeToWorld;
+  fit.overlap = OverlapOf(best, region.cells, cell);
+  const Residual residual = ResidualOf(best, region.many);
+  fit.residualMm = residual.rms;
+  fit.typicalMm = residual.median;
+  const double limit = std::max(parameters.maximumResidual * region.size, cell);
+  const std::string refusal = "no fan explains the valid region: ";
+  if (fit.overlap < parameters.minimumOverlap || fit.residualMm > limit)
+    throw Error(Error::Kind::NotPossible, refusal + Text("the best one overlaps it by %.3f", fit.overlap) +
+                                              Text(" (%.3g is asked for)", parameters.minimumOverlap) +
+                                              Text(" and its surface lies %.3g mm off the outline", fit.residualMm) +
+                                              Text(" (at most %.3g mm are allowed)", limit));
+  if (region.outline.holesPart > mostHoles)
+    throw Error(Error::Kind::NotPossible, refusal + Text("%.0f%% of it are holes", 100.0 * region.outline.holesPart));
+  const std::array<double, faces> seen = SeenParts(best, region);
+  if (std::max(seen[Near], seen[Far]) < leastSeenEnd || std::min(seen[FanSide], seen[SweepSide]) < leastSeenSide)
+    throw Error(Error::Kind::NotPossible, refusal + "the grid cuts off so much of it that its sides are not seen");
+  fit.notes = NotesOn(choice, region, seen);
+  return fit;
+}
+
+} // namespace echorama
