@@ -253,7 +253,8 @@ std::vector<OpenCycle> TransformGraph::CheckCycles(const CycleTolerance& toleran
       rootOf.emplace(reached.first, frame);
   }
 
-  for (const auto& [name, edge] : edges_) {
+  for (const auto& item : edges_) {
+    const NamedTransform& edge = item.second;
     if (edge.status != TransformStatus::Valid || !IsInvertible(edge.matrix))
       continue;
     const std::map<std::string, Step>& tree = trees.at(rootOf.at(edge.from));
