@@ -43,12 +43,20 @@ int VtkTypeOf(VoxelType type)
 }
 
 // An array for the voxels of a file, which are read into its memory directly.
-vtkSmartPointer<vtkDataArray> NewArray(const VolumeContent& content, const char* name)
+vtkSmartPointer<vtkDataArray> NewArray(VoxelType type, std::size_t count, const char* name)
 {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VtkTypeOf(content.type)));
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VtkTypeOf(type)));
   array->SetName(name);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(content.geometry.VoxelCount()));
+  array->SetNumberOfTuples(static_cast<vtkIdType>(count));
   return array;
+}
+
+// Beams as an image: they lie in no space of millimetres, so samples, beams and steps are counted.
+echorama::ImageGeometry BeamGrid(const echorama::BeamContent& beams)
+{
+  echorama::ImageGeometry grid;
+  grid.dimensions = beams.dimensions;
+  return grid;
 }
 
 // The file NAME.array.ext beside NAME.ext, with the same geometry as the volume, or nullptr when there is none.
@@ -65,7 +73,7 @@ vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char*
     throw Error(Error::Kind::BadFile, companion + ": its geometry is not that of " + path +
                                           "; remove it if it belongs to an earlier file of this name");
   }
-  auto values = NewArray(source->Content(), array);
+  auto values = NewArray(source->Content().type, source->Content().geometry.VoxelCount(), array);
   source->Read(0, values->GetVoidPointer(0), nullptr, progress);
   return values;
 }
@@ -75,6 +83,20 @@ std::size_t IndexOfTime(const std::vector<double>& times, double time)
 {
   const auto later = std::upper_bound(times.begin(), times.end(), time);
   return later == times.begin() ? 0 : static_cast<std::size_t>(later - times.begin()) - 1;
+}
+
+// Which volume is asked for, and its time.
+std::size_t SetTime(const VolumeContent& content, vtkInformation* asked, vtkImageData* output)
+{
+  std::size_t index = 0;
+  if (!content.times.empty()) {
+    if (asked->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())) {
+      index = IndexOfTime(content.times, asked->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP()));
+    }
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), content.times[index]);
+    vtkUltrasoundAcquisition::SetTimeStamp(output, content.times[index]);
+  }
+  return index;
 }
 
 // A valid region as the contract wants it: 1 or 0 in unsigned chars.
@@ -176,6 +198,7 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
 vtkUltrasoundReader::vtkUltrasoundReader()
 {
   this->SetNumberOfInputPorts(0);
+  this->SetNumberOfOutputPorts(2);
 }
 
 //----------------------------------------------------------------------------
@@ -230,8 +253,13 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
   return vtkUltrasoundVolume::Run(this, nullptr, [this, outputs](const echorama::Progress&) {
     const std::string path = this->FileName ? this->FileName : "";
     vtkInformation* out = outputs->GetInformationObject(0);
-    out->Remove(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
-    out->Remove(vtkStreamingDemandDrivenPipeline::TIME_RANGE());
+    vtkInformation* beams = outputs->GetInformationObject(1);
+    for (vtkInformation* each : {out, beams}) {
+      each->Remove(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
+      each->Remove(vtkStreamingDemandDrivenPipeline::TIME_RANGE());
+    }
+    const int nothing[6] = {0, -1, 0, -1, 0, -1};
+    beams->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), nothing, 6);
     if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
       const vtkNew<vtkXMLImageDataReader> reader;
       vtkUltrasoundVolume::SetGeometry(out, OpenXml(reader, path));
@@ -241,12 +269,58 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
     const VolumeContent& content = source->Content();
     vtkUltrasoundVolume::SetGeometry(out, content.geometry);
     vtkDataObject::SetPointDataActiveScalarInfo(out, VtkTypeOf(content.type), 1);
-    if (!content.times.empty()) {
-      const double range[2] = {content.times.front(), content.times.back()};
-      out->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), content.times.data(), static_cast<int>(content.times.size()));
-      out->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
+    if (content.beams) {
+      vtkUltrasoundVolume::SetGeometry(beams, BeamGrid(*content.beams));
+      vtkDataObject::SetPointDataActiveScalarInfo(beams, VtkTypeOf(content.beams->type), 1);
+    }
+    for (vtkInformation* each : {out, beams}) {
+      if (!content.times.empty()) {
+        const double range[2] = {content.times.front(), content.times.back()};
+        each->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), content.times.data(), static_cast<int>(content.times.size()));
+        each->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
+      }
     }
   });
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundReader::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  // The output that nobody asks for now is made when somebody does: neither beams nor their conversion come for nothing.
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_NOT_GENERATED())) {
+    const int asked = request->Get(vtkExecutive::FROM_OUTPUT_PORT());
+    if (asked >= 0) {
+      outputs->GetInformationObject(1 - asked)->Set(vtkDemandDrivenPipeline::DATA_NOT_GENERATED(), 1);
+    }
+    return 1;
+  }
+  return this->Superclass::ProcessRequest(request, inputs, outputs);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundReader::RequestData(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  const int asked = request->Get(vtkExecutive::FROM_OUTPUT_PORT());
+  if (asked != 1 && !this->Superclass::RequestData(request, inputs, outputs)) {
+    return 0;
+  }
+  if (asked == 0) {
+    return 1;
+  }
+  vtkInformation* out = outputs->GetInformationObject(1);
+  vtkImageData* beams = vtkImageData::GetData(out);
+  const int finished = vtkUltrasoundVolume::Run(this, nullptr, [this, beams, out](const echorama::Progress& progress) {
+    this->ReadBeams(beams, progress);
+    if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT())) {
+      int wanted[6];
+      out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), wanted);
+      beams->Crop(wanted);
+    }
+  });
+  if (!finished) {
+    beams->Initialize();
+  }
+  return finished;
 }
 
 //----------------------------------------------------------------------------
@@ -270,17 +344,9 @@ void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progr
   const auto source = echorama::OpenVolume(this->FileName, this->Parameters());
   const VolumeContent& content = source->Content();
   this->Notes = content.notes;
-  vtkInformation* out = this->GetOutputInformation(0);
-  std::size_t index = 0;
-  if (!content.times.empty()) {
-    if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())) {
-      index = IndexOfTime(content.times, out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP()));
-    }
-    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), content.times[index]);
-    vtkUltrasoundAcquisition::SetTimeStamp(output, content.times[index]);
-  }
+  const std::size_t index = SetTime(content, this->GetOutputInformation(0), output);
   vtkUltrasoundVolume::SetGeometry(output, content.geometry);
-  const auto intensity = NewArray(content, vtkUltrasoundVolume::IntensityName());
+  const auto intensity = NewArray(content.type, content.geometry.VoxelCount(), vtkUltrasoundVolume::IntensityName());
   vtkSmartPointer<vtkUnsignedCharArray> valid;
   if (content.holdsValidRegion) {
     valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
@@ -290,7 +356,34 @@ void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progr
   }
   source->Read(index, intensity->GetVoidPointer(0), valid ? valid->GetPointer(0) : nullptr, progress);
   output->GetPointData()->SetScalars(intensity);
+  this->SetFields(content, output);
+}
 
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::ReadBeams(vtkImageData* output, const echorama::Progress& progress)
+{
+  const std::string path = this->FileName ? this->FileName : "";
+  if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
+    return; // voxels
+  }
+  const auto source = echorama::OpenVolume(path, this->Parameters());
+  const VolumeContent& content = source->Content();
+  if (!content.beams) {
+    return;
+  }
+  this->Notes = content.notes;
+  const std::size_t index = SetTime(content, this->GetOutputInformation(1), output);
+  const echorama::ImageGeometry grid = BeamGrid(*content.beams);
+  vtkUltrasoundVolume::SetGeometry(output, grid);
+  const auto samples = NewArray(content.beams->type, grid.VoxelCount(), vtkUltrasoundVolume::IntensityName());
+  source->ReadBeams(index, samples->GetVoidPointer(0), progress);
+  output->GetPointData()->SetScalars(samples);
+  this->SetFields(content, output);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundReader::SetFields(const VolumeContent& content, vtkImageData* output)
+{
   if (content.probe) {
     vtkUltrasoundAcquisition::SetProbeGeometry(output, *content.probe);
   }

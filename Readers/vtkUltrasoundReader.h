@@ -3,10 +3,14 @@
  * @class vtkUltrasoundReader
  * @brief reads a volume with its pose: .mha, .mhd, .nrrd, .nhdr, .vti
  *
- * Output: one vtkImageData whose origin, spacing and direction are those of the file (mm, LPS), with the point arrays
+ * Output 0: one vtkImageData whose origin, spacing and direction are those of the file (mm, LPS), with the point arrays
  * `Intensity` (whatever the file called it; the active scalars) and `ValidRegion` (unsigned char, 1 or 0), and with what the
  * file says of the acquisition as field data (vtkUltrasoundAcquisition). Other lines of a header come as field data too, one
  * string each, under their own names. VTK's readers of MetaImage and NRRD lose the direction; this one does not.
+ *
+ * Output 1: where the file holds samples along beams (GE Kretz), these, as vtkUltrasoundScanConverter takes them: depth along
+ * x, the beams of the fan along y, the steps of the sweep along z, with the same field data; else an empty image. Output 0
+ * is then their scan conversion. Each is made only when it is asked for.
  *
  * The content decides what a file is, not its extension. `ValidRegion` is, in this order: the array of that name (.vti);
  * the file `NAME.ValidRegion.mha` beside `NAME.mha` (any extension, the same for both), whose geometry must agree; everything
@@ -33,8 +37,9 @@
 
 #ifndef __VTK_WRAP__
 namespace echorama {
+struct VolumeContent;
 struct VolumeReadParameters;
-}
+} // namespace echorama
 #endif
 
 class vtkXMLImageDataReader;
@@ -83,7 +88,9 @@ protected:
   vtkUltrasoundReader();
   ~vtkUltrasoundReader() override;
 
+  int ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
 #ifndef __VTK_WRAP__
   void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
@@ -100,6 +107,8 @@ private:
 #ifndef __VTK_WRAP__
   echorama::VolumeReadParameters Parameters() const;
   void ReadSource(vtkImageData* output, const echorama::Progress& progress);
+  void ReadBeams(vtkImageData* output, const echorama::Progress& progress);
+  void SetFields(const echorama::VolumeContent& content, vtkImageData* output);
   void ReadXml(vtkImageData* output);
   void FindValidRegion(vtkImageData* output, const echorama::Progress& progress);
   void FindProvenance(vtkImageData* output, const echorama::Progress& progress);

@@ -126,6 +126,39 @@ def test_a_wrong_sweep_would_show():
     expect(axes.max() / axes.min() - 1 > 0.05, f"half axes {axes}")
 
 
+def test_beams_are_the_second_output():
+    reader = echorama.vtkUltrasoundReader()
+    reader.SetFileName(str(FILE))
+    reader.Update(1)
+    expect(reader.GetOutput(0).GetNumberOfPoints() == 0, "the volume was made though only the beams were asked for")
+    beams = reader.GetOutput(1)
+    expect(beams.GetDimensions() == (468, 116, 72), f"{beams.GetDimensions()}")
+    data = FILE.read_bytes()
+    start = data.index(b"\x00\xd0\x01\x00" + (468 * 116 * 72).to_bytes(4, "little")) + 8
+    there = np.frombuffer(data, np.uint8, 468 * 116 * 72, start).reshape(72, 116, 468)
+    expect((voxels(beams) == there[::-1]).all(), "samples are the file's, the planes in reverse")
+
+    # Converted by the filter they are the first output.
+    converter = echorama.vtkUltrasoundScanConverter()
+    converter.SetInputConnection(reader.GetOutputPort(1))
+    converter.Update()
+    expect(reader.GetOutput(0).GetNumberOfPoints() == 0, "the volume was made though only the beams were asked for")
+    reader.Update(0)
+    volume, converted = reader.GetOutput(0), converter.GetOutput()
+    expect(volume.GetOrigin() == converted.GetOrigin() and volume.GetSpacing() == converted.GetSpacing(), "geometry")
+    expect((voxels(volume) == voxels(converted)).all(), "voxels")
+    expect((voxels(volume, "ValidRegion") == voxels(converted, "ValidRegion")).all(), "ValidRegion")
+    expect(reader.GetOutput(1).GetNumberOfPoints() == 468 * 116 * 72, "the beams are kept")
+
+    only = read()
+    expect(only.GetOutput(1).GetNumberOfPoints() == 0, "the beams were read though only the volume was asked for")
+    only.SetFileName(str(FILE) + ".missing")
+    only.GetExecutive().AddObserver("ErrorEvent", lambda *_: None)
+    only.AddObserver("ErrorEvent", lambda *_: None)
+    only.Update(1)
+    expect(only.GetOutput(1).GetNumberOfPoints() == 0, "beams of a file that is not there")
+
+
 for name, test in list(globals().items()):
     if name.startswith("test_"):
         test()
