@@ -258,7 +258,7 @@ std::vector<OpenCycle> TransformGraph::CheckCycles(const CycleTolerance& toleran
     if (edge.status != TransformStatus::Valid || !IsInvertible(edge.matrix))
       continue;
     const std::map<std::string, Step>& tree = trees.at(rootOf.at(edge.from));
-    const auto treeEdge = [&](const std::string& frame) { return tree.at(frame).edge == &edge; };
+    const auto treeEdge = [&tree, self = &edge](const std::string& frame) { return tree.at(frame).edge == self; };
     if (tree.count(edge.to) == 0 || treeEdge(edge.from) || treeEdge(edge.to))
       continue;
 
