@@ -318,14 +318,6 @@ struct SequenceFile::Parts {
   void ReadInterleaved(int index, char* out, const Progress& progress);
 };
 
-TransformStatus StatusOf(std::string_view statusText)
-{
-  const std::string status = Upper(statusText);
-  return status == "OK"                                         ? TransformStatus::Valid
-         : status == "OUT_OF_VIEW" || status == "OUT_OF_VOLUME" ? TransformStatus::OutOfRange
-                                                                : TransformStatus::Missing;
-}
-
 const SequenceTransform* SequenceFrame::Find(std::string_view name) const
 {
   const auto found = std::find_if(transforms.begin(), transforms.end(), [name](const auto& t) { return t.name == name; });
@@ -507,7 +499,7 @@ void SequenceFile::Parts::NoteFaults()
       ++status;
     bool good = !matrix.fault;
     for (auto s = status; s != statuses.All().end() && s->frame == frame; ++s)
-      good = good && (s->name != name || StatusOf(names[s->value]) == TransformStatus::Valid);
+      good = good && (s->name != name || TransformStatusOf(names[s->value]) == TransformStatus::Valid);
     valid[name] += good;
   }
   for (const auto& [what, fault] : faults)
@@ -592,11 +584,11 @@ SequenceFrame SequenceFile::Frame(int index) const
       transform.statusText = p.names[*status];
     const Matrix& matrix = entry->value;
     if (matrix.fault) {
-      if (StatusOf(transform.statusText) == TransformStatus::Valid)
+      if (TransformStatusOf(transform.statusText) == TransformStatus::Valid)
         transform.statusText = "INVALID";
     } else
       transform.matrix.matrix().topRows<3>() = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(matrix.rows.data());
-    transform.status = StatusOf(transform.statusText);
+    transform.status = TransformStatusOf(transform.statusText);
     frame.transforms.push_back(std::move(transform));
   }
   const auto [firstText, lastText] = p.texts.Of(index);

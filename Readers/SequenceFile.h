@@ -17,13 +17,9 @@ namespace echorama {
 struct SequenceTransform {
   std::string name;                                     ///< without "Transform" at its end
   Eigen::Affine3d matrix = Eigen::Affine3d::Identity(); ///< of no meaning unless the status is Valid
-  TransformStatus status = TransformStatus::Valid;      ///< StatusOf(statusText)
+  TransformStatus status = TransformStatus::Valid;      ///< TransformStatusOf(statusText)
   std::string statusText = "OK";                        ///< as the file says it: OK, INVALID, MISSING, OUT_OF_VIEW ...
 };
-
-/// What a status in a file means, in any case of letters: OK is Valid; OUT_OF_VIEW and OUT_OF_VOLUME are OutOfRange;
-/// everything else is Missing.
-TransformStatus StatusOf(std::string_view statusText);
 
 /// What a sequence says of one frame, besides its pixels.
 struct SequenceFrame {
