@@ -7,6 +7,7 @@
 #include "Core/Base/Error.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/KretzFile.h"
+#include "Readers/NiftiFile.h"
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -77,6 +78,8 @@ FileFormat FormatOfContent(const std::string& path)
 
   if (LooksLikeKretz(start))
     return FileFormat::Kretz;
+  if (LooksLikeNifti(start))
+    return FileFormat::Nifti;
   if (start.compare(0, 4, "NRRD") == 0)
     return FileFormat::Nrrd;
   if (start.find("<VTKFile") != std::string::npos && start.find("ImageData") != std::string::npos)
@@ -88,7 +91,7 @@ FileFormat FormatOfContent(const std::string& path)
 
 const char* KnownFormats()
 {
-  return "MetaImage, NRRD, GE Kretz and VTK image file";
+  return "MetaImage, NRRD, NIfTI, GE Kretz and VTK image file";
 }
 
 FileFormat FormatOfName(const std::string& path)
@@ -98,6 +101,8 @@ FileFormat FormatOfName(const std::string& path)
     return FileFormat::MetaImage;
   if (extension == ".nrrd" || extension == ".nhdr")
     return FileFormat::Nrrd;
+  if (extension == ".nii" || (extension == ".gz" && LowerExtension(fs::path(path).stem().string()) == ".nii"))
+    return FileFormat::Nifti;
   return extension == ".vti" ? FileFormat::VtkXmlImage : FileFormat::Unknown;
 }
 

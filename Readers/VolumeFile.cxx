@@ -273,8 +273,8 @@ std::string CompanionPath(const std::string& path, const std::string& array)
 {
   const fs::path main = path;
   fs::path stem = main.stem(), extension = main.extension();
-  if (stem.extension() == ".nii") { // .nii.gz is one extension
-    extension = ".nii" + extension.string();
+  if (FormatOfName(path) == FileFormat::Nifti && stem.has_extension() && extension.string().size() == 3) { // .nii.gz is one
+    extension = stem.extension().string() + extension.string();
     stem = stem.stem();
   }
   return (main.parent_path() / (stem.string() + "." + array + extension.string())).string();

@@ -3,6 +3,7 @@
 #include "Readers/VolumeSource.h"
 #include "Core/Base/Error.h"
 #include "Readers/KretzFile.h"
+#include "Readers/NiftiFile.h"
 #include "Readers/VolumeFile.h"
 
 namespace echorama {
@@ -18,6 +19,8 @@ std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeRe
   case FileFormat::MetaImage:
   case FileFormat::Nrrd:
     return OpenHeaderVolume(path);
+  case FileFormat::Nifti:
+    return OpenNifti(path);
   case FileFormat::Kretz:
     return OpenKretz(path, parameters);
   default:
