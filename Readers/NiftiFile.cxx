@@ -247,7 +247,6 @@ public:
     content_.path = stored_.path = path;
     content_.format = FileFormat::Nifti;
     ReadHeader();
-    CheckSizes();
   }
   void Read(std::size_t index, void* voxels, unsigned char* valid, const Progress& progress) override;
 
@@ -705,21 +704,22 @@ std::string HeaderText(const ImageHeader& header, const std::string& description
   q.normalize();
   if (q.w() < 0.0)
     q.coeffs() = -q.coeffs();
-  Eigen::Matrix<double, 3, 4> stored;
   for (int row = 0; row < 3; ++row) {
     const std::size_t r = static_cast<std::size_t>(row);
     real(at.quaternion, r, q.vec()[row]);
     real(at.quaternion, 3 + r, ras.translation()[row]);
-    for (int column = 0; column < 4; ++column) {
-      stored(row, column) = static_cast<double>(static_cast<Real>(ras(row, column)));
+    for (int column = 0; column < 4; ++column)
       real(at.srow, 4 * r + static_cast<std::size_t>(column), ras(row, column));
-    }
   }
+  // The loss, from the header as others will read it.
+  const std::array<double, 12> srow = Parse<Version>(Bytes(bytes.Content(), false)).srow;
+  Eigen::Matrix<double, 3, 4> rounding = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(srow.data());
+  rounding -= ras.matrix().topRows<3>();
   loss = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector4d index(corner & 1 ? g.dimensions[0] - 1 : 0, corner & 2 ? g.dimensions[1] - 1 : 0,
                                 corner & 4 ? g.dimensions[2] - 1 : 0, 1.0);
-    loss = std::max(loss, (stored * index - ras.matrix().topRows<3>() * index).norm());
+    loss = std::max(loss, (rounding * index).norm());
   }
   bytes.PutText(at.magic, one ? std::string("n+1\0", 4) : std::string("n+2\0\r\n\032\n", 8));
   return bytes.Content();
@@ -797,8 +797,8 @@ double WriteNifti(const std::string& path, const ImageHeader& header, const void
   {
     Deflater deflater(stream, CompressedForm::Gzip);
     deflater.Append(start.data(), start.size());
-    deflater.Append(voxels, bytes, progress);
-    deflater.Finish();
+    deflater.Append(voxels, bytes, progress.Part(0.0, 0.9));
+    deflater.Finish(progress.Part(0.9, 1.0));
   } else {
     stream << start;
     constexpr std::uint64_t Piece = 1 << 24;

@@ -416,7 +416,7 @@ TEST_F(NiftiFile, Extensions)
     std::string bytes(8, '\0');
     std::memcpy(bytes.data(), &size, 4);
     std::memcpy(bytes.data() + 4, &code, 4);
-    text.resize(static_cast<std::size_t>(std::max(0, std::min(size, 4096) - 8)), '\0');
+    text.resize(static_cast<std::size_t>(std::max(8, std::min(size, 4096) - 8)), '\0');
     return bytes + text;
   };
   const auto with = [](const std::string& extensions) {
@@ -476,7 +476,7 @@ TEST_F(NiftiFile, BadFilesAreRefused)
   const std::string file = good.File();
   for (const std::size_t length : {4u, 100u, 347u}) {
     const std::string path = Put("short.nii", file.substr(0, length));
-    ExpectRefused([&] { OpenNifti(path); }, Error::Kind::BadFile, path, "ends early");
+    ExpectRefused([&] { OpenNifti(path); }, Error::Kind::BadFile, path, "end early");
   }
   const std::string other = Put("other.nii", "this is text, and long enough");
   ExpectRefused([&] { OpenNifti(other); }, Error::Kind::BadFile, other, "not NIfTI");
@@ -552,11 +552,14 @@ TEST_F(NiftiFile, WhatCannotBeWritten)
   refused("a.nii", bad, Error::Kind::InvalidParameter, "two words");
   ImageHeader large = good;
   large.geometry.dimensions = {100, 100, 100};
-  const FullDisk full(100000);
-  refused("a.nii", large, Error::Kind::FileSystem, "full");
+  {
+    const FullDisk full(100000);
+    refused("a.nii", large, Error::Kind::FileSystem, "full");
+  }
   const Progress stop([](double) { return false; });
   FileReplacement files;
-  EXPECT_THROW(WriteNifti(Path("b.nii.gz"), large, voxels.data(), files, stop), Error);
+  for (const char* name : {"b.nii", "b.nii.gz"})
+    EXPECT_THROW(WriteNifti(Path(name), large, voxels.data(), files, stop), Error);
 }
 
 TEST_F(NiftiFile, CompanionsOfTwoExtensions)
