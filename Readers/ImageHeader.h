@@ -54,7 +54,8 @@ struct ImageHeader {
 };
 
 /// Reads the header of a MetaImage or NRRD file; the voxels are not touched.
-/// \throws Error(FileSystem) as FormatOfContent, Error(BadFile) that names the file and the line or field.
+/// \throws Error(FileSystem) as FormatOfContent, Error(BadFile) that names the file and the line or field, also for a tracked
+/// sequence of frames (see ReadSequenceHeader).
 ImageHeader ReadImageHeader(const std::string& path);
 
 /// What of a header makes it that of a sequence of frames.

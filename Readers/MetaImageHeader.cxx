@@ -207,6 +207,8 @@ void ParseMetaImage(ImageHeader& header, FrameAxis* axis)
       lines.FailHere(key + " is given twice, with different values");
   }
 
+  if (std::any_of(header.fields.begin(), header.fields.end(), [](const HeaderField& field) { return IsFrameField(field.first); }))
+    lines.Fail(NotAVolume);
   const Values values(lines, known);
   if (const std::string* object = values.Find("ObjectType"); object && *object != "Image")
     lines.Fail("it holds an object of type " + *object + ", not an image");

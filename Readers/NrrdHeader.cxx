@@ -124,7 +124,8 @@ private:
         lines_.FailHere("\"field: value\" or \"key:=value\" is needed");
       const std::string_view before = std::string_view(line).substr(0, colon), after = std::string_view(line).substr(colon + 1);
       if (!after.empty() && after[0] == '=') {
-        if (sequence_ && TakeFrameField(lines_, *sequence_, HeaderLines::Trimmed(before), HeaderLines::Trimmed(after.substr(1))))
+        if (sequence_ &&
+            TakeFrameField(lines_, *sequence_, HeaderLines::Trimmed(before), Unescaped(HeaderLines::Trimmed(after.substr(1)))))
           continue;
         header_.fields.emplace_back(Unescaped(HeaderLines::Trimmed(before)), Unescaped(after.substr(1)));
       } else if (const auto [place, fresh] = fields_.emplace(Plain(before), HeaderLines::Trimmed(after)); !fresh)

@@ -149,8 +149,6 @@ void CheckMemory(const std::string& path, double bytes)
 void CheckVolume(const ImageHeader& header)
 {
   const std::string& path = header.path;
-  if (std::any_of(header.fields.begin(), header.fields.end(), [](const HeaderField& field) { return IsFrameField(field.first); }))
-    FailFile(path, NotAVolume);
   if (!header.typeIsKnown)
     FailFile(path, "its voxels are of a type that is not supported");
   if (header.components != 1)

@@ -10,8 +10,8 @@
 namespace echorama {
 
 /// Checks, before anything is allocated, that the file can be read as one volume: numbers, one per voxel, a geometry that
-/// is a pose (ImageGeometry::Check), frames that are not a tracked sequence, as many bytes as its dimensions say (for
-/// compressed data: as many as could decompress to that), and memory enough for them.
+/// is a pose (ImageGeometry::Check), as many bytes as its dimensions say (for compressed data: as many as could decompress to
+/// that), and memory enough for them.
 /// \throws Error(BadFile) or Error(TooLarge) that names the file, Error(FileSystem) when a detached data file is missing.
 void CheckVolume(const ImageHeader& header);
 

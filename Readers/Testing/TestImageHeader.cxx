@@ -224,14 +224,21 @@ TEST_F(ImageHeaderTest, ImagesAreOneSlice)
                                    {"space directions", "none (0,0.25,0) (-0.5,0,0) (0,0,2)"}})));
 }
 
-TEST_F(ImageHeaderTest, SequencesAreReadAsHeadersAndRefusedAsVolumes)
+TEST_F(ImageHeaderTest, SequencesAreRefusedAsVolumes)
 {
   const std::string text = "Seq_Frame0000_Timestamp = 1.5\nSeq_Frame0001_Timestamp = 2.5\n" +
                            Meta({{"DimSize", "0 0 2"}, {"ElementType", "MET_OTHER"}}, "");
-  const ImageHeader header = Read("a.mha", text);
-  EXPECT_EQ(header.geometry.dimensions, (std::array<int, 3>{0, 0, 2}));
-  EXPECT_EQ(header.fields.size(), 2u);
-  Refused("a.mha", text, "tracked sequence");
+  Refused("a.mha", text, "vtkUltrasoundSequenceReader");
+  FrameAxis axis;
+  std::vector<std::string> taken;
+  axis.field = [&](std::int64_t frame, std::string_view key, std::string_view value) {
+    taken.push_back(std::to_string(frame) + " " + std::string(key) + " " + std::string(value));
+  };
+  const ImageHeader header = ReadSequenceHeader(Path("a.mha"), axis);
+  EXPECT_EQ(header.geometry.dimensions, (std::array<int, 3>{0, 0, 1}));
+  EXPECT_EQ(axis.frames, 2);
+  EXPECT_TRUE(header.fields.empty());
+  EXPECT_EQ(taken, (std::vector<std::string>{"0 Timestamp 1.5", "1 Timestamp 2.5"}));
 }
 
 TEST_F(ImageHeaderTest, MetaImagesThatAreRefused)
