@@ -33,8 +33,8 @@ namespace echorama {
 namespace {
 
 constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
-constexpr std::size_t MostStates = 256;               // of a decoder, 40 kB each
-constexpr std::uint64_t FirstStretch = 4u << 20;      // bytes between two of them at first
+constexpr std::size_t MostMoments = 256;              // of a decoder, 40 kB each
+constexpr std::uint64_t FirstStretch = 1u << 18;      // bytes between two of them at first
 constexpr std::uint64_t InterleavedBytes = 64u << 20; // of frames that are taken from an interleaved file in one pass
 constexpr std::uint64_t PassBytes = 4u << 20;         // of such a file that are looked at together
 
@@ -298,10 +298,10 @@ struct SequenceFile::Parts {
 
   std::ifstream stream;
   std::unique_ptr<Inflater> inflater;
-  int next = -1;                                                // the frame at whose beginning the inflater stands, -1: not known
-  std::vector<std::shared_ptr<const Inflater::State>> states{}; // at frame 0, stretch, 2 stretch ...
-  int stretch = 1;                                              // frames
-  std::vector<char> batch;                                      // interleaved frames that were taken together
+  int next = -1; // the frame at whose beginning the inflater stands, -1: not known
+  std::vector<std::shared_ptr<const Inflater::State>> moments{}; // at frame 0, stretch, 2 stretch ...
+  int stretch = 1;                                               // frames
+  std::vector<char> batch;                                       // interleaved frames that were taken together
   int batchBegin = 0, batchEnd = 0;
   std::vector<char> scratch;
 
@@ -615,7 +615,7 @@ void SequenceFile::Parts::OpenData()
     const std::uint64_t frame = content.FrameBytes(), all = frame * static_cast<std::uint64_t>(content.frames);
     inflater = std::make_unique<Inflater>(stream, dataOffset, header.dataPath, all);
     inflater->Read(nullptr, header.skipDecoded);
-    states.push_back(inflater->Save());
+    moments.push_back(inflater->Save());
     stretch = static_cast<int>(std::max<std::uint64_t>(1, std::min<std::uint64_t>(FirstStretch / frame, 1u << 30)));
   }
 }
@@ -623,20 +623,20 @@ void SequenceFile::Parts::OpenData()
 void SequenceFile::Parts::ReadInflated(int index, char* out, const Progress& progress)
 {
   const std::uint64_t frame = content.FrameBytes();
-  const int kept = std::min(index / stretch, static_cast<int>(states.size()) - 1);
+  const int kept = std::min(index / stretch, static_cast<int>(moments.size()) - 1);
   if (next < kept * stretch || next > index) {
     next = -1;
-    inflater->Restore(*states[static_cast<std::size_t>(kept)]);
+    inflater->Restore(*moments[static_cast<std::size_t>(kept)]);
     next = kept * stretch;
   }
   const int begin = next;
   while (true) {
-    if (next > 0 && next % stretch == 0 && next / stretch == static_cast<int>(states.size())) {
-      states.push_back(inflater->Save());
-      if (states.size() > MostStates) {
-        for (std::size_t i = 0; 2 * i < states.size(); ++i)
-          states[i] = states[2 * i];
-        states.resize((states.size() + 1) / 2);
+    if (next > 0 && next % stretch == 0 && next / stretch == static_cast<int>(moments.size())) {
+      moments.push_back(inflater->Save());
+      if (moments.size() > MostMoments) {
+        for (std::size_t i = 0; 2 * i < moments.size(); ++i)
+          moments[i] = moments[2 * i];
+        moments.resize((moments.size() + 1) / 2);
         stretch *= 2;
       }
     }
@@ -664,7 +664,7 @@ void SequenceFile::Parts::ReadInterleaved(int index, char* out, const Progress& 
     std::vector<char> piece(static_cast<std::size_t>(std::min(step, pixels) * perPixel));
     batch.resize(static_cast<std::size_t>(count * frame));
     if (inflater)
-      inflater->Restore(*states[0]);
+      inflater->Restore(*moments[0]);
     else
       stream.seekg(dataOffset);
     for (std::uint64_t pixel = 0; pixel < pixels; pixel += step) {

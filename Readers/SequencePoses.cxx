@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One graph serves all frames: which edges there are is the same for the whole sequence (those that some frame has), and only
+// their matrices and status change. So the way from the image to the world does not jump from frame to frame, and a frame
+// whose tracker saw nothing has no pose instead of one by another way.
+#include "Readers/SequencePoses.h"
+#include "Core/Base/Error.h"
+#include <algorithm>
+#include <cctype>
+
+namespace echorama {
+namespace {
+
+// Names of frames begin with a capital, as FramesOf makes them.
+std::string FrameName(std::string name)
+{
+  if (!name.empty())
+    name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
+  return name;
+}
+
+std::string Listed(const std::vector<std::string>& names)
+{
+  std::string text;
+  for (const std::string& name : names)
+    text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+NamedTransform EdgeOf(const std::string& name)
+{
+  NamedTransform edge;
+  std::tie(edge.from, edge.to) = FramesOf(name).value();
+  return edge;
+}
+
+} // namespace
+
+std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& image, const std::string& requested)
+{
+  const std::vector<std::string> frames = graph.Frames();
+  const auto has = [](const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const std::vector<std::string> reachable = has(frames, image) ? graph.ReachableFrom(image) : frames;
+  if (!requested.empty()) {
+    if (!has(reachable, FrameName(requested)))
+      throw Error(Error::Kind::NotPossible,
+                  "no way leads to the world frame \"" + requested + "\"; the choices are " + Listed(reachable));
+    return FrameName(requested);
+  }
+  if (frames.empty())
+    return {};
+  for (const char* usual : {"Reference", "World", "Tracker"})
+    if (has(reachable, usual))
+      return usual;
+  std::vector<std::string> ends;
+  const std::vector<NamedTransform> edges = graph.Edges();
+  for (const std::string& frame : reachable)
+    if (std::any_of(edges.begin(), edges.end(), [&](const auto& edge) { return edge.to == frame; }) &&
+        std::none_of(edges.begin(), edges.end(), [&](const auto& edge) { return edge.from == frame; }))
+      ends.push_back(frame);
+  if (ends.size() != 1)
+    throw Error(Error::Kind::NotPossible,
+                "it is not clear which frame is the world; name one of " + Listed(ends.empty() ? reachable : ends));
+  return ends[0];
+}
+
+SequencePoses::SequencePoses(const SequenceContent& content, const std::vector<NamedTransform>& fixed, const std::string& image,
+                             const std::string& world)
+  : graph_(fixed), names_(content.transforms), image_(FrameName(image))
+{
+  for (const std::string& name : names_)
+    graph_.Set(EdgeOf(name));
+  try {
+    world_ = ChooseWorldFrame(graph_, image_, world);
+  } catch (const Error& error) {
+    throw Error(error.GetKind(), content.path + ": " + error.what());
+  }
+}
+
+bool SequencePoses::Reaches(const std::string& frame) const
+{
+  const std::vector<std::string> frames = graph_.Frames();
+  if (world_.empty() || std::find(frames.begin(), frames.end(), frame) == frames.end())
+    return false;
+  const std::vector<std::string> reachable = graph_.ReachableFrom(frame);
+  return std::find(reachable.begin(), reachable.end(), world_) != reachable.end();
+}
+
+std::vector<std::string> SequencePoses::Tools() const
+{
+  std::vector<std::string> tools;
+  for (const std::string& name : names_) {
+    const std::string frame = EdgeOf(name).from;
+    if (frame != world_ && Reaches(frame) && std::find(tools.begin(), tools.end(), frame) == tools.end())
+      tools.push_back(frame);
+  }
+  return tools;
+}
+
+void SequencePoses::MoveTo(const SequenceFrame& frame)
+{
+  for (const std::string& name : names_) {
+    NamedTransform edge = EdgeOf(name);
+    if (const SequenceTransform* transform = frame.Find(name)) {
+      edge.matrix = transform->matrix;
+      edge.status = transform->status;
+    } else
+      edge.status = TransformStatus::Missing;
+    graph_.Set(edge);
+  }
+}
+
+} // namespace echorama

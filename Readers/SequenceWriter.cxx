@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The header comes before the pixels and grows with every frame, so the two are written side by side: the header, with blanks
+// where the number of frames and the compressed size will stand, under the temporary name of the final file; the pixels,
+// compressed on the way, in a file of their own. Finish() fills the blanks and, where one file is to hold both, appends the
+// pixels: they are written twice, and the disk needs room for both copies. In memory there is never more than the 32 MB of
+// the compressor.
+#include "Readers/SequenceWriter.h"
+#include "Core/Base/Error.h"
+#include "Readers/Compression.h"
+#include "Readers/HeaderLines.h"
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+constexpr std::size_t FrameDigits = 10, SizeDigits = 20; // blanks that are left for numbers
+
+std::string VectorText(const Eigen::Vector3d& v)
+{
+  return "(" + NumberText(v[0]) + "," + NumberText(v[1]) + "," + NumberText(v[2]) + ")";
+}
+
+// 16 numbers, row by row.
+std::string MatrixText(const Eigen::Affine3d& matrix)
+{
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = matrix.matrix().topRows<3>();
+  return JoinedNumbers(rows.data(), 12) + " 0 0 0 1";
+}
+
+} // namespace
+
+struct SequenceWriter::Parts {
+  std::string path;
+  SequenceContent content;
+  bool meta = true, compress = false;
+  std::string pixelPath;   // where the pixels are written
+  FileReplacement scratch; // holds that file when it is to be appended, and is never committed
+  std::ofstream header, pixels;
+  std::streamoff frameCountAt = 0, compressedSizeAt = 0; // 0: nowhere
+  std::unique_ptr<Deflater> deflater;
+  std::string dataFile; // its name, when it is detached
+  int frames = 0;
+
+  [[noreturn]] void Fail(Error::Kind kind, const std::string& reason) const { throw Error(kind, path + ": " + reason); }
+  void CheckStreams() const
+  {
+    if (!header || (pixels.is_open() && !pixels))
+      Fail(Error::Kind::FileSystem, "it cannot be written (is the disk full?); what was there is left as it was");
+  }
+  void CheckField(const HeaderField& field) const
+  {
+    if (!CanHold(field))
+      Fail(Error::Kind::InvalidParameter, "the header cannot hold the field \"" + field.first + "\"");
+  }
+  void Put(const std::string& key, const std::string& value) { header << key << (meta ? " = " : ": ") << value << "\n"; }
+  void PutField(const std::string& key, const std::string& value)
+  {
+    header << key << (meta ? " = " : ":=") << (meta ? value : EscapedNrrd(value)) << "\n";
+  }
+  void WriteMetaImage();
+  void WriteNrrd();
+};
+
+void SequenceWriter::Parts::WriteMetaImage()
+{
+  const ImageGeometry& g = content.geometry;
+  const bool images = content.HasImages(), volumes = content.dimensions[2] > 1;
+  const std::string one = volumes ? " 1" : "", zero = volumes ? " 0" : "";
+  Put("ObjectType", "Image");
+  Put("NDims", volumes ? "4" : "3");
+  Put("BinaryData", "True");
+  Put("BinaryDataByteOrderMSB", HostIsBigEndian ? "True" : "False");
+  Put("CompressedData", compress ? "True" : "False");
+  if (compress) {
+    header << "CompressedDataSize = ";
+    compressedSizeAt = header.tellp();
+    header << std::string(SizeDigits, ' ') << "\n";
+  }
+  header << "DimSize = ";
+  for (int axis = 0; axis < (volumes ? 3 : 2); ++axis)
+    header << content.dimensions[static_cast<std::size_t>(axis)] << " ";
+  frameCountAt = header.tellp();
+  header << std::string(FrameDigits, ' ') << "\n";
+  Put("Kinds", volumes ? "domain domain domain list" : "domain domain list");
+  Put("ElementNumberOfChannels", NumberText(content.components));
+  Put("ElementSpacing", JoinedNumbers(g.spacing.data(), 3) + one);
+  Put("ElementType", images ? MetaImageTypeName(content.type) : "MET_OTHER");
+  Put("Offset", JoinedNumbers(g.origin.data(), 3) + zero);
+  std::string matrix;
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    matrix += (axis > 0 ? " " : "") + JoinedNumbers(g.direction.col(axis).data(), 3) + zero;
+  Put("TransformMatrix", matrix + (volumes ? " 0 0 0 1" : ""));
+  Put("UltrasoundImageOrientation", images ? "MF" : "XX");
+  Put("UltrasoundImageType", content.imageType.empty() ? images ? "BRIGHTNESS" : "XX" : content.imageType);
+}
+
+void SequenceWriter::Parts::WriteNrrd()
+{
+  const ImageGeometry& g = content.geometry;
+  const bool vectors = content.components > 1; // an axis of numbers per pixel comes first
+  header << "NRRD0004\n";
+  Put("type", NrrdTypeName(content.type));
+  Put("dimension", vectors ? "5" : "4");
+  Put("space", "left-posterior-superior");
+  header << "sizes: " << (vectors ? NumberText(content.components) + " " : "");
+  for (const int size : content.dimensions)
+    header << size << " ";
+  frameCountAt = header.tellp();
+  header << std::string(FrameDigits, ' ') << "\n";
+  std::string directions = vectors ? "none " : "";
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    directions += VectorText(g.direction.col(axis) * g.spacing[axis]) + " ";
+  Put("space directions", directions + "none");
+  Put("kinds", vectors ? "vector domain domain domain list" : "domain domain domain list");
+  Put("space origin", VectorText(g.origin));
+  Put("encoding", compress ? "gzip" : "raw");
+  Put("endian", HostIsBigEndian ? "big" : "little");
+  if (!dataFile.empty())
+    Put("data file", dataFile);
+  PutField("ultrasound image orientation", "MF");
+  PutField("ultrasound image type", content.imageType.empty() ? "BRIGHTNESS" : content.imageType);
+}
+
+SequenceWriter::SequenceWriter(const std::string& path, const SequenceContent& content, bool compress, FileReplacement& files)
+  : parts_(new Parts)
+{
+  Parts& p = *parts_;
+  p.path = path;
+  p.content = content;
+  const FileFormat format = FormatOfName(path);
+  const std::string extension = fs::path(path).extension().string();
+  if (format != FileFormat::MetaImage && format != FileFormat::Nrrd)
+    p.Fail(Error::Kind::InvalidParameter, "the extension must be .mha, .mhd, .nrrd or .nhdr");
+  p.meta = format == FileFormat::MetaImage;
+  const char letter = extension[p.meta ? 3 : 2]; // .mhd, .nhdr
+  const bool detached = letter == (p.meta ? 'd' : 'h') || letter == (p.meta ? 'D' : 'H');
+  const bool images = p.content.HasImages();
+  p.compress = compress && images;
+  if (!images && !p.meta)
+    p.Fail(Error::Kind::InvalidParameter, "NRRD cannot hold a sequence without images; .mha can");
+  if (p.content.dimensions[0] < 0 || p.content.dimensions[1] < 0 || p.content.dimensions[2] < 1 || p.content.components < 1)
+    p.Fail(Error::Kind::BadInput, "frames of these dimensions cannot be written");
+  if (!images)
+    p.content.dimensions = {0, 0, 1};
+  for (const HeaderField& field : p.content.fields) {
+    p.CheckField(field);
+    if (IsFrameField(field.first) || field.first == "UltrasoundImageOrientation" || field.first == "UltrasoundImageType")
+      p.Fail(Error::Kind::InvalidParameter, "the field \"" + field.first + "\" is one that the writer makes itself");
+  }
+  p.CheckField({"type", p.content.imageType});
+  p.content.geometry.dimensions = images ? p.content.dimensions : std::array<int, 3>{1, 1, 1};
+  p.content.geometry.Check(path);
+
+  if (images) {
+    if (detached) {
+      p.dataFile = fs::path(path).stem().string() + (!compress ? ".raw" : p.meta ? ".zraw" : ".raw.gz");
+      p.pixelPath = files.Stage(DetachedPath(path, p.dataFile));
+    } else
+      p.pixelPath = p.scratch.Stage(path + ".pixels");
+    p.pixels.open(p.pixelPath, std::ios::binary);
+    if (p.compress)
+      p.deflater = std::make_unique<Deflater>(p.pixels, p.meta ? CompressedForm::Zlib : CompressedForm::Gzip);
+  }
+  p.header.open(files.Stage(path), std::ios::binary);
+  if (p.meta)
+    p.WriteMetaImage();
+  else
+    p.WriteNrrd();
+  for (const auto& [key, value] : p.content.fields)
+    p.PutField(key, value);
+  p.CheckStreams();
+}
+
+SequenceWriter::~SequenceWriter() = default;
+
+void SequenceWriter::Append(const SequenceFrame& frame, const void* pixels, const Progress& progress)
+{
+  Parts& p = *parts_;
+  const std::string number = std::to_string(p.frames),
+                    prefix = "Seq_Frame" + std::string(number.size() < 4 ? 4 - number.size() : 0, '0') + number + "_";
+  if (p.frames == std::numeric_limits<int>::max())
+    p.Fail(Error::Kind::TooLarge, "it cannot hold more than " + number + " frames");
+  if (std::isinf(frame.time))
+    p.Fail(Error::Kind::BadInput, "the time of frame " + number + " is not finite");
+
+  std::vector<HeaderField> lines; // all are checked before the first is written
+  std::set<std::string> given{"Timestamp", "ImageStatus", "Status"};
+  const auto add = [&](const std::string& key, const std::string& value) {
+    p.CheckField({key, value});
+    if (!given.insert(key).second)
+      p.Fail(Error::Kind::InvalidParameter, "the field \"" + key + "\" of frame " + number + " is given twice");
+    lines.emplace_back(key, value);
+  };
+  for (const SequenceTransform& transform : frame.transforms) {
+    if (!FramesOf(transform.name))
+      p.Fail(Error::Kind::InvalidParameter, "\"" + transform.name + "\" is not the name of a transform, FrameAToFrameB");
+    const bool finite = transform.matrix.matrix().allFinite();
+    if (!finite && transform.status == TransformStatus::Valid)
+      p.Fail(Error::Kind::BadInput, transform.name + "Transform of frame " + number + " is not finite");
+    const bool told = TransformStatusOf(transform.statusText) == transform.status;
+    add(transform.name + "Transform", MatrixText(finite ? transform.matrix : Eigen::Affine3d::Identity()));
+    add(transform.name + "TransformStatus", told ? transform.statusText : TransformStatusText(transform.status));
+  }
+  for (const auto& [key, value] : frame.fields)
+    add(key, value);
+  for (const auto& [key, value] : lines)
+    p.PutField(prefix + key, value);
+  if (!std::isnan(frame.time))
+    p.PutField(prefix + "Timestamp", NumberText(frame.time));
+  p.PutField(prefix + (p.meta ? "ImageStatus" : "Status"), frame.imageValid && pixels ? "OK" : "INVALID");
+
+  if (p.content.HasImages()) {
+    const std::uint64_t bytes = p.content.FrameBytes();
+    std::vector<char> zeros(pixels ? 0 : bytes);
+    const void* from = pixels ? pixels : zeros.data();
+    if (p.deflater)
+      p.deflater->Append(from, bytes, progress);
+    else
+      p.pixels.write(static_cast<const char*>(from), static_cast<std::streamsize>(bytes));
+  }
+  p.CheckStreams();
+  ++p.frames;
+}
+
+void SequenceWriter::Finish(const Progress& progress)
+{
+  Parts& p = *parts_;
+  if (p.frames == 0)
+    p.Fail(Error::Kind::BadInput, "there are no frames to write");
+  const std::uint64_t compressed = p.deflater ? p.deflater->Finish(progress.Part(0.0, 0.2)) : 0;
+  if (p.pixels.is_open())
+    p.pixels.close();
+  if (p.meta)
+    p.Put("ElementDataFile", p.dataFile.empty() ? "LOCAL" : p.dataFile);
+  else
+    p.header << (p.dataFile.empty() ? "\n" : "");
+  const std::streamoff end = p.header.tellp();
+  const auto fill = [&p](std::streamoff at, const std::string& text) {
+    p.header.seekp(at);
+    p.header << text;
+  };
+  fill(p.frameCountAt, std::to_string(p.frames));
+  if (p.compressedSizeAt > 0)
+    fill(p.compressedSizeAt, std::to_string(compressed));
+  p.header.seekp(end);
+  p.CheckStreams();
+
+  if (p.content.HasImages() && p.dataFile.empty()) {
+    std::ifstream from(p.pixelPath, std::ios::binary);
+    std::vector<char> piece(std::size_t{1} << 22);
+    const double all = static_cast<double>(fs::file_size(p.pixelPath));
+    double done = 0.0;
+    while (from.read(piece.data(), static_cast<std::streamsize>(piece.size())), from.gcount() > 0) {
+      p.header.write(piece.data(), from.gcount());
+      done += static_cast<double>(from.gcount());
+      progress.Part(0.2, 1.0)(done / all);
+    }
+  }
+  p.header.close();
+  p.CheckStreams();
+}
+
+} // namespace echorama

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which frame is the world, and poses in it against products of matrices written out.
+#include "Core/Base/Random.h"
+#include "Readers/SequencePoses.h"
+#include "Readers/Testing/TemporaryFolder.h"
+
+using namespace echorama;
+using namespace echorama::testing;
+
+namespace {
+
+TransformGraph Graph(const std::vector<std::string>& names)
+{
+  TransformGraph graph;
+  for (const std::string& name : names) {
+    NamedTransform edge;
+    std::tie(edge.from, edge.to) = FramesOf(name).value();
+    graph.Set(edge);
+  }
+  return graph;
+}
+
+std::string World(const std::vector<std::string>& names, const std::string& requested = "", const std::string& image = "Image")
+{
+  return ChooseWorldFrame(Graph(names), image, requested);
+}
+
+Eigen::Affine3d Moved(double x, double degrees)
+{
+  return Eigen::Translation3d(x, 2.0 * x, -x) * Eigen::AngleAxisd(degrees * 0.0174532925, Eigen::Vector3d(1, 2, 2) / 3.0);
+}
+
+} // namespace
+
+TEST(SequencePosesTest, TheWorldIsChosenByASimpleRule)
+{
+  EXPECT_EQ(World({}), "");
+  EXPECT_EQ(World({"ImageToReference"}), "Reference");
+  EXPECT_EQ(World({"ImageToProbe", "ProbeToTracker", "ReferenceToTracker"}), "Reference");
+  EXPECT_EQ(World({"ImageToProbe", "ProbeToTracker", "TrackerToWorld"}), "World");
+  EXPECT_EQ(World({"ImageToProbe", "ProbeToTracker"}), "Tracker");
+  EXPECT_EQ(World({"ImageToProbe", "ProbeToTracker"}, "Probe"), "Probe");
+  EXPECT_EQ(World({"ImageToProbe", "ProbeToTracker"}, "tracker"), "Tracker");
+  // The stepper: no usual name, one frame at the end.
+  EXPECT_EQ(World({"ImageToProbe", "ProbeToStepperHome", "TemplateToStepperHome"}), "StepperHome");
+  // Without the image, all frames count.
+  EXPECT_EQ(World({"StylusToTracker", "ReferenceToTracker"}), "Reference");
+  EXPECT_EQ(World({"ProbeToStepperHome"}, "Probe"), "Probe");
+  // What the image does not reach does not count.
+  EXPECT_EQ(World({"ImageToRobot", "StylusToReference"}), "Robot");
+
+  const auto refused = [](const std::vector<std::string>& names, const std::string& requested, const std::string& words) {
+    ExpectRefused([&] { World(names, requested); }, Error::Kind::NotPossible, "world", words);
+  };
+  refused({"ImageToA", "ImageToB"}, "", "name one of A, B");
+  refused({"ImageToA", "AToImage"}, "", "name one of A");
+  refused({"ImageToReference"}, "Tracker", "\"Tracker\"; the choices are Reference");
+  refused({"ImageToRobot", "StylusToReference"}, "Reference", "the choices are Robot");
+  refused({}, "Reference", "none");
+}
+
+TEST(SequencePosesTest, PosesAreComposedFrameByFrame)
+{
+  SequenceContent content;
+  content.path = "some.mha";
+  content.transforms = {"ProbeToTracker", "ReferenceToTracker", "StylusToTracker"};
+  NamedTransform calibration;
+  calibration.from = "Image";
+  calibration.to = "Probe";
+  calibration.matrix = Moved(3.0, 10.0);
+  calibration.matrix.linear() *= 0.2;
+  SequencePoses poses(content, {calibration});
+  EXPECT_EQ(poses.World(), "Reference");
+  EXPECT_TRUE(poses.ImageIsPlaced());
+  EXPECT_FALSE(poses.Reaches("Nowhere"));
+  EXPECT_FALSE(SequencePoses(content, {}).ImageIsPlaced());
+  EXPECT_EQ(poses.Tools(), (std::vector<std::string>{"Probe", "Stylus"}));
+
+  SequenceFrame frame;
+  frame.transforms.resize(2);
+  frame.transforms[0].name = "ProbeToTracker";
+  frame.transforms[0].matrix = Moved(5.0, 20.0);
+  frame.transforms[1].name = "ReferenceToTracker";
+  frame.transforms[1].matrix = Moved(-7.0, 40.0);
+  poses.MoveTo(frame);
+  const ComposedTransform found = poses.Find("Image");
+  EXPECT_EQ(found.status, TransformStatus::Valid);
+  const Eigen::Affine3d expected = Moved(-7.0, 40.0).inverse() * Moved(5.0, 20.0) * calibration.matrix;
+  for (Eigen::Index i = 0; i < 16; ++i)
+    EXPECT_NEAR(found.matrix(i / 4, i % 4), expected(i / 4, i % 4), 1e-12);
+  EXPECT_EQ(poses.Find("Stylus").status, TransformStatus::Missing); // the frame has none
+
+  frame.transforms[0].status = TransformStatus::OutOfRange;
+  poses.MoveTo(frame);
+  EXPECT_EQ(poses.Find("Image").status, TransformStatus::OutOfRange);
+  frame.transforms[1].status = TransformStatus::Missing;
+  poses.MoveTo(frame);
+  EXPECT_EQ(poses.Find("Image").status, TransformStatus::Missing);
+  poses.MoveTo({});
+  EXPECT_EQ(poses.Find("Probe").status, TransformStatus::Missing);
+
+  ExpectRefused([&] { SequencePoses(content, {calibration}, "Image", "Mars"); }, Error::Kind::NotPossible, "some.mha", "Mars");
+}
