@@ -6,12 +6,14 @@ import os
 import pathlib
 import resource
 import subprocess
+import sys
 import tempfile
 import unittest
 
 import numpy
 
-from program_under_test import PROGRAM, blobs, read_mha, run, run_json, snapshot, turned, write_mha, write_poses
+from program_under_test import (PROGRAM, SOURCE, blobs, read_mha, run, run_json, snapshot, turned, write_mha, write_plus, write_poses,
+                                write_sequence)
 
 NAN = float("nan")
 SHEARED = numpy.array([[1, 0.3, 0], [0, 1, 0], [0, 0, 1.0]])
@@ -167,6 +169,100 @@ class BadInput(unittest.TestCase):
         write_mha(self.path / "bad.mha", blobs())
         write_mha(self.path / "bad.ValidRegion.mha", numpy.ones((20, 20, 19), "u1"))
         self.refused_by_all(self.path / "bad.mha")
+
+    def test_what_the_fuzzers_start_from(self):
+        """Small files of every format, whole and broken: told about or refused with one line, and never a crash."""
+        refused = 0
+        for script in SOURCE.glob("*/Fuzzing/Seeds*.py"):
+            seeds = self.path / script.stem
+            seeds.mkdir()
+            subprocess.run([sys.executable, script, seeds], check=True)
+            for seed in sorted(path for path in seeds.iterdir() if path.is_file()):
+                done = run("info", seed)
+                lines = [line for line in done.stderr.splitlines() if not line.startswith("echorama: note: ")]
+                self.assertIn((done.returncode, len(lines)), ((0, 0), (1, 1)), f"{seed}: {done.returncode} {done.stderr}")
+                if done.returncode:
+                    refused += 1
+                    self.assertIn(seed.name, lines[0])
+        self.assertGreater(refused, 10)
+
+    # Tracked sequences.
+
+    def sequence(self, name="tracked.igs.mha", **options):
+        path = self.path / name
+        options = {"pixels": blobs((4, 20, 30)), "transforms": [{"ImageToWorld": (numpy.eye(4), "OK")}] * 4, **options}
+        write_sequence(path, **options)
+        return path
+
+    def test_sequences_that_are_broken(self):
+        good = self.sequence()
+        bad = self.path / "bad.igs.mha"
+        out = self.path / "out.seq.nrrd"
+        for header, word in (({"DimSize": "30 20 5"}, ""), ({"DimSize": "30 -20 4"}, ""), ({"DimSize": "2147483647 2147483647 4"}, ""),
+                             ({"Seq_Frame0004_Timestamp": "1"}, "Seq_Frame0004"), ({"UltrasoundImageOrientation": "QQ"}, "QQ"),
+                             ({"ElementType": "MET_BANANA"}, "MET_BANANA")):
+            self.sequence("bad.igs.mha", header=header)
+            self.refuses("bad.igs.mha", ["info", bad], [word])
+            self.refuses("bad.igs.mha", ["convert", bad, out], [word])
+        bad.write_bytes(good.read_bytes()[:-700])
+        self.refuses("bad.igs.mha", ["convert", bad, out])
+        bad.write_bytes(good.read_bytes()[:300])
+        self.refuses("bad.igs.mha", ["info", bad])
+        self.sequence("bad.igs.mha", pixels=blobs((4, 20, 30)), header={"CompressedData": "True"})
+        self.refuses("bad.igs.mha", ["convert", bad, out])
+
+    def test_sequences_are_no_volumes(self):
+        path = self.sequence()
+        self.refuses("tracked.igs.mha", ["stitch", self.good, path, "-o", self.path / "out.mha"], ["sequence"])
+        self.refuses("tracked.igs.mha", ["align", self.good, path, "-o", self.path / "poses.json"], ["sequence"])
+        for name in ("out.vti", "out.banana"):
+            self.refuses(name, ["convert", path, self.path / name], ["sequence"], status=2)
+
+    def test_frames_that_are_not_there(self):
+        path = self.sequence()
+        for text in ("4", "-1", "2:1", "0:4", "0:3:0", "0:3:-1", "a", "1.5", "0:1:1:1", ",", "1,", "99999999999"):
+            self.refuses("--frames", ["convert", path, self.path / "out.igs.mha", f"--frames={text}"], ["4 frames"], status=2)
+        self.refuses("--frames", ["convert", self.good, self.path / "out.nrrd", "--frames", "1"], ["good.mha"], status=2)
+
+    # Transforms.
+
+    def test_transforms_that_are_none(self):
+        unit = numpy.eye(4)
+        path = self.path / "set.xml"
+        moved = numpy.eye(4)
+        moved[1, 3] = 1
+        for transforms, word in (([("A", "A", unit, "")], "itself"), ([("A", "B", unit[:3], "")], "12 values"), ([("A", "", unit, "")], "names"),
+                                 ([("A", "B", unit * 2, "")], "last row"), ([("A", "B", numpy.full((4, 4), NAN), "")], "finite"),
+                                 ([("A", "B", unit, ""), ("A", "B", moved, "")], "twice")):
+            write_plus(path, transforms)
+            self.refuses("set.xml", ["info", path], [word])
+            self.refuses("set.xml", ["convert", path, self.path / "out.json"], [word])
+        write_plus(path, [("A", "B", unit, ""), ("B", "A", moved, "")])
+        self.refuses("set.xml", ["convert", path, self.path / "out.json"], ["does not close"])
+        for text in ("", "<", "<a/>", "<PlusConfiguration>", "<PlusConfiguration/>"):
+            path.write_text(text)
+            self.refuses("set.xml", ["info", path])
+        write_plus(path, [("A", "B", unit, "")])
+        self.refuses("out.xml", ["convert", path, self.path / "out.xml"], [".json"], status=2)
+        self.refuses("input", ["convert", path, path])
+        ours = self.path / "set.json"
+        for text in ("", "{", '{"schema": "echorama-transforms-1"}', '{"schema": "echorama-transforms-1", "unit": "m", "transforms": []}'):
+            ours.write_text(text)
+            self.refuses("set.json", ["info", ours])
+
+    # What convert cannot do with a good file.
+
+    def test_options_that_do_not_apply(self):
+        out = self.path / "out.nrrd"
+        self.refuses("--time", ["convert", self.good, out, "--time", 1], ["one volume"], status=2)
+        self.refuses("--time", ["convert", self.good, out, "--time", -1], status=2)
+        self.refuses("--beams", ["convert", self.good, out, "--beams"], ["good.mha"], status=2)
+        self.refuses("--spacing", ["convert", self.good, out, "--spacing", 1], ["good.mha"], status=2)
+        self.refuses("--stack-spacing", ["convert", self.good, out, "--stack-spacing", 1, 1, 1], ["good.mha"], status=2)
+        self.refuses("--stack-spacing", ["convert", self.good, out, "--stack-spacing", 1, 1, 0], status=2)
+        poses = self.path / "poses.json"
+        write_poses(poses, ["good.mha"], [numpy.eye(4)])
+        self.refuses("poses.json", ["convert", poses, self.path / "other.json"])
 
     # Volumes that are good files and bad input.
 

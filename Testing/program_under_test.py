@@ -9,6 +9,9 @@ import zlib
 import numpy
 
 PROGRAM = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"]) / "bin" / "echorama"
+SOURCE = pathlib.Path(__file__).resolve().parents[1]
+DATA = SOURCE / ".." / "shared" / "data"  # real files, where they are
+PLUS = DATA / "plus"
 TYPES = {"u1": "MET_UCHAR", "i2": "MET_SHORT", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}
 
 
@@ -46,6 +49,38 @@ def read_mha(path):
     data = zlib.decompress(content[end:]) if header.get("CompressedData") == "True" else content[end:]
     kind = {value: key for key, value in TYPES.items()}[header["ElementType"]]
     return header, numpy.frombuffer(data, kind).reshape([int(n) for n in header["DimSize"].split()][::-1])
+
+
+def write_sequence(path, pixels, transforms, times=None, images=None, header=None):
+    """A tracked sequence in MetaImage: pixels [frame, y, x], per frame {name: (matrix, status)}, seconds and ImageStatus."""
+    fields = {"UltrasoundImageOrientation": "MF", "Kinds": "domain domain list"}
+    for i, frame in enumerate(transforms):
+        for name, (matrix, status) in frame.items():
+            fields[f"Seq_Frame{i:04}_{name}Transform"] = " ".join(repr(float(value)) for value in numpy.asarray(matrix).ravel())
+            fields[f"Seq_Frame{i:04}_{name}TransformStatus"] = status
+        if times:
+            fields[f"Seq_Frame{i:04}_Timestamp"] = repr(float(times[i]))
+        fields[f"Seq_Frame{i:04}_ImageStatus"] = images[i] if images else "OK"
+    write_mha(path, pixels, header={**fields, **(header or {})})
+
+
+def read_sequence(path):
+    """The pixels [frame, y, x] of a tracked sequence, and per frame its fields."""
+    header, pixels = read_mha(path)
+    frames = [{} for _ in pixels]
+    for key, value in header.items():
+        if key.startswith("Seq_Frame"):
+            number, name = key[len("Seq_Frame"):].split("_", 1)
+            frames[int(number)][name] = value
+    return pixels, frames
+
+
+def write_plus(path, transforms):
+    """A configuration of Plus with (from, to, matrix, further attributes)."""
+    elements = [f'<Transform From="{start}" To="{end}" Matrix="{" ".join(map(repr, map(float, numpy.asarray(matrix).ravel())))}" {more}/>'
+                for start, end, matrix, more in transforms]
+    text = f'<PlusConfiguration version="2.1"><CoordinateDefinitions>{"".join(elements)}</CoordinateDefinitions></PlusConfiguration>'
+    pathlib.Path(path).write_text(text)
 
 
 def turned(degrees, axis=2):

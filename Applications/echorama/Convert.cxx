@@ -1,33 +1,140 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// echorama convert: from one file format to another.
+// echorama convert: from one file format to another. Volumes go through VTK's reader and writer; sequences go frame by frame from
+// kernel to kernel, so that they need no memory; transforms become our JSON.
 #include "Commands.h"
+#include "Files.h"
 #include "Outputs.h"
+#include "Readers/SequenceWriter.h"
+#include "Readers/TransformFile.h"
 #include "Volumes.h"
+#include <algorithm>
+#include <cctype>
+#include <CLI/Validators.hpp>
+#include <filesystem>
 #include <memory>
 
 namespace echorama {
 namespace {
 
-void Convert(Session& session, const std::string& from, const std::string& to)
+struct ConvertOptions {
+  std::string input, output, frames;
+  VolumeReading reading;
+  std::vector<double> stackSpacingMm;
+};
+
+[[noreturn]] void Misused(const std::string& reason)
 {
-  CheckVolumeOutput(to, {from});
-  const LoadedVolume volume = LoadVolume(session, from);
-  const std::vector<std::string> lost = SaveVolume(session, volume.image, to);
-  session.result["input"] = from;
-  session.result["output"] = to;
+  throw Error(Error::Kind::InvalidParameter, reason);
+}
+
+void ConvertVolume(Session& session, const ConvertOptions& options)
+{
+  CheckVolumeOutput(options.output, {options.input});
+  const LoadedVolume volume = LoadVolume(session, options.input, options.reading);
+  if (options.reading.spacingMm > 0.0 && (!volume.content.beams || options.reading.beams))
+    Misused("--spacing: " + options.input + " is not scan-converted, so there is nothing to choose");
+  if (!options.stackSpacingMm.empty() && volume.content.format != FileFormat::ImageStack)
+    Misused("--stack-spacing: " + options.input + " is no stack of pictures; it says itself what its spacing is");
+  const std::vector<std::string> lost = SaveVolume(session, volume.image, options.output);
+  const std::size_t steps = volume.content.Volumes();
+  if (steps > 1)
+    session.Note(options.input + ": step " + std::to_string(options.reading.step) + " of " + std::to_string(steps) +
+                 " was written; --time names another");
   session.result["lost"] = lost;
-  session.Say("wrote " + to);
+  session.Say("wrote " + options.output);
+}
+
+void ConvertSequence(Session& session, const ConvertOptions& options)
+{
+  CheckOutput(options.output, {options.input});
+  const FileFormat format = FormatOfName(options.output);
+  if (format != FileFormat::MetaImage && format != FileFormat::Nrrd)
+    Misused(options.output +
+            ": a tracked sequence becomes .mha, .mhd, .nrrd or .nhdr; echorama reconstruct makes a volume of it");
+  SequenceFile sequence(options.input);
+  const SequenceContent& content = sequence.Content();
+  for (const std::string& note : content.notes)
+    session.Note(options.input + ": " + note);
+  const std::vector<int> frames = FramesInList(options.frames, content.frames);
+  FileReplacement files;
+  session.Work("convert", options.input, [&](const Progress& progress) {
+    SequenceWriter writer(options.output, content, true, files);
+    std::vector<char> pixels(content.FrameBytes());
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      progress(static_cast<double>(i) / static_cast<double>(frames.size()));
+      const SequenceFrame frame = sequence.Frame(frames[i]);
+      if (content.HasImages())
+        sequence.ReadFrame(frames[i], pixels.data());
+      writer.Append(frame, content.HasImages() ? pixels.data() : nullptr);
+    }
+    writer.Finish();
+  });
+  files.Commit();
+  session.result["frames"] = frames.size();
+  session.result["lost"] = nlohmann::ordered_json::array();
+  session.Say("wrote " + options.output + ": " + std::to_string(frames.size()) + " frames");
+}
+
+void ConvertTransforms(Session& session, const ConvertOptions& options)
+{
+  CheckOutput(options.output, {options.input});
+  if (std::filesystem::path(options.output).extension() != ".json")
+    Misused(options.output + ": transforms become .json");
+  const std::vector<NamedTransform> transforms = ReadTransforms(options.input);
+  WriteTransforms(options.output, transforms);
+  session.result["lost"] = nlohmann::ordered_json::array();
+  session.Say("wrote " + options.output + ": " + std::to_string(transforms.size()) + " transforms");
+}
+
+void Convert(Session& session, ConvertOptions options)
+{
+  if (!options.stackSpacingMm.empty())
+    options.reading.stackSpacingMm = Eigen::Vector3d(options.stackSpacingMm.data());
+  session.result["input"] = options.input;
+  session.result["output"] = options.output;
+  const FileKind kind = KindOf(options.input);
+  if (kind != FileKind::Sequence && !options.frames.empty())
+    Misused("--frames: " + options.input + " is no tracked sequence");
+  if (kind != FileKind::Volume &&
+      (options.reading.spacingMm > 0.0 || options.reading.step > 0 || !options.stackSpacingMm.empty()))
+    Misused("--time, --spacing and --stack-spacing: " + options.input + " is no volume");
+  switch (kind) {
+  case FileKind::Volume:
+    return ConvertVolume(session, options);
+  case FileKind::Sequence:
+    return ConvertSequence(session, options);
+  case FileKind::Transforms:
+    return ConvertTransforms(session, options);
+  case FileKind::Poses:
+    throw Error(Error::Kind::BadInput, options.input + ": poses have one format only");
+  }
 }
 
 } // namespace
 
 Command ConvertCommand(CLI::App& program)
 {
-  auto files = std::make_shared<std::pair<std::string, std::string>>();
-  CLI::App* options = program.add_subcommand("convert", "Write a volume in another file format");
-  options->add_option("input", files->first, "Volume to read (.mha .mhd .nrrd .nhdr .vti)")->required();
-  options->add_option("output", files->second, "File to write; its extension names the format")->required();
-  return {options, [files](Session& session) { Convert(session, files->first, files->second); }};
+  auto values = std::make_shared<ConvertOptions>();
+  CLI::App* options =
+      program.add_subcommand("convert", "Write a volume, a tracked sequence or transforms in another file format");
+  options->add_option("input", values->input, "Volume of any format (a file, or a folder of slices), sequence or transforms")
+      ->required();
+  options->add_option("output", values->output, "File to write; its extension names the format")->required();
+  options->add_option("--time", values->reading.step, "Which volume of a time series, from 0")
+      ->check(CLI::Range(0, 2147483647))
+      ->capture_default_str();
+  options
+      ->add_option("--spacing", values->reading.spacingMm,
+                   "Edge of the voxels in mm that beams are scan-converted to (0: as many voxels in the fan as samples)")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  options
+      ->add_option("--stack-spacing", values->stackSpacingMm, "Spacing in mm of a stack of pictures: x, y, from one to the next")
+      ->expected(3)
+      ->check(CLI::Range(1e-6, 1e6));
+  options->add_option("--frames", values->frames,
+                      "Frames of a sequence, from 0: a list of single ones and FROM:TO:STEP, both included");
+  return {options, [values](Session& session) { Convert(session, *values); }};
 }
 
 } // namespace echorama

@@ -26,10 +26,19 @@ constexpr const char* CompanionArrays[] = {"ValidRegion", "Provenance"};
 // The files that reading a volume may touch.
 std::vector<fs::path> FilesOfInput(const std::string& input)
 {
+  std::error_code none;
   std::vector<fs::path> files{input};
+  if (fs::is_directory(input, none)) { // a series of slices, one a file
+    for (fs::recursive_directory_iterator entry(input, none), end; !none && entry != end; entry.increment(none))
+      files.push_back(entry->path());
+    return files;
+  }
   for (const char* array : CompanionArrays)
     files.emplace_back(CompanionPath(input, array));
   for (std::size_t i = files.size(); i-- > 0;) {
+    for (const char* extension : {".hdr", ".img"}) // NIfTI in two files
+      if (files[i].extension() == ".hdr" || files[i].extension() == ".img")
+        files.push_back(fs::path(files[i]).replace_extension(extension));
     try {
       files.emplace_back(ReadImageHeader(files[i].string()).dataPath);
     } catch (const Error&) {
@@ -78,7 +87,9 @@ void CheckVolumeOutput(const std::string& path, const std::vector<std::string>& 
 {
   CheckOutput(path, inputs);
   if (FormatOfName(path) == FileFormat::Unknown)
-    throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd, .nhdr or .vti");
+    throw Error(Error::Kind::InvalidParameter,
+                path +
+                    ": the extension names none of the formats that are written (.mha .mhd .nrrd .nhdr .nii .nii.gz .vdb .vti)");
 }
 
 OutputFolder::OutputFolder(Session& session, const std::string& path, const std::vector<std::string>& inputs)

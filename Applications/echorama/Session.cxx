@@ -188,6 +188,23 @@ void Session::Watch(vtkAlgorithm* algorithm, const std::string& stage, const std
   ThrowReported();
 }
 
+void Session::Work(const std::string& stage, const std::string& what, const std::function<void(const Progress&)>& body)
+{
+  const std::string label = what.empty() ? stage : stage + " " + what;
+  const Progress progress([this, &label](double fraction) {
+    ShowProgress(label, fraction);
+    return !Interrupted();
+  });
+  Watch(nullptr, stage, what, [&] {
+    try {
+      body(progress);
+    } catch (const Error& error) {
+      if (error.GetKind() != Error::Kind::Cancelled)
+        throw; // a stop is reported by Watch
+    }
+  });
+}
+
 std::string Session::TakeReportedError()
 {
   std::vector<std::string> errors = Window()->TakeErrors();

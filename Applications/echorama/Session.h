@@ -51,6 +51,9 @@ public:
   /// As Watch, for work without an algorithm.
   void Time(const std::string& stage, const std::function<void()>& body) { Watch(nullptr, stage, {}, body); }
 
+  /// As Time, for a kernel that tells how far it is.
+  void Work(const std::string& stage, const std::string& what, const std::function<void(const Progress&)>& body);
+
   /// Whether the user asked to stop.
   static bool Interrupted();
 

@@ -8,12 +8,17 @@
 #include <vtkCompositeDataSet.h>
 #include <vtkInformation.h>
 #include <vtkNew.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkUltrasoundReader.h>
 #include <vtkUltrasoundVolume.h>
 #include <vtkUltrasoundWriter.h>
 
 namespace echorama {
 namespace {
+
+constexpr double Degrees = 57.29577951308232;
+
+} // namespace
 
 std::vector<std::string> LinesOf(const std::string& text)
 {
@@ -24,16 +29,33 @@ std::vector<std::string> LinesOf(const std::string& text)
   return lines;
 }
 
-} // namespace
-
-LoadedVolume LoadVolume(Session& session, const std::string& file)
+LoadedVolume LoadVolume(Session& session, const std::string& file, const VolumeReading& reading)
 {
   vtkNew<vtkUltrasoundReader> reader;
   reader->SetFileName(file.c_str());
-  session.Update(reader, "read", file);
+  reader->SetSpacingMm(reading.spacingMm);
+  reader->SetStackSpacingMm(reading.stackSpacingMm[0], reading.stackSpacingMm[1], reading.stackSpacingMm[2]);
   LoadedVolume volume;
   volume.file = file;
-  volume.image = reader->GetOutput();
+  volume.content.format = FormatOfContent(file);
+  if (volume.content.format != FileFormat::VtkXmlImage)
+    volume.content = OpenVolume(file, {reading.spacingMm, reading.stackSpacingMm})->Content();
+  const std::vector<double>& times = volume.content.times;
+  if (reading.step > 0 && reading.step >= static_cast<int>(times.size()))
+    throw Error(Error::Kind::InvalidParameter, "--time " + std::to_string(reading.step) + ": " + file + " holds " +
+                                                   (times.empty() ? "one volume" : std::to_string(times.size()) + " volumes") +
+                                                   ", counted from 0");
+  if (reading.beams && !volume.content.beams)
+    throw Error(Error::Kind::InvalidParameter, "--beams: " + file + " holds no samples along beams");
+  const int port = reading.beams ? 1 : 0;
+  session.Watch(reader, "read", file, [&] {
+    reader->UpdateInformation();
+    if (!times.empty())
+      reader->GetOutputInformation(port)->Set(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(),
+                                              times[static_cast<std::size_t>(reading.step)]);
+    reader->Update(port);
+  });
+  volume.image = vtkImageData::SafeDownCast(reader->GetOutputDataObject(port));
   if (volume.image->GetNumberOfPoints() == 0)
     throw Error(Error::Kind::BadFile, file + ": it cannot be read");
   for (const std::string& note : LinesOf(reader->GetNotes()))
@@ -122,10 +144,42 @@ nlohmann::ordered_json JsonOf(const Eigen::Vector3d& v)
 
 nlohmann::ordered_json JsonOf(const Pose& pose)
 {
+  return JsonOf(Eigen::Affine3d(pose));
+}
+
+nlohmann::ordered_json JsonOf(const Eigen::Affine3d& matrix)
+{
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (int i = 0; i < 4; ++i)
-    rows.push_back({pose(i, 0), pose(i, 1), pose(i, 2), pose(i, 3)});
+    rows.push_back({matrix(i, 0), matrix(i, 1), matrix(i, 2), matrix(i, 3)});
   return rows;
+}
+
+nlohmann::ordered_json JsonOf(const ProbeGeometry& g)
+{
+  nlohmann::ordered_json json{{"fan_degrees", g.fanAngle * Degrees},
+                              {"fan_mm", g.fanWidth},
+                              {"sweep_degrees", g.sweepAngle * Degrees},
+                              {"sweep_mm", g.sweepWidth},
+                              {"depth_mm", {g.depthMin, g.depthMax}}};
+  if (g.fanOffset != 0.0)
+    json["fan_offset_degrees"] = g.fanOffset * Degrees;
+  return json;
+}
+
+std::string ProbeText(const ProbeGeometry& g)
+{
+  return "fan " + Fixed(g.fanAngle * Degrees, 1) + " degrees, " + Fixed(g.fanWidth, 1) + " mm" +
+         (g.fanOffset != 0.0 ? ", off centre by " + Fixed(g.fanOffset * Degrees, 1) + " degrees" : "") + "; sweep " +
+         Fixed(g.sweepAngle * Degrees, 1) + " degrees, " + Fixed(g.sweepWidth, 1) + " mm; depth " + Fixed(g.depthMin, 1) +
+         " to " + Fixed(g.depthMax, 1) + " mm";
+}
+
+const char* TypeText(VoxelType type)
+{
+  static const int types[] = {VTK_SIGNED_CHAR,  VTK_UNSIGNED_CHAR, VTK_SHORT,       VTK_UNSIGNED_SHORT, VTK_INT,
+                              VTK_UNSIGNED_INT, VTK_TYPE_INT64,    VTK_TYPE_UINT64, VTK_FLOAT,          VTK_DOUBLE};
+  return vtkImageScalarTypeNameMacro(types[static_cast<int>(type)]);
 }
 
 std::string Triple(const Eigen::Vector3d& v, const char* separator, int digits)

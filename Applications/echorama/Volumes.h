@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/PoseFile.h"
+#include "Readers/VolumeSource.h"
 #include "Session.h"
 #include <string>
 #include <vector>
@@ -16,11 +17,20 @@ struct LoadedVolume {
   std::string file;
   vtkSmartPointer<vtkImageData> image;   ///< where the file says, until it is moved
   ImageGeometry geometry;                ///< of the file as it stands
+  VolumeContent content;                 ///< what the file says besides its voxels; of .vti files the format alone
   Pose volumeToWorld = Pose::Identity(); ///< how far the image has been moved from there
 };
 
+/// How a volume is read where the file leaves it open.
+struct VolumeReading {
+  double spacingMm = 0.0;                                   ///< see vtkUltrasoundReader::SpacingMm
+  Eigen::Vector3d stackSpacingMm = Eigen::Vector3d::Zero(); ///< see vtkUltrasoundReader::StackSpacingMm
+  bool beams = false;                                       ///< the samples along beams, not their scan conversion
+  int step = 0;                                             ///< of a time series, from 0
+};
+
 /// Reads a volume. Throws Error that names the file.
-LoadedVolume LoadVolume(Session&, const std::string& file);
+LoadedVolume LoadVolume(Session&, const std::string& file, const VolumeReading& reading = {});
 std::vector<LoadedVolume> LoadVolumes(Session&, const std::vector<std::string>& files);
 
 /// The volumes among \a files: NAME.ValidRegion.EXT and NAME.Provenance.EXT, which a shell's * finds too, belong to NAME.EXT
@@ -43,9 +53,20 @@ vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>&)
 /// Writes \a image to \a path. Returns what the format could not hold, one sentence each.
 std::vector<std::string> SaveVolume(Session&, vtkImageData* image, const std::string& path);
 
+/// The lines of a text, as filters give notes and reports.
+std::vector<std::string> LinesOf(const std::string& text);
+
 /// JSON of a vector, and of a matrix (a list of rows).
 nlohmann::ordered_json JsonOf(const Eigen::Vector3d&);
 nlohmann::ordered_json JsonOf(const Pose&);
+nlohmann::ordered_json JsonOf(const Eigen::Affine3d&);
+nlohmann::ordered_json JsonOf(const ProbeGeometry&);
+
+/// "fan 60.0 degrees, 50.0 mm; sweep ...".
+std::string ProbeText(const ProbeGeometry&);
+
+/// "unsigned char", as VTK names it.
+const char* TypeText(VoxelType);
 
 /// "12.3 x 4.5 x 6.7", with \a digits after the point.
 std::string Triple(const Eigen::Vector3d&, const char* separator, int digits);

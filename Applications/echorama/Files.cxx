@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Files.h"
+
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include "Readers/SequenceFile.h"
+#include "Readers/TransformFile.h"
+#include <filesystem>
+#include <fstream>
+
+namespace echorama {
+namespace {
+
+std::string FirstBytes(const std::string& path)
+{
+  std::string bytes(1 << 16, '\0');
+  std::error_code none;
+  std::ifstream stream(path, std::ios::binary);
+  if (!std::filesystem::is_regular_file(path, none) || !stream)
+    return {};
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
+}
+
+std::vector<std::string_view> Split(std::string_view text, char separator)
+{
+  std::vector<std::string_view> parts;
+  for (std::size_t end = 0; end != std::string_view::npos; text.remove_prefix(std::min(text.size(), end + 1))) {
+    end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos)
+      break;
+  }
+  return parts;
+}
+
+} // namespace
+
+FileKind KindOf(const std::string& path)
+{
+  if (LooksLikeTransforms(FirstBytes(path)))
+    return FileKind::Transforms;
+  if (LooksLikeSequence(path))
+    return FileKind::Sequence;
+  const std::string extension = std::filesystem::path(path).extension().string();
+  return extension == ".json" ? FileKind::Poses : extension == ".xml" ? FileKind::Transforms : FileKind::Volume;
+}
+
+const char* FormatText(FileFormat format)
+{
+  switch (format) {
+  case FileFormat::MetaImage:
+    return "MetaImage";
+  case FileFormat::Nrrd:
+    return "NRRD";
+  case FileFormat::VtkXmlImage:
+    return "VTK XML image";
+  case FileFormat::Nifti:
+    return "NIfTI";
+  case FileFormat::Dicom:
+    return "DICOM";
+  case FileFormat::Kretz:
+    return "GE Kretz";
+  case FileFormat::Vdb:
+    return "OpenVDB";
+  case FileFormat::ImageStack:
+    return "stack of pictures";
+  case FileFormat::Unknown:
+    break;
+  }
+  return "unknown";
+}
+
+std::vector<int> FramesInList(const std::string& list, int count)
+{
+  const auto fail = [&](const std::string& reason) -> void {
+    throw Error(Error::Kind::InvalidParameter,
+                "--frames " + list + ": " + reason + " (the sequence has " + std::to_string(count) + " frames, counted from 0)");
+  };
+  std::vector<int> frames;
+  for (const std::string_view part : Split(list.empty() ? ":" : list, ',')) {
+    const std::vector<std::string_view> numbers = Split(part, ':');
+    int values[3] = {0, count - 1, 1};
+    if (numbers.size() > 3)
+      fail("from:to:step has three numbers at most");
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      if (!(numbers[i].empty() && numbers.size() > 1) && !ParseNumber(numbers[i], values[i]))
+        fail("\"" + std::string(numbers[i]) + "\" is not a whole number");
+    if (numbers.size() == 1)
+      values[1] = values[0];
+    const auto [from, to, step] = values;
+    if (from < 0 || to >= count || from > to || step < 1)
+      fail("there are no frames " + std::string(part));
+    for (long long frame = from; frame <= to; frame += step)
+      frames.push_back(static_cast<int>(frame));
+  }
+  return frames;
+}
+
+} // namespace echorama

@@ -1,0 +1,172 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""info and convert on every kind of file: volumes of all formats, beams, time series, tracked sequences, transforms."""
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy
+
+from program_under_test import PLUS, SOURCE, blobs, read_mha, read_sequence, run, run_json, turned, write_mha, write_plus, write_sequence
+
+work = None  # a folder for all tests
+
+
+def setUpModule():
+    global work
+    work = pathlib.Path(tempfile.mkdtemp())
+    subprocess.run([sys.executable, SOURCE / "Readers" / "Fuzzing" / "SeedsKretz.py", work], check=True)
+
+
+def tearDownModule():
+    shutil.rmtree(work)
+
+
+def tracked(frames=5, size=(6, 7)):
+    """Pixels [frame, y, x] and, per frame, its transforms: a probe that moves and is lost once, and a reference that rests."""
+    pixels = numpy.random.default_rng(3).integers(0, 255, (frames, *size), "u1")
+    transforms = []
+    for i in range(frames):
+        probe = numpy.eye(4)
+        probe[:3, :3], probe[:3, 3] = turned(3 * i, 1), (1.5 * i, -2, 30)
+        transforms.append({"ProbeToTracker": (probe, "INVALID" if i == 3 else "OK"), "ReferenceToTracker": (numpy.eye(4), "OK")})
+    return pixels, transforms
+
+
+class Volumes(unittest.TestCase):
+    def test_formats_by_content(self):
+        """The name of a file does not say what it is."""
+        write_mha(work / "volume.mha", blobs((5, 6, 7)))
+        for extension, name in (("mha", "MetaImage"), ("nrrd", "NRRD"), ("vti", "VTK XML image"), ("nii", "NIfTI"), ("nii.gz", "NIfTI"),
+                                ("vdb", "OpenVDB")):
+            path = work / f"format.{extension}"
+            done = run("convert", work / "volume.mha", path)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            told = run_json("info", path)["files"][0]
+            self.assertEqual((told["kind"], told["format"], told["dimensions"]), ("volume", name, [7, 6, 5]))
+            self.assertIn(name, run("info", path).stdout)
+            anonymous = work / "anonymous"
+            shutil.copy(path, anonymous)
+            self.assertEqual(run_json("info", anonymous)["files"][0]["format"], name)
+
+    def test_beams(self):
+        told = run_json("info", work / "even")["files"][0]
+        self.assertEqual(told["format"], "GE Kretz")
+        self.assertEqual(told["beams"]["dimensions"], [4, 3, 2])
+        self.assertAlmostEqual(told["beams"]["probe"]["fan_degrees"], numpy.degrees(0.2), places=6)
+        self.assertEqual(told["acquisition"]["ProbeGeometry"], told["beams"]["probe"])
+        self.assertIn("4 samples x 3 beams x 2 planes", run("info", work / "even").stdout)
+        for spacing in (0.5, 1.0):
+            run_json("convert", work / "even", work / "even.mha", "--spacing", spacing)
+            self.assertEqual(run_json("info", work / "even.mha")["files"][0]["spacing"], [spacing] * 3)
+        run_json("convert", work / "even", work / "beams.nrrd", "--beams")
+        beams = run_json("info", work / "beams.nrrd")["files"][0]
+        self.assertEqual((beams["dimensions"], beams["range"]), ([4, 3, 2], [0, 23]))
+        self.assertEqual(beams["acquisition"]["ProbeGeometry"], told["beams"]["probe"])
+
+    def test_time_series(self):
+        told = run_json("info", work / "movie")["files"][0]
+        self.assertEqual(told["times"], [0, 0.1])
+        self.assertIn("2, from 0.000 to 0.100 s", run("info", work / "movie").stdout)
+        for step in (0, 1):
+            done = run("convert", work / "movie", work / "step.mha", "--time", step)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn(f"step {step} of 2", done.stderr)
+            self.assertEqual(run_json("info", work / "step.mha")["files"][0]["acquisition"].get("TimeStamp"), 0.1 * step)
+
+    def test_header(self):
+        write_mha(work / "fields.mha", blobs((5, 6, 7)), header={"Operator": "nobody", "Comment": "x" * 200})
+        told = run_json("info", work / "fields.mha")["files"][0]["fields"]
+        self.assertEqual((told["Operator"], told["Comment"]), ("nobody", "x" * 200))
+        self.assertIn("Operator = nobody", run("info", work / "fields.mha").stdout)
+
+
+class Sequences(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.pixels, cls.transforms = tracked()
+        cls.path = work / "tracked.igs.mha"
+        write_sequence(cls.path, cls.pixels, cls.transforms, times=[10, 10.1, 10.2, 10.3, 10.4], images=["OK"] * 4 + ["INVALID"],
+                       header={"Operator": "nobody"})
+
+    def test_info(self):
+        told = run_json("info", self.path)["files"][0]
+        self.assertEqual((told["kind"], told["format"], told["frames"], told["dimensions"]), ("sequence", "MetaImage", 5, [7, 6, 1]))
+        self.assertEqual((told["orientation"], told["valid_images"], told["invalid_images"]), ("MF", 4, 1))
+        self.assertEqual(told["transforms"]["ProbeToTracker"]["statuses"], {"OK": 4, "INVALID": 1})
+        self.assertAlmostEqual(told["transforms"]["ProbeToTracker"]["moves_mm"], 6)  # the lost place does not count
+        self.assertEqual(told["transforms"]["ReferenceToTracker"], {"statuses": {"OK": 5}, "moves_mm": 0})
+        self.assertAlmostEqual(told["time"]["frames_per_second"], 10)
+        self.assertEqual(told["fields"]["Operator"], "nobody")
+        text = run("info", self.path).stdout
+        for words in ("5 of 7 x 6, unsigned char", "MF", "4 valid, 1 invalid", "10.000 to 10.400 s, 10.00 frames a second",
+                      "ProbeToTracker: 4 OK, 1 INVALID; moves within 6.0 mm", "Operator = nobody"):
+            self.assertIn(words, text)
+
+    def test_trackers_alone(self):
+        path = work / "trackers.igs.mha"
+        write_sequence(path, numpy.zeros((5, 0, 0), "u1"), self.transforms, header={"ElementType": "MET_OTHER"})
+        told = run_json("info", path)["files"][0]
+        self.assertEqual((told["frames"], told["valid_images"], told["time"]), (5, 0, None))
+        self.assertIn("without images", run("info", path).stdout)
+
+    def test_round_trip(self):
+        path = self.path
+        for onward in (work / "round.seq.nrrd", work / "round.igs.mhd", work / "round.seq.nhdr", work / "back.igs.mha"):
+            self.assertEqual(run_json("convert", path, onward)["frames"], 5)
+            path = onward
+        pixels, frames = read_sequence(path)
+        numpy.testing.assert_array_equal(pixels, self.pixels)
+        for frame, (given, image) in enumerate(zip(self.transforms, ["OK"] * 4 + ["INVALID"])):
+            self.assertEqual(frames[frame]["ImageStatus"], image)
+            for name, (matrix, status) in given.items():
+                self.assertEqual(frames[frame][name + "TransformStatus"], status)
+                numpy.testing.assert_array_equal(numpy.array(frames[frame][name + "Transform"].split(), float).reshape(4, 4), matrix)
+
+    def test_some_frames(self):
+        for text, expected in (("1", [1]), ("1:3", [1, 2, 3]), ("::2", [0, 2, 4]), ("3:", [3, 4]), (":1,4", [0, 1, 4]), ("4,0:1", [4, 0, 1])):
+            run_json("convert", self.path, work / "some.igs.mha", "--frames", text)
+            numpy.testing.assert_array_equal(read_sequence(work / "some.igs.mha")[0], self.pixels[expected], text)
+
+    def test_real_ones(self):
+        if not PLUS.exists():
+            self.skipTest(f"{PLUS} is not there")
+        for path in sorted(PLUS.glob("*.igs.mha")):
+            told = run_json("info", path)["files"][0]
+            self.assertEqual(told["kind"], "sequence")
+            self.assertGreater(told["frames"], 4)
+
+
+class Transforms(unittest.TestCase):
+    def test_info_and_convert(self):
+        path = work / "set.xml"
+        matrix = numpy.diag([0.08, 0.07, 0.08, 1.0])
+        write_plus(path, [("Image", "Probe", matrix, 'Error="1.68" Date="022312_110631"'), ("Phantom", "Reference", numpy.eye(4), "")])
+        told = run_json("info", path)["files"][0]
+        self.assertEqual(told["frames"], ["Image", "Phantom", "Probe", "Reference"])
+        self.assertEqual(told["transforms"][0], {"from": "Image", "to": "Probe", "matrix": matrix.tolist(), "status": "OK", "error_mm": 1.68,
+                                                 "date": "022312_110631"})
+        self.assertEqual(told["open_cycles"], [])
+        self.assertIn("ImageToProbe: OK, error 1.680 mm, scale 0.08000 x 0.07000 x 0.08000, of 022312_110631", run("info", path).stdout)
+        run_json("convert", path, work / "set.json")
+        again = run_json("info", work / "set.json")["files"][0]
+        self.assertEqual(again["transforms"], told["transforms"])
+        self.assertEqual(json.loads((work / "set.json").read_text())["schema"], "echorama-transforms-1")
+
+    def test_open_cycles_are_told(self):
+        path = work / "open.xml"
+        moved = numpy.eye(4)
+        moved[0, 3] = 2
+        write_plus(path, [("A", "B", numpy.eye(4), ""), ("B", "C", numpy.eye(4), ""), ("A", "C", moved, "")])
+        done = run("info", path)
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("off by 2 mm", done.stderr)
+        self.assertAlmostEqual(run_json("info", path)["files"][0]["open_cycles"][0]["mm"], 2)
+
+
+if __name__ == "__main__":
+    unittest.main()
