@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Most voxels that were not seen are nowhere near one that was. For each row, "near" is made first: a byte per voxel, whether any
+// voxel of the rows around, at most "reach" away along each axis, was seen. That is a matter of ORs over bytes. Only where it
+// is set are the 13 lines tried. Seen voxels are read and others written, so rows are independent.
+#include "HoleFilling.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+namespace {
+
+constexpr int longestReach = 100; // voxels
+constexpr int lines[13][3] = {{1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, -1, 0}, {1, 0, 1}, {1, 0, -1},
+                              {0, 1, 1}, {0, 1, -1}, {1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}};
+
+// How the narrowest gap at a voxel is bridged.
+struct Bridge {
+  int gap = 0;      // voxels between the ends, 0: there is none
+  double sum = 0.0; // of the values interpolated along the shortest lines
+  int count = 0;    // how many lines are as short
+};
+
+template <class T>
+class Holes {
+public:
+  Holes(VolumeView<const T> intensity, VolumeView<const unsigned short> coverage, int reach)
+    : intensity_(intensity), coverage_(coverage), reach_(reach)
+  {
+  }
+
+  Bridge At(int i, int j, int k) const
+  {
+    Bridge bridge;
+    double shortest = std::numeric_limits<double>::infinity();
+    int narrowest = reach_ + 1;
+    for (const auto& line : lines) {
+      const int ahead = Walk(i, j, k, line, 1, reach_);
+      if (!ahead)
+        continue;
+      const int back = Walk(i, j, k, line, -1, reach_ + 1 - ahead);
+      if (!back)
+        continue;
+      narrowest = std::min(narrowest, ahead + back - 1);
+      const int steps = line[0] * line[0] + line[1] * line[1] + line[2] * line[2];
+      // The ends count with one more step, as in Plus: a line of n voxels is n steps long.
+      const double length = (ahead + back + 1) * std::sqrt(static_cast<double>(steps));
+      if (length > shortest)
+        continue;
+      if (length < shortest) {
+        shortest = length;
+        bridge.sum = 0.0;
+        bridge.count = 0;
+      }
+      const double share = (back + 1.0) / (ahead + back + 1.0);
+      bridge.sum += share * Value(i, j, k, line, ahead) + (1.0 - share) * Value(i, j, k, line, -back);
+      ++bridge.count;
+    }
+    bridge.gap = bridge.count ? narrowest : 0;
+    return bridge;
+  }
+
+  double MeanAround(int i, int j, int k, int half) const
+  {
+    const auto& n = coverage_.Dimensions();
+    double sum = 0.0;
+    int count = 0;
+    for (int z = std::max(0, k - half); z <= std::min(n[2] - 1, k + half); ++z)
+      for (int y = std::max(0, j - half); y <= std::min(n[1] - 1, j + half); ++y)
+        for (int x = std::max(0, i - half); x <= std::min(n[0] - 1, i + half); ++x)
+          if (coverage_(x, y, z)) {
+            sum += static_cast<double>(intensity_(x, y, z));
+            ++count;
+          }
+    return sum / count; // the ends of the bridge are in the cube
+  }
+
+private:
+  // Steps to the first voxel that was seen, 0 when there is none within "most".
+  int Walk(int i, int j, int k, const int* line, int sign, int most) const
+  {
+    const auto& n = coverage_.Dimensions();
+    for (int step = 1; step <= most; ++step) {
+      const int x = i + sign * step * line[0], y = j + sign * step * line[1], z = k + sign * step * line[2];
+      if (x < 0 || y < 0 || z < 0 || x >= n[0] || y >= n[1] || z >= n[2])
+        return 0;
+      if (coverage_(x, y, z))
+        return step;
+    }
+    return 0;
+  }
+
+  double Value(int i, int j, int k, const int* line, int step) const
+  {
+    return static_cast<double>(intensity_(i + step * line[0], j + step * line[1], k + step * line[2]));
+  }
+
+  VolumeView<const T> intensity_;
+  VolumeView<const unsigned short> coverage_;
+  int reach_;
+};
+
+template <class T>
+T Rounded(double value)
+{
+  if constexpr (std::is_floating_point_v<T>)
+    return static_cast<T>(value);
+  else
+    return static_cast<T>(std::floor(value + 0.5)); // a mean of values of T is in the range of T
+}
+
+} // namespace
+
+template <class T>
+std::size_t FillHoles(const HoleFillingParameters& parameters, VolumeView<T> intensity, VolumeView<unsigned char> valid,
+                      VolumeView<const unsigned short> coverage, const Progress& progress)
+{
+  if (parameters.reach < 1 || parameters.reach > longestReach)
+    throw Error(Error::Kind::InvalidParameter, "HoleReach is " + std::to_string(parameters.reach) + "; it must be in [1, 100]");
+  const int reach = parameters.reach;
+  const auto& n = coverage.Dimensions();
+  const Holes<T> holes(intensity, coverage, reach);
+  std::vector<std::size_t> filled(static_cast<std::size_t>(n[2]), 0);
+  ParallelFor(n[2], progress, [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    std::vector<unsigned short> around(static_cast<std::size_t>(n[0]));
+    for (int j = 0; j < n[1]; ++j) {
+      const unsigned short* own = coverage.Row(j, k);
+      T* values = intensity.Row(j, k);
+      unsigned char* real = valid.Row(j, k);
+      for (int i = 0; i < n[0]; ++i) {
+        if (!own[i]) { // others may read what was seen at this moment
+          real[i] = 0;
+          values[i] = T(0);
+        }
+      }
+      if (parameters.method == HoleFilling::Nothing)
+        continue;
+      std::fill(around.begin(), around.end(), static_cast<unsigned short>(0));
+      for (int z = std::max(0, k - reach); z <= std::min(n[2] - 1, k + reach); ++z)
+        for (int y = std::max(0, j - reach); y <= std::min(n[1] - 1, j + reach); ++y) {
+          const unsigned short* row = coverage.Row(y, z);
+          for (int i = 0; i < n[0]; ++i)
+            around[static_cast<std::size_t>(i)] |= row[i];
+        }
+      int last = std::numeric_limits<int>::min() / 2, next = 0; // voxels of "around" that are set, at or before and at or after i
+      for (int i = 0; i < n[0]; ++i) {
+        if (around[static_cast<std::size_t>(i)])
+          last = i;
+        next = std::max(next, i);
+        while (next < n[0] && !around[static_cast<std::size_t>(next)])
+          ++next;
+        if (own[i] || (i - last > reach && (next == n[0] || next - i > reach)))
+          continue;
+        const Bridge bridge = holes.At(i, j, k);
+        if (!bridge.gap)
+          continue;
+        values[i] = Rounded<T>(parameters.method == HoleFilling::Stick ? bridge.sum / bridge.count
+                                                                       : holes.MeanAround(i, j, k, (bridge.gap + 2) / 2));
+        real[i] = 1;
+        ++filled[static_cast<std::size_t>(k)];
+      }
+    }
+  });
+  std::size_t sum = 0;
+  for (const std::size_t count : filled)
+    sum += count;
+  return sum;
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template std::size_t FillHoles<T>(const HoleFillingParameters&, VolumeView<T>, VolumeView<unsigned char>,                      \
+                                    VolumeView<const unsigned short>, const Progress&);
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama

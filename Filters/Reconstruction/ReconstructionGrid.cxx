@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Corners suffice: pixels lie between them. The smallest box that contains points is a hard problem, and frames make it easy:
+// they are planes that move little sideways, so the mean image's axes are right for most sweeps. Where the probe wanders or
+// turns, the principal directions can be better; whichever box is smaller is taken.
+#include "ReconstructionGrid.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Memory.h"
+#include "Filters/Reconstruction/VolumeReconstruction.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <limits>
+#include <string>
+
+namespace echorama {
+
+namespace {
+
+constexpr double megabyte = 1e6;
+constexpr double slack = 1e-6; // of a voxel: rounding adds no empty layer
+
+Eigen::AlignedBox3d BoxAlong(const Eigen::Matrix3d& directions, const std::vector<Eigen::Vector3d>& points)
+{
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& point : points)
+    box.extend(directions.transpose() * point);
+  return box;
+}
+
+// What a box costs; a flat one is as thick as a voxel.
+double Cost(const Eigen::AlignedBox3d& box, double spacing)
+{
+  return (box.sizes().array() + spacing).prod();
+}
+
+// The nearest rotation.
+Eigen::Matrix3d Orthonormal(const Eigen::Matrix3d& m)
+{
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs(1.0, 1.0, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0);
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+// Axes of the images, averaged. Images that were turned over count with their axes turned back.
+Eigen::Matrix3d MeanImage(const std::vector<FramePlace>& frames)
+{
+  Eigen::Vector3d across = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
+  for (const FramePlace& frame : frames) {
+    const Eigen::Vector3d u = frame.imageToWorld.linear().col(0).normalized(),
+                          v = frame.imageToWorld.linear().col(1).normalized();
+    across += across.dot(u) < 0.0 ? Eigen::Vector3d(-u) : u;
+    down += down.dot(v) < 0.0 ? Eigen::Vector3d(-v) : v;
+  }
+  Eigen::Matrix3d axes;
+  axes << across.normalized(), down.normalized(), across.cross(down).normalized();
+  return Orthonormal(axes);
+}
+
+// Principal directions, each along the axis of the mean image that it is nearest to.
+Eigen::Matrix3d Principal(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& image)
+{
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points)
+    mean += point / static_cast<double>(points.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point : points)
+    spread += (point - mean) * (point - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  const Eigen::Matrix3d found = solver.eigenvectors();
+  int order[3] = {0, 1, 2}, best[3] = {0, 1, 2};
+  double agreement = -1.0;
+  do {
+    double sum = 0.0;
+    for (int axis = 0; axis < 3; ++axis)
+      sum += std::abs(found.col(order[axis]).dot(image.col(axis)));
+    if (sum > agreement) {
+      agreement = sum;
+      std::copy(order, order + 3, best);
+    }
+  } while (std::next_permutation(order, order + 3));
+  Eigen::Matrix3d axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    axes.col(axis) = found.col(best[axis]);
+    if (axes.col(axis).dot(image.col(axis)) < 0.0)
+      axes.col(axis) *= -1.0;
+  }
+  if (axes.determinant() < 0.0)
+    axes.col(2) *= -1.0;
+  return axes;
+}
+
+ImageGeometry GridAround(const Eigen::AlignedBox3d& box, const Eigen::Matrix3d& directions, double spacing)
+{
+  ImageGeometry grid;
+  grid.direction = directions;
+  grid.spacing.setConstant(spacing);
+  grid.origin = directions * box.min();
+  const Eigen::Array3d size = (box.sizes().array() / spacing - slack).ceil().max(0.0) + 1.0;
+  if (!(size.maxCoeff() <= std::numeric_limits<int>::max()) || !(size.prod() <= 1e15))
+    throw Error(Error::Kind::TooLarge, "the output grid would have " + std::to_string(size[0]) + " x " + std::to_string(size[1]) +
+                                           " x " + std::to_string(size[2]) +
+                                           " voxels; choose a larger SpacingMm, or leave frames out that lie far away");
+  for (int axis = 0; axis < 3; ++axis)
+    grid.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(size[axis]);
+  return grid;
+}
+
+std::string Megabytes(double bytes)
+{
+  char text[64];
+  std::snprintf(text, sizeof text, bytes < 10.0 * megabyte ? "%.2g MB" : "%.0f MB", bytes / megabyte);
+  return text;
+}
+
+} // namespace
+
+ImageGeometry ReconstructionGrid(const std::vector<FramePlace>& frames, GridDirections directions, double spacingMm)
+{
+  if (frames.empty())
+    throw Error(Error::Kind::BadInput, "there is no frame with a valid pose");
+  if (!(spacingMm >= 0.0) || !std::isfinite(spacingMm))
+    throw Error(Error::Kind::InvalidParameter,
+                "SpacingMm is " + std::to_string(spacingMm) + "; it must be positive, or 0 for the size of a pixel");
+  std::vector<Eigen::Vector3d> corners;
+  double pixel = 0.0;
+  for (const FramePlace& frame : frames) {
+    const FrameUse use = CheckPose(frame.imageToWorld);
+    if (use != FrameUse::Used)
+      throw Error(Error::Kind::BadInput, std::string("a frame cannot be placed: ") + FrameUseText(use));
+    for (int corner = 0; corner < 4; ++corner)
+      corners.push_back(frame.imageToWorld *
+                        Eigen::Vector3d(frame.pixels[corner & 1 ? 1 : 0], frame.pixels[corner & 2 ? 3 : 2], 0.0));
+    pixel += std::max(frame.imageToWorld.linear().col(0).norm(), frame.imageToWorld.linear().col(1).norm());
+  }
+  const double spacing = spacingMm > 0.0 ? spacingMm : pixel / static_cast<double>(frames.size());
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  if (directions == GridDirections::Fitted) {
+    axes = MeanImage(frames);
+    const Eigen::Matrix3d principal = Principal(corners, axes);
+    if (Cost(BoxAlong(principal, corners), spacing) < Cost(BoxAlong(axes, corners), spacing))
+      axes = principal;
+  }
+  return GridAround(BoxAlong(axes, corners), axes, spacing);
+}
+
+ImageGeometry WithSpacing(const ImageGeometry& grid, double spacingMm)
+{
+  ImageGeometry other = grid;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double length = (grid.dimensions[axis] - 1) * grid.spacing[static_cast<Eigen::Index>(axis)];
+    other.dimensions[axis] = static_cast<int>(std::min(std::ceil(length / spacingMm - slack) + 1.0, 2147483647.0));
+  }
+  other.spacing.setConstant(spacingMm);
+  return other;
+}
+
+void CheckMemory(const ImageGeometry& grid, double bytesPerVoxel, double limitMb)
+{
+  if (!(limitMb >= 0.0))
+    throw Error(Error::Kind::InvalidParameter, "MemoryLimitMb is " + std::to_string(limitMb) + "; it must not be negative");
+  const double allowed = limitMb > 0.0 ? limitMb * megabyte : FreeMemory();
+  const double needed = static_cast<double>(grid.VoxelCount()) * bytesPerVoxel;
+  if (needed <= allowed)
+    return;
+  double spacing = std::cbrt(grid.spacing.prod());
+  for (double bytes = needed; bytes > allowed && spacing < 1e9;) {
+    spacing *= std::max(1.01, std::cbrt(bytes / allowed));
+    const double digit = std::pow(10.0, std::floor(std::log10(spacing)) - 1.0);
+    spacing = std::ceil(spacing / digit) * digit; // two digits, rounded up
+    bytes = static_cast<double>(WithSpacing(grid, spacing).VoxelCount()) * bytesPerVoxel;
+  }
+  char suggestion[32];
+  std::snprintf(suggestion, sizeof suggestion, "%.2g", spacing);
+  const auto& n = grid.dimensions;
+  throw Error(Error::Kind::TooLarge,
+              "a volume of " + std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]) +
+                  " voxels takes " + Megabytes(needed) + " to make, more than the " + Megabytes(allowed) +
+                  (limitMb > 0.0 ? " allowed (MemoryLimitMb)" : " that are free") + "; SpacingMm = " + suggestion + " would fit");
+}
+
+} // namespace echorama

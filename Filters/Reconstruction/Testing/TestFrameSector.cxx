@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Error.h"
+#include "Core/Base/Random.h"
+#include "Filters/Reconstruction/FrameSector.h"
+#include <cmath>
+#include <gtest/gtest.h>
+#include <vector>
+
+using namespace echorama;
+
+namespace {
+
+constexpr int width = 240, height = 200;
+
+bool InFan(int x, int y)
+{
+  const double across = x - 120.0, down = y + 40.0, radius = std::hypot(across, down);
+  return radius > 55.0 && radius < 220.0 && std::abs(std::atan2(across, down)) < 0.5;
+}
+
+// A fan with speckle and a black vessel; beside it text, a bar that changes now and then, a clock, and noise of compression.
+Volume<unsigned char> Screen(int frame)
+{
+  Volume<unsigned char> image({width, height, 1});
+  Random random(5, static_cast<std::uint64_t>(frame));
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      unsigned char& pixel = image.View()(x, y, 0);
+      const double noise = random.Uniform();
+      if (InFan(x, y))
+        pixel = std::hypot(x - 118.0, y - 110.0) < 22.0 ? 0 : static_cast<unsigned char>(20 + 200 * noise);
+      else if (x < 30 && y < 20)
+        pixel = (x * 7 + y * 3) % 5 == 0 ? 255 : 0; // text
+      else if (x > 228 && y > 30 && y < 170)
+        pixel = static_cast<unsigned char>(y); // bar of grey levels
+      else if (x > 205 && y > 185)
+        pixel = static_cast<unsigned char>(255 * noise); // a clock
+      else if (noise < 0.01)
+        pixel = 3;
+    }
+  return image;
+}
+
+} // namespace
+
+TEST(FrameSector, FindsTheFanAmongWhatScannersPrint)
+{
+  FrameSector sector;
+  for (int frame = 0; frame < 30; ++frame)
+    sector.Add<unsigned char>(Screen(frame).View());
+  EXPECT_EQ(sector.Frames(), 30);
+  const Volume<unsigned char> mask = sector.Detect();
+  int both = 0, fan = 0, found = 0, elsewhere = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      both += InFan(x, y) && mask.View()(x, y, 0);
+      fan += InFan(x, y);
+      found += mask.View()(x, y, 0);
+      elsewhere += mask.View()(x, y, 0) && (y < 10 || x < 15 || x > 225);
+    }
+  EXPECT_GT(both, 0.99 * fan);
+  EXPECT_EQ(elsewhere, 0);
+  EXPECT_LT(found - both, 0.04 * fan); // the hollow under the face is closed
+  EXPECT_EQ(mask.View()(118, 110, 0), 1) << "fluid is real data";
+}
+
+TEST(FrameSector, ASingleFrameAndOtherTypes)
+{
+  Volume<float> image({60, 50, 1});
+  for (int y = 10; y < 40; ++y)
+    for (int x = 5; x < 45; ++x)
+      image.View()(x, y, 0) = 2.5f;
+  FrameSector sector;
+  sector.Add<float>(image.View());
+  const auto mask = sector.Detect();
+  for (int y = 0; y < 50; ++y)
+    for (int x = 0; x < 60; ++x)
+      ASSERT_EQ(mask.View()(x, y, 0), y >= 10 && y < 40 && x >= 5 && x < 45);
+}
+
+TEST(FrameSector, RefusesWhatHasNone)
+{
+  FrameSector none;
+  EXPECT_THROW(none.Detect(), Error);
+  FrameSector still;
+  const Volume<unsigned char> image({20, 20, 1}, 80);
+  still.Add<unsigned char>(image.View());
+  still.Add<unsigned char>(image.View());
+  EXPECT_THROW(still.Detect(), Error);
+  EXPECT_THROW(still.Add<unsigned char>(Volume<unsigned char>({20, 21, 1}).View()), Error);
+  EXPECT_THROW(FrameSector().Add<unsigned char>(Volume<unsigned char>({20, 20, 2}).View()), Error);
+}
+
+TEST(FrameSector, ClippedToARectangle)
+{
+  const Volume<unsigned char> mask({10, 10, 1}, 1);
+  const auto part = Clipped(mask, 2, 20, -3, 4);
+  int count = 0;
+  for (const unsigned char pixel : part.View())
+    count += pixel;
+  EXPECT_EQ(count, 8 * 5);
+  EXPECT_EQ(part.View()(2, 0, 0), 1);
+  EXPECT_EQ(part.View()(1, 0, 0), 0);
+}
