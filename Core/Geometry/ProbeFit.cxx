@@ -184,23 +184,23 @@ std::vector<T> Thinned(const std::vector<T>& all, std::size_t count)
   return some;
 }
 
-// The middle of a cell and how much of it is valid.
+// The voxel in the middle of a cell, and whether it belongs to the region (holes do).
 struct Cell {
   Eigen::Vector3d position;
-  double filled = 0.0;
+  bool inside = false;
 };
 
-// Intersection over union of region and model, by cells; one that the surface cuts counts in part.
-double OverlapOf(const Model& model, const std::vector<Cell>& cells, double cellMm)
+// Intersection over union of region and model.
+double OverlapOf(const Model& model, const std::vector<Cell>& cells)
 {
   const Pose worldToProbe = model.probeToWorld.inverse();
-  double both = 0.0, either = 0.0;
+  std::ptrdiff_t both = 0, either = 0;
   for (const Cell& cell : cells) {
-    const double inside = std::clamp(0.5 - Locate(model.shape, worldToProbe * cell.position).distance / cellMm, 0.0, 1.0);
-    both += std::min(inside, cell.filled);
-    either += std::max(inside, cell.filled);
+    const bool inside = Locate(model.shape, worldToProbe * cell.position).distance <= 0.0;
+    both += inside && cell.inside;
+    either += inside || cell.inside;
   }
-  return either > 0.0 ? both / either : 0.0;
+  return either > 0 ? static_cast<double>(both) / static_cast<double>(either) : 0.0;
 }
 
 // Mean distance of the outline, each at most \a cap, as a part of it: 0 ... 1. Ends of the grid count when they are outside.
@@ -358,23 +358,26 @@ struct Region {
   double Reach() const { return 1.75 * outline.cellMm; }
 };
 
-Region RegionOf(RegionOutline outline, int outlinePoints)
+Region RegionOf(RegionOutline outline, VolumeView<const unsigned char> valid, int outlinePoints)
 {
   Region region;
   const auto& n = outline.filled.Dimensions();
   region.plane = outline.geometry.dimensions[2] == 1;
   region.size = std::pow(outline.validMm, region.plane ? 1.0 / 2.0 : 1.0 / 3.0);
   region.cells.reserve(static_cast<std::size_t>(outline.filled.View().Size()));
+  const Eigen::Affine3d toWorld = outline.geometry.IndexToWorld();
+  const Eigen::Vector3d middle = outline.geometry.Centre();
   double sum = 0.0;
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-  const Eigen::Vector3d middle = outline.geometry.Centre();
   for (int k = 0; k < n[2]; ++k)
     for (int j = 0; j < n[1]; ++j)
       for (int i = 0; i < n[0]; ++i) {
         const double filled = outline.filled.View()(i, j, k);
-        region.cells.push_back({outline.CellPosition(i, j, k), filled});
-        const Eigen::Vector3d at = region.cells.back().position - middle;
+        const Eigen::Vector3i voxel =
+            Eigen::Vector3d(outline.centres[0][i], outline.centres[1][j], outline.centres[2][k]).cast<int>();
+        const Eigen::Vector3d position = toWorld * voxel.cast<double>(), at = position - middle;
+        region.cells.push_back({position, filled == 1.0 || valid(voxel[0], voxel[1], voxel[2]) != 0});
         sum += filled;
         first += filled * at;
         second += filled * at * at.transpose();
@@ -382,16 +385,15 @@ Region RegionOf(RegionOutline outline, int outlinePoints)
   first /= sum;
   region.centroid = middle + first;
   if (region.plane) {
-    // In the plane the starts turn all around.
-    region.axes = outline.geometry.direction;
+    region.axes = outline.geometry.direction; // the starts turn all around
   } else {
     region.axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second / sum - first * first.transpose()).eigenvectors();
     if (region.axes.determinant() < 0.0)
       region.axes.col(2) = -region.axes.col(2);
   }
-  region.sample = Thinned(region.cells, 1500);
+  region.sample = Thinned(region.cells, 2000);
   region.few = Thinned(outline.points, 300);
-  region.some = Thinned(outline.points, std::min(600, outlinePoints));
+  region.some = Thinned(outline.points, static_cast<std::size_t>(std::min(600, outlinePoints)));
   region.many = Thinned(outline.points, static_cast<std::size_t>(outlinePoints));
   region.outline = std::move(outline);
   return region;
@@ -524,7 +526,7 @@ std::vector<Rated> Distinct(const std::vector<Rated>& sorted, std::size_t most, 
 double RatingOf(const Model& model, const Region& region, const std::vector<Cell>& cells, const Points& points)
 {
   const double cellMm = region.outline.cellMm;
-  return OverlapOf(model, cells, cellMm) - 0.5 * MisfitOf(model, points, std::max(0.05 * region.size, 2.0 * cellMm));
+  return OverlapOf(model, cells) - 0.5 * MisfitOf(model, points, std::max(0.05 * region.size, 2.0 * cellMm));
 }
 
 // The best model, and those that explain the region as well, or nearly so.
@@ -578,8 +580,13 @@ Choice Choose(const Region& region, const Progress& progress)
   refineAll(progress.Part(0.6, 0.8));
   candidates.insert(candidates.begin(), best);
   SortByRating(candidates);
-  candidates = Distinct(candidates, 4, region.size);
+  candidates = Distinct(candidates, candidates.size(), region.size);
   const double bestRating = candidates.front().rating;
+  const auto tied = std::find_if(candidates.begin(), candidates.end(),
+                                 [&](const Rated& candidate) { return candidate.rating < bestRating - asGood; });
+  std::stable_sort(candidates.begin(), tied,
+                   [&](const Rated& a, const Rated& b) { return ConventionOf(a.model, region) > ConventionOf(b.model, region); });
+  candidates.resize(std::min<std::size_t>(candidates.size(), 4));
   candidates.erase(std::find_if(candidates.begin(), candidates.end(),
                                 [&](const Rated& candidate) { return candidate.rating < bestRating - 2.0 * nearlyAsGood; }),
                    candidates.end());
@@ -626,6 +633,61 @@ Residual ResidualOf(const Model& model, const Points& points)
   return {std::sqrt(sum / static_cast<double>(distances.size())), distances[distances.size() / 2]};
 }
 
+// The near end of a fan that begins in a tip, from the voxels themselves: blocks of voxels blunt it. The face moves along the
+// beams to where it puts the fewest voxels on the wrong side; not beyond the point where beams or planes of the sweep meet.
+void SharpenTip(Model& model, VolumeView<const unsigned char> valid, const Region& region)
+{
+  ProbeGeometry& shape = model.shape;
+  const double cell = region.outline.cellMm, inside = 4.0 * cell;
+  const auto isTip = [&](const ProbeArc& arc) { return arc.angle > 5.0 * degree && arc.width < 8.0 * cell; };
+  if (!(isTip(shape.Fan()) || (!region.plane && isTip(shape.Sweep()))) || shape.depthMax < 2.0 * inside)
+    return;
+  double behind = 10.0 * cell;
+  for (const ProbeArc& arc : {shape.Fan(), shape.Sweep()})
+    if (arc.angle > 0.0 && arc.width > 0.0)
+      behind = std::min(behind, arc.width / arc.angle);
+
+  ProbeGeometry longer = shape;
+  longer.depthMin = -behind;
+  const Eigen::Affine3d probeToIndex = region.outline.geometry.WorldToIndex() * model.probeToWorld;
+  const Eigen::Affine3d indexToProbe = probeToIndex.inverse();
+  Eigen::AlignedBox3d box;
+  for (const double depth : {-behind, inside})
+    for (const double fan : {-0.5, 0.0, 0.5})
+      for (const double sweep : {-0.5, 0.0, 0.5})
+        box.extend(probeToIndex * PointOf(longer, {depth, fan, sweep}));
+  std::array<int, 3> first, last;
+  for (int a = 0; a < 3; ++a) {
+    first[a] = std::max(0, static_cast<int>(std::floor(box.min()[a])));
+    last[a] = std::min(valid.Dimensions()[a] - 1, static_cast<int>(std::ceil(box.max()[a])));
+  }
+  std::vector<std::pair<double, int>> voxels; // depth; 1: valid, -1: not
+  for (int k = first[2]; k <= last[2]; ++k)
+    for (int j = first[1]; j <= last[1]; ++j)
+      for (int i = first[0]; i <= last[0]; ++i) {
+        const Located at = Locate(longer, indexToProbe * Eigen::Vector3d(i, j, k));
+        if (at.distance <= 0.0 && at.fan.depth < inside)
+          voxels.emplace_back(at.fan.depth, valid(i, j, k) ? 1 : -1);
+      }
+  std::sort(voxels.begin(), voxels.end());
+  // With the face before voxel i, the valid ones before it are wrong, and the others from it on.
+  int wrong = 0, least = 0;
+  double face = inside;
+  for (std::size_t i = voxels.size(); i-- > 0;) {
+    wrong -= voxels[i].second;
+    if (wrong < least) {
+      least = wrong;
+      face = i > 0 ? 0.5 * (voxels[i].first + voxels[i - 1].first) : voxels[i].first;
+    }
+  }
+  if (least == 0)
+    return; // nothing is valid there: not a tip after all
+  shape.fanWidth = std::max(0.0, shape.Fan().Span(face));
+  shape.sweepWidth = std::max(0.0, shape.Sweep().Span(face));
+  shape.depthMax -= face;
+  model.probeToWorld.translation() += face * model.probeToWorld.linear().col(2);
+}
+
 std::string Text(const char* format, double value)
 {
   char text[200];
@@ -636,28 +698,40 @@ std::string Text(const char* format, double value)
 // How much of each face of the model the outline touches, of FanSide and SweepSide the lesser of both sides, [0, 1].
 std::array<double, faces> SeenParts(const Model& model, const Region& region)
 {
-  constexpr int across = 6;
-  const int bins = region.plane ? across : across * across;
+  const ProbeGeometry& shape = model.shape;
+  // A face is looked at in up to 6 x 6 parts, none smaller than two cells.
+  constexpr int most = 6;
+  const auto partsOf = [&](double extent) { return std::clamp(static_cast<int>(0.5 * extent / region.outline.cellMm), 1, most); };
+  const auto partsOfFace = [&](int face) -> std::array<int, 2> {
+    const double depth = face == Near ? 0.0 : face == Far ? shape.depthMax : 0.5 * shape.depthMax;
+    const int fan = partsOf(shape.Fan().Span(depth)), sweep = region.plane ? 1 : partsOf(shape.Sweep().Span(depth));
+    const int deep = partsOf(shape.depthMax);
+    return {face == FanSide ? deep : fan, face == SweepSide ? deep : sweep};
+  };
+  bool touched[faces][2][most][most] = {};
   const Pose worldToProbe = model.probeToWorld.inverse();
-  std::vector<std::array<bool, 2>> touched(static_cast<std::size_t>(faces * bins), {false, false});
-  const auto bin = [](double position) { return std::clamp(static_cast<int>(position * across), 0, across - 1); };
-  for (const RegionOutline::Point& point : region.many) {
-    const Located at = Locate(model.shape, worldToProbe * point.position);
+  for (const RegionOutline::Point& point : region.outline.points) {
+    const Located at = Locate(shape, worldToProbe * point.position);
     if (std::abs(at.distance) > region.Reach())
       continue;
-    const int fan = bin(at.fan.along + 0.5), sweep = region.plane ? 0 : bin(at.sweep.along + 0.5);
-    const int depth = bin(at.fan.depth / model.shape.depthMax);
-    const int first = at.face == FanSide ? depth : fan, second = at.face == SweepSide ? depth : sweep;
-    const bool positive = at.face == FanSide ? at.fan.along > 0.0 : at.face == SweepSide && at.sweep.along > 0.0;
-    touched[static_cast<std::size_t>(at.face * bins + second * across + first)][positive] = true;
+    const double fan = at.fan.along + 0.5, sweep = at.sweep.along + 0.5, deep = at.fan.depth / shape.depthMax;
+    const double place[2] = {at.face == FanSide ? deep : fan, at.face == SweepSide ? deep : sweep};
+    const bool positive = at.face == FanSide ? fan > 0.5 : at.face == SweepSide && sweep > 0.5;
+    int part[2];
+    for (int a = 0; a < 2; ++a) {
+      const int parts = partsOfFace(at.face)[a];
+      part[a] = std::clamp(static_cast<int>(place[a] * parts), 0, parts - 1);
+    }
+    touched[at.face][positive][part[0]][part[1]] = true;
   }
   std::array<double, faces> seen{};
   for (int face = 0; face < faces; ++face) {
-    std::array<int, 2> count{0, 0};
-    for (int i = 0; i < bins; ++i)
-      for (const int side : {0, 1})
-        count[side] += touched[static_cast<std::size_t>(face * bins + i)][side];
-    seen[face] = static_cast<double>(face == FanSide || face == SweepSide ? std::min(count[0], count[1]) : count[0]) / bins;
+    int count[2] = {0, 0};
+    for (int side = 0; side < 2; ++side)
+      for (const auto& row : touched[face][side])
+        count[side] += static_cast<int>(std::count(std::begin(row), std::end(row), true));
+    const auto [first, second] = partsOfFace(face);
+    seen[face] = static_cast<double>(face < Near ? std::min(count[0], count[1]) : count[0]) / (first * second);
   }
   if (region.plane)
     seen[SweepSide] = 1.0;
@@ -729,18 +803,20 @@ ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& ge
   if (parameters.outlinePoints < 100)
     throw Error(Error::Kind::InvalidParameter, "probe fit: outlinePoints must be at least 100");
 
-  const Region region = RegionOf(OutlineRegion(valid, geometry, mostCells, progress.Part(0.0, 0.3)), parameters.outlinePoints);
+  const Region region =
+      RegionOf(OutlineRegion(valid, geometry, mostCells, progress.Part(0.0, 0.3)), valid, parameters.outlinePoints);
   const double cell = region.outline.cellMm;
   if (region.outline.points.size() < (region.plane ? 40 : 150))
     throw Error(Error::Kind::NotPossible, "the valid region is too small for a fit: its outline is " +
                                               std::to_string(region.outline.points.size()) + " voxels long");
-  const Choice choice = Choose(region, progress.Part(0.3, 1.0));
+  Choice choice = Choose(region, progress.Part(0.3, 1.0));
+  SharpenTip(choice.best, valid, region);
   const Model& best = choice.best;
 
   ProbeFit fit;
   fit.geometry = best.shape;
   fit.probeToWorld = best.probeToWorld;
-  fit.overlap = OverlapOf(best, region.cells, cell);
+  fit.overlap = OverlapOf(best, region.cells);
   const Residual residual = ResidualOf(best, region.many);
   fit.residualMm = residual.rms;
   fit.typicalMm = residual.median;

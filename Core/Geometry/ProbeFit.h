@@ -13,7 +13,7 @@ struct ProbeFitParameters {
   double minimumOverlap = 0.8; ///< fits with less overlap are refused, [0, 1]
   /// Fits with a greater residual are refused: a part of the region's size, which is the cube root of its volume (the square
   /// root of the area of a single slice), but never less than a cell of the outline; > 0.
-  double maximumResidual = 0.05;
+  double maximumResidual = 0.04;
   int outlinePoints = 4000; ///< how many points of the outline take part in the last fit, >= 100
 };
 
