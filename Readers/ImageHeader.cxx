@@ -5,6 +5,8 @@
 // interface sets one, and "0,5" would end a number at its zero.
 #include "Readers/ImageHeader.h"
 #include "Core/Base/Error.h"
+#include "Readers/DicomFile.h"
+#include "Readers/DicomHeader.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/KretzFile.h"
 #include "Readers/NiftiFile.h"
@@ -65,8 +67,11 @@ FileFormat FormatOfContent(const std::string& path)
     throw Error(Error::Kind::FileSystem, "no file name was given");
   if (!fs::exists(path, error))
     fail(Error::Kind::FileSystem, "there is no such file");
-  if (fs::is_directory(path, error))
+  if (fs::is_directory(path, error)) {
+    if (IsDicomFolder(path))
+      return FileFormat::Dicom;
     fail(Error::Kind::FileSystem, "it is a folder, not a file");
+  }
   std::ifstream stream(path, std::ios::binary);
   std::string start(4096, '\0');
   if (!stream)
@@ -76,6 +81,8 @@ FileFormat FormatOfContent(const std::string& path)
   if (start.empty())
     fail(stream.bad() ? Error::Kind::FileSystem : Error::Kind::BadFile, stream.bad() ? "it cannot be read" : "the file is empty");
 
+  if (LooksLikeDicom(start))
+    return FileFormat::Dicom;
   if (LooksLikeKretz(start))
     return FileFormat::Kretz;
   if (LooksLikeNifti(start))
@@ -91,7 +98,7 @@ FileFormat FormatOfContent(const std::string& path)
 
 const char* KnownFormats()
 {
-  return "MetaImage, NRRD, NIfTI, GE Kretz and VTK image file";
+  return "MetaImage, NRRD, NIfTI, DICOM, GE Kretz and VTK image file";
 }
 
 FileFormat FormatOfName(const std::string& path)

@@ -2,6 +2,7 @@
 // The one place that knows which file holds which format. Each format lies in a file of its own.
 #include "Readers/VolumeSource.h"
 #include "Core/Base/Error.h"
+#include "Readers/DicomFile.h"
 #include "Readers/KretzFile.h"
 #include "Readers/NiftiFile.h"
 #include "Readers/VolumeFile.h"
@@ -21,6 +22,8 @@ std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeRe
     return OpenHeaderVolume(path);
   case FileFormat::Nifti:
     return OpenNifti(path);
+  case FileFormat::Dicom:
+    return OpenDicom(path, parameters);
   case FileFormat::Kretz:
     return OpenKretz(path, parameters);
   default:
