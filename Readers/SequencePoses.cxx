@@ -65,6 +65,23 @@ std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& ima
   return ends[0];
 }
 
+ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions)
+{
+  ImageGeometry grid;
+  grid.dimensions = dimensions;
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    grid.spacing[axis] = imageToWorld.linear().col(axis).norm();
+  // The sum and the difference of two unit vectors are perpendicular; half-way between them lie the axes that we want.
+  const Eigen::Vector3d x = imageToWorld.linear().col(0) / grid.spacing[0], y = imageToWorld.linear().col(1) / grid.spacing[1];
+  const Eigen::Vector3d sum = (x + y).normalized(), difference = (x - y).normalized();
+  grid.direction.col(0) = (sum + difference).normalized();
+  grid.direction.col(1) = (sum - difference).normalized();
+  grid.direction.col(2) = grid.direction.col(0).cross(grid.direction.col(1));
+  const Eigen::Vector3d middle((dimensions[0] - 1) / 2.0, (dimensions[1] - 1) / 2.0, (dimensions[2] - 1) / 2.0);
+  grid.origin = imageToWorld * middle - grid.direction * grid.spacing.cwiseProduct(middle);
+  return grid;
+}
+
 SequencePoses::SequencePoses(const SequenceContent& content, const std::vector<NamedTransform>& fixed, const std::string& image,
                              const std::string& world)
   : graph_(fixed), names_(content.transforms), image_(FrameName(image))

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/TransformGraph.h"
 #include "Readers/SequenceFile.h"
 #include <string>
@@ -14,6 +15,11 @@ namespace echorama {
 /// \throws Error(NotPossible) that names the choices when the requested one is not among them, or nothing was requested and none
 /// or several qualify.
 std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& image, const std::string& requested);
+
+/// The grid nearest to pixels of \a dimensions under \a imageToWorld that is a rigid pose with a spacing: its x and y axes are
+/// turned by the same small angle to become perpendicular, about the middle of the frame. The third axis is perpendicular to
+/// both and only its spacing is that of the matrix. \a imageToWorld must not be singular.
+ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions);
 
 /// Where the frames of a sequence lie, composed by name from the transforms of the file and fixed ones (a calibration).
 class SequencePoses {
@@ -30,6 +36,9 @@ public:
   /// Whether a way leads from \a frame to the world at all. Its path, as ComposedTransform::PathText, is always the same.
   bool Reaches(const std::string& frame) const;
   bool ImageIsPlaced() const { return Reaches(image_); }
+
+  /// All frames of coordinates that there are.
+  std::vector<std::string> Frames() const { return graph_.Frames(); }
 
   /// The frames that a way leads from to the world and that a transform of the file begins at: the tracked things.
   std::vector<std::string> Tools() const;

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundReader.h"
 
 #include "Readers/BorderZeros.h"
+#include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeSource.h"
 
@@ -17,6 +18,7 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundVoxelTypes.h"
 #include "vtkUnsignedCharArray.h"
 #include "vtkXMLImageDataReader.h"
 
@@ -35,17 +37,10 @@ vtkStandardNewMacro(vtkUltrasoundReader);
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
 
-int VtkTypeOf(VoxelType type)
-{
-  static const int types[] = {VTK_SIGNED_CHAR,  VTK_UNSIGNED_CHAR, VTK_SHORT,       VTK_UNSIGNED_SHORT, VTK_INT,
-                              VTK_UNSIGNED_INT, VTK_TYPE_INT64,    VTK_TYPE_UINT64, VTK_FLOAT,          VTK_DOUBLE};
-  return types[static_cast<int>(type)];
-}
-
 // An array for the voxels of a file, which are read into its memory directly.
 vtkSmartPointer<vtkDataArray> NewArray(VoxelType type, std::size_t count, const char* name)
 {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VtkTypeOf(type)));
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(echorama::VtkTypeOf(type)));
   array->SetName(name);
   array->SetNumberOfTuples(static_cast<vtkIdType>(count));
   return array;
@@ -222,7 +217,8 @@ void vtkUltrasoundReader::PrintSelf(ostream& os, vtkIndent indent)
 int vtkUltrasoundReader::CanReadFile(const char* fileName)
 {
   try {
-    return fileName && echorama::FormatOfContent(fileName) != FileFormat::Unknown ? 1 : 0;
+    return fileName && echorama::FormatOfContent(fileName) != FileFormat::Unknown && !echorama::LooksLikeSequence(fileName) ? 1
+                                                                                                                            : 0;
   } catch (const Error&) {
     return 0;
   }
@@ -268,10 +264,10 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
     const auto source = echorama::OpenVolume(path, this->Parameters());
     const VolumeContent& content = source->Content();
     vtkUltrasoundVolume::SetGeometry(out, content.geometry);
-    vtkDataObject::SetPointDataActiveScalarInfo(out, VtkTypeOf(content.type), 1);
+    vtkDataObject::SetPointDataActiveScalarInfo(out, echorama::VtkTypeOf(content.type), 1);
     if (content.beams) {
       vtkUltrasoundVolume::SetGeometry(beams, BeamGrid(*content.beams));
-      vtkDataObject::SetPointDataActiveScalarInfo(beams, VtkTypeOf(content.beams->type), 1);
+      vtkDataObject::SetPointDataActiveScalarInfo(beams, echorama::VtkTypeOf(content.beams->type), 1);
     }
     for (vtkInformation* each : {out, beams}) {
       if (!content.times.empty()) {

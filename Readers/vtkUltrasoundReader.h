@@ -75,7 +75,8 @@ public:
   ///@}
 
   /**
-   * 1 when \a fileName is there and begins like a file that this class reads, else 0. The voxels are not looked at.
+   * 1 when \a fileName is there and begins like a file that this class reads, else 0 (also for tracked sequences). The voxels
+   * are not looked at.
    */
   static int CanReadFile(const char* fileName);
 

@@ -17,6 +17,7 @@
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundVolume.h"
+#include "vtkUltrasoundVoxelTypes.h"
 #include "vtkUnsignedCharArray.h"
 #include "vtkXMLImageDataWriter.h"
 
@@ -26,33 +27,11 @@ using echorama::Error;
 using echorama::FileFormat;
 using echorama::FileReplacement;
 using echorama::ImageHeader;
-using echorama::VoxelType;
 
 vtkStandardNewMacro(vtkUltrasoundWriter);
 
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
-
-template <class T>
-constexpr VoxelType VoxelTypeOf()
-{
-  if constexpr (std::is_floating_point_v<T>) {
-    return sizeof(T) == 4 ? VoxelType::Float32 : VoxelType::Float64;
-  }
-  constexpr VoxelType types[] = {VoxelType::Int8,  VoxelType::UInt8,  VoxelType::Int16, VoxelType::UInt16,
-                                 VoxelType::Int32, VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64};
-  constexpr int power = sizeof(T) == 1 ? 0 : sizeof(T) == 2 ? 1 : sizeof(T) == 4 ? 2 : 3;
-  return types[2 * power + (std::is_signed_v<T> ? 0 : 1)];
-}
-
-VoxelType TypeOf(vtkDataArray* array)
-{
-  switch (array->GetDataType()) {
-    vtkTemplateMacro(return VoxelTypeOf<VTK_TT>());
-  default:
-    throw Error(Error::Kind::BadInput, std::string("voxels of type ") + array->GetDataTypeAsString() + " cannot be written");
-  }
-}
 
 // Whether the reader would find every voxel real without being told.
 bool LooksValidEverywhere(vtkImageData* input, vtkDataArray* intensity)
@@ -198,7 +177,7 @@ void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& 
       files.Remove(companion);
       return;
     }
-    header.type = TypeOf(array);
+    header.type = echorama::VoxelTypeOf(array);
     echorama::WriteVolume(companion, header, array->GetVoidPointer(0), compress, files, progress.Part(0.0, 0.2));
   };
   writeBeside(vtkUltrasoundVolume::ValidRegionName(), ValidRegionToWrite(input, intensity));
@@ -241,7 +220,7 @@ void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& 
     this->Notes.push_back("the format cannot hold the " + what + "; .vti can");
   }
 
-  header.type = TypeOf(intensity);
+  header.type = echorama::VoxelTypeOf(intensity);
   echorama::WriteVolume(path, header, intensity->GetVoidPointer(0), compress, files, progress.Part(0.2, 1.0));
 }
 

@@ -101,3 +101,31 @@ TEST(SequencePosesTest, PosesAreComposedFrameByFrame)
 
   ExpectRefused([&] { SequencePoses(content, {calibration}, "Image", "Mars"); }, Error::Kind::NotPossible, "some.mha", "Mars");
 }
+
+TEST(SequencePosesTest, TheGridOfAFrameIsTheNearestWithoutShear)
+{
+  // Without shear: exactly that grid.
+  Eigen::Affine3d exact = Moved(4.0, 30.0);
+  exact.linear().col(0) *= 0.2;
+  exact.linear().col(1) *= 0.3;
+  exact.linear().col(2) *= -1.0; // Plus's third axis may point either way
+  const ImageGeometry grid = FrameGeometry(exact, {820, 616, 1});
+  EXPECT_NO_THROW(grid.Check("grid"));
+  for (const Eigen::Vector3d pixel : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(819, 615, 0)})
+    for (Eigen::Index i = 0; i < 3; ++i)
+      EXPECT_NEAR((grid.IndexToWorld() * pixel)[i], (exact * pixel)[i], 1e-10);
+
+  // With shear the middle stays and both axes turn by half of the angle.
+  Eigen::Affine3d sheared = exact;
+  const double angle = 0.01;
+  sheared.linear().col(1) = 0.3 * (std::cos(angle) * grid.direction.col(1) + std::sin(angle) * grid.direction.col(0));
+  const ImageGeometry nearest = FrameGeometry(sheared, {820, 616, 1});
+  EXPECT_NO_THROW(nearest.Check("grid"));
+  const Eigen::Vector3d middle(409.5, 307.5, 0.0);
+  for (Eigen::Index i = 0; i < 3; ++i)
+    EXPECT_NEAR((nearest.IndexToWorld() * middle)[i], (sheared * middle)[i], 1e-10);
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    EXPECT_NEAR(nearest.spacing[axis], axis == 0 ? 0.2 : 0.3, 1e-12);
+    EXPECT_NEAR(std::acos(nearest.direction.col(axis).dot(sheared.linear().col(axis).normalized())), angle / 2.0, 1e-9);
+  }
+}

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundSequenceWriter
+ * @brief writes tracked frames as Plus does: .igs.mha, .seq.mha, .mhd, .seq.nrrd, .igs.nrrd, .nhdr
+ *
+ * Input 0: vtkImageData, one frame per time step, with `Intensity` (else the active scalars) and the field data that
+ * vtkUltrasoundSequenceReader describes. All time steps are asked for and written one after the other, so that a sequence need
+ * not fit in memory; an input without time steps is one frame. An image without voxels at the first step makes a recording of
+ * poses alone (not in NRRD).
+ *
+ * Every field AToBTransform of 16 numbers is written with its status. `ImageToWorld` is written as ImageToReferenceTransform
+ * (or whatever frame the string `WorldFrame` names), unless the frame has that one already; a frame without it, where others have
+ * it, gets one that is INVALID. An image whose `ValidRegion` is 0 everywhere is marked as INVALID. The time is `TimeStamp`; where
+ * there is none, the time step, but for frames of a sequence (FrameIndex) that had none. Strings Frame_KEY are fields of
+ * the frame; other strings, and ProbeGeometry, Seed and Scene, are written once, as the first frame has them. Pixels, matrices
+ * and times come back to the last bit. What cannot be held is listed by GetNotes() and in a warning.
+ *
+ * All or nothing: after an error, a full disk or an abort, what was there before is there unchanged.
+ *
+ * Errors, with the file and the reason: an input that fails, frames that differ in size or type, more than one number per pixel,
+ * what echorama::SequenceWriter refuses.
+ *
+ * @sa vtkUltrasoundSequenceReader
+ */
+#ifndef vtkUltrasoundSequenceWriter_h
+#define vtkUltrasoundSequenceWriter_h
+
+#include "EchoramaReadersModule.h"
+#include "vtkWriter.h"
+
+#include <string> // for the notes
+#include <vector> // for the notes
+
+#ifndef __VTK_WRAP__
+#include "Core/Base/Progress.h"
+#endif
+
+class ECHORAMAREADERS_EXPORT vtkUltrasoundSequenceWriter : public vtkWriter {
+public:
+  static vtkUltrasoundSequenceWriter* New();
+  vtkTypeMacro(vtkUltrasoundSequenceWriter, vtkWriter);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /** The file to write; its extension chooses the format. Default: none. */
+  vtkSetFilePathMacro(FileName);
+  vtkGetFilePathMacro(FileName);
+  ///@}
+
+  ///@{
+  /** Whether pixels are compressed (zlib, without loss). Default: on. */
+  vtkSetMacro(UseCompression, vtkTypeBool);
+  vtkGetMacro(UseCompression, vtkTypeBool);
+  vtkBooleanMacro(UseCompression, vtkTypeBool);
+  ///@}
+
+  /**
+   * Updates the input at each of its time steps and writes them. Returns 1 when the file is there, complete; 0 after any
+   * error, also of the input.
+   */
+  int Write() override;
+
+  /** What the last Write() could not keep, one sentence per line. */
+  std::string GetNotes() const;
+
+protected:
+  vtkUltrasoundSequenceWriter() = default;
+  ~vtkUltrasoundSequenceWriter() override;
+
+  int FillInputPortInformation(int port, vtkInformation* information) override;
+  void WriteData() override;
+
+  char* FileName = nullptr;
+  vtkTypeBool UseCompression = 1;
+
+private:
+  vtkUltrasoundSequenceWriter(const vtkUltrasoundSequenceWriter&) = delete;
+  void operator=(const vtkUltrasoundSequenceWriter&) = delete;
+
+#ifndef __VTK_WRAP__
+  void WriteSteps(const echorama::Progress& progress);
+
+  std::vector<std::string> Notes;
+#endif
+};
+
+#endif
