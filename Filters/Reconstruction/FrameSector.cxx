@@ -3,6 +3,8 @@
 // piece, and the closing of gaps along rows and columns. Some 10 ns a pixel, once per sweep; Add() is one pass.
 #include "FrameSector.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Geometry/ProbeFit.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
 #include <cmath>
@@ -156,14 +158,65 @@ Volume<unsigned char> FrameSector::Detect() const
   return sector;
 }
 
-Volume<unsigned char> Clipped(const Volume<unsigned char>& mask, int left, int right, int top, int bottom)
+FittedSector FitSector(const Volume<unsigned char>& mask, double spacingX, double spacingY, const Progress& progress)
 {
-  Volume<unsigned char> part(mask.Dimensions());
-  const auto& n = mask.Dimensions();
-  for (int j = std::max(0, top); j <= std::min(bottom, n[1] - 1); ++j)
-    for (int i = std::max(0, left); i <= std::min(right, n[0] - 1); ++i)
-      part.View()(i, j, 0) = mask.View()(i, j, 0);
-  return part;
+  ImageGeometry image;
+  image.dimensions = mask.Dimensions();
+  image.spacing = {spacingX, spacingY, 1.0};
+  try {
+    const ProbeFit fit = FitProbe(mask.View(), image, {}, progress);
+    FittedSector fitted{Volume<unsigned char>(mask.Dimensions()), fit.overlap};
+    const Eigen::Affine3d toProbe = Eigen::Affine3d(fit.probeToWorld.inverse()) * image.IndexToWorld();
+    const double tolerance = 0.5 * std::min(spacingX, spacingY) / fit.geometry.Size(); // centres of pixels lie inside the outline
+    ParallelFor(image.dimensions[1], [&](std::ptrdiff_t row) {
+      for (int x = 0; x < image.dimensions[0]; ++x) {
+        Eigen::Vector3d at = toProbe * Eigen::Vector3d(x, static_cast<double>(row), 0.0);
+        at[1] = 0.0; // of a plane
+        fitted.mask.View()(x, static_cast<int>(row), 0) = BeamPointAt(fit.geometry, at, tolerance).has_value();
+      }
+    });
+    return fitted;
+  } catch (const Error& error) {
+    if (error.GetKind() != Error::Kind::NotPossible)
+      throw;
+    return {mask, 0.0};
+  }
+}
+
+Volume<unsigned char> FanMask(const ImageFan& fan, int width, int height, double spacingX, double spacingY)
+{
+  constexpr double degreesPerRadian = 57.29577951308232;
+  if (!(fan.from >= -180.0 && fan.from < fan.to && fan.to <= 180.0))
+    throw Error(Error::Kind::InvalidParameter, "FanAngles are " + std::to_string(fan.from) + " and " + std::to_string(fan.to) +
+                                                   "; they must be in [-180, 180] degrees and in order");
+  if (!(fan.nearMm >= 0.0 && fan.nearMm < fan.farMm))
+    throw Error(Error::Kind::InvalidParameter, "FanDepths are " + std::to_string(fan.nearMm) + " and " +
+                                                   std::to_string(fan.farMm) + "; they must not be negative, and in order");
+  if (!std::isfinite(fan.apexX) || !std::isfinite(fan.apexY))
+    throw Error(Error::Kind::InvalidParameter, "FanApex is not finite");
+  Volume<unsigned char> mask({width, height, 1});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double across = (x - fan.apexX) * spacingX, down = (y - fan.apexY) * spacingY;
+      const double depth = std::hypot(across, down), angle = std::atan2(across, down) * degreesPerRadian;
+      mask.View()(x, y, 0) = depth >= fan.nearMm && depth <= fan.farMm && angle >= fan.from && angle <= fan.to;
+    }
+  return mask;
+}
+
+Volume<unsigned char> RectangleMask(int left, int right, int top, int bottom, int width, int height)
+{
+  left = std::max(left, 0);
+  right = std::min(right, width - 1);
+  top = std::max(top, 0);
+  bottom = std::min(bottom, height - 1);
+  if (left > right || top > bottom)
+    throw Error(Error::Kind::InvalidParameter,
+                "Rectangle holds no pixel of an image of " + std::to_string(width) + " x " + std::to_string(height));
+  Volume<unsigned char> mask({width, height, 1});
+  for (int y = top; y <= bottom; ++y)
+    std::fill(mask.View().Row(y, 0) + left, mask.View().Row(y, 0) + right + 1, static_cast<unsigned char>(1));
+  return mask;
 }
 
 #define EchoramaInstantiate(T) template void FrameSector::Add<T>(VolumeView<const T>);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 #include <cstdint>
 #include <vector>
@@ -31,7 +32,27 @@ private:
   std::vector<std::uint32_t> changes_, bright_; // how often a pixel changed, and was not 0
 };
 
-/// The part of a mask that lies in a rectangle of columns and rows, inclusive.
-Volume<unsigned char> Clipped(const Volume<unsigned char>& mask, int left, int right, int top, int bottom);
+/// A sector that was found and made regular.
+struct FittedSector {
+  Volume<unsigned char> mask;
+  double overlap = 0.0; ///< intersection over union of what was found and of the fan that was fitted to it; 0: none fits
+};
+
+/// The fan, or rectangle, that is fitted to a mask (FitProbe): with smooth edges, and without the hollow under a curved face. A
+/// mask that no fan explains is given back as it is. \param spacingX, spacingY size of a pixel, mm
+FittedSector FitSector(const Volume<unsigned char>& mask, double spacingX, double spacingY, const Progress& progress = {});
+
+/// A fan in an image, as scanners and the Plus toolkit describe it.
+struct ImageFan {
+  double apexX = 0.0, apexY = 0.0; ///< where all beams meet, pixels; may lie outside the image
+  double from = -30.0, to = 30.0;  ///< angles from the direction down the image, degrees, positive to the right, in [-180, 180]
+  double nearMm = 0.0, farMm = 100.0; ///< distances from the apex
+};
+
+/// 1 inside the fan. \throws Error(InvalidParameter) for angles or distances that are not in order or out of range.
+Volume<unsigned char> FanMask(const ImageFan& fan, int width, int height, double spacingX, double spacingY);
+
+/// 1 inside a rectangle of columns and rows, inclusive. \throws Error(InvalidParameter) when none of it is in the image.
+Volume<unsigned char> RectangleMask(int left, int right, int top, int bottom, int width, int height);
 
 } // namespace echorama

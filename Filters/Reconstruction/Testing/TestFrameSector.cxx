@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Filters/Reconstruction/FrameSector.h"
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <vector>
@@ -15,7 +16,7 @@ constexpr int width = 240, height = 200;
 bool InFan(int x, int y)
 {
   const double across = x - 120.0, down = y + 40.0, radius = std::hypot(across, down);
-  return radius > 55.0 && radius < 220.0 && std::abs(std::atan2(across, down)) < 0.5;
+  return radius >= 55.0 && radius <= 220.0 && std::abs(std::atan2(across, down)) <= 0.5;
 }
 
 // A fan with speckle and a black vessel; beside it text, a bar that changes now and then, a clock, and noise of compression.
@@ -91,14 +92,51 @@ TEST(FrameSector, RefusesWhatHasNone)
   EXPECT_THROW(FrameSector().Add<unsigned char>(Volume<unsigned char>({20, 20, 2}).View()), Error);
 }
 
-TEST(FrameSector, ClippedToARectangle)
+TEST(FrameSector, AFanIsFittedToWhatWasFound)
 {
-  const Volume<unsigned char> mask({10, 10, 1}, 1);
-  const auto part = Clipped(mask, 2, 20, -3, 4);
+  FrameSector sector;
+  for (int frame = 0; frame < 30; ++frame)
+    sector.Add<unsigned char>(Screen(frame).View());
+  const FittedSector fitted = FitSector(sector.Detect(), 0.4, 0.4);
+  EXPECT_GT(fitted.overlap, 0.95);
+  int both = 0, either = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      both += InFan(x, y) && fitted.mask.View()(x, y, 0);
+      either += InFan(x, y) || fitted.mask.View()(x, y, 0);
+    }
+  EXPECT_GT(both, 0.97 * either);
+}
+
+TEST(FrameSector, WhatNoFanExplainsStaysAsItIs)
+{
+  Volume<unsigned char> cross({60, 60, 1});
+  for (int i = 0; i < 60; ++i)
+    for (int j = 28; j < 32; ++j)
+      cross.View()(i, j, 0) = cross.View()(j, i, 0) = 1;
+  const FittedSector fitted = FitSector(cross, 1.0, 1.0);
+  EXPECT_EQ(fitted.overlap, 0.0);
+  EXPECT_TRUE(std::equal(cross.View().begin(), cross.View().end(), fitted.mask.View().begin()));
+}
+
+TEST(FrameSector, FanAndRectangleByNumbers)
+{
+  const ImageFan fan{120.0, -40.0, -0.5 * 57.29577951308232, 0.5 * 57.29577951308232, 55.0, 220.0};
+  const auto mask = FanMask(fan, width, height, 1.0, 1.0);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      ASSERT_EQ(mask.View()(x, y, 0), InFan(x, y)) << x << " " << y;
+  EXPECT_THROW(FanMask({0.0, 0.0, 20.0, 10.0, 0.0, 10.0}, 9, 9, 1.0, 1.0), Error);
+  EXPECT_THROW(FanMask({0.0, 0.0, 0.0, 10.0, 5.0, 5.0}, 9, 9, 1.0, 1.0), Error);
+  EXPECT_THROW(FanMask({std::nan(""), 0.0, 0.0, 10.0, 0.0, 5.0}, 9, 9, 1.0, 1.0), Error);
+
+  const auto part = RectangleMask(2, 20, -3, 4, 10, 10);
   int count = 0;
   for (const unsigned char pixel : part.View())
     count += pixel;
   EXPECT_EQ(count, 8 * 5);
   EXPECT_EQ(part.View()(2, 0, 0), 1);
   EXPECT_EQ(part.View()(1, 0, 0), 0);
+  EXPECT_THROW(RectangleMask(10, 20, 0, 4, 10, 10), Error);
+  EXPECT_THROW(RectangleMask(5, 2, 0, 4, 10, 10), Error);
 }
