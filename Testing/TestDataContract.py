@@ -191,6 +191,34 @@ class ScanConverter(ToOtherGrid):
         return [beam_volume()]
 
 
+class Reconstructor(ToOtherGrid):
+    """A tracked frame into the grid of a volume that it crosses."""
+
+    keeps_fields = False # an acquisition is that of one frame
+    works_on_blocks = False # it asks its input for one frame after the other
+
+    def inputs(self):
+        grid = empty_volume()
+        middle = (grid.GetExtent()[4] + grid.GetExtent()[5]) // 2
+        image = empty_volume(first=(0, 0, 0), size=(SIZE[0], SIZE[1], 1))
+        place = np.eye(4)
+        place[:3, :3] = rotation(0.3, -0.4, 0.5) * SPACING
+        place[:3, 3] = np.array(grid.GetPoint(0)) + place[:3, 2] * (middle - grid.GetExtent()[4])
+        image.SetOrigin(place[:3, 3])
+        points = np.array([image.GetPoint(i) for i in range(image.GetNumberOfPoints())])
+        add_array(image, INTENSITY, tissue(points).astype(np.uint8))
+        image.GetPointData().SetActiveScalars(INTENSITY)
+        add_array(image, VALID, (np.arange(len(points)) % 7 > 0).astype(np.uint8))
+        add_field(image, acquisition.ImageToWorldName(), place.ravel().tolist())
+        return [image]
+
+    def filter(self, images=()):
+        filter = super().filter(images)
+        filter.SetSector(filter.ALL)
+        filter.SetReferenceData(empty_volume())
+        return filter
+
+
 class Phantom(ToOtherGrid):
     is_source = True
     volumes = 0
@@ -247,6 +275,7 @@ Special = {
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundStitcher": Stitcher,
     "vtkUltrasoundScanConverter": ScanConverter,
+    "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }
 
 

@@ -1,0 +1,637 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundVolumeReconstructor.h"
+
+#include "Core/Base/Error.h"
+#include "Filters/Reconstruction/FrameSector.h"
+#include "Filters/Reconstruction/ReconstructionGrid.h"
+
+#include "vtkAlgorithmOutput.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundAcquisition.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <sstream>
+
+using echorama::Error;
+using Pipeline = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkUltrasoundVolumeReconstructor);
+
+namespace {
+const char* const NoPose = "it has no valid pose (ImageToWorld)";
+const char* const OtherType = "its pixels are of another type than those of the first frame";
+
+// The size of a pixel, mm.
+Eigen::Vector2d PixelSize(const Eigen::Affine3d& imageToWorld)
+{
+  return {imageToWorld.linear().col(0).norm(), imageToWorld.linear().col(1).norm()};
+}
+
+std::string Dimensions(const std::array<int, 3>& n)
+{
+  return std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]);
+}
+
+// What a frame may show: the sector, and of that what its own valid region allows. The store keeps what is combined.
+echorama::VolumeView<const unsigned char> MaskOf(const vtkUltrasoundVolume::Input& frame,
+                                                 const std::optional<echorama::Volume<unsigned char>>& sector,
+                                                 echorama::Volume<unsigned char>& store)
+{
+  const auto own = vtkUltrasoundVolume::ViewOf<const unsigned char>(frame.ValidRegion, frame.Image);
+  if (!sector) {
+    return own;
+  }
+  if (own.Empty()) {
+    return sector->View();
+  }
+  store = *sector;
+  std::transform(own.begin(), own.end(), store.View().begin(), store.View().begin(),
+                 [](unsigned char a, unsigned char b) { return static_cast<unsigned char>(a && b); });
+  return store.View();
+}
+
+vtkDataArray* MakeArray(vtkImageData* image, const char* name, int type)
+{
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(type));
+  array->SetName(name);
+  array->SetNumberOfTuples(image->GetNumberOfPoints());
+  image->GetPointData()->AddArray(array);
+  return array;
+}
+
+// The arrays of a volume that is reconstructed.
+struct Arrays {
+  explicit Arrays(vtkImageData* image, int type)
+    : Intensity(MakeArray(image, vtkUltrasoundVolume::IntensityName(), type)),
+      Valid(MakeArray(image, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR)),
+      Coverage(MakeArray(image, vtkUltrasoundVolumeReconstructor::CoverageName(), VTK_UNSIGNED_SHORT))
+  {
+    image->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+  }
+
+  template <class T>
+  echorama::ReconstructionOutput<T> Views(vtkImageData* image) const
+  {
+    return {vtkUltrasoundVolume::ViewOf<T>(this->Intensity, image),
+            vtkUltrasoundVolume::ViewOf<unsigned char>(this->Valid, image),
+            vtkUltrasoundVolume::ViewOf<unsigned short>(this->Coverage, image)};
+  }
+
+  vtkDataArray* Intensity;
+  vtkDataArray* Valid;
+  vtkDataArray* Coverage;
+};
+} // namespace
+
+//----------------------------------------------------------------------------
+// The frames of the input, made one at a time.
+class vtkUltrasoundVolumeReconstructor::Frames {
+public:
+  Frames(vtkUltrasoundVolumeReconstructor* self, vtkInformationVector** inputs) : Self(self)
+  {
+    this->Producer = self->GetInputAlgorithm(0, 0, this->Port);
+    this->Executive = Pipeline::SafeDownCast(this->Producer->GetExecutive());
+    vtkInformation* in = inputs[0]->GetInformationObject(0);
+    std::vector<double> times;
+    if (in->Has(Pipeline::TIME_STEPS())) {
+      times.assign(in->Get(Pipeline::TIME_STEPS()), in->Get(Pipeline::TIME_STEPS()) + in->Length(Pipeline::TIME_STEPS()));
+      std::sort(times.begin(), times.end());
+    }
+    this->Timed = !times.empty();
+    this->Total = this->Timed ? static_cast<int>(times.size()) : 1;
+    const int last = self->LastFrame < 0 ? this->Total - 1 : std::min(self->LastFrame, this->Total - 1);
+    for (long frame = self->FirstFrame; frame <= last; frame += self->FrameStep) {
+      this->Numbers.push_back(static_cast<int>(frame));
+      this->Times.push_back(this->Timed ? times[static_cast<std::size_t>(frame)] : 0.0);
+    }
+    if (this->Numbers.empty()) {
+      throw Error(Error::Kind::InvalidParameter, "there is no frame from FirstFrame " + std::to_string(self->FirstFrame) +
+                                                     " to LastFrame " + std::to_string(self->LastFrame) + " in a sequence of " +
+                                                     std::to_string(this->Total) + " frames");
+    }
+  }
+
+  int Count() const { return static_cast<int>(this->Numbers.size()); }
+
+  // The data of a frame lives until the next one is made.
+  vtkUltrasoundVolume::Input Make(int index)
+  {
+    const std::string name = "frame " + std::to_string(this->Numbers[static_cast<std::size_t>(index)]);
+    vtkInformation* information = this->Executive->GetOutputInformation(this->Port);
+    this->Request(information, this->Times[static_cast<std::size_t>(index)]);
+    vtkImageData* image = vtkImageData::SafeDownCast(this->Executive->GetOutputData(this->Port));
+    if (!image) {
+      throw Error(Error::Kind::BadInput, name + " could not be made");
+    }
+    vtkUltrasoundVolume::Input frame = vtkUltrasoundVolume::CheckInput(this->Self, image, name);
+    if (image->GetDimensions()[2] != 1) {
+      throw Error(Error::Kind::BadInput,
+                  name + ": it has " + std::to_string(image->GetDimensions()[2]) + " slices; a frame is an image of one slice");
+    }
+    return frame;
+  }
+
+  // Others that show a frame of the same input find the one that they had asked for.
+  void Restore(vtkInformation* in)
+  {
+    if (this->Timed && in->Has(Pipeline::UPDATE_TIME_STEP())) {
+      this->Request(this->Executive->GetOutputInformation(this->Port), this->Shown);
+    }
+  }
+
+  void Remember(vtkInformation* in)
+  {
+    if (in->Has(Pipeline::UPDATE_TIME_STEP())) {
+      this->Shown = in->Get(Pipeline::UPDATE_TIME_STEP());
+    }
+  }
+
+private:
+  void Request(vtkInformation* information, double time)
+  {
+    this->Executive->UpdateInformation();
+    if (this->Timed) {
+      information->Set(Pipeline::UPDATE_TIME_STEP(), time);
+    }
+    information->Set(Pipeline::UPDATE_PIECE_NUMBER(), 0);
+    information->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), 1);
+    information->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+    if (information->Has(Pipeline::WHOLE_EXTENT())) {
+      int whole[6];
+      information->Get(Pipeline::WHOLE_EXTENT(), whole);
+      information->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
+    }
+    this->Executive->Update(this->Port);
+  }
+
+  vtkUltrasoundVolumeReconstructor* Self;
+  vtkAlgorithm* Producer = nullptr;
+  Pipeline* Executive = nullptr;
+  int Port = 0, Total = 0;
+  bool Timed = false;
+  double Shown = 0.0;
+  std::vector<int> Numbers;
+  std::vector<double> Times;
+};
+
+//----------------------------------------------------------------------------
+// What is known before the volume is made.
+struct vtkUltrasoundVolumeReconstructor::Plan {
+  vtkMTimeType InputTime = 0, ReferenceTime = 0, OwnTime = 0;
+  echorama::ImageGeometry Grid;
+  std::optional<echorama::Volume<unsigned char>> Sector; // of all frames, when there is one
+  std::string SectorText;
+  int Type = VTK_UNSIGNED_CHAR;
+};
+
+//----------------------------------------------------------------------------
+struct vtkUltrasoundVolumeReconstructor::Live {
+  vtkSmartPointer<vtkImageData> Image;
+  int Type = VTK_UNSIGNED_CHAR;
+  std::optional<echorama::Volume<unsigned char>> Sector; // made for the first frame
+  std::unique_ptr<Arrays> Data;
+  // Adds a frame to the reconstruction, whatever its voxel type.
+  std::function<echorama::FrameUse(const vtkUltrasoundVolume::Input&, echorama::VolumeView<const unsigned char>,
+                                   const Eigen::Affine3d&)>
+      Add;
+  std::function<int()> Between;
+};
+
+//----------------------------------------------------------------------------
+vtkUltrasoundVolumeReconstructor::vtkUltrasoundVolumeReconstructor()
+{
+  this->SetNumberOfInputPorts(2);
+}
+
+vtkUltrasoundVolumeReconstructor::~vtkUltrasoundVolumeReconstructor() = default;
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::SetReferenceConnection(vtkAlgorithmOutput* output)
+{
+  this->SetInputConnection(1, output);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::SetReferenceData(vtkImageData* volume)
+{
+  this->SetInputData(1, volume);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundVolumeReconstructor::FillInputPortInformation(int port, vtkInformation* information)
+{
+  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  if (port == 1) {
+    information->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+echorama::ReconstructionParameters vtkUltrasoundVolumeReconstructor::Parameters() const
+{
+  echorama::ReconstructionParameters parameters;
+  parameters.splat = static_cast<echorama::SplatMethod>(this->Splat);
+  parameters.compounding = static_cast<echorama::Compounding>(this->Compounding);
+  parameters.alpha = this->Alpha;
+  parameters.between = static_cast<echorama::BetweenFrames>(this->Between);
+  parameters.stepMm = this->StepMm;
+  parameters.maximumGapMm = this->MaximumGapMm;
+  return parameters;
+}
+
+//----------------------------------------------------------------------------
+echorama::Volume<unsigned char> vtkUltrasoundVolumeReconstructor::SectorMask(const std::array<int, 3>& size,
+                                                                             const Eigen::Affine3d& imageToWorld) const
+{
+  if (this->Sector == RECTANGLE) {
+    return echorama::RectangleMask(this->Rectangle[0], this->Rectangle[1], this->Rectangle[2], this->Rectangle[3], size[0],
+                                   size[1]);
+  }
+  const Eigen::Vector2d pixel = PixelSize(imageToWorld);
+  return echorama::FanMask(
+      {this->FanApex[0], this->FanApex[1], this->FanAngles[0], this->FanAngles[1], this->FanDepths[0], this->FanDepths[1]},
+      size[0], size[1], pixel[0], pixel[1]);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::Refuse(const std::string& reason)
+{
+  ++this->Statistics.Refused;
+  for (auto& [text, count] : this->Statistics.Reasons) {
+    if (text == reason) {
+      ++count;
+      return;
+    }
+  }
+  this->Statistics.Reasons.emplace_back(reason, 1);
+}
+
+//----------------------------------------------------------------------------
+const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::Prepare(vtkInformationVector** inputs)
+{
+  // Going through all frames is not to be repeated as long as nothing has changed.
+  const auto timeOf = [this](int inputPort) -> vtkMTimeType {
+    int port = 0;
+    vtkAlgorithm* producer = this->GetNumberOfInputConnections(inputPort) ? this->GetInputAlgorithm(inputPort, 0, port) : nullptr;
+    auto* executive = producer ? Pipeline::SafeDownCast(producer->GetExecutive()) : nullptr;
+    return executive ? std::max(executive->GetPipelineMTime(), producer->GetMTime()) : 0;
+  };
+  const vtkMTimeType inputTime = timeOf(0), referenceTime = timeOf(1), ownTime = this->GetMTime();
+  if (this->Prepared && this->Prepared->InputTime == inputTime && this->Prepared->ReferenceTime == referenceTime &&
+      this->Prepared->OwnTime == ownTime) {
+    return *this->Prepared;
+  }
+  this->Prepared.reset();
+  auto plan = std::make_unique<Plan>();
+  plan->InputTime = inputTime;
+  plan->ReferenceTime = referenceTime;
+  plan->OwnTime = ownTime;
+
+  vtkInformation* in = inputs[0]->GetInformationObject(0);
+  Frames frames(this, inputs);
+  frames.Remember(in);
+  const bool given = this->GetNumberOfInputConnections(1) > 0, detect = this->Sector == DETECTED;
+  echorama::FrameSector found;
+  std::vector<echorama::FramePlace> places;
+  std::array<int, 3> size{0, 0, 0};
+  std::optional<Eigen::Affine3d> first; // pose
+  for (int index = 0; index < frames.Count(); ++index) {
+    const vtkUltrasoundVolume::Input frame = frames.Make(index);
+    const auto pose = vtkUltrasoundAcquisition::ImageToWorldOf(frame.Image);
+    if (!pose || echorama::CheckPose(*pose) != echorama::FrameUse::Used) {
+      continue;
+    }
+    const std::array<int, 3> dimensions = vtkUltrasoundVolume::GeometryOf(frame.Image).dimensions;
+    if (!first) {
+      first = pose;
+      size = dimensions;
+      plan->Type = frame.Intensity->GetDataType();
+    }
+    if (frame.Intensity->GetDataType() != plan->Type) {
+      continue;
+    }
+    if (detect) {
+      vtkUltrasoundVolume::Dispatch(frame.Intensity, [&](auto type) {
+        found.Add<decltype(type)>(vtkUltrasoundVolume::ViewOf<const decltype(type)>(frame.Intensity, frame.Image));
+      });
+    }
+    places.push_back({*pose, {0, dimensions[0] - 1, 0, dimensions[1] - 1}});
+    if (given && !detect) {
+      break; // the type is all that was to be learned
+    }
+  }
+  frames.Restore(in);
+  if (!first) {
+    throw Error(Error::Kind::BadInput,
+                "none of the " + std::to_string(frames.Count()) + " frames has a valid pose (ImageToWorld)");
+  }
+  plan->SectorText = "all pixels";
+  if (detect) {
+    const Eigen::Vector2d pixel = PixelSize(*first);
+    echorama::FittedSector fitted = echorama::FitSector(found.Detect(), pixel[0], pixel[1]);
+    plan->Sector = std::move(fitted.mask);
+    std::ostringstream text;
+    text << "sector found by what changes";
+    if (fitted.overlap > 0.0) {
+      text << ", a fan fitted to it (overlap " << fitted.overlap << ")";
+    } else {
+      text << "; no fan fits it, so it was taken as it is";
+    }
+    plan->SectorText = text.str();
+  } else if (this->Sector != ALL) {
+    plan->Sector = this->SectorMask(size, *first);
+    plan->SectorText = this->Sector == RECTANGLE ? "the given rectangle" : "the given fan";
+  }
+  if (plan->Sector) {
+    // The grid is that of the pixels that count.
+    const auto mask = plan->Sector->View();
+    std::array<int, 4> box{size[0], -1, size[1], -1};
+    std::ptrdiff_t inside = 0;
+    for (int y = 0; y < size[1]; ++y) {
+      for (int x = 0; x < size[0]; ++x) {
+        if (mask(x, y, 0)) {
+          box = {std::min(box[0], x), std::max(box[1], x), std::min(box[2], y), std::max(box[3], y)};
+          ++inside;
+        }
+      }
+    }
+    plan->SectorText += ", " + std::to_string(inside) + " of " + std::to_string(mask.Size()) + " pixels";
+    for (echorama::FramePlace& place : places) {
+      place.pixels = inside > 0 ? box : place.pixels;
+    }
+  }
+  if (given) {
+    int port = 0;
+    vtkAlgorithm* producer = this->GetInputAlgorithm(1, 0, port);
+    producer->Update(port);
+    vtkImageData* reference = vtkImageData::SafeDownCast(producer->GetOutputDataObject(port));
+    if (!reference || reference->GetNumberOfPoints() < 1) {
+      throw Error(Error::Kind::BadInput, "the reference volume is empty");
+    }
+    plan->Grid = vtkUltrasoundVolume::GeometryOf(reference);
+    plan->Grid.Check("the reference volume");
+  } else {
+    plan->Grid = echorama::ReconstructionGrid(places, static_cast<echorama::GridDirections>(this->Grid), this->SpacingMm);
+  }
+  this->Prepared = std::move(plan);
+  return *this->Prepared;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundVolumeReconstructor::RequestInformation(vtkInformation*, vtkInformationVector** inputs,
+                                                         vtkInformationVector* outputs)
+{
+  // A failure here ends the update: an earlier output would stay.
+  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress&) {
+    vtkInformation* out = outputs->GetInformationObject(0);
+    const Plan& plan = this->Prepare(inputs);
+    vtkUltrasoundVolume::SetGeometry(out, plan.Grid);
+    vtkDataObject::SetPointDataActiveScalarInfo(out, plan.Type, 1);
+    // One volume of all times.
+    out->Remove(Pipeline::TIME_STEPS());
+    out->Remove(Pipeline::TIME_RANGE());
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vtkImageData* output,
+                                               const echorama::Progress& progress)
+{
+  this->Statistics = Counts();
+  const Plan& plan = this->Prepare(inputs);
+  const echorama::ReconstructionParameters parameters = this->Parameters();
+  const std::size_t voxelBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(plan.Type));
+  const double bytes = echorama::ReconstructionMemory(parameters, plan.Grid, voxelBytes);
+  this->Statistics.MemoryMb = bytes / 1e6;
+  this->Statistics.Grid = Dimensions(plan.Grid.dimensions);
+  this->Statistics.SectorText = plan.SectorText;
+  echorama::CheckMemory(plan.Grid, bytes / static_cast<double>(plan.Grid.VoxelCount()), this->MemoryLimitMb);
+
+  output->Initialize();
+  vtkUltrasoundVolume::SetGeometry(output, plan.Grid);
+  const Arrays arrays(output, plan.Type);
+  vtkInformation* in = inputs[0]->GetInformationObject(0);
+  Frames frames(this, inputs);
+  frames.Remember(in);
+  vtkUltrasoundVolume::Dispatch(arrays.Intensity, [&](auto type) {
+    using T = decltype(type);
+    const echorama::ReconstructionOutput<T> views = arrays.Views<T>(output);
+    echorama::VolumeReconstruction<T> reconstruction(parameters, plan.Grid, views);
+    echorama::Volume<unsigned char> store;
+    for (int index = 0; index < frames.Count(); ++index) {
+      progress(0.9 * index / frames.Count());
+      const vtkUltrasoundVolume::Input frame = frames.Make(index);
+      const auto pose = vtkUltrasoundAcquisition::ImageToWorldOf(frame.Image);
+      if (!pose) {
+        this->Refuse(NoPose);
+        continue;
+      }
+      if (frame.Intensity->GetDataType() != plan.Type) {
+        this->Refuse(OtherType);
+        continue;
+      }
+      const auto pixels = vtkUltrasoundVolume::ViewOf<const T>(frame.Intensity, frame.Image);
+      if (plan.Sector && plan.Sector->Dimensions() != pixels.Dimensions()) {
+        this->Refuse("it is not of the size of the first frame, " + Dimensions(plan.Sector->Dimensions()));
+        continue;
+      }
+      const echorama::FrameUse use = reconstruction.Add({pixels, MaskOf(frame, plan.Sector, store), *pose});
+      if (use != echorama::FrameUse::Used) {
+        this->Refuse(echorama::FrameUseText(use));
+      }
+    }
+    this->Statistics.Used = reconstruction.FramesUsed();
+    this->Statistics.Between = reconstruction.FramesBetween();
+    if (this->Statistics.Used == 0) {
+      throw Error(Error::Kind::BadInput, "none of the frames could be used; " + this->GetReport());
+    }
+    this->Statistics.Seen = static_cast<vtkIdType>(views.valid.Size() - std::count(views.valid.begin(), views.valid.end(), 0));
+    if (this->Holes != KEEP_HOLES) {
+      const echorama::HoleFillingParameters holes{static_cast<echorama::HoleFilling>(this->Holes), this->HoleReach};
+      this->Statistics.Filled = static_cast<vtkIdType>(
+          echorama::FillHoles<T>(holes, views.intensity, views.valid, views.coverage, progress.Part(0.9, 1.0)));
+    }
+  });
+  frames.Restore(in);
+  vtkNew<vtkStringArray> report;
+  report->SetName(ReportName());
+  std::istringstream lines(this->GetReport());
+  for (std::string line; std::getline(lines, line);) {
+    report->InsertNextValue(line);
+  }
+  output->GetFieldData()->AddArray(report);
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundVolumeReconstructor::GetReport()
+{
+  const Counts& counts = this->Statistics;
+  std::ostringstream text;
+  text << counts.Used << " frames used, " << counts.Between << " put in between, " << counts.Refused << " refused\n";
+  for (const auto& [reason, count] : counts.Reasons) {
+    text << count << " refused: " << reason << "\n";
+  }
+  if (!counts.Grid.empty()) {
+    text << counts.Grid << " voxels, " << counts.Seen << " seen, " << counts.Filled << " filled; " << counts.MemoryMb
+         << " MB to make\n";
+  }
+  if (!counts.SectorText.empty()) {
+    text << counts.SectorText << "\n";
+  }
+  return text.str();
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundVolumeReconstructor::BeginLive(vtkImageData* grid, int vtkType)
+{
+  this->EndLive();
+  return vtkUltrasoundVolume::Run(this, nullptr, [this, grid, vtkType](const echorama::Progress&) {
+           if (!grid) {
+             throw Error(Error::Kind::BadInput, "a live volume needs a grid");
+           }
+           const echorama::ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(grid);
+           geometry.Check("the grid");
+           const echorama::ReconstructionParameters parameters = this->Parameters();
+           const auto voxelBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(vtkType));
+           const double bytes = echorama::ReconstructionMemory(parameters, geometry, voxelBytes);
+           echorama::CheckMemory(geometry, bytes / static_cast<double>(geometry.VoxelCount()), this->MemoryLimitMb);
+           auto live = std::make_unique<Live>();
+           live->Type = vtkType;
+           live->Image = vtkSmartPointer<vtkImageData>::New();
+           vtkUltrasoundVolume::SetGeometry(live->Image, geometry);
+           live->Data = std::make_unique<Arrays>(live->Image, vtkType);
+           vtkUltrasoundVolume::Dispatch(live->Data->Intensity, [&](auto type) {
+             using T = decltype(type);
+             auto reconstruction = std::make_shared<echorama::VolumeReconstruction<T>>(
+                 parameters, geometry, live->Data->template Views<T>(live->Image));
+             live->Between = [reconstruction] { return reconstruction->FramesBetween(); };
+             live->Add = [reconstruction](const vtkUltrasoundVolume::Input& frame, echorama::VolumeView<const unsigned char> mask,
+                                          const Eigen::Affine3d& pose) {
+               return reconstruction->Add({vtkUltrasoundVolume::ViewOf<const T>(frame.Intensity, frame.Image), mask, pose});
+             };
+           });
+           this->Statistics = Counts();
+           this->Statistics.MemoryMb = bytes / 1e6;
+           this->Statistics.Grid = Dimensions(geometry.dimensions);
+           this->LiveVolume = std::move(live);
+         }) == 1;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundVolumeReconstructor::AddFrame(vtkImageData* image)
+{
+  bool used = false;
+  vtkUltrasoundVolume::Run(this, nullptr, [this, image, &used](const echorama::Progress&) {
+    if (!this->LiveVolume) {
+      throw Error(Error::Kind::BadInput, "BeginLive comes before AddFrame");
+    }
+    if (!image) {
+      throw Error(Error::Kind::BadInput, "a frame is missing");
+    }
+    Live& live = *this->LiveVolume;
+    const vtkUltrasoundVolume::Input frame = vtkUltrasoundVolume::CheckInput(this, image, "the frame");
+    const auto pose = vtkUltrasoundAcquisition::ImageToWorldOf(image);
+    if (!pose) {
+      this->Refuse(NoPose);
+      return;
+    }
+    if (frame.Intensity->GetDataType() != live.Type) {
+      this->Refuse("its pixels are not of the type of the live volume");
+      return;
+    }
+    const std::array<int, 3> size = vtkUltrasoundVolume::GeometryOf(image).dimensions;
+    if ((this->Sector == RECTANGLE || this->Sector == FAN) && (!live.Sector || live.Sector->Dimensions() != size) &&
+        echorama::CheckPose(*pose) == echorama::FrameUse::Used) {
+      live.Sector = this->SectorMask(size, *pose);
+    }
+    echorama::Volume<unsigned char> store;
+    const echorama::FrameUse use = live.Add(frame, MaskOf(frame, live.Sector, store), *pose);
+    used = use == echorama::FrameUse::Used;
+    if (!used) {
+      this->Refuse(echorama::FrameUseText(use));
+      return;
+    }
+    ++this->Statistics.Used;
+    this->Statistics.Between = live.Between();
+    live.Data->Intensity->Modified();
+    live.Data->Valid->Modified();
+    live.Data->Coverage->Modified();
+    live.Image->Modified();
+  });
+  return used;
+}
+
+//----------------------------------------------------------------------------
+vtkImageData* vtkUltrasoundVolumeReconstructor::GetLiveOutput()
+{
+  return this->LiveVolume ? this->LiveVolume->Image.Get() : nullptr;
+}
+
+//----------------------------------------------------------------------------
+vtkIdType vtkUltrasoundVolumeReconstructor::FillLiveHoles()
+{
+  if (!this->LiveVolume) {
+    vtkErrorMacro("BeginLive comes before FillLiveHoles");
+    return 0;
+  }
+  vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
+    Live& live = *this->LiveVolume;
+    vtkUltrasoundVolume::Dispatch(live.Data->Intensity, [&](auto type) {
+      const auto views = live.Data->template Views<decltype(type)>(live.Image);
+      const echorama::HoleFillingParameters holes{static_cast<echorama::HoleFilling>(this->Holes), this->HoleReach};
+      this->Statistics.Filled = static_cast<vtkIdType>(
+          echorama::FillHoles<decltype(type)>(holes, views.intensity, views.valid, views.coverage, progress));
+      this->Statistics.Seen =
+          static_cast<vtkIdType>(views.coverage.Size() - std::count(views.coverage.begin(), views.coverage.end(), 0));
+    });
+    live.Data->Intensity->Modified();
+    live.Data->Valid->Modified();
+    live.Image->Modified();
+  });
+  return this->Statistics.Filled;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::EndLive()
+{
+  this->LiveVolume.reset();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Splat: " << this->Splat << "\n";
+  os << indent << "Compounding: " << this->Compounding << "\n";
+  os << indent << "Alpha: " << this->Alpha << "\n";
+  os << indent << "Between: " << this->Between << "\n";
+  os << indent << "StepMm: " << this->StepMm << "\n";
+  os << indent << "MaximumGapMm: " << this->MaximumGapMm << "\n";
+  os << indent << "Holes: " << this->Holes << "\n";
+  os << indent << "HoleReach: " << this->HoleReach << "\n";
+  os << indent << "Sector: " << this->Sector << "\n";
+  os << indent << "Rectangle: " << this->Rectangle[0] << " " << this->Rectangle[1] << " " << this->Rectangle[2] << " "
+     << this->Rectangle[3] << "\n";
+  os << indent << "FanApex: " << this->FanApex[0] << " " << this->FanApex[1] << "\n";
+  os << indent << "FanAngles: " << this->FanAngles[0] << " " << this->FanAngles[1] << "\n";
+  os << indent << "FanDepths: " << this->FanDepths[0] << " " << this->FanDepths[1] << "\n";
+  os << indent << "Grid: " << this->Grid << "\n";
+  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
+  os << indent << "FirstFrame: " << this->FirstFrame << "\n";
+  os << indent << "LastFrame: " << this->LastFrame << "\n";
+  os << indent << "FrameStep: " << this->FrameStep << "\n";
+  os << indent << "MemoryLimitMb: " << this->MemoryLimitMb << "\n";
+  os << indent << "Report: " << this->GetReport();
+}
