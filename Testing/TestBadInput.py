@@ -199,7 +199,7 @@ class BadInput(unittest.TestCase):
         bad = self.path / "bad.igs.mha"
         out = self.path / "out.seq.nrrd"
         for header, word in (({"DimSize": "30 20 5"}, ""), ({"DimSize": "30 -20 4"}, ""), ({"DimSize": "2147483647 2147483647 4"}, ""),
-                             ({"Seq_Frame0004_Timestamp": "1"}, "Seq_Frame0004"), ({"UltrasoundImageOrientation": "QQ"}, "QQ"),
+                             ({"Seq_Frame0004_Timestamp": "1"}, "frame 4"), ({"UltrasoundImageOrientation": "QQ"}, "QQ"),
                              ({"ElementType": "MET_BANANA"}, "MET_BANANA")):
             self.sequence("bad.igs.mha", header=header)
             self.refuses("bad.igs.mha", ["info", bad], [word])

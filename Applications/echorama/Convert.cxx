@@ -96,8 +96,8 @@ void Convert(Session& session, ConvertOptions options)
   if (kind != FileKind::Sequence && !options.frames.empty())
     Misused("--frames: " + options.input + " is no tracked sequence");
   if (kind != FileKind::Volume &&
-      (options.reading.spacingMm > 0.0 || options.reading.step > 0 || !options.stackSpacingMm.empty()))
-    Misused("--time, --spacing and --stack-spacing: " + options.input + " is no volume");
+      (options.reading.spacingMm > 0.0 || options.reading.step > 0 || options.reading.beams || !options.stackSpacingMm.empty()))
+    Misused("--time, --beams, --spacing and --stack-spacing: " + options.input + " is no volume");
   switch (kind) {
   case FileKind::Volume:
     return ConvertVolume(session, options);
@@ -123,6 +123,8 @@ Command ConvertCommand(CLI::App& program)
   options->add_option("--time", values->reading.step, "Which volume of a time series, from 0")
       ->check(CLI::Range(0, 2147483647))
       ->capture_default_str();
+  options->add_flag("--beams", values->reading.beams,
+                    "Write the samples along beams that the file holds, not their scan conversion");
   options
       ->add_option("--spacing", values->reading.spacingMm,
                    "Edge of the voxels in mm that beams are scan-converted to (0: as many voxels in the fan as samples)")
