@@ -100,8 +100,9 @@ public:
     } catch (const Error& error) {
       throw Error(Error::Kind::BadFile, error.what());
     }
-    const double decoded =
-        first.encoded ? static_cast<double>(first.PictureBytes()) * static_cast<double>(first.pictures.size()) : 0.0;
+    const double decoded = first.storage != DicomStorage::Plain
+                               ? static_cast<double>(first.PictureBytes()) * static_cast<double>(first.pictures.size())
+                               : 0.0;
     CheckMemory(content_.path,
                 static_cast<double>(content_.geometry.VoxelCount()) * static_cast<double>(SizeOf(content_.type)) + decoded);
     content_.fields = first.fields;
@@ -128,7 +129,7 @@ public:
       for (std::size_t k = 0; k < slicesOfPicture; ++k) {
         const char* pixels = nullptr;
         const std::uint64_t place = (slice.picture * slicesOfPicture + k) * bytes;
-        if (file.encoded) {
+        if (file.storage != DicomStorage::Plain) {
           if (decodedFile != slice.file)
             decoded = DecodeDicomPixels(file);
           decodedFile = slice.file;
@@ -201,7 +202,7 @@ private:
         continue;
       try {
         DicomHeader header = ReadDicomHeader(file);
-        if (header.series == files_[0].series && !header.pictures.empty())
+        if (header.series == files_[0].series && header.pictures.size() == 1 && header.volumeSlices == 0)
           files_.push_back(std::move(header));
       } catch (const Error&) {
         ++broken; // of which series it was nobody can say; a slice that is missing shows
@@ -389,7 +390,7 @@ private:
     const DicomHeader& file = files_[0];
     content_.geometry.dimensions = {file.columns, file.rows, file.volumeSlices};
     content_.geometry.spacing = file.volumeSpacing;
-    if (file.encoded || file.samples != 1)
+    if (file.storage != DicomStorage::Plain || file.samples != 1)
       Fail(file.path, "it is a Cartesian volume of Philips whose pixels are compressed or coloured, which is not known");
     for (std::size_t i = 0; i < file.pictures.size(); ++i) {
       slices_.push_back({0, i});
@@ -462,7 +463,7 @@ private:
   {
     const std::size_t columns = static_cast<std::size_t>(file.columns), count = columns * static_cast<std::size_t>(file.rows);
     const bool floats = content_.type == VoxelType::Float32, inverted = file.photometric == "MONOCHROME1";
-    const bool halved = !file.encoded && file.photometric == "YBR_FULL_422";
+    const bool halved = file.storage != DicomStorage::Encapsulated && file.photometric == "YBR_FULL_422";
     const int spare = file.bitsAllocated - file.bitsStored;
     const std::int64_t highest = file.isSigned ? -1 : (std::int64_t{1} << file.bitsStored) - 1;
     for (std::size_t i = 0; i < count; ++i) {
@@ -501,10 +502,11 @@ private:
       const std::size_t row = i / columns, column = i % columns;
       return bytes[row * ((columns + 1) / 2 * 4) + column / 2 * 4 + column % 2];
     }
-    const unsigned char* first = bytes + (file.planar && !file.encoded ? i : 3 * i);
+    const bool planar = file.planar && file.storage != DicomStorage::Encapsulated; // decoded, they never are
+    const unsigned char* first = bytes + (planar ? i : 3 * i);
     if (file.photometric.compare(0, 8, "YBR_FULL") == 0)
       return first[0];
-    const std::size_t next = file.planar && !file.encoded ? count : 1;
+    const std::size_t next = planar ? count : 1;
     return (299 * first[0] + 587 * first[next] + 114 * first[2 * next] + 500) / 1000;
   }
 

@@ -1,25 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// gdcm parses and decodes; this is the one file that sees its headers. Two passes over a file:
+// The elements are parsed here and not by gdcm, which allocates what a length promises before it reads, and whose assertions
+// end the program on damaged files. One walk over the heads of all elements compares each length with what is left of the
+// file, keeps the values of the few tags that we know how to use, and notes where the pixels are.
 //
-// 1. Lengths. gdcm allocates what an element says of its length before it reads. So all elements, down into sequences, are
-//    walked first, only their heads, and each length must fit into what is left of the file. (A deflated data set is
-//    inflated for that.) On the way the place of the pixels is noted.
-// 2. Meaning. gdcm reads everything before the pixels, and the few tags that we know how to use are copied out.
-//
-// Pixels that are not compressed are later read straight from the file, picture by picture; all others go through gdcm.
+// Pixels that are not compressed are later read straight from the file, picture by picture. Compressed ones are given to
+// gdcm's codecs, fragment by fragment; this is the one file that sees gdcm.
 #include "Readers/DicomHeader.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <gdcmImageReader.h>
-#include <gdcmReader.h>
-#include <gdcmSequenceOfItems.h>
+#include <gdcmImage.h>
+#include <gdcmSequenceOfFragments.h>
 #include <gdcmTrace.h>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <zlib.h>
 
@@ -28,23 +27,51 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-using gdcm::Tag;
+using Tag = std::uint32_t; // group and element
 
 constexpr std::uint32_t Undefined = 0xFFFFFFFF;
-constexpr std::uint32_t ItemTag = 0xFFFEE000, ItemEnd = 0xFFFEE00D, SequenceEnd = 0xFFFEE0DD, PixelTag = 0x7FE00010;
+constexpr Tag ItemTag = 0xFFFEE000, ItemEnd = 0xFFFEE00D, SequenceEnd = 0xFFFEE0DD, PixelTag = 0x7FE00010;
 constexpr int deepest = 16;           // sequences in sequences
 constexpr std::uint64_t before = 132; // the preamble and "DICM"
+constexpr std::uint64_t longestValue = 65536;
 constexpr std::size_t mostPictures = 100000;
 
 // No frame is compressed to less than this part of itself, but for empty ones.
 constexpr double mostCompressed = 1e4;
+
+constexpr const char* ImplicitLittleEndian = "1.2.840.10008.1.2";
+constexpr const char* Deflated = "1.2.840.10008.1.2.1.99";
+constexpr const char* BigEndian = "1.2.840.10008.1.2.2";
+
+// The sequences and the values that are kept.
+constexpr Tag SharedGroups = 0x52009229, PictureGroups = 0x52009230, Regions = 0x00186011;
+constexpr Tag Sequences[] = {SharedGroups, PictureGroups, Regions,    0x0020930E, 0x0020930F, 0x00209310,
+                             0x00209111,   0x00209113,    0x00209116, 0x00289110, 0x00289145, 0x00189807};
+constexpr Tag Values[] = {0x00080060, 0x00080070, 0x00081090, 0x00180088, 0x00181060, 0x00181063, 0x00186014,
+                          0x00186024, 0x00186026, 0x0018602C, 0x0018602E, 0x00186031, 0x00189808, 0x0020000E,
+                          0x00200032, 0x00200037, 0x00200100, 0x00209128, 0x00209301, 0x00209302, 0x00209309,
+                          0x0020930D, 0x00280002, 0x00280004, 0x00280006, 0x00280008, 0x00280009, 0x00280010,
+                          0x00280011, 0x00280030, 0x00280100, 0x00280101, 0x00280102, 0x00280103, 0x00280301,
+                          0x00281052, 0x00281053, 0x30011001, 0x30011003, 0x7FE10010, 0x7FE10011};
+
+bool IsKeptSequence(Tag tag)
+{
+  return std::find(std::begin(Sequences), std::end(Sequences), tag) != std::end(Sequences);
+}
+
+bool IsKeptValue(Tag tag)
+{
+  // Philips' group has its creators in elements below 0x100 and the spacing in number 3 of the block of one of them.
+  return std::binary_search(std::begin(Values), std::end(Values), tag) ||
+         (tag >> 16 == 0x200D && ((tag & 0xFFFF) < 0x100 || (tag & 0xFF) == 0x03));
+}
 
 [[noreturn]] void Fail(const std::string& path, const std::string& reason)
 {
   throw Error(Error::Kind::BadFile, path + ": " + reason);
 }
 
-std::string TextOf(std::uint32_t tag)
+std::string TextOf(Tag tag)
 {
   char text[16];
   std::snprintf(text, sizeof text, "(%04X,%04X)", tag >> 16, tag & 0xFFFF);
@@ -65,36 +92,45 @@ struct Place {
   std::uint64_t offset = 0, bytes = 0;
 };
 
-// Pass 1.
-class LengthWalk {
-public:
-  LengthWalk(std::istream& stream, std::uint64_t end, const std::string& path) : stream_(stream), end_(end), path_(path) {}
+// What is kept of a data set.
+struct DataSet {
+  std::map<Tag, std::string> values;
+  std::map<Tag, std::vector<DataSet>> sequences;
+};
 
-  // The elements of group 2, which say how the others are written.
-  void MetaInformation()
+class Parser {
+public:
+  Parser(std::istream& stream, std::uint64_t end, const std::string& path) : stream_(stream), end_(end), path_(path) {}
+
+  // The elements of group 2, which say how the others are written. \returns the transfer syntax
+  std::string MetaInformation()
   {
     Seek(before);
+    std::string syntax;
     while (end_ - at_ >= 8) {
       const std::uint64_t start = at_;
-      const std::uint32_t tag = ReadTag();
-      if (tag >> 16 != 2) {
-        Seek(start);
-        break;
-      }
+      const Tag tag = ReadTag();
       Seek(start);
+      if (tag >> 16 != 2)
+        break;
       std::string value;
-      Element(true, 0, tag == 0x00020010 ? &value : nullptr);
+      Element(nullptr, true, end_, 0, tag == 0x00020010 ? &value : nullptr);
       if (tag == 0x00020010)
-        transferSyntax = Trimmed(value);
+        syntax = Trimmed(value);
     }
+    return syntax;
   }
 
-  void DataSet(bool explicitTypes) { Elements(end_, explicitTypes, 0); }
+  DataSet Outermost(bool explicitTypes)
+  {
+    DataSet data;
+    Elements(&data, explicitTypes, end_, 0);
+    return data;
+  }
 
   std::uint64_t At() const { return at_; }
 
-  std::string transferSyntax;
-  Place pixels, kretz, kretzCreator, movieCreator;
+  Place pixels, kretz;
   bool encapsulated = false;
 
 private:
@@ -114,14 +150,14 @@ private:
       stream_.ignore(static_cast<std::streamsize>(bytes));
   }
 
-  void Take(unsigned char* bytes, std::size_t count)
+  void Take(void* bytes, std::size_t count)
   {
-    if (end_ - at_ < count || !stream_.read(reinterpret_cast<char*>(bytes), static_cast<std::streamsize>(count)))
+    if (end_ - at_ < count || !stream_.read(static_cast<char*>(bytes), static_cast<std::streamsize>(count)))
       Fail(path_, "the data end early, in the head of an element: the file is truncated");
     at_ += count;
   }
 
-  std::uint32_t ReadTag()
+  Tag ReadTag()
   {
     unsigned char b[4];
     Take(b, 4);
@@ -135,37 +171,37 @@ private:
     return std::uint32_t{b[3]} << 24 | std::uint32_t{b[2]} << 16 | std::uint32_t{b[1]} << 8 | b[0];
   }
 
-  void CheckLength(std::uint32_t tag, std::uint64_t bytes, std::uint64_t end)
+  void CheckLength(Tag tag, std::uint64_t bytes, std::uint64_t end) const
   {
-    if (bytes > end - at_)
+    if (at_ > end || bytes > end - at_)
       Fail(path_, "the element " + TextOf(tag) + " says that it is " + std::to_string(bytes) + " bytes long, and only " +
-                      std::to_string(end - at_) + " follow: the file is truncated or damaged");
+                      std::to_string(at_ > end ? 0 : end - at_) + " follow: the file is truncated or damaged");
   }
 
-  // Elements up to \a end or a mark of the end of an item.
-  void Elements(std::uint64_t end, bool explicitTypes, int depth)
+  // Elements up to \a end or a mark of the end of an item. \a data may be null: then they are only walked over.
+  void Elements(DataSet* data, bool explicitTypes, std::uint64_t end, int depth)
   {
     if (depth > deepest)
       Fail(path_, "its sequences are nested more than " + std::to_string(deepest) + " deep");
     while (at_ < end) {
       if (depth == 0 && pixels.bytes > 0 && end - at_ < 8)
         return; // padding
-      if (Element(explicitTypes, depth, nullptr, end))
+      if (Element(data, explicitTypes, end, depth, nullptr))
         return;
     }
   }
 
   // \returns whether it was the mark of an end
-  bool Element(bool explicitTypes, int depth, std::string* value, std::uint64_t end)
+  bool Element(DataSet* data, bool explicitTypes, std::uint64_t end, int depth, std::string* asked)
   {
-    const std::uint32_t tag = ReadTag();
+    const Tag tag = ReadTag();
     if (tag == ItemEnd || tag == SequenceEnd) {
       ReadLength();
       return true;
     }
     std::string type;
     std::uint64_t bytes = 0;
-    if (explicitTypes && tag >> 16 != 0xFFFE) {
+    if (explicitTypes) {
       unsigned char b[4];
       Take(b, 4);
       type.assign(reinterpret_cast<const char*>(b), 2);
@@ -178,52 +214,36 @@ private:
       bytes = ReadLength();
 
     const std::uint64_t start = at_;
-    const bool ofPixels = tag == PixelTag || type == "OB" || type == "OW";
-    if (bytes == Undefined) {
-      if (ofPixels)
-        Fragments(end);
-      else
-        Items(end, explicitTypes && type != "UN", depth);
-    } else {
+    const bool isPixels = tag == PixelTag || type == "OB" || type == "OW", isUndefined = bytes == Undefined;
+    if (!isUndefined)
       CheckLength(tag, bytes, end);
-      if (value && bytes <= 256) {
-        value->resize(bytes);
-        Take(reinterpret_cast<unsigned char*>(value->data()), bytes);
-      } else if (type == "SQ" || (!ofPixels && bytes >= 8 && (type.empty() || type == "UN") && ItemFollows()))
-        Items(start + bytes, explicitTypes && type != "UN", depth);
-      if (at_ > start + bytes)
-        Fail(path_, "the items of " + TextOf(tag) + " are longer than it is: the file is damaged");
-      Skip(start + bytes - at_);
-    }
-    if (depth == 0) {
-      const Place place{start, at_ - start};
-      if (tag == PixelTag) {
-        pixels = place;
-        encapsulated = bytes == Undefined;
-      } else if (tag == 0x7FE11101)
-        kretz = place;
-      else if (tag == 0x7FE10011)
-        kretzCreator = place;
-      else if (tag == 0x7FE10010)
-        movieCreator = place;
-    }
+    if (isUndefined && isPixels)
+      Fragments(end);
+    else if (isUndefined || (data && IsKeptSequence(tag))) {
+      std::vector<DataSet>* items = data && IsKeptSequence(tag) ? &data->sequences[tag] : nullptr;
+      Items(items, explicitTypes && type != "UN", isUndefined ? end : start + bytes, depth);
+      if (!isUndefined)
+        Seek(start + bytes);
+    } else if (asked || (data && IsKeptValue(tag) && bytes <= longestValue)) {
+      std::string& value = asked ? *asked : data->values[tag];
+      value.resize(std::min(bytes, longestValue));
+      Take(value.data(), value.size());
+      Seek(start + bytes);
+    } else
+      Skip(bytes);
+    if (data && depth == 0 && tag == PixelTag) {
+      pixels = {start, at_ - start};
+      encapsulated = isUndefined;
+    } else if (data && depth == 0 && tag == 0x7FE11101)
+      kretz = {start, at_ - start};
     return false;
-  }
-  bool Element(bool explicitTypes, int depth, std::string* value) { return Element(explicitTypes, depth, value, end_); }
-
-  bool ItemFollows()
-  {
-    const std::uint64_t start = at_;
-    const std::uint32_t tag = ReadTag();
-    Seek(start);
-    return tag == ItemTag;
   }
 
   // The items of a sequence, up to \a end or a mark.
-  void Items(std::uint64_t end, bool explicitTypes, int depth)
+  void Items(std::vector<DataSet>* items, bool explicitTypes, std::uint64_t end, int depth)
   {
     while (at_ < end) {
-      const std::uint32_t tag = ReadTag();
+      const Tag tag = ReadTag();
       const std::uint32_t bytes = ReadLength();
       if (tag == SequenceEnd)
         return;
@@ -231,7 +251,12 @@ private:
         Fail(path_, "a sequence holds " + TextOf(tag) + " where an item should begin: the file is damaged");
       if (bytes != Undefined)
         CheckLength(tag, bytes, end);
-      Elements(bytes == Undefined ? end : at_ + bytes, explicitTypes, depth + 1);
+      const std::uint64_t itemEnd = bytes == Undefined ? end : at_ + bytes;
+      if (items)
+        items->emplace_back();
+      Elements(items ? &items->back() : nullptr, explicitTypes, itemEnd, depth + 1);
+      if (bytes != Undefined)
+        Seek(itemEnd);
     }
   }
 
@@ -239,7 +264,7 @@ private:
   void Fragments(std::uint64_t end)
   {
     while (at_ < end) {
-      const std::uint32_t tag = ReadTag();
+      const Tag tag = ReadTag();
       const std::uint32_t bytes = ReadLength();
       if (tag == SequenceEnd)
         return;
@@ -285,19 +310,15 @@ std::string Inflated(std::ifstream& stream, std::uint64_t at, std::uint64_t byte
   return out;
 }
 
-// Pass 2: values of a gdcm data set. What is missing or of another form is empty.
-std::string Text(const gdcm::DataSet& data, const Tag& tag)
+// Values of a data set. What is missing or of another form is empty.
+std::string Text(const DataSet& data, Tag tag)
 {
-  if (!data.FindDataElement(tag))
-    return {};
-  const gdcm::ByteValue* value = data.GetDataElement(tag).GetByteValue();
-  if (!value || value->GetLength() > 4096 * 16)
-    return {};
-  return Trimmed(std::string(value->GetPointer(), value->GetLength()));
+  const auto found = data.values.find(tag);
+  return found == data.values.end() ? std::string() : Trimmed(found->second);
 }
 
 // Numbers written as text, separated by backslashes (DS, IS).
-std::vector<double> Decimals(const gdcm::DataSet& data, const Tag& tag, std::size_t count)
+std::vector<double> Decimals(const DataSet& data, Tag tag, std::size_t count)
 {
   std::vector<double> numbers;
   std::istringstream parts(Text(data, tag));
@@ -310,49 +331,47 @@ std::vector<double> Decimals(const gdcm::DataSet& data, const Tag& tag, std::siz
   return numbers.size() == count ? numbers : std::vector<double>();
 }
 
+// Numbers in binary, little endian as this machine.
 template <class T>
-std::vector<T> Binary(const gdcm::DataSet& data, const Tag& tag, std::size_t count)
+std::vector<T> Binary(const DataSet& data, Tag tag, std::size_t count)
 {
-  if (!data.FindDataElement(tag))
-    return {};
-  const gdcm::ByteValue* value = data.GetDataElement(tag).GetByteValue();
-  if (!value || value->GetLength() != count * sizeof(T))
+  const auto found = data.values.find(tag);
+  if (found == data.values.end() || found->second.size() != count * sizeof(T))
     return {};
   std::vector<T> numbers(count);
-  std::memcpy(numbers.data(), value->GetPointer(), count * sizeof(T));
+  std::memcpy(numbers.data(), found->second.data(), count * sizeof(T));
   if constexpr (std::is_floating_point_v<T>)
     if (std::any_of(numbers.begin(), numbers.end(), [](T n) { return !std::isfinite(n); }))
       return {};
   return numbers;
 }
 
-std::optional<double> Double(const gdcm::DataSet& data, const Tag& tag)
+std::optional<double> Double(const DataSet& data, Tag tag)
 {
   const auto numbers = Binary<double>(data, tag, 1);
   return numbers.empty() ? std::nullopt : std::optional<double>(numbers[0]);
 }
 
-int Short(const gdcm::DataSet& data, const Tag& tag, int otherwise)
+int Short(const DataSet& data, Tag tag, int otherwise)
 {
   const auto numbers = Binary<std::uint16_t>(data, tag, 1);
   return numbers.empty() ? otherwise : numbers[0];
 }
 
-gdcm::SmartPointer<gdcm::SequenceOfItems> Sequence(const gdcm::DataSet& data, const Tag& tag)
+const std::vector<DataSet>* Sequence(const DataSet& data, Tag tag)
 {
-  return data.FindDataElement(tag) ? data.GetDataElement(tag).GetValueAsSQ() : nullptr;
+  const auto found = data.sequences.find(tag);
+  return found == data.sequences.end() ? nullptr : &found->second;
 }
 
 // Calls functor with the first item of a sequence, if there is one.
 template <class Functor>
-bool WithItem(const gdcm::DataSet* data, const Tag& tag, const Functor& functor)
+bool WithItem(const DataSet& data, Tag tag, const Functor& functor)
 {
-  if (!data)
+  const std::vector<DataSet>* items = Sequence(data, tag);
+  if (!items || items->empty())
     return false;
-  const auto sequence = Sequence(*data, tag);
-  if (!sequence || sequence->GetNumberOfItems() < 1)
-    return false;
-  functor(sequence->GetItem(1).GetNestedDataSet());
+  functor(items->front());
   return true;
 }
 
@@ -370,37 +389,36 @@ void SetDirections(DicomPlane& plane, const std::vector<double>& n)
   }
 }
 
-void SetSpacing(DicomPicture& picture, const gdcm::DataSet& data)
+void SetSpacing(DicomPicture& picture, const DataSet& data)
 {
-  if (const auto n = Decimals(data, {0x0028, 0x0030}, 2); !n.empty())
+  if (const auto n = Decimals(data, 0x00280030, 2); !n.empty())
     picture.spacing = {n[1], n[0]}; // the file gives that of rows, then that of columns
-  if (const auto n = Decimals(data, {0x0018, 0x0088}, 1); !n.empty())
+  if (const auto n = Decimals(data, 0x00180088, 1); !n.empty())
     picture.sliceSpacing = n[0];
 }
 
-void SetRescale(DicomPicture& picture, const gdcm::DataSet& data)
+void SetRescale(DicomPicture& picture, const DataSet& data)
 {
-  if (const auto n = Decimals(data, {0x0028, 0x1053}, 1); !n.empty())
+  if (const auto n = Decimals(data, 0x00281053, 1); !n.empty())
     picture.slope = n[0];
-  if (const auto n = Decimals(data, {0x0028, 0x1052}, 1); !n.empty())
+  if (const auto n = Decimals(data, 0x00281052, 1); !n.empty())
     picture.intercept = n[0];
 }
 
 // The one spacing of the calibrated regions of an ultrasound picture; nothing where they disagree or are no lengths.
-void SetRegionSpacing(DicomPicture& picture, const gdcm::DataSet& data)
+void SetRegionSpacing(DicomPicture& picture, const DataSet& data)
 {
   constexpr int centimetres = 3, tissue = 1;
   constexpr double mmPerCm = 10.0;
-  const auto regions = Sequence(data, {0x0018, 0x6011});
+  const std::vector<DataSet>* regions = Sequence(data, Regions);
   Eigen::Vector2d found = Eigen::Vector2d::Zero();
-  for (std::size_t i = 1; regions && i <= regions->GetNumberOfItems(); ++i) {
-    const gdcm::DataSet& region = regions->GetItem(i).GetNestedDataSet();
-    if (Short(region, {0x0018, 0x6014}, tissue) != tissue || Short(region, {0x0018, 0x6024}, 0) != centimetres ||
-        Short(region, {0x0018, 0x6026}, 0) != centimetres)
+  for (std::size_t i = 0; regions && i < regions->size(); ++i) {
+    const DataSet& region = (*regions)[i];
+    if (Short(region, 0x00186014, tissue) != tissue || Short(region, 0x00186024, 0) != centimetres ||
+        Short(region, 0x00186026, 0) != centimetres)
       continue;
     const Eigen::Vector2d spacing =
-        mmPerCm * Eigen::Vector2d(Double(region, {0x0018, 0x602C}).value_or(0.0), Double(region, {0x0018, 0x602E}).value_or(0.0))
-                      .cwiseAbs();
+        mmPerCm * Eigen::Vector2d(Double(region, 0x0018602C).value_or(0.0), Double(region, 0x0018602E).value_or(0.0)).cwiseAbs();
     if (!found.isZero() && !found.isApprox(spacing, 1e-6))
       return;
     found = spacing;
@@ -409,51 +427,51 @@ void SetRegionSpacing(DicomPicture& picture, const gdcm::DataSet& data)
 }
 
 // What an object without functional groups says of all its pictures.
-DicomPicture PlainPicture(const gdcm::DataSet& data)
+DicomPicture PlainPicture(const DataSet& data)
 {
   DicomPicture picture;
-  SetPosition(picture.patient, Decimals(data, {0x0020, 0x0032}, 3));
-  SetDirections(picture.patient, Decimals(data, {0x0020, 0x0037}, 6));
+  SetPosition(picture.patient, Decimals(data, 0x00200032, 3));
+  SetDirections(picture.patient, Decimals(data, 0x00200037, 6));
   SetSpacing(picture, data);
   if (picture.spacing.isZero())
     SetRegionSpacing(picture, data);
   SetRescale(picture, data);
-  if (const auto n = Decimals(data, {0x0020, 0x0100}, 1); !n.empty())
+  if (const auto n = Decimals(data, 0x00200100, 1); !n.empty())
     picture.timeIndex = static_cast<int>(n[0]);
-  if (const auto n = Decimals(data, {0x0018, 0x1060}, 1); !n.empty() && picture.timeIndex)
+  if (const auto n = Decimals(data, 0x00181060, 1); !n.empty() && picture.timeIndex)
     picture.time = n[0] * 1e-3;
   return picture;
 }
 
 // One functional group is in the item of the picture or, for all, in the shared one.
-DicomPicture GroupedPicture(const gdcm::DataSet& shared, const gdcm::DataSet& own)
+DicomPicture GroupedPicture(const DataSet& shared, const DataSet& own)
 {
   DicomPicture picture;
-  const auto group = [&shared, &own](const Tag& tag, const auto& functor) {
-    WithItem(&own, tag, functor) || WithItem(&shared, tag, functor);
+  const auto group = [&shared, &own](Tag tag, const auto& functor) {
+    WithItem(own, tag, functor) || WithItem(shared, tag, functor);
   };
-  using Data = const gdcm::DataSet&;
-  group({0x0020, 0x9113}, [&](Data d) { SetPosition(picture.patient, Decimals(d, {0x0020, 0x0032}, 3)); });
-  group({0x0020, 0x9116}, [&](Data d) { SetDirections(picture.patient, Decimals(d, {0x0020, 0x0037}, 6)); });
-  group({0x0020, 0x930E}, [&](Data d) { SetPosition(picture.volume, Binary<double>(d, {0x0020, 0x9301}, 3)); });
-  group({0x0020, 0x930F}, [&](Data d) { SetDirections(picture.volume, Binary<double>(d, {0x0020, 0x9302}, 6)); });
-  group({0x0028, 0x9110}, [&](Data d) { SetSpacing(picture, d); });
-  group({0x0028, 0x9145}, [&](Data d) { SetRescale(picture, d); });
-  group({0x0018, 0x9807}, [&](Data d) { picture.dataType = Text(d, {0x0018, 0x9808}); });
-  group({0x0020, 0x9310}, [&](Data d) { picture.time = Double(d, {0x0020, 0x930D}); });
-  group({0x0020, 0x9111}, [&](Data d) {
-    if (const auto n = Binary<std::uint32_t>(d, {0x0020, 0x9128}, 1); !n.empty())
+  using Data = const DataSet&;
+  group(0x00209113, [&](Data d) { SetPosition(picture.patient, Decimals(d, 0x00200032, 3)); });
+  group(0x00209116, [&](Data d) { SetDirections(picture.patient, Decimals(d, 0x00200037, 6)); });
+  group(0x0020930E, [&](Data d) { SetPosition(picture.volume, Binary<double>(d, 0x00209301, 3)); });
+  group(0x0020930F, [&](Data d) { SetDirections(picture.volume, Binary<double>(d, 0x00209302, 6)); });
+  group(0x00289110, [&](Data d) { SetSpacing(picture, d); });
+  group(0x00289145, [&](Data d) { SetRescale(picture, d); });
+  group(0x00189807, [&](Data d) { picture.dataType = Text(d, 0x00189808); });
+  group(0x00209310, [&](Data d) { picture.time = Double(d, 0x0020930D); });
+  group(0x00209111, [&](Data d) {
+    if (const auto n = Binary<std::uint32_t>(d, 0x00209128, 1); !n.empty())
       picture.timeIndex = static_cast<int>(n[0] & 0x7FFFFFFF);
   });
   return picture;
 }
 
 // The element with this number that a private creator has reserved, by the creator's name.
-std::string PrivateText(const gdcm::DataSet& data, std::uint16_t group, std::uint8_t element, const std::string& creator)
+std::string PrivateText(const DataSet& data, std::uint32_t group, std::uint32_t element, const std::string& creator)
 {
-  for (std::uint16_t block = 0x10; block <= 0xFF; ++block)
-    if (Text(data, {group, block}) == creator)
-      return Text(data, {group, static_cast<std::uint16_t>(block << 8 | element)});
+  for (std::uint32_t block = 0x10; block <= 0xFF; ++block)
+    if (Text(data, group << 16 | block) == creator)
+      return Text(data, group << 16 | block << 8 | element);
   return {};
 }
 
@@ -463,23 +481,9 @@ public:
 
   DicomHeader Read()
   {
-    Walk();
-    gdcm::Trace::WarningOff();
-    gdcm::Trace::ErrorOff();
-    gdcm::Trace::DebugOff();
-    gdcm::Reader reader;
-    std::ifstream stream(path_, std::ios::binary);
-    reader.SetStream(stream);
-    bool read = false;
-    try {
-      read = reader.ReadUpToTag({0x7FE0, 0x0010}, {});
-    } catch (const std::exception&) {
-    }
-    if (!read)
-      Fail(path_, "it cannot be parsed as DICOM");
-    const gdcm::DataSet& data = reader.GetFile().GetDataSet();
+    const DataSet data = Parse();
     ReadImage(data);
-    if (header_.kretzBytes == 0 && walked_ && pixelsSeen_) {
+    if (header_.kretzBytes == 0 && header_.pixelBytes > 0) {
       ReadPictures(data);
       CheckPixels();
     }
@@ -487,7 +491,7 @@ public:
   }
 
 private:
-  void Walk()
+  DataSet Parse()
   {
     std::error_code error;
     const std::uint64_t bytes = fs::is_regular_file(path_, error) ? fs::file_size(path_, error) : 0;
@@ -498,73 +502,64 @@ private:
     stream.read(start.data(), static_cast<std::streamsize>(start.size()));
     if (!stream || !LooksLikeDicom(start))
       Fail(path_, "it is not DICOM: DICM is missing after its first 128 bytes");
-    LengthWalk walk(stream, bytes, path_);
-    walk.MetaInformation();
-    const std::string& syntax = walk.transferSyntax;
-    if (syntax == "1.2.840.10008.1.2.2")
+    Parser parser(stream, bytes, path_);
+    header_.transferSyntax = parser.MetaInformation();
+    if (header_.transferSyntax.empty())
+      Fail(path_, "its transfer syntax is missing");
+    if (header_.transferSyntax == BigEndian)
       Fail(path_, "its numbers are big-endian, a retired way to write DICOM that is not supported");
-    if (syntax == "1.2.840.10008.1.2.1.99") {
-      // Offsets in a deflated data set are not those of the file: gdcm reads the pixels too.
-      const std::string plain = Inflated(stream, walk.At(), bytes - walk.At(), path_);
-      std::istringstream inflated(std::string(before, '\0') + plain);
-      LengthWalk inside(inflated, before + plain.size(), path_);
-      inside.MetaInformation(); // finds none, and stands behind the preamble
-      inside.DataSet(true);
-      inside.encapsulated = true;
-      Note(inside, stream, false);
-      return;
+    if (header_.transferSyntax == Deflated) {
+      const std::string plain = Inflated(stream, parser.At(), bytes - parser.At(), path_);
+      std::istringstream inflated(plain);
+      Parser inside(inflated, plain.size(), path_);
+      DataSet data = inside.Outermost(true);
+      Note(inside, data);
+      header_.storage = DicomStorage::Deflated;
+      header_.kretzBytes = 0; // its offset is not one of the file
+      return data;
     }
-    walk.DataSet(syntax != "1.2.840.10008.1.2" && !syntax.empty());
-    Note(walk, stream, true);
+    DataSet data = parser.Outermost(header_.transferSyntax != ImplicitLittleEndian);
+    Note(parser, data);
+    return data;
   }
 
-  void Note(const LengthWalk& walk, std::ifstream& stream, bool inFile)
+  void Note(const Parser& parser, const DataSet& data)
   {
-    walked_ = true;
-    pixelsSeen_ = walk.pixels.bytes > 0;
-    header_.encoded = walk.encapsulated;
-    header_.pixelOffset = walk.pixels.offset;
-    header_.pixelBytes = walk.pixels.bytes;
-    const auto text = [&stream, inFile](const Place& place) {
-      std::string value(std::min<std::uint64_t>(place.bytes, 64), '\0');
-      stream.clear();
-      stream.seekg(static_cast<std::streamoff>(place.offset));
-      if (!inFile || !stream.read(value.data(), static_cast<std::streamsize>(value.size())))
-        return std::string();
-      return Trimmed(value);
-    };
-    if (text(walk.kretzCreator) == "KRETZ_US") {
-      header_.kretzOffset = walk.kretz.offset;
-      header_.kretzBytes = walk.kretz.bytes;
+    header_.storage = parser.encapsulated ? DicomStorage::Encapsulated : DicomStorage::Plain;
+    header_.pixelOffset = parser.pixels.offset;
+    header_.pixelBytes = parser.pixels.bytes;
+    if (Text(data, 0x7FE10011) == "KRETZ_US") {
+      header_.kretzOffset = parser.kretz.offset;
+      header_.kretzBytes = parser.kretz.bytes;
     }
-    header_.holdsMovieGroup = text(walk.movieCreator) == "GEMS_Ultrasound_MovieGroup_001";
+    header_.holdsMovieGroup = Text(data, 0x7FE10010) == "GEMS_Ultrasound_MovieGroup_001";
   }
 
-  void ReadImage(const gdcm::DataSet& data)
+  void ReadImage(const DataSet& data)
   {
-    header_.series = Text(data, {0x0020, 0x000E});
-    header_.photometric = Text(data, {0x0028, 0x0004});
-    header_.rows = Short(data, {0x0028, 0x0010}, 0);
-    header_.columns = Short(data, {0x0028, 0x0011}, 0);
-    header_.samples = Short(data, {0x0028, 0x0002}, 1);
-    header_.planar = Short(data, {0x0028, 0x0006}, 0) == 1;
-    header_.bitsAllocated = Short(data, {0x0028, 0x0100}, 0);
-    header_.bitsStored = Short(data, {0x0028, 0x0101}, header_.bitsAllocated);
-    highBit_ = Short(data, {0x0028, 0x0102}, header_.bitsStored - 1);
-    header_.isSigned = Short(data, {0x0028, 0x0103}, 0) == 1;
-    header_.burnedIn = Text(data, {0x0028, 0x0301}) == "YES";
-    if (const auto n = Decimals(data, {0x0018, 0x1063}, 1); !n.empty())
+    header_.series = Text(data, 0x0020000E);
+    header_.photometric = Text(data, 0x00280004);
+    header_.rows = Short(data, 0x00280010, 0);
+    header_.columns = Short(data, 0x00280011, 0);
+    header_.samples = Short(data, 0x00280002, 1);
+    header_.planar = Short(data, 0x00280006, 0) == 1;
+    header_.bitsAllocated = Short(data, 0x00280100, 0);
+    header_.bitsStored = Short(data, 0x00280101, header_.bitsAllocated);
+    highBit_ = Short(data, 0x00280102, header_.bitsStored - 1);
+    header_.isSigned = Short(data, 0x00280103, 0) == 1;
+    header_.burnedIn = Text(data, 0x00280301) == "YES";
+    if (const auto n = Decimals(data, 0x00181063, 1); !n.empty())
       header_.frameTime = n[0] * 1e-3;
-    if (const auto n = Binary<std::uint16_t>(data, {0x0028, 0x0009}, 2); !n.empty())
+    if (const auto n = Binary<std::uint16_t>(data, 0x00280009, 2); !n.empty())
       header_.frameIncrement = n[0] == 0x0018 && (n[1] == 0x1063 || n[1] == 0x1065) ? "time"
                                : (n[0] == 0x0018 && n[1] == 0x0088) || (n[0] == 0x0020 && (n[1] == 0x1041 || n[1] == 0x0032))
                                    ? "space"
                                    : "";
-    if (const auto n = Binary<double>(data, {0x0020, 0x9309}, 16); !n.empty())
+    if (const auto n = Binary<double>(data, 0x00209309, 16); !n.empty())
       header_.volumeToTransducer = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n.data());
     for (const auto& [key, tag] :
-         {std::pair("Modality", Tag(0x0008, 0x0060)), std::pair("Manufacturer", Tag(0x0008, 0x0070)),
-          std::pair("ManufacturerModelName", Tag(0x0008, 0x1090)), std::pair("TransducerType", Tag(0x0018, 0x6031))}) {
+         {std::pair("Modality", Tag(0x00080060)), std::pair("Manufacturer", Tag(0x00080070)),
+          std::pair("ManufacturerModelName", Tag(0x00081090)), std::pair("TransducerType", Tag(0x00186031))}) {
       std::string text = Text(data, tag).substr(0, 256);
       std::replace_if(
           text.begin(), text.end(), [](char c) { return c < 32 || c > 126; }, '?');
@@ -573,11 +568,11 @@ private:
     }
   }
 
-  void ReadPictures(const gdcm::DataSet& data)
+  void ReadPictures(const DataSet& data)
   {
     std::size_t count = 1;
-    if (const std::string text = Text(data, {0x0028, 0x0008}); !text.empty()) {
-      const auto n = Decimals(data, {0x0028, 0x0008}, 1);
+    if (const std::string text = Text(data, 0x00280008); !text.empty()) {
+      const auto n = Decimals(data, 0x00280008, 1);
       if (n.empty() || !(n[0] >= 1.0 && n[0] <= static_cast<double>(mostPictures)) || n[0] != std::floor(n[0]))
         Fail(path_,
              "its number of frames is \"" + text.substr(0, 40) + "\"; it must be from 1 to " + std::to_string(mostPictures));
@@ -586,31 +581,27 @@ private:
     if (count > header_.pixelBytes)
       Fail(path_, "it says that it holds " + std::to_string(count) + " frames, more than it has bytes for");
 
-    const auto groups = Sequence(data, {0x5200, 0x9230});
+    const std::vector<DataSet>* groups = Sequence(data, PictureGroups);
     if (!groups) {
       const DicomPicture picture = PlainPicture(data);
       header_.pictures.assign(count, picture);
       ReadPhilips(data);
       return;
     }
-    if (groups->GetNumberOfItems() != count)
-      Fail(path_, "it holds " + std::to_string(count) + " frames and functional groups for " +
-                      std::to_string(groups->GetNumberOfItems()));
+    if (groups->size() != count)
+      Fail(path_, "it holds " + std::to_string(count) + " frames and functional groups for " + std::to_string(groups->size()));
     header_.grouped = true;
-    const gdcm::DataSet nothing;
-    const auto sharedItems = Sequence(data, {0x5200, 0x9229});
-    const gdcm::DataSet& shared =
-        sharedItems && sharedItems->GetNumberOfItems() > 0 ? sharedItems->GetItem(1).GetNestedDataSet() : nothing;
-    for (std::size_t i = 1; i <= count; ++i)
-      header_.pictures.push_back(GroupedPicture(shared, groups->GetItem(i).GetNestedDataSet()));
+    const std::vector<DataSet>* shared = Sequence(data, SharedGroups);
+    for (const DataSet& own : *groups)
+      header_.pictures.push_back(GroupedPicture(shared && !shared->empty() ? shared->front() : DataSet(), own));
   }
 
-  void ReadPhilips(const gdcm::DataSet& data)
+  void ReadPhilips(const DataSet& data)
   {
     // QLAB's Cartesian export: depth of the volume and its third spacing in private elements, lengths in cm.
     constexpr double mmPerCm = 10.0;
-    if (const auto slices = Binary<std::uint32_t>(data, {0x3001, 0x1001}, 1); !slices.empty()) {
-      const auto x = Double(data, {0x0018, 0x602C}), y = Double(data, {0x0018, 0x602E}), z = Double(data, {0x3001, 0x1003});
+    if (const auto slices = Binary<std::uint32_t>(data, 0x30011001, 1); !slices.empty()) {
+      const auto x = Double(data, 0x0018602C), y = Double(data, 0x0018602E), z = Double(data, 0x30011003);
       if (slices[0] >= 1 && slices[0] <= 65535 && x && y && z) {
         header_.volumeSlices = static_cast<int>(slices[0]);
         header_.volumeSpacing = mmPerCm * Eigen::Vector3d(*x, *y, *z);
@@ -649,25 +640,70 @@ private:
     const double decoded = static_cast<double>(header_.PictureBytes()) * static_cast<double>(header_.pictures.size()) *
                            std::max(1, header_.volumeSlices);
     const double there = static_cast<double>(header_.pixelBytes);
-    if (header_.encoded ? decoded > mostCompressed * there : decoded > there)
+    const bool encapsulated = header_.storage == DicomStorage::Encapsulated;
+    if (encapsulated ? decoded > mostCompressed * there : decoded > there)
       Fail(path_, "its " + std::to_string(header_.pictures.size()) + " frames of " + std::to_string(header_.columns) + " x " +
                       std::to_string(header_.rows) + " pixels need " + NumberText(decoded) + " bytes, " +
-                      (header_.encoded ? "more than can be compressed to the " : "and it holds ") + NumberText(there) +
+                      (encapsulated ? "more than can be compressed to the " : "and it holds ") + NumberText(there) +
                       ": it is truncated or its sizes are wrong");
   }
 
   std::string path_;
   DicomHeader header_;
-  bool walked_ = false, pixelsSeen_ = false;
   int highBit_ = 7;
 };
+
+// The compressed pixels as gdcm's codecs take them; null where they are none that are known. What does not begin as its
+// syntax says is kept from the codecs.
+gdcm::SmartPointer<gdcm::SequenceOfFragments> Fragments(const DicomHeader& header, std::ifstream& stream)
+{
+  const gdcm::TransferSyntax::TSType syntax = gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str());
+  std::vector<std::string> fragments;
+  std::uint64_t at = header.pixelOffset;
+  const std::uint64_t end = at + header.pixelBytes;
+  stream.seekg(static_cast<std::streamoff>(at));
+  for (bool table = true; at < end; table = false) {
+    unsigned char b[8];
+    if (end - at < 8 || !stream.read(reinterpret_cast<char*>(b), 8))
+      return nullptr;
+    at += 8;
+    const std::uint32_t bytes = std::uint32_t{b[7]} << 24 | std::uint32_t{b[6]} << 16 | std::uint32_t{b[5]} << 8 | b[4];
+    if (b[2] == 0xDD) // the end of the sequence
+      break;
+    if (bytes > end - at)
+      return nullptr;
+    std::string fragment(bytes, '\0');
+    if (!stream.read(fragment.data(), static_cast<std::streamsize>(bytes)))
+      return nullptr;
+    at += bytes;
+    if (!table) // the first item is a table of offsets
+      fragments.push_back(std::move(fragment));
+  }
+  // One per picture, or all of one.
+  const std::size_t pictures = header.pictures.size();
+  if (syntax == gdcm::TransferSyntax::TS_END || fragments.size() < pictures || (pictures > 1 && fragments.size() != pictures))
+    return nullptr;
+  const bool isRle = syntax == gdcm::TransferSyntax::RLELossless;
+  auto sequence = gdcm::SequenceOfFragments::New();
+  for (std::size_t i = 0; i < fragments.size(); ++i) {
+    const std::string& f = fragments[i];
+    const auto begins = [&f](const char* mark, std::size_t count) { return f.compare(0, count, mark, count) == 0; };
+    const bool first = pictures > 1 || i == 0;
+    if (first && (isRle ? f.size() < 64 : !begins("\xFF\xD8", 2) && !begins("\xFF\x4F\xFF\x51", 4) && !begins("\0\0\0\x0CjP", 6)))
+      return nullptr;
+    gdcm::Fragment fragment;
+    fragment.SetByteValue(f.data(), static_cast<std::uint32_t>(f.size()));
+    sequence->AddFragment(fragment);
+  }
+  return sequence;
+}
 
 } // namespace
 
 std::uint64_t DicomHeader::PictureBytes() const
 {
   const std::uint64_t pixels = static_cast<std::uint64_t>(rows) * static_cast<std::uint64_t>(columns);
-  if (!encoded && photometric == "YBR_FULL_422")
+  if (storage != DicomStorage::Encapsulated && photometric == "YBR_FULL_422")
     return (static_cast<std::uint64_t>(columns) + 1) / 2 * 4 * static_cast<std::uint64_t>(rows);
   return pixels * static_cast<std::uint64_t>(samples) * static_cast<std::uint64_t>(bitsAllocated / 8);
 }
@@ -687,18 +723,45 @@ std::vector<char> DecodeDicomPixels(const DicomHeader& header)
   const auto fail = [&header]() {
     Fail(header.path, "its pixels cannot be decoded: they are damaged or of a kind that is not supported");
   };
-  std::vector<char> pixels;
+  const std::uint64_t wanted = header.PictureBytes() * header.pictures.size();
+  std::ifstream stream(header.path, std::ios::binary);
+  if (header.storage == DicomStorage::Deflated) {
+    const std::uint64_t bytes = fs::file_size(header.path);
+    Parser parser(stream, bytes, header.path);
+    parser.MetaInformation();
+    const std::string plain = Inflated(stream, parser.At(), bytes - parser.At(), header.path);
+    if (plain.size() < header.pixelOffset || plain.size() - header.pixelOffset < wanted)
+      fail();
+    const auto first = plain.begin() + static_cast<std::ptrdiff_t>(header.pixelOffset);
+    return {first, first + static_cast<std::ptrdiff_t>(wanted)};
+  }
+
+  std::vector<char> pixels(wanted);
   try {
-    gdcm::ImageReader reader;
-    reader.SetFileName(header.path.c_str());
-    if (!reader.Read())
+    gdcm::Trace::WarningOff();
+    gdcm::Trace::ErrorOff();
+    gdcm::Trace::DebugOff();
+    const auto fragments = Fragments(header, stream);
+    if (!fragments)
       fail();
-    const gdcm::Image& image = reader.GetImage();
-    const std::uint64_t wanted = header.PictureBytes() * header.pictures.size();
-    if (image.GetBufferLength() != wanted)
-      fail();
-    pixels.resize(wanted);
-    if (!image.GetBuffer(pixels.data()))
+    gdcm::DataElement element(gdcm::Tag(0x7FE0, 0x0010));
+    element.SetVR(gdcm::VR::OB);
+    element.SetValue(*fragments);
+    gdcm::Image image;
+    image.SetNumberOfDimensions(header.pictures.size() > 1 ? 3 : 2);
+    image.SetDimension(0, static_cast<unsigned>(header.columns));
+    image.SetDimension(1, static_cast<unsigned>(header.rows));
+    if (header.pictures.size() > 1)
+      image.SetDimension(2, static_cast<unsigned>(header.pictures.size()));
+    image.SetPixelFormat(gdcm::PixelFormat(static_cast<unsigned short>(header.samples),
+                                           static_cast<unsigned short>(header.bitsAllocated),
+                                           static_cast<unsigned short>(header.bitsStored),
+                                           static_cast<unsigned short>(header.bitsStored - 1), header.isSigned ? 1 : 0));
+    image.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::GetPIType(header.photometric.c_str()));
+    image.SetPlanarConfiguration(0);
+    image.SetTransferSyntax(gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str()));
+    image.SetDataElement(element);
+    if (image.GetBufferLength() != wanted || !image.GetBuffer(pixels.data()))
       fail();
   } catch (const Error&) {
     throw;

@@ -3,9 +3,9 @@
 #include "Readers/ImageHeader.h"
 #include <cstdint>
 #include <Eigen/Core>
-#include <iosfwd>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace echorama {
@@ -30,6 +30,9 @@ struct DicomPicture {
   std::string dataType;                              ///< TISSUE_INTENSITY, FLOW_VELOCITY, ...; empty: the file does not say
 };
 
+/// How the pixels lie in the file: as they are, in a deflated data set, or compressed, in fragments.
+enum class DicomStorage { Plain, Deflated, Encapsulated };
+
 /// What a DICOM file says, without its pixels. Nothing that names a person, an institution or a day is kept.
 struct DicomHeader {
   std::string path;
@@ -45,9 +48,10 @@ struct DicomHeader {
   std::string frameIncrement; ///< what pictures are counted by, "time" or "space", or empty
   double frameTime = 0.0;     ///< seconds from one picture to the next; 0: not said
 
-  bool encoded = false;          ///< the pixels are compressed (gdcm decodes them); otherwise they lie in the file at ...
-  std::uint64_t pixelOffset = 0; ///< ... this offset
-  std::uint64_t pixelBytes = 0;  ///< that many bytes are there, encoded or not
+  DicomStorage storage = DicomStorage::Plain;
+  std::string transferSyntax;
+  std::uint64_t pixelOffset = 0; ///< where the pixels begin in the file, or in its inflated data set
+  std::uint64_t pixelBytes = 0;  ///< that many bytes are there, compressed or not
 
   /// The Cartesian volumes of Philips' QLAB: slices per volume and their spacing in mm; one "picture" is one volume.
   int volumeSlices = 0;
@@ -70,7 +74,7 @@ bool LooksLikeDicom(std::string_view start);
 /// \throws Error(FileSystem), Error(BadFile) that names the file and what is wrong.
 DicomHeader ReadDicomHeader(const std::string& path);
 
-/// The pixels of all pictures of a file as they were before compression, one after the other.
+/// The pixels of all pictures of a file that are not plain, as they were before compression, one after the other.
 /// Colours stay in the file's space, but YBR_RCT and YBR_ICT, which become RGB.
 /// \throws Error(BadFile) when they cannot be decoded or are not as many as the header says.
 std::vector<char> DecodeDicomPixels(const DicomHeader& header);

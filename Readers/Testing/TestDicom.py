@@ -435,6 +435,9 @@ class Dicom(unittest.TestCase):
         data = enhanced()
         data.compress(RLE, encoding_plugin="pydicom")
         self.expect(self.read(data))
+        colours = np.stack([VOXELS, VOXELS[::-1], 255 - VOXELS], axis=-1)
+        pixels(data := enhanced(), colours, "RGB").compress(RLE, encoding_plugin="pydicom")
+        self.expect(self.read(data), (colours.astype(int) @ (299, 587, 114) + 500) // 1000)
         try:
             from PIL import Image
         except ImportError:

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Any bytes as a DICOM file. What gdcm's decoders do with compressed pixels is left out: they are not ours, and the sanitizers
+// see only what they write to our memory.
+#include "Readers/DicomFile.h"
+#include "Readers/DicomHeader.h"
+#include "Testing/Fuzzing.h"
+#include <vector>
+
+using namespace echorama;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
+{
+  const MemoryFile file(data, size);
+  return Survives([&] {
+    if (ReadDicomHeader(file.Path()).storage == DicomStorage::Encapsulated)
+      return;
+    const auto source = OpenDicom(file.Path());
+    const VolumeContent& content = source->Content();
+    if (content.geometry.VoxelCount() > (1u << 20)) // more would only cost time
+      return;
+    std::vector<char> voxels(content.geometry.VoxelCount() * SizeOf(content.type));
+    std::vector<unsigned char> valid(content.holdsValidRegion ? content.geometry.VoxelCount() : 0);
+    source->Read(content.Volumes() - 1, voxels.data(), valid.empty() ? nullptr : valid.data());
+  });
+}

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Elements byte by byte, for what no library writes: lengths that lie, sequences without an end. Objects of all kinds are
+// read in TestDicom.py.
+#include "Core/Geometry/RigidTransform.h"
+#include "Readers/DicomFile.h"
+#include "Readers/DicomHeader.h"
+#include "Readers/Testing/TemporaryFolder.h"
+#include <gdcmImageChangeTransferSyntax.h>
+#include <gdcmImageReader.h>
+#include <gdcmImageWriter.h>
+
+using namespace echorama;
+using namespace echorama::testing;
+
+namespace {
+
+std::string Number(std::uint64_t value, int bytes)
+{
+  std::string text;
+  for (int i = 0; i < bytes; ++i)
+    text += static_cast<char>(value >> 8 * i & 0xFF);
+  return text;
+}
+
+std::string Tag(int group, int element)
+{
+  return Number(static_cast<std::uint64_t>(group), 2) + Number(static_cast<std::uint64_t>(element), 2);
+}
+
+// An element in explicit little endian, of the length that is said.
+std::string Element(int group, int element, const std::string& type, const std::string& value, std::uint32_t length)
+{
+  const bool isLong = std::string("OB OW SQ UN UT").find(type) != std::string::npos;
+  return Tag(group, element) + type + (isLong ? std::string(2, '\0') + Number(length, 4) : Number(length, 2)) + value;
+}
+
+std::string Element(int group, int element, const std::string& type, std::string value)
+{
+  if (value.size() % 2)
+    value += type == "UI" ? '\0' : ' ';
+  return Element(group, element, type, value, static_cast<std::uint32_t>(value.size()));
+}
+
+std::string Item(const std::string& value, std::uint32_t length)
+{
+  return Tag(0xFFFE, 0xE000) + Number(length, 4) + value;
+}
+
+std::string StartOf(const std::string& syntax)
+{
+  const std::string element = Element(2, 0x10, "UI", syntax);
+  return std::string(128, '\0') + "DICM" + Element(2, 0, "UL", Number(element.size(), 4)) + element;
+}
+
+const std::string Start = StartOf("1.2.840.10008.1.2.1");
+constexpr std::uint32_t Undefined = 0xFFFFFFFF;
+const std::string EndOfItem = Tag(0xFFFE, 0xE00D) + Number(0, 4), EndOfSequence = Tag(0xFFFE, 0xE0DD) + Number(0, 4);
+
+// A slice of 8 x 6 pixels that count up from k.
+std::string Slice(int k, int bits = 8)
+{
+  std::string pixels;
+  for (int i = 0; i < 48; ++i)
+    pixels += Number(static_cast<std::uint64_t>(i * 5 + k), bits / 8);
+  return Element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.6.1") + Element(8, 0x18, "UI", "1.2.3." + std::to_string(k)) +
+         Element(8, 0x60, "CS", "US") + Element(0x20, 0xE, "UI", "1.2.3") +
+         Element(0x20, 0x32, "DS", "1.5\\-2.5\\" + std::to_string(3 + 2 * k)) + Element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
+         Element(0x28, 2, "US", Number(1, 2)) + Element(0x28, 4, "CS", "MONOCHROME2") + Element(0x28, 0x10, "US", Number(6, 2)) +
+         Element(0x28, 0x11, "US", Number(8, 2)) + Element(0x28, 0x30, "DS", "0.5\\0.25") +
+         Element(0x28, 0x100, "US", Number(static_cast<unsigned>(bits), 2)) +
+         Element(0x28, 0x101, "US", Number(static_cast<unsigned>(bits), 2)) +
+         Element(0x28, 0x102, "US", Number(static_cast<unsigned>(bits - 1), 2)) + Element(0x28, 0x103, "US", Number(0, 2)) +
+         Element(0x7FE0, 0x10, bits == 8 ? "OB" : "OW", pixels);
+}
+
+class DicomFile : public TemporaryFolder {
+protected:
+  void ExpectBad(const std::string& elements, const std::string& words) const
+  {
+    const std::string path = Put("bad.dcm", Start + elements);
+    ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, words);
+  }
+
+  void PutSlices(int count, int bits = 8) const
+  {
+    for (int k = 0; k < count; ++k)
+      Put("s" + std::to_string(k), Start + Slice(k, bits));
+  }
+};
+
+TEST_F(DicomFile, SlicesOfASeries)
+{
+  PutSlices(4);
+  for (const std::string& path : {folder.string(), Path("s2")}) {
+    EXPECT_EQ(FormatOfContent(path), FileFormat::Dicom);
+    const auto source = OpenVolume(path);
+    const ImageGeometry& geometry = source->Content().geometry;
+    EXPECT_EQ(geometry.dimensions, (std::array<int, 3>{8, 6, 4}));
+    EXPECT_EQ(geometry.origin, Eigen::Vector3d(1.5, -2.5, 3));
+    EXPECT_EQ(geometry.spacing, Eigen::Vector3d(0.25, 0.5, 2));
+    EXPECT_EQ(source->Content().fields, std::vector<HeaderField>({{"Modality", "US"}}));
+    EXPECT_TRUE(source->Content().notes.empty());
+    std::vector<unsigned char> voxels(8 * 6 * 4);
+    source->Read(0, voxels.data(), nullptr);
+    for (int k = 0; k < 4; ++k)
+      for (int i = 0; i < 48; ++i)
+        ASSERT_EQ(voxels[static_cast<std::size_t>(48 * k + i)], i * 5 + k);
+    EXPECT_THROW(source->Read(0, voxels.data(), nullptr, Progress([](double) { return false; })), Error);
+  }
+}
+
+// What gdcm writes, it reads. (JPEG 2000 is in TestDicom.py: gdcm's own encoder writes beyond its buffer for small pictures.)
+TEST_F(DicomFile, LosslessCompressions)
+{
+  using gdcm::TransferSyntax;
+  const TransferSyntax::TSType syntaxes[] = {TransferSyntax::RLELossless, TransferSyntax::JPEGLosslessProcess14_1,
+                                             TransferSyntax::JPEGLSLossless};
+  for (const int bits : {8, 16})
+    for (const auto syntax : syntaxes) {
+      PutSlices(3, bits);
+      for (int k = 0; k < 3; ++k) {
+        gdcm::ImageReader reader;
+        reader.SetFileName(Path("s" + std::to_string(k)).c_str());
+        ASSERT_TRUE(reader.Read());
+        gdcm::ImageChangeTransferSyntax change;
+        change.SetTransferSyntax(syntax);
+        change.SetInput(reader.GetImage());
+        ASSERT_TRUE(change.Change());
+        gdcm::ImageWriter writer;
+        writer.SetFile(reader.GetFile());
+        writer.SetImage(change.GetOutput());
+        writer.SetFileName(Path("t" + std::to_string(k)).c_str());
+        ASSERT_TRUE(writer.Write());
+        std::filesystem::rename(Path("t" + std::to_string(k)), Path("s" + std::to_string(k)));
+      }
+      const DicomHeader header = ReadDicomHeader(Path("s1"));
+      EXPECT_EQ(header.storage, DicomStorage::Encapsulated);
+      const auto source = OpenVolume(folder.string());
+      std::vector<char> voxels(8 * 6 * 3 * SizeOf(source->Content().type));
+      source->Read(0, voxels.data(), nullptr);
+      std::string wanted;
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 48; ++i)
+          wanted += Number(static_cast<std::uint64_t>(i * 5 + k), bits / 8);
+      EXPECT_EQ(std::string(voxels.begin(), voxels.end()), wanted) << bits << " bits, " << TransferSyntax::GetTSString(syntax);
+    }
+}
+
+TEST_F(DicomFile, LengthsThatLie)
+{
+  // 2 GB and more are promised, at the top and inside sequences; nothing is allocated for them.
+  for (const std::uint32_t length : {0x7FFFFFFFu, 0xFFFFFFFEu}) {
+    ExpectBad(Element(8, 0x60, "UT", "US", length), "(0008,0060)");
+    ExpectBad(Slice(0) + Element(0x7FE1, 0x1101, "OB", "US", length), "(7FE1,1101)");
+    const std::string inner = Element(0x20, 0x9301, "UN", "12", length);
+    for (const std::string& sequence :
+         {Element(0x5200, 0x9229, "SQ", Item(inner, static_cast<std::uint32_t>(inner.size()))),
+          Element(0x5200, 0x9229, "SQ", Item(inner + EndOfItem, Undefined) + EndOfSequence, Undefined),
+          Element(0x5200, 0x9229, "UN", Item(Tag(0x20, 0x9301) + Number(length, 4) + "12", Undefined) + EndOfSequence, Undefined),
+          Element(0x5200, 0x9229, "UN", Item(Tag(0x20, 0x9301) + Number(length, 4) + "12", 10))})
+      ExpectBad(sequence, "(0020,9301)");
+    ExpectBad(Element(0x5200, 0x9229, "SQ", Item("12345678", length) + EndOfSequence, Undefined), "(FFFE,E000)");
+    ExpectBad(Element(0x7FE0, 0x10, "OB", Item("", 0) + Item("12345678", length) + EndOfSequence, Undefined), "(FFFE,E000)");
+  }
+}
+
+TEST_F(DicomFile, DamagedStructure)
+{
+  ExpectBad(Element(0x7FE0, 0x10, "OB", Item("", 0) + Item("12", 2), Undefined), "end early");
+  ExpectBad(Element(0x7FE0, 0x10, "OB", "12345678", Undefined), "compressed pixels are damaged");
+  ExpectBad(Element(0x5200, 0x9229, "SQ", "12345678"), "where an item should begin");
+  ExpectBad(Tag(8, 0x60) + Number(0, 4), "has no type");
+  ExpectBad(Tag(8, 0x60) + "CS", "end early");
+  std::string nested;
+  for (int i = 0; i < 40; ++i)
+    nested += Tag(0x20, 0x9301) + "SQ" + Number(0, 2) + Number(Undefined, 4) + Tag(0xFFFE, 0xE000) + Number(Undefined, 4);
+  ExpectBad(nested, "nested");
+  ExpectBad("", "");
+}
+
+TEST_F(DicomFile, DeflatedDataAreChecked)
+{
+  const std::string path = Put("deflated", StartOf("1.2.840.10008.1.2.1.99") + "not deflated");
+  ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "deflated");
+}
+
+TEST_F(DicomFile, OtherFilesOfAFolder)
+{
+  PutSlices(3);
+  Put("readme.txt", "nothing");
+  Put("report", Start + Element(8, 0x60, "CS", "SR") + Element(0x20, 0xE, "UI", "9.9"));
+  EXPECT_EQ(OpenVolume(folder.string())->Content().geometry.dimensions[2], 3);
+  const std::string cut = Put("cut", (Start + Slice(3)).substr(0, Start.size() + Slice(3).size() - 20));
+  ExpectRefused([&] { OpenVolume(folder.string()); }, Error::Kind::BadFile, cut, "truncated");
+  EXPECT_NE(OpenVolume(Path("s0"))->Content().notes.at(0).find("1 files"), std::string::npos);
+  std::filesystem::remove(cut);
+  std::filesystem::remove(Path("s0"));
+  std::filesystem::remove(Path("s1"));
+  std::filesystem::remove(Path("s2"));
+  ExpectRefused([&] { OpenVolume(folder.string()); }, Error::Kind::BadFile, folder.string(), "no DICOM pictures");
+  ExpectRefused([&] { OpenVolume(Path("report")); }, Error::Kind::BadFile, "report", "no pictures");
+}
+
+} // namespace
