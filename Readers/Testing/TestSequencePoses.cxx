@@ -111,7 +111,7 @@ TEST(SequencePosesTest, TheGridOfAFrameIsTheNearestWithoutShear)
   exact.linear().col(2) *= -1.0; // Plus's third axis may point either way
   const ImageGeometry grid = FrameGeometry(exact, {820, 616, 1});
   EXPECT_NO_THROW(grid.Check("grid"));
-  for (const Eigen::Vector3d pixel : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(819, 615, 0)})
+  for (const Eigen::Vector3d& pixel : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(819, 615, 0)})
     for (Eigen::Index i = 0; i < 3; ++i)
       EXPECT_NEAR((grid.IndexToWorld() * pixel)[i], (exact * pixel)[i], 1e-10);
 

@@ -222,7 +222,6 @@ class Sequences(unittest.TestCase):
                 self.assertEqual(self.errors, [])
                 self.assertEqual(writer.GetNotes(), "")
                 again = self.open(self.path(name)) # without the calibration: the poses were written
-                self.errors_of_reader = self.errors
                 self.assertEqual(steps(again), steps(reader))
                 for time in steps(reader):
                     one, two = self.frame(reader, time), self.frame(again, time)
@@ -251,7 +250,6 @@ class Sequences(unittest.TestCase):
         writer = self.watched(vtkUltrasoundSequenceWriter())
         writer.SetInputData(image)
         writer.SetFileName(self.path("a.seq.mha"))
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
         self.assertEqual(writer.Write(), 1)
         self.assertEqual(writer.GetNotes(), "sequences cannot hold the field Temperature")
         frame = self.frame(self.open(self.path("a.seq.mha")), 0)
@@ -284,6 +282,7 @@ class Sequences(unittest.TestCase):
             reader.SetFileName(path)
             reader.SetTransformFile(settings.get("transforms"))
             reader.SetWorldFrame(settings.get("world"))
+            reader.Modified()
             self.errors.clear()
             reader.UpdateInformation()
             reader.Update()
@@ -298,7 +297,10 @@ class Sequences(unittest.TestCase):
         refused(self.put("a.mha", good.replace(b"Frame0003_Timestamp", b"Frame0009_Timestamp")), "frame 9")
         refused(self.put("a.mha", good.replace(b"= MF", b"= QQ")), "orientation")
         refused(self.put("a.igs.mha", good), "Nowhere", world="Nowhere")
-        refused(self.path("a.igs.mha"), "", transforms=self.path("missing.xml"))
+        reader.SetTransformFile(self.path("missing.xml"))
+        self.errors.clear()
+        reader.Update()
+        self.assertIn("missing.xml", self.errors[0])
         refused(self.put("b.mha", sequence([{"ImageToATransform": text(matrix()), "ImageToBTransform": text(matrix())}])), "A, B")
         # A file that changes under the reader is opened again.
         reader = self.open(self.put("c.mha", sequence(tracked())))
@@ -362,4 +364,5 @@ class Sequences(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF) # errors are collected by the tests
     unittest.main()
