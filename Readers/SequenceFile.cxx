@@ -642,13 +642,13 @@ void SequenceFile::Parts::ReadInflated(int index, char* out, const Progress& pro
     }
     const int now = next;
     next = -1; // unless all goes well
-    inflater->Read(now == index ? out : nullptr, frame);
+    const double frames = index - begin + 1;
+    inflater->Read(now == index ? out : nullptr, frame, progress.Part((now - begin) / frames, (now - begin + 1) / frames));
     if (now + 1 == content.frames)
       inflater->Finish();
     next = now + 1;
     if (now == index)
       return;
-    progress(static_cast<double>(next - begin) / static_cast<double>(index - begin + 1));
   }
 }
 
@@ -700,6 +700,7 @@ void SequenceFile::ReadFrame(int index, void* pixels, const Progress& progress)
   char* const out = static_cast<char*>(pixels);
   char* const raw = turned ? p.scratch.data() : out;
 
+  progress(0.0);
   p.OpenData();
   p.stream.clear();
   if (p.interleaved)

@@ -362,17 +362,21 @@ void vtkUltrasoundSequenceReader::ReadFrame(int index, vtkImageData* output, con
     output->GetFieldData()->AddArray(matrix);
     AddString(output, transform.name + "TransformStatus", transform.statusText);
   }
+  // Ours come back as what they were.
+  const auto add = [output](const std::string& key, const std::string& value, const std::string& prefix) {
+    if (key.compare(0, FieldPrefix.size(), FieldPrefix) != 0 ||
+        !vtkUltrasoundAcquisition::SetFromText(output, key.substr(FieldPrefix.size()), value)) {
+      AddString(output, prefix + key, value);
+    }
+  };
   for (const auto& [key, value] : frame.fields) {
-    AddString(output, "Frame_" + key, value);
+    add(key, value, "Frame_");
   }
   if (!content.imageType.empty()) {
     AddString(output, "UltrasoundImageType", content.imageType);
   }
   for (const auto& [key, value] : content.fields) {
-    if (key.compare(0, FieldPrefix.size(), FieldPrefix) != 0 ||
-        !vtkUltrasoundAcquisition::SetFromText(output, key.substr(FieldPrefix.size()), value)) {
-      AddString(output, key, value);
-    }
+    add(key, value, "");
   }
 }
 

@@ -115,8 +115,6 @@ SequenceContent ContentOf(vtkImageData* image, const std::string& path, std::vec
     if (name == vtkUltrasoundAcquisition::ProbeGeometryName() || name == vtkUltrasoundAcquisition::SeedName() ||
         name == vtkUltrasoundAcquisition::SceneName()) {
       content.fields.emplace_back(FieldPrefix + name, text);
-    } else if (name == vtkUltrasoundAcquisition::ProbeToWorldName()) {
-      lost.push_back("field " + name);
     }
   }
   if (!placed && image->GetNumberOfPoints() > 0) {
@@ -140,6 +138,11 @@ SequenceFrame FrameOf(vtkImageData* image, double timeStep, bool& placed)
       frame.transforms.push_back(*transform);
     } else if (const auto text = StringOf(image, name); text && BeginsWith(name, FramePrefix)) {
       frame.fields.emplace_back(name.substr(FramePrefix.size()), *text);
+    }
+  }
+  for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(image)) {
+    if (name == vtkUltrasoundAcquisition::ProbeToWorldName()) {
+      frame.fields.emplace_back(FieldPrefix + name, text);
     }
   }
   const auto imageToWorld = vtkUltrasoundAcquisition::ImageToWorldOf(image);

@@ -12,8 +12,8 @@
  * (or whatever frame the string `WorldFrame` names), unless the frame has that one already; a frame without it, where others have
  * it, gets one that is INVALID. An image whose `ValidRegion` is 0 everywhere is marked as INVALID. The time is `TimeStamp`; where
  * there is none, the time step, but for frames of a sequence (FrameIndex) that had none. Strings Frame_KEY are fields of
- * the frame; other strings, and ProbeGeometry, Seed and Scene, are written once, as the first frame has them. Pixels, matrices
- * and times come back to the last bit. What cannot be held is listed by GetNotes() and in a warning.
+ * the frame, as is ProbeToWorld; other strings, ProbeGeometry, Seed and Scene are written once, as the first frame has them.
+ * Pixels, matrices and times come back to the last bit. What cannot be held is listed by GetNotes() and in a warning.
  *
  * All or nothing: after an error, a full disk or an abort, what was there before is there unchanged.
  *

@@ -267,8 +267,34 @@ class Writer(Files):
         filter.Write()
 
 
+class SequenceReader(Reader):
+    """A volume as the one frame of a sequence."""
+
+    same_grid = False # sequences hold intensities alone
+
+    def path(self):
+        return os.path.join(self.folder.name, "volume.seq.mha")
+
+    def filter(self, images=()):
+        filter = self.make()
+        filter.SetFileName(self.path())
+        if images:
+            writer = echorama.vtkUltrasoundSequenceWriter()
+            writer.SetFileName(self.path())
+            writer.SetInputData(images[0])
+            errors_of(writer, writer.Write)
+        return filter
+
+
+class SequenceWriter(Writer):
+    def path(self):
+        return os.path.join(self.folder.name, "volume.seq.mha")
+
+
 Special = {
     "vtkUltrasoundReader": Reader,
+    "vtkUltrasoundSequenceReader": SequenceReader,
+    "vtkUltrasoundSequenceWriter": SequenceWriter,
     "vtkUltrasoundWriter": Writer,
     "vtkUltrasoundPhantomSource": Phantom,
     "vtkUltrasoundAligner": Aligner,
