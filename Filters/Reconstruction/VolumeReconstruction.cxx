@@ -138,6 +138,24 @@ struct Plane {
   PixelMap map;
 };
 
+// The values of columns [begin, end) of a row, to the same places of \a values.
+template <class T>
+void ReadRow(const Plane<T>& plane, int row, int begin, int end, float* values)
+{
+  const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(row) * plane.next->size[0];
+  const T* next = plane.next->pixels.data() + first;
+  if (!plane.previous) {
+    for (int i = begin; i < end; ++i)
+      values[i] = static_cast<float>(next[i]);
+    return;
+  }
+  const T* before = plane.previous->pixels.data() + first;
+  for (int i = begin; i < end; ++i) {
+    const float value = static_cast<float>(before[i]);
+    values[i] = value + plane.share * (static_cast<float>(next[i]) - value);
+  }
+}
+
 Fixed ToFixed(double coordinate)
 {
   return static_cast<Fixed>(std::llround(coordinate * one));
@@ -190,12 +208,12 @@ struct VolumeReconstruction<T>::Body {
   int used = 0, between = 0;
 
   std::ptrdiff_t RowOf(int j, int k) const { return static_cast<std::ptrdiff_t>(k) * grid.dimensions[1] + j; }
-  void Touch(std::ptrdiff_t row, int x)
+  void Touch(std::ptrdiff_t row, int first, int last)
   {
     int& from = touchedFrom[static_cast<std::size_t>(row)];
     int& to = touchedTo[static_cast<std::size_t>(row)];
-    from = std::min(from, x);
-    to = std::max(to, x);
+    from = std::min(from, first);
+    to = std::max(to, last);
   }
 
   // One or several pixels of mean value "mean" and total weight "weight" reach a voxel.
@@ -224,10 +242,10 @@ struct VolumeReconstruction<T>::Body {
   template <Compounding how, SplatMethod splat>
   bool SplatSlab(const std::vector<Plane<T>>& planes, int axis, int lower, int upper);
   template <bool flush, Compounding how>
-  bool NearestRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper, const float* values,
+  bool NearestRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper, float* values,
                   std::vector<Cell>& target);
   template <bool flush, Compounding how>
-  bool LinearRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper, const float* values,
+  bool LinearRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper, float* values,
                  std::vector<Cell>& target);
   void LayOver(Cell& cell, Cell& fresh) const;
   bool Blend(const Frame<T>& a, const Frame<T>& b);
@@ -300,7 +318,7 @@ void VolumeReconstruction<T>::Body::LayOver(Cell& cell, Cell& fresh) const
 template <class T>
 template <bool flush, Compounding how>
 bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper,
-                                               const float* values, std::vector<Cell>& target)
+                                               float* values, std::vector<Cell>& target)
 {
   Fixed first[3], step[3];
   int begin = span.begin, end = span.end;
@@ -312,6 +330,8 @@ bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Span
   }
   if (begin >= end)
     return false;
+  if constexpr (!flush)
+    ReadRow(plane, span.row, begin, end, values);
   const std::ptrdiff_t nx = grid.dimensions[0];
   Fixed x = first[0] + begin * step[0], y = first[1] + begin * step[1], z = first[2] + begin * step[2];
   // Neighbours along the row that share a voxel are put in together.
@@ -343,7 +363,7 @@ bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Span
       } else {
         Put<how>(target[at], sum, most, static_cast<float>(count));
       }
-      Touch(row, static_cast<int>(xi));
+      Touch(row, static_cast<int>(xi), static_cast<int>(xi));
     }
   }
   return true;
@@ -352,7 +372,7 @@ bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Span
 template <class T>
 template <bool flush, Compounding how>
 bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper,
-                                              const float* values, std::vector<Cell>& target)
+                                              float* values, std::vector<Cell>& target)
 {
   Fixed first[3], step[3];
   int begin = span.begin, end = span.end;
@@ -363,6 +383,10 @@ bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const Span&
     const Fixed from = a == axis ? lower - 1 : -1, to = a == axis ? upper : grid.dimensions[static_cast<std::size_t>(a)];
     Narrow(first[a], step[a], from * (Fixed(1) << 32), to << 32, begin, end);
   }
+  if (begin >= end)
+    return false;
+  if constexpr (!flush)
+    ReadRow(plane, span.row, begin, end, values);
   bool any = false;
   const std::ptrdiff_t nx = grid.dimensions[0];
   const int from[3] = {0, axis == 1 ? lower : 0, axis == 2 ? lower : 0};
@@ -395,8 +419,7 @@ bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const Span&
             Put<how>(cell[0], w0 * values[i], values[i], w0);
             Put<how>(cell[1], w1 * values[i], values[i], w1);
           }
-          Touch(row, below[0]);
-          Touch(row, below[0] + 1);
+          Touch(row, below[0], below[0] + 1);
         }
         any = true;
         continue;
@@ -426,7 +449,7 @@ bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const Span&
             if (how == Compounding::Maximum && w < leastWeight)
               continue;
             Put<how>(target[at], w * values[i], values[i], w);
-            Touch(row, x);
+            Touch(row, x, x);
             any = true;
           }
         }
@@ -451,18 +474,6 @@ bool VolumeReconstruction<T>::Body::SplatSlab(const std::vector<Plane<T>>& plane
       const double begin = edge + plane.map.column[axis] * span.begin, end = edge + plane.map.column[axis] * (span.end - 1);
       if (std::max(begin, end) < lower - 1.5 || std::min(begin, end) > upper + 0.5)
         continue;
-      const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(span.row) * plane.next->size[0];
-      const T* next = plane.next->pixels.data() + row;
-      if (plane.previous) {
-        const T* before = plane.previous->pixels.data() + row;
-        for (int i = span.begin; i < span.end; ++i) {
-          const float value = static_cast<float>(before[i]);
-          values[static_cast<std::size_t>(i)] = value + plane.share * (static_cast<float>(next[i]) - value);
-        }
-      } else {
-        for (int i = span.begin; i < span.end; ++i)
-          values[static_cast<std::size_t>(i)] = static_cast<float>(next[i]);
-      }
       std::vector<Cell>& target = byFrame ? latest : cells;
       if constexpr (splat == SplatMethod::Nearest)
         any |= NearestRow<false, put>(plane, span, axis, lower, upper, values.data(), target);
@@ -660,7 +671,7 @@ bool VolumeReconstruction<T>::Body::Blend(const Frame<T>& a, const Frame<T>& b)
           default:
             LayOver(cell, fresh);
           }
-          Touch(row, x);
+          Touch(row, x, x);
           reached[static_cast<std::size_t>(slab)] = 1;
         }
         done = std::max(done, end);
