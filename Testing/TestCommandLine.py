@@ -52,7 +52,7 @@ class Usage(unittest.TestCase):
     def test_help(self):
         self.assertEqual(run("--help").returncode, 0)
         self.assertRegex(run("--version").stdout, r"^echorama \d+\.\d+\.\d+\n$")
-        for command in ("info", "convert", "align", "score", "stitch", "phantom", "view"):
+        for command in ("info", "convert", "reconstruct", "align", "score", "stitch", "probe-fit", "phantom", "view"):
             done = run(command, "--help")
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             self.assertIn("--threads", done.stdout)

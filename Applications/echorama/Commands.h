@@ -16,9 +16,11 @@ struct Command {
 // Each adds one subcommand to the program; they lie in files of their own.
 Command InfoCommand(CLI::App& program);
 Command ConvertCommand(CLI::App& program);
+Command ReconstructCommand(CLI::App& program);
 Command AlignCommand(CLI::App& program);
 Command ScoreCommand(CLI::App& program);
 Command StitchCommand(CLI::App& program);
+Command ProbeFitCommand(CLI::App& program);
 Command PhantomCommand(CLI::App& program);
 Command ViewCommand(CLI::App& program);
 

@@ -26,13 +26,13 @@ std::string FirstBytes(const std::string& path)
 std::vector<std::string_view> Split(std::string_view text, char separator)
 {
   std::vector<std::string_view> parts;
-  for (std::size_t end = 0; end != std::string_view::npos; text.remove_prefix(std::min(text.size(), end + 1))) {
-    end = text.find(separator);
+  for (;;) {
+    const std::size_t end = text.find(separator);
     parts.push_back(text.substr(0, end));
     if (end == std::string_view::npos)
-      break;
+      return parts;
+    text.remove_prefix(end + 1);
   }
-  return parts;
 }
 
 } // namespace
