@@ -4,14 +4,18 @@
 // file, keeps the values of the few tags that we know how to use, and notes where the pixels are.
 //
 // Pixels that are not compressed are later read straight from the file, picture by picture. Compressed ones are given to
-// gdcm's codecs, fragment by fragment; this is the one file that sees gdcm.
+// gdcm's codecs, fragment by fragment; this is the one file that sees gdcm. They print, and damaged pixels can end them by an
+// assertion or worse, so they run in a process of their own, which writes to memory shared with this one.
 #include "Readers/DicomHeader.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <gdcmImage.h>
@@ -19,7 +23,12 @@
 #include <gdcmTrace.h>
 #include <limits>
 #include <map>
+#include <new>
 #include <sstream>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <zlib.h>
 
 namespace fs = std::filesystem;
@@ -698,6 +707,77 @@ gdcm::SmartPointer<gdcm::SequenceOfFragments> Fragments(const DicomHeader& heade
   return sequence;
 }
 
+bool Decode(const DicomHeader& header, const gdcm::SequenceOfFragments& fragments, std::uint64_t bytes, char* out)
+{
+  gdcm::Trace::WarningOff();
+  gdcm::Trace::ErrorOff();
+  gdcm::Trace::DebugOff();
+  gdcm::DataElement element(gdcm::Tag(0x7FE0, 0x0010));
+  element.SetVR(gdcm::VR::OB);
+  element.SetValue(fragments);
+  gdcm::Image image;
+  const auto pictures = static_cast<unsigned>(header.pictures.size());
+  image.SetNumberOfDimensions(pictures > 1 ? 3 : 2);
+  image.SetDimension(0, static_cast<unsigned>(header.columns));
+  image.SetDimension(1, static_cast<unsigned>(header.rows));
+  if (pictures > 1)
+    image.SetDimension(2, pictures);
+  const auto stored = static_cast<unsigned short>(header.bitsStored);
+  image.SetPixelFormat(gdcm::PixelFormat(static_cast<unsigned short>(header.samples),
+                                         static_cast<unsigned short>(header.bitsAllocated), stored,
+                                         static_cast<unsigned short>(stored - 1), header.isSigned ? 1 : 0));
+  image.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::GetPIType(header.photometric.c_str()));
+  image.SetPlanarConfiguration(0);
+  image.SetTransferSyntax(gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str()));
+  image.SetDataElement(element);
+  return image.GetBufferLength() == bytes && image.GetBuffer(out);
+}
+
+// Memory that this process shares with those that it starts.
+class SharedMemory {
+public:
+  explicit SharedMemory(std::size_t bytes)
+    : bytes_(bytes), data_(mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0))
+  {
+    if (data_ == MAP_FAILED)
+      throw std::bad_alloc();
+  }
+  ~SharedMemory() { munmap(data_, bytes_); }
+  SharedMemory(const SharedMemory&) = delete;
+  SharedMemory& operator=(const SharedMemory&) = delete;
+
+  char* Data() const { return static_cast<char*>(data_); }
+
+private:
+  std::size_t bytes_;
+  void* data_;
+};
+
+// Runs \a task in a process of its own, silently. Whether it came to its end must be seen in shared memory.
+template <class Task>
+void InAnotherProcess(const std::string& path, const Task& task)
+{
+  const pid_t child = fork();
+  if (child < 0)
+    throw Error(Error::Kind::NotPossible, path + ": its pixels are compressed, and no process to decode them can be started");
+  if (child == 0) {
+    for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL})
+      std::signal(number, SIG_DFL); // the program's own handlers are not for this
+    const rlimit none{0, 0};
+    setrlimit(RLIMIT_CORE, &none);
+    const int nothing = open("/dev/null", O_WRONLY);
+    dup2(nothing, STDOUT_FILENO);
+    dup2(nothing, STDERR_FILENO);
+    try {
+      task();
+    } catch (...) {
+    }
+    _exit(0);
+  }
+  while (waitpid(child, nullptr, 0) < 0 && errno == EINTR)
+    ;
+}
+
 } // namespace
 
 std::uint64_t DicomHeader::PictureBytes() const
@@ -736,39 +816,16 @@ std::vector<char> DecodeDicomPixels(const DicomHeader& header)
     return {first, first + static_cast<std::ptrdiff_t>(wanted)};
   }
 
-  std::vector<char> pixels(wanted);
-  try {
-    gdcm::Trace::WarningOff();
-    gdcm::Trace::ErrorOff();
-    gdcm::Trace::DebugOff();
-    const auto fragments = Fragments(header, stream);
-    if (!fragments)
-      fail();
-    gdcm::DataElement element(gdcm::Tag(0x7FE0, 0x0010));
-    element.SetVR(gdcm::VR::OB);
-    element.SetValue(*fragments);
-    gdcm::Image image;
-    image.SetNumberOfDimensions(header.pictures.size() > 1 ? 3 : 2);
-    image.SetDimension(0, static_cast<unsigned>(header.columns));
-    image.SetDimension(1, static_cast<unsigned>(header.rows));
-    if (header.pictures.size() > 1)
-      image.SetDimension(2, static_cast<unsigned>(header.pictures.size()));
-    image.SetPixelFormat(gdcm::PixelFormat(static_cast<unsigned short>(header.samples),
-                                           static_cast<unsigned short>(header.bitsAllocated),
-                                           static_cast<unsigned short>(header.bitsStored),
-                                           static_cast<unsigned short>(header.bitsStored - 1), header.isSigned ? 1 : 0));
-    image.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::GetPIType(header.photometric.c_str()));
-    image.SetPlanarConfiguration(0);
-    image.SetTransferSyntax(gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str()));
-    image.SetDataElement(element);
-    if (image.GetBufferLength() != wanted || !image.GetBuffer(pixels.data()))
-      fail();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception&) {
+  const auto fragments = Fragments(header, stream);
+  if (!fragments)
     fail();
-  }
-  return pixels;
+  const SharedMemory memory(wanted + 1);
+  char* const out = memory.Data();
+  char& finished = out[wanted];
+  InAnotherProcess(header.path, [&] { finished = Decode(header, *fragments, wanted, out) ? 1 : 0; });
+  if (finished == 0)
+    fail();
+  return {out, out + wanted};
 }
 
 } // namespace echorama

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any bytes as a DICOM file. What gdcm's decoders do with compressed pixels is left out: they are not ours, and the sanitizers
-// see only what they write to our memory.
+// Any bytes as a DICOM file. Compressed pixels are left out: gdcm's codecs are not ours, and run in a process of their own.
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Testing/Fuzzing.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Elements byte by byte, for what no library writes: lengths that lie, sequences without an end. Objects of all kinds are
 // read in TestDicom.py.
-#include "Core/Geometry/RigidTransform.h"
+#include "Core/Base/Random.h"
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Readers/Testing/TemporaryFolder.h"
@@ -81,6 +81,24 @@ protected:
     ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, words);
   }
 
+  void Compress(int k, gdcm::TransferSyntax::TSType syntax) const
+  {
+    const std::string from = Path("s" + std::to_string(k)), to = Path("t" + std::to_string(k));
+    gdcm::ImageReader reader;
+    reader.SetFileName(from.c_str());
+    ASSERT_TRUE(reader.Read());
+    gdcm::ImageChangeTransferSyntax change;
+    change.SetTransferSyntax(syntax);
+    change.SetInput(reader.GetImage());
+    ASSERT_TRUE(change.Change());
+    gdcm::ImageWriter writer;
+    writer.SetFile(reader.GetFile());
+    writer.SetImage(change.GetOutput());
+    writer.SetFileName(to.c_str());
+    ASSERT_TRUE(writer.Write());
+    std::filesystem::rename(to, from);
+  }
+
   void PutSlices(int count, int bits = 8) const
   {
     for (int k = 0; k < count; ++k)
@@ -118,21 +136,8 @@ TEST_F(DicomFile, LosslessCompressions)
   for (const int bits : {8, 16})
     for (const auto syntax : syntaxes) {
       PutSlices(3, bits);
-      for (int k = 0; k < 3; ++k) {
-        gdcm::ImageReader reader;
-        reader.SetFileName(Path("s" + std::to_string(k)).c_str());
-        ASSERT_TRUE(reader.Read());
-        gdcm::ImageChangeTransferSyntax change;
-        change.SetTransferSyntax(syntax);
-        change.SetInput(reader.GetImage());
-        ASSERT_TRUE(change.Change());
-        gdcm::ImageWriter writer;
-        writer.SetFile(reader.GetFile());
-        writer.SetImage(change.GetOutput());
-        writer.SetFileName(Path("t" + std::to_string(k)).c_str());
-        ASSERT_TRUE(writer.Write());
-        std::filesystem::rename(Path("t" + std::to_string(k)), Path("s" + std::to_string(k)));
-      }
+      for (int k = 0; k < 3; ++k)
+        Compress(k, syntax);
       const DicomHeader header = ReadDicomHeader(Path("s1"));
       EXPECT_EQ(header.storage, DicomStorage::Encapsulated);
       const auto source = OpenVolume(folder.string());
@@ -144,6 +149,38 @@ TEST_F(DicomFile, LosslessCompressions)
           wanted += Number(static_cast<std::uint64_t>(i * 5 + k), bits / 8);
       EXPECT_EQ(std::string(voxels.begin(), voxels.end()), wanted) << bits << " bits, " << TransferSyntax::GetTSString(syntax);
     }
+}
+
+// Whatever a damaged compression does to a codec, the reader refuses it or reads something.
+TEST_F(DicomFile, DamagedCompressions)
+{
+  using gdcm::TransferSyntax;
+  Random random(7);
+  int refused = 0, tried = 0;
+  for (const auto syntax :
+       {TransferSyntax::RLELossless, TransferSyntax::JPEGLosslessProcess14_1, TransferSyntax::JPEGLSLossless}) {
+    PutSlices(1);
+    Compress(0, syntax);
+    const DicomHeader header = ReadDicomHeader(Path("s0"));
+    std::stringstream whole;
+    whole << std::ifstream(Path("s0"), std::ios::binary).rdbuf();
+    for (int i = 0; i < 25; ++i) {
+      std::string damaged = whole.str();
+      for (int changes = 1 + i % 5; changes > 0; --changes)
+        damaged[header.pixelOffset + 16 + random.Bits() % (header.pixelBytes - 24)] = static_cast<char>(random.Bits());
+      const std::string path = Put("s0", damaged);
+      ++tried;
+      try {
+        const auto source = OpenVolume(path);
+        std::vector<unsigned char> voxels(48);
+        source->Read(0, voxels.data(), nullptr);
+      } catch (const Error& error) {
+        EXPECT_EQ(error.GetKind(), Error::Kind::BadFile) << error.what();
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(refused, tried / 10);
 }
 
 TEST_F(DicomFile, LengthsThatLie)
