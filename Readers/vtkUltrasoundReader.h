@@ -12,6 +12,9 @@
  * x, the beams of the fan along y, the steps of the sweep along z, with the same field data; else an empty image. Output 0
  * is then their scan conversion. Each is made only when it is asked for.
  *
+ * DICOM: enhanced ultrasound volumes, series of slices (by their folder or any one of them), frames over space; the volume of a
+ * time series is chosen by the pipeline's time. GE Kretz: see output 1. Documentation/filters/Reader.md tells of each format.
+ *
  * The content decides what a file is, not its extension. `ValidRegion` is, in this order: the array of that name (.vti);
  * the file `NAME.ValidRegion.mha` beside `NAME.mha` (any extension, the same for both), whose geometry must agree; everything
  * but the zeros connected to the border of the grid and voxels that are not numbers. `NAME.Provenance.mha` is carried as the
@@ -51,7 +54,7 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   ///@{
-  /** The file to read. Default: none. */
+  /** The file to read, or a folder of DICOM slices. Default: none. */
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
   ///@}
