@@ -190,13 +190,14 @@ struct Cell {
   bool inside = false;
 };
 
-// Intersection over union of region and model.
-double OverlapOf(const Model& model, const std::vector<Cell>& cells)
+// Intersection over union of region and model. Voxels that the surface cuts agree with the region.
+double OverlapOf(const Model& model, const std::vector<Cell>& cells, double voxelMm)
 {
   const Pose worldToProbe = model.probeToWorld.inverse();
   std::ptrdiff_t both = 0, either = 0;
   for (const Cell& cell : cells) {
-    const bool inside = Locate(model.shape, worldToProbe * cell.position).distance <= 0.0;
+    const double distance = Locate(model.shape, worldToProbe * cell.position).distance;
+    const bool inside = std::abs(distance) <= 0.5 * voxelMm ? cell.inside : distance < 0.0;
     both += inside && cell.inside;
     either += inside || cell.inside;
   }
@@ -269,7 +270,7 @@ public:
           damping *= 8.0;
         }
       }
-      if (!better || gain < 1e-7 * cost)
+      if (!better || gain < 1e-5 * cost)
         return better;
       cost = Evaluate(model, &hessian, &slope);
     }
@@ -349,10 +350,10 @@ void Refine(Model& model, const Points& points, bool plane, double from, double 
 struct Region {
   RegionOutline outline;
   bool plane = false;
-  double size = 0.0;               // mm
+  double size = 0.0, voxelMm = 0.0;
   Eigen::Vector3d centroid;        // mm
   Eigen::Matrix3d axes;            // of inertia; of a slice the last is its normal
-  std::vector<Cell> cells, sample; // all cells; some of them
+  std::vector<Cell> cells, sample; // many; some of them
   Points few, some, many;
 
   double Reach() const { return 1.75 * outline.cellMm; }
@@ -364,6 +365,8 @@ Region RegionOf(RegionOutline outline, VolumeView<const unsigned char> valid, in
   const auto& n = outline.filled.Dimensions();
   region.plane = outline.geometry.dimensions[2] == 1;
   region.size = std::pow(outline.validMm, region.plane ? 1.0 / 2.0 : 1.0 / 3.0);
+  const Eigen::Vector3d& spacing = outline.geometry.spacing;
+  region.voxelMm = region.plane ? std::sqrt(spacing.x() * spacing.y()) : std::cbrt(spacing.prod());
   region.cells.reserve(static_cast<std::size_t>(outline.filled.View().Size()));
   const Eigen::Affine3d toWorld = outline.geometry.IndexToWorld();
   const Eigen::Vector3d middle = outline.geometry.Centre();
@@ -374,10 +377,10 @@ Region RegionOf(RegionOutline outline, VolumeView<const unsigned char> valid, in
     for (int j = 0; j < n[1]; ++j)
       for (int i = 0; i < n[0]; ++i) {
         const double filled = outline.filled.View()(i, j, k);
+        const Eigen::Vector3d at = outline.CellPosition(i, j, k) - middle;
         const Eigen::Vector3i voxel =
             Eigen::Vector3d(outline.centres[0][i], outline.centres[1][j], outline.centres[2][k]).cast<int>();
-        const Eigen::Vector3d position = toWorld * voxel.cast<double>(), at = position - middle;
-        region.cells.push_back({position, filled == 1.0 || valid(voxel[0], voxel[1], voxel[2]) != 0});
+        region.cells.push_back({toWorld * voxel.cast<double>(), filled == 1.0 || valid(voxel[0], voxel[1], voxel[2]) != 0});
         sum += filled;
         first += filled * at;
         second += filled * at * at.transpose();
@@ -391,6 +394,7 @@ Region RegionOf(RegionOutline outline, VolumeView<const unsigned char> valid, in
     if (region.axes.determinant() < 0.0)
       region.axes.col(2) = -region.axes.col(2);
   }
+  region.cells = Thinned(region.cells, 1 << 16);
   region.sample = Thinned(region.cells, 2000);
   region.few = Thinned(outline.points, 300);
   region.some = Thinned(outline.points, static_cast<std::size_t>(std::min(600, outlinePoints)));
@@ -470,13 +474,14 @@ std::vector<Rated> StartsOf(const Region& region, const Eigen::Matrix3d& frame)
   const Eigen::Vector3d extent = high - low;
 
   // Where the middle beam, through the centroid, comes in: of the points near it the first. The near edge of a fan is hollow.
-  double top = std::numeric_limits<double>::infinity();
-  for (const RegionOutline::Point& point : region.few) {
+  double top = high.z();
+  for (const RegionOutline::Point& point : region.some) {
     const Eigen::Vector3d at = toFrame * (point.position - region.centroid);
-    if (std::abs(at.x()) < 0.1 * extent.x() && (region.plane || std::abs(at.y()) < 0.1 * extent.y()))
+    if (std::abs(at.x()) < 0.15 * extent.x() && (region.plane || std::abs(at.y()) < 0.15 * extent.y() + region.outline.cellMm))
       top = std::min(top, at.z());
   }
-  top = std::clamp(top, low.z(), high.z() - 0.1 * extent.z());
+  if (top > high.z() - 0.1 * extent.z())
+    top = low.z();
   const double length = high.z() - top;
 
   static constexpr double angles[] = {0.0, 0.35, 0.7, 1.2, 1.9, 2.8};
@@ -526,7 +531,7 @@ std::vector<Rated> Distinct(const std::vector<Rated>& sorted, std::size_t most, 
 double RatingOf(const Model& model, const Region& region, const std::vector<Cell>& cells, const Points& points)
 {
   const double cellMm = region.outline.cellMm;
-  return OverlapOf(model, cells) - 0.5 * MisfitOf(model, points, std::max(0.05 * region.size, 2.0 * cellMm));
+  return OverlapOf(model, cells, region.voxelMm) - 0.5 * MisfitOf(model, points, std::max(0.05 * region.size, 2.0 * cellMm));
 }
 
 // The best model, and those that explain the region as well, or nearly so.
@@ -535,12 +540,22 @@ struct Choice {
   std::vector<Rated> others; // distinct from it, with their ratings less its own
 };
 
+// Whether an extent (mm) is too small to tell the angle from the width.
+bool IsThin(double extent, const Region& region)
+{
+  return extent < 4.0 * region.outline.cellMm;
+}
+
 // How well a model follows the axes of the grid, where the region leaves the choice.
 double ConventionOf(const Model& model, const Region& region)
 {
   const Eigen::Matrix3d& axes = region.outline.geometry.direction;
   const Eigen::Matrix3d turn = model.probeToWorld.linear();
-  return turn.col(2).dot(axes.col(region.plane ? 1 : 2)) + 0.3 * std::abs(turn.col(0).dot(axes.col(0)));
+  // A slab is a plane that was hardly swept.
+  const double middle = 0.5 * model.shape.depthMax;
+  const bool isThin = !region.plane && IsThin(model.shape.Fan().Span(middle), region) &&
+                      model.shape.Fan().Span(middle) < model.shape.Sweep().Span(middle);
+  return (isThin ? -10.0 : 0.0) + turn.col(2).dot(axes.col(region.plane ? 1 : 2)) + 0.3 * std::abs(turn.col(0).dot(axes.col(0)));
 }
 
 Choice Choose(const Region& region, const Progress& progress)
@@ -611,26 +626,29 @@ Choice Choose(const Region& region, const Progress& progress)
 
 // How well the outline lies on the model.
 struct Residual {
-  double rms = 0.0, median = 0.0; // mm
+  double rms = 0.0, mean = 0.0; // mm
+  double beyond = 0.0;          // the part of the outline that is further off than what voxels and rounding explain
 };
 
-Residual ResidualOf(const Model& model, const Points& points)
+Residual ResidualOf(const Model& model, const Region& region)
 {
+  const Points& points = region.outline.points;
   const Pose worldToProbe = model.probeToWorld.inverse();
   const bool onlyGrid = std::all_of(points.begin(), points.end(), [](const auto& point) { return point.atGrid; });
-  std::vector<double> distances;
-  double sum = 0.0;
+  const double near = std::max(0.015 * region.size, region.outline.cellMm);
+  Residual residual;
+  double count = 0.0;
   for (const RegionOutline::Point& point : points) {
     const double distance = Locate(model.shape, worldToProbe * point.position).distance;
     if (point.atGrid && !onlyGrid && distance < 0.0)
       continue;
-    distances.push_back(std::abs(distance));
-    sum += distance * distance;
+    residual.rms += distance * distance;
+    residual.mean += std::abs(distance);
+    residual.beyond += std::abs(distance) > near;
+    count += 1.0;
   }
-  if (distances.empty())
-    return {};
-  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2), distances.end());
-  return {std::sqrt(sum / static_cast<double>(distances.size())), distances[distances.size() / 2]};
+  count = std::max(count, 1.0);
+  return {std::sqrt(residual.rms / count), residual.mean / count, residual.beyond / count};
 }
 
 // The near end of a fan that begins in a tip, from the voxels themselves: blocks of voxels blunt it. The face moves along the
@@ -688,6 +706,18 @@ void SharpenTip(Model& model, VolumeView<const unsigned char> valid, const Regio
   model.probeToWorld.translation() += face * model.probeToWorld.linear().col(2);
 }
 
+// Turned by half about the middle beam a fan is the same: +x is the side towards which the indices grow.
+void FaceTheGrid(Model& model, const Region& region)
+{
+  const Eigen::Vector3d along = region.outline.geometry.direction.transpose() * model.probeToWorld.linear().col(0);
+  Eigen::Index most = 0;
+  along.cwiseAbs().maxCoeff(&most);
+  if (along[most] < 0.0) {
+    model.probeToWorld.linear().col(0) *= -1.0;
+    model.probeToWorld.linear().col(1) *= -1.0;
+  }
+}
+
 std::string Text(const char* format, double value)
 {
   char text[200];
@@ -739,7 +769,7 @@ std::array<double, faces> SeenParts(const Model& model, const Region& region)
 }
 
 // What the region leaves open, in sentences.
-std::vector<std::string> NotesOn(const Choice& choice, const Region& region, const std::array<double, faces>& seen)
+std::vector<std::string> NotesOn(const Choice& choice, const Region& region, const std::array<double, faces>& seen, double beyond)
 {
   const ProbeGeometry& shape = choice.best.shape;
   const double cell = region.outline.cellMm;
@@ -748,6 +778,11 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
     notes.push_back("Every voxel is valid: the fan is the grid, which need not be what the probe saw.");
   if (region.outline.holesPart > 0.01)
     notes.push_back(Text("Holes (%.0f%% of the region) were taken as part of it.", 100.0 * region.outline.holesPart));
+  if (beyond > 0.1)
+    notes.push_back(
+        Text("%.0f%% of the outline do not lie on the model: corners are missing, edges are ragged, or the region is not "
+             "quite a fan.",
+             100.0 * beyond));
   if (region.outline.largestPart < 0.99)
     notes.push_back(Text("%.0f%% of the region does not hang together with the rest and was left out of the fit.",
                          100.0 * (1.0 - region.outline.largestPart)));
@@ -778,7 +813,7 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
     notes.push_back(exchangedRating > -asGood ? "Fan and sweep could as well be exchanged; the axes of the grid decided."
                                               : "Fan and sweep could be exchanged: that explains the region nearly as well.");
 
-  if (!region.plane && shape.Sweep().Span(0.5 * shape.depthMax) < 4.0 * cell)
+  if (!region.plane && IsThin(shape.Sweep().Span(0.5 * shape.depthMax), region))
     notes.push_back(Text("The region is only %.3g mm thick along the sweep, too little to tell its angle from its width.",
                          shape.Sweep().Span(0.5 * shape.depthMax)));
   if (shape.fanAngle * shape.depthMax < cell)
@@ -798,41 +833,40 @@ ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& ge
 {
   if (!(parameters.minimumOverlap >= 0.0 && parameters.minimumOverlap <= 1.0))
     throw Error(Error::Kind::InvalidParameter, "probe fit: minimumOverlap must be in [0, 1]");
-  if (!(parameters.maximumResidual > 0.0))
-    throw Error(Error::Kind::InvalidParameter, "probe fit: maximumResidual must be greater than 0");
+  if (!(parameters.maximumDistance > 0.0))
+    throw Error(Error::Kind::InvalidParameter, "probe fit: maximumDistance must be greater than 0");
   if (parameters.outlinePoints < 100)
     throw Error(Error::Kind::InvalidParameter, "probe fit: outlinePoints must be at least 100");
 
   const Region region =
       RegionOf(OutlineRegion(valid, geometry, mostCells, progress.Part(0.0, 0.3)), valid, parameters.outlinePoints);
-  const double cell = region.outline.cellMm;
   if (region.outline.points.size() < (region.plane ? 40 : 150))
     throw Error(Error::Kind::NotPossible, "the valid region is too small for a fit: its outline is " +
                                               std::to_string(region.outline.points.size()) + " voxels long");
   Choice choice = Choose(region, progress.Part(0.3, 1.0));
   SharpenTip(choice.best, valid, region);
+  FaceTheGrid(choice.best, region);
   const Model& best = choice.best;
 
   ProbeFit fit;
   fit.geometry = best.shape;
   fit.probeToWorld = best.probeToWorld;
-  fit.overlap = OverlapOf(best, region.cells);
-  const Residual residual = ResidualOf(best, region.many);
+  fit.overlap = OverlapOf(best, region.cells, region.voxelMm);
+  const Residual residual = ResidualOf(best, region);
   fit.residualMm = residual.rms;
-  fit.typicalMm = residual.median;
-  const double limit = std::max(parameters.maximumResidual * region.size, cell);
+  fit.meanDistance = residual.mean / region.size;
   const std::string refusal = "no fan explains the valid region: ";
-  if (fit.overlap < parameters.minimumOverlap || fit.residualMm > limit)
-    throw Error(Error::Kind::NotPossible, refusal + Text("the best one overlaps it by %.3f", fit.overlap) +
-                                              Text(" (%.3g is asked for)", parameters.minimumOverlap) +
-                                              Text(" and its surface lies %.3g mm off the outline", fit.residualMm) +
-                                              Text(" (at most %.3g mm are allowed)", limit));
   if (region.outline.holesPart > mostHoles)
     throw Error(Error::Kind::NotPossible, refusal + Text("%.0f%% of it are holes", 100.0 * region.outline.holesPart));
+  if (fit.overlap < parameters.minimumOverlap || fit.meanDistance > parameters.maximumDistance)
+    throw Error(Error::Kind::NotPossible, refusal + Text("the best one overlaps it by %.3f", fit.overlap) +
+                                              Text(" (at least %.3g is asked for), and", parameters.minimumOverlap) +
+                                              Text(" its surface lies %.3g mm off the outline", residual.mean) +
+                                              Text(" in the mean (at most %.3g mm)", parameters.maximumDistance * region.size));
   const std::array<double, faces> seen = SeenParts(best, region);
   if (std::max(seen[Near], seen[Far]) < leastSeenEnd || std::min(seen[FanSide], seen[SweepSide]) < leastSeenSide)
     throw Error(Error::Kind::NotPossible, refusal + "the grid cuts off so much of it that its sides are not seen");
-  fit.notes = NotesOn(choice, region, seen);
+  fit.notes = NotesOn(choice, region, seen, residual.beyond);
   return fit;
 }
 

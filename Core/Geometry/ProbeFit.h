@@ -10,10 +10,11 @@ namespace echorama {
 
 /// How a probe geometry is fitted to a valid region, and what is refused.
 struct ProbeFitParameters {
-  double minimumOverlap = 0.8; ///< fits with less overlap are refused, [0, 1]
-  /// Fits with a greater residual are refused: a part of the region's size, which is the cube root of its volume (the square
-  /// root of the area of a single slice), but never less than a cell of the outline; > 0.
-  double maximumResidual = 0.04;
+  double minimumOverlap = 0.75; ///< fits with less overlap are refused, [0, 1]
+  /// Fits whose surface lies further from the outline, in the mean, are refused: a part of the region's size, which is the
+  /// cube root of its volume (the square root of the area of a single slice); > 0. A ball has 0.05, a cylinder 0.03, a
+  /// freehand sweep or a fan without a fifth of its far end 0.02, a whole fan 0.003.
+  double maximumDistance = 0.026;
   int outlinePoints = 4000; ///< how many points of the outline take part in the last fit, >= 100
 };
 
@@ -24,7 +25,7 @@ struct ProbeFit {
   /// Root mean square distance of the region's outline from the model's surface, mm. The ends of the grid are no outline
   /// (unless there is no other); all else counts in full, also corners that are missing and ragged edges.
   double residualMm = 0.0;
-  double typicalMm = 0.0;         ///< median distance of the outline from the model's surface, mm
+  double meanDistance = 0.0;      ///< mean distance of the same points, as a part of the region's size
   double overlap = 0.0;           ///< intersection over union of region (holes filled) and model within the grid, [0, 1]
   std::vector<std::string> notes; ///< what the region leaves open, sentences for people
 };

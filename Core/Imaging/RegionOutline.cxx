@@ -141,19 +141,18 @@ RegionOutline OutlineRegion(VolumeView<const unsigned char> valid, const ImageGe
     if (atBorder && empty[cell])
       Flood(n, cell, empty, cells);
   });
-  double sum = 0.0, holes = 0.0;
+  const Volume<float> before = outline.filled;
+  double sum = 0.0, valids = 0.0;
   forEachCell([&](std::ptrdiff_t cell, const Index3& at) {
     const double voxels = static_cast<double>(voxelsOf(0, at[0])) * voxelsOf(1, at[1]) * voxelsOf(2, at[2]);
-    if (empty[cell]) {
-      holes += (1.0 - filled[cell]) * voxels;
+    valids += filled[cell] * voxels;
+    if (empty[cell])
       filled[cell] = 1.0f;
-    }
     sum += filled[cell] * voxels;
   });
-  if (!(sum - holes > 0.0))
+  if (!(valids > 0.0))
     throw Error(Error::Kind::BadInput, "the valid region is empty");
-  outline.holesPart = holes / sum;
-  outline.coversGrid = sum - holes == static_cast<double>(valid.Size());
+  outline.coversGrid = valids == static_cast<double>(valid.Size());
   outline.validMm = sum;
   for (int a = 0; a < 3; ++a)
     if (geometry.dimensions[a] > 1)
@@ -163,6 +162,7 @@ RegionOutline OutlineRegion(VolumeView<const unsigned char> valid, const ImageGe
   const std::ptrdiff_t strides[3] = {1, n[0], static_cast<std::ptrdiff_t>(n[0]) * n[1]};
   std::vector<char> inside(static_cast<std::size_t>(filled.Size())), core = inside;
   std::ptrdiff_t insideCount = 0, coreCount = 0;
+  double invalid = 0.0;
   forEachCell([&](std::ptrdiff_t cell, const Index3& at) {
     inside[cell] = filled[cell] >= half;
     bool deep = inside[cell];
@@ -172,20 +172,25 @@ RegionOutline OutlineRegion(VolumeView<const unsigned char> valid, const ImageGe
     core[cell] = deep;
     insideCount += inside[cell];
     coreCount += deep;
+    invalid += deep ? 1.0 - before.View()[cell] : 0.0;
   });
+  for (std::ptrdiff_t cell = 0; cell < filled.Size(); ++cell)
+    if (core[cell])
+      filled[cell] = 1.0f;
   if (insideCount == 0)
     throw Error(Error::Kind::NotPossible, "the valid region is scattered: no block of it is half full");
+  outline.holesPart = coreCount > 0 ? invalid / static_cast<double>(coreCount) : 0.0;
   const bool isThick = coreCount > insideCount / 4;
   std::vector<char> piece = LargestPiece(n, isThick ? core : inside);
   for (int step = 0; isThick && step < regrowth; ++step) {
-    const std::vector<char> before = piece;
+    const std::vector<char> smaller = piece;
     forEachCell([&](std::ptrdiff_t cell, const Index3& at) {
-      if (!inside[cell] || before[cell])
+      if (!inside[cell] || smaller[cell])
         return;
       for (int z = std::max(at[2] - 1, 0); z <= std::min(at[2] + 1, n[2] - 1); ++z)
         for (int y = std::max(at[1] - 1, 0); y <= std::min(at[1] + 1, n[1] - 1); ++y)
           for (int x = std::max(at[0] - 1, 0); x <= std::min(at[0] + 1, n[0] - 1); ++x)
-            piece[cell] |= before[z * strides[2] + y * strides[1] + x];
+            piece[cell] |= smaller[z * strides[2] + y * strides[1] + x];
     });
   }
   outline.largestPart = static_cast<double>(std::count(piece.begin(), piece.end(), char(1))) / static_cast<double>(insideCount);

@@ -15,13 +15,13 @@ struct RegionOutline {
     bool atGrid = false;      ///< the region ends here because the grid does: it may go on
   };
   std::vector<Point> points;      ///< in the order of the cells
-  Volume<float> filled;           ///< per cell: the valid part of its voxels, [0, 1]; holes are 1
+  Volume<float> filled;           ///< per cell: the valid part of its voxels, [0, 1]; 1 in holes and but for the rim
   std::vector<double> centres[3]; ///< index coordinates of the middle of the cells along each axis
   ImageGeometry geometry;         ///< of the voxels
   double cellMm = 0.0;            ///< geometric mean of the cells' edges (of the axes with more than one voxel)
   double validMm = 0.0;           ///< volume (mm^3) of the region with its holes filled; area (mm^2) of a single slice
   double largestPart = 0.0;       ///< how much of the region is the largest connected piece, (0, 1]
-  double holesPart = 0.0;         ///< how much of the filled region were holes, [0, 1)
+  double holesPart = 0.0;         ///< how much of the region, but for its rim, is not valid: holes and what dropped out, [0, 1)
   bool coversGrid = false;        ///< the region is the whole grid
 
   Eigen::Vector3d CellPosition(int i, int j, int k) const; ///< mm, world
