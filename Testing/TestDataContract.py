@@ -219,6 +219,16 @@ class Reconstructor(ToOtherGrid):
         return filter
 
 
+class ProbeFit(Feed):
+    keeps_fields = False # it replaces two of them
+
+    def filter(self, images=()):
+        filter = super().filter(images)
+        filter.SetMinimumOverlap(0.0) # the regions in here are no fans
+        filter.SetMaximumDistance(10.0)
+        return filter
+
+
 class Phantom(ToOtherGrid):
     is_source = True
     volumes = 0
@@ -300,6 +310,7 @@ Special = {
     "vtkUltrasoundAligner": Aligner,
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundStitcher": Stitcher,
+    "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }
