@@ -1,0 +1,225 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""vtkUltrasoundProbeFit: finds the probe of phantoms (known) and of real data; what it says, keeps and refuses."""
+import os
+import zlib
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkCommand
+from vtkmodules.vtkCommonDataModel import vtkImageData
+
+import echorama
+
+acquisition = echorama.vtkUltrasoundAcquisition
+data = os.path.join(os.environ["ECHORAMA_SOURCE_DIR"], "..", "shared", "data")
+skipped = []
+
+
+def image_of(intensity, valid=None, spacing=(1, 1, 1), origin=(0, 0, 0)):
+    """A volume of arrays [z, y, x] or [y, x]."""
+    intensity = np.atleast_3d(intensity.T).T
+    image = vtkImageData()
+    image.SetDimensions(intensity.shape[::-1])
+    image.SetSpacing(spacing)
+    image.SetOrigin(origin)
+    arrays = {"Intensity": intensity} if valid is None else {"Intensity": intensity, "ValidRegion": valid}
+    for name, values in arrays.items():
+        array = numpy_to_vtk(np.ascontiguousarray(values.ravel()), deep=1)
+        array.SetName(name)
+        image.GetPointData().AddArray(array)
+    return image
+
+
+def fit(image, **properties):
+    """(filter, its errors)"""
+    filter = echorama.vtkUltrasoundProbeFit()
+    filter.SetInputData(image)
+    for name, value in properties.items():
+        getattr(filter, "Set" + name)(value)
+    errors = []
+
+    def note(caller, event, text):
+        errors.append(text)
+
+    note.CallDataType = "string0"
+    filter.AddObserver(vtkCommand.ErrorEvent, note)
+    filter.GetExecutive().AddObserver(vtkCommand.ErrorEvent, lambda *_: None) # it would print that the filter failed
+    filter.Update()
+    return filter, errors
+
+
+def fields(image):
+    probe = vtk_to_numpy(image.GetFieldData().GetArray(acquisition.ProbeGeometryName())).ravel()
+    pose = vtk_to_numpy(image.GetFieldData().GetArray(acquisition.ProbeToWorldName())).reshape(4, 4)
+    return probe, pose
+
+
+def mha(name):
+    """Header and voxels of a MetaImage of bytes, or None where the data is not there."""
+    path = os.path.join(data, name)
+    if not os.path.exists(path):
+        skipped.append(name)
+        return None
+    with open(path, "rb") as file:
+        header = {}
+        while "ElementDataFile" not in header:
+            key, _, value = file.readline().decode("latin-1").partition("=")
+            header[key.strip()] = value.strip()
+        rest = file.read()
+    size = [int(n) for n in header["DimSize"].split()]
+    rest = zlib.decompress(rest) if header.get("CompressedData") == "True" else rest
+    return header, np.frombuffer(rest, np.uint8)[: np.prod(size)].reshape(size[::-1])
+
+
+def check_phantoms():
+    """The phantoms know their probe."""
+    if not hasattr(echorama, "vtkUltrasoundPhantomSource"):
+        skipped.append("phantoms (the room Filters/Synthesis is not built)")
+        return
+    for place in (dict(), dict(Position=(20, -30, 40), Orientation=(30, -50, 70)), dict(FanAngle=80, FanRadius=12, SweepRadius=50)):
+        source = echorama.vtkUltrasoundPhantomSource()
+        source.SetSpacingMm(1.5)
+        for name, value in place.items():
+            getattr(source, "Set" + name)(value)
+        source.Update()
+        phantom = source.GetOutput()
+        truth, pose = fields(phantom)
+        filter, errors = fit(phantom)
+        assert not errors, errors
+        found, found_pose = fields(filter.GetOutput())
+        assert abs(found[0] - truth[0]) < 0.5 and abs(found[2] - truth[2]) < 0.5, (found, truth)
+        # Depth 0 is the near edge: the first sample of the truth.
+        fan, sweep = np.radians(truth[0]), np.radians(truth[2])
+        assert abs(found[1] - (truth[1] + fan * truth[4])) < 1.5, (found, truth)
+        assert abs(found[3] - (truth[3] + sweep * truth[4])) < 1.5, (found, truth)
+        assert found[4] == 0 and abs(found[5] - (truth[5] - truth[4])) < 1.0, (found, truth)
+        near = pose @ [0, 0, truth[4], 1]
+        assert np.linalg.norm(found_pose[:3, 3] - near[:3]) < 1.0, (found_pose, near)
+        assert found_pose[:3, 2] @ pose[:3, 2] > 0.9999
+        assert filter.GetOverlap() > 0.98 and filter.GetResidualMm() < 1.5 and filter.GetMeanDistance() < 0.01
+        assert "was replaced" in filter.GetNotes() and "Depth 0" in filter.GetNotes()
+
+
+def check_output(probe_less):
+    """All but the two fields is shared or kept; the input is as it was."""
+    remark = numpy_to_vtk(np.arange(3.0))
+    remark.SetName("Remark")
+    probe_less.GetFieldData().AddArray(remark)
+    filter, errors = fit(probe_less)
+    output = filter.GetOutput()
+    assert not errors and "was replaced" not in filter.GetNotes()
+    for i in range(probe_less.GetPointData().GetNumberOfArrays()):
+        assert output.GetPointData().GetAbstractArray(i) is probe_less.GetPointData().GetAbstractArray(i)
+    assert output.GetFieldData().GetArray("Remark") is not None
+    assert probe_less.GetFieldData().GetNumberOfArrays() == 1
+    assert "OutlinePoints: 4000" in str(filter) and f"Overlap: {filter.GetOverlap():.5g}"[:12] in str(filter)
+
+
+def check_refusals():
+    z, y, x = np.mgrid[:40, :40, :40] - 20.0
+    grey = np.full(x.shape, 7, np.uint8)
+    ball = ((x**2 + y**2 + z**2) < 15**2).astype(np.uint8)
+    filter, errors = fit(image_of(grey, ball))
+    assert len(errors) == 1 and "no fan explains the valid region" in errors[0], errors
+    assert filter.GetOutput().GetNumberOfPoints() == 0 and filter.GetOverlap() == 0 and filter.GetNotes() == ""
+    filter, errors = fit(image_of(grey, ball), MinimumOverlap=0, MaximumDistance=10)
+    assert not errors and 0 < filter.GetOverlap() < 0.85
+    filter, errors = fit(image_of(grey, np.zeros_like(ball)))
+    assert len(errors) == 1 and "empty" in errors[0], errors
+    # Clamped, as documented.
+    filter.SetMinimumOverlap(7)
+    filter.SetMaximumDistance(-1)
+    filter.SetOutlinePoints(3)
+    assert (filter.GetMinimumOverlap(), filter.GetMaximumDistance(), filter.GetOutlinePoints()) == (1, 1e-4, 100)
+
+
+def check_region():
+    """Without a valid region all that is finite is valid."""
+    grey = np.full((30, 40, 50), 7, np.float32)
+    filter, errors = fit(image_of(grey, spacing=(0.5, 0.5, 0.5)))
+    assert not errors and "has no valid region" in filter.GetNotes() and "Every voxel is valid" in filter.GetNotes()
+    probe, pose = fields(filter.GetOutput())
+    assert np.allclose(probe, [0, 25, 0, 20, 0, 15], atol=0.1), probe
+    grey[:, :, 30:] = np.nan
+    filter, errors = fit(image_of(grey, spacing=(0.5, 0.5, 0.5)))
+    probe, pose = fields(filter.GetOutput())
+    assert not errors and np.allclose(probe, [0, 15, 0, 20, 0, 15], atol=0.3), probe
+
+
+def edge_angle(valid):
+    """Between the straight sides of a sector that looks down, by the medians of the slopes between rows far apart."""
+    rows = np.arange(valid.shape[0] // 6, valid.shape[0] * 3 // 4)
+    left, right = valid[rows].argmax(1), valid.shape[1] - 1 - valid[rows, ::-1].argmax(1)
+    half = len(rows) // 2
+    slopes = [np.median((edge[half:2 * half] - edge[:half]) / half) for edge in (left, right)]
+    return np.degrees(np.arctan(slopes[1]) - np.arctan(slopes[0]))
+
+
+def check_liver_frames():
+    """The sector of the frames, beside the angle between its sides."""
+    read = mha("liver/liver_sweep.igs.mha")
+    if not read:
+        return
+    frames = read[1]
+    for valid in (frames[70] > 0, (frames > 0).mean(0) > 0.5, (frames > 0).any(0)):
+        filter, errors = fit(image_of(frames[70], valid.astype(np.uint8), spacing=(0.315, 0.315, 1)))
+        assert not errors, errors
+        probe, pose = fields(filter.GetOutput())
+        assert abs(probe[0] - edge_angle(frames[70, :, :-1] > 0)) < 0.6 and abs(probe[5] - 181.5) < 2.0 and probe[2] == probe[3] == 0, probe
+        assert abs(probe[1] - 54.0) < 1.6, probe
+        assert pose[1, 2] > 0.9999 and pose[0, 0] > 0.9999 # away from the probe is down
+        assert filter.GetOverlap() > 0.93
+
+
+def check_plus_frames():
+    read = mha("plus/UltrasonixCurvilinearScanConvertedData.igs.mha")
+    if read:
+        valid = (read[1] > 0).any(0).astype(np.uint8)
+        filter, errors = fit(image_of(valid, valid))
+        probe, pose = fields(filter.GetOutput())
+        assert not errors and abs(probe[0] - 150) < 0.3 and filter.GetOverlap() > 0.99 and filter.GetResidualMm() < 0.5, probe
+    read = mha("plus/SpinePhantomFreehand.igs.mha")
+    if read:
+        valid = (read[1] > 0).any(0).astype(np.uint8)
+        filter, errors = fit(image_of(valid, valid))
+        probe, pose = fields(filter.GetOutput())
+        rows, columns = np.where(valid)
+        assert not errors and abs(probe[1] - 445) < 1 and abs(probe[5] - 590) < 1 and probe[0] < 0.01, probe
+        assert pose[1, 2] > 0.999 and "another axis" in filter.GetNotes()
+    read = mha("plus/NwirePhantomFreehand.igs.mha")
+    if read: # mostly black: the pixels that are not are no sector
+        valid = (read[1] > 0).any(0).astype(np.uint8)
+        filter, errors = fit(image_of(valid, valid))
+        assert errors and "no fan explains" in errors[0]
+
+
+def check_liver_volumes():
+    """A freehand sweep is not quite a fan: accepted, and said. Its frames have a fan of 60.5 degrees, 54 mm, 181 mm long."""
+    for name in "A", "B", "full":
+        read = mha(f"liver/liver_volume_{name}.mha")
+        if not read:
+            continue
+        voxels = read[1]
+        filter, errors = fit(image_of(voxels, (voxels > 0).astype(np.uint8), (0.8, 0.8, 0.8), [float(n) for n in read[0]["Offset"].split()]))
+        assert not errors, errors
+        probe, pose = fields(filter.GetOutput())
+        angles, widths = (probe[[0, 2]], probe[[1, 3]]) if probe[0] > probe[2] else (probe[[2, 0]], probe[[3, 1]])
+        assert abs(angles[0] - 60.5) < 2 and abs(widths[0] - 54) < 4 and abs(probe[5] - 181) < 2, probe
+        assert "do not lie on the model" in filter.GetNotes()
+        assert filter.GetOverlap() > 0.85 and filter.GetResidualMm() < 6
+        print(f"liver {name}: fan {angles[0]:.1f}, sweep {angles[1]:.1f} degrees, overlap {filter.GetOverlap():.3f}, "
+              f"residual {filter.GetResidualMm():.2f} mm")
+
+
+z, y, x = np.mgrid[:30, :60, :50]
+wedge = (np.abs(x - 25) < 5 + 0.3 * y).astype(np.uint8)
+check_output(image_of(wedge, wedge))
+check_refusals()
+check_region()
+check_phantoms()
+check_liver_frames()
+check_plus_frames()
+check_liver_volumes()
+if skipped:
+    print("left out, not there:", ", ".join(skipped))
