@@ -319,7 +319,8 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
       size = dimensions;
       plan->Type = frame.Intensity->GetDataType();
     }
-    if (frame.Intensity->GetDataType() != plan->Type) {
+    const auto own = vtkUltrasoundVolume::ViewOf<const unsigned char>(frame.ValidRegion, frame.Image);
+    if (frame.Intensity->GetDataType() != plan->Type || (!own.Empty() && std::find(own.begin(), own.end(), 1) == own.end())) {
       continue;
     }
     if (detect) {
@@ -333,6 +334,10 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
     }
   }
   frames.Restore(in);
+  if (first && places.empty()) {
+    throw Error(Error::Kind::BadInput,
+                "none of the " + std::to_string(frames.Count()) + " frames has a real pixel (ValidRegion)");
+  }
   if (!first) {
     throw Error(Error::Kind::BadInput,
                 "none of the " + std::to_string(frames.Count()) + " frames has a valid pose (ImageToWorld)");
