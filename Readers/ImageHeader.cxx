@@ -8,8 +8,10 @@
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Readers/HeaderLines.h"
+#include "Readers/ImageStackFile.h"
 #include "Readers/KretzFile.h"
 #include "Readers/NiftiFile.h"
+#include "Readers/VdbFile.h"
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -70,7 +72,9 @@ FileFormat FormatOfContent(const std::string& path)
   if (fs::is_directory(path, error)) {
     if (IsDicomFolder(path))
       return FileFormat::Dicom;
-    fail(Error::Kind::FileSystem, "it is a folder, not a file");
+    if (HoldsImages(path))
+      return FileFormat::ImageStack;
+    fail(Error::Kind::FileSystem, "it is a folder, not a file, and holds no images");
   }
   std::ifstream stream(path, std::ios::binary);
   std::string start(4096, '\0');
@@ -87,6 +91,10 @@ FileFormat FormatOfContent(const std::string& path)
     return FileFormat::Kretz;
   if (LooksLikeNifti(start))
     return FileFormat::Nifti;
+  if (LooksLikeVdb(start))
+    return FileFormat::Vdb;
+  if (LooksLikeImage(start))
+    return FileFormat::ImageStack;
   if (start.compare(0, 4, "NRRD") == 0)
     return FileFormat::Nrrd;
   if (start.find("<VTKFile") != std::string::npos && start.find("ImageData") != std::string::npos)
@@ -98,7 +106,7 @@ FileFormat FormatOfContent(const std::string& path)
 
 const char* KnownFormats()
 {
-  return "MetaImage, NRRD, NIfTI, DICOM, GE Kretz and VTK image file";
+  return "MetaImage, NRRD, NIfTI, DICOM, GE Kretz, OpenVDB, VTK image file and images (PNG, JPEG, TIFF)";
 }
 
 FileFormat FormatOfName(const std::string& path)
@@ -110,6 +118,8 @@ FileFormat FormatOfName(const std::string& path)
     return FileFormat::Nrrd;
   if (extension == ".nii" || (extension == ".gz" && LowerExtension(fs::path(path).stem().string()) == ".nii"))
     return FileFormat::Nifti;
+  if (extension == ".vdb")
+    return FileFormat::Vdb;
   return extension == ".vti" ? FileFormat::VtkXmlImage : FileFormat::Unknown;
 }
 

@@ -19,7 +19,7 @@ FileFormat FormatOfContent(const std::string& path);
 /// The formats by their names, for messages.
 const char* KnownFormats();
 
-/// What the extension of a name asks for: .mha .mhd, .nrrd .nhdr, .vti, .nii .nii.gz (in any case of letters).
+/// What the extension of a name asks for: .mha .mhd, .nrrd .nhdr, .vti, .nii .nii.gz, .vdb (in any case of letters).
 FileFormat FormatOfName(const std::string& path);
 
 /// "key = value" of a MetaImage header, "key:=value" of a NRRD header; line breaks inside values are escaped in files.

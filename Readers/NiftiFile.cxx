@@ -4,14 +4,13 @@
 // length and ends where a file does without saying so: here each number is checked against the file's size before anything
 // is allocated, and voxels go through the same code as those of the other formats.
 //
-// The header's affine maps indices to RAS; two signs make it LPS. What is left is to find the pose in it: the polar
-// decomposition gives the nearest rotation, and the corners of the grid say how far that moves a voxel. (An affine difference
-// is largest at a corner.)
+// The header's affine maps indices to RAS; two signs make it LPS.
 //
 // Compressed time series are inflated in order; going back to an earlier volume starts over.
 #include "Readers/NiftiFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Readers/AffinePose.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/VolumeFile.h"
@@ -30,8 +29,7 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr int SizeOfHeader[] = {0, 348, 540};            // by version
-constexpr double SilentShear = 1e-3, LargestShear = 0.1; // voxels
+constexpr int SizeOfHeader[] = {0, 348, 540}; // by version
 constexpr int CommentCode = 6;
 const std::string CommentStart = "Echorama volume";
 
@@ -259,7 +257,6 @@ private:
   void ReadType(const Fields& fields);
   void ReadGeometry(const Fields& fields);
   Eigen::Matrix<double, 3, 4> AffineOf(const Fields& fields);
-  void FindPose(const Eigen::Matrix<double, 3, 4>& affine);
   void ReadExtensions(PlainOrGzip& file, std::uint64_t at, bool swap);
   void ReadComment(const std::string& text);
   void CheckSizes();
@@ -460,57 +457,10 @@ void NiftiSource::ReadGeometry(const Fields& fields)
   default:
     Fail("its unit of length is unknown (xyzt_units is " + std::to_string(fields.units) + ")");
   }
-  FindPose(affine);
-  PlaceAxes(stored_, 3);
+  PlaceAffine(stored_, affine);
   for (const std::string& note : stored_.notes)
     Note(note);
-  try {
-    stored_.geometry.Check(content_.path);
-  } catch (const Error& error) {
-    throw Error(Error::Kind::BadFile, error.what());
-  }
   content_.geometry = stored_.geometry;
-}
-
-// Spacing and direction of an affine; left-handed axes stay so.
-void NiftiSource::FindPose(const Eigen::Matrix<double, 3, 4>& affine)
-{
-  ImageGeometry& g = stored_.geometry;
-  Eigen::Matrix3d axes = affine.leftCols<3>();
-  if (g.dimensions[2] == 1 && axes.col(2).isZero(0.0)) // an image that says nothing of its thickness
-    axes.col(2) = axes.col(0).cross(axes.col(1)).normalized();
-  g.origin = affine.col(3);
-  g.spacing = axes.colwise().norm();
-  if (!(g.spacing.minCoeff() > 0.0) || !axes.allFinite() || !g.spacing.allFinite())
-    Fail("its affine is singular: a row or column of it is zero or not finite");
-  g.direction = axes * g.spacing.cwiseInverse().asDiagonal();
-  if (!(std::fabs(g.direction.determinant()) > 1e-3))
-    Fail("its affine is singular: its axes lie in one plane");
-
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(g.direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose(); // a rotation or, left-handed, a mirror
-  const Eigen::Matrix3d difference =
-      g.spacing.cwiseInverse().asDiagonal() * nearest.transpose() * (g.direction - nearest) * g.spacing.asDiagonal();
-  double residual = 0.0;
-  for (int corner = 0; corner < 4; ++corner) {
-    const Eigen::Vector3d half(0.5 * (g.dimensions[0] - 1), (corner & 1 ? 0.5 : -0.5) * (g.dimensions[1] - 1),
-                               (corner & 2 ? 0.5 : -0.5) * (g.dimensions[2] - 1));
-    residual = std::max(residual, (difference * half).norm());
-  }
-  if (residual <= SilentShear)
-    return;
-  const Eigen::Matrix3d cosines = g.direction.transpose() * g.direction;
-  const double angle = std::asin(std::min(1.0, (cosines - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff())) * 180.0 / M_PI;
-  const std::string shear = "its affine is sheared: axes are " + NumberText(std::round(angle * 1e4) / 1e4) +
-                            " degrees off a right angle, which no rigid pose can express";
-  if (residual > LargestShear)
-    Fail(shear + " (the nearest moves voxels by up to " + NumberText(std::round(residual * 1e3) / 1e3) +
-         " voxels); resample the volume with the program that made it");
-  Note(shear + "; the nearest was taken, which moves voxels by up to " + NumberText(std::round(residual * 1e4) / 1e4) +
-       " voxels");
-  const Eigen::Vector3d half = 0.5 * (Eigen::Vector3d(g.dimensions[0], g.dimensions[1], g.dimensions[2]).array() - 1.0).matrix();
-  g.origin += (g.direction - nearest) * g.spacing.cwiseProduct(half); // the centre stays
-  g.direction = nearest;
 }
 
 void NiftiSource::ReadExtensions(PlainOrGzip& file, std::uint64_t at, bool swap)

@@ -3,8 +3,10 @@
 #include "Readers/VolumeSource.h"
 #include "Core/Base/Error.h"
 #include "Readers/DicomFile.h"
+#include "Readers/ImageStackFile.h"
 #include "Readers/KretzFile.h"
 #include "Readers/NiftiFile.h"
+#include "Readers/VdbFile.h"
 #include "Readers/VolumeFile.h"
 
 namespace echorama {
@@ -24,6 +26,10 @@ std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeRe
     return OpenNifti(path);
   case FileFormat::Dicom:
     return OpenDicom(path, parameters);
+  case FileFormat::Vdb:
+    return OpenVdb(path);
+  case FileFormat::ImageStack:
+    return OpenImageStack(path, parameters);
   case FileFormat::Kretz:
     return OpenKretz(path, parameters);
   default:
