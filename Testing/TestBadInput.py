@@ -200,7 +200,7 @@ class BadInput(unittest.TestCase):
         out = self.path / "out.seq.nrrd"
         for header, word in (({"DimSize": "30 20 5"}, ""), ({"DimSize": "30 -20 4"}, ""), ({"DimSize": "2147483647 2147483647 4"}, ""),
                              ({"Seq_Frame0004_Timestamp": "1"}, "frame 4"), ({"UltrasoundImageOrientation": "QQ"}, "QQ"),
-                             ({"ElementType": "MET_BANANA"}, "MET_BANANA")):
+                             ({"ElementType": "MET_BANANA"}, "type")):
             self.sequence("bad.igs.mha", header=header)
             self.refuses("bad.igs.mha", ["info", bad], [word])
             self.refuses("bad.igs.mha", ["convert", bad, out], [word])

@@ -99,12 +99,13 @@ class Sequences(unittest.TestCase):
         self.assertEqual((told["orientation"], told["valid_images"], told["invalid_images"]), ("MF", 4, 1))
         self.assertEqual(told["transforms"]["ProbeToTracker"]["statuses"], {"OK": 4, "INVALID": 1})
         self.assertAlmostEqual(told["transforms"]["ProbeToTracker"]["moves_mm"], 6)  # the lost place does not count
-        self.assertEqual(told["transforms"]["ReferenceToTracker"], {"statuses": {"OK": 5}, "moves_mm": 0})
+        self.assertAlmostEqual(told["transforms"]["ProbeToTracker"]["turns_degrees"], 12)
+        self.assertEqual(told["transforms"]["ReferenceToTracker"], {"statuses": {"OK": 5}, "moves_mm": 0, "turns_degrees": 0})
         self.assertAlmostEqual(told["time"]["frames_per_second"], 10)
         self.assertEqual(told["fields"]["Operator"], "nobody")
         text = run("info", self.path).stdout
         for words in ("5 of 7 x 6, unsigned char", "MF", "4 valid, 1 invalid", "10.000 to 10.400 s, 10.00 frames a second",
-                      "ProbeToTracker: 4 OK, 1 INVALID; moves within 6.0 mm", "Operator = nobody"):
+                      "ProbeToTracker: 4 OK, 1 INVALID; moves within 6.0 mm, turns by up to 12.0 degrees", "Operator = nobody"):
             self.assertIn(words, text)
 
     def test_trackers_alone(self):

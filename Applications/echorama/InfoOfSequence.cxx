@@ -4,6 +4,7 @@
 #include "Info.h"
 #include "Readers/SequenceFile.h"
 #include "Volumes.h"
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -17,6 +18,8 @@ struct Track {
   std::vector<std::pair<std::string, int>> statuses; // how often each, in order of appearance
   int valid = 0;
   Eigen::AlignedBox3d places; // of the first frame's origin in the second
+  Eigen::Matrix3d first = Eigen::Matrix3d::Identity();
+  double radians = 0.0; // the largest turn against the first valid one
 
   void Add(const SequenceTransform& transform)
   {
@@ -28,7 +31,10 @@ struct Track {
     ++status->second;
     if (transform.status != TransformStatus::Valid)
       return;
-    ++valid;
+    const Eigen::Matrix3d rotation = transform.matrix.rotation(); // the nearest, where pixels are scaled
+    if (valid++ == 0)
+      first = rotation;
+    radians = std::max(radians, std::abs(Eigen::AngleAxisd(Eigen::Matrix3d(first.transpose() * rotation)).angle()));
     places.extend(transform.matrix.translation());
   }
 };
@@ -113,8 +119,10 @@ Json DescribeSequence(Session& session, const std::string& file)
     }
     if (track.valid > 0) {
       const double mm = track.places.diagonal().norm();
+      const double degrees = track.radians * 57.29577951308232;
       one["moves_mm"] = mm;
-      line += "; moves within " + Fixed(mm, 1) + " mm";
+      one["turns_degrees"] = degrees;
+      line += "; moves within " + Fixed(mm, 1) + " mm, turns by up to " + Fixed(degrees, 1) + " degrees";
     }
     json["transforms"][name] = one;
     session.Say(Entry(name == content.transforms.front() ? "transforms" : "", name + ": " + line));
