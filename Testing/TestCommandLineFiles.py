@@ -41,8 +41,7 @@ class Volumes(unittest.TestCase):
     def test_formats_by_content(self):
         """The name of a file does not say what it is."""
         write_mha(work / "volume.mha", blobs((5, 6, 7)))
-        for extension, name in (("mha", "MetaImage"), ("nrrd", "NRRD"), ("vti", "VTK XML image"), ("nii", "NIfTI"), ("nii.gz", "NIfTI"),
-                                ("vdb", "OpenVDB")):
+        for extension, name in (("mha", "MetaImage"), ("nrrd", "NRRD"), ("vti", "VTK XML image")):
             path = work / f"format.{extension}"
             done = run("convert", work / "volume.mha", path)
             self.assertEqual(done.returncode, 0, done.stderr)

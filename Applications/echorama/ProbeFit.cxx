@@ -40,8 +40,8 @@ void FitProbe(Session& session, const ProbeFitOptions& options)
     session.Say("  file says   " + ProbeText(*known));
   session.Say("  probe at    " + Triple(fit.probeToWorld.translation(), ", ", 2) + " mm, looking along " +
               Triple(fit.probeToWorld.linear().col(2), ", ", 3));
-  session.Say("  residual    " + Fixed(fit.residualMm, 3) + " mm (root mean square), " + Fixed(fit.typicalMm, 3) +
-              " mm (median)");
+  session.Say("  residual    " + Fixed(fit.residualMm, 3) + " mm (root mean square); mean distance " +
+              Fixed(100.0 * fit.meanDistance, 2) + "% of the region's size");
   session.Say("  overlap     " + Fixed(100.0 * fit.overlap, 2) + "% of region and model together");
   for (const std::string& note : fit.notes)
     session.Note(options.file + ": " + note);
@@ -49,7 +49,7 @@ void FitProbe(Session& session, const ProbeFitOptions& options)
   session.result["ProbeGeometry"] = JsonOf(fit.geometry);
   session.result["ProbeToWorld"] = JsonOf(fit.probeToWorld);
   session.result["residual_mm"] = fit.residualMm;
-  session.result["median_mm"] = fit.typicalMm;
+  session.result["mean_distance"] = fit.meanDistance;
   session.result["overlap"] = fit.overlap;
 
   if (options.output.empty())
@@ -75,8 +75,8 @@ Command ProbeFitCommand(CLI::App& program)
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   options
-      ->add_option("--maximum-residual", values->parameters.maximumResidual,
-                   "Refuse a fit whose outline is further off, as a part of the region's size")
+      ->add_option("--maximum-distance", values->parameters.maximumDistance,
+                   "Refuse a fit whose outline is further off in the mean, as a part of the region's size")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();
   return {options, [values](Session& session) { FitProbe(session, *values); }};
