@@ -420,7 +420,7 @@ public:
 private:
   void Note(const std::string& note) { content_.notes.push_back(note); }
   void Collect();
-  void CollectPages(const std::string& path);
+  void CollectPages(std::string path);
   void NoteGaps();
   void CheckSlices();
   void FindSpacing(const VolumeReadParameters& parameters);
@@ -482,7 +482,7 @@ void ImageStack::Collect()
   NoteGaps();
 }
 
-void ImageStack::CollectPages(const std::string& path)
+void ImageStack::CollectPages(std::string path) // a copy: the slices are made anew
 {
   Slice first{path, Kind::Tiff};
   const TiffPointer tiff = OpenTiff(path, &first.info);

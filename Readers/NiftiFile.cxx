@@ -31,7 +31,7 @@ namespace {
 
 constexpr int SizeOfHeader[] = {0, 348, 540}; // by version
 constexpr int CommentCode = 6;
-const std::string CommentStart = "Echorama volume";
+const std::string CommentStart = "Echorama volume", OwnDescription = "Echorama";
 
 template <class T>
 T Swapped(T value)
@@ -321,7 +321,7 @@ void NiftiSource::ReadHeader()
   CheckSizes(); // before loops whose length the header tells
   ReadTimes(fields);
   ReadGeometry(fields);
-  if (!fields.description.empty())
+  if (!fields.description.empty() && fields.description != OwnDescription)
     content_.fields.emplace_back("descrip", fields.description);
   if (!fields.intentName.empty())
     content_.fields.emplace_back("intent_name", fields.intentName);
@@ -708,7 +708,7 @@ double WriteNifti(const std::string& path, const ImageHeader& header, const void
   if (!(std::max(g.origin.norm(), g.spacing.norm()) < static_cast<double>(std::numeric_limits<float>::max())))
     throw Error(Error::Kind::BadInput,
                 path + ": its geometry is beyond the range of 32-bit floats, which is all that NIfTI-1 has");
-  std::string description = "Echorama";
+  std::string description = OwnDescription;
   std::string comment = CommentStart;
   const auto add = [&](const auto& numbers) {
     for (Eigen::Index i = 0; i < numbers.size(); ++i)

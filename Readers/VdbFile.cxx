@@ -142,6 +142,9 @@ public:
   openvdb::GridBase::Ptr Read(std::istream& stream, const std::string& path, std::vector<std::string>& others)
   {
     readHeader(stream);
+    setFormatVersion(stream); // the stream carries them to what is read from it
+    setLibraryVersion(stream);
+    setDataCompression(stream);
     openvdb::MetaMap().readMeta(stream);
     const std::int32_t count = readGridCount(stream);
     openvdb::io::GridDescriptor chosen;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundWriter.h"
 
+#include "Core/Base/NumberText.h"
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
+#include "Readers/NiftiFile.h"
+#include "Readers/VdbFile.h"
 #include "Readers/VolumeFile.h"
 
 #include "vtkCellData.h"
@@ -111,64 +114,89 @@ void vtkUltrasoundWriter::WriteData()
 {
   this->SetErrorCode(vtkErrorCode::NoError);
   this->Notes.clear();
-  this->Written =
-      vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
-        const std::string path = this->FileName ? this->FileName : "";
-        if (path.empty()) {
-          throw Error(Error::Kind::InvalidParameter, "no file name was given");
-        }
-        vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
-        if (!input) {
-          throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
-        }
-        vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
-        vtkUltrasoundVolume::GeometryOf(input).Check(path);
-        if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints()) {
-          throw Error(Error::Kind::BadInput,
-                      path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
-        }
-        if (intensity->GetNumberOfComponents() != 1) {
-          throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
-        }
-        vtkUltrasoundVolume::CheckValidRegion(input, path);
-        for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
-          vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
-          if (array->GetNumberOfTuples() != input->GetNumberOfPoints()) {
-            throw Error(Error::Kind::BadInput, path + ": the point array " +
-                                                   (array->GetName() ? array->GetName() : "without a name") +
-                                                   " has not one value per voxel");
-          }
-        }
+  double rounding = 0.0;
+  this->Written = vtkUltrasoundVolume::Run(this, nullptr, [this, &rounding](const echorama::Progress& progress) {
+                    const std::string path = this->FileName ? this->FileName : "";
+                    if (path.empty()) {
+                      throw Error(Error::Kind::InvalidParameter, "no file name was given");
+                    }
+                    vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
+                    if (!input) {
+                      throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
+                    }
+                    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
+                    vtkUltrasoundVolume::GeometryOf(input).Check(path);
+                    if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints()) {
+                      throw Error(Error::Kind::BadInput,
+                                  path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
+                    }
+                    if (intensity->GetNumberOfComponents() != 1) {
+                      throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
+                    }
+                    vtkUltrasoundVolume::CheckValidRegion(input, path);
+                    for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
+                      vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
+                      if (array->GetNumberOfTuples() != input->GetNumberOfPoints()) {
+                        throw Error(Error::Kind::BadInput, path + ": the point array " +
+                                                               (array->GetName() ? array->GetName() : "without a name") +
+                                                               " has not one value per voxel");
+                      }
+                    }
 
-        FileReplacement files;
-        switch (echorama::FormatOfName(path)) {
-        case FileFormat::MetaImage:
-        case FileFormat::Nrrd:
-          this->WriteHeaderFile(input, files, progress);
-          break;
-        case FileFormat::VtkXmlImage:
-          this->WriteXml(input, files);
-          break;
-        default:
-          throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd, .nhdr or .vti");
-        }
-        files.Commit();
-      }) != 0;
+                    FileReplacement files;
+                    switch (echorama::FormatOfName(path)) {
+                    case FileFormat::MetaImage:
+                    case FileFormat::Nrrd:
+                    case FileFormat::Nifti:
+                    case FileFormat::Vdb:
+                      rounding = this->WriteOneArrayFile(input, files, progress);
+                      break;
+                    case FileFormat::VtkXmlImage:
+                      this->WriteXml(input, files);
+                      break;
+                    default:
+                      throw Error(Error::Kind::InvalidParameter,
+                                  path + ": the extension must be .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb or .vti");
+                    }
+                    files.Commit();
+                  }) != 0;
   if (!this->Written) {
     this->SetErrorCode(vtkErrorCode::UnknownError);
   } else if (!this->Notes.empty()) {
     vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
   }
+  // No warning: it is the format's own, and our reader does not see it.
+  if (this->Written && rounding > 1e-9) {
+    this->Notes.push_back("NIfTI holds the geometry as 32-bit floats: other programs see voxels up to " +
+                          echorama::NumberText(static_cast<float>(rounding)) +
+                          " mm off; for vtkUltrasoundReader the exact one is in an extension of the header");
+  }
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& files, const echorama::Progress& progress)
+double vtkUltrasoundWriter::WriteOneArrayFile(vtkImageData* input, FileReplacement& files, const echorama::Progress& progress)
 {
   const std::string path = this->FileName;
   const bool compress = this->UseCompression != 0;
   vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
   ImageHeader header;
   header.geometry = vtkUltrasoundVolume::GeometryOf(input);
+
+  const FileFormat format = echorama::FormatOfName(path);
+  const auto write = [&](const std::string& target, vtkDataArray* array, const unsigned char* valid,
+                         const echorama::Progress& part) {
+    header.type = echorama::VoxelTypeOf(array);
+    const void* voxels = array->GetVoidPointer(0);
+    if (format == FileFormat::Nifti) {
+      return echorama::WriteNifti(target, header, voxels, files, part);
+    }
+    if (format == FileFormat::Vdb) {
+      echorama::WriteVdb(target, header, voxels, valid, compress, files, part);
+    } else {
+      echorama::WriteVolume(target, header, voxels, compress, files, part);
+    }
+    return 0.0;
+  };
 
   // Files beside the main one, which is staged last; those of an earlier volume of this name must not stay.
   const auto writeBeside = [&](const char* name, vtkDataArray* array) {
@@ -177,10 +205,10 @@ void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& 
       files.Remove(companion);
       return;
     }
-    header.type = echorama::VoxelTypeOf(array);
-    echorama::WriteVolume(companion, header, array->GetVoidPointer(0), compress, files, progress.Part(0.0, 0.2));
+    write(companion, array, nullptr, progress.Part(0.0, 0.2));
   };
-  writeBeside(vtkUltrasoundVolume::ValidRegionName(), ValidRegionToWrite(input, intensity));
+  const bool holdsValid = format == FileFormat::Vdb; // as its active voxels
+  writeBeside(vtkUltrasoundVolume::ValidRegionName(), holdsValid ? nullptr : ValidRegionToWrite(input, intensity));
   vtkDataArray* provenance = input->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName());
   const bool single =
       provenance && provenance->GetNumberOfComponents() == 1 && provenance->GetNumberOfTuples() == input->GetNumberOfPoints();
@@ -220,8 +248,9 @@ void vtkUltrasoundWriter::WriteHeaderFile(vtkImageData* input, FileReplacement& 
     this->Notes.push_back("the format cannot hold the " + what + "; .vti can");
   }
 
-  header.type = echorama::VoxelTypeOf(intensity);
-  echorama::WriteVolume(path, header, intensity->GetVoidPointer(0), compress, files, progress.Part(0.2, 1.0));
+  vtkDataArray* valid = vtkUltrasoundVolume::GetValidRegion(input);
+  return write(path, intensity, valid ? static_cast<const unsigned char*>(valid->GetVoidPointer(0)) : nullptr,
+               progress.Part(0.2, 1.0));
 }
 
 //----------------------------------------------------------------------------

@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /**
  * @class vtkUltrasoundWriter
- * @brief writes a volume so that vtkUltrasoundReader gives it back: .mha, .mhd, .nrrd, .nhdr, .vti
+ * @brief writes a volume so that vtkUltrasoundReader gives it back: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb, .vti
  *
  * Input 0: vtkImageData with intensities (the array `Intensity`, else the active scalars; any type of number).
  * The extension chooses the format. Pose and acquisition (vtkUltrasoundAcquisition) are kept by all of them; numbers come
- * back to the last bit, but for .nrrd, which stores spacing and direction as a product. .vti holds all arrays and field
- * data in one file. The others hold the intensities; `ValidRegion` and `Provenance` go to files beside them
- * (`NAME.ValidRegion.mha`), and field data that are single strings go to the header. What cannot be held is listed by
- * GetNotes() and in a warning. The file of the valid region is left out where every voxel is real and the reader would
- * see that without it; one that stood there before is removed.
+ * back to the last bit, but for .nrrd and .vdb, which store spacing and direction as a product. .vti holds all arrays and
+ * field data in one file, and .vdb (OpenVDB) intensities and valid region, sparsely: its active voxels. The others hold the
+ * intensities; `ValidRegion` and `Provenance` go to files beside them (`NAME.ValidRegion.mha`), and field data that are
+ * single strings go to the header. NIfTI has 32-bit floats for the geometry: an extension of its header, which other programs
+ * skip, holds it exactly, and GetNotes() says how far off they see it. What cannot be held is listed by GetNotes() and in a
+ * warning. The file of the valid region is left out where every voxel is real and the reader would see that without it; one
+ * that stood there before is removed.
  *
  * Everything is written under temporary names in the same folder and renamed at the end, all together: after an error, a
  * full disk or an abort, what was there before is there unchanged.
  *
- * Errors, with the file and the reason: an extension that is not one of the five, a folder that is missing or not writable,
+ * Errors, with the file and the reason: an extension that is not one of these, a folder that is missing or not writable,
  * a full disk, more than one number per voxel, a geometry that is not a pose, point arrays that do not fit the voxels, a
  * `ValidRegion` that is not unsigned char.
  *
@@ -49,7 +51,7 @@ public:
   ///@}
 
   ///@{
-  /** Whether voxels are compressed (zlib, without loss). Default: on. */
+  /** Whether voxels are compressed (without loss). Default: on. NIfTI goes by its extension: .nii is not, .nii.gz is. */
   vtkSetMacro(UseCompression, vtkTypeBool);
   vtkGetMacro(UseCompression, vtkTypeBool);
   vtkBooleanMacro(UseCompression, vtkTypeBool);
@@ -78,7 +80,7 @@ private:
   void operator=(const vtkUltrasoundWriter&) = delete;
 
 #ifndef __VTK_WRAP__
-  void WriteHeaderFile(vtkImageData* input, echorama::FileReplacement& files, const echorama::Progress& progress);
+  double WriteOneArrayFile(vtkImageData* input, echorama::FileReplacement& files, const echorama::Progress& progress);
   void WriteXml(vtkImageData* input, echorama::FileReplacement& files);
 
   std::vector<std::string> Notes;

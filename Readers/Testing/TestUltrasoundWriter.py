@@ -16,7 +16,8 @@ from vtkmodules.vtkIOImage import vtkMetaImageReader, vtkNrrdReader
 
 from echorama import vtkUltrasoundReader, vtkUltrasoundWriter
 
-extensions = ["mha", "mhd", "nrrd", "nhdr", "vti"]
+extensions = ["mha", "mhd", "nrrd", "nhdr", "nii", "nii.gz", "vdb", "vti"]
+products = ["nrrd", "nhdr", "vdb"]  # these store spacing and direction as one matrix
 c, s = math.cos(0.3), math.sin(0.3)
 oblique = [0, -1, 0, c, 0, s, -s, 0, c]  # a rotation, row by row
 
@@ -114,13 +115,18 @@ class Writer(unittest.TestCase):
                     field(image, "Scene", [scene], vtkStringArray)
                     field(image, "Modality", ["MET_MOD_US"], vtkStringArray)
                     name = "a." + extension
-                    self.assertEqual(self.write(name, image, compress), "")
+                    said = self.write(name, image, compress)
+                    if extension.startswith("nii"):  # said, without a warning
+                        self.assertIn("32-bit floats", said)
+                    else:
+                        self.assertEqual(said, "")
+                    self.assertEqual(self.messages, [])
                     back, notes = self.read(name)
                     self.assertEqual(notes, "")
                     self.assertEqual(back.GetDimensions(), (5, 4, 3))
                     self.assertEqual(back.GetOrigin(), image.GetOrigin())
                     direction = [back.GetDirectionMatrix().GetData()[i] for i in range(9)]
-                    if extension in ("nrrd", "nhdr"):  # these store the product of both
+                    if extension in products:
                         np.testing.assert_allclose(back.GetSpacing(), image.GetSpacing(), rtol=1e-15)
                         np.testing.assert_allclose(direction, oblique, atol=1e-15)
                     else:
@@ -165,6 +171,17 @@ class Writer(unittest.TestCase):
                 self.assertTrue((self.values(back, "ValidRegion") == wanted).all())
         self.assertEqual(self.files(), ["a.mha"], "all ones over all ones needs no second file")
 
+    def test_openvdb_holds_the_valid_region_itself(self):
+        image = volume()
+        mask = (np.arange(60) % 2).astype(np.uint8)
+        array(image, "ValidRegion", mask)
+        self.write("a.vdb", image)
+        self.assertEqual(self.files(), ["a.vdb"])
+        back, notes = self.read("a.vdb")
+        self.assertEqual(notes, "")
+        self.assertTrue((self.values(back, "ValidRegion") == mask).all())
+        self.assertTrue((self.values(back, "Intensity") == self.values(image, "Intensity")).all())
+
     def test_files_of_an_earlier_volume_do_not_stay(self):
         image = volume()
         array(image, "ValidRegion", np.zeros(60, np.uint8))
@@ -175,6 +192,10 @@ class Writer(unittest.TestCase):
         array(later, "Intensity", np.ones(60, np.uint8))
         self.write("a.nrrd", later)
         self.assertEqual(self.files(), ["a.nrrd"])
+        self.write("b.nii.gz", image)
+        self.assertEqual(self.files(), ["a.nrrd", "b.Provenance.nii.gz", "b.ValidRegion.nii.gz", "b.nii.gz"])
+        self.write("b.nii.gz", later)
+        self.assertEqual(self.files(), ["a.nrrd", "b.nii.gz"])
 
     def test_vtk_reads_the_same_voxels(self):
         for extension, reader, compress in [("mha", vtkMetaImageReader(), True), ("mha", vtkMetaImageReader(), False),
@@ -217,7 +238,7 @@ class Writer(unittest.TestCase):
         array(image, "Elasticity", np.zeros(60))
         field(image, "Numbers", [1.0, 2.0])
         field(image, "Story", ["two\nlines"], vtkStringArray)
-        for extension in extensions[:4]:
+        for extension in extensions[:-1]:
             notes = self.write("a." + extension, image)
             for name in ["Elasticity", "Numbers", "Story"]:
                 self.assertIn(name, notes)

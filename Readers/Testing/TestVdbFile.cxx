@@ -6,7 +6,11 @@
 #include "Readers/VdbFile.h"
 #include <cstring>
 #include <limits>
+
+// Programs hide what they do not export; OpenVDB's static members must be one with those of its library.
+#pragma GCC visibility push(default)
 #include <openvdb/openvdb.h>
+#pragma GCC visibility pop
 
 using namespace echorama;
 using namespace echorama::testing;
