@@ -747,4 +747,11 @@ bool LooksLikeSequence(const std::string& path)
   return false;
 }
 
+bool NamesSequence(const std::string& path)
+{
+  const FileFormat format = FormatOfName(path);
+  const std::string before = Upper(fs::path(path).stem().extension().string());
+  return (format == FileFormat::MetaImage || format == FileFormat::Nrrd) && (before == ".IGS" || before == ".SEQ");
+}
+
 } // namespace echorama

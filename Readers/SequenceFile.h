@@ -99,4 +99,7 @@ private:
 /// time. Only its first 64 kB are looked at. Never throws.
 bool LooksLikeSequence(const std::string& path);
 
+/// Whether a name asks for a sequence: .igs or .seq before one of the extensions of MetaImage and NRRD, in any case.
+bool NamesSequence(const std::string& path);
+
 } // namespace echorama

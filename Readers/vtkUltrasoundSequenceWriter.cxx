@@ -200,8 +200,9 @@ int vtkUltrasoundSequenceWriter::Write()
   this->SetErrorCode(vtkErrorCode::NoError);
   this->Notes.clear();
   this->InvokeEvent(vtkCommand::StartEvent);
-  const int written =
-      vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) { this->WriteSteps(progress); });
+  const int written = vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
+    this->Notes = WriteSteps(this, this->FileName ? this->FileName : "", this->UseCompression != 0, progress);
+  });
   this->InvokeEvent(vtkCommand::EndEvent);
   if (!written) {
     this->SetErrorCode(vtkErrorCode::UnknownError);
@@ -218,14 +219,14 @@ void vtkUltrasoundSequenceWriter::WriteData()
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundSequenceWriter::WriteSteps(const echorama::Progress& progress)
+std::vector<std::string> vtkUltrasoundSequenceWriter::WriteSteps(vtkWriter* sink, const std::string& path, bool compress,
+                                                                 const echorama::Progress& progress)
 {
-  const std::string path = this->FileName ? this->FileName : "";
   if (path.empty()) {
     throw Error(Error::Kind::InvalidParameter, "no file name was given");
   }
   int port = 0;
-  vtkAlgorithm* source = this->GetNumberOfInputConnections(0) > 0 ? this->GetInputAlgorithm(0, 0, port) : nullptr;
+  vtkAlgorithm* source = sink->GetNumberOfInputConnections(0) > 0 ? sink->GetInputAlgorithm(0, 0, port) : nullptr;
   if (!source) {
     throw Error(Error::Kind::BadInput, path + ": there are no frames to write");
   }
@@ -261,7 +262,7 @@ void vtkUltrasoundSequenceWriter::WriteSteps(const echorama::Progress& progress)
     vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(image);
     if (!writer) {
       content = ContentOf(image, path, lost);
-      writer = std::make_unique<echorama::SequenceWriter>(path, content, this->UseCompression != 0, files);
+      writer = std::make_unique<echorama::SequenceWriter>(path, content, compress, files);
     }
     if (image->GetNumberOfPoints() == 0) {
       intensity = nullptr;
@@ -296,7 +297,8 @@ void vtkUltrasoundSequenceWriter::WriteSteps(const echorama::Progress& progress)
   writer->Finish(progress.Part(static_cast<double>(times.size()) / static_cast<double>(times.size() + 1), 1.0));
   files.Commit();
   lost.insert(lost.end(), lostArrays.begin(), lostArrays.end());
-  for (const std::string& what : lost) {
-    this->Notes.push_back("sequences cannot hold the " + what);
+  for (std::string& what : lost) {
+    what.insert(0, "sequences cannot hold the ");
   }
+  return lost;
 }

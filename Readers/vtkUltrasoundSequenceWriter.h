@@ -63,6 +63,15 @@ public:
   /** What the last Write() could not keep, one sentence per line. */
   std::string GetNotes() const;
 
+#ifndef __VTK_WRAP__
+  /**
+   * Writes what is connected to port 0 of \a sink, one time step after the other. Returns notes on what could not be kept;
+   * throws echorama::Error.
+   */
+  static std::vector<std::string> WriteSteps(vtkWriter* sink, const std::string& path, bool compress,
+                                             const echorama::Progress& progress);
+#endif
+
 protected:
   vtkUltrasoundSequenceWriter() = default;
   ~vtkUltrasoundSequenceWriter() override;
@@ -78,8 +87,6 @@ private:
   void operator=(const vtkUltrasoundSequenceWriter&) = delete;
 
 #ifndef __VTK_WRAP__
-  void WriteSteps(const echorama::Progress& progress);
-
   std::vector<std::string> Notes;
 #endif
 };

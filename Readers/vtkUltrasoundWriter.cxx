@@ -5,6 +5,7 @@
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/NiftiFile.h"
+#include "Readers/SequenceFile.h"
 #include "Readers/VdbFile.h"
 #include "Readers/VolumeFile.h"
 
@@ -19,6 +20,7 @@
 #include "vtkSmartPointer.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundSequenceWriter.h"
 #include "vtkUltrasoundVolume.h"
 #include "vtkUltrasoundVoxelTypes.h"
 #include "vtkUnsignedCharArray.h"
@@ -105,66 +107,77 @@ int vtkUltrasoundWriter::Write()
   // When the input fails, WriteData() is never called and the superclass reports success.
   this->Written = false;
   this->Notes.clear();
-  this->Superclass::Write();
+  const std::string path = this->FileName ? this->FileName : "";
+  if (echorama::NamesSequence(path)) {
+    this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this, &path](const echorama::Progress& progress) {
+      this->Notes = vtkUltrasoundSequenceWriter::WriteSteps(this, path, this->UseCompression != 0, progress);
+    }));
+  } else {
+    this->Superclass::Write();
+  }
   return this->Written ? 1 : 0;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::Finish(int written)
+{
+  this->Written = written != 0;
+  this->SetErrorCode(this->Written ? vtkErrorCode::NoError : vtkErrorCode::UnknownError);
+  if (this->Written && !this->Notes.empty()) {
+    vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
+  }
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundWriter::WriteData()
 {
-  this->SetErrorCode(vtkErrorCode::NoError);
   this->Notes.clear();
   double rounding = 0.0;
-  this->Written = vtkUltrasoundVolume::Run(this, nullptr, [this, &rounding](const echorama::Progress& progress) {
-                    const std::string path = this->FileName ? this->FileName : "";
-                    if (path.empty()) {
-                      throw Error(Error::Kind::InvalidParameter, "no file name was given");
-                    }
-                    vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
-                    if (!input) {
-                      throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
-                    }
-                    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
-                    vtkUltrasoundVolume::GeometryOf(input).Check(path);
-                    if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints()) {
-                      throw Error(Error::Kind::BadInput,
-                                  path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
-                    }
-                    if (intensity->GetNumberOfComponents() != 1) {
-                      throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
-                    }
-                    vtkUltrasoundVolume::CheckValidRegion(input, path);
-                    for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
-                      vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
-                      if (array->GetNumberOfTuples() != input->GetNumberOfPoints()) {
-                        throw Error(Error::Kind::BadInput, path + ": the point array " +
-                                                               (array->GetName() ? array->GetName() : "without a name") +
-                                                               " has not one value per voxel");
-                      }
-                    }
+  this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this, &rounding](const echorama::Progress& progress) {
+    const std::string path = this->FileName ? this->FileName : "";
+    if (path.empty()) {
+      throw Error(Error::Kind::InvalidParameter, "no file name was given");
+    }
+    vtkImageData* input = vtkImageData::SafeDownCast(this->GetInput());
+    if (!input) {
+      throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
+    }
+    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
+    vtkUltrasoundVolume::GeometryOf(input).Check(path);
+    if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints()) {
+      throw Error(Error::Kind::BadInput,
+                  path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
+    }
+    if (intensity->GetNumberOfComponents() != 1) {
+      throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
+    }
+    vtkUltrasoundVolume::CheckValidRegion(input, path);
+    for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
+      vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
+      if (array->GetNumberOfTuples() != input->GetNumberOfPoints()) {
+        throw Error(Error::Kind::BadInput, path + ": the point array " +
+                                               (array->GetName() ? array->GetName() : "without a name") +
+                                               " has not one value per voxel");
+      }
+    }
 
-                    FileReplacement files;
-                    switch (echorama::FormatOfName(path)) {
-                    case FileFormat::MetaImage:
-                    case FileFormat::Nrrd:
-                    case FileFormat::Nifti:
-                    case FileFormat::Vdb:
-                      rounding = this->WriteOneArrayFile(input, files, progress);
-                      break;
-                    case FileFormat::VtkXmlImage:
-                      this->WriteXml(input, files);
-                      break;
-                    default:
-                      throw Error(Error::Kind::InvalidParameter,
-                                  path + ": the extension must be .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb or .vti");
-                    }
-                    files.Commit();
-                  }) != 0;
-  if (!this->Written) {
-    this->SetErrorCode(vtkErrorCode::UnknownError);
-  } else if (!this->Notes.empty()) {
-    vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
-  }
+    FileReplacement files;
+    switch (echorama::FormatOfName(path)) {
+    case FileFormat::MetaImage:
+    case FileFormat::Nrrd:
+    case FileFormat::Nifti:
+    case FileFormat::Vdb:
+      rounding = this->WriteOneArrayFile(input, files, progress);
+      break;
+    case FileFormat::VtkXmlImage:
+      this->WriteXml(input, files);
+      break;
+    default:
+      throw Error(Error::Kind::InvalidParameter,
+                  path + ": the extension must be .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb or .vti");
+    }
+    files.Commit();
+  }));
   // No warning: it is the format's own, and our reader does not see it.
   if (this->Written && rounding > 1e-9) {
     this->Notes.push_back("NIfTI holds the geometry as 32-bit floats: other programs see voxels up to " +

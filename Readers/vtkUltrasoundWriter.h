@@ -13,6 +13,9 @@
  * warning. The file of the valid region is left out where every voxel is real and the reader would see that without it; one
  * that stood there before is removed.
  *
+ * A name with a double extension (.igs.mha, .seq.mha, .seq.nrrd ...) asks for a sequence of all time steps: it is written as
+ * vtkUltrasoundSequenceWriter does. (ParaView's Save Data looks at the last extension alone, so it comes here.)
+ *
  * Everything is written under temporary names in the same folder and renamed at the end, all together: after an error, a
  * full disk or an abort, what was there before is there unchanged.
  *
@@ -20,7 +23,7 @@
  * a full disk, more than one number per voxel, a geometry that is not a pose, point arrays that do not fit the voxels, a
  * `ValidRegion` that is not unsigned char.
  *
- * @sa vtkUltrasoundReader
+ * @sa vtkUltrasoundReader, vtkUltrasoundSequenceWriter
  */
 #ifndef vtkUltrasoundWriter_h
 #define vtkUltrasoundWriter_h
@@ -81,6 +84,7 @@ private:
 
 #ifndef __VTK_WRAP__
   double WriteOneArrayFile(vtkImageData* input, echorama::FileReplacement& files, const echorama::Progress& progress);
+  void Finish(int written);
   void WriteXml(vtkImageData* input, echorama::FileReplacement& files);
 
   std::vector<std::string> Notes;

@@ -384,6 +384,14 @@ TEST_F(SequenceFileTest, MatricesThatCannotBeUsedAreMarkedInvalid)
   EXPECT_EQ(odd.Frame(0).fields, (std::vector<HeaderField>{{"ProbeTransform", "1 2 3"}}));
 }
 
+TEST_F(SequenceFileTest, NamesOfSequences)
+{
+  for (const char* name : {"a.igs.mha", "a.seq.mha", "/some/where.x/a.b.IGS.MHD", "a.seq.nrrd", "a.Seq.Nhdr"})
+    EXPECT_TRUE(NamesSequence(name)) << name;
+  for (const char* name : {"a.mha", "igs.mha", "a.igs", "a.igs.vti", "a.seq.nii", "a.seq.mha.txt", "a.seq/b.mha", "", ".igs.x"})
+    EXPECT_FALSE(NamesSequence(name)) << name;
+}
+
 TEST_F(SequenceFileTest, FilesThatLieAreRefused)
 {
   Refused("a.mha", Meta({}, "", Bytes(23)), "truncated");

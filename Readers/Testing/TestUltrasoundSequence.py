@@ -12,7 +12,7 @@ from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkLogger
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
-from echorama import vtkUltrasoundReader, vtkUltrasoundSequenceReader, vtkUltrasoundSequenceWriter, vtkUltrasoundVolume
+from echorama import vtkUltrasoundReader, vtkUltrasoundSequenceReader, vtkUltrasoundSequenceWriter, vtkUltrasoundWriter
 
 real_data = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"]).parent / "shared" / "data"
 SIZE = (6, 4)
@@ -231,6 +231,19 @@ class Sequences(unittest.TestCase):
                     for key in (*names, "ImageToWorld"):
                         np.testing.assert_array_equal(field(one, key), field(two, key), err_msg=key)
                     self.assertEqual(field(two, "ImageToReferenceTransformStatus"), "INVALID" if field(one, "FrameIndex") == 2 else "OK")
+
+    def test_the_writer_of_volumes_knows_sequences_by_their_name(self):
+        reader = self.open(self.put("a.igs.mha", sequence(tracked())))
+        writer = self.watched(vtkUltrasoundWriter())
+        writer.SetInputConnection(reader.GetOutputPort())
+        writer.SetFileName(self.path("b.Seq.nrrd"))
+        self.assertEqual(writer.Write(), 1)
+        again = self.open(self.path("b.Seq.nrrd"))
+        self.assertEqual(steps(again), steps(reader))
+        np.testing.assert_array_equal(field(self.frame(again, 101), "ProbeToTrackerTransform"), matrix(30.0))
+        writer.SetFileName(self.path("no/b.seq.nrrd"))
+        self.assertEqual(writer.Write(), 0)
+        self.assertIn("no folder", self.errors[-1])
 
     def test_other_sources(self):
         # One image that no sequence made: what a live source could give.
