@@ -4,10 +4,12 @@
 import json
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 import numpy
 
@@ -41,7 +43,8 @@ class Volumes(unittest.TestCase):
     def test_formats_by_content(self):
         """The name of a file does not say what it is."""
         write_mha(work / "volume.mha", blobs((5, 6, 7)))
-        for extension, name in (("mha", "MetaImage"), ("nrrd", "NRRD"), ("vti", "VTK XML image")):
+        for extension, name in (("mha", "MetaImage"), ("nrrd", "NRRD"), ("vti", "VTK XML image"), ("nii", "NIfTI"), ("nii.gz", "NIfTI"),
+                                ("vdb", "OpenVDB")):
             path = work / f"format.{extension}"
             done = run("convert", work / "volume.mha", path)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -76,6 +79,21 @@ class Volumes(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn(f"step {step} of 2", done.stderr)
             self.assertEqual(run_json("info", work / "step.mha")["files"][0]["acquisition"].get("TimeStamp"), 0.1 * step)
+
+    def test_a_stack_of_pictures(self):
+        """PNG files in a folder, which do not say their spacing."""
+        voxels = blobs((3, 4, 5))
+        (work / "stack").mkdir()
+        for z, slice_ in enumerate(voxels):
+            rows = b"".join(b"\0" + row.tobytes() for row in slice_)
+            chunks = [(b"IHDR", struct.pack(">IIBBBBB", 5, 4, 8, 0, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+            (work / "stack" / f"{z:03}.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+                struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+        self.assertEqual(run_json("info", work / "stack")["files"][0]["format"], "stack of pictures")
+        run_json("convert", work / "stack", work / "stacked.mha", "--stack-spacing", 0.25, 0.5, 2)
+        header, read = read_mha(work / "stacked.mha")
+        numpy.testing.assert_array_equal(read, voxels)
+        self.assertEqual([float(n) for n in header["ElementSpacing"].split()], [0.25, 0.5, 2])
 
     def test_header(self):
         write_mha(work / "fields.mha", blobs((5, 6, 7)), header={"Operator": "nobody", "Comment": "x" * 200})
