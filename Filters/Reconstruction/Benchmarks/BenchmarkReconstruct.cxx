@@ -90,18 +90,26 @@ void Straightforward(const Sweep& sweep, Result& result)
   }
 }
 
-std::vector<double> Reconstruct(const Sweep& sweep, const ReconstructionParameters& parameters, Result& result, bool fill)
+struct Latency {
+  std::vector<double> seconds;   // of each frame, in ascending order
+  double processorSeconds = 0.0; // of a frame, the mean
+};
+
+Latency Reconstruct(const Sweep& sweep, const ReconstructionParameters& parameters, Result& result, bool fill)
 {
   VolumeReconstruction<Byte> reconstruction(parameters, sweep.grid, result.Output());
-  std::vector<double> seconds;
+  Latency latency;
+  const std::clock_t start = std::clock();
   for (std::size_t k = 0; k < sweep.frames.size(); ++k)
-    seconds.push_back(benchmark::Seconds([&] {
+    latency.seconds.push_back(benchmark::Seconds([&] {
       reconstruction.Add({sweep.frames[k].View(), sweep.sector.View(), sweep.poses[k]});
     }));
+  latency.processorSeconds =
+      static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / static_cast<double>(sweep.frames.size());
   if (fill)
     FillHoles<Byte>({}, result.intensity.View(), result.valid.View(), result.coverage.View());
-  std::sort(seconds.begin(), seconds.end());
-  return seconds;
+  std::sort(latency.seconds.begin(), latency.seconds.end());
+  return latency;
 }
 
 void ReportErrors(const Sweep& sweep, const std::string& method, double seconds, double processor, const Result& result)
@@ -161,7 +169,7 @@ int main()
     parameters.splat = way.splat;
     parameters.between = way.between;
     const bool first = way.splat == SplatMethod::Nearest && way.between == BetweenFrames::Nothing;
-    std::vector<double> latency;
+    Latency latency;
     const auto ours = [&] { latency = Reconstruct(sweep, parameters, result, way.fill); };
     double seconds;
     if (first) {
@@ -175,8 +183,10 @@ int main()
     }
     const double processor = ProcessorSeconds(ours);
     ReportErrors(sweep, way.name, seconds, processor, result);
-    benchmark::Report("reconstruct", "one live frame", way.name, latency[latency.size() / 2], 0.0, "",
-                      {{"slowest_of_20", latency[latency.size() * 19 / 20]}, {"slowest", latency.back()}});
+    const std::vector<double>& each = latency.seconds;
+    benchmark::Report(
+        "reconstruct", "one live frame", way.name, each[each.size() / 2], 0.0, "",
+        {{"cpu_seconds", latency.processorSeconds}, {"slowest_of_20", each[each.size() * 19 / 20]}, {"slowest", each.back()}});
   }
   for (const auto& [method, name] : {std::pair{HoleFilling::Mean, "mean"}, std::pair{HoleFilling::Stick, "stick"}}) {
     ReconstructionParameters parameters;
