@@ -6,13 +6,15 @@
 // 1. Outline: a few ten thousand points between blocks of voxels (OutlineRegion), thinned evenly.
 // 2. Starts: a fan is symmetric about two planes, so the axes of inertia of the region are those of the probe, unless two
 //    moments agree or a part is missing. They, and they turned by 45 degrees about each, with depth along any of them, times
-//    a few fan and sweep angles, widths from the extent: some thousand models, rated by distance and overlap of a few hundred
-//    points.
-// 3. The best are fitted to the outline by Levenberg-Marquardt with Tukey's weights, whose reach shrinks from a part of the
-//    region's size to about a cell: what no model explains (a missing corner, a ragged edge) is outvoted. The Jacobian is
+//    a few fan and sweep angles, widths from the extent: some 1,700 models, rated by the distance of 300 points.
+// 3. The best 24 are fitted to 600 points by Levenberg-Marquardt with Tukey's weights, whose reach shrinks from a part of the
+//    region's size to about two cells: what no model explains (a missing corner, a ragged edge) is outvoted. The Jacobian is
 //    analytic: a face moves under a parameter by minus its normal times the derivative of its point. Unknowns: the pose (6), fan
 //    angle and width, sweep angle and width, length of the beams. None is infinite for flat faces or points.
-// 4. The best of these are fitted once more with all points; overlap and residual of the winner decide whether it is put out.
+// 4. The best, by overlap less misfit, is fitted anew with its axes exchanged and reversed in all ways, for a solid may be the
+//    fan of several probes. Those that explain the region alike are fitted with all points, and the axes of the grid choose.
+// 5. Blocks of voxels blunt the tip of a fan; how far it goes is counted in the voxels themselves.
+// 6. Overlap, distance and how much of each face is seen decide whether the fit is put out, and what its notes say.
 //
 // A point at the end of the grid must not lie outside the model; when it lies inside, the model goes on beyond the grid, which
 // costs next to nothing.
@@ -35,7 +37,7 @@ constexpr double degree = pi / 180.0;
 constexpr int mostCells = 1 << 18;
 // Ratings (overlap less misfit) that differ by less say the same, and nearly so.
 constexpr double asGood = 0.004, nearlyAsGood = 0.02;
-constexpr double mostHoles = 1.0 / 3.0;                    // of the filled region
+constexpr double mostHoles = 1.0 / 3.0;                    // of the region but for its rim
 constexpr double leastSeenSide = 0.15, leastSeenEnd = 0.4; // of each side, and of the near or the far end
 constexpr double leastWeight = 0.01;                       // of a point at the end of the grid that is inside the model
 
@@ -71,14 +73,16 @@ struct Model {
   Pose probeToWorld = Pose::Identity();
   ProbeGeometry shape; // depthMin = 0
 
-  double Get(int unknown) const { return const_cast<Model*>(this)->Shape(unknown); }
-  double& Shape(int unknown)
+  double& operator[](int unknown) { return shape.*NumberOf(unknown); }
+  double operator[](int unknown) const { return shape.*NumberOf(unknown); }
+
+private:
+  static double ProbeGeometry::*NumberOf(int unknown)
   {
-    return unknown == FanAngle     ? shape.fanAngle
-           : unknown == FanWidth   ? shape.fanWidth
-           : unknown == SweepAngle ? shape.sweepAngle
-           : unknown == SweepWidth ? shape.sweepWidth
-                                   : shape.depthMax;
+    static constexpr double ProbeGeometry::*numbers[] = {&ProbeGeometry::fanAngle, &ProbeGeometry::fanWidth,
+                                                         &ProbeGeometry::sweepAngle, &ProbeGeometry::sweepWidth,
+                                                         &ProbeGeometry::depthMax};
+    return numbers[unknown - FanAngle];
   }
 };
 
@@ -248,8 +252,8 @@ public:
     return cost;
   }
 
-  // At most \a steps steps downhill. Returns false when there is nowhere to go.
-  bool Improve(Model& model, int steps) const
+  // At most \a steps steps downhill.
+  void Improve(Model& model, int steps) const
   {
     double damping = 1e-3;
     Matrix hessian;
@@ -271,10 +275,9 @@ public:
         }
       }
       if (!better || gain < 1e-5 * cost)
-        return better;
+        return;
       cost = Evaluate(model, &hessian, &slope);
     }
-    return true;
   }
 
 private:
@@ -312,9 +315,9 @@ private:
         }
       change = Solved(system, right);
       for (int unknown = FanAngle; unknown < unknowns; ++unknown)
-        if (!held[unknown] && model.Get(unknown) + change[unknown] < 0.0) {
+        if (!held[unknown] && model[unknown] + change[unknown] < 0.0) {
           held[unknown] = true;
-          change[unknown] = -model.Get(unknown);
+          change[unknown] = -model[unknown];
           again = true;
         }
       if (again)
@@ -326,7 +329,7 @@ private:
     moved.probeToWorld = model.probeToWorld * Exp(change.head<6>());
     for (int unknown = FanAngle; unknown < unknowns; ++unknown)
       if (IsFree(unknown))
-        moved.Shape(unknown) = std::max(0.0, model.Get(unknown) + change[unknown]);
+        moved[unknown] = std::max(0.0, model[unknown] + change[unknown]);
     moved.shape.fanAngle = std::min(moved.shape.fanAngle, 1.999 * pi);
     moved.shape.sweepAngle = std::min(moved.shape.sweepAngle, 1.999 * pi);
     moved.shape.depthMax = std::max(moved.shape.depthMax, 0.5 * model.shape.depthMax);
@@ -866,6 +869,11 @@ ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& ge
   const std::array<double, faces> seen = SeenParts(best, region);
   if (std::max(seen[Near], seen[Far]) < leastSeenEnd || std::min(seen[FanSide], seen[SweepSide]) < leastSeenSide)
     throw Error(Error::Kind::NotPossible, refusal + "the grid cuts off so much of it that its sides are not seen");
+  try {
+    fit.geometry.Check();
+  } catch (const Error& error) {
+    throw Error(Error::Kind::NotPossible, refusal + "the best one is no probe (" + error.what() + ")");
+  }
   fit.notes = NotesOn(choice, region, seen, residual.beyond);
   return fit;
 }
