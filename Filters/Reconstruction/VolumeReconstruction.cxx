@@ -35,6 +35,7 @@ constexpr int longestAxis = 1 << 26;     // voxels, for the same reason
 constexpr float mostPixels = 65535.0f;   // of a voxel, before its mean moves on
 constexpr float leastWeight = 0.125f;    // of a pixel in the middle of eight voxels
 constexpr double singular = 1e-9;        // sine of the angle between the axes of an image
+constexpr int mostParts = 1000;          // from one frame to the next
 constexpr int slabs = 24;                // enough to keep threads busy, few enough to keep the rows' overhead low
 
 struct Cell {
@@ -746,9 +747,10 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
     return FrameUse::NoPixels;
 
   const BetweenFrames between = body.parameters.between;
-  const double step = body.hasPrevious && body.previous.size == body.current.size ? body.StepBetween(body.previous, body.current)
-                                                                                  : std::numeric_limits<double>::infinity();
-  const bool joined = between != BetweenFrames::Nothing && step <= body.parameters.maximumGapMm;
+  const bool neighbours = body.hasPrevious && body.previous.size == body.current.size;
+  const double step = neighbours ? body.StepBetween(body.previous, body.current) : 0.0;
+  const bool joined = neighbours && between != BetweenFrames::Nothing && step <= body.parameters.maximumGapMm &&
+                      (between == BetweenFrames::Backward || step <= mostParts * body.parameters.stepMm);
   bool reached = false;
   if (joined && between == BetweenFrames::Backward) {
     reached = body.Blend(body.previous, body.current);

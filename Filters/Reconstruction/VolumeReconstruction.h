@@ -41,7 +41,7 @@ struct ReconstructionParameters {
 
   BetweenFrames between = BetweenFrames::Forward;
   double stepMm = 0.0;        ///< Forward: no pixel moves further from frame to frame, mm; 0: 0.7 of the smallest spacing
-  double maximumGapMm = 10.0; ///< frames between which a pixel moves further than this are not joined, mm, > 0
+  double maximumGapMm = 10.0; ///< frames between which a pixel moves further than this, or 1000 steps, are not joined, mm, > 0
 };
 
 /// A 2D image and where it lies.

@@ -284,6 +284,13 @@ TEST(VolumeReconstruction, FramesFarApartAreNotJoined)
     EXPECT_EQ(result.valid.View()(3, 3, 2), 0);
     EXPECT_EQ(result.intensity.View()(3, 3, 4), 80);
   }
+  // Nor where that would take more than 1000 frames; and no gap is too wide for those who want it so.
+  parameters.between = BetweenFrames::Forward;
+  parameters.maximumGapMm = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(Reconstruct(parameters, grid, frames).valid.View()(3, 3, 2), 1);
+  parameters.stepMm = 1e-12;
+  EXPECT_EQ(Reconstruct(parameters, grid, frames).valid.View()(3, 3, 2), 0);
+  parameters.stepMm = 0.0;
   parameters.maximumGapMm = 10.0;
   Result<unsigned char> result(grid);
   VolumeReconstruction<unsigned char> reconstruction(parameters, grid, result.Output());
