@@ -10,7 +10,8 @@
 // 3. The best 24 are fitted to 600 points by Levenberg-Marquardt with Tukey's weights, whose reach shrinks from a part of the
 //    region's size to about two cells: what no model explains (a missing corner, a ragged edge) is outvoted. The Jacobian is
 //    analytic: a face moves under a parameter by minus its normal times the derivative of its point. Unknowns: the pose (6), fan
-//    angle and width, sweep angle and width, length of the beams. None is infinite for flat faces or points.
+//    angle and width, sweep angle and width, length of the beams; in the last fit of a volume also the offset of the fan, when
+//    that explains clearly more. None is infinite for flat faces or points.
 // 4. The best, by overlap less misfit, is fitted anew with its axes exchanged and reversed in all ways, for a solid may be the
 //    fan of several probes. Those that explain the region alike are fitted with all points, and the axes of the grid choose.
 // 5. Blocks of voxels blunt the tip of a fan; how far it goes is counted in the voxels themselves.
@@ -27,6 +28,7 @@
 #include <cstdio>
 #include <Eigen/Eigenvalues>
 #include <limits>
+#include <utility>
 
 namespace echorama {
 namespace {
@@ -37,12 +39,13 @@ constexpr double degree = pi / 180.0;
 constexpr int mostCells = 1 << 18;
 // Ratings (overlap less misfit) that differ by less say the same, and nearly so.
 constexpr double asGood = 0.004, nearlyAsGood = 0.02;
+constexpr double worthAnUnknown = 0.01;                    // gain of a rating by an offset of the fan
 constexpr double mostHoles = 1.0 / 3.0;                    // of the region but for its rim
 constexpr double leastSeenSide = 0.15, leastSeenEnd = 0.4; // of each side, and of the near or the far end
 constexpr double leastWeight = 0.01;                       // of a point at the end of the grid that is inside the model
 
 // The unknowns: a twist of the probe frame, then the shape.
-enum Unknown { FanAngle = 6, FanWidth, SweepAngle, SweepWidth, Length, unknowns };
+enum Unknown { FanAngle = 6, FanWidth, SweepAngle, SweepWidth, Length, FanOffset, unknowns };
 using Vector = Eigen::Matrix<double, unknowns, 1>;
 using Matrix = Eigen::Matrix<double, unknowns, unknowns>;
 
@@ -79,9 +82,9 @@ struct Model {
 private:
   static double ProbeGeometry::*NumberOf(int unknown)
   {
-    static constexpr double ProbeGeometry::*numbers[] = {&ProbeGeometry::fanAngle, &ProbeGeometry::fanWidth,
+    static constexpr double ProbeGeometry::*numbers[] = {&ProbeGeometry::fanAngle,   &ProbeGeometry::fanWidth,
                                                          &ProbeGeometry::sweepAngle, &ProbeGeometry::sweepWidth,
-                                                         &ProbeGeometry::depthMax};
+                                                         &ProbeGeometry::depthMax,   &ProbeGeometry::fanOffset};
     return numbers[unknown - FanAngle];
   }
 };
@@ -90,7 +93,7 @@ enum Face { FanSide, SweepSide, Near, Far, faces };
 
 // A point in the coordinates of the beams, with the face that is nearest when it is inside, or that it is furthest beyond.
 struct Located {
-  ProbeArc::Place sweep, fan; // sweep.depth is the distance from the face in the fan's plane
+  ProbeArc::Place sweep, fan; // sweep.depth is the distance from the face in the fan's plane; fan.along from the fan's middle
   double distance = 0.0;      // mm, negative inside
   Face face = FanSide;
 };
@@ -101,6 +104,7 @@ Located Locate(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe)
   const bool plane = shape.IsPlane();
   at.sweep = plane ? ProbeArc::Place{0.0, inProbe.z()} : shape.Sweep().PlaceOf(inProbe.y(), inProbe.z());
   at.fan = shape.Fan().PlaceOf(inProbe.x(), at.sweep.depth);
+  at.fan.along -= shape.fanOffset;
   const auto beyond = [&at](Face face, double distance) {
     if (distance > at.distance) {
       at.distance = distance;
@@ -150,6 +154,7 @@ Vector GradientOf(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe, Lo
     at.sweep.along = 0.5 * sweepSign;
   else
     at.fan.depth = at.face == Near ? shape.depthMin : shape.depthMax;
+  at.fan.along += shape.fanOffset;
   const double phi = shape.fanAngle * at.fan.along, psi = shape.sweepAngle * at.sweep.along;
   const Eigen::Vector3d outward(0.0, std::sin(psi), std::cos(psi)); // along the middle beam of the plane
   const Eigen::Vector3d beam = std::sin(phi) * Eigen::Vector3d::UnitX() + std::cos(phi) * outward;
@@ -169,6 +174,7 @@ Vector GradientOf(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe, Lo
   gradient[SweepAngle] = -normal.tail<2>().dot(sweep.angle);
   gradient[SweepWidth] = -normal.tail<2>().dot(sweep.width);
   gradient[Length] = at.face == Far ? -1.0 : 0.0;
+  gradient[FanOffset] = at.face == FanSide ? -fanSign * shape.Fan().Span(at.fan.depth) : 0.0;
   return gradient;
 }
 
@@ -222,10 +228,13 @@ double MisfitOf(const Model& model, const Points& points, double cap)
   return sum / (weights * cap);
 }
 
+// Which of the unknowns a fit may change.
+enum class Freedom { Plane, Centred, Offset };
+
 // The robust least squares of a model to points, at one reach of Tukey's weight.
 class Problem {
 public:
-  Problem(const Points& points, double reach, bool plane) : points_(points), reach_(reach), plane_(plane) {}
+  Problem(const Points& points, double reach, Freedom freedom) : points_(points), reach_(reach), freedom_(freedom) {}
 
   // The sum that is minimised. With a matrix, also the normal equations.
   double Evaluate(const Model& model, Matrix* hessian = nullptr, Vector* slope = nullptr) const
@@ -283,8 +292,10 @@ public:
 private:
   bool IsFree(int unknown) const
   {
-    return !plane_ || unknown == 0 || unknown == 2 || unknown == 4 || unknown == FanAngle || unknown == FanWidth ||
-           unknown == Length;
+    if (unknown == FanOffset)
+      return freedom_ == Freedom::Offset;
+    return freedom_ != Freedom::Plane || unknown == 0 || unknown == 2 || unknown == 4 || unknown == FanAngle ||
+           unknown == FanWidth || unknown == Length;
   }
 
   // One damped step. Shape numbers do not fall below 0: one that would is held there and the others are solved for again.
@@ -315,7 +326,7 @@ private:
         }
       change = Solved(system, right);
       for (int unknown = FanAngle; unknown < unknowns; ++unknown)
-        if (!held[unknown] && model[unknown] + change[unknown] < 0.0) {
+        if (unknown != FanOffset && !held[unknown] && model[unknown] + change[unknown] < 0.0) {
           held[unknown] = true;
           change[unknown] = -model[unknown];
           again = true;
@@ -329,7 +340,8 @@ private:
     moved.probeToWorld = model.probeToWorld * Exp(change.head<6>());
     for (int unknown = FanAngle; unknown < unknowns; ++unknown)
       if (IsFree(unknown))
-        moved[unknown] = std::max(0.0, model[unknown] + change[unknown]);
+        moved[unknown] =
+            unknown == FanOffset ? model[unknown] + change[unknown] : std::max(0.0, model[unknown] + change[unknown]);
     moved.shape.fanAngle = std::min(moved.shape.fanAngle, 1.999 * pi);
     moved.shape.sweepAngle = std::min(moved.shape.sweepAngle, 1.999 * pi);
     moved.shape.depthMax = std::max(moved.shape.depthMax, 0.5 * model.shape.depthMax);
@@ -338,15 +350,15 @@ private:
 
   const Points& points_;
   double reach_;
-  bool plane_;
+  Freedom freedom_;
 };
 
 // Fits with a reach that shrinks from \a from to \a to, mm.
-void Refine(Model& model, const Points& points, bool plane, double from, double to, int steps)
+void Refine(Model& model, const Points& points, Freedom freedom, double from, double to, int steps)
 {
   for (double reach = from; reach > 1.5 * to; reach *= 0.5)
-    Problem(points, reach, plane).Improve(model, 4);
-  Problem(points, to, plane).Improve(model, steps);
+    Problem(points, reach, freedom).Improve(model, 4);
+  Problem(points, to, freedom).Improve(model, steps);
 }
 
 // All that the search needs to know of a region.
@@ -563,6 +575,7 @@ double ConventionOf(const Model& model, const Region& region)
 
 Choice Choose(const Region& region, const Progress& progress)
 {
+  const Freedom freedom = region.plane ? Freedom::Plane : Freedom::Centred;
   // 2. starts
   const Frames frames = StartFrames(region);
   std::vector<std::vector<Rated>> perFrame(frames.size());
@@ -577,7 +590,7 @@ Choice Choose(const Region& region, const Progress& progress)
   // 3. each to its optimum
   const auto refineAll = [&](const Progress& part) {
     ParallelFor(static_cast<std::ptrdiff_t>(candidates.size()), part, [&](std::ptrdiff_t i) {
-      Refine(candidates[i].model, region.some, region.plane, 0.2 * region.size, region.Reach(), 10);
+      Refine(candidates[i].model, region.some, freedom, 0.2 * region.size, region.Reach(), 10);
       candidates[i].rating = RatingOf(candidates[i].model, region, region.sample, region.some);
     });
     SortByRating(candidates);
@@ -611,8 +624,16 @@ Choice Choose(const Region& region, const Progress& progress)
 
   // 4. the best with all points
   ParallelFor(static_cast<std::ptrdiff_t>(candidates.size()), progress.Part(0.8, 1.0), [&](std::ptrdiff_t i) {
-    Refine(candidates[i].model, region.many, region.plane, 4.0 * region.Reach(), region.Reach(), 30);
+    Refine(candidates[i].model, region.many, freedom, 4.0 * region.Reach(), region.Reach(), 30);
     candidates[i].rating = RatingOf(candidates[i].model, region, region.cells, region.many);
+    // A fan that is not centred on its array is a solid of its own only when the array bends and turns.
+    if (region.plane || std::min(candidates[i].model.shape.fanAngle, candidates[i].model.shape.sweepAngle) < 5.0 * degree)
+      return;
+    Rated offset = candidates[i];
+    Refine(offset.model, region.many, Freedom::Offset, 0.1 * region.size, region.Reach(), 40);
+    offset.rating = RatingOf(offset.model, region, region.cells, region.many);
+    if (offset.rating > candidates[i].rating + worthAnUnknown)
+      candidates[i] = offset;
   });
   SortByRating(candidates);
   auto chosen = candidates.begin();
@@ -718,6 +739,7 @@ void FaceTheGrid(Model& model, const Region& region)
   if (along[most] < 0.0) {
     model.probeToWorld.linear().col(0) *= -1.0;
     model.probeToWorld.linear().col(1) *= -1.0;
+    model.shape.fanOffset *= -1.0;
   }
 }
 
@@ -816,6 +838,10 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
     notes.push_back(exchangedRating > -asGood ? "Fan and sweep could as well be exchanged; the axes of the grid decided."
                                               : "Fan and sweep could be exchanged: that explains the region nearly as well.");
 
+  if (shape.fanOffset != 0.0)
+    notes.push_back(
+        Text("The fan is not centred (fanOffset): its middle beam is turned by %.1f degrees from where the sweep looks.",
+             shape.fanAngle * shape.fanOffset / degree));
   if (!region.plane && IsThin(shape.Sweep().Span(0.5 * shape.depthMax), region))
     notes.push_back(Text("The region is only %.3g mm thick along the sweep, too little to tell its angle from its width.",
                          shape.Sweep().Span(0.5 * shape.depthMax)));
@@ -841,6 +867,12 @@ ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& ge
   if (parameters.outlinePoints < 100)
     throw Error(Error::Kind::InvalidParameter, "probe fit: outlinePoints must be at least 100");
 
+  Volume<unsigned char> all;
+  if (valid.Empty()) {
+    geometry.Check("the volume");
+    all = Volume<unsigned char>(geometry.dimensions, 1);
+    valid = std::as_const(all).View();
+  }
   const Region region =
       RegionOf(OutlineRegion(valid, geometry, mostCells, progress.Part(0.0, 0.3)), valid, parameters.outlinePoints);
   if (region.outline.points.size() < (region.plane ? 40 : 150))

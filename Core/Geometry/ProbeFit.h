@@ -12,8 +12,8 @@ namespace echorama {
 struct ProbeFitParameters {
   double minimumOverlap = 0.75; ///< fits with less overlap are refused, [0, 1]
   /// Fits whose surface lies further from the outline, in the mean, are refused: a part of the region's size, which is the
-  /// cube root of its volume (the square root of the area of a single slice); > 0. A ball has 0.05, a cylinder 0.03, a
-  /// freehand sweep or a fan without a fifth of its far end 0.02, a whole fan 0.003.
+  /// cube root of its volume (the square root of the area of a single slice); > 0. A ball has 0.05, a cylinder 0.03, a fan
+  /// without a fifth of its far end 0.02, a freehand sweep 0.01, a whole fan 0.003.
   double maximumDistance = 0.026;
   int outlinePoints = 4000; ///< how many points of the outline take part in the last fit, >= 100
 };
@@ -31,7 +31,7 @@ struct ProbeFit {
 };
 
 /// Fits the geometry whose fan fills the region: apex, radii, fan and sweep angles, depth range. A mask of one slice
-/// (dimensions[2] == 1) is fitted by a single plane (ProbeGeometry::IsPlane).
+/// (dimensions[2] == 1) is fitted by a single plane (ProbeGeometry::IsPlane). An empty mask means that every voxel is valid.
 ///
 /// Nothing is assumed about where the probe is: its end is the narrow one. Where the grid cuts the region (its bottom is often
 /// cut flat) the model may go on beyond. Holes, ragged edges and missing corners cost accuracy, but are outvoted.
@@ -40,8 +40,9 @@ struct ProbeFit {
 /// that fanWidth and sweepWidth are what the first samples span, and the distances from there to the centres of fan and sweep
 /// are fanWidth / fanAngle and sweepWidth / sweepAngle. Where a region is the fan of several probes (a box), depth runs along the
 /// last index axis (of a single slice: the second) and the array along the first, as in a grid made by ScanConversionGrid;
-/// the notes say so. Of a thin slab the thin side is the sweep. +x of the probe is the side towards which the indices grow. Fans
-/// whose sweep axis lies within the region are not found.
+/// the notes say so. A fan that is not centred (ProbeGeometry::fanOffset) is found where that explains clearly more. Of a thin
+/// slab the thin side is the sweep. +x of the probe is the side towards which the indices grow. Fans whose sweep axis lies within
+/// the region are not found.
 ///
 /// The result does not depend on the number of threads. Cost: one pass over the voxels, then a search whose time does not
 /// depend on their number: together half a second of one core for 256^3 voxels, and the search runs in parallel.
