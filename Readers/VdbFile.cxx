@@ -3,11 +3,11 @@
 // both directions go by blocks of 8^3: one look-up per block, then a copy of 512 voxels in another order. Blocks of a layer are
 // made in parallel and hung into the tree one after the other, in their order, so the file does not depend on the threads.
 //
-// OpenVDB trusts its files: it allocates what a length says and does not ask whether reading succeeded. Therefore (1) the
-// lengths in the header and in the metadata are walked through here first and compared with the file's size, and (2) the
-// library reads from a stream that throws at the end of the file, through io::Archive, the base class of its own readers. What
-// remains: a damaged length of compressed voxels reserves addresses (not memory) before the throw, and damage within voxels that
-// were compressed with Blosc, or not at all, is not noticed, as in every format without checksums.
+// OpenVDB trusts its files: it allocates what a length says, does not ask whether reading succeeded, and reads as many bytes
+// into a node as a damaged length says. Therefore the file is walked through here first: every length in its header, metadata
+// and tree must be the one that its place allows. Then the library reads from a stream that throws at the end of the file,
+// through io::Archive, the base class of its own readers. What remains: damage within voxels that were compressed with
+// Blosc, or not at all, is not noticed, as in every format without checksums. The walk costs one pass over the file.
 #include "Readers/VdbFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
@@ -15,6 +15,7 @@
 #include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -136,6 +137,108 @@ private:
   std::uint64_t size_;
 };
 
+// The lengths in a tree of Tree_..._5_4_3, from its topology on: whether OpenVDB can read it without leaving its buffers.
+class TreeWalk {
+public:
+  // \param valueBytes of a value in the nodes' tables, \param dataBytes of one among the voxels (halves are shorter)
+  TreeWalk(std::istream& stream, std::string path, std::size_t valueBytes, std::size_t dataBytes, std::uint32_t compression)
+    : stream_(stream), path_(std::move(path)), valueBytes_(valueBytes), dataBytes_(dataBytes), compression_(compression)
+  {
+  }
+  void Tree()
+  {
+    if (Number<std::int32_t>() != 1)
+      Fail();
+    Skip(valueBytes_); // background
+    const std::uint32_t tiles = Number<std::uint32_t>(), children = Number<std::uint32_t>();
+    for (std::uint32_t i = 0; i < tiles; ++i) {
+      Corner();
+      Skip(valueBytes_);
+      if (Number<unsigned char>() > 1)
+        Fail();
+    }
+    for (std::uint32_t i = 0; i < children; ++i) {
+      Corner();
+      Node<5>();
+    }
+    for (std::uint64_t i = 0; i < leaves_; ++i)
+      Values<3>(Mask<3>());
+  }
+
+private:
+  template <int Log2>
+  static constexpr std::size_t Count = std::size_t{1} << (3 * Log2);
+
+  template <class T>
+  T Number()
+  {
+    T value;
+    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
+    return value;
+  }
+  void Skip(std::uint64_t bytes) { stream_.ignore(static_cast<std::streamsize>(bytes)); }
+  [[noreturn]] void Fail() const { FailFile(path_, "its tree of voxels is damaged"); }
+  void Corner()
+  {
+    for (int axis = 0; axis < 3; ++axis)
+      if (Number<std::int32_t>() % 4096 != 0)
+        Fail();
+  }
+  // Reads a mask. \returns how many of its bits are set.
+  template <int Log2>
+  std::size_t Mask()
+  {
+    std::array<std::uint64_t, Count<Log2> / 64> words;
+    stream_.read(reinterpret_cast<char*>(words.data()), sizeof words);
+    std::size_t on = 0;
+    for (const std::uint64_t word : words)
+      on += static_cast<std::size_t>(__builtin_popcountll(word));
+    return on;
+  }
+  template <int Log2>
+  void Node()
+  {
+    const std::size_t children = Mask<Log2>();
+    Values<Log2>(Mask<Log2>());
+    for (std::size_t i = 0; i < children; ++i)
+      if constexpr (Log2 == 5)
+        Node<4>();
+      else {
+        Mask<3>();
+        ++leaves_;
+      }
+  }
+  // The values of a node of which \a active are on, as io::readCompressedValues takes them.
+  template <int Log2>
+  void Values(std::size_t active)
+  {
+    namespace io = openvdb::io;
+    const int form = Number<std::int8_t>();
+    if (form < io::NO_MASK_OR_INACTIVE_VALS || form > io::NO_MASK_AND_ALL_VALS)
+      Fail();
+    const bool two = form == io::MASK_AND_TWO_INACTIVE_VALS;
+    if (two || form == io::NO_MASK_AND_ONE_INACTIVE_VAL || form == io::MASK_AND_ONE_INACTIVE_VAL)
+      Skip((two ? 2 : 1) * valueBytes_);
+    if (two || form == io::MASK_AND_NO_INACTIVE_VALS || form == io::MASK_AND_ONE_INACTIVE_VAL)
+      Skip(Count<Log2> / 8);
+    const bool activeAlone = (compression_ & io::COMPRESS_ACTIVE_MASK) && form != io::NO_MASK_AND_ALL_VALS;
+    const std::int64_t bytes = static_cast<std::int64_t>((activeAlone ? active : Count<Log2>)*dataBytes_);
+    if (!(compression_ & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)))
+      return Skip(static_cast<std::uint64_t>(bytes));
+    // Positive: bytes of compressed values. Else they are as they are, and it counts them.
+    const std::int64_t length = Number<std::int64_t>();
+    if (length > 2 * bytes + 1024 || (length <= 0 && length != -bytes))
+      Fail();
+    Skip(static_cast<std::uint64_t>(std::abs(length)));
+  }
+
+  std::istream& stream_;
+  std::string path_;
+  std::size_t valueBytes_, dataBytes_;
+  std::uint32_t compression_;
+  std::uint64_t leaves_ = 0;
+};
+
 class Archive : public openvdb::io::Archive {
 public:
   // The grid to take, whole. \a others: the names of the rest.
@@ -167,6 +270,16 @@ public:
     }
     if (!grid)
       FailFile(path, "it holds no grid of single numbers: the last of " + std::to_string(count) + " is " + last);
+    // Up to the tree, then through it, before it is read.
+    chosen.seekToGrid(stream);
+    readGridCompression(stream);
+    grid->readMeta(stream);
+    grid->readTransform(stream);
+    const std::size_t valueBytes = grid->isType<openvdb::FloatGrid>() || grid->isType<openvdb::Int32Grid>() ? 4 : 8;
+    const bool real = grid->isType<openvdb::FloatGrid>() || grid->isType<openvdb::DoubleGrid>();
+    if (chosen.saveFloatAsHalf() && !real)
+      FailFile(path, "its grid " + chosen.gridName() + " holds halves of whole numbers");
+    TreeWalk(stream, path, valueBytes, chosen.saveFloatAsHalf() ? 2 : valueBytes, openvdb::io::getDataCompression(stream)).Tree();
     chosen.seekToGrid(stream);
     readGrid(grid, chosen, stream);
     return grid;
