@@ -103,7 +103,6 @@ void OtherFormats(const fs::path& folder, int n, const Voxels& voxels)
       double vtkSeconds = 0.0;
       std::tie(writeSeconds, vtkSeconds) = Duel(write, [&] { writer->Write(); });
       read(theirs);
-      // VTK mirrors the rows of what it writes and reads: both ends of it agree.
       Report("volume_file", name + " write", "vtkNIFTIImageWriter", vtkSeconds, Different(voxels, back.data()), "voxels",
              {{"file_mb", Megabytes(theirs)}});
       std::tie(readSeconds, vtkSeconds) = Duel([&] { read(theirs); },
