@@ -14,7 +14,9 @@
  * | Scene          | a string: what a synthetic volume shows, enough to make it again                          |
  *
  * ImageToWorld is the exact place of a tracked frame, whose pixels may be sheared a little by its calibration; the geometry
- * of the image is the nearest without shear. A frame whose tracker saw nothing has none. Nobody else spells these names. It has no state.
+ * of the image is the nearest without shear. A frame whose tracker saw nothing has none.
+ *
+ * Nobody else spells these names. It has no state.
  */
 #ifndef vtkUltrasoundAcquisition_h
 #define vtkUltrasoundAcquisition_h
