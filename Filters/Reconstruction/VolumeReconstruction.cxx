@@ -749,7 +749,8 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
   const BetweenFrames between = body.parameters.between;
   const bool neighbours = body.hasPrevious && body.previous.size == body.current.size;
   const double step = neighbours ? body.StepBetween(body.previous, body.current) : 0.0;
-  const bool joined = neighbours && between != BetweenFrames::Nothing && step <= body.parameters.maximumGapMm &&
+  const bool joined = neighbours && between != BetweenFrames::Nothing && std::isfinite(step) &&
+                      step <= body.parameters.maximumGapMm &&
                       (between == BetweenFrames::Backward || step <= mostParts * body.parameters.stepMm);
   bool reached = false;
   if (joined && between == BetweenFrames::Backward) {

@@ -300,6 +300,33 @@ TEST(VolumeReconstruction, FramesFarApartAreNotJoined)
   EXPECT_EQ(result.valid.View()(3, 3, 2), 0);
 }
 
+// No gap is too wide: a first frame, and one of another size, have no neighbour all the same.
+TEST(VolumeReconstruction, FramesWithoutANeighbourAreNotJoined)
+{
+  const ImageGeometry grid = Grid(10, 8, 5);
+  const Image<unsigned char> large{Volume<unsigned char>({10, 8, 1}, 50)};
+  Image<unsigned char> small{Volume<unsigned char>({6, 5, 1}, 80)}, far = large;
+  small.pose.translation() = Eigen::Vector3d(0.0, 0.0, 4.0);
+  far.pose.translation() = Eigen::Vector3d(0.0, 0.0, 1e200); // the square of the distance is not finite
+  ReconstructionParameters parameters;
+  parameters.maximumGapMm = std::numeric_limits<double>::infinity();
+  for (const BetweenFrames between : {BetweenFrames::Forward, BetweenFrames::Backward})
+    for (const double stepMm : {0.0, 1e-300, 1e308}) {
+      parameters.between = between;
+      parameters.stepMm = stepMm;
+      Result<unsigned char> result(grid);
+      VolumeReconstruction<unsigned char> reconstruction(parameters, grid, result.Output());
+      EXPECT_EQ(reconstruction.Add(large.Frame()), FrameUse::Used);
+      EXPECT_EQ(reconstruction.Add(small.Frame()), FrameUse::Used);
+      EXPECT_EQ(reconstruction.Add(far.Frame()), FrameUse::Outside);
+      EXPECT_EQ(reconstruction.FramesBetween(), 0);
+      EXPECT_EQ(result.intensity.View()(9, 7, 0), 50);
+      EXPECT_EQ(result.valid.View()(3, 3, 2), 0);
+      EXPECT_EQ(result.intensity.View()(3, 3, 4), 80);
+      EXPECT_EQ(result.valid.View()(9, 7, 4), 0);
+    }
+}
+
 // A smooth field, sampled by a fan of frames that turns about a line, comes back within a bound.
 TEST(VolumeReconstruction, AFieldComesBackFromARotatedFan)
 {
