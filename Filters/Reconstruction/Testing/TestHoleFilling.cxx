@@ -110,6 +110,43 @@ TEST(HoleFilling, ConstantsStayAndThreadsDoNotMatter)
   EXPECT_TRUE(std::equal(scene.valid.View().begin(), scene.valid.View().end(), other.valid.View().begin()));
 }
 
+// Which voxels are holes, against the definition tried at every voxel.
+TEST(HoleFilling, HolesAreThoseOfTheDefinition)
+{
+  const std::array<int, 3> n{23, 19, 21};
+  Random random(17);
+  Scene scene(n);
+  for (int seen = 0; seen < 60; ++seen)
+    scene.See(static_cast<int>(random.Below(23)), static_cast<int>(random.Below(19)), static_cast<int>(random.Below(21)), 9);
+  const auto seen = scene.coverage.View();
+  const auto ahead = [&](int i, int j, int k, int x, int y, int z) {
+    for (int step = 1;; ++step) {
+      const int a = i + step * x, b = j + step * y, c = k + step * z;
+      if (a < 0 || b < 0 || c < 0 || a >= n[0] || b >= n[1] || c >= n[2])
+        return 1000;
+      if (seen(a, b, c))
+        return step;
+    }
+  };
+  for (const int reach : {1, 4, 9, 40, 100}) {
+    scene.Fill(HoleFilling::Stick, reach);
+    std::ptrdiff_t different = 0, holes = 0;
+    for (int k = 0; k < n[2]; ++k)
+      for (int j = 0; j < n[1]; ++j)
+        for (int i = 0; i < n[0]; ++i) {
+          bool hole = false;
+          for (int line = 14; line < 27 && !seen(i, j, k); ++line) { // one of each pair of opposite directions
+            const int x = line % 3 - 1, y = line / 3 % 3 - 1, z = line / 9 - 1;
+            hole = hole || ahead(i, j, k, x, y, z) + ahead(i, j, k, -x, -y, -z) - 1 <= reach;
+          }
+          holes += hole;
+          different += (scene.valid.View()(i, j, k) == 1) != (hole || seen(i, j, k));
+        }
+    EXPECT_EQ(different, 0) << reach;
+    EXPECT_GT(holes, 0) << reach;
+  }
+}
+
 TEST(HoleFilling, RefusesABadReachAndStops)
 {
   Scene scene({4, 4, 4});
