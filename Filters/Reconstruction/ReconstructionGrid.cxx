@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Corners suffice: pixels lie between them. The smallest box that contains points is a hard problem, and frames make it easy:
 // they are planes that move little sideways, so the mean image's axes are right for most sweeps. Where the probe wanders or
-// turns, the principal directions can be better; whichever box is smaller is taken.
+// turns, the principal directions can be better; whichever box is smaller is taken. Where the probe turns so far that there is
+// no mean image, the principal directions are all there is.
 #include "ReconstructionGrid.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
@@ -12,6 +13,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <limits>
+#include <optional>
 #include <string>
 
 namespace echorama {
@@ -19,7 +21,10 @@ namespace echorama {
 namespace {
 
 constexpr double megabyte = 1e6;
-constexpr double slack = 1e-6; // of a voxel: rounding adds no empty layer
+constexpr double slack = 1e-6;           // of a voxel: rounding adds no empty layer
+constexpr double leastPreference = 1e-3; // of all images, for a line to be nearest to their axes
+constexpr double leastSine = 0.1;        // of the angle between the mean axes
+constexpr double undecided = 1e-9;
 
 Eigen::AlignedBox3d BoxAlong(const Eigen::Matrix3d& directions, const std::vector<Eigen::Vector3d>& points)
 {
@@ -43,22 +48,45 @@ Eigen::Matrix3d Orthonormal(const Eigen::Matrix3d& m)
   return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
-// Axes of the images, averaged. Images that were turned over count with their axes turned back.
-Eigen::Matrix3d MeanImage(const std::vector<FramePlace>& frames)
+// The line that is nearest to an axis of all images, pointing as most of them do: whatever their order, and with images that were
+// turned over. Nothing when no line is nearest.
+std::optional<Eigen::Vector3d> MeanAxis(const std::vector<FramePlace>& frames, int column)
 {
-  Eigen::Vector3d across = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const FramePlace& frame : frames) {
-    const Eigen::Vector3d u = frame.imageToWorld.linear().col(0).normalized(),
-                          v = frame.imageToWorld.linear().col(1).normalized();
-    across += across.dot(u) < 0.0 ? Eigen::Vector3d(-u) : u;
-    down += down.dot(v) < 0.0 ? Eigen::Vector3d(-v) : v;
+    const Eigen::Vector3d axis = frame.imageToWorld.linear().col(column).normalized();
+    spread += axis * axis.transpose();
+    sum += axis;
   }
+  const double count = static_cast<double>(frames.size());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  if (solver.eigenvalues()[2] - solver.eigenvalues()[1] < leastPreference * count)
+    return std::nullopt;
+  Eigen::Vector3d axis = solver.eigenvectors().col(2);
+  double sign = axis.dot(sum);
+  if (std::abs(sign) < undecided * count) { // as many point one way as the other: then along the world's axis that is nearest
+    Eigen::Index most = 0;
+    axis.cwiseAbs().maxCoeff(&most);
+    sign = axis[most];
+  }
+  if (sign < 0.0)
+    axis = -axis;
+  return axis;
+}
+
+// Axes of the images, averaged. Nothing when the images point everywhere, or when both axes come out alike.
+std::optional<Eigen::Matrix3d> MeanImage(const std::vector<FramePlace>& frames)
+{
+  const auto across = MeanAxis(frames, 0), down = MeanAxis(frames, 1);
+  if (!across || !down || across->cross(*down).norm() < leastSine)
+    return std::nullopt;
   Eigen::Matrix3d axes;
-  axes << across.normalized(), down.normalized(), across.cross(down).normalized();
+  axes << *across, *down, across->cross(*down).normalized();
   return Orthonormal(axes);
 }
 
-// Principal directions, each along the axis of the mean image that it is nearest to.
+// Principal directions, each along the axis of \a image that it is nearest to.
 Eigen::Matrix3d Principal(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& image)
 {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -137,9 +165,10 @@ ImageGeometry ReconstructionGrid(const std::vector<FramePlace>& frames, GridDire
   const double spacing = spacingMm > 0.0 ? spacingMm : pixel / static_cast<double>(frames.size());
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   if (directions == GridDirections::Fitted) {
-    axes = MeanImage(frames);
+    const std::optional<Eigen::Matrix3d> image = MeanImage(frames);
+    axes = image.value_or(axes);
     const Eigen::Matrix3d principal = Principal(corners, axes);
-    if (Cost(BoxAlong(principal, corners), spacing) < Cost(BoxAlong(axes, corners), spacing))
+    if (!image || Cost(BoxAlong(principal, corners), spacing) < Cost(BoxAlong(axes, corners), spacing))
       axes = principal;
   }
   return GridAround(BoxAlong(axes, corners), axes, spacing);

@@ -9,7 +9,8 @@ namespace echorama {
 /// How the grid of a reconstruction lies.
 enum class GridDirections {
   Fitted, ///< along the data's own directions, in the smaller of two boxes: that of the mean image (x and y as in the images, z
-          ///< along the sweep) and that of the principal directions of all corners
+          ///< along the sweep) and that of the principal directions of all corners; in the latter where images turn so far that
+          ///< they have no mean. The order of the frames does not matter
   World,  ///< along the axes of the world
 };
 

@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Reconstruction/ReconstructionGrid.h"
+#include <algorithm>
 #include <functional>
 #include <gtest/gtest.h>
 #include <limits>
@@ -89,6 +90,47 @@ TEST(ReconstructionGrid, AnObliqueSweepIsAlongItsPrincipalDirections)
   ExpectInside(grid, places);
   EXPECT_LT(grid.VoxelCount() * 3, world.VoxelCount());
   EXPECT_NEAR(grid.direction.determinant(), 1.0, 1e-9);
+}
+
+// A probe that is turned about its own axis: no direction is the mean of all, or both axes of the images have the same.
+TEST(ReconstructionGrid, ImagesThatTurnAllTheWayHaveAGrid)
+{
+  for (const int turn : {0, 1, 2, 3}) {
+    std::vector<FramePlace> places;
+    for (int k = 0; k < 36; ++k) {
+      FramePlace place;
+      const double angle = k * 3.14159265358979323846 / 18.0;
+      place.imageToWorld.linear() = ExpRotation(turn == 3 ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                                                          : Eigen::Vector3d(angle * Eigen::Vector3d::Unit(turn)));
+      if (turn == 3 && k % 2) { // columns and rows exchanged in every other image
+        place.imageToWorld.linear().col(0).swap(place.imageToWorld.linear().col(1));
+        place.imageToWorld.linear().col(2) *= -1.0;
+      }
+      place.imageToWorld.translation() = Eigen::Vector3d(0.0, 0.0, k);
+      place.pixels = {-20, 20, 0, 30};
+      places.push_back(place);
+    }
+    const ImageGeometry grid = ReconstructionGrid(places, GridDirections::Fitted, 1.0);
+    grid.Check("grid");
+    EXPECT_TRUE(grid.direction.allFinite()) << turn;
+    ExpectInside(grid, places);
+  }
+}
+
+TEST(ReconstructionGrid, TheOrderOfFramesDoesNotMatter)
+{
+  const Eigen::Matrix3d rotation = ExpRotation({0.4, -0.9, 0.3});
+  auto places = StraightSweep(rotation, 12);
+  for (const std::size_t k : {0u, 1u, 5u}) { // turned over, about their first rows
+    places[k].imageToWorld.linear().col(0) *= -1.0;
+    places[k].imageToWorld.linear().col(2) *= -1.0;
+  }
+  const ImageGeometry grid = ReconstructionGrid(places, GridDirections::Fitted);
+  EXPECT_LT((grid.direction - rotation).cwiseAbs().maxCoeff(), 1e-9) << "as most of them lie";
+  std::reverse(places.begin(), places.end());
+  const ImageGeometry other = ReconstructionGrid(places, GridDirections::Fitted);
+  EXPECT_LT((other.direction - grid.direction).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_EQ(other.dimensions, grid.dimensions);
 }
 
 TEST(ReconstructionGrid, RefusesWhatCannotBe)
