@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Passes over bytes: threshold, erosion and dilation by a square (separable running counts), one flood fill for the largest
-// piece, and the closing of gaps along rows and columns. Some 10 ns a pixel, once per sweep; Add() is one pass.
+// piece, and the closing of gaps that rows and columns enclose. Some 10 ns a pixel, once per sweep; Add() is one pass.
 #include "FrameSector.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
@@ -8,7 +8,9 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <string>
+#include <utility>
 
 namespace echorama {
 
@@ -17,6 +19,8 @@ namespace {
 constexpr double changingShare = 0.1; // of the steps between frames in which a pixel changes
 constexpr double brightShare = 0.5;   // of the frames in which a pixel that changes at all is not 0
 constexpr int bridge = 3;             // half the width of the thinnest part of a sector, pixels
+constexpr double leastShare = 0.05;   // of the image, that a fan or rectangle of echoes takes
+constexpr double leastPiece = 0.25;   // of the image, that a piece takes which is neither
 
 // 1 where all (erode) or any (dilate) of the pixels within "half" along the axis are set. Beyond the image counts as set for an
 // erosion: a sector may be cut by the image's border.
@@ -82,21 +86,22 @@ std::ptrdiff_t KeepLargest(Volume<unsigned char>& mask)
   return largest;
 }
 
-// Sets everything between the first and the last set pixel of each line along the axis.
-void CloseGaps(Volume<unsigned char>& mask, int axis)
+// Adds 1 to "enclosed" between the first and the last set pixel of each line along the axis.
+void Enclose(const Volume<unsigned char>& mask, int axis, Volume<unsigned char>& enclosed)
 {
   const auto& n = mask.Dimensions();
   const int length = n[static_cast<std::size_t>(axis)], lines = n[static_cast<std::size_t>(1 - axis)];
   const std::ptrdiff_t step = axis == 0 ? 1 : n[0], line = axis == 0 ? n[0] : 1;
   for (int l = 0; l < lines; ++l) {
-    unsigned char* first = mask.View().Data() + l * line;
+    const unsigned char* first = mask.View().Data() + l * line;
+    unsigned char* counts = enclosed.View().Data() + l * line;
     int from = 0, to = length - 1;
     while (from < length && !first[from * step])
       ++from;
     while (to > from && !first[to * step])
       --to;
     for (int i = from; i <= to && i < length; ++i)
-      first[i * step] = 1;
+      ++counts[i * step];
   }
 }
 
@@ -153,8 +158,12 @@ Volume<unsigned char> FrameSector::Detect() const
   const auto view = sector.View();
   for (std::ptrdiff_t at = 0; at < view.Size(); ++at)
     view[at] = view[at] && alive.View()[at];
+  // What its row alone encloses may be the hollow under a curved face.
+  Volume<unsigned char> enclosed(size_);
   for (const int axis : {0, 1})
-    CloseGaps(sector, axis);
+    Enclose(sector, axis, enclosed);
+  for (std::ptrdiff_t at = 0; at < view.Size(); ++at)
+    view[at] = enclosed.View()[at] == 2;
   return sector;
 }
 
@@ -181,6 +190,41 @@ FittedSector FitSector(const Volume<unsigned char>& mask, double spacingX, doubl
       throw;
     return {mask, 0.0};
   }
+}
+
+DetectedSector DetectSector(const FrameSector& frames, double spacingX, double spacingY, const Progress& progress)
+{
+  const Volume<unsigned char> found = frames.Detect();
+  const auto share = [](const Volume<unsigned char>& mask) {
+    return static_cast<double>(mask.View().Size() - std::count(mask.View().begin(), mask.View().end(), 0)) /
+           static_cast<double>(mask.View().Size());
+  };
+  const auto percent = [](double part) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2g%%", 100.0 * part);
+    return std::string(text);
+  };
+  FittedSector fitted = FitSector(found, spacingX, spacingY, progress);
+  const double part = std::min(share(found), share(fitted.mask));
+  if (part < (fitted.overlap > 0.0 ? leastShare : leastPiece))
+    return {Volume<unsigned char>(found.Dimensions(), 1), false,
+            "no sector was found: what changes from frame to frame is only " + percent(part) + " of the image" +
+                (fitted.overlap > 0.0 ? "" : " and no fan fits it") + ", so all pixels were taken"};
+  if (fitted.overlap > 0.0)
+    return {std::move(fitted.mask), true,
+            "sector found by what changes, a fan fitted to it (overlap " + percent(fitted.overlap) + ")"};
+  return {std::move(fitted.mask), true, "sector found by what changes; no fan fits it, so it was taken as it is"};
+}
+
+std::array<int, 4> BoxOf(VolumeView<const unsigned char> mask)
+{
+  const auto& size = mask.Dimensions();
+  std::array<int, 4> box{size[0], -1, size[1], -1};
+  for (int y = 0; y < size[1]; ++y)
+    for (int x = 0; x < size[0]; ++x)
+      if (mask(x, y, 0))
+        box = {std::min(box[0], x), std::max(box[1], x), std::min(box[2], y), std::max(box[3], y)};
+  return box;
 }
 
 Volume<unsigned char> FanMask(const ImageFan& fan, int width, int height, double spacingX, double spacingY)

@@ -129,10 +129,11 @@ public:
   {
     const std::string name = "frame " + std::to_string(this->Numbers[static_cast<std::size_t>(index)]);
     vtkInformation* information = this->Executive->GetOutputInformation(this->Port);
-    this->Request(information, this->Times[static_cast<std::size_t>(index)]);
+    const bool made = this->Request(information, this->Times[static_cast<std::size_t>(index)]);
     vtkImageData* image = vtkImageData::SafeDownCast(this->Executive->GetOutputData(this->Port));
-    if (!image) {
-      throw Error(Error::Kind::BadInput, name + " could not be made");
+    if (!made || !image) {
+      throw Error(Error::Kind::BadInput,
+                  name + " could not be made by " + this->Producer->GetClassName() + "; its own message says why");
     }
     vtkUltrasoundVolume::Input frame = vtkUltrasoundVolume::CheckInput(this->Self, image, name);
     if (image->GetDimensions()[2] != 1) {
@@ -158,9 +159,12 @@ public:
   }
 
 private:
-  void Request(vtkInformation* information, double time)
+  // Whether it succeeded; what is in the output otherwise is of an earlier time.
+  bool Request(vtkInformation* information, double time)
   {
-    this->Executive->UpdateInformation();
+    if (!this->Executive->UpdateInformation()) {
+      return false;
+    }
     if (this->Timed) {
       information->Set(Pipeline::UPDATE_TIME_STEP(), time);
     }
@@ -172,7 +176,7 @@ private:
       information->Get(Pipeline::WHOLE_EXTENT(), whole);
       information->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
     }
-    this->Executive->Update(this->Port);
+    return this->Executive->Update(this->Port) != 0;
   }
 
   vtkUltrasoundVolumeReconstructor* Self;
@@ -279,7 +283,8 @@ void vtkUltrasoundVolumeReconstructor::Refuse(const std::string& reason)
 }
 
 //----------------------------------------------------------------------------
-const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::Prepare(vtkInformationVector** inputs)
+const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::Prepare(vtkInformationVector** inputs,
+                                                                                        const echorama::Progress& progress)
 {
   // Going through all frames is not to be repeated as long as nothing has changed.
   const auto timeOf = [this](int inputPort) -> vtkMTimeType {
@@ -308,6 +313,7 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
   std::array<int, 3> size{0, 0, 0};
   std::optional<Eigen::Affine3d> first; // pose
   for (int index = 0; index < frames.Count(); ++index) {
+    progress(0.9 * index / frames.Count());
     const vtkUltrasoundVolume::Input frame = frames.Make(index);
     const auto pose = vtkUltrasoundAcquisition::ImageToWorldOf(frame.Image);
     if (!pose || echorama::CheckPose(*pose) != echorama::FrameUse::Used) {
@@ -345,16 +351,12 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
   plan->SectorText = "all pixels";
   if (detect) {
     const Eigen::Vector2d pixel = PixelSize(*first);
-    echorama::FittedSector fitted = echorama::FitSector(found.Detect(), pixel[0], pixel[1]);
-    plan->Sector = std::move(fitted.mask);
-    std::ostringstream text;
-    text << "sector found by what changes";
-    if (fitted.overlap > 0.0) {
-      text << ", a fan fitted to it (overlap " << fitted.overlap << ")";
-    } else {
-      text << "; no fan fits it, so it was taken as it is";
+    echorama::DetectedSector sector = echorama::DetectSector(found, pixel[0], pixel[1], progress.Part(0.9, 1.0));
+    plan->Sector = std::move(sector.mask);
+    plan->SectorText = sector.text;
+    if (!sector.found) {
+      vtkWarningMacro(<< sector.text);
     }
-    plan->SectorText = text.str();
   } else if (this->Sector != ALL) {
     plan->Sector = this->SectorMask(size, *first);
     plan->SectorText = this->Sector == RECTANGLE ? "the given rectangle" : "the given fan";
@@ -362,16 +364,8 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
   if (plan->Sector) {
     // The grid is that of the pixels that count.
     const auto mask = plan->Sector->View();
-    std::array<int, 4> box{size[0], -1, size[1], -1};
-    std::ptrdiff_t inside = 0;
-    for (int y = 0; y < size[1]; ++y) {
-      for (int x = 0; x < size[0]; ++x) {
-        if (mask(x, y, 0)) {
-          box = {std::min(box[0], x), std::max(box[1], x), std::min(box[2], y), std::max(box[3], y)};
-          ++inside;
-        }
-      }
-    }
+    const std::array<int, 4> box = echorama::BoxOf(mask);
+    const std::ptrdiff_t inside = mask.Size() - std::count(mask.begin(), mask.end(), 0);
     plan->SectorText += ", " + std::to_string(inside) + " of " + std::to_string(mask.Size()) + " pixels";
     for (echorama::FramePlace& place : places) {
       place.pixels = inside > 0 ? box : place.pixels;
@@ -380,9 +374,9 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
   if (given) {
     int port = 0;
     vtkAlgorithm* producer = this->GetInputAlgorithm(1, 0, port);
-    producer->Update(port);
+    const bool made = producer->GetExecutive()->Update(port) != 0;
     vtkImageData* reference = vtkImageData::SafeDownCast(producer->GetOutputDataObject(port));
-    if (!reference || reference->GetNumberOfPoints() < 1) {
+    if (!made || !reference || reference->GetNumberOfPoints() < 1) {
       throw Error(Error::Kind::BadInput, "the reference volume is empty");
     }
     plan->Grid = vtkUltrasoundVolume::GeometryOf(reference);
@@ -398,16 +392,31 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
 int vtkUltrasoundVolumeReconstructor::RequestInformation(vtkInformation*, vtkInformationVector** inputs,
                                                          vtkInformationVector* outputs)
 {
+  // The pipeline takes a request to stop back when data are made; all frames are gone through before that.
+  this->SetAbortExecute(0);
   // A failure here ends the update: an earlier output would stay.
-  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress&) {
+  const int done = vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
     vtkInformation* out = outputs->GetInformationObject(0);
-    const Plan& plan = this->Prepare(inputs);
+    const Plan& plan = this->Prepare(inputs, progress);
     vtkUltrasoundVolume::SetGeometry(out, plan.Grid);
     vtkDataObject::SetPointDataActiveScalarInfo(out, plan.Type, 1);
     // One volume of all times.
     out->Remove(Pipeline::TIME_STEPS());
     out->Remove(Pipeline::TIME_RANGE());
   });
+  this->Stopped = !done && this->GetAbortExecute();
+  return done;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundVolumeReconstructor::ComputePipelineMTime(vtkInformation* request, vtkInformationVector** inputs,
+                                                           vtkInformationVector* outputs, int port, vtkMTimeType* time)
+{
+  if (this->Stopped) { // the pipeline takes information as made even where that was stopped
+    this->Stopped = false;
+    this->Modified();
+  }
+  return this->Superclass::ComputePipelineMTime(request, inputs, outputs, port, time);
 }
 
 //----------------------------------------------------------------------------
@@ -415,7 +424,7 @@ void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vt
                                                const echorama::Progress& progress)
 {
   this->Statistics = Counts();
-  const Plan& plan = this->Prepare(inputs);
+  const Plan& plan = this->Prepare(inputs, progress);
   const echorama::ReconstructionParameters parameters = this->Parameters();
   const std::size_t voxelBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(plan.Type));
   const double bytes = echorama::ReconstructionMemory(parameters, plan.Grid, voxelBytes);

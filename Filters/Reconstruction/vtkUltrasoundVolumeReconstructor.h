@@ -16,13 +16,14 @@
  *
  * The filter goes through the time steps itself, in the order of time: once for poses and the sector when information is asked
  * for (not when the grid is given and no sector is to be found), once to splat. Frames are made one at a time by the input and
- * not kept. The output does not depend on time. Memory is stated (GetMemoryMb) and checked before any is allocated.
+ * not kept. Both times it tells its progress and can be stopped. The output does not depend on time. Memory is stated
+ * (GetMemoryMb) and checked before any is allocated.
  *
  * Live: BeginLive() with a grid, then AddFrame() for each frame; GetLiveOutput() is up to date after each. That needs no input.
  *
- * Refuses, with a message: no frame that can be used (with the reasons), frames of different sizes where a sector is to be found,
- * a frame that is not one slice, parameters out of range, and a grid that takes more memory than allowed (with a spacing that
- * fits).
+ * Refuses, with a message: a frame that its input fails to make, no frame that can be used (with the reasons), frames of
+ * different sizes where a sector is to be found, a frame that is not one slice, parameters out of range, and a grid that takes
+ * more memory than allowed (with a spacing that fits).
  *
  * Under MPI each rank computes the whole and keeps its piece.
  *
@@ -124,8 +125,9 @@ public:
   ///@{
   /**
    * Which part of the images goes into the volume, of what their ValidRegion allows: ALL; the sector that is DETECTED in the
-   * sequence (default), by what changes from frame to frame, with a fan or rectangle fitted to it; a RECTANGLE; or a FAN. Live
-   * there is nothing to detect: DETECTED is then ALL.
+   * sequence (default), by what changes from frame to frame, with a fan or rectangle fitted to it; a RECTANGLE; or a FAN. Where
+   * what changes is too small for a sector (echorama::DetectSector), all pixels are taken, with a warning. Live there is nothing
+   * to detect: DETECTED is then ALL.
    */
   vtkSetClampMacro(Sector, int, ALL, FAN);
   vtkGetMacro(Sector, int);
@@ -224,6 +226,8 @@ protected:
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int ComputePipelineMTime(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs, int port,
+                           vtkMTimeType* time) override;
 #ifndef __VTK_WRAP__
   void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
 #endif
@@ -233,7 +237,7 @@ private:
   class Frames;
   struct Plan;
   struct Live;
-  const Plan& Prepare(vtkInformationVector** inputs);
+  const Plan& Prepare(vtkInformationVector** inputs, const echorama::Progress& progress);
   echorama::ReconstructionParameters Parameters() const;
   echorama::Volume<unsigned char> SectorMask(const std::array<int, 3>& size, const Eigen::Affine3d& imageToWorld) const;
   void Refuse(const std::string& reason);
@@ -264,6 +268,7 @@ private:
   int LastFrame = -1;
   int FrameStep = 1;
   double MemoryLimitMb = 0.0;
+  bool Stopped = false; // while information was made
 #ifndef __VTK_WRAP__
   double Alpha = echorama::ReconstructionParameters().alpha;
   double StepMm = echorama::ReconstructionParameters().stepMm;

@@ -48,6 +48,16 @@ def reconstructor(source, **parameters):
     return filter, messages_of(filter)
 
 
+def data_like(pixels, pose):
+    """An image on the grid of a frame, a few slices thick."""
+    image = vtkImageData()
+    image.SetDimensions(pixels.shape[1], pixels.shape[0], 4)
+    image.SetSpacing(0.5, 0.5, 0.5)
+    image.SetOrigin(pose[:3, 3])
+    image.SetDirectionMatrix(ROTATION.ravel())
+    return image
+
+
 def direction_of(image):
     matrix = image.GetDirectionMatrix()
     return np.array([[matrix.GetElement(i, j) for j in range(3)] for i in range(3)])
@@ -188,6 +198,22 @@ def test_the_sector_is_found():
     filter.SetFanAngles(20, -20)
     filter.Update()
     assert any("FanAngles" in message for message in messages), messages
+
+
+def test_what_is_too_small_for_a_sector_is_not_believed():
+    """A black bath with one small thing that moves in it: all pixels are taken, and that is told."""
+    images, poses = straight_sweep(shape=(60, 80), noise=12)
+    for image in images:
+        bath = np.zeros_like(image)
+        bath[20:30, 30:40] = image[20:30, 30:40]
+        image[:] = bath
+    filter, messages = reconstructor(Source(images, poses), Sector=Reconstructor.DETECTED, SpacingMm=0.5)
+    warnings = messages_of(filter, "WarningEvent")
+    filter.Update()
+    assert not messages, messages
+    assert filter.GetOutput().GetDimensions()[:2] == (80, 60), filter.GetOutput().GetDimensions()
+    assert len([w for w in warnings if "all pixels were taken" in w]) == 1, warnings
+    assert "all pixels were taken" in filter.GetReport()
 
 
 def test_a_valid_region_keeps_pixels_out():
@@ -352,6 +378,45 @@ def test_it_can_be_stopped():
     filter.Modified()
     filter.Update()
     assert filter.GetOutput().GetNumberOfPoints() > 0
+
+    # While poses are looked up, and without anything else to make it run again.
+    for after in (5, 25):
+        source = Source(images, poses)
+        filter, messages = reconstructor(source, SpacingMm=0.7)
+        tag = filter.AddObserver("ProgressEvent", lambda f, e: f.SetAbortExecute(int(len(source.made) >= after)))
+        filter.Update()
+        assert filter.GetOutput().GetNumberOfPoints() == 0
+        assert after <= len(source.made) <= after + 2, (after, len(source.made))
+        filter.RemoveObserver(tag)
+        messages.clear()
+        filter.Update()
+        assert filter.GetOutput().GetNumberOfPoints() > 0 and not messages, messages
+
+
+def test_a_failing_input_fails():
+    """Frame 7 cannot be made: frame 6 must not take its place."""
+    images, poses = straight_sweep()
+
+    class Failing(Source):
+        broken = True
+
+        def RequestData(self, request, inputs, outputs):
+            super().RequestData(request, inputs, outputs)
+            return 0 if self.broken and self.made[-1] == 7 else 1
+
+    for given in (False, True):
+        source = Failing(images, poses)
+        filter, messages = reconstructor(source, SpacingMm=0.7)
+        if given:
+            filter.SetReferenceData(data_like(images[0], poses[0]))
+        filter.Update()
+        assert any("frame 7 could not be made" in message for message in messages), messages
+        assert filter.GetOutput().GetNumberOfPoints() == 0
+        source.broken = False
+        source.Modified()
+        messages.clear()
+        filter.Update()
+        assert not messages and (0 if given else 20) < filter.GetFramesUsed(), messages
 
 
 if __name__ == "__main__":

@@ -98,13 +98,13 @@ def array(image, name="Intensity"):
     return vtk_to_numpy(image.GetPointData().GetArray(name)).reshape(image.GetDimensions()[::-1])
 
 
-def messages_of(filter):
-    """The list that will hold the error messages of a filter and its pipeline."""
+def messages_of(filter, event="ErrorEvent"):
+    """The list that will hold the error messages, or the warnings, of a filter and its pipeline."""
     messages = []
 
     def heard(caller, event, message=None):
         messages.append(message)
     heard.CallDataType = "string0"
-    filter.AddObserver("ErrorEvent", heard)
-    filter.GetExecutive().AddObserver("ErrorEvent", heard)
+    filter.AddObserver(event, heard)
+    filter.GetExecutive().AddObserver(event, heard)
     return messages
