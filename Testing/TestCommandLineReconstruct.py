@@ -54,7 +54,7 @@ class Reconstruct(unittest.TestCase):
         self.assertEqual((told["transform"], told["path"]), ("ImageToWorld", ["ImageToWorld"]))
         self.assertGreater(told["memory_mb"], 0)
         text = run("reconstruct", path, "-o", out, *EXACT).stdout
-        for words in ("15 x 12 x 9 voxels of 1.000", "9 ", "100.0% of the voxels are real", "ImageToWorld"):
+        for words in ("15 x 12 x 9 voxels of 1.000", "9 ", "100.0% of the voxels are real", "images placed by ImageToWorld\n"):
             self.assertIn(words, text)
 
     def test_coverage_goes_where_it_can(self):

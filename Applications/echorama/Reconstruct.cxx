@@ -201,7 +201,8 @@ void Reconstruct(Session& session, const ReconstructOptions& options)
   session.Say("wrote " + options.output + ": " + std::to_string(geometry.dimensions[0]) + " x " +
               std::to_string(geometry.dimensions[1]) + " x " + std::to_string(geometry.dimensions[2]) + " voxels of " +
               Triple(geometry.spacing, " x ", 3) + " mm");
-  session.Say("  " + place.Image() + "To" + place.World() + " from " + place.Find(place.Image()).PathText());
+  const std::string placing = place.Image() + "To" + place.World(), path = place.Find(place.Image()).PathText();
+  session.Say("  images placed by " + placing + (path == placing ? "" : ", composed of " + path));
   for (const std::string& line : LinesOf(reconstructor->GetReport()))
     session.Say("  " + line);
   session.Say("  " + Fixed(100.0 * (seen + filled) / voxels, 1) + "% of the voxels are real; those that were seen got " +
