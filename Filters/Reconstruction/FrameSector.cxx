@@ -201,7 +201,7 @@ DetectedSector DetectSector(const FrameSector& frames, double spacingX, double s
   };
   const auto percent = [](double part) {
     char text[32];
-    std::snprintf(text, sizeof text, "%.2g%%", 100.0 * part);
+    std::snprintf(text, sizeof text, "%.1f%%", 100.0 * part);
     return std::string(text);
   };
   FittedSector fitted = FitSector(found, spacingX, spacingY, progress);

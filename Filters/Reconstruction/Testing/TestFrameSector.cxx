@@ -133,7 +133,7 @@ TEST(FrameSector, WhatIsTooSmallForASectorIsNotBelieved)
       EXPECT_EQ(box, (std::array<int, 4>{0, 199, 0, 199}));
       EXPECT_EQ(std::count(sector.mask.View().begin(), sector.mask.View().end(), 1), 200 * 200);
       EXPECT_NE(sector.text.find("all pixels were taken"), std::string::npos);
-      EXPECT_NE(sector.text.find(edge == 20 ? "1%" : "4%"), std::string::npos) << sector.text;
+      EXPECT_NE(sector.text.find(edge == 20 ? "1.0%" : "4.0%"), std::string::npos) << sector.text;
     }
   }
   EXPECT_EQ(BoxOf(Volume<unsigned char>({5, 4, 1}).View())[1], -1);
