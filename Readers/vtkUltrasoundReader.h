@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /**
  * @class vtkUltrasoundReader
- * @brief reads a volume with its pose: .mha, .mhd, .nrrd, .nhdr, .vti
+ * @brief reads a volume with its pose: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb, .vti, stacks of images
  *
  * Output 0: one vtkImageData whose origin, spacing and direction are those of the file (mm, LPS), with the point arrays
  * `Intensity` (whatever the file called it; the active scalars) and `ValidRegion` (unsigned char, 1 or 0), and with what the
@@ -19,6 +19,9 @@
  * the file `NAME.ValidRegion.mha` beside `NAME.mha` (any extension, the same for both), whose geometry must agree; everything
  * but the zeros connected to the border of the grid and voxels that are not numbers. `NAME.Provenance.mha` is carried as the
  * point array `Provenance`. GetNotes() says what was assumed or lost.
+ *
+ * Active voxels of an OpenVDB grid are its valid region. A stack of PNG, JPEG or TIFF images is named by its folder or by one of
+ * its files, and has no pose.
  *
  * A 2D image is a volume of one slice. Where the axes of a file are left-handed the slices are taken in reverse, so that the
  * geometry is a rigid pose. The header alone is read until voxels are asked for.
