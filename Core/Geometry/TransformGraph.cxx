@@ -93,10 +93,12 @@ std::string NamedTransform::Complaint() const
     return "the frames \"" + from + "\" and \"" + to + "\" need names without blanks";
   if (from == to)
     return Name() + " leads from a frame to itself";
-  if (matrix.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    return Name() + ": the last row of the matrix is not 0 0 0 1";
-  if (status == TransformStatus::Valid && !matrix.matrix().allFinite())
-    return Name() + ": the matrix holds a number that is not finite";
+  if (status == TransformStatus::Valid) { // else the matrix says nothing
+    if (!matrix.matrix().allFinite())
+      return Name() + ": the matrix holds a number that is not finite";
+    if (matrix.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+      return Name() + ": the last row of the matrix is not 0 0 0 1";
+  }
   if (errorMm && !(*errorMm >= 0.0 && std::isfinite(*errorMm)))
     return Name() + ": the error is negative or not finite";
   return {};
@@ -178,7 +180,9 @@ std::vector<TransformGraph::Step> TransformGraph::StepsFrom(const std::string& f
   for (const std::string& next : neighbours_.at(frame)) {
     const NamedTransform* along = Edge(frame, next);
     const NamedTransform* against = Edge(next, frame);
-    if (along && (!trustedOnly || isSafe(along)))
+    // Of the two edges of a pair the one that is Valid counts; of equals, the one that points along.
+    const bool turned = against && isSafe(against) && along && along->status != TransformStatus::Valid;
+    if (along && !turned && (!trustedOnly || isSafe(along)))
       steps.push_back({along, false});
     else if (against && (isSafe(against) || (!trustedOnly && against->status != TransformStatus::Valid)))
       steps.push_back({against, true});

@@ -51,7 +51,8 @@ std::optional<std::pair<std::string, std::string>> FramesOf(std::string_view nam
 struct ComposedTransform {
   Eigen::Affine3d matrix = Eigen::Affine3d::Identity();
   TransformStatus status = TransformStatus::Valid; ///< the worst along the way; Missing is worse than OutOfRange
-  /// Root of the sum of the squares of the edges' errors, as for independent ones; nothing when no edge states one.
+  /// Root of the sum of the squares of the edges' errors, as for independent ones; nothing when no edge states one. How far
+  /// an error of rotation reaches along the way is not in it: the files do not tell rotation from translation.
   std::optional<double> errorMm;
   bool errorIsComplete = false;  ///< every edge states its error; else those without count as exact
   std::vector<std::string> path; ///< "ImageToProbe", "inverse of ReferenceToTracker" ...; empty from a frame to itself
@@ -89,9 +90,10 @@ public:
   void Set(const NamedTransform& edge);
 
   /// The way from \a from to \a to with the fewest edges; of several, the one whose frames come first in the order of bytes; of
-  /// two edges between the same frames, the one that points along the way. Status plays no role, so that the way is the same
-  /// from moment to moment. An edge that is not Valid and whose matrix is singular gives NaN when walked backwards.
-  /// \throws Error(BadInput) when a frame is unknown, Error(NotPossible) when no way leads there; both say what there is.
+  /// two edges between the same frames, the one that is Valid, else the one that points along the way. Beyond that status
+  /// plays no role, so that the frames of the way are the same from moment to moment. An edge that is not Valid and whose matrix
+  /// is singular gives NaN when walked backwards. \throws Error(BadInput) when a frame is unknown, Error(NotPossible) when no way
+  /// leads there; both say what there is.
   ComposedTransform Find(const std::string& from, const std::string& to) const;
 
   /// The cycles that do not close: one for each edge beyond a spanning tree of fewest edges. Edges that are not Valid or

@@ -154,7 +154,23 @@ TEST(TransformGraph, TheShortestWayAndThenTheFirstByName)
   EXPECT_EQ(graph.Find("A", "Z").path, (Names{"AToZ"})) << "the edge along the way, not the other's inverse";
   EXPECT_EQ(graph.Find("Z", "A").path, (Names{"ZToA"}));
   graph.Set(Link("AToZ", {}, TransformStatus::Missing));
-  EXPECT_EQ(graph.Find("A", "Z").path, (Names{"AToZ"})) << "the way does not change with the status";
+  EXPECT_EQ(graph.Find("A", "Z").path, (Names{"inverse of ZToA"})) << "the one of the pair that is known";
+  graph.Set(Link("ZToA", {}, TransformStatus::Missing));
+  EXPECT_EQ(graph.Find("A", "Z").path, (Names{"AToZ"})) << "no longer way, whatever the status";
+}
+
+TEST(TransformGraph, AValidEdgeCountsForMoreThanItsInverseThatIsMissing)
+{
+  NamedTransform along, against;
+  along.from = against.to = "A";
+  along.to = against.from = "B";
+  along.status = TransformStatus::Missing;
+  along.matrix.matrix().setConstant(std::numeric_limits<double>::quiet_NaN()); // nothing was measured
+  against.matrix.translation() = Eigen::Vector3d(1, 2, 3);
+  const ComposedTransform found = TransformGraph({along, against}).Find("A", "B");
+  EXPECT_EQ(found.status, TransformStatus::Valid);
+  EXPECT_EQ(found.path, std::vector<std::string>{"inverse of BToA"});
+  EXPECT_EQ(found.matrix.translation(), Eigen::Vector3d(-1, -2, -3));
 }
 
 TEST(TransformGraph, SingularMatricesLeadOneWay)
