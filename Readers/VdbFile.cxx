@@ -4,24 +4,27 @@
 // made in parallel and hung into the tree one after the other, in their order, so the file does not depend on the threads.
 //
 // OpenVDB trusts its files: it allocates what a length says, does not ask whether reading succeeded, and reads as many bytes
-// into a node as a damaged length says. Therefore the file is walked through here first: every length in its header, metadata
-// and tree must be the one that its place allows. Then the library reads from a stream that throws at the end of the file,
-// through io::Archive, the base class of its own readers. What remains: damage within voxels that were compressed with
-// Blosc, or not at all, is not noticed, as in every format without checksums. The walk costs one pass over the file.
+// into a node as a damaged length says. Therefore the file is taken into memory and walked through here first: every length in
+// its header, metadata and tree must be the one that its place allows. Then the library reads from a stream that throws at
+// the end, through io::Archive, the base class of its own readers. What remains: damage within voxels that were compressed
+// with Blosc, or not at all, is not noticed, as in every format without checksums. The walk costs one pass over the file.
 #include "Readers/VdbFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Readers/AffinePose.h"
 #include "Readers/VolumeFile.h"
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <istream>
 #include <limits>
 #include <openvdb/io/Archive.h>
 #include <openvdb/openvdb.h>
+#include <streambuf>
 
 namespace fs = std::filesystem;
 
@@ -69,10 +72,38 @@ void Initialize()
   static_cast<void>(done);
 }
 
-// The lengths that OpenVDB would allocate, walked through in its file's header and in the metadata of each grid.
+class MemoryBuffer : public std::streambuf {
+public:
+  explicit MemoryBuffer(std::string& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
+
+private:
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override
+  {
+    const off_type at = offset + (from == std::ios_base::beg ? 0 : (from == std::ios_base::cur ? gptr() : egptr()) - eback());
+    if (at < 0 || at > egptr() - eback())
+      return pos_type(off_type(-1));
+    setg(eback(), eback() + at, egptr());
+    return pos_type(at);
+  }
+  pos_type seekpos(pos_type position, std::ios_base::openmode mode) override
+  {
+    return seekoff(position, std::ios_base::beg, mode);
+  }
+};
+
+// A stream over bytes in memory that throws at their end.
+class MemoryStream : private MemoryBuffer, public std::istream {
+public:
+  explicit MemoryStream(std::string& bytes) : MemoryBuffer(bytes), std::istream(static_cast<MemoryBuffer*>(this))
+  {
+    exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+  }
+};
+
+// The lengths in a file's header and in the metadata of each grid, which OpenVDB would allocate.
 class Walk {
 public:
-  Walk(std::istream& stream, std::string path, std::uint64_t size) : stream_(stream), path_(std::move(path)), size_(size) {}
+  Walk(std::string& bytes, std::string path) : bytes_(bytes), stream_(bytes), path_(std::move(path)) {}
 
   void File()
   {
@@ -85,7 +116,12 @@ public:
     Skip(8); // the library that wrote it
     if (Number<char>() == 0)
       FailFile(path_, "it was written as a stream, without the places of its grids; write it as a file");
-    Skip(36); // a unique name
+    for (int i = 0; i < 36; ++i) { // a unique name
+      const char c = Number<char>();
+      const bool dash = i == 8 || i == 13 || i == 18 || i == 23;
+      if (dash ? c != '-' : std::isxdigit(static_cast<unsigned char>(c)) == 0)
+        FailFile(path_, "its header is damaged");
+    }
     Metadata();
     const std::int32_t grids = Number<std::int32_t>();
     if (grids < 1)
@@ -96,15 +132,15 @@ public:
       const std::int64_t begin = Number<std::int64_t>(), blocks = Number<std::int64_t>(), end = Number<std::int64_t>();
       if (!(begin >= static_cast<std::int64_t>(Position()) && begin <= blocks && blocks <= end))
         FailFile(path_, "the places of its grids are damaged");
-      if (static_cast<std::uint64_t>(end) > size_)
+      if (static_cast<std::uint64_t>(end) > bytes_.size())
         FailFile(path_, "grid " + std::to_string(i + 1) + " ends at byte " + std::to_string(end) + ", and the file at " +
-                            std::to_string(size_) + ": it is truncated");
+                            std::to_string(bytes_.size()) + ": it is truncated");
       stream_.seekg(begin);
       Number<std::uint32_t>(); // compression
       Metadata();
+      Skip(Length()); // the name of the transform's kind
       stream_.seekg(end);
     }
-    stream_.seekg(0);
   }
 
 private:
@@ -119,22 +155,42 @@ private:
   std::uint32_t Length()
   {
     const std::uint32_t length = Number<std::uint32_t>();
-    if (length > size_ - Position())
+    if (length > bytes_.size() - Position())
       FailFile(path_, "a text in its header is " + std::to_string(length) + " bytes long, more than the file: it is damaged");
     return length;
   }
   void Skip(std::uint64_t bytes) { stream_.seekg(static_cast<std::streamoff>(bytes), std::ios::cur); }
+
+  // A type of metadata that OpenVDB knows is read by its own size, whatever the length beside it says; one that it does not
+  // know, by that length. Types that are not in this list (among them the index for loading voxels later, which holds lengths of
+  // its own) are made unknown.
   void Metadata()
   {
     const std::uint32_t count = Number<std::uint32_t>();
-    for (std::uint32_t i = 0; i < count; ++i)
-      for (int part = 0; part < 3; ++part) // name, type, value
-        Skip(Length());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      Skip(Length()); // name
+      const std::uint32_t length = Length();
+      const std::uint64_t at = Position();
+      const std::string type = bytes_.substr(at, length);
+      Skip(length);
+      const std::uint32_t size = Length();
+      constexpr std::pair<const char*, std::uint32_t> sizes[] = {{"bool", 1},   {"float", 4},  {"double", 8}, {"int32", 4},
+                                                                 {"int64", 8},  {"vec2i", 8},  {"vec2s", 8},  {"vec2d", 16},
+                                                                 {"vec3i", 12}, {"vec3s", 12}, {"vec3d", 24}, {"vec4i", 16},
+                                                                 {"vec4s", 16}, {"vec4d", 32}, {"mat4s", 64}, {"mat4d", 128}};
+      const auto* known =
+          std::find_if(std::begin(sizes), std::end(sizes), [&](const auto& entry) { return type == entry.first; });
+      if (known != std::end(sizes) && known->second != size)
+        FailFile(path_, "its metadata are damaged");
+      if (known == std::end(sizes) && type != "string" && length > 0)
+        bytes_[at] = '?';
+      Skip(size);
+    }
   }
 
-  std::istream& stream_;
+  std::string& bytes_;
+  MemoryStream stream_;
   std::string path_;
-  std::uint64_t size_;
 };
 
 // The lengths in a tree of Tree_..._5_4_3, from its topology on: whether OpenVDB can read it without leaving its buffers.
@@ -274,6 +330,10 @@ public:
     chosen.seekToGrid(stream);
     readGridCompression(stream);
     grid->readMeta(stream);
+    const std::streampos transform = stream.tellg();
+    if (openvdb::readString(stream) == openvdb::math::NonlinearFrustumMap::mapType())
+      FailFile(path, "its grid lies in a frustum; only affine transforms have a pose");
+    stream.seekg(transform);
     grid->readTransform(stream);
     const std::size_t valueBytes = grid->isType<openvdb::FloatGrid>() || grid->isType<openvdb::Int32Grid>() ? 4 : 8;
     const bool real = grid->isType<openvdb::FloatGrid>() || grid->isType<openvdb::DoubleGrid>();
@@ -404,13 +464,20 @@ void VdbSource::Open()
 {
   Initialize();
   const std::string& path = content_.path;
-  std::ifstream stream(path, std::ios::binary);
-  std::error_code error;
-  const std::uint64_t size = fs::file_size(path, error);
-  if (!stream || error)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");
-  stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-  Walk(stream, path, size).File();
+  std::string bytes;
+  {
+    std::ifstream file(path, std::ios::binary);
+    std::error_code error;
+    const std::uint64_t size = fs::file_size(path, error);
+    if (!file || error)
+      throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");
+    CheckMemory(path, static_cast<double>(size));
+    bytes.resize(size);
+    file.read(bytes.data(), static_cast<std::streamsize>(size));
+    bytes.resize(static_cast<std::size_t>(file.gcount()));
+  }
+  Walk(bytes, path).File();
+  MemoryStream stream(bytes);
   std::vector<std::string> others;
   grid_ = Archive().Read(stream, path, others);
   if (!others.empty()) {
@@ -421,8 +488,6 @@ void VdbSource::Open()
   }
   if (grid_->getGridClass() == openvdb::GRID_LEVEL_SET)
     Fail("its grid " + grid_->getName() + " is a level set (distances from a surface), not a volume of intensities");
-  if (!grid_->transform().isLinear())
-    Fail("its grid lies in a frustum; only affine transforms have a pose");
 
   const openvdb::CoordBBox box = grid_->evalActiveVoxelBoundingBox();
   const bool ours = IsOurs(box);

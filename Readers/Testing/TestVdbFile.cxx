@@ -314,6 +314,7 @@ TEST_F(VdbFile, LengthsBeyondTheFileAreRefused)
     return Put("bad.vdb", bad);
   };
   // Behind the magic, versions, flag and name: the count of metadata, the count of grids, the length of the first name.
+  Refused(with(21, 7), "header is damaged");
   Refused(with(57, 1), "more than the file");
   Refused(with(65, 2000000000), "more than the file");
   Refused(with(61, 0), "no grids");
