@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The example in Python runs as a user would run it, and its volumes come together."""
+"""The examples in Python run as a user would run them: volumes come together, a sweep becomes a volume."""
 import os
 import pathlib
 import re
@@ -17,5 +17,13 @@ with tempfile.TemporaryDirectory() as folder:
     scores = re.search(r"off by ([\d.]+) mm before, ([\d.]+) mm after", answer.stdout)
     if answer.returncode != 0 or not written.is_file() or written.stat().st_size < 10_000:
         sys.exit("TestExamples: stitched.vti was not written")
+    sweep = source.parent / "shared" / "data" / "liver" / "liver_sweep.igs.mha"
+    if sweep.is_file():
+        answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / "reconstruct_sweep.py", sweep], cwd=folder,
+                                capture_output=True, text=True)
+        print(answer.stdout, answer.stderr, sep="")
+        volume = pathlib.Path(folder) / "sweep.vti"
+        if answer.returncode != 0 or "140 frames used" not in answer.stdout or volume.stat().st_size < 100_000:
+            sys.exit("TestExamples: the sweep did not become a volume")
     if not scores or float(scores[1]) < 3.0 or float(scores[2]) > 1.0:
         sys.exit("TestExamples: the volumes did not come together")
