@@ -35,5 +35,7 @@ function(echorama_compile_options target)
     target_compile_definitions(${target} PRIVATE ECHORAMA_MULTIVERSION)
   endif()
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+    # & between truths is meant where a branch would keep a loop from being vectorised.
+    $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical;-Wno-bitwise-conditional-parentheses>
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
 endfunction()
