@@ -4,6 +4,7 @@
 #   [KERNEL_SUBDIRECTORIES dir...] where the kernels lie, default: the room's own folder
 #   [CLASSES class...]            vtk classes, by path without extension
 #   [VTK_LIBRARIES target...]     further libraries, private to the vtk classes
+#   [FUZZED file...]              kernels whose branches the fuzzers follow, default: all of a room with fuzzers
 #   [BENCHMARK_DEPENDS room...])  other rooms whose kernels the benchmarks use; without them they are left out
 #
 # A room is two layers. Kernels (every .cxx whose name does not begin with vtk) become lib<Echorama><NAME>Kernels,
@@ -11,7 +12,7 @@
 # their place and name: Testing/Test*.cxx (GoogleTest), Testing/Test*.py (wrapped classes),
 # Benchmarks/Benchmark*.cxx, Fuzzing/Fuzz*.cxx (libFuzzer).
 function(echorama_add_room name)
-  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES;BENCHMARK_DEPENDS")
+  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES;FUZZED;BENCHMARK_DEPENDS")
   if(NOT ECHORAMA_STACK STREQUAL "paraview")
     _echorama_add_kernels(${name})
   endif()
@@ -121,7 +122,9 @@ endmacro()
 # that Fuzzing/Seeds<Name>.py, if there is one, writes to the folder it is given.
 macro(_echorama_add_fuzzers name)
   file(GLOB fuzzers CONFIGURE_DEPENDS Fuzzing/Fuzz*.cxx)
-  if(fuzzers)
+  if(room_FUZZED)
+    set_property(SOURCE ${room_FUZZED} APPEND PROPERTY COMPILE_OPTIONS -fsanitize=fuzzer-no-link)
+  elseif(fuzzers)
     target_compile_options(${name}Kernels PRIVATE -fsanitize=fuzzer-no-link)
   endif()
   foreach(fuzzer IN LISTS fuzzers)
