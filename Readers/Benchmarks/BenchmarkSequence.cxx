@@ -138,7 +138,7 @@ int main()
       differences += Different(frame.data(), pixels.data() + FrameBytes * static_cast<std::size_t>(i), FrameBytes);
     }
     Report("sequence", name, "ours, forwards", ours, differences, "pixels", more(ours, Frames));
-    Report("sequence", name, "whole file, zlib", theirs, Different(whole.data(), pixels.data(), pixels.size()), "pixels",
+    Report("sequence", name, "whole file, ours", theirs, Different(whole.data(), pixels.data(), pixels.size()), "pixels",
            more(theirs, Frames));
 
     Random random(6);
