@@ -23,6 +23,13 @@ find_library(ECHORAMA_IMATH NAMES Imath Imath-3_1 REQUIRED)
 add_library(Echorama_OpenVDB INTERFACE IMPORTED)
 target_include_directories(Echorama_OpenVDB SYSTEM INTERFACE ${ECHORAMA_OPENVDB_INCLUDE_DIR})
 target_link_libraries(Echorama_OpenVDB INTERFACE ${ECHORAMA_OPENVDB} ${ECHORAMA_IMATH} TBB::tbb)
+# Ceres' own configuration is used for its library and headers alone; its dense solvers are all we call.
+find_package(Ceres 2 REQUIRED)
+# The FFT (BSD-3-Clause, one header) comes with Debian's pythran.
+find_path(ECHORAMA_POCKETFFT_INCLUDE_DIR pocketfft.hpp
+  PATHS /usr/lib/python3/dist-packages/pythran/pythonic/numpy/fft REQUIRED)
+add_library(Echorama_PocketFFT INTERFACE IMPORTED)
+target_include_directories(Echorama_PocketFFT SYSTEM INTERFACE ${ECHORAMA_POCKETFFT_INCLUDE_DIR})
 if(ECHORAMA_TESTING)
   find_package(GTest REQUIRED)
   include(GoogleTest)

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Progress.h"
-#include "Core/Geometry/RigidTransform.h"
-#include "Core/Imaging/Pyramid.h"
+#include "PlacedVolume.h"
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -23,13 +22,6 @@ struct AlignSearchParameters {
 
   /// Throws Error(InvalidParameter) that names the parameter and its range.
   void Check() const;
-};
-
-/// A volume as the search sees it: its resolutions, and a motion from where its geometry says to where it is taken to be.
-struct PlacedVolume {
-  const std::vector<PyramidLevel>* pyramid = nullptr; ///< the finest first (BuildPyramid)
-  Pose volumeToWorld = Pose::Identity();
-  std::string name; ///< for messages
 };
 
 /// One level of the search, the way it went.
