@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// elastix (a Debian package, https://elastix.lumc.nl) as the peer of benchmarks: volumes and masks are handed over as files
+// in a temporary folder, which is removed again.
+#include "Core/Geometry/ImageGeometry.h"
+#include "Core/Geometry/RigidTransform.h"
+#include "Core/Imaging/VolumeView.h"
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+namespace echorama::benchmark {
+
+class Elastix {
+public:
+  Elastix()
+  {
+    char name[] = "/tmp/elastix-XXXXXX";
+    if (mkdtemp(name))
+      folder_ = name;
+  }
+  ~Elastix()
+  {
+    std::error_code ignored;
+    if (!folder_.empty())
+      std::filesystem::remove_all(folder_, ignored);
+  }
+  Elastix(const Elastix&) = delete;
+  Elastix& operator=(const Elastix&) = delete;
+
+  static bool IsInstalled() { return std::system("elastix --version >/dev/null 2>&1") == 0; }
+
+  /// A rigid registration on four levels; \a metric is one of elastix, as "AdvancedMattesMutualInformation".
+  static std::string RigidParameters(const std::string& metric)
+  {
+    return "(FixedInternalImagePixelType \"float\")\n(MovingInternalImagePixelType \"float\")\n(UseDirectionCosines \"true\")\n"
+           "(Registration \"MultiResolutionRegistration\")\n(Interpolator \"LinearInterpolator\")\n"
+           "(ResampleInterpolator \"FinalLinearInterpolator\")\n(Resampler \"DefaultResampler\")\n"
+           "(FixedImagePyramid \"FixedSmoothingImagePyramid\")\n(MovingImagePyramid \"MovingSmoothingImagePyramid\")\n"
+           "(Optimizer \"AdaptiveStochasticGradientDescent\")\n(Transform \"EulerTransform\")\n(Metric \"" +
+           metric +
+           "\")\n(AutomaticScalesEstimation \"true\")\n(AutomaticTransformInitialization \"false\")\n"
+           "(NumberOfResolutions 4)\n(MaximumNumberOfIterations 250)\n(NumberOfSpatialSamples 4096)\n(NewSamplesEveryIteration "
+           "\"true\")\n"
+           "(ImageSampler \"RandomCoordinate\")\n(NumberOfHistogramBins 32)\n(ErodeMask \"false\")\n(RequiredRatioOfValidSamples "
+           "0.05)\n"
+           "(HowToCombineTransforms \"Compose\")\n(WriteResultImage \"false\")\n(DefaultPixelValue 0)\n(RandomSeed 1)\n";
+  }
+
+  /// Runs it. \returns the text of the parameters that were found, or nothing when it failed.
+  std::optional<std::string> Run(const PosedVolume<unsigned char>& fixed, const PosedVolume<unsigned char>& moving,
+                                 const std::string& parameters) const
+  {
+    Write("fixed.mha", fixed.intensity, fixed.geometry);
+    Write("fixed-mask.mha", fixed.valid, fixed.geometry);
+    Write("moving.mha", moving.intensity, moving.geometry);
+    Write("moving-mask.mha", moving.valid, moving.geometry);
+    std::ofstream(Path("parameters.txt")) << parameters;
+    const std::string command = "cd " + folder_ +
+                                " && rm -f TransformParameters.0.txt && elastix -f fixed.mha -m moving.mha -fMask fixed-mask.mha"
+                                " -mMask moving-mask.mha -p parameters.txt -out . >/dev/null 2>&1";
+    if (std::system(command.c_str()) != 0)
+      return std::nullopt;
+    std::ifstream file(Path("TransformParameters.0.txt"));
+    if (!file)
+      return std::nullopt;
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+
+  /// How the moving volume has to be moved from where its geometry has it, by a rigid run.
+  std::optional<Pose> RunRigid(const PosedVolume<unsigned char>& fixed, const PosedVolume<unsigned char>& moving,
+                               const std::string& metric) const
+  {
+    const auto text = Run(fixed, moving, RigidParameters(metric));
+    if (!text)
+      return std::nullopt;
+    const std::vector<double> p = Numbers(*text, "TransformParameters"), c = Numbers(*text, "CenterOfRotationPoint");
+    if (p.size() != 6 || c.size() != 3)
+      return std::nullopt;
+    // ITK's Euler transform turns about y, then x, then z, and maps the fixed volume's world to the moving one's.
+    const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d centre(c[0], c[1], c[2]);
+    Pose toMoving = Pose::Identity();
+    toMoving.linear() = (Eigen::AngleAxisd(p[2], z) * Eigen::AngleAxisd(p[0], x) * Eigen::AngleAxisd(p[1], y)).toRotationMatrix();
+    toMoving.translation() = centre - toMoving.linear() * centre + Eigen::Vector3d(p[3], p[4], p[5]);
+    return toMoving.inverse();
+  }
+
+  /// The numbers after a key of elastix' parameter files.
+  static std::vector<double> Numbers(const std::string& text, const std::string& key)
+  {
+    std::vector<double> numbers;
+    const std::size_t at = text.find("(" + key + " ");
+    if (at == std::string::npos)
+      return numbers;
+    std::istringstream values(text.substr(at + key.size() + 2, text.find(')', at) - at - key.size() - 2));
+    for (double value = 0.0; values >> value;)
+      numbers.push_back(value);
+    return numbers;
+  }
+
+  std::string Path(const std::string& name) const { return folder_ + "/" + name; }
+
+private:
+  void Write(const std::string& name, VolumeView<const unsigned char> voxels, const ImageGeometry& geometry) const
+  {
+    std::ofstream file(Path(name), std::ios::binary);
+    const auto& n = geometry.dimensions;
+    file.precision(17);
+    file << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
+         << "TransformMatrix =";
+    for (int axis = 0; axis < 3; ++axis)
+      for (int row = 0; row < 3; ++row)
+        file << ' ' << geometry.direction(row, axis);
+    file << "\nOffset = " << geometry.origin.transpose()
+         << "\nCenterOfRotation = 0 0 0\nElementSpacing = " << geometry.spacing.transpose() << "\nDimSize = " << n[0] << ' '
+         << n[1] << ' ' << n[2] << "\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    file.write(reinterpret_cast<const char*>(voxels.Data()), static_cast<std::streamsize>(voxels.Size()));
+  }
+
+  std::string folder_;
+};
+
+} // namespace echorama::benchmark
