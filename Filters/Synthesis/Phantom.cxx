@@ -7,8 +7,10 @@
 // 2. Echoes: a slab of planes per task gathers its scatterers in the order of the lattice, so that every sum has one order,
 //    whatever the threads. The innermost loop runs along depth over always eight samples, real and imaginary parts side by
 //    side: sixteen floats, for the vector unit. Rows have a margin, so that no sample needs a test.
-// 3. Shadows: beams are straight lines, so the way through an ellipsoid is an interval of depth.
-// 4. Grey: log compression to bytes on the beams, then scan conversion, in the order of a scanner.
+// 3. Shadows: beams are straight lines, so the way through an ellipsoid is an interval of depth. In tissue that the probe
+//    deforms it is looked for in steps along the beam.
+// 4. Noise of the receiver, when there is any: each row of samples has its own stream of random numbers.
+// 5. Grey: log compression to bytes on the beams, then scan conversion, in the order of a scanner.
 //
 // The sampling follows the point spread: 0.75 of its standard deviation in depth, 0.8 across, where it is narrowest
 // beside the spread of the beams. Cost: one hash (Philox) and one inverse of the geometry per lattice cell in the box, some
@@ -109,21 +111,27 @@ private:
 class ScattererSource {
 public:
   ScattererSource(const PhantomParameters& p, const BeamGrid& grid)
-    : p_(p), grid_(grid), scene_(p.scene), worldToProbe_(p.probeToWorld.inverse()), cell_(std::cbrt(1.0 / p.scatterersPerMm3))
+    : p_(p), grid_(grid), scene_(p.WholeScene()), worldToProbe_(p.probeToWorld.inverse()),
+      cell_(std::cbrt(1.0 / p.scatterersPerMm3))
   {
     far_ = 3.0 * std::max({2.0 * p.pulseSigmaMm, grid.LateralSigma(p.probe.depthMax), grid.ElevationSigma(p.probe.depthMax)});
+    const double from = far_ + p.press.mm; // unpressed, what is seen in the fan lies no further from it
     boxInProbe_ = BoxAround(p.probe);
-    boxInProbe_.min().array() -= far_;
-    boxInProbe_.max().array() += far_;
+    boxInProbe_.min().array() -= from;
+    boxInProbe_.max().array() += from;
     const Eigen::AlignedBox3d box = BoxAround(p.probe, p.probeToWorld);
-    const Eigen::Array3d first = ((box.min().array() - far_) / cell_).floor(),
-                         last = ((box.max().array() + far_) / cell_).floor();
+    const Eigen::Array3d first = ((box.min().array() - from) / cell_).floor(),
+                         last = ((box.max().array() + from) / cell_).floor();
     if (!((last - first + 1.0).prod() <= maxCells))
       throw Error(Error::Kind::TooLarge,
                   "the phantom would need more than 2^28 scatterers; choose fewer scatterers per mm^3 or a "
                   "smaller probe geometry");
     first_ = first.cast<int>();
     count_ = (last - first).cast<int>() + 1;
+    const auto key =
+        Random::Block({static_cast<std::uint32_t>(p.changeSeed), static_cast<std::uint32_t>(p.changeSeed >> 32), 0u, 1u},
+                      {static_cast<std::uint32_t>(p.seed), static_cast<std::uint32_t>(p.seed >> 32)});
+    changeKey_ = {key[0], key[1]};
   }
 
   int Layers() const { return count_.z(); }
@@ -148,9 +156,10 @@ private:
         {static_cast<std::uint32_t>(p_.seed), static_cast<std::uint32_t>(p_.seed >> 32)});
     const auto uniform = [&bits](int n) { return (bits[static_cast<std::size_t>(n)] + 0.5) * (1.0 / 4294967296.0); };
     const Eigen::Vector3d world = cell_ * (cell.cast<double>() + Eigen::Array3d(uniform(0), uniform(1), uniform(2))).matrix();
-    const Eigen::Vector3d point = worldToProbe_ * world;
-    if (!boxInProbe_.contains(point))
+    const Eigen::Vector3d unpressed = worldToProbe_ * world;
+    if (!boxInProbe_.contains(unpressed))
       return;
+    const Eigen::Vector3d point = p_.press.mm > 0.0 ? p_.press.Seen(unpressed) : unpressed;
     // Beam coordinates that go on beyond the edges of the fan: echoes from just outside reach in.
     const ProbeArc fan = p_.probe.Fan(), sweep = p_.probe.Sweep();
     const ProbeArc::Place plane = sweep.PlaceOf(point.y(), point.z());
@@ -177,7 +186,7 @@ private:
     // A uniform strength of variance 1 needs fewer scatterers for full speckle than a Gaussian one. The mean power of
     // uniform tissue is the density times the integral of the squared point spread.
     const double power = p_.scatterersPerMm3 * std::pow(pi, 1.5) * p_.pulseSigmaMm * lateral * elevation;
-    const double strength = std::sqrt(12.0) * (uniform(3) - 0.5) * scene_.AmplitudeAt(world) / std::sqrt(power);
+    const double strength = Strength(cell, uniform(3)) * scene_.AmplitudeAt(world) / std::sqrt(power);
     const double phase = -4.0 * pi / p_.wavelengthMm * beam.depth;
     s.re = static_cast<float>(strength * std::cos(phase));
     s.im = static_cast<float>(strength * std::sin(phase));
@@ -189,6 +198,20 @@ private:
       part.bySlab[static_cast<std::size_t>(slab)].push_back(index);
   }
 
+  // Of variance 1 and mean 0: the tissue's own, of which the change replaces a part. Echoes are linear in it, so those of two
+  // changes correlate as their strengths do, by 1 - decorrelation.
+  double Strength(const Eigen::Array3i& cell, double own) const
+  {
+    const double strength = std::sqrt(12.0) * (own - 0.5);
+    if (p_.decorrelation == 0.0)
+      return strength;
+    const auto bits = Random::Block(
+        {static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y()), static_cast<std::uint32_t>(cell.z()), 2u},
+        changeKey_);
+    const double other = std::sqrt(12.0) * ((bits[0] + 0.5) * (1.0 / 4294967296.0) - 0.5);
+    return std::sqrt(1.0 - p_.decorrelation) * strength + std::sqrt(p_.decorrelation) * other;
+  }
+
   const PhantomParameters& p_;
   const BeamGrid& grid_;
   SceneLookup scene_;
@@ -197,6 +220,7 @@ private:
   double far_; // no echo reaches further across, mm
   Eigen::AlignedBox3d boxInProbe_;
   Eigen::Array3i first_, count_;
+  std::array<std::uint32_t, 2> changeKey_;
 };
 
 // Adds the echoes of all scatterers of a slab of planes to \a rows: [plane][beam][depth with margins][re, im].
@@ -241,26 +265,91 @@ struct Crossing {
   double begin, end, dbPerMm;
 };
 
-// The crossings of one beam with the bodies that attenuate.
-std::vector<Crossing> CrossingsOf(const PhantomParameters& p, double fan, double sweep)
-{
-  std::vector<Crossing> crossings;
-  const BeamPoint start{0.0, fan, sweep};
-  const Eigen::Vector3d origin = p.probeToWorld * PointOf(p.probe, start);
-  const Eigen::Vector3d along = p.probeToWorld.linear() * DirectionOf(p.probe, start);
-  for (const Inclusion& inclusion : p.scene.inclusions) {
-    const auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape);
-    if (!ellipsoid || inclusion.attenuationDbPerMm == 0.0)
-      continue;
-    // |a + t b| = 1 in the ellipsoid's own axes and radii.
-    const Eigen::Matrix3d toUnit = ellipsoid->radii.cwiseInverse().asDiagonal() * ExpRotation(-ellipsoid->rotation);
-    const Eigen::Vector3d a = toUnit * (origin - ellipsoid->centre), b = toUnit * along;
-    const double bb = b.squaredNorm(), ab = a.dot(b), discriminant = ab * ab - bb * (a.squaredNorm() - 1.0);
-    if (discriminant > 0.0)
-      crossings.push_back({std::max(0.0, (-ab - std::sqrt(discriminant)) / bb), (-ab + std::sqrt(discriminant)) / bb,
-                           inclusion.attenuationDbPerMm});
+// The bodies of a scene that attenuate, and where beams cross them.
+class Attenuation {
+public:
+  Attenuation(const PhantomParameters& p, const PhantomScene& scene) : p_(p)
+  {
+    for (const Inclusion& inclusion : scene.inclusions) {
+      const auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape);
+      if (ellipsoid && inclusion.attenuationDbPerMm > 0.0) {
+        const Eigen::Matrix3d turn = ExpRotation(-ellipsoid->rotation);
+        const Eigen::Vector3d wide = ellipsoid->radii.array() + p.press.mm;
+        bodies_.push_back({ellipsoid->centre, ellipsoid->radii.cwiseInverse().asDiagonal() * turn,
+                           wide.cwiseInverse().asDiagonal() * turn, inclusion.attenuationDbPerMm});
+      }
+    }
   }
-  return crossings;
+
+  // The crossings of one beam with all of them.
+  std::vector<Crossing> Of(double fan, double sweep) const
+  {
+    std::vector<Crossing> crossings;
+    const BeamPoint start{0.0, fan, sweep};
+    const Eigen::Vector3d origin = p_.probeToWorld * PointOf(p_.probe, start);
+    const Eigen::Vector3d along = p_.probeToWorld.linear() * DirectionOf(p_.probe, start);
+    for (const Body& body : bodies_) {
+      // |a + t b| = 1 in the ellipsoid's own axes and radii.
+      const Eigen::Vector3d a = body.toWideUnit * (origin - body.centre), b = body.toWideUnit * along;
+      const double bb = b.squaredNorm(), ab = a.dot(b), discriminant = ab * ab - bb * (a.squaredNorm() - 1.0);
+      if (!(discriminant > 0.0))
+        continue;
+      Crossing crossing{std::max(0.0, (-ab - std::sqrt(discriminant)) / bb), (-ab + std::sqrt(discriminant)) / bb, body.dbPerMm};
+      if (p_.press.mm == 0.0 || Narrow(body, origin, along, crossing))
+        crossings.push_back(crossing);
+    }
+    return crossings;
+  }
+
+private:
+  struct Body {
+    Eigen::Vector3d centre;
+    Eigen::Matrix3d toUnit, toWideUnit; // wide: it holds the body wherever the probe presses it
+    double dbPerMm;
+  };
+
+  // From where the beam may cross a body to where it crosses what the probe has made of it; false when it does not.
+  bool Narrow(const Body& body, const Eigen::Vector3d& origin, const Eigen::Vector3d& along, Crossing& crossing) const
+  {
+    constexpr int steps = 64;
+    const Pose worldToProbe = p_.probeToWorld.inverse();
+    const auto outside = [&](double t) { // < 0 inside
+      const Eigen::Vector3d tissue = p_.probeToWorld * p_.press.Unpressed(worldToProbe * (origin + t * along));
+      return (body.toUnit * (tissue - body.centre)).squaredNorm() - 1.0;
+    };
+    const double begin = crossing.begin, step = (crossing.end - crossing.begin) / steps;
+    bool found = false;
+    double before = outside(begin);
+    if (before < 0.0)
+      found = true;
+    for (int i = 1; i <= steps; ++i) {
+      const double now = outside(begin + i * step);
+      const double edge = begin + (i - 1 + (before != now ? before / (before - now) : 0.0)) * step;
+      if (before >= 0.0 && now < 0.0 && !found) {
+        crossing.begin = edge;
+        found = true;
+      }
+      if (before < 0.0 && now >= 0.0)
+        crossing.end = edge;
+      before = now;
+    }
+    return found;
+  }
+
+  const PhantomParameters& p_;
+  std::vector<Body> bodies_;
+};
+
+// Adds complex Gaussian noise of the given amplitude to one row of samples.
+void AddNoise(const PhantomParameters& p, float amplitude, std::uint64_t row, std::complex<float>* samples, int count)
+{
+  Random random(p.changeSeed, row);
+  for (int i = 0; i < count; ++i) {
+    // Of a complex Gaussian number, the square of the size is exponentially distributed and the angle uniformly.
+    const auto size = amplitude * static_cast<float>(std::sqrt(-std::log1p(-random.Uniform())));
+    const auto angle = static_cast<float>(2.0 * pi * random.Uniform());
+    samples[i] += std::complex<float>(size * std::cos(angle), size * std::sin(angle));
+  }
 }
 
 // Samples along one axis that surround a position, given as a fraction of the axis' length.
@@ -323,6 +412,10 @@ void PhantomParameters::Check() const
   require("the gain in dB", gainDb, -200.0, 200.0);
   require("the dynamic range in dB", dynamicRangeDb, 10.0, 200.0);
   require("the grey of the background", backgroundGrey, 0.0, 255.0);
+  require("the decorrelation", decorrelation, 0.0, 1.0);
+  require("the deformation in mm", press.mm, 0.0, ProbePress::maxMm);
+  require("the noise in dB", noiseDb, noNoiseDb, 60.0);
+  require("the share of the rib", ribShare, 0.0, 0.6);
   require("the wavelength in mm", wavelengthMm, 0.05, 10.0);
   require("the pulse sigma in mm", pulseSigmaMm, 0.05, 20.0);
   require("the lateral sigma in mm", lateralSigmaMm, 0.05, 20.0);
@@ -330,6 +423,36 @@ void PhantomParameters::Check() const
   require("the elevation sigma in mm", elevationSigmaMm, 0.05, 20.0);
   require("the elevation growth", elevationGrowth, 0.0, 1.0);
   require("the number of scatterers per mm^3", scatterersPerMm3, 0.01, 100.0);
+}
+
+PhantomScene PhantomParameters::WholeScene() const
+{
+  PhantomScene whole = scene;
+  if (jets) {
+    const std::vector<Inclusion> list = Jets();
+    whole.inclusions.insert(whole.inclusions.end(), list.begin(), list.end());
+  }
+  if (ribShare > 0.0)
+    whole.inclusions.push_back(RibBelow(probe, probeToWorld, ribShare));
+  return whole;
+}
+
+Inclusion RibBelow(const ProbeGeometry& probe, const Pose& probeToWorld, double share)
+{
+  constexpr double thickness = 2.5, length = 400.0, place = 0.15; // mm, mm, of the fan
+  const double depth = probe.depthMin + 6.0;
+  // The tangents from the apex of the fan to an ellipse across a beam: tan(half angle) = width / sqrt(distance^2 -
+  // thickness^2). Beams of a flat array are parallel.
+  const double distance = probe.fanAngle > 0.0 ? probe.fanWidth / probe.fanAngle + depth : 0.0;
+  const double width = probe.fanAngle > 0.0
+                           ? std::tan(0.5 * share * probe.fanAngle) *
+                                 std::sqrt(std::max(distance * distance - thickness * thickness, thickness * thickness))
+                           : 0.5 * share * probe.fanWidth;
+  Ellipsoid rib;
+  rib.centre = probeToWorld * PointOf(probe, {depth, place, 0.0});
+  rib.radii = {std::max(width, 0.1), length, thickness};
+  rib.rotation = LogRotation(probeToWorld.linear() * ExpRotation({0.0, place * probe.fanAngle, 0.0}));
+  return {"rib", rib, 15.0, 0.0, 0.0, 20.0};
 }
 
 std::optional<std::complex<double>> BeamEchoes::At(const Eigen::Vector3d& pointInProbe) const
@@ -357,6 +480,8 @@ BeamEchoes SimulateEchoes(const PhantomParameters& p, const Progress& progress)
   BeamEchoes echoes{p.probe, Volume<std::complex<float>>(grid.size)};
   const VolumeView<std::complex<float>> baseband = echoes.baseband.View();
   const GaussTable gauss;
+  const Attenuation attenuation(p, p.WholeScene());
+  const auto noise = static_cast<float>(p.noiseDb > PhantomParameters::noNoiseDb ? std::pow(10.0, p.noiseDb / 20.0) : 0.0);
   const int slabs = (grid.size[2] + planesPerSlab - 1) / planesPerSlab;
   ParallelFor(slabs, progress.Part(0.5, 1.0), [&](std::ptrdiff_t slab) {
     const std::ptrdiff_t rowLength = 2 * (grid.size[0] + 2 * margin);
@@ -370,14 +495,18 @@ BeamEchoes SimulateEchoes(const PhantomParameters& p, const Progress& progress)
         std::complex<float>* out = baseband.Row(beam, plane);
         for (int d = 0; d < grid.size[0]; ++d)
           out[d] = {row[2 * d], row[2 * d + 1]};
-        if (!p.shadows)
-          continue;
-        for (const Crossing& crossing : CrossingsOf(p, beam / (grid.size[1] - 1.0) - 0.5, plane / (grid.size[2] - 1.0) - 0.5))
-          for (int d = 0; d < grid.size[0]; ++d) {
-            const double way = std::min(grid.DepthOf(d), crossing.end) - crossing.begin;
-            if (way > 0.0)
-              out[d] *= static_cast<float>(std::pow(10.0, -crossing.dbPerMm * way / 20.0));
-          }
+        if (p.shadows)
+          for (const Crossing& crossing : attenuation.Of(beam / (grid.size[1] - 1.0) - 0.5, plane / (grid.size[2] - 1.0) - 0.5))
+            for (int d = 0; d < grid.size[0]; ++d) {
+              const double way = std::min(grid.DepthOf(d), crossing.end) - crossing.begin;
+              if (way > 0.0)
+                out[d] *= static_cast<float>(std::pow(10.0, -crossing.dbPerMm * way / 20.0));
+            }
+        if (noise > 0.0f)
+          AddNoise(p, noise,
+                   static_cast<std::uint64_t>(plane) * static_cast<std::uint64_t>(grid.size[1]) +
+                       static_cast<std::uint64_t>(beam),
+                   out, grid.size[0]);
       }
   });
   return echoes;
@@ -427,12 +556,18 @@ void MakePhantom(const PhantomParameters& p, VolumeView<unsigned char> intensity
 
 std::string DescribePhantom(const PhantomParameters& p)
 {
-  nlohmann::ordered_json text = nlohmann::ordered_json::parse(SceneToJson(p.scene));
+  nlohmann::ordered_json text = nlohmann::ordered_json::parse(SceneToJson(p.scene)); // without rib and jets: they are parameters
   text["parameters"] = {{"spacingMm", p.spacingMm},
                         {"gainDb", p.gainDb},
                         {"dynamicRangeDb", p.dynamicRangeDb},
                         {"backgroundGrey", p.backgroundGrey},
                         {"shadows", p.shadows},
+                        {"decorrelation", p.decorrelation},
+                        {"changeSeed", p.changeSeed},
+                        {"deformationMm", p.press.mm},
+                        {"noiseDb", p.noiseDb},
+                        {"ribShare", p.ribShare},
+                        {"jets", p.jets},
                         {"wavelengthMm", p.wavelengthMm},
                         {"pulseSigmaMm", p.pulseSigmaMm},
                         {"lateralSigmaMm", p.lateralSigmaMm},

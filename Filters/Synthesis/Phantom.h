@@ -4,6 +4,7 @@
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
 #include "PhantomScene.h"
+#include "ProbePress.h"
 #include <complex>
 #include <cstdint>
 #include <optional>
@@ -24,6 +25,21 @@ struct PhantomParameters {
   double backgroundGrey = 100.0;        ///< mean grey of the background at gain 0, in [0, 255]
   bool shadows = true;                  ///< whether bodies attenuate what lies behind them
 
+  // What sets one volume apart from another of the same tissue.
+  /// How far the speckle has changed, in [0, 1]. Volumes of one tissue seed, different change seeds and decorrelation d that
+  /// are seen alike have complex echoes that correlate by 1 - d (their powers by about (1 - d)^2); where which body lies and how
+  /// loud it is stay.
+  double decorrelation = 0.0;
+  std::uint64_t changeSeed = 1; ///< of the change and of the noise: volumes of the same one have changed alike
+  ProbePress press;             ///< how the probe deforms the tissue: scatterers and bodies together
+  /// Power of the receiver's noise (white, complex Gaussian, on every sample of the beams) beside that of the background, in dB,
+  /// in [-120, 60]; -120: none. It is added behind all shadows.
+  double noiseDb = noNoiseDb;
+  static constexpr double noNoiseDb = -120.0;
+  /// Share of the fan that lies in the shadow of a rib close below the face, in [0, 0.6]; 0: no rib (RibBelow).
+  double ribShare = 0.0;
+  bool jets = false; ///< whether the short-lived bodies Jets() are there
+
   double wavelengthMm = 0.6;      ///< in tissue, in [0.05, 10]: 0.6 mm is 2.6 MHz
   double pulseSigmaMm = 0.5;      ///< standard deviation of the Gaussian pulse in depth, amplitudes, in [0.05, 20]
   double lateralSigmaMm = 0.7;    ///< of the beam along the fan at depth 0, in [0.05, 20]
@@ -35,7 +51,14 @@ struct PhantomParameters {
   /// Throws Error(InvalidParameter) that names the number that is out of its range; also for a probe whose sweep is a single
   /// plane, or whose beams start at or behind the sweep axis.
   void Check() const;
+
+  /// The scene with the rib and the jets of this volume.
+  PhantomScene WholeScene() const;
 };
+
+/// A rib below the face of one view: a long bright body across the sweep, 6 mm behind the first depth, on the +x side of the
+/// fan, that takes all echoes behind it over about \a share (in (0, 0.6]) of the fan. World coordinates.
+Inclusion RibBelow(const ProbeGeometry& probe, const Pose& probeToWorld, double share);
 
 /// The echoes on the beams before detection: complex baseband, depth fastest, then fan, then sweep. Samples lie evenly from
 /// the first to the last depth, beam and plane. Uniform background has mean power 1.
@@ -53,8 +76,8 @@ struct BeamEchoes {
 /// cell. Its echo has the phase exp(-i 4 pi r / wavelength) of its depth r and a Gaussian envelope in depth, along the fan
 /// and along the sweep. So the speckle of a point stays when the probe slides past it, and decorrelates as the probe turns
 /// about it: by exp(-(2 pi sigma sin(angle) / wavelength)^2) in amplitude for a beam of standard deviation sigma.
-/// Not simulated: reverberation, refraction, multiple scattering, side lobes, mirror echoes at smooth walls, noise of the
-/// receiver, frequency-dependent attenuation, and tissue that moves.
+/// Not simulated: reverberation, refraction, multiple scattering, side lobes, mirror echoes at smooth walls,
+/// frequency-dependent attenuation, and tissue that moves during the sweep.
 /// \throws Error(InvalidParameter) as Check(), Error(TooLarge) when beams or scatterers would not fit, Error(Cancelled).
 BeamEchoes SimulateEchoes(const PhantomParameters& parameters, const Progress& progress = {});
 

@@ -195,6 +195,19 @@ PhantomScene DefaultScene()
   return scene;
 }
 
+std::vector<Inclusion> Jets()
+{
+  const auto plume = [](const char* name, const std::vector<Vector3d>& through, double radius, double db) {
+    return Inclusion{name, Tube{Curve(through), radius}, db, 0.0, 0.0, 0.0};
+  };
+  return {plume("jet in the caval vein", {{16, -30, 88}, {10, -5, 87}, {4, 20, 86}}, 5.0, 8.0),
+          plume("jet in the gall bladder", {{-90, -16, 60}, {-80, -16, 57}, {-72, -16, 52}}, 4.0, 6.0),
+          plume("jet in the portal vein", {{-14, 4, 60}, {6, 3, 58}, {26, 2, 56}}, 4.0, 10.0),
+          Body("jet in a cyst", {{-60, 22, 42}, {6, 5, 7}, {0, 0, 0}}, 6.0),
+          Body("puff", {{12, -24, 58}, {9, 5, 5}, {0.3, 0.2, 0}}, 14.0),
+          Body("shallow puff", {{-24, 16, 44}, {6, 8, 4}, {0, 0.3, 0.4}}, 12.0)};
+}
+
 std::string SceneToJson(const PhantomScene& scene)
 {
   Json list = Json::array();

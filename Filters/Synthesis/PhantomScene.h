@@ -46,6 +46,10 @@ struct PhantomScene {
 /// a shadow. No symmetry. About 200 x 130 x 110 mm: room for three or four overlapping views.
 PhantomScene DefaultScene();
 
+/// Bodies that come and go, as the jets of urine in a bladder do: clouds of echoes in the fluids of the default scene and two
+/// bright puffs in its tissue. Added to the scene of one volume of two, they are there in that one only.
+std::vector<Inclusion> Jets();
+
 /// Only background: uniform speckle.
 inline PhantomScene UniformScene()
 {

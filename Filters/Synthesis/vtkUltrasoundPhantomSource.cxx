@@ -5,8 +5,10 @@
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix4x4.h"
+#include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
+#include "vtkPoints.h"
 #include "vtkUltrasoundAcquisition.h"
 
 #include <cmath>
@@ -17,7 +19,25 @@ vtkStandardNewMacro(vtkUltrasoundPhantomSource);
 
 namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
+
+// Applies a map of the probe frame to points of the world.
+template <class Map>
+void MapPoints(const echorama::Pose& probeToWorld, vtkPoints* from, vtkPoints* to, Map&& map)
+{
+  if (!from || !to) {
+    return;
+  }
+  const echorama::Pose worldToProbe = probeToWorld.inverse();
+  vtkNew<vtkPoints> mapped;
+  mapped->SetDataTypeToDouble();
+  mapped->SetNumberOfPoints(from->GetNumberOfPoints());
+  for (vtkIdType i = 0; i < from->GetNumberOfPoints(); ++i) {
+    const Eigen::Vector3d point = probeToWorld * map(worldToProbe * Eigen::Map<const Eigen::Vector3d>(from->GetPoint(i)));
+    mapped->SetPoint(i, point.data());
+  }
+  to->ShallowCopy(mapped);
 }
+} // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundPhantomSource::vtkUltrasoundPhantomSource()
@@ -30,6 +50,12 @@ vtkUltrasoundPhantomSource::vtkUltrasoundPhantomSource()
   this->DynamicRangeDb = defaults.dynamicRangeDb;
   this->BackgroundGrey = defaults.backgroundGrey;
   this->Shadows = defaults.shadows;
+  this->Decorrelation = defaults.decorrelation;
+  this->ChangeSeed = static_cast<vtkTypeInt64>(defaults.changeSeed);
+  this->DeformationMm = defaults.press.mm;
+  this->NoiseDb = defaults.noiseDb;
+  this->RibShare = defaults.ribShare;
+  this->Jets = defaults.jets;
   this->WavelengthMm = defaults.wavelengthMm;
   this->FanAngle = defaults.probe.fanAngle * DegreesPerRadian;
   this->FanRadius = defaults.probe.fanWidth / defaults.probe.fanAngle;
@@ -59,15 +85,19 @@ echorama::PhantomParameters vtkUltrasoundPhantomSource::Parameters() const
   parameters.probe =
       echorama::ProbeGeometry::Convex(this->FanAngle / DegreesPerRadian, this->FanRadius, this->SweepAngle / DegreesPerRadian,
                                       this->SweepRadius, this->DepthMin, this->DepthMax);
-  parameters.probeToWorld.linear() =
-      echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
-  parameters.probeToWorld.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
+  parameters.probeToWorld = this->ProbeToWorld();
   parameters.seed = static_cast<std::uint64_t>(this->Seed);
   parameters.spacingMm = this->SpacingMm;
   parameters.gainDb = this->GainDb;
   parameters.dynamicRangeDb = this->DynamicRangeDb;
   parameters.backgroundGrey = this->BackgroundGrey;
   parameters.shadows = this->Shadows;
+  parameters.decorrelation = this->Decorrelation;
+  parameters.changeSeed = static_cast<std::uint64_t>(this->ChangeSeed);
+  parameters.press.mm = this->DeformationMm;
+  parameters.noiseDb = this->NoiseDb;
+  parameters.ribShare = this->RibShare;
+  parameters.jets = this->Jets;
   parameters.wavelengthMm = this->WavelengthMm;
   return parameters;
 }
@@ -96,14 +126,33 @@ void vtkUltrasoundPhantomSource::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
 }
 
 //----------------------------------------------------------------------------
+echorama::Pose vtkUltrasoundPhantomSource::ProbeToWorld() const
+{
+  echorama::Pose pose = echorama::Pose::Identity();
+  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
+  pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
+  return pose;
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  const Eigen::Vector3d turn = Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian;
-  echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(turn);
-  pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = pose.matrix();
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = this->ProbeToWorld().matrix();
   probeToWorld->DeepCopy(rows.data());
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundPhantomSource::TissueToSeen(vtkPoints* from, vtkPoints* to)
+{
+  const echorama::ProbePress press{this->DeformationMm};
+  MapPoints(this->ProbeToWorld(), from, to, [&press](const Eigen::Vector3d& point) { return press.Seen(point); });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundPhantomSource::SeenToTissue(vtkPoints* from, vtkPoints* to)
+{
+  const echorama::ProbePress press{this->DeformationMm};
+  MapPoints(this->ProbeToWorld(), from, to, [&press](const Eigen::Vector3d& point) { return press.Unpressed(point); });
 }
 
 //----------------------------------------------------------------------------
@@ -181,6 +230,12 @@ void vtkUltrasoundPhantomSource::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "DynamicRangeDb: " << this->DynamicRangeDb << "\n";
   os << indent << "BackgroundGrey: " << this->BackgroundGrey << "\n";
   os << indent << "Shadows: " << this->Shadows << "\n";
+  os << indent << "Decorrelation: " << this->Decorrelation << "\n";
+  os << indent << "ChangeSeed: " << this->ChangeSeed << "\n";
+  os << indent << "DeformationMm: " << this->DeformationMm << "\n";
+  os << indent << "NoiseDb: " << this->NoiseDb << "\n";
+  os << indent << "RibShare: " << this->RibShare << "\n";
+  os << indent << "Jets: " << this->Jets << "\n";
   os << indent << "WavelengthMm: " << this->WavelengthMm << "\n";
   os << indent << "Fan: " << this->FanAngle << " degrees, radius " << this->FanRadius << "\n";
   os << indent << "Sweep: " << this->SweepAngle << " degrees, radius " << this->SweepRadius << "\n";

@@ -9,7 +9,8 @@
  *
  * The scene lies in the world and its scatterers are fixed to it, so volumes of the same scene and seed from different
  * poses show the same tissue, and share speckle as far as their viewing angles are near. That makes them test data for
- * alignment and blending whose truth is known.
+ * alignment and blending whose truth is known. What sets volumes of one tissue apart in life can be planted: changed speckle,
+ * tissue that the probe deforms, noise, the shadow of a rib, and bodies that come and go.
  *
  * Fails, with a message that names the number, for a probe geometry without volume or with beams that cross, a pose that is
  * not rigid, a scene that cannot be read, or a volume that is too large.
@@ -27,6 +28,7 @@
 #endif
 
 class vtkMatrix4x4;
+class vtkPoints;
 
 class ECHORAMAFILTERSSYNTHESIS_EXPORT vtkUltrasoundPhantomSource : public vtkUltrasoundImageAlgorithm {
 public:
@@ -72,6 +74,49 @@ public:
   vtkSetMacro(Shadows, bool);
   vtkGetMacro(Shadows, bool);
   vtkBooleanMacro(Shadows, bool);
+  ///@}
+
+  ///@{
+  /**
+   * How far the speckle has changed, in [0, 1]. Volumes of one Seed, different ChangeSeeds and decorrelation d that are seen
+   * alike have complex echoes that correlate by 1 - d; bodies stay where and as loud as they are. Default 0.
+   */
+  vtkSetClampMacro(Decorrelation, double, 0.0, 1.0);
+  vtkGetMacro(Decorrelation, double);
+  ///@}
+
+  ///@{
+  /** Seed of the change and of the noise: volumes with the same one have changed alike. At least 0. Default 1. */
+  vtkSetClampMacro(ChangeSeed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
+  vtkGetMacro(ChangeSeed, vtkTypeInt64);
+  ///@}
+
+  ///@{
+  /**
+   * How far the pressed probe moves the tissue below the middle of its face, in mm, in [0, 10]. The displacement fades with
+   * depth and sideways; TissueToSeen gives it exactly. Default 0.
+   */
+  vtkSetClampMacro(DeformationMm, double, 0.0, 10.0);
+  vtkGetMacro(DeformationMm, double);
+  ///@}
+
+  ///@{
+  /** Power of the receiver's noise beside that of the background, in dB, in [-120, 60]. Default -120: none. */
+  vtkSetClampMacro(NoiseDb, double, -120.0, 60.0);
+  vtkGetMacro(NoiseDb, double);
+  ///@}
+
+  ///@{
+  /** Share of the fan in the shadow of a rib close below the face of this view, in [0, 0.6]. Default 0: no rib. */
+  vtkSetClampMacro(RibShare, double, 0.0, 0.6);
+  vtkGetMacro(RibShare, double);
+  ///@}
+
+  ///@{
+  /** Whether bodies that come and go (jets and puffs at places of the default scene) are there in this volume. Default off. */
+  vtkSetMacro(Jets, bool);
+  vtkGetMacro(Jets, bool);
+  vtkBooleanMacro(Jets, bool);
   ///@}
 
   ///@{
@@ -126,6 +171,15 @@ public:
 
   ///@{
   /**
+   * The truth of the deformation, in the world, mm: where the tissue at each point (unpressed) is seen, and back (to 1e-9
+   * mm). The points that come out replace those in \a to; their precision is double.
+   */
+  void TissueToSeen(vtkPoints* from, vtkPoints* to);
+  void SeenToTissue(vtkPoints* from, vtkPoints* to);
+  ///@}
+
+  ///@{
+  /**
    * The scene as JSON text, as it stands in the field data `Scene` of our volumes (see Documentation/filters/PhantomSource.md).
    * Empty (default): the default scene.
    */
@@ -165,6 +219,7 @@ protected:
 private:
 #ifndef __VTK_WRAP__
   void Add(echorama::Inclusion inclusion);
+  echorama::Pose ProbeToWorld() const;
 #endif
 
   vtkTypeInt64 Seed;
@@ -173,6 +228,12 @@ private:
   double DynamicRangeDb;
   double BackgroundGrey;
   bool Shadows;
+  double Decorrelation;
+  vtkTypeInt64 ChangeSeed;
+  double DeformationMm;
+  double NoiseDb;
+  double RibShare;
+  bool Jets;
   double WavelengthMm;
   double FanAngle;
   double FanRadius;

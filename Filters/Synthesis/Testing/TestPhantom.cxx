@@ -104,7 +104,154 @@ std::string MessageOf(const PhantomParameters& p)
   return "";
 }
 
+// The correlation of the complex echoes of two volumes that are seen from one place.
+double EchoCorrelation(const BeamEchoes& a, const BeamEchoes& b)
+{
+  std::complex<double> product = 0.0;
+  double powerA = 0.0, powerB = 0.0;
+  const auto x = a.baseband.View(), y = b.baseband.View();
+  for (std::ptrdiff_t i = 0; i < x.end() - x.begin(); ++i) {
+    product += std::complex<double>(x[i]) * std::conj(std::complex<double>(y[i]));
+    powerA += std::norm(x[i]);
+    powerB += std::norm(y[i]);
+  }
+  return product.real() / std::sqrt(powerA * powerB);
+}
+
+double MeanPower(const BeamEchoes& echoes)
+{
+  double sum = 0.0;
+  for (const std::complex<float>& value : echoes.baseband.View())
+    sum += std::norm(value);
+  return sum / static_cast<double>(echoes.baseband.View().end() - echoes.baseband.View().begin());
+}
+
 } // namespace
+
+TEST(Phantom, PlantedChangeDecorrelatesTheEchoesByAsMuchAsStated)
+{
+  PhantomParameters p = Small();
+  const BeamEchoes own = SimulateEchoes(p);
+  for (const double decorrelation : {0.2, 0.6, 1.0}) {
+    p.decorrelation = decorrelation;
+    p.changeSeed = 1;
+    const BeamEchoes first = SimulateEchoes(p), again = SimulateEchoes(p);
+    p.changeSeed = 2;
+    const BeamEchoes second = SimulateEchoes(p);
+    EXPECT_TRUE(std::equal(first.baseband.View().begin(), first.baseband.View().end(), again.baseband.View().begin()));
+    // The volume holds some 5000 cells of resolution.
+    EXPECT_NEAR(EchoCorrelation(first, second), 1.0 - decorrelation, 0.04);
+    EXPECT_NEAR(EchoCorrelation(first, own), std::sqrt(1.0 - decorrelation), 0.04);
+    EXPECT_NEAR(MeanPower(first), 1.0, 0.05);
+  }
+}
+
+TEST(Phantom, BodiesStayWhenTheSpeckleChanges)
+{
+  PhantomParameters p = Small();
+  p.scene.inclusions.push_back({"cyst", Ellipsoid{{0, 0, 35}, {7, 7, 7}, {0, 0, 0}}, Inclusion::anechoicDb, 0, 0, 0});
+  p.decorrelation = 1.0;
+  p.changeSeed = 9;
+  const BeamEchoes echoes = SimulateEchoes(p);
+  EXPECT_LT(Power(echoes, {0, 0, 35}), 1e-3);
+  EXPECT_LT(Power(echoes, {3, 0, 36}), 1e-3);
+}
+
+TEST(Phantom, APressedProbeSeesTissueAndBodiesWhereThePressPutsThem)
+{
+  // Bright grains in fluid: the centroid of each one's power is where it is seen.
+  PhantomParameters p = Small();
+  p.press.mm = 4.0;
+  p.probeToWorld.translation() << 30, -20, 10;
+  p.probeToWorld.linear() = ExpRotation({0.2, -0.3, 0.1});
+  p.scene.inclusions.push_back({"fluid", Ellipsoid{p.probeToWorld.translation(), {200, 200, 200}, {0, 0, 0}}, -80, 0, 0, 0});
+  const std::vector<Vector3d> grains{{0, 0, 28}, {7, 4, 38}, {-6, -3, 42}};
+  for (const Vector3d& grain : grains)
+    p.scene.inclusions.push_back({"grain", Ellipsoid{p.probeToWorld * grain, {1.2, 1.2, 1.2}, {0, 0, 0}}, 30, 0, 0, 0});
+  p.scatterersPerMm3 = 6.0;
+  const BeamEchoes echoes = SimulateEchoes(p);
+  for (const Vector3d& grain : grains) {
+    const Vector3d seen = p.press.Seen(grain);
+    EXPECT_GT((seen - grain).norm(), 1.8);
+    Vector3d sum = Vector3d::Zero();
+    double weight = 0.0;
+    for (double z = -4.0; z <= 4.0; z += 0.25)
+      for (double y = -4.0; y <= 4.0; y += 0.5)
+        for (double x = -4.0; x <= 4.0; x += 0.5)
+          if (const auto value = echoes.At(seen + Vector3d(x, y, z))) {
+            sum += std::norm(*value) * Vector3d(x, y, z);
+            weight += std::norm(*value);
+          }
+    // A grain holds some 40 scatterers of random strength, so its centroid is not exactly its middle.
+    EXPECT_LT((sum / weight).norm(), 0.6) << grain.transpose();
+  }
+}
+
+TEST(Phantom, AShadowFollowsTheBodyThatAPressedProbeMoves)
+{
+  PhantomParameters p = Small();
+  p.scene.inclusions.push_back({"stone", Ellipsoid{{0, 0, 28}, {3, 3, 1}, {0, 0, 0}}, 0, 0, 0, 20});
+  p.press.mm = 6.0;
+  const double top = p.press.Seen({0, 0, 27}).z(), bottom = p.press.Seen({0, 0, 29}).z();
+  ASSERT_GT(top, 30.0);
+  PhantomParameters clear = p;
+  clear.shadows = false;
+  const BeamEchoes dark = SimulateEchoes(p), bright = SimulateEchoes(clear);
+  const auto lossDb = [&](double z) { return 10.0 * std::log10(Power(bright, {0, 0, z}) / Power(dark, {0, 0, z})); };
+  // The middle of beams lies between samples, where interpolation mixes beams with slightly different ways.
+  EXPECT_NEAR(lossDb(top - 0.5), 0.0, 1.0);
+  EXPECT_NEAR(lossDb(bottom + 2.0), 20.0 * (bottom - top), 2.5);
+}
+
+TEST(Phantom, NoiseHasItsPowerAndItsSeed)
+{
+  PhantomParameters p = Small();
+  p.scene.inclusions.push_back({"fluid", Ellipsoid{{0, 0, 0}, {200, 200, 200}, {0, 0, 0}}, Inclusion::anechoicDb, 0, 0, 0});
+  p.noiseDb = -10.0;
+  const BeamEchoes first = SimulateEchoes(p);
+  EXPECT_NEAR(10.0 * std::log10(MeanPower(first)), -10.0, 0.1);
+  p.changeSeed = 2;
+  EXPECT_NEAR(EchoCorrelation(first, SimulateEchoes(p)), 0.0, 0.02);
+  p.noiseDb = -120.0;
+  EXPECT_LT(MeanPower(SimulateEchoes(p)), 1e-9);
+}
+
+TEST(Phantom, ARibShadowsItsShareOfTheFan)
+{
+  for (const ProbeGeometry& probe : {Small().probe, ProbeGeometry::Linear(30.0, 20.0, 5.0, 40.0)})
+    for (const double share : {0.2, 0.5}) {
+      PhantomParameters p = Small();
+      p.probe = probe;
+      p.probeToWorld.linear() = ExpRotation({0.1, 0.4, -0.2});
+      p.ribShare = share;
+      const BeamEchoes echoes = SimulateEchoes(p);
+      const auto view = echoes.baseband.View();
+      const auto& n = echoes.baseband.Dimensions();
+      int dark = 0;
+      for (int beam = 0; beam < n[1]; ++beam) { // the middle plane, well behind the rib
+        double power = 0.0;
+        for (int d = 2 * n[0] / 3; d < n[0]; ++d)
+          power += std::norm(view.Row(beam, n[2] / 2)[d]);
+        dark += power / (n[0] - 2 * n[0] / 3) < 0.01 ? 1 : 0;
+      }
+      EXPECT_NEAR(static_cast<double>(dark) / n[1], share, 0.06) << share;
+    }
+}
+
+TEST(Phantom, JetsAreThereInOneVolumeOnly)
+{
+  PhantomParameters p;
+  EXPECT_EQ(p.WholeScene().inclusions.size(), DefaultScene().inclusions.size());
+  p.jets = true;
+  const PhantomScene with = p.WholeScene();
+  EXPECT_NO_THROW(with.Check());
+  const SceneLookup before(DefaultScene()), after(with);
+  const Vector3d inVein(4, 20, 86), inTissue(12, -24, 58), elsewhere(-50, 10, 75);
+  EXPECT_LT(before.EchogenicityAt(inVein), -100.0);
+  EXPECT_GT(after.EchogenicityAt(inVein), 0.0);
+  EXPECT_GT(after.EchogenicityAt(inTissue), before.EchogenicityAt(inTissue) + 5.0);
+  EXPECT_EQ(after.EchogenicityAt(elsewhere), before.EchogenicityAt(elsewhere));
+}
 
 TEST(Phantom, TheSameSeedGivesTheSameBytes)
 {
@@ -123,6 +270,11 @@ TEST(Phantom, IsTheSameForOneAndForTwoThreads)
 {
   PhantomParameters p = Small();
   p.scene = DefaultScene();
+  p.decorrelation = 0.3;
+  p.press.mm = 2.0;
+  p.noiseDb = -20.0;
+  p.ribShare = 0.2;
+  p.jets = true;
   Made one, two;
   {
     const ThreadLimit limit(1);
@@ -439,6 +591,10 @@ TEST(Phantom, RefusesWhatItCannotMake)
   EXPECT_NE(with([](auto& p) { p.wavelengthMm = 0.0; }).find("wavelength"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.pulseSigmaMm = -1.0; }).find("pulse"), std::string::npos);
   EXPECT_NE(with([&](auto& p) { p.gainDb = nan; }).find("gain"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.decorrelation = 1.1; }).find("decorrelation"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.press.mm = 11.0; }).find("deformation"), std::string::npos);
+  EXPECT_NE(with([&](auto& p) { p.noiseDb = nan; }).find("noise"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.ribShare = -0.1; }).find("rib"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.dynamicRangeDb = 0.0; }).find("dynamic range"), std::string::npos);
 
   PhantomParameters p = Small();

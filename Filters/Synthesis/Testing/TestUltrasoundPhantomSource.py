@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkCommand
+from vtkmodules.vtkCommonCore import vtkCommand, vtkPoints
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
@@ -130,6 +130,45 @@ def at(point):
 
 assert at((0, 0, 35)) < 20
 assert at((0, 0, 22)) > 140
+
+# What sets two volumes of one tissue apart: each has its effect, and is told in the scene's text.
+for change, name, value in (
+    (lambda f: f.SetDecorrelation(0.4), "decorrelation", 0.4),
+    (lambda f: f.SetDeformationMm(2), "deformationMm", 2),
+    (lambda f: f.SetNoiseDb(-10), "noiseDb", -10),
+    (lambda f: f.SetRibShare(0.3), "ribShare", 0.3),
+    (lambda f: f.SetJets(True), "jets", True),
+):
+    changed = small()
+    changed.SetPosition(0, 0, 40)  # where a jet is in view
+    as_it_was = array((changed.Update(), changed.GetOutput())[1], "Intensity").copy()
+    change(changed)
+    changed.Update()
+    assert (array(changed.GetOutput(), "Intensity") != as_it_was).mean() > 0.005, name
+    told = json.loads(changed.GetOutput().GetFieldData().GetAbstractArray("Scene").GetValue(0))["parameters"]
+    assert told[name] == value, told
+changed = small()
+changed.SetDecorrelation(2)
+changed.SetDeformationMm(-1)
+changed.SetRibShare(1)
+assert (changed.GetDecorrelation(), changed.GetDeformationMm(), changed.GetRibShare()) == (1, 0, 0.6)
+
+# The truth of the deformation: along the probe's axis below its face, nothing far away, and back again.
+pressed = small()
+pressed.SetProbeToWorld(matrix)
+pressed.SetDeformationMm(3)
+tissue, seen, back_again = vtkPoints(), vtkPoints(), vtkPoints()
+tissue.SetDataTypeToDouble()
+tissue.InsertNextPoint(30, -12, 5)
+tissue.InsertNextPoint(rotation @ (0, 0, 300) + (30, -12, 5))
+tissue.InsertNextPoint(rotation @ (12, -9, 30) + (30, -12, 5))
+pressed.TissueToSeen(tissue, seen)
+pressed.SeenToTissue(seen, back_again)
+before, after, again = (vtk_to_numpy(p.GetData()) for p in (tissue, seen, back_again))
+assert np.allclose(after[0] - before[0], rotation @ (0, 0, 3), atol=1e-12)
+assert np.abs(after[1] - before[1]).max() < 1e-9
+assert 1 < np.linalg.norm(after[2] - before[2]) < 3
+assert np.abs(again - before).max() < 1e-8
 
 # Bad parameters: a message that says why, an empty output, and no crash.
 for change, word in (
