@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Levenberg-Marquardt over rigid motions, coarse to fine. A level compares what the metric sees at points of both volumes
+// (Metric*.cxx); here are the steps, and what is said about the result.
+//
+// Merit. Gauss-Newton follows the differences inside the overlap and does not see its border. Whether a step is kept is
+// decided by the merit: on the coarse levels the similarity summed over the overlap, where every point that agrees better
+// than chance adds, so that volumes are not driven apart; on the last level its mean, because the pull of the
+// overlap alone would shift the answer by some tenths of a voxel.
+//
+// Step length. Speckle that differs between the volumes has gradients too; Gauss-Newton takes them for signal, its Hessian is
+// too large and its steps too short by the same factor again and again. How much the gradient really changed over the
+// last step tells the factor (a secant), and the next step is longer by it.
+//
+// Covariance. The curvature is measured: central differences of the analytic gradient. The noise of the gradient is measured
+// too: its parts, summed over blocks of tissue larger than the speckle's and the windows' correlation, vary from block to block,
+// whatever the correlation inside. Both give the covariance of the estimate as H^-1 B H^-1.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#endif
+#include "LocalAlign.h"
+#include "Metric.h"
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+namespace echorama {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+struct Stage {
+  const MetricLevel *fixed, *moving;
+  double VoxelMm() const { return std::max(fixed->voxelMm, moving->voxelMm); }
+};
+
+// The coarsest level that is not coarser than the octave; the finest when all are.
+const MetricLevel& LevelAt(const MetricPyramid& pyramid, int octave)
+{
+  const MetricLevel* found = &pyramid.levels.front();
+  for (const MetricLevel& level : pyramid.levels)
+    if (level.octave <= octave && level.octave > found->octave)
+      found = &level;
+  return *found;
+}
+
+// Pairs of levels of like resolution, the coarsest first.
+std::vector<Stage> StagesOf(const MetricPyramid& fixed, const MetricPyramid& moving, const LocalAlignParameters& p)
+{
+  const int coarsest = std::min(fixed.levels.back().octave, moving.levels.back().octave);
+  const int finest = std::max(fixed.levels.front().octave, moving.levels.front().octave);
+  std::vector<Stage> all;
+  for (int octave = std::max(coarsest, finest); octave >= finest; --octave) {
+    const Stage stage{&LevelAt(fixed, octave), &LevelAt(moving, octave)};
+    if (all.empty() || all.back().fixed != stage.fixed || all.back().moving != stage.moving)
+      all.push_back(stage);
+  }
+  constexpr double Slack = 1.001;
+  std::size_t first = 0, last = all.size() - 1;
+  while (p.finestMm > 0.0 && last > 0 && all[last].VoxelMm() * Slack < p.finestMm)
+    --last;
+  while (p.coarsestMm > 0.0 && first < last && all[first].VoxelMm() > p.coarsestMm * Slack)
+    ++first;
+  return {all.begin() + static_cast<std::ptrdiff_t>(first), all.begin() + static_cast<std::ptrdiff_t>(last) + 1};
+}
+
+Pose Moved(const Pose& pose, const Eigen::Vector3d& centre, const Vector6& twist)
+{
+  Pose moved = MotionAbout(centre, twist.tail<3>(), twist.head<3>()) * pose;
+  moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
+  return moved;
+}
+
+class LocalSearch {
+public:
+  LocalSearch(const MetricPyramid& fixed, const Pose& fixedToWorld, const MetricPyramid& moving, const Pose& movingToWorld,
+              const LocalAlignParameters& p)
+    : p_(p), fixedToWorld_(fixedToWorld), start_(movingToWorld), pose_(movingToWorld)
+  {
+    p.Check();
+    if (fixed.metric != moving.metric || fixed.levels.empty() || moving.levels.empty())
+      throw Error(Error::Kind::BadInput, fixed.name + " and " + moving.name +
+                                             " cannot be compared: they were prepared for different metrics (" + fixed.metric +
+                                             ", " + moving.metric + ")");
+    if (!IsRotation(fixedToWorld.linear()) || !IsRotation(movingToWorld.linear()) || !fixedToWorld.matrix().allFinite() ||
+        !movingToWorld.matrix().allFinite())
+      throw Error(Error::Kind::BadInput, fixed.name + " and " + moving.name + ": their poses must be rigid and finite");
+    metric_ = &MetricNamed(fixed.metric);
+    stages_ = StagesOf(fixed, moving, p);
+    centre_ = movingToWorld * moving.centre;
+  }
+
+  LocalAlignResult Align(const Progress& progress)
+  {
+    for (std::size_t s = 0; s < stages_.size(); ++s) {
+      progress(static_cast<double>(s) / static_cast<double>(stages_.size()));
+      if (!Enter(stages_[s]))
+        break;
+      Descend(s + 1 == stages_.size(), static_cast<double>(s) / static_cast<double>(stages_.size()), progress);
+    }
+    progress(1.0);
+    return Result();
+  }
+
+  LocalAlignResult Evaluate()
+  {
+    converged_ = Enter(stages_.back());
+    return Result();
+  }
+
+private:
+  // Draws the points of a level; whether the volumes overlap there.
+  bool Enter(const Stage& stage)
+  {
+    ComparisonSetup setup;
+    setup.metric = metric_;
+    setup.fixed = stage.fixed;
+    setup.moving = stage.moving;
+    setup.fixedToWorld = fixedToWorld_;
+    setup.startToWorld = start_;
+    setup.points = p_.points;
+    setup.part = p_.part;
+    setup.blockMm = 12.0 * stages_.back().VoxelMm();
+    setup.seed = p_.seed;
+    comparison_ = ComparePoints(setup);
+    voxelMm_ = stage.VoxelMm();
+    sums_ = comparison_->At(pose_, centre_);
+    if (!(sums_.weight > 0.0)) {
+      sums_ = MetricSums();
+      return false;
+    }
+    centre_ = sums_.moment / sums_.weight;
+    sums_ = comparison_->At(pose_, centre_);
+    return true;
+  }
+
+  double Merit(const MetricSums& sums, bool isLast) const
+  {
+    if (!(sums.weight > 0.0))
+      return -std::numeric_limits<double>::infinity();
+    return sums.similar / (isLast ? sums.weight : comparison_->SmallerWeight());
+  }
+
+  void Descend(bool isLast, double fraction, const Progress& progress)
+  {
+    const double tolerance = (isLast ? 0.002 : 0.02) * voxelMm_, longest = 1.5 * voxelMm_;
+    const double leastShare = std::min(std::max(p_.minimumOverlap, isLast ? 0.7 * sums_.share : 0.0), sums_.share);
+    double damping = 1e-3, stretch = 1.0, merit = Merit(sums_, isLast);
+    converged_ = false;
+    for (int iteration = 0; iteration < p_.iterations && !converged_; ++iteration) {
+      progress(fraction);
+      Matrix6 damped = sums_.hessian;
+      const double most = damped.diagonal().maxCoeff();
+      if (!(most > 0.0))
+        return;
+      for (int d = 0; d < 6; ++d)
+        damped(d, d) += damping * damped(d, d) + 1e-9 * std::max(damped(d, d), 1e-6 * most);
+      Vector6 step = -stretch * damped.ldlt().solve(sums_.gradient);
+      if (!step.allFinite())
+        return;
+      // What the step does to the points of the overlap, at most.
+      const double radius = Radius();
+      const double length = step.head<3>().norm() + radius * step.tail<3>().norm();
+      if (length > longest)
+        step *= longest / length;
+      const Pose trial = Moved(pose_, centre_, step);
+      const MetricSums sums = comparison_->At(trial, centre_);
+      const double trialMerit = Merit(sums, isLast);
+      if (sums.share >= leastShare && trialMerit > merit) {
+        const double expected = step.dot(sums_.hessian * step), real = step.dot(sums.gradient - sums_.gradient);
+        stretch = real > 0.0 ? std::clamp(expected / real, 1.0, 5.0) : 1.0;
+        pose_ = trial;
+        sums_ = sums;
+        merit = trialMerit;
+        damping = std::max(damping * 0.2, 1e-6);
+        converged_ = length < tolerance;
+      } else {
+        converged_ = length < tolerance;
+        stretch = 1.0;
+        damping = std::min(std::max(damping * 8.0, 1e-2), 1e6);
+      }
+    }
+  }
+
+  // Of the overlap about its centre, as the Hessian weighs it.
+  double Radius() const
+  {
+    const double moves = sums_.hessian.topLeftCorner<3, 3>().trace(), turns = sums_.hessian.bottomRightCorner<3, 3>().trace();
+    return moves > 0.0 ? std::sqrt(turns / moves) : 0.0;
+  }
+
+  LocalAlignResult Result()
+  {
+    LocalAlignResult result;
+    result.volumeToWorld = pose_;
+    result.voxelMm = voxelMm_;
+    result.centre = centre_;
+    result.overlap = std::clamp(sums_.share, 0.0, 1.0);
+    if (!(sums_.weight > 0.0))
+      return result;
+    centre_ = result.centre = sums_.moment / sums_.weight;
+    result.similarity = sums_.similar / sums_.weight;
+    result.score = comparison_->SmallerWeight() > 0.0 ? sums_.similar / comparison_->SmallerWeight() : 0.0;
+    result.converged = converged_;
+    Inform(result);
+    return result;
+  }
+
+  void Inform(LocalAlignResult& result) const
+  {
+    BlockGradients blocks;
+    const MetricSums here = comparison_->At(pose_, centre_, &blocks);
+    const double radius = std::max(Radius(), voxelMm_), h = 0.5 * voxelMm_;
+    Matrix6 curvature = Matrix6::Zero();
+    for (int d = 0; d < 6; ++d) {
+      const double step = d < 3 ? h : h / radius;
+      const Vector6 twist = step * Vector6::Unit(d);
+      curvature.col(d) = (comparison_->At(Moved(pose_, centre_, twist), centre_).gradient -
+                          comparison_->At(Moved(pose_, centre_, -twist), centre_).gradient) /
+                         (2.0 * step);
+    }
+    curvature = 0.5 * (curvature + curvature.transpose()).eval();
+
+    // In units of length for turns too, so that eigenvalues can be compared.
+    Vector6 scale;
+    scale << 1.0, 1.0, 1.0, 1.0 / radius, 1.0 / radius, 1.0 / radius;
+    const Matrix6 gaussNewton = scale.asDiagonal() * here.hessian * scale.asDiagonal();
+    curvature = scale.asDiagonal() * curvature * scale.asDiagonal();
+    Matrix6 noise = Matrix6::Zero();
+    int counted = 0;
+    for (const Vector6& block : blocks) {
+      if (block.isZero())
+        continue;
+      const Vector6 g = scale.asDiagonal() * block;
+      noise += g * g.transpose();
+      ++counted;
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix6> gn(gaussNewton);
+    const double largest = gn.eigenvalues().maxCoeff();
+    if (!(largest > 0.0) || counted < 2)
+      return;
+    const Matrix6 regular = gaussNewton + 1e-9 * largest * Matrix6::Identity();
+    const double factor = (regular.ldlt().solve(noise)).trace() / 6.0;
+    if (!(factor > 0.0) || !std::isfinite(factor))
+      return;
+    // Few blocks say little about 21 numbers: they are drawn towards what all directions have in common.
+    constexpr double Prior = 12.0;
+    noise = (counted * noise + Prior * factor * regular) / (counted + Prior);
+    // Directions in which the measure does not curve down at all are known not at all.
+    const Eigen::SelfAdjointEigenSolver<Matrix6> bent(curvature);
+    const Vector6 kept = bent.eigenvalues().cwiseMax(0.0);
+    const Matrix6 hessian = bent.eigenvectors() * kept.asDiagonal() * bent.eigenvectors().transpose();
+    const Matrix6 unscale = scale.cwiseInverse().asDiagonal();
+    Information information = unscale * (hessian * noise.ldlt().solve(hessian)) * unscale;
+    information = 0.5 * (information + information.transpose()).eval();
+    if (!information.allFinite())
+      return;
+    result.information = information;
+    result.independentVoxels = here.loss / factor;
+  }
+
+  const LocalAlignParameters p_;
+  const Metric* metric_ = nullptr;
+  Pose fixedToWorld_, start_, pose_;
+  std::vector<Stage> stages_;
+  std::unique_ptr<LevelComparison> comparison_;
+  MetricSums sums_;
+  Eigen::Vector3d centre_;
+  double voxelMm_ = 0.0;
+  bool converged_ = false;
+};
+
+} // namespace
+
+void LocalAlignParameters::Check() const
+{
+  const auto check = [](bool good, const char* message) {
+    if (!good)
+      throw Error(Error::Kind::InvalidParameter, message);
+  };
+  check(coarsestMm >= 0.0, "the coarsest voxel size must not be negative");
+  check(finestMm >= 0.0, "the finest voxel size must not be negative");
+  check(iterations >= 1 && iterations <= 1000, "the number of iterations must be in [1, 1000]");
+  check(points >= 100 && points <= 10000000, "the points must be in [100, 10000000]");
+  check(minimumOverlap >= 0.001 && minimumOverlap <= 1.0, "the minimum overlap must be in [0.001, 1]");
+  check(part >= 0 && part <= 2, "the part must be 0, 1 or 2");
+}
+
+LocalAlignResult LocalAlign(const MetricPyramid& fixed, const Pose& fixedToWorld, const MetricPyramid& moving,
+                            const Pose& movingToWorld, const LocalAlignParameters& parameters, const Progress& progress)
+{
+  return LocalSearch(fixed, fixedToWorld, moving, movingToWorld, parameters).Align(progress);
+}
+
+LocalAlignResult Evaluate(const MetricPyramid& fixed, const Pose& fixedToWorld, const MetricPyramid& moving,
+                          const Pose& movingToWorld, const LocalAlignParameters& parameters)
+{
+  return LocalSearch(fixed, fixedToWorld, moving, movingToWorld, parameters).Evaluate();
+}
+
+} // namespace echorama

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Metric.h"
+#include "Core/Base/Parallel.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+namespace {
+
+constexpr std::ptrdiff_t FewestVoxels = 100, FewestOfLevel = 200;
+
+const std::vector<const Metric*>& Metrics()
+{
+  static const std::vector<const Metric*> metrics{&LocalNccMetric};
+  return metrics;
+}
+
+// Voxels beside real ones get their mean value (and keep the weight 0), so that reading between the two sees no step.
+void ExtendByOne(MetricLevel& level)
+{
+  const auto& n = level.geometry.dimensions;
+  float* seen = level.seen.data();
+  const std::ptrdiff_t row = n[0], slice = row * n[1];
+  ParallelFor(n[2], [&](std::ptrdiff_t k) {
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) {
+        const std::ptrdiff_t at = k * slice + j * row + i;
+        if (seen[2 * at + 1] > 0.0f)
+          continue;
+        float sum = 0.0f, neighbours = 0.0f;
+        const auto add = [&](bool inside, std::ptrdiff_t other) {
+          if (inside && seen[2 * other + 1] > 0.0f) {
+            sum += seen[2 * other];
+            neighbours += 1.0f;
+          }
+        };
+        add(i > 0, at - 1);
+        add(i + 1 < n[0], at + 1);
+        add(j > 0, at - row);
+        add(j + 1 < n[1], at + row);
+        add(k > 0, at - slice);
+        add(k + 1 < n[2], at + slice);
+        if (neighbours > 0.0f)
+          seen[2 * at] = sum / neighbours;
+      }
+  });
+}
+
+void Check(const PlacedVolume& volume)
+{
+  if (!volume.pyramid || volume.pyramid->empty())
+    throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");
+  const PyramidLevel& finest = volume.pyramid->front();
+  const auto& n = finest.geometry.dimensions;
+  if (*std::min_element(n.begin(), n.end()) < 2)
+    throw Error(Error::Kind::BadInput, volume.name + ": it is not a volume (one voxel thick); aligning needs three dimensions");
+  if (finest.geometry.VoxelCount() > (std::size_t{1} << 29))
+    throw Error(Error::Kind::TooLarge, volume.name + ": volumes of at most 2^29 voxels can be aligned");
+  if (finest.realVoxels < FewestVoxels)
+    throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) +
+                                           " of its voxels are real; at least " + std::to_string(FewestVoxels) + " are needed");
+  const VolumeView<const float> view = finest.intensity.View();
+  const float* first = std::find_if(view.begin(), view.end(), [](float v) { return v == v; });
+  if (std::all_of(first, view.end(), [first](float v) { return !(v == v) || v == *first; }))
+    throw Error(Error::Kind::BadInput, volume.name + ": it is constant; there is nothing to align on");
+  if (!volume.reliability)
+    return;
+  for (std::size_t l = 0; l < std::min(volume.reliability->size(), volume.pyramid->size()); ++l)
+    if ((*volume.reliability)[l].geometry.dimensions != (*volume.pyramid)[l].geometry.dimensions)
+      throw Error(Error::Kind::BadInput, volume.name + ": its reliability has other dimensions than itself");
+}
+
+} // namespace
+
+std::vector<std::string> MetricNames()
+{
+  std::vector<std::string> names;
+  for (const Metric* metric : Metrics())
+    names.emplace_back(metric->name);
+  return names;
+}
+
+const Metric& MetricNamed(const std::string& name)
+{
+  std::string known;
+  for (const Metric* metric : Metrics()) {
+    if (name == metric->name)
+      return *metric;
+    known += (known.empty() ? "" : ", ") + std::string(metric->name);
+  }
+  throw Error(Error::Kind::InvalidParameter, "there is no metric \"" + name + "\"; there are " + known);
+}
+
+MeanAndDeviation MeanAndDeviationOf(const MetricSource& source)
+{
+  struct Sum {
+    double weight = 0.0, value = 0.0;
+    void operator+=(const Sum& s)
+    {
+      weight += s.weight;
+      value += s.value;
+    }
+  };
+  const auto sum = [&source](const auto& of) {
+    return ParallelSum<Sum>(source.intensity.Size(), 1 << 16, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      Sum s;
+      for (std::ptrdiff_t i = begin; i < end; ++i) {
+        const double v = static_cast<double>(source.intensity[i]), trust = v == v ? source.Trust(i) : 0.0;
+        if (trust > 0.0)
+          s += {trust, trust * of(v)};
+      }
+      return s;
+    });
+  };
+  const Sum first = sum([](double v) { return v; });
+  if (!(first.weight > 0.0))
+    return {};
+  const double mean = first.value / first.weight;
+  const Sum second = sum([mean](double v) { return (v - mean) * (v - mean); });
+  return {mean, std::sqrt(second.value / second.weight)};
+}
+
+std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volume, const std::string& name,
+                                                        const Progress& progress)
+{
+  const Metric& metric = MetricNamed(name);
+  Check(volume);
+  auto result = std::make_shared<MetricPyramid>();
+  result->metric = name;
+  result->name = volume.name;
+  for (std::size_t l = 0; l < volume.pyramid->size(); ++l) {
+    const PyramidLevel& in = (*volume.pyramid)[l];
+    const auto& n = in.geometry.dimensions;
+    if (l > 0 && (in.realVoxels < FewestOfLevel || *std::min_element(n.begin(), n.end()) < 2))
+      break;
+    progress(l == 0 ? 0.0 : 0.9);
+    MetricLevel level;
+    level.geometry = in.geometry;
+    level.voxelMm = std::cbrt(in.geometry.spacing.prod());
+    level.octave = static_cast<int>(std::lround(std::log2(level.voxelMm)));
+    MetricSource source{in.intensity.View(), {}};
+    if (volume.reliability && l < volume.reliability->size())
+      source.reliability = (*volume.reliability)[l].intensity.View();
+    metric.see(source, level);
+    if (!level.seen.empty())
+      ExtendByOne(level);
+    result->levels.push_back(std::move(level));
+  }
+
+  // The centroid, from the coarsest level: it is where numbers are counted from, so that they stay small.
+  const PyramidLevel& coarsest = (*volume.pyramid)[result->levels.size() - 1];
+  const Eigen::Affine3d toWorld = coarsest.geometry.IndexToWorld();
+  const auto view = coarsest.intensity.View();
+  const auto& n = view.Dimensions();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i)
+        if (view(i, j, k) == view(i, j, k)) {
+          sum += Eigen::Vector3d(i, j, k);
+          count += 1.0;
+        }
+  result->centre = toWorld * (sum / std::fmax(count, 1.0));
+  progress(1.0);
+  return result;
+}
+
+} // namespace echorama

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "LocalAlign.h"
+
+namespace echorama {
+
+/// One resolution of a volume as a metric sees it. The voxels of a metric that compares values hold a value and a weight, side
+/// by side in \a seen; those of one that compares descriptors hold sixteen bytes, twelve of the descriptor and one of the
+/// weight. Weights are 0 where a voxel is not real.
+struct MetricLevel {
+  ImageGeometry geometry;
+  double voxelMm = 0.0;                   ///< geometric mean of the spacing
+  int octave = 0;                         ///< log2(voxelMm), rounded: windows follow it, so that two volumes are seen alike
+  std::vector<float> seen;                ///< value, weight, value, weight, ...
+  std::vector<float> edges;               ///< a second value of each voxel: the gradient's magnitude (lc2), else empty
+  std::vector<unsigned char> descriptors; ///< 16 bytes per voxel (mind-ssc), else empty
+};
+
+class MetricPyramid {
+public:
+  std::string metric, name;
+  std::vector<MetricLevel> levels;                  ///< the finest first
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< the centroid of the finest level's voxels, as its geometry stands, mm
+};
+
+/// What is read to build one level.
+struct MetricSource {
+  VolumeView<const float> intensity;   ///< NaN where not real
+  VolumeView<const float> reliability; ///< [0, 1]; empty: all 1
+  double Trust(std::ptrdiff_t i) const { return reliability.Empty() ? 1.0 : Clamped(reliability[i]); }
+
+private:
+  static double Clamped(float v) { return v > 0.0f ? (v < 1.0f ? static_cast<double>(v) : 1.0) : 0.0; } // NaN: 0
+};
+
+/// Of the real voxels, by their trust; two passes, in double precision.
+struct MeanAndDeviation {
+  double mean = 0.0, deviation = 0.0;
+};
+MeanAndDeviation MeanAndDeviationOf(const MetricSource& source);
+
+/// A metric: how it sees, and how differences count.
+struct Metric {
+  const char* name;
+  /// Differences beyond this count linearly instead of squared (pseudo-Huber), in the units of what is seen.
+  double lossScale;
+  /// Values are brought to one mean and deviation over the overlap at each pose, so that gain and offset do not matter.
+  bool fitsOverlap;
+  /// Fills seen, edges or descriptors of a level whose geometry, voxelMm and octave are set.
+  void (*see)(const MetricSource& source, MetricLevel& level);
+};
+
+extern const Metric LocalNccMetric;
+
+/// \throws Error(InvalidParameter) for a name that is not one of MetricNames().
+const Metric& MetricNamed(const std::string& name);
+
+/// What both volumes say at one pose. Sums are over points of both, each point by the volume of tissue it stands for.
+struct MetricSums {
+  double weight = 0.0;                              ///< of the points compared, mm^3
+  double similar = 0.0;                             ///< weight times similarity
+  double loss = 0.0;                                ///< weight times loss
+  double share = 0.0;                               ///< overlap: of the smaller volume, by reliability, [0, 1]
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero(); ///< weight times position, mm
+  Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero(); ///< of half the loss, by the twist
+  Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();  ///< of half the loss, Gauss-Newton
+};
+
+/// The gradient of half the loss, by blocks of tissue.
+using BlockGradients = std::vector<Eigen::Matrix<double, 6, 1>>;
+
+/// Two volumes at one resolution, with the points at which they are compared.
+class LevelComparison {
+public:
+  virtual ~LevelComparison() = default;
+  /// At a pose of the moving volume; derivatives by the twist (translation mm, rotation vector) that acts as
+  /// MotionAbout(centre, rotation, translation) * movingToWorld. \a blocks: if given, receives the gradient's parts.
+  virtual MetricSums At(const Pose& movingToWorld, const Eigen::Vector3d& centre, BlockGradients* blocks = nullptr) const = 0;
+  /// The weight of the smaller volume compared with itself, mm^3.
+  double SmallerWeight() const { return smallerWeight_; }
+
+protected:
+  double smallerWeight_ = 0.0;
+};
+
+/// What the comparison of two levels needs to know.
+struct ComparisonSetup {
+  const Metric* metric = nullptr;
+  const MetricLevel *fixed = nullptr, *moving = nullptr;
+  Pose fixedToWorld = Pose::Identity();
+  Pose startToWorld = Pose::Identity(); ///< of the moving volume: tells which points are in which part
+  int points = 0, part = 0;
+  double blockMm = 12.0; ///< size of the blocks of tissue: of parts, and of the gradient
+  std::uint64_t seed = 1;
+};
+std::unique_ptr<LevelComparison> ComparePoints(const ComparisonSetup& setup);
+
+/// Smooths volumes in place along all three axes with a Gaussian (separable, cut at 2.5 standard deviations, nothing beyond the
+/// border), standard deviations in voxels per axis; below 0.2 an axis is left alone.
+void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels);
+
+} // namespace echorama

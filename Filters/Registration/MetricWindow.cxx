@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A Gaussian along each axis in turn. Every pass is a weighted sum of rows, whether they lie beside, above or behind each
+// other, so one loop serves all three and runs along memory. x and y are done slice by slice, z row by row of a slice, each
+// with a copy that fits in the cache. Cost: about 5 standard deviations of multiplications per voxel and axis.
+#include "Core/Base/Multiversion.h"
+#include "Core/Base/Parallel.h"
+#include "Metric.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+namespace {
+
+constexpr int Lanes = 64;
+
+// out[i] = sum over t of taps[t] * rows[t][i].
+ECHORAMA_HOT void SumRows(const float* const* rows, const float* taps, int count, int width, float* out)
+{
+  int i = 0;
+  for (; i + Lanes <= width; i += Lanes) {
+    float sum[Lanes] = {};
+    for (int t = 0; t < count; ++t) {
+      const float* row = rows[t] + i;
+      const float tap = taps[t];
+      for (int lane = 0; lane < Lanes; ++lane)
+        sum[lane] += tap * row[lane];
+    }
+    for (int lane = 0; lane < Lanes; ++lane)
+      out[i + lane] = sum[lane];
+  }
+  for (; i < width; ++i) {
+    float sum = 0.0f;
+    for (int t = 0; t < count; ++t)
+      sum += taps[t] * rows[t][i];
+    out[i] = sum;
+  }
+}
+
+struct Kernel {
+  explicit Kernel(double sigma)
+  {
+    if (sigma < 0.2)
+      return;
+    reach = std::max(1, static_cast<int>(std::lround(2.5 * sigma)));
+    double sum = 0.0;
+    std::vector<double> w;
+    for (int i = -reach; i <= reach; ++i) {
+      w.push_back(std::exp(-0.5 * i * i / (sigma * sigma)));
+      sum += w.back();
+    }
+    for (const double v : w)
+      taps.push_back(static_cast<float>(v / sum));
+  }
+  int reach = 0;
+  std::vector<float> taps; // 2 * reach + 1, none: nothing to do
+};
+
+// Replaces n rows (row i at first + i * stride) by their weighted sums; copy holds n rows of the width.
+void Across(float* first, std::ptrdiff_t stride, int n, int width, const Kernel& kernel, std::vector<float>& copy)
+{
+  copy.resize(static_cast<std::size_t>(n) * static_cast<std::size_t>(width));
+  for (int i = 0; i < n; ++i)
+    std::copy_n(first + i * stride, width, copy.data() + static_cast<std::ptrdiff_t>(i) * width);
+  std::vector<const float*> rows(kernel.taps.size());
+  for (int i = 0; i < n; ++i) {
+    const int from = std::max(0, i - kernel.reach), to = std::min(n - 1, i + kernel.reach);
+    for (int r = from; r <= to; ++r)
+      rows[static_cast<std::size_t>(r - from)] = copy.data() + static_cast<std::ptrdiff_t>(r) * width;
+    SumRows(rows.data(), kernel.taps.data() + (from - i + kernel.reach), to - from + 1, width, first + i * stride);
+  }
+}
+
+void Along(float* row, int n, const Kernel& kernel, std::vector<float>& padded)
+{
+  padded.assign(static_cast<std::size_t>(n + 2 * kernel.reach), 0.0f);
+  std::copy_n(row, n, padded.data() + kernel.reach);
+  std::vector<const float*> rows(kernel.taps.size());
+  for (std::size_t t = 0; t < rows.size(); ++t)
+    rows[t] = padded.data() + t;
+  SumRows(rows.data(), kernel.taps.data(), static_cast<int>(rows.size()), n, row);
+}
+
+} // namespace
+
+void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels)
+{
+  const Kernel x(sigmaVoxels.x()), y(sigmaVoxels.y()), z(sigmaVoxels.z());
+  const auto& n = volume.Dimensions();
+  if (!x.taps.empty() || !y.taps.empty())
+    ParallelFor(n[2], [&](std::ptrdiff_t k) {
+      std::vector<float> copy;
+      if (!x.taps.empty())
+        for (int j = 0; j < n[1]; ++j)
+          Along(volume.Row(j, static_cast<int>(k)), n[0], x, copy);
+      if (!y.taps.empty())
+        Across(volume.Row(0, static_cast<int>(k)), volume.RowStride(), n[1], n[0], y, copy);
+    });
+  if (!z.taps.empty())
+    ParallelFor(n[1], [&](std::ptrdiff_t j) {
+      std::vector<float> copy;
+      Across(volume.Row(static_cast<int>(j), 0), volume.SliceStride(), n[2], n[0], z, copy);
+    });
+}
+
+} // namespace echorama
