@@ -4,20 +4,12 @@
 // T_f, so that an alignment that equals the truth scores 0 to rounding.
 #include "AlignmentScore.h"
 #include "Core/Base/Error.h"
+#include "Percentile.h"
 #include <algorithm>
 #include <cmath>
 
 namespace echorama {
 namespace {
-
-// The value below which a share of the numbers lies (nearest rank).
-double Percentile(std::vector<double> numbers, double share)
-{
-  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(numbers.size()))) - 1;
-  const auto nth = numbers.begin() + std::max<std::ptrdiff_t>(rank, 0);
-  std::nth_element(numbers.begin(), nth, numbers.end());
-  return *nth;
-}
 
 void Check(const ScoredVolume& volume)
 {

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace echorama {
+
+/// The least of the numbers (at least one) that a \a share, in [0, 1], of them does not exceed: nearest rank.
+inline double Percentile(std::vector<double> numbers, double share)
+{
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(numbers.size()))) - 1;
+  const auto nth = numbers.begin() + std::max<std::ptrdiff_t>(rank, 0);
+  std::nth_element(numbers.begin(), nth, numbers.end());
+  return *nth;
+}
+
+} // namespace echorama
