@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/Progress.h"
+#include "PlacedVolume.h"
+#include "RotationCover.h"
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// Which poses the global search looks at, and how closely.
+struct GlobalSearchParameters {
+  double coneDegrees = 180.0; ///< rotations by at most so much about the start are tried, [0, 180]; 180: all there are
+  double reachMm = std::numeric_limits<double>::infinity(); ///< the valid centroid moves at most so far from the start, > 0
+  double minimumOverlap = 0.1; ///< of the smaller volume's valid region, (0, 1]: poses with less do not count
+  int resolution = 40;         ///< voxels along the longest side of the larger valid region, [16, 96]
+  double stepDegrees = 0.0;    ///< between neighbouring rotations, [2, 45]; 0: what the resolution needs
+  int candidates = 12;         ///< how many distinct poses are kept, [1, 1000]
+
+  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  void Check() const;
+};
+
+/// A pose that looks right at low resolution.
+struct GlobalCandidate {
+  Pose volumeToWorld = Pose::Identity(); ///< of the moving volume
+  double ncc = 0.0;       ///< masked normalised cross-correlation there, of locally normalised intensities, [-1, 1]
+  double overlap = 0.0;   ///< share of the smaller volume's valid region that lies in the other, [0, 1]
+  double sharpness = 0.0; ///< how far the peak stands above the other translations of its rotation, in their standard deviations
+};
+
+struct GlobalSearchResult {
+  std::vector<GlobalCandidate> candidates; ///< best first, no two alike (a step or more apart, as the mean over the volume)
+  int rotations = 0;                       ///< tried
+  double voxelMm = 0.0;                    ///< of the low resolution
+};
+
+/// Looks for the pose of \a moving beside \a fixed from far off, at low resolution.
+///
+/// For each of a cover of rotations (RotationCover) the masked normalised cross-correlation is worked out over all
+/// translations at once in Fourier space (Padfield, IEEE TIP 21(5), 2012), on intensities of which the local mean is taken off
+/// and which are divided by the local standard deviation: gain and slow changes of brightness do not count. Poses are ranked
+/// by sqrt(overlap) atanh(correlation), so that small overlaps do not win by chance. The best peaks are then refined in space
+/// at the resolution asked for, and the best that differ are kept. Voxels count by their reliability where there is one.
+/// The answer does not depend on the threads. \throws Error(InvalidParameter); Error(BadInput) that names the volume when it
+/// is constant, has fewer than 100 real voxels or is not three-dimensional; Error(Cancelled).
+GlobalSearchResult GlobalSearch(const PlacedVolume& fixed, const PlacedVolume& moving,
+                                const GlobalSearchParameters& parameters = {}, const Progress& progress = {});
+
+} // namespace echorama
