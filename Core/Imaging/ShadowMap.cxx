@@ -8,8 +8,8 @@
 //      tissue there, a quantile over beams, smoothed; it may follow attenuation down, but not below half of the whole image's.
 //      Brightness becomes a level: 0 black, 1 ordinary tissue.
 //   3. Witnesses. An opening along the beam (a minimum over the least length of an echo) takes specks away; the running maximum
-//      from the far end is the best witness from each depth on; a median over the neighbouring beams removes what is not
-//      coherent. It never grows with depth, so each beam is reliable down to where it ruptures. Short dark tails are excused.
+//      from the far end is the best witness from each depth on; what most of the neighbouring beams agree on removes what is
+//      not coherent. It never grows with depth, so each beam is reliable down to where it ruptures. Short dark tails are excused.
 //   4. Back to cells, by the exact inverse of the geometry, clamped to the fan, so that ragged rims get their neighbours' answer;
 //      times what saturation leaves: the share of voxels at the top value among 3 x 3 x 3 cells.
 //   5. Cells to voxels, linearly; 0 where a voxel is not real.
@@ -32,7 +32,7 @@ constexpr float Unreal = std::numeric_limits<float>::quiet_NaN();
 // Quantiles, see the essay. Black: of the cells' least values. Tissue: of the cells' means at a depth. Bright: of all means.
 constexpr double BlackQuantile = 0.01, TissueQuantile = 0.7, BrightQuantile = 0.99;
 // Ordinary tissue at a depth is at least this part of what it is in the whole image, and of what is bright there.
-constexpr float LeastOfImage = 0.5f, LeastOfBright = 0.15f;
+constexpr float LeastOfImage = 0.5f, LeastOfBright = 0.25f;
 // Half of the range of depths over which the grey of tissue is smoothed, as a part of the beam.
 constexpr double DepthWindow = 0.05;
 // Tissue that is fewer steps of an integer above black is no tissue.
@@ -303,9 +303,9 @@ void FindWitnesses(float* beam, int samples, const Greys& greys, int echo, std::
       beam[d] = best[static_cast<std::size_t>(r--)];
 }
 
-// The median over the neighbours of a beam, itself included, at one depth. Of an even number the upper one: the benefit of the
-// doubt.
-float MedianOfNeighbours(VolumeView<const float> beams, int d, int fan, int sweep)
+// What a beam and its neighbours agree on at one depth: of nine values the fourth smallest, so that a dark beam alone is noise
+// while the corner of a shadow stays.
+float Agreed(VolumeView<const float> beams, int d, int fan, int sweep)
 {
   const auto& n = beams.Dimensions();
   std::array<float, 9> values;
@@ -314,10 +314,9 @@ float MedianOfNeighbours(VolumeView<const float> beams, int d, int fan, int swee
     for (int f = std::max(0, fan - 1); f <= std::min(n[1] - 1, fan + 1); ++f)
       if (const float value = beams(d, f, s); value == value)
         values[static_cast<std::size_t>(count++)] = value;
-  if (count == 0)
-    return Unreal;
-  std::nth_element(values.begin(), values.begin() + count / 2, values.begin() + count);
-  return values[static_cast<std::size_t>(count / 2)];
+  const int rank = 3 * count / 9; // of three, in a single plane, the median
+  std::nth_element(values.begin(), values.begin() + rank, values.begin() + count);
+  return values[static_cast<std::size_t>(rank)];
 }
 
 // From witnesses to reliability, in place: levels to [0, 1], short tails excused, samples that are not real filled from their
@@ -367,7 +366,7 @@ Volume<float> BeamReliability(const Cells& cells, const BeamGrid& grid, const Re
     for (int fan = 0; fan < grid.Size()[1]; ++fan) {
       float* beam = out.Row(fan, sweep);
       for (int d = 0; d < samples; ++d)
-        beam[d] = beams(d, fan, sweep) == beams(d, fan, sweep) ? MedianOfNeighbours(beams, d, fan, sweep) : Unreal;
+        beam[d] = beams(d, fan, sweep) == beams(d, fan, sweep) ? Agreed(beams, d, fan, sweep) : Unreal;
       Judge(beam, samples, p);
     }
   });

@@ -37,10 +37,14 @@ public:
   vtkTypeMacro(vtkUltrasoundVolume, vtkObject);
 
   ///@{
-  /** Names of the two point arrays, and of a third that says which volume each voxel of a stitched one came from. */
+  /**
+   * Names of the two point arrays, of one that says which volume each voxel of a stitched one came from, and of one that says
+   * how far each voxel can be trusted (float, 0 to 1; see vtkUltrasoundReliabilityMap).
+   */
   static const char* IntensityName() { return "Intensity"; }
   static const char* ValidRegionName() { return "ValidRegion"; }
   static const char* ProvenanceName() { return "Provenance"; }
+  static const char* ReliabilityName() { return "Reliability"; }
   ///@}
 
   /**
