@@ -23,8 +23,14 @@ find_library(ECHORAMA_IMATH NAMES Imath Imath-3_1 REQUIRED)
 add_library(Echorama_OpenVDB INTERFACE IMPORTED)
 target_include_directories(Echorama_OpenVDB SYSTEM INTERFACE ${ECHORAMA_OPENVDB_INCLUDE_DIR})
 target_link_libraries(Echorama_OpenVDB INTERFACE ${ECHORAMA_OPENVDB} ${ECHORAMA_IMATH} TBB::tbb)
-# Ceres' own configuration is used for its library and headers alone; its dense solvers are all we call.
-find_package(Ceres 2 REQUIRED)
+# Ceres' own configuration names its static library. That one shares Eigen's inline functions with our code, which may be
+# compiled for another instruction set and then allocates memory in another way: it frees what it did not allocate. The shared
+# library keeps its own to itself.
+find_path(ECHORAMA_CERES_INCLUDE_DIR ceres/manifold.h REQUIRED)
+find_library(ECHORAMA_CERES NAMES libceres.so libceres.dylib ceres REQUIRED)
+add_library(Echorama_Ceres INTERFACE IMPORTED)
+target_include_directories(Echorama_Ceres SYSTEM INTERFACE ${ECHORAMA_CERES_INCLUDE_DIR})
+target_link_libraries(Echorama_Ceres INTERFACE ${ECHORAMA_CERES})
 # The FFT (BSD-3-Clause, one header) comes with Debian's pythran.
 find_path(ECHORAMA_POCKETFFT_INCLUDE_DIR pocketfft.hpp
   PATHS /usr/lib/python3/dist-packages/pythran/pythonic/numpy/fft REQUIRED)
