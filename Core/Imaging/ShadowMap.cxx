@@ -35,8 +35,8 @@ constexpr double BlackQuantile = 0.01, TissueQuantile = 0.7, BrightQuantile = 0.
 constexpr float LeastOfImage = 0.5f, LeastOfBright = 0.25f;
 // Half of the range of depths over which the grey of tissue is smoothed, as a part of the beam.
 constexpr double DepthWindow = 0.05;
-// Tissue that is fewer steps of an integer above black is no tissue.
-constexpr float LeastSteps = 4.0f;
+// Tissue is above black by at least this part of the range of all values, and so many steps of an integer.
+constexpr float LeastOfRange = 0.02f, LeastSteps = 4.0f;
 // Values closer to the largest, as a part of the range, are as large: interpolation has rounded them.
 constexpr double TopMargin = 1e-3;
 
@@ -53,6 +53,24 @@ float Quantile(std::vector<float>& values, double q)
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
+
+// Whether a voxel is real, and as a float still a number.
+template <class T>
+class Reality {
+public:
+  explicit Reality(const PosedVolume<T>& volume) : sampler_(volume.intensity, volume.valid), intensity_(volume.intensity) {}
+  bool operator()(std::ptrdiff_t voxel) const
+  {
+    if constexpr (std::is_same_v<T, double>)
+      if (!(std::abs(intensity_[voxel]) <= static_cast<double>(std::numeric_limits<float>::max())))
+        return false;
+    return sampler_.IsReal(voxel);
+  }
+
+private:
+  Sampler<T> sampler_;
+  VolumeView<const T> intensity_;
+};
 
 //----------------------------------------------------------------------------------------------------------------------
 // 1. Cells
@@ -104,7 +122,7 @@ template <class T>
 Cells GatherCells(const PosedVolume<T>& volume, int resolution, const Progress& progress)
 {
   Cells cells = CellsFor(volume.geometry, resolution);
-  const Sampler<T> sampler(volume.intensity, volume.valid);
+  const Reality<T> isReal(volume);
   const auto mean = cells.mean.View(), least = cells.least.View(), largest = cells.largest.View();
   const auto count = cells.count.View();
   ParallelFor(cells.geometry.dimensions[2], progress, [&](std::ptrdiff_t slice) {
@@ -112,7 +130,7 @@ Cells GatherCells(const PosedVolume<T>& volume, int resolution, const Progress& 
     const std::ptrdiff_t first = slice * mean.SliceStride();
     ForPieces(cells, volume.geometry.dimensions, static_cast<int>(slice), [&](std::ptrdiff_t cell, std::ptrdiff_t voxel, int n) {
       for (std::ptrdiff_t i = voxel; i < voxel + n; ++i)
-        if (sampler.IsReal(i)) {
+        if (isReal(i)) {
           const float value = static_cast<float>(volume.intensity[i]);
           const bool isFirst = count[cell]++ == 0;
           sums[static_cast<std::size_t>(cell - first)] += static_cast<double>(volume.intensity[i]);
@@ -401,13 +419,13 @@ Volume<int> SaturatedVoxels(const PosedVolume<T>& volume, const Cells& cells, fl
   Volume<int> saturated(cells.geometry.dimensions, 0);
   const auto out = saturated.View();
   const auto largest = cells.largest.View();
-  const Sampler<T> sampler(volume.intensity, volume.valid);
+  const Reality<T> isReal(volume);
   ParallelFor(out.Slices(), progress, [&](std::ptrdiff_t slice) {
     ForPieces(cells, volume.geometry.dimensions, static_cast<int>(slice), [&](std::ptrdiff_t cell, std::ptrdiff_t voxel, int n) {
       if (!(largest[cell] >= top))
         return;
       for (std::ptrdiff_t i = voxel; i < voxel + n; ++i)
-        out[cell] += sampler.IsReal(i) && static_cast<float>(volume.intensity[i]) >= top ? 1 : 0;
+        out[cell] += isReal(i) && static_cast<float>(volume.intensity[i]) >= top ? 1 : 0;
     });
   });
   return saturated;
@@ -466,7 +484,7 @@ void Spread(const PosedVolume<T>& volume, const Cells& cells, VolumeView<const f
   const auto& n = map.Dimensions();
   const auto& m = from.Dimensions();
   const AxisPlan x(n[0], m[0], cells.block[0]), y(n[1], m[1], cells.block[1]), z(n[2], m[2], cells.block[2]);
-  const Sampler<T> sampler(volume.intensity, volume.valid);
+  const Reality<T> isReal(volume);
   ParallelFor(n[2], progress, [&](std::ptrdiff_t slice) {
     std::vector<float> row(static_cast<std::size_t>(m[0]));
     const auto k = static_cast<std::size_t>(slice);
@@ -483,7 +501,7 @@ void Spread(const PosedVolume<T>& volume, const Cells& cells, VolumeView<const f
       for (int i = 0; i < n[0]; ++i) {
         const auto v = static_cast<std::size_t>(i);
         const float left = row[static_cast<std::size_t>(x.below[v])], right = row[static_cast<std::size_t>(x.above[v])];
-        out[i] = sampler.IsReal(first + i) ? left + x.t[v] * (right - left) : 0.0f;
+        out[i] = isReal(first + i) ? left + x.t[v] * (right - left) : 0.0f;
       }
     }
   });
@@ -558,8 +576,8 @@ Reliability MeasureReliability(const PosedVolume<T>& volume, const std::optional
 
   const BeamGrid grid =
       probe ? BeamGrid(cells.geometry, *probe, p.resolution) : BeamGrid(cells.geometry, DepthAxisOf(p, n), p.depthReversed);
-  const Volume<float> beams =
-      BeamReliability(cells, grid, p, std::is_integral_v<T> ? LeastSteps : 0.0f, progress.Part(0.35, 0.6));
+  const float leastTissue = std::max(LeastOfRange * (largest - least), std::is_integral_v<T> ? LeastSteps : 0.0f);
+  const Volume<float> beams = BeamReliability(cells, grid, p, leastTissue, progress.Part(0.35, 0.6));
   Volume<float> values = ShadowOfCells(cells, grid, beams.View(), progress.Part(0.6, 0.7));
   result.shadowShare = ShareBelowHalf(cells, values.View());
   if (result.shadowShare > 0.99)
@@ -582,10 +600,10 @@ std::optional<PlacedProbe> FindProbe(const PosedVolume<T>& volume, const ProbeFi
 {
   Volume<unsigned char> region(volume.intensity.Dimensions());
   const auto inside = region.View();
-  const Sampler<T> sampler(volume.intensity, volume.valid);
+  const Reality<T> isReal(volume);
   ParallelRanges(inside.Size(), 65536, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (std::ptrdiff_t i = begin; i < end; ++i)
-      inside[i] = sampler.IsReal(i) ? 1 : 0;
+      inside[i] = isReal(i) ? 1 : 0;
   });
   try {
     const ProbeFit fit = FitProbe(region.View(), volume.geometry, parameters, progress);

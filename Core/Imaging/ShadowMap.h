@@ -20,7 +20,7 @@ struct PlacedProbe {
 /// to the grey of ordinary tissue at that depth, so that gain and type do not matter. Lengths are parts of a beam.
 struct ReliabilityParameters {
   int resolution = 96;         ///< cells along the longest side of the volume, at most one per voxel, [16, 512]
-  double shadowLevel = 0.3;   ///< a tail of a beam no brighter than this is shadow: reliability 0, [0, 1)
+  double shadowLevel = 0.3;    ///< a tail of a beam no brighter than this is shadow: reliability 0, [0, 1)
   double tissueLevel = 0.7;    ///< one that gets as bright as this is not: reliability 1, (shadowLevel, 1]
   double leastEcho = 0.03;     ///< what is brighter over less than this length is a speck, and no proof of sound, [0, 0.25]
   double leastShadow = 0.2;    ///< dark tails shorter than half of this are left alone, those longer count in full, [0, 1]
