@@ -53,34 +53,38 @@ void BlendWeights(const float* scales, std::size_t count, const BlendPower& powe
 /// The blend of one voxel, fed one volume at a time: the weighted mean of eq. 5.5 and 5.10 without keeping any volume.
 ///
 /// It keeps the largest scale so far and the sum of weights relative to it; when a larger one comes, the sum shrinks. The
-/// mean moves by w / total * (v - mean), so that equal values stay what they are to the last bit.
+/// mean moves by w / total * (v - mean), so that equal values stay what they are to the last bit. A factor (how far the value can
+/// be trusted, > 0) multiplies the weight of a volume.
 template <class A>
 struct BlendSum {
   A mean = A(0);
   float largest = 0.0f; ///< scale
-  float total = 0.0f;   ///< sum of (scale / largest)^b; 0: nothing came yet
+  float total = 0.0f;   ///< sum of factor (scale / largest)^b; 0: nothing came yet
 
-  void Add(A value, float scale, const BlendPower& power)
+  void Add(A value, float scale, const BlendPower& power, float factor = 1.0f)
   {
-    float weight = 1.0f;
+    float weight = factor;
     if (total == 0.0f) {
       mean = value;
       largest = scale;
-      total = 1.0f;
+      total = factor;
       return;
     }
     if (scale > largest) {
       total *= power(largest / scale);
       largest = scale;
     } else if (scale < largest) {
-      weight = power(scale / largest);
+      weight *= power(scale / largest);
     }
     total += weight;
     mean += static_cast<A>(weight / total) * (value - mean);
   }
 
-  /// The weight that a volume of this scale has, once all volumes came.
-  float Weight(float scale, const BlendPower& power) const { return (scale < largest ? power(scale / largest) : 1.0f) / total; }
+  /// The weight that a volume of this scale and factor has, once all volumes came.
+  float Weight(float scale, const BlendPower& power, float factor = 1.0f) const
+  {
+    return factor * (scale < largest ? power(scale / largest) : 1.0f) / total;
+  }
 };
 
 } // namespace echorama

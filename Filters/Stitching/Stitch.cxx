@@ -3,8 +3,9 @@
 //   1. where each lies in the grid (a mask in its own box), from which RegionMap knows pure, overlap and empty regions;
 //   2. volumes that others cover wholly get a core;
 //   3. one volume after the other is resampled; where it is alone its value is final, where it overlaps it goes into a
-//      running blend (BlendSum) with the scale that its two distance maps give. The maps live for one volume only, and the
-//      blend is kept for voxels of the overlap only, in the dense numbering that RegionMap gives them.
+//      running blend (BlendSum) with the scale that its two distance maps give, and how far it can be trusted there. The maps
+//      live for one volume only, and the blend is kept for voxels of the overlap only, in the dense numbering that RegionMap
+//      gives them.
 // Volumes come in their order and every voxel is worked on by one thread, so threads do not change the result.
 #include "Stitch.h"
 #include "BlendWeights.h"
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <unistd.h>
 
 namespace echorama {
@@ -54,6 +56,37 @@ AnySampler SamplerOf(const StitchInput& input, const ImageGeometry& grid)
       },
       input.volume);
 }
+
+// How far the voxels of a volume can be trusted, row by row of its box in the grid; 1 where it does not say.
+class Trust {
+public:
+  Trust(const StitchInput& input, const ImageGeometry& grid, double floor) : floor_(static_cast<float>(floor))
+  {
+    if (input.reliability.Empty())
+      return;
+    std::visit(
+        [&](const auto& volume) {
+          if (input.reliability.Dimensions() != volume.geometry.dimensions)
+            throw Error(Error::Kind::BadInput, input.name + ": its reliability is not of the size that its geometry says");
+          sampler_.emplace(PosedVolume<float>{input.reliability, volume.valid, volume.geometry}, grid);
+        },
+        input.volume);
+  }
+
+  explicit operator bool() const { return sampler_.has_value(); }
+
+  // Numbers in [floor, 1], where bit 0 of inside is set. What is not a number is not trusted.
+  void Row(int j, int k, const unsigned char* inside, std::vector<float>& trust) const
+  {
+    sampler_->Values(j, k, inside, trust.data());
+    for (float& value : trust)
+      value = value > floor_ ? std::min(value, 1.0f) : floor_;
+  }
+
+private:
+  float floor_;
+  std::optional<RowSampler<float>> sampler_;
+};
 
 template <class T, class A>
 T Rounded(A value)
@@ -186,6 +219,9 @@ void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeom
   if (!(parameters.sharpness >= 0.0 && parameters.sharpness <= 1000.0))
     throw Error(Error::Kind::InvalidParameter,
                 "Sharpness is " + std::to_string(parameters.sharpness) + "; it must be in [0, 1000]");
+  if (!(parameters.reliabilityFloor > 0.0 && parameters.reliabilityFloor <= 1.0))
+    throw Error(Error::Kind::InvalidParameter,
+                "ReliabilityFloor is " + std::to_string(parameters.reliabilityFloor) + "; it must be in (0, 1]");
   if (!(parameters.maximumMemoryGb >= 0.0))
     throw Error(Error::Kind::InvalidParameter,
                 "MaximumMemoryGb is " + std::to_string(parameters.maximumMemoryGb) + "; it must not be negative");
@@ -225,6 +261,9 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
   std::vector<AnySampler> samplers;
   for (const StitchInput& input : inputs)
     samplers.push_back(SamplerOf(input, grid));
+  std::vector<Trust> trusts;
+  for (const StitchInput& input : inputs)
+    trusts.emplace_back(input, grid, parameters.reliabilityFloor);
   RegionMap regions(MasksOf(samplers, progress.Part(0.0, 0.15)), grid.spacing, output.coverage, progress.Part(0.15, 0.2));
   CheckRegions(parameters, inputs, regions);
 
@@ -243,8 +282,10 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
     const Progress part = progress.Part(0.3 + 0.6 * v / regions.Count(), 0.3 + 0.6 * (v + 1) / regions.Count());
     const Scales scales(parameters.method, regions, v, part.Part(0.0, 0.6));
     const GridBox& box = regions.Box(v);
+    const Trust& trust = trusts[v];
     const auto blendRows = [&](const auto& sampler, std::ptrdiff_t begin, std::ptrdiff_t end) {
       std::vector<A> values(box.size[0]);
+      std::vector<float> factors(box.size[0], 1.0f);
       for (std::ptrdiff_t row = begin; row < end; ++row) {
         const int j = box.first[1] + static_cast<int>(row % box.size[1]), k = box.first[2] + static_cast<int>(row / box.size[1]);
         const unsigned char* inside = regions.MaskRow(v, j, k);
@@ -253,6 +294,8 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
         float* weight = output.weights.empty() ? nullptr : output.weights[v].Row(j, k) + box.first[0];
         const Scales::Row scale(scales, j, k);
         sampler.Values(j, k, inside, values.data());
+        if (trust)
+          trust.Row(j, k, inside, factors);
         std::ptrdiff_t number = regions.OverlapBefore(box.first[0], j, k);
         for (int i = 0; i < box.size[0]; ++i) {
           const bool overlap = covered[i] > 1;
@@ -274,7 +317,7 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
             continue;
           }
           const float s = scale(box.first[0] + i);
-          sum.Add(values[i], s, power);
+          sum.Add(values[i], s, power, factors[i]);
           if (weight)
             weight[i] = s; // becomes the weight once all volumes came
         }
@@ -305,6 +348,9 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
     const GridBox& box = regions.Box(static_cast<int>(v));
     ForRows(box, Progress(), [&](int j, int k) {
       const unsigned char* inside = regions.MaskRow(static_cast<int>(v), j, k);
+      std::vector<float> factors(box.size[0], 1.0f);
+      if (trusts[v])
+        trusts[v].Row(j, k, inside, factors);
       const unsigned char* covered = output.coverage.Row(j, k) + box.first[0];
       float* weight = output.weights[v].Row(j, k) + box.first[0];
       std::ptrdiff_t number = regions.OverlapBefore(box.first[0], j, k);
@@ -312,7 +358,8 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
         if (covered[i] > 1) {
           const BlendSum<A>& sum = blend[number++];
           if (inside[i] & 1)
-            weight[i] = maximum ? static_cast<float>(sum.largest == static_cast<float>(v + 1)) : sum.Weight(weight[i], power);
+            weight[i] =
+                maximum ? static_cast<float>(sum.largest == static_cast<float>(v + 1)) : sum.Weight(weight[i], power, factors[i]);
         }
     });
   }

@@ -18,8 +18,11 @@ enum class StitchMethod {
 
 struct StitchParameters {
   StitchMethod method = StitchMethod::Distance;
-  double sharpness = 1.5;     ///< the exponent b of eq. 5.10, [0, 1000]; 0 is the plain average, large a hard edge. Distance only
-  bool allowDisjoint = false; ///< whether a volume may overlap no other; it is then just put in its place
+  double sharpness = 1.5; ///< the exponent b of eq. 5.10, [0, 1000]; 0 is the plain average, large a hard edge. Distance only
+  /// Volumes that say how far their voxels can be trusted count by that (their weight is multiplied), but by no less than this,
+  /// (0, 1]: where none can be trusted they are blended as ever. Not for Maximum.
+  double reliabilityFloor = 0.01;
+  bool allowDisjoint = false;   ///< whether a volume may overlap no other; it is then just put in its place
   double maximumMemoryGb = 0.0; ///< 10^9 bytes; 0: three quarters of this machine's memory
 };
 
@@ -29,7 +32,8 @@ using AnyPosedVolume = std::variant<PosedVolume<unsigned char>, PosedVolume<shor
 
 struct StitchInput {
   AnyPosedVolume volume;
-  std::string name; ///< for messages
+  std::string name;                         ///< for messages
+  VolumeView<const float> reliability = {}; ///< how far each voxel can be trusted, in [0, 1] (ReliabilityMap); empty: all alike
 };
 
 /// Where the result goes: views of the size of the grid.
@@ -56,11 +60,11 @@ void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeom
 /// Resamples posed volumes onto \a grid (see StitchGrid) and blends them into one, in 2D and 3D.
 ///
 /// Weights are s^b / sum s^b with s = e / (p + e): p and e are the distances, in the grid, to the pure and the empty region
-/// of the volume. A volume without a pure region gets a core (RegionMap::GiveCores). The blend is v0 + sum w (v - v0), so a
-/// constant stays that constant; integer results are rounded, and clamped to the range of T.
-/// Cost: per volume one resampling and two distance maps in boxes around its overlap; memory as StitchMemory() says.
-/// \throws what CheckStitch() throws, Error(BadInput) that names a volume with no voxel in the grid, Error(NotPossible) that
-/// names a volume which overlaps no other, Error(Cancelled).
+/// of the volume. A volume without a pure region gets a core (RegionMap::GiveCores). Reliabilities multiply s^b. The blend is v0
+/// + sum w (v - v0), so a constant stays that constant; integer results are rounded, and clamped to the range of T. Cost: per
+/// volume one resampling and two distance maps in boxes around its overlap; memory as StitchMemory() says. \throws what
+/// CheckStitch() throws, Error(BadInput) that names a volume with no voxel in the grid, Error(NotPossible) that names a volume
+/// which overlaps no other, Error(Cancelled).
 template <class T>
 void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& volumes, const ImageGeometry& grid,
             const StitchOutput<T>& output, const Progress& progress = {});

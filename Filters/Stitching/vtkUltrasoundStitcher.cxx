@@ -132,6 +132,18 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
 }
 
 //----------------------------------------------------------------------------
+echorama::VolumeView<const float> vtkUltrasoundStitcher::ReliabilityOf(const vtkUltrasoundVolume::Input& volume) const
+{
+  vtkDataArray* array =
+      this->UseReliability ? volume.Image->GetPointData()->GetArray(vtkUltrasoundVolume::ReliabilityName()) : nullptr;
+  if (array && (array->GetDataType() != VTK_FLOAT || array->GetNumberOfComponents() != 1 ||
+                array->GetNumberOfTuples() != volume.Image->GetNumberOfPoints())) {
+    throw Error(Error::Kind::BadInput, volume.Name + ": its Reliability is not one float per voxel");
+  }
+  return vtkUltrasoundVolume::ViewOf<const float>(array, volume.Image);
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   // 1. what came in
@@ -143,7 +155,7 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   names->SetName(StitchedVolumesName());
   for (const vtkUltrasoundVolume::Input& volume : volumes) {
     vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
-      stitched.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name});
+      stitched.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name, this->ReliabilityOf(volume)});
     });
     geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
     type = CommonType(type, volume.Intensity->GetDataType());
@@ -152,6 +164,7 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   echorama::StitchParameters parameters;
   parameters.method = static_cast<echorama::StitchMethod>(this->Method);
   parameters.sharpness = this->Sharpness;
+  parameters.reliabilityFloor = this->ReliabilityFloor;
   parameters.allowDisjoint = this->AllowDisjoint;
   parameters.maximumMemoryGb = this->MaximumMemoryGb;
 
@@ -197,6 +210,8 @@ void vtkUltrasoundStitcher::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Sharpness: " << this->Sharpness << "\n";
   os << indent << "SpacingMm: " << this->SpacingMm << "\n";
   os << indent << "AllowDisjoint: " << this->AllowDisjoint << "\n";
+  os << indent << "UseReliability: " << this->UseReliability << "\n";
+  os << indent << "ReliabilityFloor: " << this->ReliabilityFloor << "\n";
   os << indent << "OutputWeights: " << this->OutputWeights << "\n";
   os << indent << "MaximumMemoryGb: " << this->MaximumMemoryGb << "\n";
 }

@@ -17,7 +17,8 @@
  *
  * Where volumes overlap each is weighted by s^b / sum s^b, s = e / (p + e), with p and e the distances to the region where
  * it is alone and to the region where only others are (dissertation 5.1, 5.2, 5.4). A volume that others cover wholly counts
- * as alone where it lies deepest inside its border.
+ * as alone where it lies deepest inside its border. A volume with the point array `Reliability` (vtkUltrasoundReliabilityMap:
+ * shadows, saturation) is weighted by it as well.
  *
  * Refuses, with a message: fewer than two volumes, a volume that overlaps no other (see AllowDisjoint), one with no real
  * voxels, a bad geometry or type, and a result that needs more memory than allowed.
@@ -85,6 +86,19 @@ public:
   ///@}
 
   ///@{
+  /** Whether the `Reliability` of volumes that have it multiplies their weights (but for MAXIMUM). Default on. */
+  vtkSetMacro(UseReliability, bool);
+  vtkGetMacro(UseReliability, bool);
+  vtkBooleanMacro(UseReliability, bool);
+  ///@}
+
+  ///@{
+  /** What cannot be trusted at all still counts by this, in [1e-6, 1]: enough where nothing else is there. Default 0.01. */
+  vtkSetClampMacro(ReliabilityFloor, double, 1e-6, 1.0);
+  vtkGetMacro(ReliabilityFloor, double);
+  ///@}
+
+  ///@{
   /** Whether the share of each volume is put out too (4 bytes per voxel and volume). Default off. */
   vtkSetMacro(OutputWeights, bool);
   vtkGetMacro(OutputWeights, bool);
@@ -117,11 +131,17 @@ private:
   vtkUltrasoundStitcher(const vtkUltrasoundStitcher&) = delete;
   void operator=(const vtkUltrasoundStitcher&) = delete;
 
+#ifndef __VTK_WRAP__
+  echorama::VolumeView<const float> ReliabilityOf(const vtkUltrasoundVolume::Input& volume) const;
+#endif
+
   int Method = DISTANCE;
   bool OutputWeights = false;
+  bool UseReliability = true;
   double SpacingMm = 0.0;
 #ifndef __VTK_WRAP__
   double Sharpness = echorama::StitchParameters().sharpness;
+  double ReliabilityFloor = echorama::StitchParameters().reliabilityFloor;
   bool AllowDisjoint = echorama::StitchParameters().allowDisjoint;
   double MaximumMemoryGb = echorama::StitchParameters().maximumMemoryGb;
 #endif
