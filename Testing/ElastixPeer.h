@@ -5,6 +5,7 @@
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Core/Imaging/VolumeView.h"
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <filesystem>
@@ -41,12 +42,12 @@ public:
   {
     return "(FixedInternalImagePixelType \"float\")\n(MovingInternalImagePixelType \"float\")\n(UseDirectionCosines \"true\")\n"
            "(Registration \"MultiResolutionRegistration\")\n(Interpolator \"LinearInterpolator\")\n"
-           "(ResampleInterpolator \"FinalLinearInterpolator\")\n(Resampler \"DefaultResampler\")\n"
+           "(ResampleInterpolator \"FinalBSplineInterpolator\")\n(Resampler \"DefaultResampler\")\n"
            "(FixedImagePyramid \"FixedSmoothingImagePyramid\")\n(MovingImagePyramid \"MovingSmoothingImagePyramid\")\n"
            "(Optimizer \"AdaptiveStochasticGradientDescent\")\n(Transform \"EulerTransform\")\n(Metric \"" +
            metric +
            "\")\n(AutomaticScalesEstimation \"true\")\n(AutomaticTransformInitialization \"false\")\n"
-           "(NumberOfResolutions 4)\n(MaximumNumberOfIterations 250)\n(NumberOfSpatialSamples 4096)\n(NewSamplesEveryIteration "
+           "(NumberOfResolutions 4)\n(MaximumNumberOfIterations 500)\n(NumberOfSpatialSamples 5000)\n(NewSamplesEveryIteration "
            "\"true\")\n"
            "(ImageSampler \"RandomCoordinate\")\n(NumberOfHistogramBins 32)\n(ErodeMask \"false\")\n(RequiredRatioOfValidSamples "
            "0.05)\n"
@@ -57,9 +58,9 @@ public:
   std::optional<std::string> Run(const PosedVolume<unsigned char>& fixed, const PosedVolume<unsigned char>& moving,
                                  const std::string& parameters) const
   {
-    Write("fixed.mha", fixed.intensity, fixed.geometry);
+    Write("fixed.mha", Filled(fixed).View(), fixed.geometry);
     Write("fixed-mask.mha", fixed.valid, fixed.geometry);
-    Write("moving.mha", moving.intensity, moving.geometry);
+    Write("moving.mha", Filled(moving).View(), moving.geometry);
     Write("moving-mask.mha", moving.valid, moving.geometry);
     std::ofstream(Path("parameters.txt")) << parameters;
     const std::string command = "cd " + folder_ +
@@ -110,6 +111,21 @@ public:
   std::string Path(const std::string& name) const { return folder_ + "/" + name; }
 
 private:
+  // Its pyramids know no masks: black outside would be smoothed into the fan, so what is not real gets the mean of what is.
+  static Volume<unsigned char> Filled(const PosedVolume<unsigned char>& volume)
+  {
+    double sum = 0.0, count = 0.0;
+    for (std::ptrdiff_t i = 0; i < volume.intensity.Size(); ++i) {
+      sum += volume.valid[i] ? volume.intensity[i] : 0.0;
+      count += volume.valid[i] ? 1.0 : 0.0;
+    }
+    Volume<unsigned char> filled(volume.intensity.Dimensions());
+    const VolumeView<unsigned char> view = filled.View();
+    for (std::ptrdiff_t i = 0; i < view.Size(); ++i)
+      view[i] = volume.valid[i] ? volume.intensity[i] : static_cast<unsigned char>(sum / std::max(1.0, count));
+    return filled;
+  }
+
   void Write(const std::string& name, VolumeView<const unsigned char> voxels, const ImageGeometry& geometry) const
   {
     std::ofstream file(Path(name), std::ios::binary);

@@ -1,0 +1,374 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The candidates of the global search, and the start itself, are refined at a coarse level, where that takes a few
+// milliseconds each; those that meet are one. The best few go on to a middle level and the best of these to the finest.
+//
+// What is trusted. A measure alone cannot tell: any two volumes have a best pose. So the answer is questioned from four
+// sides, each of which sees what the others do not. Overlap and similarity above chance: nothing in common. The next best of
+// the different poses: repeated or symmetric structure. The covariance: a motion that changes nothing (a sphere about its
+// middle, a slab along itself). Two halves of the voxels, a checkerboard, refined each for itself from the same pose: where
+// the match is an accident of the noise, the halves share no optimum and part.
+//
+// The automatic start widens its search as long as there is no clear answer: near the start a search costs a few
+// milliseconds, over all rotations some seconds. What is clear already at the middle level to be no answer is not refined.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#endif
+#include "AlignPair.h"
+#include "Core/Base/Error.h"
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+namespace echorama {
+namespace {
+
+constexpr double HighestRatio = 99.0;
+constexpr int MostPoints = 1000;
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start)
+{
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::string Number(double value, int digits)
+{
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", digits, value);
+  return text;
+}
+
+// The shape of a volume: some of its real voxels, and how far it goes.
+struct Shape {
+  std::vector<Eigen::Vector3d> points; // mm, where the geometry of the volume has them
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+  double radius = 0.0; // root mean square distance from the centroid, mm
+  double extent = 0.0; // the longest side of the box around them, mm
+
+  explicit Shape(const PlacedVolume& volume)
+  {
+    const PyramidLevel& level = volume.pyramid->back();
+    const VolumeView<const float> view = level.intensity.View();
+    const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, level.realVoxels / MostPoints);
+    const auto& n = view.Dimensions();
+    const Eigen::Affine3d toWorld = level.geometry.IndexToWorld();
+    Eigen::AlignedBox3d box;
+    std::ptrdiff_t real = 0, index = 0;
+    for (int k = 0; k < n[2]; ++k)
+      for (int j = 0; j < n[1]; ++j)
+        for (int i = 0; i < n[0]; ++i)
+          if (std::isfinite(view[index++])) {
+            const Eigen::Vector3d p = toWorld * Eigen::Vector3d(i, j, k);
+            box.extend(p);
+            if (real++ % step == 0)
+              points.push_back(p);
+          }
+    for (const Eigen::Vector3d& p : points)
+      centroid += p / static_cast<double>(points.size());
+    for (const Eigen::Vector3d& p : points)
+      radius += (p - centroid).squaredNorm() / static_cast<double>(points.size());
+    radius = std::sqrt(radius);
+    extent = points.empty() ? 0.0 : box.sizes().maxCoeff();
+  }
+
+  /// How far two poses put the volume apart: the mean over its points, mm.
+  double Distance(const Pose& a, const Pose& b) const
+  {
+    double sum = 0.0;
+    for (const Eigen::Vector3d& p : points)
+      sum += (a * p - b * p).norm();
+    return sum / static_cast<double>(points.size());
+  }
+
+  /// The root mean square displacement of the points under a twist of this covariance about \a centre (world), mm.
+  double Error(const Information& covariance, const Eigen::Vector3d& centre, const Pose& pose) const
+  {
+    double sum = 0.0;
+    for (const Eigen::Vector3d& p : points) {
+      const Eigen::Vector3d r = pose * p - centre;
+      Eigen::Matrix<double, 3, 6> jacobian;
+      jacobian << 1.0, 0.0, 0.0, 0.0, r.z(), -r.y(), 0.0, 1.0, 0.0, -r.z(), 0.0, r.x(), 0.0, 0.0, 1.0, r.y(), -r.x(), 0.0;
+      sum += (jacobian * covariance * jacobian.transpose()).trace();
+    }
+    return std::sqrt(std::max(0.0, sum / static_cast<double>(points.size())));
+  }
+};
+
+// The motion that is least determined, in words.
+std::string LeastDetermined(const Information& covariance, double radius)
+{
+  Information scaled = covariance; // rotations by what they move at the rim
+  scaled.rightCols<3>() *= radius;
+  scaled.bottomRows<3>() *= radius;
+  const Eigen::SelfAdjointEigenSolver<Information> eigen(scaled);
+  const Eigen::Matrix<double, 6, 1> worst = eigen.eigenvectors().col(5);
+  const bool turns = worst.tail<3>().norm() > worst.head<3>().norm();
+  const Eigen::Vector3d axis = (turns ? worst.tail<3>() : worst.head<3>()).normalized();
+  return std::string(turns ? "a turn about" : "a move along") + " the direction (" + Number(axis.x(), 2) + ", " +
+         Number(axis.y(), 2) + ", " + Number(axis.z(), 2) + ")";
+}
+
+class Pair {
+public:
+  Pair(const PlacedVolume& fixed, const MetricPyramid& fixedFeatures, const PlacedVolume& moving,
+       const MetricPyramid& movingFeatures, const AlignPairParameters& p)
+    : fixed_(fixed), moving_(moving), fixedFeatures_(fixedFeatures), movingFeatures_(movingFeatures), p_(p), shape_(moving),
+      fixedShape_(fixed)
+  {
+    const auto finest = [](const PlacedVolume& v) { return v.pyramid->front().geometry.spacing.maxCoeff(); };
+    finestMm_ = std::max({p.finestMm, finest(fixed), finest(moving)});
+    // Coarse: some 32 voxels along the smaller of both; never finer than what there is.
+    coarseMm_ = std::max(finestMm_, std::min(shape_.extent, fixedShape_.extent) / 32.0);
+  }
+
+  /// \param isLast whether nobody will search further, so that a doubtful answer is worth its refinement
+  PairAlignment Align(double coneDegrees, double reachMm, bool isLast, const Progress& progress)
+  {
+    PairAlignment result;
+    result.volumeToWorld = moving_.volumeToWorld;
+    result.anywhere = coneDegrees >= 180.0;
+
+    // 1. where it could be
+    Clock::time_point start = Clock::now();
+    GlobalSearchParameters global;
+    global.coneDegrees = coneDegrees;
+    global.reachMm = reachMm;
+    global.minimumOverlap = p_.minimumOverlap;
+    global.candidates = p_.candidates;
+    std::vector<Pose> poses{moving_.volumeToWorld};
+    for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving_, global, progress.Part(0.0, 0.6)).candidates)
+      poses.push_back(candidate.volumeToWorld);
+    result.globalSeconds = SecondsSince(start);
+
+    // 2. refined, coarse to fine
+    start = Clock::now();
+    std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.7));
+    if (found.empty()) {
+      result.reason =
+          "no pose was found in which they overlap by " + Number(100.0 * p_.minimumOverlap, 0) + "% of the smaller one";
+      return result;
+    }
+    poses.clear();
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, found.size()); ++i)
+      poses.push_back(found[i].volumeToWorld);
+    const double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
+    found = Refine(poses, coarseMm_, middleMm, progress.Part(0.7, 0.8));
+    if (found.empty()) {
+      result.reason = "every pose that fits at a coarse level loses its overlap at a finer one";
+      return result;
+    }
+    result.peakRatio = Ratio(found);
+    if (!isLast && (result.peakRatio < p_.minimumPeakRatio || found.front().similarity < p_.minimumSimilarity)) {
+      result.verdict = Verdict::Failed;
+      result.localSeconds = SecondsSince(start);
+      return result;
+    }
+    const LocalAlignResult best = Local(found.front().volumeToWorld, middleMm, finestMm_, 0, progress.Part(0.8, 0.9));
+    result.localSeconds = SecondsSince(start);
+
+    // 3. what that is worth
+    start = Clock::now();
+    result.volumeToWorld = best.volumeToWorld;
+    result.similarity = best.similarity;
+    result.overlap = best.overlap;
+    result.score = best.score;
+    result.voxelMm = best.voxelMm;
+    result.centre = best.centre;
+    result.information = best.information;
+    const Information covariance = CovarianceOf(best.information, shape_.radius);
+    result.errorMm = shape_.Error(covariance, best.centre, best.volumeToWorld);
+    std::array<Pose, 2> halves;
+    for (int half = 0; half < 2; ++half)
+      halves[static_cast<std::size_t>(half)] = Local(best.volumeToWorld, std::max(finestMm_, 0.5 * middleMm), finestMm_, half + 1,
+                                                     progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
+                                                   .volumeToWorld;
+    result.splitMm = shape_.Distance(halves[0], halves[1]);
+    Judge(best, covariance, result);
+    result.confidenceSeconds = SecondsSince(start);
+    return result;
+  }
+
+  double ReachHandMade() const { return std::max(shape_.extent, fixedShape_.extent) / 3.0; }
+
+private:
+  LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int part, const Progress& progress) const
+  {
+    LocalAlignParameters local;
+    local.coarsestMm = coarsestMm;
+    local.finestMm = finestMm;
+    local.points = p_.points;
+    local.minimumOverlap = 0.5 * p_.minimumOverlap;
+    local.part = part;
+    local.seed = p_.seed;
+    return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, start, local, progress);
+  }
+
+  // Refines the poses and keeps those that are different and overlap, the best first.
+  std::vector<LocalAlignResult> Refine(const std::vector<Pose>& poses, double coarsestMm, double finestMm,
+                                       const Progress& progress) const
+  {
+    std::vector<LocalAlignResult> all, different;
+    const double count = static_cast<double>(poses.size());
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      all.push_back(Local(poses[i], coarsestMm, finestMm, 0,
+                          progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count)));
+    std::stable_sort(all.begin(), all.end(),
+                     [](const LocalAlignResult& a, const LocalAlignResult& b) { return a.score > b.score; });
+    for (const LocalAlignResult& one : all)
+      if (one.overlap >= p_.minimumOverlap &&
+          std::none_of(different.begin(), different.end(), [&](const LocalAlignResult& other) {
+            return shape_.Distance(one.volumeToWorld, other.volumeToWorld) < 3.0 * coarseMm_;
+          }))
+        different.push_back(one);
+    return different;
+  }
+
+  static double Ratio(const std::vector<LocalAlignResult>& found)
+  {
+    if (found.size() < 2 || found[1].score * HighestRatio <= found[0].score)
+      return HighestRatio;
+    return found[0].score / found[1].score;
+  }
+
+  void Judge(const LocalAlignResult& best, const Information& covariance, PairAlignment& result) const
+  {
+    const double voxel = result.voxelMm;
+    if (best.overlap < p_.minimumOverlap) {
+      result.verdict = Verdict::Failed;
+      result.reason = "they overlap by only " + Number(100.0 * best.overlap, 0) + "% of the smaller one";
+    } else if (!(best.similarity >= p_.minimumSimilarity)) {
+      result.verdict = Verdict::Failed;
+      result.reason =
+          "where they overlap best, they are hardly more alike than by chance (similarity " + Number(best.similarity, 3) + ")";
+    } else if (result.errorMm > p_.maximumErrorVoxels * voxel) {
+      result.verdict = Verdict::Ambiguous;
+      result.reason = "the contents do not determine the pose (predicted error " + Number(std::min(result.errorMm, 999.0), 1) +
+                      " mm); least " + LeastDetermined(covariance, shape_.radius);
+    } else if (result.splitMm > p_.maximumSplitVoxels * voxel) {
+      result.verdict = Verdict::Failed;
+      result.reason = "two halves of the voxels find poses that lie " + Number(result.splitMm, 1) + " mm apart";
+    } else if (result.peakRatio < p_.minimumPeakRatio) {
+      result.verdict = Verdict::Ambiguous;
+      result.reason = "a different pose fits nearly as well (ratio " + Number(result.peakRatio, 2) + ")";
+    } else {
+      result.verdict = Verdict::Aligned;
+    }
+  }
+
+  const PlacedVolume &fixed_, &moving_;
+  const MetricPyramid &fixedFeatures_, &movingFeatures_;
+  const AlignPairParameters& p_;
+  Shape shape_, fixedShape_;
+  double finestMm_ = 0.0, coarseMm_ = 0.0;
+};
+
+// The start's names, how far it may be off, and whether the whole world is searched when that has no clear answer.
+constexpr std::array<const char*, 4> StartNames{"automatic", "tracked", "hand-made", "unknown"};
+
+} // namespace
+
+const char* NameOf(AlignStart start)
+{
+  return StartNames[static_cast<std::size_t>(start)];
+}
+
+std::vector<std::string> AlignStartNames()
+{
+  return {StartNames.begin(), StartNames.end()};
+}
+
+AlignStart AlignStartOf(const std::string& name)
+{
+  std::string names;
+  for (std::size_t i = 0; i < StartNames.size(); ++i) {
+    if (name == StartNames[i])
+      return static_cast<AlignStart>(i);
+    names += (names.empty() ? "" : ", ") + std::string(StartNames[i]);
+  }
+  throw Error(Error::Kind::InvalidParameter, "there is no start named \"" + name + "\"; the names are: " + names);
+}
+
+const char* NameOf(Verdict verdict)
+{
+  return verdict == Verdict::Aligned ? "aligned" : verdict == Verdict::Ambiguous ? "ambiguous" : "failed";
+}
+
+void AlignPairParameters::Check() const
+{
+  const auto check = [](const char* name, double value, double from, double to) {
+    if (!(value >= from && value <= to))
+      throw Error(Error::Kind::InvalidParameter,
+                  std::string(name) + " must be in [" + Number(from, 2) + ", " + Number(to, 2) + "]; it is " + Number(value, 4));
+  };
+  check("minimumOverlap", minimumOverlap, 0.01, 1.0);
+  check("candidates", candidates, 1, 1000);
+  check("finestMm", finestMm, 0.0, 1000.0);
+  check("points", points, 1000, 1e7);
+  check("minimumSimilarity", minimumSimilarity, 0.0, 1.0);
+  check("minimumPeakRatio", minimumPeakRatio, 1.0, HighestRatio);
+  check("maximumErrorVoxels", maximumErrorVoxels, 1e-3, 1000.0);
+  check("maximumSplitVoxels", maximumSplitVoxels, 1e-3, 1000.0);
+  const std::vector<std::string> metrics = MetricNames();
+  if (std::find(metrics.begin(), metrics.end(), metric) == metrics.end()) {
+    std::string names;
+    for (const std::string& name : metrics)
+      names += (names.empty() ? "" : ", ") + name;
+    throw Error(Error::Kind::InvalidParameter, "there is no metric named \"" + metric + "\"; the metrics are: " + names);
+  }
+}
+
+Information CovarianceOf(const Information& information, double radiusMm)
+{
+  // In units in which a rotation moves the rim as far as a translation does, so that one bound serves both.
+  constexpr double FarMm = 1e6;
+  Eigen::Matrix<double, 6, 1> unit;
+  unit << 1.0, 1.0, 1.0, radiusMm, radiusMm, radiusMm;
+  Information scaled = unit.cwiseInverse().asDiagonal() * information * unit.cwiseInverse().asDiagonal();
+  if (!scaled.allFinite())
+    scaled.setZero(); // nothing is known
+  const Eigen::SelfAdjointEigenSolver<Information> eigen(0.5 * (scaled + scaled.transpose()));
+  const Eigen::Matrix<double, 6, 1> variances = eigen.eigenvalues().cwiseMax(1.0 / (FarMm * FarMm)).cwiseInverse();
+  return unit.cwiseInverse().asDiagonal() * eigen.eigenvectors() * variances.asDiagonal() * eigen.eigenvectors().transpose() *
+         unit.cwiseInverse().asDiagonal();
+}
+
+PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures,
+                        const PlacedVolume& moving, const std::shared_ptr<const MetricPyramid>& movingFeatures,
+                        const AlignPairParameters& p, const Progress& progress)
+{
+  p.Check();
+  Pair pair(fixed, *fixedFeatures, moving, *movingFeatures, p);
+  struct Stage {
+    AlignStart start;
+    double coneDegrees, reachMm, costs;
+  };
+  const std::array<Stage, 3> stages{{{AlignStart::Tracked, 12.0, 20.0, 0.05},
+                                     {AlignStart::HandMade, 35.0, pair.ReachHandMade(), 0.2},
+                                     {AlignStart::Unknown, 180.0, std::numeric_limits<double>::infinity(), 0.75}}};
+  if (p.start != AlignStart::Automatic) {
+    const Stage& stage = *std::find_if(stages.begin(), stages.end(), [&p](const Stage& s) { return s.start == p.start; });
+    return pair.Align(stage.coneDegrees, stage.reachMm, true, progress);
+  }
+  // A wider search sees what a narrower one has seen: its answer is the one that counts.
+  PairAlignment result;
+  double done = 0.0;
+  for (const Stage& stage : stages) {
+    const bool isLast = stage.start == AlignStart::Unknown;
+    PairAlignment found = pair.Align(stage.coneDegrees, stage.reachMm, isLast, progress.Part(done, done + stage.costs));
+    done += stage.costs;
+    found.globalSeconds += result.globalSeconds;
+    found.localSeconds += result.localSeconds;
+    found.confidenceSeconds += result.confidenceSeconds;
+    result = found;
+    if (result.verdict == Verdict::Aligned)
+      break;
+  }
+  return result;
+}
+
+} // namespace echorama

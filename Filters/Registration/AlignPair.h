@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "GlobalSearch.h"
+#include "LocalAlign.h"
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// What is known about where the moving volume belongs.
+enum class AlignStart {
+  Automatic, ///< nothing for sure: as Tracked first, then as HandMade and as Unknown while there is no clear answer
+  Tracked,   ///< within some 10 degrees and 15 mm of the start: a calibrated tracker
+  HandMade,  ///< within some 35 degrees and a third of the volume's size: placed by eye
+  Unknown,   ///< any rotation and any translation
+};
+
+/// "automatic", "tracked", "hand-made", "unknown"; and back. AlignStartOf throws Error(InvalidParameter) that lists the names.
+const char* NameOf(AlignStart);
+std::vector<std::string> AlignStartNames();
+AlignStart AlignStartOf(const std::string& name);
+
+/// What an alignment is worth.
+enum class Verdict {
+  Aligned,   ///< every check was passed
+  Ambiguous, ///< there is a best pose, but another would do as well or part of the pose is undetermined
+  Failed,    ///< no pose explains both volumes
+};
+
+/// "aligned", "ambiguous", "failed".
+const char* NameOf(Verdict);
+
+/// How a pair is aligned, and from when on the answer is trusted.
+struct AlignPairParameters {
+  AlignStart start = AlignStart::Automatic;
+  std::string metric = "local-ncc"; ///< of the local stage, one of MetricNames()
+  double minimumOverlap = 0.1;      ///< share of the smaller volume, [0.01, 1]: poses with less do not count
+  int candidates = 16;              ///< poses of the global stage that are refined, [1, 1000]
+  double finestMm = 0.0;            ///< the local stage ends at voxels not smaller than this, mm; 0: the volumes' own
+  int points = 200000;              ///< of each volume that the local stage compares on a level, at most, [1000, 10 million]
+
+  double minimumSimilarity = 0.06; ///< of the overlap, [0, 1]: less is Failed
+  double minimumPeakRatio = 1.25;  ///< best score : that of the next different pose, >= 1: less is Ambiguous
+  double maximumErrorVoxels = 1.0; ///< predicted root mean square error over the moving volume, > 0: more is Ambiguous
+  double maximumSplitVoxels = 2.0; ///< how far the poses that two halves of the voxels find may lie apart, > 0: more is Failed
+  std::uint64_t seed = 1;          ///< of the points that are compared
+
+  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  void Check() const;
+};
+
+/// Where the moving volume belongs beside the fixed one, and how sure that is.
+struct PairAlignment {
+  Pose volumeToWorld = Pose::Identity(); ///< of the moving volume, the fixed one being where it was placed
+  Verdict verdict = Verdict::Failed;
+  std::string reason;      ///< why it is not Aligned, for people; else empty
+  double similarity = 0.0; ///< mean over the overlap: 1 identical, 0 chance
+  double overlap = 0.0;    ///< share of the smaller volume, [0, 1]
+  double score = 0.0;      ///< of both, see LocalAlignResult
+  double peakRatio =
+      0.0;              ///< best score : that of the next different pose, at the coarse level; 99 when there is none above chance
+  double splitMm = 0.0; ///< how far the poses that two halves of the voxels find lie apart, in the mean over the moving volume
+  double errorMm = 0.0; ///< predicted root mean square error over the moving volume
+  double voxelMm = 0.0; ///< of the last level
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world: the twist below acts about it
+  /// Inverse covariance of (translation mm, rotation vector radians) in MotionAbout(centre, rotation, translation) *
+  /// volumeToWorld.
+  Information information = Information::Zero();
+  bool anywhere = false; ///< whether every rotation was tried
+  double globalSeconds = 0.0, localSeconds = 0.0, confidenceSeconds = 0.0;
+};
+
+/// The 6 x 6 covariance; in directions that are not determined the standard deviation is 1 km at \a radiusMm mm from the centre.
+Information CovarianceOf(const Information& information, double radiusMm);
+
+/// Aligns two volumes: global search, local refinement of its candidates, and a verdict on the best.
+///
+/// The start is always one of the candidates. All are refined at a coarse level, the best down to the finest. Four checks
+/// decide: enough overlap and more similarity than chance; no different pose that does nearly as well; the covariance; and the
+/// poses that two disjoint halves of the voxels find, each for itself: where nothing real is matched they drift apart.
+/// \throws Error(InvalidParameter), Error(BadInput) for volumes that cannot be aligned at all (constant, nearly empty, flat),
+/// Error(Cancelled). An alignment that is not found is no error: it is the verdict.
+PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures,
+                        const PlacedVolume& moving, const std::shared_ptr<const MetricPyramid>& movingFeatures,
+                        const AlignPairParameters& parameters = {}, const Progress& progress = {});
+
+} // namespace echorama
