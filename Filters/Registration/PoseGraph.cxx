@@ -35,7 +35,8 @@ using Flags = std::vector<bool>;
 
 constexpr int CyclesPerEdge = 64;          // as many short cycles are tried for an edge
 constexpr double TreeEdgesAtMost = 200000; // trees times edges
-constexpr int Rounds = 30;                 // of putting edges aside and taking them back
+constexpr int Rounds = 50;                 // of putting edges aside and taking them back
+constexpr int MostFalls = 3;               // an edge that was put aside so often stays there
 constexpr int Regroupings = 5;             // of parts that a majority of edges wants elsewhere
 
 std::size_t Index(int number)
@@ -114,12 +115,16 @@ private:
     std::vector<Pose> poses;
   };
 
+  struct Judgement {
+    double mm, sigmas;
+  };
+
+  Judgement Judge(std::size_t e, const MarginalCovariances& covariances) const;
   Twist ResidualOf(std::size_t e) const
   {
     return Disagreement(edges_[e], poses[Index(edges_[e].from)], poses[Index(edges_[e].to)]);
   }
   const Pose& Step(std::size_t e, int from) const { return edges_[e].from == from ? edges_[e].toInFrom : edges_[e].fromInTo; }
-  bool IsWithinGate(double mm, double sigmas) const { return mm <= p_.outlierMm || sigmas <= p_.outlierSigmas; }
   double GateMm(double variance) const { return std::max(p_.outlierMm, p_.outlierSigmas * std::sqrt(variance / 3.0)); }
 
   std::vector<double> CycleWeights(const Flags& take) const;
@@ -347,6 +352,31 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
   poses = bestPoses;
 }
 
+// How far an edge disagrees with what all the others that stand predict for it.
+Graph::Judgement Graph::Judge(std::size_t e, const MarginalCovariances& covariances) const
+{
+  const Twist gap = ResidualOf(e), whitened = edges_[e].root * gap;
+  const Information predicted = edges_[e].root * covariances.OfEdge(e) * edges_[e].root.transpose();
+  if (!stands[e]) {
+    const Information covariance = Information::Identity() + predicted;
+    return {DistanceMm(gap, p_.radiusMm), std::sqrt(whitened.dot(covariance.ldlt().solve(whitened)))};
+  }
+  // It stands, and has pulled the prediction towards itself: that is taken back. Directions in which nothing but the edge
+  // itself holds its volumes cannot be judged.
+  const Eigen::SelfAdjointEigenSolver<Information> solver(Information::Identity() - predicted);
+  Twist alone = Twist::Zero();
+  double square = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    const double share = solver.eigenvalues()[i];
+    if (share < 1e-6)
+      continue;
+    const double along = solver.eigenvectors().col(i).dot(whitened);
+    alone += solver.eigenvectors().col(i) * (along / share);
+    square += along * along / share;
+  }
+  return {DistanceMm(edges_[e].root.partialPivLu().solve(alone), p_.radiusMm), std::sqrt(square)};
+}
+
 // Least squares of the edges that stand, and which edges that makes stand, until both agree.
 void Graph::Settle(const Flags& take, const Flags& keep)
 {
@@ -354,36 +384,32 @@ void Graph::Settle(const Flags& take, const Flags& keep)
   std::vector<int> falls(edges_.size(), 0);
   for (int round = 0; round < Rounds; ++round) {
     MinimiseDisagreement(edges_, stands, isFixed, 0.0, poses);
-    bool isChanged = false, isAside = false;
-    for (std::size_t e = 0; e < edges_.size(); ++e)
-      isAside = isAside || (take[e] && !stands[e] && falls[e] < 3);
-    if (isAside) {
-      const MarginalCovariances covariances(edges_, stands, take, isFixed, poses);
-      Flags next = stands;
-      for (std::size_t e = 0; e < edges_.size(); ++e) {
-        if (!take[e] || stands[e] || falls[e] >= 3)
-          continue;
-        const Twist gap = ResidualOf(e);
-        const Information own = (edges_[e].root.transpose() * edges_[e].root).inverse();
-        const double sigmas = std::sqrt(gap.dot((own + covariances.OfEdge(e)).ldlt().solve(gap)));
-        next[e] = IsWithinGate(DistanceMm(gap, p_.radiusMm), sigmas);
-        isChanged = isChanged || next[e];
-      }
-      stands = next;
+    const MarginalCovariances covariances(edges_, stands, take, isFixed, poses);
+    Flags next = stands;
+    std::vector<std::pair<double, std::size_t>> bad; // minus the standard deviations: the worst first
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      if (!take[e] || (stands[e] && keep[e]) || (!stands[e] && falls[e] >= MostFalls))
+        continue;
+      const Judgement judgement = Judge(e, covariances);
+      const bool isGood = judgement.mm <= p_.outlierMm || judgement.sigmas <= p_.outlierSigmas;
+      if (!stands[e])
+        next[e] = isGood;
+      else if (!isGood)
+        bad.push_back({-judgement.sigmas, e});
     }
+    bool isChanged = next != stands;
+    stands = next;
     if (!isChanged) {
-      // The worst go first: they may be what makes the others look bad.
-      std::vector<std::pair<double, std::size_t>> bad;
-      for (std::size_t e = 0; e < edges_.size(); ++e)
-        if (stands[e] && !keep[e] && !IsWithinGate(ResidualMm(e), ResidualSigmas(e)))
-          bad.push_back({-ResidualSigmas(e), e});
+      // What is wrong makes its neighbours look bad: of edges that share a volume only the worst goes.
       std::sort(bad.begin(), bad.end());
+      Flags isTouched(poses.size(), false);
       for (const auto& [minusSigmas, e] : bad) {
-        if (minusSigmas > 0.7 * bad.front().first || Bridges(stands)[e])
+        const std::size_t from = Index(edges_[e].from), to = Index(edges_[e].to);
+        if (minusSigmas > 0.7 * bad.front().first || isTouched[from] || isTouched[to] || Bridges(stands)[e])
           continue;
         stands[e] = false;
         ++falls[e];
-        isChanged = true;
+        isChanged = isTouched[from] = isTouched[to] = true;
       }
     }
     if (!isChanged)
@@ -406,7 +432,7 @@ void Graph::Solve(const Flags& take, const Flags& keep, const Progress& progress
   progress(0.6);
   std::vector<std::pair<double, std::size_t>> aside;
   for (std::size_t e = 0; e < edges_.size(); ++e)
-    if (take[e] && !keep[e] && !IsWithinGate(ResidualMm(e), ResidualSigmas(e))) {
+    if (take[e] && !keep[e] && ResidualMm(e) > p_.outlierMm && ResidualSigmas(e) > p_.outlierSigmas) {
       stands[e] = false;
       aside.push_back({ResidualSigmas(e), e});
     }

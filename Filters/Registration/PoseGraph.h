@@ -28,7 +28,7 @@ struct PoseGraphParameters {
   double outlierSigmas = 6.0;   ///< nor are edges that disagree by less of their standard deviations, > 0
   double lossSigmas = 2.0;      ///< scale of the Cauchy loss, standard deviations, > 0
   double undeterminedMm = 10.0; ///< a volume with a larger standard deviation in some direction is not determined, > 0
-  int trees = 200;              ///< spanning trees that are tried as starts, at most, >= 1
+  int trees = 100;              ///< spanning trees that are tried as starts, at most, >= 1
   std::uint64_t seed = 1;       ///< of these trees
 
   /// Throws Error(InvalidParameter) that names the parameter and its range.
