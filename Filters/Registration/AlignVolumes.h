@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "AlignPair.h"
+#include <functional>
+
+namespace echorama {
+
+/// What aligns two volumes; AlignPair unless another is given.
+using PairAligner = std::function<PairAlignment(
+    const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures, const PlacedVolume& moving,
+    const std::shared_ptr<const MetricPyramid>& movingFeatures, const AlignPairParameters& parameters, const Progress& progress)>;
+
+/// Which pairs are aligned, and when a pair is voted down.
+struct AlignVolumesParameters {
+  AlignPairParameters pair; ///< of every pair
+  int pairsPerVolume = 6;   ///< a volume is paired with so many others, those it overlaps most, [1, 1000]
+  int rounds = 2; ///< 1: every pair is aligned once; more: pairs are aligned again from where the others place them, [1, 5]
+  double floorVoxels = 0.3;   ///< no pair is believed to be better than this standard deviation, voxels, [0, 10]
+  double outlierVoxels = 2.0; ///< pairs that disagree by less are never voted down, voxels, [0, 100]
+  double outlierSigmas = 6.0; ///< nor are those that disagree by less of their standard deviations, (0, 1000]
+  std::uint64_t seed = 1;     ///< of the pose graph's trees
+
+  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  void Check() const;
+};
+
+/// Where a volume belongs, and how sure that is.
+struct VolumeAlignment {
+  Pose volumeToWorld = Pose::Identity(); ///< where it started if it Failed
+  Verdict verdict = Verdict::Failed;     ///< the fixed volume is Aligned
+  std::string reason;                    ///< why it is not Aligned, for people; else empty
+  /// Inverse covariance, relative to the fixed volume, of (translation mm, rotation vector radians) in
+  /// MotionAbout(centre, rotation, translation) * volumeToWorld; zero for the fixed volume and for those that Failed.
+  Information information = Information::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world
+  double overlap = 0.0;                             ///< of the pair that stands and overlaps most, share of the smaller volume
+  double similarity = 0.0;                          ///< mean of the pairs that stand, by overlap
+};
+
+/// What became of a pair.
+struct PairOfVolumes {
+  int fixed = 0, moving = 0; ///< volumes
+  /// What the pair itself found, the volume `fixed` being where it is placed in the end.
+  PairAlignment alignment;
+  Verdict verdict = Verdict::Failed; ///< with what the other pairs say of it
+  std::string reason;                ///< empty when aligned by itself and not disagreed with
+  bool votedDown = false;            ///< the other pairs disagreed with what it found at first
+  bool contested = false;            ///< voted down, but as many pairs spoke for it as against it
+  bool stands = false;               ///< it has a say in where the volumes are
+  int attempts = 0;                  ///< how often it was aligned: again from where the other pairs placed the volumes
+  double residualMm = 0.0;           ///< how far it disagrees with where the volumes are; if voted down, as it was then
+};
+
+struct AlignVolumesResult {
+  std::vector<VolumeAlignment> volumes;
+  std::vector<PairOfVolumes> pairs; ///< those that were tried, by their numbers
+  double consistency = 0.0; ///< how far pairs disagree, in what they claim to be sure of: 1 as claimed; 0: nothing to compare
+  double featureSeconds = 0.0, pairSeconds = 0.0, graphSeconds = 0.0;
+};
+
+/// Aligns any number of volumes: every pair that may overlap by itself, then all pairs together as a pose graph.
+///
+/// Which pairs: those that overlap where the volumes start, and where a volume has few of them also those that would overlap
+/// if it were moved as far as the start may be off; all when the start is unknown. From where the first solution places
+/// the volumes, pairs that failed, were voted down or were not thought of are tried again. With an automatic start, the search
+/// over all rotations is kept for volumes that no pair places otherwise.
+/// Two volumes are AlignPair and nothing else. Volumes that cannot be aligned (constant, nearly empty) fail for themselves.
+/// \throws Error(InvalidParameter) when \a fixed is not a volume, Error(BadInput) for fewer than two volumes or when the
+/// fixed one or all others cannot be aligned, Error(Cancelled).
+AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fixed,
+                                const AlignVolumesParameters& parameters = {}, const Progress& progress = {},
+                                const PairAligner& aligner = AlignPair);
+
+} // namespace echorama

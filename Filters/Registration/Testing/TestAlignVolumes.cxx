@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wuninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+#include "Core/Base/Random.h"
+#include "Filters/Registration/AlignVolumes.h"
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <limits>
+#include <map>
+
+namespace echorama {
+namespace {
+
+constexpr double RadiansPerDegree = 0.017453292519943295;
+using Numbers = std::pair<int, int>;
+
+std::size_t Index(int number)
+{
+  return static_cast<std::size_t>(number);
+}
+
+// Boxes of 48 mm around a ring of 10, each overlapping the next two on either side by a half and a little. What aligns them is
+// a stand-in that knows the truth, adds noise, and lies where it is told to; the volumes themselves are noise.
+class Ring {
+public:
+  explicit Ring(int count = 10)
+  {
+    for (int v = 0; v < count; ++v) {
+      const double angle = 6.283185307179586 * v / 10.0;
+      Pose pose = Pose::Identity();
+      pose.linear() = ExpRotation({0.0, 0.0, angle});
+      pose.translation() = Eigen::Vector3d(22.0 * std::cos(angle), 22.0 * std::sin(angle), 0.0) + pose.linear() * Corner();
+      truth.push_back(pose);
+      ImageGeometry geometry;
+      geometry.dimensions = {8, 8, 12};
+      geometry.spacing.setConstant(4.0);
+      Volume<float> voxels(geometry.dimensions);
+      Random random(5, static_cast<std::uint64_t>(v));
+      for (float& voxel : voxels.View())
+        voxel = static_cast<float>(random.Uniform(0.0, 255.0));
+      pyramids.push_back(BuildPyramid<float>({voxels.View(), {}, geometry}));
+      const Pose knock = MotionAbout(Eigen::Vector3d(22.0 * std::cos(angle), 22.0 * std::sin(angle), 0.0),
+                                     random.Direction() * (4.0 * RadiansPerDegree), random.Direction() * 4.0);
+      starts.push_back(v == 0 ? pose : knock * pose);
+    }
+  }
+
+  std::vector<PlacedVolume> Volumes() const
+  {
+    std::vector<PlacedVolume> volumes;
+    for (std::size_t v = 0; v < truth.size(); ++v)
+      volumes.push_back({&pyramids[v], starts[v], "volume " + std::to_string(v)});
+    return volumes;
+  }
+
+  PairAligner Aligner()
+  {
+    return [this](const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures,
+                  const PlacedVolume& moving, const std::shared_ptr<const MetricPyramid>& movingFeatures,
+                  const AlignPairParameters& parameters, const Progress& progress) {
+      EXPECT_TRUE(fixedFeatures && movingFeatures);
+      progress(0.5);
+      const Numbers pair(std::stoi(fixed.name.substr(7)), std::stoi(moving.name.substr(7)));
+      calls.push_back({pair, parameters.start});
+      const auto a = Index(pair.first), b = Index(pair.second);
+      PairAlignment found;
+      found.volumeToWorld = moving.volumeToWorld;
+      const double apart = (truth[a] * -Corner() - truth[b] * -Corner()).norm();
+      if (apart > 30.0) {
+        found.reason = "no overlap";
+        return found;
+      }
+      Random random(9, static_cast<std::uint64_t>(100 * pair.first + pair.second));
+      Pose error = MotionAbout(truth[b] * -Corner(), random.Direction() * 0.002, random.Direction() * 0.05);
+      const auto lie = lies.find(pair);
+      if (lie != lies.end() && (isStubborn || parameters.start != AlignStart::Tracked))
+        error = lie->second;
+      const auto verdict = verdicts.find(pair);
+      found.volumeToWorld = fixed.volumeToWorld * truth[a].inverse() * error * truth[b];
+      found.verdict = verdict != verdicts.end() ? verdict->second : Verdict::Aligned;
+      found.reason = found.verdict == Verdict::Aligned ? "" : "told so";
+      found.overlap = 1.0 - apart / 30.0;
+      found.similarity = 0.5;
+      found.voxelMm = 1.0;
+      found.centre = fixed.volumeToWorld * truth[a].inverse() * (0.5 * (truth[a] * -Corner() + truth[b] * -Corner()));
+      found.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (0.05 * 0.05)),
+          Eigen::Vector3d::Constant(1.0 / (0.002 * 0.002));
+      return found;
+    };
+  }
+
+  void Lie(int a, int b, std::uint64_t item, double mm = 20.0, double degrees = 15.0)
+  {
+    Random random(3, item);
+    lies[{a, b}] =
+        MotionAbout(truth[Index(b)] * -Corner(), random.Direction() * (degrees * RadiansPerDegree), random.Direction() * mm);
+  }
+
+  /// Mean distance of the volumes' centres from where they belong.
+  double Error(const AlignVolumesResult& result) const
+  {
+    const Pose onto = truth[0] * result.volumes[0].volumeToWorld.inverse();
+    double sum = 0.0;
+    for (std::size_t v = 0; v < truth.size(); ++v)
+      sum += (onto * result.volumes[v].volumeToWorld * -Corner() - truth[v] * -Corner()).norm();
+    return sum / static_cast<double>(truth.size());
+  }
+
+  static Eigen::Vector3d Corner() { return {-14.0, -14.0, -22.0}; } // of a box, from its centre
+
+  std::vector<Pose> truth, starts;
+  std::vector<std::vector<PyramidLevel>> pyramids;
+  std::map<Numbers, Pose> lies;
+  std::map<Numbers, Verdict> verdicts;
+  bool isStubborn = true; // lies again when asked again
+  std::vector<std::pair<Numbers, AlignStart>> calls;
+};
+
+std::vector<Numbers> VotedDown(const AlignVolumesResult& result)
+{
+  std::vector<Numbers> pairs;
+  for (const PairOfVolumes& pair : result.pairs)
+    if (pair.votedDown)
+      pairs.push_back({pair.fixed, pair.moving});
+  return pairs;
+}
+
+AlignVolumesParameters Tracked()
+{
+  AlignVolumesParameters p;
+  p.pair.start = AlignStart::Tracked;
+  return p;
+}
+
+TEST(AlignVolumes, ARingComesTogether)
+{
+  Ring ring;
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  EXPECT_LT(ring.Error(result), 0.1);
+  for (const VolumeAlignment& volume : result.volumes) {
+    EXPECT_EQ(volume.verdict, Verdict::Aligned) << volume.reason;
+    EXPECT_TRUE(volume.reason.empty());
+    EXPECT_GT(volume.overlap, 0.5);
+    EXPECT_NEAR(volume.similarity, 0.5, 1e-12);
+  }
+  EXPECT_TRUE(VotedDown(result).empty());
+  EXPECT_GE(result.pairs.size(), 20u);
+  EXPECT_LT(ring.calls.size(), 45u); // not all pairs
+  EXPECT_EQ(result.volumes[0].information, Information::Zero());
+  EXPECT_GT(result.volumes[5].information(0, 0), 0.0);
+  // A pair tells where its moving volume is beside where its fixed one is in the end.
+  for (const PairOfVolumes& pair : result.pairs)
+    if (pair.stands) {
+      const Eigen::Vector3d centre = -Ring::Corner();
+      EXPECT_LT((pair.alignment.volumeToWorld * centre - result.volumes[Index(pair.moving)].volumeToWorld * centre).norm(), 0.3);
+      EXPECT_EQ(pair.verdict, Verdict::Aligned);
+    }
+}
+
+TEST(AlignVolumes, TwoWrongPairsAreNamed)
+{
+  Ring ring;
+  ring.Lie(3, 5, 1);
+  ring.Lie(7, 8, 2);
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  EXPECT_EQ(VotedDown(result), (std::vector<Numbers>{{3, 5}, {7, 8}}));
+  EXPECT_LT(ring.Error(result), 0.1);
+  for (const PairOfVolumes& pair : result.pairs)
+    if (pair.votedDown) {
+      EXPECT_EQ(pair.verdict, Verdict::Failed);
+      EXPECT_FALSE(pair.stands || pair.contested);
+      EXPECT_EQ(pair.attempts, 2);
+      EXPECT_GT(pair.residualMm, 15.0);
+      EXPECT_NE(pair.reason.find("disagrees with the other pairs by "), std::string::npos) << pair.reason;
+    }
+  for (const VolumeAlignment& volume : result.volumes)
+    EXPECT_EQ(volume.verdict, Verdict::Aligned) << volume.reason;
+}
+
+TEST(AlignVolumes, AWrongPairIsMeasuredAgain)
+{
+  Ring ring;
+  ring.isStubborn = false;
+  ring.Lie(3, 5, 1);
+  const AlignVolumesResult result = AlignVolumes(
+      ring.Volumes(), 0,
+      [] {
+        AlignVolumesParameters p;
+        p.pair.start = AlignStart::HandMade;
+        return p;
+      }(),
+      {}, ring.Aligner());
+  EXPECT_EQ(VotedDown(result), (std::vector<Numbers>{{3, 5}}));
+  for (const PairOfVolumes& pair : result.pairs)
+    if (pair.votedDown) {
+      EXPECT_EQ(pair.verdict, Verdict::Aligned);
+      EXPECT_TRUE(pair.stands);
+      EXPECT_NE(pair.reason.find("aligned again"), std::string::npos) << pair.reason;
+    }
+}
+
+// A pair that nobody thought of from the start is found from where the others place the volumes.
+TEST(AlignVolumes, PairsAreFoundAtTheSolution)
+{
+  Ring ring(5);
+  ring.starts[4] = MotionAbout(ring.truth[4] * -Ring::Corner(), {}, {0.0, 0.0, 30.0}) * ring.truth[4];
+  AlignVolumesParameters p;
+  p.pair.start = AlignStart::HandMade;
+  p.pairsPerVolume = 3;
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  EXPECT_LT(ring.Error(result), 0.1);
+  EXPECT_TRUE(std::any_of(result.pairs.begin(), result.pairs.end(),
+                          [](const PairOfVolumes& pair) { return pair.fixed == 3 && pair.moving == 4 && pair.stands; }));
+}
+
+TEST(AlignVolumes, TheLostAreSearchedForInAllRotations)
+{
+  Ring ring(4);
+  ring.starts[3].translation() += Eigen::Vector3d(500.0, 0.0, 0.0);
+  AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, {}, {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[3].verdict, Verdict::Aligned) << result.volumes[3].reason;
+  EXPECT_LT(ring.Error(result), 0.1);
+  const auto far =
+      std::count_if(ring.calls.begin(), ring.calls.end(), [](const auto& call) { return call.second == AlignStart::Unknown; });
+  EXPECT_TRUE(far >= 1 && far <= 3) << far;
+
+  // Unless the start is said to be a good one.
+  result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[3].verdict, Verdict::Failed);
+  EXPECT_NE(result.volumes[3].reason.find("overlaps no other volume"), std::string::npos);
+  EXPECT_EQ(result.volumes[3].volumeToWorld.matrix(), ring.starts[3].matrix());
+}
+
+TEST(AlignVolumes, WhereNothingIsKnownAllPairsAreTried)
+{
+  Ring ring(5);
+  AlignVolumesParameters p;
+  p.pair.start = AlignStart::Unknown;
+  p.rounds = 1;
+  EXPECT_EQ(AlignVolumes(ring.Volumes(), 2, p, {}, ring.Aligner()).pairs.size(), 10u);
+  for (const auto& call : ring.calls) {
+    EXPECT_NE(call.first.second, 2); // the fixed one stays in its pairs too
+    EXPECT_EQ(call.second, AlignStart::Unknown);
+  }
+}
+
+// In a chain the pair's own verdict is all there is.
+TEST(AlignVolumes, ChainsAreAsSureAsTheirPairs)
+{
+  Ring ring(3);
+  ring.verdicts[{0, 2}] = Verdict::Failed;
+  ring.verdicts[{1, 2}] = Verdict::Ambiguous;
+  AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[1].verdict, Verdict::Aligned);
+  EXPECT_EQ(result.volumes[2].verdict, Verdict::Ambiguous);
+  EXPECT_NE(result.volumes[2].reason.find("volume 1 and volume 2 (told so)"), std::string::npos) << result.volumes[2].reason;
+
+  ring.verdicts[{1, 2}] = Verdict::Failed;
+  result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[2].verdict, Verdict::Failed);
+  EXPECT_NE(result.volumes[2].reason.find("volume 0 and volume 2: told so"), std::string::npos) << result.volumes[2].reason;
+  EXPECT_EQ(result.volumes[2].volumeToWorld.matrix(), ring.starts[2].matrix());
+
+  // An ambiguous pair that the others agree with counts.
+  ring.verdicts = {{{0, 2}, Verdict::Ambiguous}, {{1, 2}, Verdict::Ambiguous}};
+  result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[2].verdict, Verdict::Aligned) << result.volumes[2].reason;
+}
+
+TEST(AlignVolumes, ATriangleKnowsOnlyThatSomethingIsWrong)
+{
+  Ring ring(3);
+  ring.Lie(0, 2, 1);
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
+  ASSERT_EQ(VotedDown(result).size(), 1u);
+  for (const std::size_t v : {1u, 2u}) {
+    EXPECT_EQ(result.volumes[v].verdict, Verdict::Ambiguous);
+    EXPECT_NE(result.volumes[v].reason.find("as many pairs"), std::string::npos) << result.volumes[v].reason;
+  }
+}
+
+TEST(AlignVolumes, TwoVolumesAreAPair)
+{
+  Ring ring(2);
+  const auto volumes = ring.Volumes();
+  AlignVolumesResult result = AlignVolumes(volumes, 1, {}, {}, ring.Aligner());
+  ASSERT_EQ(ring.calls.size(), 1u);
+  EXPECT_EQ(ring.calls[0], std::make_pair(Numbers(1, 0), AlignStart::Automatic));
+  EXPECT_EQ(result.volumes[0].verdict, Verdict::Aligned);
+  EXPECT_NEAR(result.volumes[0].information(0, 0), 400.0, 1e-3);
+
+  ring.verdicts[{0, 1}] = Verdict::Failed;
+  result = AlignVolumes(volumes, 0, {}, {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[1].verdict, Verdict::Failed);
+  EXPECT_EQ(result.volumes[1].reason, "told so");
+  EXPECT_EQ(result.pairs[0].reason, "told so");
+}
+
+TEST(AlignVolumes, VolumesThatCannotBeAlignedFailForThemselves)
+{
+  Ring ring(4);
+  auto volumes = ring.Volumes();
+  ImageGeometry geometry = ring.pyramids[2].front().geometry;
+  const Volume<float> grey(geometry.dimensions, 5.0f);
+  const auto constant = BuildPyramid<float>({grey.View(), {}, geometry});
+  volumes[2].pyramid = &constant;
+  const AlignVolumesResult result = AlignVolumes(volumes, 0, Tracked(), {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[2].verdict, Verdict::Failed);
+  EXPECT_NE(result.volumes[2].reason.find("constant"), std::string::npos) << result.volumes[2].reason;
+  EXPECT_EQ(result.volumes[1].verdict, Verdict::Aligned) << result.volumes[1].reason;
+  EXPECT_THROW(AlignVolumes(volumes, 2, Tracked(), {}, ring.Aligner()), Error);
+  EXPECT_THROW(AlignVolumes({volumes[1], volumes[2]}, 0, Tracked(), {}, ring.Aligner()), Error);
+}
+
+TEST(AlignVolumes, SameAnswerTwice)
+{
+  Ring one, two;
+  one.Lie(0, 1, 4);
+  two.Lie(0, 1, 4);
+  const AlignVolumesResult a = AlignVolumes(one.Volumes(), 0, {}, {}, one.Aligner()),
+                           b = AlignVolumes(two.Volumes(), 0, {}, {}, two.Aligner());
+  EXPECT_EQ(one.calls, two.calls);
+  for (std::size_t v = 0; v < 10; ++v)
+    EXPECT_EQ(a.volumes[v].volumeToWorld.matrix(), b.volumes[v].volumeToWorld.matrix());
+}
+
+TEST(AlignVolumes, ProgressAndStopping)
+{
+  Ring ring(5);
+  double last = 0.0;
+  AlignVolumes(ring.Volumes(), 0, {}, Progress([&last](double fraction) {
+                 EXPECT_GE(fraction, last);
+                 last = fraction;
+                 return true;
+               }),
+               ring.Aligner());
+  EXPECT_EQ(last, 1.0);
+  try {
+    AlignVolumes(ring.Volumes(), 0, {}, Progress([](double fraction) { return fraction < 0.3; }), ring.Aligner());
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.GetKind(), Error::Kind::Cancelled);
+  }
+}
+
+TEST(AlignVolumes, RefusesWhatIsWrong)
+{
+  Ring ring(3);
+  const auto volumes = ring.Volumes();
+  EXPECT_THROW(AlignVolumes(volumes, 3), Error);
+  EXPECT_THROW(AlignVolumes(volumes, -1), Error);
+  EXPECT_THROW(AlignVolumes({volumes[0]}, 0), Error);
+  EXPECT_THROW(AlignVolumes({}, 0), Error);
+  EXPECT_THROW(AlignVolumes({volumes[0], {}, volumes[1]}, 0), Error);
+  const auto wrong = [](void (*change)(AlignVolumesParameters&)) {
+    AlignVolumesParameters p;
+    change(p);
+    EXPECT_THROW(p.Check(), Error);
+  };
+  wrong([](AlignVolumesParameters& p) { p.pairsPerVolume = 0; });
+  wrong([](AlignVolumesParameters& p) { p.rounds = 0; });
+  wrong([](AlignVolumesParameters& p) { p.floorVoxels = std::nan(""); });
+  wrong([](AlignVolumesParameters& p) { p.outlierVoxels = -1.0; });
+  wrong([](AlignVolumesParameters& p) { p.outlierSigmas = 0.0; });
+  wrong([](AlignVolumesParameters& p) { p.pair.metric = "no such metric"; });
+}
+
+} // namespace
+} // namespace echorama
