@@ -63,7 +63,8 @@ class Usage(unittest.TestCase):
                           ["info", some[0], "--threads", "many"], ["convert", some[0]], ["stitch", *some],
                           ["stitch", *some, "-o", work / "no.mha", "--method", "banana"],
                           ["stitch", *some, "-o", work / "no.mha", "--sharpness", "-1"],
-                          ["stitch", *some, "-o", work / "no.mha", "--spacing", "-1"], ["align", *some],
+                          ["stitch", *some, "-o", work / "no.mha", "--spacing", "-1"], ["align", *some, "--start", "nowhere"],
+                          ["align", *some, "--metric", "banana"], ["align", *some, "--method", "search", "--set", "Candidates=3"],
                           ["align", *some, "-o", work / "no.json", "--method", "banana"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "0"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "4"],
@@ -145,6 +146,54 @@ class MainJob(unittest.TestCase):
         self.assertAlmostEqual(score["volumes"][2]["mean_mm"], 3, places=6)
         self.assertAlmostEqual(score["score_mm"], 1.5, places=6)
 
+    def test_align_tells_how_sure_it_is(self):
+        told = self.aligned
+        self.assertEqual((told["method"], told["verdict"]), ("global", "aligned"))
+        for volume in told["volumes"]:
+            self.assertEqual((volume["verdict"], volume["reason"]), ("aligned", ""))
+            covariance = numpy.array(volume["covariance"])
+            numpy.testing.assert_allclose(covariance, covariance.T, rtol=1e-9)
+            self.assertGreaterEqual(numpy.linalg.eigvalsh(covariance).min(), 0)
+            self.assertEqual(len(volume["centre"]), 3)
+        self.assertGreater(min(volume["overlap"] for volume in told["volumes"][1:]), 0.2)
+        self.assertTrue(any({pair["fixed"], pair["moving"]} == {1, 2} for pair in told["pairs"]))
+        for pair in told["pairs"]:
+            self.assertIn(pair["verdict"], ("aligned", "ambiguous", "failed"))
+            self.assertEqual(set(pair["seconds"]), {"global", "local", "confidence"})
+            self.assertFalse(pair["voted_down"])
+        self.assertEqual(set(told["align_seconds"]), {"prepare", "pairs", "graph"})
+
+    def test_the_search_of_the_dissertation(self):
+        told = run_json("align", *volumes(), "-o", work / "search.json", "--method", "search", *FEWER_POINTS)
+        self.assertNotIn("verdict", told)
+        self.assertGreater(told["volumes"][1]["error_grey"], 0)
+        self.assertLess(run_json("score", work / "search.json", "--truth", phantom / "truth.json")["score_mm"], 1.25)
+
+    def test_align_with_no_options(self):
+        """The poses go to poses.json, and what is there already stays."""
+        folder = work / "plain"
+        folder.mkdir()
+        files = [path.resolve() for path in volumes()[:2]]
+        done = run("align", *files, cwd=folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("aligned", done.stdout)
+        before = (folder / "poses.json").read_bytes()
+        again = run("align", *files, cwd=folder)
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("poses.json", again.stderr)
+        self.assertEqual((folder / "poses.json").read_bytes(), before)
+
+    def test_align_says_when_it_cannot(self):
+        """Noise beside a phantom: exit status 3 and a reason."""
+        write_mha(work / "noise.mha", numpy.random.default_rng(1).integers(1, 255, (40, 40, 40), "u1"), spacing=(2.5, 2.5, 2.5))
+        done = run("align", phantom / "volume_1.mha", work / "noise.mha", "-o", work / "doubt.json", "--start", "hand-made", "--json")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        told = json.loads(done.stdout)
+        self.assertEqual(told["verdict"], "doubtful")
+        self.assertIn(told["volumes"][1]["verdict"], ("ambiguous", "failed"))
+        self.assertTrue(told["volumes"][1]["reason"])
+        self.assertTrue(any("not every volume is aligned" in note for note in told["notes"]))
+
     def test_pose_file(self):
         text = json.loads(self.poses.read_text())
         self.assertEqual((text["schema"], text["unit"], text["frame"]), ("echorama-poses-1", "mm", "LPS"))
@@ -170,8 +219,8 @@ class MainJob(unittest.TestCase):
 
     def test_start_poses_and_fixed_volume(self):
         """From the truth the aligner stays there, and the fixed volume is where the start says, to the last bit."""
-        again = run_json("align", *volumes(), "-o", work / "again.json", "--poses", phantom / "truth.json", "--fixed", 2, "--set", "FirstStepMm=1",
-                         "--set", "FirstStepDegrees=1", *FEWER_POINTS)
+        again = run_json("align", *volumes(), "-o", work / "again.json", "--poses", phantom / "truth.json", "--fixed", 2, "--start", "tracked",
+                         *FEWER_POINTS)
         numpy.testing.assert_allclose(again["volumes"][1]["VolumeToWorld"], affine_of(truth()["volumes"][1]), atol=1e-12)
         self.assertEqual(again["fixed"], 2)
         self.assertLess(run_json("score", work / "again.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1.25)
@@ -206,7 +255,7 @@ class MainJob(unittest.TestCase):
         for threads in (1, 2):
             folder = work / f"threads{threads}"
             folder.mkdir()
-            run_json("align", *volumes(), "-o", folder / "poses.json", "--threads", threads, "--set", "Levels=3", *FEWER_POINTS)
+            run_json("align", *volumes(), "-o", folder / "poses.json", "--threads", threads, *FEWER_POINTS)
             run_json("stitch", *volumes(), "-o", folder / "stitched.mha", "--poses", folder / "poses.json", "--threads", threads, "--spacing", 3)
             results.append({path.name: path.read_bytes() for path in folder.iterdir()})
         self.assertEqual(len(results[0]), 3)
@@ -333,7 +382,7 @@ class Manners(unittest.TestCase):
         self.assertGreater(told["stages"]["read"], 0)
 
     def test_progress_on_a_terminal_alone(self):
-        command = [PROGRAM, "align", *volumes(), "-o", work / "bar.json", "--set", "Levels=2", *FEWER_POINTS]
+        command = [PROGRAM, "align", *volumes(), "-o", work / "bar.json", "--method", "search", "--set", "Levels=2", *FEWER_POINTS]
         terminal, child = pty.openpty()
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=child)
         os.close(child)
@@ -371,8 +420,9 @@ class Manners(unittest.TestCase):
 
     def test_stopping(self):
         """Far more work than can be done in the time before the signal; afterwards there is no new file."""
-        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--set", "Samples=7", "--set", "Levels=20",
-                         "--set", "Points=1000000")
+        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--method", "search", "--set", "Samples=7",
+                         "--set", "Levels=20", "--set", "Points=1000000")
+        self.interrupted(signal.SIGINT, "align", *volumes(), "--start", "unknown", "--set", "Candidates=1000")
         self.interrupted(signal.SIGTERM, "phantom", "-o", "volumes", "--spacing", "0.5", "--count", "40")
         self.interrupted(signal.SIGINT, "stitch", *volumes(), "-o", "stitched.mha", "--spacing", "0.4")
 

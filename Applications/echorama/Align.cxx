@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundAligner.h>
@@ -14,9 +15,11 @@
 namespace echorama {
 namespace {
 
+constexpr const char* DefaultOutput = "poses.json";
+
 struct AlignOptions {
   std::vector<std::string> files, settings;
-  std::string output, start, apply, method = "search";
+  std::string output, poses, apply, start, metric, method;
   int fixed = 1;
 };
 
@@ -46,14 +49,21 @@ void Align(Session& session, AlignOptions options)
 {
   options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
-  if (!options.start.empty())
-    inputs.push_back(options.start);
+  if (!options.poses.empty())
+    inputs.push_back(options.poses);
+  if (options.output.empty()) {
+    options.output = DefaultOutput;
+    if (std::filesystem::exists(options.output))
+      throw Error(Error::Kind::FileSystem, options.output + ": it is there already; name it with -o to replace it");
+  }
   CheckOutput(options.output, inputs);
   if (options.fixed > static_cast<int>(options.files.size()))
     throw Error(Error::Kind::InvalidParameter, "--fixed: there are only " + std::to_string(options.files.size()) + " volumes");
   vtkNew<vtkUltrasoundAligner> aligner;
   aligner->SetFixedVolume(options.fixed - 1);
   aligner->SetMethod(options.method.c_str());
+  aligner->SetStart(options.start.c_str());
+  aligner->SetMetric(options.metric.c_str());
   for (const std::string& setting : options.settings)
     Set(aligner, setting);
   // Places for the moved volumes are looked for first, so that nothing is refused after all the work.
@@ -66,12 +76,14 @@ void Align(Session& session, AlignOptions options)
   }
 
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
-  ApplyPoses(volumes, options.start);
+  ApplyPoses(volumes, options.poses);
   aligner->SetInputDataObject(BlocksOf(volumes));
   session.Update(aligner, "align");
 
+  const auto report = nlohmann::ordered_json::parse(aligner->GetReport());
   session.result["output"] = options.output;
   session.result["fixed"] = options.fixed;
+  session.result["method"] = options.method;
   session.result["volumes"] = nlohmann::ordered_json::array();
   std::vector<VolumePose> poses;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
@@ -81,18 +93,33 @@ void Align(Session& session, AlignOptions options)
     const double degrees = RotationAngle(pose) * 57.29577951308232, mm = (pose * start.Centre() - start.Centre()).norm();
     MoveVolume(volume, pose);
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
+    nlohmann::ordered_json entry{{"file", volume.file}, {"turned_degrees", degrees}, {"moved_mm", mm}};
+    for (const auto& [key, value] : report["volumes"][i].items())
+      if (key != "name")
+        entry[key] = value;
+    entry["VolumeToWorld"] = JsonOf(volume.volumeToWorld);
+    session.result["volumes"].push_back(entry);
     const int number = static_cast<int>(i);
-    session.result["volumes"].push_back({{"file", volume.file},
-                                         {"turned_degrees", degrees},
-                                         {"moved_mm", mm},
-                                         {"error_grey", aligner->GetError(number)},
-                                         {"overlap", aligner->GetOverlap(number)},
-                                         {"VolumeToWorld", JsonOf(volume.volumeToWorld)}});
+    const std::string verdict = aligner->GetVerdict(number), reason = aligner->GetReason(number);
     session.Say(volume.file + ": " +
                 (number + 1 == options.fixed
                      ? "fixed"
-                     : "turned by " + Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) + " mm, overlap " +
+                     : (verdict.empty() ? "" : verdict + (reason.empty() ? "" : " (" + reason + ")") + "; ") + "turned by " +
+                           Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) + " mm, overlap " +
                            Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
+  }
+  if (report.contains("pairs")) {
+    session.result["pairs"] = report["pairs"];
+    for (auto& pair : session.result["pairs"]) { // from 1, as --fixed counts
+      pair["fixed"] = pair["fixed"].get<int>() + 1;
+      pair["moving"] = pair["moving"].get<int>() + 1;
+    }
+    session.result["align_seconds"] = report["seconds"];
+    session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
+  }
+  if (!aligner->GetAllAligned()) {
+    session.status = Session::Doubtful;
+    session.Note("not every volume is aligned: the poses should not be used unseen");
   }
 
   for (std::size_t i = 0; i < places.size(); ++i)
@@ -113,24 +140,51 @@ Command AlignCommand(CLI::App& program)
   auto values = std::make_shared<AlignOptions>();
   CLI::App* options = program.add_subcommand("align", "Find where overlapping volumes belong");
   options->add_option("volume", values->files, "Two or more volumes")->required();
-  options->add_option("-o,--output", values->output, "Pose file to write")->required();
-  options->add_option("--poses", values->start, "Pose file to start from (default: where the volumes say)");
+  options->add_option("-o,--output", values->output,
+                      std::string("Pose file to write (default: ") + DefaultOutput + ", unless it is there)");
+  options->add_option("--poses", values->poses, "Pose file to start from (default: where the volumes say)");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  options->add_option("--method", values->method, "How poses are found: search goes through six dimensions from coarse to fine")
-      ->check(CLI::IsMember({"search"}))
+  const vtkNew<vtkUltrasoundAligner> defaults;
+  values->method = defaults->GetMethod();
+  values->start = defaults->GetStart();
+  values->metric = defaults->GetMetric();
+  options
+      ->add_option(
+          "--method", values->method,
+          "How poses are found: global correlates over all poses, refines, and tells how sure it is; search goes through six "
+          "dimensions from coarse to fine about the start (the dissertation's)")
+      ->check(CLI::IsMember({"global", "search"}))
       ->capture_default_str();
-  const AlignSearchParameters defaults;
+  options
+      ->add_option("--start", values->start,
+                   "What is known about where volumes belong, for global: tracked (within 12 degrees and 20 mm), hand-made (35 "
+                   "degrees and a third of a volume), unknown (nothing), automatic (hand-made, then unknown)")
+      ->check(CLI::IsMember(AlignStartNames()))
+      ->capture_default_str();
+  options->add_option("--metric", values->metric, "The likeness that refines poses, for global")
+      ->check(CLI::IsMember(MetricNames()))
+      ->capture_default_str();
+  const AlignSearchParameters search;
+  const AlignPairParameters pair;
   options->add_option(
       "--set", values->settings,
-      "A parameter of the method, as NAME=VALUE; again for each. MinimumOverlap=" + Fixed(defaults.minimumOverlap, 1) +
-          " (share of a volume that must lie in others, 0.01 to 1), Samples=" + std::to_string(defaults.samples) +
-          " (along each dimension: 3, 5 or 7), Levels=" + std::to_string(defaults.levels) + " (1 to 20), FirstStepMm=" +
-          Fixed(defaults.firstStepMm, 0) + " (up to 1000), FirstStepDegrees=" + Fixed(defaults.firstStepDegrees, 0) +
-          " (up to 60), Repeats=" + std::to_string(defaults.repeats) + " (of a level, 0 to 100), Points=" +
-          std::to_string(defaults.points) + " (compared, 100 to 10000000), Seed=" + std::to_string(defaults.seed) +
-          ", Pyramid=" + std::to_string(defaults.pyramid) + " (0 or 1)");
+      "A parameter of the method, as NAME=VALUE; again for each. Of global: MinimumOverlap=" + Fixed(pair.minimumOverlap, 1) +
+          " (share of the smaller volume, 0.01 to 1), Candidates=" + std::to_string(pair.candidates) +
+          " (refined poses, 1 to 1000), FinestMm=0 (the voxels at which it ends; 0: the volumes' own), UseReliability=1 (0 or 1: "
+          "shadowed and saturated voxels count less), Points=" +
+          std::to_string(pair.points) +
+          " (compared on a level, 1000 to 10000000), MinimumSimilarity=" + Fixed(pair.minimumSimilarity, 2) +
+          ", MinimumPeakRatio=" + Fixed(pair.minimumPeakRatio, 2) + ", MaximumErrorVoxels=" + Fixed(pair.maximumErrorVoxels, 1) +
+          ", MaximumSplitVoxels=" + Fixed(pair.maximumSplitVoxels, 1) +
+          " (what is trusted), Seed=1. Of search: MinimumOverlap=" + Fixed(search.minimumOverlap, 1) +
+          " (share of a volume that must lie in others, 0.01 to 1), Samples=" + std::to_string(search.samples) +
+          " (along each dimension: 3, 5 or 7), Levels=" + std::to_string(search.levels) + " (1 to 20), FirstStepMm=" +
+          Fixed(search.firstStepMm, 0) + " (up to 1000), FirstStepDegrees=" + Fixed(search.firstStepDegrees, 0) +
+          " (up to 60), Repeats=" + std::to_string(search.repeats) + " (of a level, 0 to 100), Points=" +
+          std::to_string(search.points) + " (compared, 1000 to 10000000), Seed=" + std::to_string(search.seed) +
+          ", Pyramid=" + std::to_string(search.pyramid) + " (0 or 1)");
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry");
   return {options, [values](Session& session) { Align(session, *values); }};
 }

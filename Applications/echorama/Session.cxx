@@ -262,10 +262,10 @@ int Session::Finish()
   } else {
     std::cout << text_ << std::flush;
   }
-  return std::cout ? 0 : Fail("standard output: cannot be written", 1);
+  return std::cout ? status : Fail("standard output: cannot be written", 1);
 }
 
-int Session::Fail(const std::string& message, int status)
+int Session::Fail(const std::string& message, int exitStatus)
 {
   ClearProgress();
   const std::string line = Line(message);
@@ -274,7 +274,7 @@ int Session::Fail(const std::string& message, int status)
     const nlohmann::ordered_json object{{"command", command_}, {"error", line}, {"seconds", Seconds()}, {"notes", notes_}};
     std::cout << object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;
   }
-  return status;
+  return exitStatus;
 }
 
 std::string Fixed(double value, int digits)

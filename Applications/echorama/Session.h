@@ -29,6 +29,10 @@ public:
   /// The results for --json. Keys "command", "seconds", "stages" and "notes" belong to the session.
   nlohmann::ordered_json result = nlohmann::ordered_json::object();
 
+  /// The exit status when all is printed: 0, or Doubtful for a result that must not be used unseen.
+  static constexpr int Doubtful = 3;
+  int status = 0;
+
   /// A line of results for people.
   void Say(const std::string& line);
 
@@ -60,8 +64,8 @@ public:
   /// Prints the results. Returns the exit status.
   int Finish();
 
-  /// Prints one line of error, and with json an object with "error". Returns \a status.
-  int Fail(const std::string& message, int status);
+  /// Prints one line of error, and with json an object with "error". Returns \a exitStatus.
+  int Fail(const std::string& message, int exitStatus);
 
 private:
   std::string Line(std::string message) const;

@@ -41,7 +41,7 @@ int main(int argc, char** argv)
   program.set_version_flag("--version", "echorama " ECHORAMA_VERSION);
   program.require_subcommand(1);
   program.footer("Every subcommand explains itself: echorama align --help\n"
-                 "Exit status: 0 done, 1 it could not be done, 2 wrong usage.");
+                 "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done but not to be trusted (align).");
 
   bool json = false;
   int threads = 0;

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundAligner.h"
 
 #include "AlignInTurn.h"
+#include "Core/Imaging/ShadowMap.h"
 #include "vtkDataObjectTree.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -12,11 +13,15 @@
 #include "vtkMultiBlockDataSet.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 vtkStandardNewMacro(vtkUltrasoundAligner);
 
@@ -31,64 +36,168 @@ void AddField(vtkDataObject* data, const char* name, const double* values, int c
   array->InsertNextTuple(values);
   data->GetFieldData()->AddArray(array);
 }
+
+void AddField(vtkDataObject* data, const char* name, const std::string& text)
+{
+  vtkNew<vtkStringArray> array;
+  array->SetName(name);
+  array->InsertNextValue(text);
+  data->GetFieldData()->AddArray(array);
+}
+
+// A volume at falling resolution, and how much its voxels count.
+struct Prepared {
+  std::vector<echorama::PyramidLevel> Pyramid, Reliability;
+};
+
+Prepared Prepare(const vtkUltrasoundVolume::Input& volume, bool withReliability, const echorama::Progress& progress)
+{
+  Prepared prepared;
+  vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
+    const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume);
+    prepared.Pyramid = echorama::BuildPyramid(posed, {}, progress.Part(0.0, 0.3));
+    if (withReliability) {
+      const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(volume.Image);
+      const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(volume.Image);
+      const auto probe = geometry && pose ? std::optional(echorama::PlacedProbe{*geometry, *pose}) : echorama::FindProbe(posed);
+      const auto reliability = echorama::ReliabilityMap(posed, probe, {}, progress.Part(0.3, 0.8));
+      prepared.Reliability = echorama::BuildPyramid(echorama::PosedVolume<float>{reliability.View(), posed.valid, posed.geometry},
+                                                    {}, progress.Part(0.8, 1.0));
+    }
+  });
+  return prepared;
+}
+
+nlohmann::ordered_json JsonOf(const echorama::Information& matrix)
+{
+  auto rows = nlohmann::ordered_json::array();
+  for (int r = 0; r < 6; ++r) {
+    rows.push_back(std::vector<double>{matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3), matrix(r, 4), matrix(r, 5)});
+  }
+  return rows;
+}
 } // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundAligner::vtkUltrasoundAligner()
 {
-  const echorama::AlignSearchParameters defaults;
-  this->MinimumOverlap = defaults.minimumOverlap;
-  this->Samples = defaults.samples;
-  this->Levels = defaults.levels;
-  this->FirstStepMm = defaults.firstStepMm;
-  this->FirstStepDegrees = defaults.firstStepDegrees;
-  this->Repeats = defaults.repeats;
-  this->Points = defaults.points;
-  this->Seed = static_cast<int>(defaults.seed);
-  this->Pyramid = defaults.pyramid;
+  const echorama::AlignPairParameters pair;
+  this->Start = echorama::NameOf(pair.start);
+  this->Metric = pair.metric;
+  this->Candidates = pair.candidates;
+  this->FinestMm = pair.finestMm;
+  this->MinimumSimilarity = pair.minimumSimilarity;
+  this->MinimumPeakRatio = pair.minimumPeakRatio;
+  this->MaximumErrorVoxels = pair.maximumErrorVoxels;
+  this->MaximumSplitVoxels = pair.maximumSplitVoxels;
+  const echorama::AlignSearchParameters search;
+  this->Samples = search.samples;
+  this->Levels = search.levels;
+  this->FirstStepMm = search.firstStepMm;
+  this->FirstStepDegrees = search.firstStepDegrees;
+  this->Repeats = search.repeats;
+  this->Seed = static_cast<int>(search.seed);
+  this->Pyramid = search.pyramid;
 }
 
 //----------------------------------------------------------------------------
 vtkUltrasoundAligner::~vtkUltrasoundAligner() = default;
 
 //----------------------------------------------------------------------------
+bool vtkUltrasoundAligner::Choose(std::string& choice, const char* name, const char* what, const std::vector<std::string>& names)
+{
+  if (!name || std::find(names.begin(), names.end(), name) == names.end()) {
+    std::string list;
+    for (const std::string& one : names) {
+      list += (list.empty() ? "" : ", ") + one;
+    }
+    vtkErrorMacro("there is no " << what << " named \"" << (name ? name : "") << "\"; there are: " << list);
+    return false;
+  }
+  if (choice != name) {
+    choice = name;
+    this->Modified();
+  }
+  return true;
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundAligner::SetMethod(const char* name)
 {
-  if (!name || std::strcmp(name, this->GetMethod()) != 0) {
-    vtkErrorMacro("there is no alignment method named \"" << (name ? name : "") << "\"; the methods are: search");
-  }
+  this->Choose(this->Method, name, "alignment method", {"global", "search"});
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::SetStart(const char* name)
+{
+  this->Choose(this->Start, name, "start", echorama::AlignStartNames());
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::SetMetric(const char* name)
+{
+  this->Choose(this->Metric, name, "metric", echorama::MetricNames());
+}
+
+//----------------------------------------------------------------------------
+const char* vtkUltrasoundAligner::GetMethod() const
+{
+  return this->Method.c_str();
+}
+
+//----------------------------------------------------------------------------
+const char* vtkUltrasoundAligner::GetStart() const
+{
+  return this->Start.c_str();
+}
+
+//----------------------------------------------------------------------------
+const char* vtkUltrasoundAligner::GetMetric() const
+{
+  return this->Metric.c_str();
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
 {
+  using Self = vtkUltrasoundAligner;
   struct Parameter {
     const char* Name;
+    const char* Methods; // g: global, s: search
     double From, To;
-    bool Whole;
-    void (vtkUltrasoundAligner::*SetReal)(double);
-    void (vtkUltrasoundAligner::*SetWhole)(int);
+    void (Self::*SetReal)(double);
+    void (Self::*SetWhole)(int);
+    void (Self::*SetSwitch)(bool);
   };
-  using Self = vtkUltrasoundAligner;
   static const Parameter parameters[] = {
-      {"MinimumOverlap", 0.01, 1.0, false, &Self::SetMinimumOverlap, nullptr},
-      {"Samples", 3, 7, true, nullptr, &Self::SetSamples},
-      {"Levels", 1, 20, true, nullptr, &Self::SetLevels},
-      {"FirstStepMm", 1e-6, 1000.0, false, &Self::SetFirstStepMm, nullptr},
-      {"FirstStepDegrees", 1e-6, 60.0, false, &Self::SetFirstStepDegrees, nullptr},
-      {"Repeats", 0, 100, true, nullptr, &Self::SetRepeats},
-      {"Points", 100, 1e7, true, nullptr, &Self::SetPoints},
-      {"Seed", 0, VTK_INT_MAX, true, nullptr, &Self::SetSeed},
-      {"Pyramid", 0, 1, true, nullptr, nullptr},
+      {"MinimumOverlap", "gs", 0.01, 1.0, &Self::SetMinimumOverlap, nullptr, nullptr},
+      {"Candidates", "g", 1, 1000, nullptr, &Self::SetCandidates, nullptr},
+      {"FinestMm", "g", 0.0, 1000.0, &Self::SetFinestMm, nullptr, nullptr},
+      {"UseReliability", "g", 0, 1, nullptr, nullptr, &Self::SetUseReliability},
+      {"MinimumSimilarity", "g", 0.0, 1.0, &Self::SetMinimumSimilarity, nullptr, nullptr},
+      {"MinimumPeakRatio", "g", 1.0, 99.0, &Self::SetMinimumPeakRatio, nullptr, nullptr},
+      {"MaximumErrorVoxels", "g", 1e-3, 1000.0, &Self::SetMaximumErrorVoxels, nullptr, nullptr},
+      {"MaximumSplitVoxels", "g", 1e-3, 1000.0, &Self::SetMaximumSplitVoxels, nullptr, nullptr},
+      {"Samples", "s", 3, 7, nullptr, &Self::SetSamples, nullptr},
+      {"Levels", "s", 1, 20, nullptr, &Self::SetLevels, nullptr},
+      {"FirstStepMm", "s", 1e-6, 1000.0, &Self::SetFirstStepMm, nullptr, nullptr},
+      {"FirstStepDegrees", "s", 1e-6, 60.0, &Self::SetFirstStepDegrees, nullptr, nullptr},
+      {"Repeats", "s", 0, 100, nullptr, &Self::SetRepeats, nullptr},
+      {"Points", "gs", 1000, 1e7, nullptr, &Self::SetPoints, nullptr},
+      {"Seed", "gs", 0, VTK_INT_MAX, nullptr, &Self::SetSeed, nullptr},
+      {"Pyramid", "s", 0, 1, nullptr, nullptr, &Self::SetPyramid},
   };
   std::string names;
   for (const Parameter& p : parameters) {
+    if (!std::strchr(p.Methods, this->IsGlobal() ? 'g' : 's')) {
+      continue;
+    }
     names += (names.empty() ? "" : ", ") + std::string(p.Name);
     if (!name || std::strcmp(name, p.Name) != 0) {
       continue;
     }
-    if (!(value >= p.From && value <= p.To) || (p.Whole && value != std::floor(value))) {
-      vtkErrorMacro(<< p.Name << " must be " << (p.Whole ? "a whole number" : "a number") << " in [" << p.From << ", " << p.To
+    if (!(value >= p.From && value <= p.To) || (!p.SetReal && value != std::floor(value))) {
+      vtkErrorMacro(<< p.Name << " must be " << (p.SetReal ? "a number" : "a whole number") << " in [" << p.From << ", " << p.To
                     << "]; it is not " << value);
       return false;
     }
@@ -97,28 +206,125 @@ bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
     } else if (p.SetWhole) {
       (this->*p.SetWhole)(static_cast<int>(value));
     } else {
-      this->SetPyramid(value != 0.0);
+      (this->*p.SetSwitch)(value != 0.0);
     }
     return true;
   }
-  vtkErrorMacro("the method search has no parameter named \"" << (name ? name : "") << "\"; it has: " << names);
+  vtkErrorMacro("the method " << this->Method << " has no parameter named \"" << (name ? name : "") << "\"; it has: " << names);
   return false;
 }
 
 //----------------------------------------------------------------------------
-echorama::AlignSearchParameters vtkUltrasoundAligner::Parameters() const
+echorama::AlignSearchParameters vtkUltrasoundAligner::SearchParameters() const
 {
   echorama::AlignSearchParameters p;
-  p.minimumOverlap = this->MinimumOverlap;
+  p.minimumOverlap = this->MinimumOverlap > 0.0 ? this->MinimumOverlap : p.minimumOverlap;
   p.samples = this->Samples;
   p.levels = this->Levels;
   p.firstStepMm = this->FirstStepMm;
   p.firstStepDegrees = this->FirstStepDegrees;
   p.repeats = this->Repeats;
-  p.points = this->Points;
+  p.points = this->Points > 0 ? this->Points : p.points;
   p.seed = static_cast<std::uint64_t>(this->Seed);
   p.pyramid = this->Pyramid;
   return p;
+}
+
+//----------------------------------------------------------------------------
+echorama::AlignVolumesParameters vtkUltrasoundAligner::GlobalParameters() const
+{
+  echorama::AlignVolumesParameters p;
+  p.pair.start = echorama::AlignStartOf(this->Start);
+  p.pair.metric = this->Metric;
+  p.pair.minimumOverlap = this->MinimumOverlap > 0.0 ? this->MinimumOverlap : p.pair.minimumOverlap;
+  p.pair.candidates = this->Candidates;
+  p.pair.finestMm = this->FinestMm;
+  p.pair.points = this->Points > 0 ? this->Points : p.pair.points;
+  p.pair.minimumSimilarity = this->MinimumSimilarity;
+  p.pair.minimumPeakRatio = this->MinimumPeakRatio;
+  p.pair.maximumErrorVoxels = this->MaximumErrorVoxels;
+  p.pair.maximumSplitVoxels = this->MaximumSplitVoxels;
+  p.pair.seed = static_cast<std::uint64_t>(this->Seed);
+  return p;
+}
+
+//----------------------------------------------------------------------------
+std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignBySearch(const std::vector<echorama::PlacedVolume>& volumes,
+                                                                              const echorama::Progress& progress)
+{
+  std::vector<Result> results;
+  auto report = nlohmann::ordered_json::array();
+  for (const auto& found : echorama::AlignInTurn(volumes, this->FixedVolume, this->SearchParameters(), progress)) {
+    Result result;
+    result.VolumeToWorld = found.volumeToWorld;
+    result.Error = found.error;
+    result.Overlap = found.overlap;
+    report.push_back({{"name", volumes[results.size()].name}, {"error_grey", found.error}, {"overlap", found.overlap}});
+    results.push_back(result);
+  }
+  this->Report = nlohmann::ordered_json{{"method", this->Method}, {"volumes", report}}.dump();
+  return results;
+}
+
+//----------------------------------------------------------------------------
+std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignGlobally(const std::vector<echorama::PlacedVolume>& volumes,
+                                                                              double prepareSeconds,
+                                                                              const echorama::Progress& progress)
+{
+  const auto found = echorama::AlignVolumes(volumes, this->FixedVolume, this->GlobalParameters(), progress);
+  std::vector<Result> results;
+  auto ofVolumes = nlohmann::ordered_json::array(), ofPairs = nlohmann::ordered_json::array();
+  for (const auto& volume : found.volumes) {
+    Result result;
+    result.VolumeToWorld = volume.volumeToWorld;
+    result.Similarity = volume.similarity;
+    result.Overlap = volume.overlap;
+    result.Verdict = echorama::NameOf(volume.verdict);
+    result.Reason = volume.reason;
+    result.Centre = volume.centre;
+    // What nothing is known of is 1 km off.
+    constexpr double radiusMm = 100.0;
+    if (static_cast<int>(results.size()) != this->FixedVolume) {
+      result.Covariance = echorama::CovarianceOf(volume.information, radiusMm);
+    }
+    ofVolumes.push_back({{"name", volumes[results.size()].name},
+                         {"verdict", result.Verdict},
+                         {"reason", result.Reason},
+                         {"similarity", result.Similarity},
+                         {"overlap", result.Overlap},
+                         {"centre", {result.Centre.x(), result.Centre.y(), result.Centre.z()}},
+                         {"covariance", JsonOf(result.Covariance)}});
+    results.push_back(result);
+  }
+  for (const auto& pair : found.pairs) {
+    const auto& a = pair.alignment;
+    ofPairs.push_back(
+        {{"fixed", pair.fixed},
+         {"moving", pair.moving},
+         {"verdict", echorama::NameOf(pair.verdict)},
+         {"reason", pair.reason},
+         {"score", a.score},
+         {"similarity", a.similarity},
+         {"overlap", a.overlap},
+         {"peak_ratio", a.peakRatio},
+         {"split_mm", a.splitMm},
+         {"error_mm", a.errorMm},
+         {"voted_down", pair.votedDown},
+         {"stands", pair.stands},
+         {"attempts", pair.attempts},
+         {"residual_mm", pair.residualMm},
+         {"anywhere", a.anywhere},
+         {"seconds", {{"global", a.globalSeconds}, {"local", a.localSeconds}, {"confidence", a.confidenceSeconds}}}});
+  }
+  this->Report =
+      nlohmann::ordered_json{
+          {"method", this->Method},
+          {"volumes", ofVolumes},
+          {"pairs", ofPairs},
+          {"seconds",
+           {{"prepare", prepareSeconds + found.featureSeconds}, {"pairs", found.pairSeconds}, {"graph", found.graphSeconds}}}}
+          .dump();
+  return results;
 }
 
 //----------------------------------------------------------------------------
@@ -150,40 +356,58 @@ int vtkUltrasoundAligner::RequestUpdateExtent(vtkInformation*, vtkInformationVec
 int vtkUltrasoundAligner::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   this->Results.clear();
+  this->Report.clear();
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
     const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-    const echorama::AlignSearchParameters parameters = this->Parameters();
-    parameters.Check();
+    if (this->IsGlobal()) {
+      this->GlobalParameters().pair.Check();
+    } else {
+      this->SearchParameters().Check();
+    }
 
     // 1. the resolutions of each volume
-    std::vector<std::vector<echorama::PyramidLevel>> pyramids(volumes.size());
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<Prepared> prepared;
     std::vector<echorama::PlacedVolume> placed(volumes.size());
     for (std::size_t i = 0; i < volumes.size(); ++i) {
       const double count = static_cast<double>(volumes.size());
-      const auto part = progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count);
-      vtkUltrasoundVolume::Dispatch(volumes[i].Intensity, [&](auto type) {
-        pyramids[i] = echorama::BuildPyramid(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volumes[i]), {}, part);
-      });
-      placed[i].pyramid = &pyramids[i];
+      prepared.push_back(Prepare(volumes[i], this->IsGlobal() && this->UseReliability,
+                                 progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count)));
+    }
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
+      placed[i].pyramid = &prepared[i].Pyramid;
+      placed[i].reliability = prepared[i].Reliability.empty() ? nullptr : &prepared[i].Reliability;
       placed[i].name = volumes[i].Name;
     }
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
 
     // 2. where they belong
-    const auto results = echorama::AlignInTurn(placed, this->FixedVolume, parameters, progress.Part(0.1, 1.0));
+    const auto results = this->IsGlobal() ? this->AlignGlobally(placed, seconds.count(), progress.Part(0.1, 1.0))
+                                          : this->AlignBySearch(placed, progress.Part(0.1, 1.0));
 
     // 3. the same voxels there
     auto* output = vtkMultiBlockDataSet::GetData(outputs);
     output->SetNumberOfBlocks(static_cast<unsigned int>(volumes.size()));
     for (std::size_t i = 0; i < volumes.size(); ++i) {
+      const Result& result = results[i];
       vtkNew<vtkImageData> moved;
       moved->ShallowCopy(volumes[i].Image);
-      if (static_cast<int>(i) != this->FixedVolume) {
-        vtkUltrasoundVolume::Move(moved, results[i].volumeToWorld);
-        AddField(moved, AlignmentErrorName(), &results[i].error, 1);
-        AddField(moved, AlignmentOverlapName(), &results[i].overlap, 1);
+      const bool isFixed = static_cast<int>(i) == this->FixedVolume;
+      if (!isFixed) {
+        vtkUltrasoundVolume::Move(moved, result.VolumeToWorld);
+        AddField(moved, AlignmentOverlapName(), &result.Overlap, 1);
       }
-      const RowMajor rows = results[i].volumeToWorld.matrix();
+      const RowMajor rows = result.VolumeToWorld.matrix();
       AddField(moved, VolumeToWorldName(), rows.data(), 16);
+      if (this->IsGlobal()) {
+        AddField(moved, AlignmentVerdictName(), result.Verdict);
+        AddField(moved, AlignmentReasonName(), result.Reason);
+        AddField(moved, AlignmentSimilarityName(), &result.Similarity, 1);
+        AddField(moved, AlignmentCovarianceName(), result.Covariance.data(), 36); // symmetric: rows are columns
+        AddField(moved, AlignmentCentreName(), result.Centre.data(), 3);
+      } else if (!isFixed) {
+        AddField(moved, AlignmentErrorName(), &result.Error, 1);
+      }
       const auto block = static_cast<unsigned int>(i);
       output->SetBlock(block, moved);
       output->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volumes[i].Name.c_str());
@@ -193,7 +417,7 @@ int vtkUltrasoundAligner::RequestData(vtkInformation*, vtkInformationVector** in
 }
 
 //----------------------------------------------------------------------------
-const echorama::AlignSearchResult* vtkUltrasoundAligner::ResultOf(int volume) const
+const vtkUltrasoundAligner::Result* vtkUltrasoundAligner::ResultOf(int volume) const
 {
   return volume >= 0 && volume < this->GetNumberOfVolumes() ? &this->Results[static_cast<std::size_t>(volume)] : nullptr;
 }
@@ -209,7 +433,7 @@ bool vtkUltrasoundAligner::GetPose(int volume, vtkMatrix4x4* pose) const
 {
   const auto* result = this->ResultOf(volume);
   if (result) {
-    const RowMajor rows = result->volumeToWorld.matrix();
+    const RowMajor rows = result->VolumeToWorld.matrix();
     pose->DeepCopy(rows.data());
   }
   return result != nullptr;
@@ -219,14 +443,44 @@ bool vtkUltrasoundAligner::GetPose(int volume, vtkMatrix4x4* pose) const
 double vtkUltrasoundAligner::GetError(int volume) const
 {
   const auto* result = this->ResultOf(volume);
-  return result ? result->error : 0.0;
+  return result ? result->Error : 0.0;
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundAligner::GetOverlap(int volume) const
 {
   const auto* result = this->ResultOf(volume);
-  return result ? result->overlap : 0.0;
+  return result ? result->Overlap : 0.0;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundAligner::GetSimilarity(int volume) const
+{
+  const auto* result = this->ResultOf(volume);
+  return result ? result->Similarity : 0.0;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundAligner::GetVerdict(int volume) const
+{
+  const auto* result = this->ResultOf(volume);
+  return result ? result->Verdict : std::string();
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundAligner::GetReason(int volume) const
+{
+  const auto* result = this->ResultOf(volume);
+  return result ? result->Reason : std::string();
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAligner::GetAllAligned() const
+{
+  const std::string aligned = echorama::NameOf(echorama::Verdict::Aligned);
+  return !this->Results.empty() && std::all_of(this->Results.begin(), this->Results.end(), [&aligned](const Result& result) {
+    return result.Verdict.empty() || result.Verdict == aligned;
+  });
 }
 
 //----------------------------------------------------------------------------
@@ -235,6 +489,15 @@ void vtkUltrasoundAligner::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FixedVolume: " << this->FixedVolume << "\n";
   os << indent << "Method: " << this->GetMethod() << "\n";
+  os << indent << "Start: " << this->Start << "\n";
+  os << indent << "Metric: " << this->Metric << "\n";
+  os << indent << "UseReliability: " << (this->UseReliability ? "on" : "off") << "\n";
+  os << indent << "Candidates: " << this->Candidates << "\n";
+  os << indent << "FinestMm: " << this->FinestMm << "\n";
+  os << indent << "MinimumSimilarity: " << this->MinimumSimilarity << "\n";
+  os << indent << "MinimumPeakRatio: " << this->MinimumPeakRatio << "\n";
+  os << indent << "MaximumErrorVoxels: " << this->MaximumErrorVoxels << "\n";
+  os << indent << "MaximumSplitVoxels: " << this->MaximumSplitVoxels << "\n";
   os << indent << "MinimumOverlap: " << this->MinimumOverlap << "\n";
   os << indent << "Samples: " << this->Samples << "\n";
   os << indent << "Levels: " << this->Levels << "\n";
