@@ -14,44 +14,48 @@ struct ShiftRange {
   std::array<int, 3> Counts() const { return {last[0] - first[0] + 1, last[1] - first[1] + 1, last[2] - first[2] + 1}; }
 };
 
-/// Correlates one fixed volume with many moving ones over all translations at once, through Fourier space, each voxel
-/// counting by its weight (Padfield, IEEE TIP 21(5), 2012, with weights in place of masks).
+/// Correlates one fixed volume with many moving ones over all translations at once, through Fourier space (Padfield, IEEE
+/// TIP 21(5), 2012, with weights in place of masks).
 ///
-/// The fixed volume is transformed once. Both volumes are real pairs, so that a pair makes one complex transform. Wrap-around
-/// is kept out of the range of shifts alone; the transforms are no larger than that needs. Thread-safe after construction:
-/// each thread brings its own Work.
+/// A voxel is a pair: its weight (0: not real, and up to 1), and its value times the weight. Single precision: bring values of
+/// mean 0 and variance 1 or so. The fixed volume is transformed once. Wrap-around is kept out of the range of shifts alone, so
+/// the transforms are no larger than that needs. Safe for threads; each brings its own Work.
 class MaskedCorrelator {
 public:
-  /// \param fixed (weight, weight * value)
-  /// \param movingDimensions of every moving volume
-  MaskedCorrelator(VolumeView<const std::complex<float>> fixed, const std::array<int, 3>& movingDimensions,
-                   const ShiftRange& shifts);
+  using Complex = std::complex<float>;
 
-  /// Room for one correlation.
+  /// \param movingDimensions of every moving volume that will come
+  MaskedCorrelator(VolumeView<const Complex> fixed, const std::array<int, 3>& movingDimensions, const ShiftRange& shifts);
+
+  /// Room for one correlation; it may be used again.
   struct Work {
-    std::vector<std::complex<float>> moving, squares, sums[3];
+    std::vector<Complex> moving, squares, sums[3];
   };
 
-  /// At each shift the sum of weights w_f w_m (real part) and of products w_f f w_m m (imaginary part).
-  /// \a moving: (weight, weight * value), of the dimensions promised. \a out: of the shifts' counts.
-  void Products(VolumeView<const std::complex<float>> moving, VolumeView<std::complex<float>> out, Work& work) const;
+  /// The sums of w_f w_m (real part) and of w_f f w_m m (imaginary part) at each shift: one transform there, one back.
+  /// \a out has as many voxels as there are shifts.
+  void Products(VolumeView<const Complex> moving, VolumeView<Complex> out, Work& work) const;
 
-  /// At each shift the sum of weights (real part) and the weighted normalised cross-correlation in [-1, 1] (imaginary part);
-  /// 0 where the weights sum to less than \a leastWeight or a volume is constant there.
-  void Normalised(VolumeView<const std::complex<float>> moving, double leastWeight, VolumeView<std::complex<float>> out,
-                  Work& work) const;
+  /// The sum of w_f w_m (real part) and the normalised cross-correlation where both are real, weighted so, in [-1, 1]
+  /// (imaginary part): two transforms there, three back. The correlation is 0 where the weights sum to less than
+  /// \a leastWeight, and where one of the two is constant. Never NaN.
+  void Normalised(VolumeView<const Complex> moving, double leastWeight, VolumeView<Complex> out, Work& work) const;
 
+  /// Of the transforms, voxels.
   const std::array<int, 3>& TransformSize() const { return size_; }
 
 private:
-  using Spectrum = std::vector<std::complex<float>>;
-  void Forward(VolumeView<const std::complex<float>> voxels, const std::array<int, 3>& at, Spectrum& spectrum) const;
+  using Spectrum = std::vector<Complex>;
+  void Forward(VolumeView<const Complex> voxels, const std::array<int, 3>& at, Spectrum& spectrum) const;
   void Backward(Spectrum& spectrum) const;
-  std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(size_[0]) * size_[1] * size_[2]; }
+  template <class RowBody>
+  void ForEachRow(const RowBody& body) const;
 
   ShiftRange shifts_;
-  std::array<int, 3> movingDimensions_, size_;
-  Spectrum weights_, values_, squares_; // of the fixed volume; Hermitian each
+  std::array<int, 3> size_;
+  // Of the fixed volume: half of weights minus and plus values, and the squares of the values. All times 1 / voxels, which the
+  // way back leaves out.
+  Spectrum halfDifference_, halfSum_, squares_;
 };
 
 } // namespace echorama

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Small cones are a ball of lattice points. A large one is 24 pieces, one around each rotation of a cube; a piece is the set
 // of rotations that no other of the 24 is nearer to, and reaches 62.8 degrees from its middle, where the map from rotation
-// vectors is still nearly even (0.91 at the far corners). Points just beyond the cone are drawn back onto its rim, so that the
-// rim is covered as well as the inside.
+// vectors is still nearly even (0.91 at the far corners). The lattices do not fit where pieces meet: points just beyond a piece
+// are added as long as nothing lies near. Points just beyond the cone are drawn back onto its rim, so that the rim is
+// covered as well as the inside.
 #include "RotationCover.h"
 #include "Core/Base/Error.h"
 #include "Core/Geometry/RigidTransform.h"
@@ -15,6 +16,8 @@ namespace {
 
 constexpr double RadiansPerDegree = 0.017453292519943295;
 constexpr double LargestPlainCone = 60.0 * RadiansPerDegree;
+constexpr double LargestInPiece = 63.0 * RadiansPerDegree;
+constexpr double FillDistance = 0.65; // of the step
 
 // The lattice points within \a radius of the origin, the origin first. Neighbours are \a step apart.
 std::vector<Eigen::Vector3d> LatticeBall(double radius, double step)
@@ -52,6 +55,38 @@ std::vector<Eigen::Matrix3d> CubeRotations()
   return rotations; // the identity first
 }
 
+// A cover of all rotations: lattices around the 24 rotations of a cube.
+std::vector<Eigen::Vector3d> FullCover(double step)
+{
+  const std::vector<Eigen::Matrix3d> cube = CubeRotations();
+  std::vector<Eigen::Matrix3d> inside, beyond; // of the piece around the identity
+  for (const Eigen::Vector3d& v : LatticeBall(LargestInPiece + step, step)) {
+    const Eigen::Matrix3d R = ExpRotation(v);
+    const double own = R.trace(); // 1 + 2 cos(angle): the nearest has the largest
+    const bool nearest =
+        std::all_of(cube.begin(), cube.end(), [&](const Eigen::Matrix3d& g) { return R.cwiseProduct(g).sum() <= own + 1e-9; });
+    (nearest ? inside : beyond).push_back(R);
+  }
+  std::vector<Eigen::Matrix3d> cover;
+  for (const Eigen::Matrix3d& R : inside)
+    for (const Eigen::Matrix3d& g : cube)
+      cover.push_back(g * R);
+  const double apart = 1.0 + 2.0 * std::cos(FillDistance * step);
+  for (const Eigen::Matrix3d& R : beyond)
+    for (const Eigen::Matrix3d& g : cube) {
+      const Eigen::Matrix3d candidate = g * R;
+      if (std::all_of(cover.begin(), cover.end(),
+                      [&](const Eigen::Matrix3d& c) { return candidate.cwiseProduct(c).sum() < apart; }))
+        cover.push_back(candidate);
+    }
+  std::vector<Eigen::Vector3d> vectors;
+  for (const Eigen::Matrix3d& R : cover)
+    vectors.push_back(LogRotation(R));
+  std::stable_sort(vectors.begin(), vectors.end(),
+                   [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return a.norm() < b.norm(); });
+  return vectors;
+}
+
 } // namespace
 
 std::vector<Eigen::Matrix3d> RotationCover(double coneDegrees, double stepDegrees)
@@ -71,23 +106,9 @@ std::vector<Eigen::Matrix3d> RotationCover(double coneDegrees, double stepDegree
     else if (angle <= cone + 0.75 * coveringRadius)
       vectors.push_back(v * (cone / angle));
   };
-  if (cone <= LargestPlainCone) {
-    for (const Eigen::Vector3d& v : cone > 0.0 ? LatticeBall(cone + coveringRadius, step) : LatticeBall(0.0, step))
-      add(v);
-  } else {
-    const std::vector<Eigen::Matrix3d> cube = CubeRotations();
-    for (const Eigen::Vector3d& v : LatticeBall(63.0 * RadiansPerDegree, step)) {
-      const Eigen::Matrix3d R = ExpRotation(v);
-      const double own = R.trace(); // 1 + 2 cos(angle): the nearest has the largest
-      const bool nearest =
-          std::all_of(cube.begin(), cube.end(), [&](const Eigen::Matrix3d& g) { return R.cwiseProduct(g).sum() <= own + 1e-9; });
-      for (const Eigen::Matrix3d& g : cube)
-        if (nearest)
-          add(LogRotation(g * R));
-    }
-    std::stable_sort(vectors.begin(), vectors.end(),
-                     [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return a.norm() < b.norm(); });
-  }
+  const bool plain = cone <= LargestPlainCone;
+  for (const Eigen::Vector3d& v : plain ? LatticeBall(cone > 0.0 ? cone + coveringRadius : 0.0, step) : FullCover(step))
+    add(v);
   std::vector<Eigen::Matrix3d> cover;
   for (const Eigen::Vector3d& v : vectors)
     cover.push_back(ExpRotation(v));
