@@ -72,6 +72,7 @@ class Usage(unittest.TestCase):
                           ["align", *some, "-o", work / "no.json", "--set", "Levels"],
                           ["align", *some, "-o", work / "no.json", "--set", "Levels=many"],
                           ["align", *some, "-o", work / "no.json", "--set", "Levels=999"], ["score", phantom / "truth.json"],
+                          ["score", phantom / "truth.json", "--landmarks", work / "one.csv"],
                           ["phantom"], ["phantom", "-o", work / "no", "--count", "0"], ["view"],
                           ["view", some[0], "--screenshot", work / "no.png", "--size", "1", "1"]):
             done = run(*arguments)
@@ -116,6 +117,29 @@ class Phantom(unittest.TestCase):
         self.assertNotEqual(contents[0]["volume_1.mha"], contents[2]["volume_1.mha"])
         other = json.loads(contents[2]["truth.json"])["volumes"][1]
         self.assertGreater(abs(affine_of(other) - affine_of(truth()["volumes"][1])).max(), 0.01)
+
+    def test_what_sets_volumes_apart(self):
+        """Each planted difference changes the volumes it is for and no others, and landmarks tell where tissue is seen."""
+        def contents(name, *options):
+            run_json("phantom", "-o", work / name, "--spacing", 2.5, "--seed", 5, "--count", 2, *options)
+            return [(work / name / file).read_bytes() for file in FILES[:2]]
+
+        unchanged = contents("changed", "--landmarks", 30)
+        for options, first_stays in ((("--decorrelation", 0.5), False), (("--noise", -10), False), (("--rib", 0.3), True),
+                                     (("--jets",), True), (("--deformation", 3, "--landmarks", 30), True)):
+            changed = contents("changed" + options[0], *options)
+            self.assertEqual(changed[0] == unchanged[0], first_stays, options)
+            self.assertNotEqual(changed[1], unchanged[1], options)
+
+        def error(name, poses="truth.json"):
+            return run_json("score", work / name / poses, "--landmarks", *(work / name / f"landmarks_{i}.csv" for i in (1, 2)))["landmarks"]
+
+        right = error("changed")
+        self.assertEqual(right["pairs"], 30)
+        self.assertLess(right["max_mm"], 1e-9)
+        pressed = error("changed--deformation")  # the part of the deformation that is left after the true poses
+        self.assertTrue(0.2 < pressed["mean_mm"] < pressed["max_mm"] <= 3, pressed)
+        self.assertEqual(len(pressed["errors"]), pressed["pairs"])
 
 
 class MainJob(unittest.TestCase):
@@ -193,6 +217,29 @@ class MainJob(unittest.TestCase):
         self.assertIn(told["volumes"][1]["verdict"], ("ambiguous", "failed"))
         self.assertTrue(told["volumes"][1]["reason"])
         self.assertTrue(any("not every volume is aligned" in note for note in told["notes"]))
+
+    def test_score_with_landmarks(self):
+        """Lists of Slicer and our own, each in the frame of its volume's file; 3 mm off is an error of 3 mm."""
+        places = numpy.array([[10.0, -5, 40], [-20, 8, 55], [0, 12, 70]])
+        poses = [affine_of(pose) for pose in truth()["volumes"]]
+        seen = [(places - pose[:3, 3]) @ pose[:3, :3] for pose in poses]  # by the inverse of each pose
+        (work / "1.csv").write_text("".join(f"p{i},{x},{y},{z}\n" for i, (x, y, z) in enumerate(seen[0])))
+        (work / "2.fcsv").write_text("# Markups fiducial file version = 4.11\n# CoordinateSystem = 0\n" + "".join(
+            f"n{i},{-x},{-y},{z},0,0,0,1,1,1,0,p{i},,\n" for i, (x, y, z) in enumerate(seen[1])))
+        (work / "3.mrk.json").write_text(json.dumps({"markups": [{"coordinateSystem": "LPS", "controlPoints": [
+            {"label": f"p{i}", "position": list(point)} for i, point in enumerate(seen[2])]}]}))
+        lists = [work / "1.csv", work / "2.fcsv", work / "3.mrk.json"]
+        right = run_json("score", phantom / "truth.json", "--landmarks", *lists, "--truth", phantom / "truth.json")
+        self.assertEqual(right["landmarks"]["pairs"], 9)
+        self.assertLess(right["landmarks"]["max_mm"], 1e-9)
+        self.assertLess(right["score_mm"], 1e-9)
+        poses[2] = poses[2].copy()
+        poses[2][1, 3] -= 3
+        write_poses(work / "off.json", volumes(), poses)
+        off = run_json("score", work / "off.json", "--landmarks", *lists)["landmarks"]
+        self.assertAlmostEqual(off["mean_mm"], 2, places=9)  # 0 for the first pair of volumes, 3 for the others
+        self.assertAlmostEqual(off["max_mm"], 3, places=9)
+        numpy.testing.assert_allclose(off["errors"][3]["vector_mm"], [0, -3, 0], atol=1e-9)
 
     def test_pose_file(self):
         text = json.loads(self.poses.read_text())

@@ -3,13 +3,17 @@
 //
 // The first volume stays where it is, so that poses found with it held fixed lie in the frame of the truth.
 #include "Commands.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/Random.h"
 #include "Core/Geometry/PoseFile.h"
 #include "Filters/Registration/ValidPoints.h"
 #include "Filters/Synthesis/PhantomViews.h"
 #include "Outputs.h"
 #include "Volumes.h"
+#include <algorithm>
 #include <CLI/Validators.hpp>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <vtkNew.h>
 #include <vtkUltrasoundAcquisition.h>
@@ -21,10 +25,32 @@ namespace {
 
 struct PhantomOptions {
   std::string folder, format = "mha";
-  int count = 3;
+  int count = 3, landmarks = 0;
   std::uint64_t seed = 1;
   double spacingMm = 1.0, overlap = 0.55, knockMm = 8.0, knockDegrees = 6.0;
+  double decorrelation = 0.0, deformationMm = 0.0, noiseDb = PhantomParameters::noNoiseDb, ribShare = 0.0;
+  bool jets = false;
 };
+
+// Places in the tissue that two views at least see.
+std::vector<Eigen::Vector3d> SharedPlaces(const PhantomOptions& options, const ProbeGeometry& probe,
+                                          const std::vector<PhantomView>& views)
+{
+  std::vector<Eigen::Vector3d> places;
+  Random random(options.seed, 0x1a4d);
+  for (int attempt = 0; attempt < 1000 * options.landmarks && static_cast<int>(places.size()) < options.landmarks; ++attempt) {
+    const PhantomView& view = views[random.Below(views.size())];
+    const Eigen::AlignedBox3d box = BoxAround(probe);
+    const Eigen::Vector3d share(random.Uniform(), random.Uniform(), random.Uniform());
+    const Eigen::Vector3d place = view.probeToWorld * (box.min() + share.cwiseProduct(box.sizes()));
+    const auto sees = [&](const PhantomView& other) {
+      return BeamPointAt(probe, other.probeToWorld.inverse() * place).has_value();
+    };
+    if (sees(view) && std::count_if(views.begin(), views.end(), sees) > 1)
+      places.push_back(place);
+  }
+  return places;
+}
 
 Eigen::Vector3d CentroidOf(vtkImageData* image)
 {
@@ -40,12 +66,35 @@ Eigen::Vector3d CentroidOf(vtkImageData* image)
   return vtkUltrasoundVolume::GeometryOf(image).IndexToWorld() * index;
 }
 
+// Where each of the places is seen in a volume that was knocked out of place, if it is.
+void WriteLandmarks(const std::string& file, const std::vector<Eigen::Vector3d>& places, const PhantomParameters& parameters,
+                    const Pose& knock)
+{
+  std::ofstream stream(file);
+  stream << "label,x,y,z\n";
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Eigen::Vector3d seen = parameters.press.Seen(parameters.probeToWorld.inverse() * places[i]);
+    if (!BeamPointAt(parameters.probe, seen))
+      continue;
+    const Eigen::Vector3d point = knock * (parameters.probeToWorld * seen);
+    stream << "L" << i + 1 << ',' << NumberText(point.x()) << ',' << NumberText(point.y()) << ',' << NumberText(point.z())
+           << '\n';
+  }
+  stream.close();
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, file + ": it cannot be written (is the disk full?)");
+}
+
 void Phantom(Session& session, const PhantomOptions& options)
 {
   vtkNew<vtkUltrasoundPhantomSource> source;
   source->SetSeed(static_cast<vtkTypeInt64>(options.seed));
   source->SetSpacingMm(options.spacingMm);
-  const std::vector<PhantomView> views = PhantomViews(source->Parameters().probe, options.count, options.overlap);
+  const ProbeGeometry probe = source->Parameters().probe;
+  const std::vector<PhantomView> views = PhantomViews(probe, options.count, options.overlap);
+  const std::vector<Eigen::Vector3d> places = SharedPlaces(options, probe, views);
+  source->SetDecorrelation(options.decorrelation);
+  source->SetNoiseDb(options.noiseDb);
 
   OutputFolder folder(session, options.folder, {});
   const std::string truthName = "truth.json", truthFile = folder.Stage(truthName);
@@ -57,6 +106,10 @@ void Phantom(Session& session, const PhantomOptions& options)
   for (std::size_t i = 0; i < views.size(); ++i) {
     const std::string name = "volume_" + std::to_string(i + 1) + "." + options.format;
     source->SetView(views[i].probeToWorld, views[i].gainDb);
+    source->SetChangeSeed(static_cast<vtkTypeInt64>(i + 1));
+    source->SetDeformationMm(i == 0 ? 0.0 : options.deformationMm);
+    source->SetRibShare(i == 0 ? 0.0 : options.ribShare);
+    source->SetJets(i > 0 && options.jets);
     session.Update(source, "make", name);
     vtkNew<vtkImageData> image;
     image->ShallowCopy(source->GetOutput());
@@ -69,6 +122,11 @@ void Phantom(Session& session, const PhantomOptions& options)
     session.result["volumes"].push_back(
         {{"file", folder.Final(name)}, {"gain_db", views[i].gainDb}, {"VolumeToWorld", JsonOf(knock.inverse())}});
     session.Say("wrote " + folder.Final(name));
+    if (options.landmarks > 0) {
+      const std::string list = "landmarks_" + std::to_string(i + 1) + ".csv";
+      WriteLandmarks(folder.Stage(list), places, source->Parameters(), knock);
+      session.result["volumes"].back()["landmarks"] = folder.Final(list);
+    }
   }
   WritePoses(truthFile, truth); // relative to the folder, so they stay right when it gets its place
   folder.Commit();
@@ -101,6 +159,28 @@ Command PhantomCommand(CLI::App& program)
   options
       ->add_option("--knock-degrees", values->knockDegrees, "How far it is turned about the centre of its valid region, degrees")
       ->check(CLI::Range(0.0, 180.0))
+      ->capture_default_str();
+  options
+      ->add_option("--decorrelation", values->decorrelation, "How far the speckle of each volume has changed by itself, 0 to 1")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  options
+      ->add_option("--deformation", values->deformationMm,
+                   "How far the probe presses the tissue below its face, mm, in each volume but the first")
+      ->check(CLI::Range(0.0, ProbePress::maxMm))
+      ->capture_default_str();
+  options->add_option("--noise", values->noiseDb, "Power of the receiver's noise beside that of the background, dB; -120: none")
+      ->check(CLI::Range(-120.0, 60.0))
+      ->capture_default_str();
+  options
+      ->add_option("--rib", values->ribShare, "Share of the fan in the shadow of a rib, in each volume but the first; 0: no rib")
+      ->check(CLI::Range(0.0, 0.6))
+      ->capture_default_str();
+  options->add_flag("--jets", values->jets, "Bodies that come and go are there in each volume but the first");
+  options
+      ->add_option("--landmarks", values->landmarks,
+                   "How many places that two volumes see are listed for each volume, as landmarks_N.csv")
+      ->check(CLI::Range(0, 10000))
       ->capture_default_str();
   options->add_option("--format", values->format, "File format")
       ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))
