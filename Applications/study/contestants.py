@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Who aligns: the program echorama with one set of options or another, and elastix when it is installed.
+
+Each gets a case and a start and answers with the second volume's motion as seen from the first, from where their files stand.
+"""
+import dataclasses
+import json
+import pathlib
+import re
+import resource
+import shutil
+import subprocess
+import tempfile
+import time
+
+import numpy as np
+from vtkmodules.util.numpy_support import vtk_to_numpy
+
+import echorama
+from cases import matrix_of
+from geometry import read_poses, rotation
+
+
+@dataclasses.dataclass
+class Answer:
+    motion: np.ndarray
+    seconds: float
+    cpu_seconds: float = 0.0  # of all its threads, reading and writing included; other work on the machine does not count
+    verdict: str = ""  # aligned, ambiguous or failed; empty: the method gives none
+    reason: str = ""
+
+
+class Failed(Exception):
+    """A contestant gave no answer; says why."""
+
+
+def cpu_seconds():
+    """Of all programs that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def run_program(arguments, seconds):
+    try:
+        return subprocess.run([str(argument) for argument in arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, timeout=seconds)
+    except subprocess.TimeoutExpired as problem:
+        raise Failed(f"no answer within {seconds:g} s") from problem
+    except OSError as problem:
+        raise Failed(f"{arguments[0]} does not start: {problem.strerror}") from problem
+
+
+class Echorama:
+    """`echorama align` with some options. The time is that of its stage "align": reading and writing do not count."""
+
+    def __init__(self, program, options=()):
+        self.program, self.options = program, list(options)
+
+    def align(self, case, start, limit):
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder) / "poses.json"
+            begin = ["--poses", start.path] if start.path else []
+            before = cpu_seconds()
+            done = run_program([self.program, "align", *case.files, *begin, "-o", out, "--json", *self.options], limit)
+            try:
+                said = json.loads(done.stdout)
+            except ValueError as problem:
+                raise Failed(done.stderr.strip()[-300:] or f"it ended with status {done.returncode}") from problem
+            if "error" in said or not out.exists():
+                raise Failed(said.get("error", "it wrote no poses"))
+            second = said["volumes"][1]
+            (_, first), (_, moved) = read_poses(out)
+            seconds = stage_seconds(said.get("stages", {}), "align", said["seconds"])
+            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, second.get("verdict", said.get("verdict", "")),
+                          second.get("reason", said.get("reason", "")) or "")
+
+
+def stage_seconds(stages, name, otherwise):
+    """Seconds of a stage, told as {name: seconds} or as a list of {"stage": name, "seconds": ..}."""
+    if isinstance(stages, dict):
+        return float(stages.get(name, otherwise))
+    return float(sum(stage.get("seconds", 0) for stage in stages if name in stage.values()) or otherwise)
+
+
+PARAMETERS = """(FixedInternalImagePixelType "float")
+(MovingInternalImagePixelType "float")
+(FixedImageDimension 3)
+(MovingImageDimension 3)
+(UseDirectionCosines "true")
+(Registration "MultiResolutionRegistration")
+(Interpolator "LinearInterpolator")
+(ResampleInterpolator "FinalBSplineInterpolator")
+(FinalBSplineInterpolationOrder 1)
+(Resampler "DefaultResampler")
+(FixedImagePyramid "FixedSmoothingImagePyramid")
+(MovingImagePyramid "MovingSmoothingImagePyramid")
+(NumberOfResolutions 4)
+(Transform "EulerTransform")
+(AutomaticScalesEstimation "true")
+(AutomaticTransformInitialization "false")
+(HowToCombineTransforms "Compose")
+(Optimizer "AdaptiveStochasticGradientDescent")
+(AutomaticParameterEstimation "true")
+(MaximumNumberOfIterations 250)
+(Metric "{metric}")
+(NumberOfHistogramBins 32)
+(ImageSampler "RandomCoordinate")
+(NumberOfSpatialSamples 5000)
+(NewSamplesEveryIteration "true")
+(RequiredRatioOfValidSamples 0.05)
+(RandomSeed 1)
+(ErodeMask "false")
+(WriteResultImage "false")
+"""
+
+
+def fill_outside(image):
+    """Gives what is not real the mean of what is. A pyramid that knows no masks would smooth the black outside into the fan."""
+    intensity = vtk_to_numpy(echorama.vtkUltrasoundVolume.GetIntensity(image))
+    valid = echorama.vtkUltrasoundVolume.GetValidRegion(image)
+    if valid is not None:
+        real = vtk_to_numpy(valid) != 0
+        intensity[~real] = intensity[real].mean()
+
+
+class Elastix:
+    """elastix: rigid, four resolutions, 250 iterations each, both masks. The start is put into the geometry of the second volume,
+    so that its own transform begins at the identity. The time is that of the whole program, which reads its files too."""
+
+    METRICS = {"elastix-mi": "AdvancedMattesMutualInformation", "elastix-ncc": "AdvancedNormalizedCorrelation"}
+
+    def __init__(self, metric):
+        self.metric = metric
+
+    def align(self, case, start, limit):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "parameters.txt").write_text(PARAMETERS.format(metric=self.metric))
+            for number, motion in ((0, np.eye(4)), (1, start.motion)):
+                image = case.image(number)
+                echorama.vtkUltrasoundVolume.Move(image, matrix_of(motion))
+                fill_outside(image)
+                writer = echorama.vtkUltrasoundWriter()
+                writer.SetInputDataObject(image)
+                writer.SetFileName(str(folder / f"{number}.mha"))
+                writer.SetUseCompression(False)
+                writer.Write()
+            masks = [[flag, folder / f"{number}.ValidRegion.mha"] for number, flag in ((0, "-fMask"), (1, "-mMask"))]
+            begin, before = time.monotonic(), cpu_seconds()
+            done = run_program(["elastix", "-f", folder / "0.mha", "-m", folder / "1.mha", "-out", folder, "-threads", 2, "-p",
+                                folder / "parameters.txt", *[word for mask in masks if mask[1].exists() for word in mask]], limit)
+            seconds = time.monotonic() - begin
+            result = folder / "TransformParameters.0.txt"
+            if done.returncode != 0 or not result.exists():
+                errors = re.findall(r"(?:Description|ERROR|Error): *(\S.*)", done.stdout + done.stderr)
+                raise Failed(errors[-1] if errors else f"elastix ended with status {done.returncode}")
+            # It maps the world of the first volume to that of the second where it started.
+            return Answer(np.linalg.inv(euler_motion(result.read_text())) @ start.motion, seconds,
+                          cpu_seconds() - before)
+
+
+def euler_motion(text):
+    """The motion that a file of elastix's EulerTransform holds."""
+    def numbers(key):
+        return [float(word) for word in re.search(rf"\({key} ([^)]*)\)", text).group(1).split()]
+
+    x, y, z, *move = numbers("TransformParameters")
+    centre = np.array(numbers("CenterOfRotationPoint"))
+    order = re.search(r'\(ComputeZYX "(\w+)"\)', text)
+    about_x, about_y, about_z = rotation((x, 0, 0)), rotation((0, y, 0)), rotation((0, 0, z))
+    turn = about_z @ about_y @ about_x if order and order.group(1) == "true" else about_z @ about_x @ about_y
+    motion = np.eye(4)
+    motion[:3, :3] = turn
+    motion[:3, 3] = centre + move - turn @ centre
+    return motion
+
+
+def contestants(program, own=()):
+    """By name. `own`: "NAME=OPTIONS of echorama align" of the user."""
+    found = {"echorama": Echorama(program), "search": Echorama(program, ["--method", "search", "--set", "MinimumOverlap=0.15"])}
+    if shutil.which("elastix"):
+        found.update({name: Elastix(metric) for name, metric in Elastix.METRICS.items()})
+    for text in own:
+        name, _, options = text.partition("=")
+        found[name] = Echorama(program, options.split())
+    return found

@@ -1,0 +1,163 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The study with truth: study.py make FOLDER, run FOLDER, plot FOLDER (see Documentation/study.md).
+
+It needs the Python package echorama and, to run, the program; ./run study provides both.
+"""
+import argparse
+import csv
+import json
+import pathlib
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+from cases import PAIRS, Case, cases_in, make
+from contestants import Answer, Failed, contestants, run_program
+from geometry import apply, degrees_of, write_poses
+
+PROPERTIES = ["overlap", "gain_db", "noise_db", "rib", "decorrelation", "jets", "deformation_mm"]
+COLUMNS = ["case", "start", "method", "verdict", "start_degrees", "start_mm", "tre_mm", "tre_voxels", "percentile95_mm", "landmarks_mm",
+           "landmarks_max_mm", "seconds", "cpu_seconds", *PROPERTIES, "reason", "error"]
+
+
+class Judge:
+    """Holds a motion of the second volume against what a case knows."""
+
+    def __init__(self, case, program, points=1000):
+        self.case, self.program, self.voxel = case, program, case.voxel_mm()
+        self.points = case.points(1, points)
+
+    def figures(self, motion):
+        found = {}
+        if self.case.truth is not None:
+            wrong = np.linalg.norm(apply(motion, self.points) - apply(self.case.truth, self.points), axis=1)
+            found = {"tre_mm": float(wrong.mean()), "percentile95_mm": float(np.percentile(wrong, 95))}
+        if None not in self.case.landmarks:
+            with tempfile.TemporaryDirectory() as folder:
+                poses = pathlib.Path(folder) / "poses.json"
+                write_poses(poses, self.case.files, [np.eye(4), motion])
+                done = run_program([self.program, "score", poses, "--landmarks", *self.case.landmarks, "--json"], 60)
+            said = json.loads(done.stdout or "{}")
+            if "landmarks" not in said:
+                raise ValueError(f"{self.case.folder}: {said.get('error', 'its landmarks cannot be read')}")
+            found |= {"landmarks_mm": said["landmarks"]["mean_mm"], "landmarks_max_mm": said["landmarks"]["max_mm"]}
+            found.setdefault("tre_mm", found["landmarks_mm"])
+        return found | {"tre_voxels": found["tre_mm"] / self.voxel}
+
+    def size_of_start(self, start):
+        """How far a start is off: degrees, and mm at the middle of the volume; nothing without a truth."""
+        if self.case.truth is None:
+            return {}
+        middle = self.points.mean(axis=0)[np.newaxis]
+        return {"start_degrees": round(degrees_of(start.motion @ np.linalg.inv(self.case.truth)), 3),
+                "start_mm": round(float(np.linalg.norm(apply(start.motion, middle) - apply(self.case.truth, middle))), 3)}
+
+
+def results_of(folder):
+    """What has been found so far: one row per case, start and method, the latest counts."""
+    path = pathlib.Path(folder) / "results.jsonl"
+    rows = {}
+    if path.exists():
+        for line in path.read_text().splitlines():
+            try:
+                row = json.loads(line)
+                rows[row["case"], row["start"], row["method"]] = row
+            except (ValueError, KeyError):
+                continue  # the last line of a run that was cut off
+    return list(rows.values())
+
+
+def write_table(folder, rows):
+    with open(pathlib.Path(folder) / "results.csv", "w", newline="") as stream:
+        table = csv.DictWriter(stream, COLUMNS, extrasaction="ignore")
+        table.writeheader()
+        table.writerows(rows)
+
+
+def run(folder, methods, program, again=False, limit=300.0, starts=None, say=print):
+    """Lets every method align every start of every case, and notes what came out. What was done before is not done again."""
+    folder = pathlib.Path(folder)
+    done = set() if again else {(row["case"], row["start"], row["method"]) for row in results_of(folder)}
+    for place in cases_in(folder):
+        name = str(place.relative_to(folder)) if place != folder else place.name
+        try:
+            case = Case(place)
+            judge = Judge(case, program)
+            judge.figures(np.eye(4))  # whatever is wrong with the case shows before anything is aligned
+            chosen = [start for start in case.starts() if not starts or any(text in start.name for text in starts)]
+        except (OSError, ValueError, KeyError, Failed) as problem:
+            say(f"{name}: left out: {problem}")
+            continue
+        for start in chosen:
+            for method, contestant in {"start": None, **methods}.items():
+                if (name, start.name, method) in done:
+                    continue
+                row = {"case": name, "start": start.name, "method": method, **judge.size_of_start(start),
+                       **{key: case.properties[key] for key in PROPERTIES if key in case.properties}}
+                try:
+                    answer = contestant.align(case, start, limit) if contestant else Answer(start.motion, 0.0)
+                except Failed as problem:
+                    # A method that gives up leaves the volumes where they were.
+                    answer, row["error"] = Answer(start.motion, 0.0, 0.0, "failed"), str(problem)
+                    row["reason"] = str(problem)
+                row |= judge.figures(answer.motion)
+                row |= {"seconds": round(answer.seconds, 3), "cpu_seconds": round(answer.cpu_seconds, 3), "verdict": answer.verdict, "motion": answer.motion.tolist()}
+                row.setdefault("reason", answer.reason)
+                with open(folder / "results.jsonl", "a") as stream:
+                    stream.write(json.dumps(row) + "\n")
+                say(f"{name} {start.name} {method}: {row['tre_mm']:.3f} mm, {row['seconds']:.1f} s {row['verdict']}"
+                    + (f" ({row['error']})" if "error" in row else ""))
+    rows = results_of(folder)
+    write_table(folder, rows)
+    return rows
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="study", description="Cases with truth, contestants that align them, tables and plots.")
+    commands = parser.add_subparsers(dest="command", required=True)
+    command = commands.add_parser("make", help="write the cases: pairs of volumes of a phantom, with truth and starts")
+    command.add_argument("folder", type=pathlib.Path)
+    command.add_argument("--pairs", nargs="+", choices=list(PAIRS), metavar="NAME", help=f"some of: {' '.join(PAIRS)}")
+    command.add_argument("--repeats", type=int, default=1, help="pairs of each kind (default 1)")
+    command.add_argument("--seed", type=int, default=1)
+    command.add_argument("--spacing", type=float, default=1.0, help="edge of the voxels, mm (default 1)")
+    command = commands.add_parser("run", help="align every start of every case below a folder, ours or your own")
+    command.add_argument("folder", type=pathlib.Path)
+    command.add_argument("--methods", nargs="+", metavar="NAME", help="only these (default: all that are installed)")
+    command.add_argument("--method", action="append", default=[], metavar="NAME=OPTIONS",
+                         help="one more contestant: echorama align with these options; again for each")
+    command.add_argument("--starts", nargs="+", metavar="TEXT", help="only starts whose names hold one of these texts (default: all)")
+    command.add_argument("--again", action="store_true", help="also what was done before")
+    command.add_argument("--limit", type=float, default=300.0, help="seconds for one alignment (default 300)")
+    command.add_argument("--program", default="echorama", help="the program echorama")
+    command = commands.add_parser("plot", help="tables and plots of what was found")
+    command.add_argument("folder", type=pathlib.Path)
+    command.add_argument("--out", type=pathlib.Path, help="folder for the pictures (default: the folder of the cases)")
+    command.add_argument("--show", metavar="CASE/START", help="the pair for the picture of slices (default: the first plain one)")
+    options = parser.parse_args(arguments)
+
+    begin = time.monotonic()
+    try:
+        if options.command == "make":
+            make(options.folder, options.pairs, options.seed, options.repeats, options.spacing)
+        elif options.command == "run":
+            known = contestants(options.program, options.method)
+            unknown = [name for name in options.methods or [] if name not in known]
+            if unknown:
+                raise ValueError(f"there is no method {unknown[0]}; there are {', '.join(known)}")
+            wanted = [*(options.methods or []), *(text.partition("=")[0] for text in options.method)] or list(known)
+            rows = run(options.folder, {name: known[name] for name in known if name in wanted}, options.program,
+                       options.again, options.limit, options.starts)
+            print(f"{len(rows)} results in {options.folder / 'results.csv'}, {time.monotonic() - begin:.0f} s")
+        else:
+            import figures  # matplotlib is only needed here
+            figures.plot(options.folder, results_of(options.folder), options.out or options.folder, options.show)
+    except (OSError, ValueError) as problem:
+        sys.exit(f"study: {problem}")
+
+
+if __name__ == "__main__":
+    main()

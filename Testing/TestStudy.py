@@ -1,0 +1,159 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The study: coarse cases made twice alike, aligned in a batch that nothing ends, judged rightly, and drawn."""
+import csv
+import json
+import pathlib
+import shutil
+import sys
+import tempfile
+import types
+import unittest
+
+import numpy as np
+
+from program_under_test import PROGRAM, SOURCE, run_json
+
+sys.path.insert(0, str(SOURCE / "Applications" / "study"))
+import cases  # noqa: E402
+import contestants  # noqa: E402
+import figures  # noqa: E402
+import study  # noqa: E402
+from geometry import Probe, about, apply, degrees_of, pose, random_motion, read_poses, write_poses  # noqa: E402
+
+temporary = tempfile.TemporaryDirectory()
+work = pathlib.Path(temporary.name)
+QUICK = "--method search --set MinimumOverlap=0.2 --set Points=2000 --set Levels=5 --set Repeats=1"
+
+
+def quiet(*_):
+    pass
+
+
+class Study(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = work / "cases"
+        cases.make_case(cls.folder / "plain", "plain", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
+        cls.case = cases.Case(cls.folder / "plain")
+
+    def test_the_truth_is_true(self):
+        """Landmarks coincide under the truth, and views overlap as stated."""
+        judge = study.Judge(self.case, PROGRAM)
+        right = judge.figures(self.case.truth)
+        self.assertEqual(right["tre_mm"], 0)
+        self.assertLess(right["landmarks_max_mm"], 1e-9)
+        moved = judge.figures(pose(move=(3, 0, 4)) @ self.case.truth)
+        for name in ("tre_mm", "percentile95_mm", "landmarks_mm", "landmarks_max_mm"):
+            self.assertAlmostEqual(moved[name], 5, places=6)
+        self.assertAlmostEqual(moved["tre_voxels"], 5 / 3, places=6)
+        score = run_json("score", self.folder / "plain" / "start_20deg_25mm.json", "--truth", self.folder / "plain" / "truth.json")
+        start = next(start for start in self.case.starts() if "20deg" in start.name)
+        self.assertAlmostEqual(judge.figures(start.motion)["tre_mm"] / score["score_mm"], 1, delta=0.03)  # other points, one score
+        size = judge.size_of_start(start)
+        self.assertAlmostEqual(size["start_degrees"], 20, places=2)
+        self.assertAlmostEqual(size["start_mm"], 25, places=2)
+
+        first, second = (self.case.image(number) for number in (0, 1))
+        views = [np.array([matrix for matrix in image.GetFieldData().GetArray("ProbeToWorld").GetTuple(0)]).reshape(4, 4)
+                 for image in (first, second)]
+        motion = np.linalg.inv(views[0]) @ self.case.truth @ views[1]
+        self.assertAlmostEqual(Probe().overlap(motion, Probe().points(np.random.default_rng(9), 20000)), 0.7, delta=0.02)
+
+    def test_landmarks_know_the_deformation(self):
+        cases.make_case(work / "pressed", "pressed", {"deformation_mm": 3.0}, (), seed=3, spacing=3.0)
+        case = cases.Case(work / "pressed")
+        found = study.Judge(case, PROGRAM).figures(case.truth)
+        self.assertEqual(found["tre_mm"], 0)
+        self.assertTrue(0.3 < found["landmarks_mm"] < found["landmarks_max_mm"] <= 3, found)
+
+    def test_the_same_seed_makes_the_same_case(self):
+        cases.make_case(work / "again", "plain", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
+        names = sorted(path.name for path in (work / "again").iterdir())
+        self.assertEqual(names, sorted(path.name for path in (self.folder / "plain").iterdir()))
+        for name in names:
+            self.assertEqual((work / "again" / name).read_bytes(), (self.folder / "plain" / name).read_bytes(), name)
+
+    def test_batch(self):
+        """Cases that are broken and methods that fail are noted; what was done is not done again; plots appear."""
+        folder = work / "batch"
+        shutil.copytree(self.folder, folder)
+        (folder / "broken").mkdir()
+        (folder / "broken" / "truth.json").write_text("{")
+        own = folder / "own"  # a user's: landmarks of Slicer, no truth, no start
+        own.mkdir()
+        for number, point in ((1, "1,2,3"), (2, "2,2,3")):
+            shutil.copy(self.case.files[number - 1], own / f"{number}.mha")
+            (own / f"landmarks_{number}.fcsv").write_text(f"# CoordinateSystem = 0\nid,{point},0,0,0,1,1,1,0,apex,,\n")
+        said = []
+        methods = {name: value for name, value in contestants.contestants(PROGRAM, [f"quick={QUICK}", "wrong=--method banana"]).items()
+                   if name in ("quick", "wrong")}
+        rows = study.run(folder, methods, PROGRAM, say=said.append)
+        self.assertEqual(len(rows), 3 * 3, [(row["case"], row["start"], row["method"]) for row in rows])
+        self.assertTrue(any(text.startswith("broken: left out") for text in said), said)
+        row = {(row["case"], row["start"], row["method"]): row for row in rows}
+        near = row["plain", "start_4deg_4mm", "quick"]
+        self.assertLess(near["tre_mm"], 3)
+        self.assertGreater(near["seconds"], 0)
+        self.assertGreater(row["plain", "start_4deg_4mm", "start"]["tre_mm"], 3)
+        self.assertEqual(row["plain", "start_4deg_4mm", "wrong"]["verdict"], "failed")
+        self.assertIn("banana", row["plain", "start_4deg_4mm", "wrong"]["error"])
+        self.assertAlmostEqual(row["own", "files", "start"]["tre_mm"], 1, places=9)
+        before = (folder / "results.jsonl").read_bytes()
+        self.assertEqual(len(study.run(folder, methods, PROGRAM, say=quiet)), 9)
+        self.assertEqual((folder / "results.jsonl").read_bytes(), before)
+        with open(folder / "results.csv") as stream:
+            table = list(csv.DictReader(stream))
+        self.assertEqual([line["overlap"] for line in table], [str(line.get("overlap", "")) for line in rows])
+        self.assertIn("0.7", [line["overlap"] for line in table])
+
+        with self.assertRaisesRegex(ValueError, "no such pair"):
+            figures.plot(folder, rows, folder / "out", "plain/nowhere")
+        figures.plot(folder, rows, folder / "out", "plain/start_4deg_4mm")
+        for name in ("results.png", "slices.png", "scores.png"):
+            self.assertGreater((folder / "out" / name).stat().st_size, 5000)
+        self.assertIn("| 4 deg, 4 mm | quick | 1 | 100% |", (folder / "out" / "table.md").read_text())
+
+    @unittest.skipUnless(shutil.which("elastix"), "elastix is not installed")
+    def test_elastix_finds_a_known_motion(self):
+        """A volume against itself under another geometry: the whole chain of conventions, on the way there and back."""
+        known = about(np.array([0.0, 0, 60]), pose((0.09, -0.07, 0.08), (3, -4, 2)))
+        same = types.SimpleNamespace(files=self.case.files, image=lambda number: self.case.image(0))
+        start = cases.Start("known", None, known)
+        answer = contestants.Elastix("AdvancedMattesMutualInformation").align(same, start, 120)
+        points = self.case.points(0, 500)
+        before = np.linalg.norm(apply(known, points) - points, axis=1).mean()
+        after = np.linalg.norm(apply(answer.motion, points) - points, axis=1).mean()
+        self.assertGreater(before, 5)
+        self.assertLess(after, 0.6)  # a fifth of a voxel
+
+    def test_refusals(self):
+        (work / "empty").mkdir(exist_ok=True)
+        for arguments, words in ((["run", work / "empty"], "there are no cases in it"), (["plot", work / "empty"], "run comes first"),
+                                 (["run", self.folder, "--methods", "banana"], "there is no method banana")):
+            with self.assertRaises(SystemExit) as stopped:
+                study.main([str(argument) for argument in arguments])
+            self.assertIn(words, str(stopped.exception.code))
+
+
+class Geometry(unittest.TestCase):
+    def test_motions(self):
+        random = np.random.default_rng(5)
+        motion = about(np.array([10.0, -20, 30]), random_motion(random, 33, 12))
+        self.assertAlmostEqual(degrees_of(motion), 33, places=9)
+        self.assertAlmostEqual(np.linalg.norm(apply(motion, np.array([[10.0, -20, 30]])) - (10, -20, 30)), 12, places=9)
+        write_poses(work / "poses.json", [work / "a.mha"], [motion])
+        np.testing.assert_array_equal(read_poses(work / "poses.json")[0][1], motion)
+
+    def test_euler_motion(self):
+        """The order of the turns and the centre as ITK has them: R = Rz Rx Ry, x -> R (x - c) + c + t."""
+        text = '(Transform "EulerTransform")\n(TransformParameters 0.3 -0.2 0.5 1 2 3)\n(CenterOfRotationPoint 4 5 6)\n'
+        turn = pose((0, 0, 0.5)) @ pose((0.3, 0, 0)) @ pose((0, -0.2, 0))
+        np.testing.assert_allclose(contestants.euler_motion(text), pose(move=(1, 2, 3)) @ about(np.array([4.0, 5, 6]), turn), atol=1e-12)
+        turn = pose((0, 0, 0.5)) @ pose((0, -0.2, 0)) @ pose((0.3, 0, 0))
+        np.testing.assert_allclose(contestants.euler_motion(text + '(ComputeZYX "true")'),
+                                   pose(move=(1, 2, 3)) @ about(np.array([4.0, 5, 6]), turn), atol=1e-12)
+
+
+if __name__ == "__main__":
+    unittest.main()
