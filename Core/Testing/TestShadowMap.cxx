@@ -203,13 +203,15 @@ TEST(ShadowMap, WithoutAProbeAlongAnAxis)
       geometry.dimensions = turned(n[0], n[1], n[2]);
       geometry.dimensions[axis] = n[2];
       Volume<float> intensity(geometry.dimensions);
+      Volume<unsigned char> valid(geometry.dimensions);
       for (int k = 0; k < n[2]; ++k)
         for (int j = 0; j < n[1]; ++j)
           for (int i = 0; i < n[0]; ++i) {
             const auto at = turned(i, j, k);
             intensity.View()(at[0], at[1], at[2]) = image.intensity.View()(i, j, k);
+            valid.View()(at[0], at[1], at[2]) = image.valid.View()(i, j, k);
           }
-      const Volume<float> map = ReliabilityMap(PosedVolume<float>{intensity.View(), {}, geometry}, {}, parameters);
+      const Volume<float> map = ReliabilityMap(PosedVolume<float>{intensity.View(), valid.View(), geometry}, {}, parameters);
       Volume<float> back(n);
       for (int k = 0; k < n[2]; ++k)
         for (int j = 0; j < n[1]; ++j)
