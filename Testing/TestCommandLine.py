@@ -289,6 +289,18 @@ class MainJob(unittest.TestCase):
         run_json("stitch", *volumes(), "-o", work / "blunt.mha", "--poses", self.poses, "--spacing", 3, "--sharpness", 0)
         self.assertLessEqual(abs(read_mha(work / "blunt.mha")[1].astype(int) - results["average"]).max(), 1)
 
+    def test_stitch_by_reliability(self):
+        """The shadow of the phantom's stone is found, and filled by the volumes that look past it."""
+        told = run_json("stitch", *volumes(), "-o", work / "trusted.mha", "--poses", phantom / "truth.json", "--spacing", 3, "--reliability")
+        self.assertEqual([pathlib.Path(each["file"]).name for each in told["reliability"]], FILES)
+        fractions = [each["shadow_fraction"] for each in told["reliability"]]
+        self.assertTrue(all(0 <= fraction < 0.05 for fraction in fractions), fractions)
+        self.assertGreater(max(fractions), 0.001)
+        run_json("stitch", *volumes(), "-o", work / "trusting.mha", "--poses", phantom / "truth.json", "--spacing", 3)
+        change = read_mha(work / "trusted.mha")[1].astype(int) - read_mha(work / "trusting.mha")[1]
+        self.assertGreater((change > 20).sum(), 20 * (change < -20).sum())  # shadows became lighter
+        self.assertGreater((change > 20).sum(), 20)
+
     def test_companions_are_no_volumes(self):
         """volume_*.mha in a shell names the valid regions too."""
         done = run("stitch", *sorted(phantom.glob("volume_*.mha")), "-o", work / "globbed.mha", "--poses", self.poses, "--spacing", 3)

@@ -10,6 +10,7 @@
 #include <vtkFieldData.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkUltrasoundReliabilityMap.h>
 #include <vtkUltrasoundStitcher.h>
 #include <vtkUltrasoundVolume.h>
 
@@ -20,8 +21,28 @@ struct StitchOptions {
   std::vector<std::string> files;
   std::string output, poses, method = vtkUltrasoundStitcher::GetMethodName(vtkUltrasoundStitcher::DISTANCE);
   double sharpness = StitchParameters().sharpness, spacingMm = 0.0, memoryGb = StitchParameters().maximumMemoryGb;
-  bool allowDisjoint = StitchParameters().allowDisjoint;
+  bool allowDisjoint = StitchParameters().allowDisjoint, reliability = false;
 };
+
+// Gives every volume its map of what can be trusted, and tells how much cannot.
+void AddReliability(Session& session, std::vector<LoadedVolume>& volumes)
+{
+  for (LoadedVolume& volume : volumes) {
+    vtkNew<vtkUltrasoundReliabilityMap> map;
+    map->SetInputData(volume.image);
+    session.Update(map, "reliability", volume.file);
+    volume.image = map->GetOutput();
+    const std::vector<std::string> notes = LinesOf(map->GetNote());
+    for (std::size_t i = 1; i < notes.size(); ++i) // the first says where the beams are from
+      session.Note(volume.file + ": " + notes[i]);
+    session.result["reliability"].push_back({{"file", volume.file},
+                                             {"shadow_fraction", map->GetShadowFraction()},
+                                             {"saturated_fraction", map->GetSaturatedFraction()},
+                                             {"note", notes.front()}});
+    session.Say(volume.file + ": " + Fixed(100.0 * map->GetShadowFraction(), 1) + "% in shadow, " +
+                Fixed(100.0 * map->GetSaturatedFraction(), 1) + "% saturated");
+  }
+}
 
 std::vector<std::string> MethodNames()
 {
@@ -40,6 +61,8 @@ void Stitch(Session& session, StitchOptions options)
   CheckVolumeOutput(options.output, inputs);
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
   ApplyPoses(volumes, options.poses);
+  if (options.reliability)
+    AddReliability(session, volumes);
 
   vtkNew<vtkUltrasoundStitcher> stitcher;
   stitcher->SetInputDataObject(BlocksOf(volumes));
@@ -99,6 +122,8 @@ Command StitchCommand(CLI::App& program)
   options->add_option("--spacing", values->spacingMm, "Edge of the voxels in mm (0: the smallest of the volumes)")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
+  options->add_flag("--reliability", values->reliability,
+                    "Find shadows and saturated areas first, and weigh voxels by how far they can be trusted");
   options->add_flag("--allow-disjoint", values->allowDisjoint, "Accept volumes that overlap no other");
   options
       ->add_option("--memory", values->memoryGb,

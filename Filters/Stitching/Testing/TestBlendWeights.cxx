@@ -92,6 +92,33 @@ TEST(BlendWeights, SumFedOneByOneGivesTheSame)
   }
 }
 
+TEST(BlendWeights, FactorsMultiplyTheWeights)
+{
+  Random random(3);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const std::size_t n = 1 + random.Below(8);
+    const double bs[] = {0.0, 0.01, 1.0, 1.5, 30.0};
+    const double b = bs[random.Below(5)];
+    const BlendPower power(b);
+    std::vector<float> scales(n), factors(n), values(n);
+    std::vector<double> weights(n);
+    BlendSum<float> sum;
+    double total = 0.0, mean = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      scales[i] = static_cast<float>(random.Uniform(0.05, 1.0));
+      factors[i] = random.Below(3) == 0 ? 0.01f : static_cast<float>(random.Uniform(0.01, 1.0));
+      values[i] = static_cast<float>(random.Uniform(0.0, 255.0));
+      sum.Add(values[i], scales[i], power, factors[i]);
+      total += weights[i] = static_cast<double>(factors[i]) * std::pow(static_cast<double>(scales[i]), b);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      mean += weights[i] / total * static_cast<double>(values[i]);
+      EXPECT_NEAR(sum.Weight(scales[i], power, factors[i]), weights[i] / total, 1e-4) << "trial " << trial;
+    }
+    EXPECT_NEAR(sum.mean, mean, 0.02) << "trial " << trial;
+  }
+}
+
 TEST(BlendWeights, EqualValuesStayToTheLastBit)
 {
   Random random(2);
@@ -99,7 +126,7 @@ TEST(BlendWeights, EqualValuesStayToTheLastBit)
   for (const float value : {0.1f, 77.0f, 65535.0f, -1.0e-20f}) {
     BlendSum<float> sum;
     for (int i = 0; i < 20; ++i) {
-      sum.Add(value, static_cast<float>(random.Uniform()), power);
+      sum.Add(value, static_cast<float>(random.Uniform()), power, static_cast<float>(random.Uniform(0.01, 1.0)));
       EXPECT_EQ(sum.mean, value);
     }
   }

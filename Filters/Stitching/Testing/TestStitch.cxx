@@ -490,6 +490,69 @@ TEST(Stitch, ThreadsDoNotMatter)
   }
 }
 
+TEST(Stitch, ReliabilityMultipliesTheWeights)
+{
+  // Two volumes on one lattice, the second shadowed (0) in a part and NaN in another; random trust elsewhere.
+  Scene<float> scene;
+  scene.AddBox({0, 0, 0}, {30, 20, 5}, 100.0f);
+  scene.AddBox({10, 0, 0}, {30, 20, 5}, 200.0f);
+  const auto with = [&](StitchMethod method, double b) {
+    StitchParameters parameters;
+    parameters.method = method;
+    parameters.sharpness = b;
+    return parameters;
+  };
+  const std::vector<std::pair<StitchMethod, double>> methods{
+      {StitchMethod::Distance, 1.5}, {StitchMethod::Distance, 0.0}, {StitchMethod::Feather, 1.0}, {StitchMethod::Average, 1.0}};
+  Volume<float> trusts[2] = {Volume<float>({30, 20, 5}), Volume<float>({30, 20, 5})};
+  Random random(4);
+  for (Volume<float>& trust : trusts)
+    for (float& value : trust.View())
+      value = static_cast<float>(random.Uniform());
+  for (int j = 5; j < 10; ++j)
+    for (int i = 0; i < 30; ++i) {
+      trusts[1].View()(i, j, 2) = 0.0f;
+      trusts[1].View()(i, j, 3) = std::numeric_limits<float>::quiet_NaN();
+      trusts[1].View()(i, j, 4) = 7.0f; // counts as 1
+    }
+  for (const auto& [method, b] : methods) {
+    scene.inputs[0].reliability = scene.inputs[1].reliability = {};
+    const Result<float> plain = Stitched(scene, with(method, b));
+    scene.inputs[0].reliability = trusts[0].View();
+    scene.inputs[1].reliability = trusts[1].View();
+    const Result<float> trusted = Stitched(scene, with(method, b));
+    ExpectSoundWeights(trusted);
+    for (int k = 0; k < 5; ++k)
+      for (int j = 0; j < 20; ++j)
+        for (int i = 0; i < 40; ++i) {
+          const double w0 = plain.weights[0].View()(i, j, k), w1 = plain.weights[1].View()(i, j, k);
+          const auto floored = [](double r) { return r > 0.01 ? std::min(r, 1.0) : 0.01; };
+          const double r0 = i < 30 ? floored(trusts[0].View()(i, j, k)) : 0.0;
+          const double r1 = i >= 10 ? floored(trusts[1].View()(i - 10, j, k)) : 0.0;
+          const double expected = r0 * w0 / (r0 * w0 + r1 * w1);
+          ASSERT_NEAR(trusted.weights[0].View()(i, j, k), expected, 1e-5) << i << " " << j << " " << k;
+          ASSERT_NEAR(trusted.intensity.View()(i, j, k), 200.0 - 100.0 * expected, 1e-3);
+        }
+    // Without the views of the weights the same comes out.
+    Volume<float> alone(trusted.intensity.Dimensions());
+    Volume<unsigned char> valid(alone.Dimensions()), coverage(alone.Dimensions());
+    Stitch<float>(with(method, b), scene.inputs, trusted.grid, {alone.View(), valid.View(), coverage.View(), {}});
+    EXPECT_TRUE(std::equal(alone.View().begin(), alone.View().end(), trusted.intensity.View().begin()));
+  }
+  // Full trust changes nothing, to the last bit; a floor of 1 neither.
+  scene.inputs[0].reliability = scene.inputs[1].reliability = {};
+  const Result<float> plain = Stitched(scene);
+  StitchParameters blind;
+  blind.reliabilityFloor = 1.0;
+  const Volume<float> full({30, 20, 5}, 1.0f);
+  for (const bool floor : {false, true}) {
+    scene.inputs[0].reliability = floor ? trusts[0].View() : full.View();
+    scene.inputs[1].reliability = floor ? trusts[1].View() : full.View();
+    const Result<float> same = Stitched(scene, floor ? blind : StitchParameters());
+    EXPECT_TRUE(std::equal(same.intensity.View().begin(), same.intensity.View().end(), plain.intensity.View().begin()));
+  }
+}
+
 TEST(Stitch, RefusesWithTheReason)
 {
   Scene<float> scene;
@@ -500,6 +563,14 @@ TEST(Stitch, RefusesWithTheReason)
   EXPECT_NE(ErrorOf(scene, With(StitchMethod::Distance, -0.1)).find("Sharpness"), std::string::npos);
   EXPECT_NE(ErrorOf(scene, With(StitchMethod::Distance, 1001.0)).find("Sharpness"), std::string::npos);
   EXPECT_NE(ErrorOf(scene, With(StitchMethod::Distance, std::nan(""))).find("Sharpness"), std::string::npos);
+
+  StitchParameters careless;
+  careless.reliabilityFloor = 0.0;
+  EXPECT_NE(ErrorOf(scene, careless).find("ReliabilityFloor"), std::string::npos);
+  const Volume<float> small({10, 10, 2}, 1.0f);
+  scene.inputs[1].reliability = small.View();
+  EXPECT_NE(ErrorOf(scene).find("volume 2: its reliability"), std::string::npos);
+  scene.inputs[1].reliability = {};
 
   scene.AddBox({40, 0, 0}, {10, 10, 3}, 1.0f);
   EXPECT_NE(ErrorOf(scene).find("volume 3 overlaps no other volume"), std::string::npos);
