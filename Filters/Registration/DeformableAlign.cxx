@@ -1,0 +1,689 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The lattice of control points and the grid on which differences are summed both lie along the axes of the moving volume.
+// That makes everything a product along three axes. A voxel touches 64 control points, so its share of the normal equations
+// is a matrix of 192 x 192; but the products of two weights along one axis are only ten numbers, so sums over a row need
+// ten times six numbers per cell (six of the outer product of the gradient), those over a slice a hundred times six, and
+// only whole cells get all thousand. The cost is then that of reading the moving volume, about 50 ns per voxel and step.
+//
+// The matrix couples control points at most three apart: it is kept as a stencil of 7^3 blocks of 3 x 3 per control point, the
+// penalty is added to it, and conjugate gradients solve it.
+#include "DeformableAlign.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Multiversion.h"
+#include "Core/Base/Parallel.h"
+#include "Metric.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+
+namespace {
+
+using Vectors = std::vector<Eigen::Vector3d>;
+
+// A value and a weight of every voxel of a grid, as MetricLevel keeps them.
+using Seen = std::vector<float>;
+
+// The level whose voxels are of a size: the finest that is not finer.
+const MetricLevel& LevelOf(const MetricPyramid& pyramid, int octave)
+{
+  for (const MetricLevel& level : pyramid.levels)
+    if (level.octave >= octave)
+      return level;
+  return pyramid.levels.back();
+}
+
+// Reads value and weight between voxels; the weight is 0 outside.
+ECHORAMA_HOT void ReadRow(const float* seen, const int* n, const double* positions, int count, float* out)
+{
+  const std::ptrdiff_t sy = 2 * static_cast<std::ptrdiff_t>(n[0]), sz = sy * n[1];
+  for (int i = 0; i < count; ++i, positions += 3, out += 2) {
+    const double x = positions[0], y = positions[1], z = positions[2];
+    out[0] = out[1] = 0.0f;
+    if (!(x >= 0.0 && y >= 0.0 && z >= 0.0 && x <= n[0] - 1.0 && y <= n[1] - 1.0 && z <= n[2] - 1.0))
+      continue;
+    const int ix = std::min(static_cast<int>(x), n[0] - 2), iy = std::min(static_cast<int>(y), n[1] - 2),
+              iz = std::min(static_cast<int>(z), n[2] - 2);
+    const float tx = static_cast<float>(x - ix), ty = static_cast<float>(y - iy), tz = static_cast<float>(z - iz);
+    const float* p = seen + iz * sz + iy * sy + 2 * static_cast<std::ptrdiff_t>(ix);
+    for (int c = 0; c < 2; ++c, ++p) {
+      const float a = p[0] + tx * (p[2] - p[0]), b = p[sy] + tx * (p[sy + 2] - p[sy]);
+      const float d = p[sz] + tx * (p[sz + 2] - p[sz]), e = p[sz + sy] + tx * (p[sz + sy + 2] - p[sz + sy]);
+      const float lower = a + ty * (b - a), upper = d + ty * (e - d);
+      out[c] = lower + tz * (upper - lower);
+    }
+  }
+}
+
+// What a placed level shows at the voxels of a grid, read through a field.
+void SeeThrough(const MetricLevel& level, const Pose& volumeToWorld, const DisplacementField* field, const ImageGeometry& grid,
+                Seen& seen, const Progress& progress)
+{
+  const Eigen::Affine3d toWorld = grid.IndexToWorld(),
+                        toIndex = level.geometry.WorldToIndex() * Eigen::Affine3d(volumeToWorld.inverse());
+  const auto& n = grid.dimensions;
+  seen.resize(2 * grid.VoxelCount());
+  ParallelFor(n[2], progress, [&](std::ptrdiff_t k) {
+    Vectors positions(static_cast<std::size_t>(n[0]), Eigen::Vector3d::Zero());
+    const Eigen::Vector3d step = toWorld.linear().col(0), indexStep = toIndex.linear() * step;
+    for (int j = 0; j < n[1]; ++j) {
+      const Eigen::Vector3d start = toWorld * Eigen::Vector3d(0.0, j, static_cast<double>(k)), indexStart = toIndex * start;
+      if (field)
+        field->Row(start, step, n[0], positions.data());
+      for (int i = 0; i < n[0]; ++i) {
+        Eigen::Vector3d& p = positions[static_cast<std::size_t>(i)];
+        p = field ? Eigen::Vector3d(indexStart + i * indexStep + toIndex.linear() * p)
+                  : Eigen::Vector3d(indexStart + i * indexStep);
+      }
+      ReadRow(level.seen.data(), level.geometry.dimensions.data(), positions.data()->data(), n[0],
+              seen.data() + 2 * ((k * n[1] + j) * static_cast<std::ptrdiff_t>(n[0])));
+    }
+  });
+}
+
+// The weights of the control points along one axis of the grid.
+struct Axis {
+  Axis(const ImageGeometry& grid, const ImageGeometry& lattice, int axis)
+  {
+    const Eigen::Vector3d from = lattice.WorldToIndex() * grid.origin;
+    const double by = grid.spacing[axis] / lattice.spacing[axis];
+    cells = lattice.dimensions[static_cast<std::size_t>(axis)] - 3;
+    for (int i = 0; i < grid.dimensions[static_cast<std::size_t>(axis)]; ++i) {
+      const double x = from[axis] + i * by;
+      // The lattice is laid so that only rounding can put a voxel beyond its inner cells.
+      const int c = std::clamp(static_cast<int>(std::floor(x)) - 1, 0, cells - 1);
+      const auto w = CubicWeights(x - (c + 1));
+      cell.push_back(c);
+      weights.push_back(w);
+      std::array<double, 10> products{};
+      for (std::size_t a = 0, p = 0; a < 4; ++a)
+        for (std::size_t b = a; b < 4; ++b)
+          products[p++] = w[a] * w[b];
+      pairs.push_back(products);
+    }
+  }
+  int cells = 0;
+  std::vector<int> cell; // whose control points are cell ... cell + 3
+  std::vector<std::array<double, 4>> weights;
+  std::vector<std::array<double, 10>> pairs; // their products, (0,0) (0,1) (0,2) (0,3) (1,1) ...
+};
+
+constexpr int pairOf[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
+
+// Normal equations over the control points: a symmetric block matrix as a stencil, and a right side.
+class Normal {
+public:
+  explicit Normal(const std::array<int, 3>& n)
+    : n_(n), count_(static_cast<std::ptrdiff_t>(n[0]) * n[1] * n[2]),
+      blocks_(static_cast<std::size_t>(count_) * Stencil * 6, 0.0),
+      right_(static_cast<std::size_t>(count_), Eigen::Vector3d::Zero())
+  {
+  }
+
+  static constexpr int Stencil = 343;
+  const std::array<int, 3>& Dimensions() const { return n_; }
+  std::ptrdiff_t Node(int i, int j, int k) const { return (static_cast<std::ptrdiff_t>(k) * n_[1] + j) * n_[0] + i; }
+  /// xx, xy, xz, yy, yz, zz of the block that couples a node with the one \a offset away.
+  double* Block(std::ptrdiff_t node, int di, int dj, int dk)
+  {
+    return blocks_.data() + 6 * (node * Stencil + ((dk + 3) * 7 + dj + 3) * 7 + di + 3);
+  }
+  const double* Block(std::ptrdiff_t node, int di, int dj, int dk) const
+  {
+    return const_cast<Normal*>(this)->Block(node, di, dj, dk);
+  }
+  Vectors& Right() { return right_; }
+
+  // Calls body(other node, di, dj, dk) for all nodes that a node is coupled with.
+  template <class Body>
+  void Neighbours(std::ptrdiff_t node, const Body& body) const
+  {
+    const int i = static_cast<int>(node % n_[0]), j = static_cast<int>(node / n_[0] % n_[1]),
+              k = static_cast<int>(node / n_[0] / n_[1]);
+    for (int dk = std::max(-3, -k); dk <= std::min(3, n_[2] - 1 - k); ++dk)
+      for (int dj = std::max(-3, -j); dj <= std::min(3, n_[1] - 1 - j); ++dj)
+        for (int di = std::max(-3, -i); di <= std::min(3, n_[0] - 1 - i); ++di)
+          body(Node(i + di, j + dj, k + dk), di, dj, dk);
+  }
+
+  // Adds the quadratic penalty whose entries depend on the offset alone, and its pull on the coefficients.
+  void AddPenalty(const std::array<double, Stencil>& entries, const Vectors& coefficients)
+  {
+    ParallelRanges(count_, 32, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t node = begin; node < end; ++node)
+        Neighbours(node, [&](std::ptrdiff_t other, int di, int dj, int dk) {
+          const double entry = entries[static_cast<std::size_t>(((dk + 3) * 7 + dj + 3) * 7 + di + 3)];
+          double* block = Block(node, di, dj, dk);
+          block[0] += entry;
+          block[3] += entry;
+          block[5] += entry;
+          right_[static_cast<std::size_t>(node)] -= entry * coefficients[static_cast<std::size_t>(other)];
+        });
+    });
+  }
+
+  // Conjugate gradients, preconditioned by the blocks of the diagonal, which are raised by \a damping of themselves.
+  Vectors Solve(double damping) const
+  {
+    std::vector<Eigen::Matrix3d> inverse(right_.size());
+    for (std::ptrdiff_t node = 0; node < count_; ++node)
+      inverse[static_cast<std::size_t>(node)] = Full(Block(node, 0, 0, 0)).inverse() / (1.0 + damping);
+    const auto dot = [this](const Vectors& a, const Vectors& b) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < a.size(); ++i)
+        sum += a[i].dot(b[i]);
+      return sum;
+    };
+    Vectors x(right_.size(), Eigen::Vector3d::Zero()), r = right_, z(x), p(x), q(x);
+    const auto precondition = [&] {
+      for (std::size_t i = 0; i < r.size(); ++i)
+        z[i] = inverse[i] * r[i];
+    };
+    precondition();
+    p = z;
+    double rz = dot(r, z);
+    const double enough = 1e-8 * rz;
+    for (int step = 0; step < 400 && rz > enough; ++step) {
+      ParallelRanges(count_, 32, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+        for (std::ptrdiff_t node = begin; node < end; ++node) {
+          Eigen::Vector3d sum = damping * (Full(Block(node, 0, 0, 0)) * p[static_cast<std::size_t>(node)]);
+          Neighbours(node, [&](std::ptrdiff_t other, int di, int dj, int dk) {
+            const double* b = Block(node, di, dj, dk);
+            const Eigen::Vector3d& v = p[static_cast<std::size_t>(other)];
+            sum[0] += b[0] * v[0] + b[1] * v[1] + b[2] * v[2];
+            sum[1] += b[1] * v[0] + b[3] * v[1] + b[4] * v[2];
+            sum[2] += b[2] * v[0] + b[4] * v[1] + b[5] * v[2];
+          });
+          q[static_cast<std::size_t>(node)] = sum;
+        }
+      });
+      const double alpha = rz / dot(p, q);
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        x[i] += alpha * p[i];
+        r[i] -= alpha * q[i];
+      }
+      precondition();
+      const double next = dot(r, z), beta = next / rz;
+      rz = next;
+      for (std::size_t i = 0; i < p.size(); ++i)
+        p[i] = z[i] + beta * p[i];
+    }
+    return x;
+  }
+
+private:
+  static Eigen::Matrix3d Full(const double* b)
+  {
+    Eigen::Matrix3d full;
+    full << b[0], b[1], b[2], b[1], b[3], b[4], b[2], b[4], b[5];
+    return full;
+  }
+
+  std::array<int, 3> n_;
+  std::ptrdiff_t count_;
+  std::vector<double> blocks_;
+  Vectors right_;
+};
+
+// What two volumes have in common: weighted sums over the voxels of the grid.
+struct Common {
+  double weight = 0.0, ff = 0.0, mm = 0.0, fm = 0.0;
+  void operator+=(const Common& c)
+  {
+    weight += c.weight;
+    ff += c.ff;
+    mm += c.mm;
+    fm += c.fm;
+  }
+  double Correlation() const { return ff > 0.0 && mm > 0.0 ? fm / std::sqrt(ff * mm) : 0.0; }
+  // The share of the variance that neither explains of the other. The floor keeps identical volumes finite.
+  double Unexplained() const { return std::fmax(0.0, 1.0 - Correlation() * Correlation()) + 1e-3; }
+};
+
+// One per fixed volume.
+using Commons = std::vector<Common>;
+
+double Similarity(const Commons& commons)
+{
+  double sum = 0.0, weight = 0.0;
+  for (const Common& c : commons) {
+    sum += c.weight * c.Correlation();
+    weight += c.weight;
+  }
+  return weight > 0.0 ? sum / weight : 0.0;
+}
+
+// One resolution: a grid, what the fixed volumes show there, and a lattice.
+class Level {
+public:
+  Level(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving, int octave,
+        const Eigen::AlignedBox3d& overlap, double controlSpacing)
+    : moving_(LevelOf(*moving.features, octave)), movingToWorld_(moving.volumeToWorld)
+  {
+    const ImageGeometry whole = moving_.geometry.Moved(movingToWorld_);
+    grid_ = whole;
+    lattice_ = whole;
+    Eigen::Vector3d first;
+    for (int axis = 0; axis < 3; ++axis) {
+      // The overlap is told along the axes of the moving volume, in mm from its first voxel's centre.
+      const int n = whole.dimensions[static_cast<std::size_t>(axis)];
+      const Eigen::Vector3d shift = whole.direction.transpose() * (whole.origin - MillimetreFrame(moving).origin);
+      const double low = std::floor((overlap.min()[axis] - shift[axis]) / whole.spacing[axis]),
+                   high = std::ceil((overlap.max()[axis] - shift[axis]) / whole.spacing[axis]);
+      first[axis] = std::clamp(low, 0.0, n - 1.0);
+      grid_.dimensions[static_cast<std::size_t>(axis)] =
+          static_cast<int>(std::clamp(high, first[axis], n - 1.0) - first[axis]) + 1;
+      const double length = overlap.sizes()[axis];
+      const int cells = std::max(1, static_cast<int>(std::ceil(length / controlSpacing - 0.01)));
+      lattice_.dimensions[static_cast<std::size_t>(axis)] = cells + 3;
+      lattice_.spacing[axis] = controlSpacing;
+    }
+    grid_.origin = whole.IndexToWorld() * first;
+    const Eigen::Vector3d size(lattice_.dimensions[0] - 1, lattice_.dimensions[1] - 1, lattice_.dimensions[2] - 1);
+    lattice_.origin =
+        MillimetreFrame(moving).origin + whole.direction * (overlap.center() - 0.5 * size.cwiseProduct(lattice_.spacing));
+    for (const DeformableVolume& f : fixed) {
+      fixed_.emplace_back();
+      SeeThrough(LevelOf(*f.features, octave), f.volumeToWorld, f.field, grid_, fixed_.back(), {});
+    }
+  }
+
+  /// The axes of the moving volume in the world, mm, from the first voxel of its finest level.
+  static ImageGeometry MillimetreFrame(const DeformableVolume& moving)
+  {
+    return moving.features->levels.front().geometry.Moved(moving.volumeToWorld);
+  }
+
+  const ImageGeometry& Grid() const { return grid_; }
+  const ImageGeometry& Lattice() const { return lattice_; }
+  double VoxelMm() const { return moving_.voxelMm; }
+  const std::vector<Seen>& Fixed() const { return fixed_; }
+
+  void Warp(const DisplacementField& field, Seen& seen, const Progress& progress) const
+  {
+    SeeThrough(moving_, movingToWorld_, field.IsZero() ? nullptr : &field, grid_, seen, progress);
+  }
+
+  Commons Compare(const Seen& warped) const
+  {
+    const std::ptrdiff_t slice = static_cast<std::ptrdiff_t>(grid_.dimensions[0]) * grid_.dimensions[1];
+    Commons commons;
+    for (const Seen& fixed : fixed_)
+      commons.push_back(ParallelSum<Common>(grid_.dimensions[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
+        Common sum;
+        for (std::ptrdiff_t i = k * slice; i < (k + 1) * slice; ++i) {
+          const float *f = fixed.data() + 2 * i, *m = warped.data() + 2 * i;
+          const double w = static_cast<double>(f[1] * m[1]), a = static_cast<double>(f[0]), b = static_cast<double>(m[0]);
+          sum.weight += w;
+          sum.ff += w * a * a;
+          sum.mm += w * b * b;
+          sum.fm += w * a * b;
+        }
+        return sum;
+      }));
+    return commons;
+  }
+
+  // How residuals and slopes follow from what is seen, per fixed volume: the residual is scale * (f / deviation of f -
+  // correlation * m / deviation of m), and its derivative -slope times that of m.
+  struct Weighing {
+    double weight, f, m;
+  };
+
+  // The data's share of the normal equations at what was warped.
+  Normal Equations(const Seen& warped, const std::vector<Weighing>& weighing) const
+  {
+    const Axis x(grid_, lattice_, 0), y(grid_, lattice_, 1), z(grid_, lattice_, 2);
+    Normal normal(lattice_.dimensions);
+    const std::ptrdiff_t cells = static_cast<std::ptrdiff_t>(x.cells) * y.cells;
+    constexpr std::ptrdiff_t squareSize = 600, lineSize = 60, rightSquare = 48, rightLine = 12;
+    constexpr int atOnce = 16;
+    std::vector<std::vector<double>> squares(atOnce), rights(atOnce);
+    std::vector<double> cubes(static_cast<std::size_t>(cells * 10 * squareSize)),
+        rightCubes(static_cast<std::size_t>(cells * 4 * rightSquare));
+    for (int from = 0; from < grid_.dimensions[2];) {
+      int to = from;
+      while (to < grid_.dimensions[2] && to < from + atOnce &&
+             z.cell[static_cast<std::size_t>(to)] == z.cell[static_cast<std::size_t>(from)])
+        ++to;
+      if (from == 0 || z.cell[static_cast<std::size_t>(from)] != z.cell[static_cast<std::size_t>(from) - 1]) {
+        std::fill(cubes.begin(), cubes.end(), 0.0);
+        std::fill(rightCubes.begin(), rightCubes.end(), 0.0);
+      }
+      ParallelFor(to - from, [&](std::ptrdiff_t s) {
+        auto &square = squares[static_cast<std::size_t>(s)], &right = rights[static_cast<std::size_t>(s)];
+        square.assign(static_cast<std::size_t>(cells * squareSize), 0.0);
+        right.assign(static_cast<std::size_t>(cells * rightSquare), 0.0);
+        SumSlice(warped, from + static_cast<int>(s), weighing, x, y, square.data(), right.data());
+      });
+      ParallelFor(cells, [&](std::ptrdiff_t cell) {
+        for (int k = from; k < to; ++k) {
+          const auto& pz = z.pairs[static_cast<std::size_t>(k)];
+          const auto& wz = z.weights[static_cast<std::size_t>(k)];
+          const double* square = squares[static_cast<std::size_t>(k - from)].data() + cell * squareSize;
+          const double* right = rights[static_cast<std::size_t>(k - from)].data() + cell * rightSquare;
+          for (int p = 0; p < 10; ++p) {
+            double* cube = cubes.data() + (cell * 10 + p) * squareSize;
+            for (std::ptrdiff_t i = 0; i < squareSize; ++i)
+              cube[i] += pz[static_cast<std::size_t>(p)] * square[i];
+          }
+          for (int p = 0; p < 4; ++p) {
+            double* cube = rightCubes.data() + (cell * 4 + p) * rightSquare;
+            for (std::ptrdiff_t i = 0; i < rightSquare; ++i)
+              cube[i] += wz[static_cast<std::size_t>(p)] * right[i];
+          }
+        }
+      });
+      const int zCell = z.cell[static_cast<std::size_t>(from)];
+      if (to == grid_.dimensions[2] || z.cell[static_cast<std::size_t>(to)] != zCell)
+        for (std::ptrdiff_t cell = 0; cell < cells; ++cell)
+          Scatter(normal, static_cast<int>(cell % x.cells), static_cast<int>(cell / x.cells), zCell,
+                  cubes.data() + cell * 10 * squareSize, rightCubes.data() + cell * 4 * rightSquare);
+      from = to;
+    }
+    static_assert(squareSize == 10 * lineSize && rightSquare == 4 * rightLine);
+    return normal;
+  }
+
+private:
+  void SumSlice(const Seen& warped, int k, const std::vector<Weighing>& weighing, const Axis& x, const Axis& y, double* squares,
+                double* rights) const
+  {
+    const auto& n = grid_.dimensions;
+    const Eigen::Matrix3d toWorld = grid_.direction * grid_.spacing.cwiseInverse().asDiagonal() * 0.5; // central
+    const std::ptrdiff_t steps[3] = {2, 2 * static_cast<std::ptrdiff_t>(n[0]), 2 * static_cast<std::ptrdiff_t>(n[0]) * n[1]};
+    std::vector<double> line(static_cast<std::size_t>(x.cells) * 60), right(static_cast<std::size_t>(x.cells) * 12);
+    for (int j = 0; j < n[1]; ++j) {
+      std::fill(line.begin(), line.end(), 0.0);
+      std::fill(right.begin(), right.end(), 0.0);
+      bool any = false;
+      for (int i = 0; i < n[0]; ++i) {
+        const std::ptrdiff_t at = i * steps[0] + j * steps[1] + k * steps[2];
+        const float* m = warped.data() + at;
+        if (!(m[1] > 0.0f))
+          continue;
+        const bool inner[3] = {i > 0 && i + 1 < n[0], j > 0 && j + 1 < n[1], k > 0 && k + 1 < n[2]};
+        Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+        for (int axis = 0; axis < 3; ++axis)
+          if (inner[axis] && m[1 + steps[axis]] > 0.0f && m[1 - steps[axis]] > 0.0f)
+            slope[axis] = static_cast<double>(m[steps[axis]] - m[-steps[axis]]);
+        const Eigen::Vector3d g = toWorld * slope;
+        double square = 0.0, residual = 0.0;
+        for (std::size_t v = 0; v < fixed_.size(); ++v) {
+          const float* f = fixed_[v].data() + at;
+          const Weighing& by = weighing[v];
+          const double w = by.weight * static_cast<double>(f[1] * m[1]);
+          square += w * by.m * by.m;
+          residual += w * by.m * (by.f * static_cast<double>(f[0]) - by.m * static_cast<double>(m[0]));
+        }
+        if (!(square > 0.0))
+          continue;
+        any = true;
+        const double outer[6] = {square * g[0] * g[0], square * g[0] * g[1], square * g[0] * g[2],
+                                 square * g[1] * g[1], square * g[1] * g[2], square * g[2] * g[2]};
+        const double pull[3] = {residual * g[0], residual * g[1], residual * g[2]};
+        const std::size_t column = static_cast<std::size_t>(i);
+        double* l = line.data() + 60 * static_cast<std::ptrdiff_t>(x.cell[column]);
+        for (std::size_t p = 0; p < 10; ++p)
+          for (int c = 0; c < 6; ++c)
+            *l++ += x.pairs[column][p] * outer[c];
+        double* q = right.data() + 12 * static_cast<std::ptrdiff_t>(x.cell[column]);
+        for (std::size_t p = 0; p < 4; ++p)
+          for (int c = 0; c < 3; ++c)
+            *q++ += x.weights[column][p] * pull[c];
+      }
+      if (!any)
+        continue;
+      const std::size_t row = static_cast<std::size_t>(j);
+      for (int cell = 0; cell < x.cells; ++cell) {
+        const std::ptrdiff_t place = static_cast<std::ptrdiff_t>(y.cell[row]) * x.cells + cell;
+        const double *l = line.data() + 60 * cell, *q = right.data() + 12 * cell;
+        for (std::size_t p = 0; p < 10; ++p)
+          for (std::ptrdiff_t c = 0; c < 60; ++c)
+            squares[place * 600 + static_cast<std::ptrdiff_t>(p) * 60 + c] += y.pairs[row][p] * l[c];
+        for (std::size_t p = 0; p < 4; ++p)
+          for (std::ptrdiff_t c = 0; c < 12; ++c)
+            rights[place * 48 + static_cast<std::ptrdiff_t>(p) * 12 + c] += y.weights[row][p] * q[c];
+      }
+    }
+  }
+
+  // The sums of one cell go to its 64 control points.
+  static void Scatter(Normal& normal, int ci, int cj, int ck, const double* cube, const double* right)
+  {
+    for (int k = 0; k < 4; ++k)
+      for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i) {
+          const std::ptrdiff_t node = normal.Node(ci + i, cj + j, ck + k);
+          normal.Right()[static_cast<std::size_t>(node)] += Eigen::Map<const Eigen::Vector3d>(right + ((k * 4 + j) * 4 + i) * 3);
+          for (int c = 0; c < 4; ++c)
+            for (int b = 0; b < 4; ++b)
+              for (int a = 0; a < 4; ++a) {
+                const double* sum = cube + ((pairOf[k][c] * 10 + pairOf[j][b]) * 10 + pairOf[i][a]) * 6;
+                double* block = normal.Block(node, a - i, b - j, c - k);
+                for (int e = 0; e < 6; ++e)
+                  block[e] += sum[e];
+              }
+        }
+  }
+
+  const MetricLevel& moving_;
+  Pose movingToWorld_;
+  ImageGeometry grid_, lattice_;
+  std::vector<Seen> fixed_;
+};
+
+// Where, along the axes of the moving volume, it lies in others, and how much of it.
+Eigen::AlignedBox3d OverlapBox(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving, int octave,
+                               double& share)
+{
+  const MetricLevel& level = LevelOf(*moving.features, octave);
+  const ImageGeometry grid = level.geometry.Moved(moving.volumeToWorld);
+  std::vector<Seen> seen(fixed.size());
+  for (std::size_t f = 0; f < fixed.size(); ++f)
+    SeeThrough(LevelOf(*fixed[f].features, octave), fixed[f].volumeToWorld, fixed[f].field, grid, seen[f], {});
+  const Eigen::Vector3d shift = grid.direction.transpose() * (grid.origin - Level::MillimetreFrame(moving).origin);
+  Eigen::AlignedBox3d box;
+  double own = 0.0, common = 0.0;
+  const auto& n = grid.dimensions;
+  std::size_t at = 1;
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i, at += 2) {
+        const double w = static_cast<double>(level.seen[at]);
+        own += w;
+        if (!(w > 0.0) || std::none_of(seen.begin(), seen.end(), [at](const Seen& s) { return s[at] > 0.0f; }))
+          continue;
+        common += w;
+        box.extend(shift + grid.spacing.cwiseProduct(Eigen::Vector3d(i, j, k)));
+      }
+  share = own > 0.0 ? common / own : 0.0;
+  if (!box.isEmpty()) { // voxels have a size, and finer levels reach a little farther
+    box.min() -= grid.spacing;
+    box.max() += grid.spacing;
+  }
+  return box;
+}
+
+std::array<double, Normal::Stencil> PenaltyEntries(double bending, double reachMm, const Eigen::Vector3d& spacing)
+{
+  std::array<double, Normal::Stencil> entries{};
+  const double mass = bending / (reachMm * reachMm * reachMm * reachMm);
+  std::size_t at = 0;
+  for (int c = -3; c <= 3; ++c)
+    for (int b = -3; b <= 3; ++b)
+      for (int a = -3; a <= 3; ++a)
+        entries[at++] = bending * BendingEntry({a, b, c}, spacing) + mass * MassEntry({a, b, c}, spacing);
+  return entries;
+}
+
+double PenaltyOf(const Normal& shape, const std::array<double, Normal::Stencil>& entries, const Vectors& c)
+{
+  return ParallelSum<double>(static_cast<std::ptrdiff_t>(c.size()), 32, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    double sum = 0.0;
+    for (std::ptrdiff_t node = begin; node < end; ++node)
+      shape.Neighbours(node, [&](std::ptrdiff_t other, int di, int dj, int dk) {
+        sum += entries[static_cast<std::size_t>(((dk + 3) * 7 + dj + 3) * 7 + di + 3)] *
+               c[static_cast<std::size_t>(node)].dot(c[static_cast<std::size_t>(other)]);
+      });
+    return 0.5 * sum;
+  });
+}
+
+// The cost of a fixed volume is W/2 log(1 - r^2), W being its weight before anything moved: the likelihood of two signals of
+// correlation r. Its gradient and Gauss-Newton matrix are those of the residual (f - r m) / sqrt(1 - r^2) of signals of
+// variance one. So what does not agree lends no weight, and blur that comes from reading between voxels wins nothing.
+std::vector<Level::Weighing> WeighingOf(const Commons& now, const Commons& rigid)
+{
+  std::vector<Level::Weighing> weighing;
+  for (std::size_t v = 0; v < now.size(); ++v) {
+    const Common& c = now[v];
+    const double r = std::fmax(0.0, c.Correlation()), scale = 1.0 / std::sqrt(c.Unexplained());
+    if (c.ff > 0.0 && c.mm > 0.0)
+      weighing.push_back(
+          {rigid[v].weight / c.weight, scale * std::sqrt(c.weight / c.ff), scale * r * std::sqrt(c.weight / c.mm)});
+    else
+      weighing.push_back({0.0, 0.0, 0.0});
+  }
+  return weighing;
+}
+
+void CheckRange(const char* name, double value, double from, double to)
+{
+  if (!(value >= from && value <= to)) {
+    std::string text = std::string(name) + " is " + std::to_string(value) + "; it must be in [" + std::to_string(from) + ", " +
+                       std::to_string(to) + "]";
+    throw Error(Error::Kind::InvalidParameter, text);
+  }
+}
+
+void CheckVolume(const DeformableVolume& volume)
+{
+  if (!volume.features || volume.features->levels.empty())
+    throw Error(Error::Kind::BadInput, "a volume without features cannot be deformed");
+  if (volume.features->levels.front().seen.empty())
+    throw Error(Error::Kind::BadInput, volume.features->name + ": the metric " + volume.features->metric +
+                                           " compares descriptors; deforming needs one that compares values, as local-ncc");
+}
+
+} // namespace
+
+void DeformableAlignParameters::Check() const
+{
+  CheckRange("ControlSpacingMm", controlSpacingMm, 5.0, 500.0);
+  CheckRange("BendingWeight", bendingWeight, 1e-6, 1e12);
+  CheckRange("Levels", levels, 1, 6);
+  CheckRange("Iterations", iterations, 1, 1000);
+  CheckRange("FinestMm", finestMm, 0.01, 100.0);
+  CheckRange("MinimumOverlap", minimumOverlap, 0.001, 1.0);
+}
+
+DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving,
+                                      const DeformableAlignParameters& parameters, const Progress& progress)
+{
+  parameters.Check();
+  if (fixed.empty())
+    throw Error(Error::Kind::BadInput, "there is no volume to deform towards");
+  CheckVolume(moving);
+  for (const DeformableVolume& f : fixed) {
+    CheckVolume(f);
+    if (f.features->metric != moving.features->metric)
+      throw Error(Error::Kind::BadInput,
+                  f.features->name + " and " + moving.features->name + " were prepared for different metrics");
+  }
+  const int finest = static_cast<int>(std::lround(std::log2(parameters.finestMm))), first = finest + parameters.levels - 1;
+
+  DeformableAlignResult result;
+  const Eigen::AlignedBox3d overlap = OverlapBox(fixed, moving, std::max(first, 2), result.overlap);
+  if (result.overlap < parameters.minimumOverlap)
+    throw Error(Error::Kind::NotPossible,
+                moving.features->name + " lies in the volumes it should agree with by " + std::to_string(100.0 * result.overlap) +
+                    "% of itself; " + std::to_string(100.0 * parameters.minimumOverlap) + "% are asked for (MinimumOverlap)");
+
+  DisplacementField field;
+  Seen warped, tried;
+  for (int l = 0; l < parameters.levels; ++l) {
+    const Progress part = progress.Part(l == 0 ? 0.0 : std::pow(0.3, parameters.levels - l),
+                                        std::pow(0.3, parameters.levels - 1 - l)); // finer levels take longer
+    const bool isLast = l + 1 == parameters.levels;
+    const double spacing = parameters.controlSpacingMm * (l == 0 && !isLast ? 2.0 : 1.0);
+    const Level level(fixed, moving, first - l, overlap, spacing);
+    result.voxelMm = level.VoxelMm();
+    const auto penalty = PenaltyEntries(parameters.bendingWeight, 3.0 * parameters.controlSpacingMm, level.Lattice().spacing);
+
+    level.Warp(DisplacementField(), warped, {});
+    const Commons rigid = level.Compare(warped);
+    if (std::all_of(rigid.begin(), rigid.end(), [](const Common& c) { return !(c.weight > 0.0); }))
+      throw Error(Error::Kind::NotPossible, moving.features->name + " has nothing to compare in the overlap");
+    field = field.IsZero() ? DisplacementField(level.Lattice()) : field.SeenOn(level.Lattice());
+    Vectors c = field.Coefficients();
+    level.Warp(field, warped, {});
+    Commons now = level.Compare(warped);
+    const Normal shape(level.Lattice().dimensions);
+    const auto costOf = [&](const Commons& commons, const Vectors& coefficients) {
+      double cost = PenaltyOf(shape, penalty, coefficients);
+      for (std::size_t v = 0; v < commons.size(); ++v)
+        cost += 0.5 * rigid[v].weight * std::log(commons[v].Unexplained());
+      return cost;
+    };
+    double cost = costOf(now, c), damping = 0.0;
+    for (int iteration = 0; iteration < parameters.iterations; ++iteration, ++result.iterations) {
+      part(static_cast<double>(iteration) / parameters.iterations);
+      Normal normal = level.Equations(warped, WeighingOf(now, rigid));
+      normal.AddPenalty(penalty, c);
+      double step = 0.0;
+      bool isBetter = false;
+      const double before = cost;
+      for (int attempt = 0; attempt < 5 && !isBetter; ++attempt) {
+        const Vectors by = normal.Solve(damping);
+        Vectors moved = c;
+        step = 0.0;
+        for (std::size_t i = 0; i < c.size(); ++i) {
+          moved[i] += by[i];
+          step = std::fmax(step, by[i].norm());
+        }
+        const DisplacementField trial(level.Lattice(), moved);
+        level.Warp(trial, tried, {});
+        const Commons there = level.Compare(tried);
+        const double costThere = costOf(there, moved);
+        isBetter = costThere < cost;
+        if (isBetter) {
+          field = trial;
+          c = moved;
+          now = there;
+          cost = costThere;
+          warped.swap(tried);
+          damping = damping > 1e-2 ? damping * 0.1 : 0.0;
+        } else {
+          damping = std::fmax(1e-1, 10.0 * damping);
+        }
+        if (step < 0.01 * level.VoxelMm())
+          break;
+      }
+      if (!isBetter || step < 0.01 * level.VoxelMm() || before - cost < 1e-5 * std::abs(before))
+        break;
+    }
+    result.similarityBefore = Similarity(rigid);
+    result.similarityAfter = Similarity(now);
+    if (isLast) {
+      const auto displacements = field.SampledOn(level.Grid());
+      for (std::size_t i = 0; i < level.Grid().VoxelCount(); ++i)
+        if (warped[2 * i + 1] > 0.0f)
+          result.largestMm = std::fmax(result.largestMm, displacements.View()[static_cast<std::ptrdiff_t>(i)].norm());
+    }
+  }
+  result.bendingEnergy = field.BendingEnergy();
+  result.smallestDeterminant = field.SmallestDeterminant();
+  if (!(result.smallestDeterminant > 0.0))
+    result.reason = "the displacement folds space over; more BendingWeight or a wider ControlSpacingMm would keep it smooth";
+  else if (!(result.similarityAfter > result.similarityBefore))
+    result.reason = "no displacement makes the volumes more alike";
+  else {
+    result.isApplied = true;
+    result.field = field;
+  }
+  progress(1.0);
+  return result;
+}
+
+} // namespace echorama

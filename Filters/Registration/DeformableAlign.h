@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Imaging/DisplacementField.h"
+#include "LocalAlign.h"
+
+namespace echorama {
+
+/// A volume that lies where it belongs as well as a rigid motion can tell.
+struct DeformableVolume {
+  const MetricPyramid* features = nullptr; ///< of "local-ncc", "ncc" or "mad": metrics that compare values
+  Pose volumeToWorld = Pose::Identity();
+  const DisplacementField* field = nullptr; ///< its own displacement, when that is known already; none: rigid
+};
+
+struct DeformableAlignParameters {
+  double controlSpacingMm = 30.0; ///< of the lattice, mm, [5, 500]; about the size of what can be told apart
+  double bendingWeight = 2000.0;  ///< of the bending energy, in voxels that agree as little as they do, per mm, [1e-6, 1e12]
+  int levels = 2;               ///< resolutions, each half as fine as the next, [1, 6]; the lattice of the first is twice as wide
+  int iterations = 15;          ///< per resolution, at most, [1, 1000]
+  double finestMm = 1.0;        ///< voxels of the last level are about this large, mm, [0.01, 100]
+  double minimumOverlap = 0.02; ///< share of the moving volume that must lie in others, by weight, [0.001, 1]
+
+  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  void Check() const;
+};
+
+struct DeformableAlignResult {
+  DisplacementField field;          ///< pull-back of the moving volume in the world; zero when it is not applied
+  bool isApplied = false;           ///< false: the rigid result stands
+  std::string reason;               ///< why not; empty when applied
+  double similarityBefore = 0.0;    ///< correlation of what is seen, by weight, on the last level: 1 identical, 0 chance
+  double similarityAfter = 0.0;     ///< of the field that was found, applied or not
+  double overlap = 0.0;             ///< share of the moving volume that lies in others, by weight
+  double bendingEnergy = 0.0;       ///< DisplacementField::BendingEnergy() of the field that was found
+  double largestMm = 0.0;           ///< its longest displacement in the overlap
+  double smallestDeterminant = 1.0; ///< DisplacementField::SmallestDeterminant() of it
+  double voxelMm = 0.0;             ///< of the last level
+  int iterations = 0;               ///< over all levels
+};
+
+/// What a rigid motion leaves over: finds the smooth displacement that makes a moving volume agree with others.
+///
+/// Free-form deformation (Rueckert et al. 1999): cubic B-splines on a lattice along the axes of the moving volume over the
+/// overlap, whose coefficients minimise the differences of what the metric sees (pseudo-Huber loss, weighted by both volumes,
+/// over the overlap alone) plus bendingWeight times the bending energy, by Levenberg-Marquardt, coarse to fine. Beyond the
+/// overlap nothing but the bending counts, and the field goes smoothly to zero within three spacings of the lattice.
+/// What is left of a rigid motion becomes part of the field.
+///
+/// A field that folds anywhere, or does not raise the similarity, is not applied: the result says why and holds a zero field.
+/// The result does not depend on the number of threads.
+/// \throws Error(InvalidParameter); Error(BadInput) without a fixed volume or for pyramids of descriptors;
+/// Error(NotPossible) when they overlap by less than minimumOverlap; Error(Cancelled).
+DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving,
+                                      const DeformableAlignParameters& parameters = {}, const Progress& progress = {});
+
+} // namespace echorama
