@@ -4,6 +4,7 @@
 // a branch; when they are all real that is the answer, otherwise (at the rim of a mask, near a NaN) Sampler gives it.
 // Where the volume lies on the grid's own lattice but for a shift, the fractions are the same along the row: that loop has
 // no index arithmetic and runs in vector registers, and a shift by whole voxels copies exactly.
+// Through a displacement rows are not straight: every voxel's position is computed, and Sampler reads there.
 #include "RowSampler.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
@@ -29,7 +30,7 @@ A Mixed(A a, A b, A t)
 
 } // namespace
 
-GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid)
+GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid, double marginMm)
 {
   const Eigen::Affine3d indexToGrid = grid.WorldToIndex() * volume.IndexToWorld();
   const auto& n = volume.dimensions;
@@ -40,8 +41,9 @@ GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid)
   GridBox box;
   for (int axis = 0; axis < 3; ++axis) {
     // A little wider than the truth: what is outside is found out later.
-    const double first = std::clamp(std::ceil(hull.min()[axis] - 1e-6), 0.0, static_cast<double>(grid.dimensions[axis]));
-    const double last = std::clamp(std::floor(hull.max()[axis] + 1e-6), -1.0, grid.dimensions[axis] - 1.0);
+    const double margin = marginMm / grid.spacing[axis] + 1e-6;
+    const double first = std::clamp(std::ceil(hull.min()[axis] - margin), 0.0, static_cast<double>(grid.dimensions[axis]));
+    const double last = std::clamp(std::floor(hull.max()[axis] + margin), -1.0, grid.dimensions[axis] - 1.0);
     box.first[axis] = static_cast<int>(first);
     box.size[axis] = std::max(0, static_cast<int>(last - first) + 1);
   }
@@ -56,14 +58,30 @@ struct RowSampler<T>::Line {
 };
 
 template <class T>
-RowSampler<T>::RowSampler(const PosedVolume<T>& volume, const ImageGeometry& grid)
+RowSampler<T>::RowSampler(const PosedVolume<T>& volume, const ImageGeometry& grid, const DisplacementField* displacement)
   : intensity_(volume.intensity), valid_(volume.valid), sampler_(volume.intensity, volume.valid),
-    gridToIndex_(volume.geometry.WorldToIndex() * grid.IndexToWorld()), box_(BoxOf(volume.geometry, grid))
+    displacement_(displacement && !displacement->IsZero() ? displacement : nullptr), gridToWorld_(grid.IndexToWorld()),
+    worldToIndex_(volume.geometry.WorldToIndex()), gridToIndex_(worldToIndex_ * gridToWorld_),
+    box_(BoxOf(volume.geometry, grid, displacement_ ? displacement_->Bound() : 0.0))
 {
   for (int column = 0; column < 4; ++column)
     for (int row = 0; row < 3; ++row)
       gridToIndex_(row, column) = Snapped(gridToIndex_(row, column));
   shifted_ = gridToIndex_.linear().col(0) == Eigen::Vector3d::UnitX();
+}
+
+// Where the voxels of a row of the box are read, in index coordinates of the volume.
+template <class T>
+std::vector<Eigen::Vector3d> RowSampler<T>::DisplacedRow(int j, int k) const
+{
+  std::vector<Eigen::Vector3d> row(static_cast<std::size_t>(box_.size[0]));
+  const Eigen::Vector3d start = gridToWorld_ * Eigen::Vector3d(box_.first[0], j, k), step = gridToWorld_.linear().col(0);
+  displacement_->Row(start, step, box_.size[0], row.data());
+  for (int i = 0; i < box_.size[0]; ++i) {
+    Eigen::Vector3d& position = row[static_cast<std::size_t>(i)];
+    position = gridToIndex_ * Eigen::Vector3d(box_.first[0] + i, j, k) + worldToIndex_.linear() * position;
+  }
+  return row;
 }
 
 template <class T>
@@ -94,6 +112,11 @@ typename RowSampler<T>::Line RowSampler<T>::LineAt(int j, int k) const
 template <class T>
 void RowSampler<T>::Inside(int j, int k, unsigned char* inside) const
 {
+  if (displacement_) {
+    for (const Eigen::Vector3d& p : DisplacedRow(j, k))
+      *inside++ = static_cast<unsigned char>(sampler_.NearestIndex(p[0], p[1], p[2]) >= 0);
+    return;
+  }
   const Line line = LineAt(j, k);
   std::fill_n(inside, box_.size[0], static_cast<unsigned char>(0));
   inside -= box_.first[0];
@@ -132,6 +155,15 @@ template <class T>
 template <class A>
 void RowSampler<T>::Values(int j, int k, const unsigned char* inside, A* values) const
 {
+  if (displacement_) {
+    for (const Eigen::Vector3d& p : DisplacedRow(j, k)) {
+      double value = 0.0;
+      if (*inside++ & 1)
+        sampler_.Linear(p[0], p[1], p[2], value);
+      *values++ = static_cast<A>(value);
+    }
+    return;
+  }
   const Line line = LineAt(j, k);
   inside -= box_.first[0];
   values -= box_.first[0];

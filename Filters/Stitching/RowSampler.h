@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Imaging/DisplacementField.h"
 #include "Core/Imaging/Sampling.h"
 #include "RegionMap.h"
 
 namespace echorama {
 
-/// Where in a grid the voxels of a volume can be.
-GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid);
+/// Where in a grid the voxels of a volume can be, when they may also lie \a marginMm beside where its geometry says.
+GridBox BoxOf(const ImageGeometry& volume, const ImageGeometry& grid, double marginMm = 0.0);
 
 /// Reads a posed volume at the voxels of a grid, one row of the grid at a time. It gives what Sampler gives (Core), and is
-/// several times faster, because neighbours in a row share their work.
+/// several times faster, because neighbours in a row share their work. Through a displacement it reads at x + u(x), a voxel at a
+/// time.
 template <class T>
 class RowSampler {
 public:
-  RowSampler(const PosedVolume<T>& volume, const ImageGeometry& grid);
+  /// \param displacement none: the volume lies as its geometry says; must outlive the sampler
+  RowSampler(const PosedVolume<T>& volume, const ImageGeometry& grid, const DisplacementField* displacement = nullptr);
 
-  /// BoxOf the volume.
+  /// BoxOf the volume, with the longest displacement as margin.
   const GridBox& Box() const { return box_; }
 
   /// Writes 1 where a voxel of the grid lies in the volume (Sampler::NearestIndex) and 0 elsewhere, for the row (j, k) of
@@ -30,11 +33,13 @@ public:
 private:
   struct Line;
   Line LineAt(int j, int k) const;
+  std::vector<Eigen::Vector3d> DisplacedRow(int j, int k) const;
 
   VolumeView<const T> intensity_;
   VolumeView<const unsigned char> valid_;
   Sampler<T> sampler_;
-  Eigen::Affine3d gridToIndex_;
+  const DisplacementField* displacement_; ///< nullptr: none, or zero everywhere
+  Eigen::Affine3d gridToWorld_, worldToIndex_, gridToIndex_;
   bool shifted_; ///< the grid steps along x exactly as the volume does
   GridBox box_;
 };

@@ -52,7 +52,7 @@ AnySampler SamplerOf(const StitchInput& input, const ImageGeometry& grid)
         if (volume.intensity.Dimensions() != volume.geometry.dimensions ||
             (!volume.valid.Empty() && volume.valid.Dimensions() != volume.geometry.dimensions))
           throw Error(Error::Kind::BadInput, input.name + ": its voxels are not of the size that its geometry says");
-        return RowSampler(volume, grid);
+        return RowSampler(volume, grid, input.displacement);
       },
       input.volume);
 }
@@ -68,7 +68,7 @@ public:
         [&](const auto& volume) {
           if (input.reliability.Dimensions() != volume.geometry.dimensions)
             throw Error(Error::Kind::BadInput, input.name + ": its reliability is not of the size that its geometry says");
-          sampler_.emplace(PosedVolume<float>{input.reliability, volume.valid, volume.geometry}, grid);
+          sampler_.emplace(PosedVolume<float>{input.reliability, volume.valid, volume.geometry}, grid, input.displacement);
         },
         input.volume);
   }
@@ -190,6 +190,23 @@ private:
 
 } // namespace
 
+ImageGeometry ReachOf(const StitchInput& input)
+{
+  ImageGeometry reach = GeometryOf(input);
+  if (!input.displacement)
+    return reach;
+  Eigen::Vector3d first;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double voxels = std::ceil(input.displacement->Bound() / reach.spacing[axis]);
+    if (!(reach.dimensions[axis] + 2.0 * voxels <= std::numeric_limits<int>::max()))
+      throw Error(Error::Kind::BadInput, input.name + ": its displacement is too long");
+    reach.dimensions[axis] += 2 * static_cast<int>(voxels);
+    first[axis] = -voxels;
+  }
+  reach.origin = reach.IndexToWorld() * first;
+  return reach;
+}
+
 double StitchMemory(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
                     std::size_t voxelBytes, bool weights)
 {
@@ -255,7 +272,10 @@ void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& 
     throw Error(Error::Kind::BadInput, "stitching needs at least two volumes; " + std::to_string(inputs.size()) + " came in");
   for (std::size_t v = 0; v < inputs.size(); ++v)
     geometries[v].Check(inputs[v].name);
-  CheckStitch(parameters, geometries, grid, sizeof(T), !output.weights.empty());
+  std::vector<ImageGeometry> reaches;
+  for (const StitchInput& input : inputs)
+    reaches.push_back(ReachOf(input));
+  CheckStitch(parameters, reaches, grid, sizeof(T), !output.weights.empty());
 
   // 1. regions
   std::vector<AnySampler> samplers;

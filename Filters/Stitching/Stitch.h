@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Progress.h"
+#include "Core/Imaging/DisplacementField.h"
 #include "Core/Imaging/VolumeView.h"
 #include <string>
 #include <variant>
@@ -34,7 +35,12 @@ struct StitchInput {
   AnyPosedVolume volume;
   std::string name;                         ///< for messages
   VolumeView<const float> reliability = {}; ///< how far each voxel can be trusted, in [0, 1] (ReliabilityMap); empty: all alike
+  /// What belongs at x is read at x + u(x); none: the volume lies as its geometry says. It must outlive the stitching.
+  const DisplacementField* displacement = nullptr;
 };
+
+/// The geometry of a volume, grown by how far its displacement can carry voxels: the box to allow memory for.
+ImageGeometry ReachOf(const StitchInput& input);
 
 /// Where the result goes: views of the size of the grid.
 template <class T>

@@ -155,3 +155,47 @@ TEST(RowSampler, FarAwayIsAnEmptyBox)
   geometry.origin = {1e9, -1e12, 3.0};
   EXPECT_TRUE(RowSampler<short>(scene.Posed(geometry), Grid({20, 20, 20}, 1.0)).Box().Empty());
 }
+
+TEST(RowSampler, ReadsThroughADisplacement)
+{
+  Random random(9);
+  const Scene<short> scene = RandomScene<short>({14, 12, 10}, random);
+  ImageGeometry geometry = Grid({14, 12, 10}, 1.5);
+  geometry.origin = {3.0, -4.0, 5.0};
+  geometry.direction = ExpRotation({0.2, 0.4, -0.3});
+  const ImageGeometry grid = Grid({40, 40, 40}, 1.0);
+  ImageGeometry lattice = Grid({5, 5, 5}, 8.0);
+  std::vector<Eigen::Vector3d> coefficients(125);
+  for (auto& c : coefficients)
+    c = 4.0 * random.Direction();
+  const DisplacementField field(lattice, coefficients), none(lattice);
+  const RowSampler<short> rows(scene.Posed(geometry), grid, &field);
+  const Sampler<short> sampler(scene.values.View(), scene.valid.View());
+  const Eigen::Affine3d toIndex = geometry.WorldToIndex();
+  const GridBox& box = rows.Box();
+  std::vector<unsigned char> inside(static_cast<std::size_t>(box.size[0]));
+  std::vector<float> values(inside.size());
+  int read = 0;
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j) {
+      if (box.HasRow(j, k)) {
+        rows.Inside(j, k, inside.data());
+        rows.Values(j, k, inside.data(), values.data());
+      }
+      for (int i = 0; i < 40; ++i) {
+        const Eigen::Vector3d x = grid.IndexToWorld() * Eigen::Vector3d(i, j, k), p = toIndex * (x + field.At(x));
+        double truth = 0.0;
+        const bool isInside = sampler.Linear(p[0], p[1], p[2], truth);
+        const int at = i - box.first[0];
+        const bool inBox = box.HasRow(j, k) && at >= 0 && at < box.size[0];
+        ASSERT_EQ(isInside, inBox && inside[static_cast<std::size_t>(at)]);
+        if (isInside) {
+          EXPECT_NEAR(values[static_cast<std::size_t>(at)], truth, 1e-4);
+          ++read;
+        }
+      }
+    }
+  EXPECT_GT(read, 1000);
+  EXPECT_EQ(RowSampler<short>(scene.Posed(geometry), grid, &none).Box().size,
+            RowSampler<short>(scene.Posed(geometry), grid).Box().size);
+}

@@ -623,3 +623,37 @@ TEST(Stitch, StopsWhenAsked)
   EXPECT_LE(last, 1.0);
   EXPECT_THROW(Stitched(scene, {}, 0.0, Progress([](double fraction) { return fraction < 0.5; })), Error);
 }
+
+TEST(Stitch, ADisplacementSaysWhereAVolumeIsRead)
+{
+  // A volume that is read 2 mm to the right everywhere is the volume, put 2 mm to the left.
+  Scene<float> pushed, placed;
+  Random random(31);
+  for (int v = 0; v < 2; ++v) {
+    ImageGeometry geometry;
+    geometry.dimensions = {20, 16, 12};
+    geometry.origin = Eigen::Vector3d(12.0 * v, 0.0, 0.0);
+    Volume<float> values(geometry.dimensions);
+    for (float& value : values.View())
+      value = static_cast<float>(random.Uniform(0.0, 100.0));
+    pushed.Add(values, {}, geometry);
+    geometry.origin[0] -= 2.0 * v;
+    placed.Add(values, {}, geometry);
+  }
+  ImageGeometry lattice;
+  lattice.dimensions = {9, 9, 9};
+  lattice.spacing.setConstant(10.0);
+  lattice.origin.setConstant(-30.0);
+  const DisplacementField field(lattice, std::vector<Eigen::Vector3d>(729, {2.0, 0.0, 0.0}));
+  pushed.inputs[1].displacement = &field;
+  const auto a = Stitched(pushed), b = Stitched(placed);
+  const auto& n = b.grid.dimensions;
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) {
+        EXPECT_EQ(a.coverage.View()(i, j, k), b.coverage.View()(i, j, k));
+        EXPECT_NEAR(a.intensity.View()(i, j, k), b.intensity.View()(i, j, k), 1e-3);
+      }
+  EXPECT_EQ(ReachOf(pushed.inputs[1]).dimensions, (std::array<int, 3>{24, 20, 16}));
+  EXPECT_EQ(ReachOf(pushed.inputs[0]).dimensions, pushed.geometries[0].dimensions);
+}
