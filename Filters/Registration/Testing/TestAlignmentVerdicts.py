@@ -53,7 +53,8 @@ def with_voxels(image, intensity, valid=None, dims=None, spacing=None, origin_in
     dims = dims or image.GetDimensions()
     new.SetDimensions(dims)
     new.SetSpacing(spacing or image.GetSpacing())
-    new.SetDirectionMatrix(image.GetDirectionMatrix())
+    d = image.GetDirectionMatrix()  # numbers, not the matrix itself: the images would share it
+    new.SetDirectionMatrix(*[d.GetElement(row, column) for row in range(3) for column in range(3)])
     origin = [0.0, 0.0, 0.0]
     image.TransformContinuousIndexToPhysicalPoint(*[float(i) for i in origin_index], origin)
     new.SetOrigin(origin)
@@ -153,7 +154,7 @@ expect("disjoint volumes of different scenes", align(a, view(0.0, (0, 25.0, 90.0
 # Any type, any voxels.
 intensity, valid = arrays(b)
 for dtype, scale, shift in ((np.uint16, 200, 50), (np.int16, 60, -9000), (np.float32, 1e-3, 0.0)):
-    expect(f"{np.dtype(dtype)}", align(a, with_voxels(b, (intensity * scale + shift).astype(dtype), valid)), RIGHT, 0.5)
+    expect(f"{np.dtype(dtype)}", align(a, with_voxels(b, (intensity.astype(float) * scale + shift).astype(dtype), valid)), RIGHT, 0.5)
 holes = intensity.astype(np.float32)
 holes[np.random.default_rng(2).random(holes.shape) < 0.05] = np.nan
 holes[20:30, 10:30, 20:50] = np.inf
@@ -200,7 +201,9 @@ stopped = vtkUltrasoundAligner()
 stopped.AddInputDataObject(0, a)
 stopped.AddInputDataObject(0, b)
 stopped.AddObserver(vtkCommand.ProgressEvent, lambda caller, event: caller.GetProgress() > 0.15 and caller.AbortExecuteOn())
-stopped.AddObserver(vtkCommand.ErrorEvent, lambda caller, event: failures.append("an error on abort"))
+told = lambda caller, event, text: failures.append("on abort: " + text)
+told.CallDataType = "string0"
+stopped.AddObserver(vtkCommand.ErrorEvent, told)
 stopped.GetExecutive().AddObserver(vtkCommand.ErrorEvent, lambda caller, event: None)
 stopped.Update()
 assert stopped.GetOutput().GetNumberOfBlocks() == 0 and stopped.GetNumberOfVolumes() == 0
