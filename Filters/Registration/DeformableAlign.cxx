@@ -19,6 +19,8 @@ namespace echorama {
 
 namespace {
 
+constexpr int CoarseOctave = 2; // voxels of about 4 mm tell where volumes overlap
+
 using Vectors = std::vector<Eigen::Vector3d>;
 
 // A value and a weight of every voxel of a grid, as MetricLevel keeps them.
@@ -594,7 +596,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
   const int finest = static_cast<int>(std::lround(std::log2(parameters.finestMm))), first = finest + parameters.levels - 1;
 
   DeformableAlignResult result;
-  const Eigen::AlignedBox3d overlap = OverlapBox(fixed, moving, std::max(first, 2), result.overlap);
+  const Eigen::AlignedBox3d overlap = OverlapBox(fixed, moving, std::max(first, CoarseOctave), result.overlap);
   if (result.overlap < parameters.minimumOverlap)
     throw Error(Error::Kind::NotPossible,
                 moving.features->name + " lies in the volumes it should agree with by " + std::to_string(100.0 * result.overlap) +
@@ -684,6 +686,53 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
   }
   progress(1.0);
   return result;
+}
+
+std::vector<DeformableAlignResult> DeformInTurn(const std::vector<DeformableVolume>& volumes, int fixed,
+                                                const DeformableAlignParameters& parameters, const Progress& progress)
+{
+  parameters.Check();
+  const int count = static_cast<int>(volumes.size());
+  if (count < 2)
+    throw Error(Error::Kind::BadInput, "two volumes are needed at least; " + std::to_string(count) + " came in");
+  if (fixed < 0 || fixed >= count)
+    throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(count) +
+                                                   ", counted from 0; it is " + std::to_string(fixed));
+  for (const DeformableVolume& volume : volumes)
+    CheckVolume(volume);
+  std::vector<DeformableAlignResult> results(volumes.size());
+  std::vector<bool> isPlaced(volumes.size(), false);
+  std::vector<DeformableVolume> placed{volumes[static_cast<std::size_t>(fixed)]};
+  placed.front().field = nullptr;
+  isPlaced[static_cast<std::size_t>(fixed)] = true;
+  for (int turn = 1; turn < count; ++turn) {
+    std::size_t next = 0;
+    double most = -1.0;
+    for (std::size_t v = 0; v < volumes.size(); ++v) {
+      double share = 0.0;
+      if (isPlaced[v])
+        continue;
+      OverlapBox(placed, volumes[v], CoarseOctave, share);
+      if (share > most) {
+        most = share;
+        next = v;
+      }
+    }
+    try {
+      results[next] =
+          DeformableAlign(placed, volumes[next], parameters, progress.Part((turn - 1.0) / (count - 1.0), turn / (count - 1.0)));
+    } catch (const Error& error) {
+      if (error.GetKind() != Error::Kind::NotPossible)
+        throw;
+      results[next].overlap = std::fmax(most, 0.0);
+      results[next].reason = error.what();
+    }
+    isPlaced[next] = true;
+    placed.push_back(volumes[next]);
+    placed.back().field = &results[next].field;
+  }
+  progress(1.0);
+  return results;
 }
 
 } // namespace echorama

@@ -53,4 +53,12 @@ struct DeformableAlignResult {
 DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving,
                                       const DeformableAlignParameters& parameters = {}, const Progress& progress = {});
 
+/// The same for many volumes, in turn: the one that lies in the placed ones most comes next, and agrees with all of them as
+/// their fields have it. The volume number \a fixed keeps a zero field. One that overlaps too little is left as it is, with the
+/// reason. Ties go to the first.
+/// \returns one result per volume
+/// \throws Error(InvalidParameter) also when \a fixed is not a volume, Error(BadInput) for fewer than two volumes.
+std::vector<DeformableAlignResult> DeformInTurn(const std::vector<DeformableVolume>& volumes, int fixed,
+                                                const DeformableAlignParameters& parameters = {}, const Progress& progress = {});
+
 } // namespace echorama

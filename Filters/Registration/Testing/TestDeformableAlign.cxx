@@ -202,6 +202,25 @@ TEST_F(DeformableAlignTest, AFixedVolumeIsReadThroughItsOwnField)
   EXPECT_GT(second.similarityBefore, DeformableAlign({Volume(bent)}, Volume(straight), Quick()).similarityBefore);
 }
 
+TEST_F(DeformableAlignTest, ManyComeInTurn)
+{
+  const Pose away = MotionAbout({0, 0, 0}, {0, 0, 0}, {900.0, 0.0, 0.0});
+  const std::vector<DeformableVolume> volumes{
+      {straight->features.get(), away, nullptr}, Volume(bent), Volume(fixed), Volume(straight)};
+  const auto results = DeformInTurn(volumes, 2, Quick());
+  ASSERT_EQ(results.size(), 4u);
+  EXPECT_FALSE(results[0].isApplied);
+  EXPECT_NE(results[0].reason.find("straight"), std::string::npos) << results[0].reason;
+  EXPECT_TRUE(results[1].isApplied) << results[1].reason;
+  EXPECT_TRUE(results[2].field.IsZero());
+  EXPECT_LT(ErrorsOf(results[1].field, 3.0).after, 0.5);
+  EXPECT_LT(ErrorsOf(results[3].field, 0.0).after, 0.25);
+  EXPECT_NE(MessageOf([&] { DeformInTurn(volumes, 4, Quick()); }, Error::Kind::InvalidParameter).find("fixed volume"),
+            std::string::npos);
+  EXPECT_NE(MessageOf([&] { DeformInTurn({Volume(fixed)}, 0, Quick()); }, Error::Kind::BadInput).find("two volumes"),
+            std::string::npos);
+}
+
 TEST_F(DeformableAlignTest, AFieldThatFoldsIsNotApplied)
 {
   // More noise than tissue, and all but nothing against bending.

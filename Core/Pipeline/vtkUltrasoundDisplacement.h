@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundDisplacement
+ * @brief smooth displacements as images: a coarse lattice of vectors stands for a field that is defined everywhere
+ *
+ * A displacement image is a vtkImageData with the point array `Displacement`: three doubles or floats per point, mm, along the
+ * axes of the world. It pulls back: what belongs at x is read at x + u(x), in the volume where its geometry places it. Between
+ * the points u is the cubic spline through them (echorama::DisplacementField), twice continuously differentiable; beyond
+ * the image it fades to zero within two spacings. So a lattice of 30 mm, as vtkUltrasoundDeformableAligner makes it, says all.
+ *
+ * @sa vtkUltrasoundDeformableAligner, vtkUltrasoundStitcher
+ */
+#ifndef vtkUltrasoundDisplacement_h
+#define vtkUltrasoundDisplacement_h
+
+#include "EchoramaCoreModule.h"
+#include "vtkObject.h"
+
+#ifndef __VTK_WRAP__
+#include "Core/Imaging/DisplacementField.h"
+#include <string>
+#endif
+
+class vtkImageData;
+
+class ECHORAMACORE_EXPORT vtkUltrasoundDisplacement : public vtkObject {
+public:
+  static vtkUltrasoundDisplacement* New();
+  vtkTypeMacro(vtkUltrasoundDisplacement, vtkObject);
+
+  /** Name of the point array. */
+  static const char* DisplacementName() { return "Displacement"; }
+
+  ///@{
+  /**
+   * The displacement at a point of the world, and where what is read at a point belongs (the inverse), mm. Return false, with
+   * an error message, for an image that is no displacement, or where the inverse does not exist.
+   */
+  static bool Evaluate(vtkImageData* displacement, const double point[3], double result[3]);
+  static bool Invert(vtkImageData* displacement, const double read[3], double belongs[3]);
+  ///@}
+
+#ifndef __VTK_WRAP__
+  /** Throws echorama::Error(BadInput) that begins with \a name for an image that is no displacement. */
+  static echorama::DisplacementField FieldOf(vtkImageData* displacement, const std::string& name);
+
+  /** Makes \a image the lattice of a field, with the values that it takes there. */
+  static void ImageOf(const echorama::DisplacementField& field, vtkImageData* image);
+#endif
+
+protected:
+  vtkUltrasoundDisplacement() = default;
+  ~vtkUltrasoundDisplacement() override = default;
+
+private:
+  vtkUltrasoundDisplacement(const vtkUltrasoundDisplacement&) = delete;
+  void operator=(const vtkUltrasoundDisplacement&) = delete;
+};
+
+#endif
