@@ -11,7 +11,7 @@ constexpr std::ptrdiff_t FewestVoxels = 100, FewestOfLevel = 200;
 
 const std::vector<const Metric*>& Metrics()
 {
-  static const std::vector<const Metric*> metrics{&LocalNccMetric};
+  static const std::vector<const Metric*> metrics{&LocalNccMetric, &NccMetric, &MadMetric, &MindSscMetric, &Lc2Metric};
   return metrics;
 }
 

@@ -12,7 +12,7 @@ struct MetricLevel {
   double voxelMm = 0.0;                   ///< geometric mean of the spacing
   int octave = 0;                         ///< log2(voxelMm), rounded: windows follow it, so that two volumes are seen alike
   std::vector<float> seen;                ///< value, weight, value, weight, ...
-  std::vector<float> edges;               ///< a second value of each voxel: the gradient's magnitude (lc2), else empty
+  std::vector<float> edges;               ///< the gradient's magnitude and the weight, side by side (lc2), else empty
   std::vector<unsigned char> descriptors; ///< 16 bytes per voxel (mind-ssc), else empty
 };
 
@@ -50,7 +50,7 @@ struct Metric {
   void (*see)(const MetricSource& source, MetricLevel& level);
 };
 
-extern const Metric LocalNccMetric;
+extern const Metric LocalNccMetric, NccMetric, MadMetric, MindSscMetric, Lc2Metric;
 
 /// \throws Error(InvalidParameter) for a name that is not one of MetricNames().
 const Metric& MetricNamed(const std::string& name);

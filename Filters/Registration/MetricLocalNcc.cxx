@@ -13,9 +13,9 @@
 namespace echorama {
 namespace {
 
-constexpr double WindowVoxels = 3.0; // standard deviation of the window, in voxels of the octave
+constexpr double WindowVoxels = 2.0; // standard deviation of the window, in voxels of the octave
 constexpr double SmoothVoxels = 0.6; // of what is compared
-constexpr double FloorShare = 0.25;  // of the level's own standard deviation: the floor under the local one
+constexpr double FloorShare = 0.6;   // of the level's own standard deviation: the floor under the local one
 
 void See(const MetricSource& source, MetricLevel& level)
 {
@@ -64,6 +64,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric LocalNccMetric{"local-ncc", 1.0, false, See};
+const Metric LocalNccMetric{"local-ncc", 0.25, false, See};
 
 } // namespace echorama
