@@ -4,7 +4,8 @@ set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks 
   FiltersCore FiltersGeneral FiltersSources IOCore IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
   RenderingVolumeOpenGL2 RenderingImage)
-find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} Python WrappingPythonCore WrappingTools)
+find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} ImagingFourier # the last: a peer in benchmarks
+  Python WrappingPythonCore WrappingTools)
 include(EchoramaDependencies)
 set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH
 set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages)
