@@ -395,15 +395,31 @@ Volume<float> BeamReliability(const Cells& cells, const BeamGrid& grid, const Re
 //----------------------------------------------------------------------------------------------------------------------
 // 4. Back to cells
 
+// Whether some voxel will ask for the cell: it, or one beside it, has real voxels.
+bool IsNeeded(VolumeView<const int> count, int i, int j, int k)
+{
+  if (count(i, j, k) > 0)
+    return true;
+  const auto& n = count.Dimensions();
+  for (int c = std::max(0, k - 1); c <= std::min(n[2] - 1, k + 1); ++c)
+    for (int b = std::max(0, j - 1); b <= std::min(n[1] - 1, j + 1); ++b)
+      for (int a = std::max(0, i - 1); a <= std::min(n[0] - 1, i + 1); ++a)
+        if (count(a, b, c) > 0)
+          return true;
+  return false;
+}
+
 Volume<float> ShadowOfCells(const Cells& cells, const BeamGrid& grid, VolumeView<const float> beams, const Progress& progress)
 {
-  Volume<float> result(cells.geometry.dimensions);
+  Volume<float> result(cells.geometry.dimensions, 1.0f);
   const auto out = result.View();
   const Sampler<float> sampler(beams, {});
   ParallelFor(out.Slices(), progress, [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     for (int j = 0; j < cells.geometry.dimensions[1]; ++j)
       for (int i = 0; i < cells.geometry.dimensions[0]; ++i) {
+        if (!IsNeeded(cells.count.View(), i, j, k))
+          continue;
         const Eigen::Vector3f at = grid.SampleOf(Eigen::Vector3d(i, j, k));
         double value = 1.0;
         sampler.Linear(at.x(), at.y(), at.z(), value);
