@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The candidates of the global search, and the start itself, are refined at a coarse level, where that takes a few
 // milliseconds each; those that meet are one. The best few go on to a middle level and the best of these to the finest.
+// They are ranked as a test of correlation would: likeness times the square root of how much is compared. The likeness alone
+// prefers chance matches of small overlaps, the sum over the overlap those of large ones.
 //
 // What is trusted. A measure alone cannot tell: any two volumes have a best pose. So the answer is questioned from four
 // sides, each of which sees what the others do not. Overlap and similarity above chance: nothing in common. The next best of
@@ -28,6 +30,7 @@ namespace {
 
 constexpr double HighestRatio = 99.0;
 constexpr int MostPoints = 1000;
+constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
 
 using Clock = std::chrono::steady_clock;
 
@@ -139,7 +142,7 @@ public:
     global.coneDegrees = coneDegrees;
     global.reachMm = reachMm;
     global.minimumOverlap = p_.minimumOverlap;
-    global.candidates = p_.candidates;
+    global.candidates = p_.candidates * (result.anywhere ? 4 : 1);
     std::vector<Pose> poses{moving_.volumeToWorld};
     for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving_, global, progress.Part(0.0, 0.6)).candidates)
       poses.push_back(candidate.volumeToWorld);
@@ -154,7 +157,7 @@ public:
       return result;
     }
     poses.clear();
-    for (std::size_t i = 0; i < std::min<std::size_t>(3, found.size()); ++i)
+    for (std::size_t i = 0; i < std::min<std::size_t>(Finalists, found.size()); ++i)
       poses.push_back(found[i].volumeToWorld);
     const double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
     found = Refine(poses, coarseMm_, middleMm, progress.Part(0.7, 0.8));
@@ -208,6 +211,9 @@ private:
     return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, start, local, progress);
   }
 
+  // How much speaks for a pose, as a test of correlation weighs it: the likeness times the square root of how much is compared.
+  static double Evidence(const LocalAlignResult& found) { return found.similarity * std::sqrt(found.overlap); }
+
   // Refines the poses and keeps those that are different and overlap, the best first.
   std::vector<LocalAlignResult> Refine(const std::vector<Pose>& poses, double coarsestMm, double finestMm,
                                        const Progress& progress) const
@@ -218,7 +224,7 @@ private:
       all.push_back(Local(poses[i], coarsestMm, finestMm, 0,
                           progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count)));
     std::stable_sort(all.begin(), all.end(),
-                     [](const LocalAlignResult& a, const LocalAlignResult& b) { return a.score > b.score; });
+                     [](const LocalAlignResult& a, const LocalAlignResult& b) { return Evidence(a) > Evidence(b); });
     for (const LocalAlignResult& one : all)
       if (one.overlap >= p_.minimumOverlap &&
           std::none_of(different.begin(), different.end(), [&](const LocalAlignResult& other) {
@@ -230,9 +236,9 @@ private:
 
   static double Ratio(const std::vector<LocalAlignResult>& found)
   {
-    if (found.size() < 2 || found[1].score * HighestRatio <= found[0].score)
+    if (found.size() < 2 || Evidence(found[1]) * HighestRatio <= Evidence(found[0]))
       return HighestRatio;
-    return found[0].score / found[1].score;
+    return Evidence(found[0]) / Evidence(found[1]);
   }
 
   void Judge(const LocalAlignResult& best, const Information& covariance, PairAlignment& result) const

@@ -36,12 +36,12 @@ struct AlignPairParameters {
   AlignStart start = AlignStart::Automatic;
   std::string metric = "local-ncc"; ///< of the local stage, one of MetricNames()
   double minimumOverlap = 0.1;      ///< share of the smaller volume, [0.01, 1]: poses with less do not count
-  int candidates = 16;              ///< poses of the global stage that are refined, [1, 1000]
+  int candidates = 16;              ///< poses of the global stage that are refined, four times as many for Unknown, [1, 1000]
   double finestMm = 0.0;            ///< the local stage ends at voxels not smaller than this, mm; 0: the volumes' own
   int points = 200000;              ///< of each volume that the local stage compares on a level, at most, [1000, 10 million]
 
   double minimumSimilarity = 0.06; ///< of the overlap, [0, 1]: less is Failed
-  double minimumPeakRatio = 1.25;  ///< best score : that of the next different pose, >= 1: less is Ambiguous
+  double minimumPeakRatio = 1.25;  ///< evidence of the best pose : of the next different one, [1, 99]: less is Ambiguous
   double maximumErrorVoxels = 1.0; ///< predicted root mean square error over the moving volume, > 0: more is Ambiguous
   double maximumSplitVoxels = 2.0; ///< how far the poses that two halves of the voxels find may lie apart, > 0: more is Failed
   std::uint64_t seed = 1;          ///< of the points that are compared
