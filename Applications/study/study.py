@@ -103,7 +103,11 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
                     # A method that gives up leaves the volumes where they were.
                     answer, row["error"] = Answer(start.motion, 0.0, 0.0, "failed"), str(problem)
                     row["reason"] = str(problem)
-                row |= judge.figures(answer.motion)
+                try:
+                    row |= judge.figures(answer.motion)
+                except (OSError, ValueError, Failed) as problem:
+                    say(f"{name} {start.name} {method}: not judged: {problem}")
+                    continue
                 row |= {"seconds": round(answer.seconds, 3), "cpu_seconds": round(answer.cpu_seconds, 3), "verdict": answer.verdict, "motion": answer.motion.tolist()}
                 row.setdefault("reason", answer.reason)
                 with open(folder / "results.jsonl", "a") as stream:
