@@ -15,7 +15,7 @@ struct GlobalSearchParameters {
   double reachMm = std::numeric_limits<double>::infinity(); ///< the valid centroid moves at most so far from the start, > 0
   double minimumOverlap = 0.1; ///< of the smaller volume's valid region, (0, 1]: poses with less do not count
   int resolution = 40;         ///< voxels along the longest side of the larger valid region, [16, 96]
-  double stepDegrees = 0.0;    ///< between neighbouring rotations, [2, 45]; 0: what the resolution needs
+  double stepDegrees = 0.0;    ///< between neighbouring rotations, [2, 45]; 0: 20
   int candidates = 12;         ///< how many distinct poses are kept, [1, 1000]
 
   /// Throws Error(InvalidParameter) that names the parameter and its range.
@@ -25,9 +25,10 @@ struct GlobalSearchParameters {
 /// A pose that looks right at low resolution.
 struct GlobalCandidate {
   Pose volumeToWorld = Pose::Identity(); ///< of the moving volume
-  double ncc = 0.0;       ///< masked normalised cross-correlation there, of locally normalised intensities, [-1, 1]
-  double overlap = 0.0;   ///< share of the smaller volume's valid region that lies in the other, [0, 1]
-  double sharpness = 0.0; ///< how far the peak stands above the other translations of its rotation, in their standard deviations
+  double ncc = 0.0;     ///< masked normalised cross-correlation there, of locally normalised intensities, [-1, 1]
+  double overlap = 0.0; ///< share of the smaller volume's valid region that lies in the other, [0, 1]
+  /// How far the peak stood above the other translations of its rotation, in their standard deviations, before it was refined.
+  double sharpness = 0.0;
 };
 
 struct GlobalSearchResult {
@@ -42,9 +43,11 @@ struct GlobalSearchResult {
 /// translations at once in Fourier space (Padfield, IEEE TIP 21(5), 2012), on intensities of which the local mean is taken off
 /// and which are divided by the local standard deviation: gain and slow changes of brightness do not count. Poses are ranked
 /// by sqrt(overlap) atanh(correlation), so that small overlaps do not win by chance. The best peaks are then refined in space
-/// at the resolution asked for, and the best that differ are kept. Voxels count by their reliability where there is one.
+/// at the resolution asked for (they may turn a little beyond the cone, but do not leave the reach), and the best that differ
+/// are kept. Voxels count by their reliability where there is one. Contrast must not be inverted. A small volume beside a
+/// large one raises the resolution. When no pose within cone and reach has the overlap there are no candidates.
 /// The answer does not depend on the threads. \throws Error(InvalidParameter); Error(BadInput) that names the volume when it
-/// is constant, has fewer than 100 real voxels or is not three-dimensional; Error(Cancelled).
+/// is constant, has fewer than 100 real voxels, is not three-dimensional, or is nowhere reliable; Error(Cancelled).
 GlobalSearchResult GlobalSearch(const PlacedVolume& fixed, const PlacedVolume& moving,
                                 const GlobalSearchParameters& parameters = {}, const Progress& progress = {});
 
