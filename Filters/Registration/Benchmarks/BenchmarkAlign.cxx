@@ -9,6 +9,7 @@
 //   BenchmarkAlign [PAIRS [CASE...]]     default: 12 pairs, all cases: near, far, anywhere, liver
 // ECHORAMA_CONTESTANT=elastix leaves out those whose name does not contain that; ECHORAMA_TRACE=1 tells of each pair of ours.
 #include "Core/Base/Random.h"
+#include "Core/Imaging/ShadowMap.h"
 #include "Filters/Registration/AlignmentScore.h"
 #include "Filters/Registration/AlignPair.h"
 #include "Filters/Registration/AlignSearch.h"
@@ -106,18 +107,27 @@ struct Answer {
 };
 using Contestant = std::function<Answer(const BenchmarkPair&, const Pose& start)>;
 
+std::vector<PyramidLevel> ReliabilityOf(const PosedVolume<unsigned char>& volume)
+{
+  const Volume<float> map = ReliabilityMap(volume, FindProbe(volume));
+  return BuildPyramid(PosedVolume<float>{map.View(), volume.valid, volume.geometry});
+}
+
 Answer Ours(const BenchmarkPair& pair, const Pose& start)
 {
   const AlignPairParameters parameters;
   const auto pa = BuildPyramid(pair.a.Posed()), pb = BuildPyramid(pair.b.Posed(start));
-  const PlacedVolume a{&pa, Pose::Identity(), "A", nullptr}, b{&pb, Pose::Identity(), "B", nullptr};
+  const auto ra = ReliabilityOf(pair.a.Posed()), rb = ReliabilityOf(pair.b.Posed(start));
+  const PlacedVolume a{&pa, Pose::Identity(), "A", &ra}, b{&pb, Pose::Identity(), "B", &rb};
   const PairAlignment found =
       AlignPair(a, BuildMetricPyramid(a, parameters.metric), b, BuildMetricPyramid(b, parameters.metric), parameters);
   if (std::getenv("ECHORAMA_TRACE"))
     std::cerr << NameOf(found.verdict) << " error " << pair.Error(found.volumeToWorld * start) << " mm, similarity "
               << found.similarity << ", overlap " << found.overlap << ", ratio " << found.peakRatio << ", split " << found.splitMm
               << ", predicted " << found.errorMm << (found.anywhere ? ", anywhere, " : ", near, ") << found.globalSeconds << " + "
-              << found.localSeconds << " + " << found.confidenceSeconds << " s; " << found.reason << "\n";
+              << found.localSeconds << " + " << found.confidenceSeconds << " s; " << found.reason << "; moved by "
+              << ((found.volumeToWorld * start) * pair.centre - pair.centre).transpose() << " mm, turned by "
+              << LogRotation((found.volumeToWorld * start).linear()).transpose() / RadiansPerDegree << " degrees\n";
   return {found.volumeToWorld, found.verdict == Verdict::Aligned, found.globalSeconds};
 }
 
@@ -240,6 +250,12 @@ int main(int argc, char** argv)
                                      [only](const auto& one) { return one.first.find(only) == std::string::npos; }),
                       contestants.end());
 
+  if (wanted("near")) {
+    std::vector<BenchmarkPair> pairs;
+    for (int i = 0; i < count; ++i)
+      pairs.push_back(PhantomPair(2000 + i, 0.75));
+    Compete("phantom, overlap 75%, from 10 degrees and 15 voxels", Knocked(pairs, 5, 10.0, 15.0), 1.0, contestants);
+  }
   if (wanted("near") || wanted("far")) {
     std::vector<BenchmarkPair> pairs;
     for (int i = 0; i < count; ++i)
