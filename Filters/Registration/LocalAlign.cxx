@@ -248,9 +248,9 @@ private:
     // Few blocks say little about 21 numbers: they are drawn towards what all directions have in common.
     constexpr double Prior = 12.0;
     noise = (counted * noise + Prior * factor * regular) / (counted + Prior);
-    // Directions in which the measure does not curve down at all are known not at all.
+    // Directions in which the measure does not curve down at all are as good as not known.
     const Eigen::SelfAdjointEigenSolver<Matrix6> bent(curvature);
-    const Vector6 kept = bent.eigenvalues().cwiseMax(0.0);
+    const Vector6 kept = bent.eigenvalues().cwiseMax(1e-3 * largest);
     const Matrix6 hessian = bent.eigenvectors() * kept.asDiagonal() * bent.eigenvectors().transpose();
     const Matrix6 unscale = scale.cwiseInverse().asDiagonal();
     Information information = unscale * (hessian * noise.ldlt().solve(hessian)) * unscale;

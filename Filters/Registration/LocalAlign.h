@@ -16,7 +16,7 @@ std::vector<std::string> MetricNames();
 /// may go. Built once per volume and shared by all of the volume's pairs.
 class MetricPyramid;
 
-/// Levels with fewer than 200 voxels that count are left out, except the finest.
+/// Levels with fewer than 200 real voxels are left out, except the finest; for mind-ssc also those with more than 2^22 voxels.
 /// \param metric one of MetricNames()
 /// \throws Error(InvalidParameter) for a metric of another name; Error(BadInput) when the volume is constant, is not
 /// three-dimensional, has fewer than 100 real voxels, or when its reliability has other dimensions than itself;

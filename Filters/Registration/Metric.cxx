@@ -128,11 +128,16 @@ std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volu
   auto result = std::make_shared<MetricPyramid>();
   result->metric = name;
   result->name = volume.name;
+  std::size_t coarsest = 0;
   for (std::size_t l = 0; l < volume.pyramid->size(); ++l) {
     const PyramidLevel& in = (*volume.pyramid)[l];
     const auto& n = in.geometry.dimensions;
     if (l > 0 && (in.realVoxels < FewestOfLevel || *std::min_element(n.begin(), n.end()) < 2))
       break;
+    const bool isCoarserGood = l + 1 < volume.pyramid->size() && (*volume.pyramid)[l + 1].realVoxels >= FewestOfLevel;
+    if (static_cast<std::ptrdiff_t>(in.geometry.VoxelCount()) > metric.mostVoxels && isCoarserGood)
+      continue;
+    coarsest = l;
     progress(l == 0 ? 0.0 : 0.9);
     MetricLevel level;
     level.geometry = in.geometry;
@@ -148,9 +153,9 @@ std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volu
   }
 
   // The centroid, from the coarsest level: it is where numbers are counted from, so that they stay small.
-  const PyramidLevel& coarsest = (*volume.pyramid)[result->levels.size() - 1];
-  const Eigen::Affine3d toWorld = coarsest.geometry.IndexToWorld();
-  const auto view = coarsest.intensity.View();
+  const PyramidLevel& last = (*volume.pyramid)[coarsest];
+  const Eigen::Affine3d toWorld = last.geometry.IndexToWorld();
+  const auto view = last.intensity.View();
   const auto& n = view.Dimensions();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0.0;

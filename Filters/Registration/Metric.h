@@ -39,6 +39,8 @@ struct MeanAndDeviation {
 };
 MeanAndDeviation MeanAndDeviationOf(const MetricSource& source);
 
+constexpr std::ptrdiff_t NoLimit = std::ptrdiff_t{1} << 40;
+
 /// A metric: how it sees, and how differences count.
 struct Metric {
   const char* name;
@@ -46,6 +48,8 @@ struct Metric {
   double lossScale;
   /// Values are brought to one mean and deviation over the overlap at each pose, so that gain and offset do not matter.
   bool fitsOverlap;
+  /// Levels with more voxels are left out, unless there is none with fewer.
+  std::ptrdiff_t mostVoxels;
   /// Fills seen, edges or descriptors of a level whose geometry, voxelMm and octave are set.
   void (*see)(const MetricSource& source, MetricLevel& level);
 };

@@ -51,6 +51,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric Lc2Metric{"lc2", 1e3, false, See};
+const Metric Lc2Metric{"lc2", 1e3, false, NoLimit, See};
 
 } // namespace echorama

@@ -15,7 +15,10 @@ namespace {
 
 constexpr double WindowVoxels = 2.0; // standard deviation of the window, in voxels of the octave
 constexpr double SmoothVoxels = 0.6; // of what is compared
-constexpr double FloorShare = 0.6;   // of the level's own standard deviation: the floor under the local one
+// A window that the border cuts has a mean of its own: a pattern that moves with the volume and pulls the borders of both onto
+// each other. Voxels count by how much of their window is real, from nothing to all between these two.
+constexpr float CutWindow = 0.6f, WholeWindow = 0.95f;
+constexpr double FloorShare = 0.6; // of the level's own standard deviation: the floor under the local one
 
 void See(const MetricSource& source, MetricLevel& level)
 {
@@ -55,7 +58,8 @@ void See(const MetricSource& source, MetricLevel& level)
       if (!(source.intensity[i] == source.intensity[i]))
         continue;
       const float m = s[i] / w[i], variance = std::fmax(0.0f, q[i] / w[i] - m * m);
-      const float texture = variance / (variance + floor), full = std::fmin(1.0f, 2.0f * w[i]);
+      const float texture = variance / (variance + floor);
+      const float whole = std::fmin(1.0f, std::fmax(0.0f, (w[i] - CutWindow) / (WholeWindow - CutWindow))), full = whole * whole;
       level.seen[static_cast<std::size_t>(2 * i)] = (fs[i] / fw[i] - m) / std::sqrt(variance + floor);
       level.seen[static_cast<std::size_t>(2 * i + 1)] = static_cast<float>(source.Trust(i)) * std::fmax(1e-3f, texture * full);
     }
@@ -64,6 +68,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric LocalNccMetric{"local-ncc", 0.25, false, See};
+const Metric LocalNccMetric{"local-ncc", 0.25, false, NoLimit, See};
 
 } // namespace echorama

@@ -22,6 +22,6 @@ void SeeIntensity(const MetricSource& source, MetricLevel& level)
   });
 }
 
-const Metric MadMetric{"mad", 0.1, false, SeeIntensity};
+const Metric MadMetric{"mad", 0.1, false, NoLimit, SeeIntensity};
 
 } // namespace echorama

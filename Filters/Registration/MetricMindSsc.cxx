@@ -6,7 +6,7 @@
 //
 // A distance is the smoothed square of the difference of two shifted images: twelve Gaussians over the volume. Descriptors
 // are kept as bytes: 16 per voxel with the weight; the error of 1/510 is far below the noise. Because of their size the
-// finest level is left out beyond 2^22 voxels that count (see BuildMetricPyramid).
+// levels of more than 2^22 voxels are left out.
 #include "Core/Base/Parallel.h"
 #include "Metric.h"
 #include "MetricBlock.h"
@@ -109,6 +109,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric MindSscMetric{"mind-ssc", 0.3, false, See};
+const Metric MindSscMetric{"mind-ssc", 0.3, false, 1 << 22, See};
 
 } // namespace echorama

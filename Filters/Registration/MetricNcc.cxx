@@ -8,6 +8,6 @@ namespace echorama {
 
 void SeeIntensity(const MetricSource& source, MetricLevel& level);
 
-const Metric NccMetric{"ncc", 1e3, true, SeeIntensity};
+const Metric NccMetric{"ncc", 1e3, true, NoLimit, SeeIntensity};
 
 } // namespace echorama
