@@ -4,6 +4,8 @@
 #include "Core/Base/Error.h"
 #include "Filters/Stitching/StitchGrid.h"
 
+#include "vtkDataObjectTree.h"
+#include "vtkDataObjectTreeIterator.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -11,8 +13,10 @@
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
+#include "vtkSmartPointer.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
+#include "vtkUltrasoundDisplacement.h"
 
 #include <cstring>
 
@@ -75,11 +79,24 @@ int vtkUltrasoundStitcher::GetMethodFromName(const char* name)
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundStitcher::FillInputPortInformation(int, vtkInformation* information)
+vtkUltrasoundStitcher::vtkUltrasoundStitcher()
 {
+  this->SetNumberOfInputPorts(2);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundStitcher::FillInputPortInformation(int port, vtkInformation* information)
+{
+  information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
+  if (port == 1) {
+    // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
+    information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+    information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+    information->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+    return 1;
+  }
   information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
   information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-  information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
   return 1;
 }
 
@@ -144,12 +161,47 @@ echorama::VolumeView<const float> vtkUltrasoundStitcher::ReliabilityOf(const vtk
 }
 
 //----------------------------------------------------------------------------
+std::vector<echorama::DisplacementField>
+vtkUltrasoundStitcher::DisplacementsOf(vtkInformationVector* port, const std::vector<vtkUltrasoundVolume::Input>& volumes) const
+{
+  std::vector<echorama::DisplacementField> fields;
+  const auto add = [&fields, &volumes](vtkImageData* image, const char* name) {
+    const std::size_t number = fields.size();
+    const std::string of = number < volumes.size() ? volumes[number].Name : "a volume too many";
+    if (name && *name && number < volumes.size() && of != name) {
+      throw Error(Error::Kind::BadInput, "displacement " + std::to_string(number + 1) + " is that of " + name +
+                                             ", but the volume in its place is " + of);
+    }
+    fields.push_back(vtkUltrasoundDisplacement::FieldOf(image, "the displacement of " + of));
+  };
+  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection) {
+    vtkDataObject* data = vtkDataObject::GetData(port, connection);
+    if (vtkImageData* image = vtkImageData::SafeDownCast(data)) {
+      add(image, nullptr);
+    } else if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data)) {
+      const auto leaf = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
+      leaf->VisitOnlyLeavesOn();
+      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
+        vtkInformation* meta = leaf->HasCurrentMetaData() ? leaf->GetCurrentMetaData() : nullptr;
+        add(vtkImageData::SafeDownCast(leaf->GetCurrentDataObject()), meta ? meta->Get(vtkCompositeDataSet::NAME()) : nullptr);
+      }
+    }
+  }
+  if (!fields.empty() && fields.size() != volumes.size()) {
+    throw Error(Error::Kind::BadInput, std::to_string(fields.size()) + " displacements came in for " +
+                                           std::to_string(volumes.size()) + " volumes; there must be one for each, or none");
+  }
+  return fields;
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   // 1. what came in
   const std::vector<vtkUltrasoundVolume::Input> volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+  const std::vector<echorama::DisplacementField> fields = this->DisplacementsOf(inputs[1], volumes);
   std::vector<echorama::StitchInput> stitched;
-  std::vector<echorama::ImageGeometry> geometries;
+  std::vector<echorama::ImageGeometry> geometries, reaches;
   int type = VTK_UNSIGNED_CHAR;
   vtkNew<vtkStringArray> names;
   names->SetName(StitchedVolumesName());
@@ -157,7 +209,9 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
     vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
       stitched.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name, this->ReliabilityOf(volume)});
     });
+    stitched.back().displacement = fields.empty() ? nullptr : &fields[stitched.size() - 1];
     geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
+    reaches.push_back(echorama::ReachOf(stitched.back()));
     type = CommonType(type, volume.Intensity->GetDataType());
     names->InsertNextValue(volume.Name);
   }
@@ -176,7 +230,7 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
       announced[5] + 1 != grid.dimensions[2]) {
     throw Error(Error::Kind::BadInput, "a volume came in with another geometry than its pipeline had announced");
   }
-  echorama::CheckStitch(parameters, geometries, grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)),
+  echorama::CheckStitch(parameters, reaches, grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)),
                         this->OutputWeights);
   output->Initialize();
   vtkUltrasoundVolume::SetGeometry(output, grid);

@@ -7,6 +7,9 @@
  * collection), each with `Intensity` and optionally `ValidRegion`. Their geometry is their pose. 2D images are volumes of
  * one slice. Voxels that are not finite count as not real. Types may differ: the output has the smallest type that holds all.
  *
+ * Input 1 (optional, repeatable): displacement images (vtkUltrasoundDisplacement), one per volume in the same order; blocks with
+ * names must have those of their volumes. Volumes are then read through them. The grid stays that of the geometries alone.
+ *
  * Output: one vtkImageData that covers all of them (echorama::StitchGrid says how it lies), with
  * - `Intensity`: the blend, 0 where no volume is;
  * - `ValidRegion`: 1 where any volume is;
@@ -112,13 +115,20 @@ public:
   ///@}
 
   ///@{
+  /** Displacements go to input 1, in the order of the volumes. */
+  void AddDisplacementConnection(vtkAlgorithmOutput* output) { this->AddInputConnection(1, output); }
+  void AddDisplacementData(vtkDataObject* data) { this->AddInputDataObject(1, data); }
+  void RemoveAllDisplacements() { this->SetInputConnection(1, nullptr); }
+  ///@}
+
+  ///@{
   /** Names of the output's own arrays. */
   static const char* CoverageName() { return "Coverage"; }
   static const char* StitchedVolumesName() { return "StitchedVolumes"; }
   ///@}
 
 protected:
-  vtkUltrasoundStitcher() = default;
+  vtkUltrasoundStitcher();
   ~vtkUltrasoundStitcher() override = default;
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
@@ -133,6 +143,8 @@ private:
 
 #ifndef __VTK_WRAP__
   echorama::VolumeView<const float> ReliabilityOf(const vtkUltrasoundVolume::Input& volume) const;
+  std::vector<echorama::DisplacementField> DisplacementsOf(vtkInformationVector* port,
+                                                           const std::vector<vtkUltrasoundVolume::Input>& volumes) const;
 #endif
 
   int Method = DISTANCE;
