@@ -168,6 +168,16 @@ class Aligner(Several):
         return filter
 
 
+class DeformableAligner(Several):
+    output = "blocks"
+
+    def filter(self, images=()):
+        filter = super().filter(images)
+        filter.SetFinestMm(2.0)
+        filter.SetIterations(2)
+        return filter
+
+
 class Score(Several):
     output = "points"
     same_grid = False
@@ -309,6 +319,7 @@ Special = {
     "vtkUltrasoundPhantomSource": Phantom,
     "vtkUltrasoundAligner": Aligner,
     "vtkUltrasoundAlignmentScore": Score,
+    "vtkUltrasoundDeformableAligner": DeformableAligner,
     "vtkUltrasoundStitcher": Stitcher,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundDeformableAligner.h"
+
+#include "Core/Base/Error.h"
+#include "vtkDataObjectTree.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMultiBlockDataSet.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundDisplacement.h"
+#include "vtkUltrasoundVolume.h"
+
+#include <algorithm>
+
+using echorama::Error;
+
+vtkStandardNewMacro(vtkUltrasoundDeformableAligner);
+
+namespace {
+void AddField(vtkDataObject* data, const char* name, std::initializer_list<double> values)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(static_cast<int>(values.size()));
+  array->InsertNextTuple(values.begin());
+  data->GetFieldData()->AddArray(array);
+}
+
+// What the metric sees of a volume, by its Reliability where it has one.
+std::shared_ptr<const echorama::MetricPyramid> FeaturesOf(const vtkUltrasoundVolume::Input& volume,
+                                                          const echorama::Progress& progress)
+{
+  vtkDataArray* trust = volume.Image->GetPointData()->GetArray(vtkUltrasoundVolume::ReliabilityName());
+  if (trust && (trust->GetDataType() != VTK_FLOAT || trust->GetNumberOfComponents() != 1 ||
+                trust->GetNumberOfTuples() != volume.Image->GetNumberOfPoints())) {
+    throw Error(Error::Kind::BadInput, volume.Name + ": its Reliability is not one float per voxel");
+  }
+  std::vector<echorama::PyramidLevel> pyramid, reliability;
+  vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
+    const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume);
+    pyramid = echorama::BuildPyramid(posed, {}, progress.Part(0.0, 0.3));
+    if (trust) {
+      reliability =
+          echorama::BuildPyramid(echorama::PosedVolume<float>{vtkUltrasoundVolume::ViewOf<const float>(trust, volume.Image),
+                                                              posed.valid, posed.geometry},
+                                 {}, progress.Part(0.3, 0.5));
+    }
+  });
+  echorama::PlacedVolume placed{&pyramid, echorama::Pose::Identity(), volume.Name};
+  placed.reliability = trust ? &reliability : nullptr;
+  return echorama::BuildMetricPyramid(placed, "local-ncc", progress.Part(0.5, 1.0));
+}
+
+// A volume that is not bent has a zero displacement at the corners of its box.
+echorama::DisplacementField ZeroField(const echorama::ImageGeometry& volume)
+{
+  echorama::ImageGeometry corners = volume;
+  for (int axis = 0; axis < 3; ++axis) {
+    corners.spacing[axis] *= std::max(1, volume.dimensions[axis] - 1);
+    corners.dimensions[axis] = 2;
+  }
+  return echorama::DisplacementField(corners);
+}
+} // namespace
+
+//----------------------------------------------------------------------------
+vtkUltrasoundDeformableAligner::vtkUltrasoundDeformableAligner()
+{
+  this->SetNumberOfOutputPorts(2);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundDeformableAligner::FillInputPortInformation(int, vtkInformation* info)
+{
+  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+  info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  info->Set(INPUT_IS_REPEATABLE(), 1);
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundDeformableAligner::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  // Without this, ranks other than the first would be handed empty data.
+  for (int port = 0; port < 2; ++port) {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundDeformableAligner::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
+{
+  vtkUltrasoundVolume::RequestWhole(inputs[0]);
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundDeformableAligner::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+    // 1. what came in
+    const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+    echorama::DeformableAlignParameters parameters;
+    parameters.controlSpacingMm = this->ControlSpacingMm;
+    parameters.bendingWeight = this->BendingWeight;
+    parameters.levels = this->Levels;
+    parameters.iterations = this->Iterations;
+    parameters.finestMm = this->FinestMm;
+    parameters.minimumOverlap = this->MinimumOverlap;
+    parameters.Check();
+    std::vector<std::shared_ptr<const echorama::MetricPyramid>> features;
+    std::vector<echorama::DeformableVolume> seen;
+    const double count = static_cast<double>(volumes.size());
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
+      const double done = static_cast<double>(i);
+      features.push_back(FeaturesOf(volumes[i], progress.Part(0.2 * done / count, 0.2 * (done + 1.0) / count)));
+      seen.push_back({features.back().get(), echorama::Pose::Identity(), nullptr});
+    }
+
+    // 2. the kernel
+    const auto results = echorama::DeformInTurn(seen, this->FixedVolume, parameters, progress.Part(0.2, 1.0));
+
+    // 3. the same volumes, and their displacements
+    auto* output = vtkMultiBlockDataSet::GetData(outputs, 0);
+    auto* displacements = vtkMultiBlockDataSet::GetData(outputs, 1);
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
+      const echorama::DeformableAlignResult& result = results[i];
+      vtkNew<vtkImageData> volume;
+      volume->ShallowCopy(volumes[i].Image);
+      AddField(volume, DeformationAppliedName(), {result.isApplied ? 1.0 : 0.0});
+      AddField(volume, DeformationSimilarityName(), {result.similarityBefore, result.similarityAfter});
+      AddField(volume, DeformationBendingName(), {result.bendingEnergy});
+      AddField(volume, DeformationLargestName(), {result.largestMm});
+      AddField(volume, DeformationJacobianName(), {result.smallestDeterminant});
+      vtkNew<vtkStringArray> reason;
+      reason->SetName(DeformationReasonName());
+      reason->InsertNextValue(static_cast<int>(i) == this->FixedVolume ? "it is the fixed volume" : result.reason);
+      volume->GetFieldData()->AddArray(reason);
+      vtkNew<vtkImageData> displacement;
+      vtkUltrasoundDisplacement::ImageOf(
+          result.isApplied ? result.field : ZeroField(vtkUltrasoundVolume::GeometryOf(volumes[i].Image)), displacement);
+      const auto block = static_cast<unsigned int>(i);
+      output->SetBlock(block, volume);
+      displacements->SetBlock(block, displacement);
+      for (vtkMultiBlockDataSet* blocks : {output, displacements}) {
+        blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volumes[i].Name.c_str());
+      }
+    }
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundDeformableAligner::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "FixedVolume: " << this->FixedVolume << "\n";
+  os << indent << "ControlSpacingMm: " << this->ControlSpacingMm << "\n";
+  os << indent << "BendingWeight: " << this->BendingWeight << "\n";
+  os << indent << "Levels: " << this->Levels << "\n";
+  os << indent << "Iterations: " << this->Iterations << "\n";
+  os << indent << "FinestMm: " << this->FinestMm << "\n";
+  os << indent << "MinimumOverlap: " << this->MinimumOverlap << "\n";
+}
