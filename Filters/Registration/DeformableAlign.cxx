@@ -3,7 +3,7 @@
 // That makes everything a product along three axes. A voxel touches 64 control points, so its share of the normal equations
 // is a matrix of 192 x 192; but the products of two weights along one axis are only ten numbers, so sums over a row need
 // ten times six numbers per cell (six of the outer product of the gradient), those over a slice a hundred times six, and
-// only whole cells get all thousand. The cost is then that of reading the moving volume, about 50 ns per voxel and step.
+// only whole cells get all thousand. The cost is then mostly that of reading the moving volume.
 //
 // The matrix couples control points at most three apart: it is kept as a stencil of 7^3 blocks of 3 x 3 per control point, the
 // penalty is added to it, and conjugate gradients solve it.
