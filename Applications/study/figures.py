@@ -76,49 +76,62 @@ def tables(rows):
     return "\n".join(text) + "\n"
 
 
+def size_of(row):
+    """Degrees and mm of the start's error; nothing where the truth is not known."""
+    return (round(row["start_degrees"]), round(row["start_mm"])) if "start_degrees" in row else None
+
+
 def against_start(axes, rows, methods):
     """Success and time, over the size of the start's error."""
+    rows = [row for row in rows if "start_degrees" in row]
+    sizes = sorted({size_of(row) for row in rows})
     for method in methods:
-        found = [row for row in rows if row["method"] == method and "start_degrees" in row]
-        sizes = sorted({(round(row["start_degrees"]), round(row["start_mm"])) for row in found})
-        if not sizes:
-            continue
-        groups = [[row for row in found if (round(row["start_degrees"]), round(row["start_mm"])) == size] for size in sizes]
-        where = range(len(sizes))
+        groups = [[row for row in rows if row["method"] == method and size_of(row) == size] for size in sizes]
+        right = [100 * np.mean([is_right(row) for row in group]) if group else np.nan for group in groups]
         colour = colour_of(method, methods)
-        axes[0].plot(where, [100 * np.mean([is_right(row) for row in group]) for group in groups], "o-", color=colour, label=method)
+        axes[0].plot(range(len(sizes)), right, "o-", color=colour, label=method)
         if method != "start":
-            axes[1].plot(where, [float(median_seconds(group, "cpu_seconds") or "nan") for group in groups], "o-", color=colour, label=method)
-        for one in axes:
-            one.set_xticks(where, [f"{degrees}°\n{mm} mm" for degrees, mm in sizes], fontsize=8)
-            one.set_xlabel("error of the start")
+            axes[1].plot(range(len(sizes)), [float(median_seconds(group, "cpu_seconds") or "nan") for group in groups], "o-", color=colour)
+    for one in axes:
+        one.set_xticks(range(len(sizes)), [f"{degrees}°\n{mm} mm" for degrees, mm in sizes], fontsize=8)
+        one.set_xlim(-0.5, len(sizes) - 0.5)
+        one.set_xlabel("error of the start")
     axes[0].set_ylabel("within 1 voxel, %")
     axes[0].set_ylim(-3, 103)
     axes[1].set_ylabel("CPU seconds, median")
-    axes[1].set_yscale("log")
+    axes[1].set_ylim(bottom=0)
+
+
+def usual_start(rows):
+    """The size of start that most methods have met in most cases, the larger of equals."""
+    sizes = {size_of(row) for row in rows} - {None}
+    return max(sizes, key=lambda size: (sum(size_of(row) == size for row in rows), size), default=None)
 
 
 def against_property(axis, rows, name, methods):
-    """Each run a dot, over a property; only cases that are plain in everything else. The line is the median."""
+    """Each run a dot, over a property; only cases that are plain in everything else, from one size of start. The line is the
+    median."""
     def plain_otherwise(row):
         return all(row.get(key, value) == value for key, value in PLAIN.items() if key not in (name, "gain_db"))
 
-    rows = [row for row in rows if name in row and plain_otherwise(row)]
+    size = usual_start(rows)
+    rows = [row for row in rows if name in row and plain_otherwise(row) and (size is None or size_of(row) == size)]
     values = sorted({row[name] for row in rows})
     axis.set_xticks(range(len(values)), ["none" if name == "noise_db" and value <= -120 else f"{value:g}" for value in values])
     for number, method in enumerate(methods):
         found = [[max(row["tre_voxels"], 1e-3) for row in rows if row["method"] == method and row[name] == value] for value in values]
-        shift = 0.12 * (number - (len(methods) - 1) / 2)
+        shift = 0.08 * (number - (len(methods) - 1) / 2)
         colour = colour_of(method, methods)
         for place, errors in enumerate(found):
-            axis.plot([place + shift] * len(errors), errors, ".", color=colour, alpha=0.5, markersize=5)
+            axis.plot([place + shift] * len(errors), errors, "o", color=colour, markersize=4)
         medians = [(place + shift, np.median(errors)) for place, errors in enumerate(found) if errors]
         if medians:
             axis.plot(*zip(*medians), "-", color=colour, linewidth=1.2)
+    axis.set_xlim(-0.5, len(values) - 0.5)
     axis.axhline(1, color="#bbbbbb", linewidth=0.8)
     axis.set_yscale("log")
     axis.set_xlabel(AGAINST[name])
-    axis.set_ylabel("TRE, voxels")
+    axis.set_ylabel("TRE, voxels" + (f" (start {size[0]}°, {size[1]} mm)" if size else ""))
 
 
 def plot_results(path, rows):
@@ -183,6 +196,8 @@ def plot_scores(path, rows, truth):
     figure, axis = plt.subplots(figsize=(6.5, 3.2))
     bars = axis.bar(methods, scores, color=[colour_of(method, methods) for method in methods])
     axis.bar_label(bars, [f"{score:.2f}" for score in scores], fontsize=9)
+    axis.set_yscale("log")
+    axis.set_ylim(0.05, 3 * max(scores))
     axis.set_ylabel("score: mean distance, mm")
     axis.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
