@@ -126,6 +126,26 @@ TEST_P(MetricTest, WhatIsNotReliableHasNoSay)
   EXPECT_LT(without, with - 0.2);
 }
 
+// The weights of both halves add up to those of all points.
+TEST_P(MetricTest, HalvesAreDisjoint)
+{
+  const auto features = seen.As(GetParam());
+  ComparisonSetup setup;
+  setup.metric = &MetricNamed(GetParam());
+  setup.fixed = setup.moving = &features->levels.front();
+  setup.points = 20000;
+  std::array<double, 3> weights{};
+  for (int part = 0; part < 3; ++part) {
+    setup.part = part;
+    const auto comparison = ComparePoints(setup);
+    const MetricSums sums = comparison->At(Pose::Identity(), Eigen::Vector3d::Zero());
+    weights[static_cast<std::size_t>(part)] = sums.weight;
+  }
+  EXPECT_GT(weights[1], 0.3 * weights[0]);
+  EXPECT_GT(weights[2], 0.3 * weights[0]);
+  EXPECT_NEAR(weights[1] + weights[2], weights[0], 1e-4 * weights[0]);
+}
+
 TEST(MetricNames, TheDefaultComesFirstAndOthersAreRefused)
 {
   EXPECT_EQ(MetricNames(), (std::vector<std::string>{"local-ncc", "ncc", "mad", "mind-ssc", "lc2"}));
