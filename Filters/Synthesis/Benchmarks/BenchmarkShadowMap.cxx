@@ -190,8 +190,7 @@ void Run(const Case& volume, bool withPeer)
     function();
     return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   };
-  const auto report = [&](const char* method, double time, double processor, VolumeView<const float> result, bool best,
-                          int threads) {
+  const auto report = [&](const char* method, double time, double work, VolumeView<const float> result, bool best, int threads) {
     const Quality q = QualityOf(volume, result);
     benchmark::Report("shadow_map", volume.name, method, time, best ? q.bestError : q.error, "1 - balanced accuracy",
                       {{"sensitivity", q.sensitivity},
@@ -200,12 +199,15 @@ void Run(const Case& volume, bool withPeer)
                        {"area_under_curve", q.area},
                        {"best_error", q.bestError},
                        {"mvoxels_per_second", voxels * 1e-6 / time},
-                       {"processor_seconds", processor},
+                       {"processor_seconds", work},
                        {"threads", threads}});
   };
-  report("echorama", seconds, processorSeconds(ours), map.View(), false, tbb::info::default_concurrency());
-  if (withPeer)
-    report("random walks 64x48x40, best threshold", peerSeconds, processorSeconds(peer), peerMap.View(), true, 1);
+  const double processor = processorSeconds(ours);
+  report("echorama", seconds, processor, map.View(), false, tbb::info::default_concurrency());
+  if (withPeer) {
+    const double peerProcessor = processorSeconds(peer);
+    report("random walks 64x48x40, best threshold", peerSeconds, peerProcessor, peerMap.View(), true, 1);
+  }
 }
 
 } // namespace
