@@ -162,9 +162,8 @@ class Aligner(Several):
 
     def filter(self, images=()):
         filter = super().filter(images)
-        filter.SetLevels(2)
-        filter.SetPoints(500)
-        filter.SetMinimumOverlap(0.2)
+        filter.SetStart("tracked")
+        filter.SetPoints(2000)
         return filter
 
 
