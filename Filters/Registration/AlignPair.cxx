@@ -30,6 +30,7 @@ namespace {
 
 constexpr double HighestRatio = 99.0;
 constexpr int MostPoints = 1000;
+constexpr int MostCandidates = 1000;
 constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
 
 using Clock = std::chrono::steady_clock;
@@ -142,7 +143,7 @@ public:
     global.coneDegrees = coneDegrees;
     global.reachMm = reachMm;
     global.minimumOverlap = p_.minimumOverlap;
-    global.candidates = p_.candidates * (result.anywhere ? 4 : 1);
+    global.candidates = result.anywhere ? std::min(4 * p_.candidates, MostCandidates) : p_.candidates;
     std::vector<Pose> poses{moving_.volumeToWorld};
     for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving_, global, progress.Part(0.0, 0.6)).candidates)
       poses.push_back(candidate.volumeToWorld);
@@ -312,7 +313,7 @@ void AlignPairParameters::Check() const
                   std::string(name) + " must be in [" + Number(from, 2) + ", " + Number(to, 2) + "]; it is " + Number(value, 4));
   };
   check("minimumOverlap", minimumOverlap, 0.01, 1.0);
-  check("candidates", candidates, 1, 1000);
+  check("candidates", candidates, 1, MostCandidates);
   check("finestMm", finestMm, 0.0, 1000.0);
   check("points", points, 1000, 1e7);
   check("minimumSimilarity", minimumSimilarity, 0.0, 1.0);

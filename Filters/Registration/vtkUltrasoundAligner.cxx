@@ -56,7 +56,7 @@ Prepared Prepare(const vtkUltrasoundVolume::Input& volume, bool withReliability,
   vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
     const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume);
     prepared.Pyramid = echorama::BuildPyramid(posed, {}, progress.Part(0.0, 0.3));
-    if (withReliability) {
+    if (withReliability && prepared.Pyramid.front().realVoxels > 0) {
       const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(volume.Image);
       const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(volume.Image);
       const auto probe = geometry && pose ? std::optional(echorama::PlacedProbe{*geometry, *pose}) : echorama::FindProbe(posed);

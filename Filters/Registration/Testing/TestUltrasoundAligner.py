@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The wrapped aligner and score: motions found, voxels shared, geometry and ProbeToWorld moved, errors that say why."""
+import json
 import math
 
 import numpy as np
@@ -84,6 +85,7 @@ def errors_of(algorithm):
 
 def aligner(*images):
     filter = vtkUltrasoundAligner()
+    filter.SetMethod("search")
     filter.SetPoints(3000)
     filter.SetFirstStepMm(5)
     filter.SetFirstStepDegrees(4)
@@ -179,6 +181,10 @@ assert even.GetNumberOfVolumes() == 2
 
 # 5. parameters by name
 named = vtkUltrasoundAligner()
+assert (named.GetMethod(), named.GetStart(), named.GetMetric()) == ("global", "automatic", "local-ncc")
+assert named.SetParameter("Candidates", 5) and named.GetCandidates() == 5
+assert named.SetParameter("UseReliability", 0) and not named.GetUseReliability()
+named.SetMethod("search")
 assert named.SetParameter("MinimumOverlap", 0.25) and named.GetMinimumOverlap() == 0.25
 assert named.SetParameter("Levels", 5) and named.GetLevels() == 5
 assert named.SetParameter("Pyramid", 0) and not named.GetPyramid()
@@ -197,8 +203,14 @@ messages = []
 named.AddObserver(vtkCommand.ErrorEvent, note)
 named.SetMethod("mutual-information")
 assert "mutual-information" in messages[0] and "search" in messages[0]
+named.SetStart("nowhere")
+assert "nowhere" in messages[1] and "hand-made" in messages[1]
+named.SetMetric("banana")
+assert "banana" in messages[2] and "mind-ssc" in messages[2]
+assert not named.SetParameter("Candidates", 5) and "search has no parameter" in messages[3]  # another method's
+assert (named.GetMethod(), named.GetStart(), named.GetMetric()) == ("search", "automatic", "local-ncc")
 named.SetMethod("search")
-assert len(messages) == 1
+assert len(messages) == 4
 
 # 6. abort: no output, and the filter itself reports no error
 stopped = aligner(a, wrong)
@@ -211,7 +223,34 @@ assert not messages, messages
 assert stopped.GetNumberOfVolumes() == 0 and stopped.GetOutput().GetNumberOfBlocks() == 0
 
 
-# 7. the score
+# 7. the method that needs no start: what it says of each volume, and the report
+sure = vtkUltrasoundAligner()
+assert not sure.GetAllAligned() and sure.GetReport() == "" and sure.GetVerdict(0) == ""
+sure.SetStart("tracked")
+sure.SetPoints(20000)
+for image in (a, wrong):
+    sure.AddInputDataObject(0, image)
+sure.Update()
+assert np.abs(geometry(sure.GetOutput().GetBlock(1)) - geometry(b)).max() < 0.5
+assert [sure.GetVerdict(i) for i in range(3)] == ["aligned", "aligned", ""] and sure.GetReason(1) == "" and sure.GetAllAligned()
+fields = sure.GetOutput().GetBlock(1).GetFieldData()
+assert fields.GetAbstractArray("AlignmentVerdict").GetValue(0) == "aligned" and fields.GetAbstractArray("AlignmentReason").GetValue(0) == ""
+assert fields.GetArray("AlignmentSimilarity").GetValue(0) == sure.GetSimilarity(1) > 0.5
+covariance = np.array(fields.GetArray("AlignmentCovariance").GetTuple(0)).reshape(6, 6)
+assert np.allclose(covariance, covariance.T) and np.linalg.eigvalsh(covariance).min() > 0
+assert fields.GetArray("AlignmentCentre").GetNumberOfComponents() == 3
+report = json.loads(sure.GetReport())
+assert report["method"] == "global" and len(report["volumes"]) == 2 and len(report["pairs"]) == 1
+assert report["pairs"][0]["verdict"] == "aligned" and not report["pairs"][0]["voted_down"]
+forward = np.linalg.inv(geometry(sure.GetOutput().GetBlock(0))) @ geometry(sure.GetOutput().GetBlock(1))
+sure.SetFixedVolume(1)  # the other way round is the inverse motion, within a tenth of a voxel
+sure.Update()
+swapped = np.linalg.inv(geometry(sure.GetOutput().GetBlock(0))) @ geometry(wrong)
+corners = np.array([[i, j, k, 1.0] for i in (0, 86) for j in (0, 78) for k in (0, 70)]).T
+assert np.linalg.norm(((swapped - forward) @ corners)[:3], axis=0).mean() < 0.2, "voxels of 2 mm"
+
+
+# 8. the score
 def score(aligned, truth):
     filter = vtkUltrasoundAlignmentScore()
     filter.SetPoints(500)
