@@ -6,6 +6,7 @@
 #include "Core/Geometry/ProbeFit.h"
 #include "Core/Imaging/RegionOutline.h"
 #include "Core/Imaging/ScanConversion.h"
+#include "Testing/Sanitized.h"
 #include <functional>
 #include <gtest/gtest.h>
 #include <vector>
@@ -123,13 +124,7 @@ ImageGeometry GridOf(int x, int y, int z, const Eigen::Vector3d& spacing = Eigen
 
 using NamedProbe = std::pair<const char*, ProbeGeometry>;
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ECHORAMA_SANITIZED
-#endif
-#endif
-
-// All of them; under the sanitizers, which look for slips of memory and take fifteen times as long, the first two.
+// All of them; under the sanitizers the first two.
 std::vector<NamedProbe> Chosen(const std::vector<NamedProbe>& probes)
 {
 #ifdef ECHORAMA_SANITIZED

@@ -3,6 +3,7 @@
 #include "Core/Base/Random.h"
 #include "Filters/Registration/GlobalSearch.h"
 #include "Filters/Registration/MaskedCorrelation.h"
+#include "Testing/Sanitized.h"
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -308,6 +309,7 @@ TEST_F(GlobalSearchTest, FindsTheWayBackFromACone)
 
 TEST_F(GlobalSearchTest, FindsTheWayBackFromAnywhere)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const GlobalSearchResult result = GlobalSearch(fixed, Knocked(3, 170.0, 200.0), Quick(180.0));
   ASSERT_FALSE(result.candidates.empty());
   EXPECT_LT(Distance(result.candidates.front().volumeToWorld, Pose::Identity(), movingSeen.geometry), 5.0);
@@ -326,6 +328,7 @@ TEST_F(GlobalSearchTest, TurnsAndMovesTheFixedVolumeToo)
 
 TEST_F(GlobalSearchTest, DoesNotDependOnTheThreads)
 {
+  ECHORAMA_SKIP_SANITIZED();
   GlobalSearchResult results[2];
   for (const int threads : {1, 2}) {
     const ThreadLimit limit(threads);
@@ -341,6 +344,7 @@ TEST_F(GlobalSearchTest, DoesNotDependOnTheThreads)
 // Gain, an offset, and brightness that changes slowly leave the answer alone.
 TEST_F(GlobalSearchTest, IsNotMisledByGain)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Seen dim(scene, movingSeen.geometry,
                  [](const Eigen::Vector3d& p, double v) { return 0.3 * v * (1.0 - 0.006 * (p.z() + 6.0)) + 40.0; });
   PlacedVolume knocked = Knocked(0, 25.0, 30.0);
@@ -380,6 +384,7 @@ TEST_F(GlobalSearchTest, LooksAtWhatIsRealAndTrusted)
 
 TEST_F(GlobalSearchTest, WorksAcrossSpacingsAndSizes)
 {
+  ECHORAMA_SKIP_SANITIZED();
   ImageGeometry other = Box({36, 38, 12}, {1.5, 1.5, 7.5}, {0.0, 0.0, 0.0}); // 1 : 1 : 5, oblique
   other.direction = ExpRotation({0.0, 0.2, 0.4});
   other.origin += fixedSeen.geometry.Centre() + Eigen::Vector3d(8.0, -4.0, 2.0) - other.Centre();

@@ -5,6 +5,7 @@
 #endif
 #include "Filters/Registration/LocalAlign.h"
 #include "LocalAlignScene.h"
+#include "Testing/Sanitized.h"
 #include <limits>
 
 namespace echorama {
@@ -182,6 +183,7 @@ TEST_P(LocalNccAlignTest, WrongCallsAreRefused)
 // Speckle of its own in each volume, correlated over some voxels: the covariance that is told against the scatter of answers.
 TEST(LocalAlignCovariance, TellsTheScatterOfAnswers)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Texture texture(7);
   const ImageGeometry geometry = Box({32, 30, 28}, {1.0, 1.0, 1.0}, {-16.0, -15.0, -14.0});
   constexpr int Trials = 12;
