@@ -36,6 +36,7 @@ namespace {
 constexpr double RadiansPerDegree = 0.017453292519943295;
 constexpr int Views = 10;
 constexpr double SpacingMm = 1.5;
+constexpr double RadiusMm = 45.0; // of the ring: neighbours overlap by some 70%, the next but one by some 35%
 const std::vector<std::pair<int, int>> WrongPairs{{2, 4}, {6, 7}};
 
 std::size_t Index(int number)
@@ -99,7 +100,7 @@ public:
       Pose pose = Pose::Identity();
       pose.linear() = ExpRotation(0.12 * Eigen::Vector3d(-std::sin(angle), std::cos(angle), 0.0)) *
                       ExpRotation({0.0, 0.0, 0.35 * std::sin(angle)});
-      pose.translation() = Eigen::Vector3d(62.0 * std::cos(angle), 62.0 * std::sin(angle), 0.0);
+      pose.translation() = Eigen::Vector3d(RadiusMm * std::cos(angle), RadiusMm * std::sin(angle), 0.0);
       parameters.probeToWorld = pose;
       parameters.gainDb = gains[v % 3];
       geometries.push_back(PhantomGeometry(parameters));
