@@ -5,6 +5,7 @@
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Imaging/ShadowMap.h"
+#include "Testing/Sanitized.h"
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -400,6 +401,7 @@ TEST(ShadowMap, OneThreadOrTwo)
 
 TEST(ShadowMap, FindsTheProbeItself)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Image& image = BodyImage();
   std::string note;
   const auto probe = FindProbe(image.Posed(), {}, &note);

@@ -4,6 +4,7 @@
 #include "Filters/Registration/AlignInTurn.h"
 #include "Filters/Registration/AlignSearch.h"
 #include "RandomScene.h"
+#include "Testing/Sanitized.h"
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -244,6 +245,7 @@ TEST_F(AlignSearchTest, ProgressGrowsToOne)
 // Three in a row, the last given first: it is placed last, because it overlaps only the middle one.
 TEST_F(AlignSearchTest, PlacesManyInTurn)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const ImageGeometry thirdGeometry = Box({45, 40, 35}, 2.0, {60.0, 0.0, 2.0});
   const Volume<float> thirdVoxels = See(scene, thirdGeometry);
   const auto thirdPyramid = PyramidOf(thirdVoxels, thirdGeometry);
