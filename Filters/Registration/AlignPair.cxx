@@ -31,6 +31,7 @@ namespace {
 constexpr double HighestRatio = 99.0;
 constexpr int MostPoints = 1000;
 constexpr int MostCandidates = 1000;
+constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
 
 using Clock = std::chrono::steady_clock;
@@ -160,11 +161,23 @@ public:
     poses.clear();
     for (std::size_t i = 0; i < std::min<std::size_t>(Finalists, found.size()); ++i)
       poses.push_back(found[i].volumeToWorld);
-    const double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
+    double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
     found = Refine(poses, coarseMm_, middleMm, progress.Part(0.7, 0.8));
     if (found.empty()) {
       result.reason = "every pose that fits at a coarse level loses its overlap at a finer one";
       return result;
+    }
+    // What this level cannot tell apart a finer one may.
+    while (Ratio(found) < p_.minimumPeakRatio && middleMm > finestMm_) {
+      const double finerMm = std::max(finestMm_, 0.5 * middleMm);
+      poses.clear();
+      for (std::size_t i = 0; i < std::min<std::size_t>(Rivals, found.size()); ++i)
+        poses.push_back(found[i].volumeToWorld);
+      std::vector<LocalAlignResult> closer = Refine(poses, middleMm, finerMm, progress.Part(0.8, 0.8));
+      if (closer.empty())
+        break;
+      found = std::move(closer);
+      middleMm = finerMm;
     }
     result.peakRatio = Ratio(found);
     if (!isLast && (result.peakRatio < p_.minimumPeakRatio || found.front().similarity < p_.minimumSimilarity)) {
