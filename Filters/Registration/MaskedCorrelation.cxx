@@ -13,18 +13,13 @@
 #include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <complex>
-#include <condition_variable>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <queue>
 #include <stdexcept>
-#include <thread>
 #include <vector>
 // It asks aligned_alloc for sizes that are no multiples of the alignment, which C11 does not allow.
 #define aligned_alloc(alignment, size) std::aligned_alloc(alignment, ((size) + (alignment)-1) / (alignment) * (alignment))
