@@ -160,7 +160,7 @@ Command AlignCommand(CLI::App& program)
   options
       ->add_option("--start", values->start,
                    "What is known about where volumes belong, for global: tracked (within 12 degrees and 20 mm), hand-made (35 "
-                   "degrees and a third of a volume), unknown (nothing), automatic (hand-made, then unknown)")
+                   "degrees and a third of a volume), unknown (nothing), automatic (one after the other, while unclear)")
       ->check(CLI::IsMember(AlignStartNames()))
       ->capture_default_str();
   options->add_option("--metric", values->metric, "The likeness that refines poses, for global")

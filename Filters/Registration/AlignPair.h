@@ -11,7 +11,7 @@ namespace echorama {
 /// What is known about where the moving volume belongs.
 enum class AlignStart {
   Automatic, ///< nothing for sure: as Tracked first, then as HandMade and as Unknown while there is no clear answer
-  Tracked,   ///< within some 10 degrees and 15 mm of the start: a calibrated tracker
+  Tracked,   ///< within some 12 degrees and 20 mm of the start: a calibrated tracker
   HandMade,  ///< within some 35 degrees and a third of the volume's size: placed by eye
   Unknown,   ///< any rotation and any translation
 };

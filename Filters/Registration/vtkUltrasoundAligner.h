@@ -71,8 +71,8 @@ public:
   /**
    * What is known about where the volumes belong, method `global`: "tracked" (within some 12 degrees and 20 mm), "hand-made"
    * (within some 35 degrees and a third of a volume's size), "unknown" (nothing: every rotation and translation is tried), or
-   * "automatic" (default: hand-made first, unknown when that gives no clear answer). Another name is an error and changes
-   * nothing.
+   * "automatic" (default: tracked, then hand-made, then unknown, while there is no clear answer). Another name is an error and
+   * changes nothing.
    */
   void SetStart(const char* name);
   const char* GetStart() const;
@@ -120,8 +120,8 @@ public:
 
   ///@{
   /**
-   * When an answer is trusted, method `global`: least similarity in the overlap, [0, 1]; least ratio of the best score to that of
-   * the next different pose, [1, 99]; largest predicted error and largest distance of the poses that two halves of the voxels
+   * When an answer is trusted, method `global`: least similarity in the overlap, [0, 1]; least ratio of the best evidence to that
+   * of the next different pose, [1, 99]; largest predicted error and largest distance of the poses that two halves of the voxels
    * find, voxels, (0, 1000]. Defaults as echorama::AlignPairParameters.
    */
   vtkSetClampMacro(MinimumSimilarity, double, 0.0, 1.0);
