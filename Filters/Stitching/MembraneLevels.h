@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/Parallel.h"
+#include <array>
+#include <cstdint>
+#include <Eigen/Core>
+#include <vector>
+
+namespace echorama {
+
+/// Where the voxels of one level of a membrane are kept. Rows run along x; each stores the voxels between its first and last
+/// unknown, and what the unknowns of rows nearby look at (one voxel further on all sides), so that loops over a row need no
+/// cases. Rows of the border hold no unknowns. Voxels are found by Row::at + i, with i the index along x.
+struct MembraneRows {
+  struct Row {
+    int begin = 0, end = 0;  ///< the unknowns lie here
+    int first = 0, last = 0; ///< what is stored, [first, last)
+    std::ptrdiff_t at = 0;   ///< position of x = 0 in arrays of the level
+  };
+  std::array<int, 2> low{0, 0};  ///< the lowest y and z that hold unknowns
+  std::array<int, 2> size{0, 0}; ///< how many rows and slices do
+  std::ptrdiff_t count = 0;      ///< voxels stored
+  std::vector<Row> rows;         ///< with one more row on each side
+
+  MembraneRows() = default;
+  /// From begin and end of the rows that hold unknowns (y fastest); lays out what is stored.
+  MembraneRows(std::array<int, 2> lowest, std::array<int, 2> extent, const std::vector<std::array<int, 2>>& unknowns);
+
+  /// y from low[0] - 1 to low[0] + size[0]; z alike.
+  const Row& At(int y, int z) const
+  {
+    return rows[static_cast<std::size_t>(z - low[1] + 1) * static_cast<std::size_t>(size[0] + 2) +
+                static_cast<std::size_t>(y - low[0] + 1)];
+  }
+  Row& At(int y, int z) { return const_cast<Row&>(static_cast<const MembraneRows&>(*this).At(y, z)); }
+  /// Slices that one task works on, whatever the number of threads.
+  std::ptrdiff_t Grain() const;
+};
+
+/// What a stored voxel of the finest level is: for unknowns, how many neighbours along x, y and z are not void, two bits each
+/// from the lowest on; bit 6 marks known voxels; 0 is void.
+enum : unsigned char { MembraneCounts = 0x3f, MembraneKnown = 0x40 };
+
+/// The levels of a membrane: the equations A e = r of its unknowns, and ever coarser images of them.
+///
+/// Finest level: (A e)(p) = sum over neighbours q that are not void of w_axis (e_p - e_q), e = 0 at known voxels. A coarse
+/// cell joins two voxels per axis (only the axes whose spacing is nearly the least), holds an unknown if any of them does, and
+/// is tied to its neighbours and to the known voxels by the sums of their ties, scaled to its size.
+class MembraneLevels {
+public:
+  struct Level {
+    MembraneRows rows;
+    std::array<bool, 3> halved{false, false, false}; ///< the axes along which the next level is coarser
+    std::ptrdiff_t unknowns = 0;
+    std::vector<float> value, right; ///< e and r
+    // Coarse levels: ties to the lower neighbour along x, y and z, and one over their sum (0: not an unknown).
+    std::vector<float> tie[3], inverse;
+    // Coarse cells without unknowns that interpolation looks at: they take a weighted sum of unknowns nearby.
+    struct Fill {
+      std::vector<std::uint32_t> cell, from; ///< the voxels from[start[n]] ... take part in cell[n]
+      std::vector<std::uint32_t> start;
+      std::vector<float> weight; ///< like from
+    };
+    Fill voids;  ///< cells that are not there: the mean of their neighbours
+    Fill knowns; ///< known cells: the boundary value, from the right sides of their neighbours
+  };
+
+  /// \param rows, codes of the finest level; there is at least one unknown, each is connected to a known voxel
+  MembraneLevels(MembraneRows rows, std::vector<unsigned char> codes, const Eigen::Vector3d& spacing, const Progress& progress);
+
+  const MembraneRows& Rows() const { return levels_.front().rows; }
+  const std::vector<unsigned char>& Codes() const { return codes_; }
+  const Eigen::Vector3d& Weights() const { return weights_; } ///< (least spacing / spacing)^2
+  Level& Finest() { return levels_.front(); }
+  int Count() const { return static_cast<int>(levels_.size()); }
+  const std::vector<Level>& All() const { return levels_; }
+
+  /// value := about A^-1 right on the finest level: one V-cycle.
+  void Cycle() { Cycle(0, false); }
+  /// value := a first guess of the solution on the finest level, from all coarser ones. right holds what known values give.
+  void Guess();
+  /// value := about A^-1 right where the right side is a source in space, not at known voxels.
+  void Spread();
+  /// value := the improved value, by \a sweeps over both colours.
+  void Smooth(int sweeps) { Smooth(0, sweeps, false, false); }
+
+private:
+  void BuildCoarse(int fine);
+  void BuildFills(int level, const std::vector<unsigned char>& kinds);
+  void BuildCoarsest();
+  void Smooth(int level, int sweeps, bool fromZero, bool backwards);
+  void Aggregate(int fine, float factor);
+  void Restrict(int fine);
+  void Prolong(int fine, bool add, bool solution);
+  void SolveCoarsest();
+  void Cycle(int level, bool improve);
+
+  std::vector<Level> levels_;
+  std::vector<unsigned char> codes_;
+  Eigen::Vector3d weights_;
+  std::vector<std::vector<float>> known_; // per level while it is built: ties to known voxels
+  std::vector<unsigned char> kinds_;      // of the level built last
+  std::vector<std::ptrdiff_t> coarsest_;  // the unknowns of the coarsest level
+  std::vector<double> factor_;            // its Cholesky factor, by rows
+};
+
+} // namespace echorama
