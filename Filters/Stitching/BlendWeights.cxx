@@ -16,12 +16,16 @@ float BlendScale(float pure, float empty)
   return empty / (pure + empty);
 }
 
-void BlendWeights(const float* scales, std::size_t count, const BlendPower& power, float* weights)
+void BlendWeights(const float* scales, const float* factors, std::size_t count, const BlendPower& power, float* weights)
 {
   const float largest = count ? *std::max_element(scales, scales + count) : 0.0f;
   float total = 0.0f;
-  for (std::size_t i = 0; i < count; ++i)
-    total += weights[i] = scales[i] < largest ? power(scales[i] / largest) : 1.0f;
+  for (std::size_t i = 0; i < count; ++i) {
+    weights[i] = scales[i] < largest ? power(scales[i] / largest) : 1.0f;
+    if (factors)
+      weights[i] *= factors[i];
+    total += weights[i];
+  }
   for (std::size_t i = 0; i < count; ++i)
     weights[i] /= total;
 }

@@ -15,11 +15,12 @@ float BlendScale(float pure, float empty);
 class BlendPower {
 public:
   explicit BlendPower(double b)
-    : kind_(b == 0.0   ? Kind::Zero
-            : b == 1.0 ? Kind::One
-            : b == 1.5 ? Kind::OneAndAHalf
-            : b == 2.0 ? Kind::Two
-                       : Kind::Other),
+    : kind_(b == 0.0    ? Kind::Zero
+            : b == 1.0  ? Kind::One
+            : b == 1.5  ? Kind::OneAndAHalf
+            : b == 2.0  ? Kind::Two
+            : b == 32.0 ? Kind::ThirtyTwo
+                        : Kind::Other),
       b_(static_cast<float>(b))
   {
   }
@@ -35,6 +36,10 @@ public:
       return ratio * std::sqrt(ratio);
     case Kind::Two:
       return ratio * ratio;
+    case Kind::ThirtyTwo:
+      for (int doubling = 0; doubling < 5; ++doubling)
+        ratio *= ratio;
+      return ratio;
     case Kind::Other:
       break;
     }
@@ -42,49 +47,13 @@ public:
   }
 
 private:
-  enum class Kind { Zero, One, OneAndAHalf, Two, Other } kind_;
+  enum class Kind { Zero, One, OneAndAHalf, Two, ThirtyTwo, Other } kind_;
   float b_;
 };
 
 /// The weights of \a count volumes at one voxel: s_i^b / sum s_j^b, dissertation eq. 5.10 (5.4 with b = 1).
 /// Scales are divided by the largest first, so that a large b never gives 0/0. All scales 0: each weight is 1 / count.
-void BlendWeights(const float* scales, std::size_t count, const BlendPower& power, float* weights);
-
-/// The blend of one voxel, fed one volume at a time: the weighted mean of eq. 5.5 and 5.10 without keeping any volume.
-///
-/// It keeps the largest scale so far and the sum of weights relative to it; when a larger one comes, the sum shrinks. The
-/// mean moves by w / total * (v - mean), so that equal values stay what they are to the last bit. A factor (how far the value can
-/// be trusted, > 0) multiplies the weight of a volume.
-template <class A>
-struct BlendSum {
-  A mean = A(0);
-  float largest = 0.0f; ///< scale
-  float total = 0.0f;   ///< sum of factor (scale / largest)^b; 0: nothing came yet
-
-  void Add(A value, float scale, const BlendPower& power, float factor = 1.0f)
-  {
-    float weight = factor;
-    if (total == 0.0f) {
-      mean = value;
-      largest = scale;
-      total = factor;
-      return;
-    }
-    if (scale > largest) {
-      total *= power(largest / scale);
-      largest = scale;
-    } else if (scale < largest) {
-      weight *= power(scale / largest);
-    }
-    total += weight;
-    mean += static_cast<A>(weight / total) * (value - mean);
-  }
-
-  /// The weight that a volume of this scale and factor has, once all volumes came.
-  float Weight(float scale, const BlendPower& power, float factor = 1.0f) const
-  {
-    return factor * (scale < largest ? power(scale / largest) : 1.0f) / total;
-  }
-};
+/// \param factors how far each volume can be trusted, > 0: multiplies s^b; nullptr: 1
+void BlendWeights(const float* scales, const float* factors, std::size_t count, const BlendPower& power, float* weights);
 
 } // namespace echorama

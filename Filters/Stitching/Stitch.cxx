@@ -1,92 +1,44 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Three passes over the volumes, each parallel over rows of the output:
-//   1. where each lies in the grid (a mask in its own box), from which RegionMap knows pure, overlap and empty regions;
-//   2. volumes that others cover wholly get a core;
-//   3. one volume after the other is resampled; where it is alone its value is final, where it overlaps it goes into a
-//      running blend (BlendSum) with the scale that its two distance maps give, and how far it can be trusted there. The maps
-//      live for one volume only, and the blend is kept for voxels of the overlap only, in the dense numbering that RegionMap
-//      gives them.
-// Volumes come in their order and every voxel is worked on by one thread, so threads do not change the result.
+// The plan, in its order:
+//   1. masks of the volumes on the plan's grid, from which RegionMap knows pure, overlap and empty regions; cores;
+//   2. a scale per volume at the voxels of its overlap (StitchScales), kept in spans of rows;
+//   3. where gains, seams or textures are wanted: smooth parts of the volumes (LowPass, on their own lattices), and all volumes
+//      on a coarse copy of the grid, on which gains, correlations, seams and offsets are found.
+// Masks and maps are gone when the plan stands. Rendering goes row by row: every volume that covers the row is sampled, and
+// what belongs to a voxel is gathered and blended there. Nothing is kept per voxel but the output, and no voxel needs its
+// neighbours, so boxes and threads do not change the result.
 #include "Stitch.h"
 #include "BlendWeights.h"
 #include "Core/Base/Error.h"
 #include "Core/Imaging/VoxelTypes.h"
+#include "LowPass.h"
+#include "Multiband.h"
 #include "RegionMap.h"
-#include "RowSampler.h"
-#include "StitchGrid.h"
+#include "SeamCut.h"
+#include "StitchGain.h"
+#include "StitchMemory.h"
+#include "StitchOffsets.h"
+#include "StitchSampler.h"
+#include "StitchScales.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <optional>
-#include <unistd.h>
 
 namespace echorama {
 
 namespace {
 
-// Blends are kept in float, those of doubles in double.
+// What is decided for all voxels together is decided on a grid of about so many at most.
+constexpr double coarseVoxels = 1.5e6;
+
+// Details are made stronger or weaker by no more than this: a shadow holds nothing but noise.
+constexpr float mostAmplified = 2.0f;
+
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+
+// Sums are kept in float, those of doubles in double.
 template <class T>
 using Accumulator = std::conditional_t<std::is_same_v<T, double>, double, float>;
-
-using AnySampler =
-    std::variant<RowSampler<unsigned char>, RowSampler<short>, RowSampler<unsigned short>, RowSampler<float>, RowSampler<double>>;
-
-const ImageGeometry& GeometryOf(const StitchInput& input)
-{
-  return std::visit([](const auto& volume) -> const ImageGeometry& { return volume.geometry; }, input.volume);
-}
-
-std::vector<ImageGeometry> GeometriesOf(const std::vector<StitchInput>& inputs)
-{
-  std::vector<ImageGeometry> geometries;
-  for (const StitchInput& input : inputs)
-    geometries.push_back(GeometryOf(input));
-  return geometries;
-}
-
-AnySampler SamplerOf(const StitchInput& input, const ImageGeometry& grid)
-{
-  return std::visit(
-      [&](const auto& volume) -> AnySampler {
-        if (volume.intensity.Dimensions() != volume.geometry.dimensions ||
-            (!volume.valid.Empty() && volume.valid.Dimensions() != volume.geometry.dimensions))
-          throw Error(Error::Kind::BadInput, input.name + ": its voxels are not of the size that its geometry says");
-        return RowSampler(volume, grid, input.displacement);
-      },
-      input.volume);
-}
-
-// How far the voxels of a volume can be trusted, row by row of its box in the grid; 1 where it does not say.
-class Trust {
-public:
-  Trust(const StitchInput& input, const ImageGeometry& grid, double floor) : floor_(static_cast<float>(floor))
-  {
-    if (input.reliability.Empty())
-      return;
-    std::visit(
-        [&](const auto& volume) {
-          if (input.reliability.Dimensions() != volume.geometry.dimensions)
-            throw Error(Error::Kind::BadInput, input.name + ": its reliability is not of the size that its geometry says");
-          sampler_.emplace(PosedVolume<float>{input.reliability, volume.valid, volume.geometry}, grid, input.displacement);
-        },
-        input.volume);
-  }
-
-  explicit operator bool() const { return sampler_.has_value(); }
-
-  // Numbers in [floor, 1], where bit 0 of inside is set. What is not a number is not trusted.
-  void Row(int j, int k, const unsigned char* inside, std::vector<float>& trust) const
-  {
-    sampler_->Values(j, k, inside, trust.data());
-    for (float& value : trust)
-      value = value > floor_ ? std::min(value, 1.0f) : floor_;
-  }
-
-private:
-  float floor_;
-  std::optional<RowSampler<float>> sampler_;
-};
 
 template <class T, class A>
 T Rounded(A value)
@@ -96,38 +48,6 @@ T Rounded(A value)
                                      static_cast<A>(std::numeric_limits<T>::max())));
   else
     return static_cast<T>(value);
-}
-
-std::string Gigabytes(double bytes)
-{
-  char text[32];
-  std::snprintf(text, sizeof text, bytes < 1e8 ? "%.3g GB" : "%.1f GB", bytes * 1e-9);
-  return text;
-}
-
-double AllowedMemory(const StitchParameters& parameters)
-{
-  if (parameters.maximumMemoryGb > 0.0)
-    return parameters.maximumMemoryGb * 1e9;
-  return 0.75 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
-
-std::vector<Boxed<unsigned char>> MasksOf(const std::vector<AnySampler>& samplers, const Progress& progress)
-{
-  std::vector<Boxed<unsigned char>> masks(samplers.size());
-  for (std::size_t v = 0; v < samplers.size(); ++v)
-    std::visit(
-        [&](const auto& sampler) {
-          masks[v].box = sampler.Box();
-          if (masks[v].box.Empty())
-            return;
-          masks[v].values = Volume<unsigned char>(sampler.Box().size);
-          const double n = static_cast<double>(samplers.size());
-          ForRows(sampler.Box(), progress.Part(static_cast<double>(v) / n, static_cast<double>(v + 1) / n),
-                  [&](int j, int k) { sampler.Inside(j, k, masks[v].Row(j, k)); });
-        },
-        samplers[v]);
-  return masks;
 }
 
 void CheckRegions(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const RegionMap& regions)
@@ -142,51 +62,12 @@ void CheckRegions(const StitchParameters& parameters, const std::vector<StitchIn
                   inputs[v].name + " overlaps no other volume; check its pose, or set AllowDisjoint to put it where it is");
 }
 
-// The scales of one volume in its overlap region.
-class Scales {
-public:
-  Scales(StitchMethod method, const RegionMap& regions, int volume, const Progress& progress) : method_(method)
-  {
-    if (regions.OverlapCount(volume) == 0)
-      return;
-    if (method == StitchMethod::Distance) {
-      pure_ = regions.SquaredDistanceTo(Region::Pure, volume, progress.Part(0.0, 0.5));
-      empty_ = regions.SquaredDistanceTo(Region::Empty, volume, progress.Part(0.5, 1.0));
-    } else if (method == StitchMethod::Feather) {
-      depth_ = regions.SquaredDepth(volume, progress);
-    }
-  }
-
-  // For one row of the grid: at(i) is the scale of an overlap voxel of this volume.
-  class Row {
-  public:
-    Row(const Scales& scales, int j, int k)
-      : method_(scales.method_), pure_(scales.pure_, j, k), empty_(scales.empty_, j, k), depth_(scales.depth_, j, k)
-    {
-    }
-    float operator()(int i) const
-    {
-      if (method_ == StitchMethod::Distance)
-        return BlendScale(pure_(i), empty_(i));
-      return method_ == StitchMethod::Feather ? depth_(i) : 1.0f;
-    }
-
-  private:
-    struct Distance {
-      Distance(const Boxed<float>& map, int j, int k) : squared(map.box.HasRow(j, k) ? map.Row(j, k) - map.box.first[0] : nullptr)
-      {
-      }
-      float operator()(int i) const { return squared ? std::sqrt(squared[i]) : std::numeric_limits<float>::infinity(); }
-      const float* squared;
-    };
-    StitchMethod method_;
-    Distance pure_, empty_, depth_;
-  };
-
-private:
-  StitchMethod method_;
-  Boxed<float> pure_, empty_, depth_;
-};
+bool IsTextured(const StitchParameters& parameters)
+{
+  const bool weighted = parameters.method == StitchMethod::Distance || parameters.method == StitchMethod::Feather ||
+                        parameters.method == StitchMethod::Average || parameters.method == StitchMethod::Membrane;
+  return weighted && parameters.texture != StitchTexture::Mix;
+}
 
 } // namespace
 
@@ -207,185 +88,620 @@ ImageGeometry ReachOf(const StitchInput& input)
   return reach;
 }
 
-double StitchMemory(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
-                    std::size_t voxelBytes, bool weights)
-{
-  const double voxels = static_cast<double>(grid.VoxelCount());
-  double boxes = 0.0, largestBox = 0.0;
-  for (const ImageGeometry& volume : volumes) {
-    const double box = static_cast<double>(BoxOf(volume, grid).VoxelCount());
-    boxes += box;
-    largestBox = std::max(largestBox, box);
+// A field on a box of a coarse grid, and where it is known.
+struct CoarseField {
+  Boxed<float> values;
+  Boxed<unsigned char> known;
+};
+
+struct StitchPlan::Parts {
+  StitchParameters parameters;
+  std::vector<StitchInput> inputs;
+  ImageGeometry grid;
+  std::vector<StitchSampler> samplers;
+  int factor = 1;
+  double bound = 0.0;
+  bool textured = false;
+  std::vector<RowField<float>> scales;   // on the grid (factor 1); an empty one: 1 everywhere
+  std::vector<CoarseField> coarseScales; // or on the coarser grid of the plan
+  BlockLattice blocks;                   // of the smooth parts
+  std::vector<SmoothPart> lows;
+  StitchGains gains;
+  std::vector<CoarseField> shares;  // of the details (Seam) or of all (Offset)
+  std::vector<CoarseField> offsets; // Peleg's
+  std::vector<CoarseSampler> scaleSamplers, lowSamplers, deviationSamplers, shareSamplers, offsetSamplers;
+  Volume<float> whole; // the result of Multiband
+
+  bool NeedsLows() const { return textured || parameters.equalizeGain || parameters.method == StitchMethod::Offset; }
+  CoarseSampler BlockSampler(const Boxed<float>& field, const ImageGeometry& where) const
+  {
+    const PosedVolume<float> blockwise{field.values.View(), {}, Cropped(blocks.geometry, field.box)};
+    return CoarseSampler(RowSampler<float>(blockwise, where));
   }
-  const double overlap = std::min(voxels, boxes / 2.0); // every voxel of it lies in two boxes
-  const double blend =
-      overlap * static_cast<double>(voxelBytes == sizeof(double) ? sizeof(BlendSum<double>) : sizeof(BlendSum<float>));
-  const double output =
-      voxels * (static_cast<double>(voxelBytes) + 2.0 + (weights ? 4.0 * static_cast<double>(volumes.size()) : 0.0));
-  double maps = 0.0;
-  if (parameters.method == StitchMethod::Distance)
-    maps = 4.0 * largestBox + 5.0 * voxels;
-  else if (parameters.method == StitchMethod::Feather)
-    maps = 5.0 * largestBox;
-  return output + boxes + blend + maps;
+  void FindScales(const Progress& progress);
+  std::vector<CoarseVolume> CoarseVolumes(const ImageGeometry& coarse, int step) const;
+  void FindWhatIsCoarse(const Progress& progress);
+  void BlendWhole(const Progress& progress);
+  void ScaleRow(int volume, int j, int k, int first, int end, const unsigned char* wanted, float* scale) const;
+  template <class T>
+  class RowBlender;
+};
+
+// The scales of a volume at wanted voxels of a row of the grid.
+void StitchPlan::Parts::ScaleRow(int volume, int j, int k, int first, int end, const unsigned char* wanted, float* scale) const
+{
+  if (!scaleSamplers.empty()) {
+    scaleSamplers[volume].Row(j, k, first, end, wanted, 1.0f, scale);
+    return;
+  }
+  const RowField<float>& field = scales[volume];
+  const float* row = field.Row(j, k);
+  if (!row) {
+    std::fill(scale, scale + (end - first), 1.0f);
+    return;
+  }
+  const int from = std::max(first, field.spans->First(j, k)), to = std::min(end, field.spans->End(j, k));
+  if (from < to)
+    std::copy(row + (from - field.spans->First(j, k)), row + (to - field.spans->First(j, k)), scale + (from - first));
 }
 
-void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
-                 std::size_t voxelBytes, bool weights)
+void StitchPlan::Parts::FindScales(const Progress& progress)
 {
-  if (!(parameters.sharpness >= 0.0 && parameters.sharpness <= 1000.0))
-    throw Error(Error::Kind::InvalidParameter,
-                "Sharpness is " + std::to_string(parameters.sharpness) + "; it must be in [0, 1000]");
-  if (!(parameters.reliabilityFloor > 0.0 && parameters.reliabilityFloor <= 1.0))
-    throw Error(Error::Kind::InvalidParameter,
-                "ReliabilityFloor is " + std::to_string(parameters.reliabilityFloor) + "; it must be in (0, 1]");
-  if (!(parameters.maximumMemoryGb >= 0.0))
-    throw Error(Error::Kind::InvalidParameter,
-                "MaximumMemoryGb is " + std::to_string(parameters.maximumMemoryGb) + "; it must not be negative");
-  grid.Check("the output grid");
-  const double needed = StitchMemory(parameters, volumes, grid, voxelBytes, weights), allowed = AllowedMemory(parameters);
-  if (needed <= allowed)
-    return;
-  double spacing = std::cbrt(grid.spacing.prod());
-  for (double bytes = needed; bytes > allowed;) {
-    spacing *= std::max(1.01, std::cbrt(bytes / allowed));
-    const double digit = std::pow(10.0, std::floor(std::log10(spacing)) - 1.0);
-    spacing = std::ceil(spacing / digit) * digit; // two digits, rounded up
-    bytes = StitchMemory(parameters, volumes, StitchGrid(volumes, spacing), voxelBytes, weights);
+  const ImageGeometry planGrid = Coarsened(grid, factor);
+  std::vector<StitchSampler> coarser;
+  if (factor > 1)
+    for (const StitchInput& input : inputs)
+      coarser.emplace_back(input, planGrid, parameters.reliabilityFloor);
+  Volume<unsigned char> coverage(planGrid.dimensions);
+  RegionMap regions(MasksOf(factor > 1 ? coarser : samplers, progress.Part(0.0, 0.15)), planGrid.spacing, coverage.View(),
+                    progress.Part(0.15, 0.2));
+  if (factor == 1)
+    CheckRegions(parameters, inputs, regions);
+  const StitchMethod method = parameters.method;
+  const bool cored = method != StitchMethod::Feather && method != StitchMethod::Average && method != StitchMethod::Maximum;
+  if (cored)
+    regions.GiveCores(progress.Part(0.2, 0.3));
+  const VolumeView<const unsigned char> covered = coverage.View();
+  scales = StitchScales(parameters, regions, covered, planGrid.spacing, bound, progress.Part(0.3, 0.85));
+  if (NeedsLows()) {
+    blocks = BlocksOf(grid, parameters.detailScale);
+    const double n = static_cast<double>(inputs.size());
+    for (std::size_t v = 0; v < inputs.size(); ++v)
+      lows.push_back(
+          LowPass(samplers[v], blocks, covered, factor,
+                  progress.Part(0.85 + 0.15 * static_cast<double>(v) / n, 0.85 + 0.15 * static_cast<double>(v + 1) / n)));
   }
-  char suggestion[32];
-  std::snprintf(suggestion, sizeof suggestion, "%.2g", spacing);
+  if (factor == 1 || method == StitchMethod::Average || method == StitchMethod::Maximum)
+    return;
+  // Interpolation needs to know 1 and 0 beyond the overlap as well.
+  for (int v = 0; v < regions.Count(); ++v) {
+    CoarseField field;
+    const GridBox& own = regions.Box(v);
+    for (int axis = 0; axis < 3 && !own.Empty(); ++axis) {
+      field.values.box.first[axis] = std::max(0, own.first[axis] - 1);
+      field.values.box.size[axis] =
+          std::min(planGrid.dimensions[axis], own.first[axis] + own.size[axis] + 1) - field.values.box.first[axis];
+    }
+    field.known.box = field.values.box;
+    field.values.values = Volume<float>(field.values.box.size);
+    field.known.values = Volume<unsigned char>(field.known.box.size);
+    ForRows(field.values.box, Progress(), [&](int j, int k) {
+      float* value = field.values.Row(j, k);
+      unsigned char* known = field.known.Row(j, k);
+      const unsigned char* inside = own.HasRow(j, k) ? regions.MaskRow(v, j, k) : nullptr;
+      const float* scale = scales[v].Row(j, k);
+      for (int x = 0; x < field.values.box.size[0]; ++x) {
+        const int i = field.values.box.first[0] + x;
+        known[x] = covered(i, j, k) > 0;
+        const bool here = inside && i >= own.first[0] && i < own.first[0] + own.size[0] && (inside[i - own.first[0]] & 1);
+        if (here)
+          value[x] = covered(i, j, k) == 1 || !scale ? 1.0f : scale[i - scales[v].spans->First(j, k)];
+      }
+    });
+    coarseScales.push_back(std::move(field));
+  }
+  scales.clear();
+  for (const CoarseField& field : coarseScales)
+    scaleSamplers.emplace_back(field.values, field.known, planGrid, grid);
+}
+
+// All volumes on a coarse copy of the grid, every step-th voxel of it.
+std::vector<CoarseVolume> StitchPlan::Parts::CoarseVolumes(const ImageGeometry& coarse, int step) const
+{
+  std::vector<CoarseVolume> volumes(inputs.size());
+  Volume<unsigned char> coverage(coarse.dimensions);
+  for (std::size_t v = 0; v < inputs.size(); ++v) {
+    CoarseVolume& volume = volumes[v];
+    const StitchSampler sampler(inputs[v], coarse, parameters.reliabilityFloor);
+    const GridBox box = sampler.Box();
+    volume.inside = {box, Volume<unsigned char>(box.size)};
+    volume.value = {box, Volume<float>(box.size)};
+    volume.low = {box, Volume<float>(box.size)};
+    if (sampler.HasTrust())
+      volume.trust = {box, Volume<float>(box.size)};
+    const CoarseSampler low = BlockSampler(lows[v].low, coarse);
+    ForRows(box, Progress(), [&](int j, int k) {
+      unsigned char* inside = volume.inside.Row(j, k);
+      sampler.Inside(j, k, inside);
+      sampler.Values(j, k, inside, volume.value.Row(j, k));
+      // Outside of the overlap there is no smooth part, and no use for one.
+      low.Row(j, k, box.first[0], box.first[0] + box.size[0], inside, nothing, volume.low.Row(j, k));
+      for (int i = 0; i < box.size[0]; ++i)
+        if (std::isnan(volume.low.Row(j, k)[i]))
+          volume.low.Row(j, k)[i] = volume.value.Row(j, k)[i];
+      if (sampler.HasTrust())
+        sampler.Trust(j, k, inside, volume.trust.Row(j, k));
+      unsigned char* covered = coverage.View().Row(j, k) + box.first[0];
+      for (int i = 0; i < box.size[0]; ++i)
+        covered[i] = static_cast<unsigned char>(covered[i] + (inside[i] & (covered[i] < 255)));
+    });
+  }
+  if (scales.empty() && scaleSamplers.empty())
+    return volumes;
   const auto& n = grid.dimensions;
-  throw Error(Error::Kind::TooLarge, "stitching " + std::to_string(volumes.size()) + " volumes onto " + std::to_string(n[0]) +
-                                         " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]) + " voxels needs " +
-                                         Gigabytes(needed) + ", more than the " + Gigabytes(allowed) +
-                                         " allowed (MaximumMemoryGb); SpacingMm = " + suggestion + " would fit");
+  const bool depths = parameters.method == StitchMethod::Feather; // in mm: 1 says nothing of being alone
+  const auto bounded = [depths](float scale) { return depths ? scale / (scale + 1.0f) : scale; };
+  const std::array<int, 3> start{CoarseStart(n[0], step), CoarseStart(n[1], step), CoarseStart(n[2], step)};
+  for (std::size_t v = 0; v < inputs.size(); ++v) {
+    CoarseVolume& volume = volumes[v];
+    const GridBox box = volume.inside.box;
+    volume.scale = {box, Volume<float>(box.size)};
+    ForRows(box, Progress(), [&](int j, int k) {
+      const int first = start[0] + step * box.first[0], end = std::min(n[0], first + step * box.size[0]);
+      std::vector<float> row(static_cast<std::size_t>(end - first), 1.0f);
+      const std::vector<unsigned char> wanted(row.size(), 1);
+      ScaleRow(static_cast<int>(v), start[1] + step * j, start[2] + step * k, first, end, wanted.data(), row.data());
+      const unsigned char *covered = coverage.View().Row(j, k) + box.first[0], *inside = volume.inside.Row(j, k);
+      float* scale = volume.scale.Row(j, k);
+      for (int i = 0; i < box.size[0]; ++i)
+        scale[i] = !(inside[i] & 1) ? 0.0f : covered[i] == 1 ? 1.0f : bounded(row[static_cast<std::size_t>(step) * i]);
+    });
+  }
+  return volumes;
+}
+
+void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
+{
+  gains.gain.assign(inputs.size(), 1.0);
+  gains.offset.assign(inputs.size(), 0.0);
+  const bool offset = parameters.method == StitchMethod::Offset;
+  if (!NeedsLows())
+    return;
+  int step = factor;
+  while (static_cast<double>(Coarsened(grid, step).VoxelCount()) > coarseVoxels)
+    ++step;
+  const ImageGeometry coarse = Coarsened(grid, step);
+  std::vector<CoarseVolume> volumes = CoarseVolumes(coarse, step);
+  progress(0.5);
+  gains = EstimateStitchGains(volumes, parameters.equalizeGain);
+  for (std::size_t v = 0; v < inputs.size(); ++v) {
+    lowSamplers.push_back(BlockSampler(lows[v].low, grid));
+    deviationSamplers.push_back(BlockSampler(lows[v].deviation, grid));
+  }
+  if (!offset && !(textured && parameters.texture == StitchTexture::Seam))
+    return;
+  for (std::size_t v = 0; v < inputs.size(); ++v)
+    for (Boxed<float>* field : {&volumes[v].value, &volumes[v].low})
+      for (float& value : field->values.View())
+        value = static_cast<float>(gains.gain[v] * value + gains.offset[v]);
+  const Volume<unsigned short> labels =
+      offset ? LargestScale(volumes, coarse.dimensions) : CutSeams(volumes, coarse.dimensions, {}, progress.Part(0.5, 0.9));
+  std::vector<Boxed<float>> moved;
+  if (offset)
+    moved = OffsetFields(volumes, labels, coarse.spacing, progress.Part(0.5, 0.9));
+  for (std::size_t v = 0; v < inputs.size(); ++v) {
+    const GridBox box = volumes[v].inside.box;
+    CoarseField share{{box, Volume<float>(box.size)}, {box, Volume<unsigned char>(box.size)}};
+    ForRows(box, Progress(), [&](int j, int k) {
+      const unsigned short* label = labels.View().Row(j, k) + box.first[0];
+      for (int i = 0; i < box.size[0]; ++i) {
+        share.values.Row(j, k)[i] = label[i] == v;
+        share.known.Row(j, k)[i] = label[i] != noVolume;
+      }
+    });
+    shares.push_back(std::move(share));
+    if (offset)
+      offsets.push_back({std::move(moved[v]), std::move(volumes[v].inside)});
+  }
+  for (const CoarseField& share : shares)
+    shareSamplers.emplace_back(share.values, share.known, coarse, grid);
+  for (const CoarseField& field : offsets)
+    offsetSamplers.emplace_back(field.values, field.known, coarse, grid);
+}
+
+// Multiband needs neighbourhoods, and so all volumes at once.
+void StitchPlan::Parts::BlendWhole(const Progress& progress)
+{
+  std::vector<ResampledVolume> volumes;
+  Volume<float> largest(grid.dimensions, -1.0f);
+  Volume<unsigned short> shown(grid.dimensions, noVolume);
+  for (std::size_t v = 0; v < inputs.size(); ++v) {
+    const GridBox box = samplers[v].Box();
+    ResampledVolume volume{
+        {box, Volume<float>(box.size)}, {box, Volume<unsigned char>(box.size)}, {box, Volume<float>(box.size)}};
+    ForRows(box, Progress(), [&](int j, int k) {
+      unsigned char* inside = volume.inside.Row(j, k);
+      float *values = volume.values.Row(j, k), *scale = volume.share.Row(j, k);
+      samplers[v].Inside(j, k, inside);
+      samplers[v].Values(j, k, inside, values);
+      std::fill(scale, scale + box.size[0], 1.0f);
+      ScaleRow(static_cast<int>(v), j, k, box.first[0], box.first[0] + box.size[0], inside, scale);
+      float* most = largest.View().Row(j, k) + box.first[0];
+      unsigned short* label = shown.View().Row(j, k) + box.first[0];
+      for (int i = 0; i < box.size[0]; ++i) {
+        values[i] = inside[i] & 1 ? static_cast<float>(gains.gain[v] * values[i] + gains.offset[v]) : 0.0f;
+        if ((inside[i] & 1) && scale[i] > most[i]) {
+          most[i] = scale[i];
+          label[i] = static_cast<unsigned short>(v);
+        }
+      }
+    });
+    volumes.push_back(std::move(volume));
+  }
+  for (std::size_t v = 0; v < inputs.size(); ++v)
+    ForRows(volumes[v].share.box, Progress(), [&](int j, int k) {
+      const unsigned short* label = shown.View().Row(j, k) + volumes[v].share.box.first[0];
+      float* share = volumes[v].share.Row(j, k);
+      for (int i = 0; i < volumes[v].share.box.size[0]; ++i)
+        share[i] = label[i] == v;
+    });
+  whole = BlendMultiband(volumes, grid.dimensions, 5, progress);
+}
+
+StitchPlan::StitchPlan(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const ImageGeometry& grid,
+                       const StitchOutputs& outputs, const Progress& progress)
+  : parts_(std::make_unique<Parts>())
+{
+  if (inputs.size() < 2)
+    throw Error(Error::Kind::BadInput, "stitching needs at least two volumes; " + std::to_string(inputs.size()) + " came in");
+  for (const StitchInput& input : inputs)
+    GeometryOf(input).Check(input.name);
+  std::vector<ImageGeometry> reaches;
+  for (const StitchInput& input : inputs)
+    reaches.push_back(ReachOf(input));
+  CheckStitch(parameters, reaches, grid, outputs, GridBox{});
+  parts_->parameters = parameters;
+  parts_->inputs = inputs;
+  parts_->grid = grid;
+  parts_->textured = IsTextured(parameters);
+  parts_->factor = CostOfStitch(parameters, reaches, grid, outputs).planFactor;
+  for (const StitchInput& input : inputs)
+    parts_->samplers.emplace_back(input, grid, parameters.reliabilityFloor);
+  parts_->FindScales(progress.Part(0.0, 0.6));
+  parts_->FindWhatIsCoarse(progress.Part(0.6, parameters.method == StitchMethod::Multiband ? 0.7 : 1.0));
+  if (parameters.method == StitchMethod::Multiband)
+    parts_->BlendWhole(progress.Part(0.7, 1.0));
+}
+
+StitchPlan::~StitchPlan() = default;
+StitchPlan::StitchPlan(StitchPlan&&) noexcept = default;
+StitchPlan& StitchPlan::operator=(StitchPlan&&) noexcept = default;
+
+const ImageGeometry& StitchPlan::Grid() const
+{
+  return parts_->grid;
+}
+int StitchPlan::Factor() const
+{
+  return parts_->factor;
+}
+double StitchPlan::MembraneBound() const
+{
+  return parts_->bound;
+}
+const std::vector<double>& StitchPlan::Gain() const
+{
+  return parts_->gains.gain;
+}
+const std::vector<double>& StitchPlan::Offset() const
+{
+  return parts_->gains.offset;
+}
+
+// The rows of one task: buffers, and how a row is made.
+template <class T>
+class StitchPlan::Parts::RowBlender {
+  using A = Accumulator<T>;
+
+public:
+  RowBlender(const Parts& parts, const GridBox& box, const StitchOutput<T>& output)
+    : parts_(parts), box_(box), output_(output), layers_(parts.inputs.size()),
+      power_(parts.parameters.method == StitchMethod::Distance || parts.parameters.method == StitchMethod::Membrane
+                 ? parts.parameters.sharpness
+             : parts.parameters.method == StitchMethod::Feather ? 1.0
+                                                                : 0.0),
+      detailPower_(parts.parameters.detailSharpness), count_(static_cast<std::size_t>(box.size[0])), here_(parts.inputs.size()),
+      voxel_(parts.inputs.size())
+  {
+    const std::size_t n = parts.inputs.size();
+    correlation_.assign(n * n, 0.0f);
+    for (std::size_t a = 0; a < n; ++a)
+      for (std::size_t b = 0; b < n; ++b)
+        correlation_[a * n + b] =
+            parts.gains.detailCorrelation.size() ? static_cast<float>(parts.gains.detailCorrelation(a, b)) : 0.0f;
+  }
+
+  void Row(int j, int k)
+  {
+    const int y = j - box_.first[1], z = k - box_.first[2];
+    Sample(j, k);
+    T* result = output_.intensity.Row(y, z);
+    unsigned char *valid = output_.valid.Row(y, z), *coverage = output_.coverage.Row(y, z);
+    float* spread = output_.spread.Empty() ? nullptr : output_.spread.Row(y, z);
+    for (std::size_t v = 0; v < output_.weights.size(); ++v)
+      std::fill_n(output_.weights[v].Row(y, z), box_.size[0], 0.0f);
+    bool overlap = false;
+    for (int i = 0; i < box_.size[0]; ++i) {
+      result[i] = T(0);
+      valid[i] = count_[i] > 0;
+      coverage[i] = static_cast<unsigned char>(std::min<int>(count_[i], 255));
+      overlap = overlap || count_[i] > 1;
+      if (spread)
+        spread[i] = 0.0f;
+    }
+    for (const int v : rows_) {
+      const Layer& layer = layers_[v];
+      float* weight = output_.weights.empty() ? nullptr : output_.weights[v].Row(y, z);
+      const A gain = static_cast<A>(parts_.gains.gain[v]), offset = static_cast<A>(parts_.gains.offset[v]);
+      for (int i = layer.first; i < layer.end; ++i)
+        if (count_[i] == 1 && (layer.Inside(i) & 1)) {
+          result[i] = Rounded<T>(gain * layer.values[i - layer.start] + offset);
+          if (weight)
+            weight[i] = 1.0f;
+        }
+    }
+    if (overlap) {
+      SampleOverlap(j, k);
+      for (int i = 0; i < box_.size[0]; ++i)
+        if (count_[i] > 1)
+          result[i] = Rounded<T>(Blend(i, y, z, spread));
+    }
+    if (parts_.parameters.method == StitchMethod::Multiband) {
+      const float* row = parts_.whole.View().Row(j, k) + box_.first[0];
+      for (int i = 0; i < box_.size[0]; ++i)
+        if (valid[i])
+          result[i] = Rounded<T>(row[i]);
+    }
+  }
+
+private:
+  // What a volume has on the row. Indices are those of the box that is made; start is where the volume's own box begins.
+  struct Layer {
+    int start = 0, first = 0, end = 0;
+    std::vector<unsigned char> inside;
+    std::vector<A> values, low;
+    std::vector<float> trust, scale, share, deviation;
+    std::vector<unsigned char> shared; // of the box that is made: 1 where it meets others
+    unsigned char Inside(int i) const { return inside[static_cast<std::size_t>(i - start)]; }
+  };
+  // A volume at one voxel.
+  struct Here {
+    int volume;
+    A value, low;
+    float deviation; // of the details around here
+  };
+  struct Voxel {
+    explicit Voxel(std::size_t n) : scale(n), trust(n), weight(n), detail(n) {}
+    std::vector<float> scale, trust, weight, detail;
+  };
+
+  void Sample(int j, int k)
+  {
+    rows_.clear();
+    std::fill(count_.begin(), count_.end(), 0);
+    for (int v = 0; v < static_cast<int>(layers_.size()); ++v) {
+      const StitchSampler& sampler = parts_.samplers[v];
+      const GridBox& own = sampler.Box();
+      if (!own.HasRow(j, k))
+        continue;
+      Layer& layer = layers_[v];
+      layer.start = own.first[0] - box_.first[0];
+      layer.first = std::max(0, layer.start);
+      layer.end = std::min(box_.size[0], layer.start + own.size[0]);
+      if (layer.first >= layer.end)
+        continue;
+      rows_.push_back(v);
+      layer.inside.resize(static_cast<std::size_t>(own.size[0]));
+      layer.values.resize(static_cast<std::size_t>(own.size[0]));
+      sampler.Inside(j, k, layer.inside.data());
+      sampler.Values(j, k, layer.inside.data(), layer.values.data());
+      for (int i = layer.first; i < layer.end; ++i)
+        count_[i] += layer.Inside(i) & 1;
+    }
+  }
+
+  void SampleOverlap(int j, int k)
+  {
+    const int n = box_.size[0], first = box_.first[0];
+    const bool offset = parts_.parameters.method == StitchMethod::Offset;
+    for (const int v : rows_) {
+      Layer& layer = layers_[v];
+      layer.shared.assign(static_cast<std::size_t>(n), 0);
+      for (int i = layer.first; i < layer.end; ++i)
+        layer.shared[i] = (layer.Inside(i) & 1) & (count_[i] > 1);
+      layer.scale.assign(static_cast<std::size_t>(n), 1.0f);
+      if (!parts_.scales.empty() || !parts_.scaleSamplers.empty())
+        parts_.ScaleRow(v, j, k, first, first + n, layer.shared.data(), layer.scale.data());
+      if (parts_.samplers[v].HasTrust()) {
+        layer.trust.resize(layer.inside.size());
+        parts_.samplers[v].Trust(j, k, layer.inside.data(), layer.trust.data());
+      }
+      if (parts_.textured) {
+        layer.low.resize(static_cast<std::size_t>(n));
+        layer.deviation.resize(static_cast<std::size_t>(n));
+        parts_.lowSamplers[v].Row(j, k, first, first + n, layer.shared.data(), nothing, layer.low.data());
+        parts_.deviationSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.deviation.data());
+      }
+      if (!parts_.shareSamplers.empty()) {
+        layer.share.resize(static_cast<std::size_t>(n));
+        parts_.shareSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.share.data());
+      }
+      if (offset) {
+        layer.low.resize(static_cast<std::size_t>(n));
+        parts_.offsetSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.low.data());
+        for (int i = layer.first; i < layer.end; ++i)
+          layer.values[i - layer.start] += layer.low[i] / static_cast<A>(parts_.gains.gain[v]);
+      }
+    }
+  }
+
+  A Blend(int i, int y, int z, float* spread)
+  {
+    std::size_t n = 0;
+    bool trusted = false;
+    for (const int v : rows_) {
+      const Layer& layer = layers_[v];
+      if (!layer.shared[i])
+        continue;
+      const A gain = static_cast<A>(parts_.gains.gain[v]), offset = static_cast<A>(parts_.gains.offset[v]);
+      here_[n] = {v, gain * layer.values[i - layer.start] + offset, A(0), 0.0f};
+      if (parts_.textured) // without a smooth part (an overlap thinner than the plan's voxels) the voxel is taken as smooth
+        here_[n].low = std::isnan(layer.low[i]) ? here_[n].value : gain * layer.low[i] + offset;
+      if (parts_.textured)
+        here_[n].deviation = static_cast<float>(gain) * layer.deviation[i];
+      voxel_.scale[n] = layer.scale[i];
+      voxel_.detail[n] = parts_.shareSamplers.empty() ? 0.0f : layer.share[i];
+      const bool trust = parts_.samplers[v].HasTrust();
+      voxel_.trust[n] = trust ? layer.trust[i - layer.start] : 1.0f;
+      trusted = trusted || trust;
+      ++n;
+    }
+    Weigh(n, trusted);
+    if (spread) {
+      A least = here_[0].value, most = least;
+      for (std::size_t a = 1; a < n; ++a) {
+        least = std::min(least, here_[a].value);
+        most = std::max(most, here_[a].value);
+      }
+      spread[i] = static_cast<float>(most - least);
+    }
+    for (std::size_t a = 0; a < n && !output_.weights.empty(); ++a)
+      output_.weights[here_[a].volume].Row(y, z)[i] = voxel_.weight[a];
+    if (!parts_.textured) {
+      A mean = here_[0].value;
+      for (std::size_t a = 1; a < n; ++a)
+        mean += static_cast<A>(voxel_.weight[a]) * (here_[a].value - here_[0].value);
+      return mean;
+    }
+    A smooth = here_[0].low;
+    for (std::size_t a = 1; a < n; ++a)
+      smooth += static_cast<A>(voxel_.weight[a]) * (here_[a].low - here_[0].low);
+    return smooth + Detail(n);
+  }
+
+  // The weights of the voxel's volumes, from their scales and how far they can be trusted.
+  void Weigh(std::size_t n, bool trusted)
+  {
+    const float* trust = trusted ? voxel_.trust.data() : nullptr;
+    switch (parts_.parameters.method) {
+    case StitchMethod::Maximum: {
+      std::size_t largest = 0;
+      for (std::size_t a = 1; a < n; ++a)
+        if (here_[a].value > here_[largest].value)
+          largest = a;
+      for (std::size_t a = 0; a < n; ++a)
+        voxel_.weight[a] = a == largest;
+      return;
+    }
+    case StitchMethod::Offset:
+    case StitchMethod::Multiband:
+      if (!Normalize(voxel_.detail.data(), n, voxel_.weight.data())) {
+        const BlendPower hard(1000.0);
+        BlendWeights(voxel_.scale.data(), nullptr, n, hard, voxel_.weight.data());
+      }
+      return;
+    default:
+      BlendWeights(voxel_.scale.data(), trust, n, power_, voxel_.weight.data());
+    }
+  }
+
+  static bool Normalize(const float* shares, std::size_t n, float* weights)
+  {
+    float total = 0.0f;
+    for (std::size_t a = 0; a < n; ++a)
+      total += shares[a];
+    if (!(total > 0.0f))
+      return false;
+    for (std::size_t a = 0; a < n; ++a)
+      weights[a] = shares[a] / total;
+    return true;
+  }
+
+  // The blend of the details, with the variance that they would have one by one.
+  A Detail(std::size_t n)
+  {
+    float* h = voxel_.detail.data();
+    const bool seam = parts_.parameters.texture == StitchTexture::Seam && Normalize(h, n, h);
+    if (parts_.parameters.texture == StitchTexture::Restore) {
+      std::copy_n(voxel_.weight.data(), n, h);
+    } else if (!seam) {
+      for (std::size_t a = 0; a < n; ++a)
+        voxel_.scale[a] *= voxel_.trust[a];
+      BlendWeights(voxel_.scale.data(), nullptr, n, detailPower_, h);
+    }
+    // Details change over as narrowly as their weights, how strong they are as widely as the smooth part does: a texture that
+    // ends abruptly at a stronger one is a seam as well.
+    float strength = here_[0].deviation;
+    for (std::size_t a = 1; a < n; ++a)
+      strength += voxel_.weight[a] * (here_[a].deviation - here_[0].deviation);
+    A sum = 0;
+    float variance = 0.0f;
+    for (std::size_t a = 0; a < n; ++a) {
+      const float own = here_[a].deviation;
+      const float amplified = own > 0.0f ? std::clamp(strength / own, 1.0f / mostAmplified, mostAmplified) : 1.0f;
+      sum += static_cast<A>(h[a] * amplified) * (here_[a].value - here_[a].low);
+      const float* correlation = correlation_.data() + static_cast<std::size_t>(here_[a].volume) * layers_.size();
+      variance += h[a] * h[a];
+      for (std::size_t b = 0; b < a; ++b)
+        variance += 2.0f * h[a] * h[b] * correlation[here_[b].volume];
+    }
+    return sum / static_cast<A>(std::sqrt(variance));
+  }
+
+  const Parts& parts_;
+  const GridBox box_;
+  const StitchOutput<T>& output_;
+  std::vector<Layer> layers_;
+  BlendPower power_, detailPower_;
+  std::vector<int> count_, rows_;
+  std::vector<Here> here_;
+  Voxel voxel_;
+  std::vector<float> correlation_;
+};
+
+template <class T>
+void StitchPlan::Render(const GridBox& box, const StitchOutput<T>& output, const Progress& progress) const
+{
+  const GridBox whole{{0, 0, 0}, parts_->grid.dimensions};
+  const GridBox within = box.Intersected(whole);
+  if (box.Empty())
+    return;
+  if (within.first != box.first || within.size != box.size)
+    throw Error(Error::Kind::InvalidParameter, "the box to make reaches beyond the output");
+  ParallelRanges(static_cast<std::ptrdiff_t>(box.size[1]) * box.size[2], rowsOfOneTask, progress,
+                 [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                   typename Parts::RowBlender<T> blender(*parts_, box, output);
+                   for (std::ptrdiff_t row = begin; row < end; ++row)
+                     blender.Row(box.first[1] + static_cast<int>(row % box.size[1]),
+                                 box.first[2] + static_cast<int>(row / box.size[1]));
+                 });
 }
 
 template <class T>
 void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const ImageGeometry& grid,
             const StitchOutput<T>& output, const Progress& progress)
 {
-  using A = Accumulator<T>;
-  const std::vector<ImageGeometry> geometries = GeometriesOf(inputs);
-  if (inputs.size() < 2)
-    throw Error(Error::Kind::BadInput, "stitching needs at least two volumes; " + std::to_string(inputs.size()) + " came in");
-  for (std::size_t v = 0; v < inputs.size(); ++v)
-    geometries[v].Check(inputs[v].name);
   std::vector<ImageGeometry> reaches;
   for (const StitchInput& input : inputs)
     reaches.push_back(ReachOf(input));
-  CheckStitch(parameters, reaches, grid, sizeof(T), !output.weights.empty());
-
-  // 1. regions
-  std::vector<AnySampler> samplers;
-  for (const StitchInput& input : inputs)
-    samplers.push_back(SamplerOf(input, grid));
-  std::vector<Trust> trusts;
-  for (const StitchInput& input : inputs)
-    trusts.emplace_back(input, grid, parameters.reliabilityFloor);
-  RegionMap regions(MasksOf(samplers, progress.Part(0.0, 0.15)), grid.spacing, output.coverage, progress.Part(0.15, 0.2));
-  CheckRegions(parameters, inputs, regions);
-
-  // 2. cores
-  const bool distance = parameters.method == StitchMethod::Distance, maximum = parameters.method == StitchMethod::Maximum;
-  if (distance)
-    regions.GiveCores(progress.Part(0.2, 0.3));
-
-  // 3. blend
-  const BlendPower power(distance ? parameters.sharpness : parameters.method == StitchMethod::Feather ? 1.0 : 0.0);
-  std::vector<BlendSum<A>> blend(static_cast<std::size_t>(regions.OverlapCount()));
-  std::fill(output.intensity.begin(), output.intensity.end(), T(0));
-  for (const auto& weights : output.weights)
-    std::fill(weights.begin(), weights.end(), 0.0f);
-  for (int v = 0; v < regions.Count(); ++v) {
-    const Progress part = progress.Part(0.3 + 0.6 * v / regions.Count(), 0.3 + 0.6 * (v + 1) / regions.Count());
-    const Scales scales(parameters.method, regions, v, part.Part(0.0, 0.6));
-    const GridBox& box = regions.Box(v);
-    const Trust& trust = trusts[v];
-    const auto blendRows = [&](const auto& sampler, std::ptrdiff_t begin, std::ptrdiff_t end) {
-      std::vector<A> values(box.size[0]);
-      std::vector<float> factors(box.size[0], 1.0f);
-      for (std::ptrdiff_t row = begin; row < end; ++row) {
-        const int j = box.first[1] + static_cast<int>(row % box.size[1]), k = box.first[2] + static_cast<int>(row / box.size[1]);
-        const unsigned char* inside = regions.MaskRow(v, j, k);
-        const unsigned char* covered = output.coverage.Row(j, k) + box.first[0];
-        T* result = output.intensity.Row(j, k) + box.first[0];
-        float* weight = output.weights.empty() ? nullptr : output.weights[v].Row(j, k) + box.first[0];
-        const Scales::Row scale(scales, j, k);
-        sampler.Values(j, k, inside, values.data());
-        if (trust)
-          trust.Row(j, k, inside, factors);
-        std::ptrdiff_t number = regions.OverlapBefore(box.first[0], j, k);
-        for (int i = 0; i < box.size[0]; ++i) {
-          const bool overlap = covered[i] > 1;
-          const std::ptrdiff_t here = number;
-          number += overlap;
-          if (!(inside[i] & 1))
-            continue;
-          if (!overlap) {
-            result[i] = Rounded<T>(values[i]);
-            if (weight)
-              weight[i] = 1.0f;
-            continue;
-          }
-          BlendSum<A>& sum = blend[here];
-          if (maximum) {
-            // The scale says which volume is shown: the first is number 1.
-            if (sum.total == 0.0f || values[i] > sum.mean)
-              sum = {values[i], static_cast<float>(v + 1), 1.0f};
-            continue;
-          }
-          const float s = scale(box.first[0] + i);
-          sum.Add(values[i], s, power, factors[i]);
-          if (weight)
-            weight[i] = s; // becomes the weight once all volumes came
-        }
-      }
-    };
-    std::visit(
-        [&](const auto& sampler) {
-          ParallelRanges(static_cast<std::ptrdiff_t>(box.size[1]) * box.size[2], rowsOfOneTask, part.Part(0.6, 1.0),
-                         [&](std::ptrdiff_t begin, std::ptrdiff_t end) { blendRows(sampler, begin, end); });
-        },
-        samplers[v]);
-  }
-
-  // The blend of the overlap, and what follows from the coverage.
-  const GridBox all{{0, 0, 0}, grid.dimensions};
-  ForRows(all, progress.Part(0.9, 1.0), [&](int j, int k) {
-    const unsigned char* covered = output.coverage.Row(j, k);
-    T* result = output.intensity.Row(j, k);
-    unsigned char* valid = output.valid.Row(j, k);
-    std::ptrdiff_t number = regions.OverlapBefore(0, j, k);
-    for (int i = 0; i < grid.dimensions[0]; ++i) {
-      valid[i] = covered[i] > 0;
-      if (covered[i] > 1)
-        result[i] = Rounded<T>(blend[number++].mean);
-    }
-  });
-  for (std::size_t v = 0; v < output.weights.size(); ++v) {
-    const GridBox& box = regions.Box(static_cast<int>(v));
-    ForRows(box, Progress(), [&](int j, int k) {
-      const unsigned char* inside = regions.MaskRow(static_cast<int>(v), j, k);
-      std::vector<float> factors(box.size[0], 1.0f);
-      if (trusts[v])
-        trusts[v].Row(j, k, inside, factors);
-      const unsigned char* covered = output.coverage.Row(j, k) + box.first[0];
-      float* weight = output.weights[v].Row(j, k) + box.first[0];
-      std::ptrdiff_t number = regions.OverlapBefore(box.first[0], j, k);
-      for (int i = 0; i < box.size[0]; ++i)
-        if (covered[i] > 1) {
-          const BlendSum<A>& sum = blend[number++];
-          if (inside[i] & 1)
-            weight[i] =
-                maximum ? static_cast<float>(sum.largest == static_cast<float>(v + 1)) : sum.Weight(weight[i], power, factors[i]);
-        }
-    });
-  }
+  const GridBox whole{{0, 0, 0}, grid.dimensions};
+  const StitchOutputs outputs{sizeof(T), !output.weights.empty(), !output.spread.Empty()};
+  CheckStitch(parameters, reaches, grid, outputs, whole);
+  StitchPlan(parameters, inputs, grid, outputs, progress.Part(0.0, 0.6)).Render(whole, output, progress.Part(0.6, 1.0));
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \
+  template void StitchPlan::Render<T>(const GridBox&, const StitchOutput<T>&, const Progress&) const;                            \
   template void Stitch<T>(const StitchParameters&, const std::vector<StitchInput>&, const ImageGeometry&,                        \
                           const StitchOutput<T>&, const Progress&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)

@@ -3,28 +3,51 @@
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/DisplacementField.h"
 #include "Core/Imaging/VolumeView.h"
+#include "GridBox.h"
+#include "Membrane.h"
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
 namespace echorama {
 
-/// How overlapping volumes are blended.
+/// What decides how much each of the overlapping volumes counts at a voxel.
 enum class StitchMethod {
-  Distance, ///< by the distances to pure and empty regions (dissertation 5.2, 5.4)
-  Feather,  ///< by the distance to the own border (Szeliski 1996)
-  Average,  ///< plain mean
-  Maximum,  ///< the largest value
+  Distance,  ///< the distances to pure and empty regions (dissertation 5.2, 5.4)
+  Feather,   ///< the distance to the own border (Szeliski 1996)
+  Average,   ///< plain mean
+  Maximum,   ///< the largest value is shown
+  Membrane,  ///< the smoothest surface from pure to empty regions (dissertation 5.3, 5.4)
+  Multiband, ///< each octave over a transition as wide as its features (Burt and Adelson 1983); to compare with
+  Offset,    ///< one volume per voxel, with smooth offsets that make them meet at the seam (Peleg 1981); to compare with
+};
+
+/// What becomes of speckle and edges where volumes overlap. A weighted mean of two speckle patterns has less texture than either,
+/// so all but Mix blend the smooth part of the volumes by the weights and the rest, the detail, in another way.
+enum class StitchTexture {
+  Mix,     ///< the weighted mean of all
+  Restore, ///< the weighted mean of the details, amplified by as much as their mixture has lost
+  Split,   ///< details change over in a narrow transition
+  Seam,    ///< details come from one volume per voxel, along a seam where the volumes differ least (graph cut)
 };
 
 struct StitchParameters {
-  StitchMethod method = StitchMethod::Distance;
-  double sharpness = 1.5; ///< the exponent b of eq. 5.10, [0, 1000]; 0 is the plain average, large a hard edge. Distance only
+  StitchMethod method = StitchMethod::Membrane;
+  StitchTexture texture = StitchTexture::Split; ///< for Distance, Feather, Average and Membrane
+  double sharpness =
+      1.5; ///< the exponent b of eq. 5.10, [0, 1000]; 0 is the plain average, large a hard edge. Distance and Membrane
+  double detailSharpness = 32.0; ///< the same for the details of Split, [0, 1000]
+  double detailScale = 2.0;      ///< standard deviation that parts smooth from detail, in voxels of the output, [1, 100]
+  /// Whether a gain and an offset per volume are found on the overlaps, and applied.
+  bool equalizeGain = false;
   /// Volumes that say how far their voxels can be trusted count by that (their weight is multiplied), but by no less than this,
   /// (0, 1]: where none can be trusted they are blended as ever. Not for Maximum.
   double reliabilityFloor = 0.01;
   bool allowDisjoint = false;   ///< whether a volume may overlap no other; it is then just put in its place
   double maximumMemoryGb = 0.0; ///< 10^9 bytes; 0: three quarters of this machine's memory
+  MembraneSolver membraneSolver = MembraneSolver::Multigrid;
+  double membraneTolerance = 1.0 / 512; ///< largest error of a membrane, certified, (0, 1]
 };
 
 /// A volume of any of our voxel types.
@@ -42,35 +65,65 @@ struct StitchInput {
 /// The geometry of a volume, grown by how far its displacement can carry voxels: the box to allow memory for.
 ImageGeometry ReachOf(const StitchInput& input);
 
-/// Where the result goes: views of the size of the grid.
+/// Where the result goes: views of the size of the box that is made.
 template <class T>
 struct StitchOutput {
   VolumeView<T> intensity;            ///< 0 where no volume is
   VolumeView<unsigned char> valid;    ///< 1 where any volume is
   VolumeView<unsigned char> coverage; ///< how many volumes are there (255: 255 or more)
   std::vector<VolumeView<float>>
-      weights; ///< empty, or one per volume: its share of the voxel, in [0, 1]; they sum to 1 where valid
+      weights; ///< empty, or one per volume: its share of the voxel (of its smooth part), in [0, 1]; they sum to 1 where valid
+  VolumeView<float> spread = {}; ///< empty, or the largest minus the smallest of the volumes' values there; 0 where one is alone
 };
 
-/// Bytes that Stitch() needs at most, its output included, for volumes of these geometries on \a grid.
-/// \param voxelBytes of the output's type \param weights whether they are wanted too
-double StitchMemory(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
-                    std::size_t voxelBytes, bool weights = false);
+/// What is wanted of the output; memory depends on it.
+struct StitchOutputs {
+  std::size_t voxelBytes = 1; ///< of the output's type
+  bool weights = false, spread = false;
+};
 
-/// Checks all that can be known before anything is allocated.
-/// \throws Error(InvalidParameter) for a parameter out of range, Error(BadInput) for fewer than two volumes or a bad geometry,
-/// Error(TooLarge), with the numbers and a spacing that would fit, when StitchMemory() is more than allowed.
-void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
-                 std::size_t voxelBytes, bool weights = false);
-
-/// Resamples posed volumes onto \a grid (see StitchGrid) and blends them into one, in 2D and 3D.
+/// Stitching in two steps: what is global is found once (where volumes overlap, how they share each voxel of it, gains,
+/// seams), and then any box of the output is made from it, voxel by voxel, whatever the other boxes are. So slabs that are
+/// written one after the other, or pieces that several processes make, are those of the whole to the last bit.
 ///
-/// Weights are s^b / sum s^b with s = e / (p + e): p and e are the distances, in the grid, to the pure and the empty region
-/// of the volume. A volume without a pure region gets a core (RegionMap::GiveCores). Reliabilities multiply s^b. The blend is v0
-/// + sum w (v - v0), so a constant stays that constant; integer results are rounded, and clamped to the range of T. Cost: per
-/// volume one resampling and two distance maps in boxes around its overlap; memory as StitchMemory() says. \throws what
-/// CheckStitch() throws, Error(BadInput) that names a volume with no voxel in the grid, Error(NotPossible) that names a volume
-/// which overlaps no other, Error(Cancelled).
+/// Weights are s^b / sum s^b times reliability. s is that of StitchMethod; a volume without a pure region gets a core
+/// (RegionMap::GiveCores). The blend is v0 + sum w (v - v0), so a constant stays that constant; integer results are rounded, and
+/// clamped to their range. With a texture but Mix the result is sum w L + D with L the smooth part of a volume (LowPass), H = v -
+/// L, D = sum h H / sqrt(sum h_i h_j rho_ij), h the weights of the details and rho the measured correlation of two volumes'
+/// details: what a mixture of independent textures loses is given back, and what they share is not doubled.
+///
+/// When memory is short the global part is found on a grid that is coarser by a whole factor (StitchCost), and interpolated;
+/// where volumes are is always known exactly.
+class StitchPlan {
+public:
+  /// Volumes and displacements must outlive the plan.
+  /// \throws what CheckStitch() throws but for the size of the output, Error(BadInput) that names a volume with no voxel in the
+  /// grid, Error(NotPossible) that names a volume which overlaps no other, Error(Cancelled).
+  StitchPlan(const StitchParameters& parameters, const std::vector<StitchInput>& volumes, const ImageGeometry& grid,
+             const StitchOutputs& outputs, const Progress& progress = {});
+  ~StitchPlan();
+  StitchPlan(StitchPlan&&) noexcept;
+  StitchPlan& operator=(StitchPlan&&) noexcept;
+
+  const ImageGeometry& Grid() const;
+  int Factor() const;           ///< of the grid that the global part was found on
+  double MembraneBound() const; ///< no scale of a membrane is further from the exact one than this; 0 without membranes
+  ///@{
+  /// What was applied to each volume: gain * value + offset.
+  const std::vector<double>& Gain() const;
+  const std::vector<double>& Offset() const;
+  ///@}
+
+  /// Makes a box of the output; views are of its size.
+  template <class T>
+  void Render(const GridBox& box, const StitchOutput<T>& output, const Progress& progress = {}) const;
+
+private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Resamples posed volumes onto \a grid (see StitchGrid) and blends them into one, in 2D and 3D: StitchPlan, and the whole of it.
 template <class T>
 void Stitch(const StitchParameters& parameters, const std::vector<StitchInput>& volumes, const ImageGeometry& grid,
             const StitchOutput<T>& output, const Progress& progress = {});

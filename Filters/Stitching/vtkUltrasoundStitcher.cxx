@@ -3,9 +3,11 @@
 
 #include "Core/Base/Error.h"
 #include "Filters/Stitching/StitchGrid.h"
+#include "Filters/Stitching/StitchMemory.h"
 
 #include "vtkDataObjectTree.h"
 #include "vtkDataObjectTreeIterator.h"
+#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -18,14 +20,34 @@
 #include "vtkStringArray.h"
 #include "vtkUltrasoundDisplacement.h"
 
+#include <algorithm>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundStitcher);
 
 namespace {
-const char* const METHOD_NAMES[] = {"distance", "feather", "average", "maximum"};
+const char* const METHOD_NAMES[] = {"distance", "feather", "average", "maximum", "membrane", "multiband", "offset"};
+const char* const TEXTURE_NAMES[] = {"mix", "restore", "split", "seam"};
+
+template <std::size_t count>
+const char* NameOf(const char* const (&names)[count], int number)
+{
+  return number >= 0 && number < static_cast<int>(count) ? names[number] : nullptr;
+}
+
+template <std::size_t count>
+int NumberOf(const char* const (&names)[count], const char* name)
+{
+  for (std::size_t number = 0; name && number < count; ++number) {
+    if (!std::strcmp(name, names[number])) {
+      return static_cast<int>(number);
+    }
+  }
+  return -1;
+}
 
 // The smallest of our voxel types that holds the values of both.
 int CommonType(int a, int b)
@@ -62,20 +84,51 @@ bool Announced(vtkInformation* information, echorama::ImageGeometry& geometry)
 } // namespace
 
 //----------------------------------------------------------------------------
+struct vtkUltrasoundStitcher::Scene {
+  vtkMTimeType Made = 0; // of the parameters and of all that came in
+  std::vector<vtkUltrasoundVolume::Input> Volumes;
+  std::vector<echorama::DisplacementField> Fields;
+  std::vector<echorama::StitchInput> Stitched;
+  std::vector<echorama::ImageGeometry> Geometries, Reaches;
+  int Type = VTK_UNSIGNED_CHAR;
+  echorama::ImageGeometry Grid;
+  std::unique_ptr<echorama::StitchPlan> Plan;
+};
+
+//----------------------------------------------------------------------------
 const char* vtkUltrasoundStitcher::GetMethodName(int method)
 {
-  return method >= DISTANCE && method <= MAXIMUM ? METHOD_NAMES[method] : nullptr;
+  return NameOf(METHOD_NAMES, method);
 }
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundStitcher::GetMethodFromName(const char* name)
 {
-  for (int method = DISTANCE; name && method <= MAXIMUM; ++method) {
-    if (!std::strcmp(name, METHOD_NAMES[method])) {
-      return method;
-    }
-  }
-  return -1;
+  return NumberOf(METHOD_NAMES, name);
+}
+
+//----------------------------------------------------------------------------
+const char* vtkUltrasoundStitcher::GetTextureName(int texture)
+{
+  return NameOf(TEXTURE_NAMES, texture);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundStitcher::GetTextureFromName(const char* name)
+{
+  return NumberOf(TEXTURE_NAMES, name);
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundStitcher::GetGain(int volume) const
+{
+  return volume >= 0 && volume < static_cast<int>(this->Gains.size()) ? this->Gains[volume] : 1.0;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundStitcher::GetOffset(int volume) const
+{
+  return volume >= 0 && volume < static_cast<int>(this->Offsets.size()) ? this->Offsets[volume] : 0.0;
 }
 
 //----------------------------------------------------------------------------
@@ -83,6 +136,9 @@ vtkUltrasoundStitcher::vtkUltrasoundStitcher()
 {
   this->SetNumberOfInputPorts(2);
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundStitcher::~vtkUltrasoundStitcher() = default;
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundStitcher::FillInputPortInformation(int port, vtkInformation* information)
@@ -195,65 +251,160 @@ vtkUltrasoundStitcher::DisplacementsOf(vtkInformationVector* port, const std::ve
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+echorama::StitchParameters vtkUltrasoundStitcher::Parameters() const
 {
-  // 1. what came in
-  const std::vector<vtkUltrasoundVolume::Input> volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-  const std::vector<echorama::DisplacementField> fields = this->DisplacementsOf(inputs[1], volumes);
-  std::vector<echorama::StitchInput> stitched;
-  std::vector<echorama::ImageGeometry> geometries, reaches;
-  int type = VTK_UNSIGNED_CHAR;
-  vtkNew<vtkStringArray> names;
-  names->SetName(StitchedVolumesName());
-  for (const vtkUltrasoundVolume::Input& volume : volumes) {
-    vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
-      stitched.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name, this->ReliabilityOf(volume)});
-    });
-    stitched.back().displacement = fields.empty() ? nullptr : &fields[stitched.size() - 1];
-    geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
-    reaches.push_back(echorama::ReachOf(stitched.back()));
-    type = CommonType(type, volume.Intensity->GetDataType());
-    names->InsertNextValue(volume.Name);
-  }
   echorama::StitchParameters parameters;
   parameters.method = static_cast<echorama::StitchMethod>(this->Method);
+  parameters.texture = static_cast<echorama::StitchTexture>(this->Texture);
   parameters.sharpness = this->Sharpness;
+  parameters.detailSharpness = this->DetailSharpness;
+  parameters.detailScale = this->DetailScale;
+  parameters.equalizeGain = this->EqualizeGain;
   parameters.reliabilityFloor = this->ReliabilityFloor;
   parameters.allowDisjoint = this->AllowDisjoint;
   parameters.maximumMemoryGb = this->MaximumMemoryGb;
+  return parameters;
+}
 
-  // 2. what goes out
-  const echorama::ImageGeometry grid = echorama::StitchGrid(geometries, this->SpacingMm);
-  int announced[6];
-  this->GetOutputInformation(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), announced);
+//----------------------------------------------------------------------------
+std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtkInformationVector** inputs)
+{
+  auto scene = std::make_unique<Scene>();
+  scene->Volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+  scene->Fields = this->DisplacementsOf(inputs[1], scene->Volumes);
+  scene->Made = this->GetMTime();
+  for (int port = 0; port < 2; ++port) {
+    for (int connection = 0; connection < inputs[port]->GetNumberOfInformationObjects(); ++connection) {
+      scene->Made = std::max(scene->Made, vtkDataObject::GetData(inputs[port], connection)->GetMTime());
+    }
+  }
+  for (const vtkUltrasoundVolume::Input& volume : scene->Volumes) {
+    vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
+      scene->Stitched.push_back(
+          {vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name, this->ReliabilityOf(volume)});
+    });
+    echorama::StitchInput& stitched = scene->Stitched.back();
+    stitched.displacement = scene->Fields.empty() ? nullptr : &scene->Fields[scene->Stitched.size() - 1];
+    scene->Geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
+    scene->Reaches.push_back(echorama::ReachOf(stitched));
+    scene->Type = CommonType(scene->Type, volume.Intensity->GetDataType());
+    scene->Made = std::max({scene->Made, volume.Image->GetMTime(), volume.Intensity->GetMTime()});
+  }
+  scene->Grid = echorama::StitchGrid(scene->Geometries, this->SpacingMm);
+  return scene;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+{
+  // 1. what came in, and what is wanted of the output
+  std::unique_ptr<Scene> scene = this->Collect(inputs);
+  const echorama::ImageGeometry& grid = scene->Grid;
+  vtkInformation* out = this->GetOutputInformation(0);
+  int announced[6], wanted[6];
+  out->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), announced);
   if (announced[1] + 1 != grid.dimensions[0] || announced[3] + 1 != grid.dimensions[1] ||
       announced[5] + 1 != grid.dimensions[2]) {
     throw Error(Error::Kind::BadInput, "a volume came in with another geometry than its pipeline had announced");
   }
-  echorama::CheckStitch(parameters, reaches, grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)),
-                        this->OutputWeights);
+  out->Get(out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT()) ? vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT()
+                                                                       : vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(),
+           wanted);
+  echorama::GridBox box;
+  bool whole = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.first[axis] = wanted[2 * axis];
+    box.size[axis] = wanted[2 * axis + 1] - wanted[2 * axis] + 1;
+    whole = whole && box.size[axis] == grid.dimensions[axis];
+  }
+  const echorama::StitchParameters parameters = this->Parameters();
+  const echorama::StitchOutputs outputs{static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(scene->Type)), this->OutputWeights,
+                                        this->OutputSpread};
+  echorama::CheckStitch(parameters, scene->Reaches, grid, outputs, box);
+
+  // 2. the plan, new or that of the piece before
+  double planned = 0.0;
+  if (this->Kept && this->Kept->Made == scene->Made) {
+    scene = std::move(this->Kept);
+  } else {
+    this->Kept.reset();
+    planned = 0.6;
+    scene->Plan =
+        std::make_unique<echorama::StitchPlan>(parameters, scene->Stitched, scene->Grid, outputs, progress.Part(0.0, planned));
+  }
+  this->PlanFactor = scene->Plan->Factor();
+  this->MembraneBound = scene->Plan->MembraneBound();
+  this->Gains = scene->Plan->Gain();
+  this->Offsets = scene->Plan->Offset();
+
+  // 3. what goes out
+  vtkNew<vtkStringArray> names;
+  names->SetName(StitchedVolumesName());
+  for (const vtkUltrasoundVolume::Input& volume : scene->Volumes) {
+    names->InsertNextValue(volume.Name);
+  }
   output->Initialize();
-  vtkUltrasoundVolume::SetGeometry(output, grid);
-  vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), type);
+  vtkUltrasoundVolume::SetGeometry(output, scene->Grid);
+  output->SetExtent(wanted);
+  vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), scene->Type);
   vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
   vtkDataArray* coverage = AddArray(output, CoverageName(), VTK_UNSIGNED_CHAR);
   output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
   output->GetFieldData()->AddArray(names);
+  echorama::VolumeView<float> spread;
+  if (this->OutputSpread) {
+    spread = vtkUltrasoundVolume::ViewOf<float>(AddArray(output, SpreadName(), VTK_FLOAT), output);
+  }
   std::vector<echorama::VolumeView<float>> weights;
-  for (std::size_t volume = 0; this->OutputWeights && volume < volumes.size(); ++volume) {
+  for (std::size_t volume = 0; this->OutputWeights && volume < scene->Volumes.size(); ++volume) {
     vtkDataArray* weight = AddArray(output, ("Weight" + std::to_string(volume)).c_str(), VTK_FLOAT);
     weights.push_back(vtkUltrasoundVolume::ViewOf<float>(weight, output));
   }
 
-  // 3. the kernel
+  // 4. the kernel
   vtkUltrasoundVolume::Dispatch(intensity, [&](auto voxel) {
     using T = decltype(voxel);
-    echorama::Stitch<T>(parameters, stitched, grid,
-                        {vtkUltrasoundVolume::ViewOf<T>(intensity, output),
-                         vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output),
-                         vtkUltrasoundVolume::ViewOf<unsigned char>(coverage, output), weights},
-                        progress);
+    scene->Plan->Render<T>(box,
+                           {vtkUltrasoundVolume::ViewOf<T>(intensity, output),
+                            vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output),
+                            vtkUltrasoundVolume::ViewOf<unsigned char>(coverage, output), weights, spread},
+                           progress.Part(planned, 1.0));
   });
+  if (!whole) {
+    this->Kept = std::move(scene); // the other pieces will be asked for
+  }
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundStitcher::EstimateCost()
+{
+  std::string report;
+  this->UpdateInformation();
+  vtkInformationVector* inputs[2] = {this->GetExecutive()->GetInputInformation(0), this->GetExecutive()->GetInputInformation(1)};
+  for (int port = 0; port < 2; ++port) {
+    for (int connection = 0; connection < this->GetNumberOfInputConnections(port); ++connection) {
+      int number = 0;
+      vtkAlgorithm* producer = this->GetInputAlgorithm(port, connection, number);
+      producer->Update(number);
+    }
+  }
+  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+    const std::unique_ptr<Scene> scene = this->Collect(inputs);
+    const echorama::StitchOutputs outputs{static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(scene->Type)),
+                                          this->OutputWeights, this->OutputSpread};
+    const echorama::StitchCost cost = echorama::CostOfStitch(this->Parameters(), scene->Reaches, scene->Grid, outputs);
+    const auto& spacing = scene->Grid.spacing;
+    report = nlohmann::ordered_json{{"volumes", scene->Volumes.size()},
+                                    {"dimensions", scene->Grid.dimensions},
+                                    {"spacing", {spacing[0], spacing[1], spacing[2]}},
+                                    {"plan_factor", cost.planFactor},
+                                    {"plan_bytes", cost.planBytes},
+                                    {"output_bytes", cost.outputBytes},
+                                    {"allowed_bytes", cost.allowedBytes},
+                                    {"slabs", cost.slabs}}
+                 .dump();
+  });
+  return report;
 }
 
 //----------------------------------------------------------------------------
@@ -261,11 +412,16 @@ void vtkUltrasoundStitcher::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Method: " << this->GetMethodAsString() << "\n";
+  os << indent << "Texture: " << this->GetTextureAsString() << "\n";
   os << indent << "Sharpness: " << this->Sharpness << "\n";
+  os << indent << "DetailSharpness: " << this->DetailSharpness << "\n";
+  os << indent << "DetailScale: " << this->DetailScale << "\n";
+  os << indent << "EqualizeGain: " << this->EqualizeGain << "\n";
   os << indent << "SpacingMm: " << this->SpacingMm << "\n";
   os << indent << "AllowDisjoint: " << this->AllowDisjoint << "\n";
   os << indent << "UseReliability: " << this->UseReliability << "\n";
   os << indent << "ReliabilityFloor: " << this->ReliabilityFloor << "\n";
   os << indent << "OutputWeights: " << this->OutputWeights << "\n";
+  os << indent << "OutputSpread: " << this->OutputSpread << "\n";
   os << indent << "MaximumMemoryGb: " << this->MaximumMemoryGb << "\n";
 }

@@ -14,19 +14,26 @@
  * - `Intensity`: the blend, 0 where no volume is;
  * - `ValidRegion`: 1 where any volume is;
  * - `Coverage` (unsigned char): how many volumes are there;
+ * - `Spread` (float), if asked for: the largest minus the smallest of the volumes' values, 0 where one is alone: where volumes
+ *   disagree;
  * - `Weight0`, `Weight1` ... (float), if asked for: the share of each volume;
  * - field data `StitchedVolumes`: the names of the volumes, in order. What a volume's own field data says of its acquisition
  *   is not true of the whole, and is dropped.
  *
- * Where volumes overlap each is weighted by s^b / sum s^b, s = e / (p + e), with p and e the distances to the region where
- * it is alone and to the region where only others are (dissertation 5.1, 5.2, 5.4). A volume that others cover wholly counts
- * as alone where it lies deepest inside its border. A volume with the point array `Reliability` (vtkUltrasoundReliabilityMap:
- * shadows, saturation) is weighted by it as well.
+ * Where volumes overlap each is weighted by s^b / sum s^b. By default s is the smoothest surface that is 1 where the volume
+ * is alone and 0 where only others are (dissertation 5.3), and the weights blend what is smooth in the volumes; speckle and
+ * edges change over in a narrow transition, because a mean of two speckle patterns has less texture than either (see
+ * Texture). A volume that others cover wholly counts as alone where it lies deepest inside its border. A volume with the point
+ * array `Reliability` (vtkUltrasoundReliabilityMap: shadows, saturation) is weighted by it as well.
+ *
+ * The filter makes the extent that is asked for and no more: what is global (how volumes share the overlaps, gains,
+ * seams) is found once and kept until the inputs or a parameter change, so slabs or pieces are those of the whole to the last
+ * bit. When the memory that is allowed does not suffice, the global part is found on a coarser grid (GetPlanFactor).
  *
  * Refuses, with a message: fewer than two volumes, a volume that overlaps no other (see AllowDisjoint), one with no real
  * voxels, a bad geometry or type, and a result that needs more memory than allowed.
  *
- * Under MPI each rank computes the whole and keeps its piece.
+ * Under MPI each rank reads all volumes, finds the global part for itself (the same everywhere), and makes its own piece.
  */
 #ifndef vtkUltrasoundStitcher_h
 #define vtkUltrasoundStitcher_h
@@ -34,8 +41,12 @@
 #include "EchoramaFiltersStitchingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
+#include <string> // for what it costs
+
 #ifndef __VTK_WRAP__
 #include "Filters/Stitching/Stitch.h"
+#include <memory> // for what is kept
+#include <vector> // for gains
 #endif
 
 class ECHORAMAFILTERSSTITCHING_EXPORT vtkUltrasoundStitcher : public vtkUltrasoundImageAlgorithm {
@@ -44,35 +55,85 @@ public:
   vtkTypeMacro(vtkUltrasoundStitcher, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3 };
+  enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3, MEMBRANE = 4, MULTIBAND = 5, OFFSET = 6 };
+  enum Textures { MIX = 0, RESTORE = 1, SPLIT = 2, SEAM = 3 };
 
   ///@{
   /**
-   * How overlapping volumes are blended: by the distances to pure and empty regions (default), by the distance to the own
-   * border (Szeliski 1996), by their plain mean, or the largest value.
+   * What decides how much each volume counts: the smoothest surface from pure to empty regions (MEMBRANE, default), the distances
+   * to them (DISTANCE), the distance to the own border (FEATHER, Szeliski 1996), nothing (AVERAGE), or the largest value is shown
+   * (MAXIMUM). MULTIBAND (Burt and Adelson 1983) and OFFSET (Peleg 1981) are there to compare with.
    */
-  vtkSetClampMacro(Method, int, DISTANCE, MAXIMUM);
+  vtkSetClampMacro(Method, int, DISTANCE, OFFSET);
   vtkGetMacro(Method, int);
   void SetMethodToDistance() { this->SetMethod(DISTANCE); }
   void SetMethodToFeather() { this->SetMethod(FEATHER); }
   void SetMethodToAverage() { this->SetMethod(AVERAGE); }
   void SetMethodToMaximum() { this->SetMethod(MAXIMUM); }
+  void SetMethodToMembrane() { this->SetMethod(MEMBRANE); }
+  void SetMethodToMultiband() { this->SetMethod(MULTIBAND); }
+  void SetMethodToOffset() { this->SetMethod(OFFSET); }
   const char* GetMethodAsString() { return GetMethodName(this->Method); }
   ///@}
 
-  /** "distance", "feather", "average" or "maximum"; nullptr for another number. */
+  ///@{
+  /** The name of a method in small letters (nullptr for another number), and its number by name (or -1). */
   static const char* GetMethodName(int method);
-
-  /** The number of a method by its name, or -1. */
   static int GetMethodFromName(const char* name);
+  ///@}
 
   ///@{
   /**
-   * The exponent b of the weights of the distance method, in [0, 1000]. 0 is the plain average, 1 a linear ramp across the
+   * What becomes of speckle and edges where volumes overlap (for DISTANCE, FEATHER, AVERAGE, MEMBRANE): the weighted mean of all
+   * (MIX), the mean of the details amplified by what their mixture has lost (RESTORE), details that change over in a narrow
+   * transition (SPLIT, default), or details of one volume per voxel along a seam where the volumes differ least (SEAM, graph
+   * cut).
+   */
+  vtkSetClampMacro(Texture, int, MIX, SEAM);
+  vtkGetMacro(Texture, int);
+  void SetTextureToMix() { this->SetTexture(MIX); }
+  void SetTextureToRestore() { this->SetTexture(RESTORE); }
+  void SetTextureToSplit() { this->SetTexture(SPLIT); }
+  void SetTextureToSeam() { this->SetTexture(SEAM); }
+  const char* GetTextureAsString() { return GetTextureName(this->Texture); }
+  ///@}
+
+  ///@{
+  /** The name of a texture in small letters (nullptr for another number), and its number by name (or -1). */
+  static const char* GetTextureName(int texture);
+  static int GetTextureFromName(const char* name);
+  ///@}
+
+  ///@{
+  /**
+   * The exponent b of the weights of DISTANCE and MEMBRANE, in [0, 1000]. 0 is the plain average, 1 a ramp across the
    * whole overlap, large values a hard edge half-way. Default 1.5.
    */
   vtkSetClampMacro(Sharpness, double, 0.0, 1000.0);
   vtkGetMacro(Sharpness, double);
+  ///@}
+
+  ///@{
+  /** The same exponent for the details of SPLIT, in [0, 1000]. Default 32: about a sixteenth of the overlap is transition. */
+  vtkSetClampMacro(DetailSharpness, double, 0.0, 1000.0);
+  vtkGetMacro(DetailSharpness, double);
+  ///@}
+
+  ///@{
+  /** What counts as smooth: the standard deviation of the filter that parts it from details, in voxels of the output, [1, 100].
+   * Default 2. */
+  vtkSetClampMacro(DetailScale, double, 1.0, 100.0);
+  vtkGetMacro(DetailScale, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether a gain and an offset per volume are found where volumes overlap (least squares over all pairs), and applied. For
+   * volumes of different gain or depth compensation. Default off. What was applied: GetGain(), GetOffset().
+   */
+  vtkSetMacro(EqualizeGain, bool);
+  vtkGetMacro(EqualizeGain, bool);
+  vtkBooleanMacro(EqualizeGain, bool);
   ///@}
 
   ///@{
@@ -109,6 +170,13 @@ public:
   ///@}
 
   ///@{
+  /** Whether `Spread` is put out too (4 bytes per voxel). Default off. */
+  vtkSetMacro(OutputSpread, bool);
+  vtkGetMacro(OutputSpread, bool);
+  vtkBooleanMacro(OutputSpread, bool);
+  ///@}
+
+  ///@{
   /** Refuse what needs more memory than this, in 10^9 bytes. 0 (default): three quarters of this machine's memory. */
   vtkSetClampMacro(MaximumMemoryGb, double, 0.0, VTK_DOUBLE_MAX);
   vtkGetMacro(MaximumMemoryGb, double);
@@ -122,14 +190,35 @@ public:
   ///@}
 
   ///@{
+  /** Of the last update: the factor of the grid on which what is global was found (1: the output's own), and how far the
+   * scales of the membranes can be from the exact ones (certified; 0 without membranes). */
+  int GetPlanFactor() const { return this->PlanFactor; }
+  double GetMembraneBound() const { return this->MembraneBound; }
+  ///@}
+
+  ///@{
+  /** What was applied to a volume in the last update: gain * value + offset; 1 and 0 for a number that is none. */
+  double GetGain(int volume) const;
+  double GetOffset(int volume) const;
+  ///@}
+
+  /**
+   * What stitching the inputs with these parameters needs, without doing it (inputs are updated): a JSON object with dimensions,
+   * spacing, volumes, plan_factor, plan_bytes, output_bytes, allowed_bytes and slabs (of the output, so many that one fits; 0:
+   * none does). Empty after an error.
+   */
+  std::string EstimateCost();
+
+  ///@{
   /** Names of the output's own arrays. */
   static const char* CoverageName() { return "Coverage"; }
+  static const char* SpreadName() { return "Spread"; }
   static const char* StitchedVolumesName() { return "StitchedVolumes"; }
   ///@}
 
 protected:
   vtkUltrasoundStitcher();
-  ~vtkUltrasoundStitcher() override = default;
+  ~vtkUltrasoundStitcher() override;
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
@@ -142,20 +231,33 @@ private:
   void operator=(const vtkUltrasoundStitcher&) = delete;
 
 #ifndef __VTK_WRAP__
+  struct Scene; // what came in, and the plan for it
+  std::unique_ptr<Scene> Collect(vtkInformationVector** inputs);
+  echorama::StitchParameters Parameters() const;
   echorama::VolumeView<const float> ReliabilityOf(const vtkUltrasoundVolume::Input& volume) const;
   std::vector<echorama::DisplacementField> DisplacementsOf(vtkInformationVector* port,
                                                            const std::vector<vtkUltrasoundVolume::Input>& volumes) const;
+
+  std::unique_ptr<Scene> Kept; // between pieces of one output
 #endif
 
-  int Method = DISTANCE;
+  int Method = MEMBRANE;
+  int Texture = SPLIT;
   bool OutputWeights = false;
+  bool OutputSpread = false;
   bool UseReliability = true;
   double SpacingMm = 0.0;
+  int PlanFactor = 0;
+  double MembraneBound = 0.0;
 #ifndef __VTK_WRAP__
   double Sharpness = echorama::StitchParameters().sharpness;
+  double DetailSharpness = echorama::StitchParameters().detailSharpness;
+  double DetailScale = echorama::StitchParameters().detailScale;
+  bool EqualizeGain = echorama::StitchParameters().equalizeGain;
   double ReliabilityFloor = echorama::StitchParameters().reliabilityFloor;
   bool AllowDisjoint = echorama::StitchParameters().allowDisjoint;
   double MaximumMemoryGb = echorama::StitchParameters().maximumMemoryGb;
+  std::vector<double> Gains, Offsets;
 #endif
 };
 

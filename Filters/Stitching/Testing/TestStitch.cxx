@@ -4,6 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Filters/Stitching/Stitch.h"
 #include "Filters/Stitching/StitchGrid.h"
+#include "Filters/Stitching/StitchMemory.h"
 #include <cmath>
 #include <deque>
 #include <gtest/gtest.h>
@@ -53,8 +54,17 @@ struct Result {
   std::vector<Volume<float>> weights;
 };
 
+StitchParameters With(StitchMethod method, double sharpness = 1.5)
+{
+  StitchParameters parameters;
+  parameters.method = method;
+  parameters.texture = StitchTexture::Mix;
+  parameters.sharpness = sharpness;
+  return parameters;
+}
+
 template <class T>
-Result<T> Stitched(const Scene<T>& scene, const StitchParameters& parameters = {}, double spacing = 0.0,
+Result<T> Stitched(const Scene<T>& scene, const StitchParameters& parameters = With(StitchMethod::Distance), double spacing = 0.0,
                    const Progress& progress = {})
 {
   Result<T> result;
@@ -72,7 +82,7 @@ Result<T> Stitched(const Scene<T>& scene, const StitchParameters& parameters = {
 }
 
 template <class T>
-std::string ErrorOf(const Scene<T>& scene, const StitchParameters& parameters = {})
+std::string ErrorOf(const Scene<T>& scene, const StitchParameters& parameters = With(StitchMethod::Distance))
 {
   try {
     Stitched(scene, parameters);
@@ -112,14 +122,6 @@ double LargestStep(const Result<T>& result)
             if (next[0] < n[0] && next[1] < n[1] && next[2] < n[2] && valid(i, j, k) && valid(next[0], next[1], next[2]))
               step = std::max(step, std::abs(double{volume.View()(i, j, k)} - volume.View()(next[0], next[1], next[2])));
   return step;
-}
-
-StitchParameters With(StitchMethod method, double sharpness = 1.5)
-{
-  StitchParameters parameters;
-  parameters.method = method;
-  parameters.sharpness = sharpness;
-  return parameters;
 }
 
 // The equations as they are written, by brute force over a grid of a few voxels; masks are whole-grid.
@@ -496,12 +498,6 @@ TEST(Stitch, ReliabilityMultipliesTheWeights)
   Scene<float> scene;
   scene.AddBox({0, 0, 0}, {30, 20, 5}, 100.0f);
   scene.AddBox({10, 0, 0}, {30, 20, 5}, 200.0f);
-  const auto with = [&](StitchMethod method, double b) {
-    StitchParameters parameters;
-    parameters.method = method;
-    parameters.sharpness = b;
-    return parameters;
-  };
   const std::vector<std::pair<StitchMethod, double>> methods{
       {StitchMethod::Distance, 1.5}, {StitchMethod::Distance, 0.0}, {StitchMethod::Feather, 1.0}, {StitchMethod::Average, 1.0}};
   Volume<float> trusts[2] = {Volume<float>({30, 20, 5}), Volume<float>({30, 20, 5})};
@@ -517,10 +513,10 @@ TEST(Stitch, ReliabilityMultipliesTheWeights)
     }
   for (const auto& [method, b] : methods) {
     scene.inputs[0].reliability = scene.inputs[1].reliability = {};
-    const Result<float> plain = Stitched(scene, with(method, b));
+    const Result<float> plain = Stitched(scene, With(method, b));
     scene.inputs[0].reliability = trusts[0].View();
     scene.inputs[1].reliability = trusts[1].View();
-    const Result<float> trusted = Stitched(scene, with(method, b));
+    const Result<float> trusted = Stitched(scene, With(method, b));
     ExpectSoundWeights(trusted);
     for (int k = 0; k < 5; ++k)
       for (int j = 0; j < 20; ++j)
@@ -536,19 +532,19 @@ TEST(Stitch, ReliabilityMultipliesTheWeights)
     // Without the views of the weights the same comes out.
     Volume<float> alone(trusted.intensity.Dimensions());
     Volume<unsigned char> valid(alone.Dimensions()), coverage(alone.Dimensions());
-    Stitch<float>(with(method, b), scene.inputs, trusted.grid, {alone.View(), valid.View(), coverage.View(), {}});
+    Stitch<float>(With(method, b), scene.inputs, trusted.grid, {alone.View(), valid.View(), coverage.View(), {}});
     EXPECT_TRUE(std::equal(alone.View().begin(), alone.View().end(), trusted.intensity.View().begin()));
   }
   // Full trust changes nothing, to the last bit; a floor of 1 neither.
   scene.inputs[0].reliability = scene.inputs[1].reliability = {};
   const Result<float> plain = Stitched(scene);
-  StitchParameters blind;
+  StitchParameters blind = With(StitchMethod::Distance);
   blind.reliabilityFloor = 1.0;
   const Volume<float> full({30, 20, 5}, 1.0f);
   for (const bool floor : {false, true}) {
     scene.inputs[0].reliability = floor ? trusts[0].View() : full.View();
     scene.inputs[1].reliability = floor ? trusts[1].View() : full.View();
-    const Result<float> same = Stitched(scene, floor ? blind : StitchParameters());
+    const Result<float> same = Stitched(scene, floor ? blind : With(StitchMethod::Distance));
     EXPECT_TRUE(std::equal(same.intensity.View().begin(), same.intensity.View().end(), plain.intensity.View().begin()));
   }
 }
@@ -591,8 +587,9 @@ TEST(Stitch, StatesTheMemoryAndASpacingThatFits)
   b.origin[0] = 100.0;
   StitchParameters parameters;
   parameters.maximumMemoryGb = 0.1;
+  const GridBox whole{{0, 0, 0}, {400, 300, 300}};
   try {
-    CheckStitch(parameters, {a, b}, StitchGrid({a, b}), 1);
+    CheckStitch(parameters, {a, b}, StitchGrid({a, b}), {}, whole);
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.GetKind(), Error::Kind::TooLarge);
@@ -603,7 +600,8 @@ TEST(Stitch, StatesTheMemoryAndASpacingThatFits)
     const double spacing = std::stod(message.substr(at + 12));
     EXPECT_GT(spacing, 1.0);
     EXPECT_LT(spacing, 4.0);
-    EXPECT_NO_THROW(CheckStitch(parameters, {a, b}, StitchGrid({a, b}, spacing), 1));
+    const ImageGeometry fitting = StitchGrid({a, b}, spacing);
+    EXPECT_NO_THROW(CheckStitch(parameters, {a, b}, fitting, {}, {{0, 0, 0}, fitting.dimensions}));
   }
 }
 
@@ -618,10 +616,11 @@ TEST(Stitch, StopsWhenAsked)
     last = fraction;
     return true;
   });
-  Stitched(scene, {}, 0.0, watch);
+  Stitched(scene, With(StitchMethod::Distance), 0.0, watch);
   EXPECT_GT(last, 0.9);
   EXPECT_LE(last, 1.0);
-  EXPECT_THROW(Stitched(scene, {}, 0.0, Progress([](double fraction) { return fraction < 0.5; })), Error);
+  EXPECT_THROW(Stitched(scene, With(StitchMethod::Distance), 0.0, Progress([](double fraction) { return fraction < 0.5; })),
+               Error);
 }
 
 TEST(Stitch, ADisplacementSaysWhereAVolumeIsRead)

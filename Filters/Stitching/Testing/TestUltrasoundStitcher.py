@@ -85,13 +85,15 @@ def test_common_lattice_is_copied():
     a = volume(world[:, :, :26], origin, spacing, pose)
     b = volume(world[2:, 3:, 15:], origin + pose @ (spacing * [15, 3, 2]), spacing, pose)
     filter, messages = stitcher(a, b)
-    filter.Update()
-    assert not messages, messages
-    out = filter.GetOutput()
+    for texture in range(4):
+        filter.SetTexture(texture)
+        filter.Update()
+        assert not messages, messages
+        out = filter.GetOutput()
+        valid = array(out, "ValidRegion").astype(bool)
+        assert np.array_equal(array(out)[valid], world[valid]), "what both volumes see must come out as it is"
     assert np.allclose(out.GetOrigin(), origin) and np.allclose(out.GetSpacing(), spacing)
     assert np.allclose(direction_of(out), pose)
-    valid = array(out, "ValidRegion").astype(bool)
-    assert np.array_equal(array(out)[valid], world[valid])
     assert not array(out)[~valid].any()
     assert not valid[:2, :, 26:].any() and valid[2:, 3:, :].all()
     coverage = array(out, "Coverage")
@@ -210,20 +212,27 @@ def test_information_and_pieces():
 
 def test_methods_and_parameters():
     filter = vtkUltrasoundStitcher()
-    assert filter.GetMethodAsString() == "distance" and filter.GetSharpness() == 1.5 and filter.GetSpacingMm() == 0
+    assert filter.GetMethodAsString() == "membrane" and filter.GetTextureAsString() == "split"
+    assert filter.GetSharpness() == 1.5 and filter.GetSpacingMm() == 0
     assert not filter.GetAllowDisjoint() and not filter.GetOutputWeights()
-    for number, name in enumerate(("distance", "feather", "average", "maximum")):
+    for number, name in enumerate(("distance", "feather", "average", "maximum", "membrane", "multiband", "offset")):
         assert filter.GetMethodFromName(name) == number
         getattr(filter, "SetMethodTo" + name.capitalize())()
         assert filter.GetMethod() == number and filter.GetMethodAsString() == name
-    assert filter.GetMethodFromName("nothing") == -1
+    for number, name in enumerate(("mix", "restore", "split", "seam")):
+        assert filter.GetTextureFromName(name) == number
+        getattr(filter, "SetTextureTo" + name.capitalize())()
+        assert filter.GetTexture() == number and filter.GetTextureAsString() == name
+    assert filter.GetMethodFromName("nothing") == -1 and filter.GetTextureFromName("nothing") == -1
+    assert filter.GetTextureName(4) is None and filter.GetMethodName(7) is None
     filter.SetSharpness(-3)
     assert filter.GetSharpness() == 0
     filter.SetSharpness(1e9)
     assert filter.GetSharpness() == 1000
 
     a, b = volume(np.full((3, 20, 30), 100, np.uint8)), volume(np.full((3, 20, 30), 201, np.uint8), (20, 0, 0))
-    middle = {"distance": range(101, 201), "feather": range(101, 201), "average": [151], "maximum": [201]}
+    middle = {"distance": range(101, 201), "feather": range(101, 201), "average": [151], "maximum": [201],
+              "membrane": range(101, 201)}
     for name, allowed in middle.items():
         filter, messages = stitcher(a, b)
         filter.SetMethod(filter.GetMethodFromName(name))
