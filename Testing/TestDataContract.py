@@ -192,6 +192,17 @@ class Stitcher(Several):
     keeps_fields = False # an acquisition is that of one volume
 
 
+class StitchQuality(Feed):
+    """A volume, held against itself as the only source."""
+
+    works_on_blocks = False # it measures one result
+
+    def connect(self, filter, images):
+        super().connect(filter, images)
+        for image in images:
+            filter.AddSourceData(copy_of(image))
+
+
 class ScanConverter(ToOtherGrid):
     works_on_blocks = False # where the output lies is in the field data, which VTK's pipeline gives to no block beforehand
     accepts = ("direction", "spacing") # the place of a beam volume says nothing
@@ -320,6 +331,7 @@ Special = {
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundDeformableAligner": DeformableAligner,
     "vtkUltrasoundStitcher": Stitcher,
+    "vtkUltrasoundStitchQuality": StitchQuality,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
