@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Stitching: time, and mean absolute error against the truth, inside and outside the overlap. `seam` compares how much the
-// error changes from one voxel to the next where the number of volumes changes with how much it does elsewhere: 1 is no
-// seam. The peer does the plain average with filters of VTK: reslice each volume and its mask onto the grid, multiply, sum,
-// divide.
+// Stitching, all methods in one table: time, also over that of a plain average in turn, processor time, the largest memory per
+// voxel of the output, and what became of the image (MeasureStitch): seams, texture, and the error against the truth inside and
+// outside overlaps. The truth of a synthetic case is the anatomy without speckle, so that its error favours averages; that of the
+// liver is its full reconstruction, which is itself an average. The peer does the plain average with filters of VTK: reslice
+// each volume and its mask onto the grid, multiply, sum, divide.
+// Arguments: words, one of which a case's name must contain; none: all cases.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/Sampling.h"
-#include "Filters/Stitching/Stitch.h"
 #include "Filters/Stitching/StitchGrid.h"
+#include "Filters/Stitching/StitchQuality.h"
 #include "Testing/Benchmark.h"
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <malloc.h>
 
 #ifdef ECHORAMA_WITH_VTK
 #include <vtkImageData.h>
@@ -39,6 +43,7 @@ struct Case {
   std::vector<ImageGeometry> geometries;
   ImageGeometry grid;
   Volume<float> truth; ///< NaN where it is not known
+  int runs = 3;
 
   std::vector<StitchInput> Inputs() const
   {
@@ -53,16 +58,80 @@ struct Result {
   Volume<Byte> intensity, valid, coverage;
 };
 
-// Smooth anatomy, and texture that is fixed to the material.
-double Material(const Eigen::Vector3d& p)
+// Echo level of the anatomy, dB: slow changes, and bright and dark balls with sharp edges.
+double Level(const Eigen::Vector3d& p)
 {
-  const double anatomy = std::sin(0.11 * p[0]) * std::sin(0.13 * p[1] + 0.5) + std::sin(0.07 * (p[0] + p[1] + p[2]));
-  const double texture = std::sin(1.1 * p[0] + 0.9 * p[2]) * std::sin(0.8 * p[1] - 0.7 * p[2] + 0.3 * p[0]);
-  return 110.0 + 30.0 * anatomy + 12.0 * texture;
+  double level = 33.0 + 4.0 * std::sin(0.05 * p[0]) * std::sin(0.06 * p[1] + 0.5) + 3.0 * std::sin(0.04 * (p[0] + p[1] + p[2]));
+  constexpr double cell = 26.0;
+  const Eigen::Vector3d at = (p / cell).array().floor();
+  Random random(11, static_cast<std::uint64_t>((std::lround(at[0]) + 500) * 1000000 + (std::lround(at[1]) + 500) * 1000 +
+                                               std::lround(at[2]) + 500));
+  const double radius = random.Uniform(3.0, 7.0), change = random.Uniform() < 0.5 ? -11.0 : 6.0;
+  const Eigen::Vector3d centre =
+      at * cell + Eigen::Vector3d(random.Uniform(8.0, 18.0), random.Uniform(8.0, 18.0), random.Uniform(8.0, 18.0));
+  if ((p - centre).norm() < radius)
+    level += change;
+  return level;
 }
 
-// A row of fan-shaped views of the material, each turned a little, with gains that differ by up to ten grey levels.
-Case Synthetic(const std::string& name, int count, int size, double step)
+constexpr double greyPerDb = 255.0 / 60.0;
+constexpr double meanOfSpeckleDb = -2.5068; // of 20 log10 of a Rayleigh amplitude of mean square 1
+
+// Fully developed speckle in dB: 20 log10 of the amplitude of complex Gaussian noise whose grain is 2 to 3 voxels wide.
+Volume<float> SpeckleDb(const std::array<int, 3>& n, std::uint64_t seed)
+{
+  const auto noise = [&](std::uint64_t part) {
+    Volume<float> field(n);
+    ParallelFor(static_cast<std::ptrdiff_t>(n[1]) * n[2], [&](std::ptrdiff_t row) {
+      Random random(100 + 2 * seed + part, static_cast<std::uint64_t>(row));
+      float* values = field.View().Data() + row * n[0];
+      for (int i = 0; i < n[0]; ++i)
+        values[i] = static_cast<float>(random.Normal());
+    });
+    constexpr int radius = 3;
+    const double sigmas[3] = {1.1, 1.1, 0.9};
+    for (int axis = 0; axis < 3; ++axis) {
+      float taps[2 * radius + 1];
+      double squares = 0.0;
+      for (int t = -radius; t <= radius; ++t) {
+        const double tap = std::exp(-0.5 * t * t / (sigmas[axis] * sigmas[axis]));
+        taps[t + radius] = static_cast<float>(tap);
+        squares += tap * tap;
+      }
+      const std::ptrdiff_t stride = axis == 0 ? 1 : axis == 1 ? n[0] : static_cast<std::ptrdiff_t>(n[0]) * n[1];
+      Volume<float> smooth(n);
+      ParallelFor(static_cast<std::ptrdiff_t>(n[1]) * n[2], [&](std::ptrdiff_t row) {
+        const int place[3] = {0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1])};
+        for (int t = -radius; t <= radius; ++t)
+          for (int i = 0; i < n[0]; ++i) {
+            // Noise goes on round the corner.
+            const int at = axis == 0 ? i : place[axis], wrapped = (at + t + n[axis]) % n[axis];
+            const std::ptrdiff_t here = row * n[0] + i;
+            smooth.View()[here] += taps[t + radius] * field.View()[here + (wrapped - at) * stride];
+          }
+      });
+      const float scale = static_cast<float>(1.0 / std::sqrt(squares));
+      for (float& value : smooth.View())
+        value *= scale;
+      field = std::move(smooth);
+    }
+    return field;
+  };
+  Volume<float> speckle = noise(0);
+  const Volume<float> imaginary = noise(1);
+  ParallelFor(n[2], [&](std::ptrdiff_t k) {
+    float* re = speckle.View().Row(0, static_cast<int>(k));
+    const float* im = imaginary.View().Row(0, static_cast<int>(k));
+    for (std::ptrdiff_t i = 0; i < speckle.View().SliceStride(); ++i)
+      re[i] = 10.0f * std::log10(0.5f * (re[i] * re[i] + im[i] * im[i]) + 1e-6f);
+  });
+  return speckle;
+}
+
+// A row of views of the anatomy, each turned a little, with speckle of its own, and with brightness and contrast of its own.
+// \param inside whether a voxel, counted from the middle of the volume, is real
+Case Synthetic(const std::string& name, int count, int size, double step, double turn,
+               const std::function<bool(double, double, double)>& inside)
 {
   Case result;
   result.name = name;
@@ -71,20 +140,20 @@ Case Synthetic(const std::string& name, int count, int size, double step)
     ImageGeometry geometry;
     geometry.dimensions = {size, size, size};
     geometry.spacing.setConstant(0.5);
-    const Eigen::Vector3d turn = 0.15 * random.Direction();
-    geometry = geometry.Moved(MotionAbout(geometry.Centre(), turn, {step * size * 0.5 * v, 0.0, 0.0}));
-    const double gain = v % 2 ? 5.0 : -5.0;
+    const Eigen::Vector3d shift(step * size * 0.5 * v + 0.17 * v, 0.11 * v, -0.14 * v);
+    geometry = geometry.Moved(MotionAbout(geometry.Centre(), turn * random.Direction(), shift));
+    const double gain = v % 2 ? 1.05 : 0.96, offset = v % 2 ? 5.0 : -4.0;
     Volume<Byte> values(geometry.dimensions), mask(geometry.dimensions);
+    const Volume<float> speckle = SpeckleDb(geometry.dimensions, static_cast<std::uint64_t>(v));
     const Eigen::Affine3d map = geometry.IndexToWorld();
-    ParallelFor(size, [&](std::ptrdiff_t k) {
-      Random noise(8 + static_cast<std::uint64_t>(v), static_cast<std::uint64_t>(k));
+    ParallelFor(size, [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice);
       for (int j = 0; j < size; ++j)
         for (int i = 0; i < size; ++i) {
-          const double half = 0.5 * (size - 1), x = i - half, y = j - half, z = static_cast<double>(k) + 0.3 * size;
-          mask.View()(i, j, static_cast<int>(k)) =
-              std::hypot(x, y, z) < 1.28 * size && std::abs(x) < 0.4 * z && std::abs(y) < 0.4 * z;
-          const double value = Material(map * Eigen::Vector3d(i, j, static_cast<double>(k))) + gain + 3.0 * noise.Normal();
-          values.View()(i, j, static_cast<int>(k)) = static_cast<Byte>(std::lround(std::clamp(value, 0.0, 255.0)));
+          const double half = 0.5 * (size - 1);
+          mask.View()(i, j, k) = inside(i - half, j - half, k - half);
+          const double value = gain * greyPerDb * (Level(map * Eigen::Vector3d(i, j, k)) + speckle.View()(i, j, k)) + offset;
+          values.View()(i, j, k) = static_cast<Byte>(std::lround(std::clamp(value, 0.0, 255.0)));
         }
     });
     result.values.push_back(std::move(values));
@@ -98,52 +167,131 @@ Case Synthetic(const std::string& name, int count, int size, double step)
     for (int j = 0; j < result.grid.dimensions[1]; ++j)
       for (int i = 0; i < result.grid.dimensions[0]; ++i)
         result.truth.View()(i, j, static_cast<int>(k)) =
-            static_cast<float>(Material(map * Eigen::Vector3d(i, j, static_cast<double>(k))));
+            static_cast<float>(greyPerDb * (Level(map * Eigen::Vector3d(i, j, static_cast<double>(k))) + meanOfSpeckleDb));
   });
   return result;
 }
 
-Result Stitched(const Case& scene, StitchMethod method)
+Case Chain(int size)
+{
+  return Synthetic("chain of 3, " + std::to_string(size) + "^3", 3, size, 0.6, 0.03, [](double, double, double) { return true; });
+}
+
+Case Fans(int count, int size, double step)
+{
+  return Synthetic(std::to_string(count) + " fans, " + std::to_string(size) + "^3", count, size, step, 0.15,
+                   [size](double x, double y, double z) {
+                     z += 0.8 * size;
+                     return std::hypot(x, y, z) < 1.28 * size && std::abs(x) < 0.4 * z && std::abs(y) < 0.4 * z;
+                   });
+}
+
+// The largest memory of this process since it was made, beyond what was there then.
+class MemoryPeak {
+public:
+  MemoryPeak()
+  {
+    malloc_trim(0);
+    std::ofstream("/proc/self/clear_refs") << "5"; // the peak is what is there now
+    before_ = Now();
+  }
+  double Bytes() const { return 1024.0 * static_cast<double>(Now() - before_); }
+
+private:
+  static long Now()
+  {
+    std::ifstream stream("/proc/self/status");
+    std::string word;
+    long kilobytes = -1;
+    while (stream >> word)
+      if (word == "VmHWM:" && stream >> kilobytes)
+        break;
+    return kilobytes;
+  }
+  long before_ = 0;
+};
+
+struct Time {
+  double wall = 0.0, processor = 0.0;
+};
+
+double ProcessorSeconds()
+{
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+Time TimeOf(const std::function<void()>& function)
+{
+  const double before = ProcessorSeconds();
+  Time time;
+  time.wall = benchmark::Seconds(function);
+  time.processor = ProcessorSeconds() - before;
+  return time;
+}
+
+double Median(std::vector<double> values)
+{
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+Result Stitched(const Case& scene, const StitchParameters& parameters)
 {
   const auto& n = scene.grid.dimensions;
   Result result{Volume<Byte>(n), Volume<Byte>(n), Volume<Byte>(n)};
-  StitchParameters parameters;
-  parameters.method = method;
   Stitch<Byte>(parameters, scene.Inputs(), scene.grid,
                {result.intensity.View(), result.valid.View(), result.coverage.View(), {}});
   return result;
 }
 
-void ReportErrors(const Case& scene, const std::string& method, double seconds, const Result& result)
+// One line: a stitching, timed in turn with the plain average.
+void Contest(const Case& scene, const std::string& method, const std::function<Result()>& stitch,
+             const std::function<Result()>& average, int runs)
 {
-  const auto& n = scene.grid.dimensions;
-  const auto known = [&](std::ptrdiff_t at) { return result.valid.View()[at] && !std::isnan(scene.truth.View()[at]); };
-  const auto error = [&](std::ptrdiff_t at) { return result.intensity.View()[at] - scene.truth.View()[at]; };
-  double sums[2] = {0.0, 0.0}, steps[2] = {0.0, 0.0};
-  std::ptrdiff_t counts[2] = {0, 0}, faces[2] = {0, 0};
-  const std::ptrdiff_t strides[3] = {1, n[0], static_cast<std::ptrdiff_t>(n[0]) * n[1]};
-  for (int k = 0; k < n[2]; ++k)
-    for (int j = 0; j < n[1]; ++j)
-      for (int i = 0; i < n[0]; ++i) {
-        const std::ptrdiff_t at = k * strides[2] + j * strides[1] + i;
-        if (!known(at))
-          continue;
-        const bool overlap = result.coverage.View()[at] > 1;
-        sums[overlap] += std::abs(error(at));
-        ++counts[overlap];
-        const bool next[3] = {i + 1 < n[0], j + 1 < n[1], k + 1 < n[2]};
-        for (int axis = 0; axis < 3; ++axis)
-          if (next[axis] && known(at + strides[axis])) {
-            const bool change = result.coverage.View()[at] != result.coverage.View()[at + strides[axis]];
-            steps[change] += std::abs(error(at) - error(at + strides[axis]));
-            ++faces[change];
-          }
-      }
-  benchmark::Report("stitch", scene.name, method, seconds, (sums[0] + sums[1]) / static_cast<double>(counts[0] + counts[1]),
-                    "grey",
-                    {{"error_overlap", sums[1] / static_cast<double>(counts[1])},
-                     {"error_outside", sums[0] / static_cast<double>(counts[0])},
-                     {"seam", steps[1] / static_cast<double>(faces[1]) / (steps[0] / static_cast<double>(faces[0]))},
+  Result result;
+  double peak = 0.0;
+  try {
+    const MemoryPeak memory;
+    result = stitch();
+    peak = memory.Bytes();
+  } catch (const Error& error) {
+    std::cerr << scene.name << ", " << method << ": " << error.what() << "\n";
+    return;
+  }
+  std::vector<double> wall, processor, ratio, processorRatio;
+  for (int run = 0; run < runs; ++run) {
+    const Time ours = TimeOf([&] { stitch(); }), plain = TimeOf([&] { average(); });
+    wall.push_back(ours.wall);
+    processor.push_back(ours.processor);
+    ratio.push_back(ours.wall / plain.wall);
+    processorRatio.push_back(ours.processor / plain.processor);
+  }
+  const AnyPosedVolume truth = PosedVolume<float>{scene.truth.View(), {}, scene.grid};
+  const StitchQualityReport quality = MeasureStitch<Byte>(scene.Inputs(), scene.grid, std::as_const(result.intensity).View(),
+                                                          std::as_const(result.valid).View(), &truth);
+  const auto voxels = static_cast<double>(result.valid.View().Size());
+  benchmark::Report("stitch", scene.name, method, Median(wall), quality.errorOverlap, "grey",
+                    {{"cpu_seconds", Median(processor)},
+                     {"over_average", Median(ratio)},
+                     {"cpu_over_average", Median(processorRatio)},
+                     {"bytes_per_voxel", peak / voxels},
+                     {"seam_mean", quality.seamMean},
+                     {"seam_gradient", quality.seamGradient},
+                     {"border_mean", quality.borders.mean},
+                     {"border_gradient", quality.borders.gradient},
+                     {"cut_mean", quality.cuts.mean},
+                     {"cut_gradient", quality.cuts.gradient},
+                     {"texture_kept", quality.textureKept},
+                     {"snr", quality.snr},
+                     {"snr_sources", quality.snrSources},
+                     {"error_overlap", quality.errorOverlap},
+                     {"error_outside", quality.errorOutside},
+                     {"overlap_voxels", quality.overlapVoxels},
                      {"voxels", result.valid.View().Size()}});
 }
 
@@ -288,46 +436,69 @@ bool Liver(Case& scene)
 
 void Measure(const Case& scene)
 {
-  const std::pair<StitchMethod, const char*> methods[] = {{StitchMethod::Distance, "distance"},
-                                                          {StitchMethod::Feather, "feather"},
-                                                          {StitchMethod::Average, "average"},
-                                                          {StitchMethod::Maximum, "maximum"}};
-  for (const auto& [method, name] : methods) {
-    Result result;
-    const StitchMethod which = method;
-    const auto ours = [&] { result = Stitched(scene, which); };
+  struct Contender {
+    const char* name;
+    StitchMethod method;
+    StitchTexture texture;
+  };
+  const Contender contenders[] = {
+      {"average", StitchMethod::Average, StitchTexture::Mix},
+      {"feather", StitchMethod::Feather, StitchTexture::Mix},
+      {"maximum", StitchMethod::Maximum, StitchTexture::Mix},
+      {"distance", StitchMethod::Distance, StitchTexture::Mix},
+      {"membrane", StitchMethod::Membrane, StitchTexture::Mix},
+      {"distance restore", StitchMethod::Distance, StitchTexture::Restore},
+      {"distance split", StitchMethod::Distance, StitchTexture::Split},
+      {"distance seam", StitchMethod::Distance, StitchTexture::Seam},
+      {"membrane restore", StitchMethod::Membrane, StitchTexture::Restore},
+      {"membrane split", StitchMethod::Membrane, StitchTexture::Split},
+      {"membrane seam", StitchMethod::Membrane, StitchTexture::Seam},
+      {"multiband", StitchMethod::Multiband, StitchTexture::Mix},
+      {"offset", StitchMethod::Offset, StitchTexture::Mix},
+  };
+  const auto with = [&scene](StitchMethod method, StitchTexture texture) {
+    StitchParameters parameters;
+    parameters.method = method;
+    parameters.texture = texture;
+    return [&scene, parameters] { return Stitched(scene, parameters); };
+  };
+  const std::function<Result()> average = with(StitchMethod::Average, StitchTexture::Mix);
+  for (const Contender& contender : contenders)
+    Contest(scene, contender.name, with(contender.method, contender.texture), average, scene.runs);
 #ifdef ECHORAMA_WITH_VTK
-    if (method == StitchMethod::Average) {
-      std::vector<vtkSmartPointer<vtkImageData>> values, masks;
-      for (std::size_t v = 0; v < scene.values.size(); ++v) {
-        values.push_back(VtkImageOf(scene.values[v], scene.geometries[v]));
-        masks.push_back(VtkImageOf(scene.masks[v], scene.geometries[v]));
-      }
-      Result theirs;
-      const auto [seconds, theirSeconds] = benchmark::Duel(
-          ours, [&] { theirs = VtkAverage(scene, values, masks); }, 3);
-      ReportErrors(scene, name, seconds, result);
-      ReportErrors(scene, "vtk reslice and average", theirSeconds, theirs);
-      continue;
-    }
-#endif
-    const double seconds = benchmark::MedianSeconds(ours, 3);
-    ReportErrors(scene, name, seconds, result);
+  std::vector<vtkSmartPointer<vtkImageData>> values, masks;
+  for (std::size_t v = 0; v < scene.values.size(); ++v) {
+    values.push_back(VtkImageOf(scene.values[v], scene.geometries[v]));
+    masks.push_back(VtkImageOf(scene.masks[v], scene.geometries[v]));
   }
+  Contest(
+      scene, "vtk reslice and average", [&] { return VtkAverage(scene, values, masks); }, average, 1);
+#endif
 }
 
 } // namespace
 
-int main()
+int main(int argc, char** argv)
 {
-  Measure(Synthetic("pair 160^3", 2, 160, 0.5));
-  Measure(Synthetic("chain of 5, 96^3", 5, 96, 0.3));
+  const auto wanted = [&](const std::string& name) {
+    return argc < 2 || std::any_of(argv + 1, argv + argc, [&](const char* word) { return name.find(word) != std::string::npos; });
+  };
+  if (wanted("chain of 3, 96^3"))
+    Measure(Chain(96));
+  if (wanted("2 fans, 160^3"))
+    Measure(Fans(2, 160, 0.5));
+  if (wanted("5 fans, 96^3"))
+    Measure(Fans(5, 96, 0.3));
 #ifdef ECHORAMA_WITH_VTK
   Case liver;
-  if (Liver(liver))
-    Measure(liver);
-  else
-    std::cerr << "no liver volumes beside the project: that case is left out\n";
+  if (wanted("liver A + B")) {
+    if (Liver(liver))
+      Measure(liver);
+    else
+      std::cerr << "no liver volumes beside the project: that case is left out\n";
+  }
 #endif
+  if (wanted("chain of 3, 256^3"))
+    Measure(Chain(256));
   return 0;
 }
