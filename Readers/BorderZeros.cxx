@@ -109,7 +109,31 @@ std::int64_t ValidFromBorderZeros(VolumeView<const T> voxels, VolumeView<unsigne
   return missing;
 }
 
-#define ECHORAMA_INSTANTIATE(T) template std::int64_t ValidFromBorderZeros<T>(VolumeView<const T>, VolumeView<unsigned char>);
+template <class T>
+bool LooksValidEverywhere(VolumeView<const T> slab, int first, int slices)
+{
+  const auto [nx, ny, nz] = slab.Dimensions();
+  for (int k = 0; k < nz; ++k)
+    for (int j = 0; j < ny; ++j) {
+      const T* row = slab.Row(j, k);
+      const bool outerSlice = slices > 1 && (first + k == 0 || first + k == slices - 1);
+      if (j == 0 || j == ny - 1 || outerSlice) {
+        if (std::any_of(row, row + nx, IsNothing<T>))
+          return false;
+        continue;
+      }
+      if (IsNothing(row[0]) || IsNothing(row[nx - 1]))
+        return false;
+      if constexpr (std::is_floating_point_v<T>)
+        if (!std::all_of(row, row + nx, [](T value) { return std::isfinite(value); }))
+          return false;
+    }
+  return true;
+}
+
+#define ECHORAMA_INSTANTIATE(T)                                                                                                  \
+  template std::int64_t ValidFromBorderZeros<T>(VolumeView<const T>, VolumeView<unsigned char>);                                 \
+  template bool LooksValidEverywhere<T>(VolumeView<const T>, int, int);
 ECHORAMA_INSTANTIATE(char)
 ECHORAMA_INSTANTIATE(signed char)
 ECHORAMA_INSTANTIATE(unsigned char)

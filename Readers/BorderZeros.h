@@ -13,4 +13,9 @@ namespace echorama {
 template <class T>
 std::int64_t ValidFromBorderZeros(VolumeView<const T> voxels, VolumeView<unsigned char> valid);
 
+/// Whether ValidFromBorderZeros would find every voxel valid, asked slab by slab: \a slab holds slices \a first ... of a volume
+/// of \a slices, and it would when this says so of every slab.
+template <class T>
+bool LooksValidEverywhere(VolumeView<const T> slab, int first, int slices);
+
 } // namespace echorama

@@ -506,7 +506,7 @@ void NiftiSource::ReadExtensions(PlainOrGzip& file, std::uint64_t at, bool swap)
          " of the header (of other programs) cannot be kept");
 }
 
-// What WriteNifti wrote: a line with the exact geometry, then key=value lines.
+// What NiftiHeaderText made: a line with the exact geometry, then key=value lines.
 void NiftiSource::ReadComment(const std::string& text)
 {
   std::istringstream lines(text);
@@ -698,13 +698,9 @@ std::unique_ptr<VolumeSource> OpenNifti(const std::string& path)
   return std::make_unique<NiftiSource>(path);
 }
 
-double WriteNifti(const std::string& path, const ImageHeader& header, const void* voxels, FileReplacement& files,
-                  const Progress& progress)
+std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, double& roundingMm)
 {
-  if (FormatOfName(path) != FileFormat::Nifti)
-    throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .nii or .nii.gz");
   const ImageGeometry& g = header.geometry;
-  g.Check(path);
   if (!(std::max(g.origin.norm(), g.spacing.norm()) < static_cast<double>(std::numeric_limits<float>::max())))
     throw Error(Error::Kind::BadInput,
                 path + ": its geometry is beyond the range of 32-bit floats, which is all that NIfTI-1 has");
@@ -719,8 +715,6 @@ double WriteNifti(const std::string& path, const ImageHeader& header, const void
   add(Eigen::Matrix3d(g.direction.transpose())); // row by row
   comment += "\n";
   for (const HeaderField& field : header.fields) {
-    if (!CanHold(field))
-      throw Error(Error::Kind::InvalidParameter, path + ": the header cannot hold the field \"" + field.first + "\"");
     if (field.first == "descrip" && field.second.size() < 80)
       description = field.second;
     else
@@ -732,35 +726,12 @@ double WriteNifti(const std::string& path, const ImageHeader& header, const void
 
   const int version = *std::max_element(g.dimensions.begin(), g.dimensions.end()) > 32767 ? 2 : 1;
   const std::size_t offset = static_cast<std::size_t>(SizeOfHeader[version]) + 4 + 8 + comment.size();
-  double loss = 0.0;
-  std::string start =
-      version == 1 ? HeaderText<1>(header, description, offset, loss) : HeaderText<2>(header, description, offset, loss);
+  std::string start = version == 1 ? HeaderText<1>(header, description, offset, roundingMm)
+                                   : HeaderText<2>(header, description, offset, roundingMm);
   start += std::string("\1\0\0\0", 4);
   for (const std::int32_t number : {static_cast<std::int32_t>(comment.size() + 8), std::int32_t{CommentCode}})
     start.append(reinterpret_cast<const char*>(&number), sizeof number);
-  start += comment;
-
-  std::ofstream stream(files.Stage(path), std::ios::binary);
-  const std::uint64_t bytes = header.ByteCount();
-  std::string extension = fs::path(path).extension().string();
-  if (extension.size() == 3) // .gz
-  {
-    Deflater deflater(stream, CompressedForm::Gzip);
-    deflater.Append(start.data(), start.size());
-    deflater.Append(voxels, bytes, progress.Part(0.0, 0.9));
-    deflater.Finish(progress.Part(0.9, 1.0));
-  } else {
-    stream << start;
-    constexpr std::uint64_t Piece = 1 << 24;
-    for (std::uint64_t done = 0; done < bytes && stream; done += Piece) {
-      stream.write(static_cast<const char*>(voxels) + done, static_cast<std::streamsize>(std::min(Piece, bytes - done)));
-      progress(static_cast<double>(done) / static_cast<double>(bytes));
-    }
-  }
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?); what was there is left as it was");
-  return loss;
+  return start + comment;
 }
 
 } // namespace echorama

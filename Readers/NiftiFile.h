@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Core/Base/FileReplacement.h"
 #include "Readers/VolumeSource.h"
 #include <string>
 #include <string_view>
@@ -17,16 +16,17 @@ bool LooksLikeNifti(std::string_view start);
 /// and micrometres become millimetres. Left-handed axes, usual in this format, are made right-handed by taking the slices
 /// in reverse. An affine that is not a pose: where the nearest pose moves no voxel by more than 0.1 voxel it is taken (with a
 /// note from 0.001 voxel on), else the file is refused. Stored numbers are scaled (scl_slope, scl_inter) to Float32, to Float64
-/// when they have more than 16 bits. Text that WriteNifti left in the header's extension comes back as fields, and the exact
+/// when they have more than 16 bits. Text that NiftiHeaderText left in the header's extension comes back as fields, and the exact
 /// geometry with it, unless another program has since changed the header's. \throws Error as OpenVolume: ANALYZE, colours,
 /// complex numbers, several numbers per voxel and spectra are refused.
 std::unique_ptr<VolumeSource> OpenNifti(const std::string& path);
 
-/// Writes a volume as NIfTI-1, compressed when the name ends in .gz (NIfTI-2 when a dimension is beyond 32767). sform and
-/// qform hold the pose as 32-bit floats, which is all that NIfTI-1 has; an extension of the header (a comment, which other
-/// programs skip) holds it exactly, and the fields. \returns by how many millimetres other programs see a voxel displaced, at
-/// most: the rounding to floats \throws Error as WriteVolume.
-double WriteNifti(const std::string& path, const ImageHeader& header, const void* voxels, FileReplacement& files,
-                  const Progress& progress = {});
+/// All that comes before the voxels of a NIfTI-1 file (NIfTI-2 when a dimension is beyond 32767). sform and qform hold the pose
+/// as 32-bit floats, which is all that NIfTI-1 has; an extension of the header (a comment, which other programs skip) holds
+/// it exactly, and the fields.
+/// \param path the file, for messages
+/// \param roundingMm by how many millimetres other programs see a voxel displaced, at most: the rounding to floats
+/// \throws Error(InvalidParameter) for fields that are too long, Error(BadInput) for a geometry beyond the range of floats.
+std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, double& roundingMm);
 
 } // namespace echorama

@@ -107,13 +107,6 @@ void ReverseSlices(char* bytes, std::size_t slice, int slices)
     std::swap_ranges(bytes + front * slice, bytes + (front + 1) * slice, bytes + back * slice);
 }
 
-bool IsDetached(const std::string& path)
-{
-  std::string extension = fs::path(path).extension().string();
-  return extension.size() == 4 ? std::tolower(extension[3]) == 'd' && std::tolower(extension[1]) == 'm'
-                               : extension.size() == 5 && std::tolower(extension[1]) == 'n' && std::tolower(extension[2]) == 'h';
-}
-
 class HeaderVolume : public VolumeSource {
 public:
   explicit HeaderVolume(const std::string& path) : header_(ReadImageHeader(path))
@@ -223,48 +216,6 @@ void ArrangeVoxels(const ImageHeader& header, void* voxels)
 std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path)
 {
   return std::make_unique<HeaderVolume>(path);
-}
-
-void WriteVolume(const std::string& path, ImageHeader header, const void* voxels, bool compress, FileReplacement& files,
-                 const Progress& progress)
-{
-  header.format = FormatOfName(path);
-  if (header.format != FileFormat::MetaImage && header.format != FileFormat::Nrrd)
-    throw Error(Error::Kind::InvalidParameter, path + ": the extension must be .mha, .mhd, .nrrd or .nhdr");
-  header.geometry.Check(path);
-  for (const HeaderField& field : header.fields)
-    if (!CanHold(field))
-      throw Error(Error::Kind::InvalidParameter, path + ": the header cannot hold the field \"" + field.first + "\"");
-  header.encoding = compress ? ImageHeader::Encoding::Zlib : ImageHeader::Encoding::Raw;
-  header.bigEndian = HostIsBigEndian;
-  const bool meta = header.format == FileFormat::MetaImage, detached = IsDetached(path);
-  const std::string dataFile = detached ? fs::path(path).stem().string() + (!compress ? ".raw" : meta ? ".zraw" : ".raw.gz") : "";
-
-  std::ofstream dataStream;
-  if (detached)
-    dataStream.open(files.Stage(DetachedPath(path, dataFile)), std::ios::binary);
-  std::ofstream stream(files.Stage(path), std::ios::binary);
-  std::size_t sizeAt = 0;
-  stream << (meta ? MetaImageHeaderText(header, dataFile, sizeAt) : NrrdHeaderText(header, dataFile));
-
-  std::ofstream& target = detached ? dataStream : stream;
-  const std::uint64_t bytes = header.ByteCount();
-  if (compress) {
-    const std::uint64_t size = Compress(target, meta ? CompressedForm::Zlib : CompressedForm::Gzip, voxels, bytes, progress);
-    if (sizeAt > 0) {
-      stream.seekp(static_cast<std::streamoff>(sizeAt));
-      stream << size;
-    }
-  } else
-    for (std::uint64_t done = 0; done < bytes && target; done += ChunkBytes) {
-      target.write(static_cast<const char*>(voxels) + done, static_cast<std::streamsize>(std::min(ChunkBytes, bytes - done)));
-      progress(static_cast<double>(done) / static_cast<double>(bytes));
-    }
-  stream.close();
-  if (detached)
-    dataStream.close();
-  if (!stream || !target)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?); what was there is left as it was");
 }
 
 std::string CompanionPath(const std::string& path, const std::string& array)

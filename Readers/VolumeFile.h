@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Core/Base/FileReplacement.h"
 #include "Core/Base/Progress.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeSource.h"
@@ -28,14 +27,6 @@ std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path);
 
 /// Puts voxels that were read as they lie in the file into this machine's byte order and the header's order of slices.
 void ArrangeVoxels(const ImageHeader& header, void* voxels);
-
-/// Writes a volume as MetaImage or NRRD, whichever \a path names; .mhd and .nhdr get their voxels in a file beside them
-/// (.raw; compressed .zraw, .raw.gz). Uses geometry, type and fields of \a header. The files appear when \a files is
-/// committed; the main file is staged last.
-/// \throws Error(InvalidParameter) when the name has none of these extensions or a field cannot be held (CanHold),
-/// Error(BadInput) for a geometry that is none, Error(FileSystem) when the disk is full, Error(Cancelled).
-void WriteVolume(const std::string& path, ImageHeader header, const void* voxels, bool compress, FileReplacement& files,
-                 const Progress& progress = {});
 
 /// The path of a file's companion that holds another array of the same voxels: NAME.ValidRegion.mha beside NAME.mha,
 /// NAME.ValidRegion.nii.gz beside NAME.nii.gz.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundWriter.h"
 
+#include "Core/Base/FileReplacement.h"
 #include "Core/Base/NumberText.h"
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
@@ -8,64 +9,184 @@
 #include "Readers/SequenceFile.h"
 #include "Readers/VdbFile.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VolumeWriter.h"
 
+#include "vtkCallbackCommand.h"
 #include "vtkCellData.h"
+#include "vtkCommand.h"
 #include "vtkErrorCode.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMatrix3x3.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundSequenceWriter.h"
 #include "vtkUltrasoundVolume.h"
 #include "vtkUltrasoundVoxelTypes.h"
-#include "vtkUnsignedCharArray.h"
 #include "vtkXMLImageDataWriter.h"
 
 #include <algorithm>
+#include <memory>
+#include <optional>
 
 using echorama::Error;
 using echorama::FileFormat;
 using echorama::FileReplacement;
 using echorama::ImageHeader;
+using echorama::VolumeWriter;
 
 vtkStandardNewMacro(vtkUltrasoundWriter);
 
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
+const char* const UnknownExtension = ": the extension must be .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb or .vti";
 
-// Whether the reader would find every voxel real without being told.
-bool LooksValidEverywhere(vtkImageData* input, vtkDataArray* intensity)
-{
-  const vtkNew<vtkUnsignedCharArray> guess;
-  guess->SetNumberOfTuples(input->GetNumberOfPoints());
-  const auto target = vtkUltrasoundVolume::ViewOf<unsigned char>(guess, input);
-  std::int64_t missing = 0;
-  switch (intensity->GetDataType()) {
-    vtkTemplateMacro(missing =
-                         echorama::ValidFromBorderZeros(vtkUltrasoundVolume::ViewOf<const VTK_TT>(intensity, input), target));
+using Extent = std::array<int, 6>;
+
+// A slab of a volume, checked, and where its voxels lie.
+struct Slab {
+  vtkImageData* Image = nullptr;
+  vtkDataArray* Intensity = nullptr;
+  vtkDataArray* Valid = nullptr;      // nullptr: every voxel is real
+  vtkDataArray* Provenance = nullptr; // nullptr: none that a file could hold
+  std::array<int, 3> Dimensions{0, 0, 0};
+  std::size_t First = 0; // voxel of the image: the input may hand out more slices than were asked for
+
+  std::size_t Count() const { return static_cast<std::size_t>(Dimensions[0]) * Dimensions[1] * Dimensions[2]; }
+  template <class T>
+  const T* Voxels(vtkDataArray* array) const
+  {
+    return static_cast<const T*>(array->GetVoidPointer(static_cast<vtkIdType>(First)));
   }
-  return missing == 0;
+  const void* Voxels(vtkDataArray* array) const { return array->GetVoidPointer(static_cast<vtkIdType>(First)); }
+  std::uint64_t Bytes(vtkDataArray* array) const { return Count() * static_cast<std::uint64_t>(array->GetDataTypeSize()); }
+};
+
+// The voxels of \a image that lie in \a extent.
+Slab CheckedSlab(vtkImageData* image, const Extent& extent, const std::string& path)
+{
+  Slab slab;
+  slab.Image = image;
+  slab.Intensity = vtkUltrasoundVolume::GetIntensity(image);
+  vtkUltrasoundVolume::GeometryOf(image).Check(path);
+  if (!slab.Intensity || slab.Intensity->GetNumberOfTuples() != image->GetNumberOfPoints()) {
+    throw Error(Error::Kind::BadInput,
+                path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
+  }
+  if (slab.Intensity->GetNumberOfComponents() != 1) {
+    throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
+  }
+  slab.Valid = vtkUltrasoundVolume::CheckValidRegion(image, path);
+  for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
+    vtkAbstractArray* array = image->GetPointData()->GetAbstractArray(i);
+    if (array->GetNumberOfTuples() != image->GetNumberOfPoints()) {
+      throw Error(Error::Kind::BadInput, path + ": the point array " + (array->GetName() ? array->GetName() : "without a name") +
+                                             " has not one value per voxel");
+    }
+  }
+  slab.Provenance = image->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName());
+  if (slab.Provenance && slab.Provenance->GetNumberOfComponents() != 1) {
+    slab.Provenance = nullptr;
+  }
+  Extent given{};
+  image->GetExtent(given.data());
+  if (!std::equal(given.begin(), given.begin() + 4, extent.begin()) || given[4] > extent[4] || given[5] < extent[5]) {
+    throw Error(Error::Kind::BadInput, path + ": the input did not give the slices " + std::to_string(extent[4]) + " to " +
+                                           std::to_string(extent[5]) + " that it was asked for");
+  }
+  slab.Dimensions = {extent[1] - extent[0] + 1, extent[3] - extent[2] + 1, extent[5] - extent[4] + 1};
+  slab.First = static_cast<std::size_t>(slab.Dimensions[0]) * static_cast<std::size_t>(slab.Dimensions[1]) *
+               static_cast<std::size_t>(extent[4] - given[4]);
+  return slab;
 }
 
-// The valid region of a volume, 1 or 0, or nullptr when its file can be left out.
-vtkSmartPointer<vtkDataArray> ValidRegionToWrite(vtkImageData* input, vtkDataArray* intensity)
-{
-  const vtkIdType count = input->GetNumberOfPoints();
-  vtkDataArray* given = vtkUltrasoundVolume::GetValidRegion(input);
-  const auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
-  valid->SetNumberOfTuples(count);
-  bool everywhere = true;
-  for (vtkIdType i = 0; i < count; ++i) {
-    const bool real = !given || given->GetComponent(i, 0) != 0.0;
-    valid->SetValue(i, real ? 1 : 0);
-    everywhere = everywhere && real;
+// What must not change from one slab to the next.
+struct Kind {
+  std::array<double, 15> Pose{}; // origin, spacing, direction
+  std::array<int, 3> Types{-1, -1, -1};
+
+  explicit Kind(const Slab& slab)
+  {
+    std::copy_n(slab.Image->GetOrigin(), 3, Pose.begin());
+    std::copy_n(slab.Image->GetSpacing(), 3, Pose.begin() + 3);
+    std::copy_n(slab.Image->GetDirectionMatrix()->GetData(), 9, Pose.begin() + 6);
+    Types[0] = slab.Intensity->GetDataType();
+    Types[1] = slab.Valid ? slab.Valid->GetDataType() : -1;
+    Types[2] = slab.Provenance ? slab.Provenance->GetDataType() : -1;
   }
-  return everywhere && LooksValidEverywhere(input, intensity) ? nullptr : valid;
+  bool operator==(const Kind& other) const { return Pose == other.Pose && Types == other.Types; }
+};
+
+// Whether the reader would find every voxel of a slab real without being told.
+bool LooksValidEverywhere(const Slab& slab, int first, int slices)
+{
+  bool valid = false;
+  switch (slab.Intensity->GetDataType()) {
+    vtkTemplateMacro(
+        valid = echorama::LooksValidEverywhere(
+            echorama::VolumeView<const VTK_TT>(slab.Voxels<VTK_TT>(slab.Intensity), slab.Dimensions), first, slices));
+  }
+  return valid;
+}
+
+// The valid region of a slab, 1 or 0.
+std::vector<unsigned char> ValidOf(const Slab& slab)
+{
+  std::vector<unsigned char> valid(slab.Count(), 1);
+  if (slab.Valid) {
+    const unsigned char* given = slab.Voxels<unsigned char>(slab.Valid);
+    std::transform(given, given + valid.size(), valid.begin(), [](unsigned char v) { return v != 0 ? 1 : 0; });
+  }
+  return valid;
+}
+
+// Field data that a header can hold: the acquisition, and lines that a header brought. Names of all else go to \a lost.
+std::vector<echorama::HeaderField> FieldsOf(const Slab& slab, std::vector<std::string>& lost)
+{
+  std::vector<echorama::HeaderField> held;
+  vtkImageData* image = slab.Image;
+  for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(image)) {
+    held.emplace_back(FieldPrefix + name, text);
+  }
+  const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
+  vtkFieldData* fields = image->GetFieldData();
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
+    vtkAbstractArray* array = fields->GetAbstractArray(i);
+    const std::string name = array->GetName() ? array->GetName() : "";
+    if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end()) {
+      continue;
+    }
+    vtkStringArray* text = vtkStringArray::SafeDownCast(array);
+    if (text && text->GetNumberOfValues() == 1 && echorama::CanHold({name, text->GetValue(0)})) {
+      held.emplace_back(name, text->GetValue(0));
+    } else {
+      lost.push_back("field " + name);
+    }
+  }
+  for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
+    vtkAbstractArray* array = image->GetPointData()->GetAbstractArray(i);
+    const std::string name = array->GetName() ? array->GetName() : "";
+    if (array != slab.Intensity && name != vtkUltrasoundVolume::ValidRegionName() && array != slab.Provenance) {
+      lost.push_back("point array " + name);
+    }
+  }
+  for (int i = 0; i < image->GetCellData()->GetNumberOfArrays(); ++i) {
+    lost.push_back(std::string("cell array ") + image->GetCellData()->GetArrayName(i));
+  }
+  return held;
+}
+
+std::unique_ptr<VolumeWriter> OpenFile(const std::string& path, ImageHeader header, vtkDataArray* array, bool compress,
+                                       FileReplacement& files)
+{
+  header.type = array ? echorama::VoxelTypeOf(array) : echorama::VoxelType::UInt8;
+  return std::make_unique<VolumeWriter>(path, std::move(header), compress, files);
 }
 } // namespace
 
@@ -81,6 +202,7 @@ void vtkUltrasoundWriter::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
   os << indent << "UseCompression: " << this->UseCompression << "\n";
+  os << indent << "NumberOfSlabs: " << this->NumberOfSlabs << "\n";
   os << indent << "Notes: " << this->GetNotes() << "\n";
 }
 
@@ -107,14 +229,24 @@ int vtkUltrasoundWriter::Write()
   // When the input fails, WriteData() is never called and the superclass reports success.
   this->Written = false;
   this->Notes.clear();
+  this->RoundingMm = 0.0;
   const std::string path = this->FileName ? this->FileName : "";
-  if (echorama::NamesSequence(path)) {
-    this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this, &path](const echorama::Progress& progress) {
-      this->Notes = vtkUltrasoundSequenceWriter::WriteSteps(this, path, this->UseCompression != 0, progress);
-    }));
-  } else {
+  const bool sequence = echorama::NamesSequence(path);
+  if (!sequence && this->NumberOfSlabs == 1) {
     this->Superclass::Write();
+    return this->Written ? 1 : 0;
   }
+  this->InvokeEvent(vtkCommand::StartEvent);
+  this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this, &path, sequence](const echorama::Progress& progress) {
+    if (!sequence) {
+      this->WriteBySlabs(path, progress);
+    } else if (this->NumberOfSlabs == 1) {
+      this->Notes = vtkUltrasoundSequenceWriter::WriteSteps(this, path, this->UseCompression != 0, progress);
+    } else {
+      throw Error(Error::Kind::InvalidParameter, path + ": a sequence is written frame by frame, not by slabs");
+    }
+  }));
+  this->InvokeEvent(vtkCommand::EndEvent);
   return this->Written ? 1 : 0;
 }
 
@@ -126,14 +258,20 @@ void vtkUltrasoundWriter::Finish(int written)
   if (this->Written && !this->Notes.empty()) {
     vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
   }
+  // No warning: it is the format's own, and our reader does not see it.
+  if (this->Written && this->RoundingMm > 1e-9) {
+    this->Notes.push_back("NIfTI holds the geometry as 32-bit floats: other programs see voxels up to " +
+                          echorama::NumberText(static_cast<float>(this->RoundingMm)) +
+                          " mm off; for vtkUltrasoundReader the exact one is in an extension of the header");
+  }
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundWriter::WriteData()
 {
   this->Notes.clear();
-  double rounding = 0.0;
-  this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this, &rounding](const echorama::Progress& progress) {
+  this->RoundingMm = 0.0;
+  this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
     const std::string path = this->FileName ? this->FileName : "";
     if (path.empty()) {
       throw Error(Error::Kind::InvalidParameter, "no file name was given");
@@ -142,134 +280,213 @@ void vtkUltrasoundWriter::WriteData()
     if (!input) {
       throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
     }
-    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
-    vtkUltrasoundVolume::GeometryOf(input).Check(path);
-    if (!intensity || intensity->GetNumberOfTuples() != input->GetNumberOfPoints()) {
-      throw Error(Error::Kind::BadInput,
-                  path + ": the volume has no intensities (a point array named Intensity, or active scalars)");
-    }
-    if (intensity->GetNumberOfComponents() != 1) {
-      throw Error(Error::Kind::BadInput, path + ": the volume has several numbers per voxel; one can be written");
-    }
-    vtkUltrasoundVolume::CheckValidRegion(input, path);
-    for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
-      vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
-      if (array->GetNumberOfTuples() != input->GetNumberOfPoints()) {
-        throw Error(Error::Kind::BadInput, path + ": the point array " +
-                                               (array->GetName() ? array->GetName() : "without a name") +
-                                               " has not one value per voxel");
-      }
-    }
+    Extent extent{};
+    input->GetExtent(extent.data());
+    const Slab whole = CheckedSlab(input, extent, path); // whatever the format
 
-    FileReplacement files;
     switch (echorama::FormatOfName(path)) {
     case FileFormat::MetaImage:
     case FileFormat::Nrrd:
     case FileFormat::Nifti:
-    case FileFormat::Vdb:
-      rounding = this->WriteOneArrayFile(input, files, progress);
+      this->WriteSlabs(
+          path, extent, 1, [input](const Extent&, const echorama::Progress&) { return input; }, progress);
       break;
+    case FileFormat::Vdb: {
+      std::vector<std::string> lost;
+      ImageHeader header;
+      header.geometry = vtkUltrasoundVolume::GeometryOf(input);
+      FileReplacement files;
+      // The valid region are its active voxels; a file of an earlier volume of this name must not stay.
+      files.Remove(echorama::CompanionPath(path, vtkUltrasoundVolume::ValidRegionName()));
+      const std::string provenance = echorama::CompanionPath(path, vtkUltrasoundVolume::ProvenanceName());
+      if (whole.Provenance) {
+        header.type = echorama::VoxelTypeOf(whole.Provenance);
+        echorama::WriteVdb(provenance, header, whole.Voxels(whole.Provenance), nullptr, this->UseCompression != 0, files,
+                           progress.Part(0.0, 0.2));
+      } else {
+        files.Remove(provenance);
+      }
+      header.type = echorama::VoxelTypeOf(whole.Intensity);
+      header.fields = FieldsOf(whole, lost);
+      echorama::WriteVdb(path, header, whole.Voxels(whole.Intensity),
+                         whole.Valid ? whole.Voxels<unsigned char>(whole.Valid) : nullptr, this->UseCompression != 0, files,
+                         progress.Part(0.2, 1.0));
+      files.Commit();
+      this->NoteLost(lost);
+      break;
+    }
     case FileFormat::VtkXmlImage:
-      this->WriteXml(input, files);
+      this->WriteXml(input);
       break;
     default:
-      throw Error(Error::Kind::InvalidParameter,
-                  path + ": the extension must be .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb or .vti");
+      throw Error(Error::Kind::InvalidParameter, path + UnknownExtension);
     }
-    files.Commit();
   }));
-  // No warning: it is the format's own, and our reader does not see it.
-  if (this->Written && rounding > 1e-9) {
-    this->Notes.push_back("NIfTI holds the geometry as 32-bit floats: other programs see voxels up to " +
-                          echorama::NumberText(static_cast<float>(rounding)) +
-                          " mm off; for vtkUltrasoundReader the exact one is in an extension of the header");
-  }
 }
 
 //----------------------------------------------------------------------------
-double vtkUltrasoundWriter::WriteOneArrayFile(vtkImageData* input, FileReplacement& files, const echorama::Progress& progress)
+void vtkUltrasoundWriter::WriteBySlabs(const std::string& path, const echorama::Progress& progress)
 {
-  const std::string path = this->FileName;
+  if (path.empty()) {
+    throw Error(Error::Kind::InvalidParameter, "no file name was given");
+  }
+  switch (echorama::FormatOfName(path)) {
+  case FileFormat::MetaImage:
+  case FileFormat::Nrrd:
+  case FileFormat::Nifti:
+    break;
+  case FileFormat::Vdb:
+  case FileFormat::VtkXmlImage:
+    throw Error(Error::Kind::InvalidParameter,
+                path + ": this format is written whole; by slabs: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz");
+  default:
+    throw Error(Error::Kind::InvalidParameter, path + UnknownExtension);
+  }
+  int port = 0;
+  vtkAlgorithm* source = this->GetNumberOfInputConnections(0) > 0 ? this->GetInputAlgorithm(0, 0, port) : nullptr;
+  if (!source) {
+    throw Error(Error::Kind::BadInput, path + ": there is no volume to write");
+  }
+  if (!source->GetExecutive()->UpdateInformation()) {
+    throw Error(Error::Kind::BadInput, path + ": the input failed");
+  }
+  vtkInformation* information = source->GetOutputInformation(port);
+  if (!information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT())) {
+    throw Error(Error::Kind::BadInput, path + ": the input does not say how large it is");
+  }
+  Extent whole{};
+  information->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole.data());
+
+  // The input tells how far it is with a slab, and stops when this is to stop.
+  const echorama::Progress* making = nullptr;
+  bool stopped = false;
+  const std::function<void()> onProgress = [&] {
+    try {
+      if (making) {
+        (*making)(source->GetProgress());
+      }
+    } catch (const Error&) {
+      stopped = true;
+      source->SetAbortExecute(1);
+    }
+  };
+  const vtkNew<vtkCallbackCommand> observer;
+  observer->SetClientData(const_cast<std::function<void()>*>(&onProgress));
+  observer->SetCallback(
+      [](vtkObject*, unsigned long, void* function, void*) { (*static_cast<const std::function<void()>*>(function))(); });
+  const unsigned long tag = source->AddObserver(vtkCommand::ProgressEvent, observer);
+  const auto atTheEnd = [&](void*) {
+    source->RemoveObserver(tag);
+    // Whoever updates the input next without saying what of it wants the whole, as ever.
+    information->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), whole.data(), 6);
+  };
+  const std::shared_ptr<void> cleanup(nullptr, atTheEnd);
+
+  const auto slabOf = [&](const Extent& extent, const echorama::Progress& slabProgress) {
+    const vtkNew<vtkInformationVector> requests;
+    requests->SetNumberOfInformationObjects(source->GetNumberOfOutputPorts());
+    requests->GetInformationObject(port)->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), extent.data(), 6);
+    making = &slabProgress;
+    const bool made = source->Update(port, requests) != 0;
+    making = nullptr;
+    if (stopped) {
+      throw Error(Error::Kind::Cancelled, "stopped on request");
+    }
+    vtkImageData* image = made ? vtkImageData::SafeDownCast(source->GetOutputDataObject(port)) : nullptr;
+    if (!image || source->GetErrorCode() != vtkErrorCode::NoError) {
+      throw Error(Error::Kind::BadInput,
+                  path + ": the input failed at slices " + std::to_string(extent[4]) + " to " + std::to_string(extent[5]));
+    }
+    return image;
+  };
+  this->WriteSlabs(path, whole, this->NumberOfSlabs, slabOf, progress);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whole, int slabs, const SlabSource& slabOf,
+                                     const echorama::Progress& progress)
+{
   const bool compress = this->UseCompression != 0;
-  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(input);
-  ImageHeader header;
-  header.geometry = vtkUltrasoundVolume::GeometryOf(input);
-
-  const FileFormat format = echorama::FormatOfName(path);
-  const auto write = [&](const std::string& target, vtkDataArray* array, const unsigned char* valid,
-                         const echorama::Progress& part) {
-    header.type = echorama::VoxelTypeOf(array);
-    const void* voxels = array->GetVoidPointer(0);
-    if (format == FileFormat::Nifti) {
-      return echorama::WriteNifti(target, header, voxels, files, part);
-    }
-    if (format == FileFormat::Vdb) {
-      echorama::WriteVdb(target, header, voxels, valid, compress, files, part);
-    } else {
-      echorama::WriteVolume(target, header, voxels, compress, files, part);
-    }
-    return 0.0;
-  };
-
-  // Files beside the main one, which is staged last; those of an earlier volume of this name must not stay.
-  const auto writeBeside = [&](const char* name, vtkDataArray* array) {
-    const std::string companion = echorama::CompanionPath(path, name);
-    if (!array) {
-      files.Remove(companion);
-      return;
-    }
-    write(companion, array, nullptr, progress.Part(0.0, 0.2));
-  };
-  const bool holdsValid = format == FileFormat::Vdb; // as its active voxels
-  writeBeside(vtkUltrasoundVolume::ValidRegionName(), holdsValid ? nullptr : ValidRegionToWrite(input, intensity));
-  vtkDataArray* provenance = input->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName());
-  const bool single =
-      provenance && provenance->GetNumberOfComponents() == 1 && provenance->GetNumberOfTuples() == input->GetNumberOfPoints();
-  writeBeside(vtkUltrasoundVolume::ProvenanceName(), single ? provenance : nullptr);
-
-  // Field data: the acquisition, and lines that a header brought.
-  for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(input)) {
-    header.fields.emplace_back(FieldPrefix + name, text);
-  }
-  const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
+  const int slices = whole[5] - whole[4] + 1;
+  slabs = std::max(1, std::min(slabs, slices));
+  FileReplacement files;
+  std::unique_ptr<VolumeWriter> main, valid, provenance;
+  const std::string validPath = echorama::CompanionPath(path, vtkUltrasoundVolume::ValidRegionName()),
+                    provenancePath = echorama::CompanionPath(path, vtkUltrasoundVolume::ProvenanceName());
+  bool validIsSeen = true; // by the reader, without a file that says so
   std::vector<std::string> lost;
-  vtkFieldData* fields = input->GetFieldData();
-  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
-    vtkAbstractArray* array = fields->GetAbstractArray(i);
-    const std::string name = array->GetName() ? array->GetName() : "";
-    if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end()) {
-      continue;
+  std::optional<Kind> kind;
+  for (int s = 0; s < slabs; ++s) {
+    Extent extent = whole;
+    extent[4] = whole[4] + static_cast<int>(std::int64_t{slices} * s / slabs);
+    extent[5] = whole[4] + static_cast<int>(std::int64_t{slices} * (s + 1) / slabs) - 1;
+    const echorama::Progress part = progress.Part(s / (slabs + 0.2), (s + 1) / (slabs + 0.2));
+    const double made = slabs > 1 ? 0.8 : 0.0;
+    const Slab slab = CheckedSlab(slabOf(extent, part.Part(0.0, made)), extent, path);
+    const std::vector<unsigned char> validValues = ValidOf(slab);
+    validIsSeen = validIsSeen && std::find(validValues.begin(), validValues.end(), 0) == validValues.end() &&
+                  LooksValidEverywhere(slab, extent[4] - whole[4], slices);
+    if (s == 0) {
+      ImageHeader header;
+      header.geometry = vtkUltrasoundVolume::GeometryOf(slab.Image);
+      header.geometry.dimensions[2] = slices;
+      // Files beside the main one, which is staged last; those of an earlier volume of this name must not stay.
+      if (!validIsSeen || slabs > 1) {
+        valid = OpenFile(validPath, header, nullptr, compress, files);
+      }
+      if (slab.Provenance) {
+        provenance = OpenFile(provenancePath, header, slab.Provenance, compress, files);
+      } else {
+        files.Remove(provenancePath);
+      }
+      header.fields = FieldsOf(slab, lost);
+      main = OpenFile(path, header, slab.Intensity, compress, files);
+      kind.emplace(slab);
+    } else if (!(Kind(slab) == *kind)) {
+      throw Error(Error::Kind::BadInput, path + ": the input gave slices " + std::to_string(extent[4]) + " to " +
+                                             std::to_string(extent[5]) +
+                                             " with another pose or other types of numbers than the ones before");
     }
-    vtkStringArray* text = vtkStringArray::SafeDownCast(array);
-    if (text && text->GetNumberOfValues() == 1 && echorama::CanHold({name, text->GetValue(0)})) {
-      header.fields.emplace_back(name, text->GetValue(0));
-    } else {
-      lost.push_back("field " + name);
+    const echorama::Progress writing = part.Part(made, 1.0);
+    if (valid) {
+      valid->Append(validValues.data(), validValues.size(), writing.Part(0.0, 0.1));
     }
-  }
-  for (int i = 0; i < input->GetPointData()->GetNumberOfArrays(); ++i) {
-    vtkAbstractArray* array = input->GetPointData()->GetAbstractArray(i);
-    const std::string name = array->GetName() ? array->GetName() : "";
-    if (array != intensity && name != vtkUltrasoundVolume::ValidRegionName() && (array != provenance || !single)) {
-      lost.push_back("point array " + name);
+    if (provenance) {
+      provenance->Append(slab.Voxels(slab.Provenance), slab.Bytes(slab.Provenance), writing.Part(0.1, 0.2));
     }
+    main->Append(slab.Voxels(slab.Intensity), slab.Bytes(slab.Intensity), writing.Part(0.2, 1.0));
   }
-  for (int i = 0; i < input->GetCellData()->GetNumberOfArrays(); ++i) {
-    lost.push_back(std::string("cell array ") + input->GetCellData()->GetArrayName(i));
+  const echorama::Progress rest = progress.Part(slabs / (slabs + 0.2), 1.0);
+  if (valid && validIsSeen) {
+    valid->Discard();
+  } else if (valid) {
+    valid->Finish(rest.Part(0.0, 0.1));
   }
+  if (validIsSeen) {
+    files.Remove(validPath);
+  }
+  if (provenance) {
+    provenance->Finish(rest.Part(0.1, 0.2));
+  }
+  main->Finish(rest.Part(0.2, 1.0));
+  files.Commit();
+  this->NoteLost(lost);
+  this->RoundingMm = main->RoundingMm();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundWriter::NoteLost(const std::vector<std::string>& lost)
+{
   for (const std::string& what : lost) {
     this->Notes.push_back("the format cannot hold the " + what + "; .vti can");
   }
-
-  vtkDataArray* valid = vtkUltrasoundVolume::GetValidRegion(input);
-  return write(path, intensity, valid ? static_cast<const unsigned char*>(valid->GetVoidPointer(0)) : nullptr,
-               progress.Part(0.2, 1.0));
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundWriter::WriteXml(vtkImageData* input, FileReplacement& files)
+void vtkUltrasoundWriter::WriteXml(vtkImageData* input)
 {
   const std::string path = this->FileName;
+  FileReplacement files;
   const std::string temporary = files.Stage(path);
   const vtkNew<vtkImageData> whole;
   whole->ShallowCopy(input);
@@ -287,4 +504,5 @@ void vtkUltrasoundWriter::WriteXml(vtkImageData* input, FileReplacement& files)
                                              vtkErrorCode::GetStringFromErrorCode(writer->GetErrorCode()) +
                                              "); what was there is left as it was");
   }
+  files.Commit();
 }

@@ -21,7 +21,8 @@
  *
  * Errors, with the file and the reason: an extension that is not one of these, a folder that is missing or not writable,
  * a full disk, more than one number per voxel, a geometry that is not a pose, point arrays that do not fit the voxels, a
- * `ValidRegion` that is not unsigned char.
+ * `ValidRegion` that is not unsigned char, slabs of a format that is written whole, an input whose pose or type of numbers
+ * changes from slab to slab.
  *
  * @sa vtkUltrasoundReader, vtkUltrasoundSequenceWriter
  */
@@ -35,8 +36,9 @@
 #include <vector> // for the notes
 
 #ifndef __VTK_WRAP__
-#include "Core/Base/FileReplacement.h"
 #include "Core/Base/Progress.h"
+#include <array>      // for extents
+#include <functional> // for the source of slabs
 #endif
 
 class vtkImageData;
@@ -60,6 +62,16 @@ public:
   vtkBooleanMacro(UseCompression, vtkTypeBool);
   ///@}
 
+  ///@{
+  /**
+   * In how many slabs along z the input is asked for its voxels, one after the other, in [1, the slices that there are].
+   * Default: 1, the whole. With more the volume is never in memory as a whole, when the input makes no more than it is asked
+   * for; the files are the same to the last byte. For .mha, .mhd, .nrrd, .nhdr, .nii and .nii.gz.
+   */
+  vtkSetClampMacro(NumberOfSlabs, int, 1, VTK_INT_MAX);
+  vtkGetMacro(NumberOfSlabs, int);
+  ///@}
+
   /**
    * Updates the input and writes it. Returns 1 when the file is there, complete; 0 after any error, also of the input.
    */
@@ -77,17 +89,23 @@ protected:
 
   char* FileName = nullptr;
   vtkTypeBool UseCompression = 1;
+  int NumberOfSlabs = 1;
 
 private:
   vtkUltrasoundWriter(const vtkUltrasoundWriter&) = delete;
   void operator=(const vtkUltrasoundWriter&) = delete;
 
 #ifndef __VTK_WRAP__
-  double WriteOneArrayFile(vtkImageData* input, echorama::FileReplacement& files, const echorama::Progress& progress);
+  using SlabSource = std::function<vtkImageData*(const std::array<int, 6>& extent, const echorama::Progress& progress)>;
+  void WriteBySlabs(const std::string& path, const echorama::Progress& progress);
+  void WriteSlabs(const std::string& path, const std::array<int, 6>& whole, int slabs, const SlabSource& slabOf,
+                  const echorama::Progress& progress);
+  void WriteXml(vtkImageData* input);
+  void NoteLost(const std::vector<std::string>& lost);
   void Finish(int written);
-  void WriteXml(vtkImageData* input, echorama::FileReplacement& files);
 
   std::vector<std::string> Notes;
+  double RoundingMm = 0.0; // of the last file, as other programs see it
   bool Written = false;
 #endif
 };

@@ -3,6 +3,7 @@
 // predecessors leave first (the main file before its companions), the new companions arrive, the main file arrives last.
 #include "Core/Base/FileReplacement.h"
 #include "Core/Base/Error.h"
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <system_error>
@@ -54,6 +55,14 @@ std::string FileReplacement::Stage(const std::string& path)
     Fail(path, "the folder " + folder.string() + " cannot be written");
   items_.push_back({NameBeside(target, "part"), target.string(), {}, false});
   return items_.back().temporary;
+}
+
+void FileReplacement::Unstage(const std::string& temporary)
+{
+  std::error_code ignored;
+  fs::remove(temporary, ignored);
+  items_.erase(std::remove_if(items_.begin(), items_.end(), [&](const Item& item) { return item.temporary == temporary; }),
+               items_.end());
 }
 
 void FileReplacement::Remove(const std::string& path)

@@ -21,6 +21,9 @@ public:
   /// \throws Error(FileSystem) when the folder is missing or not writable, or \a path is there and not a plain file.
   std::string Stage(const std::string& path);
 
+  /// Takes back Stage(): the temporary file goes, and what was in its place stays.
+  void Unstage(const std::string& temporary);
+
   /// \a path shall not be there afterwards (it may be missing already): a companion of an earlier version.
   void Remove(const std::string& path);
 

@@ -67,6 +67,20 @@ TEST_F(FileReplacementTest, ASetIsReplacedAndStaleCompanionsGo)
   EXPECT_EQ(Contents(), (Files{{"a", "new"}, {"b", "companion"}}));
 }
 
+TEST_F(FileReplacementTest, WhatIsUnstagedLeavesNoTrace)
+{
+  Put(Path("a"), "old");
+  Put(Path("b"), "old companion");
+  FileReplacement replacement;
+  const std::string companion = replacement.Stage(Path("b"));
+  Put(companion, "companion");
+  Put(replacement.Stage(Path("a")), "new");
+  replacement.Unstage(companion);
+  EXPECT_FALSE(fs::exists(companion));
+  replacement.Commit();
+  EXPECT_EQ(Contents(), (Files{{"a", "new"}, {"b", "old companion"}}));
+}
+
 TEST_F(FileReplacementTest, AFailureHalfwayRollsBack)
 {
   Put(Path("a"), "old");

@@ -4,6 +4,7 @@
 #include "Readers/NiftiFile.h"
 #include "Readers/VdbFile.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VolumeWriter.h"
 #include "Testing/Benchmark.h"
 #include <algorithm>
 #include <cmath>
@@ -82,7 +83,7 @@ void OtherFormats(const fs::path& folder, int n, const Voxels& voxels)
       if (vdb)
         WriteVdb(ours, header, voxels.data(), valid.data(), true, files);
       else
-        WriteNifti(ours, header, voxels.data(), files);
+        WriteVolume(ours, header, voxels.data(), true, files);
       files.Commit();
     };
     Voxels back(voxels.size()), backValid(voxels.size());

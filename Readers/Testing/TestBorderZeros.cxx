@@ -112,3 +112,25 @@ TEST(BorderZeros, AllOrNothing)
     EXPECT_EQ(ValidFromBorderZeros<unsigned char>(voxels.View(), valid.View()), value ? 0 : 120);
   }
 }
+
+TEST(BorderZeros, LooksAreToldSlabBySlab)
+{
+  for (const std::array<int, 3>& n : {std::array<int, 3>{5, 4, 3}, {5, 4, 1}, {1, 3, 4}})
+    for (const float nothing : {0.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1.0f}) {
+      Volume<float> voxels(n, 1.0f);
+      Volume<unsigned char> valid(n, 1);
+      for (std::ptrdiff_t at = 0; at < voxels.View().Size(); ++at) {
+        voxels.View()[at] = nothing;
+        const bool everywhere = ValidFromBorderZeros<float>(voxels.View(), valid.View()) == 0;
+        for (int slab = 1; slab <= n[2]; ++slab) {
+          bool looks = true;
+          for (int first = 0; first < n[2]; first += slab) {
+            const VolumeView<const float> part(voxels.View().Row(0, first), {n[0], n[1], std::min(slab, n[2] - first)});
+            looks = LooksValidEverywhere(part, first, n[2]) && looks;
+          }
+          EXPECT_EQ(looks, everywhere) << nothing << " at " << at << ", slabs of " << slab;
+        }
+        voxels.View()[at] = 1.0f;
+      }
+    }
+}

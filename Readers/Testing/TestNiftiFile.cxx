@@ -4,6 +4,7 @@
 #include "Readers/NiftiFile.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VolumeWriter.h"
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -82,7 +83,7 @@ protected:
   double Write(const std::string& name, const ImageHeader& header, const void* voxels) const
   {
     FileReplacement files;
-    const double loss = WriteNifti(Path(name), header, voxels, files);
+    const double loss = WriteVolume(Path(name), header, voxels, true, files);
     files.Commit();
     return loss;
   }
@@ -557,7 +558,7 @@ TEST_F(NiftiFile, WhatCannotBeWritten)
   const Progress stop([](double) { return false; });
   FileReplacement files;
   for (const char* name : {"b.nii", "b.nii.gz"})
-    EXPECT_THROW(WriteNifti(Path(name), large, voxels.data(), files, stop), Error);
+    EXPECT_THROW(WriteVolume(Path(name), large, voxels.data(), true, files, stop), Error);
 }
 
 TEST_F(NiftiFile, CompanionsOfTwoExtensions)

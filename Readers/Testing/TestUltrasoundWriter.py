@@ -12,7 +12,10 @@ import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkLogger, vtkStringArray, vtkTypeUInt64Array
 from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkImagingCore import vtkRTAnalyticSource
 from vtkmodules.vtkIOImage import vtkMetaImageReader, vtkNrrdReader
+from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 
 from echorama import vtkUltrasoundReader, vtkUltrasoundWriter
 
@@ -52,6 +55,30 @@ def volume(dtype=np.uint8, dims=(5, 4, 3)):
     array(image, "Intensity", random.integers(0, 100, count).astype(dtype))
     image.GetPointData().SetActiveScalars("Intensity")
     return image
+
+
+class Streamed(VTKPythonAlgorithmBase):
+    """Makes the slices that it is asked for out of an image that it has, and remembers which."""
+
+    def __init__(self, image, change=None):
+        VTKPythonAlgorithmBase.__init__(self, nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
+        self.image = image
+        self.change = change  # of a slab, before it is handed out
+        self.asked = []
+
+    def RequestInformation(self, request, inputs, outputs):
+        outputs.GetInformationObject(0).Set(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), self.image.GetExtent(), 6)
+        return 1
+
+    def RequestData(self, request, inputs, outputs):
+        information = outputs.GetInformationObject(0)
+        extent = information.Get(vtkStreamingDemandDrivenPipeline.UPDATE_EXTENT())
+        self.asked.append(extent[4:])
+        output = vtkImageData.GetData(information)
+        output.ShallowCopy(self.image)
+        output.Crop(extent)
+        output.GetFieldData().ShallowCopy(self.image.GetFieldData())
+        return 0 if self.change and self.change(output, len(self.asked)) is False else 1
 
 
 class Writer(unittest.TestCase):
@@ -283,6 +310,139 @@ class Writer(unittest.TestCase):
         writer = self.writer("a.mha")
         writer.SetInputConnection(reader.GetOutputPort())
         self.assertEqual(writer.Write(), 0)
+        back, _ = self.read("a.mha")
+        self.assertEqual(back.GetNumberOfPoints(), 60)
+
+    def slabs(self, name, source, count, compress=True):
+        writer = self.writer(name, None, compress)
+        writer.SetInputConnection(source.GetOutputPort())
+        writer.SetNumberOfSlabs(count)
+        return writer
+
+    def contents(self):
+        contents = {}
+        for name in self.files():
+            with open(self.path(name), "rb") as file:
+                contents[name] = file.read()
+        return contents
+
+    def clear(self):
+        for name in self.files():
+            os.remove(self.path(name))
+
+    def test_slabs_make_the_same_files(self):
+        values = np.arange(17 * 16 * 23) % 251
+        holes = np.where(values % 7 == 0, 0, 1).astype(np.uint8)
+        one_hole = np.ones_like(holes)
+        one_hole[-1] = 0
+        inside = np.ones((23, 16, 17), np.int16)
+        inside[10, 5, 5] = 0
+        corner = np.ones_like(inside)
+        corner[-1, -1, -1] = 0
+        for intensity, mask in [(values, holes), (values, None), (inside, None), (corner, None),
+                                (inside, np.ones_like(holes)), (inside, one_hole)]:
+            image = volume(np.int16, (17, 16, 23))
+            array(image, "Intensity", intensity.astype(np.int16))
+            if mask is not None:
+                array(image, "ValidRegion", mask)
+                array(image, "Provenance", values.astype(np.uint8))
+            field(image, "ProbeToWorld", [1 / 3] * 16)
+            field(image, "Numbers", [1.0, 2.0])
+            image.SetExtent(3, 19, -2, 13, 5, 27)
+            for extension in extensions[:6]:
+                for compress in [True, False]:
+                    with self.subTest(extension=extension, compress=compress):
+                        self.clear()
+                        notes = self.write("a." + extension, image, compress)
+                        wanted = self.contents()
+                        for count in [2, 5, 23, 1000]:
+                            self.clear()
+                            source = Streamed(image)
+                            writer = self.slabs("a." + extension, source, count, compress)
+                            self.assertEqual(writer.Write(), 1, self.messages)
+                            self.assertEqual(writer.GetNotes(), notes)
+                            self.assertEqual(self.contents(), wanted)
+                            self.assertEqual(len(source.asked), min(count, 23))
+                            self.assertEqual(sum(([*range(a, b + 1)] for a, b in source.asked), []), [*range(5, 28)])
+        self.assertEqual(self.slabs("a.mha", Streamed(volume()), 1).GetNumberOfSlabs(), 1)
+
+    def test_inputs_that_do_not_stream_are_written_by_slabs_too(self):
+        image = volume()
+        self.write("a.nii", image)
+        wanted = self.contents()
+        writer = self.writer("a.nii", image)
+        writer.SetNumberOfSlabs(3)
+        self.assertEqual(writer.Write(), 1, self.messages)
+        self.assertEqual(self.contents(), wanted)
+
+    def test_slabs_of_vtk_sources(self):
+        source = vtkRTAnalyticSource()
+        source.SetWholeExtent(-20, 20, -15, 17, -10, 12)
+        for extension in ["mha", "nrrd", "nii.gz"]:
+            self.clear()
+            self.assertEqual(self.slabs("a." + extension, source, 1).Write(), 1, self.messages)
+            wanted = self.contents()
+            self.assertEqual(self.slabs("a." + extension, source, 4).Write(), 1, self.messages)
+            self.assertEqual(self.contents(), wanted)
+        source.Update()  # gives the whole again
+        self.assertEqual(source.GetOutput().GetDimensions(), (41, 33, 23))
+
+    def test_slabs_need_the_memory_of_a_slab(self):
+        source = vtkRTAnalyticSource()
+        source.SetWholeExtent(0, 199, 0, 199, 0, 199)
+        writer = self.slabs("a.mha", source, 50, False)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        self.assertEqual(writer.Write(), 1, self.messages)
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
+        self.assertLess(grown, 8e6, "the whole is 32 MB")
+        self.assertGreater(os.path.getsize(self.path("a.mha")), 32e6)
+
+    def test_what_slabs_refuse(self):
+        def turned(image, slab):
+            if slab == 3:
+                image.SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1)
+
+        def other_type(image, slab):
+            if slab == 3:
+                array(image, "Intensity", np.zeros(image.GetNumberOfPoints(), np.float32))
+
+        def without_region(image, slab):
+            if slab == 3:
+                image.GetPointData().RemoveArray("ValidRegion")
+
+        def too_few(image, slab):
+            if slab == 2:
+                image.Crop([0, 4, 0, 3, 3, 4])
+
+        image = volume(np.uint8, (5, 4, 9))
+        array(image, "ValidRegion", np.ones(180, np.uint8))
+        for name in ["a.vti", "a.vdb"]:
+            self.refused(self.slabs(name, Streamed(image), 3), name, "written whole", ".mha")
+        self.refused(self.slabs("a.seq.mha", Streamed(image), 3), "frame by frame")
+        self.refused(self.slabs("a.png", Streamed(image), 3), "extension")
+        self.refused(self.slabs("missing/a.mha", Streamed(image), 3), "folder")
+        self.write("a.mha", volume())
+        for change, slab in [(turned, "6 to 8"), (other_type, "6 to 8"), (without_region, "6 to 8"), (too_few, "3 to 5"),
+                             (lambda image, slab: slab < 3, "6 to 8")]:
+            self.refused(self.slabs("a.mha", Streamed(image, change), 3), "a.mha", "slices " + slab)
+        back, _ = self.read("a.mha")
+        self.assertEqual(back.GetNumberOfPoints(), 60)
+        writer = self.slabs("a.mha", Streamed(image), 3)
+        writer.AddObserver("ProgressEvent", lambda sender, _: sender.SetAbortExecute(1))
+        self.assertEqual(writer.Write(), 0)
+        source = vtkRTAnalyticSource()  # tells how far it is, and is stopped in the middle of a slab
+        writer = self.slabs("a.mha", source, 2)
+        told = []
+
+        def stop(sender, _):
+            told.append((sender.GetProgress(), source.GetAbortExecute()))
+            sender.SetAbortExecute(sender.GetProgress() > 0.1)
+        writer.AddObserver("ProgressEvent", stop)
+        self.assertEqual(writer.Write(), 0)
+        self.assertGreater(len(told), 2)
+        self.assertLess(told[-1][0], 0.5)
+        self.assertEqual(source.GetAbortExecute(), 1)
+        self.assertEqual(self.messages, [])
         back, _ = self.read("a.mha")
         self.assertEqual(back.GetNumberOfPoints(), 60)
 

@@ -5,9 +5,12 @@
 #include "Readers/Compression.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VolumeWriter.h"
 #include <algorithm>
 #include <cstring>
+#include <fstream>
 #include <limits>
+#include <sstream>
 #include <zlib.h>
 
 using namespace echorama;
@@ -321,6 +324,44 @@ TEST_F(VolumeFile, WhatCannotBeWritten)
   bad = good;
   bad.fields.emplace_back("NDims", "2");
   refused("a.nrrd", bad, Error::Kind::InvalidParameter, "NDims");
+}
+
+TEST_F(VolumeFile, PiecesMakeTheSameFile)
+{
+  ImageHeader header = Oblique(VoxelType::UInt16);
+  header.geometry.dimensions = {131, 97, 60};
+  const std::vector<std::uint16_t> voxels = Values<std::uint16_t>(header.geometry.VoxelCount());
+  const auto* bytes = reinterpret_cast<const char*>(voxels.data());
+  const auto content = [this](const std::string& name) {
+    std::stringstream text;
+    text << std::ifstream(Path(name), std::ios::binary).rdbuf();
+    return text.str();
+  };
+  for (const std::string extension : {".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz"})
+    for (const bool compress : {true, false}) {
+      Write("a" + extension, header, voxels.data(), compress);
+      const std::string data = extension == ".mhd"    ? (compress ? "a.zraw" : "a.raw")
+                               : extension == ".nhdr" ? (compress ? "a.raw.gz" : "a.raw")
+                                                      : "a" + extension;
+      const std::string whole = content("a" + extension), wholeData = content(data);
+      for (const std::uint64_t piece : {std::uint64_t{1000003}, std::uint64_t{131 * 97 * 2}}) {
+        FileReplacement files;
+        VolumeWriter writer(Path("a" + extension), header, compress, files);
+        for (std::uint64_t done = 0; done < header.ByteCount(); done += piece)
+          writer.Append(bytes + done, std::min(piece, header.ByteCount() - done));
+        writer.Finish();
+        files.Commit();
+        EXPECT_TRUE(content("a" + extension) == whole) << extension;
+        EXPECT_TRUE(content(data) == wholeData) << extension;
+      }
+    }
+  const std::size_t count = FileCount();
+  FileReplacement files;
+  VolumeWriter writer(Path("b.mhd"), header, true, files);
+  writer.Append(bytes, 1000);
+  EXPECT_THROW(writer.Finish(), Error); // most of it is missing
+  writer.Discard();
+  EXPECT_EQ(FileCount(), count);
 }
 
 TEST_F(VolumeFile, StopsOnRequest)
