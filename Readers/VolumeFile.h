@@ -3,6 +3,7 @@
 #include "Core/Base/Progress.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeSource.h"
+#include <array>
 #include <memory>
 #include <string>
 
@@ -27,6 +28,10 @@ std::unique_ptr<VolumeSource> OpenHeaderVolume(const std::string& path);
 
 /// Puts voxels that were read as they lie in the file into this machine's byte order and the header's order of slices.
 void ArrangeVoxels(const ImageHeader& header, void* voxels);
+
+/// The arrays that a companion can hold besides `ValidRegion`: which volume each voxel of a stitched one came from, how many
+/// volumes are there, and how far these disagree.
+constexpr std::array<const char*, 3> CompanionArrays{"Provenance", "Coverage", "Spread"};
 
 /// The path of a file's companion that holds another array of the same voxels: NAME.ValidRegion.mha beside NAME.mha,
 /// NAME.ValidRegion.nii.gz beside NAME.nii.gz.

@@ -331,7 +331,7 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
     this->ReadSource(output, progress.Part(0.0, 0.7));
   }
   this->FindValidRegion(output, progress.Part(0.7, 0.9));
-  this->FindProvenance(output, progress.Part(0.9, 1.0));
+  this->FindCompanions(output, progress.Part(0.9, 1.0));
 }
 
 //----------------------------------------------------------------------------
@@ -430,7 +430,8 @@ void vtkUltrasoundReader::ReadXml(vtkImageData* output)
   vtkPointData* arrays = output->GetPointData();
   const auto isIntensity = [](vtkDataArray* array) {
     const std::string name = array && array->GetName() ? array->GetName() : "";
-    return array && name != vtkUltrasoundVolume::ValidRegionName() && name != vtkUltrasoundVolume::ProvenanceName();
+    return array && name != vtkUltrasoundVolume::ValidRegionName() &&
+           std::find(echorama::CompanionArrays.begin(), echorama::CompanionArrays.end(), name) == echorama::CompanionArrays.end();
   };
   vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output); // the array of that name, else the active one
   for (int i = 0; !isIntensity(intensity) && i < arrays->GetNumberOfArrays(); ++i) {
@@ -491,11 +492,13 @@ void vtkUltrasoundReader::FindValidRegion(vtkImageData* output, const echorama::
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundReader::FindProvenance(vtkImageData* output, const echorama::Progress& progress)
+void vtkUltrasoundReader::FindCompanions(vtkImageData* output, const echorama::Progress& progress)
 {
-  if (!output->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName())) {
-    if (const auto array = ReadCompanion(this->FileName, vtkUltrasoundVolume::ProvenanceName(), output, progress)) {
-      output->GetPointData()->AddArray(array);
+  for (const char* name : echorama::CompanionArrays) {
+    if (!output->GetPointData()->GetArray(name)) {
+      if (const auto array = ReadCompanion(this->FileName, name, output, progress)) {
+        output->GetPointData()->AddArray(array);
+      }
     }
   }
 }

@@ -53,8 +53,8 @@ using Extent = std::array<int, 6>;
 struct Slab {
   vtkImageData* Image = nullptr;
   vtkDataArray* Intensity = nullptr;
-  vtkDataArray* Valid = nullptr;      // nullptr: every voxel is real
-  vtkDataArray* Provenance = nullptr; // nullptr: none that a file could hold
+  vtkDataArray* Valid = nullptr;                                        // nullptr: every voxel is real
+  std::array<vtkDataArray*, echorama::CompanionArrays.size()> Beside{}; // nullptr: none that a file could hold
   std::array<int, 3> Dimensions{0, 0, 0};
   std::size_t First = 0; // voxel of the image: the input may hand out more slices than were asked for
 
@@ -90,9 +90,9 @@ Slab CheckedSlab(vtkImageData* image, const Extent& extent, const std::string& p
                                              " has not one value per voxel");
     }
   }
-  slab.Provenance = image->GetPointData()->GetArray(vtkUltrasoundVolume::ProvenanceName());
-  if (slab.Provenance && slab.Provenance->GetNumberOfComponents() != 1) {
-    slab.Provenance = nullptr;
+  for (std::size_t i = 0; i < slab.Beside.size(); ++i) {
+    vtkDataArray* array = image->GetPointData()->GetArray(echorama::CompanionArrays[i]);
+    slab.Beside[i] = array && array != slab.Intensity && array->GetNumberOfComponents() == 1 ? array : nullptr;
   }
   Extent given{};
   image->GetExtent(given.data());
@@ -109,16 +109,17 @@ Slab CheckedSlab(vtkImageData* image, const Extent& extent, const std::string& p
 // What must not change from one slab to the next.
 struct Kind {
   std::array<double, 15> Pose{}; // origin, spacing, direction
-  std::array<int, 3> Types{-1, -1, -1};
+  std::vector<int> Types;
 
   explicit Kind(const Slab& slab)
   {
     std::copy_n(slab.Image->GetOrigin(), 3, Pose.begin());
     std::copy_n(slab.Image->GetSpacing(), 3, Pose.begin() + 3);
     std::copy_n(slab.Image->GetDirectionMatrix()->GetData(), 9, Pose.begin() + 6);
-    Types[0] = slab.Intensity->GetDataType();
-    Types[1] = slab.Valid ? slab.Valid->GetDataType() : -1;
-    Types[2] = slab.Provenance ? slab.Provenance->GetDataType() : -1;
+    Types = {slab.Intensity->GetDataType(), slab.Valid ? slab.Valid->GetDataType() : -1};
+    for (vtkDataArray* array : slab.Beside) {
+      Types.push_back(array ? array->GetDataType() : -1);
+    }
   }
   bool operator==(const Kind& other) const { return Pose == other.Pose && Types == other.Types; }
 };
@@ -172,7 +173,8 @@ std::vector<echorama::HeaderField> FieldsOf(const Slab& slab, std::vector<std::s
   for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
     vtkAbstractArray* array = image->GetPointData()->GetAbstractArray(i);
     const std::string name = array->GetName() ? array->GetName() : "";
-    if (array != slab.Intensity && name != vtkUltrasoundVolume::ValidRegionName() && array != slab.Provenance) {
+    if (array != slab.Intensity && name != vtkUltrasoundVolume::ValidRegionName() &&
+        std::find(slab.Beside.begin(), slab.Beside.end(), array) == slab.Beside.end()) {
       lost.push_back("point array " + name);
     }
   }
@@ -298,19 +300,20 @@ void vtkUltrasoundWriter::WriteData()
       FileReplacement files;
       // The valid region are its active voxels; a file of an earlier volume of this name must not stay.
       files.Remove(echorama::CompanionPath(path, vtkUltrasoundVolume::ValidRegionName()));
-      const std::string provenance = echorama::CompanionPath(path, vtkUltrasoundVolume::ProvenanceName());
-      if (whole.Provenance) {
-        header.type = echorama::VoxelTypeOf(whole.Provenance);
-        echorama::WriteVdb(provenance, header, whole.Voxels(whole.Provenance), nullptr, this->UseCompression != 0, files,
-                           progress.Part(0.0, 0.2));
-      } else {
-        files.Remove(provenance);
+      for (std::size_t i = 0; i < whole.Beside.size(); ++i) {
+        const std::string companion = echorama::CompanionPath(path, echorama::CompanionArrays[i]);
+        if (whole.Beside[i]) {
+          header.type = echorama::VoxelTypeOf(whole.Beside[i]);
+          echorama::WriteVdb(companion, header, whole.Voxels(whole.Beside[i]), nullptr, this->UseCompression != 0, files);
+        } else {
+          files.Remove(companion);
+        }
       }
       header.type = echorama::VoxelTypeOf(whole.Intensity);
       header.fields = FieldsOf(whole, lost);
       echorama::WriteVdb(path, header, whole.Voxels(whole.Intensity),
                          whole.Valid ? whole.Voxels<unsigned char>(whole.Valid) : nullptr, this->UseCompression != 0, files,
-                         progress.Part(0.2, 1.0));
+                         progress);
       files.Commit();
       this->NoteLost(lost);
       break;
@@ -410,9 +413,9 @@ void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whol
   const int slices = whole[5] - whole[4] + 1;
   slabs = std::max(1, std::min(slabs, slices));
   FileReplacement files;
-  std::unique_ptr<VolumeWriter> main, valid, provenance;
-  const std::string validPath = echorama::CompanionPath(path, vtkUltrasoundVolume::ValidRegionName()),
-                    provenancePath = echorama::CompanionPath(path, vtkUltrasoundVolume::ProvenanceName());
+  std::unique_ptr<VolumeWriter> main, valid;
+  std::array<std::unique_ptr<VolumeWriter>, echorama::CompanionArrays.size()> beside;
+  const std::string validPath = echorama::CompanionPath(path, vtkUltrasoundVolume::ValidRegionName());
   bool validIsSeen = true; // by the reader, without a file that says so
   std::vector<std::string> lost;
   std::optional<Kind> kind;
@@ -434,10 +437,13 @@ void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whol
       if (!validIsSeen || slabs > 1) {
         valid = OpenFile(validPath, header, nullptr, compress, files);
       }
-      if (slab.Provenance) {
-        provenance = OpenFile(provenancePath, header, slab.Provenance, compress, files);
-      } else {
-        files.Remove(provenancePath);
+      for (std::size_t i = 0; i < beside.size(); ++i) {
+        const std::string companion = echorama::CompanionPath(path, echorama::CompanionArrays[i]);
+        if (slab.Beside[i]) {
+          beside[i] = OpenFile(companion, header, slab.Beside[i], compress, files);
+        } else {
+          files.Remove(companion);
+        }
       }
       header.fields = FieldsOf(slab, lost);
       main = OpenFile(path, header, slab.Intensity, compress, files);
@@ -451,8 +457,10 @@ void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whol
     if (valid) {
       valid->Append(validValues.data(), validValues.size(), writing.Part(0.0, 0.1));
     }
-    if (provenance) {
-      provenance->Append(slab.Voxels(slab.Provenance), slab.Bytes(slab.Provenance), writing.Part(0.1, 0.2));
+    for (std::size_t i = 0; i < beside.size(); ++i) {
+      if (beside[i]) {
+        beside[i]->Append(slab.Voxels(slab.Beside[i]), slab.Bytes(slab.Beside[i]), writing.Part(0.1, 0.2));
+      }
     }
     main->Append(slab.Voxels(slab.Intensity), slab.Bytes(slab.Intensity), writing.Part(0.2, 1.0));
   }
@@ -465,8 +473,10 @@ void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whol
   if (validIsSeen) {
     files.Remove(validPath);
   }
-  if (provenance) {
-    provenance->Finish(rest.Part(0.1, 0.2));
+  for (const std::unique_ptr<VolumeWriter>& file : beside) {
+    if (file) {
+      file->Finish(rest.Part(0.1, 0.2));
+    }
   }
   main->Finish(rest.Part(0.2, 1.0));
   files.Commit();

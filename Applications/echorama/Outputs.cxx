@@ -21,7 +21,14 @@ namespace {
   throw Error(Error::Kind::FileSystem, path.string() + ": " + reason);
 }
 
-constexpr const char* CompanionArrays[] = {"ValidRegion", "Provenance"};
+// The files that hold other arrays of a volume.
+std::vector<fs::path> CompanionsOf(const std::string& path)
+{
+  std::vector<fs::path> files{CompanionPath(path, "ValidRegion")};
+  for (const char* array : CompanionArrays)
+    files.emplace_back(CompanionPath(path, array));
+  return files;
+}
 
 // The files that reading a volume may touch.
 std::vector<fs::path> FilesOfInput(const std::string& input)
@@ -33,8 +40,8 @@ std::vector<fs::path> FilesOfInput(const std::string& input)
       files.push_back(entry->path());
     return files;
   }
-  for (const char* array : CompanionArrays)
-    files.emplace_back(CompanionPath(input, array));
+  for (const fs::path& companion : CompanionsOf(input))
+    files.push_back(companion);
   for (std::size_t i = files.size(); i-- > 0;) {
     for (const char* extension : {".hdr", ".img"}) // NIfTI in two files
       if (files[i].extension() == ".hdr" || files[i].extension() == ".img")
@@ -52,8 +59,8 @@ std::vector<fs::path> FilesOfInput(const std::string& input)
 std::vector<fs::path> FilesOfOutput(const std::string& output)
 {
   std::vector<fs::path> files{output};
-  for (const char* array : CompanionArrays)
-    files.emplace_back(CompanionPath(output, array));
+  for (const fs::path& companion : CompanionsOf(output))
+    files.push_back(companion);
   for (std::size_t i = files.size(); i-- > 0;)
     for (const char* extension : {".raw", ".zraw", ".raw.gz"})
       if (files[i].extension() == ".mhd" || files[i].extension() == ".nhdr")
@@ -132,9 +139,9 @@ void OutputFolder::Commit()
 {
   FileReplacement replacement;
   for (const std::string& name : names_)
-    for (const char* array : CompanionArrays) // of an earlier file of this name
-      if (!fs::exists(CompanionPath((stage_ / name).string(), array)))
-        replacement.Remove(CompanionPath(Final(name), array));
+    for (const fs::path& companion : CompanionsOf(name)) // of an earlier file of this name
+      if (!fs::exists(stage_ / companion))
+        replacement.Remove((folder_ / companion).string());
   for (const auto& entry : fs::directory_iterator(stage_))
     fs::rename(entry.path(), replacement.Stage(Final(entry.path().filename().string())));
   replacement.Commit();

@@ -80,7 +80,9 @@ std::vector<std::string> WithoutCompanions(Session& session, const std::vector<s
   std::vector<std::string> volumes;
   for (const std::string& file : files) {
     const bool companion = std::any_of(files.begin(), files.end(), [&](const std::string& other) {
-      return same(file, CompanionPath(other, "ValidRegion")) || same(file, CompanionPath(other, "Provenance"));
+      return same(file, CompanionPath(other, vtkUltrasoundVolume::ValidRegionName())) ||
+             std::any_of(CompanionArrays.begin(), CompanionArrays.end(),
+                         [&](const char* array) { return same(file, CompanionPath(other, array)); });
     });
     if (companion)
       session.Note(file + ": not a volume of its own, but a part of one that is named too; left out");

@@ -33,7 +33,7 @@ struct VolumeReading {
 LoadedVolume LoadVolume(Session&, const std::string& file, const VolumeReading& reading = {});
 std::vector<LoadedVolume> LoadVolumes(Session&, const std::vector<std::string>& files);
 
-/// The volumes among \a files: NAME.ValidRegion.EXT and NAME.Provenance.EXT, which a shell's * finds too, belong to NAME.EXT
+/// The volumes among \a files: NAME.ValidRegion.EXT and its like, which a shell's * finds too, belong to NAME.EXT
 /// and are left out, with a note, when that is there.
 std::vector<std::string> WithoutCompanions(Session&, const std::vector<std::string>& files);
 

@@ -135,6 +135,8 @@ class Writer(unittest.TestCase):
                     mask = (np.arange(60) % 3 != 0).astype(np.uint8)
                     array(image, "ValidRegion", mask)
                     array(image, "Provenance", np.arange(60, dtype=np.int16))
+                    array(image, "Coverage", np.arange(60, dtype=np.uint8))
+                    array(image, "Spread", np.arange(60, dtype=np.float32))
                     field(image, "ProbeToWorld", probe_to_world)
                     field(image, "ProbeGeometry", [70.1, 0.1, 60, 12, 1 / 3, 120])
                     field(image, "TimeStamp", [1700000000.123456])
@@ -159,7 +161,7 @@ class Writer(unittest.TestCase):
                     else:
                         self.assertEqual(back.GetSpacing(), image.GetSpacing())
                         self.assertEqual(direction, oblique)
-                    for array_name in ["Intensity", "ValidRegion", "Provenance"]:
+                    for array_name in ["Intensity", "ValidRegion", "Provenance", "Coverage", "Spread"]:
                         wanted, got = self.values(image, array_name), self.values(back, array_name)
                         self.assertEqual(wanted.dtype, got.dtype)
                         self.assertTrue((wanted == got).all())
@@ -346,6 +348,7 @@ class Writer(unittest.TestCase):
             if mask is not None:
                 array(image, "ValidRegion", mask)
                 array(image, "Provenance", values.astype(np.uint8))
+                array(image, "Spread", values.astype(np.float32))
             field(image, "ProbeToWorld", [1 / 3] * 16)
             field(image, "Numbers", [1.0, 2.0])
             image.SetExtent(3, 19, -2, 13, 5, 27)
