@@ -1,6 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// Components first: those that touch one value, or none, have their answer, and the equations of all others have exactly one.
+//
+// Set-up lays out the unknowns (MembraneLevels), and solves A v = 1 roughly: v turns the largest residual into a bound of
+// the largest error. It is the time that heat spends in the overlap before it finds a known voxel, 100 to 10000, so that
+// weights right to 1/512 need residuals near 1e-7: floats cannot carry the solution. It is kept in doubles; corrections, which
+// only need to be right to some per cent, and residuals are floats.
+//
+// The first guess comes from all coarser levels. Each round then is one V-cycle on the residual, and the best step along its
+// result and the step before (conjugate gradients: a cycle alone is slow where the border of the overlap is rough). Passes
+// over the unknowns are fused (MembraneLevels::Sweep): a round reads and writes the finest level about four times.
 #include "Membrane.h"
 #include "Core/Base/Multiversion.h"
+#include "MembraneDescent.h"
+#include "MembraneLanes.h"
 #include "MembraneLevels.h"
 #include <algorithm>
 #include <chrono>
@@ -11,9 +23,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr int Lanes = 16;
-constexpr std::ptrdiff_t VoxelsOfOneTask = 65536;
 
 double SecondsSince(std::chrono::steady_clock::time_point start)
 {
@@ -27,55 +36,32 @@ float OfBits(std::int32_t bits)
   return number;
 }
 
-struct SolutionRows {
-  const double *own, *below, *above, *before, *behind;
-};
-
-// b - A u; returns the largest magnitude, as bits.
-ECHORAMA_HOT std::int32_t ResidualOf(SolutionRows u, const unsigned char* codes, double wx, double wy, double wz, int begin,
-                                     int end, float* residual)
+[[gnu::always_inline]] inline std::int32_t BitsOf(float number)
 {
-  std::int32_t largest = 0;
-  for (int i = begin; i < end; ++i) {
-    const int code = codes[i];
-    const double sum = wx * (u.own[i - 1] + u.own[i + 1]) + wy * (u.below[i] + u.above[i]) + wz * (u.before[i] + u.behind[i]);
-    const double diagonal = wx * (code & 3) + wy * ((code >> 2) & 3) + wz * ((code >> 4) & 3);
-    const float r = (code & MembraneCounts) != 0 ? static_cast<float>(sum - diagonal * u.own[i]) : 0.0f;
-    residual[i] = r;
-    std::int32_t bits;
-    std::memcpy(&bits, &r, sizeof(bits));
-    bits &= 0x7fffffff;
-    largest = bits > largest ? bits : largest;
-  }
-  return largest;
+  std::int32_t bits;
+  std::memcpy(&bits, &number, sizeof(bits));
+  return bits;
 }
 
-// The least A v over unknowns, as bits of a float rounded down (0 where it is not positive), and the largest v.
-struct Majorant {
-  std::int32_t least = 0x7f7fffff, largest = 0;
-};
-ECHORAMA_HOT Majorant MajorantOf(const float* v, const float* below, const float* above, const float* before, const float* behind,
-                                 const unsigned char* codes, double wx, double wy, double wz, int begin, int end)
+// load - A u, where known values are part of u; returns the largest magnitude. (Floats that are not negative have the order of
+// their bits.)
+ECHORAMA_HOT std::int32_t ResidualOf(const double* u, const double* below, const double* above, const double* before,
+                                     const double* behind, const unsigned char* codes, double load, double wx, double wy,
+                                     double wz, int begin, int end, float* __restrict residual)
 {
-  std::int32_t least = 0x7f7fffff, largest = 0;
-  for (int i = begin; i < end; ++i) {
-    const int code = codes[i];
-    const double sum = wx * (static_cast<double>(v[i - 1]) + v[i + 1]) + wy * (static_cast<double>(below[i]) + above[i]) +
-                       wz * (static_cast<double>(before[i]) + behind[i]);
-    const double diagonal = wx * (code & 3) + wy * ((code >> 2) & 3) + wz * ((code >> 4) & 3);
-    const float load = static_cast<float>((diagonal * v[i] - sum) * (1.0 - 1e-6));
-    const float positive = v[i] >= 0.0f && load > 0.0f ? load : 0.0f;
-    const float top = v[i] > 0.0f ? v[i] : 0.0f;
-    std::int32_t loadBits, topBits;
-    std::memcpy(&loadBits, &positive, sizeof(loadBits));
-    std::memcpy(&topBits, &top, sizeof(topBits));
-    const bool unknown = (code & MembraneCounts) != 0;
-    loadBits = unknown ? loadBits : 0x7f7fffff;
-    topBits = unknown ? topBits : 0;
-    least = loadBits < least ? loadBits : least;
-    largest = topBits > largest ? topBits : largest;
-  }
-  return {least, largest};
+  std::int32_t largest[MembraneByteLanes] = {};
+  ForLanes<MembraneByteLanes>(
+      begin, end, [&](int i, int l, float) __attribute__((always_inline)) {
+        const int code = codes[i];
+        const double sum = wx * (u[i - 1] + u[i + 1]) + wy * (below[i] + above[i]) + wz * (before[i] + behind[i]);
+        const double diagonal = wx * (code & 3) + wy * ((code >> 2) & 3) + wz * ((code >> 4) & 3);
+        const float unknown = static_cast<float>((code & MembraneCounts) != 0 ? 1 : 0);
+        const float r = unknown * static_cast<float>(load + (sum - diagonal * u[i]));
+        residual[i] = r;
+        const std::int32_t bits = BitsOf(r) & 0x7fffffff;
+        largest[l] = bits > largest[l] ? bits : largest[l];
+      });
+  return *std::max_element(largest, largest + MembraneByteLanes);
 }
 
 struct Products { // of the correction e, the last direction p, and the residual r
@@ -97,37 +83,32 @@ ECHORAMA_HOT void AddProducts(const float* e, const float* eBelow, const float* 
                               const float* pBefore, const float* pBehind, const float* r, const unsigned char* codes, float wx,
                               float wy, float wz, int begin, int end, double* sums)
 {
-  float lanes[5][Lanes] = {};
-  const auto step = [&](int i, int l) __attribute__((always_inline))
-  {
-    const int code = codes[i];
-    const float diagonal =
-        wx * static_cast<float>(code & 3) + wy * static_cast<float>((code >> 2) & 3) + wz * static_cast<float>((code >> 4) & 3);
-    const float ae =
-        diagonal * e[i] - (wx * (e[i - 1] + e[i + 1]) + wy * (eBelow[i] + eAbove[i]) + wz * (eBefore[i] + eBehind[i]));
-    const float ap =
-        diagonal * p[i] - (wx * (p[i - 1] + p[i + 1]) + wy * (pBelow[i] + pAbove[i]) + wz * (pBefore[i] + pBehind[i]));
-    lanes[0][l] += e[i] * ae;
-    lanes[1][l] += e[i] * ap;
-    lanes[2][l] += p[i] * ap;
-    lanes[3][l] += e[i] * r[i];
-    lanes[4][l] += p[i] * r[i];
-  };
-  int i = begin;
-  for (; i + Lanes <= end; i += Lanes)
-    for (int l = 0; l < Lanes; ++l)
-      step(i + l, l);
-  for (; i < end; ++i)
-    step(i, 0);
+  float lanes[5][MembraneByteLanes] = {};
+  ForLanes<MembraneByteLanes>(
+      begin, end, [&](int i, int l, float fresh) __attribute__((always_inline)) {
+        const int code = codes[i];
+        const float diagonal = wx * static_cast<float>(code & 3) + wy * static_cast<float>((code >> 2) & 3) +
+                               wz * static_cast<float>((code >> 4) & 3);
+        const float ae =
+            diagonal * e[i] - (wx * (e[i - 1] + e[i + 1]) + wy * (eBelow[i] + eAbove[i]) + wz * (eBefore[i] + eBehind[i]));
+        const float ap =
+            diagonal * p[i] - (wx * (p[i - 1] + p[i + 1]) + wy * (pBelow[i] + pAbove[i]) + wz * (pBefore[i] + pBehind[i]));
+        const float ownE = fresh * e[i], ownP = fresh * p[i];
+        lanes[0][l] += ownE * ae;
+        lanes[1][l] += ownE * ap;
+        lanes[2][l] += ownP * ap;
+        lanes[3][l] += ownE * r[i];
+        lanes[4][l] += ownP * r[i];
+      });
   for (int n = 0; n < 5; ++n)
-    for (int l = 0; l < Lanes; ++l)
+    for (int l = 0; l < MembraneByteLanes; ++l)
       sums[n] += static_cast<double>(lanes[n][l]);
 }
 
 ECHORAMA_HOT void Advance(double* u, float* p, const float* e, float alongE, float alongP, std::ptrdiff_t begin,
                           std::ptrdiff_t end)
 {
-  for (std::ptrdiff_t i = begin; i < end; ++i) {
+  for (int i = begin; i < end; ++i) {
     p[i] = alongE * e[i] + alongP * p[i];
     u[i] += static_cast<double>(p[i]);
   }
@@ -213,6 +194,8 @@ Components::Components(const Frame& frame, const GridBox& box, const RowField<un
         }
         Run run{begin, i, 0, Infinity, -Infinity};
         const auto touch = [&run](float value) {
+          if (!std::isfinite(value))
+            throw Error(Error::Kind::BadInput, "the known values of a membrane must be finite numbers");
           run.least = std::min(run.least, value);
           run.most = std::max(run.most, value);
         };
@@ -289,12 +272,12 @@ private:
   template <class Body>
   void ForRows(const Body& body) const;
   void BoundErrors(const Progress& progress);
-  double Residual();
-  void Move();
+  double Improve(bool first);
 
   std::unique_ptr<MembraneLevels> levels_;
   std::vector<double> solution_;
   std::vector<float> direction_;
+  double load_ = 0.0; // the right side at every unknown
   double lowest_ = 0.0, span_ = 1.0;
   double amplification_ = std::numeric_limits<double>::infinity(); // no error is larger than this times the largest residual
 };
@@ -350,7 +333,7 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
       inside.push_back(spans[static_cast<std::size_t>(z) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(y)]);
   MembraneRows rows({components.y0 + low[0], components.z0 + low[1]}, {high[0] - low[0], high[1] - low[1]}, inside);
 
-  // 2. what is stored: unknown, known, void; and the known values
+  // 2. what is stored: unknown, known, void
   solution_.assign(static_cast<std::size_t>(rows.count), 0.0);
   std::vector<unsigned char> kind(static_cast<std::size_t>(rows.count), 0);
   ParallelRanges(rows.size[1] + 2, rows.Grain(), Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -361,14 +344,10 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
         if (first >= last)
           continue;
         const unsigned char* from = frame.Row(kinds, y, z) - frame.First(y, z);
-        const float* value = frame.Row(values, y, z) - frame.First(y, z);
         unsigned char* to = kind.data() + row.at;
-        double* u = solution_.data() + row.at;
         for (int i = first; i < last; ++i)
-          if (from[i] == static_cast<unsigned char>(MembraneVoxel::Known)) {
+          if (from[i] == static_cast<unsigned char>(MembraneVoxel::Known))
             to[i] = 2;
-            u[i] = (static_cast<double>(value[i]) - lowest_) / span_;
-          }
         const int line = (z - components.z0) * ny + (y - components.y0);
         for (auto n = static_cast<std::size_t>(components.rowStart[static_cast<std::size_t>(line)]);
              n < static_cast<std::size_t>(components.rowStart[static_cast<std::size_t>(line) + 1]); ++n)
@@ -392,161 +371,129 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
   });
   kind = {};
   direction_.assign(static_cast<std::size_t>(rows.count), 0.0f);
-  levels_ = std::make_unique<MembraneLevels>(std::move(rows), std::move(codes), spacing, progress);
+  levels_ = std::make_unique<MembraneLevels>(std::move(rows), std::move(codes),
+                                             frame.swapped ? Eigen::Vector3d(spacing[0], spacing[2], spacing[1]) : spacing,
+                                             progress.Part(0.0, 0.5));
   BoundErrors(progress);
+
+  // 3. the known values
+  const MembraneRows& stored = Rows();
+  ParallelRanges(stored.size[1] + 2, stored.Grain(), Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (int z = stored.low[1] - 1 + static_cast<int>(begin); z < stored.low[1] - 1 + static_cast<int>(end); ++z)
+      for (int y = stored.low[0] - 1; y <= stored.low[0] + stored.size[0]; ++y) {
+        const auto& row = stored.At(y, z);
+        const int first = std::max(row.first, frame.First(y, z)), last = std::min(row.last, frame.End(y, z));
+        if (first >= last)
+          continue;
+        const unsigned char* code = levels_->Codes().data() + row.at;
+        const float* value = frame.Row(values, y, z) - frame.First(y, z);
+        double* u = solution_.data() + row.at;
+        for (int i = first; i < last; ++i)
+          if (code[i] == MembraneKnown) {
+            // Those that no unknown touches may be anything, NaN too; they must not disturb the sums that leave them out.
+            const double scaled = (static_cast<double>(value[i]) - lowest_) / span_;
+            u[i] = scaled > 0.0 ? std::min(scaled, 1.0) : 0.0;
+          }
+      }
+  });
 }
 
-// A majorant v >= 0 with A v >= load > 0 bounds every error: |A e| <= r means |e| <= v r / load, for A is an M-matrix. v is
-// about A^-1 1; what it is worth is then measured.
+// v solves A v = 1 about, and what is missing is known: A v >= 1 - r. A is an M-matrix, so v >= 0, and |A e| <= residual
+// means |e| <= residual v / (1 - r).
 void Multigrid::BoundErrors(const Progress& progress)
+{
+  constexpr int MostCycles = 30;
+  load_ = 1.0;
+  Improve(true);
+  levels_->Spread();
+  for (int cycle = 0; cycle <= MostCycles; ++cycle) {
+    progress(0.5 + 0.5 * cycle / MostCycles);
+    const double missing = Improve(cycle == 0) * (1.0 + 1e-6) + 1e-9;
+    if (missing < 1.0) {
+      const double largest = *std::max_element(solution_.begin(), solution_.end());
+      amplification_ = std::min(amplification_, largest / (1.0 - missing));
+    }
+    if (missing <= 0.5)
+      break;
+  }
+  load_ = 0.0;
+  std::fill(solution_.begin(), solution_.end(), 0.0);
+  std::fill(direction_.begin(), direction_.end(), 0.0f);
+  auto& value = levels_->Finest().value;
+  std::fill(value.begin(), value.end(), 0.0f);
+}
+
+// solution += the best combination of the cycle's correction and the direction before: conjugate gradients, which do not
+// mind that a cycle is not quite the same operator each time. right := what the new solution leaves; returns its largest
+// magnitude.
+double Multigrid::Improve(bool first)
 {
   const MembraneRows& rows = Rows();
   const Eigen::Vector3d& w = levels_->Weights();
   auto& finest = levels_->Finest();
   const unsigned char* codes = levels_->Codes().data();
-  const auto load = [&](int y, int z, const MembraneRows::Row& row) {
-    float* right = finest.right.data() + row.at;
-    const unsigned char* code = codes + row.at;
-    for (int i = row.begin; i < row.end; ++i)
-      right[i] = (code[i] & MembraneCounts) != 0 ? 1.0f : 0.0f;
-    static_cast<void>(y);
-    static_cast<void>(z);
-  };
-  ForRows(load);
-  levels_->Spread();
-  levels_->Smooth(2);
-  std::vector<float>& v = direction_;
-  v = finest.value;
-  for (int round = 0; round < 12; ++round) {
-    progress(0.0);
-    const std::ptrdiff_t grain = rows.Grain();
-    std::vector<Majorant> parts(static_cast<std::size_t>((rows.size[1] + grain - 1) / grain));
-    ParallelRanges(rows.size[1], grain, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      Majorant& part = parts[static_cast<std::size_t>(begin / grain)];
-      for (int z = rows.low[1] + static_cast<int>(begin); z < rows.low[1] + static_cast<int>(end); ++z)
-        for (int y = rows.low[0]; y < rows.low[0] + rows.size[0]; ++y) {
-          const auto& row = rows.At(y, z);
-          const Majorant m = MajorantOf(v.data() + row.at, v.data() + rows.At(y - 1, z).at, v.data() + rows.At(y + 1, z).at,
-                                        v.data() + rows.At(y, z - 1).at, v.data() + rows.At(y, z + 1).at, codes + row.at, w[0],
-                                        w[1], w[2], row.begin, row.end);
-          part.least = std::min(part.least, m.least);
-          part.largest = std::max(part.largest, m.largest);
-        }
-    });
-    Majorant whole;
-    for (const Majorant& part : parts) {
-      whole.least = std::min(whole.least, part.least);
-      whole.largest = std::max(whole.largest, part.largest);
-    }
-    const double least = static_cast<double>(OfBits(whole.least)), largest = static_cast<double>(OfBits(whole.largest));
-    if (least > 0.0)
-      amplification_ = std::min(amplification_, largest / least * (1.0 + 1e-6));
-    if (least > 0.5)
-      break;
-    // One more cycle for what is missing.
-    ForRows([&](int y, int z, const MembraneRows::Row& row) {
-      float* right = finest.right.data() + row.at;
-      const float* own = v.data() + row.at;
-      const float *below = v.data() + rows.At(y - 1, z).at, *above = v.data() + rows.At(y + 1, z).at,
-                  *before = v.data() + rows.At(y, z - 1).at, *behind = v.data() + rows.At(y, z + 1).at;
-      const unsigned char* code = codes + row.at;
-      for (int i = row.begin; i < row.end; ++i) {
-        const int c = code[i];
-        const double sum = w[0] * (static_cast<double>(own[i - 1]) + own[i + 1]) +
-                           w[1] * (static_cast<double>(below[i]) + above[i]) +
-                           w[2] * (static_cast<double>(before[i]) + behind[i]);
-        const double diagonal = w[0] * (c & 3) + w[1] * ((c >> 2) & 3) + w[2] * ((c >> 4) & 3);
-        right[i] = (c & MembraneCounts) != 0 ? static_cast<float>(1.0 + sum - diagonal * own[i]) : 0.0f;
-      }
-    });
-    levels_->Cycle();
-    ForRows([&](int, int, const MembraneRows::Row& row) {
-      for (std::ptrdiff_t i = row.at + row.begin; i < row.at + row.end; ++i)
-        v[static_cast<std::size_t>(i)] += finest.value[static_cast<std::size_t>(i)];
-    });
-  }
-  std::fill(direction_.begin(), direction_.end(), 0.0f);
-}
-
-// right := what the solution leaves; returns its largest magnitude.
-double Multigrid::Residual()
-{
-  const MembraneRows& rows = Rows();
-  const Eigen::Vector3d& w = levels_->Weights();
-  auto& right = levels_->Finest().right;
-  const std::ptrdiff_t grain = rows.Grain();
-  std::vector<std::int32_t> parts(static_cast<std::size_t>((rows.size[1] + grain - 1) / grain), 0);
-  ParallelRanges(rows.size[1], grain, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    std::int32_t& part = parts[static_cast<std::size_t>(begin / grain)];
-    for (int z = rows.low[1] + static_cast<int>(begin); z < rows.low[1] + static_cast<int>(end); ++z)
+  const auto slices = static_cast<std::size_t>(rows.size[1]);
+  float alongE = 1.0f, alongP = 0.0f;
+  if (!first) {
+    const float wx = static_cast<float>(w[0]), wy = static_cast<float>(w[1]), wz = static_cast<float>(w[2]);
+    std::vector<Products> parts(slices);
+    levels_->Cycle([&](int z) {
+      double sums[5] = {};
       for (int y = rows.low[0]; y < rows.low[0] + rows.size[0]; ++y) {
         const auto& row = rows.At(y, z);
         if (row.begin >= row.end)
           continue;
-        const double* u = solution_.data();
-        const SolutionRows around{u + row.at, u + rows.At(y - 1, z).at, u + rows.At(y + 1, z).at, u + rows.At(y, z - 1).at,
-                                  u + rows.At(y, z + 1).at};
-        part = std::max(part, ResidualOf(around, levels_->Codes().data() + row.at, w[0], w[1], w[2], row.begin, row.end,
-                                         right.data() + row.at));
-      }
-  });
-  return static_cast<double>(OfBits(*std::max_element(parts.begin(), parts.end())));
-}
-
-// solution += the best combination of the correction of the last cycle and the direction before: conjugate gradients,
-// which do not mind that a cycle is not quite the same operator each time.
-void Multigrid::Move()
-{
-  const MembraneRows& rows = Rows();
-  auto& finest = levels_->Finest();
-  const float wx = static_cast<float>(levels_->Weights()[0]), wy = static_cast<float>(levels_->Weights()[1]),
-              wz = static_cast<float>(levels_->Weights()[2]);
-  const Products s = ParallelSum<Products>(rows.size[1], rows.Grain(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    double sums[5] = {};
-    for (int z = rows.low[1] + static_cast<int>(begin); z < rows.low[1] + static_cast<int>(end); ++z)
-      for (int y = rows.low[0]; y < rows.low[0] + rows.size[0]; ++y) {
-        const auto& row = rows.At(y, z);
         const std::ptrdiff_t below = rows.At(y - 1, z).at, above = rows.At(y + 1, z).at, before = rows.At(y, z - 1).at,
                              behind = rows.At(y, z + 1).at;
         const float *e = finest.value.data(), *p = direction_.data();
         AddProducts(e + row.at, e + below, e + above, e + before, e + behind, p + row.at, p + below, p + above, p + before,
-                    p + behind, finest.right.data() + row.at, levels_->Codes().data() + row.at, wx, wy, wz, row.begin, row.end,
-                    sums);
+                    p + behind, finest.right.data() + row.at, codes + row.at, wx, wy, wz, row.begin, row.end, sums);
       }
-    return Products{sums[0], sums[1], sums[2], sums[3], sums[4]};
-  });
-  double alongE = s.eAe > 0.0 ? s.er / s.eAe : 0.0, alongP = 0.0;
-  const double determinant = s.eAe * s.pAp - s.eAp * s.eAp;
-  if (determinant > 1e-6 * s.eAe * s.pAp) {
-    alongE = (s.er * s.pAp - s.pr * s.eAp) / determinant;
-    alongP = (s.pr * s.eAe - s.er * s.eAp) / determinant;
+      parts[static_cast<std::size_t>(z - rows.low[1])] = {sums[0], sums[1], sums[2], sums[3], sums[4]};
+    });
+    Products s;
+    for (const Products& part : parts)
+      s += part;
+    alongE = static_cast<float>(s.eAe > 0.0 ? s.er / s.eAe : 0.0);
+    const double determinant = s.eAe * s.pAp - s.eAp * s.eAp;
+    if (determinant > 1e-6 * s.eAe * s.pAp) {
+      alongE = static_cast<float>((s.er * s.pAp - s.pr * s.eAp) / determinant);
+      alongP = static_cast<float>((s.pr * s.eAe - s.er * s.eAp) / determinant);
+    }
   }
-  ParallelRanges(rows.count, VoxelsOfOneTask, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    Advance(solution_.data(), direction_.data(), finest.value.data(), static_cast<float>(alongE), static_cast<float>(alongP),
-            begin, end);
+  std::vector<std::int32_t> parts(slices, 0);
+  MembraneLevels::Sweep(rows, 2, [&](int stage, int z) {
+    std::int32_t& part = parts[static_cast<std::size_t>(z - rows.low[1])];
+    for (int y = rows.low[0]; y < rows.low[0] + rows.size[0]; ++y) {
+      const auto& row = rows.At(y, z);
+      if (row.begin >= row.end)
+        continue;
+      double* u = solution_.data();
+      if (stage == 0) {
+        Advance(u + row.at, direction_.data() + row.at, finest.value.data() + row.at, alongE, alongP, row.begin, row.end);
+      } else {
+        part = std::max(part, ResidualOf(u + row.at, u + rows.At(y - 1, z).at, u + rows.At(y + 1, z).at, u + rows.At(y, z - 1).at,
+                                         u + rows.At(y, z + 1).at, codes + row.at, load_, w[0], w[1], w[2], row.begin, row.end,
+                                         finest.right.data() + row.at));
+      }
+    }
   });
+  return static_cast<double>(OfBits(*std::max_element(parts.begin(), parts.end())));
 }
 
 void Multigrid::Solve(const MembraneParameters& parameters, const Progress& progress, MembraneReport& report)
 {
-  auto& finest = levels_->Finest();
   // What is added to the bound: the sums of six rounded terms above, and the rounding of the result.
   const double rounding = std::max(std::abs(lowest_), std::abs(lowest_ + span_)) / 16777216.0;
-  Residual();
+  Improve(true);
   levels_->Guess();
-  ParallelRanges(Rows().count, VoxelsOfOneTask, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (std::ptrdiff_t at = begin; at < end; ++at)
-      solution_[static_cast<std::size_t>(at)] += static_cast<double>(finest.value[static_cast<std::size_t>(at)]);
-  });
   for (report.cycles = 0;; ++report.cycles) {
     progress(std::min(1.0, report.cycles / 10.0));
-    const double residual = Residual() * (1.0 + 1e-6) + 1e-14;
+    const double residual = Improve(report.cycles == 0) * (1.0 + 1e-6) + 1e-14;
     report.bound = amplification_ * residual * span_ + rounding;
     report.certified = report.bound <= parameters.tolerance * span_;
     if (report.certified || report.cycles >= parameters.maximumCycles)
       return;
-    levels_->Cycle();
-    Move();
   }
 }
 
@@ -567,6 +514,68 @@ void Multigrid::Write(const Frame& frame, const Components& components, RowField
   });
 }
 
+// The descent works on the box of what is unknown, as it always did.
+void Descend(const Frame& frame, const RowField<unsigned char>& kinds, const Components& components,
+             const Eigen::Vector3d& spacing, const MembraneParameters& parameters, const Progress& progress,
+             RowField<float>& values, MembraneReport& report)
+{
+  std::array<int, 3> low{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(), std::numeric_limits<int>::max()};
+  std::array<int, 3> high{std::numeric_limits<int>::min(), std::numeric_limits<int>::min(), std::numeric_limits<int>::min()};
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  const auto forRuns = [&](const auto& body) {
+    for (std::size_t line = 0; line + 1 < components.rowStart.size(); ++line)
+      for (auto n = static_cast<std::size_t>(components.rowStart[line]);
+           n < static_cast<std::size_t>(components.rowStart[line + 1]); ++n)
+        if (IsSolved(components.Root(n)))
+          body(components.y0 + static_cast<int>(line % static_cast<std::size_t>(components.ny)),
+               components.z0 + static_cast<int>(line / static_cast<std::size_t>(components.ny)), components.runs[n],
+               components.Root(n));
+  };
+  forRuns([&](int y, int z, const Run& run, const Run& root) {
+    low = {std::min(low[0], run.begin - 1), std::min(low[1], y - 1), std::min(low[2], z - 1)};
+    high = {std::max(high[0], run.end + 1), std::max(high[1], y + 2), std::max(high[2], z + 2)};
+    least = std::min(least, static_cast<double>(root.least));
+    most = std::max(most, static_cast<double>(root.most));
+  });
+  const std::array<int, 2> lowest{components.y0, components.z0}, rows{components.ny, components.nz};
+  for (std::size_t axis = 0; axis < 2; ++axis) { // not beyond the grid: flat ones stay flat
+    low[axis + 1] = std::max(low[axis + 1], lowest[axis]);
+    high[axis + 1] = std::min(high[axis + 1], lowest[axis] + rows[axis]);
+  }
+  DescentGrid grid({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  for (int z = low[2]; z < high[2]; ++z)
+    for (int y = low[1]; y < high[1]; ++y) {
+      const int first = std::max(low[0], frame.First(y, z)), end = std::min(high[0], frame.End(y, z));
+      for (int i = first; i < end; ++i)
+        if (frame.Row(kinds, y, z)[i - frame.First(y, z)] == static_cast<unsigned char>(MembraneVoxel::Known)) {
+          const std::size_t at = grid.At(i - low[0], y - low[1], z - low[2]);
+          grid.kinds[at] = static_cast<unsigned char>(MembraneVoxel::Known);
+          const double scaled = (static_cast<double>(frame.Row(values, y, z)[i - frame.First(y, z)]) - least) / (most - least);
+          grid.values[at] = scaled > 0.0 ? static_cast<float>(std::min(scaled, 1.0)) : 0.0f; // NaN where no unknown looks
+        }
+    }
+  forRuns([&](int y, int z, const Run& run, const Run&) {
+    const std::size_t at = grid.At(run.begin - low[0], y - low[1], z - low[2]);
+    std::fill_n(grid.kinds.begin() + static_cast<std::ptrdiff_t>(at), run.end - run.begin,
+                static_cast<unsigned char>(MembraneVoxel::Unknown));
+  });
+  const Eigen::Array3d weights = (spacing.minCoeff() / spacing.array()).square();
+  DescendMembrane(grid,
+                  {static_cast<float>(weights[0]), static_cast<float>(weights[frame.swapped ? 2 : 1]),
+                   static_cast<float>(weights[frame.swapped ? 1 : 2])},
+                  parameters, progress, report);
+  forRuns([&](int y, int z, const Run& run, const Run& root) {
+    const std::size_t at = grid.At(run.begin - low[0], y - low[1], z - low[2]);
+    float* to = frame.Row(values, y, z) + (run.begin - frame.First(y, z));
+    for (int i = 0; i < run.end - run.begin; ++i)
+      to[i] = std::clamp(
+          static_cast<float>(least + (most - least) * static_cast<double>(grid.values[at + static_cast<std::size_t>(i)])),
+          root.least, root.most);
+  });
+  report.bound = std::numeric_limits<double>::infinity();
+  report.certified = false;
+}
+
 void Check(const RowField<unsigned char>& kinds, const Eigen::Vector3d& spacing, const RowField<float>& values,
            const MembraneParameters& parameters)
 {
@@ -582,6 +591,12 @@ void Check(const RowField<unsigned char>& kinds, const Eigen::Vector3d& spacing,
     refuse("the tolerance of a membrane must be positive");
   if (parameters.maximumCycles < 0)
     refuse("the number of cycles of a membrane must not be negative");
+  if (parameters.levels < 1 || parameters.levels > 8)
+    refuse("the levels of a membrane's descent must be 1 to 8");
+  if (!(parameters.descentStop > 0.0 && parameters.descentStop < 1.0))
+    refuse("the fall of energy that ends a membrane's descent must lie between 0 and 1");
+  if (!(parameters.maximumSeconds >= 0.0))
+    refuse("the seconds of a membrane's descent must not be negative");
 }
 
 } // namespace
@@ -614,6 +629,11 @@ MembraneReport SolveMembrane(const RowField<unsigned char>& kinds, const Eigen::
     }
   if (!any)
     return report;
+  if (parameters.solver == MembraneSolver::SteepestDescent) {
+    Descend(frame, kinds, components, spacing, parameters, progress, values, report);
+    report.solveSeconds = SecondsSince(start);
+    return report;
+  }
   Multigrid multigrid(frame, kinds, values, components, spacing, progress.Part(0.0, 0.5));
   report.setupSeconds = SecondsSince(start);
   multigrid.Solve(parameters, progress.Part(0.5, 1.0), report);

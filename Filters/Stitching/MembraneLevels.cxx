@@ -1,6 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// Multigrid on what is left of a box: rows of unknowns between known voxels and the void.
+//
+// Smoothing: red-black Gauss-Seidel, two sweeps before and two after the coarse level. A half sweep computes both colours and
+// multiplies one by zero, for that makes plain vector loops; memory is what costs. Chunks of slices are worked on like a wave
+// (Sweep), and all half sweeps with the residual and its restriction pass through the caches once.
+//
+// Coarse levels keep the shape by numbers, not by finer rules: the tie of two cells is the sum of the ties of their voxels
+// across the face, halved for the doubled distance, so a cell that is partly void is tied less. The ties to known voxels are
+// summed in the cell; KnownTie is what is left of them one level up, for they end at the known voxel and not at a cell's
+// centre (between 5/8 and 1 in one dimension, depending on how cells fall; smaller makes cycles overshoot there).
+//
+// Interpolation is trilinear. Known cells hold 0; cells of the void, which the linear weights also reach, are filled with the
+// mean of their neighbours, and restriction is the transpose of all that.
 #include "MembraneLevels.h"
 #include "Core/Base/Multiversion.h"
+#include "MembraneLanes.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,9 +24,8 @@ namespace {
 
 constexpr std::ptrdiff_t CellsOfOneTask = 32768;
 constexpr std::ptrdiff_t CoarsestUnknowns = 200; // solved directly
-constexpr float Tiny = 1e-30f;
-constexpr float KnownTie = 0.7f;
-constexpr int Sweeps = 1;
+constexpr float KnownTie = 0.75f;                // see above
+constexpr int Sweeps = 2;                        // before, and after, the coarser level
 
 struct Around { // a row of values and its four neighbours, each by x
   float* own;
@@ -23,107 +36,138 @@ struct Ties { // of a row of a coarse level
   const float *x, *y, *yNext, *z, *zNext, *inverse;
 };
 
-ECHORAMA_HOT void RelaxFine(Around e, const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin,
-                            int end, int parity)
+// Loops over rows have no branches, so that they become vector instructions: what must not change is multiplied by 0.
+
+// 1 for voxels of the colour that are unknowns, else 0.
+[[gnu::always_inline]] inline float Take(int i, int parity, int unknown)
 {
-  float* own = e.own;
+  return static_cast<float>(~(i ^ parity) & 1 & unknown);
+}
+
+[[gnu::always_inline]] inline int IsUnknown(int code)
+{
+  return (code & MembraneCounts) != 0 ? 1 : 0;
+}
+
+// The sum of the ties of a voxel; 1 for one that is not an unknown.
+[[gnu::always_inline]] inline float Diagonal(int code, float wx, float wy, float wz)
+{
+  return wx * static_cast<float>(code & 3) + wy * static_cast<float>((code >> 2) & 3) + wz * static_cast<float>((code >> 4) & 3) +
+         static_cast<float>(1 - IsUnknown(code));
+}
+
+// Of one colour; those of the other are only read, so the order within a row does not matter.
+ECHORAMA_HOT void RelaxFine(float* own, const float* below, const float* above, const float* before, const float* behind,
+                            const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
+                            int parity, float* __restrict step)
+{
+  ForLanes<MembraneByteLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        const int code = codes[i];
+        const float sum = wx * (own[i - 1] + own[i + 1]) + wy * (below[i] + above[i]) + wz * (before[i] + behind[i]);
+        const float value = (right[i] + sum) / Diagonal(code, wx, wy, wz);
+        step[i] = Take(i, parity, IsUnknown(code)) * (value - own[i]);
+      });
 #pragma GCC ivdep
-  for (int i = begin; i < end; ++i) {
-    const int code = codes[i];
-    const float sum = wx * (own[i - 1] + own[i + 1]) + wy * (e.below[i] + e.above[i]) + wz * (e.before[i] + e.behind[i]);
-    const float diagonal =
-        wx * static_cast<float>(code & 3) + wy * static_cast<float>((code >> 2) & 3) + wz * static_cast<float>((code >> 4) & 3);
-    const float value = (right[i] + sum) / (diagonal > Tiny ? diagonal : Tiny);
-    const bool take = (code & MembraneCounts) != 0 && ((i ^ parity) & 1) == 0;
-    own[i] = take ? value : own[i];
-  }
+  for (int i = begin; i < end; ++i)
+    own[i] += step[i];
 }
 
 ECHORAMA_HOT void StartFine(float* own, const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin,
                             int end, int parity)
 {
-  for (int i = begin; i < end; ++i) {
-    const int code = codes[i];
-    const float diagonal =
-        wx * static_cast<float>(code & 3) + wy * static_cast<float>((code >> 2) & 3) + wz * static_cast<float>((code >> 4) & 3);
-    const float value = right[i] / (diagonal > Tiny ? diagonal : Tiny);
-    own[i] = (code & MembraneCounts) != 0 && ((i ^ parity) & 1) == 0 ? value : 0.0f;
-  }
+  ForLanes<MembraneByteLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        own[i] = Take(i, parity, IsUnknown(codes[i])) * right[i] / Diagonal(codes[i], wx, wy, wz);
+      });
 }
 
-ECHORAMA_HOT void ResidualFine(Around e, const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin,
-                               int end, float* residual)
+ECHORAMA_HOT void ResidualFine(const float* own, const float* below, const float* above, const float* before, const float* behind,
+                               const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
+                               float* __restrict residual)
 {
-  const float* own = e.own;
-  for (int i = begin; i < end; ++i) {
-    const int code = codes[i];
-    const float sum = wx * (own[i - 1] + own[i + 1]) + wy * (e.below[i] + e.above[i]) + wz * (e.before[i] + e.behind[i]);
-    const float diagonal =
-        wx * static_cast<float>(code & 3) + wy * static_cast<float>((code >> 2) & 3) + wz * static_cast<float>((code >> 4) & 3);
-    residual[i] = (code & MembraneCounts) != 0 ? right[i] + sum - diagonal * own[i] : 0.0f;
-  }
+  ForLanes<MembraneByteLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        const int code = codes[i];
+        const float sum = wx * (own[i - 1] + own[i + 1]) + wy * (below[i] + above[i]) + wz * (before[i] + behind[i]);
+        residual[i] = static_cast<float>(IsUnknown(code)) * (right[i] + sum - Diagonal(code, wx, wy, wz) * own[i]);
+      });
 }
 
-ECHORAMA_HOT void RelaxCoarse(Around e, Ties t, const float* right, int begin, int end, int parity)
+ECHORAMA_HOT void RelaxCoarse(float* own, const float* below, const float* above, const float* before, const float* behind,
+                              const float* x, const float* y, const float* yNext, const float* z, const float* zNext,
+                              const float* inverse, const float* right, int begin, int end, int parity, float* __restrict step)
 {
-  float* own = e.own;
+  ForLanes<MembraneFloatLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        const float sum = x[i] * own[i - 1] + x[i + 1] * own[i + 1] + y[i] * below[i] + yNext[i] * above[i] + z[i] * before[i] +
+                          zNext[i] * behind[i];
+        step[i] = Take(i, parity, 1) * ((right[i] + sum) * inverse[i] - own[i]);
+      });
 #pragma GCC ivdep
-  for (int i = begin; i < end; ++i) {
-    const float sum = t.x[i] * own[i - 1] + t.x[i + 1] * own[i + 1] + t.y[i] * e.below[i] + t.yNext[i] * e.above[i] +
-                      t.z[i] * e.before[i] + t.zNext[i] * e.behind[i];
-    const float value = (right[i] + sum) * t.inverse[i];
-    own[i] = ((i ^ parity) & 1) == 0 ? value : own[i];
-  }
+  for (int i = begin; i < end; ++i)
+    own[i] += step[i];
 }
 
 ECHORAMA_HOT void StartCoarse(float* own, const float* right, const float* inverse, int begin, int end, int parity)
 {
-  for (int i = begin; i < end; ++i)
-    own[i] = ((i ^ parity) & 1) == 0 ? right[i] * inverse[i] : 0.0f;
+  ForLanes<MembraneFloatLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) { own[i] = Take(i, parity, 1) * right[i] * inverse[i]; });
 }
 
-ECHORAMA_HOT void ResidualCoarse(Around e, Ties t, const float* right, int begin, int end, float* residual)
+ECHORAMA_HOT void ResidualCoarse(const float* own, const float* below, const float* above, const float* before,
+                                 const float* behind, const float* x, const float* y, const float* yNext, const float* z,
+                                 const float* zNext, const float* inverse, const float* right, int begin, int end,
+                                 float* __restrict residual)
 {
-  const float* own = e.own;
-  for (int i = begin; i < end; ++i) {
-    const float sum = t.x[i] * own[i - 1] + t.x[i + 1] * own[i + 1] + t.y[i] * e.below[i] + t.yNext[i] * e.above[i] +
-                      t.z[i] * e.before[i] + t.zNext[i] * e.behind[i];
-    const float inverse = t.inverse[i];
-    residual[i] = inverse > 0.0f ? right[i] + sum - own[i] / (inverse > 0.0f ? inverse : 1.0f) : 0.0f;
-  }
+  ForLanes<MembraneFloatLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        const float sum = x[i] * own[i - 1] + x[i + 1] * own[i + 1] + y[i] * below[i] + yNext[i] * above[i] + z[i] * before[i] +
+                          zNext[i] * behind[i];
+        const float unknown = inverse[i] > 0.0f ? 1.0f : 0.0f;
+        residual[i] = unknown * (right[i] + sum) - unknown * own[i] / (inverse[i] + (1.0f - unknown));
+      });
 }
 
 // Two voxels of a row share a cell; each gives three quarters to its own and one to the nearest other.
-ECHORAMA_HOT void HalveRow(const float* fine, float* coarse, int begin, int end)
+ECHORAMA_HOT void HalveRow(const float* fine, float* __restrict coarse, int begin, int end)
 {
-  for (int i = begin; i < end; ++i)
-    coarse[i] = 0.75f * (fine[2 * i] + fine[2 * i + 1]) + 0.25f * (fine[2 * i - 1] + fine[2 * i + 2]);
+  ForLanes<MembraneFloatLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        coarse[i] = 0.75f * (fine[2 * i] + fine[2 * i + 1]) + 0.25f * (fine[2 * i - 1] + fine[2 * i + 2]);
+      });
 }
 
-ECHORAMA_HOT void DoubleRow(const float* coarse, float* fine, int begin, int end)
+ECHORAMA_HOT void DoubleRow(const float* coarse, float* __restrict fine, int begin, int end)
 {
-  for (int i = begin; i < end; ++i) {
-    fine[2 * i] = 0.75f * coarse[i] + 0.25f * coarse[i - 1];
-    fine[2 * i + 1] = 0.75f * coarse[i] + 0.25f * coarse[i + 1];
-  }
+  ForLanes<MembraneFloatLanes>(
+      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+        fine[2 * i] = 0.75f * coarse[i] + 0.25f * coarse[i - 1];
+        fine[2 * i + 1] = 0.75f * coarse[i] + 0.25f * coarse[i + 1];
+      });
 }
 
 ECHORAMA_HOT void AddRow(const float* from, float weight, float* to, int begin, int end)
 {
+#pragma GCC ivdep
   for (int i = begin; i < end; ++i)
     to[i] += weight * from[i];
 }
 
 ECHORAMA_HOT void PutFine(const float* from, const unsigned char* codes, float keep, float* to, int begin, int end)
 {
-  for (int i = begin; i < end; ++i)
-    to[i] = (codes[i] & MembraneCounts) != 0 ? keep * to[i] + from[i] : 0.0f;
+  ForLanes<MembraneByteLanes>(
+      begin, end, [&](int i, int, float fresh) __attribute__((always_inline)) {
+        const float kept = fresh * keep + (1.0f - fresh);
+        to[i] = static_cast<float>(IsUnknown(codes[i])) * (kept * to[i] + fresh * from[i]);
+      });
 }
 
 ECHORAMA_HOT void PutCoarse(const float* from, const float* inverse, float keep, float* to, int begin, int end)
 {
+#pragma GCC ivdep
   for (int i = begin; i < end; ++i)
-    to[i] = inverse[i] > 0.0f ? keep * to[i] + from[i] : 0.0f;
+    to[i] = (inverse[i] > 0.0f ? 1.0f : 0.0f) * (keep * to[i] + from[i]);
 }
 
 // The cells that a voxel along one axis gives to and takes from.
@@ -283,6 +327,8 @@ void MembraneLevels::BuildCoarse(int number)
   coarse.rows = MembraneRows(low, size, spans);
   const MembraneRows& to = coarse.rows;
   const auto cells = static_cast<std::size_t>(to.count);
+  if (cells > std::numeric_limits<std::uint32_t>::max())
+    throw Error(Error::Kind::TooLarge, "the membrane has too many unknowns");
   for (auto& tie : coarse.tie)
     tie.assign(cells, 0.0f);
   coarse.inverse.assign(cells, 0.0f);
@@ -514,31 +560,34 @@ void MembraneLevels::SolveCoarsest()
   }
 }
 
-void MembraneLevels::Smooth(int number, int sweeps, bool fromZero, bool backwards)
+void MembraneLevels::RelaxSlice(int number, int z, int colour, bool fromZero)
 {
   Level& level = levels_[static_cast<std::size_t>(number)];
   const float wx = static_cast<float>(weights_[0]), wy = static_cast<float>(weights_[1]), wz = static_cast<float>(weights_[2]);
-  for (int half = 0; half < 2 * sweeps; ++half) {
-    const int colour = (half & 1) ^ (backwards ? 1 : 0);
-    const bool start = fromZero && half == 0;
-    ForRowsOf(level.rows, [&](int y, int z, const MembraneRows::Row& row) {
-      const float* right = level.right.data() + row.at;
-      const int parity = (y + z + colour) & 1;
-      const Around e = AroundRow(level.rows, level.value, y, z);
-      if (number == 0) {
-        const unsigned char* codes = codes_.data() + row.at;
-        if (start)
-          StartFine(e.own, right, codes, wx, wy, wz, row.begin, row.end, parity);
-        else
-          RelaxFine(e, right, codes, wx, wy, wz, row.begin, row.end, parity);
-      } else {
-        const Ties ties = TiesOf(level, y, z);
-        if (start)
-          StartCoarse(e.own, right, ties.inverse, row.begin, row.end, parity);
-        else
-          RelaxCoarse(e, ties, right, row.begin, row.end, parity);
-      }
-    });
+  std::vector<float> step;
+  for (int y = level.rows.low[0]; y < level.rows.low[0] + level.rows.size[0]; ++y) {
+    const auto& row = level.rows.At(y, z);
+    if (row.begin >= row.end)
+      continue;
+    step.resize(static_cast<std::size_t>(row.end - row.begin));
+    const float* right = level.right.data() + row.at;
+    const int parity = (y + z + colour) & 1;
+    const Around e = AroundRow(level.rows, level.value, y, z);
+    if (number == 0) {
+      const unsigned char* codes = codes_.data() + row.at;
+      if (fromZero)
+        StartFine(e.own, right, codes, wx, wy, wz, row.begin, row.end, parity);
+      else
+        RelaxFine(e.own, e.below, e.above, e.before, e.behind, right, codes, wx, wy, wz, row.begin, row.end, parity,
+                  step.data() - row.begin);
+    } else {
+      const Ties ties = TiesOf(level, y, z);
+      if (fromZero)
+        StartCoarse(e.own, right, ties.inverse, row.begin, row.end, parity);
+      else
+        RelaxCoarse(e.own, e.below, e.above, e.before, e.behind, ties.x, ties.y, ties.yNext, ties.z, ties.zNext, ties.inverse,
+                    right, row.begin, row.end, parity, step.data() - row.begin);
+    }
   }
 }
 
@@ -563,120 +612,156 @@ void MembraneLevels::Aggregate(int number, float factor)
   });
 }
 
-void MembraneLevels::Restrict(int number)
+// Adds the residual of a slice to the right side of the next level, with the weights of linear interpolation.
+void MembraneLevels::RestrictSlice(int number, int z)
 {
   Level& fine = levels_[static_cast<std::size_t>(number)];
   Level& coarse = levels_[static_cast<std::size_t>(number) + 1];
   const auto& halved = fine.halved;
   const MembraneRows &from = fine.rows, &to = coarse.rows;
   const float wx = static_cast<float>(weights_[0]), wy = static_cast<float>(weights_[1]), wz = static_cast<float>(weights_[2]);
-  ParallelRanges(
-      to.size[1] + 2, std::max<std::ptrdiff_t>(2, to.Grain()), Progress(), [&](std::ptrdiff_t zBegin, std::ptrdiff_t zEnd) {
-        const int Z0 = to.low[1] - 1 + static_cast<int>(zBegin), Z1 = to.low[1] - 1 + static_cast<int>(zEnd);
-        const std::ptrdiff_t first = to.At(to.low[0] - 1, Z0).at + to.At(to.low[0] - 1, Z0).first;
-        const auto& end = to.At(to.low[0] + to.size[0], Z1 - 1);
-        std::fill(coarse.right.begin() + first, coarse.right.begin() + end.at + end.last, 0.0f);
-        std::vector<float> residual, halfRow;
-        const int z0 = std::max(halved[2] ? 2 * Z0 - 1 : Z0, from.low[1]);
-        const int z1 = std::min(halved[2] ? 2 * Z1 + 1 : Z1, from.low[1] + from.size[1]);
-        for (int z = z0; z < z1; ++z)
-          for (int y = from.low[0]; y < from.low[0] + from.size[0]; ++y) {
-            const auto& row = from.At(y, z);
-            if (row.begin >= row.end)
-              continue;
-            // The residual of the row, with zeros around.
-            const int I0 = CellOf(row.begin, halved[0]) - (halved[0] ? 1 : 0);
-            const int I1 = CellOf(row.end - 1, halved[0]) + (halved[0] ? 2 : 1);
-            const int low = halved[0] ? 2 * I0 - 1 : I0;
-            residual.assign(static_cast<std::size_t>((halved[0] ? 2 * I1 + 1 : I1) - low), 0.0f);
-            float* own = residual.data() - low;
-            const Around e = AroundRow(from, fine.value, y, z);
-            const float* right = fine.right.data() + row.at;
-            if (number == 0)
-              ResidualFine(e, right, codes_.data() + row.at, wx, wy, wz, row.begin, row.end, own);
-            else
-              ResidualCoarse(e, TiesOf(fine, y, z), right, row.begin, row.end, own);
-            const float* cells = own;
-            if (halved[0]) {
-              halfRow.resize(static_cast<std::size_t>(I1 - I0));
-              HalveRow(own, halfRow.data() - I0, I0, I1);
-              cells = halfRow.data() - I0;
-            }
-            const Partners ys = PartnersOf(y, halved[1]), zs = PartnersOf(z, halved[2]);
-            for (int b = 0; b < zs.count; ++b)
-              if (zs.cell[b] >= Z0 && zs.cell[b] < Z1)
-                for (int a = 0; a < ys.count; ++a)
-                  AddRow(cells, ys.weight[a] * zs.weight[b], coarse.right.data() + to.At(ys.cell[a], zs.cell[b]).at, I0, I1);
-          }
-      });
-  // What went to cells that are filled belongs to those they are filled from.
-  const Level::Fill& fill = coarse.voids;
-  for (std::size_t n = 0; n < fill.cell.size(); ++n) {
-    const float part = coarse.right[fill.cell[n]];
-    for (std::uint32_t m = fill.start[n]; m < fill.start[n + 1]; ++m)
-      coarse.right[fill.from[m]] += part * fill.weight[m];
+  std::vector<float> residual, half;
+  for (int y = from.low[0]; y < from.low[0] + from.size[0]; ++y) {
+    const auto& row = from.At(y, z);
+    if (row.begin >= row.end)
+      continue;
+    // The residual of the row, with zeros around.
+    const int begin = CellOf(row.begin, halved[0]) - (halved[0] ? 1 : 0);
+    const int end = CellOf(row.end - 1, halved[0]) + (halved[0] ? 2 : 1);
+    const int low = halved[0] ? 2 * begin - 1 : begin;
+    residual.assign(static_cast<std::size_t>((halved[0] ? 2 * end + 1 : end) - low), 0.0f);
+    float* own = residual.data() - low;
+    const Around e = AroundRow(from, fine.value, y, z);
+    const float* right = fine.right.data() + row.at;
+    if (number == 0)
+      ResidualFine(e.own, e.below, e.above, e.before, e.behind, right, codes_.data() + row.at, wx, wy, wz, row.begin, row.end,
+                   own);
+    else {
+      const Ties ties = TiesOf(fine, y, z);
+      ResidualCoarse(e.own, e.below, e.above, e.before, e.behind, ties.x, ties.y, ties.yNext, ties.z, ties.zNext, ties.inverse,
+                     right, row.begin, row.end, own);
+    }
+    const float* cells = own;
+    if (halved[0]) {
+      half.resize(static_cast<std::size_t>(end - begin));
+      HalveRow(own, half.data() - begin, begin, end);
+      cells = half.data() - begin;
+    }
+    const Partners ys = PartnersOf(y, halved[1]), zs = PartnersOf(z, halved[2]);
+    for (int b = 0; b < zs.count; ++b)
+      for (int a = 0; a < ys.count; ++a)
+        AddRow(cells, ys.weight[a] * zs.weight[b], coarse.right.data() + to.At(ys.cell[a], zs.cell[b]).at, begin, end);
   }
 }
 
-void MembraneLevels::Prolong(int number, bool add, bool solution)
+// What went to cells that are filled belongs to those they are filled from.
+void MembraneLevels::FoldFills(int number)
 {
-  Level& fine = levels_[static_cast<std::size_t>(number)];
-  Level& coarse = levels_[static_cast<std::size_t>(number) + 1];
-  const auto& halved = fine.halved;
-  const auto apply = [](const Level::Fill& fill, const std::vector<float>& source, std::vector<float>& value) {
-    for (std::size_t n = 0; n < fill.cell.size(); ++n) {
+  Level& level = levels_[static_cast<std::size_t>(number)];
+  const Level::Fill& fill = level.voids;
+  for (std::size_t n = 0; n < fill.cell.size(); ++n) {
+    const float part = level.right[fill.cell[n]];
+    for (std::uint32_t m = fill.start[n]; m < fill.start[n + 1]; ++m)
+      level.right[fill.from[m]] += part * fill.weight[m];
+  }
+}
+
+namespace {
+
+void ApplyFill(const MembraneLevels::Level::Fill& fill, const std::vector<float>& source, std::vector<float>& value)
+{
+  ParallelRanges(static_cast<std::ptrdiff_t>(fill.cell.size()), 4096, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (auto n = static_cast<std::size_t>(begin); n < static_cast<std::size_t>(end); ++n) {
       float sum = 0.0f;
       for (std::uint32_t m = fill.start[n]; m < fill.start[n + 1]; ++m)
         sum += fill.weight[m] * source[fill.from[m]];
       value[fill.cell[n]] = sum;
     }
-  };
-  apply(coarse.voids, coarse.value, coarse.value);
-  if (solution)
-    apply(coarse.knowns, coarse.right, coarse.value);
-  const float keep = add ? 1.0f : 0.0f;
-  ParallelRanges(fine.rows.size[1], fine.rows.Grain(), Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    std::vector<float> cells, voxels;
-    for (int z = fine.rows.low[1] + static_cast<int>(begin); z < fine.rows.low[1] + static_cast<int>(end); ++z)
-      for (int y = fine.rows.low[0]; y < fine.rows.low[0] + fine.rows.size[0]; ++y) {
-        const auto& row = fine.rows.At(y, z);
-        if (row.begin >= row.end)
-          continue;
-        const int I0 = CellOf(row.begin, halved[0]), I1 = CellOf(row.end - 1, halved[0]) + 1;
-        const int border = halved[0] ? 1 : 0;
-        cells.assign(static_cast<std::size_t>(I1 - I0 + 2 * border), 0.0f);
-        float* cell = cells.data() - (I0 - border);
-        const Partners ys = PartnersOf(y, halved[1]), zs = PartnersOf(z, halved[2]);
-        for (int b = 0; b < zs.count; ++b)
-          for (int a = 0; a < ys.count; ++a)
-            AddRow(coarse.value.data() + coarse.rows.At(ys.cell[a], zs.cell[b]).at, ys.weight[a] * zs.weight[b], cell,
-                   I0 - border, I1 + border);
-        const float* voxel = cell;
-        if (halved[0]) {
-          voxels.resize(static_cast<std::size_t>(2 * (I1 - I0)));
-          DoubleRow(cell, voxels.data() - 2 * I0, I0, I1);
-          voxel = voxels.data() - 2 * I0;
-        }
-        if (number == 0)
-          PutFine(voxel, codes_.data() + row.at, keep, fine.value.data() + row.at, row.begin, row.end);
-        else
-          PutCoarse(voxel, fine.inverse.data() + row.at, keep, fine.value.data() + row.at, row.begin, row.end);
-      }
   });
-  if (solution) // known cells are 0 again
+}
+
+} // namespace
+
+void MembraneLevels::FillVoids(int number)
+{
+  Level& level = levels_[static_cast<std::size_t>(number)];
+  ApplyFill(level.voids, level.value, level.value);
+}
+
+void MembraneLevels::ProlongSlice(int number, int z, bool add)
+{
+  Level& fine = levels_[static_cast<std::size_t>(number)];
+  const Level& coarse = levels_[static_cast<std::size_t>(number) + 1];
+  const auto& halved = fine.halved;
+  const float keep = add ? 1.0f : 0.0f;
+  std::vector<float> cells, voxels;
+  for (int y = fine.rows.low[0]; y < fine.rows.low[0] + fine.rows.size[0]; ++y) {
+    const auto& row = fine.rows.At(y, z);
+    if (row.begin >= row.end)
+      continue;
+    const int begin = CellOf(row.begin, halved[0]), end = CellOf(row.end - 1, halved[0]) + 1, border = halved[0] ? 1 : 0;
+    cells.assign(static_cast<std::size_t>(end - begin + 2 * border), 0.0f);
+    float* cell = cells.data() - (begin - border);
+    const Partners ys = PartnersOf(y, halved[1]), zs = PartnersOf(z, halved[2]);
+    for (int b = 0; b < zs.count; ++b)
+      for (int a = 0; a < ys.count; ++a)
+        AddRow(coarse.value.data() + coarse.rows.At(ys.cell[a], zs.cell[b]).at, ys.weight[a] * zs.weight[b], cell, begin - border,
+               end + border);
+    const float* voxel = cell;
+    if (halved[0]) {
+      voxels.resize(static_cast<std::size_t>(2 * (end - begin)));
+      DoubleRow(cell, voxels.data() - 2 * begin, begin, end);
+      voxel = voxels.data() - 2 * begin;
+    }
+    if (number == 0)
+      PutFine(voxel, codes_.data() + row.at, keep, fine.value.data() + row.at, row.begin, row.end);
+    else
+      PutCoarse(voxel, fine.inverse.data() + row.at, keep, fine.value.data() + row.at, row.begin, row.end);
+  }
+}
+
+void MembraneLevels::Prolong(int number, bool solution)
+{
+  Level& coarse = levels_[static_cast<std::size_t>(number) + 1];
+  FillVoids(number + 1);
+  if (solution)
+    ApplyFill(coarse.knowns, coarse.right, coarse.value);
+  Sweep(levels_[static_cast<std::size_t>(number)].rows, 1, [&](int, int z) { ProlongSlice(number, z, false); });
+  if (solution) // corrections are 0 at known cells
     for (const std::uint32_t at : coarse.knowns.cell)
       coarse.value[at] = 0.0f;
 }
 
-void MembraneLevels::Cycle(int number, bool improve)
+void MembraneLevels::Cycle(int number, bool improve, const std::function<void(int z)>& then)
 {
-  if (number == Count() - 1)
-    return SolveCoarsest();
-  Smooth(number, Sweeps, !improve, false);
-  Restrict(number);
-  Cycle(number + 1, false);
-  Prolong(number, true, false);
-  Smooth(number, Sweeps, false, true);
+  const MembraneRows& rows = levels_[static_cast<std::size_t>(number)].rows;
+  if (number == Count() - 1) {
+    SolveCoarsest();
+    if (then)
+      Sweep(rows, 1, [&](int, int z) { then(z); });
+    return;
+  }
+  const int halves = 2 * Sweeps;
+  std::vector<float>& right = levels_[static_cast<std::size_t>(number) + 1].right;
+  std::fill(right.begin(), right.end(), 0.0f);
+  Sweep(rows, halves + 1, [&](int stage, int z) {
+    if (stage < halves)
+      RelaxSlice(number, z, stage & 1, stage == 0 && !improve);
+    else
+      RestrictSlice(number, z);
+  });
+  FoldFills(number + 1);
+  Cycle(number + 1, false, {});
+  FillVoids(number + 1);
+  // The colours in the opposite order: the cycle as a whole is then symmetric, as conjugate gradients like it.
+  Sweep(rows, halves + (then ? 2 : 1), [&](int stage, int z) {
+    if (stage == 0)
+      ProlongSlice(number, z, true);
+    else if (stage <= halves)
+      RelaxSlice(number, z, stage & 1, false);
+    else
+      then(z);
+  });
 }
 
 void MembraneLevels::Guess()
@@ -685,9 +770,9 @@ void MembraneLevels::Guess()
     Aggregate(level, KnownTie);
   SolveCoarsest();
   for (int level = Count() - 2; level >= 0; --level) {
-    Prolong(level, false, true);
+    Prolong(level, true);
     if (level > 0)
-      Cycle(level, true);
+      Cycle(level, true, {});
   }
 }
 
@@ -697,9 +782,8 @@ void MembraneLevels::Spread()
     Aggregate(level, 1.0f);
   SolveCoarsest();
   for (int level = Count() - 2; level >= 0; --level) {
-    Prolong(level, false, false);
-    if (level > 0)
-      Cycle(level, true);
+    Prolong(level, false);
+    Cycle(level, true, {});
   }
 }
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Parallel.h"
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 namespace echorama {
@@ -75,25 +77,32 @@ public:
   int Count() const { return static_cast<int>(levels_.size()); }
   const std::vector<Level>& All() const { return levels_; }
 
-  /// value := about A^-1 right on the finest level: one V-cycle.
-  void Cycle() { Cycle(0, false); }
+  /// Runs body(stage, z) for all stages and slices with unknowns, one stage as if after the other, but slice by slice: a stage
+  /// reads and writes its own slice and reads the two beside it. Data then pass through the caches once for all stages.
+  template <class Body>
+  static void Sweep(const MembraneRows& rows, int stages, const Body& body);
+
+  /// value := about A^-1 right on the finest level: one V-cycle. \a then, if given, is called for each slice when it and
+  /// those beside it are final.
+  void Cycle(const std::function<void(int z)>& then = {}) { Cycle(0, false, then); }
   /// value := a first guess of the solution on the finest level, from all coarser ones. right holds what known values give.
   void Guess();
-  /// value := about A^-1 right where the right side is a source in space, not at known voxels.
+  /// The same where right is a source in space, and known values are 0; followed by a cycle on the finest level too.
   void Spread();
-  /// value := the improved value, by \a sweeps over both colours.
-  void Smooth(int sweeps) { Smooth(0, sweeps, false, false); }
 
 private:
   void BuildCoarse(int fine);
   void BuildFills(int level, const std::vector<unsigned char>& kinds);
   void BuildCoarsest();
-  void Smooth(int level, int sweeps, bool fromZero, bool backwards);
   void Aggregate(int fine, float factor);
-  void Restrict(int fine);
-  void Prolong(int fine, bool add, bool solution);
+  void RelaxSlice(int level, int z, int colour, bool fromZero);
+  void RestrictSlice(int level, int z);
+  void FoldFills(int level);
+  void FillVoids(int level);
+  void ProlongSlice(int level, int z, bool add);
+  void Prolong(int fine, bool solution);
   void SolveCoarsest();
-  void Cycle(int level, bool improve);
+  void Cycle(int level, bool improve, const std::function<void(int z)>& then);
 
   std::vector<Level> levels_;
   std::vector<unsigned char> codes_;
@@ -103,5 +112,31 @@ private:
   std::vector<std::ptrdiff_t> coarsest_;  // the unknowns of the coarsest level
   std::vector<double> factor_;            // its Cholesky factor, by rows
 };
+
+template <class Body>
+void MembraneLevels::Sweep(const MembraneRows& rows, int stages, const Body& body)
+{
+  // Each task moves through its slices like a wave, the stages one slice behind each other, and leaves out what needs slices
+  // of other tasks: a wedge at each border, filled afterwards.
+  const int slices = rows.size[1], low = rows.low[1];
+  const int tasks = std::max(1, slices / std::max(4 * stages, static_cast<int>(rows.Grain())));
+  const auto border = [slices, tasks](std::ptrdiff_t task) { return static_cast<int>(slices * task / tasks); };
+  ParallelFor(tasks, [&](std::ptrdiff_t task) {
+    const int begin = border(task), end = border(task + 1);
+    for (int front = begin; front < end + stages - 1; ++front)
+      for (int stage = 0; stage < stages; ++stage) {
+        const int z = front - stage;
+        if (z >= (task == 0 ? begin : begin + stage) && z < (task + 1 == tasks ? end : end - stage))
+          body(stage, low + z);
+      }
+  });
+  if (stages > 1)
+    ParallelFor(tasks - 1, [&](std::ptrdiff_t task) {
+      const int middle = border(task + 1);
+      for (int stage = 1; stage < stages; ++stage)
+        for (int z = middle - stage; z < middle + stage; ++z)
+          body(stage, low + z);
+    });
+}
 
 } // namespace echorama
