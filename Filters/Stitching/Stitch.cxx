@@ -65,7 +65,7 @@ void CheckRegions(const StitchParameters& parameters, const std::vector<StitchIn
 bool IsTextured(const StitchParameters& parameters)
 {
   const bool weighted = parameters.method == StitchMethod::Distance || parameters.method == StitchMethod::Feather ||
-                        parameters.method == StitchMethod::Average || parameters.method == StitchMethod::Membrane;
+                        parameters.method == StitchMethod::Membrane;
   return weighted && parameters.texture != StitchTexture::Mix;
 }
 

@@ -34,7 +34,7 @@ enum class StitchTexture {
 
 struct StitchParameters {
   StitchMethod method = StitchMethod::Membrane;
-  StitchTexture texture = StitchTexture::Split; ///< for Distance, Feather, Average and Membrane
+  StitchTexture texture = StitchTexture::Split; ///< for Distance, Feather and Membrane
   double sharpness =
       1.5; ///< the exponent b of eq. 5.10, [0, 1000]; 0 is the plain average, large a hard edge. Distance and Membrane
   double detailSharpness = 32.0; ///< the same for the details of Split, [0, 1000]

@@ -84,7 +84,7 @@ public:
 
   ///@{
   /**
-   * What becomes of speckle and edges where volumes overlap (for DISTANCE, FEATHER, AVERAGE, MEMBRANE): the weighted mean of all
+   * What becomes of speckle and edges where volumes overlap (for DISTANCE, FEATHER, MEMBRANE): the weighted mean of all
    * (MIX), the mean of the details amplified by what their mixture has lost (RESTORE), details that change over in a narrow
    * transition (SPLIT, default), or details of one volume per voxel along a seam where the volumes differ least (SEAM, graph
    * cut).

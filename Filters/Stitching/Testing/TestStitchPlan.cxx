@@ -23,7 +23,7 @@ struct Way {
 const Way ways[] = {{StitchMethod::Membrane, StitchTexture::Split},   {StitchMethod::Membrane, StitchTexture::Mix},
                     {StitchMethod::Membrane, StitchTexture::Restore}, {StitchMethod::Membrane, StitchTexture::Seam},
                     {StitchMethod::Distance, StitchTexture::Split},   {StitchMethod::Feather, StitchTexture::Split},
-                    {StitchMethod::Average, StitchTexture::Restore},  {StitchMethod::Maximum, StitchTexture::Mix},
+                    {StitchMethod::Average, StitchTexture::Mix},      {StitchMethod::Maximum, StitchTexture::Mix},
                     {StitchMethod::Multiband, StitchTexture::Mix},    {StitchMethod::Offset, StitchTexture::Mix}};
 
 StitchParameters By(const Way& way)
