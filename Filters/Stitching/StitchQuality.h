@@ -48,14 +48,15 @@ struct StitchQualityParameters {
 ///   jump in the volumes that are shown on either side, where they cover both windows; the same for gradient energy (mean
 ///   squared difference of neighbours within a window), whose jump is the absolute log of the ratio. So anatomy and speckle at
 ///   that place are in both, and a perfect stitch gives 1. Where hardly any volume reaches across (overlaps thinner than a
-///   window), the jumps between windows within single volumes are the measure. Borders are faces
-///   between voxels where the set of volumes changes, and, where windows lie wholly within one overlap, faces where the volume
-///   that the result follows most closely changes: the one that the difference to varies least from within a window. It is found
-///   from the result itself, whatever the method says of its weights.
+///   window), the jumps between windows within single volumes are the measure. Borders are faces between voxels where the set of
+///   volumes changes. Cuts are faces within one overlap where the volume changes that the result follows most closely (the
+///   difference to it varies least within a window), clearly so on either side: four times less than the difference to the other.
+///   They are found from the result itself, whatever the method says of its weights. If fewer than a third of such changes are
+///   that clear, the blend is smooth and has no cuts.
 /// * Texture. The median, over windows that two volumes or more cover wholly, of the local standard deviation of the result
 ///   over the mean of the volumes' (weighted by their reliability at the middle, at least 0.01). Speckle SNR is the mean over
 ///   the standard deviation in the same windows, its median. Windows in which the volumes do not vary are left out.
-/// * Reference. Another volume, such as the full reconstruction, sampled like the others; its own errors count as those of the
+/// * Reference. Another volume, such as the full reconstruction, sampled like the others; its errors count as those of the
 /// result.
 ///
 /// Cost: volumes are resampled in tiles with their margins (about twice each); memory is that of some tiles per thread.
