@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The examples in Python run as a user would run them: volumes come together, a sweep becomes a volume."""
+"""The examples in Python run as a user would run them: volumes come together, a sweep becomes a volume, pictures are made."""
 import os
 import pathlib
 import re
@@ -25,5 +25,13 @@ with tempfile.TemporaryDirectory() as folder:
         volume = pathlib.Path(folder) / "sweep.vti"
         if answer.returncode != 0 or "140 frames used" not in answer.stdout or volume.stat().st_size < 100_000:
             sys.exit("TestExamples: the sweep did not become a volume")
+    pictures = pathlib.Path(folder) / "pictures"
+    liver = sorted(sweep.parent.glob("liver_volume_[AB].mha"))
+    answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / "stitching_figures.py", "--size", "60", pictures,
+                             *liver], cwd=folder, capture_output=True, text=True)
+    print(answer.stdout, answer.stderr, sep="")
+    made = [path for path in pictures.glob("*.png") if path.stat().st_size > 2_000]
+    if answer.returncode != 0 or len(made) != (9 if liver else 7):
+        sys.exit(f"TestExamples: {len(made)} pictures of stitching were made")
     if not scores or float(scores[1]) < 3.0 or float(scores[2]) > 1.0:
         sys.exit("TestExamples: the volumes did not come together")

@@ -174,7 +174,7 @@ def textures(folder, masks):
         volumes.append(image(np.clip(brightness[i] - 40 * (y - 0.5) + 4.0 * speckle(mask.shape, i), 0, 255), mask))
     panels = [on_shapes(stitched(volumes, method, texture), "Intensity", masks) for _, method, texture in TEXTURES]
     rows, columns = np.nonzero(np.sum(masks, axis=0) > 1)
-    panels = [panel[rows.min() - 8:rows.max() + 9, columns.min() - 8:columns.max() + 9] for panel in panels]
+    panels = [panel[max(rows.min() - 8, 0):rows.max() + 9, max(columns.min() - 8, 0):columns.max() + 9] for panel in panels]
     titles = [title for title, _, _ in TEXTURES]
     save(folder, "stitching_textures.png", [panels[:4]], titles[:4], width=2.6)
     save(folder, "stitching_textures_more.png", [panels[4:]], titles[4:], width=2.6)
