@@ -32,6 +32,7 @@
 #include "vtkXMLImageDataWriter.h"
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 #include <optional>
 
@@ -136,15 +137,18 @@ bool LooksValidEverywhere(const Slab& slab, int first, int slices)
   return valid;
 }
 
-// The valid region of a slab, 1 or 0.
-std::vector<unsigned char> ValidOf(const Slab& slab)
+// The valid region of a slab, 1 or 0; \a made is where it goes when it does not come like that.
+const unsigned char* ValidOf(const Slab& slab, std::vector<unsigned char>& made)
 {
-  std::vector<unsigned char> valid(slab.Count(), 1);
-  if (slab.Valid) {
-    const unsigned char* given = slab.Voxels<unsigned char>(slab.Valid);
-    std::transform(given, given + valid.size(), valid.begin(), [](unsigned char v) { return v != 0 ? 1 : 0; });
+  const unsigned char* given = slab.Valid ? slab.Voxels<unsigned char>(slab.Valid) : nullptr;
+  if (given && std::all_of(given, given + slab.Count(), [](unsigned char v) { return v <= 1; })) {
+    return given;
   }
-  return valid;
+  made.assign(slab.Count(), 1);
+  if (given) {
+    std::transform(given, given + made.size(), made.begin(), [](unsigned char v) { return v != 0 ? 1 : 0; });
+  }
+  return made.data();
 }
 
 // Field data that a header can hold: the acquisition, and lines that a header brought. Names of all else go to \a lost.
@@ -419,16 +423,17 @@ void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whol
   bool validIsSeen = true; // by the reader, without a file that says so
   std::vector<std::string> lost;
   std::optional<Kind> kind;
+  std::vector<unsigned char> made;
   for (int s = 0; s < slabs; ++s) {
     Extent extent = whole;
     extent[4] = whole[4] + static_cast<int>(std::int64_t{slices} * s / slabs);
     extent[5] = whole[4] + static_cast<int>(std::int64_t{slices} * (s + 1) / slabs) - 1;
     const echorama::Progress part = progress.Part(s / (slabs + 0.2), (s + 1) / (slabs + 0.2));
-    const double made = slabs > 1 ? 0.8 : 0.0;
-    const Slab slab = CheckedSlab(slabOf(extent, part.Part(0.0, made)), extent, path);
-    const std::vector<unsigned char> validValues = ValidOf(slab);
-    validIsSeen = validIsSeen && std::find(validValues.begin(), validValues.end(), 0) == validValues.end() &&
-                  LooksValidEverywhere(slab, extent[4] - whole[4], slices);
+    const double making = slabs > 1 ? 0.8 : 0.0;
+    const Slab slab = CheckedSlab(slabOf(extent, part.Part(0.0, making)), extent, path);
+    const unsigned char* const validValues = ValidOf(slab, made);
+    validIsSeen =
+        validIsSeen && !std::memchr(validValues, 0, slab.Count()) && LooksValidEverywhere(slab, extent[4] - whole[4], slices);
     if (s == 0) {
       ImageHeader header;
       header.geometry = vtkUltrasoundVolume::GeometryOf(slab.Image);
@@ -453,9 +458,9 @@ void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whol
                                              std::to_string(extent[5]) +
                                              " with another pose or other types of numbers than the ones before");
     }
-    const echorama::Progress writing = part.Part(made, 1.0);
+    const echorama::Progress writing = part.Part(making, 1.0);
     if (valid) {
-      valid->Append(validValues.data(), validValues.size(), writing.Part(0.0, 0.1));
+      valid->Append(validValues, slab.Count(), writing.Part(0.0, 0.1));
     }
     for (std::size_t i = 0; i < beside.size(); ++i) {
       if (beside[i]) {

@@ -44,6 +44,17 @@ def truth():
     return json.loads((phantom / "truth.json").read_text())
 
 
+def peak_of(*arguments):
+    """The largest memory of `echorama arguments`, bytes, and the JSON that it printed."""
+    with tempfile.TemporaryFile() as output:
+        process = subprocess.Popen([PROGRAM, *map(str, arguments), "--json", "--threads", "2"], stdout=output, stderr=subprocess.DEVNULL)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        assert process.returncode == 0, arguments
+        return usage.ru_maxrss * 1024, json.load(output)
+
+
 def affine_of(pose):
     return numpy.array(pose["VolumeToWorld"])
 
@@ -282,12 +293,105 @@ class MainJob(unittest.TestCase):
         numpy.testing.assert_array_equal([float(x) for x in header["ElementSpacing"].split()], [3, 3, 3])
         self.assertGreater(told["overlap_fraction"], 0.2)
         for method in ("feather", "average", "maximum"):
-            run_json("stitch", *volumes(), "-o", work / f"{method}.mha", "--poses", self.poses, "--spacing", 3, "--method", method)
+            run_json("stitch", *volumes(), "-o", work / f"{method}.mha", "--poses", self.poses, "--spacing", 3, "--method", method,
+                     "--texture", "mix")
         results = {method: read_mha(work / f"{method}.mha")[1].astype(int) for method in ("feather", "average", "maximum")}
         self.assertTrue((results["maximum"] >= results["average"]).all())
         self.assertTrue((results["average"] != results["feather"]).any())
-        run_json("stitch", *volumes(), "-o", work / "blunt.mha", "--poses", self.poses, "--spacing", 3, "--sharpness", 0)
+        run_json("stitch", *volumes(), "-o", work / "blunt.mha", "--poses", self.poses, "--spacing", 3, "--sharpness", 0, "--texture", "mix")
         self.assertLessEqual(abs(read_mha(work / "blunt.mha")[1].astype(int) - results["average"]).max(), 1)
+
+    def test_stitch_in_every_way(self):
+        """All methods and textures give a volume of the same shape and valid region, and no two of them the same voxels."""
+        folder = work / "ways"
+        folder.mkdir()
+        arguments = [*volumes(), "--poses", phantom / "truth.json", "--spacing", 4]
+        ways = [(method, "split") for method in ("membrane", "distance", "feather", "average", "maximum", "multiband", "offset")]
+        voxels, regions = set(), set()
+        for method, texture in [*ways, ("membrane", "mix"), ("membrane", "restore"), ("membrane", "seam")]:
+            out = folder / f"{method}_{texture}.nrrd"
+            told = run_json("stitch", *arguments, "-o", out, "--method", method, "--texture", texture)
+            self.assertEqual((told["method"], told["texture"]), (method, texture))
+            voxels.add(out.read_bytes())
+            regions.add(out.with_name(f"{out.stem}.ValidRegion.nrrd").read_bytes())
+        self.assertEqual((len(voxels), len(regions)), (10, 1))
+        default = run_json("stitch", *arguments, "-o", folder / "default.nrrd")
+        self.assertEqual((folder / "default.nrrd").read_bytes(), (folder / f"{default['method']}_{default['texture']}.nrrd").read_bytes())
+
+    def test_stitch_tells_first_what_it_needs(self):
+        before = snapshot(work)
+        arguments = ["stitch", *volumes(), "--poses", phantom / "truth.json", "--spacing", 1.5]
+        whole = run_json(*arguments, "-o", work / "dry.mha", "--dry-run")
+        self.assertEqual((whole["slabs"], whole["plan_factor"]), (1, 1))
+        self.assertGreater(whole["output_bytes"], numpy.prod(whole["dimensions"]))
+        small = run_json(*arguments, "-o", work / "dry.mha", "--dry-run", "--memory", 1e-9 * whole["output_bytes"] / 4)
+        self.assertGreater(small["slabs"], 4)
+        self.assertGreater(small["plan_factor"], 1)
+        self.assertLess(small["plan_bytes"], small["allowed_bytes"])
+        told = run(*arguments, "-o", work / "dry.mha", "--dry-run", "--memory", 1e-9 * whole["output_bytes"] / 4)
+        self.assertIn(f"{small['slabs']} slabs", told.stdout)
+        refused = run(*arguments, "-o", work / "dry.vti", "--memory", 1e-9 * whole["output_bytes"] / 4)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("dry.vti", refused.stderr)
+        self.assertIn(f"{small['slabs']} slabs", refused.stderr)
+        hopeless = run(*arguments, "-o", work / "dry.mha", "--memory", 1e-6)
+        self.assertEqual(hopeless.returncode, 1)
+        self.assertIn("would fit", hopeless.stderr)
+        self.assertEqual(snapshot(work), before)
+
+    def test_stitch_more_than_fits(self):
+        """A result four times the memory that is allowed is written slab by slab, and is the whole one but for what a coarser
+        plan leaves out in overlaps."""
+        arguments = ["stitch", *volumes(), "--poses", phantom / "truth.json", "--spacing", 0.8]
+        resting, _ = peak_of(*arguments, "-o", work / "slabs.nii", "--dry-run")
+        needed, whole = peak_of(*arguments, "-o", work / "whole.nii", "--uncertainty")
+        limit = whole["output_bytes"] / 4.1  # bytes
+        peak, slabs = peak_of(*arguments, "-o", work / "slabs.nii", "--uncertainty", "--memory", 1e-9 * limit)
+        self.assertGreater(slabs["slabs"], 4)
+        self.assertEqual(whole["valid_voxels"], slabs["valid_voxels"])
+        self.assertEqual(whole["overlap_fraction"], slabs["overlap_fraction"])
+        self.assertLess(peak - resting, 1.5 * limit + 4e6, (resting, needed, limit))
+        self.assertGreater(needed - resting, whole["output_bytes"])
+        names = ["whole", "slabs", "whole.ValidRegion", "slabs.ValidRegion", "whole.Coverage"]
+        voxels = {}
+        for name in names:
+            run_json("convert", work / f"{name}.nii", work / f"{name}.mha")
+            voxels[name] = read_mha(work / f"{name}.mha")[1].astype(int)
+        numpy.testing.assert_array_equal(voxels["whole.ValidRegion"], voxels["slabs.ValidRegion"])
+        shared = voxels["whole.Coverage"] > 1
+        difference = abs(voxels["whole"] - voxels["slabs"])
+        self.assertLessEqual(numpy.percentile(difference[~shared], 99.9), 1)
+        self.assertLess(difference[shared].mean(), 1)
+        self.assertLess(numpy.percentile(difference[shared], 99), 12)
+
+    def test_stitch_equalizes_gains(self):
+        header, voxels = read_mha(phantom / FILES[1])
+        numbers = lambda key: [float(number) for number in header[key].split()]
+        quiet = work / "quiet.mha"
+        write_mha(quiet, (0.75 * voxels).astype("u1"), numbers("ElementSpacing"), numbers("Offset"),
+                  numpy.reshape(numbers("TransformMatrix"), (3, 3)).T)
+        shutil.copy(phantom / "volume_2.ValidRegion.mha", work / "quiet.ValidRegion.mha")
+        poses = work / "quiet.json"
+        first = [affine_of(pose) for pose in truth()["volumes"]]
+        write_poses(poses, [phantom / FILES[0], quiet], first[:2])
+        told = run_json("stitch", phantom / FILES[0], quiet, "-o", work / "loud.mha", "--poses", poses, "--spacing", 3, "--gain")
+        self.assertAlmostEqual(told["gains"][1]["gain"] / told["gains"][0]["gain"], 1 / 0.75, delta=0.2)
+        self.assertNotIn("gains", run_json("stitch", phantom / FILES[0], quiet, "-o", work / "loud.mha", "--poses", poses, "--spacing", 3))
+
+    def test_stitch_tells_how_good_it_is(self):
+        told = {texture: run_json("stitch", *volumes(), "-o", work / "good.mha", "--poses", phantom / "truth.json", "--texture", texture,
+                                  "--uncertainty", "--quality") for texture in ("mix", "split")}
+        for quality in (told["mix"]["quality"], told["split"]["quality"]):
+            self.assertLess(quality["seam_mean"], 1.5)
+            self.assertTrue(0.5 < quality["texture_kept"] < 1.2, quality)
+        self.assertGreater(told["split"]["quality"]["texture_kept"], told["mix"]["quality"]["texture_kept"])
+        coverage, spread = (read_mha(work / f"good.{name}.mha")[1] for name in ("Coverage", "Spread"))
+        self.assertEqual((coverage.dtype, spread.dtype), ("u1", "f4"))
+        self.assertEqual((coverage > 0).sum(), told["split"]["valid_voxels"])
+        self.assertTrue((spread[coverage < 2] == 0).all())
+        self.assertGreater(spread[coverage > 1].mean(), 0)
+        info = run_json("info", work / "good.mha")["files"][0]
+        self.assertTrue({"Coverage", "Spread"} <= set(map(str, info["arrays"])) or "Coverage" in json.dumps(info["arrays"]))
 
     def test_stitch_by_reliability(self):
         """The shadow of the phantom's stone is found, and filled by the volumes that look past it."""
@@ -416,7 +520,7 @@ class Files(unittest.TestCase):
     def test_convert_tells_what_is_lost(self):
         run_json("stitch", *volumes(), "-o", work / "all.vti", "--poses", phantom / "truth.json", "--spacing", 4)
         lost = run_json("convert", work / "all.vti", work / "less.mha")["lost"]
-        self.assertTrue(any("Coverage" in line for line in lost), lost)
+        self.assertTrue(any("StitchedVolumes" in line for line in lost), lost)
 
     def test_overwriting_an_old_output_is_fine(self):
         old = work / "old.mha"
