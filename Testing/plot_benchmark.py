@@ -4,7 +4,9 @@
 
 IN.jsonl holds one JSON object per line, as Testing/Benchmark.h writes them. Each case becomes a panel of error against
 seconds, both logarithmic: the nearer to the lower left corner, the better. Lines that count successes over a minimum
-overlap (keys "t" and "within_1mm") become one more panel of success against t.
+overlap (keys "t" and "within_1mm") become one more panel of success against t. A case without errors becomes bars of
+seconds; one with a number of "levels" per line, seconds and error against the levels; and lines of "energy" at times "t" for
+some numbers of levels two panels of curves, linear and logarithmic.
 """
 import json
 import math
@@ -21,7 +23,7 @@ OURS = "#0b5e8a"
 PEERS = ["#8a8a8a", "#b0763b", "#6f8f5f", "#9a6f9a", "#5f6f8f"]
 MARKERS = "osD^vP*X<>hp"
 # What ours is compared with: other libraries, and the simpler ways of stitching.
-PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer", "average", "feather", "maximum")
+PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer", "average", "feather", "maximum", "cascadic", "descent")
 
 
 def is_ours(method):
@@ -121,30 +123,93 @@ def draw_success(axes, lines):
     axes.legend(fontsize=8, frameon=False)
 
 
+def draw_bars(axes, case, lines):
+    """Seconds per method, from top to bottom; a logarithm, for they lie far apart."""
+    methods = [str(line.get("method", "")) for line in lines]
+    seconds = [number(line, "seconds") or 0 for line in lines]
+    axes.barh(methods, seconds, color=[OURS if is_ours(method) else PEERS[0] for method in methods], zorder=2)
+    axes.set_xscale("log")
+    axes.set_xlim(min(seconds) / 2, max(seconds) * 4)
+    axes.invert_yaxis()
+    for index, value in enumerate(seconds):
+        axes.text(value * 1.1, index, f"{value:.2g} s", va="center", fontsize=8)
+    axes.tick_params(axis="y", labelsize=8)
+    axes.set_xlabel("seconds")
+    axes.set_title(case, fontsize=10)
+
+
+def draw_levels(axes, case, lines):
+    lines = sorted(lines, key=lambda line: line["levels"])
+    levels = [line["levels"] for line in lines]
+    axes.plot(levels, [number(line, "seconds") for line in lines], marker="o", color=OURS, label="seconds")
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("levels")
+    axes.set_ylabel("seconds until it stops")
+    axes.set_title(case, fontsize=10)
+    errors = axes.twinx()
+    errors.plot(levels, [number(line, "error") for line in lines], marker="s", color=PEERS[1], linestyle=":", label="error")
+    errors.set_ylim(bottom=0)
+    errors.set_ylabel("largest error then")
+    errors.spines["top"].set_visible(False)
+    handles = [axes.lines[0], errors.lines[0]]
+    axes.legend(handles, [handle.get_label() for handle in handles], fontsize=8, frameon=False)
+
+
+def draw_energy(axes, lines, logarithmic):
+    curves = grouped(lines, "levels")
+    for index, (levels, of_levels) in enumerate(sorted(curves.items())):
+        axes.plot([line["t"] for line in of_levels], [line["energy"] for line in of_levels], linewidth=1.2,
+                  color=plt.cm.viridis(index / max(len(curves) - 1, 1)), label=levels)
+    if logarithmic:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=max(line["energy"] for line in lines) / 1e4)
+    axes.set_title("energy of the descent" + (", logarithmic" if logarithmic else ""), fontsize=10)
+    axes.set_xlabel("seconds")
+    axes.set_ylabel("normalised energy")
+    axes.legend(title="levels", fontsize=8, title_fontsize=8, frameon=False, ncol=2)
+
+
 def main():
     if len(sys.argv) != 3:
         sys.exit("usage: plot_benchmark.py IN.jsonl OUT.png")
     lines = read(sys.argv[1])
     success = [line for line in lines if is_success(line)]
-    cases = grouped([line for line in lines if not is_success(line)], "case")
-    panels = len(cases) + bool(success)
+    energy = [line for line in lines if number(line, "t") is not None and number(line, "energy") is not None]
+    cases = grouped([line for line in lines if line not in success and line not in energy], "case")
+    panels = len(cases) + bool(success) + 2 * bool(energy)
     columns = min(panels, 3)
     rows = math.ceil(panels / columns)
     figure, axes = plt.subplots(rows, columns, figsize=(max(6.0, 4.5 * columns), 3.6 * rows + 0.6), squeeze=False)
     axes = list(axes.flat)
     for spare in axes[panels:]:
         spare.set_visible(False)
-    look = looks(dict.fromkeys(str(line.get("method", "")) for line in lines))
+    def with_levels(of_case):
+        return all(number(line, "levels") is not None for line in of_case)
+
+    def without_errors(of_case):
+        return all(number(line, "error") is None for line in of_case)
+
+    points = {case: of_case for case, of_case in cases.items() if not with_levels(of_case) and not without_errors(of_case)}
+    look = looks(dict.fromkeys(str(line.get("method", "")) for of_case in points.values() for line in of_case))
     for (case, of_case), panel in zip(cases.items(), axes):
-        draw_panel(panel, case, of_case, look)
+        if case in points:
+            draw_panel(panel, case, of_case, look)
+        elif with_levels(of_case):
+            draw_levels(panel, case, of_case)
+        else:
+            draw_bars(panel, case, of_case)
     if success:
-        draw_success(axes[panels - 1], success)
+        draw_success(axes[len(cases)], success)
+    if energy:
+        draw_energy(axes[panels - 2], energy, False)
+        draw_energy(axes[panels - 1], energy, True)
     for panel in axes[:panels]:
         panel.grid(True, which="major", color="#e6e6e6", linewidth=0.8)
         panel.set_axisbelow(True)
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
-    drawn = dict.fromkeys(str(line.get("method", "")) for of_case in cases.values() for line in of_case)
+    drawn = dict.fromkeys(str(line.get("method", "")) for of_case in points.values() for line in of_case)
     legend_columns = min(len(drawn), columns + 1) or 1
     legend_inches = 0.25 * math.ceil(len(drawn) / legend_columns)
     height = figure.get_figheight()

@@ -181,6 +181,7 @@ void DescendMembrane(DescentGrid& grid, const std::array<float, 3>& weights, con
     };
     const double scale = std::pow(static_cast<double>(1 << number), static_cast<double>(dimension - 2)); // eq. 5.9
     double energy = scale * Energy(level, weights);
+    const double small = 0.01 * energy; // a level whose samples miss one kind of known voxel falls to nothing
     std::vector<float> gradient(level.values.size(), 0.0f);
     while (seconds() < parameters.maximumSeconds) {
       progress(static_cast<double>(parameters.levels - 1 - number) / parameters.levels);
@@ -200,7 +201,7 @@ void DescendMembrane(DescentGrid& grid, const std::array<float, 3>& weights, con
       energy -= fall;
       if (parameters.trace)
         report.trace.push_back({seconds(), energy, number});
-      if (fall <= parameters.descentStop * energy)
+      if (fall <= parameters.descentStop * std::max(energy, small))
         break;
     }
     if (number > 0)

@@ -61,13 +61,25 @@ ECHORAMA_HOT void RelaxFine(float* own, const float* below, const float* above, 
                             const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
                             int parity, float* __restrict step)
 {
-  ForLanes<MembraneByteLanes>(
-      begin, end, [&](int i, int, float) __attribute__((always_inline)) {
-        const int code = codes[i];
-        const float sum = wx * (own[i - 1] + own[i + 1]) + wy * (below[i] + above[i]) + wz * (before[i] + behind[i]);
-        const float value = (right[i] + sum) / Diagonal(code, wx, wy, wz);
-        step[i] = Take(i, parity, IsUnknown(code)) * (value - own[i]);
-      });
+  if (wx == 1.0f && wy == 1.0f && wz == 1.0f) { // then the diagonal is a sum of bytes
+    ForLanes<MembraneByteLanes>(
+        begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+          const unsigned char code = codes[i];
+          const float sum = own[i - 1] + own[i + 1] + (below[i] + above[i]) + (before[i] + behind[i]);
+          const auto count = static_cast<unsigned char>((code & 3) + ((code >> 2) & 3) + ((code >> 4) & 3));
+          const auto diagonal = static_cast<unsigned char>(count + (count == 0 ? 1 : 0));
+          const auto take = static_cast<unsigned char>((count == 0 ? 0 : 1) & ~(i ^ parity));
+          step[i] = static_cast<float>(take) * ((right[i] + sum) / static_cast<float>(diagonal) - own[i]);
+        });
+  } else {
+    ForLanes<MembraneByteLanes>(
+        begin, end, [&](int i, int, float) __attribute__((always_inline)) {
+          const int code = codes[i];
+          const float sum = wx * (own[i - 1] + own[i + 1]) + wy * (below[i] + above[i]) + wz * (before[i] + behind[i]);
+          const float value = (right[i] + sum) / Diagonal(code, wx, wy, wz);
+          step[i] = Take(i, parity, IsUnknown(code)) * (value - own[i]);
+        });
+  }
 #pragma GCC ivdep
   for (int i = begin; i < end; ++i)
     own[i] += step[i];
