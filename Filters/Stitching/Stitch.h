@@ -47,7 +47,8 @@ struct StitchParameters {
   bool allowDisjoint = false;   ///< whether a volume may overlap no other; it is then just put in its place
   double maximumMemoryGb = 0.0; ///< 10^9 bytes; 0: three quarters of this machine's memory
   MembraneSolver membraneSolver = MembraneSolver::Multigrid;
-  double membraneTolerance = 1.0 / 512; ///< largest error of a membrane, certified, (0, 1]
+  /// Largest error of the weights of two volumes that comes from their membrane, certified for exponents from 1 to 32, (0, 1].
+  double membraneTolerance = 1.0 / 512;
 };
 
 /// A volume of any of our voxel types.

@@ -159,7 +159,8 @@ RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMa
     return scale;
   MembraneParameters membrane;
   membrane.solver = parameters.membraneSolver;
-  membrane.tolerance = parameters.membraneTolerance;
+  // An exponent multiplies the error of a scale: the weights are certified for exponents up to 32.
+  membrane.tolerance = parameters.membraneTolerance / std::clamp(parameters.sharpness, 1.0, 32.0);
   const MembraneReport report = SolveMembrane(kinds, spacing, scale, 0.5f, membrane, progress);
   worst = std::max(worst, report.bound);
   return scale;
