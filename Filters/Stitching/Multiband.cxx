@@ -41,8 +41,7 @@ void Divide(Field& numerator, const Field& denominator)
   });
 }
 
-// body(row out, row of the field at another place along the axis) for all rows of out, which has another size along one axis.
-// taps(place) lists the places in the field and their weights.
+// Where one place along an axis reads, and with which weights.
 struct Taps {
   int count = 0;
   std::array<int, 5> place{};
@@ -54,6 +53,7 @@ struct Taps {
   }
 };
 
+// A field with another size along one axis: weighted sums along it.
 Field Filter(const Field& field, int axis, const std::vector<Taps>& taps)
 {
   std::array<int, 3> n = field.Dimensions();

@@ -458,8 +458,7 @@ double Seams::MedianDifference(const Progress& progress) const
     for (std::size_t b = a + 1; b < volumes_.size(); ++b) {
       const GridBox both = volumes_[a].inside.box.Intersected(volumes_[b].inside.box);
       const std::size_t count = both.VoxelCount();
-      // A step without a common factor with the sizes would be better still; an odd one suffices.
-      const std::size_t step = count / samples | 1;
+      const std::size_t step = count / samples | 1; // odd: no column of a box of even size is read again and again
       for (std::size_t n = 0; n < count; n += step) {
         const std::size_t row = n / both.size[0];
         const Voxel at{both.first[0] + static_cast<int>(n % both.size[0]), both.first[1] + static_cast<int>(row % both.size[1]),
