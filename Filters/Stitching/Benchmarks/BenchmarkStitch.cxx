@@ -4,7 +4,7 @@
 // outside overlaps. The truth of a synthetic case is the anatomy without speckle, so that its error favours averages; that of the
 // liver is its full reconstruction, which is itself an average. The peer does the plain average with filters of VTK: reslice
 // each volume and its mask onto the grid, multiply, sum, divide.
-// Arguments: words, one of which a case's name must contain; none: all cases.
+// Arguments: [word of a case's name]... [--methods word...] [--runs N]; without words all cases, all methods, three runs.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/Sampling.h"
@@ -43,7 +43,6 @@ struct Case {
   std::vector<ImageGeometry> geometries;
   ImageGeometry grid;
   Volume<float> truth; ///< NaN where it is not known
-  int runs = 3;
 
   std::vector<StitchInput> Inputs() const
   {
@@ -434,7 +433,18 @@ bool Liver(Case& scene)
 
 #endif
 
-void Measure(const Case& scene)
+struct Wanted {
+  std::vector<std::string> cases, methods; // words, one of which a name must contain; none: all
+  int runs = 3;
+
+  static bool Has(const std::vector<std::string>& words, const std::string& name)
+  {
+    return words.empty() ||
+           std::any_of(words.begin(), words.end(), [&](const std::string& word) { return name.find(word) != std::string::npos; });
+  }
+};
+
+void Measure(const Case& scene, const Wanted& wanted)
 {
   struct Contender {
     const char* name;
@@ -464,15 +474,19 @@ void Measure(const Case& scene)
   };
   const std::function<Result()> average = with(StitchMethod::Average, StitchTexture::Mix);
   for (const Contender& contender : contenders)
-    Contest(scene, contender.name, with(contender.method, contender.texture), average, scene.runs);
+    if (Wanted::Has(wanted.methods, contender.name))
+      Contest(scene, contender.name, with(contender.method, contender.texture), average, wanted.runs);
 #ifdef ECHORAMA_WITH_VTK
+  const char* peer = "vtk reslice and average";
+  if (!Wanted::Has(wanted.methods, peer))
+    return;
   std::vector<vtkSmartPointer<vtkImageData>> values, masks;
   for (std::size_t v = 0; v < scene.values.size(); ++v) {
     values.push_back(VtkImageOf(scene.values[v], scene.geometries[v]));
     masks.push_back(VtkImageOf(scene.masks[v], scene.geometries[v]));
   }
   Contest(
-      scene, "vtk reslice and average", [&] { return VtkAverage(scene, values, masks); }, average, 1);
+      scene, peer, [&] { return VtkAverage(scene, values, masks); }, average, 1);
 #endif
 }
 
@@ -480,25 +494,33 @@ void Measure(const Case& scene)
 
 int main(int argc, char** argv)
 {
-  const auto wanted = [&](const std::string& name) {
-    return argc < 2 || std::any_of(argv + 1, argv + argc, [&](const char* word) { return name.find(word) != std::string::npos; });
+  Wanted wanted;
+  std::vector<std::string>* words = &wanted.cases;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--methods")
+      words = &wanted.methods;
+    else if (argument == "--runs" && i + 1 < argc)
+      wanted.runs = std::max(1, std::atoi(argv[++i]));
+    else
+      words->push_back(argument);
+  }
+  const std::pair<const char*, std::function<Case()>> synthetic[] = {
+      {"chain of 3, 96^3", [] { return Chain(96); }},      {"chain of 3, 128^3", [] { return Chain(128); }},
+      {"2 fans, 160^3", [] { return Fans(2, 160, 0.5); }}, {"5 fans, 96^3", [] { return Fans(5, 96, 0.3); }},
+      {"chain of 3, 256^3", [] { return Chain(256); }},
   };
-  if (wanted("chain of 3, 96^3"))
-    Measure(Chain(96));
-  if (wanted("2 fans, 160^3"))
-    Measure(Fans(2, 160, 0.5));
-  if (wanted("5 fans, 96^3"))
-    Measure(Fans(5, 96, 0.3));
+  for (const auto& [name, make] : synthetic)
+    if (Wanted::Has(wanted.cases, name))
+      Measure(make(), wanted);
 #ifdef ECHORAMA_WITH_VTK
-  Case liver;
-  if (wanted("liver A + B")) {
+  if (Wanted::Has(wanted.cases, "liver A + B")) {
+    Case liver;
     if (Liver(liver))
-      Measure(liver);
+      Measure(liver, wanted);
     else
       std::cerr << "no liver volumes beside the project: that case is left out\n";
   }
 #endif
-  if (wanted("chain of 3, 256^3"))
-    Measure(Chain(256));
   return 0;
 }
