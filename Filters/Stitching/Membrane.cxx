@@ -413,7 +413,7 @@ void Multigrid::BoundErrors(const Progress& progress)
       const double largest = *std::max_element(solution_.begin(), solution_.end());
       amplification_ = std::min(amplification_, largest / (1.0 - missing));
     }
-    if (missing <= 0.5)
+    if (missing <= 0.65) // another cycle would cost more than it saves
       break;
   }
   load_ = 0.0;

@@ -3,10 +3,13 @@
 
 namespace echorama {
 
+// ECHORAMA_MEMBRANE_SEPARATE says before a loop that what it writes at one place it does not read at another.
 // GCC must not unroll the loop over lanes before it has seen that they are vectors.
 #if defined(__GNUC__) && !defined(__clang__)
 #define ECHORAMA_MEMBRANE_LANES(l) _Pragma("GCC ivdep") _Pragma("GCC unroll 1") for (int l = 0; l < Lanes; ++l)
+#define ECHORAMA_MEMBRANE_SEPARATE _Pragma("GCC ivdep")
 #else
+#define ECHORAMA_MEMBRANE_SEPARATE
 #define ECHORAMA_MEMBRANE_LANES(l) for (int l = 0; l < Lanes; ++l)
 #endif
 

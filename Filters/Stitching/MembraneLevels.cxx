@@ -80,7 +80,7 @@ ECHORAMA_HOT void RelaxFine(float* own, const float* below, const float* above, 
           step[i] = Take(i, parity, IsUnknown(code)) * (value - own[i]);
         });
   }
-#pragma GCC ivdep
+  ECHORAMA_MEMBRANE_SEPARATE
   for (int i = begin; i < end; ++i)
     own[i] += step[i];
 }
@@ -116,7 +116,7 @@ ECHORAMA_HOT void RelaxCoarse(float* own, const float* below, const float* above
                           zNext[i] * behind[i];
         step[i] = Take(i, parity, 1) * ((right[i] + sum) * inverse[i] - own[i]);
       });
-#pragma GCC ivdep
+  ECHORAMA_MEMBRANE_SEPARATE
   for (int i = begin; i < end; ++i)
     own[i] += step[i];
 }
@@ -161,7 +161,7 @@ ECHORAMA_HOT void DoubleRow(const float* coarse, float* __restrict fine, int beg
 
 ECHORAMA_HOT void AddRow(const float* from, float weight, float* to, int begin, int end)
 {
-#pragma GCC ivdep
+  ECHORAMA_MEMBRANE_SEPARATE
   for (int i = begin; i < end; ++i)
     to[i] += weight * from[i];
 }
@@ -177,7 +177,7 @@ ECHORAMA_HOT void PutFine(const float* from, const unsigned char* codes, float k
 
 ECHORAMA_HOT void PutCoarse(const float* from, const float* inverse, float keep, float* to, int begin, int end)
 {
-#pragma GCC ivdep
+  ECHORAMA_MEMBRANE_SEPARATE
   for (int i = begin; i < end; ++i)
     to[i] = (inverse[i] > 0.0f ? 1.0f : 0.0f) * (keep * to[i] + from[i]);
 }
