@@ -201,7 +201,7 @@ void DescendMembrane(DescentGrid& grid, const std::array<float, 3>& weights, con
       energy -= fall;
       if (parameters.trace)
         report.trace.push_back({seconds(), energy, number});
-      if (fall <= parameters.descentStop * std::max(energy, small))
+      if (!(energy > 0.0) || fall <= parameters.descentStop * std::max(energy, small))
         break;
     }
     if (number > 0)

@@ -256,6 +256,7 @@ echorama::StitchParameters vtkUltrasoundStitcher::Parameters() const
   echorama::StitchParameters parameters;
   parameters.method = static_cast<echorama::StitchMethod>(this->Method);
   parameters.texture = static_cast<echorama::StitchTexture>(this->Texture);
+  parameters.membraneSolver = static_cast<echorama::MembraneSolver>(this->MembraneSolver);
   parameters.sharpness = this->Sharpness;
   parameters.detailSharpness = this->DetailSharpness;
   parameters.detailScale = this->DetailScale;
@@ -413,6 +414,7 @@ void vtkUltrasoundStitcher::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Method: " << this->GetMethodAsString() << "\n";
   os << indent << "Texture: " << this->GetTextureAsString() << "\n";
+  os << indent << "MembraneSolver: " << this->MembraneSolver << "\n";
   os << indent << "Sharpness: " << this->Sharpness << "\n";
   os << indent << "DetailSharpness: " << this->DetailSharpness << "\n";
   os << indent << "DetailScale: " << this->DetailScale << "\n";

@@ -56,6 +56,7 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3, MEMBRANE = 4, MULTIBAND = 5, OFFSET = 6 };
+  enum MembraneSolvers { MULTIGRID = 0, STEEPEST_DESCENT = 1 };
   enum Textures { MIX = 0, RESTORE = 1, SPLIT = 2, SEAM = 3 };
 
   ///@{
@@ -117,6 +118,17 @@ public:
   /** The same exponent for the details of SPLIT, in [0, 1000]. Default 32: about a sixteenth of the overlap is transition. */
   vtkSetClampMacro(DetailSharpness, double, 0.0, 1000.0);
   vtkGetMacro(DetailSharpness, double);
+  ///@}
+
+  ///@{
+  /**
+   * How membranes are found: MULTIGRID (default), whose largest error is certified (GetMembraneBound()), or the coarse-to-fine
+   * STEEPEST_DESCENT of the dissertation (5.3.2), slower and of unknown error, to compare with.
+   */
+  vtkSetClampMacro(MembraneSolver, int, MULTIGRID, STEEPEST_DESCENT);
+  vtkGetMacro(MembraneSolver, int);
+  void SetMembraneSolverToMultigrid() { this->SetMembraneSolver(MULTIGRID); }
+  void SetMembraneSolverToSteepestDescent() { this->SetMembraneSolver(STEEPEST_DESCENT); }
   ///@}
 
   ///@{
@@ -243,6 +255,7 @@ private:
 
   int Method = MEMBRANE;
   int Texture = SPLIT;
+  int MembraneSolver = MULTIGRID;
   bool OutputWeights = false;
   bool OutputSpread = false;
   bool UseReliability = true;

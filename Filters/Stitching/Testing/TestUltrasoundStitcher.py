@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The stitcher as a filter: poses, composite inputs, images, updates in pieces, bad input."""
+import json
 import math
 
 import numpy as np
@@ -247,6 +248,43 @@ def test_methods_and_parameters():
     filter.SetSpacingMm(2.5)
     filter.Update()
     assert filter.GetOutput().GetSpacing() == (2.5, 2.5, 2.5)
+
+
+def test_membranes_and_their_solvers():
+    a, b = volume(np.full((9, 20, 40), 100, np.uint8)), volume(np.full((9, 20, 40), 200, np.uint8), (20, 0, 0))
+    results = []
+    for name in ("Multigrid", "SteepestDescent"):
+        filter, messages = stitcher(a, b)
+        getattr(filter, "SetMembraneSolverTo" + name)()
+        filter.SetSharpness(1)
+        filter.Update()
+        assert not messages, messages
+        results.append(array(filter.GetOutput()).astype(int))
+        bound = filter.GetMembraneBound()
+        assert 0 < bound < 1 / 512 if name == "Multigrid" else bound == np.inf, bound
+        assert filter.GetPlanFactor() == 1
+    ramp = 100 + 100 * (np.arange(20) + 1) / 21
+    assert np.abs(results[0][4, 10, 20:40] - ramp).max() < 1
+    assert np.abs(results[1] - results[0]).max() < 15
+
+
+def test_gains_spread_and_cost():
+    random = np.random.default_rng(2)
+    world = 100 + 20 * random.standard_normal((12, 24, 60))
+    a, b = volume(world[:, :, :40].astype(np.float32)), volume((0.5 * world[:, :, 20:] + 10).astype(np.float32), (20, 0, 0))
+    filter, messages = stitcher(a, b)
+    filter.EqualizeGainOn()
+    filter.OutputSpreadOn()
+    filter.Update()
+    assert not messages, messages
+    assert abs(filter.GetGain(1) / filter.GetGain(0) - 2) < 0.05, (filter.GetGain(0), filter.GetGain(1))
+    assert filter.GetGain(7) == 1 and filter.GetOffset(-1) == 0
+    spread, coverage = array(filter.GetOutput(), "Spread"), array(filter.GetOutput(), "Coverage")
+    assert spread[coverage < 2].max() == 0 and 0 < spread[coverage > 1].mean() < 5, "after the gains they all but agree"
+    cost = json.loads(filter.EstimateCost())
+    assert cost["volumes"] == 2 and cost["slabs"] == 1 and cost["plan_factor"] == 1
+    assert cost["dimensions"] == list(filter.GetOutput().GetDimensions())
+    assert cost["output_bytes"] == 10 * filter.GetOutput().GetNumberOfPoints()
 
 
 def test_types():
