@@ -193,5 +193,4 @@ int main()
   Run("diagonal sheet 256^3", Mask(Small, [](int i, int j, int k) { return i + j + k == 3 * Small / 2; }));
   RunLarge("fan", Fan);
   RunLarge("balls", Balls);
-  RunLarge("noise of 1%", [](int size) { return Noise(size, 0.01); });
 }
