@@ -198,6 +198,7 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
     }
     vtkInformation* out = outputs->GetInformationObject(0);
     vtkUltrasoundVolume::SetGeometry(out, echorama::StitchGrid(geometries, this->SpacingMm));
+    out->Set(CAN_PRODUCE_SUB_EXTENT(), 1); // else the first of several ranks is asked for all
     if (typeKnown) {
       vtkDataObject::SetPointDataActiveScalarInfo(out, type, 1);
     }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads, aligns and stitches in ParaView: the liver pair, volume B knocked out of place. Also run on two ranks.
 
-Usage: pvbatch TestPipeline.py [OUT.npz]   (OUT: the stitched volume, gathered over the ranks; then nothing is drawn)
+Usage: pvbatch TestPipeline.py [OUT.pvti]   (OUT: the stitched volume, written by all ranks; then nothing is drawn)
 """
 import os
 import pathlib
@@ -52,13 +52,13 @@ if blocks:
     # A small rotation about the middle also moves the corner; half a millimetre covers it.
     assert numpy.abs(back + move).max() < 0.7, back
 
-whole = servermanager.Fetch(stitched)
+whole = servermanager.Fetch(stitched)  # of several ranks the first one's piece
 intensity = vtk_to_numpy(whole.GetPointData().GetArray("Intensity"))
 valid = vtk_to_numpy(whole.GetPointData().GetArray("ValidRegion"))
 print(f"{ranks} rank(s): {whole.GetDimensions()} voxels, {valid.mean():.3f} of them valid, mean {intensity[valid > 0].mean():.3f}")
 assert intensity[valid > 0].mean() > 10.0
 if len(sys.argv) > 1:
-    numpy.savez(sys.argv[1], intensity=intensity, valid=valid, geometry=[*whole.GetOrigin(), *whole.GetSpacing(), *whole.GetDimensions()])
+    SaveData(sys.argv[1], stitched)
 else:
     view = CreateView("RenderView")
     view.ViewSize = [800, 600]
