@@ -317,7 +317,8 @@ void CompareSolvers(int size, double cap)
 
   for (const double target : {1.0 / 512, oursError}) {
     struct Best {
-      double seconds = std::numeric_limits<double>::infinity(), cpu = 0.0, setup = 0.0, error = 0.0, omega = 0.0;
+      double seconds = std::numeric_limits<double>::infinity(), cpu = 0.0, setup = 0.0,
+             error = std::numeric_limits<double>::quiet_NaN(), omega = 0.0;
       int sweeps = 0;
     } best;
     for (const double omega : {1.7, 1.85, 1.93}) {
