@@ -342,7 +342,7 @@ class MainJob(unittest.TestCase):
     def test_stitch_more_than_fits(self):
         """A result four times the memory that is allowed is written slab by slab, and is the whole one but for what a coarser
         plan leaves out in overlaps."""
-        arguments = ["stitch", *volumes(), "--poses", phantom / "truth.json", "--spacing", 0.8]
+        arguments = ["stitch", *volumes(), "--poses", phantom / "truth.json", "--spacing", 1.0]
         resting, _ = peak_of(*arguments, "-o", work / "slabs.nii", "--dry-run")
         needed, whole = peak_of(*arguments, "-o", work / "whole.nii", "--uncertainty")
         limit = whole["output_bytes"] / 4.1  # bytes

@@ -264,6 +264,7 @@ TEST(ProbeFit, FindsKnownFansOnGridsOfAnyOrientation)
 
 TEST(ProbeFit, FindsAFanThatIsNotCentredOnItsArray)
 {
+  ECHORAMA_SKIP_SANITIZED();
   ProbeGeometry probe = ProbeGeometry::Convex(34 * degree, 10, 40 * degree, 10, 14, 57);
   for (const double offset : {0.4, -0.6}) {
     probe.fanOffset = offset;
@@ -289,6 +290,7 @@ TEST(ProbeFit, FindsTheFanOfAScanConversion)
 
 TEST(ProbeFit, SurvivesRaggedEdgesHolesAndAMissingCorner)
 {
+  ECHORAMA_SKIP_SANITIZED();
   for (const auto& [name, probe] : Chosen(volumes)) {
     SCOPED_TRACE(name);
     Case c = VolumeCase(probe, true);
@@ -317,6 +319,7 @@ TEST(ProbeFit, SurvivesRaggedEdgesHolesAndAMissingCorner)
 
 TEST(ProbeFit, GoesOnBeyondTheGrid)
 {
+  ECHORAMA_SKIP_SANITIZED();
   // The bottom is cut flat by the grid, and a bit of each side.
   for (const int which : {0, 1, 4}) {
     SCOPED_TRACE(volumes[which].first);
@@ -368,6 +371,7 @@ TEST(ProbeFit, SaysThatASlabIsThin)
 
 TEST(ProbeFit, RefusesWhatIsNoFan)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const ImageGeometry grid = GridOf(64, 64, 64);
   const auto refusal = [&grid](const std::function<bool(const Eigen::Vector3d&)>& isInside) {
     const auto mask = MaskOf(grid, [&](const Eigen::Vector3d& at) { return isInside(at - Eigen::Vector3d::Constant(32)); });
@@ -396,6 +400,7 @@ TEST(ProbeFit, RefusesWhatIsNoFan)
 
 TEST(ProbeFit, TheThresholdsDecide)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const ImageGeometry grid = GridOf(64, 64, 64);
   const auto ball = MaskOf(grid, [](const Eigen::Vector3d& at) { return (at - Eigen::Vector3d::Constant(32)).norm() < 25; });
   ProbeFitParameters anything;

@@ -195,6 +195,7 @@ TEST(StitchPlan, PiecesAreThoseOfTheWholeToTheLastBit)
 
 TEST(StitchPlan, ThreadsDoNotMatter)
 {
+  ECHORAMA_SKIP_SANITIZED();
   Scene<short> scene;
   AddTexture(scene, {0, 0, 0}, {33, 30, 21}, 90.0, 20.0, 1);
   AddTexture(scene, {15, 3, 2}, {30, 28, 21}, 110.0, 15.0, 2);
