@@ -510,7 +510,8 @@ void vtkUltrasoundWriter::WriteXml(vtkImageData* input)
   writer->SetInputData(whole);
   writer->SetFileName(temporary.c_str());
   writer->SetHeaderTypeToUInt64();
-  writer->EncodeAppendedDataOff();
+  // Not raw bytes at the end: VTK 9.1 cannot always read those with a libexpat that has the security fixes of 2024.
+  writer->SetDataModeToBinary();
   if (!this->UseCompression) {
     writer->SetCompressorTypeToNone();
   }

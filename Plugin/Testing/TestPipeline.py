@@ -58,7 +58,7 @@ valid = vtk_to_numpy(whole.GetPointData().GetArray("ValidRegion"))
 print(f"{ranks} rank(s): {whole.GetDimensions()} voxels, {valid.mean():.3f} of them valid, mean {intensity[valid > 0].mean():.3f}")
 assert intensity[valid > 0].mean() > 10.0
 if len(sys.argv) > 1:
-    SaveData(sys.argv[1], stitched)
+    SaveData(sys.argv[1], stitched, DataMode="Binary")  # raw bytes and newer libexpat: see stitch_pieces.py
 else:
     view = CreateView("RenderView")
     view.ViewSize = [800, 600]
