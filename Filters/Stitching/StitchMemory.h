@@ -6,8 +6,10 @@ namespace echorama {
 
 /// What a stitching needs, known before anything is allocated.
 struct StitchCost {
-  int planFactor = 1;        ///< of the grid on which what is global is found; 1: the output's own
-  double planBytes = 0.0;    ///< at most, while it is found; what is kept is less
+  int planFactor = 1; ///< of the grid on which what is global is found; 1: the output's own
+  /// At most, of regions, scales and membranes, while they are found; what is kept is less. Smooth parts and the coarse grid of
+  /// gains and seams are not in it: 8 bytes per block of the volumes' boxes, and some tens of bytes per voxel of that grid.
+  double planBytes = 0.0;
   double voxelBytes = 0.0;   ///< of the output, per voxel
   double outputBytes = 0.0;  ///< of the whole output
   double allowedBytes = 0.0; ///< by the parameters
