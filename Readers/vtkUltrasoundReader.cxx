@@ -21,6 +21,7 @@
 #include "vtkUltrasoundVoxelTypes.h"
 #include "vtkUnsignedCharArray.h"
 #include "vtkXMLImageDataReader.h"
+#include "vtkXMLReader.h"
 
 #include <algorithm>
 #include <cctype>
@@ -122,7 +123,21 @@ public:
     });
     object->AddObserver(vtkCommand::ErrorEvent, this->Command);
   }
-  ~Complaints() { this->Object->RemoveObserver(this->Command); }
+  // The parser of an XML reader is an object of its own, which complains by itself.
+  explicit Complaints(vtkXMLReader* reader) : Complaints(static_cast<vtkObject*>(reader))
+  {
+    this->Reader = reader;
+    this->Reader->SetParserErrorObserver(this->Command);
+  }
+  ~Complaints()
+  {
+    this->Object->RemoveObserver(this->Command);
+    if (this->Reader) {
+      this->Reader->SetParserErrorObserver(nullptr);
+    }
+  }
+  Complaints(const Complaints&) = delete;
+  Complaints& operator=(const Complaints&) = delete;
 
   // The complaint without VTK's "ERROR: In file, line" and its line breaks; empty when there was none.
   std::string Sentence() const
@@ -138,6 +153,7 @@ public:
 
 private:
   vtkSmartPointer<vtkObject> Object;
+  vtkSmartPointer<vtkXMLReader> Reader;
   vtkNew<vtkCallbackCommand> Command;
   std::string Text;
 };
