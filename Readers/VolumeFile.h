@@ -31,7 +31,7 @@ void ArrangeVoxels(const ImageHeader& header, void* voxels);
 
 /// The arrays that a companion can hold besides `ValidRegion`: which volume each voxel of a stitched one came from, how many
 /// volumes are there, and how far these disagree.
-constexpr std::array<const char*, 3> CompanionArrays{"Provenance", "Coverage", "Spread"};
+constexpr std::array<const char*, 4> CompanionArrays{"Provenance", "Coverage", "Spread", "Embedding"};
 
 /// The path of a file's companion that holds another array of the same voxels: NAME.ValidRegion.mha beside NAME.mha,
 /// NAME.ValidRegion.nii.gz beside NAME.nii.gz.

@@ -18,7 +18,7 @@
  * The content decides what a file is, not its extension. `ValidRegion` is, in this order: the array of that name (.vti);
  * the file `NAME.ValidRegion.mha` beside `NAME.mha` (any extension, the same for both), whose geometry must agree; everything
  * but the zeros connected to the border of the grid and voxels that are not numbers. `NAME.Provenance.mha` is carried as the
- * point array `Provenance`, likewise `Coverage` and `Spread`. GetNotes() says what was assumed or lost.
+ * point array `Provenance`, likewise `Coverage`, `Spread` and `Embedding`. GetNotes() says what was assumed or lost.
  *
  * Active voxels of an OpenVDB grid are its valid region. A stack of PNG, JPEG or TIFF images is named by its folder or by one of
  * its files, and has no pose.

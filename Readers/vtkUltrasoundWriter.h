@@ -7,11 +7,11 @@
  * The extension chooses the format. Pose and acquisition (vtkUltrasoundAcquisition) are kept by all of them; numbers come
  * back to the last bit, but for .nrrd and .vdb, which store spacing and direction as a product. .vti holds all arrays and
  * field data in one file, and .vdb (OpenVDB) intensities and valid region, sparsely: its active voxels. The others hold the
- * intensities; `ValidRegion`, `Provenance`, `Coverage` and `Spread` go to files beside them (`NAME.ValidRegion.mha`), and field
- * data that are single strings go to the header. NIfTI has 32-bit floats for the geometry: an extension of its header, which
- * other programs skip, holds it exactly, and GetNotes() says how far off they see it. What cannot be held is listed by GetNotes()
- * and in a warning. The file of the valid region is left out where every voxel is real and the reader would see that without it;
- * one that stood there before is removed.
+ * intensities; `ValidRegion`, `Provenance`, `Coverage`, `Spread` and `Embedding` go to files beside them
+ * (`NAME.ValidRegion.mha`), and field data that are single strings go to the header. NIfTI has 32-bit floats for the geometry: an
+ * extension of its header, which other programs skip, holds it exactly, and GetNotes() says how far off they see it. What cannot
+ * be held is listed by GetNotes() and in a warning. The file of the valid region is left out where every voxel is real and the
+ * reader would see that without it; one that stood there before is removed.
  *
  * A name with a double extension (.igs.mha, .seq.mha, .seq.nrrd ...) asks for a sequence of all time steps: it is written as
  * vtkUltrasoundSequenceWriter does. (ParaView's Save Data looks at the last extension alone, so it comes here.)

@@ -104,7 +104,7 @@ def demo(options):
         # A shell's * finds the companions NAME.ValidRegion.EXT too; they are parts of NAME.EXT.
         named = {str(short(volume)) for volume in options.volumes}
         files = [short(volume) for volume in options.volumes
-                 if re.sub(r"\.(ValidRegion|Provenance|Coverage|Spread)(?=\.\w+$)", "", str(short(volume))) not in named - {str(short(volume))}]
+                 if re.sub(r"\.(ValidRegion|Provenance|Coverage|Spread|Embedding)(?=\.\w+$)", "", str(short(volume))) not in named - {str(short(volume))}]
     else:
         steps.run("making three volumes of a phantom, knocked out of place", "phantom", "-o", out / "phantom",
                   *(["--spacing", 2] if options.quick else []))

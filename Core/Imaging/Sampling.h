@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parallel.h"
 #include "Core/Imaging/VolumeView.h"
 #include <algorithm>
 #include <cmath>
@@ -92,5 +93,18 @@ private:
   VolumeView<const T> intensity_;
   VolumeView<const unsigned char> valid_;
 };
+
+/// Which voxels of a volume are real, 1 or 0: valid and finite.
+template <class T>
+Volume<unsigned char> RealRegionOf(const PosedVolume<T>& volume)
+{
+  Volume<unsigned char> region(volume.intensity.Dimensions());
+  const Sampler<T> sampler(volume.intensity, volume.valid);
+  ParallelRanges(volume.intensity.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t at = begin; at < end; ++at)
+      region.View()[at] = sampler.IsReal(at) ? 1 : 0;
+  });
+  return region;
+}
 
 } // namespace echorama

@@ -38,13 +38,15 @@ public:
 
   ///@{
   /**
-   * Names of the two point arrays, of one that says which volume each voxel of a stitched one came from, and of one that says
-   * how far each voxel can be trusted (float, 0 to 1; see vtkUltrasoundReliabilityMap).
+   * Names of the two point arrays, of one that says which volume each voxel of a stitched one came from, of one that says
+   * how far each voxel can be trusted (float, 0 to 1; see vtkUltrasoundReliabilityMap), and of one that says what each voxel of
+   * an embedded volume is (unsigned char: 0 nothing, 1 data, 2 data mixed with background, 3 invented background).
    */
   static const char* IntensityName() { return "Intensity"; }
   static const char* ValidRegionName() { return "ValidRegion"; }
   static const char* ProvenanceName() { return "Provenance"; }
   static const char* ReliabilityName() { return "Reliability"; }
+  static const char* EmbeddingName() { return "Embedding"; }
   ///@}
 
   /**

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The depth of a voxel in its region is a distance map (Core); its ramp is the weight. The overlay is one pass, row by row; with
+// keepTexture the local means of both sides are measured before (LocalStatistics), which is one pass over each.
+#include "Feather.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/DistanceMap.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include "LocalStatistics.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace echorama {
+
+namespace {
+
+template <class T>
+T ToVoxel(double value)
+{
+  if constexpr (std::is_floating_point_v<T>)
+    return static_cast<T>(value);
+  else
+    return static_cast<T>(std::clamp(std::floor(value + 0.5), static_cast<double>(std::numeric_limits<T>::min()),
+                                     static_cast<double>(std::numeric_limits<T>::max())));
+}
+
+void CheckShape(const std::array<int, 3>& wanted, const std::array<int, 3>& given, const char* name)
+{
+  if (given != wanted)
+    throw Error(Error::Kind::BadInput, std::string("feathering: the ") + name + " does not have the size of the volume");
+}
+
+} // namespace
+
+void FeatherParameters::Check() const
+{
+  if (!(radiusMm >= 0.0) || !std::isfinite(radiusMm))
+    throw Error(Error::Kind::InvalidParameter, "radiusMm must be a number from 0 on");
+  if (!(smoothMm > 0.0) || !std::isfinite(smoothMm))
+    throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
+}
+
+void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
+                    VolumeView<float> weights, const Progress& progress)
+{
+  parameters.Check();
+  CheckShape(region.Dimensions(), weights.Dimensions(), "array of weights");
+  if (parameters.radiusMm > 0.0)
+    SquaredDepthMap(region, spacing, weights, progress.Part(0.0, 0.9));
+  const float radius = static_cast<float>(parameters.radiusMm);
+  ParallelRanges(region.Size(), 1 << 16, progress.Part(0.9, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t at = begin; at < end; ++at)
+      weights[at] = !region[at] ? 0.0f : radius > 0.0f ? std::min(1.0f, std::sqrt(weights[at]) / radius) : 1.0f;
+  });
+}
+
+template <class T>
+void Feather(const FeatherParameters& parameters, VolumeView<const float> weights, VolumeView<const unsigned char> region,
+             VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,
+             VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress)
+{
+  parameters.Check();
+  const auto& n = intensity.Dimensions();
+  CheckShape(n, weights.Dimensions(), "array of weights");
+  CheckShape(n, region.Dimensions(), "region");
+  CheckShape(n, background.Dimensions(), "background");
+  CheckShape(n, labels.Dimensions(), "array of labels");
+  if (!backgroundRegion.Empty())
+    CheckShape(n, backgroundRegion.Dimensions(), "background's region");
+
+  std::optional<LocalStatistics> own, others;
+  if (parameters.keepTexture && parameters.radiusMm > 0.0) {
+    own.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3));
+    others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6));
+  }
+  ParallelFor(n[2], progress.Part(own ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    std::vector<float> rows(own ? 4 * static_cast<std::size_t>(n[0]) : 0);
+    float *mean = rows.data(), *otherMean = mean + n[0], *unused = otherMean + n[0];
+    for (int j = 0; j < n[1]; ++j) {
+      const std::ptrdiff_t row = intensity.SliceStride() * k + intensity.RowStride() * j;
+      // 1. labels, and where this row blends
+      int first = n[0], end = 0;
+      for (int i = 0; i < n[0]; ++i) {
+        const std::ptrdiff_t at = row + i;
+        const bool there = (backgroundRegion.Empty() || backgroundRegion[at]) && std::isfinite(background[at]);
+        EmbeddedVoxel label = region[at] ? EmbeddedVoxel::Data : there ? EmbeddedVoxel::Invented : EmbeddedVoxel::Outside;
+        if (label == EmbeddedVoxel::Data && there && weights[at] < 1.0f) {
+          label = EmbeddedVoxel::Blend;
+          first = std::min(first, i);
+          end = i + 1;
+        } else if (label != EmbeddedVoxel::Data)
+          intensity[at] = label == EmbeddedVoxel::Invented ? ToVoxel<T>(static_cast<double>(background[at])) : T(0);
+        labels[at] = static_cast<unsigned char>(label);
+      }
+      // 2. the blend
+      if (own && first < end) {
+        own->Row(j, k, first, end, mean + first, unused);
+        others->Row(j, k, first, end, otherMean + first, unused);
+      }
+      for (int i = first; i < end; ++i) {
+        const std::ptrdiff_t at = row + i;
+        if (labels[at] != static_cast<unsigned char>(EmbeddedVoxel::Blend))
+          continue;
+        const double w = static_cast<double>(weights[at]), a = static_cast<double>(intensity[at]),
+                     b = static_cast<double>(background[at]);
+        double value = b + w * (a - b);
+        if (own) {
+          const double base = static_cast<double>(otherMean[i]) + w * (static_cast<double>(mean[i]) - static_cast<double>(otherMean[i]));
+          value = base + (value - base) / std::sqrt(w * w + (1.0 - w) * (1.0 - w));
+        }
+        intensity[at] = ToVoxel<T>(value);
+      }
+    }
+  });
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template void Feather(const FeatherParameters&, VolumeView<const float>, VolumeView<const unsigned char>,                      \
+                        VolumeView<const float>, VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<T>,         \
+                        VolumeView<unsigned char>, const Progress&);
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama

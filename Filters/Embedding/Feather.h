@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/Progress.h"
+#include "Core/Imaging/VolumeView.h"
+
+namespace echorama {
+
+/// What a voxel of an embedded volume is.
+enum class EmbeddedVoxel : unsigned char {
+  Outside = 0,  ///< nothing is there
+  Data = 1,     ///< a voxel of the volume that was embedded, to the last bit
+  Blend = 2,    ///< such a voxel, mixed with background
+  Invented = 3, ///< background alone
+};
+
+struct FeatherParameters {
+  double radiusMm = 3.0;   ///< the depth in the data at which they no longer show any background, >= 0; 0: a hard border
+  bool keepTexture = true; ///< whether what a mean of two independent textures loses is given back
+  double smoothMm = 3.0;   ///< standard deviation that parts texture from the rest, with keepTexture, mm, > 0
+
+  void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
+};
+
+/// How much of the data a voxel shows: 0 outside the region, 1 at depths of the radius or more, linear in between. Depth is the
+/// distance to the nearest voxel outside of the region; what lies beyond the grid is outside.
+/// Source: dissertation 6.5.
+void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
+                    VolumeView<float> weights, const Progress& progress = {});
+
+/// Overlays data on a background: \a intensity holds the data and gets the result. Data of weight 1, and data without a background
+/// below them, are not touched. With keepTexture the local means are mixed by the weights w and 1 - w, and deviations from them by
+/// w / n and (1 - w) / n with n^2 = w^2 + (1 - w)^2: the mixture has the deviation of its parts, which are independent. Integers are
+/// rounded to the nearest and clamped to their range.
+/// \param weights of FeatherWeights(); \param region of the data; \param backgroundRegion where there is a background (empty:
+/// everywhere) \param labels EmbeddedVoxel of every voxel
+/// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
+template <class T>
+void Feather(const FeatherParameters& parameters, VolumeView<const float> weights, VolumeView<const unsigned char> region,
+             VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,
+             VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress = {});
+
+} // namespace echorama

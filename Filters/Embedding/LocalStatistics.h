@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "BlockRows.h"
+#include "Core/Base/Progress.h"
+#include <memory>
+
+namespace echorama {
+
+/// The local mean and standard deviation of a volume in Gaussian windows, normalised: only voxels of the region count, however
+/// few of a window they are. (A blur that takes what is outside as black darkens every border.)
+///
+/// They are kept on a lattice of blocks of two thirds of a standard deviation, and read with linear interpolation. A constant has
+/// that mean, and deviation 0. Cost: one pass over the volume; memory is some bytes per block.
+/// Source: dissertation 6.3 and 6.4 (the blur); normalised convolution (Knutsson and Westin 1993).
+class LocalStatistics {
+public:
+  /// \param region where voxels count (not 0); empty: everywhere. Voxels that are not finite never count.
+  /// \param sigmaMm standard deviation of the window, mm, >= 0; below a voxel it is the voxel's block alone
+  /// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
+  template <class T>
+  LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
+                  double sigmaMm, const Progress& progress = {});
+
+  /// Of voxels [first, end) of row (j, k). Where no window reaches (3 standard deviations) they are those of the whole volume; of
+  /// an empty region both are 0.
+  void Row(int j, int k, int first, int end, float* mean, float* deviation) const;
+
+private:
+  struct Lattice;
+  std::shared_ptr<const Lattice> lattice_;
+};
+
+} // namespace echorama
