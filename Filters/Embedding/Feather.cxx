@@ -44,14 +44,23 @@ void FeatherParameters::Check() const
     throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
 }
 
-void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                    VolumeView<float> weights, const Progress& progress)
+void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region,
+                    VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing, VolumeView<float> weights,
+                    const Progress& progress)
 {
   parameters.Check();
   CheckShape(region.Dimensions(), weights.Dimensions(), "array of weights");
-  if (parameters.radiusMm > 0.0)
-    SquaredDepthMap(region, spacing, weights, progress.Part(0.0, 0.9));
+  if (!backgroundRegion.Empty())
+    CheckShape(region.Dimensions(), backgroundRegion.Dimensions(), "background's region");
   const float radius = static_cast<float>(parameters.radiusMm);
+  if (radius > 0.0f) {
+    Volume<unsigned char> shown(region.Dimensions());
+    ParallelRanges(region.Size(), 1 << 16, progress.Part(0.0, 0.1), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t at = begin; at < end; ++at)
+        shown.View()[at] = !region[at] && (backgroundRegion.Empty() || backgroundRegion[at]);
+    });
+    SquaredDistanceMap(shown.View(), spacing, weights, progress.Part(0.1, 0.9));
+  }
   ParallelRanges(region.Size(), 1 << 16, progress.Part(0.9, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (std::ptrdiff_t at = begin; at < end; ++at)
       weights[at] = !region[at] ? 0.0f : radius > 0.0f ? std::min(1.0f, std::sqrt(weights[at]) / radius) : 1.0f;
@@ -110,7 +119,8 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
                      b = static_cast<double>(background[at]);
         double value = b + w * (a - b);
         if (own) {
-          const double base = static_cast<double>(otherMean[i]) + w * (static_cast<double>(mean[i]) - static_cast<double>(otherMean[i]));
+          const double base =
+              static_cast<double>(otherMean[i]) + w * (static_cast<double>(mean[i]) - static_cast<double>(otherMean[i]));
           value = base + (value - base) / std::sqrt(w * w + (1.0 - w) * (1.0 - w));
         }
         intensity[at] = ToVoxel<T>(value);

@@ -22,18 +22,19 @@ struct FeatherParameters {
 };
 
 /// How much of the data a voxel shows: 0 outside the region, 1 at depths of the radius or more, linear in between. Depth is the
-/// distance to the nearest voxel outside of the region; what lies beyond the grid is outside.
+/// distance to the nearest voxel that shows background: outside of the region, but in \a backgroundRegion (empty: everywhere). So
+/// data do not fade where the background ends as well, nor at the ends of the grid.
 /// Source: dissertation 6.5.
-void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                    VolumeView<float> weights, const Progress& progress = {});
+void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region,
+                    VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing, VolumeView<float> weights,
+                    const Progress& progress = {});
 
-/// Overlays data on a background: \a intensity holds the data and gets the result. Data of weight 1, and data without a background
-/// below them, are not touched. With keepTexture the local means are mixed by the weights w and 1 - w, and deviations from them by
-/// w / n and (1 - w) / n with n^2 = w^2 + (1 - w)^2: the mixture has the deviation of its parts, which are independent. Integers are
-/// rounded to the nearest and clamped to their range.
-/// \param weights of FeatherWeights(); \param region of the data; \param backgroundRegion where there is a background (empty:
-/// everywhere) \param labels EmbeddedVoxel of every voxel
-/// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
+/// Overlays data on a background: \a intensity holds the data and gets the result. Data of weight 1, and data without a
+/// background below them, are not touched. With keepTexture the local means are mixed by the weights w and 1 - w, and deviations
+/// from them by w / n and (1 - w) / n with n^2 = w^2 + (1 - w)^2: the mixture has the deviation of its parts, which are
+/// independent. Integers are rounded to the nearest and clamped to their range. \param weights of FeatherWeights(); \param region
+/// of the data; \param backgroundRegion where there is a background (empty: everywhere) \param labels EmbeddedVoxel of every
+/// voxel \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
 template <class T>
 void Feather(const FeatherParameters& parameters, VolumeView<const float> weights, VolumeView<const unsigned char> region,
              VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,

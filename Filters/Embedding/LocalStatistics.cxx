@@ -13,8 +13,8 @@ namespace echorama {
 
 struct LocalStatistics::Lattice {
   Lattice(const Blocks& where)
-    : blocks(where), weight(where.count), first(where.count), second(where.count), rows(where, {weight.View(), first.View(),
-                                                                                               second.View()})
+    : blocks(where), weight(where.count), first(where.count), second(where.count),
+      rows(where, {weight.View(), first.View(), second.View()})
   {
   }
   Lattice(const Lattice&) = delete;

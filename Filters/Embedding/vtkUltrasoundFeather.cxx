@@ -52,7 +52,8 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
                    [](auto value) { return static_cast<float>(value); });
   });
   echorama::Volume<float> weights(geometry.dimensions);
-  echorama::FeatherWeights(parameters, region.View(), geometry.spacing, weights.View(), progress.Part(0.1, 0.4));
+  echorama::FeatherWeights(parameters, region.View(), otherRegion.View(), geometry.spacing, weights.View(),
+                           progress.Part(0.1, 0.4));
 
   vtkDataArray* result = CopyWithNewIntensity(input.Image, input.Intensity, output, input.Intensity->GetDataType());
   vtkDataArray* labels = AddArray(output, vtkUltrasoundVolume::EmbeddingName(), VTK_UNSIGNED_CHAR);

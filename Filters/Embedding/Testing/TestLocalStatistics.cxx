@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Base/Random.h"
+#include "Filters/Embedding/LocalStatistics.h"
+#include <cmath>
+#include <gtest/gtest.h>
+#include <limits>
+
+namespace echorama {
+
+namespace {
+
+struct Values {
+  Volume<float> mean, deviation;
+};
+
+template <class T>
+Values All(const LocalStatistics& statistics, const Volume<T>& like)
+{
+  Values values{Volume<float>(like.Dimensions()), Volume<float>(like.Dimensions())};
+  for (int k = 0; k < like.Dimensions()[2]; ++k)
+    for (int j = 0; j < like.Dimensions()[1]; ++j)
+      statistics.Row(j, k, 0, like.Dimensions()[0], values.mean.View().Row(j, k), values.deviation.View().Row(j, k));
+  return values;
+}
+
+const Eigen::Vector3d unit(1.0, 1.0, 1.0);
+
+} // namespace
+
+TEST(LocalStatistics, AConstantHasThatMeanAndNoDeviation)
+{
+  const Volume<unsigned short> volume({30, 21, 17}, 60001);
+  Volume<unsigned char> region(volume.Dimensions());
+  for (int k = 3; k < 9; ++k)
+    for (int j = 5; j < 20; ++j)
+      for (int i = 2; i < 12; ++i)
+        region.View()(i, j, k) = 1;
+  const Values got = All(LocalStatistics(volume.View(), region.View(), unit, 3.0), volume);
+  for (std::ptrdiff_t at = 0; at < got.mean.View().Size(); ++at) {
+    EXPECT_EQ(got.mean.View()[at], 60001.0f);
+    EXPECT_EQ(got.deviation.View()[at], 0.0f);
+  }
+}
+
+// Against the sums of the Gaussian window itself, over the region alone.
+TEST(LocalStatistics, IsTheNormalisedGaussianWindow)
+{
+  Volume<float> volume({40, 36, 32});
+  Volume<unsigned char> region(volume.Dimensions());
+  const Eigen::Vector3d spacing(0.8, 1.0, 1.2);
+  const double sigma = 4.0;
+  for (int k = 0; k < 32; ++k)
+    for (int j = 0; j < 36; ++j)
+      for (int i = 0; i < 40; ++i) {
+        Random random(5, static_cast<std::uint64_t>((k * 36 + j) * 40 + i));
+        volume.View()(i, j, k) = static_cast<float>(100.0 + 2.0 * i - j + 20.0 * random.Normal());
+        region.View()(i, j, k) = i + j > 24 && k > 4;
+      }
+  const Values got = All(LocalStatistics(VolumeView<const float>(volume.View()), region.View(), spacing, sigma), volume);
+  for (const auto& at : {std::array<int, 3>{20, 20, 16}, {30, 8, 10}, {14, 12, 6}, {36, 30, 28}}) {
+    double weight = 0.0, first = 0.0, second = 0.0;
+    for (int k = 0; k < 32; ++k)
+      for (int j = 0; j < 36; ++j)
+        for (int i = 0; i < 40; ++i)
+          if (region.View()(i, j, k)) {
+            const Eigen::Vector3d d = spacing.cwiseProduct(Eigen::Vector3d(i - at[0], j - at[1], k - at[2]));
+            const double w = std::exp(-0.5 * d.squaredNorm() / (sigma * sigma)), v = static_cast<double>(volume.View()(i, j, k));
+            weight += w;
+            first += w * v;
+            second += w * v * v;
+          }
+    const double mean = first / weight, deviation = std::sqrt(second / weight - mean * mean);
+    EXPECT_NEAR(got.mean.View()(at[0], at[1], at[2]), mean, 1.0);
+    EXPECT_NEAR(got.deviation.View()(at[0], at[1], at[2]), deviation, 0.04 * deviation);
+  }
+}
+
+TEST(LocalStatistics, WhatIsOutsideOrNoNumberDoesNotCount)
+{
+  Volume<float> volume({20, 20, 20}, 7.0f);
+  Volume<unsigned char> region(volume.Dimensions(), 1);
+  volume.View()(10, 10, 10) = std::numeric_limits<float>::quiet_NaN();
+  volume.View()(4, 4, 4) = 1e9f;
+  region.View()(4, 4, 4) = 0;
+  const Values got = All(LocalStatistics(VolumeView<const float>(volume.View()), region.View(), unit, 2.0), volume);
+  for (const float mean : got.mean.View())
+    EXPECT_EQ(mean, 7.0f);
+}
+
+TEST(LocalStatistics, FarFromTheRegionItIsTheWhole)
+{
+  Volume<unsigned char> volume({90, 4, 1}, 10), region(volume.Dimensions());
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) {
+      region.View()(i, j, 0) = 1;
+      volume.View()(i, j, 0) = static_cast<unsigned char>(i % 2 ? 30 : 10);
+    }
+  const Values got = All(LocalStatistics(VolumeView<const unsigned char>(volume.View()), region.View(), unit, 3.0), volume);
+  EXPECT_FLOAT_EQ(got.mean.View()(80, 2, 0), 20.0f);
+  EXPECT_FLOAT_EQ(got.deviation.View()(80, 2, 0), 10.0f);
+  const Volume<unsigned char> none(volume.Dimensions());
+  const Values nothing = All(LocalStatistics(VolumeView<const unsigned char>(volume.View()), none.View(), unit, 3.0), volume);
+  EXPECT_EQ(nothing.mean.View()(80, 2, 0), 0.0f);
+  EXPECT_EQ(nothing.deviation.View()(80, 2, 0), 0.0f);
+}
+
+TEST(LocalStatistics, ALargeOffsetCostsNoDigits)
+{
+  Volume<double> volume({24, 24, 24});
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
+    volume.View()[at] = 1e6 + (at % 2 ? 1.0 : -1.0);
+  const Values got = All(LocalStatistics(VolumeView<const double>(volume.View()), {}, unit, 3.0), volume);
+  EXPECT_NEAR(got.deviation.View()(12, 12, 12), 1.0, 1e-3);
+}
+
+TEST(LocalStatistics, DoesNotDependOnThreads)
+{
+  Volume<float> volume({50, 40, 30});
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
+    volume.View()[at] = static_cast<float>(Random(3, static_cast<std::uint64_t>(at)).Uniform());
+  const Values many = All(LocalStatistics(VolumeView<const float>(volume.View()), {}, unit, 2.0), volume);
+  const ThreadLimit one(1);
+  const Values single = All(LocalStatistics(VolumeView<const float>(volume.View()), {}, unit, 2.0), volume);
+  EXPECT_TRUE(std::equal(many.mean.View().begin(), many.mean.View().end(), single.mean.View().begin()));
+  EXPECT_TRUE(std::equal(many.deviation.View().begin(), many.deviation.View().end(), single.deviation.View().begin()));
+}
+
+TEST(LocalStatistics, RefusesBadInput)
+{
+  const Volume<float> volume({4, 4, 4});
+  const Volume<unsigned char> region({4, 4, 5});
+  EXPECT_THROW(LocalStatistics(volume.View(), region.View(), unit, 1.0), Error);
+  EXPECT_THROW(LocalStatistics(volume.View(), {}, unit, -1.0), Error);
+  EXPECT_THROW(LocalStatistics(VolumeView<const float>(), {}, unit, 1.0), Error);
+  EXPECT_THROW(LocalStatistics(volume.View(), {}, unit, 1.0, Progress([](double) { return false; })), Error);
+}
+
+} // namespace echorama

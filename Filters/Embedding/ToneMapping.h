@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/Progress.h"
+#include "Core/Imaging/VolumeView.h"
+
+namespace echorama {
+
+struct ToneMappingParameters {
+  double smoothMm = 3.0; ///< standard deviation of the blur that parts grain from the rest, mm, > 0
+  /// Whether the grain also gets one deviation everywhere, so that it can be given the contrast of its new neighbours.
+  bool matchDeviation = true;
+
+  void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
+};
+
+/// Removes what varies slowly from a volume, and leaves its grain; in place is allowed.
+///
+/// With matchDeviation the result is (I - B) / S, with B and S the local mean and deviation: mean 0 and deviation 1 around every
+/// voxel. Else it is I / B, of mean 1 (dissertation 6.5). Both are measured once more on the result and corrected, because the mean
+/// of a quotient is not the quotient of means: left alone, that is a step in brightness at the seam. Where there is nothing to
+/// divide by (B or S below a thousandth of that of the whole) there is no grain: 0, or 1. Outside of the region it is that too.
+/// \param region where voxels count (not 0); empty: everywhere
+/// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
+void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const float> intensity,
+                  VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> grain,
+                  const Progress& progress = {});
+
+/// The reverse, for one voxel: grain on a local mean, and with matchDeviation of a local deviation (dissertation 6.6).
+inline float ApplyGrain(bool matchDeviation, float grain, float mean, float deviation)
+{
+  return matchDeviation ? mean + deviation * grain : mean * grain;
+}
+
+} // namespace echorama
