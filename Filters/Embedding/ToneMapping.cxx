@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Two rounds of the same: measure the local mean and deviation (LocalStatistics), take them out. The first leaves some per cent of
-// either, because a window's own voxel is in its mean; the second hardly any. Cost: two passes to measure and two to correct.
+// Two rounds of the same: measure the local mean and deviation (LocalStatistics), take them out. The first leaves some per cent
+// of either, because a window's own voxel is in its mean; the second hardly any. Cost: two passes to measure and two to correct.
 #include "ToneMapping.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"

@@ -133,7 +133,8 @@ TEST(Feather, WhereTheBackgroundEndsDataDoNotFade)
   const Volume<unsigned char> result = scene.Run({5.0, true, 3.0});
   for (std::ptrdiff_t at = 0; at < result.View().Size(); ++at) {
     ASSERT_EQ(result.View()[at], scene.region.View()[at] ? scene.data.View()[at] : 0);
-    ASSERT_EQ(scene.labels.View()[at], static_cast<unsigned char>(scene.region.View()[at] ? EmbeddedVoxel::Data : EmbeddedVoxel::Outside));
+    ASSERT_EQ(scene.labels.View()[at],
+              static_cast<unsigned char>(scene.region.View()[at] ? EmbeddedVoxel::Data : EmbeddedVoxel::Outside));
   }
 }
 
