@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include <Eigen/Core>
+#include "Core/Geometry/RigidTransform.h"
 #include <optional>
 #include <string>
 
@@ -89,6 +89,12 @@ struct ProbeGeometry {
   /// sweep axis, so that the inverse has no single answer: that takes a sweep of half a turn or more whose fan reaches behind the
   /// axis.
   void Check() const;
+};
+
+/// A probe and where it was.
+struct PlacedProbe {
+  ProbeGeometry geometry;
+  Pose probeToWorld = Pose::Identity(); ///< rigid
 };
 
 /// Where the sample lies in the probe frame, mm.

@@ -10,12 +10,6 @@
 
 namespace echorama {
 
-/// A probe and where it was.
-struct PlacedProbe {
-  ProbeGeometry geometry;
-  Pose probeToWorld = Pose::Identity(); ///< rigid
-};
-
 /// What counts as a shadow and what as saturated. Levels are parts of the way from black (a voxel in a hundred or so is as dark)
 /// to the grey of ordinary tissue at that depth, so that gain and type do not matter. Lengths are parts of a beam.
 struct ReliabilityParameters {
