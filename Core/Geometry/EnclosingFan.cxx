@@ -1,0 +1,560 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where a probe stands, where it looks and how much its array and its sweep bend decide everything else: in its beam coordinates
+// the least fan around a region is a box, given by the extremes over the voxels. So the search is over the head alone, and what
+// it finds encloses the region by construction.
+//
+// 1. Surface: the voxels with a neighbour outside. Depth, fan and sweep have no extreme within a solid, so they suffice. They are
+//    found anew in each pass, never stored.
+// 2. Some hundreds of them stand for all in the search: of each block of voxels the one furthest from the middle.
+// 3. Starts: the shape that is given or the fit of the region, and plain fans along the same axes, from flat to well bent. A flat
+//    one can enclose anything, so that there is always an answer. The best few are improved by the simplex method of Nelder and
+//    Mead: the volume of the fan has kinks, where the outermost voxel changes.
+// 4. The extremes over all voxels of the surface make the fan.
+//
+// A bend is written as b in [0, 1], 0 flat and 1 a point: (1 - b) of the width halfway down is there at the face, and b comes
+// with depth. Neither end is infinite, and across the beams the unit is a millimetre at that depth.
+#include "Core/Geometry/EnclosingFan.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Geometry/ProbeFit.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace echorama {
+namespace {
+
+constexpr double pi = 3.141592653589793;
+constexpr double widestTurn = 85.0 * pi / 180.0; // of a beam, from the middle one
+constexpr int blocksAlong = 16;                  // the longest side of the region, for the points of the search
+constexpr std::size_t mostPoints = 700;
+constexpr double asGoodAsInside = 0.01; // voxels
+constexpr double leastBend = 1e-9;      // less is flat
+constexpr double slack = 1e-7;          // that extremes are widened by, as a part of the fan's size: rounding
+
+// Calls body(i, j, k) for the voxels of slice k that are on the surface of the region.
+template <class Body>
+void ForSurfaceOfSlice(VolumeView<const unsigned char> valid, int k, const Body& body)
+{
+  const auto& n = valid.Dimensions();
+  const std::ptrdiff_t row = valid.RowStride(), slice = valid.SliceStride();
+  for (int j = 0; j < n[1]; ++j) {
+    const unsigned char* line = valid.Row(j, k);
+    const bool atEnd = j == 0 || j == n[1] - 1 || (n[2] > 1 && (k == 0 || k == n[2] - 1));
+    for (int i = 0; i < n[0]; ++i) {
+      if (!line[i])
+        continue;
+      const unsigned char* at = line + i;
+      if (atEnd || i == 0 || i == n[0] - 1 || !at[-1] || !at[1] || !at[-row] || !at[row] ||
+          (n[2] > 1 && (!at[-slice] || !at[slice])))
+        body(i, j, k);
+    }
+  }
+}
+
+// Least and greatest, of what is held.
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+  void Hold(double value, double beyond = 0.0)
+  {
+    low = std::min(low, value - beyond);
+    high = std::max(high, value + beyond);
+  }
+  void Hold(const Range& other)
+  {
+    low = std::min(low, other.low);
+    high = std::max(high, other.high);
+  }
+  double Middle() const { return 0.5 * (low + high); }
+  double Length() const { return high - low; }
+};
+
+// The region as the search sees it.
+struct Region {
+  VolumeView<const unsigned char> valid;
+  ImageGeometry geometry;
+  bool plane = false;
+  double beyond = 0.0; // mm around each voxel centre that are enclosed too
+  std::vector<Eigen::Vector3d> points;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double size = 0.0; // mm, of the box around it
+};
+
+Region RegionOf(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, double marginMm, const Progress& progress)
+{
+  Region region{valid, geometry, geometry.dimensions[2] == 1, 0.0, {}, Eigen::Vector3d::Zero(), 0.0};
+  const Eigen::Vector3d& spacing = geometry.spacing;
+  region.beyond = marginMm + 0.5 * (region.plane ? std::sqrt(spacing.x() * spacing.y()) : std::cbrt(spacing.prod()));
+
+  const auto& n = geometry.dimensions;
+  std::vector<std::array<Range, 3>> boxes(static_cast<std::size_t>(n[2]));
+  ParallelFor(n[2], progress.Part(0.0, 0.5), [&](std::ptrdiff_t k) {
+    ForSurfaceOfSlice(valid, static_cast<int>(k), [&box = boxes[static_cast<std::size_t>(k)]](int i, int j, int slice) {
+      box[0].Hold(i);
+      box[1].Hold(j);
+      box[2].Hold(slice);
+    });
+  });
+  std::array<Range, 3> box;
+  for (const auto& more : boxes)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      box[axis].Hold(more[axis]);
+  if (!(box[0].Length() >= 0.0))
+    throw Error(Error::Kind::BadInput, "the valid region is empty");
+
+  const Eigen::Vector3d low(box[0].low, box[1].low, box[2].low), high(box[0].high, box[1].high, box[2].high);
+  const Eigen::Vector3d extent = (high - low).cwiseProduct(spacing), middle = 0.5 * (low + high);
+  region.middle = geometry.IndexToWorld() * middle;
+  region.size = extent.norm() + 2.0 * region.beyond;
+
+  // Of each block the voxel furthest from the middle, block by block in layers of slices.
+  const double block = std::max(extent.maxCoeff() / blocksAlong, 1e-12);
+  std::array<int, 3> step{}, blocks{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    step[axis] = std::max(1, static_cast<int>(std::ceil(block / spacing[a])));
+    blocks[axis] = static_cast<int>(high[a] - low[a]) / step[axis] + 1;
+  }
+  struct Furthest {
+    double distance = -1.0;
+    Eigen::Vector3d index = Eigen::Vector3d::Zero();
+  };
+  const auto perLayer = static_cast<std::size_t>(blocks[0]) * static_cast<std::size_t>(blocks[1]);
+  std::vector<Furthest> furthest(perLayer * static_cast<std::size_t>(blocks[2]));
+  const int first[3] = {static_cast<int>(low[0]), static_cast<int>(low[1]), static_cast<int>(low[2])};
+  ParallelFor(blocks[2], progress.Part(0.5, 1.0), [&](std::ptrdiff_t layer) {
+    const int from = first[2] + static_cast<int>(layer) * step[2], to = std::min(from + step[2], static_cast<int>(high[2]) + 1);
+    for (int k = from; k < to; ++k)
+      ForSurfaceOfSlice(valid, k, [&](int i, int j, int slice) {
+        const Eigen::Vector3d index(i, j, slice);
+        const double distance = (index - middle).cwiseProduct(spacing).squaredNorm();
+        Furthest& best = furthest[static_cast<std::size_t>(layer) * perLayer +
+                                  static_cast<std::size_t>((j - first[1]) / step[1]) * static_cast<std::size_t>(blocks[0]) +
+                                  static_cast<std::size_t>((i - first[0]) / step[0])];
+        if (distance > best.distance)
+          best = {distance, index};
+      });
+  });
+  const Eigen::Affine3d toWorld = geometry.IndexToWorld();
+  for (const Furthest& best : furthest)
+    if (best.distance >= 0.0)
+      region.points.push_back(toWorld * best.index);
+  const std::size_t count = region.points.size();
+  if (count > mostPoints) {
+    for (std::size_t i = 0; i < mostPoints; ++i)
+      region.points[i] = region.points[i * count / mostPoints];
+    region.points.resize(mostPoints);
+  }
+  return region;
+}
+
+// What the fan is made of but for its extent.
+struct Head {
+  Pose probeToWorld = Pose::Identity();
+  double fanBend = 0.0, sweepBend = 0.0;
+  double fanMiddle = 0.0; // where the middle beam leaves, mm halfway down from the middle of the array
+};
+
+// The fan that is not to become less, and the unit of bends.
+struct Least {
+  double halfway = 1.0;                  // mm of depth
+  double fanBend = 1.0, sweepBend = 1.0; // the greatest that are allowed
+  double fanTurn = widestTurn, sweepTurn = widestTurn;
+  const ProbeGeometry* shape = nullptr;
+
+  ProbeArc Unit(double bend) const { return {bend / halfway, 1.0 - bend}; }
+};
+
+// Extremes over voxels.
+struct Extent {
+  Range depth, fan, sweep;
+  void Hold(const Extent& other)
+  {
+    depth.Hold(other.depth);
+    fan.Hold(other.fan);
+    sweep.Hold(other.sweep);
+  }
+};
+
+class Measure {
+public:
+  Measure(const Head& head, const Least& least, const Region& region)
+    : worldToProbe_(head.probeToWorld.inverse()), fan_(least.Unit(head.fanBend)), sweep_(least.Unit(head.sweepBend)),
+      beyond_(region.beyond), plane_(region.plane && !(least.shape && !least.shape->IsPlane()))
+  {
+  }
+
+  void Hold(const Eigen::Vector3d& inWorld, Extent& extent) const
+  {
+    const Eigen::Vector3d point = worldToProbe_ * inWorld;
+    const ProbeArc::Place sweep = plane_ ? ProbeArc::Place{0.0, point.z()} : sweep_.PlaceOf(point.y(), point.z());
+    const ProbeArc::Place fan = fan_.PlaceOf(point.x(), sweep.depth);
+    extent.depth.Hold(fan.depth, beyond_);
+    extent.fan.Hold(fan.along, beyond_ / std::max(fan_.Span(fan.depth), 1e-6));
+    if (!plane_)
+      extent.sweep.Hold(sweep.along, beyond_ / std::max(sweep_.Span(sweep.depth), 1e-6));
+  }
+
+  bool IsPlane() const { return plane_; }
+
+private:
+  Pose worldToProbe_;
+  ProbeArc fan_, sweep_;
+  double beyond_;
+  bool plane_;
+};
+
+// Half of what is wide enough on both sides of \a middle, and nowhere less than the shape that is given.
+double HalfWidth(const Range& range, double middle, const ProbeArc& unit, const ProbeArc* shape, double shapeDepth)
+{
+  double half = std::max(range.high - middle, middle - range.low);
+  if (shape) {
+    if (unit.width > 0.0)
+      half = std::max(half, 0.5 * shape->width / unit.width);
+    if (unit.Span(shapeDepth) > 0.0)
+      half = std::max(half, 0.5 * shape->Span(shapeDepth) / unit.Span(shapeDepth));
+  }
+  return half;
+}
+
+// The least fan with this head, and by how much its beams turn too far (radians).
+std::pair<ProbeGeometry, double> FanOf(const Head& head, const Least& least, Extent extent, bool plane)
+{
+  const double rounding = slack * (extent.depth.Length() + 1e-6);
+  if (least.shape) {
+    extent.depth.Hold(least.shape->depthMin);
+    extent.depth.Hold(least.shape->depthMax);
+  } else {
+    extent.depth = {extent.depth.low - rounding, extent.depth.high + rounding};
+  }
+  const ProbeArc fan = least.Unit(head.fanBend), sweep = least.Unit(head.sweepBend);
+  const ProbeArc fanOfShape = least.shape ? least.shape->Fan() : ProbeArc(),
+                 sweepOfShape = least.shape ? least.shape->Sweep() : ProbeArc();
+  const double far = least.shape ? least.shape->depthMax : 0.0;
+  ProbeGeometry found;
+  found.depthMin = extent.depth.low;
+  found.depthMax = extent.depth.high;
+  if (fan.angle > 0.0) // no further than the centre of the fan's arc
+    found.depthMin = std::max(found.depthMin, -fan.width / fan.angle);
+  const double half = (1.0 + slack) * HalfWidth(extent.fan, head.fanMiddle, fan, least.shape ? &fanOfShape : nullptr, far);
+  found.fanAngle = 2.0 * half * fan.angle;
+  found.fanWidth = 2.0 * half * fan.width;
+  found.fanOffset = head.fanMiddle / (2.0 * half);
+  double excess = std::max(0.0, fan.angle * (half + std::abs(head.fanMiddle)) - least.fanTurn);
+  if (!plane) {
+    const double across = (1.0 + slack) * HalfWidth(extent.sweep, 0.0, sweep, least.shape ? &sweepOfShape : nullptr, far);
+    found.sweepAngle = 2.0 * across * sweep.angle;
+    found.sweepWidth = 2.0 * across * sweep.width;
+    excess += std::max(0.0, sweep.angle * across - least.sweepTurn);
+    if (found.sweepAngle >= pi && found.ReachesBehindAxis())
+      excess += 1.0;
+  }
+  return {found, excess};
+}
+
+double CostOf(const Head& head, const Least& least, const Region& region)
+{
+  const Measure measure(head, least, region);
+  Extent extent;
+  for (const Eigen::Vector3d& point : region.points)
+    measure.Hold(point, extent);
+  const auto [fan, excess] = FanOf(head, least, extent, measure.IsPlane());
+  return std::log(std::max(FanVolume(fan), 1e-300)) + 1e3 * excess;
+}
+
+// The numbers that the search turns, each in steps of about equal effect.
+class Knobs {
+public:
+  Knobs(const Head& start, const Least& least, const Region& region, bool plane) : start_(start), least_(least), region_(region)
+  {
+    for (int knob = 0; knob < Count; ++knob)
+      if (!plane || knob == AlongX || knob == AlongZ || knob == AboutY || knob == FanBend)
+        used_.push_back(knob);
+    if (start.fanMiddle == 0.0)
+      used_.erase(std::remove(used_.begin(), used_.end(), static_cast<int>(FanMiddle)), used_.end());
+  }
+
+  std::size_t Size() const { return used_.size(); }
+
+  Head At(const std::vector<double>& values) const
+  {
+    double all[Count] = {};
+    for (std::size_t i = 0; i < used_.size(); ++i)
+      all[used_[i]] = values[i];
+    const double length = 0.05 * region_.size, turn = 0.1, bend = 0.15;
+    const Eigen::Matrix3d& axes = start_.probeToWorld.linear();
+    Head head = start_;
+    head.probeToWorld =
+        MotionAbout(region_.middle, axes * Eigen::Vector3d(turn * all[AboutX], turn * all[AboutY], turn * all[AboutZ]),
+                    axes * Eigen::Vector3d(length * all[AlongX], length * all[AlongY], length * all[AlongZ])) *
+        start_.probeToWorld;
+    head.fanBend = std::clamp(start_.fanBend + bend * all[FanBend], 0.0, least_.fanBend);
+    head.sweepBend = std::clamp(start_.sweepBend + bend * all[SweepBend], 0.0, least_.sweepBend);
+    if (head.fanBend < leastBend)
+      head.fanBend = 0.0;
+    if (head.sweepBend < leastBend)
+      head.sweepBend = 0.0;
+    head.fanMiddle += length * all[FanMiddle];
+    return head;
+  }
+
+private:
+  enum Knob { AlongX, AlongY, AlongZ, AboutX, AboutY, AboutZ, FanBend, SweepBend, FanMiddle, Count };
+  const Head& start_;
+  const Least& least_;
+  const Region& region_;
+  std::vector<int> used_;
+};
+
+struct Rated {
+  Head head;
+  double cost = 0.0;
+};
+
+// One run of the simplex method from a corner at the start; \a steps evaluations at most.
+Rated Simplex(const Rated& start, const Least& least, const Region& region, bool plane, double step, int steps)
+{
+  const Knobs knobs(start.head, least, region, plane);
+  struct Corner {
+    std::vector<double> at;
+    double cost;
+  };
+  const auto corner = [&](std::vector<double> at) {
+    const double cost = CostOf(knobs.At(at), least, region);
+    return Corner{std::move(at), cost};
+  };
+  const std::size_t n = knobs.Size();
+  std::vector<Corner> simplex{{std::vector<double>(n, 0.0), start.cost}};
+  for (std::size_t i = 0; i < n; ++i) {
+    std::vector<double> at(n, 0.0);
+    at[i] = step;
+    simplex.push_back(corner(std::move(at)));
+  }
+  for (int done = static_cast<int>(n); done < steps;) {
+    std::stable_sort(simplex.begin(), simplex.end(), [](const Corner& a, const Corner& b) { return a.cost < b.cost; });
+    if (simplex.back().cost - simplex.front().cost < 1e-4)
+      break;
+    std::vector<double> middle(n, 0.0);
+    for (std::size_t c = 0; c < n; ++c)
+      for (std::size_t i = 0; i < n; ++i)
+        middle[i] += simplex[c].at[i] / static_cast<double>(n);
+    const auto along = [&](double t) {
+      std::vector<double> at(n);
+      for (std::size_t i = 0; i < n; ++i)
+        at[i] = middle[i] + t * (simplex.back().at[i] - middle[i]);
+      ++done;
+      return corner(std::move(at));
+    };
+    Corner reflected = along(-1.0);
+    if (reflected.cost < simplex.front().cost) {
+      Corner further = along(-2.0);
+      simplex.back() = further.cost < reflected.cost ? std::move(further) : std::move(reflected);
+    } else if (reflected.cost < simplex[n - 1].cost) {
+      simplex.back() = std::move(reflected);
+    } else {
+      Corner nearer = along(reflected.cost < simplex.back().cost ? -0.5 : 0.5);
+      if (nearer.cost < std::min(reflected.cost, simplex.back().cost)) {
+        simplex.back() = std::move(nearer);
+      } else {
+        for (std::size_t c = 1; c <= n; ++c) {
+          for (std::size_t i = 0; i < n; ++i)
+            simplex[c].at[i] = 0.5 * (simplex[c].at[i] + simplex[0].at[i]);
+          simplex[c] = corner(std::move(simplex[c].at));
+          ++done;
+        }
+      }
+    }
+  }
+  const auto best =
+      std::min_element(simplex.begin(), simplex.end(), [](const Corner& a, const Corner& b) { return a.cost < b.cost; });
+  return {knobs.At(best->at), best->cost};
+}
+
+// A plain fan that looks along the axes of \a pose, its face at the near end of the region, across its middle.
+Head PlainHead(const Pose& pose, double fanBend, double sweepBend, const Region& region)
+{
+  Range x, y, z;
+  for (const Eigen::Vector3d& point : region.points) {
+    const Eigen::Vector3d at = pose.linear().transpose() * point;
+    x.Hold(at.x());
+    y.Hold(at.y());
+    z.Hold(at.z(), region.beyond);
+  }
+  Head head{pose, fanBend, sweepBend, 0.0};
+  head.probeToWorld.translation() = pose.linear() * Eigen::Vector3d(x.Middle(), y.Middle(), z.low);
+  return head;
+}
+
+double BendOf(const ProbeArc& arc, double halfway)
+{
+  return arc.angle > 0.0 ? arc.angle * halfway / arc.Span(halfway) : 0.0;
+}
+
+// Whether the fan as it is holds every voxel, with the margin, to within a part of a voxel.
+bool Holds(const PlacedProbe& fan, const Region& region, double marginMm, const Progress& progress)
+{
+  const Pose worldToProbe = fan.probeToWorld.inverse();
+  const Eigen::Affine3d toProbe = worldToProbe * region.geometry.IndexToWorld();
+  const ProbeGeometry& g = fan.geometry;
+  const double off = asGoodAsInside * region.geometry.spacing.head(region.plane ? 2 : 3).minCoeff();
+  std::vector<char> outside(static_cast<std::size_t>(region.geometry.dimensions[2]), 0);
+  ParallelFor(region.geometry.dimensions[2], progress, [&](std::ptrdiff_t slice) {
+    char& out = outside[static_cast<std::size_t>(slice)];
+    ForSurfaceOfSlice(region.valid, static_cast<int>(slice), [&](int i, int j, int k) {
+      if (out)
+        return;
+      const auto beam = BeamPointAt(g, toProbe * Eigen::Vector3d(i, j, k), off / g.Size());
+      out = !beam;
+      if (out || marginMm == 0.0)
+        return;
+      const double rho = g.Fan().PointOf({beam->fan + g.fanOffset, beam->depth}).y();
+      const double least =
+          std::min({beam->depth - g.depthMin, g.depthMax - beam->depth, (0.5 - std::abs(beam->fan)) * g.Fan().Span(beam->depth),
+                    g.IsPlane() ? marginMm : (0.5 - std::abs(beam->sweep)) * std::abs(g.Sweep().Span(rho))});
+      out = least < marginMm - off;
+    });
+  });
+  return std::none_of(outside.begin(), outside.end(), [](char out) { return out != 0; });
+}
+
+Extent ExtentOf(const Measure& measure, const Region& region, const Progress& progress)
+{
+  const Eigen::Affine3d toWorld = region.geometry.IndexToWorld();
+  std::vector<Extent> extents(static_cast<std::size_t>(region.geometry.dimensions[2]));
+  ParallelFor(region.geometry.dimensions[2], progress, [&](std::ptrdiff_t slice) {
+    ForSurfaceOfSlice(region.valid, static_cast<int>(slice), [&](int i, int j, int k) {
+      measure.Hold(toWorld * Eigen::Vector3d(i, j, k), extents[static_cast<std::size_t>(slice)]);
+    });
+  });
+  Extent extent;
+  for (const Extent& more : extents)
+    extent.Hold(more);
+  return extent;
+}
+
+// Depth 0 is put at the near edge, as a fit does.
+void BeginAtNearEdge(PlacedProbe& fan)
+{
+  ProbeGeometry& g = fan.geometry;
+  const double face = g.depthMin;
+  if (g.Sweep().Span(face) < 0.0)
+    return; // the sweep axis lies within the region: no face there has a width
+  g.fanWidth = std::max(0.0, g.Fan().Span(face));
+  g.sweepWidth = std::max(0.0, g.Sweep().Span(face));
+  g.depthMax -= face;
+  g.depthMin = 0.0;
+  fan.probeToWorld.translation() += face * fan.probeToWorld.linear().col(2);
+}
+
+// Where the search starts from when no shape is given: the fit, however bad, or a box along the axes of the grid.
+PlacedProbe FoundFrom(const Region& region, const Progress& progress)
+{
+  ProbeFitParameters anything;
+  anything.minimumOverlap = 0.0;
+  anything.maximumDistance = std::numeric_limits<double>::max();
+  try {
+    const ProbeFit fit = FitProbe(region.valid, region.geometry, anything, progress);
+    return {fit.geometry, fit.probeToWorld};
+  } catch (const Error& error) {
+    if (error.GetKind() != Error::Kind::NotPossible)
+      throw;
+  }
+  const Eigen::Matrix3d& axes = region.geometry.direction;
+  PlacedProbe box{ProbeGeometry::Linear(region.size, region.plane ? 0.0 : region.size, 0.0, region.size), Pose::Identity()};
+  const Eigen::Vector3d depth = axes.col(region.plane ? 1 : 2);
+  box.probeToWorld.linear() << axes.col(0), depth.cross(axes.col(0)), depth;
+  box.probeToWorld.translation() = region.middle - 0.5 * region.size * depth;
+  return box;
+}
+
+} // namespace
+
+double FanVolume(const ProbeGeometry& geometry)
+{
+  // Over depth the area is a polynomial of degree 2 at most (Simpson's rule is exact), over the fan it is smooth (Gauss).
+  constexpr int nodes = 5;
+  constexpr double places[nodes] = {0.0, 0.2692346550528415, -0.2692346550528415, 0.4530899229693320, -0.4530899229693320};
+  constexpr double shares[nodes] = {0.2844444444444444, 0.2393143352496832, 0.2393143352496832, 0.1184634425280945,
+                                    0.1184634425280945};
+  const double depths[3] = {geometry.depthMin, 0.5 * (geometry.depthMin + geometry.depthMax), geometry.depthMax};
+  const double parts[3] = {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0};
+  double sum = 0.0;
+  for (int d = 0; d < 3; ++d) {
+    double across = 1.0;
+    if (!geometry.IsPlane()) {
+      across = 0.0;
+      for (int f = 0; f < nodes; ++f)
+        across +=
+            shares[f] * std::abs(geometry.Sweep().Span(geometry.Fan().PointOf({places[f] + geometry.fanOffset, depths[d]}).y()));
+    }
+    sum += parts[d] * geometry.Fan().Span(depths[d]) * across;
+  }
+  return sum * (geometry.depthMax - geometry.depthMin);
+}
+
+PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeometry& geometry,
+                          const EnclosingFanParameters& parameters, const Progress& progress)
+{
+  if (!(parameters.marginMm >= 0.0) || !std::isfinite(parameters.marginMm))
+    throw Error(Error::Kind::InvalidParameter,
+                "enclosing fan: marginMm is " + std::to_string(parameters.marginMm) + "; it must be at least 0");
+  geometry.Check("the volume");
+  if (parameters.shape) {
+    parameters.shape->geometry.Check();
+    if (!IsRotation(parameters.shape->probeToWorld.linear()) || !parameters.shape->probeToWorld.translation().allFinite())
+      throw Error(Error::Kind::BadInput, "enclosing fan: the pose of the shape is not rigid");
+  }
+  Volume<unsigned char> all;
+  if (valid.Empty()) {
+    all = Volume<unsigned char>(geometry.dimensions, 1);
+    valid = std::as_const(all).View();
+  }
+  if (valid.Dimensions() != geometry.dimensions)
+    throw Error(Error::Kind::BadInput, "enclosing fan: the valid region has other dimensions than the volume");
+
+  const Region region = RegionOf(valid, geometry, parameters.marginMm, progress.Part(0.0, 0.2));
+  if (parameters.shape && Holds(*parameters.shape, region, parameters.marginMm, progress.Part(0.2, 0.3)))
+    return *parameters.shape;
+
+  const PlacedProbe base = parameters.shape ? *parameters.shape : FoundFrom(region, progress.Part(0.2, 0.5));
+  const bool plane = region.plane && base.geometry.IsPlane();
+  Least least;
+  least.halfway =
+      std::max(0.5 * (base.geometry.depthMin + base.geometry.depthMax), 0.25 * (base.geometry.depthMax - base.geometry.depthMin));
+  const ProbeArc fan = base.geometry.Fan(), sweep = base.geometry.Sweep();
+  Head start{base.probeToWorld, BendOf(fan, least.halfway), BendOf(sweep, least.halfway), 0.0};
+  start.fanMiddle = base.geometry.fanOffset * fan.Span(least.halfway);
+  least.fanTurn = std::max(least.fanTurn, fan.angle * (0.5 + std::abs(base.geometry.fanOffset)));
+  least.sweepTurn = std::max(least.sweepTurn, 0.5 * sweep.angle);
+  if (parameters.shape) {
+    least.shape = &parameters.shape->geometry;
+    least.fanBend = start.fanBend;
+    if (!base.geometry.IsPlane())
+      least.sweepBend = start.sweepBend;
+  }
+
+  std::vector<Rated> starts{{start, 0.0}};
+  for (const double part : {0.0, 0.3, 0.6, 1.0})
+    starts.push_back(
+        {PlainHead(base.probeToWorld, part * std::min(least.fanBend, 0.6), part * std::min(least.sweepBend, 0.6), region), 0.0});
+  for (Rated& rated : starts)
+    rated.cost = CostOf(rated.head, least, region);
+  std::stable_sort(starts.begin(), starts.end(), [](const Rated& a, const Rated& b) { return a.cost < b.cost; });
+  starts.resize(2);
+  ParallelFor(2, progress.Part(0.5, 0.9), [&](std::ptrdiff_t i) {
+    Rated& rated = starts[static_cast<std::size_t>(i)];
+    rated = Simplex(rated, least, region, plane, 1.0, 600);
+    rated = Simplex(rated, least, region, plane, 0.4, 600); // a simplex may have become flat
+  });
+  const Head& best = starts[0].cost <= starts[1].cost ? starts[0].head : starts[1].head;
+
+  const Measure measure(best, least, region);
+  PlacedProbe found{FanOf(best, least, ExtentOf(measure, region, progress.Part(0.9, 1.0)), plane).first, best.probeToWorld};
+  if (!parameters.shape)
+    BeginAtNearEdge(found);
+  return found;
+}
+
+} // namespace echorama
