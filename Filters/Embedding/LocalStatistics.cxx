@@ -49,7 +49,7 @@ bool Counts(T value)
 }
 
 // A Gaussian along one axis, over all lines of it. Beyond the ends there is nothing.
-void Smooth(VolumeView<double> values, std::size_t axis, double sigma, const Progress& progress)
+void Smooth(VolumeView<double> values, std::size_t axis, double sigma)
 {
   const auto& n = values.Dimensions();
   const int count = n[axis];
@@ -62,7 +62,7 @@ void Smooth(VolumeView<double> values, std::size_t axis, double sigma, const Pro
   const int across = axis == 0 ? n[1] : n[0], slices = axis == 2 ? n[1] : n[2];
   const std::ptrdiff_t acrossStride = axis == 0 ? values.RowStride() : 1;
   const std::ptrdiff_t sliceStride = axis == 2 ? values.RowStride() : values.SliceStride();
-  ParallelFor(slices, progress, [&](std::ptrdiff_t slice) {
+  ParallelFor(slices, [&](std::ptrdiff_t slice) {
     std::vector<double> line(static_cast<std::size_t>(count));
     for (int a = 0; a < across; ++a) {
       double* at = values.Data() + slice * sliceStride + a * acrossStride;
@@ -143,9 +143,9 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
     const double size = blocks.size[axis], voxels = sigmaMm / spacing[static_cast<Eigen::Index>(axis)];
     const double variance = voxels * voxels - (size * size - 1.0) / 12.0 - (size > 1.0 ? size * size / 6.0 : 0.0);
     const double sigma = variance > 0.0 ? std::sqrt(variance) / size : 0.0;
-    const Progress part = progress.Part(0.8 + 0.06 * static_cast<double>(axis), 0.86 + 0.06 * static_cast<double>(axis));
     for (Volume<double>* sums : {&lattice->weight, &lattice->first, &lattice->second})
-      Smooth(sums->View(), axis, sigma, part);
+      Smooth(sums->View(), axis, sigma);
+    progress(0.8 + 0.2 * static_cast<double>(axis + 1) / 3.0);
   }
   lattice_ = lattice;
 }

@@ -60,7 +60,8 @@ void vtkUltrasoundToneMapper::Execute(vtkInformationVector** inputs, vtkImageDat
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
     const auto volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input);
     const echorama::Volume<unsigned char> region = echorama::RealRegionOf(volume);
-    std::transform(volume.intensity.begin(), volume.intensity.end(), out.begin(), [](auto value) { return static_cast<float>(value); });
+    std::transform(volume.intensity.begin(), volume.intensity.end(), out.begin(),
+                   [](auto value) { return static_cast<float>(value); });
     echorama::ExtractGrain(parameters, out, region.View(), geometry.spacing, out, progress);
   });
   if (levels.Intensity) {

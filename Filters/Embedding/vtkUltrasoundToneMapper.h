@@ -4,10 +4,10 @@
  * @brief takes from a volume what varies slowly and leaves its grain, or gives the grain another brightness and contrast
  *
  * Input 0: a volume, such as noise. Input 1 (optional): a volume on the same grid whose intensities are the local mean that the
- * result shall have (vtkUltrasoundSurfaceDiffuser), with a point array `Deviation` for the local deviation when MatchDeviation is on.
- * Output: the first volume (pose, all other arrays and field data kept) with float intensities. Without levels that is the grain:
- * of local mean 0 and deviation 1 with MatchDeviation, else of local mean 1. With levels it is mean + deviation * grain, or
- * mean * grain. Outside of the valid region the grain is 0, or 1.
+ * result shall have (vtkUltrasoundSurfaceDiffuser), with a point array `Deviation` for the local deviation when MatchDeviation is
+ * on. Output: the first volume (pose, all other arrays and field data kept) with float intensities. Without levels that is the
+ * grain: of local mean 0 and deviation 1 with MatchDeviation, else of local mean 1. With levels it is mean + deviation * grain,
+ * or mean * grain. Outside of the valid region the grain is 0, or 1.
  *
  * Fails when the grids differ, and when MatchDeviation is on and the levels have no `Deviation`.
  *

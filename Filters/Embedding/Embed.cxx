@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Local mean and deviation vary slowly, so they spread on blocks of voxels: the surface is that of the blocks which hold data, its
+// values are those measured in the data alone at the middle of each block, and both channels share their weights. Only blocks near
+// voxels that show background are worked out. Between blocks values are interpolated.
+//
+// Cost: two passes over the volume for the distance map and the statistics of the data, four over the noise to flatten it, one to
+// give it its new mean and contrast, three for the overlay; the diffusion depends on the blocks alone.
+#include "Embed.h"
+#include "BlockRows.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include "LocalStatistics.h"
+#include "RegionSurface.h"
+#include "ToneMapping.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace echorama {
+
+namespace {
+
+// Blocks of about a standard deviation, or as large as the limit on their number makes them.
+Blocks BlocksFor(const EmbedParameters& parameters, const std::array<int, 3>& dimensions, const Eigen::Vector3d& spacing)
+{
+  double mm = parameters.smoothMm;
+  for (;; mm *= 1.1) {
+    const Blocks blocks(dimensions, spacing, mm);
+    if (static_cast<double>(blocks.count[0]) * blocks.count[1] * blocks.count[2] <= parameters.diffusionVoxels)
+      return blocks;
+  }
+}
+
+// Calls visit(I, J, K, at) for every voxel, slices of blocks in parallel.
+template <class Visit>
+void ForVoxelsByBlock(const Blocks& blocks, const Progress& progress, const Visit& visit)
+{
+  ParallelFor(blocks.count[2], progress, [&](std::ptrdiff_t block) {
+    const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
+    for (int k = K * blocks.size[2]; k < kEnd; ++k)
+      for (int j = 0; j < blocks.voxels[1]; ++j) {
+        const std::ptrdiff_t row = (static_cast<std::ptrdiff_t>(k) * blocks.voxels[1] + j) * blocks.voxels[0];
+        for (int i = 0; i < blocks.voxels[0]; ++i)
+          visit(i / blocks.size[0], j / blocks.size[1], K, row + i);
+      }
+  });
+}
+
+// What is not 0, and all that touches it.
+Volume<unsigned char> Grown(VolumeView<const unsigned char> mask)
+{
+  const auto& n = mask.Dimensions();
+  Volume<unsigned char> grown(n);
+  ParallelFor(n[2], [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i)
+        for (int dk = std::max(k - 1, 0); dk <= std::min(k + 1, n[2] - 1); ++dk)
+          for (int dj = std::max(j - 1, 0); dj <= std::min(j + 1, n[1] - 1); ++dj)
+            for (int di = std::max(i - 1, 0); di <= std::min(i + 1, n[0] - 1); ++di)
+              if (mask(di, dj, dk))
+                grown.View()(i, j, k) = 1;
+  });
+  return grown;
+}
+
+// The local mean and deviation at the surface of the data, spread to wherever background shows.
+struct SpreadStatistics {
+  Blocks blocks;
+  Volume<double> mean, deviation;
+};
+
+SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics& statistics,
+                        VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<const float> weights,
+                        VolumeView<const unsigned char> form, const Progress& progress)
+{
+  SpreadStatistics spread;
+  const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
+  Volume<unsigned char> held(blocks.count), shown(blocks.count);
+  ForVoxelsByBlock(blocks, progress.Part(0.0, 0.2), [&](int I, int J, int K, std::ptrdiff_t at) {
+    if (region[at])
+      held.View()(I, J, K) = 1;
+    if (weights[at] < 1.0f && (form.Empty() || form[at]))
+      shown.View()(I, J, K) = 1;
+  });
+  DiffusionSources sources;
+  sources.voxels = SurfaceOf(held.View());
+  if (sources.voxels.empty()) // all of it is data, in a single block
+    sources.voxels = {{0, 0, 0}};
+  sources.channels = 2;
+  const std::size_t count = sources.voxels.size();
+  sources.values.resize(2 * count);
+  for (std::size_t s = 0; s < count; ++s) {
+    std::array<int, 3> middle{};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      middle[axis] = std::min(sources.voxels[s][axis] * blocks.size[axis] + blocks.size[axis] / 2, blocks.voxels[axis] - 1);
+    statistics.Row(middle[1], middle[2], middle[0], middle[0] + 1, &sources.values[s], &sources.values[count + s]);
+  }
+  const Eigen::Vector3d step = spacing.cwiseProduct(Eigen::Vector3d(blocks.size[0], blocks.size[1], blocks.size[2]));
+  Volume<float> mean(blocks.count), deviation(blocks.count);
+  const Volume<unsigned char> wanted = Grown(shown.View());
+  Diffuse(parameters.diffusion, sources, step, held.View(), wanted.View(), {mean.View(), deviation.View()},
+          progress.Part(0.2, 1.0));
+  spread.mean = Volume<double>(blocks.count);
+  spread.deviation = Volume<double>(blocks.count);
+  std::copy(mean.View().begin(), mean.View().end(), spread.mean.View().begin());
+  std::copy(deviation.View().begin(), deviation.View().end(), spread.deviation.View().begin());
+  return spread;
+}
+
+} // namespace
+
+void EmbedParameters::Check() const
+{
+  if (!(featherMm >= 0.0) || !std::isfinite(featherMm))
+    throw Error(Error::Kind::InvalidParameter, "featherMm must be a number from 0 on");
+  if (!(smoothMm > 0.0) || !std::isfinite(smoothMm))
+    throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
+  if (diffusionVoxels < 1000)
+    throw Error(Error::Kind::InvalidParameter, "diffusionVoxels must be 1000 or more");
+}
+
+template <class T>
+void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
+           VolumeView<float> noise, VolumeView<const unsigned char> form, VolumeView<T> intensity,
+           VolumeView<unsigned char> labels, const Progress& progress)
+{
+  parameters.Check();
+  const auto& n = intensity.Dimensions();
+  if (region.Dimensions() != n || noise.Dimensions() != n || labels.Dimensions() != n || (!form.Empty() && form.Dimensions() != n))
+    throw Error(Error::Kind::BadInput, "embedding: data, region, noise, form and labels do not have one size");
+  if (std::none_of(region.begin(), region.end(), [](unsigned char real) { return real != 0; }))
+    throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
+
+  const FeatherParameters feather{parameters.featherMm, parameters.keepTexture, parameters.smoothMm};
+  Volume<float> weights(n);
+  FeatherWeights(feather, region, form, spacing, weights.View(), progress.Part(0.0, 0.15));
+
+  // 1. what the data are like at their surface, everywhere
+  const LocalStatistics statistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm,
+                                   progress.Part(0.15, 0.25));
+  const SpreadStatistics spread =
+      Spread(parameters, statistics, region, spacing, weights.View(), form, progress.Part(0.25, 0.5));
+
+  // 2. noise of that kind
+  const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};
+  ExtractGrain(tone, noise, form, spacing, noise, progress.Part(0.5, 0.75));
+  const BlockRows rows(spread.blocks, {spread.mean.View(), spread.deviation.View()});
+  ParallelFor(n[2], progress.Part(0.75, 0.8), [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    std::vector<double> values(2 * static_cast<std::size_t>(n[0]));
+    double* const local[2] = {values.data(), values.data() + n[0]};
+    for (int j = 0; j < n[1]; ++j) {
+      rows.Row(j, k, 0, n[0], local);
+      float* grain = noise.Row(j, k);
+      const float* weight = weights.View().Row(j, k);
+      for (int i = 0; i < n[0]; ++i)
+        grain[i] = weight[i] < 1.0f ? ApplyGrain(parameters.matchContrast, grain[i], static_cast<float>(local[0][i]),
+                                                 static_cast<float>(local[1][i]))
+                                    : std::numeric_limits<float>::quiet_NaN(); // nobody sees it, and it was not worked out
+    }
+  });
+
+  // 3. the data over it
+  Feather<T>(feather, weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0));
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template void Embed(const EmbedParameters&, VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<float>,        \
+                      VolumeView<const unsigned char>, VolumeView<T>, VolumeView<unsigned char>, const Progress&);
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama

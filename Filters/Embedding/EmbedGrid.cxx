@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The extremes of a fan lie on its outside: on the faces of its first and last depth (a fan that bends over more than it is wide has
+// them on the sides, which these faces bound). They are found on a lattice of beams that is so fine that between its points a
+// surface bulges by far less than the voxel of margin.
+#include "EmbedGrid.h"
+#include "Core/Base/Error.h"
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Geometry>
+
+namespace echorama {
+
+EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first, const std::array<int, 3>& last,
+                      const PlacedProbe& form, int factor)
+{
+  if (factor < 1)
+    throw Error(Error::Kind::InvalidParameter, "factor must be 1 or more");
+  EmbedGrid grid;
+  grid.factor = factor;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    grid.start[axis] = (std::min(data.dimensions[axis], factor) - 1) / 2;
+
+  // 1. the coarse lattice, as an image of one voxel at the data's first
+  ImageGeometry lattice = data;
+  lattice.origin = data.IndexToWorld() * Eigen::Vector3d(grid.start[0], grid.start[1], grid.start[2]);
+  lattice.spacing = data.spacing * factor;
+  const Eigen::Affine3d probeToLattice = lattice.IndexToWorld().inverse() * form.probeToWorld;
+
+  // 2. what has to be in it
+  Eigen::AlignedBox3d box;
+  constexpr int beams = 96;
+  for (int f = 0; f <= beams; ++f)
+    for (int s = 0; s <= beams; ++s)
+      for (const double depth : {form.geometry.depthMin, form.geometry.depthMax})
+        box.extend(probeToLattice * PointOf(form.geometry, {depth, f / static_cast<double>(beams) - 0.5, s / static_cast<double>(beams) - 0.5}));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Eigen::Index a = static_cast<Eigen::Index>(axis);
+    double from = std::floor(box.min()[a]), to = std::ceil(box.max()[a]);
+    // Of data in a single slice the result is one, too.
+    if (data.dimensions[axis] == 1)
+      from = to = 0.0;
+    const double firstData = std::ceil((first[axis] - grid.start[axis]) / static_cast<double>(factor));
+    const double lastData = std::floor((last[axis] - grid.start[axis]) / static_cast<double>(factor));
+    from = std::min(from, std::min(firstData, lastData));
+    to = std::max(to, std::max(firstData, lastData));
+    if (!(to - from < 100000.0))
+      throw Error(Error::Kind::TooLarge, "the fan would need more than 100,000 voxels along one axis");
+    grid.offset[axis] = static_cast<int>(-from);
+    lattice.dimensions[axis] = static_cast<int>(to - from) + 1;
+  }
+  lattice.origin =
+      lattice.IndexToWorld() * Eigen::Vector3d(-grid.offset[0], -grid.offset[1], -grid.offset[2]);
+  grid.geometry = lattice;
+  return grid;
+}
+
+} // namespace echorama
