@@ -1,0 +1,546 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// In beam space the grain of speckle has the same shape all over the fan, so one autocorrelation along each axis tells it.
+//
+// 1. (Volumes) Beams are read from the volume by linear interpolation, as many as its voxels support.
+// 2. Standardise: local mean and deviation from LocalStatistics, whose window is stretched along the axes by its spacing. Samples
+//    are replaced by (value - mean) / deviation, and those by the Rayleigh number of the same rank (a histogram of
+//    8192 bins). Flat places take no part.
+// 3. Correlate: sums of products at lags 1, 2, ... along each axis and in each band of depth, until all fell below one half.
+//
+// Passes 2 and 3 are done three times: the window follows the lengths that were found. A window of three lengths takes 3% of
+// the variance with it, which shortens the lengths by 2%.
+#include "NoiseMatch.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/Sampling.h"
+#include "Core/Imaging/ScanConversion.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include "LocalStatistics.h"
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+namespace echorama {
+namespace {
+
+constexpr std::ptrdiff_t leastSamples = 1000;
+constexpr double most = 24e6;         // samples that are read from a volume
+constexpr double windowLengths = 3.0; // standard deviation of the window, in lengths
+constexpr double flat = 0.05;         // of the whole deviation: below this there is no texture
+
+// The autocorrelation of a Rayleigh distributed envelope whose power has the autocorrelation \a power: a hypergeometric series.
+// Source: Middleton, Introduction to Statistical Communication Theory, 1960, section 9.1.
+double EnvelopeCorrelation(double power)
+{
+  double term = 1.0, sum = 0.0;
+  for (int n = 1; n <= 60; ++n) {
+    const double factor = (n - 1.5) / n;
+    term *= factor * factor * power;
+    sum += term;
+  }
+  return sum / (4.0 / 3.14159265358979323846 - 1.0);
+}
+
+// And back.
+double PowerCorrelation(double envelope)
+{
+  double low = 0.0, high = 1.0;
+  for (int step = 0; step < 40; ++step) {
+    const double middle = 0.5 * (low + high);
+    (EnvelopeCorrelation(middle) < envelope ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+// What stands for each sample; NaN where it takes no part.
+class Scores {
+public:
+  Scores(VolumeView<const float> beams, VolumeView<const unsigned char> valid)
+    : beams_(beams), valid_(valid), scores_(beams.Dimensions())
+  {
+    struct Sums {
+      double count = 0.0, first = 0.0;
+      float least = std::numeric_limits<float>::infinity(), greatest = -std::numeric_limits<float>::infinity();
+      Sums& operator+=(const Sums& other)
+      {
+        count += other.count;
+        first += other.first;
+        least = std::min(least, other.least);
+        greatest = std::max(greatest, other.greatest);
+        return *this;
+      }
+    };
+    const Sums sums = ParallelSum<Sums>(beams.Size(), 1 << 16, [this](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      Sums part;
+      for (std::ptrdiff_t i = begin; i < end; ++i)
+        if (IsReal(i)) {
+          part.count += 1.0;
+          part.first += static_cast<double>(beams_[i]);
+          part.least = std::min(part.least, beams_[i]);
+          part.greatest = std::max(part.greatest, beams_[i]);
+        }
+      return part;
+    });
+    least_ = sums.least;
+    greatest_ = sums.greatest;
+    real_ = sums.count;
+    mean_ = sums.count > 0.0 ? sums.first / sums.count : 0.0;
+  }
+
+  double Mean() const { return mean_; }
+  double Deviation() const { return deviation_; }
+  float Least() const { return least_; }
+  float Greatest() const { return greatest_; }
+  VolumeView<const float> View() const { return scores_.View(); }
+
+  /// \param window standard deviations in samples
+  void Standardise(const Eigen::Vector3d& window, const Progress& progress)
+  {
+    const LocalStatistics local(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4));
+    const auto& n = beams_.Dimensions();
+    const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(n[1]) * n[2];
+    const VolumeView<float> scores = scores_.View();
+    // The deviation about the local means decides what is flat.
+    struct Squares {
+      double sum = 0.0;
+      Squares& operator+=(const Squares& other)
+      {
+        sum += other.sum;
+        return *this;
+      }
+    };
+    const auto forRow = [&](std::ptrdiff_t row, std::vector<float>& mean, std::vector<float>& deviation) {
+      local.Row(static_cast<int>(row % n[1]), static_cast<int>(row / n[1]), 0, n[0], mean.data(), deviation.data());
+      return row * n[0];
+    };
+    const Squares squares = ParallelSum<Squares>(rows, 64, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      std::vector<float> mean(static_cast<std::size_t>(n[0])), deviation(mean.size());
+      Squares part;
+      for (std::ptrdiff_t row = begin; row < end; ++row) {
+        const std::ptrdiff_t first = forRow(row, mean, deviation);
+        for (int i = 0; i < n[0]; ++i)
+          if (IsReal(first + i)) {
+            const double rest = static_cast<double>(beams_[first + i] - mean[static_cast<std::size_t>(i)]);
+            part.sum += rest * rest;
+          }
+      }
+      return part;
+    });
+    deviation_ = real_ > 0.0 ? std::sqrt(squares.sum / real_) : 0.0;
+    const auto floor = static_cast<float>(std::max(flat * deviation_, 1e-5 * std::abs(mean_)));
+    ParallelRanges(rows, 64, progress.Part(0.4, 0.8), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      std::vector<float> mean(static_cast<std::size_t>(n[0])), deviation(mean.size());
+      for (std::ptrdiff_t row = begin; row < end; ++row) {
+        const std::ptrdiff_t first = forRow(row, mean, deviation);
+        for (int i = 0; i < n[0]; ++i) {
+          const auto at = static_cast<std::size_t>(i);
+          scores[first + i] = IsReal(first + i) && deviation[at] > floor ? (beams_[first + i] - mean[at]) / deviation[at]
+                                                                         : std::numeric_limits<float>::quiet_NaN();
+        }
+      }
+    });
+    Count();
+  }
+
+  std::ptrdiff_t Used() const { return used_; }
+
+  /// The standardised value below which a part \a probability of the samples lies.
+  double Quantile(double probability) const
+  {
+    const double wanted = probability * static_cast<double>(used_);
+    double below = 0.0;
+    for (std::size_t b = 0; b < histogram_.size(); ++b) {
+      const double count = static_cast<double>(histogram_[b]);
+      if (count > 0.0 && below + count >= wanted)
+        return (static_cast<double>(b) + std::max(0.0, (wanted - below) / count)) / binsPerUnit - reach;
+      below += count;
+    }
+    return reach;
+  }
+
+  /// Ranks in place of values: the Rayleigh number with the same rank, less the mean of that distribution.
+  void Rank()
+  {
+    std::vector<float> table(bins);
+    double below = 0.0;
+    for (std::size_t b = 0; b < bins; ++b) {
+      const double rank = (below + 0.5 * static_cast<double>(histogram_[b])) / static_cast<double>(used_);
+      table[b] = static_cast<float>(std::sqrt(-2.0 * std::log1p(-std::min(rank, 1.0 - 1e-12))) - 1.2533141373155003);
+      below += static_cast<double>(histogram_[b]);
+    }
+    const VolumeView<float> scores = scores_.View();
+    ParallelRanges(scores.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t i = begin; i < end; ++i)
+        if (!std::isnan(scores[i]))
+          scores[i] = table[Bin(scores[i])];
+    });
+  }
+
+private:
+  static constexpr std::size_t bins = 8192;
+  static constexpr double reach = 8.0, binsPerUnit = bins / (2.0 * reach);
+
+  static std::size_t Bin(float value)
+  {
+    const double bin = (static_cast<double>(value) + reach) * binsPerUnit;
+    return static_cast<std::size_t>(std::min(std::max(bin, 0.0), static_cast<double>(bins - 1)));
+  }
+
+  bool IsReal(std::ptrdiff_t i) const { return (valid_.Empty() || valid_[i] != 0) && std::isfinite(beams_[i]); }
+
+  void Count()
+  {
+    struct Histogram {
+      std::vector<std::ptrdiff_t> counts = std::vector<std::ptrdiff_t>(bins);
+      Histogram& operator+=(const Histogram& other)
+      {
+        for (std::size_t b = 0; b < bins; ++b)
+          counts[b] += other.counts[b];
+        return *this;
+      }
+    };
+    const VolumeView<const float> scores = View();
+    histogram_ = ParallelSum<Histogram>(scores.Size(), 1 << 20, [&scores](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                   Histogram part;
+                   for (std::ptrdiff_t i = begin; i < end; ++i)
+                     if (!std::isnan(scores[i]))
+                       ++part.counts[Bin(scores[i])];
+                   return part;
+                 }).counts;
+    used_ = 0;
+    for (const std::ptrdiff_t count : histogram_)
+      used_ += count;
+  }
+
+  VolumeView<const float> beams_;
+  VolumeView<const unsigned char> valid_;
+  Volume<float> scores_;
+  std::vector<std::ptrdiff_t> histogram_;
+  std::ptrdiff_t used_ = 0;
+  double mean_ = 0.0, deviation_ = 0.0, real_ = 0.0;
+  float least_ = 0.0f, greatest_ = 0.0f;
+};
+
+// Autocorrelations of the samples in one band of depth: sums of products and of the squares of both.
+struct Products {
+  double products = 0.0, squares = 0.0;
+  std::ptrdiff_t pairs = 0;
+};
+struct BandProducts {
+  std::vector<Products> bands;
+  BandProducts& operator+=(const BandProducts& other)
+  {
+    bands.resize(std::max(bands.size(), other.bands.size()));
+    for (std::size_t b = 0; b < other.bands.size(); ++b) {
+      bands[b].products += other.bands[b].products;
+      bands[b].squares += other.bands[b].squares;
+      bands[b].pairs += other.bands[b].pairs;
+    }
+    return *this;
+  }
+};
+
+// The samples of a band.
+struct Range {
+  int begin = 0, end = 0;
+};
+
+BandProducts Correlate(VolumeView<const float> scores, const std::vector<Range>& bands, int axis, int lag)
+{
+  const auto& n = scores.Dimensions();
+  const std::ptrdiff_t shift = lag * (axis == 0 ? 1 : axis == 1 ? scores.RowStride() : scores.SliceStride());
+  const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(n[1]) * n[2];
+  return ParallelSum<BandProducts>(rows, 256, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    BandProducts sums;
+    sums.bands.resize(bands.size());
+    for (std::ptrdiff_t row = begin; row < end; ++row) {
+      if ((axis == 1 && row % n[1] + lag >= n[1]) || (axis == 2 && row / n[1] + lag >= n[2]))
+        continue;
+      const float* a = scores.Data() + row * n[0];
+      const float* b = a + shift;
+      for (std::size_t band = 0; band < bands.size(); ++band) {
+        float products = 0.0f, squares = 0.0f; // of a row: few enough for a float
+        int pairs = 0;
+        const int last = axis == 0 ? std::min(bands[band].end, n[0] - lag) : bands[band].end;
+        for (int i = bands[band].begin; i < last; ++i) {
+          const float product = a[i] * b[i];
+          const bool real = product == product; // neither is NaN
+          products += real ? product : 0.0f;
+          squares += real ? a[i] * a[i] + b[i] * b[i] : 0.0f;
+          pairs += real ? 1 : 0;
+        }
+        sums.bands[band].products += static_cast<double>(products);
+        sums.bands[band].squares += 0.5 * static_cast<double>(squares);
+        sums.bands[band].pairs += pairs;
+      }
+    }
+    return sums;
+  });
+}
+
+// The lag, in samples, at which the autocorrelation of the power is one half, by band; NaN where there are too few pairs.
+std::vector<double> HalfLags(VolumeView<const float> scores, const std::vector<Range>& bands, int axis)
+{
+  const int longest = scores.Dimensions()[static_cast<std::size_t>(axis)] / 3;
+  std::vector<double> lags(bands.size(), std::numeric_limits<double>::quiet_NaN());
+  std::vector<double> before(bands.size(), 0.0); // -log2 of the correlation at the lag before
+  std::vector<bool> open(bands.size(), true);
+  for (int lag = 1; lag <= longest && std::find(open.begin(), open.end(), true) != open.end(); ++lag) {
+    const BandProducts sums = Correlate(scores, bands, axis, lag);
+    for (std::size_t band = 0; band < bands.size(); ++band) {
+      if (!open[band])
+        continue;
+      const Products& s = sums.bands[band];
+      if (s.pairs < leastSamples || !(s.squares > 0.0)) {
+        open[band] = false;
+        continue;
+      }
+      const double power = PowerCorrelation(std::max(s.products / s.squares, 0.0));
+      const double now = -std::log2(std::max(power, 1e-6)), last = before[band];
+      if (now >= 1.0) {
+        const double from = static_cast<double>(lag - 1) * (lag - 1), to = static_cast<double>(lag) * lag;
+        lags[band] = std::sqrt(from + (1.0 - last) / (now - last) * (to - from));
+        open[band] = false;
+      } else {
+        before[band] = std::max(now, last);
+        lags[band] = lag; // the grain is at least as long
+      }
+    }
+  }
+  return lags;
+}
+
+[[noreturn]] void FailForWantOfTexture(const std::string& reason)
+{
+  throw Error(Error::Kind::NotPossible, "noise match: " + reason + ", which is too little texture to tell a grain from");
+}
+
+// How much interpolation between voxels has added along each axis of beam space at a depth: variance in samples squared.
+using AddedVariance = std::function<Eigen::Vector3d(double depthMm)>;
+
+// \param plain the same samples as they were before interpolation, which takes some of their deviation: for the quantiles
+NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, VolumeView<const unsigned char> valid,
+                 const ProbeGeometry& geometry, Eigen::Vector3d window, const NoiseMatchParameters& parameters,
+                 const AddedVariance& added, const Progress& progress)
+{
+  const auto& n = beams.Dimensions();
+  const int axes = geometry.IsPlane() ? 2 : 3;
+  std::vector<Range> ranges;
+  for (int b = 0; b < parameters.depthBands; ++b)
+    ranges.push_back({n[0] * b / parameters.depthBands, n[0] * (b + 1) / parameters.depthBands});
+
+  Scores scores(beams, valid);
+  const auto standardise = [&window, &n](Scores& some, const Progress& part) {
+    for (int axis = 0; axis < 3; ++axis)
+      window[axis] = std::min(std::max(window[axis], 2.0), static_cast<double>(n[static_cast<std::size_t>(axis)]));
+    some.Standardise(window, part);
+    if (some.Used() < leastSamples)
+      FailForWantOfTexture("only " + std::to_string(some.Used()) + " samples of the fan are real and not flat");
+  };
+  constexpr int passes = 3;
+  for (int pass = 0; pass < passes; ++pass) {
+    standardise(scores, progress.Part(0.25 * pass, 0.25 * (pass + 1)));
+    scores.Rank();
+    for (int axis = 0; axis < axes && pass + 1 < passes; ++axis) {
+      const std::vector<double> whole = HalfLags(scores.View(), {{0, n[0]}}, axis);
+      if (std::isfinite(whole[0]))
+        window[axis] = windowLengths * whole[0];
+    }
+  }
+  std::array<std::vector<double>, 3> lags;
+  for (int axis = 0; axis < axes; ++axis)
+    lags[static_cast<std::size_t>(axis)] = HalfLags(scores.View(), ranges, axis);
+
+  NoiseMatch match;
+  Scores values(plain, valid);
+  standardise(values, progress.Part(0.75, 1.0));
+  match.mean = values.Mean();
+  match.deviation = values.Deviation();
+  for (int q = 0; q < parameters.quantiles; ++q) {
+    const double value = match.mean + match.deviation * values.Quantile(static_cast<double>(q) / (parameters.quantiles - 1));
+    match.quantiles.push_back(std::min(std::max(static_cast<float>(value), values.Least()), values.Greatest()));
+  }
+
+  const double perSample[3] = {(geometry.depthMax - geometry.depthMin) / (n[0] - 1), 1.0 / (n[1] - 1),
+                               1.0 / std::max(1, n[2] - 1)};
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), weights = sum, bound = Eigen::Vector3d::Constant(1e300);
+  for (std::size_t b = 0; b < ranges.size(); ++b) {
+    NoiseMatch::Band band;
+    band.fromMm = geometry.depthMin + ranges[b].begin * perSample[0];
+    band.toMm = geometry.depthMin + ranges[b].end * perSample[0];
+    const BandProducts used = Correlate(scores.View(), {ranges[b]}, 0, 0);
+    band.samples = used.bands[0].pairs;
+    const Eigen::Vector3d variance = added(0.5 * (band.fromMm + band.toMm));
+    double* lengths[3] = {&band.lengths.depthMm, &band.lengths.fan, &band.lengths.sweep};
+    for (int axis = 0; axis < axes; ++axis) {
+      const auto at = static_cast<std::size_t>(axis);
+      const double lag = lags[at][b];
+      if (!std::isfinite(lag))
+        continue;
+      const double rest = lag * lag - 2.0 * std::log(2.0) * variance[axis];
+      band.lengths.resolved[at] = rest > 0.5 * lag * lag;
+      *lengths[axis] = perSample[axis] * (band.lengths.resolved[at] ? std::sqrt(rest) : lag);
+      if (band.lengths.resolved[at]) {
+        sum[axis] += static_cast<double>(band.samples) * *lengths[axis];
+        weights[axis] += static_cast<double>(band.samples);
+      } else {
+        bound[axis] = std::min(bound[axis], *lengths[axis]);
+      }
+    }
+    match.bands.push_back(band);
+  }
+  double* lengths[3] = {&match.lengths.depthMm, &match.lengths.fan, &match.lengths.sweep};
+  for (int axis = 0; axis < axes; ++axis) {
+    match.lengths.resolved[static_cast<std::size_t>(axis)] = weights[axis] > 0.0;
+    if (!(weights[axis] > 0.0) && !(bound[axis] < 1e300))
+      FailForWantOfTexture("it is too narrow: no line along its depth, fan or sweep has enough samples");
+    *lengths[axis] = weights[axis] > 0.0 ? sum[axis] / weights[axis] : bound[axis];
+  }
+  return match;
+}
+
+void Check(const NoiseMatchParameters& p)
+{
+  const auto need = [](const char* name, int value, int least, int greatest) {
+    if (value < least || value > greatest)
+      throw Error(Error::Kind::InvalidParameter, std::string("noise match: ") + name + " is " + std::to_string(value) +
+                                                     "; it lies between " + std::to_string(least) + " and " +
+                                                     std::to_string(greatest));
+  };
+  need("depthBands", p.depthBands, 1, 100);
+  need("quantiles", p.quantiles, 2, 65536);
+}
+
+// mm per whole fan and per whole sweep halfway down the middle beam.
+Eigen::Vector2d SpansHalfway(const ProbeGeometry& geometry)
+{
+  const double middle = 0.5 * (geometry.depthMin + geometry.depthMax);
+  return {std::abs(geometry.Fan().Span(middle)),
+          std::abs(geometry.Sweep().Span(geometry.Fan().PointOf({geometry.fanOffset, middle}).y()))};
+}
+
+// The beams of a volume.
+template <class T>
+void ReadBeams(const PosedVolume<T>& volume, const ProbeGeometry& geometry, const Pose& probeToWorld, VolumeView<float> beams,
+               VolumeView<float> plain, VolumeView<unsigned char> valid, const Progress& progress)
+{
+  const Sampler<T> sampler(volume.intensity, volume.valid);
+  const Eigen::Affine3d toIndex = volume.geometry.WorldToIndex() * Eigen::Affine3d(probeToWorld.matrix());
+  const auto& n = beams.Dimensions();
+  ParallelFor(n[2], progress, [&](std::ptrdiff_t k) {
+    for (int j = 0; j < n[1]; ++j) {
+      BeamPoint point;
+      point.fan = static_cast<double>(j) / (n[1] - 1) - 0.5;
+      point.sweep = n[2] > 1 ? static_cast<double>(k) / (n[2] - 1) - 0.5 : 0.0;
+      point.depth = geometry.depthMin;
+      const Eigen::Vector3d first = toIndex * PointOf(geometry, point);
+      point.depth = geometry.depthMax;
+      const Eigen::Vector3d step = (toIndex * PointOf(geometry, point) - first) / (n[0] - 1);
+      float* values = beams.Row(j, static_cast<int>(k));
+      float* nearest = plain.Row(j, static_cast<int>(k));
+      unsigned char* real = valid.Row(j, static_cast<int>(k));
+      for (int i = 0; i < n[0]; ++i) {
+        const Eigen::Vector3d at = first + step * i;
+        double linear = 0.0, voxel = 0.0;
+        real[i] = sampler.Linear(at.x(), at.y(), at.z(), linear) && sampler.Nearest(at.x(), at.y(), at.z(), voxel) ? 1 : 0;
+        values[i] = static_cast<float>(linear);
+        nearest[i] = static_cast<float>(voxel);
+      }
+    }
+  });
+}
+
+} // namespace
+
+NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned char> valid, const ProbeGeometry& geometry,
+                      const NoiseMatchParameters& parameters, const Progress& progress)
+{
+  Check(parameters);
+  CheckBeamVolume(beams.Dimensions(), geometry);
+  if (!valid.Empty() && valid.Dimensions() != beams.Dimensions())
+    throw Error(Error::Kind::BadInput, "noise match: the valid region does not have the dimensions of the beams");
+  return Match(
+      beams, beams, valid, geometry, Eigen::Vector3d::Constant(10.0), parameters,
+      [](double) { return Eigen::Vector3d::Zero().eval(); }, progress);
+}
+
+template <class T>
+NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometry, const Pose& probeToWorld,
+                      const NoiseMatchParameters& parameters, const Progress& progress)
+{
+  Check(parameters);
+  geometry.Check();
+  volume.geometry.Check("the volume whose noise is to be matched");
+  if (!IsRotation(probeToWorld.linear()) || !probeToWorld.translation().allFinite())
+    throw Error(Error::Kind::BadInput, "noise match: the pose of the probe is not a rigid transform");
+  if (volume.intensity.Dimensions() != volume.geometry.dimensions ||
+      (!volume.valid.Empty() && volume.valid.Dimensions() != volume.geometry.dimensions))
+    throw Error(Error::Kind::BadInput, "noise match: voxels, valid region and geometry do not agree");
+
+  // As many samples as voxels along each axis, halfway down.
+  const Eigen::Vector3d& spacing = volume.geometry.spacing;
+  double apart = std::cbrt(spacing.prod());
+  if (volume.geometry.dimensions[2] == 1)
+    apart = std::sqrt(spacing.x() * spacing.y());
+  const Eigen::Vector2d spans = SpansHalfway(geometry);
+  const Eigen::Vector3d sizes(geometry.depthMax - geometry.depthMin, spans[0], geometry.IsPlane() ? 0.0 : spans[1]);
+  const double all = (sizes / apart).array().max(1.0).prod();
+  if (all > most)
+    apart *= std::pow(all / most, geometry.IsPlane() ? 0.5 : 1.0 / 3.0);
+  const auto count = [apart](double size) { return std::max(2, static_cast<int>(std::min(size / apart, 1e5)) + 1); };
+  const std::array<int, 3> n{count(sizes[0]), count(sizes[1]), geometry.IsPlane() ? 1 : count(sizes[2])};
+  CheckBeamVolume(n, geometry);
+  Volume<float> beams(n), plain(n);
+  Volume<unsigned char> valid(n);
+  ReadBeams(volume, geometry, probeToWorld, beams.View(), plain.View(), valid.View(), progress.Part(0.0, 0.3));
+
+  // Linear interpolation between voxels adds h^2 / 3, h being the extent of a voxel in the direction of the axis.
+  const Eigen::Matrix3d toVoxels = volume.geometry.direction.transpose() * probeToWorld.linear();
+  const auto added = [&](double depth) {
+    Eigen::Vector3d variance = Eigen::Vector3d::Zero();
+    BeamPoint middle;
+    middle.depth = depth;
+    const Eigen::Vector3d at = PointOf(geometry, middle);
+    const double steps[3] = {sizes[0] / (n[0] - 1), 1.0 / (n[1] - 1), n[2] > 1 ? 1.0 / (n[2] - 1) : 0.0};
+    for (int axis = 0; axis < (n[2] > 1 ? 3 : 2); ++axis) {
+      BeamPoint next = middle;
+      (axis == 0 ? next.depth : axis == 1 ? next.fan : next.sweep) += 0.5 * steps[axis];
+      const Eigen::Vector3d step = 2.0 * (PointOf(geometry, next) - at); // mm per sample
+      const double length = step.norm();
+      if (length > 0.0)
+        variance[axis] = (toVoxels * step / length).cwiseProduct(spacing).squaredNorm() / (3.0 * length * length);
+    }
+    return variance;
+  };
+  const Eigen::Vector3d window = Eigen::Vector3d::Constant(6.0);
+  return Match(std::as_const(beams).View(), std::as_const(plain).View(), std::as_const(valid).View(), geometry, window,
+               parameters, added, progress.Part(0.3, 1.0));
+}
+
+BeamNoiseParameters NoiseLike(const NoiseMatch& match, const ProbeGeometry& measured, const ProbeGeometry& target)
+{
+  measured.Check();
+  target.Check();
+  const Eigen::Vector2d from = SpansHalfway(measured), to = SpansHalfway(target);
+  const auto scaled = [](double length, double spanFrom, double spanTo) {
+    return spanTo > 0.0 ? std::min(length * spanFrom / spanTo, 0.25) : 0.0;
+  };
+  BeamNoiseParameters p;
+  p.intensity = NoiseIntensity::Histogram;
+  p.quantiles = match.quantiles;
+  p.mean = match.mean;
+  p.depthCorrelationMm = std::min(match.lengths.depthMm, 0.25 * (target.depthMax - target.depthMin));
+  p.fanCorrelation = scaled(match.lengths.fan, from[0], to[0]);
+  p.sweepCorrelation = target.IsPlane() ? 0.0 : scaled(match.lengths.sweep, from[1], to[1]);
+  return ResolvingCounts(p, target);
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template NoiseMatch MatchNoise<T>(const PosedVolume<T>&, const ProbeGeometry&, const Pose&, const NoiseMatchParameters&,       \
+                                    const Progress&);
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "BeamNoise.h"
+#include "Core/Imaging/VolumeView.h"
+#include <array>
+#include <vector>
+
+namespace echorama {
+
+/// How the grain of a volume is measured.
+struct NoiseMatchParameters {
+  int depthBands = 4;  ///< the depth is cut into so many equal parts for the lengths by depth, [1, 100]
+  int quantiles = 257; ///< how many quantiles are given, [2, 65536]
+};
+
+/// The grain of a volume, in beam space. Lengths are those of BeamNoiseParameters, in its units.
+struct NoiseMatch {
+  /// One number along each axis of beam space.
+  struct Lengths {
+    double depthMm = 0.0, fan = 0.0, sweep = 0.0; ///< mm, whole fans, whole sweeps (0 for a single plane)
+    /// Whether each is longer than what the grid adds to it. If not, it is a bound: the grain is at most that long.
+    std::array<bool, 3> resolved{true, true, true};
+  };
+  /// A part of the depth.
+  struct Band {
+    double fromMm = 0.0, toMm = 0.0;
+    std::ptrdiff_t samples = 0; ///< that took part; lengths of bands with less than 1000 are not measured (0)
+    Lengths lengths;
+  };
+  Lengths lengths; ///< of all bands that resolve them, by their samples
+  std::vector<Band> bands;
+  /// At evenly spaced probabilities 0 ... 1: intensities less their local mean, over their local deviation, brought to the
+  /// mean and deviation below and to the range of the volume.
+  std::vector<float> quantiles;
+  double mean = 0.0;      ///< of the intensities
+  double deviation = 0.0; ///< of the intensities about their local means (root mean square)
+};
+
+/// Measures the grain of a beam volume (see ScanConversion.h): the lag at which the autocorrelation of the speckle's power has
+/// fallen to one half, along each axis. \param valid 1 or 0; empty: every sample is real (samples that are not finite are not)
+///
+/// Local mean and deviation (in a Gaussian window of three lengths, found in three passes) are taken off, and ranks put in
+/// place of the values, so that neither the scene's brightness nor the machine's compression matters: the ranks
+/// are given the Rayleigh distribution that speckle has, whose autocorrelation is a known function of the power's. Its half is
+/// found between lags as that of a Gaussian. What is smooth over the window is no grain; edges of the scene that are as sharp as
+/// the grain are taken for it.
+/// Cost: about 0.2 microseconds of one core per sample.
+/// \throws Error(NotPossible) when there are less than 1000 samples with some texture around them, Error(BadInput) for
+/// views that do not agree or are no beam volume, Error(InvalidParameter), Error(Cancelled)
+NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned char> valid, const ProbeGeometry& geometry,
+                      const NoiseMatchParameters& parameters = {}, const Progress& progress = {});
+
+/// The same of a scan-converted volume, read along the beams of \a geometry at the distance of its voxels, halfway down. What the
+/// linear interpolation between voxels adds to the lengths is taken off again (h^2 / 3 of variance in the autocorrelation, h
+/// the spacing). Instantiated for the types in VoxelTypes.h.
+/// \throws as MatchBeams, and Error(BadInput) for a pose that is not rigid; Error(NotPossible) also when the fan and
+/// the volume's valid region do not meet
+template <class T>
+NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometry, const Pose& probeToWorld,
+                      const NoiseMatchParameters& parameters = {}, const Progress& progress = {});
+
+/// Noise like what was measured in the fan \a measured, for the fan \a target (which may be the same): lengths across fan and
+/// sweep are as many mm halfway down the target as they were halfway down the other. Counts resolve the lengths
+/// (ResolvingCounts); where a length was too short to resolve it is the bound. Lengths are cut to what BeamNoiseParameters allow.
+/// Intensities are those of the quantiles.
+BeamNoiseParameters NoiseLike(const NoiseMatch& match, const ProbeGeometry& measured, const ProbeGeometry& target);
+
+} // namespace echorama
