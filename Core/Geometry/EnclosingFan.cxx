@@ -454,6 +454,7 @@ PlacedProbe FoundFrom(const Region& region, const Progress& progress)
   ProbeFitParameters anything;
   anything.minimumOverlap = 0.0;
   anything.maximumDistance = std::numeric_limits<double>::max();
+  anything.outlinePoints = 1000; // a start need not be exact
   try {
     const ProbeFit fit = FitProbe(region.valid, region.geometry, anything, progress);
     return {fit.geometry, fit.probeToWorld};
