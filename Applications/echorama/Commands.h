@@ -20,6 +20,7 @@ Command ReconstructCommand(CLI::App& program);
 Command AlignCommand(CLI::App& program);
 Command ScoreCommand(CLI::App& program);
 Command StitchCommand(CLI::App& program);
+Command EmbedCommand(CLI::App& program);
 Command ProbeFitCommand(CLI::App& program);
 Command PhantomCommand(CLI::App& program);
 Command ViewCommand(CLI::App& program);

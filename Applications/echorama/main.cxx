@@ -37,7 +37,7 @@ int Run(const Command& command, bool json, int threads)
 
 int main(int argc, char** argv)
 {
-  CLI::App program("Reconstruct, align, stitch and look at 3D ultrasound volumes.", "echorama");
+  CLI::App program("Reconstruct, align, stitch, embed and look at 3D ultrasound volumes.", "echorama");
   program.set_version_flag("--version", "echorama " ECHORAMA_VERSION);
   program.require_subcommand(1);
   program.footer("Every subcommand explains itself: echorama align --help\n"
@@ -45,9 +45,10 @@ int main(int argc, char** argv)
 
   bool json = false;
   int threads = 0;
-  const Command commands[] = {InfoCommand(program),     ConvertCommand(program), ReconstructCommand(program),
-                              AlignCommand(program),    ScoreCommand(program),   StitchCommand(program),
-                              ProbeFitCommand(program), PhantomCommand(program), ViewCommand(program)};
+  const Command commands[] = {InfoCommand(program),  ConvertCommand(program),  ReconstructCommand(program),
+                              AlignCommand(program), ScoreCommand(program),    StitchCommand(program),
+                              EmbedCommand(program), ProbeFitCommand(program), PhantomCommand(program),
+                              ViewCommand(program)};
   for (const Command& command : commands) {
     command.options->add_flag("--json", json, "Print one JSON object of results and seconds on standard output");
     command.options->add_option("--threads", threads, "Number of threads (0: as many as there are cores)")

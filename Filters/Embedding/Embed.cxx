@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Local mean and deviation vary slowly, so they spread on blocks of voxels: the surface is that of the blocks which hold data, its
-// values are those measured in the data alone at the middle of each block, and both channels share their weights. Only blocks near
-// voxels that show background are worked out. Between blocks values are interpolated.
+// Local mean and deviation vary slowly, so they spread on blocks of voxels: the surface is that of the blocks which hold data,
+// its values are those measured in the data alone at the middle of each block, and both channels share their weights. Only blocks
+// near voxels that show background are worked out. Between blocks values are interpolated.
 //
 // Cost: two passes over the volume for the distance map and the statistics of the data, four over the noise to flatten it, one to
 // give it its new mean and contrast, three for the overlay; the diffusion depends on the blocks alone.
@@ -129,7 +129,8 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
 {
   parameters.Check();
   const auto& n = intensity.Dimensions();
-  if (region.Dimensions() != n || noise.Dimensions() != n || labels.Dimensions() != n || (!form.Empty() && form.Dimensions() != n))
+  if (region.Dimensions() != n || noise.Dimensions() != n || labels.Dimensions() != n ||
+      (!form.Empty() && form.Dimensions() != n))
     throw Error(Error::Kind::BadInput, "embedding: data, region, noise, form and labels do not have one size");
   if (std::none_of(region.begin(), region.end(), [](unsigned char real) { return real != 0; }))
     throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
@@ -141,8 +142,7 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   // 1. what the data are like at their surface, everywhere
   const LocalStatistics statistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm,
                                    progress.Part(0.15, 0.25));
-  const SpreadStatistics spread =
-      Spread(parameters, statistics, region, spacing, weights.View(), form, progress.Part(0.25, 0.5));
+  const SpreadStatistics spread = Spread(parameters, statistics, region, spacing, weights.View(), form, progress.Part(0.25, 0.5));
 
   // 2. noise of that kind
   const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};

@@ -8,10 +8,10 @@
 namespace echorama {
 
 struct EmbedParameters {
-  double featherMm = 3.0;       ///< the depth in the data at which no background shows any more, mm, >= 0
-  bool keepTexture = true;      ///< whether what the mean of two textures loses in the feather band is given back
-  double smoothMm = 3.0;        ///< standard deviation of the blur that parts local mean and contrast from grain, mm, > 0
-  bool matchContrast = true;    ///< whether the background has the local deviation of the data too, not only their mean
+  double featherMm = 3.0;        ///< the depth in the data at which no background shows any more, mm, >= 0
+  bool keepTexture = true;       ///< whether what the mean of two textures loses in the feather band is given back
+  double smoothMm = 3.0;         ///< standard deviation of the blur that parts local mean and contrast from grain, mm, > 0
+  bool matchContrast = true;     ///< whether the background has the local deviation of the data too, not only their mean
   DiffusionParameters diffusion; ///< how values at the surface of the data spread
   int diffusionVoxels = 2000000; ///< they spread on a grid of at most so many blocks, >= 1000
 
@@ -20,8 +20,8 @@ struct EmbedParameters {
 
 /// Puts data into a background of noise that looks as if it had been seen with them (dissertation 6.3 to 6.5).
 ///
-/// The local mean and deviation of the data at their surface spread outwards and inwards (Diffuse); the noise loses its own and gets
-/// these (ExtractGrain); the data are laid over it with a soft border (Feather). Data deeper than featherMm are not touched.
+/// The local mean and deviation of the data at their surface spread outwards and inwards (Diffuse); the noise loses its own and
+/// gets these (ExtractGrain); the data are laid over it with a soft border (Feather). Data deeper than featherMm are not touched.
 /// \param region where the data are (not 0), finite numbers all
 /// \param noise in: any noise, where \a form is; out: the background where it shows, and not a number below the data. Voxels
 /// that are not finite, and those where it does not vary, get no grain.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The extremes of a fan lie on its outside: on the faces of its first and last depth (a fan that bends over more than it is wide has
-// them on the sides, which these faces bound). They are found on a lattice of beams that is so fine that between its points a
+// The extremes of a fan lie on its outside: on the faces of its first and last depth (a fan that bends over more than it is wide
+// has them on the sides, which these faces bound). They are found on a lattice of beams that is so fine that between its points a
 // surface bulges by far less than the voxel of margin.
 #include "EmbedGrid.h"
 #include "Core/Base/Error.h"
@@ -33,7 +33,8 @@ EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first
   for (int f = 0; f <= beams; ++f)
     for (int s = 0; s <= beams; ++s)
       for (const double depth : {form.geometry.depthMin, form.geometry.depthMax})
-        box.extend(probeToLattice * PointOf(form.geometry, {depth, f / static_cast<double>(beams) - 0.5, s / static_cast<double>(beams) - 0.5}));
+        box.extend(probeToLattice *
+                   PointOf(form.geometry, {depth, f / static_cast<double>(beams) - 0.5, s / static_cast<double>(beams) - 0.5}));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Eigen::Index a = static_cast<Eigen::Index>(axis);
     double from = std::floor(box.min()[a]), to = std::ceil(box.max()[a]);
@@ -49,8 +50,7 @@ EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first
     grid.offset[axis] = static_cast<int>(-from);
     lattice.dimensions[axis] = static_cast<int>(to - from) + 1;
   }
-  lattice.origin =
-      lattice.IndexToWorld() * Eigen::Vector3d(-grid.offset[0], -grid.offset[1], -grid.offset[2]);
+  lattice.origin = lattice.IndexToWorld() * Eigen::Vector3d(-grid.offset[0], -grid.offset[1], -grid.offset[2]);
   grid.geometry = lattice;
   return grid;
 }

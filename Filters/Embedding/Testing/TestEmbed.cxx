@@ -29,7 +29,8 @@ struct Scene {
       for (int j = 0; j < n[1]; ++j)
         for (int i = 0; i < n[0]; ++i) {
           Random random(4, static_cast<std::uint64_t>((k * n[1] + j) * n[0] + i));
-          const Eigen::Vector3d at(2.0 * i / (n[0] - 1) - 1.0, 2.0 * j / (n[1] - 1) - 1.0, n[2] > 1 ? 2.0 * k / (n[2] - 1) - 1.0 : 0.0);
+          const Eigen::Vector3d at(2.0 * i / (n[0] - 1) - 1.0, 2.0 * j / (n[1] - 1) - 1.0,
+                                   n[2] > 1 ? 2.0 * k / (n[2] - 1) - 1.0 : 0.0);
           region.View()(i, j, k) = at.norm() < 0.7;
           form.View()(i, j, k) = std::abs(at[0]) + std::abs(at[1]) < 1.6;
           if (region.View()(i, j, k)) {

@@ -13,7 +13,8 @@ ImageGeometry Oblique()
   data.dimensions = {50, 40, 30};
   data.spacing = {0.8, 0.9, 1.1};
   data.origin = {-20.0, 5.0, 30.0};
-  data.direction = (Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(-0.7, Eigen::Vector3d::UnitZ())).toRotationMatrix();
+  data.direction =
+      (Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(-0.7, Eigen::Vector3d::UnitZ())).toRotationMatrix();
   return data;
 }
 

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundEmbedder.h"
+
+#include "BeamNoise.h"
+#include "Core/Base/Memory.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Geometry/EnclosingFan.h"
+#include "Core/Imaging/Sampling.h"
+#include "Core/Imaging/ScanConversion.h"
+#include "Core/Imaging/ShadowMap.h"
+#include "Embed.h"
+#include "FanFilling.h"
+#include "NoiseMatch.h"
+#include "NoiseTiling.h"
+#include "vtkUltrasoundAcquisition.h"
+
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkSmartPointer.h"
+
+#include <algorithm>
+#include <cmath>
+
+using echorama::Error;
+using echorama::PlacedProbe;
+using echorama::Volume;
+using echorama::VolumeView;
+
+namespace {
+
+// The fan of a volume: the recorded one, or one that is fitted to its valid region.
+PlacedProbe FanOf(const vtkUltrasoundVolume::Input& input, const echorama::Progress& progress)
+{
+  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(input.Image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(input.Image);
+  if (geometry && pose) {
+    return {*geometry, *pose};
+  }
+  std::optional<PlacedProbe> found;
+  std::string reason;
+  vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+    found = echorama::FindProbe(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), {}, &reason, progress);
+  });
+  if (!found) {
+    throw Error(Error::Kind::NotPossible, input.Name + ": it brings no probe, and none fits its valid region (" + reason + ")");
+  }
+  return *found;
+}
+
+// Copies the tuples of an array of the data to their places on the grid; all others are 0.
+vtkSmartPointer<vtkDataArray> OnGrid(vtkDataArray* array, vtkImageData* data, const echorama::EmbedGrid& grid)
+{
+  const auto result = vtkSmartPointer<vtkDataArray>::Take(array->NewInstance());
+  result->SetName(array->GetName());
+  result->SetNumberOfComponents(array->GetNumberOfComponents());
+  result->SetNumberOfTuples(static_cast<vtkIdType>(grid.geometry.VoxelCount()));
+  const std::size_t bytes = static_cast<std::size_t>(array->GetDataTypeSize()) * static_cast<std::size_t>(array->GetNumberOfComponents());
+  int size[3];
+  data->GetDimensions(size);
+  const auto& n = grid.geometry.dimensions;
+  char* to = static_cast<char*>(result->GetVoidPointer(0));
+  const char* from = static_cast<const char*>(array->GetVoidPointer(0));
+  echorama::ParallelFor(n[2], [&](std::ptrdiff_t slice) {
+    const int k = grid.DataIndex(static_cast<int>(slice), 2);
+    for (int J = 0; J < n[1]; ++J) {
+      char* row = to + bytes * static_cast<std::size_t>((slice * n[1] + J) * n[0]);
+      const int j = grid.DataIndex(J, 1);
+      std::fill(row, row + bytes * static_cast<std::size_t>(n[0]), char(0));
+      if (k < 0 || k >= size[2] || j < 0 || j >= size[1]) {
+        continue;
+      }
+      const char* source = from + bytes * static_cast<std::size_t>((static_cast<vtkIdType>(k) * size[1] + j) * size[0]);
+      for (int I = 0; I < n[0]; ++I) {
+        const int i = grid.DataIndex(I, 0);
+        if (i >= 0 && i < size[0]) {
+          std::copy_n(source + bytes * static_cast<std::size_t>(i), bytes, row + bytes * static_cast<std::size_t>(I));
+        }
+      }
+    }
+  });
+  return result;
+}
+
+} // namespace
+
+vtkStandardNewMacro(vtkUltrasoundEmbedder);
+
+//----------------------------------------------------------------------------
+vtkUltrasoundEmbedder::vtkUltrasoundEmbedder()
+{
+  const echorama::EmbedParameters defaults;
+  this->FeatherMm = defaults.featherMm;
+  this->KeepTexture = defaults.keepTexture;
+  this->SmoothMm = defaults.smoothMm;
+  this->InsideExponent = defaults.diffusion.insideExponent;
+  this->OutsideExponent = defaults.diffusion.outsideExponent;
+  this->MatchContrast = defaults.matchContrast;
+  this->SetNumberOfInputPorts(3);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundEmbedder::FillInputPortInformation(int port, vtkInformation* info)
+{
+  this->Superclass::FillInputPortInformation(port, info);
+  if (port == 1) {
+    info->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+    info->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
+  }
+  if (port > 0) {
+    info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  // The fan, and with it the grid, depends on the data.
+  for (int port : {0, 2}) {
+    int output = 0;
+    if (vtkAlgorithm* source = this->GetNumberOfInputConnections(port) ? this->GetInputAlgorithm(port, 0, output) : nullptr) {
+      source->Update(output);
+    }
+  }
+  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs, progress).Grid.geometry);
+  });
+}
+
+//----------------------------------------------------------------------------
+const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformationVector** inputs, const echorama::Progress& progress)
+{
+  vtkImageData* image = vtkImageData::GetData(inputs[0]);
+  vtkImageData* shape = inputs[2]->GetNumberOfInformationObjects() > 0 ? vtkImageData::GetData(inputs[2]) : nullptr;
+  const vtkMTimeType time = std::max({this->GetMTime(), image->GetMTime(), shape ? shape->GetMTime() : 0});
+  if (this->Planned && this->PlannedAt == time) {
+    return *this->Planned;
+  }
+  this->Planned.reset();
+  const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
+  const echorama::ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(image);
+  Volume<unsigned char> region;
+  vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+    region = echorama::RealRegionOf(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input));
+  });
+
+  Plan plan;
+  echorama::EnclosingFanParameters enclosing;
+  enclosing.marginMm = this->MarginMm;
+  if (shape) {
+    enclosing.shape = FanOf(vtkUltrasoundVolume::CheckInput(this, shape, "the form"), progress.Part(0.0, 0.3));
+  }
+  plan.Form = echorama::EncloseRegion(region.View(), geometry, enclosing, progress.Part(0.3, 0.9));
+  plan.Note = !shape ? "The outline is a fan that was found from the data."
+              : plan.Form.geometry.depthMax == enclosing.shape->geometry.depthMax &&
+                      plan.Form.probeToWorld.matrix() == enclosing.shape->probeToWorld.matrix()
+                  ? "The outline is the fan of the form."
+                  : "The fan of the form does not hold all data: the outline is a larger one.";
+
+  std::array<int, 3> first = geometry.dimensions, last{-1, -1, -1};
+  for (int k = 0; k < geometry.dimensions[2]; ++k) {
+    for (int j = 0; j < geometry.dimensions[1]; ++j) {
+      const unsigned char *begin = region.View().Row(j, k), *end = begin + geometry.dimensions[0];
+      const unsigned char* found = std::find_if(begin, end, [](unsigned char real) { return real != 0; });
+      if (found == end) {
+        continue;
+      }
+      const unsigned char* lastFound = end - 1;
+      while (!*lastFound) {
+        --lastFound;
+      }
+      first = {std::min(first[0], static_cast<int>(found - begin)), std::min(first[1], j), std::min(first[2], k)};
+      last = {std::max(last[0], static_cast<int>(lastFound - begin)), std::max(last[1], j), std::max(last[2], k)};
+    }
+  }
+  plan.Grid = echorama::EmbedGridOf(geometry, first, last, plan.Form, this->PreviewFactor);
+  this->Planned = plan;
+  this->PlannedAt = time;
+  return *this->Planned;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan& plan, VolumeView<float> noise,
+                                      VolumeView<unsigned char> form, const echorama::Progress& progress)
+{
+  const echorama::ImageGeometry& grid = plan.Grid.geometry;
+  const auto input = vtkUltrasoundVolume::CheckInput(this, vtkImageData::GetData(inputs[0]), "the input");
+  const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
+
+  // 1. noise that is made, everywhere in the fan
+  echorama::BeamNoiseParameters parameters;
+  std::string note = "The noise is made";
+  if (this->MatchGrain && volumes.empty()) {
+    try {
+      vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+        const auto match = echorama::MatchNoise(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), plan.Form.geometry,
+                                                plan.Form.probeToWorld, {}, progress.Part(0.0, 0.4));
+        parameters = echorama::NoiseLike(match, plan.Form.geometry, plan.Form.geometry);
+      });
+      note += ", with the grain of the data.";
+    } catch (const Error& error) {
+      if (error.GetKind() != Error::Kind::NotPossible) {
+        throw;
+      }
+      note += std::string(", with a grain of its own: ") + error.what() + ".";
+    }
+  } else {
+    note += ".";
+  }
+  parameters.seed = static_cast<std::uint64_t>(this->Seed);
+  {
+    const Volume<float> beams = echorama::MakeBeamNoise(parameters, plan.Form.geometry, progress.Part(0.4, 0.6));
+    echorama::ScanConvert<float>(beams.View(), plan.Form.geometry, plan.Form.probeToWorld, grid, noise, form,
+                                 progress.Part(0.6, 0.8));
+  }
+
+  // 2. real noise in its place, wherever there is any
+  if (!volumes.empty()) {
+    echorama::NoiseTilingParameters tiling;
+    tiling.overlapDegrees = this->OverlapDegrees;
+    std::vector<echorama::NoiseInput> tiles;
+    for (const auto& volume : volumes) {
+      vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
+        tiles.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume), FanOf(volume, progress.Part(0.8, 0.82)),
+                         volume.Name});
+      });
+    }
+    const echorama::TiledNoise tiled = echorama::TileNoise(tiling, tiles, progress.Part(0.82, 0.9));
+    Volume<float> real(grid.dimensions);
+    Volume<unsigned char> there(grid.dimensions);
+    echorama::FillFan<float>({tiled.intensity.View(), tiled.valid.View(), tiled.geometry}, tiled.fan, plan.Form, grid, real.View(),
+                             there.View(), progress.Part(0.9, 1.0));
+    std::ptrdiff_t missing = 0;
+    for (std::ptrdiff_t at = 0; at < noise.Size(); ++at) {
+      if (there.View()[at]) {
+        noise[at] = real.View()[at];
+      } else if (form[at]) {
+        ++missing;
+      }
+    }
+    note = "The noise is that of " + std::to_string(volumes.size()) + (volumes.size() == 1 ? " volume" : " volumes") +
+           (missing ? ", and made where they have none." : ".");
+  }
+  this->Notes += note;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+{
+  this->Notes.clear();
+  vtkImageData* image = vtkImageData::GetData(inputs[0]);
+  const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
+  const Plan& plan = this->Prepare(inputs, progress.Part(0.0, 0.1));
+  const echorama::ImageGeometry& grid = plan.Grid.geometry;
+  this->Notes = plan.Note + "\n";
+
+  const double voxels = static_cast<double>(grid.VoxelCount());
+  // Noise, weights, distances and four masks beside the arrays themselves.
+  const double bytes = voxels * (20.0 + input.Intensity->GetDataTypeSize());
+  if (bytes > echorama::FreeMemory()) {
+    throw Error(Error::Kind::TooLarge, "embedding on a grid of " + std::to_string(grid.dimensions[0]) + " x " +
+                                           std::to_string(grid.dimensions[1]) + " x " + std::to_string(grid.dimensions[2]) +
+                                           " voxels needs " + std::to_string(bytes / 1e9).substr(0, 5) +
+                                           " GB, more than there is free; a PreviewFactor of 2 needs an eighth of it");
+  }
+
+  // 1. the data on the grid
+  output->Initialize();
+  vtkUltrasoundVolume::SetGeometry(output, grid);
+  output->GetFieldData()->ShallowCopy(image->GetFieldData());
+  vtkUltrasoundAcquisition::SetProbeGeometry(output, plan.Form.geometry);
+  vtkUltrasoundAcquisition::SetProbeToWorld(output, plan.Form.probeToWorld);
+  for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
+    if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
+      output->GetPointData()->AddArray(OnGrid(array, image, plan.Grid));
+    }
+  }
+  const char* name = input.Intensity->GetName() ? input.Intensity->GetName() : vtkUltrasoundVolume::IntensityName();
+  const auto intensity = OnGrid(input.Intensity, image, plan.Grid);
+  intensity->SetName(name);
+  output->GetPointData()->AddArray(intensity);
+  output->GetPointData()->SetActiveScalars(name);
+  vtkDataArray* seen = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
+  vtkDataArray* labels = AddArray(output, vtkUltrasoundVolume::EmbeddingName(), VTK_UNSIGNED_CHAR);
+  const auto region = vtkUltrasoundVolume::ViewOf<unsigned char>(seen, output);
+  vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+    const auto volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input);
+    const echorama::Sampler<decltype(type)> sampler(volume.intensity, volume.valid);
+    const auto& n = image->GetDimensions();
+    echorama::ParallelFor(grid.dimensions[2], [&](std::ptrdiff_t slice) {
+      const int k = plan.Grid.DataIndex(static_cast<int>(slice), 2);
+      for (int J = 0; J < grid.dimensions[1]; ++J) {
+        const int j = plan.Grid.DataIndex(J, 1);
+        for (int I = 0; I < grid.dimensions[0]; ++I) {
+          const int i = plan.Grid.DataIndex(I, 0);
+          const bool there = i >= 0 && j >= 0 && k >= 0 && i < n[0] && j < n[1] && k < n[2];
+          region(I, J, static_cast<int>(slice)) =
+              there && sampler.IsReal((static_cast<std::ptrdiff_t>(k) * n[1] + j) * n[0] + i) ? 1 : 0;
+        }
+      }
+    });
+  });
+
+  // 2. the background, and the data over it
+  Volume<float> noise(grid.dimensions);
+  Volume<unsigned char> form(grid.dimensions);
+  this->MakeNoise(inputs, plan, noise.View(), form.View(), progress.Part(0.1, 0.4));
+  echorama::EmbedParameters parameters;
+  parameters.featherMm = this->FeatherMm;
+  parameters.keepTexture = this->KeepTexture;
+  parameters.smoothMm = this->SmoothMm;
+  parameters.matchContrast = this->MatchContrast;
+  parameters.diffusion.insideExponent = this->InsideExponent;
+  parameters.diffusion.outsideExponent = this->OutsideExponent;
+  vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
+    using T = decltype(type);
+    echorama::Embed<T>(parameters, region, grid.spacing, noise.View(), form.View(), vtkUltrasoundVolume::ViewOf<T>(intensity, output),
+                       vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output), progress.Part(0.4, 1.0));
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundEmbedder::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "FeatherMm: " << this->FeatherMm << "\n";
+  os << indent << "KeepTexture: " << (this->KeepTexture ? "on" : "off") << "\n";
+  os << indent << "MarginMm: " << this->MarginMm << "\n";
+  os << indent << "SmoothMm: " << this->SmoothMm << "\n";
+  os << indent << "InsideExponent: " << this->InsideExponent << "\n";
+  os << indent << "OutsideExponent: " << this->OutsideExponent << "\n";
+  os << indent << "MatchContrast: " << (this->MatchContrast ? "on" : "off") << "\n";
+  os << indent << "MatchGrain: " << (this->MatchGrain ? "on" : "off") << "\n";
+  os << indent << "OverlapDegrees: " << this->OverlapDegrees << "\n";
+  os << indent << "Seed: " << this->Seed << "\n";
+  os << indent << "PreviewFactor: " << this->PreviewFactor << "\n";
+  os << indent << "Notes: " << this->Notes << "\n";
+}
