@@ -203,6 +203,24 @@ class StitchQuality(Feed):
             filter.AddSourceData(copy_of(image))
 
 
+class EmbedQuality(Feed):
+    """A volume whose labels say that it is data where it is valid."""
+
+    works_on_blocks = False # it measures one result
+
+    def inputs(self):
+        images = super().inputs()
+        for image in images:
+            seen = vtk_to_numpy(image.GetPointData().GetArray(VALID))
+            add_array(image, "Embedding", np.where(seen, 1, 3).astype(np.uint8))
+        return images
+
+    def connect(self, filter, images):
+        super().connect(filter, images)
+        for image in images:
+            filter.SetOriginalData(copy_of(image))
+
+
 class ScanConverter(ToOtherGrid):
     works_on_blocks = False # where the output lies is in the field data, which VTK's pipeline gives to no block beforehand
     accepts = ("direction", "spacing") # the place of a beam volume says nothing
@@ -331,6 +349,7 @@ Special = {
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundDeformableAligner": DeformableAligner,
     "vtkUltrasoundStitcher": Stitcher,
+    "vtkUltrasoundEmbedQuality": EmbedQuality,
     "vtkUltrasoundStitchQuality": StitchQuality,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,

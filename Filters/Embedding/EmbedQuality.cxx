@@ -8,6 +8,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/DistanceMap.h"
+#include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "Feather.h"
 #include <algorithm>
@@ -370,13 +371,7 @@ void CompareWithOriginal(VolumeView<const T> embedded, VolumeView<const unsigned
     throw Error(Error::Kind::BadInput, "the original does not lie on the voxels of the embedded volume");
   const std::array<int, 3> shift{static_cast<int>(whole[0]), static_cast<int>(whole[1]), static_cast<int>(whole[2])};
 
-  Volume<unsigned char> real(n);
-  ParallelFor(n[2], [&](std::ptrdiff_t k) {
-    const std::ptrdiff_t begin = k * original.intensity.SliceStride();
-    for (std::ptrdiff_t at = begin; at < begin + original.intensity.SliceStride(); ++at)
-      real.View()[at] =
-          (original.valid.Empty() || original.valid[at]) && std::isfinite(static_cast<double>(original.intensity[at]));
-  });
+  const Volume<unsigned char> real = RealRegionOf(original);
   Volume<float> squaredDepth(n);
   SquaredDepthMap(real.View(), grid.spacing, squaredDepth.View(), progress);
   const double farSquared = featherMm * featherMm * (1.0 + 1e-5); // beyond rounding
@@ -444,7 +439,6 @@ EmbedQualityReport MeasureEmbedding(VolumeView<const T> embedded, VolumeView<con
   if (embedded.Dimensions() != grid.dimensions || labels.Dimensions() != grid.dimensions)
     throw Error(Error::Kind::BadInput, "the embedded volume: its voxels and labels are not of the size that its geometry says");
   EmbedQualityReport report;
-  report.crop.share = notMeasured;
 
   // 1. what is where
   std::vector<Counts> counts(static_cast<Size>(grid.dimensions[2]));

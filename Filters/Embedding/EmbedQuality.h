@@ -54,7 +54,7 @@ struct EmbedQualityReport {
   std::ptrdiff_t lost = -1;      ///< deeper in the original than the feather reaches, but not labelled as data
   ///@}
 
-  Crop crop; ///< what cropping would have left of data and blend; its share is NaN when no fan was given
+  Crop crop; ///< what cropping would have left of data and blend; its share is NaN without a fan
 };
 
 /// Measures how visible the border of embedded data is, whether the data are untouched, and what embedding gained.

@@ -176,8 +176,8 @@ Crop LargestCrop(VolumeView<const unsigned char> region, const ImageGeometry& gr
     count[0] += slice[0];
     count[1] += slice[1];
   }
-  crop.share =
-      count[0] ? static_cast<double>(count[1]) / static_cast<double>(count[0]) : std::numeric_limits<double>::quiet_NaN();
+  if (count[0])
+    crop.share = static_cast<double>(count[1]) / static_cast<double>(count[0]);
   return crop;
 }
 

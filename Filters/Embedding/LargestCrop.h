@@ -3,6 +3,7 @@
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
+#include <limits>
 
 namespace echorama {
 
@@ -20,7 +21,8 @@ CellBox LargestBox(VolumeView<const float> weights, const Progress& progress = {
 /// What cropping would have left of a region.
 struct Crop {
   BeamPoint first, last; ///< corners of the box: depth in mm, fan and sweep in wholes
-  double share = 0.0;    ///< of the region's voxels, those in the box, [0, 1]; NaN for an empty region
+  double share =
+      std::numeric_limits<double>::quiet_NaN(); ///< of the region's voxels, those in the box, [0, 1]; NaN: there are none
 };
 
 /// The largest box in the beam space of a fan (depth x fan x sweep) that is all region: what is left when a fan without ragged
