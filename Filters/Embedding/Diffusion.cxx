@@ -18,7 +18,8 @@
 #include "DiffusionTree.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <limits>
+#include <memory>
 #include <string>
 
 namespace echorama {
@@ -219,69 +220,86 @@ private:
   DiffusionBlock block_;
 };
 
-// All voxels of one exponent: where wanted(i, j, k row pointer) says so.
+// What an accuracy takes: measured with white noise on the surface, the worst there is, for d from 1 to 64.
+double StepsFor(double accuracy, double d)
+{
+  return std::max(2.5, std::max(3.0, std::sqrt(d) * (1.7 + 0.01 * d)) * std::pow(0.002 / accuracy, 1.0 / 9.0));
+}
+
+DiffusionTolerance ToleranceFor(double accuracy)
+{
+  return {std::min(1.0, 0.15 * std::pow(accuracy / 0.002, 0.7)), 0.05 * accuracy};
+}
+
+// Source nodes of a level get the values of their sources.
+void PutSources(const Problem& problem, const DiffusionLevel& level, bool voxels, std::size_t channel, VolumeView<float> values)
+{
+  const std::size_t count = problem.sources.voxels.size();
+  const float* const own = voxels ? problem.sources.values.data() + channel * count : problem.rows[channel + 1].data();
+  for (std::size_t s = 0; s < count; ++s) {
+    std::array<int, 3> node;
+    bool there = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int from = problem.sources.voxels[s][axis] - level.first[axis];
+      node[axis] = from / level.step[axis];
+      there = there && from % level.step[axis] == 0;
+    }
+    if (there && level.nodes.View()(node[0], node[1], node[2]) == static_cast<unsigned char>(DiffusionNode::Source))
+      values(node[0], node[1], node[2]) = own[s];
+  }
+}
+
+// All voxels of one exponent: those with wanted(i, j, k).
 template <class Wanted>
 void DiffuseWith(const Problem& problem, double d, const Wanted& wanted, const Progress& progress)
 {
-  const DiffusionExponent exponent(d);
   const auto& grid = problem.squaredDistance.Dimensions();
+  const auto channels = static_cast<std::size_t>(problem.sources.channels);
+  const double accuracy = problem.parameters.accuracy;
   const bool exact = problem.parameters.exact;
-  static const double kappa0 = std::getenv("KAPPA") ? atof(std::getenv("KAPPA")) : 2.5;
-  static const double expansion = std::getenv("EXPANSION") ? atof(std::getenv("EXPANSION")) : 0.5;
-  static const double left = std::getenv("LEFT") ? atof(std::getenv("LEFT")) : 1e-4;
-  const float farthest2 = *std::max_element(problem.squaredDistance.begin(), problem.squaredDistance.end());
-  const double steps = exact ? 1e30 : kappa0;
-  std::vector<DiffusionLevel> levels =
-      MakeDiffusionLevels(grid, problem.spacing, steps, std::sqrt(static_cast<double>(farthest2)), problem.sources.channels);
-  ParallelFor(grid[2], [&](std::ptrdiff_t k) {
+  const double farthest =
+      std::sqrt(static_cast<double>(*std::max_element(problem.squaredDistance.begin(), problem.squaredDistance.end())));
+  const double steps = exact ? std::numeric_limits<double>::infinity() : StepsFor(accuracy, d);
+  std::vector<DiffusionLevel> levels = MakeDiffusionLevels(grid, problem.spacing, steps, farthest, problem.sources.channels);
+  ParallelFor(grid[2], progress.Part(0.0, 0.02), [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
     for (int j = 0; j < grid[1]; ++j) {
-      unsigned char* const row = levels[0].nodes.View().Row(j, static_cast<int>(k));
+      unsigned char* const row = levels[0].nodes.View().Row(j, k);
       for (int i = 0; i < grid[0]; ++i)
-        if (wanted(i, j, static_cast<int>(k)))
+        if (wanted(i, j, k))
           row[i] = static_cast<unsigned char>(DiffusionNode::Summed);
     }
   });
-  PlanDiffusionLevels(levels, problem.spacing, problem.squaredDistance, progress.Part(0.0, 0.05));
-
+  PlanDiffusionLevels(levels, problem.spacing, problem.squaredDistance, progress.Part(0.02, 0.1));
   std::unique_ptr<const DiffusionTree> tree;
   if (!exact)
     tree = std::make_unique<const DiffusionTree>(problem.sources.voxels, problem.spacing, problem.rows, d);
+
+  const DiffusionExponent exponent(d);
   for (std::size_t number = levels.size(); number-- > 0;) {
     DiffusionLevel& level = levels[number];
     const bool voxels = number == 0;
-    const auto channels = static_cast<std::size_t>(problem.sources.channels);
+    const auto done = static_cast<double>(levels.size() - 1 - number), all = static_cast<double>(levels.size());
+    const Progress part = progress.Part(voxels ? 0.3 : 0.1 + 0.2 * done / all, voxels ? 1.0 : 0.1 + 0.2 * (done + 1.0) / all);
     for (std::size_t channel = 0; channel < channels; ++channel) {
       const VolumeView<float> values = voxels ? problem.result[channel] : level.values[channel].View();
       const Spread& spread = problem.spreads[channel];
       if (number + 1 < levels.size())
         RefineDiffusionLevel(levels[number + 1], level, channel, values, voxels ? spread.middle : 0.0f,
                              voxels ? spread.least : spread.least - spread.middle,
-                             voxels ? spread.most : spread.most - spread.middle, {});
-      for (std::size_t s = 0; s < problem.sources.voxels.size(); ++s) {
-        std::array<int, 3> node;
-        bool there = true;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const int from = problem.sources.voxels[s][axis] - level.first[axis];
-          node[axis] = from / level.step[axis];
-          there = there && from % level.step[axis] == 0;
-        }
-        if (there && level.nodes.View()(node[0], node[1], node[2]) == static_cast<unsigned char>(DiffusionNode::Source))
-          values(node[0], node[1], node[2]) =
-              voxels ? problem.sources.values[channel * problem.sources.voxels.size() + s] : problem.rows[channel + 1][s];
-      }
+                             voxels ? spread.most : spread.most - spread.middle, part.Part(0.0, 0.1));
+      PutSources(problem, level, voxels, channel, values);
     }
     std::array<int, 3> tiles;
     for (std::size_t axis = 0; axis < 3; ++axis)
       tiles[axis] = (level.size[axis] + Tile - 1) / Tile;
-    ParallelRanges(
-        static_cast<std::ptrdiff_t>(tiles[0]) * tiles[1] * tiles[2], 16, voxels ? progress.Part(0.3, 1.0) : Progress(),
-        [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-          TileSum sum(problem, exponent, tree.get(), {expansion, left});
-          for (std::ptrdiff_t tile = begin; tile < end; ++tile) {
-            const int t = static_cast<int>(tile);
-            sum.Run(level, voxels, {t % tiles[0] * Tile, t / tiles[0] % tiles[1] * Tile, t / (tiles[0] * tiles[1]) * Tile});
-          }
-        });
+    ParallelRanges(static_cast<std::ptrdiff_t>(tiles[0]) * tiles[1] * tiles[2], exact ? 1 : 16, part.Part(0.1, 1.0),
+                   [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                     TileSum sum(problem, exponent, tree.get(), ToleranceFor(accuracy));
+                     for (auto tile = static_cast<int>(begin); tile < static_cast<int>(end); ++tile)
+                       sum.Run(level, voxels,
+                               {tile % tiles[0] * Tile, tile / tiles[0] % tiles[1] * Tile, tile / (tiles[0] * tiles[1]) * Tile});
+                   });
   }
 }
 

@@ -15,6 +15,7 @@
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace echorama {
 
@@ -71,7 +72,7 @@ void ClassifyNodes(DiffusionLevel& level, const DiffusionLevel* coarse, const Ei
   });
 }
 
-// marks of one line spread to the nodes that interpolation reads
+// Spreads the marks of one line to the nodes that interpolation reads.
 void SpreadAlong(unsigned char* line, std::ptrdiff_t stride, int count, std::vector<unsigned char>& copy)
 {
   for (int c = 0; c < count; ++c)
@@ -115,7 +116,7 @@ void MarkCoarse(const DiffusionLevel& fine, DiffusionLevel& coarse, const Progre
     });
 }
 
-// to[i] = a line between lines, or (odd: false) a copy of one
+// The line half-way between the middle two of six.
 ECHORAMA_HOT void CombineLines(const float* const* lines, std::ptrdiff_t count, float* to)
 {
   const float *a = lines[0], *b = lines[1], *c = lines[2], *d = lines[3], *e = lines[4], *f = lines[5];
@@ -167,7 +168,7 @@ std::vector<DiffusionLevel> MakeDiffusionLevels(const std::array<int, 3>& grid, 
       coarse.doubled[axis] = true;
       coarse.step[axis] = 2 * fine.step[axis];
       coarse.first[axis] = fine.first[axis] - Border * coarse.step[axis];
-      coarse.size[axis] = fine.size[axis] / 2 + 2 * Side - 1;
+      coarse.size[axis] = (fine.size[axis] + 1) / 2 + 2 * Side - 1;
       longest = std::max(longest, 2.0 * step);
     }
     coarse.reach = stepsPerNode * longest;

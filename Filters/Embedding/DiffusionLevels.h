@@ -44,7 +44,7 @@ void PlanDiffusionLevels(std::vector<DiffusionLevel>& levels, const Eigen::Vecto
                          VolumeView<const float> squaredDistance, const Progress& progress);
 
 /// Copies and interpolates the Coarse nodes of \a fine.
-/// \param written(i0, j, k, count, values) is called with whole rows, and takes those that are Coarse
+/// \param result of the fine level: value + \a offset, within [least, most]
 void RefineDiffusionLevel(const DiffusionLevel& coarse, const DiffusionLevel& fine, std::size_t channel, VolumeView<float> result,
                           float offset, float least, float most, const Progress& progress);
 

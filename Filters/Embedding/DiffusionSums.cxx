@@ -57,12 +57,10 @@ template <int Whole>
 {
   if constexpr (Whole == 1)
     return q;
-  else if constexpr (Whole == 2)
-    return q * q;
-  else if constexpr (Whole == 3)
-    return q * q * q;
-  else if constexpr (Whole == 4)
-    return (q * q) * (q * q);
+  else if constexpr (Whole > 1 && Whole % 2 == 0)
+    return Power<Whole / 2>(q * q, half);
+  else if constexpr (Whole > 1)
+    return q * Power<Whole / 2>(q * q, half);
   else
     return Exp2(half * Log2(q));
 }
@@ -154,6 +152,12 @@ ECHORAMA_HOT void Near(const DiffusionExponent& exponent, const DiffusionNear& n
     return NearLoop<3>(exponent, near, rows, begin, end, block);
   case 4:
     return NearLoop<4>(exponent, near, rows, begin, end, block);
+  case 8:
+    return NearLoop<8>(exponent, near, rows, begin, end, block);
+  case 16:
+    return NearLoop<16>(exponent, near, rows, begin, end, block);
+  case 32:
+    return NearLoop<32>(exponent, near, rows, begin, end, block);
   default:
     return NearLoop<0>(exponent, near, rows, begin, end, block);
   }
@@ -170,6 +174,12 @@ ECHORAMA_HOT void Far(const DiffusionExponent& exponent, const DiffusionFar& far
     return FarLoop<3>(exponent, far, rows, block);
   case 4:
     return FarLoop<4>(exponent, far, rows, block);
+  case 8:
+    return FarLoop<8>(exponent, far, rows, block);
+  case 16:
+    return FarLoop<16>(exponent, far, rows, block);
+  case 32:
+    return FarLoop<32>(exponent, far, rows, block);
   default:
     return FarLoop<0>(exponent, far, rows, block);
   }
@@ -179,26 +189,16 @@ ECHORAMA_HOT void Far(const DiffusionExponent& exponent, const DiffusionFar& far
 
 DiffusionExponent::DiffusionExponent(double exponent)
   : d(exponent), half(static_cast<float>(0.5 * exponent)),
-    whole(exponent == 2.0 || exponent == 4.0 || exponent == 6.0 || exponent == 8.0 ? static_cast<int>(exponent) / 2 : 0),
     farthest(static_cast<float>(std::min(1e9, std::exp2(100.0 / (0.5 * exponent)))))
 {
+  for (const int special : {1, 2, 3, 4, 8, 16, 32})
+    if (exponent == 2.0 * special)
+      whole = special;
 }
 
 float DiffusionExponent::Weight(float squaredRatio) const
 {
-  const float q = std::max(squaredRatio, 1.0f / farthest);
-  switch (whole) {
-  case 1:
-    return Power<1>(q, half);
-  case 2:
-    return Power<2>(q, half);
-  case 3:
-    return Power<3>(q, half);
-  case 4:
-    return Power<4>(q, half);
-  default:
-    return Power<0>(q, half);
-  }
+  return Power<0>(std::max(squaredRatio, 1.0f / farthest), half);
 }
 
 void DiffusionBlock::Start()

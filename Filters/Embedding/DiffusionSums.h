@@ -10,7 +10,7 @@ struct DiffusionExponent {
   explicit DiffusionExponent(double exponent);
   double d;
   float half;     ///< d / 2: weights are powers of squared distances
-  int whole;      ///< d / 2 where it is 1, 2, 3 or 4; else 0
+  int whole = 0;  ///< d / 2 where there is a loop for it (1, 2, 3, 4, 8, 16, 32); else 0
   float farthest; ///< squared ratios of distances are cut here, where a weight is about 2^-100: no underflow
 
   /// ratio^(d / 2) for one squared ratio of distances in (0, 1].
