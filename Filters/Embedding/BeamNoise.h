@@ -15,21 +15,21 @@ enum class NoiseIntensity {
   Histogram,     ///< given quantiles, for instance those of a real volume
 };
 
-/// Noise that is made along beams. All lengths are those of the speckle before compression: the lag at which the
-/// autocorrelation of its power (the squared envelope) has fallen to one half. (That of log-compressed greys has fallen to
-/// 0.35 there, and to one half at 0.77 of the length.) A length of 0 leaves neighbours independent, so that the grain is
-/// as large as the samples are apart, as in dissertation 6.2.
+/// Noise that is made along beams; the defaults are those of an abdominal probe. All lengths are those of the speckle before
+/// compression: the lag at which the autocorrelation of its power (the squared envelope) has fallen to one half. (That of
+/// log-compressed greys has fallen to 0.35 there, and to one half at 0.77 of the length.) A length of 0 leaves neighbours
+/// independent, so that the grain is as large as the samples are apart, as in dissertation 6.2.
 struct BeamNoiseParameters {
   int samples = 400;  ///< along each beam, >= 2
-  int elements = 160; ///< beams across the fan, >= 2
-  int steps = 80;     ///< planes of the sweep, >= 2; not used where the probe does not sweep (one plane)
+  int elements = 240; ///< beams across the fan, >= 2
+  int steps = 120;    ///< planes of the sweep, >= 2; not used where the probe does not sweep (one plane)
   NoiseIntensity intensity = NoiseIntensity::LogCompressed;
   double mean = 40.0;              ///< of the intensities: > 0 for Rayleigh, (0, 255) for LogCompressed; not used for Histogram
   double dynamicRangeDb = 60.0;    ///< dB that 255 greys span (LogCompressed), [10, 200]
   std::vector<float> quantiles;    ///< for Histogram: at least 2 ascending values at evenly spaced probabilities 0 ... 1
-  double depthCorrelationMm = 0.0; ///< along the depth, mm, 0 to a quarter of the depth range
-  double fanCorrelation = 0.0;     ///< across the fan, in whole fans, [0, 0.25]
-  double sweepCorrelation = 0.0;   ///< along the sweep, in whole sweeps, [0, 0.25]
+  double depthCorrelationMm = 0.6; ///< along the depth, mm, 0 to a quarter of the depth range
+  double fanCorrelation = 0.0125;  ///< across the fan, in whole fans, [0, 0.25]
+  double sweepCorrelation = 0.025; ///< along the sweep, in whole sweeps, [0, 0.25]
   std::uint64_t seed = 1;
 };
 
@@ -41,16 +41,16 @@ struct BeamNoiseParameters {
 /// Interpolation between samples that are independent lowers the deviation halfway between them (to 0.35 of it in the middle
 /// of eight), and their lattice shows; where a length is two or three samples long it does not (see ResolvingCounts).
 ///
-/// The samples depend on the seed and on the dimensions, not on threads. Cost: 30 ns of one core per sample, plus 3 per
-/// sample of length; memory of four floats per sample.
-/// \throws Error(InvalidParameter) that names the parameter, what ProbeGeometry::Check throws, Error(TooLarge) for more than
-/// 2^31 - 1 samples, Error(Cancelled).
-/// Source: dissertation 6.2; Wagner, Smith, Sandrik, Lopez, IEEE Trans. Sonics Ultrason. 1983 (statistics of speckle).
+/// The samples depend on the seed and on the dimensions, not on threads. Cost: about 80 ns of one core per sample; memory of four
+/// floats per sample. \throws Error(InvalidParameter) that names the parameter, what ProbeGeometry::Check throws, Error(TooLarge)
+/// for more than 2^31 - 1 samples, Error(Cancelled). Source: dissertation 6.2; Wagner, Smith, Sandrik, Lopez, IEEE Trans. Sonics
+/// Ultrason. 1983 (statistics of speckle).
 Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const Progress& progress = {});
 
 /// The parameters with as many samples, elements and steps as the correlation lengths need, \a perLength to each: with 3 the
-/// deviation is within 6% everywhere after scan conversion. Where a length is 0 the count stays. Counts are at most those
-/// that make \a maximumSamples of them together: beyond, all three are lowered by one factor.
+/// deviation after scan conversion is nowhere more than 6% lower (12% of log-compressed greys) than that of the samples. Where a
+/// length is 0 the count stays. Counts are at most those that make \a maximumSamples of them together: beyond, all three are
+/// lowered by one factor.
 BeamNoiseParameters ResolvingCounts(BeamNoiseParameters parameters, const ProbeGeometry& geometry, double perLength = 3.0,
                                     double maximumSamples = 16e6);
 

@@ -7,8 +7,8 @@
 //    8192 bins). Flat places take no part.
 // 3. Correlate: sums of products at lags 1, 2, ... along each axis and in each band of depth, until all fell below one half.
 //
-// Passes 2 and 3 are done three times: the window follows the lengths that were found. A window of three lengths takes 3% of
-// the variance with it, which shortens the lengths by 2%.
+// Passes 2 and 3 are done three times: the window follows the lengths that were found, up to the widest. A window of three
+// lengths takes 3% of the variance with it, which shortens the lengths by 2%; one of two lengths shortens them by 10%.
 #include "NoiseMatch.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
@@ -317,12 +317,43 @@ std::vector<double> HalfLags(VolumeView<const float> scores, const std::vector<R
   throw Error(Error::Kind::NotPossible, "noise match: " + reason + ", which is too little texture to tell a grain from");
 }
 
+double& Along(NoiseMatch::Lengths& lengths, std::size_t axis)
+{
+  return axis == 0 ? lengths.depthMm : axis == 1 ? lengths.fan : lengths.sweep;
+}
+
+// The lower median of the bands that resolve the length, by their samples: edges of the scene can only lengthen it. When none
+// does, the least of the bounds.
+void SetTypical(NoiseMatch& match, std::size_t axis)
+{
+  std::vector<std::pair<double, double>> resolved; // length, samples
+  double all = 0.0, bound = std::numeric_limits<double>::infinity();
+  for (NoiseMatch::Band& band : match.bands) {
+    const double length = Along(band.lengths, axis);
+    if (length > 0.0 && band.lengths.resolved[axis]) {
+      resolved.emplace_back(length, static_cast<double>(band.samples));
+      all += resolved.back().second;
+    } else if (length > 0.0) {
+      bound = std::min(bound, length);
+    }
+  }
+  if (resolved.empty() && std::isinf(bound))
+    FailForWantOfTexture("no line along the depth, the fan or the sweep has enough real samples");
+  match.lengths.resolved[axis] = !resolved.empty();
+  std::sort(resolved.begin(), resolved.end());
+  double below = 0.0;
+  std::size_t at = 0;
+  while (at < resolved.size() && (below += resolved[at].second) < 0.5 * all - 1e-6 * all)
+    ++at;
+  Along(match.lengths, axis) = resolved.empty() ? bound : resolved[at].first;
+}
+
 // How much interpolation between voxels has added along each axis of beam space at a depth: variance in samples squared.
 using AddedVariance = std::function<Eigen::Vector3d(double depthMm)>;
 
 // \param plain the same samples as they were before interpolation, which takes some of their deviation: for the quantiles
 NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, VolumeView<const unsigned char> valid,
-                 const ProbeGeometry& geometry, Eigen::Vector3d window, const NoiseMatchParameters& parameters,
+                 const ProbeGeometry& geometry, const Eigen::Vector3d& widest, const NoiseMatchParameters& parameters,
                  const AddedVariance& added, const Progress& progress)
 {
   const auto& n = beams.Dimensions();
@@ -332,6 +363,7 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
     ranges.push_back({n[0] * b / parameters.depthBands, n[0] * (b + 1) / parameters.depthBands});
 
   Scores scores(beams, valid);
+  Eigen::Vector3d window = 0.5 * widest;
   const auto standardise = [&window, &n](Scores& some, const Progress& part) {
     for (int axis = 0; axis < 3; ++axis)
       window[axis] = std::min(std::max(window[axis], 2.0), static_cast<double>(n[static_cast<std::size_t>(axis)]));
@@ -346,7 +378,7 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
     for (int axis = 0; axis < axes && pass + 1 < passes; ++axis) {
       const std::vector<double> whole = HalfLags(scores.View(), {{0, n[0]}}, axis);
       if (std::isfinite(whole[0]))
-        window[axis] = windowLengths * whole[0];
+        window[axis] = std::min(windowLengths * whole[0], widest[axis]);
     }
   }
   std::array<std::vector<double>, 3> lags;
@@ -365,7 +397,6 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
 
   const double perSample[3] = {(geometry.depthMax - geometry.depthMin) / (n[0] - 1), 1.0 / (n[1] - 1),
                                1.0 / std::max(1, n[2] - 1)};
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), weights = sum, bound = Eigen::Vector3d::Constant(1e300);
   for (std::size_t b = 0; b < ranges.size(); ++b) {
     NoiseMatch::Band band;
     band.fromMm = geometry.depthMin + ranges[b].begin * perSample[0];
@@ -373,7 +404,6 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
     const BandProducts used = Correlate(scores.View(), {ranges[b]}, 0, 0);
     band.samples = used.bands[0].pairs;
     const Eigen::Vector3d variance = added(0.5 * (band.fromMm + band.toMm));
-    double* lengths[3] = {&band.lengths.depthMm, &band.lengths.fan, &band.lengths.sweep};
     for (int axis = 0; axis < axes; ++axis) {
       const auto at = static_cast<std::size_t>(axis);
       const double lag = lags[at][b];
@@ -381,23 +411,12 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
         continue;
       const double rest = lag * lag - 2.0 * std::log(2.0) * variance[axis];
       band.lengths.resolved[at] = rest > 0.5 * lag * lag;
-      *lengths[axis] = perSample[axis] * (band.lengths.resolved[at] ? std::sqrt(rest) : lag);
-      if (band.lengths.resolved[at]) {
-        sum[axis] += static_cast<double>(band.samples) * *lengths[axis];
-        weights[axis] += static_cast<double>(band.samples);
-      } else {
-        bound[axis] = std::min(bound[axis], *lengths[axis]);
-      }
+      Along(band.lengths, at) = perSample[axis] * (band.lengths.resolved[at] ? std::sqrt(rest) : lag);
     }
     match.bands.push_back(band);
   }
-  double* lengths[3] = {&match.lengths.depthMm, &match.lengths.fan, &match.lengths.sweep};
-  for (int axis = 0; axis < axes; ++axis) {
-    match.lengths.resolved[static_cast<std::size_t>(axis)] = weights[axis] > 0.0;
-    if (!(weights[axis] > 0.0) && !(bound[axis] < 1e300))
-      FailForWantOfTexture("it is too narrow: no line along its depth, fan or sweep has enough samples");
-    *lengths[axis] = weights[axis] > 0.0 ? sum[axis] / weights[axis] : bound[axis];
-  }
+  for (int axis = 0; axis < axes; ++axis)
+    SetTypical(match, static_cast<std::size_t>(axis));
   return match;
 }
 
@@ -409,6 +428,8 @@ void Check(const NoiseMatchParameters& p)
                                                      "; it lies between " + std::to_string(least) + " and " +
                                                      std::to_string(greatest));
   };
+  if (!(p.windowMm > 0.0 && std::isfinite(p.windowMm)))
+    throw Error(Error::Kind::InvalidParameter, "noise match: windowMm must be positive");
   need("depthBands", p.depthBands, 1, 100);
   need("quantiles", p.quantiles, 2, 65536);
 }
@@ -419,6 +440,14 @@ Eigen::Vector2d SpansHalfway(const ProbeGeometry& geometry)
   const double middle = 0.5 * (geometry.depthMin + geometry.depthMax);
   return {std::abs(geometry.Fan().Span(middle)),
           std::abs(geometry.Sweep().Span(geometry.Fan().PointOf({geometry.fanOffset, middle}).y()))};
+}
+
+// Standard deviations of the window that is as wide as it may be, in samples.
+Eigen::Vector3d WidestWindow(const NoiseMatchParameters& p, const ProbeGeometry& geometry, const std::array<int, 3>& n)
+{
+  const Eigen::Vector2d spans = SpansHalfway(geometry);
+  const Eigen::Vector3d sizes(geometry.depthMax - geometry.depthMin, spans[0], geometry.IsPlane() ? 1.0 : spans[1]);
+  return p.windowMm * Eigen::Array3d(1.0, 2.0, 2.0) * (Eigen::Array3d(n[0], n[1], n[2]) - 1.0).max(1.0) / sizes.array();
 }
 
 // The beams of a volume.
@@ -462,7 +491,7 @@ NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned c
   if (!valid.Empty() && valid.Dimensions() != beams.Dimensions())
     throw Error(Error::Kind::BadInput, "noise match: the valid region does not have the dimensions of the beams");
   return Match(
-      beams, beams, valid, geometry, Eigen::Vector3d::Constant(10.0), parameters,
+      beams, beams, valid, geometry, WidestWindow(parameters, geometry, beams.Dimensions()), parameters,
       [](double) { return Eigen::Vector3d::Zero().eval(); }, progress);
 }
 
@@ -514,9 +543,8 @@ NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometr
     }
     return variance;
   };
-  const Eigen::Vector3d window = Eigen::Vector3d::Constant(6.0);
-  return Match(std::as_const(beams).View(), std::as_const(plain).View(), std::as_const(valid).View(), geometry, window,
-               parameters, added, progress.Part(0.3, 1.0));
+  return Match(std::as_const(beams).View(), std::as_const(plain).View(), std::as_const(valid).View(), geometry,
+               WidestWindow(parameters, geometry, n), parameters, added, progress.Part(0.3, 1.0));
 }
 
 BeamNoiseParameters NoiseLike(const NoiseMatch& match, const ProbeGeometry& measured, const ProbeGeometry& target)

@@ -9,6 +9,9 @@ namespace echorama {
 
 /// How the grain of a volume is measured.
 struct NoiseMatchParameters {
+  /// What is smooth over so many mm along the depth and twice as many across, halfway down (standard deviations of a Gaussian),
+  /// is the scene; what is finer is grain, > 0. Lengths of more than half of it come out too short.
+  double windowMm = 2.0;
   int depthBands = 4;  ///< the depth is cut into so many equal parts for the lengths by depth, [1, 100]
   int quantiles = 257; ///< how many quantiles are given, [2, 65536]
 };
@@ -27,7 +30,7 @@ struct NoiseMatch {
     std::ptrdiff_t samples = 0; ///< that took part; lengths of bands with less than 1000 are not measured (0)
     Lengths lengths;
   };
-  Lengths lengths; ///< of all bands that resolve them, by their samples
+  Lengths lengths; ///< the lower median over the bands that resolve them: edges of the scene can only lengthen them
   std::vector<Band> bands;
   /// At evenly spaced probabilities 0 ... 1: intensities less their local mean, over their local deviation, brought to the
   /// mean and deviation below and to the range of the volume.
@@ -39,12 +42,12 @@ struct NoiseMatch {
 /// Measures the grain of a beam volume (see ScanConversion.h): the lag at which the autocorrelation of the speckle's power has
 /// fallen to one half, along each axis. \param valid 1 or 0; empty: every sample is real (samples that are not finite are not)
 ///
-/// Local mean and deviation (in a Gaussian window of three lengths, found in three passes) are taken off, and ranks put in
+/// Local mean and deviation (in a Gaussian window that three passes fit to the grain) are taken off, and ranks put in
 /// place of the values, so that neither the scene's brightness nor the machine's compression matters: the ranks
 /// are given the Rayleigh distribution that speckle has, whose autocorrelation is a known function of the power's. Its half is
 /// found between lags as that of a Gaussian. What is smooth over the window is no grain; edges of the scene that are as sharp as
 /// the grain are taken for it.
-/// Cost: about 0.2 microseconds of one core per sample.
+/// Cost: about 0.4 microseconds of one core per sample.
 /// \throws Error(NotPossible) when there are less than 1000 samples with some texture around them, Error(BadInput) for
 /// views that do not agree or are no beam volume, Error(InvalidParameter), Error(Cancelled)
 NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned char> valid, const ProbeGeometry& geometry,
