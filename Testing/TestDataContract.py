@@ -221,6 +221,21 @@ class EmbedQuality(Feed):
             filter.SetOriginalData(copy_of(image))
 
 
+class Embedder(ToOtherGrid):
+    keeps_fields = False # the probe is that of the outline
+
+
+class Feather(Feed):
+    """A volume over itself."""
+
+    works_on_blocks = False # there is one background
+
+    def connect(self, filter, images):
+        super().connect(filter, images)
+        for image in images:
+            filter.AddInputDataObject(1, copy_of(image))
+
+
 class ScanConverter(ToOtherGrid):
     works_on_blocks = False # where the output lies is in the field data, which VTK's pipeline gives to no block beforehand
     accepts = ("direction", "spacing") # the place of a beam volume says nothing
@@ -349,7 +364,9 @@ Special = {
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundDeformableAligner": DeformableAligner,
     "vtkUltrasoundStitcher": Stitcher,
+    "vtkUltrasoundEmbedder": Embedder,
     "vtkUltrasoundEmbedQuality": EmbedQuality,
+    "vtkUltrasoundFeather": Feather,
     "vtkUltrasoundStitchQuality": StitchQuality,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,

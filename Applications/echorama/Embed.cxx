@@ -96,10 +96,11 @@ void Embed(Session& session, const EmbedOptions& options)
               std::to_string(geometry.dimensions[1]) + " x " + std::to_string(geometry.dimensions[2]) + " voxels of " +
               Triple(geometry.spacing, " x ", 3) + " mm");
   session.Say("  outline     " + ProbeText(*probe));
-  const double shown = static_cast<double>(count(EmbeddedVoxel::Data) + count(EmbeddedVoxel::Blend) + count(EmbeddedVoxel::Invented));
+  const double shown =
+      static_cast<double>(count(EmbeddedVoxel::Data) + count(EmbeddedVoxel::Blend) + count(EmbeddedVoxel::Invented));
   const auto share = [&](EmbeddedVoxel kind) { return Fixed(100.0 * static_cast<double>(count(kind)) / shown, 1) + "%"; };
-  session.Say("  inside      " + share(EmbeddedVoxel::Data) + " data, " + share(EmbeddedVoxel::Blend) + " data mixed with background, " +
-              share(EmbeddedVoxel::Invented) + " invented background");
+  session.Say("  inside      " + share(EmbeddedVoxel::Data) + " data, " + share(EmbeddedVoxel::Blend) +
+              " data mixed with background, " + share(EmbeddedVoxel::Invented) + " invented background");
   for (const std::string& line : LinesOf(embedder->GetNotes()))
     session.Say("  " + line);
 }

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace echorama {
 
@@ -74,7 +75,7 @@ struct SpreadStatistics {
 
 SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics& statistics,
                         VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<const float> weights,
-                        VolumeView<const unsigned char> form, const Progress& progress)
+                        VolumeView<const unsigned char> form, double roundedVariance, const Progress& progress)
 {
   SpreadStatistics spread;
   const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
@@ -98,6 +99,10 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
       middle[axis] = std::min(sources.voxels[s][axis] * blocks.size[axis] + blocks.size[axis] / 2, blocks.voxels[axis] - 1);
     statistics.Row(middle[1], middle[2], middle[0], middle[0] + 1, &sources.values[s], &sources.values[count + s]);
   }
+  const double whole = std::accumulate(sources.values.begin() + static_cast<std::ptrdiff_t>(count), sources.values.end(), 0.0);
+  const float least = std::max(1e-30f, static_cast<float>(1e-3 * whole / static_cast<double>(count)));
+  for (std::size_t s = count; s < 2 * count; ++s)
+    sources.values[s] = std::log(std::max(sources.values[s], least));
   const Eigen::Vector3d step = spacing.cwiseProduct(Eigen::Vector3d(blocks.size[0], blocks.size[1], blocks.size[2]));
   Volume<float> mean(blocks.count), deviation(blocks.count);
   const Volume<unsigned char> wanted = Grown(shown.View());
@@ -106,7 +111,10 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
   spread.mean = Volume<double>(blocks.count);
   spread.deviation = Volume<double>(blocks.count);
   std::copy(mean.View().begin(), mean.View().end(), spread.mean.View().begin());
-  std::copy(deviation.View().begin(), deviation.View().end(), spread.deviation.View().begin());
+  std::transform(deviation.View().begin(), deviation.View().end(), spread.deviation.View().begin(), [&](float value) {
+    const double square = std::exp(2.0 * static_cast<double>(value));
+    return std::sqrt(std::max(0.0, square - roundedVariance));
+  });
   return spread;
 }
 
@@ -140,8 +148,8 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   FeatherWeights(feather, region, form, spacing, weights.View(), progress.Part(0.0, 0.15));
 
   // 1. what the data are like at their surface, everywhere
-  const LocalStatistics statistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm,
-                                   progress.Part(0.15, 0.25));
+  const LocalStatistics statistics =
+      GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
   const SpreadStatistics spread = Spread(parameters, statistics, region, spacing, weights.View(), form, progress.Part(0.25, 0.5));
 
   // 2. noise of that kind

@@ -21,8 +21,9 @@ struct LocalStatistics::Lattice {
   Lattice& operator=(const Lattice&) = delete;
 
   Blocks blocks;
-  Volume<double> weight, first, second; // sums of 1, v - mean and (v - mean)^2
+  Volume<double> weight, first, second; // sums of 1, v - mean and (v - mean)^2, or (v - trend)^2
   BlockRows rows;
+  bool fromTrend = false;
   double mean = 0.0, variance = 0.0; // of the whole
 };
 
@@ -86,13 +87,15 @@ void Smooth(VolumeView<double> values, std::size_t axis, double sigma)
 
 template <class T>
 LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
-                                 const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress)
+                                 const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress,
+                                 const LocalStatistics* trend)
 {
   if (intensity.Empty() || (!region.Empty() && region.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "local statistics: the region does not have the size of the volume");
   if (!(sigmaMm >= 0.0) || !std::isfinite(sigmaMm))
     throw Error(Error::Kind::InvalidParameter, "sigmaMm must be a number from 0 on");
   const auto lattice = std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5));
+  lattice->fromTrend = trend != nullptr;
   const Blocks& blocks = lattice->blocks;
   const auto real = [&](std::ptrdiff_t at) { return (region.Empty() || region[at]) && Counts(intensity[at]); };
 
@@ -111,8 +114,11 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
   // 2. blocks
   ParallelFor(blocks.count[2], progress.Part(0.2, 0.8), [&](std::ptrdiff_t block) {
     const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
+    std::vector<float> around(trend ? static_cast<std::size_t>(blocks.voxels[0]) : 0), unused(around.size());
     for (int k = K * blocks.size[2]; k < kEnd; ++k)
       for (int j = 0; j < blocks.voxels[1]; ++j) {
+        if (trend)
+          trend->Row(j, k, 0, blocks.voxels[0], around.data(), unused.data());
         const std::ptrdiff_t row = intensity.SliceStride() * k + intensity.RowStride() * j;
         const int J = j / blocks.size[1];
         double *weight = lattice->weight.View().Row(J, K), *first = lattice->first.View().Row(J, K),
@@ -121,8 +127,9 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
           Moments sum;
           for (const int end = std::min((I + 1) * blocks.size[0], blocks.voxels[0]); i < end; ++i)
             if (real(row + i)) {
-              const double value = static_cast<double>(intensity[row + i]) - lattice->mean;
-              sum += {1.0, value, value * value};
+              const double value = static_cast<double>(intensity[row + i]);
+              const double from = value - (trend ? static_cast<double>(around[static_cast<std::size_t>(i)]) : lattice->mean);
+              sum += {1.0, value - lattice->mean, from * from};
             }
           weight[I] += sum.weight;
           first[I] += sum.first;
@@ -164,7 +171,7 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
     const bool reached = rows[0][i] > 0.0;
     const double scale = reached ? 1.0 / rows[0][i] : 0.0;
     const double m = rows[1][i] * scale, square = rows[2][i] * scale;
-    const double v = reached ? square - m * m : variance;
+    const double v = !reached ? variance : lattice_->fromTrend ? square : square - m * m;
     mean[i] = static_cast<float>(whole + m);
     // What rounding leaves of the variance of a constant is no deviation.
     deviation[i] = static_cast<float>(v > 1e-14 * (square + whole * whole) ? std::sqrt(v) : 0.0);
@@ -173,7 +180,7 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template LocalStatistics::LocalStatistics(VolumeView<const T>, VolumeView<const unsigned char>, const Eigen::Vector3d&,        \
-                                            double, const Progress&);
+                                            double, const Progress&, const LocalStatistics*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

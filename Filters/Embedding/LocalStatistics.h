@@ -16,10 +16,12 @@ class LocalStatistics {
 public:
   /// \param region where voxels count (not 0); empty: everywhere. Voxels that are not finite never count.
   /// \param sigmaMm standard deviation of the window, mm, >= 0; below a voxel it is the voxel's block alone
-  /// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
+  /// \param trend nullptr: deviations are those from the mean of the window; else from the local means of these statistics, of
+  /// the same volume with a smaller window, so that slopes and edges of the scene are no part of them \throws Error(BadInput) for
+  /// views of different shape, Error(InvalidParameter), Error(Cancelled)
   template <class T>
   LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                  double sigmaMm, const Progress& progress = {});
+                  double sigmaMm, const Progress& progress = {}, const LocalStatistics* trend = nullptr);
 
   /// Of voxels [first, end) of row (j, k). Where no window reaches (3 standard deviations) they are those of the whole volume; of
   /// an empty region both are 0.

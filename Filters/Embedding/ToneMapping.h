@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
+#include "LocalStatistics.h"
 
 namespace echorama {
 
@@ -13,14 +14,24 @@ struct ToneMappingParameters {
   void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
 };
 
+/// The local mean of a volume, and the local deviation of its grain: of what a window of half the standard deviation does not
+/// follow. So a slope of brightness, or the edge of an organ, is not taken for coarse speckle.
+template <class T>
+LocalStatistics GrainStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
+                                const Eigen::Vector3d& spacing, double smoothMm, const Progress& progress = {})
+{
+  const LocalStatistics trend(intensity, region, spacing, 0.5 * smoothMm, progress.Part(0.0, 0.4));
+  return LocalStatistics(intensity, region, spacing, smoothMm, progress.Part(0.4, 1.0), &trend);
+}
+
 /// Removes what varies slowly from a volume, and leaves its grain; in place is allowed.
 ///
-/// With matchDeviation the result is (I - B) / S, with B and S the local mean and deviation: mean 0 and deviation 1 around every
-/// voxel. Else it is I / B, of mean 1 (dissertation 6.5). Both are measured once more on the result and corrected, because the
-/// mean of a quotient is not the quotient of means: left alone, that is a step in brightness at the seam. Where there is nothing
-/// to divide by (B or S below a thousandth of that of the whole) there is no grain: 0, or 1. Outside of the region it is that
-/// too. \param region where voxels count (not 0); empty: everywhere \throws Error(BadInput) for views of different shape,
-/// Error(InvalidParameter), Error(Cancelled)
+/// With matchDeviation the result is (I - B) / S, with B and S the local mean and deviation (GrainStatistics): mean 0 and
+/// deviation 1 around every voxel. Else it is I / B, of mean 1 (dissertation 6.5). Both are measured once more on the result and
+/// corrected, because the mean of a quotient is not the quotient of means: left alone, that is a step in brightness at the seam.
+/// Where there is nothing to divide by (B or S below a thousandth of that of the whole) there is no grain: 0, or 1. Outside of
+/// the region it is that too. \param region where voxels count (not 0); empty: everywhere \throws Error(BadInput) for views of
+/// different shape, Error(InvalidParameter), Error(Cancelled)
 void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const float> intensity,
                   VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> grain,
                   const Progress& progress = {});

@@ -57,7 +57,8 @@ vtkSmartPointer<vtkDataArray> OnGrid(vtkDataArray* array, vtkImageData* data, co
   result->SetName(array->GetName());
   result->SetNumberOfComponents(array->GetNumberOfComponents());
   result->SetNumberOfTuples(static_cast<vtkIdType>(grid.geometry.VoxelCount()));
-  const std::size_t bytes = static_cast<std::size_t>(array->GetDataTypeSize()) * static_cast<std::size_t>(array->GetNumberOfComponents());
+  const std::size_t bytes =
+      static_cast<std::size_t>(array->GetDataTypeSize()) * static_cast<std::size_t>(array->GetNumberOfComponents());
   int size[3];
   data->GetDimensions(size);
   const auto& n = grid.geometry.dimensions;
@@ -131,7 +132,8 @@ int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVec
 }
 
 //----------------------------------------------------------------------------
-const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformationVector** inputs, const echorama::Progress& progress)
+const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformationVector** inputs,
+                                                                  const echorama::Progress& progress)
 {
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
   vtkImageData* shape = inputs[2]->GetNumberOfInformationObjects() > 0 ? vtkImageData::GetData(inputs[2]) : nullptr;
@@ -224,15 +226,15 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
     std::vector<echorama::NoiseInput> tiles;
     for (const auto& volume : volumes) {
       vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
-        tiles.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume), FanOf(volume, progress.Part(0.8, 0.82)),
-                         volume.Name});
+        tiles.push_back(
+            {vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume), FanOf(volume, progress.Part(0.8, 0.82)), volume.Name});
       });
     }
     const echorama::TiledNoise tiled = echorama::TileNoise(tiling, tiles, progress.Part(0.82, 0.9));
     Volume<float> real(grid.dimensions);
     Volume<unsigned char> there(grid.dimensions);
-    echorama::FillFan<float>({tiled.intensity.View(), tiled.valid.View(), tiled.geometry}, tiled.fan, plan.Form, grid, real.View(),
-                             there.View(), progress.Part(0.9, 1.0));
+    echorama::FillFan<float>({tiled.intensity.View(), tiled.valid.View(), tiled.geometry}, tiled.fan, plan.Form, grid,
+                             real.View(), there.View(), progress.Part(0.9, 1.0));
     std::ptrdiff_t missing = 0;
     for (std::ptrdiff_t at = 0; at < noise.Size(); ++at) {
       if (there.View()[at]) {
@@ -317,7 +319,8 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   parameters.diffusion.outsideExponent = this->OutsideExponent;
   vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
     using T = decltype(type);
-    echorama::Embed<T>(parameters, region, grid.spacing, noise.View(), form.View(), vtkUltrasoundVolume::ViewOf<T>(intensity, output),
+    echorama::Embed<T>(parameters, region, grid.spacing, noise.View(), form.View(),
+                       vtkUltrasoundVolume::ViewOf<T>(intensity, output),
                        vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output), progress.Part(0.4, 1.0));
   });
 }

@@ -3,18 +3,18 @@
  * @class vtkUltrasoundEmbedder
  * @brief puts a stitched volume into a background of noise, so that it looks as one scan of a real machine
  *
- * Input 0: a volume; its `ValidRegion` is what was seen (no array: all of it). Input 1 (optional, repeatable): real noise volumes,
- * which are placed side by side and fill the background; without them the noise is made (see vtkUltrasoundNoiseSource). Input 2
- * (optional): a volume whose fan (its `ProbeGeometry`, else fitted to its valid region) gives the outline; it grows until it holds
- * all data. Without it the fan is found from the data.
+ * Input 0: a volume; its `ValidRegion` is what was seen (no array: all of it). Input 1 (optional, repeatable): real noise
+ * volumes, which are placed side by side and fill the background; without them the noise is made (see vtkUltrasoundNoiseSource).
+ * Input 2 (optional): a volume whose fan (its `ProbeGeometry`, else fitted to its valid region) gives the outline; it grows until
+ * it holds all data. Without it the fan is found from the data.
  *
- * Output: a volume on the lattice of the first, grown by whole voxels to hold the fan (no voxel is resampled), of the same type, with
- * all its arrays and field data, the fan as its probe, and one more point array `Embedding` (unsigned char): 0 nothing, 1 data
- * (unchanged to the last bit), 2 data mixed with background, 3 invented background. `ValidRegion` stays that of the data, so
+ * Output: a volume on the lattice of the first, grown by whole voxels to hold the fan (no voxel is resampled), of the same type,
+ * with all its arrays and field data, the fan as its probe, and one more point array `Embedding` (unsigned char): 0 nothing, 1
+ * data (unchanged to the last bit), 2 data mixed with background, 3 invented background. `ValidRegion` stays that of the data, so
  * that nothing invented passes as seen.
  *
- * Local mean and deviation of the data at their surface spread into the background (vtkUltrasoundSurfaceDiffuser), whose grain gets
- * them (vtkUltrasoundToneMapper); the border of the data fades into it (vtkUltrasoundFeather).
+ * Local mean and deviation of the data at their surface spread into the background (vtkUltrasoundSurfaceDiffuser), whose grain
+ * gets them (vtkUltrasoundToneMapper); the border of the data fades into it (vtkUltrasoundFeather).
  *
  * Fails when nothing of the volume is valid, when no fan is known of a noise volume, and when memory does not suffice.
  *
@@ -75,7 +75,8 @@ public:
   ///@}
 
   ///@{
-  /** The exponents of distance by which values at the surface spread into the data and out of them, in [1, 64]. Default 6 and 4. */
+  /** The exponents of distance by which values at the surface spread into the data and out of them, in [1, 64]. Default 6 and 4.
+   */
   vtkSetClampMacro(InsideExponent, double, 1.0, 64.0);
   vtkGetMacro(InsideExponent, double);
   vtkSetClampMacro(OutsideExponent, double, 1.0, 64.0);
