@@ -27,6 +27,7 @@ namespace echorama {
 namespace {
 
 constexpr int Tile = 8;
+constexpr std::size_t FewSources = 512;  // their sums cost no more than lattices, which are at their worst with them
 constexpr std::size_t ExactChunk = 1024; // sources whose sums are floats, before they are added to doubles
 
 struct Spread { // of one channel
@@ -223,7 +224,7 @@ private:
 // What an accuracy takes: measured with white noise on the surface, the worst there is, for d from 1 to 64.
 double StepsFor(double accuracy, double d)
 {
-  return std::max(2.5, std::max(3.0, std::sqrt(d) * (1.7 + 0.01 * d)) * std::pow(0.002 / accuracy, 1.0 / 9.0));
+  return std::max(2.5, std::max(3.0, std::sqrt(d) * (1.8 + 0.01 * d)) * std::pow(0.002 / accuracy, 1.0 / 9.0));
 }
 
 DiffusionTolerance ToleranceFor(double accuracy)
@@ -259,7 +260,8 @@ void DiffuseWith(const Problem& problem, double d, const Wanted& wanted, const P
   const bool exact = problem.parameters.exact;
   const double farthest =
       std::sqrt(static_cast<double>(*std::max_element(problem.squaredDistance.begin(), problem.squaredDistance.end())));
-  const double steps = exact ? std::numeric_limits<double>::infinity() : StepsFor(accuracy, d);
+  const bool lattices = !exact && problem.sources.voxels.size() > FewSources;
+  const double steps = lattices ? StepsFor(accuracy, d) : std::numeric_limits<double>::infinity();
   std::vector<DiffusionLevel> levels = MakeDiffusionLevels(grid, problem.spacing, steps, farthest, problem.sources.channels);
   ParallelFor(grid[2], progress.Part(0.0, 0.02), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
@@ -287,7 +289,8 @@ void DiffuseWith(const Problem& problem, double d, const Wanted& wanted, const P
       if (number + 1 < levels.size())
         RefineDiffusionLevel(levels[number + 1], level, channel, values, voxels ? spread.middle : 0.0f,
                              voxels ? spread.least : spread.least - spread.middle,
-                             voxels ? spread.most : spread.most - spread.middle, part.Part(0.0, 0.1));
+                             voxels ? spread.most : spread.most - spread.middle,
+                             part.Part(0.02 * static_cast<double>(channel), 0.02 * static_cast<double>(channel + 1)));
       PutSources(problem, level, voxels, channel, values);
     }
     std::array<int, 3> tiles;

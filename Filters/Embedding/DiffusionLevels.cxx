@@ -85,7 +85,7 @@ void SpreadAlong(unsigned char* line, std::ptrdiff_t stride, int count, std::vec
 void MarkCoarse(const DiffusionLevel& fine, DiffusionLevel& coarse, const Progress& progress)
 {
   const VolumeView<unsigned char> marks = coarse.nodes.View();
-  ParallelFor(coarse.size[2], progress, [&](std::ptrdiff_t slice) {
+  ParallelFor(coarse.size[2], progress.Part(0.0, 0.8), [&](std::ptrdiff_t slice) {
     const int c = static_cast<int>(slice);
     const int k0 = coarse.doubled[2] ? 2 * (c - Border) : c, k1 = coarse.doubled[2] ? k0 + 2 : k0 + 1;
     for (int k = std::max(k0, 0); k < std::min(k1, fine.size[2]); ++k)
@@ -109,7 +109,7 @@ void MarkCoarse(const DiffusionLevel& fine, DiffusionLevel& coarse, const Progre
     }
   });
   if (coarse.doubled[2])
-    ParallelFor(coarse.size[1], progress, [&](std::ptrdiff_t j) {
+    ParallelFor(coarse.size[1], progress.Part(0.8, 1.0), [&](std::ptrdiff_t j) {
       std::vector<unsigned char> copy(static_cast<std::size_t>(coarse.size[2]));
       for (int i = 0; i < coarse.size[0]; ++i)
         SpreadAlong(marks.Row(static_cast<int>(j), 0) + i, marks.SliceStride(), coarse.size[2], copy);
@@ -186,9 +186,11 @@ void PlanDiffusionLevels(std::vector<DiffusionLevel>& levels, const Eigen::Vecto
 {
   for (std::size_t number = 0; number < levels.size(); ++number) {
     const bool last = number + 1 == levels.size();
-    ClassifyNodes(levels[number], last ? nullptr : &levels[number + 1], spacing, squaredDistance, progress);
+    const auto done = static_cast<double>(number), all = static_cast<double>(levels.size());
+    ClassifyNodes(levels[number], last ? nullptr : &levels[number + 1], spacing, squaredDistance,
+                  progress.Part(done / all, (done + 0.5) / all));
     if (!last)
-      MarkCoarse(levels[number], levels[number + 1], progress);
+      MarkCoarse(levels[number], levels[number + 1], progress.Part((done + 0.5) / all, (done + 1.0) / all));
   }
 }
 

@@ -167,7 +167,7 @@ TEST(Diffusion, FastAgreesWithExactForAllExponents)
 TEST(Diffusion, FastAgreesWithExactForScatteredSources)
 {
   const Grid grid{60, 50, 40};
-  for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{30}, std::size_t{4000}}) {
+  for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{30}, std::size_t{700}, std::size_t{4000}}) {
     Volume<unsigned char> taken(grid, 0);
     std::vector<Grid> voxels;
     Random random(3);
