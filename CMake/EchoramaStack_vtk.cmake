@@ -4,7 +4,7 @@ set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks 
   FiltersCore FiltersGeneral FiltersSources IOCore IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
   RenderingVolumeOpenGL2 RenderingImage)
-find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} ImagingFourier # the last: a peer in benchmarks
+find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} ImagingFourier ImagingHybrid # the last two: peers in benchmarks
   Python WrappingPythonCore WrappingTools)
 include(EchoramaDependencies)
 set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH
