@@ -150,7 +150,9 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   // 1. what the data are like at their surface, everywhere
   const LocalStatistics statistics =
       GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
-  const SpreadStatistics spread = Spread(parameters, statistics, region, spacing, weights.View(), form, progress.Part(0.25, 0.5));
+  const double rounded = std::is_integral_v<T> ? 1.0 / 12.0 : 0.0; // the variance that rounding adds to data and result alike
+  const SpreadStatistics spread =
+      Spread(parameters, statistics, region, spacing, weights.View(), form, rounded, progress.Part(0.25, 0.5));
 
   // 2. noise of that kind
   const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};

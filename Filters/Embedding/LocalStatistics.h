@@ -32,4 +32,14 @@ private:
   std::shared_ptr<const Lattice> lattice_;
 };
 
+/// The local mean of data, and the local deviation of their grain: of what a window of half the standard deviation does not
+/// follow. So a slope of brightness, or the edge of an organ, is not taken for coarse speckle.
+template <class T>
+LocalStatistics GrainStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
+                                const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress = {})
+{
+  const LocalStatistics trend(intensity, region, spacing, 0.5 * sigmaMm, progress.Part(0.0, 0.4));
+  return LocalStatistics(intensity, region, spacing, sigmaMm, progress.Part(0.4, 1.0), &trend);
+}
+
 } // namespace echorama

@@ -73,13 +73,9 @@ void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const floa
   parameters.Check();
   if (intensity.Dimensions() != grain.Dimensions() || (!region.Empty() && region.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "tone mapping: the volumes do not have one size");
-  const auto measure = [&](VolumeView<const float> volume, const Progress& part) {
-    return parameters.matchDeviation ? GrainStatistics(volume, region, spacing, parameters.smoothMm, part)
-                                     : LocalStatistics(volume, region, spacing, parameters.smoothMm, part);
-  };
-  const LocalStatistics first = measure(intensity, progress.Part(0.0, 0.3));
+  const LocalStatistics first(intensity, region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3));
   Normalise(parameters.matchDeviation, first, intensity, region, grain, progress.Part(0.3, 0.5));
-  const LocalStatistics second = measure(grain, progress.Part(0.5, 0.8));
+  const LocalStatistics second(VolumeView<const float>(grain), region, spacing, parameters.smoothMm, progress.Part(0.5, 0.8));
   Normalise(parameters.matchDeviation, second, grain, region, grain, progress.Part(0.8, 1.0));
 }
 

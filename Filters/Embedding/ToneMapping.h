@@ -2,7 +2,6 @@
 #pragma once
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
-#include "LocalStatistics.h"
 
 namespace echorama {
 
@@ -13,16 +12,6 @@ struct ToneMappingParameters {
 
   void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
 };
-
-/// The local mean of a volume, and the local deviation of its grain: of what a window of half the standard deviation does not
-/// follow. So a slope of brightness, or the edge of an organ, is not taken for coarse speckle.
-template <class T>
-LocalStatistics GrainStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
-                                const Eigen::Vector3d& spacing, double smoothMm, const Progress& progress = {})
-{
-  const LocalStatistics trend(intensity, region, spacing, 0.5 * smoothMm, progress.Part(0.0, 0.4));
-  return LocalStatistics(intensity, region, spacing, smoothMm, progress.Part(0.4, 1.0), &trend);
-}
 
 /// Removes what varies slowly from a volume, and leaves its grain; in place is allowed.
 ///

@@ -115,6 +115,22 @@ TEST(LocalStatistics, ALargeOffsetCostsNoDigits)
   EXPECT_NEAR(got.deviation.View()(12, 12, 12), 1.0, 1e-3);
 }
 
+// A slope that is steeper than the grain is coarse: the window alone takes it for deviation, the grain's does not.
+TEST(LocalStatistics, TheDeviationOfGrainLeavesSlopesOut)
+{
+  Volume<float> volume({60, 40, 40});
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 60; ++i)
+        volume.View()(i, j, k) =
+            static_cast<float>(5.0 * i + 4.0 * Random(6, static_cast<std::uint64_t>((k * 40 + j) * 60 + i)).Normal());
+  const Values plain = All(LocalStatistics(VolumeView<const float>(volume.View()), {}, unit, 4.0), volume);
+  const Values grain = All(GrainStatistics(VolumeView<const float>(volume.View()), {}, unit, 4.0), volume);
+  EXPECT_NEAR(plain.deviation.View()(30, 20, 20), std::hypot(4.0, 5.0 * 4.0), 1.5);
+  EXPECT_NEAR(grain.deviation.View()(30, 20, 20), 4.0, 0.4);
+  EXPECT_EQ(grain.mean.View()(30, 20, 20), plain.mean.View()(30, 20, 20));
+}
+
 TEST(LocalStatistics, DoesNotDependOnThreads)
 {
   Volume<float> volume({50, 40, 30});
