@@ -294,6 +294,10 @@ class Phantom(ToOtherGrid):
         return filter
 
 
+class NoiseSource(Phantom):
+    """Made from no input; the volumes that it may take are a matter of its own test."""
+
+
 class Files(Feed):
     def __init__(self, make):
         super().__init__(make)
@@ -359,6 +363,7 @@ Special = {
     "vtkUltrasoundSequenceReader": SequenceReader,
     "vtkUltrasoundSequenceWriter": SequenceWriter,
     "vtkUltrasoundWriter": Writer,
+    "vtkUltrasoundNoiseSource": NoiseSource,
     "vtkUltrasoundPhantomSource": Phantom,
     "vtkUltrasoundAligner": Aligner,
     "vtkUltrasoundAlignmentScore": Score,

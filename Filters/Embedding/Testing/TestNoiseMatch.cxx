@@ -89,7 +89,7 @@ TEST(NoiseMatch, CoarseGrainNeedsAWideWindow)
 {
   const BeamNoiseParameters p = NoiseOf(2.5, 3.0, 3.0);
   const Volume<float> beams = MakeBeamNoise(p, probe);
-  EXPECT_LT(MatchBeams(beams.View(), {}, probe).lengths.depthMm, 0.85 * 2.5);
+  EXPECT_LT(MatchBeams(beams.View(), {}, probe).lengths.depthMm, 0.9 * 2.5);
   NoiseMatchParameters wide;
   wide.windowMm = 6.0;
   ExpectLengths(MatchBeams(beams.View(), {}, probe, wide).lengths, p, 0.15);
