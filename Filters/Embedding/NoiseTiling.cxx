@@ -39,49 +39,57 @@ std::string Text(const char* format, double a, double b = 0.0)
   return text;
 }
 
-// The samples of one volume without their rim, and where its first depth lies in steps from depth 0.
-struct Beams {
-  Volume<float> samples;
-  int firstDepth = 0;
-};
-
 // What all tiles share: the distances between samples, of the first volume.
 struct Lattice {
-  double depthStep, fanPitch, sweepPitch; // mm; radians or mm; 0 for a plane
+  double depthStep = 1.0, fanPitch = 1.0, sweepPitch = 0.0; // mm; radians or mm; 0 for a plane
 };
 
-Volume<float> WithoutRim(VolumeView<const float> beams, const std::array<int, 3>& rim)
+// How one volume is read: its fan, cut to whole steps of the common depths, and the samples of that.
+struct Reading {
+  PlacedProbe fan;
+  std::array<int, 3> dimensions{0, 0, 0}, rim{0, 0, 0};
+  int firstDepth = 0; // of what is used, in steps from depth 0
+
+  std::array<int, 3> Used() const { return {dimensions[0] - 2 * rim[0], dimensions[1] - 2 * rim[1], dimensions[2] - 2 * rim[2]}; }
+};
+
+ImageGeometry GeometryOf(const NoiseInput& input)
 {
-  const auto& n = beams.Dimensions();
-  Volume<float> inner({n[0] - 2 * rim[0], n[1] - 2 * rim[1], n[2] - 2 * rim[2]});
+  return std::visit([](const auto& volume) { return volume.geometry; }, input.volume);
+}
+
+Reading ReadingOf(const NoiseInput& input, const Lattice& lattice)
+{
+  Reading reading;
+  reading.fan = input.fan;
+  ProbeGeometry& fan = reading.fan.geometry;
+  const double first = std::ceil(fan.depthMin / lattice.depthStep - 1e-6);
+  const double last = std::floor(fan.depthMax / lattice.depthStep + 1e-6);
+  if (last < first + 3.0)
+    throw Error(Error::Kind::BadInput, "noise tiling: " + input.name + " is only a few samples deep");
+  fan.depthMin = first * lattice.depthStep;
+  fan.depthMax = last * lattice.depthStep;
+  const auto count = [](double extent, double pitch) { return std::max(2, static_cast<int>(std::lround(extent / pitch)) + 1); };
+  reading.dimensions = {static_cast<int>(last - first) + 1, count(ExtentOf(fan.Fan()), lattice.fanPitch), 1};
+  if (lattice.sweepPitch > 0.0)
+    reading.dimensions[2] = count(ExtentOf(fan.Sweep()), lattice.sweepPitch);
+  reading.rim = RimOf(fan, reading.dimensions, GeometryOf(input));
+  reading.firstDepth = static_cast<int>(first) + reading.rim[0];
+  return reading;
+}
+
+// The samples of one volume without their rim.
+Volume<float> BeamsOf(const NoiseInput& input, const Reading& reading, const Progress& progress)
+{
+  const Volume<float> all = std::visit(
+      [&](const auto& volume) { return SampleBeams(volume, reading.fan, reading.dimensions, progress); }, input.volume);
+  const auto& rim = reading.rim;
+  Volume<float> inner(reading.Used());
   const auto view = inner.View();
   for (int k = 0; k < view.Dimensions()[2]; ++k)
     for (int j = 0; j < view.Dimensions()[1]; ++j)
-      std::copy_n(beams.Row(j + rim[1], k + rim[2]) + rim[0], view.Dimensions()[0], view.Row(j, k));
+      std::copy_n(all.View().Row(j + rim[1], k + rim[2]) + rim[0], view.Dimensions()[0], view.Row(j, k));
   return inner;
-}
-
-Beams BeamsOf(const NoiseInput& input, const Lattice& lattice, const Progress& progress)
-{
-  // Depths are put on the common lattice: the fan is cut to whole steps.
-  PlacedProbe fan = input.fan;
-  const double first = std::ceil(fan.geometry.depthMin / lattice.depthStep - 1e-6);
-  const double last = std::floor(fan.geometry.depthMax / lattice.depthStep + 1e-6);
-  if (last < first + 3.0)
-    throw Error(Error::Kind::BadInput, input.name + ": it is only a few samples deep");
-  fan.geometry.depthMin = first * lattice.depthStep;
-  fan.geometry.depthMax = last * lattice.depthStep;
-  const auto count = [](double extent, double pitch) { return std::max(2, static_cast<int>(std::lround(extent / pitch)) + 1); };
-  std::array<int, 3> dimensions{static_cast<int>(last - first) + 1, count(ExtentOf(fan.geometry.Fan()), lattice.fanPitch), 1};
-  if (lattice.sweepPitch > 0.0)
-    dimensions[2] = count(ExtentOf(fan.geometry.Sweep()), lattice.sweepPitch);
-  return std::visit(
-      [&](const auto& volume) {
-        const Volume<float> all = SampleBeams(volume, fan, dimensions, progress);
-        const auto rim = RimOf(fan.geometry, dimensions, volume.geometry);
-        return Beams{WithoutRim(all.View(), rim), static_cast<int>(first) + rim[0]};
-      },
-      input.volume);
 }
 
 // A volume that is used for the n-th time: as it is, turned by half about its middle beam, mirrored in the sweep, in the fan.
@@ -96,12 +104,6 @@ Volume<float> UsedAgain(const Volume<float>& samples, int use)
   return turned;
 }
 
-struct Tile {
-  Volume<float> samples;
-  Volume<unsigned char> valid;
-  std::array<int, 3> first{0, 0, 0}; // of the common lattice
-};
-
 int OverlapBeams(const ProbeArc& arc, double pitch, const NoiseTilingParameters& parameters)
 {
   return static_cast<int>(std::lround((Turns(arc) ? parameters.overlapDegrees * degree : parameters.overlapMm) / pitch));
@@ -115,6 +117,169 @@ void RefuseOverlap(const NoiseInput& input, const ProbeArc& arc, const char* wha
                   Text(" is %.4g, but the ", turns ? parameters.overlapDegrees : parameters.overlapMm) + what + " of " +
                   input.name + Text(" is %.4g", turns ? arc.angle / degree : arc.width) + (turns ? " degrees" : " mm") +
                   ": nothing would be left of it beside its neighbour");
+}
+
+// Which volume lies where on the common lattice, for the how many-th time.
+struct Tile {
+  std::size_t which = 0;
+  int use = 0;
+  std::array<int, 3> first{0, 0, 0};
+};
+
+// All but the voxels.
+struct Plan {
+  std::vector<Reading> readings; // of the volumes that are used
+  std::vector<Tile> tiles;
+  std::array<int, 3> size{0, 0, 1};
+  Eigen::Vector3d pitchMm = Eigen::Vector3d::Ones(); // between samples, beams and steps, halfway down
+  PlacedProbe fan;
+  ImageGeometry geometry;
+};
+
+void CheckInputs(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes)
+{
+  parameters.Check();
+  if (volumes.empty())
+    throw Error(Error::Kind::BadInput, "noise tiling: there is no volume");
+  const NoiseInput& first = volumes[0];
+  const ProbeGeometry& head = first.fan.geometry;
+  for (const NoiseInput& input : volumes) {
+    const ProbeGeometry& fan = input.fan.geometry;
+    fan.Check();
+    GeometryOf(input).Check("noise tiling: " + input.name);
+    if (fan.IsPlane() != head.IsPlane())
+      throw Error(Error::Kind::BadInput, "noise tiling: " + (head.IsPlane() ? first.name : input.name) +
+                                             " is a single plane, but " + (head.IsPlane() ? input.name : first.name) +
+                                             " is a volume");
+    if (Turns(fan.Fan()) != Turns(head.Fan()) || (!head.IsPlane() && Turns(fan.Sweep()) != Turns(head.Sweep())))
+      throw Error(Error::Kind::BadInput, "noise tiling: of " + first.name + " and " + input.name +
+                                             " one has a fan or a sweep that turns and the other one that runs straight, so they "
+                                             "do not fit side by side");
+  }
+  if (head.IsPlane() && parameters.rows > 1)
+    throw Error(Error::Kind::InvalidParameter,
+                "noise tiling: rows is " + std::to_string(parameters.rows) + ", but planes do not sweep");
+}
+
+Plan PlanOf(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes)
+{
+  CheckInputs(parameters, volumes);
+  const int number = static_cast<int>(std::min<std::size_t>(volumes.size(), 1000000));
+  const int rows = parameters.rows, columns = parameters.columns > 0 ? parameters.columns : (number + rows - 1) / rows;
+  const int used = std::min(number, rows * columns);
+  const ProbeGeometry& head = volumes[0].fan.geometry;
+  const bool plane = head.IsPlane();
+  const double voxel = VoxelSize(GeometryOf(volumes[0]));
+  const auto full = BeamDimensionsFor(head, voxel);
+  Lattice lattice;
+  lattice.depthStep = (head.depthMax - head.depthMin) / (full[0] - 1);
+  lattice.fanPitch = ExtentOf(head.Fan()) / (full[1] - 1);
+  if (!plane)
+    lattice.sweepPitch = ExtentOf(head.Sweep()) / (full[2] - 1);
+
+  Plan plan;
+  int firstDepth = std::numeric_limits<int>::max();
+  for (int i = 0; i < used; ++i) {
+    plan.readings.push_back(ReadingOf(volumes[static_cast<std::size_t>(i)], lattice));
+    firstDepth = std::min(firstDepth, plan.readings.back().firstDepth);
+  }
+  const int fanOverlap = OverlapBeams(head.Fan(), lattice.fanPitch, parameters);
+  const int sweepOverlap = plane ? 0 : OverlapBeams(head.Sweep(), lattice.sweepPitch, parameters);
+  for (int row = 0, nextSweep = 0; row < rows; ++row) {
+    int sweepEnd = 0;
+    for (int column = 0, nextFan = 0; column < columns; ++column) {
+      const int place = row * columns + column;
+      Tile tile;
+      tile.which = static_cast<std::size_t>(place % used);
+      tile.use = place / used;
+      const Reading& reading = plan.readings[tile.which];
+      const auto n = reading.Used();
+      if (columns > 1 && fanOverlap >= n[1] - 1)
+        RefuseOverlap(volumes[tile.which], reading.fan.geometry.Fan(), "fan", parameters);
+      if (rows > 1 && sweepOverlap >= n[2] - 1)
+        RefuseOverlap(volumes[tile.which], reading.fan.geometry.Sweep(), "sweep", parameters);
+      tile.first = {reading.firstDepth - firstDepth, nextFan, nextSweep};
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        plan.size[axis] = std::max(plan.size[axis], tile.first[axis] + n[axis]);
+      nextFan += n[1] - 1 - fanOverlap;
+      sweepEnd = std::max(sweepEnd, nextSweep + n[2] - 1);
+      plan.tiles.push_back(tile);
+    }
+    nextSweep = sweepEnd - sweepOverlap;
+  }
+
+  plan.fan = volumes[0].fan;
+  ProbeGeometry& fan = plan.fan.geometry;
+  const double wider = static_cast<double>(plan.size[1] - 1) / (full[1] - 1);
+  const double longer = plane ? 1.0 : static_cast<double>(plan.size[2] - 1) / (full[2] - 1);
+  fan.fanAngle *= wider;
+  fan.fanWidth *= wider;
+  fan.sweepAngle *= longer;
+  fan.sweepWidth *= longer;
+  fan.fanOffset /= wider;
+  fan.depthMin = firstDepth * lattice.depthStep;
+  fan.depthMax = (firstDepth + plan.size[0] - 1) * lattice.depthStep;
+  try {
+    CheckBeamVolume(plan.size, fan);
+  } catch (const Error& error) {
+    if (error.GetKind() == Error::Kind::TooLarge)
+      throw;
+    throw Error(Error::Kind::NotPossible,
+                "noise tiling: " + std::to_string(columns) + " columns and " + std::to_string(rows) + " rows make a fan of " +
+                    Text("%.1f degrees that sweeps over %.1f degrees", fan.fanAngle / degree, fan.sweepAngle / degree) +
+                    ", and no probe has that (" + error.what() + ")");
+  }
+  const double halfway = 0.5 * (head.depthMin + head.depthMax);
+  plan.pitchMm = {lattice.depthStep, head.Fan().Span(halfway) / (full[1] - 1), lattice.depthStep};
+  if (!plane) {
+    const double span = std::abs(head.Sweep().Span(head.Fan().PointOf({head.fanOffset, halfway}).y()));
+    plan.pitchMm.z() = std::max(span / (full[2] - 1), 1e-3 * lattice.depthStep); // the axis of the sweep may lie there
+  }
+  plan.geometry = ScanConversionGrid(fan, plan.fan.probeToWorld, parameters.spacingMm > 0.0 ? parameters.spacingMm : voxel,
+                                     parameters.maxVoxels);
+  return plan;
+}
+
+// The tiles as one beam volume, NaN where none is.
+Volume<float> Blended(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes, const Plan& plan,
+                      const Progress& progress)
+{
+  std::vector<Volume<float>> beams;
+  const double count = static_cast<double>(plan.readings.size());
+  for (std::size_t i = 0; i < plan.readings.size(); ++i) {
+    const double done = static_cast<double>(i);
+    beams.push_back(BeamsOf(volumes[i], plan.readings[i], progress.Part(0.4 * done / count, 0.4 * (done + 1.0) / count)));
+  }
+  if (plan.tiles.size() == 1)
+    return std::move(beams[0]);
+
+  ImageGeometry grid;
+  grid.dimensions = plan.size;
+  grid.spacing = plan.pitchMm;
+  std::vector<Volume<float>> turned;
+  std::vector<Volume<unsigned char>> real;
+  std::vector<StitchInput> inputs;
+  turned.reserve(plan.tiles.size());
+  real.reserve(plan.tiles.size());
+  for (const Tile& tile : plan.tiles) {
+    if (tile.use > 0)
+      turned.push_back(UsedAgain(beams[tile.which], tile.use));
+    const Volume<float>& samples = tile.use > 0 ? turned.back() : beams[tile.which];
+    real.emplace_back(samples.Dimensions());
+    std::transform(samples.View().begin(), samples.View().end(), real.back().View().begin(),
+                   [](float value) { return static_cast<unsigned char>(std::isfinite(value)); });
+    ImageGeometry place = grid;
+    place.dimensions = samples.Dimensions();
+    place.origin = Eigen::Vector3d(tile.first[0], tile.first[1], tile.first[2]).cwiseProduct(grid.spacing);
+    inputs.push_back({PosedVolume<float>{samples.View(), std::as_const(real.back()).View(), place}, volumes[tile.which].name});
+  }
+  Volume<float> whole(plan.size);
+  Volume<unsigned char> valid(plan.size), coverage(plan.size);
+  Stitch<float>(parameters.stitch, inputs, grid, {whole.View(), valid.View(), coverage.View(), {}}, progress.Part(0.4, 1.0));
+  for (std::ptrdiff_t i = 0; i < whole.View().Size(); ++i)
+    if (!valid.View()[i])
+      whole.View()[i] = std::numeric_limits<float>::quiet_NaN();
+  return whole;
 }
 
 } // namespace
@@ -145,137 +310,26 @@ void NoiseTilingParameters::Check() const
   notNegative("spacingMm", spacingMm);
 }
 
+TiledBeams TileNoiseBeams(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes,
+                          const Progress& progress)
+{
+  const Plan plan = PlanOf(parameters, volumes);
+  return {Blended(parameters, volumes, plan, progress), plan.fan};
+}
+
+NoiseTiling PlanNoiseTiling(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes)
+{
+  const Plan plan = PlanOf(parameters, volumes);
+  return {plan.geometry, plan.fan};
+}
+
 TiledNoise TileNoise(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes, const Progress& progress)
 {
-  parameters.Check();
-  if (volumes.empty())
-    throw Error(Error::Kind::BadInput, "noise tiling: there is no volume");
-  const auto number = static_cast<int>(std::min<std::size_t>(volumes.size(), 1000000));
-  const int rows = parameters.rows, columns = parameters.columns > 0 ? parameters.columns : (number + rows - 1) / rows;
-  const ProbeGeometry& head = volumes[0].fan.geometry;
-  for (const NoiseInput& input : volumes) {
-    input.fan.geometry.Check();
-    if (input.fan.geometry.IsPlane() != head.IsPlane())
-      throw Error(Error::Kind::BadInput, "noise tiling: " + (head.IsPlane() ? volumes[0].name : input.name) +
-                                             " is a single plane, but " + (head.IsPlane() ? input.name : volumes[0].name) +
-                                             " is a volume");
-    if (Turns(input.fan.geometry.Fan()) != Turns(head.Fan()) ||
-        (!head.IsPlane() && Turns(input.fan.geometry.Sweep()) != Turns(head.Sweep())))
-      throw Error(Error::Kind::BadInput, "noise tiling: of " + volumes[0].name + " and " + input.name +
-                                             " one has a fan or a sweep that turns and the other one that runs straight, so they "
-                                             "do not fit side by side");
-  }
-  if (head.IsPlane() && rows > 1)
-    throw Error(Error::Kind::InvalidParameter, "noise tiling: rows is " + std::to_string(rows) + ", but planes do not sweep");
-
-  // 1. the beams of all
-  const double voxel = std::visit(
-      [](const auto& volume) {
-        volume.geometry.Check("the first noise volume");
-        return VoxelSize(volume.geometry);
-      },
-      volumes[0].volume);
-  const auto full = BeamDimensionsFor(head, voxel);
-  const Lattice lattice{(head.depthMax - head.depthMin) / (full[0] - 1), ExtentOf(head.Fan()) / (full[1] - 1),
-                        head.IsPlane() ? 0.0 : ExtentOf(head.Sweep()) / (full[2] - 1)};
-  const int tileCount = rows * columns, used = std::min(number, tileCount);
-  std::vector<Beams> beams;
-  for (int i = 0; i < used; ++i)
-    beams.push_back(BeamsOf(volumes[static_cast<std::size_t>(i)], lattice, progress.Part(0.3 * i / used, 0.3 * (i + 1) / used)));
-
-  // 2. side by side
-  const int fanOverlap = OverlapBeams(head.Fan(), lattice.fanPitch, parameters);
-  const int sweepOverlap = head.IsPlane() ? 0 : OverlapBeams(head.Sweep(), lattice.sweepPitch, parameters);
-  std::vector<Tile> tiles;
-  std::array<int, 3> size{0, 0, 1};
-  int firstDepth = std::numeric_limits<int>::max();
-  for (const Beams& one : beams)
-    firstDepth = std::min(firstDepth, one.firstDepth);
-  for (int row = 0, nextSweep = 0; row < rows; ++row) {
-    int sweepEnd = 0;
-    for (int column = 0, nextFan = 0; column < columns; ++column) {
-      const int number_ = row * columns + column, which = number_ % used;
-      const NoiseInput& input = volumes[static_cast<std::size_t>(which)];
-      const Beams& source = beams[static_cast<std::size_t>(which)];
-      const auto& n = source.samples.Dimensions();
-      if (columns > 1 && fanOverlap >= n[1] - 1)
-        RefuseOverlap(input, input.fan.geometry.Fan(), "fan", parameters);
-      if (rows > 1 && sweepOverlap >= n[2] - 1)
-        RefuseOverlap(input, input.fan.geometry.Sweep(), "sweep", parameters);
-      Tile tile{UsedAgain(source.samples, number_ / used),
-                Volume<unsigned char>(n),
-                {source.firstDepth - firstDepth, nextFan, nextSweep}};
-      std::transform(tile.samples.View().begin(), tile.samples.View().end(), tile.valid.View().begin(),
-                     [](float value) { return static_cast<unsigned char>(std::isfinite(value)); });
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        size[axis] = std::max(size[axis], tile.first[axis] + n[axis]);
-      nextFan += n[1] - 1 - fanOverlap;
-      sweepEnd = std::max(sweepEnd, nextSweep + n[2] - 1);
-      tiles.push_back(std::move(tile));
-    }
-    nextSweep = sweepEnd - sweepOverlap;
-  }
-
-  // 3. the fan that they make together
-  TiledNoise tiled;
-  tiled.fan = volumes[0].fan;
-  ProbeGeometry& fan = tiled.fan.geometry;
-  const double wider = static_cast<double>(size[1] - 1) / (full[1] - 1);
-  const double longer = head.IsPlane() ? 1.0 : static_cast<double>(size[2] - 1) / (full[2] - 1);
-  fan.fanAngle *= wider;
-  fan.fanWidth *= wider;
-  fan.sweepAngle *= longer;
-  fan.sweepWidth *= longer;
-  fan.fanOffset /= wider;
-  fan.depthMin = firstDepth * lattice.depthStep;
-  fan.depthMax = (firstDepth + size[0] - 1) * lattice.depthStep;
-  try {
-    CheckBeamVolume(size, fan);
-  } catch (const Error& error) {
-    if (error.GetKind() == Error::Kind::TooLarge)
-      throw;
-    throw Error(Error::Kind::NotPossible,
-                "noise tiling: " + std::to_string(columns) + " columns and " + std::to_string(rows) + " rows make a fan of " +
-                    Text("%.1f degrees that sweeps over %.1f degrees", fan.fanAngle / degree, fan.sweepAngle / degree) +
-                    ", and no probe has that (" + error.what() + ")");
-  }
-  const double spacing = parameters.spacingMm > 0.0 ? parameters.spacingMm : voxel;
-  tiled.geometry = ScanConversionGrid(fan, tiled.fan.probeToWorld, spacing, parameters.maxVoxels);
-
-  // 4. blended
-  Volume<float> whole(size, std::numeric_limits<float>::quiet_NaN());
-  if (tiles.size() == 1) {
-    whole = std::move(tiles[0].samples);
-  } else {
-    const double halfway = 0.5 * (head.depthMin + head.depthMax);
-    ImageGeometry grid;
-    grid.dimensions = size;
-    grid.spacing = {lattice.depthStep, head.Fan().Span(halfway) / (full[1] - 1), lattice.depthStep};
-    if (!head.IsPlane())
-      grid.spacing.z() = std::max(std::abs(head.Sweep().Span(head.Fan().PointOf({head.fanOffset, halfway}).y())) / (full[2] - 1),
-                                  1e-3 * lattice.depthStep);
-    std::vector<StitchInput> inputs;
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      const Tile& tile = tiles[i];
-      ImageGeometry place = grid;
-      place.dimensions = tile.samples.Dimensions();
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        place.origin[static_cast<Eigen::Index>(axis)] = tile.first[axis] * grid.spacing[static_cast<Eigen::Index>(axis)];
-      inputs.push_back(
-          {PosedVolume<float>{tile.samples.View(), tile.valid.View(), place}, volumes[i % static_cast<std::size_t>(used)].name});
-    }
-    Volume<unsigned char> valid(size), coverage(size);
-    Stitch<float>(parameters.stitch, inputs, grid, {whole.View(), valid.View(), coverage.View(), {}}, progress.Part(0.3, 0.8));
-    for (std::ptrdiff_t i = 0; i < whole.View().Size(); ++i)
-      if (!valid.View()[i])
-        whole.View()[i] = std::numeric_limits<float>::quiet_NaN();
-  }
-  tiles.clear();
-
-  // 5. voxels
-  tiled.intensity = Volume<float>(tiled.geometry.dimensions);
-  tiled.valid = Volume<unsigned char>(tiled.geometry.dimensions);
-  ScanConvert<float>(std::as_const(whole).View(), fan, tiled.fan.probeToWorld, tiled.geometry, tiled.intensity.View(),
+  const Plan plan = PlanOf(parameters, volumes);
+  const Volume<float> beams = Blended(parameters, volumes, plan, progress.Part(0.0, 0.8));
+  TiledNoise tiled{Volume<float>(plan.geometry.dimensions), Volume<unsigned char>(plan.geometry.dimensions), plan.geometry,
+                   plan.fan};
+  ScanConvert<float>(beams.View(), plan.fan.geometry, plan.fan.probeToWorld, plan.geometry, tiled.intensity.View(),
                      tiled.valid.View(), progress.Part(0.8, 1.0));
   return tiled;
 }

@@ -39,6 +39,12 @@ struct TiledNoise {
   PlacedProbe fan;        ///< at the pose of the first volume's probe
 };
 
+/// Where the result will lie.
+struct NoiseTiling {
+  ImageGeometry geometry;
+  PlacedProbe fan;
+};
+
 /// Noise volumes side by side, as one of a machine with a larger fan (dissertation 6.1).
 ///
 /// Each is read along its beams, laid beside the last with the overlap that is asked for, and blended with it (Stitch), all in
@@ -56,5 +62,17 @@ struct TiledNoise {
 /// Error(TooLarge); what Stitch throws; Error(Cancelled).
 TiledNoise TileNoise(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes,
                      const Progress& progress = {});
+
+/// The same along beams, which FillFanFromBeams takes without a detour through voxels: a beam volume of the fan, NaN where no
+/// volume is.
+struct TiledBeams {
+  Volume<float> samples;
+  PlacedProbe fan;
+};
+TiledBeams TileNoiseBeams(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes,
+                          const Progress& progress = {});
+
+/// What TileNoise will make, without making it. Throws the same, but for what comes from the voxels.
+NoiseTiling PlanNoiseTiling(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes);
 
 } // namespace echorama

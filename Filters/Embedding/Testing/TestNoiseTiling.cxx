@@ -345,6 +345,9 @@ TEST(NoiseTiling, VolumesLieSideBySide)
     parameters.columns = columns;
     parameters.rows = rows;
     const TiledNoise tiled = TileNoise(parameters, {noise.Input("one")});
+    const NoiseTiling plan = PlanNoiseTiling(parameters, {noise.Input("one")});
+    EXPECT_TRUE(plan.geometry.AgreesWith(tiled.geometry, 1e-9));
+    EXPECT_EQ(plan.fan.geometry.fanAngle, tiled.fan.geometry.fanAngle);
     EXPECT_NO_THROW(tiled.fan.geometry.Check());
     EXPECT_EQ(tiled.fan.probeToWorld.matrix(), noise.fan.probeToWorld.matrix());
     // A voxel at either side is not used, at the first depth: 1.6 degrees of the fan, 2 of the sweep (a twentieth).
@@ -359,6 +362,20 @@ TEST(NoiseTiling, VolumesLieSideBySide)
                     ASSERT_NEAR(value, 10.0 + beam.depth, 0.15);
                   });
   }
+}
+
+TEST(NoiseTiling, BeamsFillAFanWithoutADetourThroughVoxels)
+{
+  const Noise a = SpeckleOf(convex, 1.0, 1), b = SpeckleOf(convex, 1.0, 2);
+  const std::vector<NoiseInput> inputs{a.Input("a"), b.Input("b")};
+  const TiledBeams beams = TileNoiseBeams({}, inputs);
+  const TiledNoise tiled = TileNoise({}, inputs);
+  EXPECT_EQ(beams.fan.geometry.fanAngle, tiled.fan.geometry.fanAngle);
+  Filled filled(tiled.fan, 1.0);
+  FillFanFromBeams(beams.samples.View(), beams.fan.geometry, {0, 0, 0}, tiled.fan, filled.grid, filled.intensity.View(),
+                   filled.valid.View());
+  EXPECT_TRUE(std::equal(tiled.intensity.View().begin(), tiled.intensity.View().end(), filled.intensity.View().begin()));
+  EXPECT_TRUE(std::equal(tiled.valid.View().begin(), tiled.valid.View().end(), filled.valid.View().begin()));
 }
 
 TEST(NoiseTiling, EachVolumeIsWhereItWasLaid)
