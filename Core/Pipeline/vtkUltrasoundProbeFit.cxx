@@ -2,11 +2,14 @@
 #include "vtkUltrasoundProbeFit.h"
 
 #include "Core/Base/Parallel.h"
+#include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "vtkUltrasoundAcquisition.h"
 
 #include "vtkImageData.h"
 #include "vtkObjectFactory.h"
+
+#include <algorithm>
 
 vtkStandardNewMacro(vtkUltrasoundProbeFit);
 
@@ -38,6 +41,7 @@ vtkUltrasoundProbeFit::vtkUltrasoundProbeFit()
   this->MinimumOverlap = defaults.minimumOverlap;
   this->MaximumDistance = defaults.maximumDistance;
   this->OutlinePoints = defaults.outlinePoints;
+  this->MarginMm = echorama::EnclosingFanParameters().marginMm;
 }
 
 //----------------------------------------------------------------------------
@@ -53,6 +57,31 @@ void vtkUltrasoundProbeFit::Remember(const echorama::ProbeFit& fit)
 }
 
 //----------------------------------------------------------------------------
+echorama::ProbeFit vtkUltrasoundProbeFit::Enclose(vtkImageData* image, const echorama::Volume<unsigned char>& region,
+                                                  const echorama::Progress& progress) const
+{
+  const auto geometry = vtkUltrasoundVolume::GeometryOf(image);
+  const auto recorded = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image);
+  echorama::EnclosingFanParameters parameters;
+  parameters.marginMm = this->MarginMm;
+  if (recorded && pose) {
+    parameters.shape = echorama::PlacedProbe{*recorded, *pose};
+  }
+  const echorama::PlacedProbe fan = echorama::EncloseRegion(region.View(), geometry, parameters, progress);
+
+  echorama::ProbeFit fit;
+  fit.geometry = fan.geometry;
+  fit.probeToWorld = fan.probeToWorld;
+  const auto voxels = region.View();
+  const auto count = std::count(voxels.begin(), voxels.end(), static_cast<unsigned char>(1));
+  const double voxel = geometry.spacing.head(geometry.dimensions[2] == 1 ? 2 : 3).prod();
+  fit.overlap = std::min(1.0, static_cast<double>(count) * voxel / echorama::FanVolume(fan.geometry));
+  fit.notes.push_back("The fan holds the whole region, which need not be one.");
+  return fit;
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundProbeFit::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   this->Remember({});
@@ -64,12 +93,16 @@ void vtkUltrasoundProbeFit::Execute(vtkInformationVector** inputs, vtkImageData*
   parameters.minimumOverlap = this->MinimumOverlap;
   parameters.maximumDistance = this->MaximumDistance;
   parameters.outlinePoints = this->OutlinePoints;
-  echorama::ProbeFit fit = echorama::FitProbe(region.View(), vtkUltrasoundVolume::GeometryOf(image), parameters, progress);
+  echorama::ProbeFit fit = this->EncloseRegion
+                               ? this->Enclose(image, region, progress)
+                               : echorama::FitProbe(region.View(), vtkUltrasoundVolume::GeometryOf(image), parameters, progress);
 
   if (!input.ValidRegion) {
     fit.notes.insert(fit.notes.begin(), "The volume has no valid region: every voxel counts as valid.");
   }
-  if (vtkUltrasoundAcquisition::ProbeGeometryOf(image)) {
+  if (const auto known = vtkUltrasoundAcquisition::ProbeGeometryOf(image); known && this->EncloseRegion) {
+    fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry; the fan is that, or larger.");
+  } else if (known) {
     fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry; it was replaced.");
   }
   output->ShallowCopy(image);
@@ -85,6 +118,8 @@ void vtkUltrasoundProbeFit::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MinimumOverlap: " << this->MinimumOverlap << "\n";
   os << indent << "MaximumDistance: " << this->MaximumDistance << "\n";
   os << indent << "OutlinePoints: " << this->OutlinePoints << "\n";
+  os << indent << "EncloseRegion: " << this->EncloseRegion << "\n";
+  os << indent << "MarginMm: " << this->MarginMm << "\n";
   os << indent << "ResidualMm: " << this->ResidualMm << "\n";
   os << indent << "MeanDistance: " << this->MeanDistance << "\n";
   os << indent << "Overlap: " << this->Overlap << "\n";

@@ -10,9 +10,10 @@
  * The region is `ValidRegion`, less the voxels whose intensity is not finite; without `ValidRegion` it is every voxel that is
  * finite, mostly a box. What a region cannot tell is told by GetNotes(): depth 0 is always the near edge of the region.
  *
- * Fails when nothing is valid and when no fan explains the region well enough.
+ * Fails when nothing is valid and when no fan explains the region well enough. With EncloseRegion the fan instead is one that
+ * holds the whole region, whatever its shape: that of a machine which would have seen all of it.
  *
- * @sa echorama::FitProbe, vtkUltrasoundScanConverter
+ * @sa echorama::FitProbe, echorama::EncloseRegion, vtkUltrasoundScanConverter
  */
 #ifndef vtkUltrasoundProbeFit_h
 #define vtkUltrasoundProbeFit_h
@@ -55,8 +56,26 @@ public:
 
   ///@{
   /**
+   * Whether the fan must hold every real voxel: the least that does, found from the region or, where the volume has probe
+   * geometry and pose, enlarged from these (they stay when they hold all). Such a region need not be a fan, so
+   * MinimumOverlap, MaximumDistance and OutlinePoints are not used. Default off.
+   */
+  vtkSetMacro(EncloseRegion, bool);
+  vtkGetMacro(EncloseRegion, bool);
+  vtkBooleanMacro(EncloseRegion, bool);
+  ///@}
+
+  ///@{
+  /** With EncloseRegion: how far the fan reaches beyond the voxels at least, mm, in [0, 1000]. Default 0. */
+  vtkSetClampMacro(MarginMm, double, 0.0, 1000.0);
+  vtkGetMacro(MarginMm, double);
+  ///@}
+
+  ///@{
+  /**
    * How good the last fit was; 0 when there was none. Residual: root mean square distance (mm) of the outline from the fan's
-   * surface. Mean distance: the mean, as a part of the region's size. Overlap: intersection over union.
+   * surface. Mean distance: the mean, as a part of the region's size. Overlap: intersection over union. With EncloseRegion the
+   * first two are 0.
    */
   double GetResidualMm() const { return this->ResidualMm; }
   double GetMeanDistance() const { return this->MeanDistance; }
@@ -80,11 +99,15 @@ private:
 
 #ifndef __VTK_WRAP__
   void Remember(const echorama::ProbeFit& fit);
+  echorama::ProbeFit Enclose(vtkImageData* image, const echorama::Volume<unsigned char>& region,
+                             const echorama::Progress& progress) const;
 #endif
 
   double MinimumOverlap;
   double MaximumDistance;
   int OutlinePoints;
+  bool EncloseRegion = false;
+  double MarginMm;
   double ResidualMm = 0.0;
   double MeanDistance = 0.0;
   double Overlap = 0.0;

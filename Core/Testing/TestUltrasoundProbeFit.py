@@ -234,15 +234,76 @@ def check_liver_volumes():
               f"residual {filter.GetResidualMm():.2f} mm")
 
 
+def outside(image, valid):
+    """How many real voxels the fan of a volume leaves out: scan conversion of beams of ones onto the same places."""
+    probe, pose = fields(image)
+    fan, sweep = np.radians(probe[0]), np.radians(probe[2])
+    k, j, i = np.nonzero(valid)
+    world = np.array(image.GetOrigin()) + np.stack([i, j, k], 1) * image.GetSpacing()
+    x, y, z = np.linalg.inv(pose)[:3, :3] @ world.T + np.linalg.inv(pose)[:3, 3:]
+
+    def place(angle, width, across, outward):
+        if angle < 1e-9:
+            return across / max(width, 1e-9), outward
+        radius = width / angle
+        return np.arctan2(across, radius + outward) / angle, np.hypot(across, radius + outward) - radius
+
+    along_sweep, rho = place(sweep, probe[3], y, z)
+    along_fan, depth = place(fan, probe[1], x, rho)
+    along_fan -= probe[6] if len(probe) > 6 else 0
+    off = 1e-6
+    return np.sum((abs(along_sweep) > 0.5 + off) | (abs(along_fan) > 0.5 + off) | (depth < probe[4] - off) | (depth > probe[5] + off))
+
+
+def check_enclosing():
+    """Two wedges that are no fan together; a margin; a probe that is there is kept where it holds all."""
+    z, y, x = np.mgrid[:40, :50, :60].astype(float)
+    two = ((np.abs(x - 15 - 0.3 * z) < 6 + 0.2 * z) | (np.abs(x - 45 + 0.2 * z) < 6 + 0.2 * z)) & (np.abs(y - 25) < 8 + 0.3 * z)
+    image = image_of(np.ones(two.shape, np.uint8), two.astype(np.uint8))
+    filter, errors = fit(image, EncloseRegion=True)
+    assert not errors and outside(filter.GetOutput(), two) == 0, errors
+    assert 0.6 < filter.GetOverlap() < 0.95 and "holds the whole region" in filter.GetNotes(), filter.GetOverlap()
+    wider, errors = fit(image, EncloseRegion=True, MarginMm=5)
+    assert not errors and wider.GetOverlap() < filter.GetOverlap() - 0.1
+    again, errors = fit(filter.GetOutput(), EncloseRegion=True)
+    assert not errors and "that, or larger" in again.GetNotes()
+    assert all(np.array_equal(a, b) for a, b in zip(fields(again.GetOutput()), fields(filter.GetOutput())))
+    alone = np.zeros((9, 9, 9), np.uint8)
+    alone[3, 4, 5] = 1
+    filter, errors = fit(image_of(alone, alone), EncloseRegion=True)
+    assert not errors and outside(filter.GetOutput(), alone) == 0
+    filter, errors = fit(image_of(alone, 0 * alone), EncloseRegion=True)
+    assert len(errors) == 1 and "empty" in errors[0], errors
+    assert "EncloseRegion" in str(filter) and "MarginMm: 0" in str(filter)
+
+
+def check_enclosing_liver():
+    """Both halves of a freehand sweep together: no fan at all, but one holds them."""
+    parts = [mha(f"liver/liver_volume_{name}.mha") for name in "AB"]
+    if not all(parts):
+        return
+    low = np.min([[float(n) for n in header["Offset"].split()] for header, _ in parts], 0)
+    places = [np.round((np.array([float(n) for n in header["Offset"].split()]) - low) / 0.8).astype(int)[::-1] for header, _ in parts]
+    valid = np.zeros(np.max([place + voxels.shape for place, (_, voxels) in zip(places, parts)], 0), np.uint8)
+    for place, (_, voxels) in zip(places, parts):
+        valid[tuple(slice(a, a + n) for a, n in zip(place, voxels.shape))] |= voxels > 0
+    filter, errors = fit(image_of(valid, valid, (0.8, 0.8, 0.8), low), EncloseRegion=True)
+    assert not errors and outside(filter.GetOutput(), valid) == 0, errors
+    print(f"liver A and B: the enclosing fan is {1 / filter.GetOverlap():.2f} times as large;", np.round(fields(filter.GetOutput())[0], 1))
+    assert filter.GetOverlap() > 0.55
+
+
 z, y, x = np.mgrid[:30, :60, :50]
 wedge = (np.abs(x - 25) < 5 + 0.3 * y).astype(np.uint8)
 check_output(image_of(wedge, wedge))
 check_refusals()
 check_region()
+check_enclosing()
 check_phantoms()
 check_liver_frames()
 check_plus_frames()
 check_kretz()
 check_liver_volumes()
+check_enclosing_liver()
 if skipped:
     print("left out, not there:", ", ".join(skipped))
