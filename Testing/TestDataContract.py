@@ -282,6 +282,11 @@ class ProbeFit(Feed):
         return filter
 
 
+class NoiseTiler(ToOtherGrid):
+    works_on_blocks = False # they become one volume
+    keeps_fields = False # an acquisition is that of one volume
+
+
 class Phantom(ToOtherGrid):
     is_source = True
     volumes = 0
@@ -373,6 +378,7 @@ Special = {
     "vtkUltrasoundEmbedQuality": EmbedQuality,
     "vtkUltrasoundFeather": Feather,
     "vtkUltrasoundStitchQuality": StitchQuality,
+    "vtkUltrasoundNoiseTiler": NoiseTiler,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,

@@ -33,5 +33,10 @@ with tempfile.TemporaryDirectory() as folder:
     made = [path for path in pictures.glob("*.png") if path.stat().st_size > 2_000]
     if answer.returncode != 0 or len(made) != (9 if liver else 7):
         sys.exit(f"TestExamples: {len(made)} pictures of stitching were made")
+    answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / "noise_tiling_figures.py", "--spacing", "2", pictures],
+                            cwd=folder, capture_output=True, text=True)
+    print(answer.stdout, answer.stderr, sep="")
+    if answer.returncode != 0 or not (pictures / "NoiseTiler.png").is_file():
+        sys.exit("TestExamples: no picture of noise was made")
     if not scores or float(scores[1]) < 3.0 or float(scores[2]) > 1.0:
         sys.exit("TestExamples: the volumes did not come together")

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundNoiseTiler.h"
+
+#include "Core/Base/Error.h"
+#include "Core/Geometry/ProbeFit.h"
+#include "Core/Imaging/Sampling.h"
+#include "Filters/Embedding/NoiseTiling.h"
+
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkUltrasoundAcquisition.h"
+
+#include <algorithm>
+
+using echorama::Error;
+
+vtkStandardNewMacro(vtkUltrasoundNoiseTiler);
+
+namespace {
+// The fan that a volume fills: recorded, or fitted to where it is real.
+template <class T>
+echorama::PlacedProbe FanOf(vtkImageData* image, const echorama::PosedVolume<T>& volume, const std::string& name,
+                            std::string& notes, const echorama::Progress& progress)
+{
+  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image);
+  if (geometry && pose) {
+    return {*geometry, *pose};
+  }
+  try {
+    const auto fit = echorama::FitProbe(echorama::RealRegionOf(volume).View(), volume.geometry, {}, progress);
+    notes += (notes.empty() ? "" : "\n") + name + ": its fan was fitted to its valid region.";
+    for (const std::string& note : fit.notes) {
+      notes += "\n" + name + ": " + note;
+    }
+    return {fit.geometry, fit.probeToWorld};
+  } catch (const Error& error) {
+    throw Error(error.GetKind(), name + ": " + error.what());
+  }
+}
+} // namespace
+
+//----------------------------------------------------------------------------
+struct vtkUltrasoundNoiseTiler::Volumes {
+  std::vector<vtkMTimeType> Made; // of each: the fits hold as long as these stay
+  std::vector<echorama::NoiseInput> Inputs;
+};
+
+//----------------------------------------------------------------------------
+vtkUltrasoundNoiseTiler::vtkUltrasoundNoiseTiler()
+{
+  const echorama::NoiseTilingParameters defaults;
+  this->Columns = defaults.columns;
+  this->Rows = defaults.rows;
+  this->OverlapDegrees = defaults.overlapDegrees;
+  this->OverlapMm = defaults.overlapMm;
+  this->SpacingMm = defaults.spacingMm;
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundNoiseTiler::~vtkUltrasoundNoiseTiler() = default;
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundNoiseTiler::FillInputPortInformation(int, vtkInformation* information)
+{
+  information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
+  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
+  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+  information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+echorama::NoiseTilingParameters vtkUltrasoundNoiseTiler::Parameters() const
+{
+  echorama::NoiseTilingParameters parameters;
+  parameters.columns = this->Columns;
+  parameters.rows = this->Rows;
+  parameters.overlapDegrees = this->OverlapDegrees;
+  parameters.overlapMm = this->OverlapMm;
+  parameters.spacingMm = this->SpacingMm;
+  return parameters;
+}
+
+//----------------------------------------------------------------------------
+const std::vector<echorama::NoiseInput>& vtkUltrasoundNoiseTiler::Prepare(vtkInformationVector* port,
+                                                                          const echorama::Progress& progress)
+{
+  const auto inputs = vtkUltrasoundVolume::CollectInputs(this, port);
+  std::vector<vtkMTimeType> made;
+  std::transform(inputs.begin(), inputs.end(), std::back_inserter(made),
+                 [](const auto& input) { return input.Image->GetMTime(); });
+  if (this->Kept && this->Kept->Made == made) {
+    return this->Kept->Inputs;
+  }
+  this->Kept.reset();
+  this->Notes.clear();
+  auto volumes = std::make_unique<Volumes>();
+  for (const auto& input : inputs) {
+    const double done = static_cast<double>(volumes->Inputs.size()), count = static_cast<double>(inputs.size());
+    const auto part = progress.Part(done / count, (done + 1.0) / count);
+    vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+      const auto volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input);
+      volumes->Inputs.push_back({volume, FanOf(input.Image, volume, input.Name, this->Notes, part), input.Name});
+    });
+  }
+  volumes->Made = std::move(made);
+  this->Kept = std::move(volumes);
+  return this->Kept->Inputs;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundNoiseTiler::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  // How large the whole is depends on the fans, and field data does not travel with the information of the pipeline.
+  for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection) {
+    int port = 0;
+    this->GetInputAlgorithm(0, connection, port)->Update(port);
+  }
+  return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress& progress) {
+    const auto tiling = echorama::PlanNoiseTiling(this->Parameters(), this->Prepare(inputs[0], progress));
+    vtkInformation* out = outputs->GetInformationObject(0);
+    vtkUltrasoundVolume::SetGeometry(out, tiling.geometry);
+    vtkDataObject::SetPointDataActiveScalarInfo(out, VTK_FLOAT, 1);
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundNoiseTiler::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+{
+  const auto& volumes = this->Prepare(inputs[0], progress.Part(0.0, 0.2));
+  const auto tiled = echorama::TileNoise(this->Parameters(), volumes, progress.Part(0.2, 1.0));
+  vtkUltrasoundVolume::SetGeometry(output, tiled.geometry);
+  vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), VTK_FLOAT);
+  vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
+  output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+  std::copy(tiled.intensity.View().begin(), tiled.intensity.View().end(),
+            vtkUltrasoundVolume::ViewOf<float>(intensity, output).begin());
+  std::copy(tiled.valid.View().begin(), tiled.valid.View().end(),
+            vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output).begin());
+  vtkUltrasoundAcquisition::SetProbeGeometry(output, tiled.fan.geometry);
+  vtkUltrasoundAcquisition::SetProbeToWorld(output, tiled.fan.probeToWorld);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundNoiseTiler::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Columns: " << this->Columns << "\n";
+  os << indent << "Rows: " << this->Rows << "\n";
+  os << indent << "OverlapDegrees: " << this->OverlapDegrees << "\n";
+  os << indent << "OverlapMm: " << this->OverlapMm << "\n";
+  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
+  os << indent << "Notes: " << this->Notes << "\n";
+}
