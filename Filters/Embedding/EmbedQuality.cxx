@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <Eigen/Eigenvalues>
 #include <functional>
 #include <string>
 
@@ -151,7 +152,9 @@ public:
         if (part.empty())
           part.resize(3 * perLayer);
         const std::ptrdiff_t before = (static_cast<std::ptrdiff_t>(CellOf(k, 2)) - 1) * static_cast<std::ptrdiff_t>(perLayer);
-        part[static_cast<Size>(nearest - before)].Add(s[i] > 0.0f, static_cast<double>(row[i]) - level_);
+        const Eigen::Vector3d at(i * spacing_[0], j * spacing_[1], k * spacing_[2]);
+        part[static_cast<Size>(nearest - before)].Add(s[i] > 0.0f, static_cast<double>(row[i]) - level_,
+                                                      at - middles[static_cast<Size>(nearest)].position);
       }
     });
     for (Size layer = 0; layer < layers; ++layer)
@@ -184,13 +187,20 @@ private:
     }
   };
 
-  struct Sides { // 0: outside, 1: inside
+  // Moments of the values and their places (about the middle of the patch), 0: outside, 1: inside.
+  struct Sides {
     double count[2] = {0.0, 0.0}, sum[2] = {0.0, 0.0}, squares[2] = {0.0, 0.0};
-    void Add(bool inside, double value)
+    Eigen::Vector3d place[2] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}, product[2] = {place[0], place[0]};
+    Eigen::Matrix3d places[2] = {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+
+    void Add(bool inside, double value, const Eigen::Vector3d& at)
     {
       ++count[inside];
       sum[inside] += value;
       squares[inside] += value * value;
+      place[inside] += at;
+      product[inside] += value * at;
+      places[inside] += at * at.transpose();
     }
     void operator+=(const Sides& other)
     {
@@ -198,13 +208,28 @@ private:
         count[side] += other.count[side];
         sum[side] += other.sum[side];
         squares[side] += other.squares[side];
+        place[side] += other.place[side];
+        product[side] += other.product[side];
+        places[side] += other.places[side];
       }
     }
     double Mean(int side) const { return sum[side] / count[side]; }
+
+    // Of what is left when the slope that fits best is taken off.
     double Deviation(int side) const
     {
-      const double square = squares[side] / count[side], variance = square - Mean(side) * Mean(side);
-      return variance > 1e-12 * square ? std::sqrt(variance) : 0.0; // below is rounding
+      const double n = count[side];
+      const Eigen::Vector3d middle = place[side] / n, along = product[side] / n - Mean(side) * middle;
+      const Eigen::Matrix3d spread = places[side] / n - middle * middle.transpose();
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
+      double variance = squares[side] / n - Mean(side) * Mean(side), freedom = n - 1.0;
+      for (int axis = 0; axis < 3; ++axis)
+        if (axes.eigenvalues()[axis] > 1e-3 * axes.eigenvalues()[2]) { // else the side is flat this way
+          const double part = axes.eigenvectors().col(axis).dot(along);
+          variance -= part * part / axes.eigenvalues()[axis];
+          --freedom;
+        }
+      return variance > 1e-9 * squares[side] / n ? std::sqrt(variance * n / freedom) : 0.0; // below is rounding
     }
   };
 

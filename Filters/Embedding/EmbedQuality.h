@@ -62,9 +62,10 @@ struct EmbedQualityReport {
 /// * The seam. The border lies between voxels that are labelled as seen (data, blend) and invented ones. It is cut into patches,
 ///   the border voxels within one cube of an even lattice, shellMm wide. A voxel within shellMm of the border belongs to the
 ///   patch whose middle is nearest. The jump of a patch is its mean outside (invented) minus its mean inside (seen), without the
-///   sign but for the bias; its ratio the standard deviation outside over that inside. Patches with less than a tenth of a full
-///   shell (or less than eight voxels) on either side are left out; borderMeasured tells how much is left. Each patch counts by
-///   its border voxels, so that what a corner of a cube cuts off counts little.
+///   sign but for the bias; its ratio the standard deviation outside over that inside, both of what is left when the slope that
+///   fits the side best is taken off: anatomy has slopes, the deviation is to be that of the texture. Patches with less than a
+///   tenth of a full shell (or less than eight voxels) on either side are left out; borderMeasured tells how much is left. Each
+///   patch counts by its border voxels, so that what a corner of a cube cuts off counts little.
 /// * The reference. The same, with the same patches and shells, at surfaces inside the data (label data on both sides), each
 ///   through a random voxel: planes, spheres of 2 to 10 shells, and the border moved inwards, in turn. So natural edges and
 ///   speckle are in it.

@@ -151,6 +151,14 @@ TEST(EmbedQuality, DeviationsHaveTheirRatio)
   }
 }
 
+TEST(EmbedQuality, SlopesAreNoTexture)
+{
+  const Scene scene(cube, Ball, [](int i, int j, int k) {
+    return 10.0 * Noise(i, j, k) + (Ball(i, j, k) == data ? 6.0 * i - 4.0 * j + 5.0 * k : 20.0);
+  });
+  EXPECT_NEAR(scene.Measure().border.deviationRatio, 1.0, 0.03);
+}
+
 TEST(EmbedQuality, BlendsAreSeenAndNoReference)
 {
   // Blended voxels vary a lot: they are inside of the border, but not what is compared with.
