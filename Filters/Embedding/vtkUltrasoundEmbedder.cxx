@@ -123,11 +123,15 @@ int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVec
   for (int port : {0, 2}) {
     int output = 0;
     if (vtkAlgorithm* source = this->GetNumberOfInputConnections(port) ? this->GetInputAlgorithm(port, 0, output) : nullptr) {
-      source->Update(output);
+      source->UpdateWholeExtent();
     }
   }
-  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
-    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs, progress).Grid.geometry);
+  if (!vtkImageData::GetData(inputs[0])) {
+    return 1; // a composite data set, whose blocks come one by one later
+  }
+  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress&) {
+    // It takes well below a second: a stop is left to the data, whose request takes it back.
+    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs, {}).Grid.geometry);
   });
 }
 

@@ -36,7 +36,7 @@ echorama::DiffusionSources SurfaceLevels(echorama::VolumeView<const T> intensity
     }
     return sources;
   }
-  const echorama::LocalStatistics statistics(intensity, region.View(), spacing, smoothMm, progress.Part(0.3, 1.0));
+  const auto statistics = echorama::GrainStatistics(intensity, region.View(), spacing, smoothMm, progress.Part(0.3, 1.0));
   for (std::size_t s = 0; s < count; ++s) {
     const auto& v = sources.voxels[s];
     statistics.Row(v[1], v[2], v[0], v[0] + 1, &sources.values[s], &sources.values[count + s]);
