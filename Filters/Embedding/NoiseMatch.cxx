@@ -28,6 +28,7 @@ namespace {
 constexpr std::ptrdiff_t leastSamples = 1000;
 constexpr double most = 24e6;         // samples that are read from a volume
 constexpr double windowLengths = 3.0; // standard deviation of the window, in lengths
+constexpr double cut = 5e-4;          // the brightest and darkest specks are the scene's
 constexpr double flat = 0.05;         // of the whole deviation: below this there is no texture
 
 // The autocorrelation of a Rayleigh distributed envelope whose power has the autocorrelation \a power: a hypergeometric series.
@@ -391,7 +392,8 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
   match.mean = values.Mean();
   match.deviation = values.Deviation();
   for (int q = 0; q < parameters.quantiles; ++q) {
-    const double value = match.mean + match.deviation * values.Quantile(static_cast<double>(q) / (parameters.quantiles - 1));
+    const double probability = static_cast<double>(q) / (parameters.quantiles - 1);
+    const double value = match.mean + match.deviation * values.Quantile(std::min(std::max(probability, cut), 1.0 - cut));
     match.quantiles.push_back(std::min(std::max(static_cast<float>(value), values.Least()), values.Greatest()));
   }
 

@@ -10,8 +10,8 @@ namespace echorama {
 /// How the grain of a volume is measured.
 struct NoiseMatchParameters {
   /// What is smooth over so many mm along the depth and twice as many across, halfway down (standard deviations of a Gaussian),
-  /// is the scene; what is finer is grain, > 0. Longer lengths than half of it come out too short (2.5 mm as 2.15 by default).
-  double windowMm = 2.0;
+  /// is the scene; what is finer is grain, > 0. Longer lengths than half of it come out too short (1.8 mm as 1.55 by default).
+  double windowMm = 1.5;
   int depthBands = 4;  ///< the depth is cut into so many equal parts for the lengths by depth, [1, 100]
   int quantiles = 257; ///< how many quantiles are given, [2, 65536]
 };
@@ -33,7 +33,7 @@ struct NoiseMatch {
   Lengths lengths; ///< the lower median over the bands that resolve them: edges of the scene can only lengthen them
   std::vector<Band> bands;
   /// At evenly spaced probabilities 0 ... 1: intensities less their local mean, over their local deviation, brought to the
-  /// mean and deviation below and to the range of the volume.
+  /// mean and deviation below and to the range of the volume. The last 0.05% at both ends are left out.
   std::vector<float> quantiles;
   double mean = 0.0;      ///< of the intensities
   double deviation = 0.0; ///< of the intensities about their local means (root mean square)

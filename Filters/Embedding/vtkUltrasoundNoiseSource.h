@@ -117,7 +117,7 @@ public:
   ///@{
   /**
    * Of the volume to match, what is smooth over so many mm along the depth, and twice as many across, is the scene and no grain;
-   * > 0. Default 2.
+   * > 0. Default 1.5.
    */
   vtkSetMacro(WindowMm, double);
   vtkGetMacro(WindowMm, double);
