@@ -564,7 +564,20 @@ BeamNoiseParameters NoiseLike(const NoiseMatch& match, const ProbeGeometry& meas
   p.depthCorrelationMm = std::min(match.lengths.depthMm, 0.25 * (target.depthMax - target.depthMin));
   p.fanCorrelation = scaled(match.lengths.fan, from[0], to[0]);
   p.sweepCorrelation = target.IsPlane() ? 0.0 : scaled(match.lengths.sweep, from[1], to[1]);
-  return ResolvingCounts(p, target);
+  p = ResolvingCounts(p, target);
+
+  // Linear interpolation between samples that correlate by c leaves (2 + c) / 3 of the variance, in the mean over places.
+  double left = 1.0;
+  const double apart[3] = {1.0 / (p.samples - 1), 1.0 / (p.elements - 1), target.IsPlane() ? 0.0 : 1.0 / (p.steps - 1)};
+  const double lengths[3] = {p.depthCorrelationMm / (target.depthMax - target.depthMin), p.fanCorrelation, p.sweepCorrelation};
+  for (int axis = 0; axis < (target.IsPlane() ? 2 : 3); ++axis)
+    if (lengths[axis] > 0.0)
+      left *= (2.0 + EnvelopeCorrelation(std::pow(0.5, std::pow(apart[axis] / lengths[axis], 2.0)))) / 3.0;
+  for (float& value : p.quantiles) {
+    const double wider = match.mean + (static_cast<double>(value) - match.mean) / std::sqrt(left);
+    value = std::max(static_cast<float>(wider), std::min(match.quantiles.front(), 0.0f)); // never newly below 0
+  }
+  return p;
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \

@@ -65,7 +65,7 @@ NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometr
 /// Noise like what was measured in the fan \a measured, for the fan \a target (which may be the same): lengths across fan and
 /// sweep are as many mm halfway down the target as they were halfway down the other. Counts resolve the lengths
 /// (ResolvingCounts); where a length was too short to resolve it is the bound. Lengths are cut to what BeamNoiseParameters allow.
-/// Intensities are those of the quantiles.
+/// Intensities are those of the quantiles, spread a little so that they are so after scan conversion.
 BeamNoiseParameters NoiseLike(const NoiseMatch& match, const ProbeGeometry& measured, const ProbeGeometry& target);
 
 } // namespace echorama
