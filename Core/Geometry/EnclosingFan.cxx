@@ -7,8 +7,8 @@
 //    found anew in each pass, never stored.
 // 2. Some hundreds of them stand for all in the search: of each block of voxels the one furthest from the middle.
 // 3. Starts: the shape that is given or the fit of the region, and plain fans along the same axes, from flat to well bent. A flat
-//    one can enclose anything, so that there is always an answer. The best few are improved by the simplex method of Nelder and
-//    Mead: the volume of the fan has kinks, where the outermost voxel changes.
+//    one can enclose anything, so that there is always an answer. The given one and the best two plain ones are improved by the
+//    simplex method of Nelder and Mead: the volume of the fan has kinks, where the outermost voxel changes.
 // 4. The extremes over all voxels of the surface make the fan.
 //
 // A bend is written as b in [0, 1], 0 flat and 1 a point: (1 - b) of the width halfway down is there at the face, and b comes
@@ -162,6 +162,7 @@ struct Least {
   double halfway = 1.0;                  // mm of depth
   double fanBend = 1.0, sweepBend = 1.0; // the greatest that are allowed
   double fanTurn = widestTurn, sweepTurn = widestTurn;
+  bool offset = false; // whether the fan may be off the middle of its array: only where the start is
   const ProbeGeometry* shape = nullptr;
 
   ProbeArc Unit(double bend) const { return {bend / halfway, 1.0 - bend}; }
@@ -272,7 +273,7 @@ public:
     for (int knob = 0; knob < Count; ++knob)
       if (!plane || knob == AlongX || knob == AlongZ || knob == AboutY || knob == FanBend)
         used_.push_back(knob);
-    if (start.fanMiddle == 0.0)
+    if (!least.offset)
       used_.erase(std::remove(used_.begin(), used_.end(), static_cast<int>(FanMiddle)), used_.end());
   }
 
@@ -527,6 +528,7 @@ PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeom
   const ProbeArc fan = base.geometry.Fan(), sweep = base.geometry.Sweep();
   Head start{base.probeToWorld, BendOf(fan, least.halfway), BendOf(sweep, least.halfway), 0.0};
   start.fanMiddle = base.geometry.fanOffset * fan.Span(least.halfway);
+  least.offset = start.fanMiddle != 0.0;
   least.fanTurn = std::max(least.fanTurn, fan.angle * (0.5 + std::abs(base.geometry.fanOffset)));
   least.sweepTurn = std::max(least.sweepTurn, 0.5 * sweep.angle);
   if (parameters.shape) {
@@ -536,20 +538,23 @@ PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeom
       least.sweepBend = start.sweepBend;
   }
 
-  std::vector<Rated> starts{{start, 0.0}};
+  std::vector<Rated> starts;
   for (const double part : {0.0, 0.3, 0.6, 1.0})
     starts.push_back(
         {PlainHead(base.probeToWorld, part * std::min(least.fanBend, 0.6), part * std::min(least.sweepBend, 0.6), region), 0.0});
+  starts.push_back({start, 0.0});
   for (Rated& rated : starts)
     rated.cost = CostOf(rated.head, least, region);
-  std::stable_sort(starts.begin(), starts.end(), [](const Rated& a, const Rated& b) { return a.cost < b.cost; });
-  starts.resize(2);
-  ParallelFor(2, progress.Part(0.5, 0.9), [&](std::ptrdiff_t i) {
+  const auto cheaper = [](const Rated& a, const Rated& b) { return a.cost < b.cost; };
+  std::stable_sort(starts.begin(), starts.end() - 1, cheaper);
+  std::swap(starts[2], starts.back()); // two plain ones, and the base
+  starts.resize(3);
+  ParallelFor(static_cast<std::ptrdiff_t>(starts.size()), progress.Part(0.5, 0.9), [&](std::ptrdiff_t i) {
     Rated& rated = starts[static_cast<std::size_t>(i)];
     rated = Simplex(rated, least, region, plane, 1.0, 600);
     rated = Simplex(rated, least, region, plane, 0.4, 600); // a simplex may have become flat
   });
-  const Head& best = starts[0].cost <= starts[1].cost ? starts[0].head : starts[1].head;
+  const Head& best = std::min_element(starts.begin(), starts.end(), cheaper)->head;
 
   const Measure measure(best, least, region);
   PlacedProbe found{FanOf(best, least, ExtentOf(measure, region, progress.Part(0.9, 1.0)), plane).first, best.probeToWorld};

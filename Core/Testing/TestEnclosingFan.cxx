@@ -152,6 +152,7 @@ const std::vector<std::pair<const char*, ProbeGeometry>> probes{
     {"phased", ProbeGeometry::Phased(80 * degree, 50 * degree, 0, 150)},
     {"linear, turned", {0.0, 44.0, 30 * degree, 12.0, 0.0, 60.0}},
     {"linear", ProbeGeometry::Linear(38, 50, 0, 60)},
+    {"off centre", {34.07 * degree, 14.66, 39.75 * degree, 17.12, 0.0, 43.15, 0.402}},
 };
 
 } // namespace
@@ -179,6 +180,9 @@ TEST(EnclosingFan, OfTheRegionOfOneFanIsThatFan)
     const Region region = UnionOf({Placed(probe, 30, -20, 50, 20, -30, 50)}, {voxel, 0.8 * voxel, 1.3 * voxel},
                                   ExpRotation(Eigen::Vector3d(-0.7, 1.1, 0.2)));
     ExpectEncloses(Enclosed(region), region, 1.16);
+    EnclosingFanParameters wider;
+    wider.marginMm = voxel;
+    ExpectEncloses(Enclosed(region, wider), region, 1.32, voxel);
   }
 }
 
