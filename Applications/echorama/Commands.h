@@ -21,6 +21,7 @@ Command AlignCommand(CLI::App& program);
 Command ScoreCommand(CLI::App& program);
 Command StitchCommand(CLI::App& program);
 Command EmbedCommand(CLI::App& program);
+Command NoiseCommand(CLI::App& program);
 Command ProbeFitCommand(CLI::App& program);
 Command PhantomCommand(CLI::App& program);
 Command ViewCommand(CLI::App& program);
