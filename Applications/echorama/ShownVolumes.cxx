@@ -33,6 +33,17 @@ std::array<double, 3> TintOf(std::size_t i, std::size_t count)
   return tint;
 }
 
+// What each voxel of an embedded volume is; nullptr of any other.
+vtkDataArray* LabelsOf(vtkImageData* image)
+{
+  vtkDataArray* labels = image->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName());
+  return labels && labels->GetDataType() == VTK_UNSIGNED_CHAR && labels->GetNumberOfComponents() == 1 ? labels : nullptr;
+}
+
+// The colours of EmbeddedVoxel.
+constexpr std::array<std::array<double, 3>, 4> labelTints{
+    {{1.0, 1.0, 1.0}, {1.0, 1.0, 1.0}, {1.0, 0.85, 0.4}, {0.45, 0.65, 1.0}}};
+
 } // namespace
 
 ShownVolumes::ShownVolumes(const std::vector<LoadedVolume>& volumes)
@@ -42,7 +53,8 @@ ShownVolumes::ShownVolumes(const std::vector<LoadedVolume>& volumes)
     Shown shown;
     shown.image = volume.image;
     shown.intensity = vtkUltrasoundVolume::GetIntensity(volume.image);
-    shown.valid = vtkUltrasoundVolume::GetValidRegion(volume.image);
+    shown.labels = LabelsOf(volume.image);
+    shown.valid = shown.labels ? shown.labels : vtkUltrasoundVolume::GetValidRegion(volume.image);
     shown.geometry = vtkUltrasoundVolume::GeometryOf(volume.image);
     shown.tint = TintOf(volumes_.size(), volumes.size());
     // Some hundred thousand voxels per volume tell the percentiles, the box and the middle.
@@ -95,7 +107,7 @@ double ShownVolumes::SmallestSpacing() const
 }
 
 vtkSmartPointer<vtkImageData> ShownVolumes::Picture(const ImageGeometry& plane, const GreyWindow& window,
-                                                    const std::vector<bool>& shown) const
+                                                    const std::vector<bool>& shown, bool labels) const
 {
   auto picture = vtkSmartPointer<vtkImageData>::New();
   vtkUltrasoundVolume::SetGeometry(picture, plane);
@@ -118,8 +130,15 @@ vtkSmartPointer<vtkImageData> ShownVolumes::Picture(const ImageGeometry& plane, 
             continue;
           auto& sum = sums[static_cast<std::size_t>(row) * width + column];
           const double grey = window(value);
+          std::array<double, 3> tint = volume.tint;
+          if (labels && volume.labels) {
+            const auto* label = static_cast<const unsigned char*>(volume.labels->GetVoidPointer(0));
+            const std::size_t kind = label[sampler.NearestIndex(at[0], at[1], at[2])];
+            for (std::size_t c = 0; c < 3; ++c)
+              tint[c] *= labelTints[std::min(kind, labelTints.size() - 1)][c];
+          }
           for (int c = 0; c < 3; ++c)
-            sum[c] += static_cast<float>(grey * volume.tint[c]);
+            sum[c] += static_cast<float>(grey * tint[c]);
           sum[3] += 1.f;
         }
       });

@@ -13,7 +13,8 @@ struct GreyWindow {
 };
 
 /// What a viewer draws of posed volumes: coloured pictures of planes, and bytes to render. Several volumes get tints that
-/// add up to grey where they agree. Voxels outside the valid region are never drawn.
+/// add up to grey where they agree. Voxels outside the valid region are never drawn, but for the background of an embedded
+/// volume.
 class ShownVolumes {
 public:
   /// Throws Error(BadInput) when a volume cannot be worked on.
@@ -37,9 +38,10 @@ public:
   double SmallestSpacing() const;
 
   /// The picture of a plane (one slice of RGBA bytes, placed in the world): the mean of the tinted grey levels of the volumes
-  /// that are real there; transparent where none is. Volumes with shown[i] == false are left out.
-  vtkSmartPointer<vtkImageData> Picture(const ImageGeometry& plane, const GreyWindow& window,
-                                        const std::vector<bool>& shown) const;
+  /// that are real there; transparent where none is. Volumes with shown[i] == false are left out. With \a labels, what of an
+  /// embedded volume is invented is blue, and what is mixed with that yellow.
+  vtkSmartPointer<vtkImageData> Picture(const ImageGeometry& plane, const GreyWindow& window, const std::vector<bool>& shown,
+                                        bool labels = false) const;
 
   /// Bytes for rendering the volume i: 0 where it is not real, else 1 to 255 through the window. Blocks of voxels are
   /// averaged so that no side is longer than \a maxSide.
@@ -49,7 +51,8 @@ private:
   struct Shown {
     vtkSmartPointer<vtkImageData> image;
     vtkDataArray* intensity = nullptr;
-    vtkDataArray* valid = nullptr;
+    vtkDataArray* labels = nullptr; ///< of an embedded volume
+    vtkDataArray* valid = nullptr;  ///< what is drawn: the labels where they are there
     ImageGeometry geometry;
     std::array<double, 3> tint{1.0, 1.0, 1.0};
   };

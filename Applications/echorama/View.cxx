@@ -43,6 +43,7 @@ struct ViewOptions {
   std::vector<std::string> files;
   std::string poses, screenshot;
   std::vector<int> size{1200, 900};
+  bool labels = false;
 };
 
 // How a plane lies on the screen, as axes of the frame: to the right, down, and into the screen. Depth (the last axis of
@@ -97,6 +98,7 @@ public:
   void LookAt(int plane, int x, int y);
   void ChangeWindow(int dx, int dy);
   void Toggle(std::size_t volume);
+  void ToggleLabels();
   void ResetCameras();
   void Render() { window_->Render(); }
 
@@ -110,6 +112,7 @@ private:
   std::vector<std::string> names_;
   GreyWindow grey_;
   std::vector<bool> shown_;
+  bool labels_;
   Eigen::Matrix3d frame_;   ///< columns: the axes of the planes
   Eigen::AlignedBox3d box_; ///< of all volumes, in coordinates of the frame
   Eigen::Vector3d focus_;   ///< where the planes meet, in coordinates of the frame
@@ -166,6 +169,8 @@ public:
     const std::string name = this->Interactor->GetKeySym() ? this->Interactor->GetKeySym() : "";
     if (key >= '1' && key <= '9')
       this->View->Toggle(static_cast<std::size_t>(key - '1'));
+    else if (key == 'l')
+      this->View->ToggleLabels();
     else if (key == 'r')
       this->View->ResetCameras();
     else if (name == "Up" || name == "Down")
@@ -194,8 +199,8 @@ private:
 vtkStandardNewMacro(ViewStyle);
 
 ViewWindow::ViewWindow(const std::vector<LoadedVolume>& volumes, const ViewOptions& options, bool offScreen)
-  : volumes_(volumes), grey_(volumes_.Window()), shown_(volumes.size(), true), frame_(volumes_.Geometry(0).direction),
-    box_(volumes_.Box()), focus_(volumes_.Middle())
+  : volumes_(volumes), grey_(volumes_.Window()), shown_(volumes.size(), true), labels_(options.labels),
+    frame_(volumes_.Geometry(0).direction), box_(volumes_.Box()), focus_(volumes_.Middle())
 {
   for (const LoadedVolume& volume : volumes)
     names_.push_back(std::filesystem::path(volume.file).filename().string());
@@ -310,7 +315,7 @@ void ViewWindow::Refresh()
   for (int plane = 0; plane < 3; ++plane) {
     const ImageGeometry grid = GridOf(plane);
     auto* mapper = static_cast<vtkImageSliceMapper*>(slices_[plane]->GetMapper());
-    mapper->SetInputData(volumes_.Picture(grid, grey_, shown_));
+    mapper->SetInputData(volumes_.Picture(grid, grey_, shown_, labels_));
     titles_[plane]->SetInput(NameOf(plane).c_str());
 
     const PlaneAxes& axes = Planes[plane];
@@ -413,11 +418,18 @@ void ViewWindow::Toggle(std::size_t volume)
   Render();
 }
 
+void ViewWindow::ToggleLabels()
+{
+  labels_ = !labels_;
+  Refresh();
+  Render();
+}
+
 void ViewWindow::Start()
 {
   vtkNew<vtkTextActor> help;
   help->SetInput("drag: look there   wheel: scroll   ctrl+drag: grey levels   middle: move   right: zoom\n"
-                 "1-9: show or hide a volume   r: reset the views   q: quit");
+                 "1-9: show or hide a volume   l: colour what is invented   r: reset the views   q: quit");
   help->GetTextProperty()->SetFontSize(12);
   help->GetTextProperty()->SetColor(0.6, 0.6, 0.6);
   help->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
@@ -486,6 +498,8 @@ Command ViewCommand(CLI::App& program)
   options->add_option("file", values->files, "Volumes (.mha .mhd .nrrd .nhdr .vti)")->required();
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong");
   options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window");
+  options->add_flag("--labels", values->labels,
+                    "Colour what of an embedded volume is invented (blue) or mixed with that (yellow)");
   options->add_option("--size", values->size, "Width and height of the window in pixels")
       ->expected(2)
       ->check(CLI::Range(64, 8192))

@@ -234,11 +234,11 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
             {vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume), FanOf(volume, progress.Part(0.8, 0.82)), volume.Name});
       });
     }
-    const echorama::TiledNoise tiled = echorama::TileNoise(tiling, tiles, progress.Part(0.82, 0.9));
+    const echorama::TiledBeams tiled = echorama::TileNoiseBeams(tiling, tiles, progress.Part(0.82, 0.9));
     Volume<float> real(grid.dimensions);
     Volume<unsigned char> there(grid.dimensions);
-    echorama::FillFan<float>({tiled.intensity.View(), tiled.valid.View(), tiled.geometry}, tiled.fan, plan.Form, grid,
-                             real.View(), there.View(), progress.Part(0.9, 1.0));
+    echorama::FillFanFromBeams(tiled.samples.View(), tiled.fan.geometry, {0, 0, 0}, plan.Form, grid, real.View(), there.View(),
+                               progress.Part(0.9, 1.0));
     std::ptrdiff_t missing = 0;
     for (std::ptrdiff_t at = 0; at < noise.Size(); ++at) {
       if (there.View()[at]) {
