@@ -5,8 +5,8 @@
 IN.jsonl holds one JSON object per line, as Testing/Benchmark.h writes them. Each case becomes a panel of error against
 seconds, both logarithmic: the nearer to the lower left corner, the better. Lines that count successes over a minimum
 overlap (keys "t" and "within_1mm") become one more panel of success against t. A case without errors becomes bars of
-seconds; one with a number of "levels" per line, seconds and error against the levels; and lines of "energy" at times "t" for
-some numbers of levels two panels of curves, linear and logarithmic.
+seconds; one with a number of "levels" per line, seconds and error against the levels; lines with an "accuracy" are joined and
+labelled with it; and lines of "energy" at times "t" for some numbers of levels two panels of curves, linear and logarithmic.
 """
 import json
 import math
@@ -83,6 +83,11 @@ def draw_panel(axes, case, lines, looks):
     # A logarithm has no zero: exact results stand on a line of their own, below all others.
     exact = len(positive) < len(points)
     floor = min(positive) / (10 if exact else 1) if positive else 1
+    for method, of_method in grouped([line for line in lines if number(line, "accuracy") is not None], "method").items():
+        curve = sorted((number(line, "accuracy"), number(line, "seconds"), number(line, "error")) for line in of_method)
+        axes.plot([seconds for _, seconds, _ in curve], [error for _, _, error in curve], color=looks[method]["color"], linewidth=1)
+        for accuracy, seconds, error in curve[::2]:
+            axes.annotate(f"{accuracy:g}", (seconds, error), xytext=(7, 3), textcoords="offset points", fontsize=8)
     for method, seconds, error in points:
         axes.plot(seconds, max(error, floor), **looks[method])
     axes.set_xscale("log")

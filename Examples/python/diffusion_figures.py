@@ -52,7 +52,7 @@ def main():
         diffuser.Update()
         panels.append((f"d = {exponent}", *middle_slice(diffuser.GetOutput(), "Intensity")))
     high = max(panel[1].max() for panel in panels[1:])
-    figure, axes = plt.subplots(2, 4, figsize=(13, 7.2), facecolor="white")
+    figure, axes = plt.subplots(2, 4, figsize=(13, 4.6), facecolor="white")
     for axis in axes.flat:
         axis.axis("off")
     aspect = volume.GetSpacing()[2] / volume.GetSpacing()[0]

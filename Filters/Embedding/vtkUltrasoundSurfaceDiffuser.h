@@ -5,8 +5,8 @@
  *
  * Input: a volume with a `ValidRegion`, whose surface is that of the data. Output: the same volume (pose, arrays and field data
  * kept), its `Intensity` a float: at every voxel, of the region and around it, the mean of the local means at the surface,
- * weighted by distance to the power -d. One more point array, `Deviation` (float), is the local standard deviation, spread alike.
- * Together they are what vtkUltrasoundToneMapper takes as levels.
+ * weighted by distance to the power -d. One more point array, `Deviation` (float), is the local standard deviation of the grain,
+ * spread alike. Together they are what vtkUltrasoundToneMapper takes as levels.
  *
  * Fails without a valid region, when nothing of it is valid, and when a parameter is out of range.
  *
@@ -40,8 +40,8 @@ public:
 
   ///@{
   /**
-   * Standard deviation, in mm, of the windows in which mean and deviation are taken at the surface; only the region counts. 0:
-   * the voxels' own values, which deviate by 0. Default 3.
+   * Standard deviation, in mm, of the windows in which mean and deviation of the grain are taken at the surface; only the region
+   * counts. 0: the voxels' own values, which deviate by 0. Default 3.
    */
   vtkSetClampMacro(SmoothMm, double, 0.0, VTK_DOUBLE_MAX);
   vtkGetMacro(SmoothMm, double);
