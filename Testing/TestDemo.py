@@ -24,12 +24,13 @@ def check(truth, what):
 
 
 def check_report(out):
-    for name in ("stitched.mha", "poses.json", "slices.png", "overlays.png", "edges.png", "rendering.png"):
+    for name in ("stitched.mha", "poses.json", "slices.png", "overlays.png", "edges.png", "embedded.png", "rendering.png",
+                 "embedded.mha", "embedded.Embedding.mha"):
         check((out / name).stat().st_size > 500, f"{name} is missing or empty")
     report = (out / "report.html").read_text()
     outside = re.findall(r"""(?:src|href)\s*=\s*["'](?!data:)[^"']*|url\([^)]*\)|@import[^;]*|<script[^>]*|<link[^>]*""", report)
     check(not outside, f"the report needs more than itself: {outside}")
-    check(report.count('src="data:image/png;base64,') == 4, "the report does not hold its four pictures")
+    check(report.count('src="data:image/png;base64,') == 5, "the report does not hold its five pictures")
     check("$" not in re.sub(r"base64,[^\"]*", "", report), "a place of the template was not filled")
     return report
 
@@ -45,6 +46,7 @@ with tempfile.TemporaryDirectory() as folder:
     before, after = float(off[1]), float(off[2])
     check(before > 5.0, f"the volumes lay only {before} mm off")
     check(after < 2.0, f"the volumes still lie {after} mm off")
+    check("no voxel of the data is altered" in made.stdout, f"embedding altered the data: {made.stdout!r}")
     check("How far off" in report and f"{off[2]}" in report, "the report does not tell the score")
     check(str((folder / "phantom volumes" / "report.html").resolve()) in made.stdout, "the demo does not say where its report is")
 

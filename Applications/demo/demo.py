@@ -19,8 +19,9 @@ import sys
 import numpy as np
 
 
-RESULTS = ["report.html", "stitched.mha", "stitched.ValidRegion.mha", "poses.json", "start.json",
-           "slices.png", "overlays.png", "edges.png", "rendering.png"]
+RESULTS = ["report.html", "stitched.mha", "stitched.ValidRegion.mha", "embedded.mha", "embedded.ValidRegion.mha",
+           "embedded.Embedding.mha", "poses.json", "start.json", "slices.png", "overlays.png", "edges.png", "rendering.png",
+           "embedded.png"]
 
 
 class StepFailed(Exception):
@@ -118,6 +119,7 @@ def demo(options):
         before = scores(steps.run("scoring where they lay", "score", out / "start.json", "--truth", truth_file), files)
         after = scores(steps.run("scoring where they lie now", "score", out / "poses.json", "--truth", truth_file), files)
     steps.run("stitching", "stitch", *files, "--poses", out / "poses.json", "-o", out / "stitched.mha")
+    steps.run("embedding", "embed", out / "stitched.mha", "-o", out / "embedded.mha")
 
     print("  drawing ...", file=sys.stderr, flush=True)
     try:

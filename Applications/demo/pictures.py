@@ -161,6 +161,26 @@ def draw_edges(path, volumes, stitched, views, window, step):
     _save(figure, path)
 
 
+def draw_embedded(path, stitched, embedded, views, window, step):
+    """One plane: stitched, embedded, and embedded with what was invented in colour."""
+    figure, axes = _grid_of_axes(views[:1], 3, 12)
+    view = views[0]
+    points = view.points(step)
+    values = embedded.as_seen().at(points)
+    for panel, title, shown in zip(axes[0], ("stitched", "embedded", "what was invented (orange) and mixed (blue)"),
+                                   (stitched.at(points), values, values)):
+        _grey(panel, shown, view, window)
+        panel.set_title(title, fontsize=10, color="#333333")
+    labels = embedded.labels_at(points)
+    tint = np.zeros((*labels.shape, 4))
+    tint[labels == 2] = (0.34, 0.71, 0.91, 0.4)
+    tint[labels == 3] = (0.9, 0.62, 0.0, 0.4)
+    axes[0][2].imshow(tint, extent=_extent(view), interpolation="nearest")
+    _bare(axes[0][2], view)
+    _scale_bar(axes[0][0], view)
+    _save(figure, path)
+
+
 def draw_overlays(path, before, after, pairs, down, low, high, window, step):
     """Each overlapping pair laid over each other in two colours, before and after: where they agree, the colours are grey."""
     views = []

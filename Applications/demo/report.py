@@ -12,6 +12,7 @@ import platform
 import string
 import subprocess
 
+import echorama
 import numpy as np
 
 import pictures
@@ -139,6 +140,42 @@ def overlap_table(names, pairs_before, pairs_after):
             '<th class="n">mean difference in grey, before → after</th></tr>' + "".join(rows) + "</table>")
 
 
+def embedding_section(stitched_file, embedded_file):
+    """What embedding made, in a paragraph and a table, and whether the data are untouched."""
+    volumes = []
+    for file in (embedded_file, stitched_file):
+        reader = echorama.vtkUltrasoundReader()
+        reader.SetFileName(str(file))
+        reader.Update()
+        volumes.append(reader.GetOutput())
+    measure = echorama.vtkUltrasoundEmbedQuality()
+    measure.SetInputData(volumes[0])
+    measure.SetOriginalData(volumes[1])
+    measure.Update()
+    if not measure.GetReport():
+        raise ValueError("the embedded volume cannot be measured")
+    numbers = json.loads(measure.GetReport())
+    voxels, border = numbers["voxels"], numbers["border"]
+    wrong = voxels["altered"] + voxels["pretended"] + voxels["lost"]
+    total = voxels["data"] + voxels["blend"] + voxels["invented"]
+    text = ("<p>A stitched volume has an outline that no machine makes. Here it lies in the fan that a machine would have needed to see it all; "
+            "what is missing was filled with noise that has the brightness, the contrast and the grain of what lies beside it. It is made up, and "
+            "marked as such, voxel by voxel, in <code>embedded.Embedding.mha</code>.</p>")
+    rows = [row("voxels that show the data, to the last bit", (f"{100 * voxels['data'] / total:.0f}%",)),
+            row("voxels at their border, mixed with background", (f"{100 * voxels['blend'] / total:.0f}%",)),
+            row("voxels that were invented", (f"{100 * voxels['invented'] / total:.0f}%",)),
+            row("voxels that are not what their label says", (str(wrong),))]
+    if border["percentile95"] is not None:
+        rows.append(row("brightness jumps across 95% of the border by at most, grey levels", (f"{border['percentile95']:.1f}",)))
+    if numbers["reference"]["percentile95"] is not None:
+        rows.append(row("the same inside the tissue, at surfaces drawn at random", (f"{numbers['reference']['percentile95']:.1f}",)))
+    if border["deviation_ratio"] is not None:
+        rows.append(row("contrast of the noise, over that of the tissue beside it", (f"{border['deviation_ratio']:.2f}",)))
+    if numbers["crop"]["share"] is not None:
+        rows.append(row("of the data, what the largest crop without ragged borders would have kept", (f"{100 * numbers['crop']['share']:.0f}%",)))
+    return text + "<table>" + "".join(rows) + "</table>", wrong
+
+
 def machine():
     threads = len(os.sched_getaffinity(0))
     return f"{platform.machine()} with {threads} core{'s' if threads > 1 else ''}"
@@ -156,6 +193,8 @@ def write_report(out, steps, files, truth_file, before, after, quick):
     poses = [poses_of(out / "poses.json")[file.resolve()] for file in files]
     now = [volume.moved(pose) for volume, pose in zip(at_first, poses)]
     stitched = Volume.read(out / "stitched.mha")
+    embedded = Volume.read(out / "embedded.mha")
+    embedding, wrong = embedding_section(out / "stitched.mha", out / "embedded.mha")
     names = [html.escape(volume.name) for volume in at_first]
 
     grid_before, grid_after = Lattice.over(at_first), Lattice.over(now)
@@ -174,6 +213,9 @@ def write_report(out, steps, files, truth_file, before, after, quick):
 
     pictures.draw_slices(out / "slices.png", at_first, now, stitched, views, window, step)
     pictures.draw_edges(out / "edges.png", now, stitched, views, window, step)
+    fan_low, fan_high = embedded.as_seen().real_box()
+    wide = np.minimum(low, fan_low - margin), np.maximum(high, fan_high + margin)
+    pictures.draw_embedded(out / "embedded.png", stitched, embedded, pictures.views_through(centre, down, *wide), window, step)
     pictures.draw_rendering(out / "rendering.png", stitched, centre, down, window)
     shown = sorted(sorted(pairs_after, key=lambda pair: -pair.percent)[: max(1, min(3, len(files) - 1))], key=lambda pair: pair.first)
     overlays = ""
@@ -223,8 +265,9 @@ def write_report(out, steps, files, truth_file, before, after, quick):
     done = "".join(row(html.escape(what), f"<code>{html.escape(command)}</code>", (f"{took:.2f}",)) for what, command, took in steps.done)
     listing = {
         "stitched.mha": "the stitched volume; its valid region lies beside it",
+        "embedded.mha": "the same in the fan of a machine; <code>embedded.Embedding.mha</code> beside it says what was invented",
         "poses.json": "where each volume belongs, for <code>echorama stitch --poses</code> and <code>echorama view --poses</code>",
-        "slices.png, overlays.png, edges.png, rendering.png": "the pictures of this page",
+        "slices.png, overlays.png, edges.png, embedded.png, rendering.png": "the pictures of this page",
         "report.html": "this page: one file, to be kept or sent",
     }
     if truth_file:
@@ -238,6 +281,7 @@ def write_report(out, steps, files, truth_file, before, after, quick):
         score=score, verdict=sentence, verdict_class="doubt" if doubt else "",
         overlap_table=overlap_table(names, pairs_before, pairs_after), resolution=f"{2 * grid_after.step:.0f}",
         rendering=data_uri(out / "rendering.png"), slices=data_uri(out / "slices.png"), edges=data_uri(out / "edges.png"),
+        embedding=embedding, embedded=data_uri(out / "embedded.png"),
         overlays=overlays, folder=html.escape(str(out)), files="".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in listing.items()),
         version=html.escape(version_of(steps.program)), date=datetime.date.today().isoformat(), machine=html.escape(machine()))
     path = out / "report.html"
@@ -247,5 +291,6 @@ def write_report(out, steps, files, truth_file, before, after, quick):
     if truth_file:
         lines.append(f"off       {mm(worst_before)} mm before, {mm(worst_after)} mm after (the worst volume)")
     lines.append("overlap   " + sentence)
+    lines.append("embedded  " + ("no voxel of the data is altered" if wrong == 0 else f"{wrong} voxels are not what their labels say"))
     lines.append(f"seconds   {total:.1f} computing")
     return Report(path, "\n".join(lines))

@@ -21,6 +21,7 @@ class Volume:
     valid: np.ndarray  # bool, the same shape: which voxels are real
     spacing: np.ndarray  # mm
     index_to_world: np.ndarray  # 4 x 4
+    labels: np.ndarray = None  # what the voxels of an embedded volume are: 0 nothing, 1 data, 2 blend, 3 invented
 
     @staticmethod
     def read(path):
@@ -33,6 +34,7 @@ class Volume:
         if intensity is None:
             raise OSError(f"{path}: cannot be read")
         valid = echorama.vtkUltrasoundVolume.GetValidRegion(image)
+        labels = image.GetPointData().GetArray(echorama.vtkUltrasoundVolume.EmbeddingName())
         direction = image.GetDirectionMatrix()
         index_to_world = np.eye(4)
         index_to_world[:3, :3] = [[direction.GetElement(row, column) * image.GetSpacing()[column] for column in range(3)]
@@ -40,7 +42,8 @@ class Volume:
         index_to_world[:3, 3] = image.GetOrigin()
         return Volume(pathlib.Path(path).name, vtk_to_numpy(intensity).reshape(shape),
                       vtk_to_numpy(valid).reshape(shape) != 0 if valid is not None else np.ones(shape, bool),
-                      np.array(image.GetSpacing()), index_to_world)
+                      np.array(image.GetSpacing()), index_to_world,
+                      vtk_to_numpy(labels).reshape(shape) if labels else None)
 
     def moved(self, pose):
         """The same voxels elsewhere; pose is a rigid 4 x 4 matrix, VolumeToWorld."""
@@ -68,6 +71,20 @@ class Volume:
             ends.insert(0, (used[0], used[-1]))
         corners = np.array([[i, j, k, 1] for i in ends[0] for j in ends[1] for k in ends[2]]) @ self.index_to_world.T
         return corners[:, :3].min(axis=0), corners[:, :3].max(axis=0)
+
+    def as_seen(self):
+        """An embedded volume as a machine shows it: what was invented counts as real."""
+        return dataclasses.replace(self, valid=self.labels > 0)
+
+    def labels_at(self, points):
+        """Labels of the nearest voxels to world points [..., 3]; 0 outside."""
+        world_to_index = np.linalg.inv(self.index_to_world)
+        index = np.rint(points.reshape(-1, 3) @ world_to_index[:3, :3].T + world_to_index[:3, 3]).astype(int)
+        labels = np.zeros(len(index), np.uint8)
+        inside = ((index >= 0) & (index < self.dimensions)).all(axis=1)
+        i, j, k = index[inside].T
+        labels[inside] = self.labels[k, j, i]
+        return labels.reshape(points.shape[:-1])
 
     def at(self, points):
         """Trilinear values at world points [..., 3]; NaN where less than half of the weight falls on real voxels."""
