@@ -239,6 +239,7 @@ TEST(EnclosingFan, HasTheMargin)
 
 TEST(EnclosingFan, OfRegionsThatAreNoFan)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const auto expect = [](const ImageGeometry& grid, double most, const std::function<bool(const Eigen::Vector3d&)>& isInside) {
     const Region region = RegionOf(grid, isInside);
     ExpectEncloses(Enclosed(region), region, most);
@@ -339,6 +340,7 @@ TEST(EnclosingFan, SurvivesAnyRegion)
 
 TEST(EnclosingFan, DoesNotDependOnThreads)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Region region = UnionOf(Views(convex, 2, 30.0, 10.0), Eigen::Vector3d::Constant(4.0));
   PlacedProbe fans[2];
   for (const int threads : {1, 3}) {

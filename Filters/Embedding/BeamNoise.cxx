@@ -82,8 +82,22 @@ ECHORAMA_HOT void Normals(const std::int32_t* __restrict radius, const std::int3
   }
 }
 
-// Eight floats anywhere in memory.
-using Lane = float __attribute__((vector_size(32), aligned(4), may_alias));
+// Eight floats, from anywhere in memory.
+using Lane = float __attribute__((vector_size(32)));
+
+// sum += weight * (a + b), and the reverse. (By reference: how eight floats are passed by value depends on the instruction set.)
+[[gnu::always_inline]] inline void Add(Lane& sum, float weight, const float* a, const float* b)
+{
+  Lane first, second;
+  std::memcpy(&first, a, sizeof first);
+  std::memcpy(&second, b, sizeof second);
+  sum += weight * (first + second);
+}
+
+[[gnu::always_inline]] inline void Store(const Lane& lane, float* to)
+{
+  std::memcpy(to, &lane, sizeof lane);
+}
 
 // out = sum of weights[t] * rows[t], the weights being symmetric: 32 numbers at a time, whose sums stay in registers.
 ECHORAMA_HOT void WeightedSum(const float* const* rows, const float* weights, int taps, int count, float* __restrict out)
@@ -101,21 +115,23 @@ ECHORAMA_HOT void WeightedSum(const float* const* rows, const float* weights, in
   }
   for (int next = 0; next < count; next += piece) {
     const int begin = next + piece <= count ? next : count - piece; // the last piece may overlap the one before
-    const auto* m = reinterpret_cast<const Lane*>(rows[middle] + begin);
-    Lane s0 = weights[middle] * m[0], s1 = weights[middle] * m[1], s2 = weights[middle] * m[2], s3 = weights[middle] * m[3];
+    const float* m = rows[middle] + begin;
+    Lane s0{}, s1{}, s2{}, s3{};
+    Add(s0, 0.5f * weights[middle], m, m);
+    Add(s1, 0.5f * weights[middle], m + 8, m + 8);
+    Add(s2, 0.5f * weights[middle], m + 16, m + 16);
+    Add(s3, 0.5f * weights[middle], m + 24, m + 24);
     for (int t = 0; t < middle; ++t) {
-      const auto* a = reinterpret_cast<const Lane*>(rows[t] + begin);
-      const auto* b = reinterpret_cast<const Lane*>(rows[taps - 1 - t] + begin);
-      s0 += weights[t] * (a[0] + b[0]);
-      s1 += weights[t] * (a[1] + b[1]);
-      s2 += weights[t] * (a[2] + b[2]);
-      s3 += weights[t] * (a[3] + b[3]);
+      const float *a = rows[t] + begin, *b = rows[taps - 1 - t] + begin;
+      Add(s0, weights[t], a, b);
+      Add(s1, weights[t], a + 8, b + 8);
+      Add(s2, weights[t], a + 16, b + 16);
+      Add(s3, weights[t], a + 24, b + 24);
     }
-    auto* to = reinterpret_cast<Lane*>(out + begin);
-    to[0] = s0;
-    to[1] = s1;
-    to[2] = s2;
-    to[3] = s3;
+    Store(s0, out + begin);
+    Store(s1, out + begin + 8);
+    Store(s2, out + begin + 16);
+    Store(s3, out + begin + 24);
   }
 }
 

@@ -27,7 +27,7 @@ constexpr int Most = DiffusionBlock::Most;
   std::int32_t bits;
   std::memcpy(&bits, &q, sizeof bits);
   const std::int32_t power = (bits - 0x3f3504f3) >> 23;
-  bits -= power << 23;
+  bits -= power * (1 << 23);
   float m;
   std::memcpy(&m, &bits, sizeof m);
   const float s = (m - 1.0f) / (m + 1.0f), s2 = s * s;

@@ -88,7 +88,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
   }
   ParallelFor(n[2], progress.Part(own ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
-    std::vector<float> rows(own ? 4 * static_cast<std::size_t>(n[0]) : 0);
+    std::vector<float> rows(3 * static_cast<std::size_t>(n[0]));
     float *mean = rows.data(), *otherMean = mean + n[0], *unused = otherMean + n[0];
     for (int j = 0; j < n[1]; ++j) {
       const std::ptrdiff_t row = intensity.SliceStride() * k + intensity.RowStride() * j;

@@ -3,6 +3,7 @@
 #include "Core/Base/Random.h"
 #include "Filters/Embedding/Diffusion.h"
 #include "Filters/Embedding/RegionSurface.h"
+#include "Testing/Sanitized.h"
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -186,6 +187,7 @@ TEST(Diffusion, FastAgreesWithExactForScatteredSources)
 
 TEST(Diffusion, AccuracyIsHeeded)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Grid grid{64, 64, 64};
   const Volume<unsigned char> region = Region(grid, Ball(30, 32, 31, 17));
   const DiffusionSources sources = Noise(SurfaceOf(region.View()));

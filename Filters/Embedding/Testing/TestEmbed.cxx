@@ -189,6 +189,7 @@ TEST(Embed, HolesIslandsAndAThinShell)
 
 TEST(Embed, OneVoxelAndNone)
 {
+  ECHORAMA_SKIP_SANITIZED();
   Scene<unsigned char> scene;
   scene.region = Volume<unsigned char>(size);
   try {
@@ -207,6 +208,7 @@ TEST(Embed, OneVoxelAndNone)
 
 TEST(Embed, DataWhereverTheFormIs)
 {
+  ECHORAMA_SKIP_SANITIZED();
   Scene<unsigned char> scene;
   scene.region = Volume<unsigned char>(size, 1);
   const Volume<unsigned char> result = scene.Run({});
