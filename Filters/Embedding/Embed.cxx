@@ -23,6 +23,9 @@ namespace echorama {
 
 namespace {
 
+// The deviation over the mean of fully developed speckle (Rayleigh): noise of more contrast would be cut off at black.
+constexpr double mostContrast = 0.5227;
+
 // Blocks of about a standard deviation, or as large as the limit on their number makes them.
 Blocks BlocksFor(const EmbedParameters& parameters, const std::array<int, 3>& dimensions, const Eigen::Vector3d& spacing)
 {
@@ -111,10 +114,14 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
   spread.mean = Volume<double>(blocks.count);
   spread.deviation = Volume<double>(blocks.count);
   std::copy(mean.View().begin(), mean.View().end(), spread.mean.View().begin());
-  std::transform(deviation.View().begin(), deviation.View().end(), spread.deviation.View().begin(), [&](float value) {
-    const double square = std::exp(2.0 * static_cast<double>(value));
-    return std::sqrt(std::max(0.0, square - roundedVariance));
-  });
+  const bool echoes = std::all_of(sources.values.begin(), sources.values.begin() + static_cast<std::ptrdiff_t>(count),
+                                  [](float value) { return value >= 0.0f; });
+  std::transform(deviation.View().begin(), deviation.View().end(), mean.View().begin(), spread.deviation.View().begin(),
+                 [&](float logarithm, float level) {
+                   const double square = std::exp(2.0 * static_cast<double>(logarithm));
+                   const double limit = echoes ? mostContrast * static_cast<double>(level) : std::numeric_limits<double>::max();
+                   return std::min(limit, std::sqrt(std::max(0.0, square - roundedVariance)));
+                 });
   return spread;
 }
 
