@@ -60,6 +60,16 @@ assert intensity[valid > 0].mean() > 10.0
 if len(sys.argv) > 1:
     SaveData(sys.argv[1], stitched, DataMode="Binary")  # raw bytes and newer libexpat: see stitch_pieces.py
 else:
+    embedded = UltrasoundEmbedder(Input=stitched, FeatherMm=4.0, Form=a)
+    result = servermanager.Fetch(embedded)
+    labels = vtk_to_numpy(result.GetPointData().GetArray("Embedding"))
+    print(f"embedded: {result.GetDimensions()} voxels, {(labels == 3).mean():.3f} of them invented")
+    assert result.GetDimensions() > whole.GetDimensions() and (labels == 3).any()
+    assert vtk_to_numpy(result.GetPointData().GetArray("ValidRegion")).sum() == valid.sum()
+    invented = Threshold(Input=embedded, Scalars=["POINTS", "Embedding"], LowerThreshold=3, UpperThreshold=3)
+    invented.UpdatePipeline()
+    assert invented.GetDataInformation().GetNumberOfPoints() > 0
+
     view = CreateView("RenderView")
     view.ViewSize = [800, 600]
     shown = Show(stitched, view)

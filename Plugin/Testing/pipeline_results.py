@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""pipeline_results.py OUT.npz: synthesises, aligns, stitches and measures distances on small volumes, and saves every number.
+"""pipeline_results.py OUT.npz: synthesises, aligns, stitches, embeds and measures distances on small volumes, and saves every number.
 
 Run by TestSameResults.py on each stack and build; nothing here knows which it is on.
 """
@@ -47,8 +47,13 @@ distance = echorama.vtkUltrasoundDistanceMap()
 distance.SetInputData(stitcher.GetOutput())
 distance.Update()
 
+embedder = echorama.vtkUltrasoundEmbedder()
+embedder.SetInputData(0, stitcher.GetOutput())
+embedder.Update()
+
 results = {"pose": [pose.GetElement(i, j) for i in range(4) for j in range(4)]}
-for name, image in [("phantom", volumes[1]), ("stitched", stitcher.GetOutput()), ("distance", distance.GetOutput())]:
+for name, image in [("phantom", volumes[1]), ("stitched", stitcher.GetOutput()), ("distance", distance.GetOutput()),
+                    ("embedded", embedder.GetOutput())]:
     results[name + ".geometry"] = [*image.GetOrigin(), *image.GetSpacing(), *image.GetDimensions()]
     arrays = image.GetPointData()
     for i in range(arrays.GetNumberOfArrays()):
