@@ -123,7 +123,7 @@ Command EmbedCommand(CLI::App& program)
       ->capture_default_str();
   options->add_option("--form", values->form, "Volume whose fan is the outline; it grows until it holds all data");
   options->add_option("--margin", values->marginMm, "How far the outline reaches beyond the volume, at least, mm")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   options->add_option("--smooth", values->smoothMm, "What is smaller than this is grain, mm (standard deviation)")
       ->check(CLI::Range(1e-3, 1e6))

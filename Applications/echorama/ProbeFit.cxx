@@ -3,6 +3,7 @@
 #include "Core/Geometry/ProbeFit.h"
 #include "Commands.h"
 #include "Core/Geometry/EnclosingFan.h"
+#include "Core/Imaging/Sampling.h"
 #include "Outputs.h"
 #include "Volumes.h"
 #include <algorithm>
@@ -79,8 +80,16 @@ void FitProbe(Session& session, const ProbeFitOptions& options)
   if (!options.output.empty())
     CheckVolumeOutput(options.output, {options.file});
   const LoadedVolume volume = LoadVolume(session, options.file);
-  const auto valid =
-      vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(volume.image), volume.image);
+  Volume<unsigned char> real; // valid, and a number
+  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(volume.image);
+  vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
+    using T = decltype(type);
+    real = RealRegionOf<T>(
+        {vtkUltrasoundVolume::ViewOf<const T>(intensity, volume.image),
+         vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(volume.image), volume.image),
+         volume.geometry});
+  });
+  const VolumeView<const unsigned char> valid = real.View();
   const std::optional<ProbeGeometry> known = vtkUltrasoundAcquisition::ProbeGeometryOf(volume.image);
   if (options.enclose) {
     WriteProbe(session, options, volume.image, EncloseRegionOf(session, options, volume, valid, known));

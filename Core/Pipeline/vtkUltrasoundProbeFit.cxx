@@ -100,7 +100,8 @@ void vtkUltrasoundProbeFit::Execute(vtkInformationVector** inputs, vtkImageData*
   if (!input.ValidRegion) {
     fit.notes.insert(fit.notes.begin(), "The volume has no valid region: every voxel counts as valid.");
   }
-  if (const auto known = vtkUltrasoundAcquisition::ProbeGeometryOf(image); known && this->EncloseRegion) {
+  if (const auto known = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
+      known && this->EncloseRegion && vtkUltrasoundAcquisition::ProbeToWorldOf(image)) {
     fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry; the fan is that, or larger.");
   } else if (known) {
     fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry; it was replaced.");

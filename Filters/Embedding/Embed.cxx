@@ -82,15 +82,27 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
 {
   SpreadStatistics spread;
   const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
-  Volume<unsigned char> held(blocks.count), shown(blocks.count);
+  Volume<unsigned char> held(blocks.count), shown(blocks.count), border(blocks.count);
   ForVoxelsByBlock(blocks, progress.Part(0.0, 0.2), [&](int I, int J, int K, std::ptrdiff_t at) {
     if (region[at])
       held.View()(I, J, K) = 1;
-    if (weights[at] < 1.0f && (form.Empty() || form[at]))
-      shown.View()(I, J, K) = 1;
+    if (form.Empty() || form[at]) {
+      if (weights[at] < 1.0f)
+        shown.View()(I, J, K) = 1;
+      if (!region[at])
+        border.View()(I, J, K) = 1;
+    }
   });
+  // The surface of the blocks, and whatever block holds both: the walls of holes that are smaller than a block.
+  const auto outer = SurfaceOf(held.View());
+  for (const auto& at : outer)
+    border.View()(at[0], at[1], at[2]) = 1;
   DiffusionSources sources;
-  sources.voxels = SurfaceOf(held.View());
+  for (int K = 0; K < blocks.count[2]; ++K)
+    for (int J = 0; J < blocks.count[1]; ++J)
+      for (int I = 0; I < blocks.count[0]; ++I)
+        if (held.View()(I, J, K) && border.View()(I, J, K))
+          sources.voxels.push_back({I, J, K});
   if (sources.voxels.empty()) // all of it is data, in a single block
     sources.voxels = {{0, 0, 0}};
   sources.channels = 2;
@@ -135,6 +147,20 @@ void EmbedParameters::Check() const
     throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
   if (diffusionVoxels < 1000)
     throw Error(Error::Kind::InvalidParameter, "diffusionVoxels must be 1000 or more");
+}
+
+double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
+{
+  const double voxels = static_cast<double>(grid.VoxelCount());
+  const auto lattice = [&](double sigmaMm) { // three sums per block, see LocalStatistics
+    const Blocks blocks(grid.dimensions, grid.spacing, sigmaMm / 1.5);
+    return 24.0 * blocks.count[0] * blocks.count[1] * blocks.count[2];
+  };
+  // Noise and weights are floats; form, valid region, labels and what shows background a byte each. Of lattices there are a
+  // coarse and a fine one at a time, or two coarse ones. Made noise is held along its beams, in some 16 million samples at most.
+  return 12.0 * voxels + lattice(parameters.smoothMm) +
+         std::max(lattice(parameters.smoothMm), lattice(0.5 * parameters.smoothMm)) +
+         60.0 * std::min(voxels, static_cast<double>(parameters.diffusionVoxels)) + 0.3e9;
 }
 
 template <class T>

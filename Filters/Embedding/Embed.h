@@ -18,6 +18,10 @@ struct EmbedParameters {
   void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
 };
 
+/// Bytes of memory that embedding on a grid takes beside its arrays of intensities: noise, masks, weights, and the lattices of
+/// local statistics, which are as fine as the voxels where these are large.
+double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid);
+
 /// Puts data into a background of noise that looks as if it had been seen with them (dissertation 6.3 to 6.5).
 ///
 /// The local mean and deviation of the data at their surface spread outwards and inwards (Diffuse); the noise loses its own and

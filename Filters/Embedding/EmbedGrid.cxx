@@ -2,7 +2,7 @@
 //
 // The extremes of a fan lie on its outside: on the faces of its first and last depth (a fan that bends over more than it is wide
 // has them on the sides, which these faces bound). They are found on a lattice of beams that is so fine that between its points a
-// surface bulges by far less than the voxel of margin.
+// surface bulges by far less than the hundredth of a voxel that is added.
 #include "EmbedGrid.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
@@ -37,7 +37,7 @@ EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first
                    PointOf(form.geometry, {depth, f / static_cast<double>(beams) - 0.5, s / static_cast<double>(beams) - 0.5}));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Eigen::Index a = static_cast<Eigen::Index>(axis);
-    double from = std::floor(box.min()[a]), to = std::ceil(box.max()[a]);
+    double from = std::floor(box.min()[a] - 0.01), to = std::ceil(box.max()[a] + 0.01);
     // Of data in a single slice the result is one, too.
     if (data.dimensions[axis] == 1)
       from = to = 0.0;
@@ -46,7 +46,8 @@ EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first
     from = std::min(from, std::min(firstData, lastData));
     to = std::max(to, std::max(firstData, lastData));
     if (!(to - from < 100000.0))
-      throw Error(Error::Kind::TooLarge, "the fan would need more than 100,000 voxels along one axis");
+      throw Error(Error::Kind::TooLarge,
+                  "the fan would need more than 100,000 voxels along one axis; is its margin, or its depth, too large?");
     grid.offset[axis] = static_cast<int>(-from);
     lattice.dimensions[axis] = static_cast<int>(to - from) + 1;
   }

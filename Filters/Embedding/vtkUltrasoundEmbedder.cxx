@@ -13,6 +13,7 @@
 #include "NoiseMatch.h"
 #include "NoiseTiling.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundFeather.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -22,6 +23,7 @@
 #include "vtkSmartPointer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 using echorama::Error;
@@ -48,6 +50,14 @@ PlacedProbe FanOf(const vtkUltrasoundVolume::Input& input, const echorama::Progr
     throw Error(Error::Kind::NotPossible, input.Name + ": it brings no probe, and none fits its valid region (" + reason + ")");
   }
   return *found;
+}
+
+bool IsSame(const PlacedProbe& a, const PlacedProbe& b)
+{
+  const auto numbers = [](const echorama::ProbeGeometry& g) {
+    return std::array<double, 7>{g.fanAngle, g.fanWidth, g.sweepAngle, g.sweepWidth, g.depthMin, g.depthMax, g.fanOffset};
+  };
+  return numbers(a.geometry) == numbers(b.geometry) && a.probeToWorld.matrix() == b.probeToWorld.matrix();
 }
 
 // Copies the tuples of an array of the data to their places on the grid; all others are 0.
@@ -141,12 +151,16 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
 {
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
   vtkImageData* shape = inputs[2]->GetNumberOfInformationObjects() > 0 ? vtkImageData::GetData(inputs[2]) : nullptr;
-  const vtkMTimeType time = std::max({this->GetMTime(), image->GetMTime(), shape ? shape->GetMTime() : 0});
-  if (this->Planned && this->PlannedAt == time) {
+  if (!shape && this->GetNumberOfInputConnections(2) > 0) {
+    throw Error(Error::Kind::BadInput, "the form is not one volume");
+  }
+  const PlanKey key{{{this, this->GetMTime()}, {image, image->GetMTime()}, {shape, shape ? shape->GetMTime() : 0}}};
+  if (this->Planned && this->PlannedFor == key) {
     return *this->Planned;
   }
   this->Planned.reset();
   const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
+  vtkUltrasoundFeather::RefuseEmbedded(image);
   const echorama::ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(image);
   Volume<unsigned char> region;
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
@@ -160,11 +174,9 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
     enclosing.shape = FanOf(vtkUltrasoundVolume::CheckInput(this, shape, "the form"), progress.Part(0.0, 0.3));
   }
   plan.Form = echorama::EncloseRegion(region.View(), geometry, enclosing, progress.Part(0.3, 0.9));
-  plan.Note = !shape ? "The outline is a fan that was found from the data."
-              : plan.Form.geometry.depthMax == enclosing.shape->geometry.depthMax &&
-                      plan.Form.probeToWorld.matrix() == enclosing.shape->probeToWorld.matrix()
-                  ? "The outline is the fan of the form."
-                  : "The fan of the form does not hold all data: the outline is a larger one.";
+  plan.Note = !shape                                ? "The outline is a fan that was found from the data."
+              : IsSame(plan.Form, *enclosing.shape) ? "The outline is the fan of the form."
+                                                    : "The fan of the form does not hold all data: the outline is a larger one.";
 
   std::array<int, 3> first = geometry.dimensions, last{-1, -1, -1};
   for (int k = 0; k < geometry.dimensions[2]; ++k) {
@@ -184,7 +196,7 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
   }
   plan.Grid = echorama::EmbedGridOf(geometry, first, last, plan.Form, this->PreviewFactor);
   this->Planned = plan;
-  this->PlannedAt = time;
+  this->PlannedFor = key;
   return *this->Planned;
 }
 
@@ -198,6 +210,9 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
 
   // 1. noise that is made, everywhere in the fan
   echorama::BeamNoiseParameters parameters;
+  parameters.depthCorrelationMm =
+      std::min(parameters.depthCorrelationMm, 0.25 * (plan.Form.geometry.depthMax - plan.Form.geometry.depthMin));
+  parameters = echorama::ResolvingCounts(parameters, plan.Form.geometry);
   std::string note = "The noise is made";
   if (this->MatchGrain && volumes.empty()) {
     try {
@@ -263,9 +278,19 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   const echorama::ImageGeometry& grid = plan.Grid.geometry;
   this->Notes = plan.Note + "\n";
 
-  const double voxels = static_cast<double>(grid.VoxelCount());
-  // Noise, weights, distances and four masks beside the arrays themselves.
-  const double bytes = voxels * (20.0 + input.Intensity->GetDataTypeSize());
+  echorama::EmbedParameters parameters;
+  parameters.featherMm = this->FeatherMm;
+  parameters.keepTexture = this->KeepTexture;
+  parameters.smoothMm = this->SmoothMm;
+  parameters.matchContrast = this->MatchContrast;
+  parameters.diffusion.insideExponent = this->InsideExponent;
+  parameters.diffusion.outsideExponent = this->OutsideExponent;
+  double bytes = echorama::EmbedMemory(parameters, grid);
+  for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
+    if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
+      bytes += static_cast<double>(grid.VoxelCount()) * array->GetDataTypeSize() * array->GetNumberOfComponents();
+    }
+  }
   if (bytes > echorama::FreeMemory()) {
     throw Error(Error::Kind::TooLarge, "embedding on a grid of " + std::to_string(grid.dimensions[0]) + " x " +
                                            std::to_string(grid.dimensions[1]) + " x " + std::to_string(grid.dimensions[2]) +
@@ -280,7 +305,7 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   vtkUltrasoundAcquisition::SetProbeGeometry(output, plan.Form.geometry);
   vtkUltrasoundAcquisition::SetProbeToWorld(output, plan.Form.probeToWorld);
   for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
-    if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
+    if (vtkDataArray* array = image->GetPointData()->GetArray(i); array && array != input.Intensity) {
       output->GetPointData()->AddArray(OnGrid(array, image, plan.Grid));
     }
   }
@@ -314,13 +339,6 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   Volume<float> noise(grid.dimensions);
   Volume<unsigned char> form(grid.dimensions);
   this->MakeNoise(inputs, plan, noise.View(), form.View(), progress.Part(0.1, 0.4));
-  echorama::EmbedParameters parameters;
-  parameters.featherMm = this->FeatherMm;
-  parameters.keepTexture = this->KeepTexture;
-  parameters.smoothMm = this->SmoothMm;
-  parameters.matchContrast = this->MatchContrast;
-  parameters.diffusion.insideExponent = this->InsideExponent;
-  parameters.diffusion.outsideExponent = this->OutsideExponent;
   vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
     using T = decltype(type);
     echorama::Embed<T>(parameters, region, grid.spacing, noise.View(), form.View(),

@@ -16,7 +16,8 @@
  * Local mean and deviation of the data at their surface spread into the background (vtkUltrasoundSurfaceDiffuser), whose grain
  * gets them (vtkUltrasoundToneMapper); the border of the data fades into it (vtkUltrasoundFeather).
  *
- * Fails when nothing of the volume is valid, when no fan is known of a noise volume, and when memory does not suffice.
+ * Fails when nothing of the volume is valid, when it was embedded before (mixed voxels would pass as data), when no fan is known
+ * of a noise volume, and when memory does not suffice.
  *
  * Source: dissertation, chapter 6.
  *
@@ -31,7 +32,9 @@
 #ifndef __VTK_WRAP__
 #include "Core/Geometry/ProbeGeometry.h"
 #include "EmbedGrid.h"
+#include <array>
 #include <optional>
+#include <utility>
 #endif
 
 #include <string>
@@ -63,8 +66,8 @@ public:
   ///@}
 
   ///@{
-  /** How far the fan reaches beyond the data, at least, in mm, from 0. Default 5. */
-  vtkSetClampMacro(MarginMm, double, 0.0, VTK_DOUBLE_MAX);
+  /** How far the fan reaches beyond the data, at least, in mm, in [0, 1000]. Default 5. */
+  vtkSetClampMacro(MarginMm, double, 0.0, 1000.0);
   vtkGetMacro(MarginMm, double);
   ///@}
 
@@ -146,8 +149,10 @@ private:
   void MakeNoise(vtkInformationVector** inputs, const Plan& plan, echorama::VolumeView<float> noise,
                  echorama::VolumeView<unsigned char> form, const echorama::Progress& progress);
 
+  // What a plan was made of: this filter's parameters, the volume and the form, which pipelines exchange at will.
+  using PlanKey = std::array<std::pair<const void*, vtkMTimeType>, 3>;
   std::optional<Plan> Planned;
-  vtkMTimeType PlannedAt = 0;
+  PlanKey PlannedFor{};
 #endif
   double FeatherMm;
   bool KeepTexture;

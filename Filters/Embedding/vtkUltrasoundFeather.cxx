@@ -6,6 +6,7 @@
 
 #include "vtkImageData.h"
 #include "vtkObjectFactory.h"
+#include "vtkPointData.h"
 
 #include <algorithm>
 
@@ -28,6 +29,7 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
 {
   const auto input = vtkUltrasoundVolume::CheckInput(this, vtkImageData::GetData(inputs[0]), "the input");
   const auto other = vtkUltrasoundVolume::CheckInput(this, vtkImageData::GetData(inputs[1]), "the background");
+  RefuseEmbedded(input.Image);
   const auto geometry = vtkUltrasoundVolume::GeometryOf(input.Image);
   if (!vtkUltrasoundVolume::GeometryOf(other.Image).AgreesWith(geometry)) {
     throw Error(Error::Kind::BadInput, "the background does not lie on the grid of the volume");
@@ -57,10 +59,9 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
 
   vtkDataArray* result = CopyWithNewIntensity(input.Image, input.Intensity, output, input.Intensity->GetDataType());
   vtkDataArray* labels = AddArray(output, vtkUltrasoundVolume::EmbeddingName(), VTK_UNSIGNED_CHAR);
-  if (!input.ValidRegion) { // what was seen stays known
-    vtkDataArray* seen = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
-    std::copy(region.View().begin(), region.View().end(), vtkUltrasoundVolume::ViewOf<unsigned char>(seen, output).begin());
-  }
+  // What was seen stays known; voxels that are not numbers were not.
+  vtkDataArray* seen = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
+  std::copy(region.View().begin(), region.View().end(), vtkUltrasoundVolume::ViewOf<unsigned char>(seen, output).begin());
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
     using T = decltype(type);
     const auto values = vtkUltrasoundVolume::ViewOf<const T>(input.Intensity, input.Image);
@@ -69,6 +70,21 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
     echorama::Feather<T>(parameters, weights.View(), region.View(), background.View(), otherRegion.View(), geometry.spacing, out,
                          vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output), progress.Part(0.4, 1.0));
   });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundFeather::RefuseEmbedded(vtkImageData* volume)
+{
+  vtkDataArray* labels = volume->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName());
+  double range[2] = {0.0, 0.0};
+  if (labels) {
+    labels->GetRange(range);
+  }
+  if (range[1] > static_cast<double>(echorama::EmbeddedVoxel::Data)) {
+    throw Error(Error::Kind::BadInput,
+                "the input was embedded before: its array Embedding has mixed or invented voxels, which would "
+                "pass as data; embed the volume that it was made from");
+  }
 }
 
 //----------------------------------------------------------------------------

@@ -8,7 +8,7 @@
  * `Embedding` (unsigned char): 0 nothing, 1 data (unchanged to the last bit), 2 data mixed with background, 3 background alone.
  * `ValidRegion` stays that of the data: what was seen.
  *
- * Fails when nothing of the volume is valid, and when the grids differ.
+ * Fails when nothing of the volume is valid, when it was embedded before, and when the grids differ.
  *
  * Source: dissertation 6.5.
  *
@@ -51,8 +51,18 @@ public:
   vtkGetMacro(SmoothMm, double);
   ///@}
 
+#ifndef __VTK_WRAP__
+  /**
+   * Throws echorama::Error(BadInput) for a volume that was embedded before: its mixed and invented voxels would pass as data.
+   */
+  static void RefuseEmbedded(vtkImageData* volume);
+#endif
+
   /** Sets the background (input port 1). */
-  void SetBackgroundConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
+  void SetBackgroundConnection(vtkAlgorithmOutput* output)
+  {
+    this->SetInputConnection(1, output);
+  }
 
 protected:
   vtkUltrasoundFeather();

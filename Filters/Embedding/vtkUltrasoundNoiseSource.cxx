@@ -27,8 +27,10 @@ constexpr double DegreesPerRadian = 57.29577951308232;
 // Its field data, or what its valid region tells.
 echorama::PlacedProbe ProbeOf(const vtkUltrasoundVolume::Input& input)
 {
-  if (const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(input.Image)) {
-    return {*geometry, vtkUltrasoundAcquisition::ProbeToWorldOf(input.Image).value_or(echorama::Pose::Identity())};
+  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(input.Image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(input.Image);
+  if (geometry && pose) {
+    return {*geometry, *pose};
   }
   echorama::PlacedProbe probe;
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&input, &probe](auto type) {

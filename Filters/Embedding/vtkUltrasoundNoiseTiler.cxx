@@ -14,6 +14,7 @@
 #include "vtkUltrasoundAcquisition.h"
 
 #include <algorithm>
+#include <tuple>
 
 using echorama::Error;
 
@@ -45,7 +46,8 @@ echorama::PlacedProbe FanOf(vtkImageData* image, const echorama::PosedVolume<T>&
 
 //----------------------------------------------------------------------------
 struct vtkUltrasoundNoiseTiler::Volumes {
-  std::vector<vtkMTimeType> Made; // of each: the fits hold as long as these stay
+  using Key = std::tuple<vtkImageData*, vtkMTimeType, vtkDataArray*, vtkDataArray*, std::string>;
+  std::vector<Key> Made; // of each: the fits hold as long as these stay
   std::vector<echorama::NoiseInput> Inputs;
 };
 
@@ -90,9 +92,10 @@ const std::vector<echorama::NoiseInput>& vtkUltrasoundNoiseTiler::Prepare(vtkInf
                                                                           const echorama::Progress& progress)
 {
   const auto inputs = vtkUltrasoundVolume::CollectInputs(this, port);
-  std::vector<vtkMTimeType> made;
-  std::transform(inputs.begin(), inputs.end(), std::back_inserter(made),
-                 [](const auto& input) { return input.Image->GetMTime(); });
+  std::vector<Volumes::Key> made;
+  std::transform(inputs.begin(), inputs.end(), std::back_inserter(made), [](const auto& input) {
+    return Volumes::Key{input.Image, input.Image->GetMTime(), input.Intensity, input.ValidRegion, input.Name};
+  });
   if (this->Kept && this->Kept->Made == made) {
     return this->Kept->Inputs;
   }

@@ -63,6 +63,11 @@ void vtkUltrasoundToneMapper::Execute(vtkInformationVector** inputs, vtkImageDat
     std::transform(volume.intensity.begin(), volume.intensity.end(), out.begin(),
                    [](auto value) { return static_cast<float>(value); });
     echorama::ExtractGrain(parameters, out, region.View(), geometry.spacing, out, progress);
+    // Voxels that are not numbers become some, and stay unreal.
+    if (input.ValidRegion || std::any_of(region.View().begin(), region.View().end(), [](unsigned char real) { return !real; })) {
+      vtkDataArray* real = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
+      std::copy(region.View().begin(), region.View().end(), vtkUltrasoundVolume::ViewOf<unsigned char>(real, output).begin());
+    }
   });
   if (levels.Intensity) {
     for (vtkIdType i = 0; i < result->GetNumberOfTuples(); ++i) {

@@ -264,7 +264,8 @@ TEST(BeamNoise, TheSmallestAndTheLongestWork)
   p.steps = 4;
   p.depthCorrelationMm = 25.0;
   p.fanCorrelation = p.sweepCorrelation = 0.25;
-  for (float value : MakeBeamNoise(p, convex).View())
+  const Volume<float> longest = MakeBeamNoise(p, convex);
+  for (float value : longest.View())
     EXPECT_TRUE(std::isfinite(value) && value >= 0.0f);
 }
 

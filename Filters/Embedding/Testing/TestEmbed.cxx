@@ -175,6 +175,17 @@ TEST(Embed, HolesIslandsAndAThinShell)
   EXPECT_NEAR(result.View()(42, 33, 23), 90, 60);
   EXPECT_EQ(scene.labels.View()(4, 36, 30), static_cast<unsigned char>(EmbeddedVoxel::Blend));
 
+  // A hole that is smaller than a block of the diffusion is filled from its own walls, not from the border of the data.
+  Scene<float> core;
+  for (std::ptrdiff_t at = 0; at < core.data.View().Size(); ++at)
+    core.data.View()[at] = core.region.View()[at] ? 30.0f : 0.0f;
+  for (int k = 18; k < 42; ++k)
+    for (int j = 24; j < 48; ++j)
+      for (int i = 30; i < 54; ++i)
+        core.data.View()(i, j, k) = 150.0f;
+  core.region.View()(42, 36, 30) = 0;
+  EXPECT_NEAR(core.Run({}).View()(42, 36, 30), 150.0f, 8.0f);
+
   Scene<unsigned char> shell;
   for (int k = 0; k < size[2]; ++k)
     for (int j = 0; j < size[1]; ++j)

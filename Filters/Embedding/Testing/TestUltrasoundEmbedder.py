@@ -136,7 +136,31 @@ result, filter = run(box(ValidRegion=one), FeatherMm=0)
 assert result and (arrays(result)["Embedding"] == 1).sum() == 1
 assert "a grain of its own" in filter.GetNotes()
 
-# 6. What is refused: nothing valid, a form without a fan.
+# 6. Blocks that are older than the filter, and lie elsewhere, keep their places; so do volumes that a source exchanges.
+first_block, second_block = box(), box(shape=(30, 40, 36))
+second_block.SetOrigin(100, 50, -30)
+from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
+from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
+blocks = vtkMultiBlockDataSet()
+blocks.SetBlock(0, first_block)
+blocks.SetBlock(1, second_block)
+filter = echorama.vtkUltrasoundEmbedder()
+filter.SetMarginMm(3)
+filter.SetInputDataObject(0, blocks)
+filter.Update()
+for number, block in enumerate((first_block, second_block)):
+    check(block, filter.GetOutputDataObject(0).GetBlock(number))
+producer = vtkTrivialProducer()
+producer.SetOutput(first_block)
+filter = echorama.vtkUltrasoundEmbedder()
+filter.SetInputConnection(producer.GetOutputPort())
+filter.Update()
+producer.SetOutput(second_block)
+filter.Update()
+check(second_block, filter.GetOutput())
+
+# 7. What is refused: nothing valid, a form without a fan, what was embedded before.
+assert run(run(box())[0])[0] is None
 assert run(box(ValidRegion=np.zeros((40, 36, 44), np.uint8)))[0] is None
 assert run(box(ValidRegion=one.astype(np.int16)))[0] is None
 nothing = box(ValidRegion=np.zeros((40, 36, 44), np.uint8))

@@ -58,10 +58,14 @@ data[20, 15, 12] = np.nan
 result = run(volume(Intensity=data), other)
 assert result["Embedding"][20, 15, 12] == 3 and result["ValidRegion"].sum() == data.size - 1
 assert (result["Embedding"] == 1).mean() > 0.9
+result = run(volume(Intensity=data, ValidRegion=np.ones(shape, np.uint8)), other)
+assert result["Embedding"][20, 15, 12] == 3 and result["ValidRegion"][20, 15, 12] == 0
 data[20, 15, 12] = 5
 assert (run(volume(Intensity=data), other)["Embedding"] == 1).all()
 
-# What is refused.
+# What is refused: also what was embedded before.
+again = run(volume(Intensity=data, ValidRegion=region), other)
+assert not run(volume(**again), other)
 assert not run(volume(Intensity=data, ValidRegion=np.zeros(shape, np.uint8)), other)
 assert not run(volume(Intensity=data), volume(Intensity=np.zeros((4, 4, 4), np.float32)))
 assert not run(volume(Intensity=data, ValidRegion=region.astype(np.int16)), other)
