@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundProbeFit.h"
 
-#include "Core/Base/Parallel.h"
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "vtkUltrasoundAcquisition.h"
@@ -18,17 +17,8 @@ namespace {
 echorama::Volume<unsigned char> RegionOf(const vtkUltrasoundVolume::Input& input)
 {
   echorama::Volume<unsigned char> region;
-  vtkUltrasoundVolume::Dispatch(input.Intensity, [&input, &region](auto type) {
-    using T = decltype(type);
-    const auto volume = vtkUltrasoundVolume::PosedVolumeOf<T>(input);
-    const echorama::Sampler<T> sampler(volume.intensity, volume.valid);
-    region = echorama::Volume<unsigned char>(volume.intensity.Dimensions());
-    const auto inside = region.View();
-    echorama::ParallelRanges(inside.Size(), 65536, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t i = begin; i < end; ++i) {
-        inside[i] = sampler.IsReal(i) ? 1 : 0;
-      }
-    });
+  vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+    region = echorama::RealRegionOf(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input));
   });
   return region;
 }
@@ -42,6 +32,33 @@ vtkUltrasoundProbeFit::vtkUltrasoundProbeFit()
   this->MaximumDistance = defaults.maximumDistance;
   this->OutlinePoints = defaults.outlinePoints;
   this->MarginMm = echorama::EnclosingFanParameters().marginMm;
+}
+
+//----------------------------------------------------------------------------
+echorama::PlacedProbe vtkUltrasoundProbeFit::ProbeOf(const vtkUltrasoundVolume::Input& input, std::string* notes,
+                                                     const echorama::Progress& progress)
+{
+  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(input.Image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(input.Image);
+  if (geometry && pose) {
+    return {*geometry, *pose};
+  }
+  try {
+    const echorama::ProbeFit fit =
+        echorama::FitProbe(RegionOf(input).View(), vtkUltrasoundVolume::GeometryOf(input.Image), {}, progress);
+    if (notes) {
+      *notes += (notes->empty() ? "" : "\n") + input.Name + ": its fan was fitted to its valid region.";
+      for (const std::string& note : fit.notes) {
+        *notes += "\n" + input.Name + ": " + note;
+      }
+    }
+    return {fit.geometry, fit.probeToWorld};
+  } catch (const echorama::Error& error) {
+    if (error.GetKind() == echorama::Error::Kind::Cancelled) {
+      throw;
+    }
+    throw echorama::Error(error.GetKind(), input.Name + ": it brings no probe, and none fits its valid region: " + error.what());
+  }
 }
 
 //----------------------------------------------------------------------------

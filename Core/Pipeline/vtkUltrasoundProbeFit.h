@@ -85,6 +85,16 @@ public:
   /** What the region left open in the last fit: sentences, one per line. */
   std::string GetNotes() const { return this->Notes; }
 
+#ifndef __VTK_WRAP__
+  /**
+   * The probe of a volume: the recorded one (`ProbeGeometry` and `ProbeToWorld` both), else one that is fitted to where the
+   * volume is real; \a notes then tells so and what the region leaves open, one per line. Throws echorama::Error that names the
+   * volume when none fits, and Error(Cancelled).
+   */
+  static echorama::PlacedProbe ProbeOf(const vtkUltrasoundVolume::Input& input, std::string* notes = nullptr,
+                                       const echorama::Progress& progress = {});
+#endif
+
 protected:
   vtkUltrasoundProbeFit();
   ~vtkUltrasoundProbeFit() override = default;

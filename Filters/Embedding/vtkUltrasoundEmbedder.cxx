@@ -7,13 +7,13 @@
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"
-#include "Core/Imaging/ShadowMap.h"
 #include "Embed.h"
 #include "FanFilling.h"
 #include "NoiseMatch.h"
 #include "NoiseTiling.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundFeather.h"
+#include "vtkUltrasoundProbeFit.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -32,25 +32,6 @@ using echorama::Volume;
 using echorama::VolumeView;
 
 namespace {
-
-// The fan of a volume: the recorded one, or one that is fitted to its valid region.
-PlacedProbe FanOf(const vtkUltrasoundVolume::Input& input, const echorama::Progress& progress)
-{
-  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(input.Image);
-  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(input.Image);
-  if (geometry && pose) {
-    return {*geometry, *pose};
-  }
-  std::optional<PlacedProbe> found;
-  std::string reason;
-  vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
-    found = echorama::FindProbe(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), {}, &reason, progress);
-  });
-  if (!found) {
-    throw Error(Error::Kind::NotPossible, input.Name + ": it brings no probe, and none fits its valid region (" + reason + ")");
-  }
-  return *found;
-}
 
 bool IsSame(const PlacedProbe& a, const PlacedProbe& b)
 {
@@ -171,7 +152,8 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
   echorama::EnclosingFanParameters enclosing;
   enclosing.marginMm = this->MarginMm;
   if (shape) {
-    enclosing.shape = FanOf(vtkUltrasoundVolume::CheckInput(this, shape, "the form"), progress.Part(0.0, 0.3));
+    enclosing.shape = vtkUltrasoundProbeFit::ProbeOf(vtkUltrasoundVolume::CheckInput(this, shape, "the form"), nullptr,
+                                                     progress.Part(0.0, 0.3));
   }
   plan.Form = echorama::EncloseRegion(region.View(), geometry, enclosing, progress.Part(0.3, 0.9));
   plan.Note = !shape                                ? "The outline is a fan that was found from the data."
@@ -245,8 +227,8 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
     std::vector<echorama::NoiseInput> tiles;
     for (const auto& volume : volumes) {
       vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
-        tiles.push_back(
-            {vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume), FanOf(volume, progress.Part(0.8, 0.82)), volume.Name});
+        tiles.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume),
+                         vtkUltrasoundProbeFit::ProbeOf(volume, nullptr, progress.Part(0.8, 0.82)), volume.Name});
       });
     }
     const echorama::TiledBeams tiled = echorama::TileNoiseBeams(tiling, tiles, progress.Part(0.82, 0.9));

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundNoiseSource.h"
 
-#include "Core/Geometry/ProbeFit.h"
-#include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "LatticeNoise.h"
 #include "NoiseMatch.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundProbeFit.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -23,27 +22,6 @@ vtkStandardNewMacro(vtkUltrasoundNoiseSource);
 
 namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
-
-// Its field data, or what its valid region tells.
-echorama::PlacedProbe ProbeOf(const vtkUltrasoundVolume::Input& input)
-{
-  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(input.Image);
-  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(input.Image);
-  if (geometry && pose) {
-    return {*geometry, *pose};
-  }
-  echorama::PlacedProbe probe;
-  vtkUltrasoundVolume::Dispatch(input.Intensity, [&input, &probe](auto type) {
-    const auto region = echorama::RealRegionOf(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input));
-    try {
-      const echorama::ProbeFit fit = echorama::FitProbe(region.View(), vtkUltrasoundVolume::GeometryOf(input.Image));
-      probe = {fit.geometry, fit.probeToWorld};
-    } catch (const Error& error) {
-      throw Error(error.GetKind(), input.Name + ": it has no probe geometry, and none could be fitted: " + error.what());
-    }
-  });
-  return probe;
-}
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -86,7 +64,7 @@ echorama::PlacedProbe vtkUltrasoundNoiseSource::FanFor(vtkInformationVector** in
 {
   for (const int port : {0, 1}) {
     if (const auto input = this->InputAt(inputs, port)) {
-      return ProbeOf(*input);
+      return vtkUltrasoundProbeFit::ProbeOf(*input);
     }
   }
   echorama::PlacedProbe fan;
@@ -162,7 +140,7 @@ void vtkUltrasoundNoiseSource::Execute(vtkInformationVector** inputs, vtkImageDa
   std::fill_n(this->MatchResolved, 3, 0);
   const auto matched = this->InputAt(inputs, 1);
   if (matched) {
-    const echorama::PlacedProbe probe = ProbeOf(*matched);
+    const echorama::PlacedProbe probe = vtkUltrasoundProbeFit::ProbeOf(*matched);
     echorama::NoiseMatchParameters how;
     how.windowMm = this->WindowMm;
     vtkUltrasoundVolume::Dispatch(matched->Intensity, [&](auto type) {

@@ -2,8 +2,6 @@
 #include "vtkUltrasoundNoiseTiler.h"
 
 #include "Core/Base/Error.h"
-#include "Core/Geometry/ProbeFit.h"
-#include "Core/Imaging/Sampling.h"
 #include "Filters/Embedding/NoiseTiling.h"
 
 #include "vtkImageData.h"
@@ -12,6 +10,7 @@
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundProbeFit.h"
 
 #include <algorithm>
 #include <tuple>
@@ -19,30 +18,6 @@
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundNoiseTiler);
-
-namespace {
-// The fan that a volume fills: recorded, or fitted to where it is real.
-template <class T>
-echorama::PlacedProbe FanOf(vtkImageData* image, const echorama::PosedVolume<T>& volume, const std::string& name,
-                            std::string& notes, const echorama::Progress& progress)
-{
-  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
-  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image);
-  if (geometry && pose) {
-    return {*geometry, *pose};
-  }
-  try {
-    const auto fit = echorama::FitProbe(echorama::RealRegionOf(volume).View(), volume.geometry, {}, progress);
-    notes += (notes.empty() ? "" : "\n") + name + ": its fan was fitted to its valid region.";
-    for (const std::string& note : fit.notes) {
-      notes += "\n" + name + ": " + note;
-    }
-    return {fit.geometry, fit.probeToWorld};
-  } catch (const Error& error) {
-    throw Error(error.GetKind(), name + ": " + error.what());
-  }
-}
-} // namespace
 
 //----------------------------------------------------------------------------
 struct vtkUltrasoundNoiseTiler::Volumes {
@@ -107,7 +82,7 @@ const std::vector<echorama::NoiseInput>& vtkUltrasoundNoiseTiler::Prepare(vtkInf
     const auto part = progress.Part(done / count, (done + 1.0) / count);
     vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
       const auto volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input);
-      volumes->Inputs.push_back({volume, FanOf(input.Image, volume, input.Name, this->Notes, part), input.Name});
+      volumes->Inputs.push_back({volume, vtkUltrasoundProbeFit::ProbeOf(input, &this->Notes, part), input.Name});
     });
   }
   volumes->Made = std::move(made);
