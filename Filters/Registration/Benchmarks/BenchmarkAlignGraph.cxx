@@ -312,7 +312,7 @@ void BenchmarkGraph(int count)
   std::vector<Pose> truth;
   for (int v = 0; v < count; ++v) {
     const double angle = 6.283185307179586 * v / count;
-    truth.push_back(MotionAbout({}, random.Direction() * random.Uniform(0.0, 3.0),
+    truth.push_back(MotionAbout(Eigen::Vector3d::Zero(), random.Direction() * random.Uniform(0.0, 3.0),
                                 Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0) * (7.0 * count)));
   }
   std::vector<PoseEdge> edges;

@@ -206,7 +206,7 @@ TEST(AlignVolumes, AWrongPairIsMeasuredAgain)
 TEST(AlignVolumes, PairsAreFoundAtTheSolution)
 {
   Ring ring(5);
-  ring.starts[4] = MotionAbout(ring.truth[4] * -Ring::Corner(), {}, {0.0, 0.0, 30.0}) * ring.truth[4];
+  ring.starts[4] = MotionAbout(ring.truth[4] * -Ring::Corner(), Eigen::Vector3d::Zero(), {0.0, 0.0, 30.0}) * ring.truth[4];
   AlignVolumesParameters p;
   p.pair.start = AlignStart::HandMade;
   p.pairsPerVolume = 3;

@@ -483,7 +483,7 @@ TEST(PoseGraph, FarFromTheOrigin)
   World world(10, 15);
   world.MeasureRing();
   const PoseGraphResult near = SolvePoseGraph(world.starts, world.edges, 0);
-  const Pose away = MotionAbout({}, {0.3, 0.2, 0.1}, {1e5, -2e5, 3e5});
+  const Pose away = MotionAbout(Eigen::Vector3d::Zero(), {0.3, 0.2, 0.1}, {1e5, -2e5, 3e5});
   std::vector<Pose> starts;
   for (const Pose& pose : world.starts)
     starts.push_back(away * pose);
