@@ -33,10 +33,14 @@ with tempfile.TemporaryDirectory() as folder:
     made = [path for path in pictures.glob("*.png") if path.stat().st_size > 2_000]
     if answer.returncode != 0 or len(made) != (9 if liver else 7):
         sys.exit(f"TestExamples: {len(made)} pictures of stitching were made")
-    answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / "noise_tiling_figures.py", "--spacing", "2", pictures],
-                            cwd=folder, capture_output=True, text=True)
-    print(answer.stdout, answer.stderr, sep="")
-    if answer.returncode != 0 or not (pictures / "NoiseTiler.png").is_file():
-        sys.exit("TestExamples: no picture of noise was made")
+    for arguments, wanted in ((["noise_tiling_figures.py", "--spacing", "2", pictures], ["NoiseTiler"]),
+                              (["noise_figures.py", pictures], ["NoiseSource"]),
+                              (["embedding_figures.py", "--spacing", "3", pictures],
+                               ["embedding_coverage", "embedding_background", "embedding_ways"])):
+        answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / arguments[0], *arguments[1:]], cwd=folder,
+                                capture_output=True, text=True)
+        print(answer.stdout, answer.stderr, sep="")
+        if answer.returncode != 0 or not all((pictures / f"{name}.png").is_file() for name in wanted):
+            sys.exit(f"TestExamples: {arguments[0]} did not make its pictures")
     if not scores or float(scores[1]) < 3.0 or float(scores[2]) > 1.0:
         sys.exit("TestExamples: the volumes did not come together")
