@@ -6,7 +6,8 @@ import pathlib
 import tempfile
 import unittest
 
-from program_under_test import run, snapshot
+import numpy as np
+from program_under_test import run, snapshot, write_mha
 
 
 class Embed(unittest.TestCase):
@@ -54,6 +55,8 @@ class Embed(unittest.TestCase):
         self.assertNotIn("grain of the data", done.stdout)
 
     def test_what_is_refused(self):
+        nothing = self.folder / "nothing.mha"
+        write_mha(nothing, np.zeros((20, 20, 20), np.uint8))
         before = snapshot(self.folder)
         for status, arguments, words in (
                 (2, (self.stitched,), ("output",)),
@@ -61,6 +64,9 @@ class Embed(unittest.TestCase):
                 (2, (self.stitched, "-o", self.folder / "a.mha", "--preview", "0"), ("preview",)),
                 (2, (self.stitched, "-o", self.folder / "a.xyz"), ("a.xyz",)),
                 (1, (self.stitched, "-o", self.stitched), ("stitched.mha",)),
+                (1, (nothing, "-o", self.folder / "a.mha"), ("nothing.mha: ", "valid region is empty")),
+                (1, (self.stitched, "-o", self.folder / "a.mha", "--noise", nothing), ("nothing.mha: ", "no probe")),
+                (1, (self.stitched, "-o", self.folder / "a.mha", "--form", nothing), ("nothing.mha: ", "no probe")),
                 (1, (self.folder / "missing.mha", "-o", self.folder / "a.mha"), ("missing.mha",)),
                 (1, (self.stitched, "-o", self.folder / "a.mha", "--noise", self.folder / "missing.mha"), ("missing.mha",)),
                 (1, (self.stitched, "-o", self.folder / "a.mha", "--form", self.folder / "missing.mha"), ("missing.mha",))):

@@ -4,6 +4,7 @@
 #include "Filters/Embedding/Feather.h"
 #include "Outputs.h"
 #include "Volumes.h"
+#include <algorithm>
 #include <array>
 #include <CLI/Validators.hpp>
 #include <memory>
@@ -67,7 +68,18 @@ void Embed(Session& session, const EmbedOptions& options)
   embedder->SetOutsideExponent(options.outsideExponent);
   embedder->SetSeed(options.seed);
   embedder->SetPreviewFactor(options.preview);
-  session.Update(embedder, "embed", options.file);
+  try {
+    session.Update(embedder, "embed", options.file);
+  } catch (const Error& error) { // the filter knows no files, but for the names of noise volumes
+    const std::string reason = error.what(), subject = "the form";
+    const bool named = std::any_of(noise.begin(), noise.end(),
+                                   [&reason](const LoadedVolume& each) { return reason.find(each.file) != std::string::npos; });
+    if (error.GetKind() == Error::Kind::Cancelled || named)
+      throw;
+    if (reason.rfind(subject, 0) == 0)
+      throw Error(error.GetKind(), options.form + reason.substr(subject.size()));
+    throw Error(error.GetKind(), options.file + ": " + reason);
+  }
   vtkImageData* result = embedder->GetOutput();
 
   std::array<std::ptrdiff_t, 4> voxels{};

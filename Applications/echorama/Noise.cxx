@@ -49,7 +49,15 @@ void MakeNoise(Session& session, const NoiseOptions& options, vtkUltrasoundNoise
     match = LoadVolume(session, options.match);
     source->SetMatchData(match->image);
   }
-  session.Update(source, "make", "noise");
+  try {
+    session.Update(source, "make", "noise");
+  } catch (const Error& error) { // the filter knows no files
+    const bool ofForm = options.match.empty() || std::string(error.what()).rfind("the volume with the fan", 0) == 0;
+    const std::string& file = ofForm ? options.form : options.match;
+    if (error.GetKind() == Error::Kind::Cancelled || file.empty())
+      throw;
+    throw Error(error.GetKind(), file + ": " + error.what());
+  }
 
   vtkImageData* noise = source->GetOutput();
   const ProbeGeometry probe = vtkUltrasoundAcquisition::ProbeGeometryOf(noise).value();
