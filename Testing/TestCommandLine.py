@@ -350,7 +350,9 @@ class MainJob(unittest.TestCase):
         self.assertGreater(slabs["slabs"], 4)
         self.assertEqual(whole["valid_voxels"], slabs["valid_voxels"])
         self.assertEqual(whole["overlap_fraction"], slabs["overlap_fraction"])
-        self.assertLess(peak - resting, 1.5 * limit + 4e6, (resting, needed, limit))
+        # The limit is of the voxels that are held; readers, threads and the allocator take some 8 MB more, whatever the size.
+        self.assertLess(peak - resting, limit + 14e6, (resting, needed, limit))
+        self.assertLess(peak - resting, 0.7 * whole["output_bytes"], (resting, needed, limit))
         self.assertGreater(needed - resting, whole["output_bytes"])
         names = ["whole", "slabs", "whole.ValidRegion", "slabs.ValidRegion", "whole.Coverage"]
         voxels = {}
