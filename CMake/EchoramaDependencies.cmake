@@ -36,6 +36,12 @@ find_path(ECHORAMA_POCKETFFT_INCLUDE_DIR pocketfft.hpp
   PATHS /usr/lib/python3/dist-packages/pythran/pythonic/numpy/fft REQUIRED)
 add_library(Echorama_PocketFFT INTERFACE IMPORTED)
 target_include_directories(Echorama_PocketFFT SYSTEM INTERFACE ${ECHORAMA_POCKETFFT_INCLUDE_DIR})
+# Embree's own configuration looks for a TBB of another name.
+find_path(ECHORAMA_EMBREE_INCLUDE_DIR embree3/rtcore.h REQUIRED)
+find_library(ECHORAMA_EMBREE embree3 REQUIRED)
+add_library(Echorama_Embree INTERFACE IMPORTED)
+target_include_directories(Echorama_Embree SYSTEM INTERFACE ${ECHORAMA_EMBREE_INCLUDE_DIR})
+target_link_libraries(Echorama_Embree INTERFACE ${ECHORAMA_EMBREE})
 if(ECHORAMA_TESTING)
   find_package(GTest REQUIRED)
   include(GoogleTest)

@@ -352,35 +352,6 @@ void AddNoise(const PhantomParameters& p, float amplitude, std::uint64_t row, st
   }
 }
 
-// Samples along one axis that surround a position, given as a fraction of the axis' length.
-struct Between {
-  Between(double fraction, int count)
-  {
-    const double position = std::clamp(fraction, 0.0, 1.0) * (count - 1);
-    first = std::min(static_cast<int>(position), count - 2);
-    t = position - first;
-  }
-  int first;
-  double t;
-};
-
-// Trilinear interpolation in beam space.
-std::complex<double> Interpolate(const VolumeView<const std::complex<float>>& samples, const Between& depth, const Between& fan,
-                                 const Between& sweep)
-{
-  const auto along = [&](int beam, int plane) {
-    const std::complex<float>* row = samples.Row(fan.first + beam, sweep.first + plane) + depth.first;
-    const std::complex<double> a(row[0]), b(row[1]);
-    return a + depth.t * (b - a);
-  };
-  const auto across = [&](int plane) {
-    const std::complex<double> a = along(0, plane);
-    return a + fan.t * (along(1, plane) - a);
-  };
-  const std::complex<double> a = across(0);
-  return a + sweep.t * (across(1) - a);
-}
-
 } // namespace
 
 void PhantomParameters::Check() const
@@ -453,16 +424,6 @@ Inclusion RibBelow(const ProbeGeometry& probe, const Pose& probeToWorld, double 
   rib.radii = {std::max(width, 0.1), length, thickness};
   rib.rotation = LogRotation(probeToWorld.linear() * ExpRotation({0.0, place * probe.fanAngle, 0.0}));
   return {"rib", rib, 15.0, 0.0, 0.0, 20.0};
-}
-
-std::optional<std::complex<double>> BeamEchoes::At(const Eigen::Vector3d& pointInProbe) const
-{
-  const auto beam = BeamPointAt(probe, pointInProbe);
-  if (!beam)
-    return {};
-  const auto& n = baseband.Dimensions();
-  return Interpolate(baseband.View(), Between((beam->depth - probe.depthMin) / (probe.depthMax - probe.depthMin), n[0]),
-                     Between(beam->fan + 0.5, n[1]), Between(beam->sweep + 0.5, n[2]));
 }
 
 BeamEchoes SimulateEchoes(const PhantomParameters& p, const Progress& progress)

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "BeamEchoes.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
 #include "PhantomScene.h"
 #include "ProbePress.h"
-#include <complex>
 #include <cstdint>
-#include <optional>
 #include <string>
 
 namespace echorama {
@@ -60,17 +59,7 @@ struct PhantomParameters {
 /// fan, that takes all echoes behind it over about \a share (in (0, 0.6]) of the fan. World coordinates.
 Inclusion RibBelow(const ProbeGeometry& probe, const Pose& probeToWorld, double share);
 
-/// The echoes on the beams before detection: complex baseband, depth fastest, then fan, then sweep. Samples lie evenly from
-/// the first to the last depth, beam and plane. Uniform background has mean power 1.
-struct BeamEchoes {
-  ProbeGeometry probe;
-  Volume<std::complex<float>> baseband;
-
-  /// Trilinear in the baseband at a point of the probe frame (mm); nothing outside the fan.
-  std::optional<std::complex<double>> At(const Eigen::Vector3d& pointInProbe) const;
-};
-
-/// Sums the echoes of scatterers that are fixed to the material.
+/// Sums the echoes of scatterers that are fixed to the material. Uniform background has mean power 1.
 ///
 /// One scatterer lies at random in each cell of a lattice in the world; place and strength are hashed from the seed and the
 /// cell. Its echo has the phase exp(-i 4 pi r / wavelength) of its depth r and a Gaussian envelope in depth, along the fan
