@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A place is tried against the spheres near it only. Their sizes may span orders of magnitude, so there is a grid per factor of
+// two in radius, with cells as wide as its largest spheres: in each, the neighbours lie within the two or three cells per axis
+// that the candidate reaches. A sphere is filed in the one cell of its centre, and cells are short lists; grids come
+// into being with their first sphere, and have no more cells than there may be spheres.
+//
+// Random: sizes are placed in descending order, because a large one finds room only while there is much. Which sizes
+// come is drawn before, so the order changes nothing about their distribution, until a size finds no room. Then that size and
+// all above are over, the limit drops by a tenth, and what is missing is drawn below it: so a packing ends after few such
+// steps whatever is asked for.
+//
+// EmptySpace: the way to the nearest surface is looked for from the coarsest grid on, and what is found narrows the search
+// in the finer ones, where most spheres are.
+//
+// Places come from one stream of random numbers, one after the other: this is a sequential process, on one thread.
+#include "SpherePacking.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/Random.h"
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+namespace echorama {
+namespace {
+
+using Eigen::Vector3d;
+using Parameters = SpherePackingParameters;
+
+constexpr double sphereVolume = 4.1887902047863905; // of radius 1
+
+// Spheres in one grid per octave of their radii.
+class Neighbourhood {
+public:
+  explicit Neighbourhood(const Parameters& p)
+    : min_(p.boxMin), size_(p.boxMax - p.boxMin), gap_(p.gapMm), largest_(p.radiusMax),
+      octaves_(1 + static_cast<std::size_t>(std::floor(std::log2(p.radiusMax / p.radiusMin))))
+  {
+  }
+
+  const std::vector<Sphere>& Spheres() const { return spheres_; }
+  std::vector<Sphere> Take() { return std::move(spheres_); }
+
+  void Add(const Sphere& sphere)
+  {
+    const auto octave = static_cast<std::size_t>(std::max(0.0, std::floor(std::log2(largest_ / sphere.radius))));
+    Octave& grid = octaves_[std::min(octave, octaves_.size() - 1)];
+    if (grid.members.empty())
+      grid.Start(size_, 2.0 * sphere.radius);
+    grid.largest = std::max(grid.largest, sphere.radius);
+    const auto index = static_cast<std::int32_t>(spheres_.size());
+    std::int32_t& head = grid.heads[grid.IndexOf(sphere.centre - min_)];
+    spheres_.push_back(sphere);
+    next_.push_back(head);
+    head = index;
+    grid.members.push_back(index);
+  }
+
+  // Whether a sphere keeps the gap to all others.
+  bool Fits(const Vector3d& centre, double radius) const
+  {
+    for (const Octave& grid : octaves_) {
+      if (grid.members.empty())
+        continue;
+      const bool clear = grid.Visit(centre - min_, radius + gap_ + grid.largest, [&](std::int32_t i) {
+        for (; i >= 0; i = next_[static_cast<std::size_t>(i)]) {
+          const Sphere& other = spheres_[static_cast<std::size_t>(i)];
+          const double reach = radius + gap_ + other.radius;
+          if ((other.centre - centre).squaredNorm() < reach * reach)
+            return false;
+        }
+        return true;
+      });
+      if (!clear)
+        return false;
+    }
+    return true;
+  }
+
+  // The largest radius up to room that keeps the gap, or something below least when there is none from least on.
+  double Room(const Vector3d& centre, double least, double room) const
+  {
+    const auto meet = [&](const Sphere& other) {
+      const double reach = room + gap_ + other.radius, squared = (other.centre - centre).squaredNorm();
+      if (squared < reach * reach) // a trace less than the distance, so that rounding never makes them overlap
+        room = std::sqrt(squared) * (1.0 - 1e-12) - gap_ - other.radius;
+      return room >= least;
+    };
+    for (const Octave& grid : octaves_) {
+      if (grid.members.empty())
+        continue;
+      const double reach = room + gap_ + grid.largest;
+      if (grid.CellsWithin(reach) > static_cast<double>(grid.members.size())) { // few spheres in a fine grid
+        for (const std::int32_t i : grid.members)
+          if (!meet(spheres_[static_cast<std::size_t>(i)]))
+            return room;
+        continue;
+      }
+      const bool clear = grid.Visit(centre - min_, reach, [&](std::int32_t i) {
+        for (; i >= 0; i = next_[static_cast<std::size_t>(i)])
+          if (!meet(spheres_[static_cast<std::size_t>(i)]))
+            return false;
+        return true;
+      });
+      if (!clear)
+        return room;
+    }
+    return room;
+  }
+
+private:
+  struct Octave {
+    std::vector<std::int32_t> heads;   // first sphere of each cell, -1: none; the others follow in next_
+    std::vector<std::int32_t> members; // all of its spheres
+    std::array<int, 3> cells{1, 1, 1};
+    double perCell = 1.0; // 1 / edge
+    double largest = 0.0;
+
+    void Start(const Vector3d& size, double edge)
+    {
+      constexpr double mostCells = 1 << 21;
+      const auto count = [&size](double e) { return (size / e).array().floor() + 1.0; };
+      while (count(edge).prod() > mostCells)
+        edge *= 1.25;
+      for (int axis = 0; axis < 3; ++axis)
+        cells[static_cast<std::size_t>(axis)] = static_cast<int>(count(edge)[axis]);
+      perCell = 1.0 / edge;
+      heads.assign(static_cast<std::size_t>(count(edge).prod()), -1);
+    }
+
+    int Cell(double place, int axis) const
+    {
+      const int last = cells[static_cast<std::size_t>(axis)] - 1;
+      return static_cast<int>(std::clamp(place * perCell, 0.0, static_cast<double>(last)));
+    }
+    std::size_t Index(int x, int y, int z) const
+    {
+      return static_cast<std::size_t>(x) +
+             static_cast<std::size_t>(cells[0]) *
+                 (static_cast<std::size_t>(y) + static_cast<std::size_t>(cells[1]) * static_cast<std::size_t>(z));
+    }
+    std::size_t IndexOf(const Vector3d& place) const { return Index(Cell(place.x(), 0), Cell(place.y(), 1), Cell(place.z(), 2)); }
+
+    double CellsWithin(double reach) const
+    {
+      const double perAxis = 2.0 * reach * perCell + 2.0;
+      return std::min(perAxis, double(cells[0])) * std::min(perAxis, double(cells[1])) * std::min(perAxis, double(cells[2]));
+    }
+
+    // Calls visit(first sphere) for the cells within reach until it returns false. \returns whether it never did.
+    template <class Function>
+    bool Visit(const Vector3d& place, double reach, const Function& visit) const
+    {
+      std::array<int, 3> from, to;
+      for (int axis = 0; axis < 3; ++axis) {
+        from[static_cast<std::size_t>(axis)] = Cell(place[axis] - reach, axis);
+        to[static_cast<std::size_t>(axis)] = Cell(place[axis] + reach, axis);
+      }
+      for (int z = from[2]; z <= to[2]; ++z)
+        for (int y = from[1]; y <= to[1]; ++y)
+          for (int x = from[0]; x <= to[0]; ++x)
+            if (!visit(heads[Index(x, y, z)]))
+              return false;
+      return true;
+    }
+  };
+
+  Vector3d min_, size_;
+  double gap_, largest_;
+  std::vector<Octave> octaves_; // [k]: radii above largest_ / 2^(k+1), up to largest_ / 2^k
+  std::vector<Sphere> spheres_;
+  std::vector<std::int32_t> next_;
+};
+
+// Where spheres may lie.
+class Site {
+public:
+  explicit Site(const Parameters& p)
+    : ball_(p.region == Parameters::Region::Ball), min_(p.boxMin), max_(p.boxMax), middle_(0.5 * (p.boxMin + p.boxMax)),
+      radius_(0.5 * (p.boxMax - p.boxMin).minCoeff())
+  {
+  }
+
+  // A centre, uniform among those whose spheres of a radius lie wholly inside.
+  Vector3d Place(Random& random, double radius) const
+  {
+    if (ball_)
+      return middle_ + (radius_ - radius) * std::cbrt(random.Uniform()) * random.Direction();
+    Vector3d place;
+    for (int axis = 0; axis < 3; ++axis)
+      place[axis] = min_[axis] + radius + (max_[axis] - min_[axis] - 2.0 * radius) * random.Uniform();
+    return place;
+  }
+
+  // How far it is to the border.
+  double Room(const Vector3d& place) const
+  {
+    if (ball_)
+      return radius_ - (place - middle_).norm();
+    return std::min((place - min_).minCoeff(), (max_ - place).minCoeff());
+  }
+
+private:
+  bool ball_;
+  Vector3d min_, max_, middle_;
+  double radius_;
+};
+
+// A radius between least and most, by the inverse of the distribution's sum.
+double DrawRadius(const Parameters& p, double least, double most, Random& random)
+{
+  const double u = random.Uniform(), ratio = least / most;
+  const double power = p.radii == Parameters::Radii::Uniform      ? 1.0
+                       : p.radii == Parameters::Radii::LogUniform ? 0.0
+                                                                  : 1.0 - p.exponent;
+  const double start = std::pow(ratio, power);
+  const double part = std::abs(power) < 1e-9 ? std::pow(ratio, 1.0 - u) : std::pow(start + u * (1.0 - start), 1.0 / power);
+  return std::clamp(most * part, least, most);
+}
+
+// What was packed so far, and what is wanted.
+class Packing {
+public:
+  Packing(const Parameters& p, const Progress& progress)
+    : p_(p), site_(p), neighbours_(p), progress_(progress), wanted_(p.fillFraction * p.Volume()), places_(p.seed, 1)
+  {
+  }
+
+  SpherePacking Random()
+  {
+    echorama::Random sizes(p_.seed, 0);
+    double limit = p_.radiusMax;
+    while (limit >= p_.radiusMin) {
+      const std::vector<double> radii = Draw(sizes, limit);
+      const auto lost = std::find_if_not(radii.begin(), radii.end(), [this](double radius) { return Insert(radius); });
+      if (lost == radii.end())
+        return Finish(false);
+      limit = 0.9 * *lost;
+    }
+    return Finish(true);
+  }
+
+  SpherePacking EmptySpace()
+  {
+    int missed = 0;
+    while (!Full()) {
+      if (missed == p_.misses)
+        return Finish(true);
+      Report();
+      const Vector3d place = site_.Place(places_, p_.radiusMin);
+      const double border = std::clamp(site_.Room(place), p_.radiusMin, p_.radiusMax);
+      const double radius = neighbours_.Room(place, p_.radiusMin, border);
+      if (radius < p_.radiusMin) {
+        ++missed;
+        continue;
+      }
+      Keep({place, radius});
+      missed = 0;
+    }
+    return Finish(false);
+  }
+
+private:
+  // The sizes that are still missing, none above limit, in descending order.
+  std::vector<double> Draw(echorama::Random& sizes, double limit) const
+  {
+    std::vector<double> radii;
+    const auto most = static_cast<std::size_t>(p_.count) - neighbours_.Spheres().size();
+    for (double missing = wanted_ - filled_; missing > 0.0 && radii.size() < most;) {
+      const double radius = DrawRadius(p_, p_.radiusMin, limit, sizes);
+      const double volume = sphereVolume * radius * radius * radius;
+      if (volume > 2.0 * missing) // nearer to what is wanted without it
+        break;
+      missing -= volume;
+      radii.push_back(radius);
+      if (missing > 0.0 && radii.size() == most && p_.count == Parameters::mostSpheres)
+        RefuseMore();
+    }
+    std::sort(radii.begin(), radii.end(), std::greater<>());
+    return radii;
+  }
+
+  bool Insert(double radius)
+  {
+    for (int tried = 0; tried < p_.misses; ++tried) {
+      Report();
+      const Vector3d place = site_.Place(places_, radius);
+      if (neighbours_.Fits(place, radius)) {
+        Keep({place, radius});
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void Keep(const Sphere& sphere)
+  {
+    if (neighbours_.Spheres().size() == Parameters::mostSpheres)
+      RefuseMore();
+    neighbours_.Add(sphere);
+    filled_ += sphereVolume * sphere.radius * sphere.radius * sphere.radius;
+  }
+
+  [[noreturn]] void RefuseMore() const
+  {
+    throw Error(Error::Kind::TooLarge, "a fill fraction of " + NumberText(p_.fillFraction) + " takes more than " +
+                                           std::to_string(Parameters::mostSpheres) +
+                                           " spheres of these radii; raise radiusMin, or make the box smaller");
+  }
+
+  bool Full() const
+  {
+    const auto there = static_cast<std::int64_t>(neighbours_.Spheres().size());
+    return filled_ >= wanted_ || (there >= p_.count && p_.count < Parameters::mostSpheres);
+  }
+
+  void Report()
+  {
+    if (tries_++ % 8192 == 0)
+      progress_(
+          std::max(wanted_ > 0.0 ? std::min(filled_ / wanted_, 1.0) : 1.0,
+                   static_cast<double>(neighbours_.Spheres().size()) / static_cast<double>(std::max<std::int64_t>(p_.count, 1))));
+  }
+
+  SpherePacking Finish(bool saturated)
+  {
+    progress_(1.0);
+    return {neighbours_.Take(), filled_ / p_.Volume(), tries_, saturated};
+  }
+
+  const Parameters& p_;
+  const Site site_;
+  Neighbourhood neighbours_;
+  const Progress& progress_;
+  const double wanted_;
+  double filled_ = 0.0;
+  std::int64_t tries_ = 0;
+  echorama::Random places_;
+};
+
+} // namespace
+
+void SpherePackingParameters::Check() const
+{
+  const auto check = [](const char* what, double value, double from, double to) {
+    if (!(value >= from && value <= to))
+      throw Error(Error::Kind::InvalidParameter, std::string("the packing's ") + what + " is " + NumberText(value) +
+                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
+  };
+  constexpr double far = 1e6;
+  for (int axis = 0; axis < 3; ++axis) {
+    check("boxMin", boxMin[axis], -far, far);
+    check("boxMax", boxMax[axis], -far, far);
+    if (!(boxMax[axis] > boxMin[axis]))
+      throw Error(Error::Kind::InvalidParameter,
+                  "the packing's box has no volume: its boxMax must be above its boxMin on every axis");
+  }
+  check("exponent", exponent, -10.0, 10.0);
+  check("radiusMin", radiusMin, 1e-6, far);
+  check("radiusMax", radiusMax, radiusMin, far);
+  const double room = 0.5 * (boxMax - boxMin).minCoeff();
+  if (radiusMax > room)
+    throw Error(Error::Kind::InvalidParameter, "the packing's radiusMax is " + NumberText(radiusMax) +
+                                                   " mm; a sphere of more than " + NumberText(room) +
+                                                   " mm does not fit into the region");
+  check("gapMm", gapMm, 0.0, 1000.0);
+  check("fillFraction", fillFraction, 0.0, 1.0);
+  check("count", static_cast<double>(count), 0.0, static_cast<double>(mostSpheres));
+  check("misses", misses, 1.0, 1e9);
+}
+
+double SpherePackingParameters::Volume() const
+{
+  const Vector3d size = boxMax - boxMin;
+  const double radius = 0.5 * size.minCoeff();
+  return region == Region::Ball ? sphereVolume * radius * radius * radius : size.prod();
+}
+
+SpherePacking PackSpheres(const SpherePackingParameters& parameters, const Progress& progress)
+{
+  parameters.Check();
+  Packing packing(parameters, progress);
+  return parameters.method == Parameters::Method::Random ? packing.Random() : packing.EmptySpace();
+}
+
+} // namespace echorama
