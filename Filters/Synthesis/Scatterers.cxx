@@ -1,0 +1,439 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The lattice is cut into blocks of blockEdge^3 cells, and each block becomes a brick.
+//
+// 1. Which blocks: those whose box, moved by the displacement at its centre and widened by how much the displacement can
+//    change within the block (a bound on its derivative from the differences of its coefficients), meets the region and is
+//    wanted. So only what is near a beam is ever hashed.
+// 2. Scatterers: tasks of a fixed number of blocks. One hash (Philox) per cell gives place (24 bits an axis), rank and strength;
+//    where it lies is asked for the whole task at once. What is kept goes to the memory of the task, so that nothing is copied
+//    and the order does not depend on the threads.
+// 3. A grid of the centres of the bricks answers which lie near a line.
+//
+// Cost: a hash, a logarithm and a cosine per cell (some 50 ns), 64 control points per cell where it is displaced; 16 bytes per
+// scatterer.
+#include "Scatterers.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Memory.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Base/Random.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+namespace {
+
+constexpr int lanes = 16;                // lists are padded to a multiple: whole vectors
+constexpr double farthest = 1e7;         // mm
+constexpr double cellsPerTask = 32768.0; // asked for at once
+constexpr double maxBlocks = 134217728.0;
+
+std::uint32_t Padded(std::size_t count)
+{
+  return static_cast<std::uint32_t>((count + lanes - 1) / lanes * lanes);
+}
+
+// Scatterers of one brick before they are stored.
+struct Gathered {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<float> amplitudes;
+
+  void Clear()
+  {
+    points.clear();
+    amplitudes.clear();
+  }
+};
+
+// Stores them at the end of a part. Padding lies at the centre and is silent.
+Scatterers::Brick Store(const Gathered& gathered, std::uint32_t partIndex, std::vector<float>& part)
+{
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& point : gathered.points)
+    box.extend(point);
+  Scatterers::Brick brick;
+  brick.centre = box.center();
+  brick.count = static_cast<std::uint32_t>(gathered.points.size());
+  brick.stride = Padded(gathered.points.size());
+  brick.part = partIndex;
+  brick.first = part.size();
+  part.resize(part.size() + 4 * static_cast<std::size_t>(brick.stride), 0.0f);
+  float* list = part.data() + brick.first;
+  for (std::size_t i = 0; i < gathered.points.size(); ++i) {
+    const Eigen::Vector3f local = (gathered.points[i] - brick.centre).cast<float>();
+    for (int axis = 0; axis < 3; ++axis)
+      list[static_cast<std::size_t>(axis) * brick.stride + i] = local[axis];
+    list[3 * static_cast<std::size_t>(brick.stride) + i] = gathered.amplitudes[i];
+    brick.halfSize = i == 0 ? local.cwiseAbs().eval() : brick.halfSize.cwiseMax(local.cwiseAbs()).eval();
+  }
+  return brick;
+}
+
+// How much the displacement changes at most per mm: the derivative of a B-spline is one of the differences of neighbouring
+// coefficients, and no larger than the largest of them.
+double LipschitzBound(const DisplacementField& field)
+{
+  const std::vector<Eigen::Vector3d> values = field.Coefficients();
+  const auto& size = field.Lattice().dimensions;
+  const auto at = [&](int i, int j, int k) -> Eigen::Vector3d {
+    if (i < 0 || j < 0 || k < 0 || i >= size[0] || j >= size[1] || k >= size[2])
+      return Eigen::Vector3d::Zero();
+    return values[(static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
+                      static_cast<std::size_t>(size[0]) +
+                  static_cast<std::size_t>(i)];
+  };
+  double sum = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    double largest = 0.0;
+    for (int k = -1; k <= size[2]; ++k)
+      for (int j = -1; j <= size[1]; ++j)
+        for (int i = -1; i <= size[0]; ++i)
+          largest = std::max(largest, (at(i + (axis == 0), j + (axis == 1), k + (axis == 2)) - at(i, j, k)).norm());
+    sum += std::pow(largest / field.Lattice().spacing[axis], 2);
+  }
+  return std::sqrt(sum);
+}
+
+// What is hashed from a cell.
+struct CellHash {
+  Eigen::Array3d place; // in the cell, [0, 1)
+  double rank;          // [0, 1)
+  double strength;      // standard normal
+};
+
+CellHash HashOf(const Eigen::Array3i& cell, const std::array<std::uint32_t, 2>& key)
+{
+  const auto bits = Random::Block(
+      {static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y()), static_cast<std::uint32_t>(cell.z()), 0x5ca7u},
+      key);
+  constexpr double part24 = 1.0 / 16777216.0, part16 = 1.0 / 65536.0;
+  CellHash hash;
+  for (int axis = 0; axis < 3; ++axis)
+    hash.place[axis] = ((bits[static_cast<std::size_t>(axis)] >> 8) + 0.5) * part24;
+  hash.rank = ((bits[0] & 255u) << 16 | (bits[1] & 255u) << 8 | (bits[2] & 255u)) * part24;
+  // Box and Muller's transform of two numbers of 16 bits.
+  const double radius = std::sqrt(-2.0 * std::log(((bits[3] >> 16) + 0.5) * part16));
+  hash.strength = radius * std::cos(6.283185307179586 * part16 * ((bits[3] & 65535u) + 0.5));
+  return hash;
+}
+
+// The lattice, its blocks and where they go.
+class Lattice {
+public:
+  Lattice(const ScattererParameters& parameters, double density, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted)
+    : key_{static_cast<std::uint32_t>(parameters.seed), static_cast<std::uint32_t>(parameters.seed >> 32)},
+      cell_(std::cbrt(1.0 / density)), edge_(std::clamp(static_cast<int>(std::lround(1.6 / cell_)), 4, 16)), region_(region),
+      wanted_(wanted)
+  {
+    if (parameters.displacement && !parameters.displacement->IsZero()) {
+      displacement_ = parameters.displacement;
+      slope_ = LipschitzBound(*displacement_);
+    }
+    const double block = BlockMm(), bound = displacement_ ? displacement_->Bound() : 0.0;
+    const Eigen::Array3d first = ((region.min().array() - bound) / block).floor(),
+                         last = ((region.max().array() + bound) / block).floor();
+    if (!((last - first + 1.0).prod() <= maxBlocks))
+      throw Error(Error::Kind::TooLarge, "scatterers: the region of " + NumberText((region.max() - region.min()).x()) + " x " +
+                                             NumberText((region.max() - region.min()).y()) + " x " +
+                                             NumberText((region.max() - region.min()).z()) +
+                                             " mm is too large for densityPerMm3 = " + NumberText(density) +
+                                             "; choose a smaller region or fewer scatterers");
+    first_ = first.cast<int>();
+    count_ = (last - first).cast<int>() + 1;
+  }
+
+  double BlockMm() const { return edge_ * cell_; }
+  int CellsPerBlock() const { return edge_ * edge_ * edge_; }
+
+  // The blocks that are needed, in the order of the lattice.
+  std::vector<Eigen::Array3i> Needed(const Progress& progress) const
+  {
+    std::vector<std::vector<Eigen::Array3i>> layers(static_cast<std::size_t>(count_.z()));
+    ParallelFor(count_.z(), progress, [&](std::ptrdiff_t k) {
+      for (int j = 0; j < count_.y(); ++j)
+        for (int i = 0; i < count_.x(); ++i) {
+          const Eigen::Array3i block = first_ + Eigen::Array3i(i, j, static_cast<int>(k));
+          const Eigen::AlignedBox3d box = BoxOf(block);
+          if (box.intersects(region_) && (!wanted_ || wanted_(box)))
+            layers[static_cast<std::size_t>(k)].push_back(block);
+        }
+    });
+    std::vector<Eigen::Array3i> all;
+    for (const auto& layer : layers)
+      all.insert(all.end(), layer.begin(), layer.end());
+    return all;
+  }
+
+  // Calls use(world, hash) for every cell of a block.
+  template <class Use>
+  void ForEach(const Eigen::Array3i& block, const Use& use) const
+  {
+    for (int k = 0; k < edge_; ++k)
+      for (int j = 0; j < edge_; ++j)
+        for (int i = 0; i < edge_; ++i) {
+          const Eigen::Array3i cell = edge_ * block + Eigen::Array3i(i, j, k);
+          const CellHash hash = HashOf(cell, key_);
+          Eigen::Vector3d point = (cell_ * (cell.cast<double>() + hash.place)).matrix();
+          if (displacement_)
+            point += displacement_->At(point);
+          use(point, hash);
+        }
+  }
+
+private:
+  // A box of the world that holds the block wherever it went.
+  Eigen::AlignedBox3d BoxOf(const Eigen::Array3i& block) const
+  {
+    const double size = BlockMm();
+    Eigen::AlignedBox3d box((size * block.cast<double>()).matrix(), (size * (block + 1).cast<double>()).matrix());
+    if (displacement_) {
+      const Eigen::Vector3d shift = displacement_->At(box.center());
+      const double slack = std::min(slope_ * 0.5 * std::sqrt(3.0) * size, 2.0 * displacement_->Bound());
+      box.translate(shift);
+      box.min().array() -= slack;
+      box.max().array() += slack;
+    }
+    return box;
+  }
+
+  std::array<std::uint32_t, 2> key_;
+  double cell_; // mm
+  int edge_;    // cells along a block
+  const Eigen::AlignedBox3d& region_;
+  const BoxPredicate& wanted_;
+  const DisplacementField* displacement_ = nullptr;
+  double slope_ = 0.0;
+  Eigen::Array3i first_, count_; // blocks
+};
+
+// Of every material: which rank it keeps, and the amplitude of a scatterer of strength 1.
+struct Share {
+  double keep = 0.0, amplitude = 0.0;
+};
+
+std::vector<Share> Shares(const std::vector<Material>& materials, double density)
+{
+  std::vector<Share> shares;
+  for (const Material& material : materials) {
+    Share share;
+    if (material.scattererDensity > 0.0 && material.backscatterDb > Material::clearDb) {
+      share.keep = std::min(1.0, material.scattererDensity / density);
+      share.amplitude = std::sqrt(std::pow(10.0, 0.1 * material.backscatterDb) / (share.keep * density));
+    }
+    shares.push_back(share);
+  }
+  return shares;
+}
+
+} // namespace
+
+void ScattererParameters::Check() const
+{
+  if (!(densityPerMm3 >= 0.0 && densityPerMm3 <= 1000.0))
+    throw Error(Error::Kind::InvalidParameter,
+                "scatterers: densityPerMm3 is " + NumberText(densityPerMm3) + "; it must be in [0, 1000]");
+  if (!(maxBytes > 0.0))
+    throw Error(Error::Kind::InvalidParameter, "scatterers: maxBytes is " + NumberText(maxBytes) + "; it must be positive");
+}
+
+Scatterers Scatterers::Make(const ScattererParameters& parameters, const std::vector<Material>& materials,
+                            const MediumLookup& mediumAt, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted,
+                            const Progress& progress)
+{
+  parameters.Check();
+  double density = 0.0;
+  for (const Material& material : materials) {
+    material.Check();
+    if (material.backscatterDb > Material::clearDb)
+      density = std::max(density, material.scattererDensity);
+  }
+  if (parameters.densityPerMm3 > 0.0)
+    density = parameters.densityPerMm3;
+  Scatterers all;
+  if (density == 0.0 || region.isEmpty())
+    return all;
+  if (!(region.min().cwiseAbs().maxCoeff() <= farthest && region.max().cwiseAbs().maxCoeff() <= farthest))
+    throw Error(Error::Kind::InvalidParameter, "scatterers: the region is not finite or lies more than 1e7 mm away");
+
+  const Lattice lattice(parameters, density, region, wanted);
+  const std::vector<Eigen::Array3i> blocks = lattice.Needed(progress.Part(0.0, 0.1));
+  const double bytes = static_cast<double>(blocks.size()) * (lattice.CellsPerBlock() * 16.0 + sizeof(Brick));
+  if (bytes > std::min(parameters.maxBytes, FreeMemory()))
+    throw Error(Error::Kind::TooLarge, "scatterers: " + NumberText(std::round(bytes / 1e6)) + " MB would be needed and " +
+                                           NumberText(std::round(std::min(parameters.maxBytes, FreeMemory()) / 1e6)) +
+                                           " MB are allowed (maxBytes) or free; choose fewer scatterers (densityPerMm3, "
+                                           "scattererDensity of the materials) or fewer and shorter beams");
+
+  const std::vector<Share> shares = Shares(materials, density);
+  const auto perTask =
+      std::max<std::size_t>(1, static_cast<std::size_t>(cellsPerTask) / static_cast<std::size_t>(lattice.CellsPerBlock()));
+  const std::size_t tasks = (blocks.size() + perTask - 1) / perTask;
+  all.parts_.resize(tasks);
+  std::vector<std::vector<Brick>> bricks(tasks);
+  ParallelFor(static_cast<std::ptrdiff_t>(tasks), progress.Part(0.1, 1.0), [&](std::ptrdiff_t task) {
+    const std::size_t begin = static_cast<std::size_t>(task) * perTask, end = std::min(blocks.size(), begin + perTask);
+    std::vector<Eigen::Vector3d> places;
+    std::vector<Eigen::Vector3f> points;
+    std::vector<float> ranks, strengths;
+    for (std::size_t block = begin; block < end; ++block)
+      lattice.ForEach(blocks[block], [&](const Eigen::Vector3d& place, const CellHash& hash) {
+        places.push_back(place);
+        points.push_back(place.cast<float>());
+        ranks.push_back(static_cast<float>(hash.rank));
+        strengths.push_back(static_cast<float>(hash.strength));
+      });
+    std::vector<std::int32_t> media(points.size(), -1);
+    mediumAt(points.data(), points.size(), media.data());
+
+    Gathered gathered;
+    std::vector<float>& part = all.parts_[static_cast<std::size_t>(task)];
+    std::size_t i = 0;
+    for (std::size_t block = begin; block < end; ++block) {
+      gathered.Clear();
+      for (const std::size_t next = i + static_cast<std::size_t>(lattice.CellsPerBlock()); i < next; ++i) {
+        const std::int32_t medium = media[i];
+        if (medium < 0 || static_cast<std::size_t>(medium) >= shares.size())
+          continue;
+        const Share& share = shares[static_cast<std::size_t>(medium)];
+        if (!(ranks[i] < share.keep))
+          continue;
+        gathered.points.push_back(places[i]);
+        gathered.amplitudes.push_back(static_cast<float>(share.amplitude) * strengths[i]);
+      }
+      if (!gathered.points.empty())
+        bricks[static_cast<std::size_t>(task)].push_back(Store(gathered, static_cast<std::uint32_t>(task), part));
+    }
+    part.shrink_to_fit();
+  });
+  for (const auto& some : bricks)
+    all.bricks_.insert(all.bricks_.end(), some.begin(), some.end());
+  all.MakeGrid(lattice.BlockMm());
+  return all;
+}
+
+Scatterers Scatterers::At(const std::vector<Eigen::Vector3d>& points, const std::vector<float>& amplitudes)
+{
+  if (points.size() != amplitudes.size())
+    throw Error(Error::Kind::BadInput, "scatterers: " + std::to_string(points.size()) + " points and " +
+                                           std::to_string(amplitudes.size()) + " amplitudes do not go together");
+  constexpr double cell = 2.0; // mm
+  // By cell, then in the order given.
+  std::vector<std::pair<std::array<double, 3>, std::size_t>> order;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!(points[i].cwiseAbs().maxCoeff() <= farthest) || !std::isfinite(amplitudes[i]))
+      throw Error(Error::Kind::BadInput,
+                  "scatterers: point " + std::to_string(i) + " or its amplitude is not finite or lies more than 1e7 mm away");
+    const Eigen::Array3d place = (points[i].array() / cell).floor();
+    order.push_back({{place.z(), place.y(), place.x()}, i});
+  }
+  std::sort(order.begin(), order.end());
+
+  Scatterers all;
+  all.parts_.resize(1);
+  Gathered gathered;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    gathered.points.push_back(points[order[i].second]);
+    gathered.amplitudes.push_back(amplitudes[order[i].second]);
+    if (i + 1 == order.size() || order[i + 1].first != order[i].first) {
+      all.bricks_.push_back(Store(gathered, 0, all.parts_[0]));
+      gathered.Clear();
+    }
+  }
+  all.MakeGrid(cell);
+  return all;
+}
+
+std::size_t Scatterers::MemoryBytes() const
+{
+  std::size_t bytes = bricks_.capacity() * sizeof(Brick) + (starts_.capacity() + list_.capacity()) * sizeof(std::uint32_t);
+  for (const std::vector<float>& part : parts_)
+    bytes += part.capacity() * sizeof(float) + sizeof(part);
+  return bytes;
+}
+
+void Scatterers::MakeGrid(double cell)
+{
+  count_ = 0;
+  largestRadius_ = 0.0;
+  Eigen::AlignedBox3d box;
+  for (const Brick& brick : bricks_) {
+    count_ += brick.count;
+    largestRadius_ = std::max(largestRadius_, static_cast<double>(brick.halfSize.norm()));
+    box.extend(brick.centre);
+  }
+  gridSize_.setZero();
+  if (bricks_.empty())
+    return;
+  // Scattered heaps of bricks get a coarser grid.
+  while (!(((box.sizes().array() / cell).floor() + 1.0).prod() <= std::max(4096.0, 64.0 * static_cast<double>(bricks_.size()))))
+    cell *= 2.0;
+  gridCell_ = cell;
+  gridFirst_ = box.min();
+  gridSize_ = (box.sizes().array() / cell).floor().cast<int>() + 1;
+  const auto cellOf = [&](const Brick& brick) {
+    const Eigen::Array3i at = ((brick.centre - gridFirst_).array() / cell).floor().cast<int>().min(gridSize_ - 1);
+    return (static_cast<std::size_t>(at.z()) * static_cast<std::size_t>(gridSize_.y()) + static_cast<std::size_t>(at.y())) *
+               static_cast<std::size_t>(gridSize_.x()) +
+           static_cast<std::size_t>(at.x());
+  };
+  const std::size_t cells =
+      static_cast<std::size_t>(gridSize_.x()) * static_cast<std::size_t>(gridSize_.y()) * static_cast<std::size_t>(gridSize_.z());
+  starts_.assign(cells + 1, 0);
+  for (const Brick& brick : bricks_)
+    ++starts_[cellOf(brick) + 1];
+  for (std::size_t i = 0; i < cells; ++i)
+    starts_[i + 1] += starts_[i];
+  list_.resize(bricks_.size());
+  std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
+  for (std::size_t i = 0; i < bricks_.size(); ++i)
+    list_[next[cellOf(bricks_[i])]++] = static_cast<std::uint32_t>(i);
+}
+
+void Scatterers::FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, double radius,
+                          std::vector<std::uint32_t>& found) const
+{
+  if (bricks_.empty() || !(length >= 0.0))
+    return;
+  // Layer by layer across the axis along which the line runs most. A centre within reach of the line lies, in its layer, within
+  // reach of the piece of the line that is as near to the layer.
+  int main = 0;
+  direction.cwiseAbs().maxCoeff(&main);
+  const int second = (main + 1) % 3, third = (main + 2) % 3;
+  const double reach = radius + largestRadius_;
+  const Eigen::Vector3d start = from - gridFirst_;
+  const double slope = direction[main];
+  const auto layerOf = [&](double x, int axis) {
+    return static_cast<int>(std::clamp(std::floor(x / gridCell_), -1.0, static_cast<double>(gridSize_[axis])));
+  };
+  const double a = start[main], b = start[main] + length * slope;
+  const int firstLayer = std::max(0, layerOf(std::min(a, b) - reach, main));
+  const int lastLayer = std::min(gridSize_[main] - 1, layerOf(std::max(a, b) + reach, main));
+  for (int layer = firstLayer; layer <= lastLayer; ++layer) {
+    // Which piece of the line may be the nearest to a point of the layer.
+    double begin = (layer * gridCell_ - reach - start[main]) / slope,
+           end = ((layer + 1) * gridCell_ + reach - start[main]) / slope;
+    if (begin > end)
+      std::swap(begin, end);
+    begin = std::clamp(begin, 0.0, length);
+    end = std::clamp(end, 0.0, length);
+    int low[2], high[2];
+    for (int n = 0; n < 2; ++n) {
+      const int axis = n == 0 ? second : third;
+      const double p = start[axis] + begin * direction[axis], q = start[axis] + end * direction[axis];
+      low[n] = std::max(0, layerOf(std::min(p, q) - reach, axis));
+      high[n] = std::min(gridSize_[axis] - 1, layerOf(std::max(p, q) + reach, axis));
+    }
+    Eigen::Array3i at;
+    at[main] = layer;
+    for (at[third] = low[1]; at[third] <= high[1]; ++at[third])
+      for (at[second] = low[0]; at[second] <= high[0]; ++at[second]) {
+        const std::size_t cell =
+            (static_cast<std::size_t>(at.z()) * static_cast<std::size_t>(gridSize_.y()) + static_cast<std::size_t>(at.y())) *
+                static_cast<std::size_t>(gridSize_.x()) +
+            static_cast<std::size_t>(at.x());
+        found.insert(found.end(), list_.begin() + starts_[cell], list_.begin() + starts_[cell + 1]);
+      }
+  }
+}
+
+} // namespace echorama

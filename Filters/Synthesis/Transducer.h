@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace echorama {
+
+/// How a probe sends and listens: the pulse and the active apertures of its beams.
+///
+/// Apertures are apodised by a Gaussian: of the amplitudes, the standard deviation is a quarter of the width given here, so
+/// that the edges are 17 dB down. Sound leaves focused on one way; it is received with the focus on every way (dynamic) along
+/// the fan. Along the sweep a lens focuses both.
+struct Transducer {
+  double frequencyMHz = 3.5;         ///< centre frequency, in [0.5, 50]
+  double bandwidth = 0.6;            ///< -6 dB width of the two-way spectrum beside the centre frequency, in [0.05, 1.5]
+  double lateralApertureMm = 14.0;   ///< width of the active aperture along the fan, in [0.1, 100]
+  double lateralFocusMm = 70.0;      ///< transmit focus along the fan, way from the face, in [1, 1000]
+  bool dynamicReceive = true;        ///< whether receiving is focused everywhere; else at the transmit focus
+  double smallestFNumber = 1.0;      ///< dynamic receiving uses no more of the aperture than the way over this, in [0.5, 10]
+  double elevationApertureMm = 10.0; ///< of the lens along the sweep, in [0.1, 100]
+  double elevationFocusMm = 70.0;    ///< of the lens, sending and receiving, in [1, 1000]
+  double assumedSoundSpeed = 1540.0; ///< m/s, in [500, 5000]: how the scanner turns time into depth
+
+  /// Throws Error(InvalidParameter) that names the number that is out of its range.
+  void Check() const;
+
+  double WavelengthMm(double soundSpeed) const { return 1e-3 * soundSpeed / frequencyMHz; } ///< \a soundSpeed in m/s
+  double WavelengthMm() const { return WavelengthMm(assumedSoundSpeed); }
+  /// Radians per mm of scan depth by which the phase of an echo turns: 4 pi over the wavelength, for the way there and back.
+  double PhasePerMm() const { return 12.566370614359172 / WavelengthMm(); }
+  /// Standard deviation of the Gaussian envelope of the two-way pulse (amplitudes), mm of scan depth.
+  double PulseSigmaMm() const;
+};
+
+/// The two-way response across a beam, of amplitudes: exp(-x^2 / (2 sigma^2)) along the fan and alike along the sweep. An
+/// echo from x beside the axis comes later by curvature x^2 / 2 mm of depth.
+struct BeamWidth {
+  double lateralSigma = 0.0, elevationSigma = 0.0;         ///< mm
+  double lateralCurvature = 0.0, elevationCurvature = 0.0; ///< of the wave front, 1/mm; negative before the focus
+
+  /// Volume of the resolution cell: (integral of the squared response)^2 over that of its fourth power, which for three
+  /// Gaussians is (2 pi)^(3/2) times the three sigmas. mm^3.
+  double ResolutionCellMm3(double pulseSigmaMm) const
+  {
+    return 15.749609945722419 * pulseSigmaMm * lateralSigma * elevationSigma;
+  }
+};
+
+/// The beam at a way (mm along the path of sound) from the face: focused Gaussian beams in closed form, transmit times
+/// receive. Closer than four wavelengths the beam is that of four wavelengths.
+BeamWidth WidthAt(const Transducer& transducer, double wayMm);
+
+} // namespace echorama
