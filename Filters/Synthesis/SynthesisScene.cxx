@@ -1,0 +1,1008 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Each struct lists its keys once, in Describe(), with their ranges and what they mean. Three visitors walk that list: Reader
+// (JSON to struct, with every check), Writer (back) and SchemaMaker (the JSON Schema). So the reader, the text that is written
+// and the schema cannot drift apart. Check() writes a scene and reads it again, and so says the same as the reader.
+#include "SynthesisScene.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/TextFile.h"
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace echorama {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Eigen::Vector3d;
+
+constexpr double degree = 0.017453292519943295;
+constexpr const char* schemaName = "echorama-scene-1";
+constexpr std::size_t longestText = 4096, longestList = 100000;
+
+/// What a number may be.
+struct Range {
+  double low, high;
+  bool open = false; ///< low itself is not in it
+
+  bool Holds(double value) const { return value <= high && (open ? value > low : value >= low); }
+  std::string Text() const { return (open ? "(" : "[") + NumberText(low) + ", " + NumberText(high) + "]"; }
+};
+
+constexpr Range anywhere{-1e5, 1e5}; // mm; a hundred metres
+constexpr Range turns{-3600.0, 3600.0};
+
+template <class T>
+using Choices = std::vector<std::pair<const char*, T>>;
+
+/// One form that an item of the list of tissue may have.
+template <class T>
+struct Form {
+  const char* key;
+  const char* help;
+};
+
+std::string Shown(const Json& value)
+{
+  const std::string text = value.dump(-1, ' ', true);
+  return text.size() <= 60 ? text : text.substr(0, 60) + " ...";
+}
+
+std::string Join(const std::vector<std::string>& names)
+{
+  std::string text;
+  for (const std::string& name : names)
+    text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+bool IsAffine(const Eigen::Matrix4d& rows)
+{
+  return rows.allFinite() && rows.row(3) == Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0);
+}
+
+// ---- checks beyond the ranges; a message without its place ----
+
+[[noreturn]] void Refuse(const std::string& reason)
+{
+  throw Error(Error::Kind::InvalidParameter, reason);
+}
+
+template <class T>
+void Validate(const T&)
+{
+}
+
+void Validate(const ScenePlace& place)
+{
+  if (!place.rows)
+    return;
+  if (!IsAffine(*place.rows))
+    Refuse("the last row must be 0 0 0 1");
+  const Eigen::Matrix3d linear = place.rows->topLeftCorner<3, 3>();
+  if (!(linear.determinant() > 1e-12 * std::pow(linear.norm(), 3)))
+    Refuse("the matrix mirrors or flattens what it moves");
+}
+
+void Validate(const ScenePose& pose)
+{
+  if (pose.rows) {
+    if (!IsAffine(*pose.rows) || !IsRotation(pose.rows->topLeftCorner<3, 3>()))
+      Refuse("the matrix is not rigid: a rotation and a translation, with 0 0 0 1 as its last row");
+    return;
+  }
+  const Vector3d beam = pose.target - pose.face;
+  if (!(beam.norm() > 1e-6))
+    Refuse("face and target are the same point");
+  if (!(pose.fan.cross(beam).norm() > 1e-6 * pose.fan.norm() * beam.norm()))
+    Refuse("the fan lies along the beam");
+}
+
+void Validate(const SceneProbe& probe)
+{
+  probe.Resolve();
+}
+
+void Validate(const SceneCylinder& cylinder)
+{
+  if (!((cylinder.to - cylinder.from).norm() > 1e-6))
+    Refuse("from and to are the same point");
+}
+
+void Validate(const SceneRecording& recording)
+{
+  const Eigen::Matrix4d matrix = recording.trackerToWorld.Matrix().matrix();
+  if (!IsRotation(matrix.topLeftCorner<3, 3>()))
+    Refuse("trackerToWorld is not rigid");
+}
+
+// ---- the keys of everything ----
+
+template <class A>
+void Describe(A& a, ScenePlace& place)
+{
+  a.Vector("translation", place.translation, anywhere, "Comes last, mm.");
+  a.Vector("rotationDegrees", place.rotationDegrees, turns, "Axis times angle.");
+  a.Number("scale", place.scale, {1e-6, 1e6}, "Comes first.");
+}
+
+template <class A>
+void Describe(A& a, ScenePose& pose)
+{
+  a.Vector("face", pose.face, anywhere, "Where the middle of the probe's face is, mm.");
+  a.Vector("target", pose.target, anywhere, "A point that the middle beam looks at, mm.");
+  a.Vector("fan", pose.fan, anywhere, "Direction of the fan.");
+}
+
+template <class A>
+void Describe(A& a, SceneProbe& probe)
+{
+  Choices<std::string> names;
+  for (const ProbePreset& preset : ProbePresets())
+    names.emplace_back(preset.name.c_str(), preset.name);
+  a.Choice("preset", probe.preset, names, "The kind of probe; the other keys change it.");
+  a.Number("fanAngleDegrees", probe.fanAngleDegrees, {0.0, 350.0}, "Whole fan.");
+  a.Number("fanRadiusMm", probe.fanRadiusMm, {0.0, 1e4}, "Of the array's arc.");
+  a.Number("fanWidthMm", probe.fanWidthMm, {0.0, 1000.0}, "Length of the array's arc, instead of its radius.");
+  a.Number("sweepAngleDegrees", probe.sweepAngleDegrees, {0.0, 350.0}, "Whole sweep.");
+  a.Number("sweepRadiusMm", probe.sweepRadiusMm, {0.0, 1e4}, "How far the face is from the axis of the sweep.");
+  a.Number("sweepWidthMm", probe.sweepWidthMm, {0.0, 1000.0},
+           "Way of the array's middle during the sweep, instead of the radius.");
+  a.Number("depthMinMm", probe.depthMinMm, {-100.0, 1000.0}, "First sample, from the face.");
+  a.Number("depthMaxMm", probe.depthMaxMm, {0.1, 1000.0}, "Last sample.");
+  a.Number("elements", probe.elements, {2, 4096}, "Beams across the fan.");
+  a.Number("sweepSteps", probe.sweepSteps, {1, 4096}, "Planes of the sweep; 1: the middle plane alone.");
+  a.Number("samples", probe.samples, {2, 65536}, "Along each beam.");
+}
+
+template <class A>
+void Describe(A& a, Material& material)
+{
+  a.Number("soundSpeed", material.soundSpeed, {100.0, 10000.0}, "m/s");
+  a.Number("density", material.density, {0.1, 20000.0}, "kg/m^3");
+  a.Number("attenuation", material.attenuation, {0.0, 200.0}, "dB/cm at 1 MHz, one way.");
+  a.Number("attenuationPower", material.attenuationPower, {0.0, 2.0}, "Exponent of the frequency.");
+  a.Number("scattererDensity", material.scattererDensity, {0.0, 1000.0}, "Per mm^3; 0: clear.");
+  a.Number("backscatterDb", material.backscatterDb, {-120.0, 60.0}, "Beside liver.");
+  a.Number("roughness", material.roughness, {0.0, 1.0}, "Of its surface: 0 mirrors, 1 sends sound every way alike.");
+  a.Number("scatterProbability", material.scatterProbability, {0.0, 1.0}, "Per mm, when scatters are counted.");
+  a.Number("youngsModulusKPa", material.youngsModulusKPa, {0.0, 1e9}, "Stiffness.");
+}
+
+template <class A>
+void Describe(A& a, SceneMesh& mesh)
+{
+  a.Text("file", mesh.file, true, "A closed surface, as a path from the scene's folder: .vtp, .ply, .stl, .obj, .glb.");
+  a.Choice("unit", mesh.unit, Choices<SceneMesh::Unit>{{"mm", SceneMesh::Unit::Millimetres}, {"m", SceneMesh::Unit::Metres}},
+           "Of the file.");
+  a.Choice("axes", mesh.axes, Choices<SceneMesh::Axes>{{"lps", SceneMesh::Axes::Lps}, {"y-up", SceneMesh::Axes::YUp}},
+           "Of the file: lps, or y up and z to the front (glTF).");
+  a.MaterialName("material", mesh.material, true);
+  a.Matrix("transform", mesh.transform, "What is done with it then.");
+}
+
+template <class A>
+void Describe(A& a, SceneSphere& sphere)
+{
+  a.Vector("centre", sphere.centre, anywhere, "mm");
+  a.Number("radius", sphere.radius, {0.0, 1e4, true}, "mm");
+  a.MaterialName("material", sphere.material, true);
+}
+
+template <class A>
+void Describe(A& a, SceneBox& box)
+{
+  a.Vector("centre", box.centre, anywhere, "mm");
+  a.Vector("size", box.size, {0.0, 1e4, true}, "Edges, mm.");
+  a.Vector("rotationDegrees", box.rotationDegrees, turns, "Axis times angle, about the centre.");
+  a.MaterialName("material", box.material, true);
+}
+
+template <class A>
+void Describe(A& a, SceneCylinder& cylinder)
+{
+  a.Vector("from", cylinder.from, anywhere, "Middle of one end, mm.");
+  a.Vector("to", cylinder.to, anywhere, "Middle of the other end, mm.");
+  a.Number("radius", cylinder.radius, {0.0, 1e4, true}, "mm");
+  a.MaterialName("material", cylinder.material, true);
+}
+
+template <class A>
+void Describe(A& a, SceneItem& item)
+{
+  a.Text("name", item.name, false, "Of the body.");
+  a.OneOf(item.what, Form<SceneMesh>{"mesh", "Triangles from a file."}, Form<SceneSphere>{"sphere", "A ball."},
+          Form<SceneBox>{"box", "A block."}, Form<SceneCylinder>{"cylinder", "A rod or a straight vessel."});
+}
+
+template <class A>
+void Describe(A& a, SceneRow& row)
+{
+  a.Number("count", row.count, {1, 1000}, "Views side by side along a convex body.");
+  a.Number("overlap", row.overlap, {0.05, 0.95}, "Fraction that neighbours share.");
+  a.Matrix("middle", row.middle, "Where the middle of the row is held.");
+}
+
+template <class A>
+void Describe(A& a, SceneViews& views)
+{
+  a.List("poses", views.poses, true, "The views, one by one: ProbeToWorld.");
+}
+
+template <class A>
+void Describe(A& a, SceneRecording& recording)
+{
+  a.Text("file", recording.file, true, "A tracked sequence, as a path from the scene's folder.");
+  a.Text("transform", recording.transform, false, "From the probe to the tracker or a reference, by its name in the file.");
+  a.Matrix("trackerToWorld", recording.trackerToWorld, "Where the tracker is in the world; rigid.");
+  a.Number("smoothSeconds", recording.smoothSeconds, {0.0, 60.0}, "Sigma of the smoothing; 0: none.");
+  a.Number("longestGapSeconds", recording.longestGapSeconds, {0.0, 600.0}, "Drop-outs up to this are bridged.");
+  a.Number("count", recording.count, {1, 1000}, "Views, evenly from the first pose to the last.");
+}
+
+/// {"recording": {...}}
+struct RecordingKey {
+  SceneRecording& recording;
+};
+
+template <class A>
+void Describe(A& a, RecordingKey& key)
+{
+  a.Object("recording", key.recording, true, "Views along a recorded path.");
+}
+
+template <class A>
+void Describe(A& a, SceneSweep& sweep)
+{
+  a.Number("seconds", sweep.seconds, {0.0, 60.0}, "How long a sweep takes; 0: all planes at once.");
+  a.Vector("velocityMmPerSecond", sweep.velocityMmPerSecond, {-1e4, 1e4}, "Of the probe during the sweep, in its own frame.");
+  a.Vector("turnDegreesPerSecond", sweep.turnDegreesPerSecond, {-3600.0, 3600.0}, "Axis times angle, in the probe's frame.");
+  a.Flag("alongRecording", sweep.alongRecording, "The motion is that of the recording; the views need one.");
+}
+
+template <class A>
+void Describe(A& a, SceneVolume& volume)
+{
+  a.Number("spacingMm", volume.spacingMm, {0.05, 20.0}, "Edge of the cubic voxels.");
+  a.Number("knockMm", volume.knockMm, {0.0, 1000.0}, "How far every volume but the first is put out of place.");
+  a.Number("knockDegrees", volume.knockDegrees, {0.0, 180.0}, "And turned.");
+}
+
+template <class A>
+void Describe(A& a, SynthesisScene& scene)
+{
+  a.Constant("schema", schemaName);
+  a.Text("name", scene.name, false, "Short; files are named after it.");
+  a.Text("about", scene.about, false, "For people.");
+  a.Seed("seed", scene.seed, "Of everything random that has no seed of its own.");
+  a.Object("probe", scene.probe, false, "The probe: a preset, and what is to be different.");
+  a.Materials("materials", scene.materials, "Materials of this scene by name, beside the standard ones.");
+  a.MaterialName("background", scene.background, false);
+  a.List("tissue", scene.tissue, false, "What lies in the world; where several hold a point the later counts.");
+  a.Views("views", scene.views, "From where the probe looks.");
+  a.Object("sweep", scene.sweep, false, "The time a sweep takes, and the motion meanwhile.");
+  a.Object("volume", scene.volume, false, "The volumes that are made.");
+}
+
+// ---- reading ----
+
+/// One object of the text, key by key.
+class Reader {
+public:
+  struct Source {
+    std::string name;
+    const SynthesisScene* scene = nullptr; ///< whose materials are read so far
+  };
+
+  Reader(const Source& text, const Json& object, std::string path) : text_(text), object_(object), path_(std::move(path))
+  {
+    if (!object.is_object())
+      Fail(path_, "an object is needed, not " + Shown(object));
+  }
+
+  /// Reads all of \a value, whose keys must all be known.
+  template <class T>
+  static void Read(const Source& text, const Json& json, const std::string& path, T& value)
+  {
+    Reader reader(text, json, path);
+    Describe(reader, value);
+    reader.Finish();
+    reader.Try(path, [&value] { Validate(value); });
+  }
+
+  void Constant(const char* key, const char* wanted)
+  {
+    const Json* found = Find(key);
+    if (!found)
+      Fail(path_, Missing(key));
+    if (!found->is_string() || found->get<std::string>() != wanted)
+      Fail(At(key), Shown(*found) + " is not known; \"" + wanted + "\" is needed");
+  }
+
+  void Text(const char* key, std::string& value, bool needed, const char*)
+  {
+    if (const Json* found = FindNeeded(key, needed)) {
+      if (!found->is_string())
+        Fail(At(key), "a text is needed, not " + Shown(*found));
+      value = found->get<std::string>();
+      if (value.size() > longestText || value.find('\0') != std::string::npos || (needed && value.empty()))
+        Fail(At(key), "the text must be of 1 to " + std::to_string(longestText) + " characters");
+    }
+  }
+
+  template <class T>
+  void Number(const char* key, T& value, const Range& range, const char*)
+  {
+    if (const Json* found = Find(key))
+      value = NumberFrom<T>(*found, At(key), range);
+  }
+  template <class T>
+  void Number(const char* key, std::optional<T>& value, const Range& range, const char*)
+  {
+    if (const Json* found = Find(key))
+      value = NumberFrom<T>(*found, At(key), range);
+  }
+
+  void Seed(const char* key, std::uint64_t& value, const char*)
+  {
+    if (const Json* found = Find(key)) {
+      if (!found->is_number_unsigned())
+        Fail(At(key), "a whole number in [0, 2^64) is needed, not " + Shown(*found));
+      value = found->get<std::uint64_t>();
+    }
+  }
+
+  void Flag(const char* key, bool& value, const char*)
+  {
+    if (const Json* found = Find(key)) {
+      if (!found->is_boolean())
+        Fail(At(key), "true or false is needed, not " + Shown(*found));
+      value = found->get<bool>();
+    }
+  }
+
+  template <class T>
+  void Choice(const char* key, T& value, const Choices<T>& choices, const char*)
+  {
+    if (const Json* found = Find(key)) {
+      std::string names;
+      for (const auto& [name, choice] : choices) {
+        if (found->is_string() && found->get<std::string>() == name) {
+          value = choice;
+          return;
+        }
+        names += std::string(names.empty() ? "\"" : ", \"") + name + "\"";
+      }
+      Fail(At(key), Shown(*found) + " is not known; there are " + names);
+    }
+  }
+
+  void Vector(const char* key, Vector3d& value, const Range& range, const char*)
+  {
+    if (const Json* found = Find(key)) {
+      if (!found->is_array() || found->size() != 3)
+        Fail(At(key), "a list of 3 numbers is needed, not " + Shown(*found));
+      for (std::size_t i = 0; i < 3; ++i)
+        value[static_cast<Eigen::Index>(i)] = NumberFrom<double>((*found)[i], At(key, i), range);
+    }
+  }
+
+  void MaterialName(const char* key, std::string& value, bool needed)
+  {
+    Text(key, value, needed, nullptr);
+    Try(At(key), [this, &value] { text_.scene->MaterialOf(value); });
+  }
+
+  template <class T>
+  void Object(const char* key, T& value, bool needed, const char*)
+  {
+    if (const Json* found = FindNeeded(key, needed))
+      Read(text_, *found, At(key), value);
+  }
+
+  /// Rows, or an object.
+  template <class T>
+  void Matrix(const char* key, T& value, const char*)
+  {
+    if (const Json* found = Find(key))
+      ReadMatrix(*found, At(key), value);
+  }
+
+  template <class T>
+  void List(const char* key, std::vector<T>& values, bool needed, const char*)
+  {
+    const Json* found = FindNeeded(key, needed);
+    if (!found)
+      return;
+    if (!found->is_array() || found->size() > longestList || (needed && found->empty()))
+      Fail(At(key), "a list of up to " + std::to_string(longestList) + (needed ? " and at least one" : "") + " is needed, not " +
+                        Shown(*found));
+    values.clear();
+    for (std::size_t i = 0; i < found->size(); ++i) {
+      values.emplace_back();
+      if constexpr (std::is_same_v<T, ScenePose>)
+        ReadMatrix((*found)[i], At(key, i), values.back());
+      else
+        Read(text_, (*found)[i], At(key, i), values.back());
+    }
+  }
+
+  template <class Variant, class... T>
+  void OneOf(Variant& value, const Form<T>&... forms)
+  {
+    const int there = (static_cast<int>(object_.contains(forms.key)) + ...);
+    if (there != 1)
+      Fail(path_, (there == 0 ? "one of " : "just one of ") + Join({forms.key...}) + " is needed");
+    const auto read = [this, &value](const auto& form, auto fresh) {
+      if (const Json* found = Find(form.key)) {
+        Read(text_, *found, At(form.key), fresh);
+        value = std::move(fresh);
+      }
+    };
+    (read(forms, T()), ...);
+  }
+
+  template <class Variant>
+  void Views(const char* key, Variant& value, const char*)
+  {
+    const Json* found = Find(key);
+    if (!found)
+      return;
+    if (found->is_object() && found->contains("recording")) {
+      RecordingKey recording{value.template emplace<SceneRecording>()};
+      Read(text_, *found, At(key), recording);
+    } else if (found->is_object() && found->contains("poses"))
+      Read(text_, *found, At(key), value.template emplace<SceneViews>());
+    else
+      Read(text_, *found, At(key), value.template emplace<SceneRow>());
+  }
+
+  void Materials(const char* key, std::vector<Material>& materials, const char*)
+  {
+    const Json* found = Find(key);
+    if (!found)
+      return;
+    if (!found->is_object())
+      Fail(At(key), "an object of materials by name is needed, not " + Shown(*found));
+    materials.clear();
+    for (const auto& [name, json] : found->items()) {
+      const std::string place = At(key) + "." + name;
+      if (name.empty() || name.size() > 100)
+        Fail(At(key), "the name of a material must be of 1 to 100 characters");
+      Reader reader(text_, json, place);
+      std::string like;
+      reader.Text("like", like, false, nullptr);
+      Material material;
+      if (!like.empty())
+        reader.Try(place + ".like", [this, &like, &material] { material = text_.scene->MaterialOf(like); });
+      material.name = name;
+      Describe(reader, material);
+      reader.Finish();
+      reader.Try(place, [&material] { material.Check(); });
+      materials.push_back(material);
+    }
+  }
+
+  /// Refuses keys that nobody asked for.
+  void Finish() const
+  {
+    for (const auto& item : object_.items())
+      if (std::find(known_.begin(), known_.end(), item.key()) == known_.end())
+        Fail(At(item.key().c_str()), "there is no such key; there are " + Join(known_));
+  }
+
+  /// Names the key to what other kernels complain of.
+  template <class F>
+  void Try(const std::string& path, F&& f) const
+  {
+    try {
+      f();
+    } catch (const Error& error) {
+      Fail(path, error.what());
+    }
+  }
+
+  [[noreturn]] void Fail(const std::string& path, const std::string& reason) const
+  {
+    throw Error(Error::Kind::BadFile, text_.name + ": " + (path.empty() ? "" : path + ": ") + reason);
+  }
+
+private:
+  std::string At(const char* key) const { return path_.empty() ? key : path_ + "." + key; }
+  std::string At(const char* key, std::size_t index) const { return At(key) + "[" + std::to_string(index) + "]"; }
+  static std::string Missing(const char* key) { return std::string("\"") + key + "\" is missing"; }
+
+  const Json* Find(const char* key)
+  {
+    known_.push_back(key);
+    const auto found = object_.find(key);
+    return found == object_.end() ? nullptr : &*found;
+  }
+
+  const Json* FindNeeded(const char* key, bool needed)
+  {
+    const Json* found = Find(key);
+    if (!found && needed)
+      Fail(path_, Missing(key));
+    return found;
+  }
+
+  template <class T>
+  T NumberFrom(const Json& json, const std::string& path, const Range& range) const
+  {
+    if (!json.is_number())
+      Fail(path, "a number is needed, not " + Shown(json));
+    const auto value = json.get<double>();
+    if (!range.Holds(value))
+      Fail(path, Shown(json) + " is out of range; it must be in " + range.Text());
+    if constexpr (std::is_integral_v<T>)
+      if (value != std::floor(value))
+        Fail(path, "a whole number is needed, not " + Shown(json));
+    return static_cast<T>(value);
+  }
+
+  template <class T>
+  void ReadMatrix(const Json& json, const std::string& path, T& value) const
+  {
+    if (!json.is_array()) {
+      Read(text_, json, path, value);
+      return;
+    }
+    const auto wrong = [this, &json, &path] { Fail(path, "4 rows of 4 numbers are needed, not " + Shown(json)); };
+    if (json.size() != 4)
+      wrong();
+    Eigen::Matrix4d rows;
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (!json[i].is_array() || json[i].size() != 4)
+        wrong();
+      for (std::size_t j = 0; j < 4; ++j)
+        rows(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+            NumberFrom<double>(json[i][j], path + "[" + std::to_string(i) + "][" + std::to_string(j) + "]", {-1e9, 1e9});
+    }
+    value.rows = rows;
+    Try(path, [&value] { Validate(value); });
+  }
+
+  const Source& text_;
+  const Json& object_;
+  std::string path_;
+  std::vector<std::string> known_;
+};
+
+Json Parse(const std::string& name, const std::string& text)
+{
+  const auto fail = [&name](const std::string& reason) { throw Error(Error::Kind::BadFile, name + ": " + reason); };
+  std::vector<std::set<std::string>> keys; // of the objects that are open
+  const auto watch = [&fail, &keys](int depth, Json::parse_event_t event, const Json& parsed) {
+    if (depth > 32)
+      fail("its lists are nested more than 32 deep"); // an attack on the stack
+    if (event == Json::parse_event_t::object_start)
+      keys.emplace_back();
+    else if (event == Json::parse_event_t::object_end)
+      keys.pop_back();
+    else if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
+      fail("the key " + Shown(parsed) + " is there twice in one object");
+    return true;
+  };
+  try {
+    return Json::parse(text.begin(), text.end(), watch);
+  } catch (const nlohmann::json::exception& problem) {
+    fail("it is not JSON (" + std::string(problem.what()).substr(0, 200) + ")");
+  }
+  return {};
+}
+
+// ---- writing ----
+
+class Writer {
+public:
+  template <class T>
+  static Json Write(T& value)
+  {
+    Writer writer;
+    Describe(writer, value);
+    return std::move(writer.object_);
+  }
+
+  void Constant(const char* key, const char* text) { object_[key] = text; }
+  void Text(const char* key, const std::string& value, bool needed, const char*)
+  {
+    if (needed || !value.empty())
+      object_[key] = value;
+  }
+  template <class T>
+  void Number(const char* key, const T& value, const Range&, const char*)
+  {
+    object_[key] = value;
+  }
+  template <class T>
+  void Number(const char* key, const std::optional<T>& value, const Range&, const char*)
+  {
+    if (value)
+      object_[key] = *value;
+  }
+  void Seed(const char* key, std::uint64_t value, const char*) { object_[key] = value; }
+  void Flag(const char* key, bool value, const char*) { object_[key] = value; }
+  template <class T>
+  void Choice(const char* key, const T& value, const Choices<T>& choices, const char*)
+  {
+    for (const auto& [name, choice] : choices)
+      if (choice == value)
+        object_[key] = name;
+    if (!object_.contains(key)) {
+      if constexpr (std::is_same_v<T, std::string>)
+        object_[key] = value; // for the reader to refuse
+    }
+  }
+  void Vector(const char* key, const Vector3d& value, const Range&, const char*)
+  {
+    object_[key] = Json::array({value.x(), value.y(), value.z()});
+  }
+  void MaterialName(const char* key, const std::string& value, bool) { object_[key] = value; }
+  template <class T>
+  void Object(const char* key, T& value, bool, const char*)
+  {
+    object_[key] = Write(value);
+  }
+  template <class T>
+  void Matrix(const char* key, T& value, const char*)
+  {
+    object_[key] = MatrixOf(value);
+  }
+  template <class T>
+  void List(const char* key, std::vector<T>& values, bool, const char*)
+  {
+    Json list = Json::array();
+    for (T& value : values)
+      if constexpr (std::is_same_v<T, ScenePose>)
+        list.push_back(MatrixOf(value));
+      else
+        list.push_back(Write(value));
+    object_[key] = std::move(list);
+  }
+  template <class Variant, class... T>
+  void OneOf(Variant& value, const Form<T>&... forms)
+  {
+    const auto write = [this](const auto& form, auto* held) {
+      if (held)
+        object_[form.key] = Write(*held);
+    };
+    (write(forms, std::get_if<T>(&value)), ...);
+  }
+  template <class Variant>
+  void Views(const char* key, Variant& value, const char*)
+  {
+    if (auto* recording = std::get_if<SceneRecording>(&value)) {
+      RecordingKey under{*recording};
+      object_[key] = Write(under);
+    } else if (auto* views = std::get_if<SceneViews>(&value))
+      object_[key] = Write(*views);
+    else
+      object_[key] = Write(std::get<SceneRow>(value));
+  }
+  void Materials(const char* key, std::vector<Material>& materials, const char*)
+  {
+    Json object = Json::object();
+    for (Material& material : materials)
+      object[material.name] = Write(material);
+    object_[key] = std::move(object);
+  }
+
+private:
+  template <class T>
+  static Json MatrixOf(T& value)
+  {
+    if (!value.rows)
+      return Write(value);
+    Json rows = Json::array();
+    for (Eigen::Index i = 0; i < 4; ++i)
+      rows.push_back(Json::array({(*value.rows)(i, 0), (*value.rows)(i, 1), (*value.rows)(i, 2), (*value.rows)(i, 3)}));
+    return rows;
+  }
+
+  Json object_ = Json::object();
+};
+
+// ---- the schema ----
+
+class SchemaMaker {
+public:
+  /// Of the objects that have the keys of T.
+  template <class T>
+  static Json Make(T&& value)
+  {
+    SchemaMaker maker;
+    Describe(maker, value);
+    Json schema{{"type", "object"}, {"properties", std::move(maker.properties_)}, {"additionalProperties", false}};
+    if (!maker.required_.empty())
+      schema["required"] = std::move(maker.required_);
+    if (!maker.oneOf_.empty())
+      schema["oneOf"] = std::move(maker.oneOf_);
+    return schema;
+  }
+
+  void Constant(const char* key, const char* text)
+  {
+    properties_[key] = {{"const", text}};
+    required_.push_back(key);
+  }
+  void Text(const char* key, const std::string& value, bool needed, const char* help)
+  {
+    Add(key, {{"type", "string"}, {"maxLength", longestText}}, help, needed);
+    if (needed)
+      properties_[key]["minLength"] = 1;
+    else
+      properties_[key]["default"] = value;
+  }
+  template <class T>
+  void Number(const char* key, const T& value, const Range& range, const char* help)
+  {
+    Add(key, NumberSchema<T>(range), help);
+    properties_[key]["default"] = value;
+  }
+  template <class T>
+  void Number(const char* key, const std::optional<T>&, const Range& range, const char* help)
+  {
+    Add(key, NumberSchema<T>(range), help);
+  }
+  void Seed(const char* key, std::uint64_t value, const char* help)
+  {
+    Add(key, {{"type", "integer"}, {"minimum", 0}, {"default", value}}, help);
+  }
+  void Flag(const char* key, bool value, const char* help) { Add(key, {{"type", "boolean"}, {"default", value}}, help); }
+  template <class T>
+  void Choice(const char* key, const T& value, const Choices<T>& choices, const char* help)
+  {
+    Json names = Json::array();
+    Json standard;
+    for (const auto& [name, choice] : choices) {
+      names.push_back(name);
+      if (choice == value)
+        standard = name;
+    }
+    Add(key, {{"enum", std::move(names)}, {"default", std::move(standard)}}, help);
+  }
+  void Vector(const char* key, const Vector3d& value, const Range& range, const char* help)
+  {
+    Add(key,
+        {{"type", "array"},
+         {"items", NumberSchema<double>(range)},
+         {"minItems", 3},
+         {"maxItems", 3},
+         {"default", Json::array({value.x(), value.y(), value.z()})}},
+        help);
+  }
+  void MaterialName(const char* key, const std::string& value, bool needed)
+  {
+    Add(key, {{"type", "string"}}, "Name of a material.", needed);
+    if (!needed)
+      properties_[key]["default"] = value;
+  }
+  template <class T>
+  void Object(const char* key, T& value, bool needed, const char* help)
+  {
+    Add(key, Make(value), help, needed);
+  }
+  template <class T>
+  void Matrix(const char* key, T& value, const char* help)
+  {
+    Add(key, MatrixSchema(value), help);
+  }
+  template <class T>
+  void List(const char* key, std::vector<T>&, bool needed, const char* help)
+  {
+    Json items;
+    if constexpr (std::is_same_v<T, ScenePose>)
+      items = MatrixSchema(T());
+    else
+      items = Make(T());
+    Add(key, {{"type", "array"}, {"items", std::move(items)}, {"maxItems", longestList}}, help, needed);
+    if (needed)
+      properties_[key]["minItems"] = 1;
+  }
+  template <class Variant, class... T>
+  void OneOf(Variant&, const Form<T>&... forms)
+  {
+    (Add(forms.key, Make(T()), forms.help), ...);
+    oneOf_ = Json::array();
+    (oneOf_.push_back({{"required", {forms.key}}}), ...);
+  }
+  template <class Variant>
+  void Views(const char* key, Variant&, const char* help)
+  {
+    SceneRecording recording;
+    Add(key, {{"oneOf", Json::array({Make(SceneRow()), Make(SceneViews()), Make(RecordingKey{recording})})}}, help);
+  }
+  void Materials(const char* key, std::vector<Material>&, const char* help)
+  {
+    Json material = Make(Material());
+    for (auto& property : material["properties"])
+      property.erase("default"); // it is that of the material which this one is like
+    material["properties"]["like"] = {{"type", "string"},
+                                      {"description", "The material that it is like but for what is said here."}};
+    Add(key, {{"type", "object"}, {"additionalProperties", std::move(material)}}, help);
+  }
+
+private:
+  void Add(const char* key, Json schema, const char* help, bool needed = false)
+  {
+    schema["description"] = help;
+    properties_[key] = std::move(schema);
+    if (needed)
+      required_.push_back(key);
+  }
+
+  template <class T>
+  static Json NumberSchema(const Range& range)
+  {
+    return {{"type", std::is_integral_v<T> ? "integer" : "number"},
+            {range.open ? "exclusiveMinimum" : "minimum", range.low},
+            {"maximum", range.high}};
+  }
+
+  template <class T>
+  static Json MatrixSchema(T&& value)
+  {
+    Json row{{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 4}, {"maxItems", 4}};
+    Json rows{{"type", "array"}, {"items", std::move(row)}, {"minItems", 4}, {"maxItems", 4}};
+    rows["description"] = "The rows of a 4 x 4 matrix.";
+    return {{"oneOf", Json::array({std::move(rows), Make(value)})}};
+  }
+
+  Json properties_ = Json::object(), required_ = Json::array(), oneOf_;
+};
+
+} // namespace
+
+Eigen::Affine3d ScenePlace::Matrix() const
+{
+  if (rows)
+    return Eigen::Affine3d(*rows);
+  Eigen::Affine3d matrix = Eigen::Affine3d::Identity();
+  matrix.linear() = scale * ExpRotation(degree * rotationDegrees);
+  matrix.translation() = translation;
+  return matrix;
+}
+
+Pose ScenePose::ProbeToWorld() const
+{
+  Pose pose = Pose::Identity();
+  if (rows) {
+    pose.matrix() = *rows;
+    // Rows that were rounded for a file are made a rotation again.
+    const Eigen::Matrix3d rotation = pose.linear();
+    if (!IsRotation(rotation, 1e-12))
+      pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+    return pose;
+  }
+  const Vector3d z = (target - face).normalized(), x = (fan - fan.dot(z) * z).normalized();
+  pose.linear().col(0) = x;
+  pose.linear().col(1) = z.cross(x);
+  pose.linear().col(2) = z;
+  pose.translation() = face;
+  return pose;
+}
+
+ProbePreset SceneProbe::Resolve() const
+{
+  ProbePreset probe = ProbePresetOf(preset);
+  ProbeGeometry& head = probe.probe;
+  const auto bend = [](const char* what, const std::optional<double>& angleDegrees, const std::optional<double>& radius,
+                       const std::optional<double>& newWidth, double& angle, double& width) {
+    if (radius && newWidth)
+      Refuse(std::string(what) + "RadiusMm and " + what + "WidthMm say the same; give one of them");
+    const double oldRadius = angle > 0.0 ? width / angle : 0.0;
+    const bool bent = angle > 0.0;
+    if (angleDegrees)
+      angle = degree * *angleDegrees;
+    if (newWidth)
+      width = *newWidth;
+    else if (radius)
+      width = angle * *radius;
+    else if (angleDegrees && bent)
+      width = angle * oldRadius;
+  };
+  bend("fan", fanAngleDegrees, fanRadiusMm, fanWidthMm, head.fanAngle, head.fanWidth);
+  bend("sweep", sweepAngleDegrees, sweepRadiusMm, sweepWidthMm, head.sweepAngle, head.sweepWidth);
+  head.depthMin = depthMinMm.value_or(head.depthMin);
+  head.depthMax = depthMaxMm.value_or(head.depthMax);
+  probe.elements = elements.value_or(probe.elements);
+  probe.samples = samples.value_or(probe.samples);
+  probe.sweepSteps = sweepSteps.value_or(probe.sweepSteps);
+  if (!sweepSteps && probe.sweepSteps == 1 && !head.IsPlane())
+    Refuse("the preset is of a single plane; say sweepSteps to sweep it");
+  if (probe.sweepSteps > 1 && head.IsPlane())
+    Refuse("sweepSteps is " + std::to_string(probe.sweepSteps) + ", but the sweep has neither angle nor width");
+  head.Check();
+  if (probe.sweepSteps == 1)
+    head.sweepAngle = head.sweepWidth = 0.0;
+  return probe;
+}
+
+Eigen::Affine3d SceneMesh::ToWorld() const
+{
+  Eigen::Matrix3d linear = Eigen::Matrix3d::Identity();
+  if (axes == Axes::YUp)
+    linear << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return transform.Matrix() * Eigen::Affine3d((unit == Unit::Metres ? 1000.0 : 1.0) * linear);
+}
+
+Pose SceneSweep::ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) const
+{
+  Pose motion(ExpRotation(secondsFromMiddle * degree * turnDegreesPerSecond));
+  motion.translation() = secondsFromMiddle * velocityMmPerSecond;
+  return middle * motion;
+}
+
+const Material& SynthesisScene::MaterialOf(const std::string& wanted) const
+{
+  std::string names;
+  for (const std::vector<Material>* list : {&materials, &StandardMaterials()})
+    for (const Material& material : *list) {
+      if (material.name == wanted)
+        return material;
+      names += (names.empty() ? "" : ", ") + material.name;
+    }
+  throw Error(Error::Kind::InvalidParameter, "there is no material " + Shown(wanted) + "; there are " + names);
+}
+
+std::string SynthesisScene::PathOf(const std::string& file) const
+{
+  const std::filesystem::path path(file);
+  if (!dataFolder.empty())
+    return (std::filesystem::path(dataFolder) / path.filename()).string();
+  return path.is_absolute() || folder.empty() ? file : (std::filesystem::path(folder) / path).lexically_normal().string();
+}
+
+void SynthesisScene::Check(const std::string& title) const
+{
+  for (std::size_t i = 0; i < materials.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (materials[i].name == materials[j].name)
+        throw Error(Error::Kind::BadFile, title + ": materials." + materials[i].name + ": it is there twice");
+  SynthesisScene copy = *this;
+  SceneFromJson(Writer::Write(copy).dump(), title);
+}
+
+SynthesisScene SceneFromJson(const std::string& text, const std::string& name)
+{
+  SynthesisScene scene;
+  const Reader::Source place{name, &scene};
+  Json json = Parse(name, text);
+  if (json.is_object())
+    json.erase("$schema"); // a hint for editors
+  Reader::Read(place, json, "", scene);
+  if (scene.sweep.alongRecording && !std::holds_alternative<SceneRecording>(scene.views))
+    throw Error(Error::Kind::BadFile, name + ": sweep.alongRecording: the views are not those of a recording");
+  return scene;
+}
+
+SynthesisScene ReadScene(const std::string& path)
+{
+  SynthesisScene scene = SceneFromJson(ReadTextFile(path), path);
+  scene.folder = std::filesystem::path(path).parent_path().string();
+  return scene;
+}
+
+std::string SceneToJson(const SynthesisScene& scene)
+{
+  scene.Check();
+  SynthesisScene copy = scene;
+  return Writer::Write(copy).dump(2) + "\n";
+}
+
+std::string SceneSchema()
+{
+  Json schema{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+              {"title", "Scene of synthetic ultrasound"},
+              {"description",
+               "What lies in the world, which probe looks at it from where, and how it is made into volumes. Lengths "
+               "in mm, angles in degrees; missing keys have their defaults."}};
+  schema.update(SchemaMaker::Make(SynthesisScene()));
+  schema["properties"]["$schema"] = {{"type", "string"}, {"description", "For editors."}};
+  return schema.dump(2) + "\n";
+}
+
+} // namespace echorama
