@@ -32,6 +32,11 @@ using Parameters = SpherePackingParameters;
 
 constexpr double sphereVolume = 4.1887902047863905; // of radius 1
 
+double VolumeOf(double radius)
+{
+  return sphereVolume * radius * radius * radius;
+}
+
 // Spheres in one grid per octave of their radii.
 class Neighbourhood {
 public:
@@ -251,8 +256,8 @@ public:
         return Finish(true);
       Report();
       const Vector3d place = site_.Place(places_, p_.radiusMin);
-      const double border = std::clamp(site_.Room(place), p_.radiusMin, p_.radiusMax);
-      const double radius = neighbours_.Room(place, p_.radiusMin, border);
+      const double most = std::min(p_.radiusMax, LargestFor(wanted_ - filled_));
+      const double radius = neighbours_.Room(place, p_.radiusMin, std::clamp(site_.Room(place), p_.radiusMin, most));
       if (radius < p_.radiusMin) {
         ++missed;
         continue;
@@ -270,11 +275,10 @@ private:
     std::vector<double> radii;
     const auto most = static_cast<std::size_t>(p_.count) - neighbours_.Spheres().size();
     for (double missing = wanted_ - filled_; missing > 0.0 && radii.size() < most;) {
-      const double radius = DrawRadius(p_, p_.radiusMin, limit, sizes);
-      const double volume = sphereVolume * radius * radius * radius;
-      if (volume > 2.0 * missing) // nearer to what is wanted without it
+      const double radius = std::min(DrawRadius(p_, p_.radiusMin, limit, sizes), LargestFor(missing));
+      missing -= VolumeOf(radius);
+      if (missing < -0.5 * VolumeOf(radius)) // nearer to what is wanted without it
         break;
-      missing -= volume;
       radii.push_back(radius);
       if (missing > 0.0 && radii.size() == most && p_.count == Parameters::mostSpheres)
         RefuseMore();
@@ -282,6 +286,9 @@ private:
     std::sort(radii.begin(), radii.end(), std::greater<>());
     return radii;
   }
+
+  // The last sphere is as large as what is missing, as far as sizes go.
+  double LargestFor(double volume) const { return std::max(p_.radiusMin, std::cbrt(volume / sphereVolume)); }
 
   bool Insert(double radius)
   {
@@ -301,7 +308,7 @@ private:
     if (neighbours_.Spheres().size() == Parameters::mostSpheres)
       RefuseMore();
     neighbours_.Add(sphere);
-    filled_ += sphereVolume * sphere.radius * sphere.radius * sphere.radius;
+    filled_ += VolumeOf(sphere.radius);
   }
 
   [[noreturn]] void RefuseMore() const
@@ -376,7 +383,7 @@ double SpherePackingParameters::Volume() const
 {
   const Vector3d size = boxMax - boxMin;
   const double radius = 0.5 * size.minCoeff();
-  return region == Region::Ball ? sphereVolume * radius * radius * radius : size.prod();
+  return region == Region::Ball ? VolumeOf(radius) : size.prod();
 }
 
 SpherePacking PackSpheres(const SpherePackingParameters& parameters, const Progress& progress)

@@ -58,13 +58,15 @@ struct SpherePacking {
   bool saturated = false;    ///< it ended for want of room, with less than what was asked for
 };
 
-/// Packs spheres until the fill fraction or the count is reached, whichever comes first, or no more fit.
+/// Packs spheres until the fill fraction or the count is reached, whichever comes first, or no more fit. The last sphere is cut
+/// to the size that is missing, so that the fill fraction comes out to less than a smallest sphere.
 ///
-/// With Method::Random, the sizes are drawn from the distribution until their volumes sum up to the fill fraction (closest
-/// from above or below), or to the count. A size that misses too often is given up together with all larger ones, and smaller
-/// ones are drawn in their stead; so a dense packing has fewer large spheres than its distribution says. Fractions up to 0.3
-/// usually come out as drawn. The result depends on the parameters alone, and not on the number of threads. \throws
-/// Error(InvalidParameter) as Check(), Error(TooLarge) when more than mostSpheres would be drawn, Error(Cancelled).
+/// With Method::Random, sizes are drawn from the distribution until they sum up to the fill fraction or the count. A size that
+/// misses too often is given up together with all larger ones, and smaller ones are drawn in their stead; so a dense packing has
+/// fewer large spheres than its distribution says. Fractions up to 0.3 usually come out as drawn.
+///
+/// The result depends on the parameters alone, and not on the number of threads.
+/// \throws Error(InvalidParameter) as Check(), Error(TooLarge) when it takes mostSpheres or more, Error(Cancelled).
 SpherePacking PackSpheres(const SpherePackingParameters& parameters, const Progress& progress = {});
 
 } // namespace echorama
