@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Glass plate first, then the stems from the plate into the balls, then the balls: later bodies count where they overlap.
+#include "CalibrationRig.h"
+#include "BodyShapes.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+namespace {
+
+using Eigen::Vector3d;
+
+[[noreturn]] void Refuse(const std::string& reason)
+{
+  throw Error(Error::Kind::InvalidParameter, "calibration rig: " + reason);
+}
+
+Vector3d InWorld(const CalibrationRigParameters& p, const Vector3d& inRig)
+{
+  return p.scale * inRig + Vector3d(0.0, 0.0, p.plateDepthMm);
+}
+
+Material Water(double celsius)
+{
+  Material water = StandardMaterial("water");
+  water.soundSpeed = WaterSoundSpeed(celsius);
+  return water;
+}
+
+Material Glass()
+{
+  Material glass = StandardMaterial("steel"); // clear and hard like it
+  glass.name = "glass";
+  glass.soundSpeed = 5640.0;
+  glass.density = 2240.0;
+  glass.attenuation = 0.05;
+  glass.youngsModulusKPa = 6.2e7;
+  return glass;
+}
+
+} // namespace
+
+std::vector<CalibrationRigParameters::Ball> CalibrationRigParameters::DefaultBalls()
+{
+  return {{"A", {-31.0, -14.0, -22.0}, 4.0}, {"B", {-16.0, 17.0, -44.0}, 5.0}, {"C", {-4.0, -19.0, -57.0}, 3.0},
+          {"D", {3.0, 4.0, -28.0}, 6.0},     {"E", {17.0, 23.0, -17.0}, 7.0},  {"F", {22.0, -9.0, -50.0}, 3.5},
+          {"G", {38.0, 6.0, -34.0}, 4.5}};
+}
+
+void CalibrationRigParameters::Check() const
+{
+  const auto check = [](const std::string& what, double value, double from, double to) {
+    if (!(value >= from && value <= to))
+      Refuse(what + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
+  };
+  check("scale", scale, 0.2, 5.0);
+  check("plateDepthMm", plateDepthMm, 10.0, 500.0);
+  check("plateMm", plateMm, 0.0, 50.0);
+  check("stemRadiusMm", stemRadiusMm, 0.0, 5.0);
+  check("waterCelsius", waterCelsius, 0.0, 95.0);
+  check("detailMm", detailMm, 0.1, 5.0);
+  check("the number of balls", static_cast<double>(balls.size()), 1.0, 1000.0);
+  StandardMaterial(material);
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const Ball& ball = balls[i];
+    const std::string name = "ball " + std::to_string(i + 1) + (ball.name.empty() ? "" : " (" + ball.name + ")");
+    check("the radius of " + name, ball.radius, 0.5, 30.0);
+    for (int axis = 0; axis < 3; ++axis)
+      check("a coordinate of " + name, ball.centre[axis], -1000.0, 1000.0);
+    if (ball.centre.z() + ball.radius >= 0.0)
+      Refuse(name + " touches the plate; its centre's z must be below " + NumberText(-ball.radius));
+    for (std::size_t j = 0; j < i; ++j)
+      if ((ball.centre - balls[j].centre).norm() <= ball.radius + balls[j].radius)
+        Refuse(name + " touches ball " + std::to_string(j + 1));
+  }
+}
+
+double WaterSoundSpeed(double celsius)
+{
+  constexpr double c[]{1.402385e3, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.787860e-9};
+  double speed = 0.0;
+  for (int i = 5; i >= 0; --i)
+    speed = speed * celsius + c[i];
+  return speed;
+}
+
+TissueSurface MakeCalibrationRig(const CalibrationRigParameters& p, const Progress& progress)
+{
+  p.Check();
+  progress(0.0);
+  TissueSurface rig;
+  rig.MaterialIndex(Water(p.waterCelsius));
+  const Material& stuff = StandardMaterial(p.material);
+  if (p.plateMm > 0.0) {
+    Eigen::Vector2d low = p.balls.front().centre.head<2>(), high = low;
+    for (const auto& ball : p.balls) {
+      low = low.cwiseMin(ball.centre.head<2>());
+      high = high.cwiseMax(ball.centre.head<2>());
+    }
+    const Eigen::Vector2d margin(25.0, 25.0);
+    AddBlock(
+        rig, "plate", Glass(), p.scale * (low - margin), p.scale * (high + margin),
+        [&p](double, double) { return p.plateDepthMm; }, p.plateDepthMm + p.plateMm, 1e6);
+    if (p.stemRadiusMm > 0.0)
+      for (const auto& ball : p.balls) {
+        // From half inside the plate, which holds it, to the ball's centre; never wider than the ball.
+        const double radius = std::min(p.stemRadiusMm, 0.6 * p.scale * ball.radius);
+        const double inPlate = std::min(0.5 * p.plateMm, radius);
+        const Vector3d foot = InWorld(p, {ball.centre.x(), ball.centre.y(), 0.0}) + Vector3d(0.0, 0.0, inPlate - radius);
+        const Vector3d top = InWorld(p, ball.centre);
+        std::vector<Vector3d> path;
+        constexpr int pieces = 8;
+        for (int k = 0; k <= pieces; ++k)
+          path.push_back(foot + (top - foot) * k / pieces);
+        AddTube(rig, "stem of " + ball.name, stuff, path, std::vector<double>(path.size(), radius), p.detailMm);
+      }
+  }
+  progress(0.5);
+  for (const auto& ball : p.balls) {
+    const double radius = p.scale * ball.radius;
+    AddBlob(
+        rig, ball.name, stuff, InWorld(p, ball.centre), [radius](const Vector3d&) { return radius; }, p.detailMm);
+  }
+  progress(1.0);
+  return rig;
+}
+
+std::vector<Landmark> CalibrationLandmarks(const CalibrationRigParameters& p)
+{
+  p.Check();
+  std::vector<Landmark> landmarks;
+  for (const auto& ball : p.balls)
+    landmarks.push_back({ball.name, InWorld(p, ball.centre)});
+  return landmarks;
+}
+
+} // namespace echorama
