@@ -70,13 +70,16 @@ class Waviness {
 public:
   explicit Waviness(Random& random)
   {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < coefficients_.size(); ++i) {
-      coefficients_[i] = random.Uniform(-1.0, 1.0);
-      sum += std::abs(coefficients_[i]);
+    for (double& c : coefficients_)
+      c = random.Uniform(-1.0, 1.0);
+    double largest = 0.0; // over a spiral of directions; the waves are so long that no other goes much beyond
+    constexpr int directions = 600;
+    for (int i = 0; i < directions; ++i) {
+      const double z = (2.0 * i + 1.0) / directions - 1.0, r = std::sqrt(1.0 - z * z), angle = 2.399963229728653 * i;
+      largest = std::max(largest, std::abs((*this)({r * std::cos(angle), r * std::sin(angle), z})));
     }
     for (double& c : coefficients_)
-      c /= sum;
+      c /= 1.04 * largest;
   }
   double operator()(const Vector3d& d) const
   {
@@ -348,25 +351,26 @@ private:
     const RadiusOf bent = Bent(EllipsoidRadius(radii), waviness, 0.1 * p_.variation);
     const RadiusOf radius = [bent, hilum](const Vector3d& d) {
       // Thin towards the left lobe (+x), hollow at the hilum.
-      return bent(d) * (1.0 - 0.2 * (1.0 + d.x()) * d.z() * d.z()) * (1.0 - 0.14 * std::exp(-(d - hilum).squaredNorm() / 0.2));
+      return bent(d) * (1.0 - 0.15 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 2)) * (1.0 - 0.14 * std::exp(-(d - hilum).squaredNorm() / 0.2));
     };
     const Organ liver = AddOrgan("liver", StandardMaterial("liver"), centre, radius);
 
     const double root = p_.vesselRadiusMm;
-    const auto tree = [&](const Vector3d& at, double rootRadius, Part part, double outside) {
+    const auto tree = [&](const Vector3d& at, const Vector3d& target, double rootRadius, Part part, double outside) {
       VesselTreeParameters t;
       t.seed = p_.seed * 16 + static_cast<std::uint64_t>(part);
       t.rootRadiusMm = rootRadius;
       t.smallestRadiusMm = p_.smallestVesselMm;
       t.generations = p_.generations;
       t.asymmetry = p_.branchAsymmetry;
-      t.lengthOverRadius = std::clamp(26.0 * scale_ / rootRadius, 3.0, 6.0);
+      t.lengthOverRadius = 4.5;
+      t.rootLengthMm = (outside + 10.0) * scale_ + rootRadius;
       t.root = centre + (liver.radius(at) + outside * scale_) * at;
-      t.direction = centre - t.root;
+      t.direction = centre + scale_ * target - t.root;
       return t;
     };
-    const VesselTreeParameters portal = tree(hilum, root, Part::Portal, 7.0),
-                               hepatic = tree(dome, 0.9 * root, Part::Hepatic, 5.0);
+    const VesselTreeParameters portal = tree(hilum, {-18.0, -12.0, 4.0}, root, Part::Portal, 7.0);
+    const VesselTreeParameters hepatic = tree(dome, {-8.0, 16.0, -10.0}, 0.9 * root, Part::Hepatic, 5.0);
 
     // Lesions first: as many as find room between the surface and the roots of the trees.
     struct Lesion {
@@ -381,8 +385,7 @@ private:
     };
     const auto toRoot = [&](const VesselTreeParameters& t, const Vector3d& p) {
       const Vector3d along = t.direction.normalized();
-      const double length = t.lengthOverRadius * t.rootRadiusMm;
-      const double s = std::clamp((p - t.root).dot(along), 0.0, 1.6 * length); // and a little of what follows
+      const double s = std::clamp((p - t.root).dot(along), 0.0, 1.3 * t.rootLengthMm); // and a little of what follows
       return (p - t.root - s * along).norm() - (1.0 + p_.wallShare) * t.rootRadiusMm;
     };
     const auto toLesions = [&lesions](const Vector3d& p) {
@@ -418,7 +421,7 @@ private:
     if (p_.generations == 0)
       return;
 
-    const double gap = 1.5;
+    const double gap = 1.0;
     const std::vector<VesselBranch> portalTree = GrowVessels(portal, [&](const Vector3d& p) {
       return std::min({toSurface(p) - gap, toLesions(p) - gap, toRoot(hepatic, p) - gap});
     });
@@ -431,7 +434,7 @@ private:
       }
       return least - gap;
     });
-    AddTree("portal vein", portalTree, true);
+AddTree("portal vein", portalTree, true);
     AddTree("hepatic vein", hepaticTree, false);
   }
 

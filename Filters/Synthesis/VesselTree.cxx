@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The tree grows breadth first, so that wide vessels find their place before narrow ones. At each branching Murray's law fixes
-// radii and angles; what is free is the plane. A dozen planes are tried, the turned ones first, and the one whose two children
-// keep furthest from everything is taken; with shorter children where long ones find no room.
+// radii and angles; what is free is the plane. Some planes are tried, and the one whose two children keep
+// furthest from everything is taken; with shorter children where long ones find no room.
 // Cost: candidates x samples x (branches so far + one look-up of room); below a millisecond for a hundred branches.
 #include "VesselTree.h"
 #include "Core/Base/Error.h"
@@ -54,6 +54,7 @@ void Check(const VesselTreeParameters& p)
                                                      "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
   };
   check("rootRadiusMm", p.rootRadiusMm, 0.01, 100.0);
+  check("rootLengthMm", p.rootLengthMm, 0.01, 1000.0);
   check("smallestRadiusMm", p.smallestRadiusMm, 0.01, 100.0);
   check("generations", p.generations, 0.0, 16.0);
   check("lengthOverRadius", p.lengthOverRadius, 3.0, 100.0);
@@ -69,7 +70,7 @@ std::vector<VesselBranch> GrowVessels(const VesselTreeParameters& p, const Vesse
   Check(p);
   std::vector<VesselBranch> tree;
   std::vector<double> planes{0.0}; // the angle of the plane in which each branch parted from its sibling
-  tree.push_back({p.root, p.root + p.lengthOverRadius * p.rootRadiusMm * p.direction.normalized(), p.rootRadiusMm, 0, -1, true});
+  tree.push_back({p.root, p.root + p.rootLengthMm * p.direction.normalized(), p.rootRadiusMm, 0, -1, true});
   for (std::size_t at = 0; at < tree.size(); ++at) {
     const VesselBranch parent = tree[at];
     if (parent.generation == p.generations)
@@ -89,10 +90,10 @@ std::vector<VesselBranch> GrowVessels(const VesselTreeParameters& p, const Vesse
     const double turn = planes[at] + 0.5 * pi + random.Uniform(-0.3, 0.3);
     const Vector3d axis = (parent.to - parent.from).normalized(), u = axis.unitOrthogonal(), v = axis.cross(u);
 
-    constexpr int candidates = 12;
+    constexpr int candidates = 16;
     std::array<VesselBranch, 2> best;
     double bestRoom = 0.0, bestPlane = 0.0;
-    for (const double length : {1.0, 0.7, 0.5}) {
+    for (const double length : {1.0, 0.75, 0.55, 0.4}) {
       for (int k = 0; k < candidates; ++k) {
         const double plane = turn + 2.0 * pi * k / candidates;
         const Vector3d side = std::cos(plane) * u + std::sin(plane) * v;
@@ -106,8 +107,8 @@ std::vector<VesselBranch> GrowVessels(const VesselTreeParameters& p, const Vesse
         double least = std::numeric_limits<double>::infinity();
         for (const VesselBranch& child : children)
           least = std::min(least, RoomAlong(tree, static_cast<int>(at), child.from, child.to, child.radius, room));
-        // Planes at right angles to the last are preferred where room is alike.
-        least *= 0.75 + 0.25 * square(std::cos(plane - turn));
+        // Room beyond the vessel's own width is no gain; then planes at right angles to the last are preferred.
+        least = std::min(least, r0) * (0.7 + 0.3 * square(std::cos(plane - turn)));
         if (least > bestRoom) {
           bestRoom = least;
           bestPlane = plane;
