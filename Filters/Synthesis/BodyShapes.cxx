@@ -205,7 +205,7 @@ int AddTube(TissueSurface& tissue, const std::string& name, const Material& mate
     }
   };
   std::uint32_t pole = 0;
-  Vector3d axis;
+  Vector3d axis = Vector3d::UnitZ();
   for (std::size_t i = 0; i < path.size(); ++i) {
     axis = (path[std::min(i + 1, path.size() - 1)] - path[i > 0 ? i - 1 : 0]).normalized();
     if (i == 0) {

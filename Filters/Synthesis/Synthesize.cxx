@@ -1,0 +1,543 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Three passes over the beams, each a parallel loop whose items know nothing of each other:
+//
+// 1. Rays. The ways of sound of every beam are kept (some 170 bytes a straight piece), because the second pass has to know
+//    where sound goes before the third can begin. Where a beam has several rays, what its third pass needs is worked out at
+//    once and the rest is dropped.
+// 2. Scatterers, only in cells of space that a beam passes.
+// 3. Echoes: each beam adds up its own row of samples.
+//
+// With several rays a beam, the mean amplitude of the direct way is a function of depth; it multiplies the row of the
+// direct way, which is summed with amplitude 1. That is right to the length of a pulse, and costs one sum instead of many.
+#include "Synthesize.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/Parallel.h"
+#include "EchoSum.h"
+#include "Scatterers.h"
+#include "VisitedSpace.h"
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace echorama {
+namespace {
+
+using Complex = std::complex<float>;
+using Eigen::Vector3d;
+
+constexpr double maxSamples = 536870912.0; // 2^29: 4 GiB of baseband
+constexpr double visitedCellMm = 5.0;
+constexpr std::ptrdiff_t beamsPerRange = 8;
+constexpr double samplesPerPulse = 1.25; // of its standard deviation: steps of 0.8
+
+class Stopwatch {
+public:
+  explicit Stopwatch(double* seconds) : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
+  ~Stopwatch()
+  {
+    if (seconds_)
+      *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+private:
+  double* seconds_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+// What the third pass needs of a beam.
+struct BeamWays {
+  std::vector<SoundSegment> segments;
+  std::vector<SurfaceEcho> echoes;
+  std::vector<float> directAmplitude; // by depth sample, when several rays were averaged; the direct segments are then bare
+};
+
+std::size_t BytesOf(const BeamWays& ways)
+{
+  return ways.segments.capacity() * sizeof(SoundSegment) + ways.echoes.capacity() * sizeof(SurfaceEcho) +
+         ways.directAmplitude.capacity() * sizeof(float);
+}
+
+struct Element {
+  Vector3d position, direction, across;
+};
+
+// Where a beam starts on the face, in the world.
+Element ElementOf(const SynthesisParameters& p, int element, int step)
+{
+  const auto n = p.BeamDimensions();
+  BeamPoint at;
+  at.fan = static_cast<double>(element) / (n[1] - 1) - 0.5;
+  at.sweep = n[2] > 1 ? static_cast<double>(step) / (n[2] - 1) - 0.5 : 0.0;
+  const Pose& pose = p.stepPoses.empty() ? p.probeToWorld : p.stepPoses[static_cast<std::size_t>(step)];
+  const Vector3d direction = DirectionOf(p.probe, at);
+  const double turn = p.probe.sweepAngle * at.sweep;
+  const Vector3d outOfPlane(0.0, std::cos(turn), -std::sin(turn));
+  return {pose * PointOf(p.probe, at), pose.linear() * direction, pose.linear() * outOfPlane.cross(direction).normalized()};
+}
+
+// The ray of a beam's axis, or one of several over the aperture, which meet at the focus at one time.
+RayStart StartOf(const Element& element, const Transducer& transducer, RaySamples* samples)
+{
+  RayStart start;
+  start.origin = element.position;
+  start.direction = element.direction;
+  start.across = element.across;
+  if (!samples)
+    return start;
+  const double lateral = (samples->Next() - 0.5) * transducer.lateralApertureMm,
+               elevation = (samples->Next() - 0.5) * transducer.elevationApertureMm;
+  const Vector3d out = element.direction.cross(element.across);
+  const Vector3d focus = element.position + transducer.lateralFocusMm * element.direction;
+  start.origin += lateral * element.across + elevation * out;
+  const double way = (focus - start.origin).norm();
+  start.direction = (focus - start.origin) / way;
+  start.across = (element.across - element.across.dot(start.direction) * start.direction).normalized();
+  start.scanDepth = transducer.lateralFocusMm - way; // the same time at the focus
+  return start;
+}
+
+// How much a ray from that part of the aperture counts: its apodisation.
+double WeightOf(const RayStart& start, const Element& element, const Transducer& transducer)
+{
+  const Vector3d offset = start.origin - element.position;
+  const double lateral = offset.dot(element.across) / (0.25 * transducer.lateralApertureMm),
+               elevation = offset.dot(element.direction.cross(element.across)) / (0.25 * transducer.elevationApertureMm);
+  return std::exp(-0.5 * (lateral * lateral + elevation * elevation));
+}
+
+// Adds the amplitude of the direct way to a function of depth.
+void AddDirect(const SoundPath& path, double weight, const DepthAxis& axis, std::vector<float>& amplitude)
+{
+  for (const SoundSegment& segment : path.segments) {
+    if (segment.bounces > 0)
+      continue;
+    const double perSample = axis.step / segment.scanDepthPerMm; // mm of length
+    const double first = (segment.scanDepth - axis.first) / axis.step, last = first + segment.length / perSample;
+    for (auto i = static_cast<int>(std::max(std::ceil(first), 0.0)); i < axis.count && i < last; ++i)
+      amplitude[static_cast<std::size_t>(i)] +=
+          static_cast<float>(weight * segment.amplitude * std::exp(-segment.attenuation * (i - first) * perSample));
+  }
+}
+
+double DirectEnd(const SoundPath& path)
+{
+  double end = 0.0;
+  for (const SoundSegment& segment : path.segments)
+    if (segment.bounces == 0)
+      end = std::max(end, segment.scanDepth + segment.length * segment.scanDepthPerMm);
+  return end;
+}
+
+class Beams {
+public:
+  Beams(const AcousticScene& scene, const SynthesisParameters& p)
+    : scene_(scene), p_(p), n_(p.BeamDimensions()), axis_(InternalAxis(p)),
+      tracer_(scene, p.transport,
+              {p.transducer.frequencyMHz, p.transducer.assumedSoundSpeed, p.probe.depthMax + 4.0 * p.transducer.PulseSigmaMm()}),
+      brightestDb_(Material::clearDb), leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
+  {
+    for (const Material& material : scene.Materials())
+      brightestDb_ = std::max(brightestDb_, material.backscatterDb);
+  }
+
+  static DepthAxis InternalAxis(const SynthesisParameters& p)
+  {
+    const double range = p.probe.depthMax - p.probe.depthMin, step = range / (p.samples - 1);
+    const double finer = std::max(1.0, std::ceil(step * samplesPerPulse / p.transducer.PulseSigmaMm() - 1e-9));
+    return {p.probe.depthMin, step / finer, static_cast<int>(std::min((p.samples - 1) * finer + 1.0, 1e9))};
+  }
+
+  const DepthAxis& Axis() const { return axis_; }
+  std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(n_[1]) * n_[2]; }
+
+  BeamWays Trace(std::ptrdiff_t beam, std::int64_t& rays) const
+  {
+    const Element element = ElementOf(p_, static_cast<int>(beam % n_[1]), static_cast<int>(beam / n_[1]));
+    SoundPath path;
+    BeamWays ways;
+    if (p_.subRays == 1) {
+      RayStart start = StartOf(element, p_.transducer, nullptr);
+      start.inside = scene_.BodiesAt(start.origin);
+      RaySamples samples = SamplesOf(beam, 0);
+      tracer_.Trace(start, path, &samples);
+      rays += path.rays;
+      std::copy_if(path.segments.begin(), path.segments.end(), std::back_inserter(ways.segments),
+                   [this](const SoundSegment& segment) { return IsVisible(segment); });
+      ways.segments.shrink_to_fit();
+      ways.echoes = path.echoes;
+      return ways;
+    }
+
+    ways.directAmplitude.assign(static_cast<std::size_t>(axis_.count), 0.0f);
+    std::vector<SoundSegment> direct;
+    double deepest = -1.0, sum = 0.0;
+    for (int ray = 0; ray < p_.subRays; ++ray) {
+      RaySamples samples = SamplesOf(beam, ray);
+      RayStart start = StartOf(element, p_.transducer, &samples);
+      start.inside = scene_.BodiesAt(start.origin);
+      const double weight = WeightOf(start, element, p_.transducer);
+      sum += weight;
+      tracer_.Trace(start, path, &samples);
+      rays += path.rays;
+      AddDirect(path, weight, axis_, ways.directAmplitude);
+      for (SurfaceEcho echo : path.echoes) {
+        echo.amplitude *= weight;
+        ways.echoes.push_back(echo);
+      }
+      const double end = DirectEnd(path);
+      const bool isDeepest = end > deepest;
+      if (isDeepest) {
+        deepest = end;
+        direct.clear();
+      }
+      for (SoundSegment segment : path.segments)
+        if (segment.bounces > 0) {
+          segment.amplitude *= weight;
+          if (IsVisible(segment))
+            ways.segments.push_back(segment);
+        } else if (isDeepest) {
+          segment.amplitude = 1.0;
+          segment.attenuation = 0.0;
+          direct.push_back(segment);
+        }
+    }
+    for (SurfaceEcho& echo : ways.echoes)
+      echo.amplitude /= sum;
+    for (SoundSegment& segment : ways.segments)
+      segment.amplitude /= sum;
+    for (float& amplitude : ways.directAmplitude)
+      amplitude /= static_cast<float>(sum);
+    ways.segments.insert(ways.segments.begin(), direct.begin(), direct.end());
+    return ways;
+  }
+
+  void Sum(const BeamWays& ways, const Scatterers& scatterers, Complex* row) const
+  {
+    // The direct way comes first.
+    const auto reflected =
+        std::find_if(ways.segments.begin(), ways.segments.end(), [](const SoundSegment& segment) { return segment.bounces > 0; });
+    for (auto segment = ways.segments.begin(); segment != reflected; ++segment)
+      AddSegmentEchoes(*segment, scatterers, p_.transducer, axis_, row);
+    if (!ways.directAmplitude.empty())
+      for (std::size_t i = 0; i < ways.directAmplitude.size(); ++i)
+        row[i] *= ways.directAmplitude[i];
+    for (auto segment = reflected; segment != ways.segments.end(); ++segment)
+      AddSegmentEchoes(*segment, scatterers, p_.transducer, axis_, row);
+    const double mirror = std::pow(10.0, p_.mirrorDb / 20.0);
+    for (const SurfaceEcho& echo : ways.echoes)
+      AddSurfaceEcho(echo, p_.transducer, axis_, row, mirror);
+  }
+
+private:
+  // Whether the speckle of the brightest material would show. Amplitude and gain change by constant numbers of dB per mm
+  // between the points of the gain, so one of those or an end is the brightest place.
+  bool IsVisible(const SoundSegment& segment) const
+  {
+    const auto isVisibleAt = [&](double scanDepth) {
+      const double along = (scanDepth - segment.scanDepth) / segment.scanDepthPerMm;
+      const double db = 8.685889638065035 * (std::log(std::abs(segment.amplitude)) - segment.attenuation * along);
+      return db + brightestDb_ + p_.receiver.GainDbAt(scanDepth) >= leastDb_;
+    };
+    const double end = segment.scanDepth + segment.length * segment.scanDepthPerMm;
+    const auto& points = p_.receiver.tgcPoints;
+    return isVisibleAt(segment.scanDepth) || isVisibleAt(end) ||
+           std::any_of(points.begin(), points.end(), [&](const auto& point) {
+             return point.depthMm > segment.scanDepth && point.depthMm < end && isVisibleAt(point.depthMm);
+           });
+  }
+
+  RaySamples SamplesOf(std::ptrdiff_t beam, int ray) const
+  {
+    return {p_.sampling, p_.seed, static_cast<std::uint64_t>(beam), static_cast<std::uint32_t>(ray),
+            static_cast<std::uint32_t>(p_.subRays)};
+  }
+
+  const AcousticScene& scene_;
+  const SynthesisParameters& p_;
+  std::array<int, 3> n_;
+  DepthAxis axis_;
+  SoundTracer tracer_;
+  double brightestDb_; // of all materials
+  double leastDb_;     // below this nothing shows
+};
+
+// How far from a way of sound scatterers are heard, mm.
+double Reach(const SoundSegment& segment, const Transducer& transducer)
+{
+  const BeamWidth from = WidthAt(transducer, segment.way), to = WidthAt(transducer, segment.way + segment.length);
+  return beamReach * std::max({from.lateralSigma, from.elevationSigma, to.lateralSigma, to.elevationSigma});
+}
+
+VisitedSpace SpaceOf(const std::vector<BeamWays>& beams, const Transducer& transducer, const Progress& progress)
+{
+  Eigen::AlignedBox3d box;
+  double reach = 0.0;
+  for (const BeamWays& ways : beams)
+    for (const SoundSegment& segment : ways.segments) {
+      box.extend(segment.from);
+      box.extend(segment.from + segment.length * segment.direction);
+      reach = std::max(reach, Reach(segment, transducer));
+    }
+  if (!box.isEmpty()) {
+    box.min().array() -= reach;
+    box.max().array() += reach;
+  }
+  VisitedSpace space(box, visitedCellMm);
+  ParallelRanges(static_cast<std::ptrdiff_t>(beams.size()), beamsPerRange, progress,
+                 [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                   for (std::ptrdiff_t beam = begin; beam < end; ++beam)
+                     for (const SoundSegment& segment : beams[static_cast<std::size_t>(beam)].segments)
+                       space.MarkLine(segment.from, segment.direction, segment.length, Reach(segment, transducer));
+                 });
+  return space;
+}
+
+const char* NameOf(Sampling sampling)
+{
+  return sampling == Sampling::Random ? "random" : sampling == Sampling::Stratified ? "stratified" : "sobol";
+}
+
+} // namespace
+
+Receiver SynthesisParameters::DefaultReceiver()
+{
+  Receiver receiver;
+  receiver.tgcDbPerCm = 3.5;
+  receiver.noiseDb = -50.0;
+  return receiver;
+}
+
+std::array<int, 3> SynthesisParameters::BeamDimensions() const
+{
+  return {samples, elements, probe.IsPlane() ? 1 : steps};
+}
+
+void SynthesisParameters::Check() const
+{
+  const auto check = [](const char* what, double value, double from, double to) {
+    if (!(value >= from && value <= to))
+      throw Error(Error::Kind::InvalidParameter, std::string(what) + " is " + NumberText(value) + "; it must be in [" +
+                                                     NumberText(from) + ", " + NumberText(to) + "]");
+  };
+  check("elements", elements, 2, 4096);
+  if (!probe.IsPlane())
+    check("steps", steps, 2, 4096);
+  check("samples", samples, 2, 16384);
+  check("subRays", subRays, 1, 4096);
+  check("mirrorDb", mirrorDb, 0.0, 120.0);
+  check("invisibleDb", invisibleDb, 0.0, 300.0);
+  probe.Check();
+  const auto checkPose = [](const Pose& pose, const std::string& name) {
+    if (!IsRotation(pose.linear()) || !(pose.translation().cwiseAbs().maxCoeff() <= 1e6))
+      throw Error(Error::Kind::InvalidParameter, name + " is not a rigid transform of at most 1e6 mm");
+  };
+  checkPose(probeToWorld, "probeToWorld");
+  for (std::size_t i = 0; i < stepPoses.size(); ++i)
+    checkPose(stepPoses[i], "stepPoses[" + std::to_string(i) + "]");
+  const auto planes = static_cast<std::size_t>(BeamDimensions()[2]);
+  if (!stepPoses.empty() && stepPoses.size() != planes)
+    throw Error(Error::Kind::InvalidParameter, "stepPoses has " + std::to_string(stepPoses.size()) + " poses for " +
+                                                   std::to_string(planes) + " steps of the sweep");
+  transducer.Check();
+  transport.Check();
+  counting.Check();
+  receiver.Check();
+}
+
+BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& p, const Progress& progress,
+                            SynthesisCost* cost)
+{
+  p.Check();
+  SynthesisCost spent;
+  const Beams beams(scene, p);
+  const auto n = p.BeamDimensions();
+  const double samples = static_cast<double>(beams.Axis().count) * n[1] * n[2];
+  if (!(samples <= maxSamples))
+    throw Error(Error::Kind::TooLarge,
+                "the beams would hold " + NumberText(samples) +
+                    " samples of a pulse this short, beyond 2^29; choose fewer elements, steps or samples, a "
+                    "smaller depth or a lower frequency or bandwidth");
+
+  std::vector<BeamWays> ways(static_cast<std::size_t>(beams.Count()));
+  {
+    const Stopwatch watch(&spent.raysSeconds);
+    std::vector<std::int64_t> rays(ways.size(), 0);
+    ParallelRanges(beams.Count(), beamsPerRange, progress.Part(0.0, 0.2), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t i = begin; i < end; ++i)
+        ways[static_cast<std::size_t>(i)] = beams.Trace(i, rays[static_cast<std::size_t>(i)]);
+    });
+    for (const std::int64_t each : rays)
+      spent.rays += each;
+  }
+  std::size_t bytes = scene.MemoryBytes();
+  for (const BeamWays& each : ways) {
+    spent.segments += static_cast<std::int64_t>(each.segments.size());
+    spent.surfaceEchoes += static_cast<std::int64_t>(each.echoes.size());
+    bytes += BytesOf(each);
+  }
+
+  const auto scatterers = [&] {
+    const Stopwatch watch(&spent.scatterersSeconds);
+    const VisitedSpace space = SpaceOf(ways, p.transducer, progress.Part(0.2, 0.22));
+    ScattererParameters parameters;
+    parameters.seed = p.seed;
+    parameters.displacement = &p.displacement;
+    return Scatterers::Make(
+        parameters, scene.Materials(),
+        [&scene](const Eigen::Vector3f* points, std::size_t count, std::int32_t* media) { scene.MediumAt(points, count, media); },
+        space.Box(), [&space](const Eigen::AlignedBox3d& box) { return space.Touches(box); }, progress.Part(0.22, 0.4));
+  }();
+  spent.scatterers = static_cast<std::int64_t>(scatterers.Count());
+  bytes += scatterers.MemoryBytes();
+
+  BeamEchoes echoes{p.probe, Volume<Complex>({beams.Axis().count, n[1], n[2]})};
+  {
+    const Stopwatch watch(&spent.echoesSeconds);
+    const VolumeView<Complex> rows = echoes.baseband.View();
+    ParallelRanges(beams.Count(), beamsPerRange, progress.Part(0.4, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t i = begin; i < end; ++i)
+        beams.Sum(ways[static_cast<std::size_t>(i)], scatterers,
+                  rows.Row(static_cast<int>(i % n[1]), static_cast<int>(i / n[1])));
+    });
+  }
+  spent.bytes = bytes + static_cast<std::size_t>(samples) * sizeof(Complex);
+  if (cost)
+    *cost = spent;
+  return echoes;
+}
+
+SynthesisParameters SliceOf(const SynthesisParameters& p, double sweep)
+{
+  if (!(sweep >= -0.5 && sweep <= 0.5))
+    throw Error(Error::Kind::InvalidParameter,
+                "the slice lies at " + NumberText(sweep) + " of the sweep; it must be in [-0.5, 0.5]");
+  // The plane's own frame: turned about the sweep's axis, or moved along it, to where its middle lies.
+  const ProbeArc arc = p.probe.Sweep();
+  const Eigen::Vector2d middle = arc.PointOf({sweep, 0.0});
+  Pose plane = Pose::Identity();
+  plane.linear() = ExpRotation(-arc.angle * sweep * Vector3d::UnitX());
+  plane.translation() = Vector3d(0.0, middle.x(), middle.y());
+  SynthesisParameters slice = p;
+  slice.probe.sweepAngle = slice.probe.sweepWidth = 0.0;
+  if (!p.stepPoses.empty()) {
+    const auto nearest = static_cast<std::size_t>(std::lround((sweep + 0.5) * static_cast<double>(p.stepPoses.size() - 1)));
+    slice.stepPoses = {p.stepPoses[nearest] * plane};
+  }
+  slice.probeToWorld = p.probeToWorld * plane;
+  return slice;
+}
+
+Volume<unsigned char> SynthesizeBeams(const AcousticScene& scene, const SynthesisParameters& p, const Progress& progress,
+                                      SynthesisCost* cost)
+{
+  p.Check();
+  SynthesisCost spent;
+  BeamEchoes echoes;
+  if (p.mode == SynthesisParameters::Mode::Coherent) {
+    echoes = SynthesizeEchoes(scene, p, progress.Part(0.0, 0.95), &spent);
+  } else {
+    const Stopwatch watch(&spent.raysSeconds);
+    ScatterCounting counting = p.counting;
+    counting.seed = p.seed;
+    counting.assumedSoundSpeed = p.transducer.assumedSoundSpeed;
+    const Volume<float> counted =
+        CountScatters(scene, counting, p.probe, p.probeToWorld, p.BeamDimensions(), progress.Part(0.0, 0.95));
+    echoes = {p.probe, Volume<Complex>(counted.Dimensions())};
+    const auto from = counted.View();
+    const auto to = echoes.baseband.View();
+    // Beside what goes straight out and back of the reference tissue, close to the face.
+    const double step = (p.probe.depthMax - p.probe.depthMin) / (p.samples - 1);
+    const auto reference = static_cast<float>(StandardMaterial("liver").scatterProbability * step);
+    for (std::ptrdiff_t i = 0; i < from.Size(); ++i)
+      to[i] = std::sqrt(from[i] / reference);
+    spent.bytes = scene.MemoryBytes() + static_cast<std::size_t>(from.Size()) * (sizeof(float) + sizeof(Complex));
+  }
+  Volume<unsigned char> beams(p.BeamDimensions());
+  {
+    const Stopwatch watch(&spent.detectionSeconds);
+    DetectEchoes(echoes, p.receiver, beams.View(), progress.Part(0.95, 1.0));
+  }
+  if (cost)
+    *cost = spent;
+  return beams;
+}
+
+std::string DescribeSynthesis(const SynthesisParameters& p)
+{
+  using Json = nlohmann::ordered_json;
+  constexpr double degrees = 57.29577951308232;
+  const auto rows = [](const Pose& pose) {
+    Json list = Json::array();
+    for (int i = 0; i < 4; ++i) {
+      const Eigen::Vector4d row = pose.matrix().row(i);
+      list.push_back({row[0], row[1], row[2], row[3]});
+    }
+    return list;
+  };
+  Json stepPoses = Json::array();
+  for (const Pose& pose : p.stepPoses)
+    stepPoses.push_back(rows(pose));
+  Json tgc = Json::array();
+  for (const Receiver::GainPoint& point : p.receiver.tgcPoints)
+    tgc.push_back({point.depthMm, point.gainDb});
+  const std::array<int, 3> n = p.BeamDimensions();
+  Json text{{"schema", "echorama-synthesis-1"},
+            {"mode", p.mode == SynthesisParameters::Mode::Coherent ? "coherent" : "counting"},
+            {"seed", p.seed},
+            {"samples", n[0]},
+            {"elements", n[1]},
+            {"steps", n[2]},
+            {"probe",
+             {{"fanAngleDegrees", p.probe.fanAngle * degrees},
+              {"fanWidthMm", p.probe.fanWidth},
+              {"fanOffset", p.probe.fanOffset},
+              {"sweepAngleDegrees", p.probe.sweepAngle * degrees},
+              {"sweepWidthMm", p.probe.sweepWidth},
+              {"depthMinMm", p.probe.depthMin},
+              {"depthMaxMm", p.probe.depthMax}}},
+            {"ProbeToWorld", rows(p.probeToWorld)},
+            {"transducer",
+             {{"frequencyMHz", p.transducer.frequencyMHz},
+              {"bandwidth", p.transducer.bandwidth},
+              {"lateralApertureMm", p.transducer.lateralApertureMm},
+              {"lateralFocusMm", p.transducer.lateralFocusMm},
+              {"dynamicReceive", p.transducer.dynamicReceive},
+              {"smallestFNumber", p.transducer.smallestFNumber},
+              {"elevationApertureMm", p.transducer.elevationApertureMm},
+              {"elevationFocusMm", p.transducer.elevationFocusMm},
+              {"assumedSoundSpeed", p.transducer.assumedSoundSpeed}}},
+            {"receiver",
+             {{"gainDb", p.receiver.gainDb},
+              {"tgcDbPerCm", p.receiver.tgcDbPerCm},
+              {"tgcPoints", tgc},
+              {"dynamicRangeDb", p.receiver.dynamicRangeDb},
+              {"referenceGrey", p.receiver.referenceGrey},
+              {"noiseDb", p.receiver.noiseDb},
+              {"noiseSeed", p.receiver.noiseSeed}}}};
+  if (!stepPoses.empty())
+    text["stepPoses"] = stepPoses;
+  if (p.mode == SynthesisParameters::Mode::Coherent) {
+    text["transport"] = {{"maxBounces", p.transport.maxBounces},
+                         {"dynamicRangeDb", p.transport.dynamicRangeDb},
+                         {"refraction", p.transport.refraction},
+                         {"faceReflection", p.transport.faceReflection},
+                         {"faceRadius", p.transport.faceRadius},
+                         {"acceptanceDegrees", p.transport.acceptanceDegrees},
+                         {"subRays", p.subRays},
+                         {"sampling", NameOf(p.sampling)},
+                         {"mirrorDb", p.mirrorDb},
+                         {"invisibleDb", p.invisibleDb}};
+  } else {
+    text["counting"] = {{"raysPerElement", p.counting.raysPerElement},
+                        {"clarity", p.counting.clarity},
+                        {"coneDegrees", p.counting.coneDegrees},
+                        {"sampling", NameOf(p.counting.sampling)}};
+  }
+  return text.dump();
+}
+
+} // namespace echorama
