@@ -1,33 +1,353 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// The pulse is the same at every depth, so no scatterer needs its own: each adds one complex number to a fine row (16
+// samples per standard deviation of the pulse, shared out linearly between two), and the fine row meets the pulse once, at the
+// end. What remains per scatterer is where it lies, a Gaussian and a phase.
+//
+// 1. Bricks. The segment is walked in pieces of some millimetres, each with the radius of the beam there. Of every brick near
+//    a piece the place relative to the segment is worked out in double precision; its box is tested against the elliptic tube
+//    of the beam. The width of the beam, its curvature and all that enters the size of an echo are linear over a brick.
+// 2. Sieve: depth, distance and exponent of every scatterer of the brick, in vectors; the indices of those within the tube.
+// 3. Echo: exponential and sine by polynomials (relative 1e-6), in vectors, relative to the middle of the brick: so single
+//    precision holds phases to 1e-5 of a turn, whatever the depth and wherever the world is.
+// 4. Pulse: the fine row is split into its phases, so that the sum over the pulse is a sum of whole rows.
+//
+// Cost: 2 to 4 ns per scatterer of a brick, the same again per one in the tube; two dozen vector operations per sample.
 #include "EchoSum.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace echorama {
 namespace {
 
 constexpr double pi = 3.141592653589793;
-constexpr double pulseReach = 3.5;
+constexpr double pulseReach = 4.0;    // standard deviations in depth: 70 dB down
+constexpr double finePerSigma = 16.0; // samples of the fine row
+constexpr double nodeMm = 1.0;        // between the widths that are worked out
+constexpr int nodesPerPiece = 6;
+constexpr int batch = 512; // scatterers at once
 
-void AddPulse(std::complex<double> size, double depth, double sigma, const DepthAxis& axis, std::complex<float>* row)
+// How the scatterers of one brick are seen; places relative to its centre, s along the segment.
+struct BrickView {
+  float along[3], across[3], up[3];
+  float x, y;                             // of the centre
+  float first, last;                      // s that count
+  float lateral[2], elevation[2];         // 1 / sigma^2 and its change per mm of s
+  float lateralBend[2], elevationBend[2]; // half the curvature and its change
+  float exponent[2];                      // of the size of the echo on the axis
+  float turn, turnsPerMm;                 // phase, in whole turns
+  float fine, finePerMm;                  // place in the fine row, from fineBase
+  int fineBase, fineLast;                 // the last place that has a successor
+};
+
+struct Sieved {
+  float late[batch], exponent[batch];
+  int kept[batch];
+};
+
+// e^x for x in [-80, 80], to 1e-7.
+inline float Exponential(float x)
 {
-  const int first =
-      std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (depth - pulseReach * sigma - axis.first) / axis.step))));
-  const int last =
-      static_cast<int>(std::floor(std::min(axis.count - 1.0, (depth + pulseReach * sigma - axis.first) / axis.step)));
-  for (int i = first; i <= last; ++i) {
-    const double away = (axis.first + i * axis.step - depth) / sigma;
-    row[i] += std::complex<float>(size * std::exp(-0.5 * away * away));
+  const float y = x * 1.44269504f;
+  const float whole = std::floor(y);
+  const float f = y - whole;
+  const float power =
+      1.0f + f * (0.693147577f + f * (0.240206874f + f * (0.0556586641f + f * (0.0091968022f + f * 0.00178966497f))));
+  const int bits = (static_cast<int>(whole) + 127) << 23;
+  float scale;
+  std::memcpy(&scale, &bits, sizeof scale);
+  return power * scale;
+}
+
+// Depth, distance and exponent of scatterers; which of them are in the tube. \returns how many.
+ECHORAMA_HOT int Sieve(const BrickView& v, const float* px, const float* py, const float* pz, int count, float reachSquared,
+                       Sieved& out)
+{
+  float distance[batch];
+  for (int i = 0; i < count; ++i) {
+    const float s = v.along[0] * px[i] + v.along[1] * py[i] + v.along[2] * pz[i];
+    const float x = v.x + (v.across[0] * px[i] + v.across[1] * py[i] + v.across[2] * pz[i]);
+    const float y = v.y + (v.up[0] * px[i] + v.up[1] * py[i] + v.up[2] * pz[i]);
+    const float xx = x * x, yy = y * y;
+    const float u = xx * (v.lateral[0] + v.lateral[1] * s) + yy * (v.elevation[0] + v.elevation[1] * s);
+    const float late = s + xx * (v.lateralBend[0] + v.lateralBend[1] * s) + yy * (v.elevationBend[0] + v.elevationBend[1] * s);
+    out.late[i] = late;
+    out.exponent[i] = v.exponent[0] + v.exponent[1] * s - 0.5f * u;
+    const bool inside = (s >= v.first) & (s < v.last);
+    distance[i] = inside ? u : 1e30f;
+  }
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    out.kept[kept] = i;
+    kept += distance[i] < reachSquared;
+  }
+  return kept;
+}
+
+// Adds the echoes of the kept scatterers to the fine row.
+ECHORAMA_HOT void AddEchoes(const BrickView& v, const float* amplitudes, const Sieved& sieved, int kept, float* fineRow)
+{
+  float re[batch], im[batch], fraction[batch];
+  int place[batch];
+  for (int j = 0; j < kept; ++j) {
+    const int i = sieved.kept[j];
+    const float late = sieved.late[i];
+    const float size = amplitudes[i] * Exponential(std::min(std::max(sieved.exponent[i], -80.0f), 80.0f));
+    // sine and cosine of half the angle, then of the whole.
+    const float turn = v.turn + v.turnsPerMm * late;
+    const float half = turn - std::floor(turn + 0.5f);
+    const float q = half * half;
+    const float sine = half * (3.14159264f + q * (-5.16771008f + q * (2.55007752f + q * (-0.598291286f + q * 0.0776576603f))));
+    const float cosine =
+        1.0f + q * (-4.9348022f + q * (4.05871142f + q * (-1.33523998f + q * (0.235074509f + q * -0.0246274055f))));
+    re[j] = size * (cosine * cosine - sine * sine);
+    im[j] = size * (-2.0f * sine * cosine);
+    const float fine = v.fine + v.finePerMm * late;
+    const float whole = std::floor(fine);
+    fraction[j] = fine - whole;
+    place[j] = v.fineBase + static_cast<int>(whole);
+  }
+  for (int j = 0; j < kept; ++j) {
+    if (place[j] < 0 || place[j] > v.fineLast)
+      continue;
+    float* at = fineRow + 2 * static_cast<std::ptrdiff_t>(place[j]);
+    const float f = fraction[j], g = 1.0f - f;
+    at[0] += g * re[j];
+    at[1] += g * im[j];
+    at[2] += f * re[j];
+    at[3] += f * im[j];
   }
 }
+
+// row += weight * samples
+ECHORAMA_HOT void AddWeighted(float weight, const float* samples, std::ptrdiff_t count, float* row)
+{
+  for (std::ptrdiff_t i = 0; i < count; ++i)
+    row[i] += weight * samples[i];
+}
+
+// The samples of a row that an interval of scan depths reaches, and between them a finer row.
+struct FineRow {
+  FineRow(const DepthAxis& depthAxis, double sigma, double from, double to) : axis(depthAxis), pulseSigma(sigma)
+  {
+    perSample = std::max(1, static_cast<int>(std::ceil(std::min(1e6, axis.step * finePerSigma / sigma))));
+    fineStep = axis.step / perSample;
+    reach = static_cast<int>(std::ceil(pulseReach * sigma / axis.step));
+    const double last = axis.count - 1.0;
+    firstSample = static_cast<int>(std::clamp(std::floor((from - axis.first) / axis.step) - reach, 0.0, last + 1.0));
+    lastSample = static_cast<int>(std::clamp(std::ceil((to - axis.first) / axis.step) + reach, -1.0, last));
+    fineFirst = axis.first + (firstSample - reach) * axis.step;
+    if (!Empty())
+      values.assign(2 * static_cast<std::size_t>(Samples()) * static_cast<std::size_t>(perSample), 0.0f);
+  }
+
+  bool Empty() const { return firstSample > lastSample; }
+  std::ptrdiff_t Samples() const { return lastSample - firstSample + 1 + 2 * reach; } // coarse ones that the fine row covers
+  int FineLast() const { return static_cast<int>(Samples() * perSample - 2); }
+
+  // row += the fine row convolved with the pulse.
+  void AddTo(std::complex<float>* row) const
+  {
+    const std::ptrdiff_t covered = Samples(), count = lastSample - firstSample + 1;
+    std::vector<float> sum(2 * static_cast<std::size_t>(count), 0.0f), phase(2 * static_cast<std::size_t>(covered));
+    for (int p = 0; p < perSample; ++p) {
+      for (std::ptrdiff_t i = 0; i < covered; ++i) {
+        phase[static_cast<std::size_t>(2 * i)] = values[static_cast<std::size_t>(2 * (i * perSample + p))];
+        phase[static_cast<std::size_t>(2 * i + 1)] = values[static_cast<std::size_t>(2 * (i * perSample + p) + 1)];
+      }
+      for (int q = 0; q <= 2 * reach; ++q) { // sample i takes the fine place (i + q) perSample + p
+        const double away = ((q - reach) * axis.step + p * fineStep) / pulseSigma;
+        if (std::abs(away) <= pulseReach)
+          AddWeighted(static_cast<float>(std::exp(-0.5 * away * away)), phase.data() + 2 * q, 2 * count, sum.data());
+      }
+    }
+    for (std::ptrdiff_t i = 0; i < count; ++i)
+      row[firstSample + i] += std::complex<float>(sum[static_cast<std::size_t>(2 * i)], sum[static_cast<std::size_t>(2 * i + 1)]);
+  }
+
+  DepthAxis axis;
+  double pulseSigma;
+  int perSample = 1;
+  double fineStep = 1.0, fineFirst = 0.0; // mm
+  int reach = 1;                          // of the pulse, in samples
+  int firstSample = 0, lastSample = -1;
+  std::vector<float> values; // re, im
+};
+
+// The beam along a segment: what is linear between nodes.
+class BeamNodes {
+public:
+  struct Node {
+    double values[5]; // 1 / sigma^2 and half the curvature along fan and sweep, logarithm of the gain
+  };
+
+  BeamNodes(const SoundSegment& segment, const Transducer& transducer)
+  {
+    const int pieces = static_cast<int>(std::ceil(std::max(1.0, std::min(1e6, segment.length / nodeMm))));
+    step_ = segment.length / pieces;
+    const double pulse = transducer.PulseSigmaMm() / segment.scanDepthPerMm;
+    for (int i = 0; i <= pieces; ++i) {
+      const BeamWidth width = WidthAt(transducer, segment.way + i * step_);
+      // Mean power of speckle is the integral of the squared response.
+      const double volume = std::pow(pi, 1.5) * pulse * width.lateralSigma * width.elevationSigma;
+      nodes_.push_back({{std::pow(width.lateralSigma, -2), std::pow(width.elevationSigma, -2), 0.5 * width.lateralCurvature,
+                         0.5 * width.elevationCurvature, -0.5 * std::log(volume)}});
+    }
+  }
+
+  int Pieces() const { return static_cast<int>(nodes_.size()) - 1; }
+  double Step() const { return step_; }
+  const Node& operator[](int i) const { return nodes_[static_cast<std::size_t>(i)]; }
+
+  // The larger of the two standard deviations between two nodes, and the latest echo from within the tube.
+  double Widest(int first, int last) const
+  {
+    double least = 1e300;
+    for (int i = first; i <= last; ++i)
+      least = std::min({least, (*this)[i].values[0], (*this)[i].values[1]});
+    return 1.0 / std::sqrt(least);
+  }
+  double LargestDelay(double reach) const
+  {
+    double largest = 0.0;
+    for (const Node& node : nodes_)
+      largest =
+          std::max(largest, reach * reach *
+                                std::max(std::abs(node.values[2] / node.values[0]), std::abs(node.values[3] / node.values[1])));
+    return largest;
+  }
+
+private:
+  double step_ = 0.0;
+  std::vector<Node> nodes_;
+};
+
+class SegmentSum {
+public:
+  SegmentSum(const SoundSegment& segment, const Scatterers& scatterers, const Transducer& transducer, double reach, FineRow& fine,
+             const BeamNodes& nodes)
+    : segment_(segment), scatterers_(scatterers), reach_(reach), fine_(fine), nodes_(nodes),
+      up_(segment.direction.cross(segment.across)), turnsPerMm_(transducer.PhasePerMm() / (2.0 * pi)),
+      negative_(segment.amplitude < 0.0), logAmplitude_(std::log(std::abs(segment.amplitude)))
+  {
+    for (int axis = 0; axis < 3; ++axis) {
+      view_.along[axis] = static_cast<float>(segment.direction[axis]);
+      view_.across[axis] = static_cast<float>(segment.across[axis]);
+      view_.up[axis] = static_cast<float>(up_[axis]);
+    }
+    view_.turnsPerMm = static_cast<float>(turnsPerMm_ * segment.scanDepthPerMm);
+    view_.finePerMm = static_cast<float>(segment.scanDepthPerMm / fine.fineStep);
+    view_.fineLast = fine.FineLast();
+  }
+
+  void Run()
+  {
+    for (int first = 0; first < nodes_.Pieces(); first += nodesPerPiece) {
+      const int last = std::min(nodes_.Pieces(), first + nodesPerPiece);
+      const double begin = first * nodes_.Step(), end = last * nodes_.Step();
+      // Bricks are widest beside the axis, where their centres lie within the piece; the beam widens a little further on.
+      const double radius = 1.05 * reach_ * nodes_.Widest(std::max(0, first - 2), std::min(nodes_.Pieces(), last + 2));
+      near_.clear();
+      scatterers_.FindNear(segment_.from + begin * segment_.direction, segment_.direction, end - begin, radius, near_);
+      for (const std::uint32_t index : near_) {
+        const Scatterers::Brick& brick = scatterers_.Bricks()[index];
+        const Eigen::Vector3d place = brick.centre - segment_.from;
+        const double s = place.dot(segment_.direction);
+        // Each brick belongs to one piece.
+        if ((first > 0 && s < begin) || (last < nodes_.Pieces() && s >= end))
+          continue;
+        AddBrick(brick, place, s);
+      }
+    }
+  }
+
+private:
+  void AddBrick(const Scatterers::Brick& brick, const Eigen::Vector3d& place, double s)
+  {
+    const Eigen::Vector3d half = brick.halfSize.cast<double>();
+    const double halfAlong = half.dot(segment_.direction.cwiseAbs());
+    if (s + halfAlong < 0.0 || s - halfAlong >= segment_.length)
+      return;
+    const int node = std::clamp(static_cast<int>(s / nodes_.Step()), 0, nodes_.Pieces() - 1);
+    const double t = s - node * nodes_.Step();
+    double value[5], slope[5];
+    for (int i = 0; i < 5; ++i) {
+      slope[i] = (nodes_[node + 1].values[i] - nodes_[node].values[i]) / nodes_.Step();
+      value[i] = nodes_[node].values[i] + t * slope[i];
+    }
+    const double x = place.dot(segment_.across), y = place.dot(up_);
+    const double beside = std::max(0.0, std::abs(x) - half.dot(segment_.across.cwiseAbs())),
+                 above = std::max(0.0, std::abs(y) - half.dot(up_.cwiseAbs()));
+    if (beside * beside * (value[0] - std::abs(slope[0]) * halfAlong) +
+            above * above * (value[1] - std::abs(slope[1]) * halfAlong) >=
+        reach_ * reach_)
+      return;
+    const double exponent = logAmplitude_ - segment_.attenuation * s + value[4];
+    if (exponent < -70.0) // nothing of single precision would be left
+      return;
+
+    view_.x = static_cast<float>(x);
+    view_.y = static_cast<float>(y);
+    view_.first = static_cast<float>(-s);
+    view_.last = static_cast<float>(segment_.length - s);
+    const auto set = [&](float* to, int i) {
+      to[0] = static_cast<float>(value[i]);
+      to[1] = static_cast<float>(slope[i]);
+    };
+    set(view_.lateral, 0);
+    set(view_.elevation, 1);
+    set(view_.lateralBend, 2);
+    set(view_.elevationBend, 3);
+    view_.exponent[0] = static_cast<float>(exponent);
+    view_.exponent[1] = static_cast<float>(slope[4] - segment_.attenuation);
+    const double depth = segment_.scanDepth + segment_.scanDepthPerMm * s;
+    const double turn = turnsPerMm_ * depth + (negative_ ? 0.5 : 0.0);
+    view_.turn = static_cast<float>(turn - std::floor(turn));
+    const double fine = (depth - fine_.fineFirst) / fine_.fineStep, base = std::floor(fine);
+    if (!(std::abs(base) < 1e9))
+      return;
+    view_.fine = static_cast<float>(fine - base);
+    view_.fineBase = static_cast<int>(base);
+
+    const float *px = scatterers_.X(brick), *py = scatterers_.Y(brick), *pz = scatterers_.Z(brick),
+                *amplitude = scatterers_.Amplitude(brick);
+    for (std::uint32_t begin = 0; begin < brick.stride; begin += batch) {
+      const int count = static_cast<int>(std::min<std::uint32_t>(batch, brick.stride - begin));
+      const int kept = Sieve(view_, px + begin, py + begin, pz + begin, count, static_cast<float>(reach_ * reach_), sieved_);
+      AddEchoes(view_, amplitude + begin, sieved_, kept, fine_.values.data());
+    }
+  }
+
+  const SoundSegment& segment_;
+  const Scatterers& scatterers_;
+  double reach_;
+  FineRow& fine_;
+  const BeamNodes& nodes_;
+  Eigen::Vector3d up_;
+  double turnsPerMm_;
+  bool negative_;
+  double logAmplitude_;
+  BrickView view_{};
+  Sieved sieved_;
+  std::vector<std::uint32_t> near_;
+};
 
 void CheckAxis(const DepthAxis& axis)
 {
   if (!(axis.step > 0.0) || !std::isfinite(axis.step) || !std::isfinite(axis.first))
-    throw Error(Error::Kind::InvalidParameter,
-                "echoes: the step of the depth axis is " + NumberText(axis.step) + " mm; it must be positive and finite");
+    throw Error(Error::Kind::InvalidParameter, "echoes: the depth axis begins at " + NumberText(axis.first) + " mm in steps of " +
+                                                   NumberText(axis.step) + " mm; it must be finite and the step positive");
+}
+
+void CheckSegment(const SoundSegment& segment)
+{
+  if (!segment.from.allFinite() || !segment.direction.allFinite() || !segment.across.allFinite() ||
+      !std::isfinite(segment.scanDepth + segment.scanDepthPerMm * segment.length) || !std::isfinite(segment.way) ||
+      !std::isfinite(segment.amplitude) || !std::isfinite(segment.attenuation))
+    throw Error(Error::Kind::BadInput, "echoes: a segment of the path of sound is not finite");
 }
 
 } // namespace
@@ -36,46 +356,103 @@ void AddSegmentEchoes(const SoundSegment& segment, const Scatterers& scatterers,
                       const DepthAxis& axis, std::complex<float>* row, double reach)
 {
   CheckAxis(axis);
+  CheckSegment(segment);
   if (!(reach > 0.0 && reach <= 6.0))
     throw Error(Error::Kind::InvalidParameter, "echoes: the reach is " + NumberText(reach) + " sigma; it must be in (0, 6]");
-  const double pulse = transducer.PulseSigmaMm(), turn = transducer.PhasePerMm();
-  double widest = 0.0;
-  for (int i = 0; i <= 32; ++i) {
-    const BeamWidth width = WidthAt(transducer, segment.way + segment.length * i / 32);
-    widest = std::max({widest, width.lateralSigma, width.elevationSigma});
-  }
-  std::vector<std::uint32_t> near;
-  scatterers.FindNear(segment.from, segment.direction, segment.length, 1.1 * reach * widest, near);
-  const Eigen::Vector3d up = segment.direction.cross(segment.across);
-  for (const std::uint32_t index : near) {
-    const Scatterers::Brick& brick = scatterers.Bricks()[index];
-    for (std::uint32_t i = 0; i < brick.count; ++i) {
-      const Eigen::Vector3d place =
-          brick.centre - segment.from + Eigen::Vector3d(scatterers.X(brick)[i], scatterers.Y(brick)[i], scatterers.Z(brick)[i]);
-      const double s = place.dot(segment.direction), x = place.dot(segment.across), y = place.dot(up);
-      if (!(s >= 0.0 && s < segment.length))
-        continue;
-      const BeamWidth width = WidthAt(transducer, segment.way + s);
-      const double u = std::pow(x / width.lateralSigma, 2) + std::pow(y / width.elevationSigma, 2);
-      if (!(u < reach * reach))
-        continue;
-      const double late = 0.5 * (width.lateralCurvature * x * x + width.elevationCurvature * y * y);
-      const double depth = segment.scanDepth + segment.scanDepthPerMm * (s + late);
-      const double volume = std::pow(pi, 1.5) * pulse / segment.scanDepthPerMm * width.lateralSigma * width.elevationSigma;
-      const double size = segment.amplitude * std::exp(-segment.attenuation * s - 0.5 * u) / std::sqrt(volume) *
-                          static_cast<double>(scatterers.Amplitude(brick)[i]);
-      AddPulse(std::polar(size < 0.0 ? -size : size, -turn * depth + (size < 0.0 ? pi : 0.0)), depth, pulse, axis, row);
-    }
-  }
+  const double end = segment.scanDepth + segment.scanDepthPerMm * segment.length;
+  if (segment.amplitude == 0.0 || !(segment.length > 0.0) || !(segment.scanDepthPerMm > 0.0) || axis.count < 1 ||
+      scatterers.Count() == 0)
+    return;
+  const BeamNodes nodes(segment, transducer);
+  const double late = segment.scanDepthPerMm * nodes.LargestDelay(reach);
+  FineRow fine(axis, transducer.PulseSigmaMm(), segment.scanDepth - late, end + late);
+  if (fine.Empty())
+    return;
+  SegmentSum(segment, scatterers, transducer, reach, fine, nodes).Run();
+  fine.AddTo(row);
 }
 
 void AddSurfaceEcho(const SurfaceEcho& echo, const Transducer& transducer, const DepthAxis& axis, std::complex<float>* row,
                     double weight)
 {
   CheckAxis(axis);
-  const double phase = -transducer.PhasePerMm() * echo.scanDepth;
-  AddPulse(weight * echo.amplitude * std::complex<double>(std::cos(phase), std::sin(phase)), echo.scanDepth,
-           transducer.PulseSigmaMm(), axis, row);
+  if (!std::isfinite(echo.scanDepth) || !std::isfinite(echo.amplitude) || !std::isfinite(weight))
+    throw Error(Error::Kind::BadInput, "echoes: the echo of a surface is not finite");
+  const double sigma = transducer.PulseSigmaMm(), phase = -transducer.PhasePerMm() * echo.scanDepth;
+  const std::complex<double> size = weight * echo.amplitude * std::complex<double>(std::cos(phase), std::sin(phase));
+  const double place = (echo.scanDepth - axis.first) / axis.step, reach = pulseReach * sigma / axis.step;
+  const int first = static_cast<int>(std::clamp(std::ceil(place - reach), 0.0, static_cast<double>(axis.count)));
+  const int last = static_cast<int>(std::clamp(std::floor(place + reach), -1.0, axis.count - 1.0));
+  for (int i = first; i <= last; ++i) {
+    const double away = (i - place) * axis.step / sigma;
+    row[i] += std::complex<float>(size * std::exp(-0.5 * away * away));
+  }
+}
+
+HeardRegion::HeardRegion(const std::vector<SoundPath>& paths, const Transducer& transducer, double reach)
+{
+  // The box around the tube between two places of a segment.
+  const auto boxOf = [&](const SoundSegment& segment, double from, double to) {
+    double widest = 0.0;
+    for (const double s : {from, to}) {
+      const BeamWidth width = WidthAt(transducer, segment.way + s);
+      widest = std::max({widest, width.lateralSigma, width.elevationSigma});
+    }
+    Eigen::AlignedBox3d box(segment.from + from * segment.direction);
+    box.extend(segment.from + to * segment.direction);
+    box.min().array() -= 1.1 * reach * widest;
+    box.max().array() += 1.1 * reach * widest;
+    return box;
+  };
+  constexpr double step = 4.0; // mm, short beside what a beam needs to widen
+  const auto forEachBox = [&](const auto& use) {
+    for (const SoundPath& path : paths)
+      for (const SoundSegment& segment : path.segments)
+        for (double s = 0.0; s < segment.length; s += step)
+          use(boxOf(segment, s, std::min(segment.length, s + step)));
+  };
+  for (const SoundPath& path : paths)
+    for (const SoundSegment& segment : path.segments) {
+      CheckSegment(segment);
+      if (!(segment.length <= 1e6))
+        throw Error(Error::Kind::TooLarge, "echoes: a segment of the path of sound is longer than 1e6 mm");
+    }
+  forEachBox([this](const Eigen::AlignedBox3d& box) { box_.extend(box); });
+  if (box_.isEmpty())
+    return;
+  constexpr double maxCells = 134217728.0;
+  while (!((box_.sizes().array() / cell_ + 1.0).prod() <= maxCells))
+    cell_ *= 2.0;
+  size_ = (box_.sizes().array() / cell_).floor().cast<int>() + 1;
+  passed_.assign(static_cast<std::size_t>(size_.cast<double>().prod()), 0);
+  forEachBox([this](const Eigen::AlignedBox3d& box) {
+    const Eigen::Array3i first = CellOf(box.min()), last = CellOf(box.max());
+    for (int k = first.z(); k <= last.z(); ++k)
+      for (int j = first.y(); j <= last.y(); ++j) {
+        unsigned char* row = passed_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y() + j) * size_.x();
+        std::fill(row + first.x(), row + last.x() + 1, static_cast<unsigned char>(1));
+      }
+  });
+}
+
+Eigen::Array3i HeardRegion::CellOf(const Eigen::Vector3d& point) const
+{
+  const Eigen::Array3d place = ((point - box_.min()).array() / cell_).floor();
+  return place.max(0.0).min((size_ - 1).cast<double>()).cast<int>();
+}
+
+bool HeardRegion::Meets(const Eigen::AlignedBox3d& box) const
+{
+  if (passed_.empty() || !box.intersects(box_))
+    return false;
+  const Eigen::Array3i first = CellOf(box.min()), last = CellOf(box.max());
+  for (int k = first.z(); k <= last.z(); ++k)
+    for (int j = first.y(); j <= last.y(); ++j) {
+      const unsigned char* row = passed_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y() + j) * size_.x();
+      if (std::any_of(row + first.x(), row + last.x() + 1, [](unsigned char passed) { return passed != 0; }))
+        return true;
+    }
+  return false;
 }
 
 } // namespace echorama

@@ -25,6 +25,7 @@ namespace {
 
 constexpr int lanes = 16;                // lists are padded to a multiple: whole vectors
 constexpr double farthest = 1e7;         // mm
+constexpr float outside = 1e9f;          // mm, of padding
 constexpr double cellsPerTask = 32768.0; // asked for at once
 constexpr double maxBlocks = 134217728.0;
 
@@ -45,7 +46,7 @@ struct Gathered {
   }
 };
 
-// Stores them at the end of a part. Padding lies at the centre and is silent.
+// Stores them at the end of a part. Padding is silent and far from every beam.
 Scatterers::Brick Store(const Gathered& gathered, std::uint32_t partIndex, std::vector<float>& part)
 {
   Eigen::AlignedBox3d box;
@@ -57,7 +58,8 @@ Scatterers::Brick Store(const Gathered& gathered, std::uint32_t partIndex, std::
   brick.stride = Padded(gathered.points.size());
   brick.part = partIndex;
   brick.first = part.size();
-  part.resize(part.size() + 4 * static_cast<std::size_t>(brick.stride), 0.0f);
+  part.resize(part.size() + 3 * static_cast<std::size_t>(brick.stride), outside);
+  part.resize(part.size() + static_cast<std::size_t>(brick.stride), 0.0f);
   float* list = part.data() + brick.first;
   for (std::size_t i = 0; i < gathered.points.size(); ++i) {
     const Eigen::Vector3f local = (gathered.points[i] - brick.centre).cast<float>();

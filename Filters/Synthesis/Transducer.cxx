@@ -15,7 +15,7 @@ namespace echorama {
 namespace {
 
 constexpr double pi = 3.141592653589793;
-constexpr double sigmasPerAperture = 4.0;
+constexpr double sigmasPerAperture = 5.0;
 
 // Of one way: 1 / sigma^2 and the curvature.
 struct OneWay {

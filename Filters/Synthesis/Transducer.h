@@ -5,9 +5,9 @@ namespace echorama {
 
 /// How a probe sends and listens: the pulse and the active apertures of its beams.
 ///
-/// Apertures are apodised by a Gaussian: of the amplitudes, the standard deviation is a quarter of the width given here, so
-/// that the edges are 17 dB down. Sound leaves focused on one way; it is received with the focus on every way (dynamic) along
-/// the fan. Along the sweep a lens focuses both.
+/// Apertures are apodised by a Gaussian whose standard deviation (of amplitudes) is a fifth of the width given here, so that
+/// the edges are 27 dB down, much like a Hann window. Sound leaves focused on one way; it is received with the focus on every
+/// way (dynamic) along the fan. Along the sweep a lens focuses both.
 struct Transducer {
   double frequencyMHz = 3.5;         ///< centre frequency, in [0.5, 50]
   double bandwidth = 0.6;            ///< -6 dB width of the two-way spectrum beside the centre frequency, in [0.05, 1.5]
