@@ -21,10 +21,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <Eigen/Geometry>
 #include <embree3/rtcore.h>
 #include <limits>
 #include <map>
 #include <numeric>
+#include <tuple>
 #include <unordered_map>
 
 namespace echorama {
