@@ -789,13 +789,14 @@ void AcousticScene::State::MakeLattice(const Shells& parts, const Progress& prog
     Meeting meeting;
     for (int j = 0; j < ny; ++j) {
       std::int32_t* const row = lattice.setOf.data() + (k * ny + j) * nx;
-      const Eigen::Vector3d start = lattice.Middle(0, j, static_cast<int>(k));
+      Eigen::Vector3d start = lattice.Middle(0, j, static_cast<int>(k));
+      start[0] = lattice.low[0]; // outside of the scene
       const Line line = LineOf(centre + start, Eigen::Vector3d::UnitX());
       BodySet inside;
       std::int32_t set = 0;
       int i = 0;
       const auto fill = [&](double to) {
-        for (; i < nx && i * lattice.size[0] < to; ++i)
+        for (; i < nx && (i + 0.5) * lattice.size[0] < to; ++i)
           row[i] = set;
       };
       for (double from = 0.0; Meet(line, from, infinity, meeting, nullptr); from = meeting.first + tolerance) {
