@@ -303,6 +303,13 @@ class NoiseSource(Phantom):
     """Made from no input; the volumes that it may take are a matter of its own test."""
 
 
+class TissueSource(Phantom):
+    output = "points"
+
+    def filter(self, images=()):
+        return self.make()
+
+
 class Files(Feed):
     def __init__(self, make):
         super().__init__(make)
@@ -381,6 +388,7 @@ Special = {
     "vtkUltrasoundNoiseTiler": NoiseTiler,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
+    "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }
 
