@@ -351,7 +351,8 @@ private:
     const RadiusOf bent = Bent(EllipsoidRadius(radii), waviness, 0.1 * p_.variation);
     const RadiusOf radius = [bent, hilum](const Vector3d& d) {
       // Thin towards the left lobe (+x), hollow at the hilum.
-      return bent(d) * (1.0 - 0.15 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 2)) * (1.0 - 0.14 * std::exp(-(d - hilum).squaredNorm() / 0.2));
+      return bent(d) * (1.0 - 0.15 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 2)) *
+             (1.0 - 0.14 * std::exp(-(d - hilum).squaredNorm() / 0.2));
     };
     const Organ liver = AddOrgan("liver", StandardMaterial("liver"), centre, radius);
 
@@ -434,7 +435,7 @@ private:
       }
       return least - gap;
     });
-AddTree("portal vein", portalTree, true);
+    AddTree("portal vein", portalTree, true);
     AddTree("hepatic vein", hepaticTree, false);
   }
 

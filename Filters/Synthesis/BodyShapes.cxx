@@ -1,22 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Every shape is a grid of known topology that is bent into place, so that it is closed by construction: a geodesic sphere
-// (each face of an icosahedron cut into n^2 triangles) for blobs, rings with poles for tubes, a sheet with walls and a floor for
+// Every shape is a grid of known topology that is bent into place, so that it is closed by construction: an icosphere for
+// blobs, rings with poles for tubes, a sheet with walls and a floor for
 // blocks. Edges of a few degrees of curvature keep the normals, which decide how a wall mirrors sound, close to the true ones.
 // Cost: one evaluation of the shape per point.
 #include "BodyShapes.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Icosphere.h"
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <utility>
 
 namespace echorama {
 namespace {
 
 using Eigen::Vector3d;
-using Eigen::Vector3f;
 
 constexpr double pi = 3.14159265358979323846;
 
@@ -64,24 +62,6 @@ private:
   int index_;
 };
 
-// The icosahedron: twelve corners, twenty faces, counter-clockwise as seen from outside.
-const std::array<Vector3d, 12>& Corners()
-{
-  static const std::array<Vector3d, 12> corners = [] {
-    const double g = 0.5 * (1.0 + std::sqrt(5.0));
-    std::array<Vector3d, 12> c{Vector3d(-1, g, 0), Vector3d(1, g, 0), Vector3d(-1, -g, 0), Vector3d(1, -g, 0),
-                               Vector3d(0, -1, g), Vector3d(0, 1, g), Vector3d(0, -1, -g), Vector3d(0, 1, -g),
-                               Vector3d(g, 0, -1), Vector3d(g, 0, 1), Vector3d(-g, 0, -1), Vector3d(-g, 0, 1)};
-    for (Vector3d& corner : c)
-      corner.normalize();
-    return c;
-  }();
-  return corners;
-}
-constexpr std::array<std::array<int, 3>, 20> faces{
-    {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-     {3, 9, 4},  {3, 4, 2}, {3, 2, 6}, {3, 6, 8},  {3, 8, 9},   {4, 9, 5}, {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}}};
-
 // Two unit vectors that make a right-handed frame with a direction.
 std::pair<Vector3d, Vector3d> Across(const Vector3d& direction)
 {
@@ -96,58 +76,22 @@ int AddBlob(TissueSurface& tissue, const std::string& name, const Material& mate
 {
   NewBody body(tissue, name, material, detailMm);
   double largest = 0.0;
-  for (const Vector3d& corner : Corners())
-    largest = std::max(largest, radius(corner));
+  for (int axis = 0; axis < 3; ++axis)
+    largest = std::max({largest, radius(Vector3d::Unit(axis)), radius(-Vector3d::Unit(axis))});
   if (!(largest > 0.0))
     Refuse(name, "its radius is " + NumberText(largest) + " mm; it must be above 0");
-  constexpr double edge = 1.0514622242382672; // of the icosahedron in the unit sphere
-  const int cuts = static_cast<int>(std::clamp(std::ceil(edge * largest / detailMm), 3.0, 400.0));
-
-  const auto point = [&](const Vector3d& towards) {
-    const Vector3d direction = towards.normalized();
+  // Each level halves the edges, which are 1.05 radii long at first: the one that comes nearest, rather too fine than too coarse.
+  const double halvings = std::log2(1.05 * largest / detailMm);
+  const int level = static_cast<int>(std::clamp(std::ceil(halvings - 0.35), 2.0, static_cast<double>(Icosphere::maxLevel)));
+  const Icosphere sphere = Icosphere::Make(level);
+  for (const Vector3d& direction : sphere.points) {
     const double r = radius(direction);
     if (!(r > 0.0))
       Refuse(name, "its radius is " + NumberText(r) + " mm; it must be above 0");
-    return body.Point(centre + r * direction);
-  };
-  std::array<std::uint32_t, 12> cornerIds;
-  for (std::size_t i = 0; i < 12; ++i)
-    cornerIds[i] = point(Corners()[i]);
-  std::map<std::pair<int, int>, std::vector<std::uint32_t>> edges; // points between two corners, from the lower one
-  const auto onEdge = [&](int a, int b, int step) {
-    auto& ids = edges[{std::min(a, b), std::max(a, b)}];
-    if (ids.empty())
-      for (int k = 1; k < cuts; ++k)
-        ids.push_back(point((cuts - k) * Corners()[static_cast<std::size_t>(std::min(a, b))] +
-                            k * Corners()[static_cast<std::size_t>(std::max(a, b))]));
-    return ids[static_cast<std::size_t>((a < b ? step : cuts - step) - 1)];
-  };
-  std::vector<std::uint32_t> row, next; // points of the face at equal distance from its first corner
-  for (const auto& [a, b, c] : faces) {
-    row.assign(1, cornerIds[static_cast<std::size_t>(a)]);
-    for (int i = 1; i <= cuts; ++i) {
-      next.clear();
-      for (int j = 0; j <= i; ++j) {
-        if (i == cuts && (j == 0 || j == cuts))
-          next.push_back(cornerIds[static_cast<std::size_t>(j == 0 ? b : c)]);
-        else if (j == 0)
-          next.push_back(onEdge(a, b, i));
-        else if (j == i)
-          next.push_back(onEdge(a, c, i));
-        else if (i == cuts)
-          next.push_back(onEdge(b, c, j));
-        else
-          next.push_back(point((cuts - i) * Corners()[static_cast<std::size_t>(a)] +
-                               (i - j) * Corners()[static_cast<std::size_t>(b)] + j * Corners()[static_cast<std::size_t>(c)]));
-      }
-      for (std::size_t j = 0; j < row.size(); ++j) {
-        body.Triangle(row[j], next[j], next[j + 1]);
-        if (j + 1 < row.size())
-          body.Triangle(row[j], next[j + 1], row[j + 1]);
-      }
-      row.swap(next);
-    }
+    body.Point(centre + r * direction);
   }
+  for (const auto& [a, b, c] : sphere.triangles)
+    body.Triangle(a, b, c);
   return body.Index();
 }
 

@@ -16,7 +16,7 @@ namespace echorama {
 /// centre.
 using RadiusOf = std::function<double(const Eigen::Vector3d& direction)>;
 
-/// A blob with edges of about \a detailMm.
+/// A blob: an icosphere, its edges 0.6 to 1.3 times \a detailMm long for a ball, up to the finest there is.
 int AddBlob(TissueSurface& tissue, const std::string& name, const Material& material, const Eigen::Vector3d& centre,
             const RadiusOf& radius, double detailMm);
 

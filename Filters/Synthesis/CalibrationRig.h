@@ -20,8 +20,8 @@ struct CalibrationRigParameters {
     double radius = 4.0;                              ///< mm, in [0.5, 30]
   };
 
-  /// Seven balls of different radii and heights. No two pairs are equally far apart, so that each ball is known by its size and
-  /// by its neighbours.
+  /// Seven balls of different radii and heights. The distances of any two pairs differ by 1.7 mm at least, so that
+  /// each ball is known by its neighbours, too. None lies above another.
   std::vector<Ball> balls = DefaultBalls();
   double scale = 1.0;             ///< size of the whole rig, in [0.2, 5]
   double plateDepthMm = 105.0;    ///< z of the plate's upper side in the world, in [10, 500]
