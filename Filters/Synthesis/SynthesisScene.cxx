@@ -32,7 +32,7 @@ struct Range {
 };
 
 constexpr Range anywhere{-1e5, 1e5}; // mm; a hundred metres
-constexpr Range turns{-3600.0, 3600.0};
+constexpr Range turns{-3600.0, 3600.0}, weights{0.0, 1e9};
 
 template <class T>
 using Choices = std::vector<std::pair<const char*, T>>;
@@ -105,6 +105,28 @@ void Validate(const SceneProbe& probe)
   probe.Resolve();
 }
 
+void Validate(const ScenePacking& packing)
+{
+  packing.spheres.Check();
+  if (std::none_of(packing.materials.begin(), packing.materials.end(), [](const auto& share) { return share.weight > 0.0; }))
+    Refuse("no material has a weight above 0");
+}
+
+void Validate(const AnatomyParameters& anatomy)
+{
+  anatomy.Check();
+}
+
+void Validate(const Transducer& transducer)
+{
+  transducer.Check();
+}
+
+void Validate(const Receiver& receiver)
+{
+  receiver.Check();
+}
+
 void Validate(const SceneCylinder& cylinder)
 {
   if (!((cylinder.to - cylinder.from).norm() > 1e-6))
@@ -116,6 +138,22 @@ void Validate(const SceneRecording& recording)
   const Eigen::Matrix4d matrix = recording.trackerToWorld.Matrix().matrix();
   if (!IsRotation(matrix.topLeftCorner<3, 3>()))
     Refuse("trackerToWorld is not rigid");
+}
+
+// What an item has from its scene unless it says otherwise.
+template <class T>
+void Inherit(const SynthesisScene&, T&)
+{
+}
+
+void Inherit(const SynthesisScene& scene, ScenePacking& packing)
+{
+  packing.spheres.seed = scene.seed;
+}
+
+void Inherit(const SynthesisScene& scene, AnatomyParameters& anatomy)
+{
+  anatomy.seed = scene.seed;
 }
 
 // ---- the keys of everything ----
@@ -210,10 +248,92 @@ void Describe(A& a, SceneCylinder& cylinder)
 }
 
 template <class A>
+void Describe(A& a, ScenePacking& packing)
+{
+  using Spheres = SpherePackingParameters;
+  Spheres& spheres = packing.spheres;
+  a.Seed("seed", spheres.seed, "The scene's, if it is not said here.");
+  a.Choice("method", spheres.method,
+           Choices<Spheres::Method>{{"random", Spheres::Method::Random}, {"empty-space", Spheres::Method::EmptySpace}},
+           "random: sizes are drawn first; empty-space: the largest sphere that fits a random place.");
+  a.Choice("region", spheres.region, Choices<Spheres::Region>{{"box", Spheres::Region::Box}, {"ball", Spheres::Region::Ball}},
+           "The box, or the largest ball in it.");
+  a.Vector("boxMin", spheres.boxMin, anywhere, "mm");
+  a.Vector("boxMax", spheres.boxMax, anywhere, "mm");
+  a.Choice("radii", spheres.radii,
+           Choices<Spheres::Radii>{{"uniform", Spheres::Radii::Uniform},
+                                   {"log-uniform", Spheres::Radii::LogUniform},
+                                   {"power-law", Spheres::Radii::PowerLaw}},
+           "Distribution of the sizes, of the method random.");
+  a.Number("exponent", spheres.exponent, {-10.0, 10.0}, "Of the power law.");
+  a.Number("radiusMin", spheres.radiusMin, {1e-6, 1e5}, "mm");
+  a.Number("radiusMax", spheres.radiusMax, {1e-6, 1e5}, "mm");
+  a.Number("gapMm", spheres.gapMm, {0.0, 1000.0}, "Least way between two surfaces.");
+  a.Number("fillFraction", spheres.fillFraction, {0.0, 1.0}, "Wanted share of the region within spheres.");
+  a.Number("count", spheres.count, {0.0, static_cast<double>(Spheres::mostSpheres)}, "It ends at so many spheres.");
+  a.Number("misses", spheres.misses, {1.0, 1e9}, "So many in a row mean that there is no more room.");
+  a.Shares("materials", packing.materials, "Materials of the spheres, each with its share beside the others'.");
+  a.Number("cellMm", packing.cellMm, {0.01, 100.0}, "Resolution cell at the origin: the level of detail follows it.");
+  a.Number("cellGrowth", packing.cellGrowth, {0.0, 1.0}, "mm more per mm from there.");
+  a.Number("deviation", packing.deviation, {0.001, 10.0}, "How far meshes may leave their spheres, in cells.");
+  a.Flag("trueVolume", packing.trueVolume, "Meshes have the volume of their spheres, and may overlap a little.");
+  a.Flag("turned", packing.turned, "Each mesh is turned at random.");
+}
+
+template <class A>
+void Describe(A& a, AnatomyParameters& anatomy)
+{
+  a.Seed("seed", anatomy.seed, "The scene's, if it is not said here.");
+  for (const AnatomyParameter& one : AnatomyParameterTable()) {
+    const char* help = "As in the anatomy's own description.";
+    if (const auto* number = std::get_if<double AnatomyParameters::*>(&one.member))
+      a.Number(one.name, anatomy.**number, {one.from, one.to}, help);
+    else if (const auto* count = std::get_if<int AnatomyParameters::*>(&one.member))
+      a.Number(one.name, anatomy.**count, {one.from, one.to}, help);
+    else
+      a.Flag(one.name, anatomy.*std::get<bool AnatomyParameters::*>(one.member), help);
+  }
+}
+
+template <class A>
+void Describe(A& a, Transducer& transducer)
+{
+  a.Number("frequencyMHz", transducer.frequencyMHz, {0.5, 50.0}, "Centre frequency.");
+  a.Number("bandwidth", transducer.bandwidth, {0.05, 1.5}, "-6 dB width of the two-way spectrum beside the frequency.");
+  a.Number("lateralApertureMm", transducer.lateralApertureMm, {0.1, 100.0}, "Active aperture along the fan.");
+  a.Number("lateralFocusMm", transducer.lateralFocusMm, {1.0, 1000.0}, "Transmit focus along the fan.");
+  a.Flag("dynamicReceive", transducer.dynamicReceive, "Receiving is focused everywhere.");
+  a.Number("smallestFNumber", transducer.smallestFNumber, {0.5, 10.0}, "Of dynamic receiving.");
+  a.Number("elevationApertureMm", transducer.elevationApertureMm, {0.1, 100.0}, "Of the lens along the sweep.");
+  a.Number("elevationFocusMm", transducer.elevationFocusMm, {1.0, 1000.0}, "Of the lens, sending and receiving.");
+  a.Number("assumedSoundSpeed", transducer.assumedSoundSpeed, {500.0, 5000.0}, "m/s: how the scanner turns time into depth.");
+}
+
+template <class A>
+void Describe(A& a, Receiver::GainPoint& point)
+{
+  a.Number("depthMm", point.depthMm, {-1000.0, 10000.0}, "Rises from point to point.");
+  a.Number("gainDb", point.gainDb, {-200.0, 200.0}, "At that depth.");
+}
+
+template <class A>
+void Describe(A& a, Receiver& receiver)
+{
+  a.Number("gainDb", receiver.gainDb, {-200.0, 200.0}, "Of everything.");
+  a.Number("tgcDbPerCm", receiver.tgcDbPerCm, {-20.0, 100.0}, "Further gain per cm of depth.");
+  a.List("tgcPoints", receiver.tgcPoints, false, "Further gain, linear between points.");
+  a.Number("dynamicRangeDb", receiver.dynamicRangeDb, {10.0, 200.0}, "How many dB the 255 steps of grey span.");
+  a.Number("referenceGrey", receiver.referenceGrey, {0.0, 255.0}, "Mean grey of the reference tissue at a gain of 0.");
+  a.Number("noiseDb", receiver.noiseDb, {Receiver::noNoiseDb, 100.0}, "Of the electronics, before all gain; -200: none.");
+  a.Seed("noiseSeed", receiver.noiseSeed, "Of that noise.");
+}
+
+template <class A>
 void Describe(A& a, SceneItem& item)
 {
   a.Text("name", item.name, false, "Of the body.");
-  a.OneOf(item.what, Form<SceneMesh>{"mesh", "Triangles from a file."}, Form<SceneSphere>{"sphere", "A ball."},
+  a.OneOf(item.what, Form<ScenePacking>{"packing", "Packed spheres."}, Form<SceneMesh>{"mesh", "Triangles from a file."},
+          Form<AnatomyParameters>{"anatomy", "An invented abdomen."}, Form<SceneSphere>{"sphere", "A ball."},
           Form<SceneBox>{"box", "A block."}, Form<SceneCylinder>{"cylinder", "A rod or a straight vessel."});
 }
 
@@ -278,6 +398,10 @@ void Describe(A& a, SynthesisScene& scene)
   a.Text("about", scene.about, false, "For people.");
   a.Seed("seed", scene.seed, "Of everything random that has no seed of its own.");
   a.Object("probe", scene.probe, false, "The probe: a preset, and what is to be different.");
+  if constexpr (A::reads)
+    scene.transducer = ProbePresetOf(scene.probe.preset).transducer;
+  a.ObjectOfPreset("transducer", scene.transducer, "How it sends and listens; numbers that are not said are the preset's.");
+  a.Object("receiver", scene.receiver, false, "From echoes to grey.");
   a.Materials("materials", scene.materials, "Materials of this scene by name, beside the standard ones.");
   a.MaterialName("background", scene.background, false);
   a.List("tissue", scene.tissue, false, "What lies in the world; where several hold a point the later counts.");
@@ -291,6 +415,7 @@ void Describe(A& a, SynthesisScene& scene)
 /// One object of the text, key by key.
 class Reader {
 public:
+  static constexpr bool reads = true;
   struct Source {
     std::string name;
     const SynthesisScene* scene = nullptr; ///< whose materials are read so far
@@ -402,6 +527,12 @@ public:
       Read(text_, *found, At(key), value);
   }
 
+  template <class T>
+  void ObjectOfPreset(const char* key, T& value, const char* help)
+  {
+    Object(key, value, false, help);
+  }
+
   /// Rows, or an object.
   template <class T>
   void Matrix(const char* key, T& value, const char*)
@@ -437,11 +568,26 @@ public:
       Fail(path_, (there == 0 ? "one of " : "just one of ") + Join({forms.key...}) + " is needed");
     const auto read = [this, &value](const auto& form, auto fresh) {
       if (const Json* found = Find(form.key)) {
+        Inherit(*text_.scene, fresh);
         Read(text_, *found, At(form.key), fresh);
         value = std::move(fresh);
       }
     };
     (read(forms, T()), ...);
+  }
+
+  void Shares(const char* key, std::vector<ScenePacking::Share>& shares, const char*)
+  {
+    const Json* found = Find(key);
+    if (!found)
+      return;
+    if (!found->is_object())
+      Fail(At(key), "an object of weights by material is needed, not " + Shown(*found));
+    shares.clear();
+    for (const auto& [name, weight] : found->items()) {
+      Try(At(key), [this, &name = name] { text_.scene->MaterialOf(name); });
+      shares.push_back({name, NumberFrom<double>(weight, At(key) + "." + name, weights)});
+    }
   }
 
   template <class Variant>
@@ -598,6 +744,7 @@ Json Parse(const std::string& name, const std::string& text)
 
 class Writer {
 public:
+  static constexpr bool reads = false;
   template <class T>
   static Json Write(T& value)
   {
@@ -647,6 +794,11 @@ public:
     object_[key] = Write(value);
   }
   template <class T>
+  void ObjectOfPreset(const char* key, T& value, const char*)
+  {
+    object_[key] = Write(value);
+  }
+  template <class T>
   void Matrix(const char* key, T& value, const char*)
   {
     object_[key] = MatrixOf(value);
@@ -682,6 +834,13 @@ public:
     else
       object_[key] = Write(std::get<SceneRow>(value));
   }
+  void Shares(const char* key, const std::vector<ScenePacking::Share>& shares, const char*)
+  {
+    Json object = Json::object();
+    for (const ScenePacking::Share& share : shares)
+      object[share.material] = share.weight;
+    object_[key] = std::move(object);
+  }
   void Materials(const char* key, std::vector<Material>& materials, const char*)
   {
     Json object = Json::object();
@@ -709,6 +868,7 @@ private:
 
 class SchemaMaker {
 public:
+  static constexpr bool reads = false;
   /// Of the objects that have the keys of T.
   template <class T>
   static Json Make(T&& value)
@@ -786,6 +946,11 @@ public:
     Add(key, Make(value), help, needed);
   }
   template <class T>
+  void ObjectOfPreset(const char* key, T& value, const char* help)
+  {
+    Add(key, WithoutDefaults(Make(value)), help);
+  }
+  template <class T>
   void Matrix(const char* key, T& value, const char* help)
   {
     Add(key, MatrixSchema(value), help);
@@ -817,15 +982,28 @@ public:
   }
   void Materials(const char* key, std::vector<Material>&, const char* help)
   {
-    Json material = Make(Material());
-    for (auto& property : material["properties"])
-      property.erase("default"); // it is that of the material which this one is like
+    Json material = WithoutDefaults(Make(Material())); // they are those of the material which this one is like
     material["properties"]["like"] = {{"type", "string"},
                                       {"description", "The material that it is like but for what is said here."}};
     Add(key, {{"type", "object"}, {"additionalProperties", std::move(material)}}, help);
   }
+  void Shares(const char* key, const std::vector<ScenePacking::Share>& shares, const char* help)
+  {
+    Json standard = Json::object();
+    for (const ScenePacking::Share& share : shares)
+      standard[share.material] = share.weight;
+    Add(key, {{"type", "object"}, {"additionalProperties", NumberSchema<double>(weights)}, {"default", std::move(standard)}},
+        help);
+  }
 
 private:
+  static Json WithoutDefaults(Json schema)
+  {
+    for (auto& property : schema["properties"])
+      property.erase("default");
+    return schema;
+  }
+
   void Add(const char* key, Json schema, const char* help, bool needed = false)
   {
     schema["description"] = help;
@@ -946,6 +1124,22 @@ const Material& SynthesisScene::MaterialOf(const std::string& wanted) const
       names += (names.empty() ? "" : ", ") + material.name;
     }
   throw Error(Error::Kind::InvalidParameter, "there is no material " + Shown(wanted) + "; there are " + names);
+}
+
+PackedTissueParameters SynthesisScene::ParametersOf(const ScenePacking& packing) const
+{
+  PackedTissueParameters parameters;
+  parameters.packing = packing.spheres;
+  parameters.background = MaterialOf(background);
+  parameters.materials.clear();
+  for (const ScenePacking::Share& share : packing.materials)
+    parameters.materials.push_back({MaterialOf(share.material), share.weight});
+  parameters.cell.mm = packing.cellMm;
+  parameters.cell.growth = packing.cellGrowth;
+  parameters.deviation = packing.deviation;
+  parameters.trueVolume = packing.trueVolume;
+  parameters.turned = packing.turned;
+  return parameters;
 }
 
 std::string SynthesisScene::PathOf(const std::string& file) const

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Anatomy.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Material.h"
+#include "PackedTissue.h"
 #include "ProbePresets.h"
+#include "Receiver.h"
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -89,10 +92,25 @@ struct SceneCylinder {
   std::string material = "blood";
 };
 
+/// Packed spheres, with materials by name. Without a seed of its own it has the scene's.
+struct ScenePacking {
+  struct Share {
+    std::string material;
+    double weight = 1.0; ///< beside the others', in [0, 1e9]
+  };
+  SpherePackingParameters spheres;
+  std::vector<Share> materials = {{"lesion-dark", 2.0}, {"liver", 2.0}, {"lesion-bright", 2.0}, {"cyst", 1.0}};
+  double cellMm = 1.0;     ///< resolution cell at the origin, for the level of detail, in [0.01, 100]
+  double cellGrowth = 0.0; ///< mm more per mm from there, in [0, 1]
+  double deviation = 0.25; ///< of meshes from their spheres, in cells, in [0.001, 10]
+  bool trueVolume = false; ///< as in PackedTissueParameters
+  bool turned = true;
+};
+
 /// One entry of the list of tissue; it may stand for many bodies. Where several hold a point the later counts.
 struct SceneItem {
   std::string name; ///< may be empty
-  std::variant<SceneMesh, SceneSphere, SceneBox, SceneCylinder> what;
+  std::variant<ScenePacking, SceneMesh, AnatomyParameters, SceneSphere, SceneBox, SceneCylinder> what;
 };
 
 /// Views side by side along a convex body, as PhantomViews() places them.
@@ -139,6 +157,8 @@ struct SynthesisScene {
   std::string about;      ///< for people; may be empty
   std::uint64_t seed = 1; ///< of everything random that has no seed of its own
   SceneProbe probe;
+  Transducer transducer = ProbePresetOf("mechanical-3d").transducer; ///< numbers that a file does not say are the preset's
+  Receiver receiver;
   std::vector<Material> materials; ///< the scene's own, which come before the standard ones
   std::string background = "water";
   std::vector<SceneItem> tissue;
@@ -152,6 +172,9 @@ struct SynthesisScene {
 
   /// The scene's material of that name, or the standard one. \throws Error(InvalidParameter) that lists the names.
   const Material& MaterialOf(const std::string& name) const;
+
+  /// With the scene's materials. \throws Error(InvalidParameter) for a material that is not there.
+  PackedTissueParameters ParametersOf(const ScenePacking& packing) const;
 
   /// A file as it can be opened.
   std::string PathOf(const std::string& file) const;

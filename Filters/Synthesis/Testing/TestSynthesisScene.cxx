@@ -78,6 +78,68 @@ TEST(SynthesisScene, ReadsEveryKindOfTissue)
   EXPECT_EQ(edge.soundSpeed, StandardMaterial("lesion-dark").soundSpeed);
 }
 
+TEST(SynthesisScene, ReadsPackedSpheres)
+{
+  const SynthesisScene scene = Parse(R"("seed": 7, "materials": {"pale": {"like": "liver"}}, "background": "gel", "tissue": [
+    {"packing": {"method": "empty-space", "region": "ball", "boxMin": [-9, -9, 0], "boxMax": [9, 9, 18], "radii": "power-law",
+                 "exponent": 2.5, "radiusMin": 0.5, "radiusMax": 3, "fillFraction": 0.2, "count": 50, "misses": 100,
+                 "materials": {"pale": 1, "cyst": 0.5}, "cellMm": 0.7, "deviation": 0.5, "trueVolume": true}},
+    {"packing": {"seed": 9}}])");
+  const auto& packing = std::get<ScenePacking>(scene.tissue[0].what);
+  const PackedTissueParameters parameters = scene.ParametersOf(packing);
+  EXPECT_EQ(parameters.packing.method, SpherePackingParameters::Method::EmptySpace);
+  EXPECT_EQ(parameters.packing.region, SpherePackingParameters::Region::Ball);
+  EXPECT_EQ(parameters.packing.radii, SpherePackingParameters::Radii::PowerLaw);
+  EXPECT_EQ(parameters.packing.seed, 7u); // the scene's
+  EXPECT_EQ(parameters.packing.count, 50);
+  EXPECT_EQ(parameters.background.name, "gel");
+  ASSERT_EQ(parameters.materials.size(), 2u);
+  EXPECT_EQ(parameters.materials[0].material.name, "pale");
+  EXPECT_EQ(parameters.materials[1].weight, 0.5);
+  EXPECT_EQ(parameters.cell.mm, 0.7);
+  EXPECT_TRUE(parameters.trueVolume);
+  EXPECT_NO_THROW(parameters.Check());
+  EXPECT_EQ(std::get<ScenePacking>(scene.tissue[1].what).spheres.seed, 9u);
+
+  ExpectComplaint(Tissue(R"({"packing": {"materials": {"lver": 1}}})"),
+                  "scene.json: tissue[0].packing.materials: there is no material \"lver\"");
+  ExpectComplaint(Tissue(R"({"packing": {"materials": {"liver": -1}}})"),
+                  "scene.json: tissue[0].packing.materials.liver: -1 is out of range");
+  ExpectComplaint(Tissue(R"({"packing": {"materials": {}}})"), "scene.json: tissue[0].packing: no material has a weight above 0");
+  ExpectComplaint(Tissue(R"({"packing": {"fillFraction": 1.5}})"),
+                  "scene.json: tissue[0].packing.fillFraction: 1.5 is out of range; it must be in [0, 1]");
+  ExpectComplaint(Tissue(R"({"packing": {"boxMax": [-60, 50, 100]}})"),
+                  "scene.json: tissue[0].packing: the packing's box has no volume");
+}
+
+TEST(SynthesisScene, ReadsAnatomies)
+{
+  const SynthesisScene scene = Parse(R"("seed": 3, "tissue": [{"anatomy": {"fatMm": 20, "ribs": 3, "spine": false}}])");
+  const auto& anatomy = std::get<AnatomyParameters>(scene.tissue[0].what);
+  EXPECT_EQ(anatomy.seed, 3u);
+  EXPECT_EQ(anatomy.fatMm, 20.0);
+  EXPECT_EQ(anatomy.ribs, 3);
+  EXPECT_FALSE(anatomy.spine);
+  ExpectComplaint(Tissue(R"({"anatomy": {"ribs": 2.5}})"), "scene.json: tissue[0].anatomy.ribs: a whole number is needed");
+  ExpectComplaint(Tissue(R"({"anatomy": {"fatMm": 1e4}})"),
+                  "scene.json: tissue[0].anatomy.fatMm: 10000.0 is out of range; it must be in [");
+  ExpectComplaint(Tissue(R"({"anatomy": {"spine": 1}})"), "scene.json: tissue[0].anatomy.spine: true or false is needed, not 1");
+}
+
+TEST(SynthesisScene, ReadsTheScanner)
+{
+  const SynthesisScene scene = Parse(R"("probe": {"preset": "linear"}, "transducer": {"bandwidth": 0.5},
+    "receiver": {"tgcPoints": [{"depthMm": 0, "gainDb": 1}, {"depthMm": 50, "gainDb": 9}], "noiseDb": -30})");
+  EXPECT_EQ(scene.transducer.frequencyMHz, ProbePresetOf("linear").transducer.frequencyMHz); // the preset's
+  EXPECT_EQ(scene.transducer.bandwidth, 0.5);
+  EXPECT_EQ(scene.receiver.tgcPoints.size(), 2u);
+  EXPECT_EQ(scene.receiver.GainDbAt(25.0), 5.0);
+  EXPECT_EQ(scene.receiver.noiseDb, -30.0);
+  ExpectComplaint(R"("transducer": {"frequencyMHz": 200})",
+                  "scene.json: transducer.frequencyMHz: 200 is out of range; it must be in [0.5, 50]");
+  ExpectComplaint(R"("receiver": {"tgcPoints": [{"depthMm": 5}, {"depthMm": 5}]})", "scene.json: receiver: ");
+}
+
 TEST(SynthesisScene, PlacesMeshes)
 {
   const auto meshOf = [](const std::string& transform) {
@@ -236,6 +298,20 @@ TEST(SynthesisScene, ComesBackBitByBit)
   scene.tissue.push_back({"", SceneSphere{{0.1, 0.2, 0.3}, 1.0 / 7.0, "odd"}});
   scene.tissue.push_back({"", SceneBox{}});
   scene.tissue.push_back({"", SceneCylinder{}});
+  ScenePacking packing;
+  packing.spheres.seed = 1ull << 63;
+  packing.spheres.radiusMin = 0.1 + 0.2;
+  packing.spheres.radii = SpherePackingParameters::Radii::PowerLaw;
+  packing.materials = {{"odd", 1.0 / 3.0}, {"cyst", 1e-9}};
+  scene.tissue.push_back({"balls", packing});
+  AnatomyParameters anatomy;
+  anatomy.fatMm = 12.3456789012345678;
+  anatomy.trunkDepthMm = 200.0;
+  anatomy.ribs = 1;
+  anatomy.liver = false;
+  scene.tissue.push_back({"", anatomy});
+  scene.transducer.bandwidth = 1.0 / 3.0;
+  scene.receiver.tgcPoints = {{0.1, 0.2}, {1.0 / 3.0, 4.0}};
   SceneRecording recording;
   recording.file = "r.mha";
   recording.smoothSeconds = 0.1 + 0.7;
@@ -255,6 +331,11 @@ TEST(SynthesisScene, ComesBackBitByBit)
             std::get<SceneMesh>(scene.tissue[0].what).transform.rotationDegrees);
   EXPECT_EQ(*std::get<SceneMesh>(back.tissue[1].what).transform.rows, *mesh.transform.rows);
   EXPECT_EQ(std::get<SceneSphere>(back.tissue[2].what).radius, 1.0 / 7.0);
+  EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).spheres.radiusMin, packing.spheres.radiusMin);
+  EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).materials[0].weight, 1.0 / 3.0);
+  EXPECT_EQ(std::get<AnatomyParameters>(back.tissue[6].what).fatMm, anatomy.fatMm);
+  EXPECT_EQ(back.transducer.bandwidth, scene.transducer.bandwidth);
+  EXPECT_EQ(back.receiver.tgcPoints[1].depthMm, scene.receiver.tgcPoints[1].depthMm);
   EXPECT_EQ(std::get<SceneRecording>(back.views).smoothSeconds, recording.smoothSeconds);
   EXPECT_EQ(back.volume.knockDegrees, scene.volume.knockDegrees);
   // Views of other kinds.
@@ -297,4 +378,20 @@ TEST(SynthesisScene, FindsFilesFromItsFolder)
   EXPECT_EQ(scene.PathOf("/b.ply"), "/b.ply");
   scene.dataFolder = "/elsewhere";
   EXPECT_EQ(scene.PathOf("../meshes/b.ply"), "/elsewhere/b.ply");
+}
+TEST(SynthesisScene, ExamplesAreSoundAndTheirSchemaIsOurs)
+{
+  const std::filesystem::path folder = std::filesystem::path(ECHORAMA_SOURCE_DIR) / "Examples/scenes";
+  int scenes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name == "echorama-scene-1.schema.json")
+      EXPECT_EQ(ReadTextFile(entry.path().string()), SceneSchema()) << "the schema file is not that of the reader";
+    else if (entry.path().extension() == ".json") {
+      SCOPED_TRACE(name);
+      EXPECT_NO_THROW(ReadScene(entry.path().string()));
+      ++scenes;
+    }
+  }
+  EXPECT_GE(scenes, 3);
 }
