@@ -12,7 +12,9 @@ struct Material {
   double density = 1000.0;       ///< kg/m^3, in [0.1, 20000]
   double attenuation = 0.5;      ///< dB/cm at 1 MHz, one way, in [0, 200]
   double attenuationPower = 1.0; ///< exponent of the frequency (MHz), in [0, 2]
-  double scattererDensity = 8.0; ///< point scatterers per mm^3, in [0, 1000]; 0: clear
+  /// Point scatterers per mm^3, in [0, 1000]; 0: clear. Of so many no scanner sees single ones; a synthesis may make fewer, as
+  /// loud together.
+  double scattererDensity = 100.0;
   /// Power that a volume of it scatters back, dB beside the reference tissue (liver: 0), in [-120, 60]. It does not change with
   /// the number of scatterers.
   double backscatterDb = 0.0;

@@ -30,7 +30,7 @@ using Complex = std::complex<float>;
 using Eigen::Vector3d;
 
 constexpr double maxSamples = 536870912.0; // 2^29: 4 GiB of baseband
-constexpr double visitedCellMm = 5.0;
+constexpr double visitedCellMm = 4.0;
 constexpr std::ptrdiff_t beamsPerRange = 8;
 constexpr double samplesPerPulse = 1.25; // of its standard deviation: steps of 0.8
 
@@ -311,6 +311,14 @@ Receiver SynthesisParameters::DefaultReceiver()
   return receiver;
 }
 
+double SynthesisParameters::ScatterersPerMm3() const
+{
+  if (scatterersPerMm3 > 0.0)
+    return scatterersPerMm3;
+  const double cell = WidthAt(transducer, transducer.lateralFocusMm).ResolutionCellMm3(transducer.PulseSigmaMm());
+  return std::min(scatterersPerCell / cell, 1000.0);
+}
+
 std::array<int, 3> SynthesisParameters::BeamDimensions() const
 {
   return {samples, elements, probe.IsPlane() ? 1 : steps};
@@ -330,6 +338,7 @@ void SynthesisParameters::Check() const
   check("subRays", subRays, 1, 4096);
   check("mirrorDb", mirrorDb, 0.0, 120.0);
   check("invisibleDb", invisibleDb, 0.0, 300.0);
+  check("scatterersPerMm3", scatterersPerMm3, 0.0, 1000.0);
   probe.Check();
   const auto checkPose = [](const Pose& pose, const std::string& name) {
     if (!IsRotation(pose.linear()) || !(pose.translation().cwiseAbs().maxCoeff() <= 1e6))
@@ -385,6 +394,7 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
     const VisitedSpace space = SpaceOf(ways, p.transducer, progress.Part(0.2, 0.22));
     ScattererParameters parameters;
     parameters.seed = p.seed;
+    parameters.densityPerMm3 = p.ScatterersPerMm3();
     parameters.displacement = &p.displacement;
     return Scatterers::Make(
         parameters, scene.Materials(),
@@ -488,6 +498,7 @@ std::string DescribeSynthesis(const SynthesisParameters& p)
   Json text{{"schema", "echorama-synthesis-1"},
             {"mode", p.mode == SynthesisParameters::Mode::Coherent ? "coherent" : "counting"},
             {"seed", p.seed},
+            {"scatterersPerMm3", p.ScatterersPerMm3()},
             {"samples", n[0]},
             {"elements", n[1]},
             {"steps", n[2]},

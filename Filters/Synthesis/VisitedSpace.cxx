@@ -39,11 +39,16 @@ void VisitedSpace::MarkLine(const Eigen::Vector3d& from, const Eigen::Vector3d& 
     box.min().array() -= radius;
     box.max().array() += radius;
     const Range range = CellsOf(box);
+    const double most = radius + 0.5 * std::sqrt(3.0) * cell_; // from the line to the middle of a cell
+    const Eigen::Vector3d middle = from + (piece + 0.5) * step * direction;
     for (int k = range.first[2]; k <= range.last[2]; ++k)
       for (int j = range.first[1]; j <= range.last[1]; ++j)
         for (int i = range.first[0]; i <= range.last[0]; ++i) {
           std::atomic<std::uint8_t>& mark = marks_[Index(i, j, k)];
-          if (!mark.load(std::memory_order_relaxed)) // most are; reading does not take the line away from others
+          if (mark.load(std::memory_order_relaxed)) // most are; reading does not take the line away from others
+            continue;
+          const Eigen::Vector3d offset = box_.min() + cell_ * Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5) - middle;
+          if ((offset - offset.dot(direction) * direction).norm() <= most)
             mark.store(1, std::memory_order_relaxed);
         }
   }

@@ -178,6 +178,15 @@ public:
   ///@}
 
   ///@{
+  /**
+   * The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0, the default: 20 in every resolution cell at the
+   * transmit focus. Fewer are faster; volumes share their speckle when they have the same number.
+   */
+  void SetScatterersPerMm3(double);
+  double GetScatterersPerMm3() const;
+  ///@}
+
+  ///@{
   /** Of the mode Counting: rays per element, in [1, 1e7], and the clarity c of dissertation eq. 3.4, in [0, 200]. Default
    * 256, 20. */
   void SetRaysPerElement(int);
