@@ -138,10 +138,13 @@ double RaySamples::Next()
 {
   const std::uint32_t dimension = dimension_++;
   const std::uint64_t keyOfDimension = Hash(key_, dimension);
-  if (sampling_ == Sampling::Sobol && dimension < sobolDimensions) {
-    const std::uint32_t order = Scrambled(ray_, static_cast<std::uint32_t>(key_)); // keeps blocks of 2^n together
+  if (sampling_ == Sampling::Sobol) {
+    // Further dimensions are the same points once more, in another order.
+    const std::uint64_t keyOfOrder = Hash(~key_, dimension / sobolDimensions);
+    const std::uint32_t order = Scrambled(ray_, static_cast<std::uint32_t>(keyOfOrder)); // keeps blocks of 2^n together
     // 32 bits make a fraction; what lies below is filled at random, so that no two rays are alike in a coordinate.
-    const std::uint32_t bits = Scrambled(Sobol(order, dimension), static_cast<std::uint32_t>(keyOfDimension >> 32));
+    const std::uint32_t bits =
+        Scrambled(Sobol(order, dimension % sobolDimensions), static_cast<std::uint32_t>(keyOfDimension >> 32));
     return Fraction(static_cast<std::uint64_t>(bits) << 32 | static_cast<std::uint32_t>(Hash(keyOfDimension, ray_)));
   }
   const double within = Fraction(Hash(keyOfDimension, ray_));

@@ -18,7 +18,7 @@ public:
   /// Ray \a ray of \a count of the beam \a beam.
   RaySamples(Sampling sampling, std::uint64_t seed, std::uint64_t beam, std::uint32_t ray, std::uint32_t count);
 
-  /// The number of the next dimension, in [0, 1). Sobol's evenness holds for the first sobolDimensions; further ones are random.
+  /// The number of the next dimension, in [0, 1). Sobol's evenness holds among each sobolDimensions in a row.
   double Next();
 
   static constexpr int sobolDimensions = 21;

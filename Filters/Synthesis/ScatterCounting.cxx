@@ -87,7 +87,9 @@ public:
       int medium = scene_.MediumOf(ray.inside);
       const Medium& here = media_[static_cast<std::size_t>(medium)];
       const double limit = begin + (2.0 * maxDepth_ - path) / here.depthPerMm;
-      const double scatter = begin + ScatterDistance(here.p, samples.Next());
+      // Three numbers each time, so that a dimension means the same on every ray: how far, and which way.
+      const double far = samples.Next(), u = samples.Next(), v = samples.Next();
+      const double scatter = begin + ScatterDistance(here.p, far);
       Crossing crossing;
       const double end = std::min(limit, scatter);
       const bool meets = scene_.NextCrossing(ray, end, crossing);
@@ -102,7 +104,6 @@ public:
         beam.Add(0.5 * (path + back), heard);
         if (here.p >= 1.0)
           return; // a solid: every further event would be here
-        const double u = samples.Next(), v = samples.Next();
         const Eigen::Vector3d direction = WithinCone(ray.direction, cosOfCone_, u, v);
         const BodySet held = ray.inside;
         ray = SceneRay();
@@ -118,7 +119,7 @@ public:
       const InterfaceResponse response = MeetInterface(here.fluid, behind.fluid, cosine);
       beam.Add(0.5 * (path + back), heard * response.reflectedEnergy);
       begin = crossing.behind;
-      if (response.reflectedEnergy > 0.0 && samples.Next() < response.reflectedEnergy) {
+      if (response.reflectedEnergy > 0.0 && u < response.reflectedEnergy) {
         const Eigen::Vector3d direction = Mirrored(ray.direction, crossing.normal);
         const BodySet came = ray.came;
         ray = SceneRay();
