@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The pulse is the same at every depth, so no scatterer needs its own: each adds one complex number to a fine row (16
+// The pulse is the same at every depth, so no scatterer needs its own: each adds one complex number to a fine row (10
 // samples per standard deviation of the pulse, shared out linearly between two), and the fine row meets the pulse once, at the
 // end. What remains per scatterer is where it lies, a Gaussian and a phase.
 //
-// 1. Bricks. The segment is walked in pieces of some millimetres, each with the radius of the beam there. Of every brick near
-//    a piece the place relative to the segment is worked out in double precision; its box is tested against the elliptic tube
-//    of the beam. The width of the beam, its curvature and all that enters the size of an echo are linear over a brick.
-// 2. Sieve: depth, distance and exponent of every scatterer of the brick, in vectors; the indices of those within the tube.
+// 1. Bricks. Of every brick near the segment the place beside it is worked out in double precision; its box is tested against
+//    the elliptic tube of the beam. The width of the beam, its curvature and all that enters the size of an echo are linear
+//    over a brick (to 0.1% of the echoes at a depth of 30 mm, 3% within the first 5 mm).
+// 2. Look and sieve: depth, distance and exponent of every scatterer of the brick, in vectors; those in the tube are moved
+//    together, unless all are.
 // 3. Echo: exponential and sine by polynomials (relative 1e-6), in vectors, relative to the middle of the brick: so single
 //    precision holds phases to 1e-5 of a turn, whatever the depth and wherever the world is.
 // 4. Pulse: the fine row is split into its phases, so that the sum over the pulse is a sum of whole rows.
-//
-// Cost: 2 to 4 ns per scatterer of a brick, the same again per one in the tube; two dozen vector operations per sample.
 #include "EchoSum.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
@@ -25,10 +24,9 @@ namespace {
 
 constexpr double pi = 3.141592653589793;
 constexpr double pulseReach = 4.0;    // standard deviations in depth: 70 dB down
-constexpr double finePerSigma = 16.0; // samples of the fine row
+constexpr double finePerSigma = 10.0; // samples of the fine row
 constexpr double nodeMm = 1.0;        // between the widths that are worked out
-constexpr int nodesPerPiece = 6;
-constexpr int batch = 512; // scatterers at once
+constexpr int batch = 512;            // scatterers at once
 
 // How the scatterers of one brick are seen; places relative to its centre, s along the segment.
 struct BrickView {
@@ -43,9 +41,10 @@ struct BrickView {
   int fineBase, fineLast;                 // the last place that has a successor
 };
 
+// Scatterers that are heard: how much deeper than the centre of the brick they seem, the exponent of the size of their echo,
+// and their own amplitude.
 struct Sieved {
-  float late[batch], exponent[batch];
-  int kept[batch];
+  float late[batch], exponent[batch], amplitude[batch];
 };
 
 // e^x for x in [-80, 80], to 1e-7.
@@ -62,63 +61,71 @@ inline float Exponential(float x)
   return power * scale;
 }
 
-// Depth, distance and exponent of scatterers; which of them are in the tube. \returns how many.
-ECHORAMA_HOT int Sieve(const BrickView& v, const float* px, const float* py, const float* pz, int count, float reachSquared,
-                       Sieved& out)
+// Depth, distance from the axis in standard deviations (squared; far when s does not count) and exponent of scatterers.
+ECHORAMA_HOT void Look(const BrickView& v, const float* px, const float* py, const float* pz, int count, float* __restrict late,
+                       float* __restrict exponent, float* __restrict distance)
 {
-  float distance[batch];
+  const BrickView w = v;
   for (int i = 0; i < count; ++i) {
-    const float s = v.along[0] * px[i] + v.along[1] * py[i] + v.along[2] * pz[i];
-    const float x = v.x + (v.across[0] * px[i] + v.across[1] * py[i] + v.across[2] * pz[i]);
-    const float y = v.y + (v.up[0] * px[i] + v.up[1] * py[i] + v.up[2] * pz[i]);
+    const float s = w.along[0] * px[i] + w.along[1] * py[i] + w.along[2] * pz[i];
+    const float x = w.x + (w.across[0] * px[i] + w.across[1] * py[i] + w.across[2] * pz[i]);
+    const float y = w.y + (w.up[0] * px[i] + w.up[1] * py[i] + w.up[2] * pz[i]);
     const float xx = x * x, yy = y * y;
-    const float u = xx * (v.lateral[0] + v.lateral[1] * s) + yy * (v.elevation[0] + v.elevation[1] * s);
-    const float late = s + xx * (v.lateralBend[0] + v.lateralBend[1] * s) + yy * (v.elevationBend[0] + v.elevationBend[1] * s);
-    out.late[i] = late;
-    out.exponent[i] = v.exponent[0] + v.exponent[1] * s - 0.5f * u;
-    const bool inside = (s >= v.first) & (s < v.last);
+    const float u = xx * (w.lateral[0] + w.lateral[1] * s) + yy * (w.elevation[0] + w.elevation[1] * s);
+    late[i] = s + xx * (w.lateralBend[0] + w.lateralBend[1] * s) + yy * (w.elevationBend[0] + w.elevationBend[1] * s);
+    exponent[i] = w.exponent[0] + w.exponent[1] * s - 0.5f * u;
+    const bool inside = (s >= w.first) & (s < w.last);
     distance[i] = inside ? u : 1e30f;
   }
+}
+
+// Keeps those within the tube, in their order. \returns how many.
+ECHORAMA_HOT int Sieve(const float* __restrict distance, const float* __restrict amplitudes, int count, float reachSquared,
+                       Sieved& out)
+{
   int kept = 0;
   for (int i = 0; i < count; ++i) {
-    out.kept[kept] = i;
+    out.late[kept] = out.late[i];
+    out.exponent[kept] = out.exponent[i];
+    out.amplitude[kept] = amplitudes[i];
     kept += distance[i] < reachSquared;
   }
   return kept;
 }
 
-// Adds the echoes of the kept scatterers to the fine row.
-ECHORAMA_HOT void AddEchoes(const BrickView& v, const float* amplitudes, const Sieved& sieved, int kept, float* fineRow)
+// Adds echoes to the fine row.
+ECHORAMA_HOT void AddEchoes(const BrickView& v, const float* __restrict late, const float* __restrict exponent,
+                            const float* __restrict amplitude, int count, float* __restrict fineRow)
 {
-  float re[batch], im[batch], fraction[batch];
-  int place[batch];
-  for (int j = 0; j < kept; ++j) {
-    const int i = sieved.kept[j];
-    const float late = sieved.late[i];
-    const float size = amplitudes[i] * Exponential(std::min(std::max(sieved.exponent[i], -80.0f), 80.0f));
-    // sine and cosine of half the angle, then of the whole.
-    const float turn = v.turn + v.turnsPerMm * late;
+  alignas(64) float re[batch], im[batch], fraction[batch];
+  alignas(64) int place[batch];
+  const float startTurn = v.turn, turnsPerMm = v.turnsPerMm, startFine = v.fine, finePerMm = v.finePerMm;
+  const int base = v.fineBase, last = v.fineLast;
+  for (int i = 0; i < count; ++i) {
+    const float size = amplitude[i] * Exponential(std::min(std::max(exponent[i], -80.0f), 80.0f));
+    // Sine and cosine of half the angle, then of the whole.
+    const float turn = startTurn + turnsPerMm * late[i];
     const float half = turn - std::floor(turn + 0.5f);
     const float q = half * half;
     const float sine = half * (3.14159264f + q * (-5.16771008f + q * (2.55007752f + q * (-0.598291286f + q * 0.0776576603f))));
     const float cosine =
         1.0f + q * (-4.9348022f + q * (4.05871142f + q * (-1.33523998f + q * (0.235074509f + q * -0.0246274055f))));
-    re[j] = size * (cosine * cosine - sine * sine);
-    im[j] = size * (-2.0f * sine * cosine);
-    const float fine = v.fine + v.finePerMm * late;
+    re[i] = size * (cosine * cosine - sine * sine);
+    im[i] = size * (-2.0f * sine * cosine);
+    const float fine = startFine + finePerMm * late[i];
     const float whole = std::floor(fine);
-    fraction[j] = fine - whole;
-    place[j] = v.fineBase + static_cast<int>(whole);
+    fraction[i] = fine - whole;
+    place[i] = base + static_cast<int>(whole);
   }
-  for (int j = 0; j < kept; ++j) {
-    if (place[j] < 0 || place[j] > v.fineLast)
+  for (int i = 0; i < count; ++i) {
+    if (place[i] < 0 || place[i] > last)
       continue;
-    float* at = fineRow + 2 * static_cast<std::ptrdiff_t>(place[j]);
-    const float f = fraction[j], g = 1.0f - f;
-    at[0] += g * re[j];
-    at[1] += g * im[j];
-    at[2] += f * re[j];
-    at[3] += f * im[j];
+    float* at = fineRow + 2 * static_cast<std::ptrdiff_t>(place[i]);
+    const float f = fraction[i], g = 1.0f - f;
+    at[0] += g * re[i];
+    at[1] += g * im[i];
+    at[2] += f * re[i];
+    at[3] += f * im[i];
   }
 }
 
@@ -245,28 +252,22 @@ public:
 
   void Run()
   {
-    for (int first = 0; first < nodes_.Pieces(); first += nodesPerPiece) {
-      const int last = std::min(nodes_.Pieces(), first + nodesPerPiece);
-      const double begin = first * nodes_.Step(), end = last * nodes_.Step();
-      // Bricks are widest beside the axis, where their centres lie within the piece; the beam widens a little further on.
-      const double radius = 1.05 * reach_ * nodes_.Widest(std::max(0, first - 2), std::min(nodes_.Pieces(), last + 2));
-      near_.clear();
-      scatterers_.FindNear(segment_.from + begin * segment_.direction, segment_.direction, end - begin, radius, near_);
-      for (const std::uint32_t index : near_) {
-        const Scatterers::Brick& brick = scatterers_.Bricks()[index];
-        const Eigen::Vector3d place = brick.centre - segment_.from;
-        const double s = place.dot(segment_.direction);
-        // Each brick belongs to one piece.
-        if ((first > 0 && s < begin) || (last < nodes_.Pieces() && s >= end))
-          continue;
-        AddBrick(brick, place, s);
-      }
-    }
+    const auto radius = [this](double begin, double end) {
+      // Bricks reach a little further along than their centres.
+      const int first = static_cast<int>(begin / nodes_.Step()) - 2, last = static_cast<int>(end / nodes_.Step()) + 3;
+      return 1.02 * reach_ * nodes_.Widest(std::max(0, first), std::min(nodes_.Pieces(), last));
+    };
+    std::vector<std::uint32_t> near;
+    scatterers_.FindNear(segment_.from, segment_.direction, segment_.length, radius, near);
+    for (const std::uint32_t index : near)
+      AddBrick(scatterers_.Bricks()[index]);
   }
 
 private:
-  void AddBrick(const Scatterers::Brick& brick, const Eigen::Vector3d& place, double s)
+  void AddBrick(const Scatterers::Brick& brick)
   {
+    const Eigen::Vector3d place = brick.centre - segment_.from;
+    const double s = place.dot(segment_.direction);
     const Eigen::Vector3d half = brick.halfSize.cast<double>();
     const double halfAlong = half.dot(segment_.direction.cwiseAbs());
     if (s + halfAlong < 0.0 || s - halfAlong >= segment_.length)
@@ -279,8 +280,8 @@ private:
       value[i] = nodes_[node].values[i] + t * slope[i];
     }
     const double x = place.dot(segment_.across), y = place.dot(up_);
-    const double beside = std::max(0.0, std::abs(x) - half.dot(segment_.across.cwiseAbs())),
-                 above = std::max(0.0, std::abs(y) - half.dot(up_.cwiseAbs()));
+    const double halfAcross = half.dot(segment_.across.cwiseAbs()), halfUp = half.dot(up_.cwiseAbs());
+    const double beside = std::max(0.0, std::abs(x) - halfAcross), above = std::max(0.0, std::abs(y) - halfUp);
     if (beside * beside * (value[0] - std::abs(slope[0]) * halfAlong) +
             above * above * (value[1] - std::abs(slope[1]) * halfAlong) >=
         reach_ * reach_)
@@ -314,10 +315,20 @@ private:
 
     const float *px = scatterers_.X(brick), *py = scatterers_.Y(brick), *pz = scatterers_.Z(brick),
                 *amplitude = scatterers_.Amplitude(brick);
-    for (std::uint32_t begin = 0; begin < brick.stride; begin += batch) {
-      const int count = static_cast<int>(std::min<std::uint32_t>(batch, brick.stride - begin));
-      const int kept = Sieve(view_, px + begin, py + begin, pz + begin, count, static_cast<float>(reach_ * reach_), sieved_);
-      AddEchoes(view_, amplitude + begin, sieved_, kept, fine_.values.data());
+    // Of bricks that lie in the tube as a whole nothing needs to be sieved.
+    const double outermost = std::pow(std::abs(x) + halfAcross, 2) * (value[0] + std::abs(slope[0]) * halfAlong) +
+                             std::pow(std::abs(y) + halfUp, 2) * (value[1] + std::abs(slope[1]) * halfAlong);
+    const bool whole = outermost < 0.999 * reach_ * reach_ && s - halfAlong > 0.0 && s + halfAlong < 0.999 * segment_.length;
+    const std::uint32_t all = whole ? brick.count : brick.stride;
+    for (std::uint32_t begin = 0; begin < all; begin += batch) {
+      const int count = static_cast<int>(std::min<std::uint32_t>(batch, all - begin));
+      Look(view_, px + begin, py + begin, pz + begin, count, sieved_.late, sieved_.exponent, distance_);
+      if (whole) {
+        AddEchoes(view_, sieved_.late, sieved_.exponent, amplitude + begin, count, fine_.values.data());
+      } else {
+        const int kept = Sieve(distance_, amplitude + begin, count, static_cast<float>(reach_ * reach_), sieved_);
+        AddEchoes(view_, sieved_.late, sieved_.exponent, sieved_.amplitude, kept, fine_.values.data());
+      }
     }
   }
 
@@ -332,7 +343,7 @@ private:
   double logAmplitude_;
   BrickView view_{};
   Sieved sieved_;
-  std::vector<std::uint32_t> near_;
+  float distance_[batch];
 };
 
 void CheckAxis(const DepthAxis& axis)

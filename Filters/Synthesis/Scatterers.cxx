@@ -347,7 +347,8 @@ Scatterers Scatterers::At(const std::vector<Eigen::Vector3d>& points, const std:
 
 std::size_t Scatterers::MemoryBytes() const
 {
-  std::size_t bytes = bricks_.capacity() * sizeof(Brick) + (starts_.capacity() + list_.capacity()) * sizeof(std::uint32_t);
+  std::size_t bytes = bricks_.capacity() * sizeof(Brick) + (starts_.capacity() + list_.capacity()) * sizeof(std::uint32_t) +
+                      listCentres_.capacity() * sizeof(Eigen::Vector3f);
   for (const std::vector<float>& part : parts_)
     bytes += part.capacity() * sizeof(float) + sizeof(part);
   return bytes;
@@ -387,53 +388,61 @@ void Scatterers::MakeGrid(double cell)
     starts_[i + 1] += starts_[i];
   list_.resize(bricks_.size());
   std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
-  for (std::size_t i = 0; i < bricks_.size(); ++i)
-    list_[next[cellOf(bricks_[i])]++] = static_cast<std::uint32_t>(i);
+  listCentres_.resize(bricks_.size());
+  for (std::size_t i = 0; i < bricks_.size(); ++i) {
+    const std::uint32_t place = next[cellOf(bricks_[i])]++;
+    list_[place] = static_cast<std::uint32_t>(i);
+    listCentres_[place] = (bricks_[i].centre - gridFirst_).cast<float>();
+  }
 }
 
-void Scatterers::FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, double radius,
+void Scatterers::FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, const RadiusAlong& radius,
                           std::vector<std::uint32_t>& found) const
 {
   if (bricks_.empty() || !(length >= 0.0))
     return;
-  // Layer by layer across the axis along which the line runs most. A centre within reach of the line lies, in its layer, within
-  // reach of the piece of the line that is as near to the layer.
+  // Layer by layer across the axis along which the line runs most. There, what is within reach of the line is an ellipse about
+  // where the line passes.
   int main = 0;
   direction.cwiseAbs().maxCoeff(&main);
-  const int second = (main + 1) % 3, third = (main + 2) % 3;
-  const double reach = radius + largestRadius_;
+  const int axes[2] = {(main + 1) % 3, (main + 2) % 3};
   const Eigen::Vector3d start = from - gridFirst_;
-  const double slope = direction[main];
-  const auto layerOf = [&](double x, int axis) {
+  const Eigen::Vector3f startFloat = start.cast<float>(), directionFloat = direction.cast<float>();
+  const double slope = direction[main], largest = radius(0.0, length) + largestRadius_;
+  const double slant = std::sqrt(std::max(0.0, 1.0 - slope * slope)) / std::abs(slope);
+  const auto cellOf = [&](double x, int axis) {
     return static_cast<int>(std::clamp(std::floor(x / gridCell_), -1.0, static_cast<double>(gridSize_[axis])));
   };
   const double a = start[main], b = start[main] + length * slope;
-  const int firstLayer = std::max(0, layerOf(std::min(a, b) - reach, main));
-  const int lastLayer = std::min(gridSize_[main] - 1, layerOf(std::max(a, b) + reach, main));
+  const int firstLayer = std::max(0, cellOf(std::min(a, b) - largest, main));
+  const int lastLayer = std::min(gridSize_[main] - 1, cellOf(std::max(a, b) + largest, main));
   for (int layer = firstLayer; layer <= lastLayer; ++layer) {
-    // Which piece of the line may be the nearest to a point of the layer.
-    double begin = (layer * gridCell_ - reach - start[main]) / slope,
-           end = ((layer + 1) * gridCell_ + reach - start[main]) / slope;
-    if (begin > end)
-      std::swap(begin, end);
-    begin = std::clamp(begin, 0.0, length);
-    end = std::clamp(end, 0.0, length);
+    const double enter = (layer * gridCell_ - start[main]) / slope, leave = ((layer + 1) * gridCell_ - start[main]) / slope;
+    const double begin = std::min(enter, leave) - slant * largest, end = std::max(enter, leave) + slant * largest;
+    const double reach = radius(std::clamp(begin, 0.0, length), std::clamp(end, 0.0, length)) + largestRadius_;
     int low[2], high[2];
     for (int n = 0; n < 2; ++n) {
-      const int axis = n == 0 ? second : third;
-      const double p = start[axis] + begin * direction[axis], q = start[axis] + end * direction[axis];
-      low[n] = std::max(0, layerOf(std::min(p, q) - reach, axis));
-      high[n] = std::min(gridSize_[axis] - 1, layerOf(std::max(p, q) + reach, axis));
+      const int axis = axes[n];
+      const double p = start[axis] + enter * direction[axis], q = start[axis] + leave * direction[axis];
+      const double wide = reach * std::sqrt(1.0 + std::pow(direction[axis] / slope, 2));
+      low[n] = std::max(0, cellOf(std::min(p, q) - wide, axis));
+      high[n] = std::min(gridSize_[axis] - 1, cellOf(std::max(p, q) + wide, axis));
     }
+    const auto reachSquared = static_cast<float>(reach * reach);
     Eigen::Array3i at;
     at[main] = layer;
-    for (at[third] = low[1]; at[third] <= high[1]; ++at[third])
-      for (at[second] = low[0]; at[second] <= high[0]; ++at[second]) {
+    for (at[axes[1]] = low[1]; at[axes[1]] <= high[1]; ++at[axes[1]])
+      for (at[axes[0]] = low[0]; at[axes[0]] <= high[0]; ++at[axes[0]]) {
         const std::size_t cell =
             (static_cast<std::size_t>(at.z()) * static_cast<std::size_t>(gridSize_.y()) + static_cast<std::size_t>(at.y())) *
                 static_cast<std::size_t>(gridSize_.x()) +
             static_cast<std::size_t>(at.x());
-        found.insert(found.end(), list_.begin() + starts_[cell], list_.begin() + starts_[cell + 1]);
+        for (std::uint32_t i = starts_[cell]; i < starts_[cell + 1]; ++i) {
+          const Eigen::Vector3f place = listCentres_[i] - startFloat;
+          const float along = place.dot(directionFloat), all = place.squaredNorm();
+          if (all - along * along <= reachSquared + 1e-6f * all) // single precision must not lose one
+            found.push_back(list_[i]);
+        }
       }
   }
 }

@@ -76,9 +76,12 @@ public:
   const float* Z(const Brick& brick) const { return X(brick) + 2 * static_cast<std::size_t>(brick.stride); }
   const float* Amplitude(const Brick& brick) const { return X(brick) + 3 * static_cast<std::size_t>(brick.stride); }
 
-  /// Appends the bricks that may reach within \a radius of the line from \a from along \a direction (unit vector), \a length
+  /// How far from a line bricks are looked for: the radius (mm) that serves all of it from \a begin to \a end mm.
+  using RadiusAlong = std::function<double(double begin, double end)>;
+
+  /// Appends the bricks that may reach within a radius of the line from \a from along \a direction (unit vector), \a length
   /// mm long: always the same in the same order, each once; also some that do not.
-  void FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, double radius,
+  void FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, const RadiusAlong& radius,
                 std::vector<std::uint32_t>& found) const;
 
 private:
@@ -94,6 +97,7 @@ private:
   double gridCell_ = 1.0;
   double largestRadius_ = 0.0; // of a brick about its centre
   std::vector<std::uint32_t> starts_, list_;
+  std::vector<Eigen::Vector3f> listCentres_; // from the grid's first point, mm
 };
 
 } // namespace echorama

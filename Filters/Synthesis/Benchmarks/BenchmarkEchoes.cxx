@@ -24,7 +24,8 @@ ExactRow PlainEchoes(const SoundSegment& segment, const Scatterers& scatterers, 
   const double sigma = transducer.PulseSigmaMm();
   const Eigen::Vector3d up = segment.direction.cross(segment.across);
   std::vector<std::uint32_t> near;
-  scatterers.FindNear(segment.from, segment.direction, segment.length, 4.0 * reach, near);
+  scatterers.FindNear(
+      segment.from, segment.direction, segment.length, [reach](double, double) { return 4.0 * reach; }, near);
   for (const std::uint32_t index : near) {
     const Scatterers::Brick& brick = scatterers.Bricks()[index];
     for (std::uint32_t n = 0; n < brick.count; ++n) {

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Error.h"
+#include "SpeckleTools.h"
+#include <gtest/gtest.h>
+
+using namespace echorama;
+using namespace echorama::testing;
+
+namespace {
+
+// The echo of a point by Rayleigh's integral: both ways over the rectangular aperture with its apodisation, which ends at
+// its edges, exact distances and delays, for every frequency of the pulse. Nothing of it is Gaussian optics.
+class RayleighPulseEcho {
+public:
+  RayleighPulseEcho(const Transducer& transducer, double depth) : transducer_(transducer), depth_(depth)
+  {
+    constexpr int along = 56, over = 40;
+    for (int i = 0; i < along; ++i)
+      for (int j = 0; j < over; ++j) {
+        Piece piece;
+        const double a = (i + 0.5) / along - 0.5, b = (j + 0.5) / over - 0.5;
+        piece.u = a * transducer.lateralApertureMm;
+        piece.v = b * transducer.elevationApertureMm;
+        piece.weight = std::exp(-0.5 * 25.0 * (a * a + b * b));
+        const auto early = [](double focus, double offset) { return std::hypot(focus, offset) - focus; };
+        const double lens = early(transducer.elevationFocusMm, piece.v);
+        piece.sendEarly = lens + early(transducer.lateralFocusMm, piece.u);
+        piece.listenEarly = lens + early(depth, piece.u);
+        pieces_.push_back(piece);
+      }
+    const double sigma = std::sqrt(2.0 * std::log(2.0)) / (pi * transducer.bandwidth * transducer.frequencyMHz); // us
+    for (double f = -1.05; f <= 1.05001; f += 0.1) {
+      const double frequency = transducer.frequencyMHz * (1.0 + f * transducer.bandwidth);
+      frequencies_.push_back({frequency, std::exp(-2.0 * std::pow(pi * sigma * (frequency - transducer.frequencyMHz), 2))});
+    }
+  }
+
+  // Envelope at delays (mm of depth beyond the point's own) in steps, of a point beside the axis.
+  std::vector<double> Envelope(double x, double y, double from, double step, int count) const
+  {
+    std::vector<std::complex<double>> spectrum;
+    for (const auto& [frequency, weight] : frequencies_) {
+      const double k = 2e3 * pi * frequency / transducer_.assumedSoundSpeed; // 1/mm
+      std::complex<double> send, listen;
+      for (const Piece& piece : pieces_) {
+        const double r = std::sqrt(std::pow(x - piece.u, 2) + std::pow(y - piece.v, 2) + depth_ * depth_);
+        const double a = k * (r - depth_ - piece.sendEarly), b = k * (r - depth_ - piece.listenEarly);
+        send += piece.weight / r * std::complex<double>(std::cos(a), -std::sin(a));
+        listen += piece.weight / r * std::complex<double>(std::cos(b), -std::sin(b));
+      }
+      spectrum.push_back(weight * send * listen);
+    }
+    std::vector<double> envelope;
+    for (int i = 0; i < count; ++i) {
+      std::complex<double> sum;
+      for (std::size_t n = 0; n < spectrum.size(); ++n)
+        sum += spectrum[n] * std::exp(std::complex<double>(0.0, 4e3 * pi * frequencies_[n].first / transducer_.assumedSoundSpeed *
+                                                                    (from + i * step)));
+      envelope.push_back(std::abs(sum));
+    }
+    return envelope;
+  }
+
+  double Peak(double x, double y) const
+  {
+    const std::vector<double> envelope = Envelope(x, y, -0.6, 0.06, 41); // late ones as well
+    return *std::max_element(envelope.begin(), envelope.end());
+  }
+
+private:
+  struct Piece {
+    double u, v, weight, sendEarly, listenEarly;
+  };
+  const Transducer& transducer_;
+  double depth_;
+  std::vector<Piece> pieces_;
+  std::vector<std::pair<double, double>> frequencies_;
+};
+
+// The same from the synthesiser: one scatterer, a beam of parallel axis beside it.
+class OurPulseEcho {
+public:
+  OurPulseEcho(const Transducer& transducer, double depth)
+    : transducer_(transducer), depth_(depth), point_(Scatterers::At({{0.0, 0.0, depth}}, {1.0f}))
+  {
+  }
+
+  std::vector<double> Envelope(double x, double y, double from, double step, int count) const
+  {
+    const DepthAxis axis{depth_ + from, step, count};
+    std::vector<double> envelope;
+    for (const auto& value : RowOf(Beam({x, y, 0.0}, {0.0, 0.0, 1.0}, 0.0, 2.0 * depth_), point_, transducer_, axis))
+      envelope.push_back(static_cast<double>(std::abs(value)));
+    return envelope;
+  }
+
+  double Peak(double x, double y) const
+  {
+    const std::vector<double> envelope = Envelope(x, y, -0.6, 0.06, 41);
+    return *std::max_element(envelope.begin(), envelope.end());
+  }
+
+private:
+  const Transducer& transducer_;
+  double depth_;
+  Scatterers point_;
+};
+
+struct Widths {
+  double depth, lateral, elevation; // half of the -6 dB widths, mm
+};
+
+template <class PulseEcho>
+Widths WidthsOf(const PulseEcho& echo, const BeamWidth& scale)
+{
+  Widths widths{};
+  widths.depth = HalfWidth(echo.Envelope(0.0, 0.0, 0.0, 0.01, 60), 0.01);
+  std::vector<double> lateral, elevation;
+  for (int i = 0; i < 12; ++i) {
+    lateral.push_back(echo.Peak(0.15 * i * scale.lateralSigma, 0.0));
+    elevation.push_back(echo.Peak(0.0, 0.15 * i * scale.elevationSigma));
+  }
+  widths.lateral = HalfWidth(lateral, 0.15 * scale.lateralSigma);
+  widths.elevation = HalfWidth(elevation, 0.15 * scale.elevationSigma);
+  return widths;
+}
+
+} // namespace
+
+TEST(Transducer, PointSpreadFollowsRayleighIntegral)
+{
+  const Transducer transducer;
+  for (const double depth : {40.0, 70.0, 110.0}) {
+    const BeamWidth scale = WidthAt(transducer, depth);
+    const Widths exact = WidthsOf(RayleighPulseEcho(transducer, depth), scale),
+                 ours = WidthsOf(OurPulseEcho(transducer, depth), scale);
+    EXPECT_NEAR(ours.depth / exact.depth, 1.0, 0.1) << depth;
+    EXPECT_NEAR(ours.lateral / exact.lateral, 1.0, 0.1) << depth;
+    EXPECT_NEAR(ours.elevation / exact.elevation, 1.0, 0.1) << depth;
+    RecordProperty("lateral_at_" + std::to_string(static_cast<int>(depth)), std::to_string(ours.lateral / exact.lateral));
+  }
+}
+
+TEST(Transducer, PulseHasItsBandwidth)
+{
+  Transducer transducer;
+  transducer.frequencyMHz = 5.0;
+  transducer.bandwidth = 0.4;
+  // The spectrum of the sampled pulse, half a bandwidth away from the centre, is half of that at the centre.
+  const double sigma = transducer.PulseSigmaMm(), step = 0.05 * sigma;
+  double centre = 0.0, side = 0.0;
+  for (int i = -200; i <= 200; ++i) {
+    const double depth = i * step, microseconds = 2.0 * depth / (1e-3 * transducer.assumedSoundSpeed);
+    const double pulse = std::exp(-0.5 * std::pow(depth / sigma, 2));
+    centre += pulse;
+    side += pulse * std::cos(2.0 * pi * 0.5 * 0.4 * 5.0 * microseconds);
+  }
+  EXPECT_NEAR(side / centre, 0.5, 1e-6);
+}
+
+TEST(Transducer, FocusIsNarrowestAndItsFrontIsCentredOnTheAperture)
+{
+  Transducer transducer;
+  transducer.elevationFocusMm = 50.0;
+  const double k = 2.0 * pi / transducer.WavelengthMm();
+  const BeamWidth focus = WidthAt(transducer, transducer.lateralFocusMm);
+  // Both ways are focused there: z / (k s), divided by the root of two.
+  EXPECT_NEAR(focus.lateralSigma, 70.0 / (k * 14.0 / 5.0) / std::sqrt(2.0), 1e-9);
+  EXPECT_NEAR(focus.lateralCurvature, 1.0 / 70.0, 1e-12);
+  EXPECT_NEAR(WidthAt(transducer, 50.0).elevationSigma, 50.0 / (k * 10.0 / 5.0) / std::sqrt(2.0), 1e-9);
+  EXPECT_GT(WidthAt(transducer, 140.0).elevationSigma, WidthAt(transducer, 50.0).elevationSigma);
+  // Before the lens' focus the front converges.
+  EXPECT_LT(WidthAt(transducer, 10.0).elevationCurvature, 0.0);
+}
+
+TEST(Transducer, FaceBoundsTheBeam)
+{
+  const Transducer transducer;
+  for (const double way : {-5.0, 0.0, 0.5, 2.0}) {
+    const BeamWidth width = WidthAt(transducer, way);
+    EXPECT_LE(width.lateralSigma, transducer.lateralApertureMm / 5.0);
+    EXPECT_LE(width.elevationSigma, transducer.elevationApertureMm / 5.0);
+    EXPECT_GT(width.lateralSigma, 0.25 * transducer.WavelengthMm());
+    EXPECT_LT(std::abs(width.lateralCurvature), 1.0 / transducer.WavelengthMm());
+  }
+}
+
+TEST(Transducer, RefusesWhatIsOutOfRange)
+{
+  const auto refuses = [](const auto& change, const std::string& name) {
+    Transducer transducer;
+    change(transducer);
+    try {
+      transducer.Check();
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.GetKind(), Error::Kind::InvalidParameter);
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("["), std::string::npos) << error.what();
+    }
+  };
+  EXPECT_NO_THROW(Transducer().Check());
+  refuses([](Transducer& t) { t.frequencyMHz = 0.0; }, "frequencyMHz");
+  refuses([](Transducer& t) { t.bandwidth = 1.6; }, "bandwidth");
+  refuses([](Transducer& t) { t.lateralApertureMm = 0.0; }, "lateralApertureMm");
+  refuses([](Transducer& t) { t.lateralFocusMm = std::nan(""); }, "lateralFocusMm");
+  refuses([](Transducer& t) { t.smallestFNumber = 0.1; }, "smallestFNumber");
+  refuses([](Transducer& t) { t.elevationApertureMm = 1000.0; }, "elevationApertureMm");
+  refuses([](Transducer& t) { t.elevationFocusMm = -1.0; }, "elevationFocusMm");
+  refuses([](Transducer& t) { t.assumedSoundSpeed = 0.0; }, "assumedSoundSpeed");
+}
