@@ -298,9 +298,11 @@ private:
       std::vector<Vector3d> path;
       for (double y = -half; y <= half; y += 2.0) {
         const double x = x0 + 0.2 * y - 0.0008 * y * y;
-        path.emplace_back(x, y, 0.5 * (wall_.Depth(3, x, y) + wall_.Depth(4, x, y)));
+        if (std::abs(x) < 0.5 * p_.trunkWidthMm - 12.0)
+          path.emplace_back(x, y, 0.5 * (wall_.Depth(3, x, y) + wall_.Depth(4, x, y)));
       }
-      AddTube(tissue_, "rib", bone, path, std::vector<double>(path.size(), radius), DetailFor(1.5 * radius));
+      if (path.size() > 1)
+        AddTube(tissue_, "rib", bone, path, std::vector<double>(path.size(), radius), DetailFor(1.5 * radius));
     }
     if (!p_.spine)
       return;
@@ -348,11 +350,11 @@ private:
     const Waviness waviness(random);
     // Where the portal vein enters (the hilum, a hollow of the hind side), and where the hepatic veins leave.
     const Vector3d hilum = Vector3d(0.3, -0.2, 0.93).normalized(), dome = Vector3d(0.1, 0.72, 0.69).normalized();
-    const RadiusOf bent = Bent(EllipsoidRadius(radii), waviness, 0.1 * p_.variation);
+    const RadiusOf bent = Bent(EllipsoidRadius(radii), waviness, 0.12 * p_.variation);
     const RadiusOf radius = [bent, hilum](const Vector3d& d) {
       // Thin towards the left lobe (+x), hollow at the hilum.
-      return bent(d) * (1.0 - 0.15 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 2)) *
-             (1.0 - 0.14 * std::exp(-(d - hilum).squaredNorm() / 0.2));
+      return bent(d) * (1.0 - 0.2 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 2)) *
+             (1.0 - 0.2 * std::exp(-(d - hilum).squaredNorm() / 0.3));
     };
     const Organ liver = AddOrgan("liver", StandardMaterial("liver"), centre, radius);
 
