@@ -388,6 +388,7 @@ Special = {
     "vtkUltrasoundNoiseTiler": NoiseTiler,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
+    "vtkUltrasoundAnatomySource": TissueSource,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }

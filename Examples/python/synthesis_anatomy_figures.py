@@ -90,6 +90,7 @@ def panel(window, left, right, eye, focus, zoom):
     renderer.SetBackground(1, 1, 1)
     renderer.UseDepthPeelingOn()
     renderer.SetMaximumNumberOfPeels(6)
+    renderer.UseFXAAOn()
     window.AddRenderer(renderer)
     camera = renderer.GetActiveCamera()
     camera.SetFocalPoint(focus)
@@ -106,13 +107,13 @@ def main():
     window = vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.SetAlphaBitPlanes(1)
-    window.SetMultiSamples(4)
+    window.SetMultiSamples(0) # which translucent bodies need
     window.SetSize(1320, 430)
 
     source = vtkUltrasoundAnatomySource()
     source.Update()
     whole = panel(window, 0.0, 0.41, (-0.25, 0.90, -0.34), (0, -15, 96), 29)
-    inside = panel(window, 0.41, 0.76, (-0.3, 0.88, -0.42), (-8, 0, 92), 24)
+    inside = panel(window, 0.41, 0.76, (-0.12, 0.92, -0.36), (-8, 0, 92), 22)
     layers = ("skin", "fat", "outer fascia", "muscle", "inner fascia", "trunk")
     shown = 0
     for name, material, surface in bodies_of(source.GetOutput()):

@@ -353,8 +353,8 @@ private:
     const RadiusOf bent = Bent(EllipsoidRadius(radii), waviness, 0.12 * p_.variation);
     const RadiusOf radius = [bent, hilum](const Vector3d& d) {
       // Thin towards the left lobe (+x), hollow at the hilum.
-      return bent(d) * (1.0 - 0.2 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 2)) *
-             (1.0 - 0.2 * std::exp(-(d - hilum).squaredNorm() / 0.3));
+      return bent(d) * (1.0 - 0.22 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 1.5)) *
+             (1.0 - 0.22 * std::exp(-(d - hilum).squaredNorm() / 0.35));
     };
     const Organ liver = AddOrgan("liver", StandardMaterial("liver"), centre, radius);
 
