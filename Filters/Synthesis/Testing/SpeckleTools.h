@@ -2,7 +2,9 @@
 #pragma once
 // What the tests of speckle share.
 #include "Filters/Synthesis/EchoSum.h"
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace echorama::testing {
 
@@ -113,6 +115,13 @@ inline double HalfWidth(const std::vector<double>& values, double step)
     if (values[i] < 0.5 * values[0])
       return step * (static_cast<double>(i) - (0.5 * values[0] - values[i]) / (values[i - 1] - values[i]));
   return std::nan("");
+}
+
+/// The width of a curve at half of its greatest value.
+inline double FullWidth(const std::vector<double>& values, double step)
+{
+  const auto peak = std::max_element(values.begin(), values.end());
+  return HalfWidth({peak, values.end()}, step) + HalfWidth({std::make_reverse_iterator(peak + 1), values.rend()}, step);
 }
 
 } // namespace echorama::testing
