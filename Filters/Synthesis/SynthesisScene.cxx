@@ -117,6 +117,17 @@ void Validate(const AnatomyParameters& anatomy)
   anatomy.Check();
 }
 
+void Validate(const CalibrationRigParameters& rig)
+{
+  rig.Check();
+}
+
+void Validate(const SceneTransport& transport)
+{
+  transport.sound.Check();
+  transport.counting.Check();
+}
+
 void Validate(const Transducer& transducer)
 {
   transducer.Check();
@@ -192,7 +203,7 @@ void Describe(A& a, SceneProbe& probe)
   a.Number("depthMaxMm", probe.depthMaxMm, {0.1, 1000.0}, "Last sample.");
   a.Number("elements", probe.elements, {2, 4096}, "Beams across the fan.");
   a.Number("sweepSteps", probe.sweepSteps, {1, 4096}, "Planes of the sweep; 1: the middle plane alone.");
-  a.Number("samples", probe.samples, {2, 65536}, "Along each beam.");
+  a.Number("samples", probe.samples, {2, 16384}, "Along each beam.");
 }
 
 template <class A>
@@ -329,12 +340,69 @@ void Describe(A& a, Receiver& receiver)
 }
 
 template <class A>
+void Describe(A& a, CalibrationRigParameters::Ball& ball)
+{
+  a.Text("name", ball.name, false, "Of the landmark.");
+  a.Vector("centre", ball.centre, {-1000.0, 1000.0}, "mm, in the rig: z = 0 is the plate's upper side, -z is up to the probe.");
+  a.Number("radius", ball.radius, {0.5, 30.0}, "mm");
+}
+
+template <class A>
+void Describe(A& a, CalibrationRigParameters& rig)
+{
+  a.List("balls", rig.balls, false, "Seven of different sizes and heights, if they are not said.");
+  a.Number("scale", rig.scale, {0.2, 5.0}, "Size of the whole rig.");
+  a.Number("plateDepthMm", rig.plateDepthMm, {10.0, 500.0}, "z of the plate's upper side in the world.");
+  a.Number("plateMm", rig.plateMm, {0.0, 50.0}, "Thickness of the glass; 0: neither plate nor stems.");
+  a.Number("stemRadiusMm", rig.stemRadiusMm, {0.0, 5.0}, "Of the pins that carry the balls; 0: none.");
+  a.Number("waterCelsius", rig.waterCelsius, {0.0, 95.0}, "Temperature of the bath, which sets its speed of sound.");
+  a.Number("detailMm", rig.detailMm, {0.1, 5.0}, "Edge of the triangles of the balls.");
+  a.Text("material", rig.material, false, "Of balls and stems: a standard one.");
+}
+
+constexpr std::pair<const char*, Sampling> samplings[] = {
+    {"random", Sampling::Random}, {"stratified", Sampling::Stratified}, {"sobol", Sampling::Sobol}};
+
+template <class A>
+void Describe(A& a, ScatterCounting& counting)
+{
+  a.Number("raysPerElement", counting.raysPerElement, {1.0, 1e7}, "Rays that each element sends.");
+  a.Number("clarity", counting.clarity, {0.0, 200.0}, "Exponent c of the angle at which an echo comes in.");
+  a.Number("coneDegrees", counting.coneDegrees, {0.0, 180.0}, "Half angle within which a scattered ray goes on.");
+  a.Number("maxEvents", counting.maxEvents, {1.0, 1e6}, "Of one ray.");
+  a.Choice("sampling", counting.sampling, Choices<Sampling>(std::begin(samplings), std::end(samplings)), "How rays are drawn.");
+}
+
+template <class A>
+void Describe(A& a, SceneTransport& transport)
+{
+  using Mode = SynthesisParameters::Mode;
+  SoundTransport& sound = transport.sound;
+  a.Choice("mode", transport.mode, Choices<Mode>{{"coherent", Mode::Coherent}, {"counting", Mode::Counting}},
+           "coherent: echoes of scatterers are summed with their phases; counting: random scatter events are counted.");
+  a.Number("maxBounces", sound.maxBounces, {0.0, 100.0}, "Reflections that are followed.");
+  a.Number("dynamicRangeDb", sound.dynamicRangeDb, {10.0, 300.0}, "A way ends where its echoes are this far below a mirror's.");
+  a.Flag("refraction", sound.refraction, "Rays bend where the speed of sound changes.");
+  a.Number("faceReflection", sound.faceReflection, {0.0, 1.0}, "Share of the pressure that the probe's face turns back.");
+  a.Number("faceRadiusMm", sound.faceRadius, {0.0, 1000.0}, "How far from the middle of the face that happens.");
+  a.Number("acceptanceDegrees", sound.acceptanceDegrees, {0.1, 90.0},
+           "How far from the normal a mirror's echo is still received.");
+  a.Number("maxSegments", sound.maxSegments, {1.0, 1e8}, "Pieces of one ray's way.");
+  a.Number("subRays", transport.subRays, {1.0, 4096.0}, "Rays of an element, spread over its aperture.");
+  a.Choice("sampling", transport.sampling, Choices<Sampling>(std::begin(samplings), std::end(samplings)), "How they are spread.");
+  a.Number("mirrorDb", transport.mirrorDb, {0.0, 120.0}, "A perfect mirror's echo beside the speckle of the reference tissue.");
+  a.Object("counting", transport.counting, false, "Of the mode counting.");
+}
+
+template <class A>
 void Describe(A& a, SceneItem& item)
 {
   a.Text("name", item.name, false, "Of the body.");
   a.OneOf(item.what, Form<ScenePacking>{"packing", "Packed spheres."}, Form<SceneMesh>{"mesh", "Triangles from a file."},
-          Form<AnatomyParameters>{"anatomy", "An invented abdomen."}, Form<SceneSphere>{"sphere", "A ball."},
-          Form<SceneBox>{"box", "A block."}, Form<SceneCylinder>{"cylinder", "A rod or a straight vessel."});
+          Form<AnatomyParameters>{"anatomy", "An invented abdomen."},
+          Form<CalibrationRigParameters>{"rig", "Balls in a water bath, to calibrate by."},
+          Form<SceneSphere>{"sphere", "A ball."}, Form<SceneBox>{"box", "A block."},
+          Form<SceneCylinder>{"cylinder", "A rod or a straight vessel."});
 }
 
 template <class A>
@@ -402,6 +470,7 @@ void Describe(A& a, SynthesisScene& scene)
     scene.transducer = ProbePresetOf(scene.probe.preset).transducer;
   a.ObjectOfPreset("transducer", scene.transducer, "How it sends and listens; numbers that are not said are the preset's.");
   a.Object("receiver", scene.receiver, false, "From echoes to grey.");
+  a.Object("transport", scene.transport, false, "How sound is followed, and how echoes are made.");
   a.Materials("materials", scene.materials, "Materials of this scene by name, beside the standard ones.");
   a.MaterialName("background", scene.background, false);
   a.List("tissue", scene.tissue, false, "What lies in the world; where several hold a point the later counts.");
@@ -1124,6 +1193,28 @@ const Material& SynthesisScene::MaterialOf(const std::string& wanted) const
       names += (names.empty() ? "" : ", ") + material.name;
     }
   throw Error(Error::Kind::InvalidParameter, "there is no material " + Shown(wanted) + "; there are " + names);
+}
+
+SynthesisParameters SynthesisScene::Parameters() const
+{
+  const ProbePreset resolved = probe.Resolve();
+  SynthesisParameters parameters;
+  parameters.mode = transport.mode;
+  parameters.probe = resolved.probe;
+  parameters.elements = resolved.elements;
+  parameters.steps = resolved.sweepSteps;
+  parameters.samples = resolved.samples;
+  parameters.transducer = transducer;
+  parameters.transport = transport.sound;
+  parameters.subRays = transport.subRays;
+  parameters.sampling = transport.sampling;
+  parameters.mirrorDb = transport.mirrorDb;
+  parameters.counting = transport.counting;
+  parameters.counting.assumedSoundSpeed = transducer.assumedSoundSpeed;
+  parameters.counting.seed = seed;
+  parameters.receiver = receiver;
+  parameters.seed = seed;
+  return parameters;
 }
 
 PackedTissueParameters SynthesisScene::ParametersOf(const ScenePacking& packing) const

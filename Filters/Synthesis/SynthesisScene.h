@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Anatomy.h"
+#include "CalibrationRig.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Material.h"
 #include "PackedTissue.h"
 #include "ProbePresets.h"
 #include "Receiver.h"
+#include "Synthesize.h"
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -110,7 +112,7 @@ struct ScenePacking {
 /// One entry of the list of tissue; it may stand for many bodies. Where several hold a point the later counts.
 struct SceneItem {
   std::string name; ///< may be empty
-  std::variant<ScenePacking, SceneMesh, AnatomyParameters, SceneSphere, SceneBox, SceneCylinder> what;
+  std::variant<ScenePacking, SceneMesh, AnatomyParameters, CalibrationRigParameters, SceneSphere, SceneBox, SceneCylinder> what;
 };
 
 /// Views side by side along a convex body, as PhantomViews() places them.
@@ -146,6 +148,16 @@ struct SceneSweep {
   Pose ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) const;
 };
 
+/// How echoes are made.
+struct SceneTransport {
+  SynthesisParameters::Mode mode = SynthesisParameters::Mode::Coherent;
+  SoundTransport sound;
+  int subRays = 1;                          ///< as in SynthesisParameters
+  Sampling sampling = Sampling::Stratified; ///< as in SynthesisParameters
+  double mirrorDb = SynthesisParameters().mirrorDb;
+  ScatterCounting counting; ///< of the mode counting; its speed of sound is the transducer's, its seed the scene's
+};
+
 struct SceneVolume {
   double spacingMm = 1.0;    ///< of the cubic voxels, in [0.05, 20]
   double knockMm = 8.0;      ///< how far every volume but the first is put out of place, in [0, 1000]
@@ -158,7 +170,8 @@ struct SynthesisScene {
   std::uint64_t seed = 1; ///< of everything random that has no seed of its own
   SceneProbe probe;
   Transducer transducer = ProbePresetOf("mechanical-3d").transducer; ///< numbers that a file does not say are the preset's
-  Receiver receiver;
+  Receiver receiver = SynthesisParameters::DefaultReceiver();
+  SceneTransport transport;
   std::vector<Material> materials; ///< the scene's own, which come before the standard ones
   std::string background = "water";
   std::vector<SceneItem> tissue;
@@ -172,6 +185,9 @@ struct SynthesisScene {
 
   /// The scene's material of that name, or the standard one. \throws Error(InvalidParameter) that lists the names.
   const Material& MaterialOf(const std::string& name) const;
+
+  /// What one volume is made with, the probe's pose apart. \throws Error(InvalidParameter) as SceneProbe::Resolve().
+  SynthesisParameters Parameters() const;
 
   /// With the scene's materials. \throws Error(InvalidParameter) for a material that is not there.
   PackedTissueParameters ParametersOf(const ScenePacking& packing) const;

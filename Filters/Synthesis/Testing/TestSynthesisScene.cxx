@@ -129,7 +129,7 @@ TEST(SynthesisScene, ReadsAnatomies)
 TEST(SynthesisScene, ReadsTheScanner)
 {
   const SynthesisScene scene = Parse(R"("probe": {"preset": "linear"}, "transducer": {"bandwidth": 0.5},
-    "receiver": {"tgcPoints": [{"depthMm": 0, "gainDb": 1}, {"depthMm": 50, "gainDb": 9}], "noiseDb": -30})");
+    "receiver": {"tgcDbPerCm": 0, "tgcPoints": [{"depthMm": 0, "gainDb": 1}, {"depthMm": 50, "gainDb": 9}], "noiseDb": -30})");
   EXPECT_EQ(scene.transducer.frequencyMHz, ProbePresetOf("linear").transducer.frequencyMHz); // the preset's
   EXPECT_EQ(scene.transducer.bandwidth, 0.5);
   EXPECT_EQ(scene.receiver.tgcPoints.size(), 2u);
@@ -137,7 +137,49 @@ TEST(SynthesisScene, ReadsTheScanner)
   EXPECT_EQ(scene.receiver.noiseDb, -30.0);
   ExpectComplaint(R"("transducer": {"frequencyMHz": 200})",
                   "scene.json: transducer.frequencyMHz: 200 is out of range; it must be in [0.5, 50]");
-  ExpectComplaint(R"("receiver": {"tgcPoints": [{"depthMm": 5}, {"depthMm": 5}]})", "scene.json: receiver: ");
+  ExpectComplaint(R"("receiver": {"tgcDbPerCm": 0, "tgcPoints": [{"depthMm": 5}, {"depthMm": 5}]})", "scene.json: receiver: ");
+}
+
+TEST(SynthesisScene, ReadsTheTransport)
+{
+  const SynthesisScene scene = Parse(R"("seed": 5, "transducer": {"assumedSoundSpeed": 1500}, "transport": {"mode": "counting",
+    "maxBounces": 2, "refraction": false, "subRays": 16, "sampling": "sobol", "faceRadiusMm": 7,
+    "counting": {"clarity": 0, "raysPerElement": 9, "sampling": "random"}}, "probe": {"elements": 33, "sweepSteps": 22})");
+  const SynthesisParameters parameters = scene.Parameters();
+  EXPECT_NO_THROW(parameters.Check());
+  EXPECT_EQ(parameters.mode, SynthesisParameters::Mode::Counting);
+  EXPECT_EQ(parameters.transport.maxBounces, 2);
+  EXPECT_EQ(parameters.transport.faceRadius, 7.0);
+  EXPECT_FALSE(parameters.transport.refraction);
+  EXPECT_EQ(parameters.subRays, 16);
+  EXPECT_EQ(parameters.sampling, Sampling::Sobol);
+  EXPECT_EQ(parameters.counting.clarity, 0.0);
+  EXPECT_EQ(parameters.counting.sampling, Sampling::Random);
+  EXPECT_EQ(parameters.counting.assumedSoundSpeed, 1500.0);
+  EXPECT_EQ(parameters.counting.seed, 5u);
+  EXPECT_EQ(parameters.seed, 5u);
+  EXPECT_EQ(parameters.BeamDimensions()[1], 33);
+  EXPECT_EQ(parameters.BeamDimensions()[2], 22);
+  ExpectComplaint(R"("transport": {"mode": "magic"})",
+                  "scene.json: transport.mode: \"magic\" is not known; there are \"coherent\", \"counting\"");
+  ExpectComplaint(R"("transport": {"counting": {"clarity": 201}})",
+                  "scene.json: transport.counting.clarity: 201 is out of range; it must be in [0, 200]");
+}
+
+TEST(SynthesisScene, ReadsRigs)
+{
+  const SynthesisScene scene =
+      Parse(Tissue(R"({"rig": {"waterCelsius": 30, "balls": [{"name": "a", "centre": [0, 0, -30], "radius": 5}]}})"));
+  const auto& rig = std::get<CalibrationRigParameters>(scene.tissue[0].what);
+  EXPECT_EQ(rig.waterCelsius, 30.0);
+  ASSERT_EQ(rig.balls.size(), 1u);
+  EXPECT_EQ(rig.balls[0].name, "a");
+  EXPECT_EQ(std::get<CalibrationRigParameters>(Parse(Tissue(R"({"rig": {}})")).tissue[0].what).balls.size(), 7u);
+  ExpectComplaint(Tissue(R"({"rig": {"waterCelsius": 100}})"),
+                  "scene.json: tissue[0].rig.waterCelsius: 100 is out of range; it must be in [0, 95]");
+  ExpectComplaint(Tissue(R"({"rig": {"balls": [{"radius": 50}]}})"),
+                  "scene.json: tissue[0].rig.balls[0].radius: 50 is out of range");
+  ExpectComplaint(Tissue(R"({"rig": {"material": "cheese"}})"), "scene.json: tissue[0].rig: ");
 }
 
 TEST(SynthesisScene, PlacesMeshes)
@@ -310,6 +352,11 @@ TEST(SynthesisScene, ComesBackBitByBit)
   anatomy.ribs = 1;
   anatomy.liver = false;
   scene.tissue.push_back({"", anatomy});
+  CalibrationRigParameters rig;
+  rig.balls[0].centre.x() += 1.0 / 3.0;
+  scene.tissue.push_back({"", rig});
+  scene.transport.sound.acceptanceDegrees = 5.0 / 3.0;
+  scene.transport.counting.coneDegrees = 0.1 + 0.2;
   scene.transducer.bandwidth = 1.0 / 3.0;
   scene.receiver.tgcPoints = {{0.1, 0.2}, {1.0 / 3.0, 4.0}};
   SceneRecording recording;
@@ -334,6 +381,9 @@ TEST(SynthesisScene, ComesBackBitByBit)
   EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).spheres.radiusMin, packing.spheres.radiusMin);
   EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).materials[0].weight, 1.0 / 3.0);
   EXPECT_EQ(std::get<AnatomyParameters>(back.tissue[6].what).fatMm, anatomy.fatMm);
+  EXPECT_EQ(std::get<CalibrationRigParameters>(back.tissue[7].what).balls[0].centre, rig.balls[0].centre);
+  EXPECT_EQ(back.transport.sound.acceptanceDegrees, scene.transport.sound.acceptanceDegrees);
+  EXPECT_EQ(back.transport.counting.coneDegrees, scene.transport.counting.coneDegrees);
   EXPECT_EQ(back.transducer.bandwidth, scene.transducer.bandwidth);
   EXPECT_EQ(back.receiver.tgcPoints[1].depthMm, scene.receiver.tgcPoints[1].depthMm);
   EXPECT_EQ(std::get<SceneRecording>(back.views).smoothSeconds, recording.smoothSeconds);
@@ -393,5 +443,5 @@ TEST(SynthesisScene, ExamplesAreSoundAndTheirSchemaIsOurs)
       ++scenes;
     }
   }
-  EXPECT_GE(scenes, 3);
+  EXPECT_GE(scenes, 4);
 }
