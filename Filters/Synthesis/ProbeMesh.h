@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ProbeGeometry.h"
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace echorama {
+
+/// What is around the face of a probe. Lengths in mm.
+struct ProbeHousing {
+  double rimMm = 4.0;              ///< radius of the edge between face and wall, in [0.1, 50]
+  double skirtMm = 10.0;           ///< straight wall below the lowest point of that edge, in [0.1, 200]
+  double neckMm = 30.0;            ///< from the wall to the handle, in [1, 500]
+  double handleMm = 80.0;          ///< length of the handle, in [1, 1000]
+  double handleWidthMm = 30.0;     ///< along the fan, in [1, 500]
+  double handleThicknessMm = 22.0; ///< along the sweep, in [1, 500]
+  double faceWidthMm = 22.0;       ///< of a phased array's face: its beams start in one point, which has no size; in [1, 300]
+  /// Of the face of a single plane, and of a sweep about a line in the face; in [1, 300].
+  double faceThicknessMm = 13.0;
+  double resolutionMm = 1.5; ///< edge of the triangles, about; in [0.1, 50]
+
+  /// Throws Error(InvalidParameter) that names the number that is out of its range.
+  void Check() const;
+};
+
+/// A probe as a solid in its own frame: the face that meets the skin (dissertation 3.1.1), a rounded edge, walls, and a neck that
+/// leads to a handle. Closed, outward, free of self-intersections, and so fit for printing and for physics.
+struct ProbeMesh {
+  enum Part : unsigned char { Face, Housing, Handle };
+
+  std::vector<Eigen::Vector3d> points;                 ///< mm; those of the face come first
+  std::vector<std::array<std::uint32_t, 3>> triangles; ///< counter-clockwise as seen from outside; those of the face come first
+  std::vector<unsigned char> part;                     ///< of each triangle
+  std::size_t facePoints = 0;
+  /// The geometry at whose depth 0 the points of the face lie: the probe's own, but for faces that have no size
+  /// (ProbeHousing::faceWidthMm, faceThicknessMm) and for fans that are a part of their array, which is shown whole.
+  ProbeGeometry face;
+
+  /// mm^3.
+  double Volume() const;
+};
+
+/// Builds the solid.
+/// \throws Error(InvalidParameter) as the two Check()s, and when it cannot be built, with the reason: a fan of more than half a
+/// turn, a sweep of 178 degrees or more, a fan that reaches the sweep axis, where the face would cut itself; Error(TooLarge)
+/// beyond 5 million triangles.
+ProbeMesh MakeProbeMesh(const ProbeGeometry& geometry, const ProbeHousing& housing = {});
+
+/// Where the beams begin, in the probe's frame, fan fastest: origin on the face (depth 0), +x along the array, +z along the beam.
+/// \throws Error(InvalidParameter) as ProbeGeometry::Check() and for counts outside [1, 65536]; Error(TooLarge) beyond 2^24.
+std::vector<Pose> ElementPoses(const ProbeGeometry& geometry, int elements, int sweepSteps);
+
+/// Where element \a index of \a count lies, -0.5 ... 0.5; the middle when there is one.
+inline double PositionOf(int index, int count)
+{
+  return count > 1 ? static_cast<double>(index) / (count - 1) - 0.5 : 0.0;
+}
+
+} // namespace echorama
