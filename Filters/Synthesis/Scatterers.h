@@ -19,7 +19,7 @@ using BoxPredicate = std::function<bool(const Eigen::AlignedBox3d& box)>;
 
 /// How scatterers are strewn.
 struct ScattererParameters {
-  std::uint64_t seed = 1; ///< of places and strengths
+  std::uint64_t seed = 1; ///< of places and signs
   /// Of the lattice, in [0, 1000]; 0: the largest of all materials. Materials that have more get this many, as loud as before.
   double densityPerMm3 = 0.0;
   /// Where the material has gone: world = material + displacement at the material's place. None: it is at rest. Must live
@@ -33,12 +33,16 @@ struct ScattererParameters {
 
 /// The points that scatter sound, fixed to the material.
 ///
-/// One lies at random in every cell of a lattice in the material's own coordinates; its place, its strength (standard normal,
-/// real) and its rank are hashed from the seed and the cell (Philox). So the same tissue has the same scatterers in every
+/// One lies at random in every cell of a lattice in the material's own coordinates; its place, its sign (as likely plus as
+/// minus) and its rank are hashed from the seed and the cell (Philox). So the same tissue has the same scatterers in every
 /// volume, and where it is displaced they go along. A material with fewer scatterers than the lattice keeps those of low rank:
-/// sparser ones are subsets of denser ones. The amplitude of a scatterer is its strength times
-/// sqrt(backscattered power of its material / density of its material), so that the speckle of a material with enough of them
-/// has the same level however many there are.
+/// sparser ones are subsets of denser ones. The amplitude of a scatterer is its sign times
+/// sqrt(backscattered power of its material / density of its material), so that the speckle of a material has the same level
+/// however many there are.
+///
+/// All of a material are equally strong: with n in the resolution cell (BeamWidth::ResolutionCellMm3) the intensity I of the
+/// speckle has <I^2> / <I>^2 = 2 + (1 - 2 c) / n, where c in [0, 1] tells how evenly they lie: nearly 0 where a cell of the
+/// lattice is larger than the pulse is long. At n = 30 that is Rayleigh's speckle to 1%.
 ///
 /// They lie in bricks: blocks of the lattice wherever they went in the world, with places relative to the brick in
 /// single precision (1e-6 mm, however far away the world is).

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the speckle is like: the statistics of its envelope, and how it changes when the tissue slides or the beam turns.
+#include "Core/Base/Random.h"
 #include "SpeckleTools.h"
 #include <gtest/gtest.h>
 
@@ -83,37 +84,82 @@ Statistics SpeckleWith(double perCell, double keep, int along)
   return StatisticsOf(field.Rows(HeardBy(field.beams, transducer, tissue, parameters), transducer));
 }
 
-// Of a K distribution whose intensity has the ratio 2 + 1 / n: shape 2 n.
-double KDistributionSnr(double n)
+// The same by brute force: one scatterer in every cell of a lattice around the response, in random places, with random phases.
+double BruteForceSnr(double perCell)
 {
-  const double shape = 2.0 * n;
-  const double squaredMean =
-      0.25 * pi * std::exp(2.0 * (std::lgamma(shape + 0.5) - std::lgamma(shape))) / shape; // of <A>^2 / <A^2>
-  return std::sqrt(squaredMean / (1.0 - squaredMean));
+  const Transducer transducer;
+  const BeamWidth width = WidthAt(transducer, depth);
+  const double cell = std::cbrt(width.ResolutionCellMm3(transducer.PulseSigmaMm()) / perCell);
+  const double cells[3] = {cell / transducer.PulseSigmaMm(), cell / width.lateralSigma, cell / width.elevationSigma};
+  Random random(9);
+  double n = 0.0, one = 0.0, two = 0.0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    // Along each axis: distance squared of jittered places, by cell.
+    double offset[3];
+    int count[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      count[axis] = static_cast<int>(std::ceil(8.0 / cells[axis])) + 1;
+      offset[axis] = -4.0 - random.Uniform() * cells[axis];
+    }
+    std::complex<double> sum;
+    for (int k = 0; k < count[2]; ++k)
+      for (int j = 0; j < count[1]; ++j)
+        for (int i = 0; i < count[0]; ++i) {
+          double square = 0.0;
+          const int index[3] = {i, j, k};
+          for (int axis = 0; axis < 3; ++axis)
+            square += std::pow(offset[axis] + (index[axis] + random.Uniform()) * cells[axis], 2);
+          sum += std::polar(std::exp(-0.5 * square), 2.0 * pi * random.Uniform());
+        }
+    n += 1.0;
+    one += std::abs(sum);
+    two += std::norm(sum);
+  }
+  return one / n / std::sqrt(two / n - one * one / (n * n));
+}
+
+// How evenly scatterers of a lattice lie that keeps a share of them, in units of the response: 1 for a fine and full lattice, 0
+// for Poisson's. Per axis, the mean of the autocorrelation of the squared response over pairs of places in one cell.
+double Evenness(double perCell, double keep)
+{
+  const Transducer transducer;
+  const BeamWidth width = WidthAt(transducer, depth);
+  const double cell = std::cbrt(keep * width.ResolutionCellMm3(transducer.PulseSigmaMm()) / perCell);
+  double evenness = keep;
+  for (const double sigma : {transducer.PulseSigmaMm(), width.lateralSigma, width.elevationSigma}) {
+    double sum = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      const double part = (i + 0.5) / 1000.0, d = part * cell / sigma;
+      sum += 2.0 * (1.0 - part) * std::exp(-0.5 * d * d) / 1000.0;
+    }
+    evenness *= sum;
+  }
+  return evenness;
 }
 
 } // namespace
 
 TEST(Speckle, IsFullyDevelopedWithThirtyPerCell)
 {
-  const Statistics statistics = SpeckleWith(30.0, 1.0, 30); // 55,000 samples
-  EXPECT_NEAR(statistics.snr, 1.91, 0.03);
+  EXPECT_NEAR(SpeckleWith(30.0, 1.0, 30).snr, 1.91, 0.03); // 55,000 samples
 }
 
 TEST(Speckle, FallsShortOfRayleighWithFewScatterers)
 {
-  // One normal strength per cell of a fine lattice: <I^2> / <I>^2 = 2 + (3 - 2) / n, as that of n Poisson scatterers of equal
-  // strength. The envelope is close to a K distribution of the same ratio.
-  double before = 2.0;
+  // With n in the cell, <I^2> / <I>^2 = 2 + (1 - 2 evenness) / n.
+  double before = 1.95;
   for (const double perCell : {10.0, 3.0, 1.0}) {
     const Statistics statistics = SpeckleWith(perCell, 1.0, 30);
-    EXPECT_NEAR(statistics.intensityRatio, 2.0 + 1.0 / perCell, 0.05 + 0.1 / perCell) << perCell;
-    EXPECT_NEAR(statistics.snr / KDistributionSnr(perCell), 1.0, 0.06) << perCell;
+    const double excess = (1.0 - 2.0 * Evenness(perCell, 1.0)) / perCell;
+    EXPECT_NEAR(statistics.intensityRatio, 2.0 + excess, 0.05 + 0.05 / perCell) << perCell;
+    EXPECT_NEAR(statistics.snr, BruteForceSnr(perCell), 0.04) << perCell;
     EXPECT_LT(statistics.snr, before);
     before = statistics.snr;
   }
-  // Those that are left of a denser lattice lie as Poisson's: 2 + 3 / n when few are left.
-  EXPECT_NEAR(SpeckleWith(3.0, 0.1, 30).intensityRatio, 2.0 + (3.0 - 0.2) / 3.0, 0.15);
+  // Those that are left of a denser lattice lie as Poisson's.
+  const double excess = (1.0 - 2.0 * Evenness(3.0, 0.1)) / 3.0;
+  EXPECT_NEAR(excess, 1.0 / 3.0, 0.04);
+  EXPECT_NEAR(SpeckleWith(3.0, 0.1, 30).intensityRatio, 2.0 + excess, 0.06);
 }
 
 TEST(Speckle, OfSlidingTissueDecorrelatesAsThePointSpread)
