@@ -20,8 +20,9 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 from echorama import vtkUltrasoundAnatomySource
 
 COLOURS = {
-    "skin": (0.87, 0.68, 0.58), "fat": (0.95, 0.87, 0.60), "fascia": (0.96, 0.96, 0.93), "muscle": (0.72, 0.32, 0.29),
-    "tissue": (0.83, 0.66, 0.60), "septum": (0.98, 0.97, 0.90), "bone": (0.93, 0.91, 0.84), "liver": (0.52, 0.22, 0.18),
+    "skin": (0.87, 0.68, 0.58), "subcutaneous-fat": (0.95, 0.87, 0.60), "fascia": (0.96, 0.96, 0.93), "muscle-wall": (0.72, 0.32, 0.29),
+    "mesentery": (0.83, 0.66, 0.60), "lobule-bright": (0.93, 0.83, 0.62), "lobule-dark": (0.80, 0.58, 0.52), "bowel-wall": (0.74, 0.47, 0.44),
+    "bowel": (0.66, 0.56, 0.42), "fat-septum": (0.98, 0.97, 0.90), "muscle-septum": (0.90, 0.62, 0.56), "bone": (0.93, 0.91, 0.84), "liver": (0.52, 0.22, 0.18),
     "capsule": (0.80, 0.62, 0.56), "kidney": (0.62, 0.29, 0.25), "kidney-medulla": (0.45, 0.16, 0.16),
     "renal-sinus": (0.94, 0.86, 0.62), "bile": (0.42, 0.58, 0.25), "stone": (0.95, 0.93, 0.80), "cyst": (0.45, 0.68, 0.80),
     "lesion-dark": (0.30, 0.24, 0.34), "lesion-bright": (0.96, 0.76, 0.42), "blood": (0.25, 0.33, 0.70),
@@ -121,7 +122,7 @@ def main():
         if opened.GetNumberOfCells():
             shown += 1
             add(whole, opened, COLOURS[material], smooth=False)
-        if name in layers or "septum" in name or "capsule" in name or "wall" in name:
+        if name in layers or "septum" in name or "capsule" in name or "wall" in name or name in ("lobule", "bowel"):
             continue
         see_through = {"liver": 0.22, "kidney": 0.35, "gallbladder": 0.45}.get(name, 1.0)
         colour = (0.72, 0.25, 0.25) if name == "aorta" else (0.30, 0.45, 0.55) if name == "hepatic vein" else COLOURS[material]

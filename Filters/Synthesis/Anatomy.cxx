@@ -25,7 +25,20 @@ using Eigen::Vector3d;
 
 constexpr double pi = 3.14159265358979323846;
 
-enum class Part : std::uint64_t { Layers = 1, Septa, Liver, Kidney, Gallbladder, Stones, Lesions, Portal, Hepatic, Great, Ribs };
+enum class Part : std::uint64_t {
+  Layers = 1,
+  Septa,
+  Lumps,
+  Liver,
+  Kidney,
+  Gallbladder,
+  Stones,
+  Lesions,
+  Portal,
+  Hepatic,
+  Great,
+  Ribs
+};
 
 Random StreamOf(const AnatomyParameters& p, Part part)
 {
@@ -121,6 +134,16 @@ Material Mixed(const char* of, const char* name, double backscatterDb)
   return material;
 }
 
+// Thin tissue that shows by its density: were sound much faster in it than beside it, it would be thrown back whole where it
+// grazes a sheet, and each sheet would cast shadows.
+Material Sheet(const char* name, double backscatterDb, double soundSpeed)
+{
+  Material material = Mixed("capsule", name, backscatterDb);
+  material.soundSpeed = soundSpeed;
+  material.density = 1180.0;
+  return material;
+}
+
 // The wall of the trunk: at which depth each of its layers begins.
 class Wall {
 public:
@@ -186,6 +209,7 @@ public:
     AddWall();
     progress_(0.3);
     AddSepta();
+    AddLumps();
     AddBones();
     AddGreatVessels();
     progress_(0.5);
@@ -231,7 +255,7 @@ private:
   {
     Organ organ{centre, radius, p_.capsuleMm > 0.0 ? Shell(radius, -p_.capsuleMm) : radius};
     if (p_.capsuleMm > 0.0)
-      Blob(name + " capsule", StandardMaterial("capsule"), centre, organ.radius, p_.detailMm);
+      Blob(name + " capsule", Sheet("capsule", 9.0, 1560.0), centre, organ.radius, p_.detailMm);
     Blob(name, material, centre, organ.inner, p_.detailMm);
     return organ;
   }
@@ -260,13 +284,13 @@ private:
   // Leaves that lie nearly flat: broad ones in the fat, narrow ones along the fibres of the muscle.
   void AddSepta()
   {
-    const Material septum = Mixed("capsule", "septum", 3.0);
+    const Material ofFat = Sheet("fat-septum", 6.0, 1465.0), ofMuscle = Sheet("muscle-septum", 5.0, 1575.0);
     for (int i = 0; i < p_.septa; ++i) {
       Random random(p_.seed, static_cast<std::uint64_t>(Part::Septa) + (static_cast<std::uint64_t>(i + 1) << 8));
       const bool inFat = i % 3 != 0;
       const int layer = inFat ? 1 : 3;
       for (int attempt = 0; attempt < 20; ++attempt) {
-        const double length = random.Uniform(7.0, 16.0), width = inFat ? random.Uniform(5.0, 10.0) : random.Uniform(1.5, 3.0);
+        const double length = random.Uniform(7.0, 16.0), width = inFat ? random.Uniform(5.0, 10.0) : random.Uniform(2.5, 5.0);
         const double x = random.Uniform(-0.5, 0.5) * (p_.trunkWidthMm - 50.0);
         const double y = random.Uniform(-0.5, 0.5) * (p_.trunkLengthMm - 50.0);
         const double from = wall_.Depth(layer, x, y), to = wall_.Depth(layer + 1, x, y);
@@ -279,11 +303,35 @@ private:
           return at.z() > wall_.Depth(layer, at.x(), at.y()) + 0.6 && at.z() < wall_.Depth(layer + 1, at.x(), at.y()) - 0.6;
         };
         if (inside(0, 0) && inside(length, 0) && inside(-length, 0) && inside(0, width) && inside(0, -width)) {
-          Blob(inFat ? "septum of fat" : "septum of muscle", septum, {x, y, z},
-               EllipsoidRadius({length, width, random.Uniform(0.2, 0.35)}, axes), std::max(length / 8.0, p_.detailMm));
+          Blob(inFat ? "septum of fat" : "septum of muscle", inFat ? ofFat : ofMuscle, {x, y, z},
+               EllipsoidRadius({length, width, random.Uniform(0.3, 0.5)}, axes), length / 2.5);
           break;
         }
       }
+    }
+  }
+
+  // What fills the room around the organs: lobules of fat and loops of bowel, brighter and darker than the rest.
+  void AddLumps()
+  {
+    const std::array<Material, 4> stuff{Mixed("tissue", "lobule-bright", 8.0), Mixed("tissue", "lobule-dark", -5.0),
+                                        Mixed("tissue", "bowel-wall", -10.0), Mixed("tissue", "bowel", 1.0)};
+    const double from = wall_.Deepest() + 4.0, to = p_.standoffMm + p_.trunkDepthMm - 10.0;
+    for (int i = 0; i < p_.lumps; ++i) {
+      Random random(p_.seed, static_cast<std::uint64_t>(Part::Lumps) + (static_cast<std::uint64_t>(i + 1) << 8));
+      const Vector3d radii(random.Uniform(5.0, 16.0), random.Uniform(5.0, 22.0), random.Uniform(3.5, 10.0));
+      const Eigen::Matrix3d axes = Eigen::AngleAxisd(random.Uniform(-0.4, 0.4), random.Direction()).toRotationMatrix();
+      const double most = radii.maxCoeff();
+      const double x = random.Uniform(-1.0, 1.0) * (0.5 * p_.trunkWidthMm - most - edge);
+      const double y = random.Uniform(-1.0, 1.0) * (0.5 * p_.trunkLengthMm - most - edge);
+      const double z = random.Uniform(from + most, std::max(from + most, to - most));
+      if (z + most > to)
+        continue;
+      const RadiusOf shape = Bent(EllipsoidRadius(radii, axes), Waviness(random), 0.2);
+      const bool loop = i % 3 == 2;
+      Blob(loop ? "bowel wall" : "lobule", stuff[loop ? 2 : static_cast<std::size_t>(i % 3)], {x, y, z}, shape, most / 2.5);
+      if (loop)
+        Blob("bowel", stuff[3], {x, y, z}, Shell(shape, -0.25 * radii.minCoeff()), most / 2.5);
     }
   }
 
@@ -328,7 +376,7 @@ private:
     for (double y = -half; y <= half; y += 2.0)
       path.push_back(Place(x, 0.0, z) + Vector3d(sway * std::sin(y / 35.0 + phase), y, 0.3 * sway * std::cos(y / 28.0 + phase)));
     const double wall = std::min(0.12, p_.wallShare) * radius;
-    AddTube(tissue_, name + " wall", StandardMaterial("vessel-wall"), path, std::vector<double>(path.size(), radius + wall),
+    AddTube(tissue_, name + " wall", Sheet("vessel-wall", 8.0, 1572.0), path, std::vector<double>(path.size(), radius + wall),
             DetailFor(2.0 * radius));
     AddTube(tissue_, name, StandardMaterial("blood"), path, std::vector<double>(path.size(), radius), DetailFor(2.0 * radius));
   }
@@ -453,8 +501,8 @@ private:
         if (wall)
           for (double& r : radius)
             r *= 1.0 + p_.wallShare;
-        AddTube(tissue_, wall ? name + " wall" : name, StandardMaterial(wall ? "vessel-wall" : "blood"), stem.path, radius,
-                std::min(p_.detailMm, 0.45 * stem.radius.front()));
+        AddTube(tissue_, wall ? name + " wall" : name, wall ? Sheet("vessel-wall", 8.0, 1572.0) : StandardMaterial("blood"),
+                stem.path, radius, std::min(p_.detailMm, 0.45 * stem.radius.front()));
       }
     }
   }
@@ -502,7 +550,7 @@ private:
     };
     const RadiusOf inner = p_.capsuleMm > 0.0 ? Shell(pear, -p_.capsuleMm) : pear;
     if (p_.capsuleMm > 0.0)
-      Blob("gallbladder wall", StandardMaterial("capsule"), centre, pear, 0.7 * p_.detailMm);
+      Blob("gallbladder wall", Sheet("capsule", 9.0, 1560.0), centre, pear, 0.7 * p_.detailMm);
     Blob("gallbladder", Mixed("cyst", "bile", Material::clearDb), centre, inner, 0.7 * p_.detailMm);
 
     // Stones lie on the wall that is farthest from the probe, side by side along the gallbladder.
@@ -547,7 +595,8 @@ const std::vector<AnatomyParameter>& AnatomyParameterTable()
       {"fatMm", &P::fatMm, 2.0, 60.0},
       {"muscleMm", &P::muscleMm, 2.0, 30.0},
       {"fasciaMm", &P::fasciaMm, 0.0, 2.0},
-      {"septa", &P::septa, 0.0, 400.0},
+      {"septa", &P::septa, 0.0, 2000.0},
+      {"lumps", &P::lumps, 0.0, 1000.0},
       {"liver", &P::liver, 0.0, 1.0},
       {"kidney", &P::kidney, 0.0, 1.0},
       {"gallbladder", &P::gallbladder, 0.0, 1.0},

@@ -29,7 +29,8 @@ struct AnatomyParameters {
   double fatMm = 12.0;          ///< in [2, 60]
   double muscleMm = 10.0;       ///< in [2, 30]
   double fasciaMm = 0.7;        ///< bright sheets on both sides of the muscle, in [0, 2]; 0: none
-  int septa = 60;               ///< thin bright leaves in fat and muscle, in [0, 400]
+  int septa = 600;              ///< thin bright leaves in fat and muscle, in [0, 2000]
+  int lumps = 700;              ///< lobules of fat and loops of bowel around the organs, in [0, 1000]
 
   // Organs.
   bool liver = true;
