@@ -9,6 +9,8 @@
 //
 // Self-intersections: a tree of boxes yields the pairs whose boxes meet, and signs of volumes of tetrahedra tell whether an
 // edge of one goes through the other. Signs within the rounding error count as zero, and zero as touching.
+//
+// Holes: open edges, followed against the way of their triangles, run around each hole, which triangles about its middle cover.
 #include "SurfaceCheck.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
@@ -492,6 +494,62 @@ std::vector<std::uint32_t> Weld(const std::vector<Vector3f>& points, double dist
   return target;
 }
 
+// Turns triangles so that components face outwards.
+void TurnOutwards(TriangleSurface& surface)
+{
+  const Mesh mesh(surface);
+  const Orientation orientation = Orient(mesh, SortedEdges(mesh));
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+    if (orientation.turn[i])
+      std::swap(surface.triangles[i][1], surface.triangles[i][2]);
+}
+
+// Follows the open edges around each hole and covers it. \returns how many were closed.
+std::int64_t CloseHoles(TriangleSurface& surface)
+{
+  std::unordered_map<std::uint32_t, std::uint32_t> next; // along the border, as the new triangles go
+  std::vector<std::uint32_t> starts;
+  std::vector<std::uint32_t> branching;
+  ForEachEdge(SortedEdges(Mesh(surface)), [&](const Edge* first, const Edge* last) {
+    if (last - first == 1) {
+      const std::uint32_t from = first->upwards ? first->high : first->low, to = first->upwards ? first->low : first->high;
+      if (!next.emplace(from, to).second)
+        branching.push_back(from);
+      starts.push_back(from);
+    }
+  });
+  for (const std::uint32_t point : branching)
+    next.erase(point);
+  std::int64_t closed = 0;
+  for (const std::uint32_t start : starts) {
+    std::vector<std::uint32_t> border;
+    std::uint32_t at = start;
+    do {
+      const auto found = next.find(at);
+      if (found == next.end())
+        break;
+      border.push_back(at);
+      at = found->second;
+      next.erase(found);
+    } while (at != start);
+    if (at != start || border.size() < 3)
+      continue; // it was covered before, or its border branches
+    ++closed;
+    if (border.size() == 3) {
+      surface.triangles.push_back({border[0], border[1], border[2]});
+      continue;
+    }
+    Vector3d middle = Vector3d::Zero();
+    for (const std::uint32_t point : border)
+      middle += surface.points[point].cast<double>() / static_cast<double>(border.size());
+    const auto centre = static_cast<std::uint32_t>(surface.points.size());
+    surface.points.push_back(middle.cast<float>());
+    for (std::size_t i = 0; i < border.size(); ++i)
+      surface.triangles.push_back({border[i], border[(i + 1) % border.size()], centre});
+  }
+  return closed;
+}
+
 std::string PlaceText(const SurfaceFault& fault)
 {
   if (fault.places.empty())
@@ -602,15 +660,17 @@ SurfaceMending MendSurface(TriangleSurface& surface, const SurfaceMendParameters
   surface.points.swap(points);
   surface.triangles.swap(kept);
 
-  if (parameters.orient) {
-    const Mesh welded(surface);
-    const Orientation orientation = Orient(welded, SortedEdges(welded));
-    for (std::size_t i = 0; i < surface.triangles.size(); ++i)
-      if (orientation.turn[i]) {
-        std::swap(surface.triangles[i][1], surface.triangles[i][2]);
-        ++mending.turnedTriangles;
-      }
+  const std::vector<Corners> before = surface.triangles;
+  if (parameters.orient)
+    TurnOutwards(surface);
+  progress(0.7);
+  if (parameters.closeHoles) {
+    mending.closedHoles = CloseHoles(surface);
+    if (parameters.orient && mending.closedHoles > 0)
+      TurnOutwards(surface); // which side is outside is certain only now
   }
+  for (std::size_t i = 0; i < before.size(); ++i)
+    mending.turnedTriangles += surface.triangles[i] != before[i];
   progress(1.0);
   return mending;
 }

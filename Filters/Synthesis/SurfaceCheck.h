@@ -59,6 +59,8 @@ SurfaceReport CheckSurface(const TriangleSurface& surface, const SurfaceCheckPar
 struct SurfaceMendParameters {
   double weldMm = 1e-3; ///< points nearer than that become one, in [0, 10]; 0: those that are equal
   bool orient = true;   ///< turn triangles so that each component faces outwards, and each cavity inwards
+  /// Close each hole by triangles about the middle of its border. Holes whose border branches stay open.
+  bool closeHoles = false;
 };
 
 /// What was mended.
@@ -66,10 +68,11 @@ struct SurfaceMending {
   std::int64_t weldedPoints = 0;     ///< that went into another, or were used by no triangle
   std::int64_t droppedTriangles = 0; ///< two corners alike, or one that is not finite
   std::int64_t turnedTriangles = 0;
+  std::int64_t closedHoles = 0;
 };
 
-/// Mends what can be mended without inventing surface: files repeat points at seams, and exporters turn triangles.
-/// Holes and self-intersections stay. \throws as CheckSurface.
+/// Mends what files do to surfaces: they repeat points at seams, turn triangles, and leave holes where organs were cut.
+/// Self-intersections stay. \throws as CheckSurface.
 SurfaceMending MendSurface(TriangleSurface& surface, const SurfaceMendParameters& parameters = {}, const Progress& progress = {});
 
 } // namespace echorama

@@ -288,6 +288,57 @@ TEST(SurfaceCheck, TurnsWhatIsTurned)
   EXPECT_EQ(MendSurface(left, leave).turnedTriangles, 0);
 }
 
+TEST(SurfaceCheck, ClosesHoles)
+{
+  SurfaceMendParameters close;
+  close.closeHoles = true;
+  TriangleSurface ball = Ball(10.0, {5, 6, 7}, 3);
+  const double whole = CheckSurface(ball).volumeMm3;
+  EXPECT_EQ(MendSurface(ball, close).closedHoles, 0);
+  ball.triangles.erase(ball.triangles.begin() + 100); // one triangle
+  std::vector<std::array<std::uint32_t, 3>> kept;     // and a cap: cut off at x = 12 or so
+  for (const auto& corners : ball.triangles)
+    if (ball.points[corners[0]].x() < 12 || ball.points[corners[1]].x() < 12 || ball.points[corners[2]].x() < 12)
+      kept.push_back(corners);
+  ball.triangles = kept;
+  for (const bool turned : {false, true}) {
+    TriangleSurface open;
+    Add(open, ball, turned);
+    const SurfaceMending mending = MendSurface(open, close);
+    EXPECT_EQ(mending.closedHoles, 2);
+    EXPECT_EQ(mending.turnedTriangles, turned ? static_cast<std::int64_t>(kept.size()) : 0);
+    const SurfaceReport report = CheckSurface(open);
+    EXPECT_TRUE(report.IsSound()) << report.Faults();
+    const double height = 10.0 - 7.0; // of the cap
+    EXPECT_NEAR((whole - report.volumeMm3) / (pi * height * height * (30.0 - height) / 3.0), 0.9, 0.2);
+  }
+  TriangleSurface cube = Cube({0, 0, 0}, 2);
+  cube.triangles.erase(cube.triangles.begin() + 11);
+  EXPECT_EQ(MendSurface(cube, close).closedHoles, 1);
+  EXPECT_TRUE(CheckSurface(cube).IsSound());
+  TriangleSurface tent; // two triangles back to back, of which one is missing
+  tent.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  tent.triangles = {{0, 1, 2}};
+  MendSurface(tent, close);
+  EXPECT_EQ(CheckSurface(tent).openEdges.count, 0);
+  TriangleSurface branching = Ball(10.0); // two holes that share a corner stay open
+  const std::uint32_t corner = branching.triangles[0][0];
+  std::vector<std::array<std::uint32_t, 3>> around;
+  for (const auto& corners : branching.triangles)
+    if (corners[0] == corner || corners[1] == corner || corners[2] == corner)
+      around.push_back(corners);
+  const auto drop = [&branching](const std::array<std::uint32_t, 3>& corners) {
+    branching.triangles.erase(std::find(branching.triangles.begin(), branching.triangles.end(), corners));
+  };
+  const auto share = [](const std::array<std::uint32_t, 3>& a, const std::array<std::uint32_t, 3>& b) {
+    return std::count_if(a.begin(), a.end(), [&b](std::uint32_t point) { return std::count(b.begin(), b.end(), point) > 0; });
+  };
+  drop(around[0]);
+  drop(*std::find_if(around.begin(), around.end(), [&](const auto& corners) { return share(corners, around[0]) == 1; }));
+  EXPECT_EQ(MendSurface(branching, close).closedHoles, 0);
+  EXPECT_EQ(CheckSurface(branching).openEdges.count, 6);
+}
+
 TEST(SurfaceCheck, DropsWhatIsNoTriangle)
 {
   TriangleSurface surface = Ball(10.0);
