@@ -365,6 +365,7 @@ struct Hit {
   float distance;
   std::uint32_t triangle;
   Eigen::Vector3f normal; // of the triangle, any length
+  float u, v;             // where in the triangle
 };
 
 struct Collector {
@@ -380,10 +381,12 @@ void Collect(const RTCFilterFunctionNArguments* arguments)
       continue;
     const std::uint32_t triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
     if (std::none_of(hits.begin(), hits.end(), [triangle](const Hit& hit) { return hit.triangle == triangle; }))
-      hits.push_back(
-          {RTCRayN_tfar(arguments->ray, arguments->N, i), triangle,
-           Eigen::Vector3f(RTCHitN_Ng_x(arguments->hit, arguments->N, i), RTCHitN_Ng_y(arguments->hit, arguments->N, i),
-                           RTCHitN_Ng_z(arguments->hit, arguments->N, i))});
+      hits.push_back({RTCRayN_tfar(arguments->ray, arguments->N, i),
+                      triangle,
+                      {RTCHitN_Ng_x(arguments->hit, arguments->N, i), RTCHitN_Ng_y(arguments->hit, arguments->N, i),
+                       RTCHitN_Ng_z(arguments->hit, arguments->N, i)},
+                      RTCHitN_u(arguments->hit, arguments->N, i),
+                      RTCHitN_v(arguments->hit, arguments->N, i)});
     arguments->valid[i] = 0; // go on
   }
 }
@@ -420,8 +423,7 @@ struct Meeting {
   struct Change {
     std::int32_t shell;
     int balance; // how often it was entered less how often it was left
-    std::uint32_t triangle;
-    Eigen::Vector3f normal;
+    Hit hit;     // one of them
   };
   std::vector<Change> changes; // of which shells; sheets have a balance of 0
   double first = 0.0, last = 0.0;
@@ -436,7 +438,7 @@ bool CountMemory(void* bytes, ssize_t more, bool)
 } // namespace
 
 struct AcousticScene::State {
-  State(const TissueSurface& surface, const Progress& progress);
+  State(const TissueSurface& surface, const Progress& progress, double creaseDegrees);
   ~State();
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -446,16 +448,20 @@ struct AcousticScene::State {
   void Pass(const Meeting& meeting, BodySet& inside) const;
   int MediumOf(const BodySet& inside) const;
   BodySet BodiesAt(const Eigen::Vector3d& point) const;
+  void SetNormals(const Hit& hit, const Eigen::Vector3d& direction, Crossing& crossing) const;
   int Walk(const Eigen::Vector3d& from, const Eigen::Vector3d& to, BodySet inside) const;
 
-  void Build(const Shells& parts, const Progress& progress);
+  void Build(const Shells& parts);
   void FindCavities(const Shells& parts);
+  void MakeNormals(const Shells& parts, double creaseDegrees);
   void MakeLattice(const Shells& parts, const Progress& progress);
 
   std::vector<Material> materials;
   std::vector<int> materialOf; // of a body
   std::vector<Shell> shells;
-  std::vector<std::int32_t> shellOf; // of a triangle of the tree
+  std::vector<std::int32_t> shellOf;      // of a triangle of the tree
+  const std::uint32_t* corners = nullptr; // of the tree's triangles
+  std::vector<Eigen::Vector3f> normals;   // of the points, unit vectors, 0 on edges; none: all triangles are flat
   Notes notes;
   std::size_t triangles = 0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();                              // of the box, world
@@ -479,8 +485,10 @@ struct AcousticScene::State {
   } lattice;
 };
 
-AcousticScene::State::State(const TissueSurface& surface, const Progress& progress)
+AcousticScene::State::State(const TissueSurface& surface, const Progress& progress, double creaseDegrees)
 {
+  if (!(creaseDegrees >= 0.0 && creaseDegrees <= 180.0))
+    throw Error(Error::Kind::InvalidParameter, "creaseDegrees must be in [0, 180]");
   surface.Check();
   materials = surface.materials;
   for (const TissueSurface::Body& body : surface.bodies)
@@ -504,11 +512,13 @@ AcousticScene::State::State(const TissueSurface& surface, const Progress& progre
   shells = parts.shells;
   notes = parts.notes;
   progress(0.3);
-  Build(parts, progress);
+  Build(parts);
   progress(0.7);
   if (triangles == 0)
     return;
   FindCavities(parts);
+  if (creaseDegrees > 0.0)
+    MakeNormals(parts, creaseDegrees);
   MakeLattice(parts, progress.Part(0.7, 1.0));
 }
 
@@ -520,7 +530,7 @@ AcousticScene::State::~State()
     rtcReleaseDevice(device);
 }
 
-void AcousticScene::State::Build(const Shells& parts, const Progress&)
+void AcousticScene::State::Build(const Shells& parts)
 {
   std::vector<std::uint32_t> kept;
   kept.reserve(parts.triangles.size());
@@ -543,13 +553,13 @@ void AcousticScene::State::Build(const Shells& parts, const Progress&)
   scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* const corners = static_cast<float*>(
+  auto* const coordinates = static_cast<float*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), parts.points.size()));
   auto* const indices = static_cast<std::uint32_t*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles));
-  if (corners && indices) {
+  if (coordinates && indices) {
     for (std::size_t i = 0; i < parts.points.size(); ++i)
-      std::copy_n(parts.points[i].data(), 3, corners + 3 * i);
+      std::copy_n(parts.points[i].data(), 3, coordinates + 3 * i);
     shellOf.resize(triangles);
     for (std::size_t i = 0; i < triangles; ++i) {
       std::copy_n(parts.triangles[kept[i]].data(), 3, indices + 3 * i);
@@ -558,10 +568,11 @@ void AcousticScene::State::Build(const Shells& parts, const Progress&)
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
   }
-  rtcReleaseGeometry(geometry);
+  corners = indices;
+  rtcReleaseGeometry(geometry); // the scene holds it
   rtcCommitScene(scene);
   const RTCError problem = rtcGetDeviceError(device);
-  if (problem == RTC_ERROR_OUT_OF_MEMORY || !corners || !indices)
+  if (problem == RTC_ERROR_OUT_OF_MEMORY || !coordinates || !indices)
     throw Error(Error::Kind::TooLarge, "the scene's " + std::to_string(triangles) + " triangles do not fit in memory");
   if (problem != RTC_ERROR_NONE)
     throw Error(Error::Kind::NotPossible, "Embree cannot build the scene (its error " + std::to_string(problem) + ")");
@@ -657,7 +668,8 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID)
     return false;
   const float first = query.ray.tfar;
-  collector.hits.push_back({first, query.hit.primID, Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z)});
+  collector.hits.push_back(
+      {first, query.hit.primID, Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z), query.hit.u, query.hit.v});
 
   RTCRayHit others = line.From(begin, end);
   others.ray.tnear = std::max(query.ray.tnear, first - static_cast<float>(0.01 * tolerance));
@@ -677,13 +689,11 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
     const auto found = std::find_if(meeting.changes.begin(), meeting.changes.end(),
                                     [shell](const Meeting::Change& other) { return other.shell == shell; });
     if (found == meeting.changes.end())
-      meeting.changes.push_back({shell, change, hit.triangle, hit.normal});
+      meeting.changes.push_back({shell, change, hit});
     else {
       found->balance += change;
-      if (hit.triangle < found->triangle) {
-        found->triangle = hit.triangle;
-        found->normal = hit.normal;
-      }
+      if (hit.triangle < found->hit.triangle)
+        found->hit = hit;
     }
   }
   meeting.first = line.base + first;
@@ -750,6 +760,56 @@ BodySet AcousticScene::State::BodiesAt(const Eigen::Vector3d& point) const
     if (count >= needed)
       result.Insert(shell);
   return result;
+}
+
+// The mean of the triangles around each point, by their area. Where one of them differs from it by more than the crease, the
+// point lies on an edge and has none.
+void AcousticScene::State::MakeNormals(const Shells& parts, double creaseDegrees)
+{
+  normals.assign(parts.points.size(), Eigen::Vector3f::Zero());
+  const auto normalOf = [&parts](const Triangle& t) -> Eigen::Vector3f {
+    return (parts.points[t[1]] - parts.points[t[0]]).cross(parts.points[t[2]] - parts.points[t[0]]);
+  };
+  for (const Triangle& triangle : parts.triangles) {
+    const Eigen::Vector3f normal = normalOf(triangle);
+    for (const std::uint32_t corner : triangle)
+      normals[corner] += normal;
+  }
+  for (Eigen::Vector3f& normal : normals)
+    normal.normalize();
+  const auto least = static_cast<float>(std::cos(creaseDegrees * 0.017453292519943295));
+  std::vector<bool> edged(normals.size(), false);
+  for (const Triangle& triangle : parts.triangles) {
+    const Eigen::Vector3f normal = normalOf(triangle).normalized();
+    for (const std::uint32_t corner : triangle)
+      if (normals[corner].dot(normal) < least && normal.squaredNorm() > 0.5f)
+        edged[corner] = true;
+  }
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    if (edged[i])
+      normals[i].setZero();
+}
+
+void AcousticScene::State::SetNormals(const Hit& hit, const Eigen::Vector3d& direction, Crossing& crossing) const
+{
+  const Eigen::Vector3f flat = hit.normal.normalized();
+  const float side = flat.dot(direction.cast<float>()) > 0.0f ? -1.0f : 1.0f;
+  crossing.facet = side * hit.normal.cast<double>().normalized();
+  crossing.normal = crossing.facet;
+  if (normals.empty())
+    return;
+  const std::uint32_t* const corner = corners + 3 * static_cast<std::size_t>(hit.triangle);
+  const float weights[] = {1.0f - hit.u - hit.v, hit.u, hit.v};
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3f& normal = normals[corner[i]];
+    sum += weights[i] * (normal.squaredNorm() > 0.5f ? normal : flat);
+  }
+  const Eigen::Vector3d curved = side * sum.cast<double>().normalized();
+  // At grazing angles a ray may come from behind the curved normal, or be mirrored into the triangle: flat, then.
+  const double cosine = -curved.dot(direction);
+  if (cosine > 0.0 && (direction + 2.0 * cosine * curved).dot(crossing.facet) > 0.0)
+    crossing.normal = curved;
 }
 
 // The medium at the end of a short way (local points) from where the shells are known.
@@ -852,8 +912,8 @@ void AcousticScene::State::MakeLattice(const Shells& parts, const Progress& prog
   progress(1.0);
 }
 
-AcousticScene::AcousticScene(const TissueSurface& surface, const Progress& progress)
-  : state_(std::make_unique<State>(surface, progress))
+AcousticScene::AcousticScene(const TissueSurface& surface, const Progress& progress, double creaseDegrees)
+  : state_(std::make_unique<State>(surface, progress, creaseDegrees))
 {
 }
 AcousticScene::~AcousticScene() = default;
@@ -936,13 +996,13 @@ bool AcousticScene::NextCrossing(SceneRay& ray, double limit, Crossing& crossing
     for (const Meeting::Change& change : meeting.changes) {
       const Shell& shell = s.shells[static_cast<std::size_t>(change.shell)];
       if (shell.sheet) { // not the one that the ray has just left, which it may graze by rounding
-        const double cosine = std::abs(change.normal.normalized().dot(line.direction));
+        const double cosine = std::abs(change.hit.normal.normalized().dot(line.direction));
         if (ray.fromSurface && begins && meeting.first * cosine < s.tolerance)
           continue;
         crossing.sheet = s.materialOf[static_cast<std::size_t>(shell.body)];
       } else if (change.balance == 0)
         continue;
-      if (!border || change.triangle < border->triangle)
+      if (!border || change.hit.triangle < border->hit.triangle)
         border = &change;
     }
     if (!border || (before == after && crossing.sheet < 0))
@@ -953,8 +1013,7 @@ bool AcousticScene::NextCrossing(SceneRay& ray, double limit, Crossing& crossing
     crossing.behind = std::max(0.0, meeting.last);
     crossing.before = before;
     crossing.after = after;
-    const Eigen::Vector3d normal = border->normal.cast<double>().normalized();
-    crossing.normal = normal.dot(ray.direction) > 0.0 ? -normal : normal;
+    s.SetNormals(border->hit, ray.direction, crossing);
     return true;
   }
   return false;
@@ -964,7 +1023,8 @@ std::size_t AcousticScene::MemoryBytes() const
 {
   const State& s = *state_;
   std::size_t bytes = static_cast<std::size_t>(std::max<std::int64_t>(0, s.treeBytes)) + s.shells.capacity() * sizeof(Shell) +
-                      s.shellOf.capacity() * sizeof(std::int32_t) + s.lattice.setOf.capacity() * sizeof(std::int32_t);
+                      s.shellOf.capacity() * sizeof(std::int32_t) + s.normals.capacity() * sizeof(Eigen::Vector3f) +
+                      s.lattice.setOf.capacity() * sizeof(std::int32_t);
   for (const BodySet& set : s.lattice.sets)
     bytes += sizeof(BodySet) + (set.Count() > 10 ? sizeof(std::int32_t) * static_cast<std::size_t>(set.Count()) : 0);
   return bytes;

@@ -34,7 +34,8 @@ private:
 struct Crossing {
   double distance = 0.0;                              ///< mm along the ray
   double behind = 0.0;                                ///< the same, of the last of several surfaces that are taken as one
-  Eigen::Vector3d normal = -Eigen::Vector3d::UnitZ(); ///< of the surface: unit vector against the ray
+  Eigen::Vector3d normal = -Eigen::Vector3d::UnitZ(); ///< of the curved surface: unit vector against the ray
+  Eigen::Vector3d facet = -Eigen::Vector3d::UnitZ();  ///< of the triangle: unit vector against the ray
   int before = 0, after = 0;                          ///< materials
   /// The material of an open surface, or -1. Sound is reflected as if its material lay behind, and goes on in the medium
   /// that it came from.
@@ -68,6 +69,9 @@ struct SceneRay {
 /// leave no gap. The medium is that of the last body in the list with the point inside; inside means within more outer shells
 /// than cavities of that body.
 ///
+/// Triangles stand for curved surfaces: normals are interpolated between those of the corners, but not across an edge. Without
+/// that, spheres would glitter like cut stones.
+///
 /// What is odd about surfaces is mended or worked around, and noted: see Notes.
 class AcousticScene {
 public:
@@ -82,8 +86,9 @@ public:
     int sheets = 0; ///< open, without an inside: see Crossing::sheet
   };
 
-  /// \throws what TissueSurface::Check throws.
-  explicit AcousticScene(const TissueSurface& surface, const Progress& progress = {});
+  /// Where the normals of a triangle and of its corner differ by more than \a creaseDegrees there is an edge; with 0 all
+  /// triangles are flat. \throws what TissueSurface::Check throws.
+  explicit AcousticScene(const TissueSurface& surface, const Progress& progress = {}, double creaseDegrees = 30.0);
   ~AcousticScene();
   AcousticScene(AcousticScene&&) noexcept;
   AcousticScene& operator=(AcousticScene&&) noexcept;

@@ -193,25 +193,32 @@ void SoundTracer::Follow(Way& way, const RayStart& start, SoundPath& path, RaySa
 
     const bool sheet = crossing.sheet >= 0;
     const Medium& behind = media_[static_cast<std::size_t>(sheet ? crossing.sheet : crossing.after)];
-    const double cosine = std::min(1.0, -ray.direction.dot(crossing.normal));
-    const bool bends = transport_.refraction && !sheet;
+    const bool bends = transport_.refraction && !sheet && behind.fluid.soundSpeed != medium.fluid.soundSpeed;
     // Without refraction the interface reflects as the impedances say, at every angle alike.
-    const InterfaceResponse response = MeetInterface(
-        medium.fluid, transport_.refraction ? behind.fluid : Fluid{behind.fluid.impedance, medium.fluid.soundSpeed}, cosine);
+    const Fluid there = transport_.refraction ? behind.fluid : Fluid{behind.fluid.impedance, medium.fluid.soundSpeed};
+    const double ratio = there.soundSpeed / medium.fluid.soundSpeed;
+    Eigen::Vector3d normal = crossing.normal;
+    double cosine = std::min(1.0, -ray.direction.dot(normal));
+    InterfaceResponse response = MeetInterface(medium.fluid, there, cosine);
+    if (bends && !response.total && Refracted(ray.direction, normal, ratio, response.cosTransmitted).dot(crossing.facet) >= 0.0) {
+      normal = crossing.facet; // at grazing angles the curved one may bend the ray back out of the triangle
+      cosine = std::min(1.0, -ray.direction.dot(normal));
+      response = MeetInterface(medium.fluid, there, cosine);
+    }
     const double roughness = std::max(medium.roughness, behind.roughness);
     if (response.reflected != 0.0)
       path.echoes.push_back(
           {way.scanDepth, way.amplitude * response.reflected * Returned(cosine, roughness), way.way, way.bounces});
 
     if (way.bounces < transport_.maxBounces && std::abs(way.amplitude) * response.reflectedEnergy > leastAmplitude_) {
-      Eigen::Vector3d direction = Mirrored(ray.direction, crossing.normal);
-      Eigen::Vector3d across = (way.across - 2.0 * way.across.dot(crossing.normal) * crossing.normal).normalized();
+      Eigen::Vector3d direction = Mirrored(ray.direction, normal);
+      Eigen::Vector3d across = (way.across - 2.0 * way.across.dot(normal) * normal).normalized();
       double amplitude = way.amplitude * response.reflectedEnergy;
       if (samples && roughness > 0.0) {
         const double choice = samples->Next(), u = samples->Next(), v = samples->Next();
         if (choice < roughness) {
           const Eigen::Vector3d mirrored = direction;
-          direction = LambertDirection(crossing.normal, u, v);
+          direction = LambertDirection(crossing.facet, u, v);
           across = CarriedThroughBend(across, mirrored, direction);
           amplitude *= std::sqrt(caught_ * cosine); // on the way back it is turned to the element by a Lambert lobe too
         }

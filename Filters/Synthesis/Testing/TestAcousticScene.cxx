@@ -460,6 +460,40 @@ TEST(AcousticScene, NoRaySlipsThroughAnEdge)
   EXPECT_EQ(missed, 0);
 }
 
+TEST(AcousticScene, NormalsAreOfTheCurvedSurface)
+{
+  TissueSurface surface = Background(water);
+  AddSphere(surface, red, {0, 0, 0}, 20, 3);
+  AddBox(surface, green, {50, -10, -10}, {70, 10, 10});
+  const AcousticScene curved(surface), flat(surface, {}, 0.0);
+  double worstCurved = 0.0, worstFlat = 0.0;
+  Random random(19);
+  for (int i = 0; i < 2000; ++i) {
+    SceneRay ray;
+    ray.direction = random.Direction();
+    ray.origin = -40.0 * ray.direction + 10.0 * random.Direction();
+    Crossing crossing;
+    SceneRay again = ray;
+    ASSERT_TRUE(curved.NextCrossing(ray, 40.0, crossing));
+    const Vector3d radial = (ray.origin + crossing.distance * ray.direction).normalized();
+    worstCurved = std::max(worstCurved, std::acos(std::min(1.0, crossing.normal.dot(radial))));
+    EXPECT_GT(crossing.facet.dot(crossing.normal), 0.98);
+    ASSERT_TRUE(flat.NextCrossing(again, 40.0, crossing));
+    worstFlat = std::max(worstFlat, std::acos(std::min(1.0, crossing.normal.dot(radial))));
+    EXPECT_EQ(crossing.normal, crossing.facet);
+  }
+  EXPECT_LT(worstCurved, 0.055);
+  EXPECT_GT(worstFlat, 0.08);
+  for (int i = 0; i < 200; ++i) { // the box has edges
+    SceneRay ray;
+    ray.origin = Vector3d(45, random.Uniform(-9.99, 9.99), random.Uniform(-9.99, 9.99));
+    ray.direction = Vector3d::UnitX();
+    Crossing crossing;
+    ASSERT_TRUE(curved.NextCrossing(ray, 40.0, crossing));
+    EXPECT_NEAR((crossing.normal + Vector3d::UnitX()).norm(), 0.0, 1e-6);
+  }
+}
+
 TEST(AcousticScene, TheSameOnAnyNumberOfThreads)
 {
   TissueSurface surface = Background(water);
