@@ -1,7 +1,7 @@
 # The VTK 9.1 stack: kernels, modules, Python package, programs, installation.
 set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks for the same
   CommonCore CommonDataModel CommonExecutionModel CommonTransforms CommonMath CommonSystem CommonColor CommonMisc
-  FiltersCore FiltersGeneral FiltersSources IOCore IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
+  FiltersCore FiltersGeneral FiltersSources IOCore IOGeometry IOImage IOPLY IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
   RenderingVolumeOpenGL2 RenderingImage)
 find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} ImagingFourier ImagingHybrid # the last two: peers in benchmarks

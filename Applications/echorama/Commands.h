@@ -24,6 +24,7 @@ Command EmbedCommand(CLI::App& program);
 Command NoiseCommand(CLI::App& program);
 Command ProbeFitCommand(CLI::App& program);
 Command PhantomCommand(CLI::App& program);
+Command SynthesizeCommand(CLI::App& program);
 Command ViewCommand(CLI::App& program);
 
 } // namespace echorama

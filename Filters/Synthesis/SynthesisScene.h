@@ -152,8 +152,8 @@ struct SceneSweep {
 struct SceneTransport {
   SynthesisParameters::Mode mode = SynthesisParameters::Mode::Coherent;
   SoundTransport sound;
-  int subRays = 1;                          ///< as in SynthesisParameters
-  Sampling sampling = Sampling::Stratified; ///< as in SynthesisParameters
+  int subRays = SynthesisParameters().subRays; ///< as in SynthesisParameters
+  Sampling sampling = Sampling::Stratified;    ///< as in SynthesisParameters
   double mirrorDb = SynthesisParameters().mirrorDb;
   ScatterCounting counting; ///< of the mode counting; its speed of sound is the transducer's, its seed the scene's
 };

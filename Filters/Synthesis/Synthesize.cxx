@@ -123,22 +123,12 @@ void AddDirect(const SoundPath& path, double weight, const DepthAxis& axis, std:
   }
 }
 
-double DirectEnd(const SoundPath& path)
-{
-  double end = 0.0;
-  for (const SoundSegment& segment : path.segments)
-    if (segment.bounces == 0)
-      end = std::max(end, segment.scanDepth + segment.length * segment.scanDepthPerMm);
-  return end;
-}
-
 class Beams {
 public:
   Beams(const AcousticScene& scene, const SynthesisParameters& p)
-    : scene_(scene), p_(p), n_(p.BeamDimensions()), axis_(InternalAxis(p)),
-      tracer_(scene, p.transport,
-              {p.transducer.frequencyMHz, p.transducer.assumedSoundSpeed, p.probe.depthMax + 4.0 * p.transducer.PulseSigmaMm()}),
-      brightestDb_(Material::clearDb), leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
+    : scene_(scene), p_(p), n_(p.BeamDimensions()), axis_(InternalAxis(p)), tracer_(scene, p.transport, ConditionsOf(p)),
+      axisTracer_(scene, WithoutBounces(p.transport), ConditionsOf(p)), brightestDb_(Material::clearDb),
+      leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
   {
     for (const Material& material : scene.Materials())
       brightestDb_ = std::max(brightestDb_, material.backscatterDb);
@@ -149,6 +139,20 @@ public:
     const double range = p.probe.depthMax - p.probe.depthMin, step = range / (p.samples - 1);
     const double finer = std::max(1.0, std::ceil(step * samplesPerPulse / p.transducer.PulseSigmaMm() - 1e-9));
     return {p.probe.depthMin, step / finer, static_cast<int>(std::min((p.samples - 1) * finer + 1.0, 1e9))};
+  }
+
+  // Echoes from behind the last sample still reach it.
+  static double LastDepth(const SynthesisParameters& p) { return p.probe.depthMax + 4.0 * p.transducer.PulseSigmaMm(); }
+
+  static SoundConditions ConditionsOf(const SynthesisParameters& p)
+  {
+    return {p.transducer.frequencyMHz, p.transducer.assumedSoundSpeed, LastDepth(p)};
+  }
+
+  static SoundTransport WithoutBounces(SoundTransport transport)
+  {
+    transport.maxBounces = 0;
+    return transport;
   }
 
   const DepthAxis& Axis() const { return axis_; }
@@ -173,8 +177,7 @@ public:
     }
 
     ways.directAmplitude.assign(static_cast<std::size_t>(axis_.count), 0.0f);
-    std::vector<SoundSegment> direct;
-    double deepest = -1.0, sum = 0.0;
+    double sum = 0.0;
     for (int ray = 0; ray < p_.subRays; ++ray) {
       RaySamples samples = SamplesOf(beam, ray);
       RayStart start = StartOf(element, p_.transducer, &samples);
@@ -188,21 +191,10 @@ public:
         echo.amplitude *= weight;
         ways.echoes.push_back(echo);
       }
-      const double end = DirectEnd(path);
-      const bool isDeepest = end > deepest;
-      if (isDeepest) {
-        deepest = end;
-        direct.clear();
-      }
-      for (SoundSegment segment : path.segments)
-        if (segment.bounces > 0) {
-          segment.amplitude *= weight;
-          if (IsVisible(segment))
-            ways.segments.push_back(segment);
-        } else if (isDeepest) {
-          segment.amplitude = 1.0;
-          segment.attenuation = 0.0;
-          direct.push_back(segment);
+      for (const SoundSegment& segment : path.segments)
+        if (segment.bounces > 0 && IsVisible(segment)) { // by itself: what many rays meet adds up
+          ways.segments.push_back(segment);
+          ways.segments.back().amplitude *= weight;
         }
     }
     for (SurfaceEcho& echo : ways.echoes)
@@ -211,8 +203,37 @@ public:
       segment.amplitude /= sum;
     for (float& amplitude : ways.directAmplitude)
       amplitude /= static_cast<float>(sum);
-    ways.segments.insert(ways.segments.begin(), direct.begin(), direct.end());
+    const std::vector<SoundSegment> axis = BareAxis(element, path, rays);
+    ways.segments.insert(ways.segments.begin(), axis.begin(), axis.end());
     return ways;
+  }
+
+  // The direct way of the axis with amplitude 1, straight on from where it ends: rays beside it may get further.
+  std::vector<SoundSegment> BareAxis(const Element& element, SoundPath& path, std::int64_t& rays) const
+  {
+    RayStart start = StartOf(element, p_.transducer, nullptr);
+    start.inside = scene_.BodiesAt(start.origin);
+    axisTracer_.Trace(start, path);
+    rays += path.rays;
+    std::vector<SoundSegment> axis = path.segments;
+    SoundSegment on;
+    on.from = start.origin;
+    on.direction = start.direction;
+    on.across = start.across;
+    if (!axis.empty()) {
+      on = axis.back();
+      on.from += on.length * on.direction;
+      on.way += on.length;
+      on.scanDepth += on.length * on.scanDepthPerMm;
+    }
+    on.length = (LastDepth(p_) - on.scanDepth) / on.scanDepthPerMm;
+    if (on.length > 0.0)
+      axis.push_back(on);
+    for (SoundSegment& segment : axis) {
+      segment.amplitude = 1.0;
+      segment.attenuation = 0.0;
+    }
+    return axis;
   }
 
   void Sum(const BeamWays& ways, const Scatterers& scatterers, Complex* row) const
@@ -260,7 +281,7 @@ private:
   const SynthesisParameters& p_;
   std::array<int, 3> n_;
   DepthAxis axis_;
-  SoundTracer tracer_;
+  SoundTracer tracer_, axisTracer_;
   double brightestDb_; // of all materials
   double leastDb_;     // below this nothing shows
 };

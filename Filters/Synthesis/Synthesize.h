@@ -36,7 +36,7 @@ struct SynthesisParameters {
 
   Transducer transducer;
   SoundTransport transport;
-  int subRays = 1;                          ///< rays per element, spread over its aperture, in [1, 4096]; 1: the axis alone
+  int subRays = 8; ///< rays per element, spread over its aperture, in [1, 4096]; 1: the axis alone, fast and hard-edged
   Sampling sampling = Sampling::Stratified; ///< how they are spread, and how rough surfaces scatter them
   /// Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue: dB, in [0, 120].
   double mirrorDb = 45.0;
@@ -85,10 +85,10 @@ struct SynthesisCost {
 /// samples lie further apart than the pulse is long; DetectEchoes brings it to the number of samples.
 ///
 /// 1. Sound is followed from every element through the scene: one ray along the axis of the beam, or several over the
-///    aperture (SoundTransport::subRays). 2. Scatterers are made where those ways pass, nowhere else. 3. Each beam sums the
-/// echoes of the scatterers around its ways, and of the surfaces that it meets. With several rays the direct way of the
-/// one that gets deepest stands for the beam, with the mean of all their amplitudes at each depth: the edge of a shadow is as
-/// soft as the aperture is wide; surfaces and reflected ways count by their share.
+///    aperture (subRays). 2. Scatterers are made where those ways pass, nowhere else. 3. Each beam sums the
+/// echoes of the scatterers around its ways, and of the surfaces that it meets. With several rays the direct way of the axis
+/// stands for the beam, with the mean of all their amplitudes at each depth: the edge of a shadow is as soft as the aperture is
+/// wide; surfaces and reflected ways count by their share.
 /// The result does not depend on the number of threads.
 /// \throws as Check(); Error(TooLarge) when samples or scatterers would not fit; Error(Cancelled).
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& parameters, const Progress& progress = {},

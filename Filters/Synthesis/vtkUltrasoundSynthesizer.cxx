@@ -297,6 +297,7 @@ void vtkUltrasoundSynthesizer::Execute(vtkInformationVector** inputs, vtkImageDa
   beams->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
   std::copy(made.View().begin(), made.View().end(), vtkUltrasoundVolume::ViewOf<unsigned char>(samples, beams).begin());
 
+  output->Initialize(); // the pipeline has passed on what the tissue says of itself
   vtkUltrasoundVolume::SetGeometry(output, job.Grid);
   vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), VTK_UNSIGNED_CHAR);
   vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);

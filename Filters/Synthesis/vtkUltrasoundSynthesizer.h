@@ -172,7 +172,7 @@ public:
   ///@}
 
   ///@{
-  /** Rays per element, over its aperture, in [1, 4096]; 1, the default, follows the axis of the beam alone. */
+  /** Rays per element, over its aperture, in [1, 4096]; 1 follows the axis of the beam alone, which is fast. Default 8. */
   void SetSubRays(int);
   int GetSubRays() const;
   ///@}

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// echorama synthesize: overlapping volumes of a scene, from several poses of a probe, with everything that is known of them.
+#include "Commands.h"
+#include "Filters/Synthesis/PhantomViews.h"
+#include "Filters/Synthesis/SceneTissue.h"
+#include "Meshes.h"
+#include "RecordedMotion.h"
+#include "SyntheticSet.h"
+#include "Volumes.h"
+#include <CLI/Validators.hpp>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPolyData.h>
+#include <vtkUltrasoundAcquisition.h>
+#include <vtkUltrasoundSynthesizer.h>
+#include <vtkUltrasoundTissue.h>
+#include <vtkXMLPolyDataWriter.h>
+
+namespace echorama {
+namespace {
+
+struct SynthesizeOptions {
+  std::string scene, folder, data, format = "mha";
+  std::optional<std::uint64_t> seed;
+  std::optional<double> spacingMm;
+  int landmarks = 0;
+};
+
+// A view: where the probe is, and at each step of its sweep if it moves meanwhile.
+struct View {
+  Pose probeToWorld;
+  std::vector<Pose> steps;
+};
+
+std::vector<View> ViewsOf(const SynthesisScene& scene, const SynthesisParameters& parameters)
+{
+  std::vector<View> views;
+  if (const auto* row = std::get_if<SceneRow>(&scene.views)) {
+    for (const PhantomView& view : PhantomViews(parameters.probe, row->count, row->overlap)) {
+      const Pose pose = row->middle.ProbeToWorld() * view.probeToWorld;
+      views.push_back({pose, StepPoses(scene, pose)});
+    }
+  } else if (const auto* listed = std::get_if<SceneViews>(&scene.views)) {
+    for (const ScenePose& pose : listed->poses)
+      views.push_back({pose.ProbeToWorld(), StepPoses(scene, pose.ProbeToWorld())});
+  } else {
+    const auto& recording = std::get<SceneRecording>(scene.views);
+    const RecordedMotion motion(scene.PathOf(recording.file), recording);
+    for (const double time : motion.Times(recording.count)) {
+      const Pose pose = motion.At(time);
+      views.push_back({pose, scene.sweep.alongRecording ? motion.Around(time, scene.sweep.seconds, parameters.BeamDimensions()[2])
+                                                        : StepPoses(scene, pose)});
+    }
+  }
+  return views;
+}
+
+void WriteText(const std::string& path, const std::string& text)
+{
+  std::ofstream stream(path);
+  stream << text << '\n';
+  stream.close();
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+}
+
+void WriteTissue(Session& session, vtkPolyData* tissue, const std::string& path)
+{
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  writer->SetInputData(tissue);
+  writer->SetFileName(path.c_str());
+  writer->SetDataModeToAppended();
+  writer->EncodeAppendedDataOff();
+  session.Watch(writer, "write", path, [&] {
+    if (!writer->Write())
+      throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+  });
+}
+
+nlohmann::ordered_json JsonOf(const SynthesisCost& cost)
+{
+  return {{"rays_seconds", cost.raysSeconds},
+          {"scatterers_seconds", cost.scatterersSeconds},
+          {"echoes_seconds", cost.echoesSeconds},
+          {"detection_seconds", cost.detectionSeconds},
+          {"rays", cost.rays},
+          {"segments", cost.segments},
+          {"surface_echoes", cost.surfaceEchoes},
+          {"scatterers", cost.scatterers},
+          {"held_mb", 1e-6 * static_cast<double>(cost.bytes)}};
+}
+
+// Where the balls of rigs are, or places at random.
+std::vector<Landmark> PlacesOf(const SynthesisScene& scene, int count, const ProbeGeometry& probe, const std::vector<View>& views)
+{
+  std::vector<Landmark> places;
+  for (const SceneItem& item : scene.tissue)
+    if (const auto* rig = std::get_if<CalibrationRigParameters>(&item.what))
+      for (const Landmark& ball : CalibrationLandmarks(*rig))
+        places.push_back(ball);
+  std::vector<Pose> poses;
+  for (const View& view : views)
+    poses.push_back(view.probeToWorld);
+  const auto more = SharedPlaces(scene.seed, count, probe, poses);
+  places.insert(places.end(), more.begin(), more.end());
+  return places;
+}
+
+void Synthesize(Session& session, const SynthesizeOptions& options)
+{
+  SynthesisScene scene = ReadScene(options.scene);
+  scene.dataFolder = options.data;
+  if (options.seed)
+    scene.seed = *options.seed;
+  if (options.spacingMm)
+    scene.volume.spacingMm = *options.spacingMm;
+  SynthesisParameters parameters = scene.Parameters();
+  const std::vector<View> views = ViewsOf(scene, parameters);
+  const std::vector<Landmark> places = PlacesOf(scene, options.landmarks, parameters.probe, views);
+
+  OutputFolder folder(session, options.folder, {options.scene});
+  session.result["folder"] = options.folder;
+  vtkNew<vtkPolyData> tissue;
+  std::vector<std::string> notes;
+  session.Work("tissue", options.scene,
+               [&](const Progress& progress) { vtkUltrasoundTissue::Set(tissue, TissueOf(scene, LoadMesh, notes, progress)); });
+  for (const std::string& note : notes)
+    session.Note(note);
+  session.result["triangles"] = tissue->GetNumberOfPolys();
+  session.result["seed"] = scene.seed;
+  WriteText(folder.Stage("scene.json"), SceneToJson(scene));
+  WriteTissue(session, tissue, folder.Stage("geometry.vtp"));
+
+  vtkNew<vtkUltrasoundSynthesizer> synthesizer;
+  synthesizer->SetInputData(tissue);
+  synthesizer->SetSpacingMm(scene.volume.spacingMm);
+  SyntheticSet set(session, folder, options.format, {scene.volume.knockMm, scene.volume.knockDegrees, scene.seed});
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    // The probe comes by its input, since the filter's own parameters are those of a curved one.
+    vtkNew<vtkPolyData> probe;
+    vtkUltrasoundAcquisition::SetProbeGeometry(probe, parameters.probe);
+    vtkUltrasoundAcquisition::SetProbeToWorld(probe, views[i].probeToWorld);
+    synthesizer->SetInputData(1, probe);
+    parameters.stepPoses = views[i].steps;
+    parameters.receiver.noiseSeed = scene.receiver.noiseSeed + i;
+    synthesizer->SetParameters(parameters);
+    const std::string number = std::to_string(i + 1);
+    session.Update(synthesizer, "synthesize", "volume_" + number);
+    vtkNew<vtkImageData> image, beams;
+    image->ShallowCopy(synthesizer->GetOutput(0));
+    beams->ShallowCopy(synthesizer->GetOutput(1));
+    const std::string name = "beams_" + number + "." + options.format;
+    const Pose knock = set.Add(image, {{"beams", folder.Final(name)}, {"cost", JsonOf(synthesizer->Cost())}}, places,
+                               [&](const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
+                                 if (!BeamPointAt(parameters.probe, views[i].probeToWorld.inverse() * place))
+                                   return {};
+                                 return place;
+                               });
+    // The beams say where the probe was as the volume does.
+    vtkUltrasoundAcquisition::SetProbeToWorld(beams, knock * views[i].probeToWorld);
+    SaveVolume(session, beams, folder.Stage(name));
+  }
+  set.WriteTruth();
+  folder.Commit();
+  session.Say("wrote " + folder.Final("truth.json") + ": the poses that put the volumes back, all but the first by " +
+              Fixed(scene.volume.knockMm, 1) + " mm and " + Fixed(scene.volume.knockDegrees, 1) + " degrees");
+}
+
+} // namespace
+
+Command SynthesizeCommand(CLI::App& program)
+{
+  auto values = std::make_shared<SynthesizeOptions>();
+  CLI::App* options = program.add_subcommand(
+      "synthesize", "Make overlapping volumes of a scene by simulating ultrasound, out of place by a known amount");
+  options->add_option("scene", values->scene, "The scene, JSON (see Documentation/scenes.md)")->required();
+  options
+      ->add_option("-o,--output", values->folder,
+                   "Folder for the volumes, their beams, the geometry, the scene, and truth.json, the poses that put them back")
+      ->required();
+  options->add_option("--seed", values->seed, "Seed instead of the scene's")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62));
+  options->add_option("--spacing", values->spacingMm, "Edge of the voxels instead of the scene's, mm")
+      ->check(CLI::Range(0.05, 20.0));
+  options->add_option("--data", values->data,
+                      "Folder of the meshes and recordings that the scene names, whatever folder it says");
+  options
+      ->add_option("--landmarks", values->landmarks,
+                   "How many places that two volumes see are listed for each volume, as landmarks_N.csv")
+      ->check(CLI::Range(0, 10000))
+      ->capture_default_str();
+  options->add_option("--format", values->format, "File format")
+      ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))
+      ->capture_default_str();
+  return {options, [values](Session& session) { Synthesize(session, *values); }};
+}
+
+} // namespace echorama

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "SyntheticSet.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/Random.h"
+#include "Filters/Registration/ValidPoints.h"
+#include "Filters/Synthesis/Phantom.h"
+#include "Filters/Synthesis/PhantomViews.h"
+#include "Volumes.h"
+#include <algorithm>
+#include <fstream>
+#include <vtkImageData.h>
+#include <vtkUltrasoundVolume.h>
+
+namespace echorama {
+namespace {
+
+Eigen::Vector3d CentroidOf(vtkImageData* image)
+{
+  std::ptrdiff_t count = 0;
+  Eigen::Vector3d index = Eigen::Vector3d::Zero();
+  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(image);
+  vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
+    using T = decltype(type);
+    index = ValidCentroid<T>(vtkUltrasoundVolume::ViewOf<const T>(intensity, image),
+                             vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(image), image),
+                             count);
+  });
+  return vtkUltrasoundVolume::GeometryOf(image).IndexToWorld() * index;
+}
+
+} // namespace
+
+SyntheticSet::SyntheticSet(Session& session, OutputFolder& folder, const std::string& format, const Knock& knock)
+  : session_(session), folder_(folder), format_(format), knock_(knock)
+{
+  session.result["knock"] = {{"mm", knock.mm}, {"degrees", knock.degrees}};
+  session.result["truth"] = folder.Final("truth.json");
+  session.result["volumes"] = nlohmann::ordered_json::array();
+}
+
+Pose SyntheticSet::Add(vtkImageData* image, const nlohmann::ordered_json& more, const std::vector<Landmark>& places,
+                       const SeenAt& seenAt)
+{
+  const std::string number = std::to_string(truth_.size() + 1), name = "volume_" + number + "." + format_;
+  const Pose knock =
+      truth_.empty() ? Pose::Identity() : KnockedPose(knock_.seed, truth_.size(), knock_.mm, knock_.degrees, CentroidOf(image));
+  vtkUltrasoundVolume::Move(image, knock);
+  const std::string file = folder_.Stage(name);
+  SaveVolume(session_, image, file);
+  truth_.push_back({file, vtkUltrasoundVolume::GeometryOf(image), knock.inverse()});
+  nlohmann::ordered_json told{{"file", folder_.Final(name)}};
+  told.update(more);
+  told["VolumeToWorld"] = JsonOf(knock.inverse());
+  session_.Say("wrote " + folder_.Final(name));
+  if (!places.empty()) {
+    const std::string list = "landmarks_" + number + ".csv", path = folder_.Stage(list);
+    std::ofstream stream(path);
+    stream << "label,x,y,z\n";
+    for (const Landmark& place : places)
+      if (const auto seen = seenAt(place.position)) {
+        const Eigen::Vector3d point = knock * *seen;
+        stream << place.label << ',' << NumberText(point.x()) << ',' << NumberText(point.y()) << ',' << NumberText(point.z())
+               << '\n';
+      }
+    stream.close();
+    if (!stream)
+      throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+    told["landmarks"] = folder_.Final(list);
+  }
+  session_.result["volumes"].push_back(told);
+  return knock;
+}
+
+void SyntheticSet::WriteTruth()
+{
+  WritePoses(folder_.Stage("truth.json"), truth_); // relative to the folder, so they stay right when it gets its place
+}
+
+std::vector<Landmark> SharedPlaces(std::uint64_t seed, int count, const ProbeGeometry& probe, const std::vector<Pose>& views)
+{
+  std::vector<Landmark> places;
+  Random random(seed, 0x1a4d);
+  const Eigen::AlignedBox3d box = BoxAround(probe);
+  for (int attempt = 0; attempt < 1000 * count && static_cast<int>(places.size()) < count; ++attempt) {
+    const Pose& view = views[random.Below(views.size())];
+    const Eigen::Vector3d share(random.Uniform(), random.Uniform(), random.Uniform());
+    const Eigen::Vector3d place = view * (box.min() + share.cwiseProduct(box.sizes()));
+    const auto sees = [&](const Pose& other) { return BeamPointAt(probe, other.inverse() * place).has_value(); };
+    if (sees(view) && std::count_if(views.begin(), views.end(), sees) > 1)
+      places.push_back({"L" + std::to_string(places.size() + 1), place});
+  }
+  return places;
+}
+
+} // namespace echorama
