@@ -310,6 +310,22 @@ class TissueSource(Phantom):
         return self.make()
 
 
+class Synthesizer(Phantom):
+    """A volume of tissue that never changes; its input is no volume."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        filter.tissue = echorama.vtkUltrasoundTissueSource()
+        filter.SetInputConnection(filter.tissue.GetOutputPort())
+        filter.SetElements(12)
+        filter.SetSteps(8)
+        filter.SetSamples(60)
+        filter.SetSpacingMm(3.0)
+        filter.SetPosition(1.0, 2.0, 3.0)
+        filter.SetOrientation(10.0, 20.0, 30.0)
+        return filter
+
+
 class Files(Feed):
     def __init__(self, make):
         super().__init__(make)
@@ -390,6 +406,7 @@ Special = {
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundAnatomySource": TissueSource,
     "vtkUltrasoundTissueSource": TissueSource,
+    "vtkUltrasoundSynthesizer": Synthesizer,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }
 
