@@ -16,6 +16,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray, vtkStringArray, vtkTypeUInt64Array
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkImageData, vtkMultiBlockDataSet
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm, vtkStreamingDemandDrivenPipeline, vtkTrivialProducer
+from vtkmodules.vtkFiltersSources import vtkSphereSource
 
 import echorama
 
@@ -323,6 +324,14 @@ class Synthesizer(Phantom):
         filter.SetSpacingMm(3.0)
         filter.SetPosition(1.0, 2.0, 3.0)
         filter.SetOrientation(10.0, 20.0, 30.0)
+class TissueMeshes(TissueSource):
+    """From meshes, which its own test feeds."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        ball = vtkSphereSource()
+        ball.Update()
+        filter.AddInputDataObject(ball.GetOutput())
         return filter
 
 
@@ -405,6 +414,7 @@ Special = {
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundAnatomySource": TissueSource,
+    "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundSynthesizer": Synthesizer,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,

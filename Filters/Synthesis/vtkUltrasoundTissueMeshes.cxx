@@ -140,7 +140,7 @@ std::vector<Body> BodiesOf(const std::string& entry, const Input& input)
 {
   std::vector<Body> bodies;
   if (entry.find_first_of("[+") == std::string::npos) {
-    echorama::StandardMaterial(entry); // is there
+    echorama::StandardMaterial(entry); // throws before there is any work
     for (std::size_t block = 0; block < input.Blocks.size(); ++block) {
       bodies.push_back({entry, {block}, Trimmed(entry + " " + input.Names[block])});
     }
@@ -153,6 +153,7 @@ std::vector<Body> BodiesOf(const std::string& entry, const Input& input)
                   "Materials: \"" + term + "\" is not a material with blocks like [0-3,7] or [*] after it");
     }
     const std::string material = Trimmed(term.substr(0, open));
+    echorama::StandardMaterial(material);
     bodies.push_back({material, NumbersFrom(term.substr(open + 1, term.size() - open - 2), input.Blocks.size(), term), term});
   }
   return bodies;
