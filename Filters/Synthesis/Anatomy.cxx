@@ -264,9 +264,13 @@ private:
   {
     static const std::array<const char*, Wall::layers + 1> names{"skin",   "fat",          "outer fascia",
                                                                  "muscle", "inner fascia", "trunk"};
-    const std::array<Material, Wall::layers + 1> materials{StandardMaterial("skin"),        StandardMaterial("fat"),
-                                                           Mixed("capsule", "fascia", 6.0), StandardMaterial("muscle"),
-                                                           Mixed("capsule", "fascia", 6.0), StandardMaterial("tissue")};
+    const Material fascia = Sheet("fascia", 10.0, 1520.0);
+    const std::array<Material, Wall::layers + 1> materials{StandardMaterial("skin"),
+                                                           Mixed("fat", "subcutaneous-fat", -11.0),
+                                                           fascia,
+                                                           Mixed("muscle", "muscle-wall", -6.0),
+                                                           fascia,
+                                                           Mixed("tissue", "mesentery", 3.0)};
     const Vector2d high(0.5 * p_.trunkWidthMm, 0.5 * p_.trunkLengthMm);
     double inset = 0.0;
     for (int i = 0; i <= Wall::layers; ++i) {
