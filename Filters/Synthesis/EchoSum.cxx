@@ -140,7 +140,7 @@ ECHORAMA_HOT void AddWeighted(float weight, const float* samples, std::ptrdiff_t
 struct FineRow {
   FineRow(const DepthAxis& depthAxis, double sigma, double from, double to) : axis(depthAxis), pulseSigma(sigma)
   {
-    perSample = std::max(1, static_cast<int>(std::ceil(std::min(1e6, axis.step * finePerSigma / sigma))));
+    perSample = std::max(1, static_cast<int>(std::ceil(axis.step * finePerSigma / sigma)));
     fineStep = axis.step / perSample;
     reach = static_cast<int>(std::ceil(pulseReach * sigma / axis.step));
     const double last = axis.count - 1.0;
@@ -194,7 +194,7 @@ public:
   BeamNodes(const SoundSegment& segment, const Transducer& transducer)
   {
     const int pieces = static_cast<int>(std::ceil(std::max(1.0, std::min(1e6, segment.length / nodeMm))));
-    step_ = segment.length / pieces;
+    step_ = std::max(segment.length / pieces, 0.1); // differences over less would be rounding
     const double pulse = transducer.PulseSigmaMm() / segment.scanDepthPerMm;
     for (int i = 0; i <= pieces; ++i) {
       const BeamWidth width = WidthAt(transducer, segment.way + i * step_);
@@ -272,7 +272,7 @@ private:
     const double halfAlong = half.dot(segment_.direction.cwiseAbs());
     if (s + halfAlong < 0.0 || s - halfAlong >= segment_.length)
       return;
-    const int node = std::clamp(static_cast<int>(s / nodes_.Step()), 0, nodes_.Pieces() - 1);
+    const int node = static_cast<int>(std::clamp(s / nodes_.Step(), 0.0, nodes_.Pieces() - 1.0));
     const double t = s - node * nodes_.Step();
     double value[5], slope[5];
     for (int i = 0; i < 5; ++i) {
@@ -346,11 +346,13 @@ private:
   float distance_[batch];
 };
 
-void CheckAxis(const DepthAxis& axis)
+void CheckAxis(const DepthAxis& axis, const Transducer& transducer)
 {
-  if (!(axis.step > 0.0) || !std::isfinite(axis.step) || !std::isfinite(axis.first))
+  const double sigma = transducer.PulseSigmaMm();
+  if (!(axis.step >= 0.001 * sigma && axis.step <= 10.0 * sigma) || !std::isfinite(axis.first))
     throw Error(Error::Kind::InvalidParameter, "echoes: the depth axis begins at " + NumberText(axis.first) + " mm in steps of " +
-                                                   NumberText(axis.step) + " mm; it must be finite and the step positive");
+                                                   NumberText(axis.step) + " mm; steps must be in [0.001, 10] times the " +
+                                                   NumberText(sigma) + " mm of the pulse");
 }
 
 void CheckSegment(const SoundSegment& segment)
@@ -366,7 +368,7 @@ void CheckSegment(const SoundSegment& segment)
 void AddSegmentEchoes(const SoundSegment& segment, const Scatterers& scatterers, const Transducer& transducer,
                       const DepthAxis& axis, std::complex<float>* row, double reach)
 {
-  CheckAxis(axis);
+  CheckAxis(axis, transducer);
   CheckSegment(segment);
   if (!(reach > 0.0 && reach <= 6.0))
     throw Error(Error::Kind::InvalidParameter, "echoes: the reach is " + NumberText(reach) + " sigma; it must be in (0, 6]");
@@ -386,7 +388,7 @@ void AddSegmentEchoes(const SoundSegment& segment, const Scatterers& scatterers,
 void AddSurfaceEcho(const SurfaceEcho& echo, const Transducer& transducer, const DepthAxis& axis, std::complex<float>* row,
                     double weight)
 {
-  CheckAxis(axis);
+  CheckAxis(axis, transducer);
   if (!std::isfinite(echo.scanDepth) || !std::isfinite(echo.amplitude) || !std::isfinite(weight))
     throw Error(Error::Kind::BadInput, "echoes: the echo of a surface is not finite");
   const double sigma = transducer.PulseSigmaMm(), phase = -transducer.PhasePerMm() * echo.scanDepth;

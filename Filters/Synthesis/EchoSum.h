@@ -11,7 +11,8 @@ namespace echorama {
 /// Samples along a beam.
 struct DepthAxis {
   double first = 0.0; ///< scan depth of the first, mm
-  double step = 0.1;  ///< mm, > 0. At most PulseSigmaMm(): coarser samples miss parts of the pulse.
+  /// mm, in [0.001, 10] times Transducer::PulseSigmaMm(). Above one, samples miss parts of the pulse.
+  double step = 0.1;
   int count = 0;
 };
 
