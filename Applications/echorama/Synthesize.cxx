@@ -49,10 +49,11 @@ std::vector<View> ViewsOf(const SynthesisScene& scene, const SynthesisParameters
   } else {
     const auto& recording = std::get<SceneRecording>(scene.views);
     const RecordedMotion motion(scene.PathOf(recording.file), recording);
-    for (const double time : motion.Times(recording.count)) {
+    const int steps = parameters.BeamDimensions()[2];
+    const double seconds = scene.sweep.alongRecording && steps > 1 ? scene.sweep.seconds : 0.0;
+    for (const double time : motion.Times(recording.count, seconds)) {
       const Pose pose = motion.At(time);
-      views.push_back({pose, scene.sweep.alongRecording ? motion.Around(time, scene.sweep.seconds, parameters.BeamDimensions()[2])
-                                                        : StepPoses(scene, pose)});
+      views.push_back({pose, seconds > 0.0 ? motion.Around(time, seconds, steps) : StepPoses(scene, pose)});
     }
   }
   return views;

@@ -1,0 +1,180 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""echorama synthesize: sets of volumes with truth, from scenes."""
+import csv
+import json
+import pathlib
+import tempfile
+import unittest
+
+import numpy
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+
+from program_under_test import read_mha, run, run_json
+
+work = None
+SCENE = {
+    "schema": "echorama-scene-1",
+    "name": "small",
+    "seed": 3,
+    "probe": {"preset": "mechanical-3d", "depthMinMm": 2, "depthMaxMm": 60, "elements": 20, "sweepSteps": 12, "samples": 120},
+    "background": "tissue",
+    "tissue": [{"name": "ball", "sphere": {"centre": [0, 0, 30], "radius": 8, "material": "cyst"}},
+               {"name": "plate", "box": {"centre": [0, 0, 55], "size": [80, 80, 4], "material": "lesion-bright"}},
+               {"name": "vessel", "cylinder": {"from": [-30, 10, 20], "to": [30, 12, 22], "radius": 3, "material": "blood"}}],
+    "views": {"count": 2, "overlap": 0.6},
+    "volume": {"spacingMm": 1.5, "knockMm": 8, "knockDegrees": 6},
+}
+
+
+def scene(name="scene.json", **changes):
+    path = work / name
+    path.write_text(json.dumps({**SCENE, **changes}))
+    return path
+
+
+def affine(header):
+    """From voxel indices to the world."""
+    numbers = lambda key: numpy.array([float(number) for number in header[key].split()])
+    matrix = numpy.eye(4)
+    matrix[:3, :3] = numpy.reshape(numbers("TransformMatrix"), (3, 3)).T * numbers("ElementSpacing")
+    matrix[:3, 3] = numbers("Offset")
+    return matrix
+
+
+class Sets(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.told = run_json("synthesize", scene(), "-o", work / "set", "--landmarks", 20)
+
+    def test_what_is_there(self):
+        names = {path.name for path in (work / "set").iterdir()}
+        for name in ("volume_1.mha", "volume_1.ValidRegion.mha", "beams_1.mha", "landmarks_1.csv", "volume_2.mha", "truth.json",
+                     "geometry.vtp", "scene.json"):
+            self.assertIn(name, names)
+        self.assertEqual([volume["file"] for volume in self.told["volumes"]],
+                         [str(work / "set" / f"volume_{i}.mha") for i in (1, 2)])
+        cost = self.told["volumes"][0]["cost"]
+        for stage in ("rays_seconds", "scatterers_seconds", "echoes_seconds", "detection_seconds"):
+            self.assertGreaterEqual(cost[stage], 0)
+        self.assertGreater(cost["scatterers"], 0)
+        self.assertEqual(self.told["seed"], 3)
+
+    def test_the_truth_is_right_for_score(self):
+        told = run_json("score", work / "set/truth.json", "--truth", work / "set/truth.json")
+        self.assertLess(max(volume["mean_mm"] for volume in told["volumes"]), 1e-9)
+
+    def test_a_landmark_is_one_place_of_the_world(self):
+        truth = json.loads((work / "set/truth.json").read_text())["volumes"]
+        places = {}
+        for i, pose in enumerate(truth, 1):
+            header, _ = read_mha(work / f"set/volume_{i}.mha")
+            to_world = numpy.array(pose["VolumeToWorld"])
+            for row in csv.DictReader((work / f"set/landmarks_{i}.csv").open()):
+                voxel = numpy.linalg.inv(affine(header)) @ [float(row["x"]), float(row["y"]), float(row["z"]), 1]
+                places.setdefault(row["label"], []).append((to_world @ affine(header) @ voxel)[:3])
+        shared = [each for each in places.values() if len(each) > 1]
+        self.assertGreater(len(shared), 10)
+        for each in shared:
+            numpy.testing.assert_allclose(each[0], each[1], atol=1e-6)
+
+    def test_volumes_show_the_scene(self):
+        _, voxels = read_mha(work / "set/volume_1.mha")
+        header, valid = read_mha(work / "set/volume_1.ValidRegion.mha")
+        k, j, i = numpy.nonzero(valid)
+        points = (affine(header) @ [i, j, k, numpy.ones(len(i))])[:3].T
+        grey = voxels[k, j, i].astype(float)
+        away = numpy.linalg.norm(points - [0, 0, 30], axis=1)
+        tissue = (away > 11) & (points[:, 2] < 45) & (abs(points[:, 1] - 11) > 5)
+        self.assertLess(grey[away < 6].mean(), 0.4 * grey[tissue].mean())
+        plate = (abs(points[:, 2] - 55) < 1.5) & (numpy.hypot(points[:, 0], points[:, 1]) > 12)
+        self.assertGreater(grey[plate].mean(), grey[tissue].mean() + 10)
+
+    def test_the_scene_in_the_folder_makes_it_again(self):
+        run_json("synthesize", work / "set/scene.json", "-o", work / "again")
+        for name in ("volume_2.mha", "beams_2.mha"):
+            numpy.testing.assert_array_equal(read_mha(work / "set" / name)[1], read_mha(work / "again" / name)[1])
+        run_json("synthesize", work / "set/scene.json", "-o", work / "other", "--seed", 4)
+        self.assertFalse((read_mha(work / "set/volume_1.mha")[1] == read_mha(work / "other/volume_1.mha")[1]).all())
+
+    def test_threads_change_nothing(self):
+        run_json("synthesize", scene(), "-o", work / "one", "--threads", 1)
+        for name in ("volume_1.mha", "beams_2.mha"):
+            numpy.testing.assert_array_equal(read_mha(work / "set" / name)[1], read_mha(work / "one" / name)[1])
+
+    def test_the_geometry_as_it_was(self):
+        reader = vtkXMLPolyDataReader()
+        reader.SetFileName(str(work / "set/geometry.vtp"))
+        reader.Update()
+        tissue = reader.GetOutput()
+        self.assertEqual(tissue.GetNumberOfPolys(), self.told["triangles"])
+        names = tissue.GetFieldData().GetAbstractArray("BodyName")
+        self.assertEqual([names.GetValue(i) for i in range(names.GetNumberOfValues())], ["ball", "plate", "vessel"])
+
+    def test_beams_scan_convert_to_the_volume(self):
+        info = run_json("info", work / "set/beams_1.mha")
+        self.assertIn("120", json.dumps(info))
+
+
+class OtherScenes(unittest.TestCase):
+    def test_a_rig_brings_its_landmarks(self):
+        path = scene("rig.json", background="water", tissue=[{"rig": {}}],
+                     probe={**SCENE["probe"], "depthMaxMm": 120}, views={"count": 2, "overlap": 0.8})
+        told = run_json("synthesize", path, "-o", work / "rig")
+        rows = list(csv.DictReader((work / "rig/landmarks_1.csv").open()))
+        self.assertGreaterEqual(len(rows), 3)
+        self.assertEqual(len(told["volumes"]), 2)
+
+    def test_a_mesh_from_a_folder_of_data(self):
+        (work / "meshes").mkdir(exist_ok=True)
+        (work / "meshes/tetrahedron.obj").write_text(
+            "v 0 0 20\nv 10 0 20\nv 0 10 20\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+        path = scene("mesh.json", tissue=[{"mesh": {"file": "../elsewhere/tetrahedron.obj", "unit": "mm", "material": "bone"}}])
+        run_json("synthesize", path, "-o", work / "mesh", "--data", work / "meshes")
+        done = run("synthesize", path, "-o", work / "mesh2")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("tetrahedron.obj", done.stderr)
+        self.assertFalse((work / "mesh2").exists())
+
+    def test_an_open_mesh_is_told_and_not_fatal(self):
+        (work / "open.obj").write_text("v 0 0 20\nv 10 0 20\nv 0 10 20\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
+        path = scene("open.json", tissue=[{"mesh": {"file": "open.obj", "material": "bone"}}])
+        told = run_json("synthesize", path, "-o", work / "open")
+        self.assertIn("open.obj", json.dumps(told["notes"]))
+
+    def test_a_plane_alone(self):
+        path = scene("plane.json", probe={"preset": "curvilinear", "elements": 32, "samples": 128},
+                     views={"poses": [{"face": [0, 0, 0], "target": [0, 0, 50]}]})
+        run_json("synthesize", path, "-o", work / "plane", "--spacing", 0.8)
+        self.assertEqual(read_mha(work / "plane/volume_1.mha")[1].shape[0], 1)
+
+
+class Refusals(unittest.TestCase):
+    def refuses(self, path, *words):
+        done = run("synthesize", path, "-o", work / "refused")
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        for word in words:
+            self.assertIn(word, done.stderr)
+        self.assertFalse((work / "refused").exists())
+
+    def test_wrong_scenes(self):
+        self.refuses(scene("bad.json", tissue=[{"sphere": {"material": "lver"}}]), "bad.json", "tissue[0].sphere.material", "lver")
+        self.refuses(scene("bad.json", probe={"elements": 1}), "probe.elements")
+        self.refuses(scene("bad.json", sede=3), "sede")
+        self.refuses(scene("bad.json", transducer={"frequencyMHz": 900}), "transducer.frequencyMHz")
+        self.refuses(work / "missing.json", "missing.json")
+        (work / "bad.json").write_text("{")
+        self.refuses(work / "bad.json", "not JSON")
+
+    def test_nothing_is_replaced_that_is_read(self):
+        (work / "kept").mkdir(exist_ok=True)
+        (work / "kept/scene.json").write_text(json.dumps(SCENE))
+        done = run("synthesize", work / "kept/scene.json", "-o", work / "kept")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertEqual(json.loads((work / "kept/scene.json").read_text()), SCENE)
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        work = pathlib.Path(folder)
+        unittest.main()
