@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""synthesis_tissue_figures.py [FOLDER]: how packed tissue is made, as pictures in FOLDER.
+"""synthesis_tissue_figures.py [FOLDER [ANATOMY]]: how tissue is made, as pictures in FOLDER.
 
 The first shows how an icosahedron becomes a sphere, and how fine spheres of one tissue are (dissertation, figures 3.3 and 3.4);
-the second cuts through dense packings, with bodies as bright as they scatter (figure 3.5).
+the second cuts through dense packings, with bodies as bright as they scatter (figure 3.5). With a folder ANATOMY of organs (VH_F_*.glb
+of the Human Reference Atlas) the third shows them as tissue.
 """
 import argparse
 import pathlib
@@ -14,12 +15,28 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import PolyCollection
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkPlane
-from vtkmodules.vtkFiltersCore import vtkCutter
+from vtkmodules.vtkCommonCore import vtkIdList
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPlane, vtkPolyData
+from vtkmodules.vtkFiltersCore import vtkCutter, vtkStripper
+from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
-from echorama import vtkUltrasoundTissueSource
+from echorama import vtkUltrasoundTissueMeshes, vtkUltrasoundTissueSource
 
+ORGANS = { # in the order in which they count, with the blocks that bound them
+    "Skin": "fat",
+    "Pelvis": "bone",
+    "Liver": "liver[10-19]",
+    "Spleen": "spleen[*]",
+    "Pancreas": "pancreas[*]",
+    "Kidney_L": "kidney[14]",
+    "Kidney_R": "kidney[2]",
+    "Urinary_Bladder": "muscle[*]",
+}
+COLOURS = {"bone": (0.93, 0.90, 0.80), "liver": (0.62, 0.30, 0.24), "spleen": (0.50, 0.30, 0.46), "pancreas": (0.90, 0.75, 0.45),
+           "kidney": (0.75, 0.42, 0.36), "muscle": (0.80, 0.60, 0.62)}
 DEVIATIONS = (0.2053, 0.0658, 0.01775, 0.00453) # of levels 0 to 3, per radius
 
 
@@ -136,9 +153,96 @@ def packings(path):
     figure.savefig(path, dpi=90)
 
 
+def organs(path, folder):
+    """Seen from the front, and cut across: the patient's left is on the right."""
+    meshes = vtkUltrasoundTissueMeshes()
+    meshes.SetScale(1000) # they are in metres
+    meshes.SetAxes(vtkUltrasoundTissueMeshes.Y_UP)
+    meshes.SetMaterials(", ".join(ORGANS.values()))
+    meshes.SetBackground("air")
+    meshes.CloseHolesOn()
+    for name in ORGANS:
+        reader = vtkGLTFReader()
+        reader.SetFileName(str(folder / f"VH_F_{name}.glb"))
+        meshes.AddInputConnection(reader.GetOutputPort())
+    meshes.Update()
+    print(meshes.GetReport())
+    tissue = meshes.GetOutput()
+    points, corners = mesh(tissue)
+    materials = tissue.GetFieldData().GetAbstractArray("MaterialName")
+    names = [materials.GetValue(i) for i in range(materials.GetNumberOfValues())]
+    bodies = [names[material] for material in vtk_to_numpy(tissue.GetFieldData().GetArray("BodyMaterial"))]
+    body = vtk_to_numpy(tissue.GetCellData().GetArray("Body"))
+
+    figure, (front, across) = plt.subplots(1, 2, figsize=(9.5, 4.4), gridspec_kw={"width_ratios": (1, 1.18)})
+    triangles = points[corners]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    seen = (normals[:, 1] < 0) & np.array([bodies[i] in COLOURS for i in body]) # looking along +y, to the back
+    order = np.argsort(-triangles[seen].mean(1)[:, 1])
+    light = np.clip(normals[seen][order] @ np.array([-0.4, -0.8, 0.45]), 0, 1)
+    colours = np.array([COLOURS[bodies[i]] for i in body[seen][order]])
+    front.add_collection(PolyCollection(triangles[seen][order][:, :, (0, 2)], facecolors=colours * (0.3 + 0.7 * light)[:, None],
+                                        edgecolors="face", linewidths=0.3, antialiaseds=False)) # else what is behind shines through
+    front.set_xlim(-175, 175)
+    front.set_ylim(-60, 445)
+    front.set_aspect("equal")
+    front.axis("off")
+
+    height = 280.0 # of the cut, mm
+    plane = vtkPlane()
+    plane.SetOrigin(0, 0, height)
+    plane.SetNormal(0, 0, 1)
+    cutter = vtkCutter()
+    cutter.SetCutFunction(plane)
+    cutter.SetInputData(tissue)
+    cutter.Update()
+    properties = tissue.GetFieldData().GetArray("MaterialProperty")
+    column = [i for i in range(properties.GetNumberOfComponents()) if properties.GetComponentName(i) == "BackscatterDb"][0]
+    for which, name in enumerate(bodies):
+        outlines = list(loops_of(cutter.GetOutput(), which))
+        if outlines:
+            grey = np.clip((properties.GetComponent(names.index(name), column) + 14) / 22, 0, 1)
+            across.add_patch(PathPatch(Path.make_compound_path(*outlines), facecolor=str(grey), edgecolor="none"))
+    front.axhline(height, color=(0.5, 0.5, 0.5), linewidth=0.6, zorder=9)
+    across.set_facecolor("black")
+    across.set_xlim(-190, 190)
+    across.set_ylim(205, -115) # the front of the patient is above
+    across.set_aspect("equal")
+    across.set_xticks([])
+    across.set_yticks([])
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.99, 0.02)
+    figure.savefig(path, dpi=110)
+
+
+def loops_of(cut, body):
+    """The closed lines of a body in a cut, as paths that go round alike."""
+    lines = vtk_to_numpy(cut.GetLines().GetConnectivityArray()).reshape(-1, 2)[vtk_to_numpy(cut.GetCellData().GetArray("Body")) == body]
+    part = vtkPolyData()
+    part.SetPoints(cut.GetPoints())
+    cells = vtkCellArray()
+    for a, b in lines:
+        cells.InsertNextCell(2, (a, b))
+    part.SetLines(cells)
+    strips = vtkStripper()
+    strips.SetInputData(part)
+    strips.SetMaximumLength(100000)
+    strips.JoinContiguousSegmentsOn()
+    strips.Update()
+    points = vtk_to_numpy(cut.GetPoints().GetData())[:, :2]
+    ids = vtkIdList()
+    strips.GetOutput().GetLines().InitTraversal()
+    while strips.GetOutput().GetLines().GetNextCell(ids):
+        yield Path(points[[ids.GetId(i) for i in range(ids.GetNumberOfIds())]], closed=True)
+
+
 arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
 arguments.add_argument("folder", nargs="?", type=pathlib.Path, default=pathlib.Path("."))
-folder = arguments.parse_args().folder
+arguments.add_argument("anatomy", nargs="?", type=pathlib.Path)
+arguments = arguments.parse_args()
+folder = arguments.folder
 folder.mkdir(parents=True, exist_ok=True)
 levels(folder / "TissueSourceLevels.png")
 packings(folder / "TissueSource.png")
+if arguments.anatomy:
+    organs(folder / "TissueMeshes.png", arguments.anatomy)
