@@ -414,6 +414,7 @@ Special = {
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundAnatomySource": TissueSource,
+    "vtkUltrasoundProbeSource": TissueSource,
     "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundSynthesizer": Synthesizer,
