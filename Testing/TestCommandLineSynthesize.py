@@ -70,7 +70,7 @@ class Sets(unittest.TestCase):
         for i, pose in enumerate(truth, 1):
             header, _ = read_mha(work / f"set/volume_{i}.mha")
             to_world = numpy.array(pose["VolumeToWorld"])
-            for row in csv.DictReader((work / f"set/landmarks_{i}.csv").open()):
+            for row in csv.DictReader((work / f"set/landmarks_{i}.csv").read_text().splitlines()):
                 voxel = numpy.linalg.inv(affine(header)) @ [float(row["x"]), float(row["y"]), float(row["z"]), 1]
                 places.setdefault(row["label"], []).append((to_world @ affine(header) @ voxel)[:3])
         shared = [each for each in places.values() if len(each) > 1]
@@ -121,7 +121,7 @@ class OtherScenes(unittest.TestCase):
         path = scene("rig.json", background="water", tissue=[{"rig": {}}],
                      probe={**SCENE["probe"], "depthMaxMm": 120}, views={"count": 2, "overlap": 0.8})
         told = run_json("synthesize", path, "-o", work / "rig")
-        rows = list(csv.DictReader((work / "rig/landmarks_1.csv").open()))
+        rows = list(csv.DictReader((work / "rig/landmarks_1.csv").read_text().splitlines()))
         self.assertGreaterEqual(len(rows), 3)
         self.assertEqual(len(told["volumes"]), 2)
 

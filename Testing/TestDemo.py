@@ -50,6 +50,12 @@ with tempfile.TemporaryDirectory() as folder:
     check("How far off" in report and f"{off[2]}" in report, "the report does not tell the score")
     check(str((folder / "phantom volumes" / "report.html").resolve()) in made.stdout, "the demo does not say where its report is")
 
+    made = demo(folder / "synthetic", "--synthetic")
+    check(made.returncode == 0, f"the demo of a synthesised scene failed:\n{made.stderr}")
+    check_report(folder / "synthetic")
+    off = re.search(r"off +([\d.]+) mm before, ([\d.]+) mm after", made.stdout)
+    check(off and float(off[1]) > 5.0 and float(off[2]) < 0.6 * float(off[1]), f"synthetic volumes: {made.stdout!r}")
+
     volumes = [folder / "phantom volumes" / "phantom" / f"volume_{number}.mha" for number in (1, 2)]
     own = demo(folder / "own", "--", *volumes)
     check(own.returncode == 0, f"the demo with volumes of one's own failed:\n{own.stderr}")

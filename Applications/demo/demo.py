@@ -4,7 +4,8 @@
 
 demo.py --program ECHORAMA --out FOLDER [-- VOLUME...]
 
-Without volumes it makes three of a phantom, knocked out of place by a known amount, so that the alignment can be scored.
+Without volumes it makes three of a phantom, or (--synthetic) of an invented abdomen by simulating ultrasound, knocked out of place
+by a known amount, so that the alignment can be scored.
 ./run demo calls it. It needs the Python package echorama, and a screen (xvfb-run provides one).
 """
 import argparse
@@ -70,6 +71,21 @@ def scores(result, files):
     return [of_file[file.resolve()] for file in files]
 
 
+def scene_file(out, quick):
+    """The example scene of an abdomen; coarse, for tests."""
+    path = pathlib.Path(__file__).resolve().parents[2] / "Examples" / "scenes" / "anatomy.json"
+    if not quick:
+        return path
+    scene = json.loads(path.read_text())
+    scene.pop("$schema", None)
+    scene["probe"].update(elements=48, sweepSteps=32, samples=160)
+    scene["transport"] = {"subRays": 1}
+    scene["volume"]["spacingMm"] = 2
+    coarse = out / "scene.json"
+    coarse.write_text(json.dumps(scene))
+    return coarse
+
+
 def write_identities(path, files):
     volumes = [{"file": os.path.relpath(file, path.parent), "VolumeToWorld": np.eye(4).tolist()} for file in files]
     path.write_text(json.dumps({"schema": "echorama-poses-1", "unit": "mm", "frame": "LPS", "volumes": volumes}, indent=1) + "\n")
@@ -80,10 +96,13 @@ def main():
     parser.add_argument("--program", required=True, help="the program echorama")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for the results")
     parser.add_argument("--quick", action="store_true", help="a coarse phantom and small pictures, for tests")
+    parser.add_argument("--synthetic", action="store_true", help="three volumes of an invented abdomen in simulated ultrasound")
     parser.add_argument("volumes", nargs="*", help="overlapping volumes (default: three of a phantom)")
     options = parser.parse_args()
     if len(options.volumes) == 1:
         parser.error("one volume cannot be aligned: name two or more, or none for the phantom")
+    if options.synthetic and options.volumes:
+        parser.error("--synthetic makes volumes: name none")
     try:
         demo(options)
     except (StepFailed, OSError) as failure:
@@ -106,6 +125,11 @@ def demo(options):
         named = {str(short(volume)) for volume in options.volumes}
         files = [short(volume) for volume in options.volumes
                  if re.sub(r"\.(ValidRegion|Provenance|Coverage|Spread|Embedding)(?=\.\w+$)", "", str(short(volume))) not in named - {str(short(volume))}]
+    elif options.synthetic:
+        steps.run("making three volumes of an invented abdomen by simulated ultrasound, knocked out of place", "synthesize",
+                  scene_file(out, options.quick), "-o", out / "synthetic")
+        truth_file = out / "synthetic" / "truth.json"
+        files = files_of(truth_file)
     else:
         steps.run("making three volumes of a phantom, knocked out of place", "phantom", "-o", out / "phantom",
                   *(["--spacing", 2] if options.quick else []))

@@ -271,7 +271,7 @@ def write_report(out, steps, files, truth_file, before, after, quick):
         "report.html": "this page: one file, to be kept or sent",
     }
     if truth_file:
-        listing["phantom"] = "the three volumes as they went in, and <code>truth.json</code>, the poses that put them back"
+        listing[truth_file.parent.name] = "the three volumes as they went in, and <code>truth.json</code>, the poses that put them back"
         listing["start.json"] = "poses that leave every volume where it lay, to score the start"
 
     page = string.Template((pathlib.Path(__file__).parent / "report.html").read_text()).substitute(

@@ -132,6 +132,7 @@ public:
   {
     for (const Material& material : scene.Materials())
       brightestDb_ = std::max(brightestDb_, material.backscatterDb);
+    brightestDb_ -= 10.0 * std::log10(p.subRays); // reflected by curved surfaces, the rays of a beam part: their powers add up
   }
 
   static DepthAxis InternalAxis(const SynthesisParameters& p)
@@ -192,7 +193,7 @@ public:
         ways.echoes.push_back(echo);
       }
       for (const SoundSegment& segment : path.segments)
-        if (segment.bounces > 0 && IsVisible(segment)) { // by itself: what many rays meet adds up
+        if (segment.bounces > 0 && IsVisible(segment)) {
           ways.segments.push_back(segment);
           ways.segments.back().amplitude *= weight;
         }

@@ -41,14 +41,14 @@ struct SynthesisParameters {
   /// Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue: dB, in [0, 120].
   double mirrorDb = 45.0;
   /// Ways of sound whose speckle would stay this far below black, after all gain, are not summed: dB, in [0, 300].
-  double invisibleDb = 10.0;
+  double invisibleDb = 6.0;
   ScatterCounting counting; ///< of the mode Counting
   Receiver receiver = DefaultReceiver();
   std::uint64_t seed = 1; ///< of the tissue: volumes of one seed see the same scatterers
   /// The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0: scatterersPerCell in every resolution cell at
   /// the transmit focus. Volumes share their speckle when they have the same number.
   double scatterersPerMm3 = 0.0;
-  static constexpr double scatterersPerCell = 20.0; ///< the speckle's signal-to-noise ratio is then 1.89 of 1.91
+  static constexpr double scatterersPerCell = 10.0; ///< enough for speckle that is all but fully developed
   /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. (So a simulator of tissue says
   /// it; the fields of an aligner point the other way.) The surfaces of the scene are those that the tissue has now. The default
   /// has not moved.

@@ -179,7 +179,7 @@ public:
 
   ///@{
   /**
-   * The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0, the default: 20 in every resolution cell at the
+   * The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0, the default: 10 in every resolution cell at the
    * transmit focus. Fewer are faster; volumes share their speckle when they have the same number.
    */
   void SetScatterersPerMm3(double);
