@@ -324,6 +324,9 @@ class Synthesizer(Phantom):
         filter.SetSpacingMm(3.0)
         filter.SetPosition(1.0, 2.0, 3.0)
         filter.SetOrientation(10.0, 20.0, 30.0)
+        return filter
+
+
 class TissueMeshes(TissueSource):
     """From meshes, which its own test feeds."""
 
