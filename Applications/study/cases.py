@@ -35,6 +35,15 @@ PAIRS = {
     "deformation_3mm": {"deformation_mm": 3.0},
     "everything": {"noise_db": -6.0, "rib": 0.2, "decorrelation": 0.3, "jets": 1, "deformation_mm": 1.5, "gain_db": 5.0},
 }
+# The same probe over an invented abdomen: sound is bent, reflected, attenuated and shadowed. Each pair is another individual.
+ANATOMY_PAIRS = {
+    "anatomy_75": {"overlap": 0.75},
+    "anatomy_55": {},
+    "anatomy_55_other": {},
+    "anatomy_35": {"overlap": 0.35},
+    "anatomy_20": {"overlap": 0.2},
+    "anatomy_noise": {"noise_db": -40.0},
+}
 STARTS = ((10.0, 15.0), (20.0, 25.0))  # degrees, mm
 FAR_STARTS = ((5.0, 5.0), (30.0, 40.0), (60.0, 60.0))  # of the plain pairs
 PLAIN_PAIRS = ("plain", "overlap_75", "overlap_35")
@@ -74,14 +83,56 @@ def seen(source, points):
     return vtk_to_numpy(places.GetData()).copy()
 
 
+def phantom(view, number, properties, seed, spacing):
+    """The view of one of both volumes of a pair, and how its tissue moves points of the world."""
+    source = echorama.vtkUltrasoundPhantomSource()
+    source.SetSeed(seed)
+    source.SetSpacingMm(spacing)
+    source.SetProbeToWorld(matrix_of(view))
+    source.SetGainDb(properties["gain_db"] * number)
+    source.SetNoiseDb(properties["noise_db"])
+    source.SetDecorrelation(properties["decorrelation"])
+    source.SetChangeSeed(number + 1)
+    if number == 1:
+        source.SetRibShare(properties["rib"])
+        source.SetJets(bool(properties["jets"]))
+        source.SetDeformationMm(properties["deformation_mm"])
+    source.Update()
+    return source.GetOutput(), lambda points: seen(source, points)
+
+
+def anatomy(view, number, properties, seed, spacing):
+    """The same of an abdomen, wide enough for both views of a pair that overlaps little."""
+    body = echorama.vtkUltrasoundAnatomySource()
+    body.SetSeed(seed)
+    body.SetTrunkWidthMm(380.0)
+    body.SetTrunkLengthMm(320.0)
+    source = echorama.vtkUltrasoundSynthesizer()
+    source.SetInputConnection(body.GetOutputPort())
+    source.SetSeed(seed)
+    source.SetDepthMin(5.0)  # the probe of the phantom's pairs
+    source.SetDepthMax(100.0)
+    source.SetElements(96)
+    source.SetSteps(64)
+    source.SetSamples(384)
+    source.SetSpacingMm(spacing)
+    source.SetProbeToWorld(matrix_of(view))
+    source.SetGainDb(4.0 + properties["gain_db"] * number)
+    source.SetNoiseDb(max(properties["noise_db"], -65.0))
+    source.Update()
+    return source.GetOutput(), lambda points: points
+
+
 def make_case(folder, name, planted, starts, seed, spacing=1.0, landmarks=200):
     """Writes one case. The same seed gives the same volumes."""
     properties = {**PLAIN, **planted}
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
     probe = Probe()
+    of_anatomy = name in ANATOMY_PAIRS
     # Where on the body the pair lies differs from pair to pair, so that they do not all show the same structures.
-    first = pose(np.radians(random.uniform((-6, -6, -35), (6, 6, 35))), random.uniform((-25, -12, -3), (5, 12, 3)))
+    middle = np.array((-25.0, 0, 0) if of_anatomy else (0, 0, 0))
+    first = pose(np.radians(random.uniform((-6, -6, -35), (6, 6, 35))), middle + random.uniform((-25, -12, -3), (5, 12, 3)))
     views = [first, first @ second_view(probe, properties["overlap"], random)]
     # The second file says something wrong about its place, as files do; the truth undoes that.
     centre = views[1] @ (0, 0, 55, 1)
@@ -95,23 +146,10 @@ def make_case(folder, name, planted, starts, seed, spacing=1.0, landmarks=200):
 
     files, lists = [], []
     for number, view in enumerate(views):
-        source = echorama.vtkUltrasoundPhantomSource()
-        source.SetSeed(seed)
-        source.SetSpacingMm(spacing)
-        source.SetProbeToWorld(matrix_of(view))
-        source.SetGainDb(properties["gain_db"] * number)
-        source.SetNoiseDb(properties["noise_db"])
-        source.SetDecorrelation(properties["decorrelation"])
-        source.SetChangeSeed(number + 1)
-        if number == 1:
-            source.SetRibShare(properties["rib"])
-            source.SetJets(bool(properties["jets"]))
-            source.SetDeformationMm(properties["deformation_mm"])
-        source.Update()
-        image = source.GetOutput()
+        image, moved = (anatomy if of_anatomy else phantom)(view, number, properties, seed, spacing)
         if image.GetNumberOfPoints() == 0:
-            raise RuntimeError(f"{name}: the phantom could not be made")
-        points = seen(source, places)
+            raise RuntimeError(f"{name}: the volume could not be made")
+        points = moved(places)
         if number == 1:
             echorama.vtkUltrasoundVolume.Move(image, matrix_of(knock))
             points = apply(knock, points)
@@ -132,10 +170,10 @@ def make_case(folder, name, planted, starts, seed, spacing=1.0, landmarks=200):
 
 
 def make(folder, pairs=None, seed=1, repeats=1, spacing=1.0, say=print):
-    """Writes the cases of the study that are not there yet."""
+    """Writes the cases of the study that are not there yet: those named, else all of the phantom."""
     for repeat in range(repeats):
-        for number, (name, planted) in enumerate(PAIRS.items()):
-            if pairs and name not in pairs:
+        for number, (name, planted) in enumerate({**PAIRS, **ANATOMY_PAIRS}.items()):
+            if name not in (pairs or PAIRS):
                 continue
             case = pathlib.Path(folder) / (name if repeats == 1 else f"{name}_{repeat + 1}")
             if (case / "case.json").exists():

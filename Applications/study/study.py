@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from cases import PAIRS, Case, cases_in, make
+from cases import ANATOMY_PAIRS, PAIRS, Case, cases_in, make
 from contestants import Answer, Failed, contestants, run_program
 from geometry import apply, degrees_of, write_poses
 
@@ -122,9 +122,11 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
 def main(arguments=None):
     parser = argparse.ArgumentParser(prog="study", description="Cases with truth, contestants that align them, tables and plots.")
     commands = parser.add_subparsers(dest="command", required=True)
-    command = commands.add_parser("make", help="write the cases: pairs of volumes of a phantom, with truth and starts")
+    command = commands.add_parser("make", help="write the cases: pairs of volumes of a phantom or an abdomen, with truth and starts")
     command.add_argument("folder", type=pathlib.Path)
-    command.add_argument("--pairs", nargs="+", choices=list(PAIRS), metavar="NAME", help=f"some of: {' '.join(PAIRS)}")
+    command.add_argument("--pairs", nargs="+", choices=[*PAIRS, *ANATOMY_PAIRS], metavar="NAME",
+                         help=f"some of: {' '.join([*PAIRS, *ANATOMY_PAIRS])}")
+    command.add_argument("--anatomy", action="store_true", help="pairs of a synthesised abdomen, half a minute each, instead of the phantom's")
     command.add_argument("--repeats", type=int, default=1, help="pairs of each kind (default 1)")
     command.add_argument("--seed", type=int, default=1)
     command.add_argument("--spacing", type=float, default=1.0, help="edge of the voxels, mm (default 1)")
@@ -146,7 +148,7 @@ def main(arguments=None):
     begin = time.monotonic()
     try:
         if options.command == "make":
-            make(options.folder, options.pairs, options.seed, options.repeats, options.spacing)
+            make(options.folder, options.pairs or (list(ANATOMY_PAIRS) if options.anatomy else None), options.seed, options.repeats, options.spacing)
         elif options.command == "run":
             known = contestants(options.program, options.method)
             unknown = [name for name in options.methods or [] if name not in known]

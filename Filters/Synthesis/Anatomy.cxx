@@ -397,7 +397,7 @@ private:
   void AddLiver()
   {
     Random random = StreamOf(p_, Part::Liver);
-    const Vector3d centre = Place(-28.0, 0.0, 41.0) + Shift(random);
+    Vector3d centre = Place(-28.0, 0.0, 41.0) + Shift(random);
     const Vector3d radii = Size(random, 72.0, 62.0, 40.0);
     const Waviness waviness(random);
     // Where the portal vein enters (the hilum, a hollow of the hind side), and where the hepatic veins leave.
@@ -408,6 +408,14 @@ private:
       return bent(d) * (1.0 - 0.22 * (1.0 + d.x()) * std::pow(std::max(0.0, d.z()), 1.5)) *
              (1.0 - 0.22 * std::exp(-(d - hilum).squaredNorm() / 0.35));
     };
+    // It lies against the wall: where its surface comes nearest to the probe.
+    double nearest = 0.0;
+    for (int i = 0; i < 400; ++i) {
+      const double z = -1.0 + 0.5 * i / 400.0, across = std::sqrt(1.0 - z * z), angle = 2.399963229728653 * i;
+      const Vector3d d(across * std::cos(angle), across * std::sin(angle), z);
+      nearest = std::min(nearest, radius(d) * z);
+    }
+    centre.z() = Place(0.0, 0.0, 1.0).z() - nearest;
     const Organ liver = AddOrgan("liver", StandardMaterial("liver"), centre, radius);
 
     const double root = p_.vesselRadiusMm;

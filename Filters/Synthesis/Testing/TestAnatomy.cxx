@@ -19,6 +19,7 @@ AnatomyParameters Coarse(std::uint64_t seed = 1)
   AnatomyParameters p;
   p.seed = seed;
   p.detailMm = 4.0;
+  p.septa = p.lumps = 60;
   return p;
 }
 
@@ -109,6 +110,8 @@ TEST(Anatomy, TheEndsOfItsRangesAreSound)
       std::visit([&](auto member) { p.*member = static_cast<std::decay_t<decltype(p.*member)>>(largest ? one.to : one.from); },
                  one.member);
     p.detailMm = 4.0;
+    p.septa = std::min(p.septa, 300);
+    p.lumps = std::min(p.lumps, 300);
     p.trunkWidthMm = p.trunkLengthMm = p.trunkDepthMm = 380.0;
     ExpectSound(MakeAnatomy(p));
     if (!largest) {
