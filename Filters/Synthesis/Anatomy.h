@@ -75,7 +75,7 @@ const std::vector<AnatomyParameter>& AnatomyParameterTable();
 
 /// Makes the abdomen: closed bodies, oriented outward, none of which cuts itself; all lie in the trunk, the first body.
 /// Later bodies count (TissueSurface), so that layers are nested solids. One seed makes one anatomy, to the last bit.
-/// Some 400,000 triangles with the defaults. Materials are standard ones, and some mixed from them.
+/// About a million triangles with the defaults. Materials are standard ones, and some mixed from them.
 /// \throws Error(InvalidParameter) as Check(), Error(Cancelled).
 TissueSurface MakeAnatomy(const AnatomyParameters& parameters, const Progress& progress = {});
 

@@ -32,6 +32,7 @@ vtkUltrasoundAnatomySource::vtkUltrasoundAnatomySource() : Kind(Anatomy)
   this->MuscleMm = anatomy.muscleMm;
   this->FasciaMm = anatomy.fasciaMm;
   this->Septa = anatomy.septa;
+  this->Lumps = anatomy.lumps;
   this->Liver = anatomy.liver;
   this->Kidney = anatomy.kidney;
   this->Gallbladder = anatomy.gallbladder;
@@ -82,6 +83,7 @@ echorama::AnatomyParameters vtkUltrasoundAnatomySource::AnatomyParameters() cons
   anatomy.muscleMm = this->MuscleMm;
   anatomy.fasciaMm = this->FasciaMm;
   anatomy.septa = this->Septa;
+  anatomy.lumps = this->Lumps;
   anatomy.liver = this->Liver;
   anatomy.kidney = this->Kidney;
   anatomy.gallbladder = this->Gallbladder;
@@ -183,6 +185,7 @@ void vtkUltrasoundAnatomySource::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MuscleMm: " << this->MuscleMm << "\n";
   os << indent << "FasciaMm: " << this->FasciaMm << "\n";
   os << indent << "Septa: " << this->Septa << "\n";
+  os << indent << "Lumps: " << this->Lumps << "\n";
   os << indent << "Liver: " << this->Liver << "\n";
   os << indent << "Kidney: " << this->Kidney << "\n";
   os << indent << "Gallbladder: " << this->Gallbladder << "\n";

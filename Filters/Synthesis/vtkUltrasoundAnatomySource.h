@@ -133,9 +133,15 @@ public:
   ///@}
 
   ///@{
-  /** Number of thin bright leaves in fat and muscle. In [0, 400]. Default 60. */
+  /** Number of thin bright leaves in fat and muscle. In [0, 2000]. Default 600. */
   vtkSetMacro(Septa, int);
   vtkGetMacro(Septa, int);
+  ///@}
+
+  ///@{
+  /** Number of lobules of fat and loops of bowel around the organs. In [0, 1000]. Default 700. */
+  vtkSetMacro(Lumps, int);
+  vtkGetMacro(Lumps, int);
   ///@}
 
   ///@{
@@ -342,6 +348,7 @@ private:
   double MuscleMm;
   double FasciaMm;
   int Septa;
+  int Lumps;
   bool Liver;
   bool Kidney;
   bool Gallbladder;
