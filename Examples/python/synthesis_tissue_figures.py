@@ -4,7 +4,7 @@
 
 The first shows how an icosahedron becomes a sphere, and how fine spheres of one tissue are (dissertation, figures 3.3 and 3.4);
 the second cuts through dense packings, with bodies as bright as they scatter (figure 3.5). With a folder ANATOMY of organs (VH_F_*.glb
-of the Human Reference Atlas) the third shows them as tissue.
+of the Human Reference Atlas) the third shows them as tissue, and the fourth what a probe sees of them.
 """
 import argparse
 import pathlib
@@ -23,7 +23,7 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPlane, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkCutter, vtkStripper
 from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
-from echorama import vtkUltrasoundTissueMeshes, vtkUltrasoundTissueSource
+from echorama import vtkUltrasoundSynthesizer, vtkUltrasoundTissueMeshes, vtkUltrasoundTissueSource
 
 ORGANS = { # in the order in which they count, with the blocks that bound them
     "Skin": "fat",
@@ -32,11 +32,11 @@ ORGANS = { # in the order in which they count, with the blocks that bound them
     "Spleen": "spleen[*]",
     "Pancreas": "pancreas[*]",
     "Kidney_L": "kidney[14]",
-    "Kidney_R": "kidney[2]",
+    "Kidney_R": "kidney[2] + " + " + ".join(f"lesion-dark[{pyramid}]" for pyramid in range(4, 14)),
     "Urinary_Bladder": "muscle[*]",
 }
 COLOURS = {"bone": (0.93, 0.90, 0.80), "liver": (0.62, 0.30, 0.24), "spleen": (0.50, 0.30, 0.46), "pancreas": (0.90, 0.75, 0.45),
-           "kidney": (0.75, 0.42, 0.36), "muscle": (0.80, 0.60, 0.62)}
+           "kidney": (0.75, 0.42, 0.36), "lesion-dark": (0.6, 0.3, 0.3), "muscle": (0.80, 0.60, 0.62)}
 DEVIATIONS = (0.2053, 0.0658, 0.01775, 0.00453) # of levels 0 to 3, per radius
 
 
@@ -153,8 +153,7 @@ def packings(path):
     figure.savefig(path, dpi=90)
 
 
-def organs(path, folder):
-    """Seen from the front, and cut across: the patient's left is on the right."""
+def organs_of(folder):
     meshes = vtkUltrasoundTissueMeshes()
     meshes.SetScale(1000) # they are in metres
     meshes.SetAxes(vtkUltrasoundTissueMeshes.Y_UP)
@@ -167,7 +166,11 @@ def organs(path, folder):
         meshes.AddInputConnection(reader.GetOutputPort())
     meshes.Update()
     print(meshes.GetReport())
-    tissue = meshes.GetOutput()
+    return meshes.GetOutput()
+
+
+def organs(path, tissue):
+    """Seen from the front, and cut across: the patient's left is on the right."""
     points, corners = mesh(tissue)
     materials = tissue.GetFieldData().GetAbstractArray("MaterialName")
     names = [materials.GetValue(i) for i in range(materials.GetNumberOfValues())]
@@ -215,6 +218,21 @@ def organs(path, folder):
     figure.savefig(path, dpi=110)
 
 
+def scan(path, tissue):
+    """What a probe on the right flank sees, along the body: its head end is on the right."""
+    synthesizer = vtkUltrasoundSynthesizer()
+    synthesizer.SetInputData(tissue)
+    synthesizer.SliceOnlyOn()
+    synthesizer.SetPosition(-142, 85, 268)
+    synthesizer.SetOrientation(-180 / 2**0.5, 0, -180 / 2**0.5) # beams to the patient's left, the fan along the body
+    synthesizer.SetFanAngle(70)
+    synthesizer.SetDepthMin(1)
+    synthesizer.SetDepthMax(150)
+    synthesizer.Update()
+    image = synthesizer.GetOutput()
+    plt.imsave(path, vtk_to_numpy(image.GetPointData().GetScalars()).reshape(image.GetDimensions()[1::-1]), cmap="gray", vmin=0, vmax=255)
+
+
 def loops_of(cut, body):
     """The closed lines of a body in a cut, as paths that go round alike."""
     lines = vtk_to_numpy(cut.GetLines().GetConnectivityArray()).reshape(-1, 2)[vtk_to_numpy(cut.GetCellData().GetArray("Body")) == body]
@@ -245,4 +263,6 @@ folder.mkdir(parents=True, exist_ok=True)
 levels(folder / "TissueSourceLevels.png")
 packings(folder / "TissueSource.png")
 if arguments.anatomy:
-    organs(folder / "TissueMeshes.png", arguments.anatomy)
+    anatomy = organs_of(arguments.anatomy)
+    organs(folder / "TissueMeshes.png", anatomy)
+    scan(folder / "TissueMeshesScan.png", anatomy)
