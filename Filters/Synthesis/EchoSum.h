@@ -4,7 +4,6 @@
 #include "SoundPath.h"
 #include "Transducer.h"
 #include <complex>
-#include <vector>
 
 namespace echorama {
 
@@ -38,25 +37,5 @@ void AddSegmentEchoes(const SoundSegment& segment, const Scatterers& scatterers,
 /// Adds the echo of a surface, \a weight times its amplitude at the peak: the pulse about its depth, and its phase.
 void AddSurfaceEcho(const SurfaceEcho& echo, const Transducer& transducer, const DepthAxis& axis, std::complex<float>* row,
                     double weight = 1.0);
-
-/// Where scatterers can be heard: the cells of a coarse grid that the tubes around the segments of some paths pass. What
-/// Scatterers::Make needs to leave out the rest of the world.
-class HeardRegion {
-public:
-  /// \throws Error(BadInput) for segments that are not finite, Error(TooLarge) for beams of more than 1e6 mm.
-  HeardRegion(const std::vector<SoundPath>& paths, const Transducer& transducer, double reach = beamReach);
-
-  const Eigen::AlignedBox3d& Box() const { return box_; }
-  /// Whether a box of the world meets a cell that was passed.
-  bool Meets(const Eigen::AlignedBox3d& box) const;
-
-private:
-  Eigen::Array3i CellOf(const Eigen::Vector3d& point) const; ///< clamped into the grid
-
-  Eigen::AlignedBox3d box_;
-  double cell_ = 4.0; // mm
-  Eigen::Array3i size_ = Eigen::Array3i::Zero();
-  std::vector<unsigned char> passed_;
-};
 
 } // namespace echorama

@@ -15,7 +15,6 @@ namespace echorama {
 namespace {
 
 constexpr double pi = 3.141592653589793;
-constexpr double sigmasPerAperture = 5.0;
 
 // Of one way: 1 / sigma^2 and the curvature.
 struct OneWay {
@@ -59,11 +58,11 @@ BeamWidth WidthAt(const Transducer& transducer, double wayMm)
 {
   const double waveNumber = 2.0 * pi / transducer.WavelengthMm();
   const double way = std::max(wayMm, 4.0 * transducer.WavelengthMm());
-  const double lateral = transducer.lateralApertureMm / sigmasPerAperture;
-  const double elevation = transducer.elevationApertureMm / sigmasPerAperture;
+  const double lateral = transducer.lateralApertureMm / Transducer::sigmasPerAperture;
+  const double elevation = transducer.elevationApertureMm / Transducer::sigmasPerAperture;
 
   const OneWay send = FocusedBeam(lateral, transducer.lateralFocusMm, way, waveNumber);
-  const double open = way / (transducer.smallestFNumber * sigmasPerAperture);
+  const double open = way / (transducer.smallestFNumber * Transducer::sigmasPerAperture);
   const OneWay listen = transducer.dynamicReceive ? FocusedBeam(std::min(lateral, open), way, way, waveNumber) : send;
   const OneWay lens = FocusedBeam(elevation, transducer.elevationFocusMm, way, waveNumber);
 

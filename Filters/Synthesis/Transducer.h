@@ -19,6 +19,8 @@ struct Transducer {
   double elevationFocusMm = 70.0;    ///< of the lens, sending and receiving, in [1, 1000]
   double assumedSoundSpeed = 1540.0; ///< m/s, in [500, 5000]: how the scanner turns time into depth
 
+  static constexpr double sigmasPerAperture = 5.0; ///< of the apodisation, from edge to edge
+
   /// Throws Error(InvalidParameter) that names the number that is out of its range.
   void Check() const;
 

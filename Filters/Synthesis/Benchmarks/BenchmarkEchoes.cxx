@@ -166,7 +166,7 @@ int main()
   Material tissue = StandardMaterial("liver");
   tissue.scattererDensity = 30.0 / WidthAt(transducer, transducer.lateralFocusMm).ResolutionCellMm3(transducer.PulseSigmaMm());
 
-  std::vector<SoundPath> paths;
+  std::vector<SoundSegment> segments;
   for (int k = 0; k < planes; ++k)
     for (int j = 0; j < beams; ++j) {
       const BeamPoint start{0.0, j / (beams - 1.0) - 0.5, k / (planes - 1.0) - 0.5};
@@ -175,11 +175,11 @@ int main()
       segment.direction = DirectionOf(probe, start);
       segment.across = (Eigen::Vector3d::UnitX() - segment.direction.x() * segment.direction).normalized();
       segment.length = 150.0;
-      paths.push_back({{segment}, {}, 1});
+      segments.push_back(segment);
     }
 
-  std::unique_ptr<HeardRegion> heard;
-  const double regionSeconds = benchmark::Seconds([&] { heard = std::make_unique<HeardRegion>(paths, transducer); });
+  std::unique_ptr<VisitedSpace> space;
+  const double regionSeconds = benchmark::Seconds([&] { space = std::make_unique<VisitedSpace>(SpaceOf(segments, transducer)); });
   Scatterers scatterers;
   double makeSeconds = 0.0;
   nlohmann::ordered_json made = Timed(
@@ -187,10 +187,10 @@ int main()
         scatterers = Scatterers::Make(
             {}, {tissue},
             [](const Eigen::Vector3f*, std::size_t count, std::int32_t* media) { std::fill(media, media + count, 0); },
-            heard->Box(), [&](const Eigen::AlignedBox3d& box) { return heard->Meets(box); });
+            space->Box(), [&](const Eigen::AlignedBox3d& box) { return space->Touches(box); });
       },
       makeSeconds);
-  heard.reset();
+  space.reset();
   made.update({{"region_seconds", regionSeconds},
                {"scatterers", scatterers.Count()},
                {"per_second", static_cast<double>(scatterers.Count()) / makeSeconds},
@@ -200,8 +200,8 @@ int main()
 
   // Beams all over the volume for the comparison.
   std::vector<const SoundSegment*> some;
-  for (std::size_t i = firstCompared; i < paths.size(); i += comparedApart)
-    some.push_back(&paths[i].segments[0]);
+  for (std::size_t i = firstCompared; i < segments.size(); i += comparedApart)
+    some.push_back(&segments[i]);
   const auto count = static_cast<double>(some.size());
   const ThreadLimit two(2);
   std::vector<Sums> exact(some.size());
@@ -242,18 +242,18 @@ int main()
     benchmark::Report("echoes", "one beam", "ours", seconds / count, RelativeError(rows, exact), "relative rms", line);
   }
 
-  std::vector<Row> rows(paths.size(), Row(static_cast<std::size_t>(axis.count)));
+  std::vector<Row> rows(segments.size(), Row(static_cast<std::size_t>(axis.count)));
   double seconds = 0.0;
   nlohmann::ordered_json line = Timed(
       [&] {
-        ParallelFor(static_cast<std::ptrdiff_t>(paths.size()), [&](std::ptrdiff_t i) {
-          AddSegmentEchoes(paths[static_cast<std::size_t>(i)].segments[0], scatterers, transducer, axis,
+        ParallelFor(static_cast<std::ptrdiff_t>(segments.size()), [&](std::ptrdiff_t i) {
+          AddSegmentEchoes(segments[static_cast<std::size_t>(i)], scatterers, transducer, axis,
                            rows[static_cast<std::size_t>(i)].data());
         });
       },
       seconds);
   std::vector<Row> compared;
-  for (std::size_t i = firstCompared; i < paths.size(); i += comparedApart)
+  for (std::size_t i = firstCompared; i < segments.size(); i += comparedApart)
     compared.push_back(rows[i]);
   line.update({{"threads", 2}});
   benchmark::Report("echoes", "volume of 128 x 128 beams", "ours", seconds, RelativeError(compared, exact), "relative rms", line);

@@ -2,6 +2,7 @@
 #pragma once
 // What the tests of speckle share.
 #include "Filters/Synthesis/EchoSum.h"
+#include "Filters/Synthesis/VisitedSpace.h"
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -48,15 +49,41 @@ inline Row RowOf(const SoundSegment& segment, const Scatterers& scatterers, cons
   return row;
 }
 
+/// Where the tubes around segments pass.
+inline VisitedSpace SpaceOf(const std::vector<SoundSegment>& segments, const Transducer& transducer, double reach = beamReach)
+{
+  constexpr double piece = 5.0; // mm
+  const auto radiusOf = [&](const SoundSegment& segment, double from) {
+    double widest = 0.0;
+    for (const double s : {from, std::min(from + piece, segment.length)}) {
+      const BeamWidth width = WidthAt(transducer, segment.way + s);
+      widest = std::max({widest, width.lateralSigma, width.elevationSigma});
+    }
+    return 1.05 * reach * widest;
+  };
+  Eigen::AlignedBox3d box;
+  for (const SoundSegment& segment : segments)
+    for (const double s : {0.0, segment.length}) {
+      const double radius = radiusOf(segment, s);
+      const Eigen::Vector3d place = segment.from + s * segment.direction;
+      box.extend(Eigen::Vector3d(place.array() - radius));
+      box.extend(Eigen::Vector3d(place.array() + radius));
+    }
+  VisitedSpace space(box, 2.0);
+  for (const SoundSegment& segment : segments)
+    for (double s = 0.0; s < segment.length; s += piece)
+      space.MarkLine(segment.from + s * segment.direction, segment.direction, std::min(piece, segment.length - s),
+                     radiusOf(segment, s));
+  return space;
+}
+
 /// All scatterers that the segments hear.
 inline Scatterers HeardBy(const std::vector<SoundSegment>& segments, const Transducer& transducer, const Material& material,
                           const ScattererParameters& parameters = {}, double reach = beamReach)
 {
-  SoundPath path;
-  path.segments = segments;
-  const HeardRegion heard({path}, transducer, reach);
-  return Scatterers::Make(parameters, {material}, AllFirst, heard.Box(),
-                          [&](const Eigen::AlignedBox3d& box) { return heard.Meets(box); });
+  const VisitedSpace space = SpaceOf(segments, transducer, reach);
+  return Scatterers::Make(parameters, {material}, AllFirst, space.Box(),
+                          [&](const Eigen::AlignedBox3d& box) { return space.Touches(box); });
 }
 
 /// Where they lie in the world, and their amplitudes.
