@@ -6,7 +6,8 @@ IN.jsonl holds one JSON object per line, as Testing/Benchmark.h writes them. Eac
 seconds, both logarithmic: the nearer to the lower left corner, the better. Lines that count successes over a minimum
 overlap (keys "t" and "within_1mm") become one more panel of success against t. A case without errors becomes bars of
 seconds; one with a number of "levels" per line, seconds and error against the levels; lines with an "accuracy" are joined and
-labelled with it; and lines of "energy" at times "t" for some numbers of levels two panels of curves, linear and logarithmic.
+labelled with it; lines with a number of "rays" become curves of error against rays, with their slopes; and lines of "energy"
+at times "t" for some numbers of levels two panels of curves, linear and logarithmic.
 """
 import json
 import math
@@ -160,6 +161,19 @@ def draw_levels(axes, case, lines):
     axes.legend(handles, [handle.get_label() for handle in handles], fontsize=8, frameon=False)
 
 
+def draw_rays(axes, case, lines):
+    for index, (method, of_method) in enumerate(grouped(lines, "method").items()):
+        axes.plot([line["rays"] for line in of_method], [number(line, "error") for line in of_method],
+                  marker=MARKERS[index], color=([OURS] + PEERS)[index % (len(PEERS) + 1)],
+                  label=f"{method}, slope {of_method[0]['slope']:.2f}")
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    axes.set_xlabel("rays")
+    axes.set_ylabel(lines[0].get("error_unit", "error"), fontsize=8)
+    axes.set_title(case, fontsize=10)
+    axes.legend(fontsize=8, frameon=False)
+
+
 def draw_energy(axes, lines, logarithmic):
     curves = grouped(lines, "levels")
     for index, (levels, of_levels) in enumerate(sorted(curves.items())):
@@ -192,16 +206,22 @@ def main():
     def with_levels(of_case):
         return all(number(line, "levels") is not None for line in of_case)
 
+    def with_rays(of_case):
+        return all(number(line, "rays") is not None and number(line, "error") is not None for line in of_case)
+
     def without_errors(of_case):
         return all(number(line, "error") is None for line in of_case)
 
-    points = {case: of_case for case, of_case in cases.items() if not with_levels(of_case) and not without_errors(of_case)}
+    points = {case: of_case for case, of_case in cases.items()
+              if not with_levels(of_case) and not with_rays(of_case) and not without_errors(of_case)}
     look = looks(dict.fromkeys(str(line.get("method", "")) for of_case in points.values() for line in of_case))
     for (case, of_case), panel in zip(cases.items(), axes):
         if case in points:
             draw_panel(panel, case, of_case, look)
         elif with_levels(of_case):
             draw_levels(panel, case, of_case)
+        elif with_rays(of_case):
+            draw_rays(panel, case, of_case)
         else:
             draw_bars(panel, case, of_case)
     if success:

@@ -391,6 +391,36 @@ void Collect(const RTCFilterFunctionNArguments* arguments)
   }
 }
 
+// What a hit needs to know of a triangle, in a quarter of a cache line.
+struct Record {
+  std::int32_t shell;
+  std::array<std::uint32_t, 3> normals; // at the corners, packed
+};
+
+// A unit vector in 32 bits, right to 4e-5: the octahedron unfolded into a square.
+constexpr std::uint32_t flatCorner = 0xffffffffu; // stands for the normal of the triangle itself
+constexpr float packSteps = 65534.0f;
+
+std::uint32_t Packed(const Eigen::Vector3f& normal)
+{
+  const Eigen::Vector3f n = normal / normal.lpNorm<1>();
+  float u = n[0], v = n[1];
+  if (n[2] < 0.0f) {
+    u = std::copysign(1.0f - std::abs(n[1]), n[0]);
+    v = std::copysign(1.0f - std::abs(n[0]), n[1]);
+  }
+  const auto bits = [](float x) { return static_cast<std::uint32_t>(std::lround((0.5f * x + 0.5f) * packSteps)); };
+  return bits(u) << 16 | bits(v);
+}
+
+Eigen::Vector3f Unpacked(std::uint32_t bits)
+{
+  const auto number = [](std::uint32_t x) { return 2.0f / packSteps * static_cast<float>(x) - 1.0f; };
+  const float u = number(bits >> 16), v = number(bits & 0xffffu), w = 1.0f - std::abs(u) - std::abs(v);
+  const float fold = std::max(-w, 0.0f);
+  return Eigen::Vector3f(u - std::copysign(fold, u), v - std::copysign(fold, v), w).normalized();
+}
+
 // A ray as Embree takes it. All lengths are along the line from where the ray begins or enters the scene's box.
 struct Line {
   Eigen::Vector3f origin, direction; // local
@@ -451,17 +481,15 @@ struct AcousticScene::State {
   void SetNormals(const Hit& hit, const Eigen::Vector3d& direction, Crossing& crossing) const;
   int Walk(const Eigen::Vector3d& from, const Eigen::Vector3d& to, BodySet inside) const;
 
-  void Build(const Shells& parts);
+  std::vector<std::uint32_t> Build(const Shells& parts);
   void FindCavities(const Shells& parts);
-  void MakeNormals(const Shells& parts, double creaseDegrees);
+  void MakeNormals(const Shells& parts, const std::vector<std::uint32_t>& kept, double creaseDegrees);
   void MakeLattice(const Shells& parts, const Progress& progress);
 
   std::vector<Material> materials;
   std::vector<int> materialOf; // of a body
   std::vector<Shell> shells;
-  std::vector<std::int32_t> shellOf;      // of a triangle of the tree
-  const std::uint32_t* corners = nullptr; // of the tree's triangles
-  std::vector<Eigen::Vector3f> normals;   // of the points, unit vectors, 0 on edges; none: all triangles are flat
+  std::vector<Record> records; // of the tree's triangles
   Notes notes;
   std::size_t triangles = 0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();                              // of the box, world
@@ -512,13 +540,13 @@ AcousticScene::State::State(const TissueSurface& surface, const Progress& progre
   shells = parts.shells;
   notes = parts.notes;
   progress(0.3);
-  Build(parts);
+  const std::vector<std::uint32_t> kept = Build(parts);
   progress(0.7);
   if (triangles == 0)
     return;
   FindCavities(parts);
   if (creaseDegrees > 0.0)
-    MakeNormals(parts, creaseDegrees);
+    MakeNormals(parts, kept, creaseDegrees);
   MakeLattice(parts, progress.Part(0.7, 1.0));
 }
 
@@ -530,7 +558,8 @@ AcousticScene::State::~State()
     rtcReleaseDevice(device);
 }
 
-void AcousticScene::State::Build(const Shells& parts)
+// \returns the triangles that the tree got.
+std::vector<std::uint32_t> AcousticScene::State::Build(const Shells& parts)
 {
   std::vector<std::uint32_t> kept;
   kept.reserve(parts.triangles.size());
@@ -544,7 +573,7 @@ void AcousticScene::State::Build(const Shells& parts)
   triangles = kept.size();
   notes.degenerateTriangles = static_cast<std::int64_t>(parts.triangles.size() - kept.size());
   if (triangles == 0)
-    return;
+    return kept;
 
   device = rtcNewDevice(nullptr);
   if (!device)
@@ -560,22 +589,22 @@ void AcousticScene::State::Build(const Shells& parts)
   if (coordinates && indices) {
     for (std::size_t i = 0; i < parts.points.size(); ++i)
       std::copy_n(parts.points[i].data(), 3, coordinates + 3 * i);
-    shellOf.resize(triangles);
+    records.resize(triangles);
     for (std::size_t i = 0; i < triangles; ++i) {
       std::copy_n(parts.triangles[kept[i]].data(), 3, indices + 3 * i);
-      shellOf[i] = parts.shellOf[kept[i]];
+      records[i] = {parts.shellOf[kept[i]], {flatCorner, flatCorner, flatCorner}};
     }
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
   }
-  corners = indices;
-  rtcReleaseGeometry(geometry); // the scene holds it
+  rtcReleaseGeometry(geometry);
   rtcCommitScene(scene);
   const RTCError problem = rtcGetDeviceError(device);
   if (problem == RTC_ERROR_OUT_OF_MEMORY || !coordinates || !indices)
     throw Error(Error::Kind::TooLarge, "the scene's " + std::to_string(triangles) + " triangles do not fit in memory");
   if (problem != RTC_ERROR_NONE)
     throw Error(Error::Kind::NotPossible, "Embree cannot build the scene (its error " + std::to_string(problem) + ")");
+  return kept;
 }
 
 // Which negative shells are cavities, and which are inside out.
@@ -668,6 +697,7 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID)
     return false;
   const float first = query.ray.tfar;
+  __builtin_prefetch(&records[query.hit.primID]);
   collector.hits.push_back(
       {first, query.hit.primID, Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z), query.hit.u, query.hit.v});
 
@@ -682,7 +712,7 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
   float last = first;
   for (const Hit& hit : collector.hits) {
     last = std::max(last, hit.distance);
-    const std::int32_t shell = shellOf[hit.triangle];
+    const std::int32_t shell = records[hit.triangle].shell;
     const Shell& about = shells[static_cast<std::size_t>(shell)];
     const bool enters = (hit.normal.dot(line.direction) < 0.0f) == (about.facing > 0);
     const int change = about.sheet ? 0 : enters ? 1 : -1;
@@ -762,11 +792,11 @@ BodySet AcousticScene::State::BodiesAt(const Eigen::Vector3d& point) const
   return result;
 }
 
-// The mean of the triangles around each point, by their area. Where one of them differs from it by more than the crease, the
-// point lies on an edge and has none.
-void AcousticScene::State::MakeNormals(const Shells& parts, double creaseDegrees)
+// Normals at corners: the mean of the triangles around each point, by their area. Where one of them differs from it by more
+// than the crease, the point lies on an edge, and its triangles are flat there.
+void AcousticScene::State::MakeNormals(const Shells& parts, const std::vector<std::uint32_t>& kept, double creaseDegrees)
 {
-  normals.assign(parts.points.size(), Eigen::Vector3f::Zero());
+  std::vector<Eigen::Vector3f> normals(parts.points.size(), Eigen::Vector3f::Zero());
   const auto normalOf = [&parts](const Triangle& t) -> Eigen::Vector3f {
     return (parts.points[t[1]] - parts.points[t[0]]).cross(parts.points[t[2]] - parts.points[t[0]]);
   };
@@ -785,27 +815,33 @@ void AcousticScene::State::MakeNormals(const Shells& parts, double creaseDegrees
       if (normals[corner].dot(normal) < least && normal.squaredNorm() > 0.5f)
         edged[corner] = true;
   }
-  for (std::size_t i = 0; i < normals.size(); ++i)
-    if (edged[i])
-      normals[i].setZero();
+  constexpr float plane = 1.0f - 1e-6f; // so flat that the triangle's own normal is more exact
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const Triangle& triangle = parts.triangles[kept[i]];
+    const Eigen::Vector3f normal = normalOf(triangle).normalized();
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const std::uint32_t point = triangle[corner];
+      const bool curved = !edged[point] && normals[point].squaredNorm() > 0.5f && normals[point].dot(normal) < plane;
+      records[i].normals[corner] = curved ? Packed(normals[point]) : flatCorner;
+    }
+  }
 }
 
 void AcousticScene::State::SetNormals(const Hit& hit, const Eigen::Vector3d& direction, Crossing& crossing) const
 {
-  const Eigen::Vector3f flat = hit.normal.normalized();
-  const float side = flat.dot(direction.cast<float>()) > 0.0f ? -1.0f : 1.0f;
-  crossing.facet = side * hit.normal.cast<double>().normalized();
+  const Eigen::Vector3d flat = hit.normal.cast<double>().normalized();
+  const double side = flat.dot(direction) > 0.0 ? -1.0 : 1.0;
+  crossing.facet = side * flat;
   crossing.normal = crossing.facet;
-  if (normals.empty())
+  const std::array<std::uint32_t, 3>& corners = records[hit.triangle].normals;
+  if (corners[0] == flatCorner && corners[1] == flatCorner && corners[2] == flatCorner)
     return;
-  const std::uint32_t* const corner = corners + 3 * static_cast<std::size_t>(hit.triangle);
   const float weights[] = {1.0f - hit.u - hit.v, hit.u, hit.v};
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3f& normal = normals[corner[i]];
-    sum += weights[i] * (normal.squaredNorm() > 0.5f ? normal : flat);
-  }
-  const Eigen::Vector3d curved = side * sum.cast<double>().normalized();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < 3; ++i)
+    sum += static_cast<double>(weights[i]) *
+           (corners[i] == flatCorner ? flat : Eigen::Vector3d(Unpacked(corners[i]).cast<double>()));
+  const Eigen::Vector3d curved = side * sum.normalized();
   // At grazing angles a ray may come from behind the curved normal, or be mirrored into the triangle: flat, then.
   const double cosine = -curved.dot(direction);
   if (cosine > 0.0 && (direction + 2.0 * cosine * curved).dot(crossing.facet) > 0.0)
@@ -1023,8 +1059,7 @@ std::size_t AcousticScene::MemoryBytes() const
 {
   const State& s = *state_;
   std::size_t bytes = static_cast<std::size_t>(std::max<std::int64_t>(0, s.treeBytes)) + s.shells.capacity() * sizeof(Shell) +
-                      s.shellOf.capacity() * sizeof(std::int32_t) + s.normals.capacity() * sizeof(Eigen::Vector3f) +
-                      s.lattice.setOf.capacity() * sizeof(std::int32_t);
+                      s.records.capacity() * sizeof(Record) + s.lattice.setOf.capacity() * sizeof(std::int32_t);
   for (const BodySet& set : s.lattice.sets)
     bytes += sizeof(BodySet) + (set.Count() > 10 ? sizeof(std::int32_t) * static_cast<std::size_t>(set.Count()) : 0);
   return bytes;

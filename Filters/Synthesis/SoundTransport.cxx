@@ -26,6 +26,11 @@ void Check(const char* name, double value, double from, double to)
                                                    NumberText(from) + ", " + NumberText(to) + "]");
 }
 
+Eigen::Vector3d MirroredAcross(const Eigen::Vector3d& across, const Eigen::Vector3d& normal)
+{
+  return (across - 2.0 * across.dot(normal) * normal).normalized();
+}
+
 // A direction about the normal, as likely as the cosine of the angle between them.
 Eigen::Vector3d LambertDirection(const Eigen::Vector3d& normal, double u, double v)
 {
@@ -56,10 +61,10 @@ void SoundConditions::Check() const
 // A way that is still to be followed.
 struct SoundTracer::Way {
   SceneRay ray;
-  Eigen::Vector3d across;
-  double way, scanDepth, amplitude;
-  int medium, bounces;
-  bool towardsFace = false; // may meet the probe's face
+  Eigen::Vector3d across = Eigen::Vector3d::UnitX();
+  double way = 0.0, scanDepth = 0.0, amplitude = 1.0; // where it begins
+  int bounces = 0;
+  bool mayMeetFace = false;
 };
 
 SoundTracer::SoundTracer(const AcousticScene& scene, const SoundTransport& transport, const SoundConditions& conditions)
@@ -87,26 +92,35 @@ double SoundTracer::Returned(double cosine, double roughness) const
   return std::sqrt((1.0 - roughness) * mirror + roughness * caught_ * cosine);
 }
 
+// How far along the ray, from a place on it, the probe's face is met from its front.
+double SoundTracer::WayToFace(const RayStart& start, const Eigen::Vector3d& place, const Eigen::Vector3d& direction) const
+{
+  const double approach = -direction.dot(start.direction);
+  if (approach > 0.0) {
+    const double distance = (place - start.origin).dot(start.direction) / approach;
+    if (distance > scene_.Tolerance() && (place + distance * direction - start.origin).norm() <= transport_.faceRadius)
+      return distance;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
 void SoundTracer::Trace(const RayStart& start, SoundPath& path, RaySamples* samples,
                         std::vector<SceneRay::Question>* record) const
 {
   path.segments.clear();
   path.echoes.clear();
   path.rays = 0;
-  thread_local std::vector<Way> waiting;
-  thread_local std::vector<Way> reflections;
+  thread_local std::vector<Way> waiting, reflections;
   waiting.clear();
-  Way way;
-  way.ray.origin = start.origin;
-  way.ray.direction = start.direction;
-  way.ray.inside = start.inside;
-  way.ray.record = record;
-  way.across = start.across;
-  way.way = 0.0;
-  way.scanDepth = start.scanDepth;
-  way.amplitude = start.amplitude;
-  way.bounces = 0;
-  waiting.push_back(std::move(way));
+  waiting.emplace_back();
+  Way& direct = waiting.back();
+  direct.ray.origin = start.origin;
+  direct.ray.direction = start.direction;
+  direct.ray.inside = start.inside;
+  direct.ray.record = record;
+  direct.across = start.across;
+  direct.scanDepth = start.scanDepth;
+  direct.amplitude = start.amplitude;
   while (!waiting.empty() && path.segments.size() < static_cast<std::size_t>(transport_.maxSegments)) {
     Way next = std::move(waiting.back());
     waiting.pop_back();
@@ -117,140 +131,133 @@ void SoundTracer::Trace(const RayStart& start, SoundPath& path, RaySamples* samp
   }
 }
 
+// Follows a way to its end. What it reflects is put aside.
 void SoundTracer::Follow(Way& way, const RayStart& start, SoundPath& path, RaySamples* samples,
                          std::vector<Way>& reflections) const
 {
   SceneRay& ray = way.ray;
-  way.medium = scene_.MediumOf(ray.inside);
-  double begin = 0.0; // along the ray
-  for (;;) {
-    const Medium& medium = media_[static_cast<std::size_t>(way.medium)];
-    const double level = std::abs(way.amplitude);
-    if (!(level > leastAmplitude_) || path.segments.size() >= static_cast<std::size_t>(transport_.maxSegments))
-      break;
-    double length = (conditions_.maxScanDepth - way.scanDepth) / medium.depthPerMm;
-    if (medium.attenuation > 0.0)
-      length = std::min(length, std::log(level / leastAmplitude_) / medium.attenuation);
+  int inMaterial = scene_.MediumOf(ray.inside);
+  double begin = 0.0; // of the next segment, along the ray
+  const auto echo = [&](double pressure) {
+    if (std::abs(way.amplitude * pressure) > leastAmplitude_)
+      path.echoes.push_back({way.scanDepth, way.amplitude * pressure, way.way, way.bounces});
+  };
+  const auto reflect = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Eigen::Vector3d& across,
+                           const BodySet& inside, double amplitude, bool mayMeetFace) {
+    if (!(std::abs(amplitude) > leastAmplitude_) || way.bounces >= transport_.maxBounces)
+      return;
+    Way& reflection = reflections.emplace_back();
+    reflection.ray.origin = from;
+    reflection.ray.direction = direction;
+    reflection.ray.inside = inside;
+    reflection.ray.fromSurface = true;
+    reflection.ray.record = ray.record;
+    reflection.across = across;
+    reflection.way = way.way;
+    reflection.scanDepth = way.scanDepth;
+    reflection.amplitude = amplitude;
+    reflection.bounces = way.bounces + 1;
+    reflection.mayMeetFace = mayMeetFace;
+  };
+
+  while (path.segments.size() < static_cast<std::size_t>(transport_.maxSegments)) {
+    const Medium& medium = media_[static_cast<std::size_t>(inMaterial)];
+    const Eigen::Vector3d from = ray.origin + begin * ray.direction;
+    const double toFace = way.mayMeetFace ? WayToFace(start, from, ray.direction) : std::numeric_limits<double>::infinity();
+    double length = std::min((conditions_.maxScanDepth - way.scanDepth) / medium.depthPerMm, toFace);
     if (!(length > 0.0))
       break;
-
-    // The probe's face: a disc in the element's plane, met from the front.
-    double toFace = std::numeric_limits<double>::infinity();
-    const double approach = -ray.direction.dot(start.direction);
-    if (way.towardsFace && approach > 0.0) {
-      const double distance = (ray.origin + begin * ray.direction - start.origin).dot(start.direction) / approach;
-      const Eigen::Vector3d place = ray.origin + (begin + distance) * ray.direction;
-      if (distance > scene_.Tolerance() && (place - start.origin).norm() <= transport_.faceRadius)
-        toFace = distance;
-    }
-
     Crossing crossing;
-    const double limit = begin + std::min(length, toFace);
-    const bool meets = scene_.NextCrossing(ray, limit, crossing);
-    const bool atFace = !meets && toFace <= length;
-    const double passed = meets ? std::max(0.0, crossing.distance - begin) : std::min(length, toFace);
-
-    SoundSegment segment;
-    segment.from = ray.origin + begin * ray.direction;
-    segment.direction = ray.direction;
-    segment.across = way.across;
-    segment.length = passed;
-    segment.way = way.way;
-    segment.scanDepth = way.scanDepth;
-    segment.scanDepthPerMm = medium.depthPerMm;
-    segment.medium = way.medium;
-    segment.amplitude = way.amplitude;
-    segment.attenuation = medium.attenuation;
-    segment.bounces = way.bounces;
-    if (passed > 0.0)
-      path.segments.push_back(segment);
-    way.way += passed;
-    way.scanDepth += passed * medium.depthPerMm;
-    way.amplitude *= std::exp(-medium.attenuation * passed);
-    begin = meets ? crossing.behind : begin + passed;
-    if (!meets && !atFace)
+    const bool meets = scene_.NextCrossing(ray, begin + length, crossing);
+    if (meets)
+      length = std::clamp(crossing.distance - begin, 0.0, length);
+    const double atEnd = way.amplitude * std::exp(-medium.attenuation * length);
+    const bool fades = !(std::abs(atEnd) > leastAmplitude_);
+    if (fades) // the segment ends where it does
+      length = medium.attenuation > 0.0
+                   ? std::clamp(std::log(std::abs(way.amplitude) / leastAmplitude_) / medium.attenuation, 0.0, length)
+                   : 0.0;
+    if (length > 0.0) {
+      SoundSegment& segment = path.segments.emplace_back();
+      segment.from = from;
+      segment.direction = ray.direction;
+      segment.across = way.across;
+      segment.length = length;
+      segment.way = way.way;
+      segment.scanDepth = way.scanDepth;
+      segment.scanDepthPerMm = medium.depthPerMm;
+      segment.medium = inMaterial;
+      segment.amplitude = way.amplitude;
+      segment.attenuation = medium.attenuation;
+      segment.bounces = way.bounces;
+    }
+    if (fades)
       break;
+    way.way += length;
+    way.scanDepth += length * medium.depthPerMm;
+    way.amplitude = atEnd;
 
-    if (atFace) { // a mirror that lets nothing pass
-      const double cosine = std::min(1.0, approach), reflected = transport_.faceReflection;
-      path.echoes.push_back({way.scanDepth, way.amplitude * reflected * Returned(cosine, 0.0), way.way, way.bounces});
-      if (way.bounces < transport_.maxBounces) {
-        Way back = way;
-        back.ray = SceneRay();
-        back.ray.origin = ray.origin + begin * ray.direction;
-        back.ray.direction = Mirrored(ray.direction, start.direction);
-        back.ray.inside = ray.inside;
-        back.ray.fromSurface = true;
-        back.ray.record = ray.record;
-        back.across = (way.across - 2.0 * way.across.dot(start.direction) * start.direction).normalized();
-        back.amplitude = way.amplitude * reflected * reflected;
-        ++back.bounces;
-        back.towardsFace = false;
-        reflections.push_back(std::move(back));
+    if (!meets) {
+      if (length == toFace) { // a mirror that lets nothing pass
+        const double reflected = transport_.faceReflection;
+        echo(reflected * Returned(-ray.direction.dot(start.direction), 0.0));
+        reflect(from + length * ray.direction, Mirrored(ray.direction, start.direction),
+                MirroredAcross(way.across, start.direction), ray.inside, way.amplitude * reflected * reflected, false);
       }
       break;
     }
 
     const bool sheet = crossing.sheet >= 0;
     const Medium& behind = media_[static_cast<std::size_t>(sheet ? crossing.sheet : crossing.after)];
-    const bool bends = transport_.refraction && !sheet && behind.fluid.soundSpeed != medium.fluid.soundSpeed;
     // Without refraction the interface reflects as the impedances say, at every angle alike.
     const Fluid there = transport_.refraction ? behind.fluid : Fluid{behind.fluid.impedance, medium.fluid.soundSpeed};
     const double ratio = there.soundSpeed / medium.fluid.soundSpeed;
-    Eigen::Vector3d normal = crossing.normal;
-    double cosine = std::min(1.0, -ray.direction.dot(normal));
+    const bool bends = !sheet && ratio != 1.0;
+    Eigen::Vector3d normal = crossing.normal, onward = ray.direction;
+    double cosine = -ray.direction.dot(normal);
     InterfaceResponse response = MeetInterface(medium.fluid, there, cosine);
-    if (bends && !response.total && Refracted(ray.direction, normal, ratio, response.cosTransmitted).dot(crossing.facet) >= 0.0) {
-      normal = crossing.facet; // at grazing angles the curved one may bend the ray back out of the triangle
-      cosine = std::min(1.0, -ray.direction.dot(normal));
-      response = MeetInterface(medium.fluid, there, cosine);
+    if (bends && !response.total) {
+      onward = Refracted(ray.direction, normal, ratio, response.cosTransmitted);
+      if (onward.dot(crossing.facet) >= 0.0) { // at grazing angles the curved normal may bend it back out of the triangle
+        normal = crossing.facet;
+        cosine = -ray.direction.dot(normal);
+        response = MeetInterface(medium.fluid, there, cosine);
+        if (!response.total)
+          onward = Refracted(ray.direction, normal, ratio, response.cosTransmitted);
+      }
     }
-    const double roughness = std::max(medium.roughness, behind.roughness);
-    if (response.reflected != 0.0)
-      path.echoes.push_back(
-          {way.scanDepth, way.amplitude * response.reflected * Returned(cosine, roughness), way.way, way.bounces});
 
-    if (way.bounces < transport_.maxBounces && std::abs(way.amplitude) * response.reflectedEnergy > leastAmplitude_) {
-      Eigen::Vector3d direction = Mirrored(ray.direction, normal);
-      Eigen::Vector3d across = (way.across - 2.0 * way.across.dot(normal) * normal).normalized();
-      double amplitude = way.amplitude * response.reflectedEnergy;
+    if (response.reflected != 0.0) {
+      const double roughness = std::max(medium.roughness, behind.roughness);
+      echo(response.reflected * Returned(cosine, roughness));
+      const double reflected = way.amplitude * response.reflectedEnergy;
+      const Eigen::Vector3d place = ray.origin + crossing.distance * ray.direction;
+      const Eigen::Vector3d mirrored = Mirrored(ray.direction, normal), across = MirroredAcross(way.across, normal);
+      const bool mayMeetFace = transport_.faceReflection > 0.0;
+      bool diffuse = false;
       if (samples && roughness > 0.0) {
         const double choice = samples->Next(), u = samples->Next(), v = samples->Next();
-        if (choice < roughness) {
-          const Eigen::Vector3d mirrored = direction;
-          direction = LambertDirection(crossing.facet, u, v);
-          across = CarriedThroughBend(across, mirrored, direction);
-          amplitude *= std::sqrt(caught_ * cosine); // on the way back it is turned to the element by a Lambert lobe too
+        diffuse = choice < roughness;
+        if (diffuse) { // and on the way back a Lambert lobe turns it to the element
+          const Eigen::Vector3d direction = LambertDirection(crossing.facet, u, v);
+          reflect(place, direction, CarriedThroughBend(across, mirrored, direction), ray.came,
+                  reflected * std::sqrt(caught_ * cosine), mayMeetFace);
         }
       }
-      if (std::abs(amplitude) > leastAmplitude_) {
-        Way reflection = way;
-        reflection.ray = SceneRay();
-        reflection.ray.origin = ray.origin + crossing.distance * ray.direction;
-        reflection.ray.direction = direction;
-        reflection.ray.inside = ray.came;
-        reflection.ray.fromSurface = true;
-        reflection.ray.record = ray.record;
-        reflection.across = across;
-        reflection.amplitude = amplitude;
-        ++reflection.bounces;
-        reflection.towardsFace = transport_.faceReflection > 0.0;
-        reflections.push_back(std::move(reflection));
-      }
+      if (!diffuse)
+        reflect(place, mirrored, across, ray.came, reflected, mayMeetFace);
     }
 
     if (response.total)
       break;
     way.amplitude *= response.transmittedEnergy;
-    if (sheet)
-      continue;
-    way.medium = crossing.after;
-    if (bends && behind.fluid.soundSpeed != medium.fluid.soundSpeed) {
-      const Eigen::Vector3d direction =
-          Refracted(ray.direction, crossing.normal, behind.fluid.soundSpeed / medium.fluid.soundSpeed, response.cosTransmitted);
-      way.across = CarriedThroughBend(way.across, ray.direction, direction);
+    begin = crossing.behind;
+    if (!sheet)
+      inMaterial = crossing.after;
+    if (bends) {
+      way.across = CarriedThroughBend(way.across, ray.direction, onward);
       ray.origin += begin * ray.direction;
-      ray.direction = direction;
+      ray.direction = onward;
       ray.fromSurface = true;
       ray.passed = 0.0;
       begin = 0.0;

@@ -74,6 +74,7 @@ private:
     double roughness;
   };
   double Returned(double cosine, double roughness) const;
+  double WayToFace(const RayStart& start, const Eigen::Vector3d& place, const Eigen::Vector3d& direction) const;
   void Follow(Way& way, const RayStart& start, SoundPath& path, RaySamples* samples, std::vector<Way>& reflections) const;
 
   const AcousticScene& scene_;
