@@ -202,7 +202,8 @@ void vtkUltrasoundProbeSource::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 //----------------------------------------------------------------------------
 int vtkUltrasoundProbeSource::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress&) {
+  return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress& progress) {
+    progress(0.0);
     const echorama::ProbePreset* preset = PresetOf(this->Preset);
     const echorama::ProbeGeometry geometry = this->Geometry();
     const echorama::Pose probeToWorld = this->ProbeToWorld();
@@ -212,12 +213,14 @@ int vtkUltrasoundProbeSource::RequestData(vtkInformation*, vtkInformationVector*
     const int elements = preset ? preset->elements : this->Elements;
     const int steps = geometry.IsPlane() ? 1 : preset ? preset->sweepSteps : this->SweepSteps;
     WriteMesh(echorama::MakeProbeMesh(geometry, this->Housing()), probeToWorld, vtkPolyData::GetData(outputs, 0));
+    progress(0.5);
     WriteElements(echorama::ElementPoses(geometry, elements, steps), elements, probeToWorld, vtkPolyData::GetData(outputs, 1));
     for (const int port : {0, 1}) {
       vtkPolyData* output = vtkPolyData::GetData(outputs, port);
       vtkUltrasoundAcquisition::SetProbeGeometry(output, geometry);
       vtkUltrasoundAcquisition::SetProbeToWorld(output, probeToWorld);
     }
+    progress(1.0);
   });
 }
 
