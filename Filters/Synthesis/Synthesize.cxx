@@ -104,8 +104,9 @@ RayStart StartOf(const Element& element, const Transducer& transducer, RaySample
 double WeightOf(const RayStart& start, const Element& element, const Transducer& transducer)
 {
   const Vector3d offset = start.origin - element.position;
-  const double lateral = offset.dot(element.across) / (0.25 * transducer.lateralApertureMm),
-               elevation = offset.dot(element.direction.cross(element.across)) / (0.25 * transducer.elevationApertureMm);
+  const double lateral = offset.dot(element.across) / (transducer.lateralApertureMm / Transducer::sigmasPerAperture),
+               elevation = offset.dot(element.direction.cross(element.across)) /
+                           (transducer.elevationApertureMm / Transducer::sigmasPerAperture);
   return std::exp(-0.5 * (lateral * lateral + elevation * elevation));
 }
 
@@ -274,7 +275,8 @@ private:
 
   RaySamples SamplesOf(std::ptrdiff_t beam, int ray) const
   {
-    return {p_.sampling, p_.seed, static_cast<std::uint64_t>(beam), static_cast<std::uint32_t>(ray),
+    // By element alone, so that one plane has the same rays by itself and within its sweep.
+    return {p_.sampling, p_.seed, static_cast<std::uint64_t>(beam % n_[1]), static_cast<std::uint32_t>(ray),
             static_cast<std::uint32_t>(p_.subRays)};
   }
 

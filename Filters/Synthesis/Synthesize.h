@@ -41,7 +41,7 @@ struct SynthesisParameters {
   /// Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue: dB, in [0, 120].
   double mirrorDb = 45.0;
   /// Ways of sound whose speckle would stay this far below black, after all gain, are not summed: dB, in [0, 300].
-  double invisibleDb = 6.0;
+  double invisibleDb = 12.0;
   ScatterCounting counting; ///< of the mode Counting
   Receiver receiver = DefaultReceiver();
   std::uint64_t seed = 1; ///< of the tissue: volumes of one seed see the same scatterers

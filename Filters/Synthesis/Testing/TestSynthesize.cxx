@@ -250,6 +250,7 @@ TEST(Synthesize, ShadowsAreAsSoftAsTheApertureIsWide)
   AddBox(surface, Vector3d(0.5, -50, 8), Vector3d(50, 50, 10), StandardMaterial("bone"));
   const AcousticScene scene(surface);
   SynthesisParameters p = Small();
+  p.subRays = 1;
   p.transport.maxBounces = 0;
   p.transport.refraction = false;
   // Mean power of every beam behind the edge, beside that without a bone.
@@ -289,7 +290,7 @@ TEST(Synthesize, WhatStaysBlackIsNotSummed)
   const auto all = SynthesizeBeams(scene, p, {}, &full);
   EXPECT_LT(cost.segments, full.segments / 2);
   for (std::ptrdiff_t i = 0; i < all.View().Size(); ++i)
-    ASSERT_NEAR(part.View()[i], all.View()[i], 8) << i; // 20 dB below black weigh where an echo fades
+    ASSERT_NEAR(part.View()[i], all.View()[i], 10) << i; // peaks of speckle, and ways that add up
 }
 
 TEST(Synthesize, ManyRaysOfAnOpenBeamAreAsGoodAsOne)
