@@ -93,7 +93,7 @@ double BruteForceSnr(double perCell)
   const double cells[3] = {cell / transducer.PulseSigmaMm(), cell / width.lateralSigma, cell / width.elevationSigma};
   Random random(9);
   double n = 0.0, one = 0.0, two = 0.0;
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (int trial = 0; trial < 8000; ++trial) {
     // Along each axis: distance squared of jittered places, by cell.
     double offset[3];
     int count[3];
