@@ -1,12 +1,17 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""synthesis_anatomy_figures.py [FOLDER]: the invented abdomen, cut open, and the calibration rig, as a picture in FOLDER.
+"""synthesis_anatomy_figures.py [--scan] [FOLDER]: the invented abdomen and the calibration rig as pictures in FOLDER.
 
-Needs a display (xvfb-run gives one where there is none).
+AnatomySource.png: the abdomen cut open, its organs, and the rig; needs a display (xvfb-run gives one where there is none).
+AnatomyScan.png: the abdomen as ultrasound shows it. With --scan this one alone.
 """
 import argparse
 import pathlib
 
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - the renderer
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
@@ -17,7 +22,7 @@ from vtkmodules.vtkFiltersGeneral import vtkClipClosedSurface
 from vtkmodules.vtkIOImage import vtkPNGWriter
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow, vtkWindowToImageFilter
 
-from echorama import vtkUltrasoundAnatomySource
+from echorama import vtkUltrasoundAnatomySource, vtkUltrasoundSynthesizer
 
 COLOURS = {
     "skin": (0.87, 0.68, 0.58), "subcutaneous-fat": (0.95, 0.87, 0.60), "fascia": (0.96, 0.96, 0.93), "muscle-wall": (0.72, 0.32, 0.29),
@@ -101,10 +106,41 @@ def panel(window, left, right, eye, focus, zoom):
     return renderer
 
 
+def scan(path):
+    """Planes of three places of a probe that slides along x."""
+    source = vtkUltrasoundAnatomySource()
+    scanner = vtkUltrasoundSynthesizer()
+    scanner.SetInputConnection(source.GetOutputPort())
+    scanner.SliceOnlyOn()
+    scanner.SetDepthMax(140)
+    scanner.SetElements(128)
+    scanner.SetSamples(500)
+    scanner.SetSpacingMm(0.4)
+    scanner.SetGainDb(4)
+    scanner.SetNoiseDb(-65)
+    figure, axes = plt.subplots(1, 3, figsize=(12, 3.3), facecolor="black")
+    for axis, (x, place) in zip(axes, ((-40, -0.05), (0, 0.1), (45, -0.05))):
+        scanner.SetPosition(x, 0, 0)
+        scanner.SetSlicePosition(place)
+        scanner.Update()
+        image = scanner.GetOutput()
+        values = vtk_to_numpy(image.GetPointData().GetArray("Intensity")).reshape(image.GetDimensions()[::-1]).squeeze()
+        axis.imshow(values, cmap="gray", vmin=0, vmax=255)
+        axis.axis("off")
+    figure.subplots_adjust(0, 0, 1, 1, 0.01, 0)
+    figure.savefig(path, dpi=85, facecolor="black")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", default=".", type=pathlib.Path)
-    folder = parser.parse_args().folder
+    parser.add_argument("--scan", action="store_true")
+    options = parser.parse_args()
+    folder = options.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    scan(folder / "AnatomyScan.png")
+    if options.scan:
+        return
     window = vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.SetAlphaBitPlanes(1)
@@ -118,7 +154,7 @@ def main():
     layers = ("skin", "fat", "outer fascia", "muscle", "inner fascia", "trunk")
     shown = 0
     for name, material, surface in bodies_of(source.GetOutput()):
-        opened = cut(surface, [((0, -8, 0), (0, -1, 0))], 0.03 * shown)
+        opened = cut(surface, [((0, -8, 0), (0, -1, 0))], 0.004 * shown)
         if opened.GetNumberOfCells():
             shown += 1
             add(whole, opened, COLOURS[material], smooth=False)
