@@ -10,7 +10,7 @@ import unittest
 import numpy
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
-from program_under_test import read_mha, run, run_json
+from program_under_test import read_mha, run, run_json, write_sequence
 
 work = None
 SCENE = {
@@ -147,6 +147,57 @@ class OtherScenes(unittest.TestCase):
                      views={"poses": [{"face": [0, 0, 0], "target": [0, 0, 50]}]})
         run_json("synthesize", path, "-o", work / "plane", "--spacing", 0.8)
         self.assertEqual(read_mha(work / "plane/volume_1.mha")[1].shape[0], 1)
+
+
+def pose(x, degrees):
+    """A probe at x that looks along +z, turned about z."""
+    angle = numpy.radians(degrees)
+    matrix = numpy.eye(4)
+    matrix[:2, :2] = [[numpy.cos(angle), -numpy.sin(angle)], [numpy.sin(angle), numpy.cos(angle)]]
+    matrix[0, 3] = x
+    return matrix
+
+
+class Recordings(unittest.TestCase):
+    def record(self, name, frames):
+        times = numpy.arange(frames) * 0.05
+        transforms = [{"ProbeToTracker": (pose(10 * time, 5 * time), "INVALID" if i == 7 else "OK")} for i, time in enumerate(times)]
+        write_sequence(work / name, numpy.zeros((frames, 2, 2), "u1"), transforms, times.tolist())
+
+    def test_the_views_lie_on_the_path(self):
+        self.record("path.igs.mha", 41)  # 2 s
+        views = {"recording": {"file": "path.igs.mha", "transform": "ProbeToTracker", "smoothSeconds": 0.1, "count": 3,
+                               "trackerToWorld": {"translation": [0, 3, 0]}}}
+        path = scene("recorded.json", views=views, volume={**SCENE["volume"], "knockMm": 0, "knockDegrees": 0})
+        run_json("synthesize", path, "-o", work / "recorded")
+        for i, time in enumerate((0, 1, 2), 1):
+            header, _ = read_mha(work / f"recorded/volume_{i}.mha")
+            wanted = pose(10 * time, 5 * time)
+            wanted[1, 3] = 3
+            held = numpy.reshape([float(number) for number in header["Echorama_ProbeToWorld"].split()], (4, 4))
+            numpy.testing.assert_allclose(held, wanted, atol=1e-6)
+
+    def test_a_probe_that_moves_while_it_sweeps(self):
+        self.record("sweep.igs.mha", 41)
+        views = {"recording": {"file": "sweep.igs.mha", "transform": "ProbeToTracker", "count": 1}}
+        still = scene("still.json", views=views)
+        moving = scene("moving.json", views=views, sweep={"seconds": 1, "alongRecording": True})
+        run_json("synthesize", still, "-o", work / "still")
+        run_json("synthesize", moving, "-o", work / "moving")
+        a, b = (read_mha(work / name / "beams_1.mha")[1].astype(float) for name in ("still", "moving"))
+        first, middle = abs(a[0] - b[0]).mean(), abs(a[5:7] - b[5:7]).mean()
+        self.assertGreater(first, 5)  # 5 mm away
+        self.assertLess(middle, first)
+
+    def test_what_is_no_recording(self):
+        for transform, word in (("NeedleToTracker", "Needle"), ("ProbeToTracker", "nothing.igs.mha")):
+            name = "path.igs.mha" if transform.startswith("Needle") else "nothing.igs.mha"
+            self.record("path.igs.mha", 5)
+            path = scene("no.json", views={"recording": {"file": name, "transform": transform, "count": 1}})
+            done = run("synthesize", path, "-o", work / "no")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(word, done.stderr)
+            self.assertFalse((work / "no").exists())
 
 
 class Refusals(unittest.TestCase):

@@ -128,12 +128,10 @@ class Beams {
 public:
   Beams(const AcousticScene& scene, const SynthesisParameters& p)
     : scene_(scene), p_(p), n_(p.BeamDimensions()), axis_(InternalAxis(p)), tracer_(scene, p.transport, ConditionsOf(p)),
-      axisTracer_(scene, WithoutBounces(p.transport), ConditionsOf(p)), brightestDb_(Material::clearDb),
-      leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
+      brightestDb_(Material::clearDb), leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
   {
     for (const Material& material : scene.Materials())
       brightestDb_ = std::max(brightestDb_, material.backscatterDb);
-    brightestDb_ -= 10.0 * std::log10(p.subRays); // reflected by curved surfaces, the rays of a beam part: their powers add up
   }
 
   static DepthAxis InternalAxis(const SynthesisParameters& p)
@@ -151,12 +149,6 @@ public:
     return {p.transducer.frequencyMHz, p.transducer.assumedSoundSpeed, LastDepth(p)};
   }
 
-  static SoundTransport WithoutBounces(SoundTransport transport)
-  {
-    transport.maxBounces = 0;
-    return transport;
-  }
-
   const DepthAxis& Axis() const { return axis_; }
   std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(n_[1]) * n_[2]; }
 
@@ -165,24 +157,27 @@ public:
     const Element element = ElementOf(p_, static_cast<int>(beam % n_[1]), static_cast<int>(beam / n_[1]));
     SoundPath path;
     BeamWays ways;
-    if (p_.subRays == 1) {
-      RayStart start = StartOf(element, p_.transducer, nullptr);
-      start.inside = scene_.BodiesAt(start.origin);
-      RaySamples samples = SamplesOf(beam, 0);
-      tracer_.Trace(start, path, &samples);
-      rays += path.rays;
-      std::copy_if(path.segments.begin(), path.segments.end(), std::back_inserter(ways.segments),
-                   [this](const SoundSegment& segment) { return IsVisible(segment); });
-      ways.segments.shrink_to_fit();
-      ways.echoes = path.echoes;
+    RayStart start = StartOf(element, p_.transducer, nullptr);
+    start.inside = scene_.BodiesAt(start.origin);
+    RaySamples ofAxis = SamplesOf(beam, 0);
+    tracer_.Trace(start, path, &ofAxis);
+    rays += path.rays;
+    const bool alone = p_.subRays == 1;
+    if (!alone)
+      MakeBare(start, path.segments);
+    std::copy_if(path.segments.begin(), path.segments.end(), std::back_inserter(ways.segments),
+                 [&](const SoundSegment& segment) { return (segment.bounces == 0 && !alone) || IsVisible(segment); });
+    ways.segments.shrink_to_fit();
+    ways.echoes = path.echoes;
+    if (alone)
       return ways;
-    }
 
+    ways.echoes.clear();
     ways.directAmplitude.assign(static_cast<std::size_t>(axis_.count), 0.0f);
     double sum = 0.0;
     for (int ray = 0; ray < p_.subRays; ++ray) {
       RaySamples samples = SamplesOf(beam, ray);
-      RayStart start = StartOf(element, p_.transducer, &samples);
+      start = StartOf(element, p_.transducer, &samples);
       start.inside = scene_.BodiesAt(start.origin);
       const double weight = WeightOf(start, element, p_.transducer);
       sum += weight;
@@ -193,49 +188,38 @@ public:
         echo.amplitude *= weight;
         ways.echoes.push_back(echo);
       }
-      for (const SoundSegment& segment : path.segments)
-        if (segment.bounces > 0 && IsVisible(segment)) {
-          ways.segments.push_back(segment);
-          ways.segments.back().amplitude *= weight;
-        }
     }
     for (SurfaceEcho& echo : ways.echoes)
       echo.amplitude /= sum;
-    for (SoundSegment& segment : ways.segments)
-      segment.amplitude /= sum;
     for (float& amplitude : ways.directAmplitude)
       amplitude /= static_cast<float>(sum);
-    const std::vector<SoundSegment> axis = BareAxis(element, path, rays);
-    ways.segments.insert(ways.segments.begin(), axis.begin(), axis.end());
     return ways;
   }
 
-  // The direct way of the axis with amplitude 1, straight on from where it ends: rays beside it may get further.
-  std::vector<SoundSegment> BareAxis(const Element& element, SoundPath& path, std::int64_t& rays) const
+  // Gives the direct way amplitude 1, and lets it go straight on from where it ends: rays beside it may get further.
+  void MakeBare(const RayStart& start, std::vector<SoundSegment>& segments) const
   {
-    RayStart start = StartOf(element, p_.transducer, nullptr);
-    start.inside = scene_.BodiesAt(start.origin);
-    axisTracer_.Trace(start, path);
-    rays += path.rays;
-    std::vector<SoundSegment> axis = path.segments;
+    const auto end =
+        std::find_if(segments.begin(), segments.end(), [](const SoundSegment& segment) { return segment.bounces > 0; });
     SoundSegment on;
     on.from = start.origin;
     on.direction = start.direction;
     on.across = start.across;
-    if (!axis.empty()) {
-      on = axis.back();
+    if (end != segments.begin()) {
+      on = *(end - 1);
       on.from += on.length * on.direction;
       on.way += on.length;
       on.scanDepth += on.length * on.scanDepthPerMm;
     }
     on.length = (LastDepth(p_) - on.scanDepth) / on.scanDepthPerMm;
-    if (on.length > 0.0)
-      axis.push_back(on);
-    for (SoundSegment& segment : axis) {
-      segment.amplitude = 1.0;
-      segment.attenuation = 0.0;
+    for (auto segment = segments.begin(); segment != end; ++segment) {
+      segment->amplitude = 1.0;
+      segment->attenuation = 0.0;
     }
-    return axis;
+    on.amplitude = 1.0;
+    on.attenuation = 0.0;
+    if (on.length > 0.0)
+      segments.insert(end, on);
   }
 
   void Sum(const BeamWays& ways, const Scatterers& scatterers, Complex* row) const
@@ -284,7 +268,7 @@ private:
   const SynthesisParameters& p_;
   std::array<int, 3> n_;
   DepthAxis axis_;
-  SoundTracer tracer_, axisTracer_;
+  SoundTracer tracer_;
   double brightestDb_; // of all materials
   double leastDb_;     // below this nothing shows
 };
@@ -331,7 +315,7 @@ Receiver SynthesisParameters::DefaultReceiver()
 {
   Receiver receiver;
   receiver.tgcDbPerCm = 3.5;
-  receiver.noiseDb = -50.0;
+  receiver.noiseDb = -65.0;
   return receiver;
 }
 

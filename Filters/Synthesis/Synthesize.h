@@ -54,7 +54,7 @@ struct SynthesisParameters {
   /// has not moved.
   DisplacementField displacement;
 
-  /// A gain that makes up for 0.5 dB/cm/MHz at 3.5 MHz, there and back, and noise of electronics 50 dB below the reference
+  /// A gain that makes up for 0.5 dB/cm/MHz at 3.5 MHz, there and back, and noise of electronics 65 dB below the reference
   /// tissue.
   static Receiver DefaultReceiver();
 
@@ -86,9 +86,9 @@ struct SynthesisCost {
 ///
 /// 1. Sound is followed from every element through the scene: one ray along the axis of the beam, or several over the
 ///    aperture (subRays). 2. Scatterers are made where those ways pass, nowhere else. 3. Each beam sums the
-/// echoes of the scatterers around its ways, and of the surfaces that it meets. With several rays the direct way of the axis
-/// stands for the beam, with the mean of all their amplitudes at each depth: the edge of a shadow is as soft as the aperture is
-/// wide; surfaces and reflected ways count by their share.
+/// echoes of the scatterers around its ways, and of the surfaces that it meets. With several rays the ways of the axis stand for
+/// the beam, the direct one with the mean amplitude of all rays at each depth: the edge of a shadow is as soft as the aperture is
+/// wide. Surfaces echo to every ray, by its share.
 /// The result does not depend on the number of threads.
 /// \throws as Check(); Error(TooLarge) when samples or scatterers would not fit; Error(Cancelled).
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& parameters, const Progress& progress = {},

@@ -199,7 +199,7 @@ public:
   /**
    * Receiver: gain, in [-200, 200] dB; time-gain compensation, in [-20, 100] dB per cm of depth; dynamic range, in [10, 200] dB;
    * mean grey of the reference tissue, in [0, 255]; noise of the electronics beside the reference tissue, in [-200, 100] dB
-   * (-200: none). Default 0, 3.5, 60, 110, -50.
+   * (-200: none). Default 0, 3.5, 60, 110, -65.
    */
   void SetGainDb(double);
   double GetGainDb() const;

@@ -76,20 +76,21 @@ void WholeVolume(std::int64_t triangles, const std::string& name)
 {
   const TissueSurface surface = Packed(triangles);
   SynthesisParameters p = Volume128();
-  double sceneSeconds = 0.0;
   std::optional<AcousticScene> scene;
-  sceneSeconds = benchmark::Seconds([&] { scene.emplace(surface); });
-  SynthesisCost cost;
-  Volume<unsigned char> beams;
-  const double seconds = benchmark::Seconds([&] { beams = SynthesizeBeams(*scene, p, {}, &cost); });
-  // Twice the same, on another number of threads: the difference must be nothing.
-  const ThreadLimit limit(1);
-  SynthesisCost single;
-  const double alone = benchmark::Seconds([&] {
-    ReportRun(name, "coherent", seconds + sceneSeconds, sceneSeconds, cost, surface,
-              Rms(beams, SynthesizeBeams(*scene, p, {}, &single)), "grey, RMS to one thread");
-  });
-  benchmark::Report("synthesize", name, "coherent, one thread", alone, 0.0, "grey");
+  const double sceneSeconds = benchmark::Seconds([&] { scene.emplace(surface); });
+  for (const int rays : {1, 8}) {
+    p.subRays = rays;
+    SynthesisCost cost;
+    Volume<unsigned char> beams;
+    const double seconds = benchmark::Seconds([&] { beams = SynthesizeBeams(*scene, p, {}, &cost); });
+    double error = 0.0;
+    if (rays == 1) { // the same on one thread: the difference must be nothing
+      const ThreadLimit limit(1);
+      error = Rms(beams, SynthesizeBeams(*scene, p));
+    }
+    ReportRun(name, rays == 1 ? "1 ray an element" : "8 rays an element", seconds + sceneSeconds, sceneSeconds, cost, surface,
+              error, rays == 1 ? "grey, RMS to one thread" : "");
+  }
 }
 
 // What the deterministic ray along the axis leaves out: the same volume with ever more rays over the aperture.
