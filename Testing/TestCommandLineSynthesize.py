@@ -117,6 +117,23 @@ class Sets(unittest.TestCase):
 
 
 class OtherScenes(unittest.TestCase):
+    def test_the_seed_is_that_of_the_tissue_too(self):
+        packing = {"boxMin": [-20, -20, 5], "boxMax": [20, 20, 45], "radiusMin": 2, "radiusMax": 5}
+        path = scene("packing.json", tissue=[{"packing": packing}])
+        geometry = {}
+        for seed in (3, 4):
+            run_json("synthesize", path, "-o", work / f"packing{seed}", "--seed", seed)
+            geometry[seed] = (work / f"packing{seed}/geometry.vtp").read_bytes()
+            self.assertEqual(json.loads((work / f"packing{seed}/scene.json").read_text())["seed"], seed)
+        self.assertNotEqual(geometry[3], geometry[4])
+
+    def test_a_mesh_that_is_read_is_not_replaced(self):
+        run_json("synthesize", scene(), "-o", work / "first")
+        before = (work / "first/geometry.vtp").read_bytes()
+        path = scene("own.json", tissue=[{"mesh": {"file": "first/geometry.vtp", "material": "liver"}}])
+        self.assertNotEqual(run("synthesize", path, "-o", work / "first").returncode, 0)
+        self.assertEqual((work / "first/geometry.vtp").read_bytes(), before)
+
     def test_a_rig_brings_its_landmarks(self):
         path = scene("rig.json", background="water", tissue=[{"rig": {}}],
                      probe={**SCENE["probe"], "depthMaxMm": 120}, views={"count": 2, "overlap": 0.8})
@@ -177,6 +194,13 @@ class Recordings(unittest.TestCase):
             held = numpy.reshape([float(number) for number in header["Echorama_ProbeToWorld"].split()], (4, 4))
             numpy.testing.assert_allclose(held, wanted, atol=1e-6)
 
+    def test_times_at_the_very_end_are_in_the_recording(self):
+        for frames, count in ((28, 4), (33, 7)):
+            self.record("end.igs.mha", frames)
+            views = {"recording": {"file": "end.igs.mha", "transform": "ProbeToTracker", "count": count}}
+            path = scene("end.json", views=views, probe={**SCENE["probe"], "elements": 4, "sweepSteps": 3, "samples": 40})
+            self.assertEqual(len(run_json("synthesize", path, "-o", work / f"end{frames}")["volumes"]), count)
+
     def test_a_probe_that_moves_while_it_sweeps(self):
         self.record("sweep.igs.mha", 41)
         views = {"recording": {"file": "sweep.igs.mha", "transform": "ProbeToTracker", "count": 1}}
@@ -188,10 +212,15 @@ class Recordings(unittest.TestCase):
         first, middle = abs(a[0] - b[0]).mean(), abs(a[5:7] - b[5:7]).mean()
         self.assertGreater(first, 5)  # 5 mm away
         self.assertLess(middle, first)
+        # Where it moves a place is not seen where it lies.
+        two = scene("two.json", sweep={"seconds": 1, "velocityMmPerSecond": [3, 0, 0]})
+        told = run_json("synthesize", two, "-o", work / "two", "--landmarks", 5)
+        self.assertIn("moves", json.dumps(told["notes"]))
+        self.assertFalse((work / "two/landmarks_1.csv").exists())
 
     def test_what_is_no_recording(self):
-        for transform, word in (("NeedleToTracker", "Needle"), ("ProbeToTracker", "nothing.igs.mha")):
-            name = "path.igs.mha" if transform.startswith("Needle") else "nothing.igs.mha"
+        for transform, name, word in (("NeedleToTracker", "path.igs.mha", "Needle"), ("ProbeToTracker", "nothing.igs.mha", "nothing"),
+                                      ("Probe", "path.igs.mha", "transform")):
             self.record("path.igs.mha", 5)
             path = scene("no.json", views={"recording": {"file": name, "transform": transform, "count": 1}})
             done = run("synthesize", path, "-o", work / "no")

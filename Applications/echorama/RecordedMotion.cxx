@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "RecordedMotion.h"
 #include "Core/Base/Error.h"
+#include "Core/Geometry/TransformGraph.h"
 #include "Readers/SequencePoses.h"
+#include <algorithm>
 
 namespace echorama {
 namespace {
@@ -10,8 +12,12 @@ namespace {
 std::vector<TimedPose> PosesOf(const std::string& path, const std::string& transform)
 {
   const SequenceFile file(path);
-  const std::size_t to = transform.find("To");
-  const std::string from = transform.substr(0, to), world = transform.substr(to + 2);
+  const auto frames = FramesOf(transform);
+  if (!frames)
+    throw Error(Error::Kind::BadInput, path + ": views.recording.transform: \"" + transform +
+                                           "\" is no name of a transform, such as "
+                                           "\"ProbeToTracker\"");
+  const auto& [from, world] = *frames;
   SequencePoses composed(file.Content(), {}, from, world);
   if (!composed.Reaches(from))
     throw Error(Error::Kind::BadInput, path + ": its transforms do not lead from " + from + " to " + world);
@@ -71,6 +77,11 @@ std::vector<double> RecordedMotion::Times(int count, double sweepSeconds) const
 
 Pose RecordedMotion::At(double time) const
 {
+  // The ends of sums of times are off by rounding.
+  constexpr double rounding = 1e-9; // s
+  const double first = motion_.FirstTime(), last = motion_.LastTime();
+  if (time > first - rounding && time < last + rounding)
+    time = std::clamp(time, first, last);
   return Named(path_, [&] { return Pose(trackerToWorld_ * motion_.At(time)); });
 }
 

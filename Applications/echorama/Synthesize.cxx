@@ -7,6 +7,7 @@
 #include "RecordedMotion.h"
 #include "SyntheticSet.h"
 #include "Volumes.h"
+#include <algorithm>
 #include <CLI/Validators.hpp>
 #include <filesystem>
 #include <fstream>
@@ -112,17 +113,31 @@ std::vector<Landmark> PlacesOf(const SynthesisScene& scene, int count, const Pro
 
 void Synthesize(Session& session, const SynthesizeOptions& options)
 {
-  SynthesisScene scene = ReadScene(options.scene);
+  SynthesisScene scene = ReadScene(options.scene, options.seed);
   scene.dataFolder = options.data;
-  if (options.seed)
-    scene.seed = *options.seed;
   if (options.spacingMm)
     scene.volume.spacingMm = *options.spacingMm;
   SynthesisParameters parameters = scene.Parameters();
   const std::vector<View> views = ViewsOf(scene, parameters);
-  const std::vector<Landmark> places = PlacesOf(scene, options.landmarks, parameters.probe, views);
+  std::vector<Landmark> places = PlacesOf(scene, options.landmarks, parameters.probe, views);
+  if (!places.empty() && std::any_of(views.begin(), views.end(), [](const View& view) { return !view.steps.empty(); })) {
+    session.Note("no landmarks are listed: the probe moves while it sweeps, so that a place is not seen where it lies");
+    places.clear();
+  }
 
-  OutputFolder folder(session, options.folder, {options.scene});
+  // Files by their full names from here on: so they stay what they are in the scene that is written.
+  std::vector<std::string> inputs{options.scene};
+  const auto resolve = [&](std::string& file) {
+    file = std::filesystem::absolute(scene.PathOf(file)).lexically_normal().string();
+    inputs.push_back(file);
+  };
+  for (SceneItem& item : scene.tissue)
+    if (auto* mesh = std::get_if<SceneMesh>(&item.what))
+      resolve(mesh->file);
+  if (auto* recording = std::get_if<SceneRecording>(&scene.views))
+    resolve(recording->file);
+  scene.dataFolder.clear();
+  OutputFolder folder(session, options.folder, inputs);
   session.result["folder"] = options.folder;
   vtkNew<vtkPolyData> tissue;
   std::vector<std::string> notes;

@@ -119,6 +119,7 @@ def anatomy(view, number, properties, seed, spacing):
     source.SetProbeToWorld(matrix_of(view))
     source.SetGainDb(4.0 + properties["gain_db"] * number)
     source.SetNoiseDb(max(properties["noise_db"], -65.0))
+    source.SetNoiseSeed(2 * seed + number)
     source.Update()
     return source.GetOutput(), lambda points: points
 

@@ -465,11 +465,37 @@ bool CountMemory(void* bytes, ssize_t more, bool)
   return true;
 }
 
+// Embree's handles, let go of however their holder ends.
+struct EmbreeDevice {
+  RTCDevice handle = nullptr;
+  EmbreeDevice() = default;
+  EmbreeDevice(const EmbreeDevice&) = delete;
+  EmbreeDevice& operator=(const EmbreeDevice&) = delete;
+  ~EmbreeDevice()
+  {
+    if (handle)
+      rtcReleaseDevice(handle);
+  }
+  operator RTCDevice() const { return handle; }
+};
+
+struct EmbreeScene {
+  RTCScene handle = nullptr;
+  EmbreeScene() = default;
+  EmbreeScene(const EmbreeScene&) = delete;
+  EmbreeScene& operator=(const EmbreeScene&) = delete;
+  ~EmbreeScene()
+  {
+    if (handle)
+      rtcReleaseScene(handle);
+  }
+  operator RTCScene() const { return handle; }
+};
+
 } // namespace
 
 struct AcousticScene::State {
   State(const TissueSurface& surface, const Progress& progress, double creaseDegrees);
-  ~State();
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
@@ -496,8 +522,8 @@ struct AcousticScene::State {
   Eigen::Vector3d low = Eigen::Vector3d::Zero(), high = Eigen::Vector3d::Zero(); // of the box, about the centre
   double tolerance = 1e-9;
   std::atomic<std::int64_t> treeBytes{0};
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
+  EmbreeDevice device; // after what it counts in, before what it holds
+  EmbreeScene scene;
 
   struct Lattice {
     std::array<int, 3> cells{0, 0, 0};
@@ -550,14 +576,6 @@ AcousticScene::State::State(const TissueSurface& surface, const Progress& progre
   MakeLattice(parts, progress.Part(0.7, 1.0));
 }
 
-AcousticScene::State::~State()
-{
-  if (scene)
-    rtcReleaseScene(scene);
-  if (device)
-    rtcReleaseDevice(device);
-}
-
 // \returns the triangles that the tree got.
 std::vector<std::uint32_t> AcousticScene::State::Build(const Shells& parts)
 {
@@ -575,11 +593,11 @@ std::vector<std::uint32_t> AcousticScene::State::Build(const Shells& parts)
   if (triangles == 0)
     return kept;
 
-  device = rtcNewDevice(nullptr);
-  if (!device)
+  device.handle = rtcNewDevice(nullptr);
+  if (!device.handle)
     throw Error(Error::Kind::NotPossible, "Embree does not start on this machine");
   rtcSetDeviceMemoryMonitorFunction(device, CountMemory, &treeBytes);
-  scene = rtcNewScene(device);
+  scene.handle = rtcNewScene(device);
   rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* const coordinates = static_cast<float*>(

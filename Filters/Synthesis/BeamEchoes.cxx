@@ -10,10 +10,12 @@ struct Between {
   Between(double fraction, int count)
   {
     const double position = std::clamp(fraction, 0.0, 1.0) * (count - 1);
-    first = std::min(static_cast<int>(position), count - 2);
+    first = std::max(0, std::min(static_cast<int>(position), count - 2));
     t = position - first;
+    next = count > 1 ? 1 : 0; // a single plane lies between itself
   }
   int first;
+  int next; // how far on the other one lies
   double t;
 };
 
@@ -23,15 +25,15 @@ std::complex<double> Interpolate(const VolumeView<const std::complex<float>>& sa
 {
   const auto along = [&](int beam, int plane) {
     const std::complex<float>* row = samples.Row(fan.first + beam, sweep.first + plane) + depth.first;
-    const std::complex<double> a(row[0]), b(row[1]);
+    const std::complex<double> a(row[0]), b(row[depth.next]);
     return a + depth.t * (b - a);
   };
   const auto across = [&](int plane) {
     const std::complex<double> a = along(0, plane);
-    return a + fan.t * (along(1, plane) - a);
+    return a + fan.t * (along(fan.next, plane) - a);
   };
   const std::complex<double> a = across(0);
-  return a + sweep.t * (across(1) - a);
+  return a + sweep.t * (across(sweep.next) - a);
 }
 
 } // namespace

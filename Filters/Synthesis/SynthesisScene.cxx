@@ -151,6 +151,8 @@ void Validate(const SceneRecording& recording)
     Refuse("trackerToWorld is not rigid");
 }
 
+constexpr std::uint64_t largestSeed = 9223372036854775807u; // VTK's seeds have a sign
+
 // What an item has from its scene unless it says otherwise.
 template <class T>
 void Inherit(const SynthesisScene&, T&)
@@ -426,7 +428,7 @@ void Describe(A& a, SceneRecording& recording)
   a.Text("transform", recording.transform, false, "From the probe to the tracker or a reference, by its name in the file.");
   a.Matrix("trackerToWorld", recording.trackerToWorld, "Where the tracker is in the world; rigid.");
   a.Number("smoothSeconds", recording.smoothSeconds, {0.0, 60.0}, "Sigma of the smoothing; 0: none.");
-  a.Number("longestGapSeconds", recording.longestGapSeconds, {0.0, 600.0}, "Drop-outs up to this are bridged.");
+  a.Number("longestGapSeconds", recording.longestGapSeconds, {0.0, 600.0, true}, "Drop-outs up to this are bridged.");
   a.Number("count", recording.count, {1, 1000}, "Views, evenly from the first pose to the last.");
 }
 
@@ -542,8 +544,8 @@ public:
   void Seed(const char* key, std::uint64_t& value, const char*)
   {
     if (const Json* found = Find(key)) {
-      if (!found->is_number_unsigned())
-        Fail(At(key), "a whole number in [0, 2^64) is needed, not " + Shown(*found));
+      if (!found->is_number_unsigned() || found->get<std::uint64_t>() > largestSeed)
+        Fail(At(key), "a whole number in [0, 2^63) is needed, not " + Shown(*found));
       value = found->get<std::uint64_t>();
     }
   }
@@ -978,7 +980,7 @@ public:
   }
   void Seed(const char* key, std::uint64_t value, const char* help)
   {
-    Add(key, {{"type", "integer"}, {"minimum", 0}, {"default", value}}, help);
+    Add(key, {{"type", "integer"}, {"minimum", 0}, {"maximum", largestSeed}, {"default", value}}, help);
   }
   void Flag(const char* key, bool value, const char* help) { Add(key, {{"type", "boolean"}, {"default", value}}, help); }
   template <class T>
@@ -1251,22 +1253,24 @@ void SynthesisScene::Check(const std::string& title) const
   SceneFromJson(Writer::Write(copy).dump(), title);
 }
 
-SynthesisScene SceneFromJson(const std::string& text, const std::string& name)
+SynthesisScene SceneFromJson(const std::string& text, const std::string& name, const std::optional<std::uint64_t>& seed)
 {
   SynthesisScene scene;
   const Reader::Source place{name, &scene};
   Json json = Parse(name, text);
   if (json.is_object())
     json.erase("$schema"); // a hint for editors
+  if (seed && json.is_object())
+    json["seed"] = *seed;
   Reader::Read(place, json, "", scene);
   if (scene.sweep.alongRecording && !std::holds_alternative<SceneRecording>(scene.views))
     throw Error(Error::Kind::BadFile, name + ": sweep.alongRecording: the views are not those of a recording");
   return scene;
 }
 
-SynthesisScene ReadScene(const std::string& path)
+SynthesisScene ReadScene(const std::string& path, const std::optional<std::uint64_t>& seed)
 {
-  SynthesisScene scene = SceneFromJson(ReadTextFile(path), path);
+  SynthesisScene scene = SceneFromJson(ReadTextFile(path), path, seed);
   scene.folder = std::filesystem::path(path).parent_path().string();
   return scene;
 }

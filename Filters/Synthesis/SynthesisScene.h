@@ -133,7 +133,7 @@ struct SceneRecording {
   std::string transform = "ProbeToTracker"; ///< which of its transforms; "ProbeToReference" may be composed
   ScenePlace trackerToWorld;                ///< rigid
   double smoothSeconds = 0.1;               ///< sigma of the smoothing, in [0, 60]
-  double longestGapSeconds = 0.5;           ///< drop-outs up to this are bridged, in [0, 600]
+  double longestGapSeconds = 0.5;           ///< drop-outs up to this are bridged, in (0, 600]
   int count = 3;                            ///< evenly from the first pose to the last, in [1, 1000]
 };
 
@@ -202,12 +202,13 @@ struct SynthesisScene {
 /// Reads a scene. Keys that are missing have the defaults above; keys that are not known are errors, as is a key that is there
 /// twice.
 /// \param name what messages call the text
+/// \param seed stands in the place of the scene's, also for the items that have none of their own
 /// \throws Error(BadFile) with the path to the wrong key: "scene.json: tissue[2].mesh.material: there is no material
 /// \"lver\"; there are ..."; for numbers it tells the range.
-SynthesisScene SceneFromJson(const std::string& text, const std::string& name);
+SynthesisScene SceneFromJson(const std::string& text, const std::string& name, const std::optional<std::uint64_t>& seed = {});
 
 /// The same from a file, in whose folder other files are looked for. \throws also Error(FileSystem).
-SynthesisScene ReadScene(const std::string& path);
+SynthesisScene ReadScene(const std::string& path, const std::optional<std::uint64_t>& seed = {});
 
 /// Every number of the scene, in a form that is read back bit by bit. \throws Error as Check().
 std::string SceneToJson(const SynthesisScene& scene);

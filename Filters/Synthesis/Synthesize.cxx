@@ -159,7 +159,7 @@ public:
     BeamWays ways;
     RayStart start = StartOf(element, p_.transducer, nullptr);
     start.inside = scene_.BodiesAt(start.origin);
-    RaySamples ofAxis = SamplesOf(beam, 0);
+    RaySamples ofAxis(Sampling::Random, p_.seed, static_cast<std::uint64_t>(beam % n_[1]), 0, 1); // however many rays there are
     tracer_.Trace(start, path, &ofAxis);
     rays += path.rays;
     const bool alone = p_.subRays == 1;
@@ -339,6 +339,10 @@ void SynthesisParameters::Check() const
       throw Error(Error::Kind::InvalidParameter, std::string(what) + " is " + NumberText(value) + "; it must be in [" +
                                                      NumberText(from) + ", " + NumberText(to) + "]");
   };
+  if (mode != Mode::Coherent && mode != Mode::Counting)
+    throw Error(Error::Kind::InvalidParameter, "mode is " + std::to_string(static_cast<int>(mode)) + "; it must be 0 or 1");
+  if (mode == Mode::Counting && !stepPoses.empty())
+    throw Error(Error::Kind::InvalidParameter, "stepPoses: events are counted for a probe at rest alone");
   check("elements", elements, 2, 4096);
   if (!probe.IsPlane())
     check("steps", steps, 2, 4096);
@@ -546,6 +550,8 @@ std::string DescribeSynthesis(const SynthesisParameters& p)
                          {"faceReflection", p.transport.faceReflection},
                          {"faceRadius", p.transport.faceRadius},
                          {"acceptanceDegrees", p.transport.acceptanceDegrees},
+                         {"maxSegments", p.transport.maxSegments},
+                         {"displaced", !p.displacement.IsZero()},
                          {"subRays", p.subRays},
                          {"sampling", NameOf(p.sampling)},
                          {"mirrorDb", p.mirrorDb},
@@ -554,6 +560,7 @@ std::string DescribeSynthesis(const SynthesisParameters& p)
     text["counting"] = {{"raysPerElement", p.counting.raysPerElement},
                         {"clarity", p.counting.clarity},
                         {"coneDegrees", p.counting.coneDegrees},
+                        {"maxEvents", p.counting.maxEvents},
                         {"sampling", NameOf(p.counting.sampling)}};
   }
   return text.dump();

@@ -27,7 +27,7 @@ struct SynthesisParameters {
   ProbeGeometry probe = ProbeGeometry::Convex(1.1344640137963142, 40.0, 0.9599310885968813, 30.0, 5.0, 120.0);
   Pose probeToWorld = Pose::Identity(); ///< rigid
   /// Where the probe was at each step of the sweep, first to last, when it moved during the sweep; empty: at probeToWorld all
-  /// the time. The scanner does not know: it places every plane as if the probe had rested at probeToWorld.
+  /// the time. The scanner does not know: it places every plane as if the probe had rested at probeToWorld. Coherent only.
   std::vector<Pose> stepPoses;
 
   int elements = 128; ///< beams of a plane, in [2, 4096]
@@ -104,7 +104,7 @@ Volume<unsigned char> SynthesizeBeams(const AcousticScene& scene, const Synthesi
 /// \throws Error(InvalidParameter) for a place outside of the sweep.
 SynthesisParameters SliceOf(const SynthesisParameters& parameters, double sweep);
 
-/// All parameters as one JSON text, to go with the volume.
+/// All parameters as one JSON text, to go with the volume; of a displacement only whether there is one.
 std::string DescribeSynthesis(const SynthesisParameters& parameters);
 
 } // namespace echorama

@@ -6,8 +6,8 @@
  * Input 0: tissue (vtkPolyData, see vtkUltrasoundTissue), from a source or from anything that deforms or adds to it. Input 1,
  * optional: a probe (data with the field data `ProbeGeometry` and `ProbeToWorld`, as vtkUltrasoundProbeSource puts it out);
  * without it the geometry and pose of this filter's own properties are used. Input 2, optional: a displacement image
- * (see vtkUltrasoundDisplacement) that says where the tissue has gone: what is at x in the world lies at x + u(x) in the
- * material, where the scatterers are fixed. The surfaces of input 0 are those that the tissue has now.
+ * (in the form of vtkUltrasoundDisplacement) that says where the tissue has gone: a scatterer at m in the material is now at
+ * m + u(m), the other way round than displacements of an aligner. The surfaces of input 0 are those that the tissue has now.
  *
  * Output 0: the scan-converted volume, a vtkImageData with `Intensity` (unsigned char, log-compressed B-mode), `ValidRegion` (1
  * inside the fan) and the field data `ProbeGeometry`, `ProbeToWorld`, `Seed` and `Scene` (all parameters as JSON). Its geometry
@@ -60,7 +60,10 @@ public:
   ///@}
 
   ///@{
-  /** Seed of the tissue's scatterers, and of all else that is random. Volumes of one seed see the same. At least 0. Default 1. */
+  /**
+   * Seed of the tissue's scatterers, and of all else that is random but the noise. Volumes of one seed see the same. At least 0.
+   * Default 1.
+   */
   void SetSeed(vtkTypeInt64);
   vtkTypeInt64 GetSeed() const;
   ///@}
@@ -211,6 +214,12 @@ public:
   double GetReferenceGrey() const;
   void SetNoiseDb(double);
   double GetNoiseDb() const;
+  ///@}
+
+  ///@{
+  /** Seed of the noise of the electronics, at least 0. Default 1. Volumes of one scan have different ones. */
+  void SetNoiseSeed(vtkTypeInt64);
+  vtkTypeInt64 GetNoiseSeed() const;
   ///@}
 
   /** What the last run noticed about the tissue (open or inverted surfaces) and what it cost, a line each; never fatal. */

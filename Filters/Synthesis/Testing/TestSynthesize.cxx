@@ -361,6 +361,19 @@ TEST(Synthesize, CountedEventsMakeAPictureToo)
   }
 }
 
+TEST(Synthesize, OnePlaneCanBeAskedAnywhere)
+{
+  SynthesisParameters p = SliceOf(Small(), 0.0);
+  const BeamEchoes echoes = SynthesizeEchoes(AcousticScene(Background(Speckled())), p);
+  const auto at = echoes.At(Vector3d(0.0, 0.0, 20.0));
+  ASSERT_TRUE(at);
+  const auto row = echoes.baseband.View().Row(p.elements / 2, 0);
+  const double sample = 20.0 / 40.0 * (echoes.baseband.Dimensions()[0] - 1);
+  const auto i = static_cast<std::ptrdiff_t>(sample);
+  const std::complex<double> a(row[i]), b(row[i + 1]);
+  EXPECT_LT(std::abs(*at - (a + (sample - static_cast<double>(i)) * (b - a))), 1e-5);
+}
+
 TEST(Synthesize, TheDescriptionIsJson)
 {
   SynthesisParameters p = Small();
@@ -388,6 +401,13 @@ TEST(Synthesize, RefusesWhatIsOutOfRange)
   refuses([](auto& p) { p.elements = 1; }, "elements");
   refuses([](auto& p) { p.steps = 5000; }, "steps");
   refuses([](auto& p) { p.samples = 0; }, "samples");
+  refuses([](auto& p) { p.mode = static_cast<SynthesisParameters::Mode>(7); }, "mode");
+  refuses(
+      [](auto& p) {
+        p.mode = SynthesisParameters::Mode::Counting;
+        p.stepPoses.assign(5, Pose::Identity());
+      },
+      "stepPoses");
   refuses([](auto& p) { p.subRays = 0; }, "subRays");
   refuses([](auto& p) { p.mirrorDb = std::nan(""); }, "mirrorDb");
   refuses([](auto& p) { p.transducer.frequencyMHz = -1.0; }, "requency");
