@@ -168,11 +168,11 @@ public:
     std::copy_if(path.segments.begin(), path.segments.end(), std::back_inserter(ways.segments),
                  [&](const SoundSegment& segment) { return (segment.bounces == 0 && !alone) || IsVisible(segment); });
     ways.segments.shrink_to_fit();
-    ways.echoes = path.echoes;
-    if (alone)
+    if (alone) {
+      ways.echoes = path.echoes;
       return ways;
+    }
 
-    ways.echoes.clear();
     ways.directAmplitude.assign(static_cast<std::size_t>(axis_.count), 0.0f);
     double sum = 0.0;
     for (int ray = 0; ray < p_.subRays; ++ray) {

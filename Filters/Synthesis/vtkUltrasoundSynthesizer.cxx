@@ -18,6 +18,7 @@
 #include "vtkUltrasoundTissue.h"
 
 #include <algorithm>
+#include <utility>
 
 using echorama::Error;
 using echorama::SynthesisParameters;
@@ -207,9 +208,10 @@ vtkUltrasoundSynthesizer::Job vtkUltrasoundSynthesizer::Prepare(vtkInformationVe
   Job job;
   SynthesisParameters& p = job.Parameters;
   p = this->Values;
-  if (this->Values.seed > static_cast<std::uint64_t>(VTK_TYPE_INT64_MAX)) {
-    throw Error(Error::Kind::InvalidParameter,
-                "Seed is " + echorama::NumberText(static_cast<double>(this->GetSeed())) + "; it must be at least 0");
+  for (const auto& [name, seed] : {std::pair("Seed", this->GetSeed()), std::pair("NoiseSeed", this->GetNoiseSeed())}) {
+    if (seed < 0) {
+      throw Error(Error::Kind::InvalidParameter, std::string(name) + " is " + std::to_string(seed) + "; it must be at least 0");
+    }
   }
   if (vtkDataObject* probe = DataOn(inputs[Probe])) {
     const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(probe);

@@ -201,6 +201,8 @@ class Refusals(unittest.TestCase):
 
     def test_parameters(self):
         self.refuses(lambda s: s.SetElements(1), "elements", "[2, 4096]")
+        self.refuses(lambda s: s.SetNoiseSeed(-1), "NoiseSeed", "at least 0")
+        self.refuses(lambda s: s.SetMode(7), "mode")
         self.refuses(lambda s: s.SetSamples(100000), "samples", "16384")
         self.refuses(lambda s: s.SetFrequencyMHz(0), "requency", "[0.5, 50]")
         self.refuses(lambda s: s.SetSubRays(0), "subRays")
