@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Error.h"
+#include "Tracking/Devices/TrackerAddress.h"
+#include "Tracking/Devices/TrackerDevice.h"
+
+namespace echorama {
+namespace {
+
+struct Kind {
+  const char* scheme;
+  std::unique_ptr<TrackerDevice> (*make)(const TrackerAddress& address);
+};
+
+// Every kind of device, one line each.
+const std::vector<Kind>& Kinds()
+{
+  static const std::vector<Kind> kinds = {};
+  return kinds;
+}
+
+} // namespace
+
+std::vector<std::string> TrackerSchemes()
+{
+  std::vector<std::string> schemes;
+  for (const Kind& kind : Kinds())
+    schemes.push_back(kind.scheme);
+  return schemes;
+}
+
+std::unique_ptr<TrackerDevice> MakeTracker(const std::string& text)
+{
+  const TrackerAddress address = TrackerAddress::Parse(text);
+  std::string list;
+  for (const Kind& kind : Kinds()) {
+    if (address.scheme == kind.scheme)
+      return kind.make(address);
+    list += (list.empty() ? "" : ", ") + std::string(kind.scheme);
+  }
+  throw Error(Error::Kind::InvalidParameter, text + ": there is no tracker " + address.scheme + "; there are: " + list);
+}
+
+} // namespace echorama

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// Names a tracker in one line, the same for programs, scripts and ParaView: SCHEME:PLACE?OPTION=VALUE&OPTION=VALUE
+///
+/// | scheme      | place                     | back end                                               |
+/// | ----------- | ------------------------- | ------------------------------------------------------ |
+/// | igtl        | //HOST:PORT               | OpenIGTLink, we are the client (of Plus, of Slicer)    |
+/// | igtl-listen | //HOST:PORT               | OpenIGTLink, we are the server; loopback by default    |
+/// | polhemus    | /dev/ttyUSB0              | Polhemus Patriot or Liberty on a serial line           |
+/// | udp         | //HOST:PORT               | our own pose packets                                   |
+/// | replay      | FILE                      | a recording                                            |
+/// | simulated   | (none)                    | a tracker that does not exist, with its faults         |
+struct TrackerAddress {
+  std::string text; ///< as given
+  std::string scheme, place;
+  std::map<std::string, std::string> options;
+
+  /// \throws Error(InvalidParameter) when the text is not of that form or an option is given twice.
+  static TrackerAddress Parse(const std::string& text);
+
+  /// \throws Error(InvalidParameter) that names the options there are, when another one was given.
+  void CheckOptions(const std::vector<std::string>& known) const;
+
+  /// An option as a number in [low, high], or \a fallback. \throws Error(InvalidParameter) that names it.
+  double Number(const std::string& option, double fallback, double low, double high) const;
+  /// An option, or \a fallback.
+  std::string Text(const std::string& option, const std::string& fallback) const;
+  /// "HOST:PORT" of a place like //HOST:PORT. Without a host \a fallbackHost, without a port \a fallbackPort.
+  /// \throws Error(InvalidParameter) for a port outside [0, 65535].
+  struct Endpoint {
+    std::string host;
+    int port = 0;
+  };
+  Endpoint HostAndPort(const std::string& fallbackHost, int fallbackPort) const;
+};
+
+} // namespace echorama

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ToolPose.h"
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// What a stream of poses remembers.
+struct StreamLimits {
+  std::size_t posesPerTool = 4096; ///< the newest ones, in [2, 1000000]: 16 s at 250 Hz, some 0.8 MB a tool
+  std::size_t tools = 64;          ///< names that a peer may make up, in [1, 4096]
+  double longestGapSeconds = 0.5;  ///< poses further apart are not interpolated, in (0, 600]
+  double jumpSeconds = 1.0;        ///< a sender's clock that runs this much ahead of ours or back has jumped, in (0, 600]
+
+  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+};
+
+/// What a device is doing.
+enum class DeviceState {
+  Idle,       ///< not started
+  Connecting, ///< started, nothing there yet
+  Running,
+  Lost,  ///< it was there and is gone (unplugged, closed); the device goes on trying where that can help
+  Ended, ///< a recording has come to its end
+  Failed ///< it cannot go on; the message says why
+};
+const char* DeviceStateText(DeviceState state); ///< "idle", "connecting" ...
+
+/// Why something that came was not taken.
+enum class Rejection {
+  Malformed,    ///< not what the format says: lengths, checks, words
+  TooLarge,     ///< a length beyond what a tracker sends
+  Replayed,     ///< older than what has come already
+  Foreign,      ///< from another sender, or for another receiver
+  NotRigid,     ///< a matrix that is no pose; the tool counts as Missing at that moment
+  Duplicate,    ///< the same tool and time again
+  OutOfOrder,   ///< older than the newest of its tool
+  TooManyTools, ///< beyond StreamLimits::tools
+};
+inline constexpr int RejectionCount = 8;
+const char* RejectionText(Rejection reason); ///< "malformed", "too large" ...
+
+/// How one tool has come so far.
+struct ToolStatistics {
+  std::string name;
+  std::uint64_t valid = 0, missing = 0, outOfRange = 0; ///< poses taken, by status
+  std::uint64_t clockJumps = 0;                         ///< of the sender's clock
+  std::uint64_t gaps = 0;            ///< waits of more than twice the median interval: poses were lost or held up
+  double rateHz = 0.0;               ///< of those remembered; 0 below two
+  double jitterSeconds = 0.0;        ///< standard deviation of the intervals of arrival
+  double medianLatencySeconds = 0.0; ///< arrival minus time of measurement; of meaning when both clocks agree
+  double latencySpreadSeconds = 0.0; ///< 95% of them are below the smallest plus this, whatever the clocks
+  double secondsSinceLast = 0.0;     ///< our clock
+
+  /// Share of poses without a valid measurement, in [0, 1].
+  double DropoutShare() const;
+};
+
+struct StreamStatistics {
+  DeviceState state = DeviceState::Idle;
+  std::string message;               ///< of the state: whom it is connected to, what went wrong
+  std::vector<ToolStatistics> tools; ///< in the order of bytes
+  std::array<std::uint64_t, RejectionCount> rejected{};
+  std::string lastRejection; ///< a sentence about the newest
+  std::uint64_t Rejected(Rejection reason) const { return rejected[static_cast<std::size_t>(reason)]; }
+};
+
+/// Every pose once, in the order in which they came: for recorders and servers. Bounded: what is not taken in time is lost,
+/// the oldest first, and counted.
+class PoseSubscription {
+public:
+  explicit PoseSubscription(std::size_t bound);
+  ~PoseSubscription();
+  PoseSubscription(const PoseSubscription&) = delete;
+  PoseSubscription& operator=(const PoseSubscription&) = delete;
+
+  /// What has come since the last call; waits for up to \a seconds for the first.
+  std::vector<ToolPose> Take(double seconds = 0.0);
+  std::uint64_t Lost() const;
+
+private:
+  friend class PoseStream;
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Timed poses of named tools: what devices write and everybody reads. Safe for use by several threads. Nothing in it blocks for
+/// longer than a copy takes; memory is bounded by StreamLimits.
+class PoseStream {
+public:
+  explicit PoseStream(const StreamLimits& limits = {});
+  ~PoseStream();
+  PoseStream(const PoseStream&) = delete;
+  PoseStream& operator=(const PoseStream&) = delete;
+
+  // Devices write.
+
+  /// Takes a pose, or counts why not. Poses that are not finite or not rigid become Missing.
+  void Add(ToolPose pose);
+  void Reject(Rejection reason, const std::string& what);
+  void SetState(DeviceState state, const std::string& message = "");
+
+  // Everybody reads.
+
+  std::vector<std::string> Tools() const; ///< in the order of bytes
+  /// The newest of a tool; Missing, with a time that is NaN, when none has come.
+  ToolPose Latest(const std::string& name) const;
+  /// At a moment on the sender's clock: interpolated between its valid neighbours when they are not further apart than
+  /// StreamLimits::longestGapSeconds. Missing in gaps, before the oldest that is remembered, and after the newest; OutOfRange
+  /// when a neighbour is.
+  ToolPose At(const std::string& name, double time) const;
+  /// Those that are remembered, in the order of time.
+  std::vector<ToolPose> History(const std::string& name) const;
+  StreamStatistics Statistics() const;
+  /// Counts up with every pose and change of state, so that a reader knows whether there is something new.
+  std::uint64_t Version() const;
+  /// Waits for up to \a seconds until the version is not \a seen any more. \returns the version
+  std::uint64_t WaitBeyond(std::uint64_t seen, double seconds) const;
+
+  /// From now on. It goes when the last copy of the pointer goes. \a bound: poses it holds.
+  std::shared_ptr<PoseSubscription> Subscribe(std::size_t bound = 65536);
+
+private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+} // namespace echorama

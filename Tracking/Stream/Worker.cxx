@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Tracking/Stream/Worker.h"
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+namespace echorama {
+
+struct Worker::Signal::State {
+  mutable std::mutex mutex;
+  std::condition_variable changed;
+  bool stopped = false, running = true;
+};
+
+struct Worker::Thread {
+  Signal signal;
+  std::thread thread;
+};
+
+bool Worker::Signal::Stopped() const
+{
+  const std::lock_guard<std::mutex> lock(state_->mutex);
+  return state_->stopped;
+}
+
+bool Worker::Signal::Sleep(double seconds) const
+{
+  std::unique_lock<std::mutex> lock(state_->mutex);
+  return !state_->changed.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return state_->stopped; });
+}
+
+void Worker::Start(std::function<void(const Signal&)> job)
+{
+  Stop();
+  thread_ = std::make_shared<Thread>();
+  thread_->signal.state_ = std::make_shared<Signal::State>();
+  thread_->thread = std::thread([job = std::move(job), signal = thread_->signal] {
+    job(signal);
+    const std::lock_guard<std::mutex> lock(signal.state_->mutex);
+    signal.state_->running = false;
+  });
+}
+
+void Worker::Stop()
+{
+  if (!thread_)
+    return;
+  {
+    const std::lock_guard<std::mutex> lock(thread_->signal.state_->mutex);
+    thread_->signal.state_->stopped = true;
+  }
+  thread_->signal.state_->changed.notify_all();
+  thread_->thread.join();
+  thread_.reset();
+}
+
+bool Worker::Running() const
+{
+  if (!thread_)
+    return false;
+  const std::lock_guard<std::mutex> lock(thread_->signal.state_->mutex);
+  return thread_->signal.state_->running;
+}
+
+} // namespace echorama
