@@ -35,6 +35,7 @@ with tempfile.TemporaryDirectory() as folder:
         sys.exit(f"TestExamples: {len(made)} pictures of stitching were made")
     for arguments, wanted in ((["noise_tiling_figures.py", "--spacing", "2", pictures], ["NoiseTiler"]),
                               (["noise_figures.py", pictures], ["NoiseSource"]),
+                              (["calibration_figures.py", pictures], ["PrintableSource"]),
                               (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity"]),
                               (["synthesis_tissue_figures.py", pictures], ["TissueSource", "TissueSourceLevels"]),
                               (["embedding_figures.py", "--spacing", "3", pictures],

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Glass plate first, then the stems from the plate into the balls, then the balls: later bodies count where they overlap.
+// Glass plate first, then the base on it, the stems from the plate into the balls, and the balls: later bodies count where they
+// overlap.
 #include "CalibrationRig.h"
 #include "BodyShapes.h"
 #include "Core/Base/Error.h"
@@ -58,6 +59,7 @@ void CalibrationRigParameters::Check() const
   check("scale", scale, 0.2, 5.0);
   check("plateDepthMm", plateDepthMm, 10.0, 500.0);
   check("plateMm", plateMm, 0.0, 50.0);
+  check("baseMm", baseMm, 0.0, 20.0);
   check("stemRadiusMm", stemRadiusMm, 0.0, 5.0);
   check("waterCelsius", waterCelsius, 0.0, 95.0);
   check("detailMm", detailMm, 0.1, 5.0);
@@ -69,12 +71,26 @@ void CalibrationRigParameters::Check() const
     check("the radius of " + name, ball.radius, 0.5, 30.0);
     for (int axis = 0; axis < 3; ++axis)
       check("a coordinate of " + name, ball.centre[axis], -1000.0, 1000.0);
-    if (ball.centre.z() + ball.radius >= 0.0)
-      Refuse(name + " touches the plate; its centre's z must be below " + NumberText(-ball.radius));
+    if (ball.centre.z() + ball.radius >= -baseMm / scale)
+      Refuse(name + " touches the plate or the base; its centre's z must be below " + NumberText(-ball.radius - baseMm / scale));
     for (std::size_t j = 0; j < i; ++j)
       if ((ball.centre - balls[j].centre).norm() <= ball.radius + balls[j].radius)
         Refuse(name + " touches ball " + std::to_string(j + 1));
   }
+}
+
+double CalibrationRigParameters::StemRadius(const Ball& ball) const
+{
+  return std::min(stemRadiusMm, 0.6 * scale * ball.radius);
+}
+
+Eigen::AlignedBox2d CalibrationRigParameters::BaseOutline() const
+{
+  Eigen::AlignedBox2d outline;
+  for (const Ball& ball : balls)
+    outline.extend(scale * ball.centre.head<2>());
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(std::min(6.0, 20.0 * scale)); // the plate's is 25 at scale 1
+  return {outline.min() - margin, outline.max() + margin};
 }
 
 double WaterSoundSpeed(double celsius)
@@ -103,10 +119,16 @@ TissueSurface MakeCalibrationRig(const CalibrationRigParameters& p, const Progre
     AddBlock(
         rig, "plate", Glass(), p.scale * (low - margin), p.scale * (high + margin),
         [&p](double, double) { return p.plateDepthMm; }, p.plateDepthMm + p.plateMm, 1e6);
+    if (p.baseMm > 0.0) {
+      const Eigen::AlignedBox2d outline = p.BaseOutline();
+      AddBlock(
+          rig, "base", stuff, outline.min(), outline.max(), [&p](double, double) { return p.plateDepthMm - p.baseMm; },
+          p.plateDepthMm, 1e6);
+    }
     if (p.stemRadiusMm > 0.0)
       for (const auto& ball : p.balls) {
-        // From half inside the plate, which holds it, to the ball's centre; never wider than the ball.
-        const double radius = std::min(p.stemRadiusMm, 0.6 * p.scale * ball.radius);
+        // From half inside the plate, which holds it, to the ball's centre.
+        const double radius = p.StemRadius(ball);
         const double inPlate = std::min(0.5 * p.plateMm, radius);
         const Vector3d foot = InWorld(p, {ball.centre.x(), ball.centre.y(), 0.0}) + Vector3d(0.0, 0.0, inPlate - radius);
         const Vector3d top = InWorld(p, ball.centre);

@@ -134,11 +134,9 @@ private:
       column.height = point.z();
       column.slope = std::clamp(std::atan2(normal.head<2>().dot(column.away), normal.z()), 0.0, 0.5 * pi);
       column.wall = column.radius + housing_.rimMm * (1.0 - std::sin(column.slope));
-      // A superellipse: a rectangle with round sides.
-      constexpr double roundness = 2.6;
-      column.handle = std::pow(std::pow(std::abs(column.away.x()) / (0.5 * housing_.handleWidthMm), roundness) +
-                                   std::pow(std::abs(column.away.y()) / (0.5 * housing_.handleThicknessMm), roundness),
-                               -1.0 / roundness);
+      column.handle = std::pow(std::pow(std::abs(column.away.x()) / (0.5 * housing_.handleWidthMm), handleRoundness) +
+                                   std::pow(std::abs(column.away.y()) / (0.5 * housing_.handleThicknessMm), handleRoundness),
+                               -1.0 / handleRoundness);
       columns_.push_back(column);
     };
     for (int i = 0; i < across; ++i)

@@ -24,6 +24,9 @@ struct ProbeHousing {
   void Check() const;
 };
 
+/// A handle's outline is a superellipse, a rectangle with round sides: (|x| / a)^n + (|y| / b)^n = 1 with this n.
+inline constexpr double handleRoundness = 2.6;
+
 /// A probe as a solid in its own frame: the face that meets the skin (dissertation 3.1.1), a rounded edge, walls, and a neck that
 /// leads to a handle. Closed, outward, free of self-intersections, and so fit for printing and for physics.
 struct ProbeMesh {

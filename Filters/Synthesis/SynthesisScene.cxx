@@ -356,6 +356,7 @@ void Describe(A& a, CalibrationRigParameters& rig)
   a.Number("scale", rig.scale, {0.2, 5.0}, "Size of the whole rig.");
   a.Number("plateDepthMm", rig.plateDepthMm, {10.0, 500.0}, "z of the plate's upper side in the world.");
   a.Number("plateMm", rig.plateMm, {0.0, 50.0}, "Thickness of the glass; 0: neither plate nor stems.");
+  a.Number("baseMm", rig.baseMm, {0.0, 20.0}, "Thickness of the slab on the glass that the pins stand on; 0: none.");
   a.Number("stemRadiusMm", rig.stemRadiusMm, {0.0, 5.0}, "Of the pins that carry the balls; 0: none.");
   a.Number("waterCelsius", rig.waterCelsius, {0.0, 95.0}, "Temperature of the bath, which sets its speed of sound.");
   a.Number("detailMm", rig.detailMm, {0.1, 5.0}, "Edge of the triangles of the balls.");

@@ -55,6 +55,7 @@ vtkUltrasoundAnatomySource::vtkUltrasoundAnatomySource() : Kind(Anatomy)
   this->RigScale = rig.scale;
   this->PlateDepthMm = rig.plateDepthMm;
   this->PlateMm = rig.plateMm;
+  this->BaseMm = rig.baseMm;
   this->StemRadiusMm = rig.stemRadiusMm;
   this->WaterCelsius = rig.waterCelsius;
   this->BallDetailMm = rig.detailMm;
@@ -112,6 +113,7 @@ echorama::CalibrationRigParameters vtkUltrasoundAnatomySource::RigParameters() c
   rig.scale = this->RigScale;
   rig.plateDepthMm = this->PlateDepthMm;
   rig.plateMm = this->PlateMm;
+  rig.baseMm = this->BaseMm;
   rig.stemRadiusMm = this->StemRadiusMm;
   rig.waterCelsius = this->WaterCelsius;
   rig.detailMm = this->BallDetailMm;
@@ -207,6 +209,7 @@ void vtkUltrasoundAnatomySource::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "RigScale: " << this->RigScale << "\n";
   os << indent << "PlateDepthMm: " << this->PlateDepthMm << "\n";
   os << indent << "PlateMm: " << this->PlateMm << "\n";
+  os << indent << "BaseMm: " << this->BaseMm << "\n";
   os << indent << "StemRadiusMm: " << this->StemRadiusMm << "\n";
   os << indent << "WaterCelsius: " << this->WaterCelsius << "\n";
   os << indent << "BallDetailMm: " << this->BallDetailMm << "\n";

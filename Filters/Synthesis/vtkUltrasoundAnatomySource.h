@@ -275,9 +275,15 @@ public:
   ///@}
 
   ///@{
-  /** Thickness of the plate in mm; 0: no plate and no stems. In [0, 50]. Default 6. */
+  /** Thickness of the plate in mm; 0: no plate, base and stems. In [0, 50]. Default 6. */
   vtkSetMacro(PlateMm, double);
   vtkGetMacro(PlateMm, double);
+  ///@}
+
+  ///@{
+  /** Thickness in mm of the slab on the glass that the pins stand on; 0: none. In [0, 20]. Default 2. */
+  vtkSetMacro(BaseMm, double);
+  vtkGetMacro(BaseMm, double);
   ///@}
 
   ///@{
@@ -370,6 +376,7 @@ private:
   double RigScale;
   double PlateDepthMm;
   double PlateMm;
+  double BaseMm;
   double StemRadiusMm;
   double WaterCelsius;
   double BallDetailMm;

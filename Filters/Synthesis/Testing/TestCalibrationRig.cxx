@@ -32,9 +32,9 @@ TEST(CalibrationRig, BallsLieWhereTheLandmarksSay)
     const std::vector<BodyShape> bodies = ShapesOf(rig);
     const std::vector<Landmark> landmarks = CalibrationLandmarks(p);
     ASSERT_EQ(landmarks.size(), p.balls.size());
-    ASSERT_EQ(rig.bodies.size(), 1 + 2 * p.balls.size());
+    ASSERT_EQ(rig.bodies.size(), 2 + 2 * p.balls.size());
     for (std::size_t i = 0; i < p.balls.size(); ++i) {
-      const std::size_t body = 1 + p.balls.size() + i;
+      const std::size_t body = 2 + p.balls.size() + i;
       EXPECT_EQ(rig.bodies[body].name, landmarks[i].label);
       EXPECT_LT((bodies[body].box.center() - landmarks[i].position).norm(), 0.02 * p.balls[i].radius);
       const double radius = scale * p.balls[i].radius, whole = 4.18879 * radius * radius * radius;
@@ -47,6 +47,8 @@ TEST(CalibrationRig, BallsLieWhereTheLandmarksSay)
       EXPECT_EQ(body.euler, 2) << body.name;
     }
     EXPECT_NEAR(bodies[0].box.min().z(), p.plateDepthMm, 1e-4);
+    EXPECT_NEAR(bodies[1].box.min().z(), p.plateDepthMm - 2.0, 1e-4);
+    EXPECT_NEAR(bodies[1].volume, 2.0 * p.BaseOutline().volume(), 1.0);
   }
 }
 
@@ -69,6 +71,8 @@ TEST(CalibrationRig, WithoutPlateOrStems)
 {
   CalibrationRigParameters p;
   p.stemRadiusMm = 0.0;
+  EXPECT_EQ(MakeCalibrationRig(p).bodies.size(), 9u);
+  p.baseMm = 0.0;
   EXPECT_EQ(MakeCalibrationRig(p).bodies.size(), 8u);
   p.plateMm = 0.0;
   EXPECT_EQ(MakeCalibrationRig(p).bodies.size(), 7u);
@@ -92,6 +96,7 @@ TEST(CalibrationRig, RefusesWhatCannotBe)
   refused([](auto& p) { p.balls.clear(); }, "number of balls");
   refused([](auto& p) { p.balls[1].centre = p.balls[0].centre; }, "touches ball 1");
   refused([](auto& p) { p.balls[2].centre.z() = -1.0; }, "touches the plate");
+  refused([](auto& p) { p.baseMm = 16.0; }, "or the base");
   refused([](auto& p) { p.balls[3].radius = 0.0; }, "ball 4 (D)");
   refused([](auto& p) { p.material = "cheese"; }, "cheese");
 }

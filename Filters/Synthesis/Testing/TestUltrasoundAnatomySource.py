@@ -94,7 +94,7 @@ source.ClearBalls()
 assert "number of balls" in errors_of(source, source.Update)
 source.AddBall("one", (0, 0, -20), 5)
 assert not errors_of(source, source.Update)
-assert names_of(source.GetOutput()) == ["plate", "stem of one", "one"]
+assert names_of(source.GetOutput()) == ["plate", "base", "stem of one", "one"]
 source.SetBallMaterial("cheese")
 assert "cheese" in errors_of(source, lambda: source.GetLandmarks(centres, labels)) and centres.GetNumberOfPoints() == 0
 print("the anatomy source holds")
