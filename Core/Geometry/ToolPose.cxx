@@ -26,8 +26,12 @@ bool NearestPose(const Eigen::Matrix4d& matrix, Pose& pose)
   const Eigen::Matrix3d turn = matrix.topLeftCorner<3, 3>();
   if (!IsRotation(turn, 1e-3))
     return false;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turn, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  if (IsRotation(turn, 1e-13)) { // one already, and stays so to the last bit however often it is written and read
+    pose.linear() = turn;
+  } else {
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turn, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  }
   pose.translation() = matrix.topRightCorner<3, 1>();
   pose.makeAffine();
   return true;
