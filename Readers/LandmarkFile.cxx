@@ -5,6 +5,7 @@
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "Readers/CsvLine.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
 #include <array>
@@ -78,23 +79,10 @@ std::vector<Landmark> JsonLandmarks(std::string_view text, const JsonPlace& file
   return landmarks;
 }
 
-// The cells of a line: text in double quotes may hold commas, and two of them for one.
 std::vector<std::string> Cells(std::string_view line, const JsonPlace& place)
 {
-  std::vector<std::string> cells(1);
-  bool quoted = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
-      cells.back() += line[++i];
-    else if (c == '"' && (quoted || HeaderLines::Trimmed(cells.back()).empty()))
-      quoted = !quoted;
-    else if (c == ',' && !quoted)
-      cells.emplace_back();
-    else
-      cells.back() += c;
-  }
-  if (quoted)
+  std::vector<std::string> cells;
+  if (!SplitCsvLine(line, ',', cells))
     place.Fail("a quotation mark is not closed");
   return cells;
 }
