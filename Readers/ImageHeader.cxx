@@ -202,7 +202,7 @@ bool HeaderLines::Next(std::string& line)
     if (c == '\n')
       return true;
     if ((c < 32 && c != '\t' && c != '\r') || line.size() == LongestLine)
-      FailHere("the header is not text here (truncated or of another type?)");
+      FailHere("this is not text (truncated, or a file of another type?)");
     if (c != '\r')
       line.push_back(static_cast<char>(c));
   }

@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/ToolPose.h"
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace echorama {
@@ -10,28 +11,45 @@ namespace echorama {
 struct PoseLog {
   std::string path;
   std::vector<std::string> tools; ///< names of transforms, "ProbeToTracker", in the order of the file
-  std::vector<ToolPose> poses;    ///< in the order of time; moments at which a tool was not seen are there, as Missing
+  /// In the order of time; of equal times in that of the file. Moments at which the file says that a tool was not seen are there,
+  /// as Missing. Times are NaN when the file has none at all.
+  std::vector<ToolPose> poses;
   std::vector<std::string> notes; ///< what was assumed or is not usable: sentences for people
 
-  /// Those of one tool. \throws Error(BadInput) that names the tools there are.
+  /// Those of one tool; its plain name ("Probe") will do. \throws Error(BadInput) that names the tools there are.
   std::vector<ToolPose> Of(const std::string& tool) const;
 };
 
 /// What a file does not say.
 struct PoseLogOptions {
-  double unitMm = 0.0; ///< of lengths, in mm (1000: metres); 0: what the format says, else mm
+  double unitMm = 0.0; ///< of lengths, in mm (1000: metres), in [0, 1e6]; 0: what the format says, see ReadPoseLog
+  /// When above 0, the times of the file are not taken: its rows (or frames) are this many a second, from 0 on. For files whose
+  /// times have too few digits. In [0, 1e6].
+  double rowsPerSecond = 0.0;
+
+  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
 };
 
 /// Reads a recording of a tracker:
-/// * sequences (.igs.mha ...): every transform of every frame;
-/// * CSV logs: NDI's as the Aurora tools write them (Hour, Minutes, Seconds, ms, then X Y Z qo qx qy qz per sensor; rows of zeros
-/// are
-///   Missing), and plain ones with a header "time,tool,tx,ty,tz,qw,qx,qy,qz[,status]" or "t, x, y, z, q_x, q_y, q_z, q_w";
-/// * pairs of poses (t, A 4x4, B 4x4 row by row): the tools are "HandToBase" and "TargetToCamera".
-/// \throws Error(FileSystem), Error(BadFile) that names file, line and reason.
+/// * sequences (.igs.mha ...): every rigid transform of every frame that has it, in mm;
+/// * tables with a row of column names, in mm unless \a options say otherwise: a time (time, timestamp or t in seconds; or hour,
+///   minutes, seconds and ms, counted from midnight on) and, for each sensor, a position (x y z or tx ty tz) and a quaternion
+///   (qw, q_w, qo or q0, then qx qy qz or q1 q2 q3), whose names end alike for one sensor. So do NDI's tools for the Aurora write
+///   them ("Xa", "qoa": SensorAToTracker). With a column tool (or name) each row is that of the tool it names; a column status
+///   holds the words of TransformStatusOf. What precedes the names is passed over. Cells are separated by commas, semicolons,
+///   tabs or blanks, and the names may follow a #;
+/// * pairs of poses without names of columns: a time, then two matrices of 4 x 4 row by row; the tools are "HandToBase" and
+///   "TargetToCamera". The unit is the metre unless \a options say otherwise: their only known writers use it.
+///
+/// A pose is Missing when all its numbers are zero or its cells are empty, and, with a note, when a number is not finite or
+/// beyond 1e7 mm, the quaternion's length is further than 0.01 from 1, or the matrix is no pose (NearestPose). Rows that end
+/// early give the poses that are whole, with a note. Rows without a time, and times that do not rise, are noted; the poses are
+/// sorted by time.
+/// \throws Error(InvalidParameter) for the options, Error(FileSystem), Error(BadFile) that names file, line and reason: no such
+/// columns, text where a number is needed, an open quotation mark, binary data, no poses.
 PoseLog ReadPoseLog(const std::string& path, const PoseLogOptions& options = {});
 
-/// Whether the text of a file looks like one that ReadPoseLog reads, other than a sequence.
+/// Whether a file that begins with \a bytes looks like one that ReadPoseLog reads, other than a sequence.
 bool LooksLikePoseLog(std::string_view bytes);
 
 } // namespace echorama
