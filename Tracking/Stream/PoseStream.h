@@ -15,7 +15,9 @@ struct StreamLimits {
   std::size_t posesPerTool = 4096; ///< the newest ones, in [2, 1000000]: 16 s at 250 Hz, some 0.8 MB a tool
   std::size_t tools = 64;          ///< names that a peer may make up, in [1, 4096]
   double longestGapSeconds = 0.5;  ///< poses further apart are not interpolated, in (0, 600]
-  double jumpSeconds = 1.0;        ///< a sender's clock that runs this much ahead of ours or back has jumped, in (0, 600]
+  /// In (0, 600]. A sender's clock that goes back by more than this has jumped, and so has one that runs ahead of ours by this
+  /// much more than before. A pose that is held up on its way is no jump. After a jump, what came before is forgotten.
+  double jumpSeconds = 1.0;
 
   void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
 };
@@ -39,23 +41,28 @@ enum class Rejection {
   Foreign,      ///< from another sender, or for another receiver
   NotRigid,     ///< a matrix that is no pose; the tool counts as Missing at that moment
   Duplicate,    ///< the same tool and time again
-  OutOfOrder,   ///< older than the newest of its tool
+  OutOfOrder,   ///< older than the newest of its tool, but by less than a jump of the clock
   TooManyTools, ///< beyond StreamLimits::tools
 };
 inline constexpr int RejectionCount = 8;
 const char* RejectionText(Rejection reason); ///< "malformed", "too large" ...
 
-/// How one tool has come so far.
+/// How one tool has come so far. Counts are of all time; the rest is of the poses that are remembered (StreamLimits), and 0 when
+/// there are fewer than two of them.
 struct ToolStatistics {
   std::string name;
   std::uint64_t valid = 0, missing = 0, outOfRange = 0; ///< poses taken, by status
   std::uint64_t clockJumps = 0;                         ///< of the sender's clock
-  std::uint64_t gaps = 0;            ///< waits of more than twice the median interval: poses were lost or held up
-  double rateHz = 0.0;               ///< of those remembered; 0 below two
-  double jitterSeconds = 0.0;        ///< standard deviation of the intervals of arrival
-  double medianLatencySeconds = 0.0; ///< arrival minus time of measurement; of meaning when both clocks agree
-  double latencySpreadSeconds = 0.0; ///< 95% of them are below the smallest plus this, whatever the clocks
-  double secondsSinceLast = 0.0;     ///< our clock
+  std::uint64_t remembered = 0;                         ///< poses
+  std::uint64_t gaps = 0;                               ///< intervals of more than twice the median, on the sender's clock
+  double longestGapSeconds = 0.0;                       ///< the longest interval on the sender's clock
+  double rateHz = 0.0;                                  ///< poses of any status per second of ours; of the recording's
+  double jitterSeconds = 0.0;                           ///< standard deviation of the intervals of arrival; of the recording's
+  /// Arrival minus time of measurement; of meaning when both clocks agree. NaN in recordings.
+  double medianLatencySeconds = 0.0;
+  /// 95% of the latencies are below the smallest plus this, whatever the clocks. NaN in recordings.
+  double latencySpreadSeconds = 0.0;
+  double secondsSinceLast = 0.0; ///< on our clock
 
   /// Share of poses without a valid measurement, in [0, 1].
   double DropoutShare() const;
@@ -64,10 +71,12 @@ struct ToolStatistics {
 struct StreamStatistics {
   DeviceState state = DeviceState::Idle;
   std::string message;               ///< of the state: whom it is connected to, what went wrong
+  bool live = true;                  ///< as SetLive
   std::vector<ToolStatistics> tools; ///< in the order of bytes
   std::array<std::uint64_t, RejectionCount> rejected{};
   std::string lastRejection; ///< a sentence about the newest
   std::uint64_t Rejected(Rejection reason) const { return rejected[static_cast<std::size_t>(reason)]; }
+  std::uint64_t Rejected() const; ///< for any reason
 };
 
 /// Every pose once, in the order in which they came: for recorders and servers. Bounded: what is not taken in time is lost,
@@ -79,7 +88,7 @@ public:
   PoseSubscription(const PoseSubscription&) = delete;
   PoseSubscription& operator=(const PoseSubscription&) = delete;
 
-  /// What has come since the last call; waits for up to \a seconds for the first.
+  /// What has come since the last call; waits for up to \a seconds (at most an hour) for the first.
   std::vector<ToolPose> Take(double seconds = 0.0);
   std::uint64_t Lost() const;
 
@@ -90,7 +99,7 @@ private:
 };
 
 /// Timed poses of named tools: what devices write and everybody reads. Safe for use by several threads. Nothing in it blocks for
-/// longer than a copy takes; memory is bounded by StreamLimits.
+/// longer than a copy takes, unless it is asked to wait; memory is bounded by StreamLimits.
 class PoseStream {
 public:
   explicit PoseStream(const StreamLimits& limits = {});
@@ -100,13 +109,18 @@ public:
 
   // Devices write.
 
-  /// Takes a pose, or counts why not. Poses that are not finite or not rigid become Missing.
+  /// Takes a pose, or counts why not. Poses that are not finite or not rigid become Missing, with the pose of nothing. One that
+  /// has no time is as old as its arrival. Names are at most 256 bytes, and not empty.
   void Add(ToolPose pose);
   void Reject(Rejection reason, const std::string& what);
   void SetState(DeviceState state, const std::string& message = "");
+  /// Whether the sender's clock runs on with ours, as it does unless this says otherwise. That of a recording does not: it may
+  /// go faster, or stand still. There, latencies mean nothing, and only a clock that goes back has jumped.
+  void SetLive(bool live);
 
   // Everybody reads.
 
+  bool Live() const;                      ///< as SetLive
   std::vector<std::string> Tools() const; ///< in the order of bytes
   /// The newest of a tool; Missing, with a time that is NaN, when none has come.
   ToolPose Latest(const std::string& name) const;
@@ -114,12 +128,14 @@ public:
   /// StreamLimits::longestGapSeconds. Missing in gaps, before the oldest that is remembered, and after the newest; OutOfRange
   /// when a neighbour is.
   ToolPose At(const std::string& name, double time) const;
+  /// All tools under one lock, in the order of bytes: as At, or as Latest when \a time is NaN.
+  std::vector<ToolPose> Poses(double time) const;
   /// Those that are remembered, in the order of time.
   std::vector<ToolPose> History(const std::string& name) const;
   StreamStatistics Statistics() const;
   /// Counts up with every pose and change of state, so that a reader knows whether there is something new.
   std::uint64_t Version() const;
-  /// Waits for up to \a seconds until the version is not \a seen any more. \returns the version
+  /// Waits for up to \a seconds (at most an hour) until the version is not \a seen any more. \returns the version
   std::uint64_t WaitBeyond(std::uint64_t seen, double seconds) const;
 
   /// From now on. It goes when the last copy of the pointer goes. \a bound: poses it holds.

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Stream/Worker.h"
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <thread>
 
@@ -11,6 +13,7 @@ struct Worker::Signal::State {
   mutable std::mutex mutex;
   std::condition_variable changed;
   bool stopped = false, running = true;
+  std::string failure;
 };
 
 struct Worker::Thread {
@@ -27,7 +30,8 @@ bool Worker::Signal::Stopped() const
 bool Worker::Signal::Sleep(double seconds) const
 {
   std::unique_lock<std::mutex> lock(state_->mutex);
-  return !state_->changed.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return state_->stopped; });
+  const std::chrono::duration<double> patience(seconds > 0.0 ? std::min(seconds, 3600.0) : 0.0);
+  return !state_->changed.wait_for(lock, patience, [&] { return state_->stopped; });
 }
 
 void Worker::Start(std::function<void(const Signal&)> job)
@@ -36,9 +40,17 @@ void Worker::Start(std::function<void(const Signal&)> job)
   thread_ = std::make_shared<Thread>();
   thread_->signal.state_ = std::make_shared<Signal::State>();
   thread_->thread = std::thread([job = std::move(job), signal = thread_->signal] {
-    job(signal);
+    std::string failure;
+    try {
+      job(signal);
+    } catch (const std::exception& error) {
+      failure = error.what();
+    } catch (...) {
+      failure = "it threw something that is no exception";
+    }
     const std::lock_guard<std::mutex> lock(signal.state_->mutex);
     signal.state_->running = false;
+    signal.state_->failure = failure;
   });
 }
 
@@ -61,6 +73,14 @@ bool Worker::Running() const
     return false;
   const std::lock_guard<std::mutex> lock(thread_->signal.state_->mutex);
   return thread_->signal.state_->running;
+}
+
+std::string Worker::Failure() const
+{
+  if (!thread_)
+    return "";
+  const std::lock_guard<std::mutex> lock(thread_->signal.state_->mutex);
+  return thread_->signal.state_->failure;
 }
 
 } // namespace echorama

@@ -2,6 +2,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <string>
 
 namespace echorama {
 
@@ -13,7 +14,7 @@ public:
   class Signal {
   public:
     bool Stopped() const;
-    /// Sleeps, but no longer than until the worker is stopped. \returns false when it was.
+    /// Sleeps (at most an hour), but no longer than until the worker is stopped. \returns false when it was.
     bool Sleep(double seconds) const;
 
   private:
@@ -27,12 +28,15 @@ public:
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Starts \a job, which must return soon after its signal says Stopped and must not throw. Stops an earlier one first.
+  /// Starts \a job, which must return soon after its signal says Stopped. Stops an earlier one first. A job that throws has
+  /// ended; what it threw is told by Failure(). Neither this nor Stop may be called by the job itself.
   void Start(std::function<void(const Signal&)> job);
   /// Tells the job to stop and waits for its end. Does nothing when there is none.
   void Stop();
   /// Whether a job was started and has not returned.
   bool Running() const;
+  /// What the job threw, as a sentence; empty when it did not.
+  std::string Failure() const;
 
 private:
   struct Thread;
