@@ -161,7 +161,15 @@ std::vector<NamedTransform> ReadTransforms(const std::string& path, const CycleT
   return transforms;
 }
 
-void WriteTransforms(const std::string& path, const std::vector<NamedTransform>& transforms)
+std::string ReadTransformReport(const std::string& path)
+{
+  const Json root = Json::parse(ReadTextFile(path), nullptr, false);
+  if (root.is_discarded())
+    throw Error(Error::Kind::BadFile, path + ": it is not JSON");
+  return root.is_object() && root.contains("report") ? root["report"].dump() : "";
+}
+
+void WriteTransforms(const std::string& path, const std::vector<NamedTransform>& transforms, const std::string& report)
 {
   Json list = Json::array();
   std::set<std::string> names;
@@ -183,7 +191,12 @@ void WriteTransforms(const std::string& path, const std::vector<NamedTransform>&
     if (!transform.date.empty())
       list.back()["date"] = transform.date;
   }
-  const Json root{{"schema", Schema}, {"unit", "mm"}, {"transforms", list}};
+  Json root{{"schema", Schema}, {"unit", "mm"}, {"transforms", list}};
+  if (!report.empty()) {
+    root["report"] = Json::parse(report, nullptr, false);
+    if (!root["report"].is_object())
+      throw Error(Error::Kind::InvalidParameter, path + ": the report is no JSON object");
+  }
 
   FileReplacement replacement;
   std::ofstream stream(replacement.Stage(path));

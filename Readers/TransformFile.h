@@ -22,10 +22,14 @@ namespace echorama {
 /// within \a tolerance.
 std::vector<NamedTransform> ReadTransforms(const std::string& path, const CycleTolerance& tolerance = {});
 
-/// Writes the JSON format under a temporary name and renames. Numbers come back to the last bit.
+/// Writes the JSON format under a temporary name and renames. Numbers come back to the last bit. \a report, the text of a JSON
+/// object, is kept under the key "report": how the transforms were found. Empty: none.
 /// \throws Error(InvalidParameter) when an edge has a NamedTransform::Complaint(), a matrix that is not finite, is given twice,
-/// or has a text that is not UTF-8, Error(FileSystem). Cycles are not checked.
-void WriteTransforms(const std::string& path, const std::vector<NamedTransform>& transforms);
+/// or has a text that is not UTF-8, or when the report is no JSON object, Error(FileSystem). Cycles are not checked.
+void WriteTransforms(const std::string& path, const std::vector<NamedTransform>& transforms, const std::string& report = "");
+
+/// The report of a file that WriteTransforms wrote, or an empty text. \throws as ReadTransforms, for a file that is not JSON.
+std::string ReadTransformReport(const std::string& path);
 
 /// Whether a file that begins with \a bytes holds transforms: XML whose root is PlusConfiguration, or JSON that names our schema.
 bool LooksLikeTransforms(std::string_view bytes);

@@ -83,6 +83,19 @@ TEST_F(TransformFile, EveryBitComesBack)
   }
 }
 
+TEST_F(TransformFile, KeepsAReport)
+{
+  const std::string path = Path("t.json");
+  WriteTransforms(path, {SomeTransform(1)}, R"({"kind": "hand-eye", "inliers": 7})");
+  EXPECT_EQ(ReadTransforms(path).size(), 1u);
+  EXPECT_EQ(ReadTransformReport(path), R"({"inliers":7,"kind":"hand-eye"})");
+  EXPECT_THROW(WriteTransforms(path, {SomeTransform(1)}, "{"), Error);
+  EXPECT_THROW(WriteTransforms(path, {SomeTransform(1)}, "[1]"), Error);
+  EXPECT_FALSE(ReadTransformReport(path).empty()) << "a refused report leaves the file";
+  WriteTransforms(path, {SomeTransform(1)});
+  EXPECT_EQ(ReadTransformReport(path), "");
+}
+
 TEST_F(TransformFile, ReadsWhatPlusWrites)
 {
   const std::string plus = std::string(ECHORAMA_SOURCE_DIR) + "/../shared/data/plus/";
