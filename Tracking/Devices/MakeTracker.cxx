@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Tracking/Devices/ReplayTracker.h"
+#include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
 
@@ -14,7 +16,10 @@ struct Kind {
 // Every kind of device, one line each.
 const std::vector<Kind>& Kinds()
 {
-  static const std::vector<Kind> kinds = {};
+  static const std::vector<Kind> kinds = {
+      {"replay", MakeReplayTracker},
+      {"simulated", MakeSimulatedTracker},
+  };
   return kinds;
 }
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Readers/PoseLog.h"
+#include "Tracking/Devices/TrackerAddress.h"
+#include "Tracking/Devices/TrackerDevice.h"
+#include "Tracking/Stream/Worker.h"
+#include <limits>
+#include <memory>
+#include <string>
+
+namespace echorama {
+
+struct ReplayParameters {
+  std::string path;
+  double speed = 1.0; ///< 1: as it was recorded, in [0, 1000]; 0: as fast as it can be read
+  bool loop = false;  ///< at the end it begins again; times go on. Not at speed 0
+  bool step = false;  ///< nothing comes but by Step()
+  /// The part that is replayed, seconds after the first pose, both included.
+  double from = 0.0, to = std::numeric_limits<double>::infinity();
+  PoseLogOptions log; ///< how the file is read
+
+  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  /// From the place and options of "replay:FILE?speed=2&loop=1&step=1&from=10&to=20&unitMm=1000".
+  /// \throws Error(InvalidParameter)
+  static ReplayParameters Of(const TrackerAddress& address);
+};
+
+/// A recording, as if it were a tracker: everything that ReadPoseLog reads, and the images of sequences.
+///
+/// All poses of one time come together. Their times are those of the file; when they come is told by the speed.
+class ReplayTracker : public TrackerDevice {
+public:
+  /// \throws Error(InvalidParameter) as Check()
+  explicit ReplayTracker(const ReplayParameters& parameters);
+  ~ReplayTracker() override;
+
+  /// Reads the file first, all of it but images. \throws also Error(BadFile) that names file and reason: damaged, without poses,
+  /// or without any in the part that was asked for.
+  void Start(PoseStream& poses, ImageStream* images) override;
+  void Stop() override;
+
+  /// The next poses of one time, and the image that goes with them, at once. \returns false when there are no more, or it was not
+  /// started to be stepped.
+  bool Step();
+
+private:
+  struct Recording;
+  ReplayParameters parameters_;
+  std::unique_ptr<Recording> recording_; // of the thread while it runs
+  Worker worker_;
+};
+
+/// The line of MakeTracker.
+std::unique_ptr<TrackerDevice> MakeReplayTracker(const TrackerAddress& address);
+
+} // namespace echorama
