@@ -8,10 +8,9 @@
 #include "Core/Base/Error.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
-#include <cmath>
+#include "Readers/SequenceText.h"
 #include <filesystem>
 #include <fstream>
-#include <set>
 
 namespace fs = std::filesystem;
 
@@ -24,13 +23,6 @@ constexpr std::size_t FrameDigits = 10, SizeDigits = 20; // blanks that are left
 std::string VectorText(const Eigen::Vector3d& v)
 {
   return "(" + NumberText(v[0]) + "," + NumberText(v[1]) + "," + NumberText(v[2]) + ")";
-}
-
-// 16 numbers, row by row.
-std::string MatrixText(const Eigen::Affine3d& matrix)
-{
-  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = matrix.matrix().topRows<3>();
-  return JoinedNumbers(rows.data(), 12) + " 0 0 0 1";
 }
 
 } // namespace
@@ -53,11 +45,6 @@ struct SequenceWriter::Parts {
     if (!header || (pixels.is_open() && !pixels))
       Fail(Error::Kind::FileSystem, "it cannot be written (is the disk full?); what was there is left as it was");
   }
-  void CheckField(const HeaderField& field) const
-  {
-    if (!CanHold(field))
-      Fail(Error::Kind::InvalidParameter, "the header cannot hold the field \"" + field.first + "\"");
-  }
   void Put(const std::string& key, const std::string& value) { header << key << (meta ? " = " : ": ") << value << "\n"; }
   void PutField(const std::string& key, const std::string& value)
   {
@@ -69,35 +56,19 @@ struct SequenceWriter::Parts {
 
 void SequenceWriter::Parts::WriteMetaImage()
 {
-  const ImageGeometry& g = content.geometry;
-  const bool images = content.HasImages(), volumes = content.dimensions[2] > 1;
-  const std::string one = volumes ? " 1" : "", zero = volumes ? " 0" : "";
-  Put("ObjectType", "Image");
-  Put("NDims", volumes ? "4" : "3");
-  Put("BinaryData", "True");
-  Put("BinaryDataByteOrderMSB", HostIsBigEndian ? "True" : "False");
-  Put("CompressedData", compress ? "True" : "False");
-  if (compress) {
-    header << "CompressedDataSize = ";
-    compressedSizeAt = header.tellp();
-    header << std::string(SizeDigits, ' ') << "\n";
+  for (const auto& [key, value] : MetaImageSequenceFields(content, compress)) {
+    if (key == "DimSize" && compress) {
+      header << "CompressedDataSize = ";
+      compressedSizeAt = header.tellp();
+      header << std::string(SizeDigits, ' ') << "\n";
+    }
+    header << key << " = " << value;
+    if (key == "DimSize") {
+      frameCountAt = header.tellp();
+      header << std::string(FrameDigits, ' ');
+    }
+    header << "\n";
   }
-  header << "DimSize = ";
-  for (int axis = 0; axis < (volumes ? 3 : 2); ++axis)
-    header << content.dimensions[static_cast<std::size_t>(axis)] << " ";
-  frameCountAt = header.tellp();
-  header << std::string(FrameDigits, ' ') << "\n";
-  Put("Kinds", volumes ? "domain domain domain list" : "domain domain list");
-  Put("ElementNumberOfChannels", NumberText(content.components));
-  Put("ElementSpacing", JoinedNumbers(g.spacing.data(), 3) + one);
-  Put("ElementType", images ? MetaImageTypeName(content.type) : "MET_OTHER");
-  Put("Offset", JoinedNumbers(g.origin.data(), 3) + zero);
-  std::string matrix;
-  for (Eigen::Index axis = 0; axis < 3; ++axis)
-    matrix += (axis > 0 ? " " : "") + JoinedNumbers(g.direction.col(axis).data(), 3) + zero;
-  Put("TransformMatrix", matrix + (volumes ? " 0 0 0 1" : ""));
-  Put("UltrasoundImageOrientation", images ? "MF" : "XX");
-  Put("UltrasoundImageType", content.imageType.empty() ? images ? "BRIGHTNESS" : "XX" : content.imageType);
 }
 
 void SequenceWriter::Parts::WriteNrrd()
@@ -144,18 +115,7 @@ SequenceWriter::SequenceWriter(const std::string& path, const SequenceContent& c
   p.compress = compress && images;
   if (!images && !p.meta)
     p.Fail(Error::Kind::InvalidParameter, "NRRD cannot hold a sequence without images; .mha can");
-  if (p.content.dimensions[0] < 0 || p.content.dimensions[1] < 0 || p.content.dimensions[2] < 1 || p.content.components < 1)
-    p.Fail(Error::Kind::BadInput, "frames of these dimensions cannot be written");
-  if (!images)
-    p.content.dimensions = {0, 0, 1};
-  for (const HeaderField& field : p.content.fields) {
-    p.CheckField(field);
-    if (IsFrameField(field.first) || field.first == "UltrasoundImageOrientation" || field.first == "UltrasoundImageType")
-      p.Fail(Error::Kind::InvalidParameter, "the field \"" + field.first + "\" is one that the writer makes itself");
-  }
-  p.CheckField({"type", p.content.imageType});
-  p.content.geometry.dimensions = images ? p.content.dimensions : std::array<int, 3>{1, 1, 1};
-  p.content.geometry.Check(path);
+  CheckSequence(path, p.content);
 
   if (images) {
     if (detached) {
@@ -182,38 +142,11 @@ SequenceWriter::~SequenceWriter() = default;
 void SequenceWriter::Append(const SequenceFrame& frame, const void* pixels, const Progress& progress)
 {
   Parts& p = *parts_;
-  const std::string number = std::to_string(p.frames),
-                    prefix = "Seq_Frame" + std::string(number.size() < 4 ? 4 - number.size() : 0, '0') + number + "_";
   if (p.frames == std::numeric_limits<int>::max())
-    p.Fail(Error::Kind::TooLarge, "it cannot hold more than " + number + " frames");
-  if (std::isinf(frame.time))
-    p.Fail(Error::Kind::BadInput, "the time of frame " + number + " is not finite");
-
-  std::vector<HeaderField> lines; // all are checked before the first is written
-  std::set<std::string> given{"Timestamp", "ImageStatus", "Status"};
-  const auto add = [&](const std::string& key, const std::string& value) {
-    p.CheckField({key, value});
-    if (!given.insert(key).second)
-      p.Fail(Error::Kind::InvalidParameter, "the field \"" + key + "\" of frame " + number + " is given twice");
-    lines.emplace_back(key, value);
-  };
-  for (const SequenceTransform& transform : frame.transforms) {
-    if (!FramesOf(transform.name))
-      p.Fail(Error::Kind::InvalidParameter, "\"" + transform.name + "\" is not the name of a transform, FrameAToFrameB");
-    const bool finite = transform.matrix.matrix().allFinite();
-    if (!finite && transform.status == TransformStatus::Valid)
-      p.Fail(Error::Kind::BadInput, transform.name + "Transform of frame " + number + " is not finite");
-    const bool told = TransformStatusOf(transform.statusText) == transform.status;
-    add(transform.name + "Transform", MatrixText(finite ? transform.matrix : Eigen::Affine3d::Identity()));
-    add(transform.name + "TransformStatus", told ? transform.statusText : TransformStatusText(transform.status));
-  }
-  for (const auto& [key, value] : frame.fields)
-    add(key, value);
-  for (const auto& [key, value] : lines)
+    p.Fail(Error::Kind::TooLarge, "it cannot hold more than " + std::to_string(p.frames) + " frames");
+  const std::string prefix = SequenceFramePrefix(p.frames);
+  for (const auto& [key, value] : SequenceFrameFields(p.path, frame, p.frames, p.meta ? "ImageStatus" : "Status", pixels))
     p.PutField(prefix + key, value);
-  if (!std::isnan(frame.time))
-    p.PutField(prefix + "Timestamp", NumberText(frame.time));
-  p.PutField(prefix + (p.meta ? "ImageStatus" : "Status"), frame.imageValid && pixels ? "OK" : "INVALID");
 
   if (p.content.HasImages()) {
     const std::uint64_t bytes = p.content.FrameBytes();
