@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Tracking/Devices/OpenIgtLinkClient.h"
+#include "Tracking/Devices/OpenIgtLinkListener.h"
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Devices/TrackerAddress.h"
@@ -13,12 +15,20 @@ struct Kind {
   std::unique_ptr<TrackerDevice> (*make)(const TrackerAddress& address);
 };
 
+template <class Device>
+std::unique_ptr<TrackerDevice> Make(const TrackerAddress& address)
+{
+  return std::make_unique<Device>(address);
+}
+
 // Every kind of device, one line each.
 const std::vector<Kind>& Kinds()
 {
   static const std::vector<Kind> kinds = {
       {"replay", MakeReplayTracker},
       {"simulated", MakeSimulatedTracker},
+      {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>},
+      {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
   };
   return kinds;
 }

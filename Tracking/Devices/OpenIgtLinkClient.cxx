@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Tracking/Devices/OpenIgtLinkClient.h"
+#include "Core/Base/Error.h"
+#include "Tracking/Devices/OpenIgtLinkEncoder.h"
+#include "Tracking/Devices/OpenIgtLinkReceiver.h"
+
+namespace echorama {
+
+OpenIgtLinkClient::OpenIgtLinkClient(const TrackerAddress& address)
+{
+  std::vector<std::string> options = OpenIgtLinkOptions;
+  options.insert(options.end(), {"frame", "header", "resolution", "retry", "tdata"});
+  address.CheckOptions(options);
+  endpoint_ = address.HostAndPort("localhost", DefaultPort);
+  decoding_ = OpenIgtLinkDecodingOf(address);
+  trackingData_ = address.Number("tdata", 0.0, 0.0, 1.0) != 0.0;
+  header_ = static_cast<int>(address.Number("header", 2.0, 1.0, 2.0));
+  resolutionSeconds_ = address.Number("resolution", 0.0, 0.0, 1e6) / 1000.0;
+  retrySeconds_ = address.Number("retry", 1.0, 0.05, 3600.0);
+  frame_ = address.Text("frame", "");
+}
+
+void OpenIgtLinkClient::Start(PoseStream& poses, ImageStream* images)
+{
+  poses.SetState(DeviceState::Connecting, "to " + endpoint_.host + ":" + std::to_string(endpoint_.port));
+  worker_.Start([this, &poses, images](const Worker::Signal& signal) { Run(signal, poses, images); });
+}
+
+void OpenIgtLinkClient::Run(const Worker::Signal& signal, PoseStream& poses, ImageStream* images) const
+{
+  const std::string place = endpoint_.host + ":" + std::to_string(endpoint_.port);
+  const auto stopped = [&signal] { return signal.Stopped(); };
+  const OpenIgtLinkEncoder encoder(header_);
+  const auto send = [](OpenIgtLinkReceiver& connection, OpenIgtLinkEncoder::Bytes bytes) {
+    connection.Replies().Push(std::make_shared<const std::vector<unsigned char>>(std::move(bytes)));
+  };
+  bool before = false; // it was there before
+  do {
+    std::string reason;
+    try {
+      OpenIgtLinkReceiver connection(TcpSocket::Connect(endpoint_.host, endpoint_.port, 5.0, stopped), decoding_);
+      if (!connection.Socket().IsOpen())
+        return;
+      before = true;
+      poses.SetState(DeviceState::Running, "connected to " + place);
+      if (trackingData_)
+        send(connection, encoder.StartTrackingData(resolutionSeconds_, frame_));
+      else if (header_ >= 2)
+        send(connection, encoder.Bare("GET_STATUS")); // shows the version of our header
+      std::string complaint;
+      bool there = true;
+      while ((there = connection.Serve(poses, images)) && !signal.Stopped()) {
+        if (connection.PeerComplaint() != complaint) {
+          complaint = connection.PeerComplaint();
+          poses.SetState(DeviceState::Running, "connected to " + place + (complaint.empty() ? "" : ", which says: " + complaint));
+        }
+        const std::vector<const TcpSocket*> socket{&connection.Socket()};
+        WaitForSockets(socket, connection.Replies().Empty() ? std::vector<const TcpSocket*>() : socket, 0.1);
+      }
+      if (there)
+        return;
+      reason = place + ": " + connection.EndReason();
+    } catch (const Error& error) { // nobody there
+      reason = error.what();
+    }
+    poses.SetState(before ? DeviceState::Lost : DeviceState::Connecting, reason + "; trying again");
+  } while (signal.Sleep(retrySeconds_));
+}
+
+} // namespace echorama

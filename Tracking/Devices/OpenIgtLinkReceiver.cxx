@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Tracking/Devices/OpenIgtLinkReceiver.h"
+#include "Core/Base/Error.h"
+#include "Tracking/Devices/OpenIgtLinkEncoder.h"
+#include "Tracking/Stream/Clock.h"
+
+namespace echorama {
+
+bool OpenIgtLinkReceiver::Serve(PoseStream& poses, ImageStream* images)
+{
+  unsigned char bytes[65536];
+  for (int piece = 0; piece < 64; ++piece) { // then others have their turn, and a stop is seen
+    const auto size = socket_.Receive(bytes, sizeof bytes);
+    if (!size) {
+      end_ = socket_.EndReason();
+      if (decoder_.InMessage()) {
+        end_ += " in the middle of a message";
+        poses.Reject(Rejection::Malformed, socket_.Peer() + ": " + end_);
+      }
+      return false;
+    }
+    if (*size == 0)
+      break;
+    const double arrival = ClockNow();
+    for (OpenIgtLinkMessage& message : decoder_.Feed(bytes, *size))
+      Take(std::move(message), arrival, poses, images);
+    if (!decoder_.InStep()) {
+      end_ = "it does not speak OpenIGTLink, or has lost the thread";
+      return false;
+    }
+    if (*size < sizeof bytes)
+      break;
+  }
+  if (!replies_.Flush(socket_)) {
+    end_ = socket_.EndReason();
+    return false;
+  }
+  return true;
+}
+
+void OpenIgtLinkReceiver::Take(OpenIgtLinkMessage message, double arrival, PoseStream& poses, ImageStream* images)
+{
+  using Kind = OpenIgtLinkMessage::Kind;
+  switch (message.kind) {
+  case Kind::Poses:
+    for (ToolPose& pose : message.poses) {
+      pose.arrival = arrival;
+      poses.Add(std::move(pose));
+    }
+    break;
+  case Kind::Image:
+    if (images) {
+      message.image.arrival = arrival;
+      images->Add(std::move(message.image));
+    }
+    break;
+  case Kind::Status:
+    complaint_ = message.statusCode == 1 ? "" : "status " + std::to_string(message.statusCode) + " " + message.statusText;
+    break;
+  case Kind::Request:
+    if (message.type == "GET_STATUS")
+      replies_.Push(
+          std::make_shared<const std::vector<unsigned char>>(OpenIgtLinkEncoder(message.headerVersion).Status(1, "receiving")));
+    break;
+  case Kind::Refused:
+    poses.Reject(message.reason, socket_.Peer() + ": " + message.complaint);
+    break;
+  default:
+    break;
+  }
+}
+
+const std::vector<std::string> OpenIgtLinkOptions = {"axes", "check", "image-mb"};
+
+OpenIgtLinkDecoding OpenIgtLinkDecodingOf(const TrackerAddress& address)
+{
+  OpenIgtLinkDecoding decoding;
+  decoding.checkSums = address.Number("check", 1.0, 0.0, 1.0) != 0.0;
+  const std::string axes = address.Text("axes", "patient");
+  if (axes != "patient" && axes != "sender")
+    throw Error(Error::Kind::InvalidParameter, address.text + ": axes must be patient or sender");
+  decoding.turnImages = axes == "patient";
+  decoding.imageBytes = static_cast<std::size_t>(address.Number("image-mb", 64.0, 1.0, 2047.0)) << 20;
+  return decoding;
+}
+
+} // namespace echorama

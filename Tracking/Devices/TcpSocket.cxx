@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// All sockets are non-blocking; waiting is done by poll alone, in slices of a tenth of a second where someone may want to
+// stop. Names are looked up by the system's asynchronous resolver, since the plain one can hang for half a minute where a
+// name server does not answer; a lookup that cannot be taken back is left to end by itself.
+#include "Tracking/Devices/TcpSocket.h"
+#include "Core/Base/Error.h"
+#include "Tracking/Stream/Clock.h"
+#include <algorithm>
+#include <arpa/inet.h>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace echorama {
+namespace {
+
+constexpr double Slice = 0.1; // s
+
+std::string Reason(int error)
+{
+  return std::generic_category().message(error);
+}
+
+[[noreturn]] void Refuse(const std::string& place, const std::string& reason)
+{
+  throw Error(Error::Kind::FileSystem, place + ": " + reason);
+}
+
+std::string PlaceOf(const sockaddr_in& address)
+{
+  char text[INET_ADDRSTRLEN] = "";
+  inet_ntop(AF_INET, &address.sin_addr, text, sizeof text);
+  return std::string(text) + ":" + std::to_string(ntohs(address.sin_port));
+}
+
+// What the system's resolver works on; it must stay where it is until the resolver has done with it.
+struct Lookup {
+  std::string host;
+  addrinfo hints{};
+  gaicb request{};
+  ~Lookup()
+  {
+    if (request.ar_result)
+      freeaddrinfo(request.ar_result);
+  }
+};
+
+// Nothing when it was stopped.
+std::optional<sockaddr_in> Resolve(const std::string& host, int port, const std::string& place, double until,
+                                   const TcpSocket::Stopped& stopped)
+{
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  if (inet_pton(AF_INET, host.c_str(), &address.sin_addr) == 1)
+    return address;
+
+  auto lookup = std::make_unique<Lookup>();
+  lookup->host = host;
+  lookup->hints.ai_family = AF_INET;
+  lookup->hints.ai_socktype = SOCK_STREAM;
+  lookup->request.ar_name = lookup->host.c_str();
+  lookup->request.ar_request = &lookup->hints;
+  gaicb* list[1] = {&lookup->request};
+  if (const int failed = getaddrinfo_a(GAI_NOWAIT, list, 1, nullptr))
+    Refuse(place, gai_strerror(failed));
+  while (gai_error(&lookup->request) == EAI_INPROGRESS) {
+    const bool late = ClockNow() > until;
+    if (late || (stopped && stopped())) {
+      if (gai_cancel(&lookup->request) == EAI_NOTCANCELED)
+        lookup.release(); // the resolver still writes to it
+      if (!late)
+        return {};
+      Refuse(place, "the name was not found in time");
+    }
+    const timespec wait{0, static_cast<long>(Slice * 1e9)};
+    gai_suspend(list, 1, &wait);
+  }
+  if (const int failed = gai_error(&lookup->request))
+    Refuse(place, gai_strerror(failed));
+  address.sin_addr = reinterpret_cast<const sockaddr_in*>(lookup->request.ar_result->ai_addr)->sin_addr;
+  return address;
+}
+
+int NewSocket(const std::string& place)
+{
+  const int descriptor = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (descriptor < 0)
+    Refuse(place, Reason(errno));
+  return descriptor;
+}
+
+void Set(int descriptor, int level, int option, int value)
+{
+  setsockopt(descriptor, level, option, &value, sizeof value); // what the system does not know is not needed
+}
+
+void Tune(int descriptor)
+{
+  Set(descriptor, IPPROTO_TCP, TCP_NODELAY, 1);
+  Set(descriptor, SOL_SOCKET, SO_KEEPALIVE, 1);
+  Set(descriptor, IPPROTO_TCP, TCP_KEEPIDLE, 5);
+  Set(descriptor, IPPROTO_TCP, TCP_KEEPINTVL, 2);
+  Set(descriptor, IPPROTO_TCP, TCP_KEEPCNT, 3);
+}
+
+int Poll(std::vector<pollfd>& descriptors, double seconds)
+{
+  timespec wait{};
+  wait.tv_sec = static_cast<time_t>(seconds);
+  wait.tv_nsec = static_cast<long>((seconds - std::floor(seconds)) * 1e9);
+  return ppoll(descriptors.data(), descriptors.size(), &wait, nullptr); // an interrupted wait is a short one
+}
+
+bool Again(int error)
+{
+  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
+}
+
+} // namespace
+
+TcpSocket::TcpSocket(TcpSocket&& other) noexcept
+  : descriptor_(other.descriptor_), peer_(std::move(other.peer_)), end_(std::move(other.end_))
+{
+  other.descriptor_ = -1;
+}
+
+TcpSocket& TcpSocket::operator=(TcpSocket&& other) noexcept
+{
+  std::swap(descriptor_, other.descriptor_);
+  std::swap(peer_, other.peer_);
+  std::swap(end_, other.end_);
+  return *this;
+}
+
+void TcpSocket::Close()
+{
+  if (descriptor_ >= 0)
+    close(descriptor_);
+  descriptor_ = -1;
+}
+
+TcpSocket TcpSocket::Connect(const std::string& host, int port, double seconds, const Stopped& stopped)
+{
+  const std::string place = host + ":" + std::to_string(port);
+  const double until = ClockNow() + seconds;
+  const auto address = Resolve(host, port, place, until, stopped);
+  TcpSocket result;
+  if (!address)
+    return result;
+  result.descriptor_ = NewSocket(place);
+  result.peer_ = place;
+  Tune(result.descriptor_);
+  if (connect(result.descriptor_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0)
+    return result;
+  if (errno != EINPROGRESS && errno != EINTR)
+    Refuse(place, Reason(errno));
+  while (true) {
+    std::vector<pollfd> waiting{{result.descriptor_, POLLOUT, 0}};
+    if (Poll(waiting, Slice) > 0)
+      break;
+    if (stopped && stopped())
+      return {};
+    if (ClockNow() > until)
+      Refuse(place, "no answer within " + std::to_string(static_cast<int>(std::ceil(seconds))) + " s");
+  }
+  int error = 0;
+  socklen_t size = sizeof error;
+  getsockopt(result.descriptor_, SOL_SOCKET, SO_ERROR, &error, &size);
+  if (error != 0)
+    Refuse(place, Reason(error));
+  return result;
+}
+
+TcpSocket TcpSocket::Listen(const std::string& host, int port)
+{
+  const std::string place = host + ":" + std::to_string(port);
+  const auto address = Resolve(host, port, place, ClockNow() + 5.0, nullptr);
+  TcpSocket result;
+  result.descriptor_ = NewSocket(place);
+  result.peer_ = place;
+  Set(result.descriptor_, SOL_SOCKET, SO_REUSEADDR, 1);
+  if (bind(result.descriptor_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0 ||
+      listen(result.descriptor_, 16) != 0)
+    Refuse(place, Reason(errno));
+  return result;
+}
+
+TcpSocket TcpSocket::Accept() const
+{
+  TcpSocket result;
+  sockaddr_in address{};
+  socklen_t size = sizeof address;
+  result.descriptor_ = accept4(descriptor_, reinterpret_cast<sockaddr*>(&address), &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (result.IsOpen()) {
+    Tune(result.descriptor_);
+    result.peer_ = PlaceOf(address);
+  }
+  return result;
+}
+
+int TcpSocket::Port() const
+{
+  sockaddr_in address{};
+  socklen_t size = sizeof address;
+  return getsockname(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) == 0 ? ntohs(address.sin_port) : 0;
+}
+
+std::optional<std::size_t> TcpSocket::Receive(unsigned char* bytes, std::size_t size)
+{
+  const ssize_t got = recv(descriptor_, bytes, size, 0);
+  if (got > 0)
+    return static_cast<std::size_t>(got);
+  if (got < 0 && Again(errno))
+    return 0;
+  end_ = got == 0 ? "closed by the peer" : Reason(errno);
+  return {};
+}
+
+std::optional<std::size_t> TcpSocket::Send(const unsigned char* bytes, std::size_t size)
+{
+  const ssize_t gone = send(descriptor_, bytes, size, MSG_NOSIGNAL);
+  if (gone >= 0)
+    return static_cast<std::size_t>(gone);
+  if (Again(errno))
+    return 0;
+  end_ = Reason(errno);
+  return {};
+}
+
+void WaitForSockets(const std::vector<const TcpSocket*>& reading, const std::vector<const TcpSocket*>& writing, double seconds)
+{
+  std::vector<pollfd> descriptors;
+  descriptors.reserve(reading.size() + writing.size());
+  for (const TcpSocket* socket : reading)
+    descriptors.push_back({socket->Descriptor(), POLLIN, 0});
+  for (const TcpSocket* socket : writing)
+    descriptors.push_back({socket->Descriptor(), POLLOUT, 0});
+  Poll(descriptors, seconds);
+}
+
+void SendQueue::Push(Bytes message)
+{
+  bytes_ += message->size();
+  waiting_.push_back(std::move(message));
+  while (bytes_ > bound_ && waiting_.size() > 1) { // one message always has room
+    bytes_ -= waiting_.front()->size();
+    waiting_.pop_front();
+    ++dropped_;
+  }
+}
+
+void SendQueue::PushNewest(const std::string& name, Bytes message)
+{
+  for (auto& [other, older] : newest_) {
+    if (other == name) {
+      older = std::move(message);
+      ++dropped_;
+      return;
+    }
+  }
+  newest_.emplace_back(name, std::move(message));
+}
+
+bool SendQueue::Flush(TcpSocket& socket)
+{
+  while (!Empty()) {
+    if (!begun_) {
+      offset_ = 0;
+      if (!waiting_.empty()) {
+        begun_ = std::move(waiting_.front());
+        waiting_.pop_front();
+        bytes_ -= begun_->size();
+      } else {
+        begun_ = std::move(newest_.front().second);
+        newest_.pop_front();
+      }
+    }
+    const auto gone = socket.Send(begun_->data() + offset_, begun_->size() - offset_);
+    if (!gone)
+      return false;
+    offset_ += *gone;
+    if (offset_ < begun_->size())
+      return true; // it takes no more now
+    begun_.reset();
+    ++sent_;
+  }
+  return true;
+}
+
+} // namespace echorama
