@@ -17,6 +17,7 @@
 #include "Core/Base/Error.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
+#include "Readers/SequenceText.h"
 #include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cctype>
@@ -468,7 +469,11 @@ void SequenceFile::Parts::CheckSizes(const FrameAxis& axis)
   const bool raw = header.encoding == ImageHeader::Encoding::Raw;
   if (raw && there < all)
     FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": it is truncated or the dimensions are wrong");
-  if (raw && there > all && header.dataOffset >= 0)
+  const bool recorded = header.dataPath != header.path &&
+                        std::find(content.fields.begin(), content.fields.end(), RecorderField) != content.fields.end();
+  if (raw && there > all && recorded)
+    content.notes.push_back("the recording was cut off: the pixels of a last frame were left out");
+  else if (raw && there > all && header.dataOffset >= 0)
     FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": the dimensions or the type are wrong");
   if (!raw && (there * static_cast<double>(LargestCompressionRatio) < all || header.dataOffset < 0))
     FailFile(header.dataPath, says + ", more than " + NumberText(there) + " compressed bytes can hold");

@@ -23,6 +23,10 @@ std::vector<HeaderField> MetaImageSequenceFields(const SequenceContent& content,
 std::vector<HeaderField> SequenceFrameFields(const std::string& path, const SequenceFrame& frame, int number,
                                              const std::string& statusKey, bool hasPixels);
 
+/// What a recorder writes into its headers, so that readers know that a file of pixels may hold more than the header counts: the
+/// recorder was killed in between.
+inline const HeaderField RecorderField{"Recorder", "Echorama"};
+
 /// "Seq_Frame0012_"
 std::string SequenceFramePrefix(int number);
 
