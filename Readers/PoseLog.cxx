@@ -435,6 +435,9 @@ PoseLog ReadSequencePoses(const std::string& path, const PoseLogOptions& options
       pose.name = transform.name;
       pose.time = time;
       pose.status = transform.status;
+      for (const auto& [key, value] : frame.fields)
+        if (key == transform.name + ArrivalField)
+          ParseNumber(value, pose.arrival);
       if (pose.status != TransformStatus::Missing) {
         seen.insert(pose.name);
         Eigen::Matrix4d matrix = transform.matrix.matrix();

@@ -20,6 +20,10 @@ struct PoseLog {
   std::vector<ToolPose> Of(const std::string& tool) const;
 };
 
+/// Behind the name of a transform it names the field of a frame that holds the arrival of its pose, in seconds:
+/// "ProbeToTrackerArrival". Recorders write it.
+inline constexpr const char* ArrivalField = "Arrival";
+
 /// What a file does not say.
 struct PoseLogOptions {
   double unitMm = 0.0; ///< of lengths, in mm (1000: metres), in [0, 1e6]; 0: what the format says, see ReadPoseLog
@@ -31,7 +35,8 @@ struct PoseLogOptions {
 };
 
 /// Reads a recording of a tracker:
-/// * sequences (.igs.mha ...): every rigid transform of every frame that has it, in mm;
+/// * sequences (.igs.mha ...): every rigid transform of every frame that has it, in mm; with its arrival, where the field
+///   ArrivalField says it;
 /// * tables with a row of column names, in mm unless \a options say otherwise: a time (time, timestamp or t in seconds; or hour,
 ///   minutes, seconds and ms, counted from midnight on) and, for each sensor, a position (x y z or tx ty tz) and a quaternion
 ///   (qw, q_w, qo or q0, then qx qy qz or q1 q2 q3), whose names end alike for one sensor. So do NDI's tools for the Aurora write
