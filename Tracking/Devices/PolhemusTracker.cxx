@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The conversation. A device may be in any state: half a command typed, text or binary, already talking. So: a line end and P
+// (one record, and an end to continuous output) until it is silent; then binary, and control-V, whose answer begins with the two
+// letters of the model; control-U for the sensors; U1 for centimetres, and a look whether it obeys. Then the richest record
+// that fits the line is asked for with O and started with C; if within half a second no record can be believed, because the
+// firmware does not know an item or writes it otherwise than we think, the next simpler one is tried.
+#include "Tracking/Devices/PolhemusTracker.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Geometry/ToolPose.h"
+#include "Tracking/Stream/Clock.h"
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+namespace echorama {
+namespace {
+
+constexpr double Slice = 0.05;      // s: how often the worker asks whether it should stop
+constexpr double Silence = 0.1;     // s without a byte: it has stopped talking
+constexpr double Patience = 0.5;    // s for an answer
+constexpr double LongSilence = 2.0; // s without a record: it is gone
+constexpr char ControlU = 0x15, ControlV = 0x16;
+
+double FramesPerSecond(PolhemusModel model)
+{
+  return model == PolhemusModel::Patriot ? 60.0 : 240.0;
+}
+
+std::uint32_t Bits(const std::string& data, std::size_t at)
+{
+  return static_cast<unsigned char>(data[at]) + 256u * static_cast<unsigned char>(data[at + 1]);
+}
+
+} // namespace
+
+PolhemusOptions PolhemusOptions::From(const TrackerAddress& address)
+{
+  address.CheckOptions({"baud", "model", "format", "names", "hemisphere", "record", "range", "distortion"});
+  const auto refuse = [&address](const std::string& what) {
+    throw Error(Error::Kind::InvalidParameter, address.text + ": " + what);
+  };
+  PolhemusOptions options;
+  options.path = address.place;
+  if (options.path.empty())
+    refuse("the line is missing, such as polhemus:/dev/ttyUSB0");
+  options.baud = static_cast<int>(address.Number("baud", options.baud, 1200, 1000000));
+
+  const std::string model = address.Text("model", "auto");
+  if (model == "patriot")
+    options.model = PolhemusModel::Patriot;
+  else if (model == "liberty")
+    options.model = PolhemusModel::Liberty;
+  else if (model != "auto")
+    refuse("model must be auto, patriot or liberty");
+
+  const std::string format = address.Text("format", "binary");
+  if (format == "ascii")
+    options.format = PolhemusFormat::Ascii;
+  else if (format != "binary")
+    refuse("format must be binary or ascii");
+
+  const std::string record = address.Text("record", "auto");
+  if (record == "twofold")
+    options.record = Record::Twofold;
+  else if (record == "single")
+    options.record = Record::Single;
+  else if (record == "bare")
+    options.record = Record::Bare;
+  else if (record != "auto")
+    refuse("record must be auto, twofold, single or bare");
+
+  options.hemisphere = address.Text("hemisphere", "");
+  if (!options.hemisphere.empty() &&
+      (options.hemisphere.size() != 2 || std::string("+-").find(options.hemisphere[0]) == std::string::npos ||
+       std::string("xyz").find(options.hemisphere[1]) == std::string::npos))
+    refuse("hemisphere must be +x, -x, +y, -y, +z or -z");
+
+  std::istringstream names(address.Text("names", ""));
+  std::set<std::string> seen;
+  for (std::string name; std::getline(names, name, ',');) {
+    if (!name.empty() && !seen.insert(ToolTransformName(name)).second)
+      refuse("the name " + name + " is given twice");
+    options.names.push_back(name);
+  }
+  const int most = PolhemusStations(options.model.value_or(PolhemusModel::Liberty));
+  if (options.names.size() > static_cast<std::size_t>(most))
+    refuse("there are " + std::to_string(options.names.size()) + " names for at most " + std::to_string(most) + " stations");
+  options.rangeMm = address.Number("range", options.rangeMm, 1.0, 20000.0);
+  options.distortion = address.Number("distortion", options.distortion, 0.0, 1e300);
+  return options;
+}
+
+std::unique_ptr<TrackerDevice> PolhemusTracker::Make(const TrackerAddress& address)
+{
+  return std::make_unique<PolhemusTracker>(PolhemusOptions::From(address));
+}
+
+PolhemusTracker::PolhemusTracker(const PolhemusOptions& options) : options_(options), port_(options.path, options.baud) {}
+
+void PolhemusTracker::Start(PoseStream& poses, ImageStream*)
+{
+  Stop();
+  port_.Open();
+  poses_ = &poses;
+  poses_->SetState(DeviceState::Connecting, options_.path);
+  worker_.Start([this](const Worker::Signal& signal) { Run(signal); });
+}
+
+void PolhemusTracker::Stop()
+{
+  worker_.Stop();
+  port_.Close();
+  if (poses_)
+    poses_->SetState(DeviceState::Idle);
+  poses_ = nullptr;
+}
+
+void PolhemusTracker::Run(const Worker::Signal& signal)
+{
+  bool wasThere = false;
+  while (!signal.Stopped()) {
+    Step step = Step::Lost;
+    try {
+      port_.Open();
+      step = Converse(signal);
+      if (step == Step::Done) {
+        wasThere = true;
+        poses_->SetState(DeviceState::Running, running_);
+        step = Listen(signal, 0.0);
+      }
+    } catch (const Error& error) {
+      problem_ = error.what();
+    }
+    if (step == Step::Stopped)
+      break;
+    if (step == Step::Impossible) {
+      poses_->SetState(DeviceState::Failed, problem_);
+      break;
+    }
+    if (step == Step::Lost && problem_.empty())
+      problem_ = options_.path + ": the line is gone";
+    poses_->SetState(wasThere ? DeviceState::Lost : DeviceState::Connecting, problem_);
+    problem_.clear();
+    if (!signal.Sleep(0.5))
+      break;
+  }
+  if (port_.IsOpen())
+    port_.Write("P", Slice); // ends continuous output
+}
+
+bool PolhemusTracker::Tell(const std::string& command)
+{
+  return port_.Write(command, Silence) == SerialPort::Outcome::Done;
+}
+
+PolhemusTracker::Step PolhemusTracker::Quiet(const Worker::Signal& signal)
+{
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    if (!Tell("\rP"))
+      return Step::Lost;
+    const double begin = ClockNow();
+    std::vector<unsigned char> bytes;
+    while (ClockNow() - begin < 2.0 * Patience) {
+      if (signal.Stopped())
+        return Step::Stopped;
+      bytes.clear();
+      const auto outcome = port_.Read(bytes, Silence);
+      if (outcome == SerialPort::Outcome::Lost)
+        return Step::Lost;
+      if (outcome == SerialPort::Outcome::Timeout)
+        return Step::Done;
+    }
+  }
+  problem_ = options_.path + ": what is there does not stop talking; is it a Polhemus, and set to " +
+             std::to_string(options_.baud) + " bits per second?";
+  return Step::Again;
+}
+
+std::optional<PolhemusReply> PolhemusTracker::Ask(const Worker::Signal& signal, const std::string& command, unsigned char answers)
+{
+  if (!Tell(command))
+    return std::nullopt;
+  std::string bytes;
+  std::vector<unsigned char> piece;
+  for (const double begin = ClockNow(); ClockNow() - begin < Patience && !signal.Stopped();) {
+    piece.clear();
+    const auto outcome = port_.Read(piece, Slice);
+    if (outcome == SerialPort::Outcome::Lost)
+      break;
+    bytes.append(piece.begin(), piece.end());
+    if (auto reply = TakePolhemusReply(bytes, answers))
+      return reply;
+  }
+  return std::nullopt;
+}
+
+std::vector<PolhemusLayout> PolhemusTracker::Layouts(PolhemusModel model, int stations) const
+{
+  using Record = PolhemusOptions::Record;
+  // A byte takes 10 bits; a line that is full to the brim has no room to catch up.
+  const double room = 0.97 * options_.baud / 10.0 / FramesPerSecond(model) / stations;
+  const bool fits = static_cast<double>(PolhemusRecordBytes(PolhemusTwofold(true), options_.format)) <= room;
+  std::vector<PolhemusLayout> layouts;
+  if (options_.record == Record::Twofold || (options_.record == Record::Auto && fits))
+    layouts = {PolhemusTwofold(true), PolhemusTwofold(false)};
+  if (options_.record == Record::Single || options_.record == Record::Auto)
+    layouts.insert(layouts.end(), {PolhemusSingle(true), PolhemusSingle(false)});
+  if (options_.record == Record::Bare || options_.record == Record::Auto)
+    layouts.push_back(PolhemusBare());
+  return layouts;
+}
+
+PolhemusTracker::Step PolhemusTracker::Converse(const Worker::Signal& signal)
+{
+  const Step quiet = Quiet(signal);
+  if (quiet != Step::Done)
+    return quiet;
+  std::optional<PolhemusReply> who;
+  for (int attempt = 0; attempt < 3 && !who; ++attempt) {
+    if (signal.Stopped())
+      return Step::Stopped;
+    if (!Tell("F1\r"))
+      return Step::Lost;
+    who = Ask(signal, std::string(1, ControlV) + "\r", ControlV);
+  }
+  if (!port_.IsOpen())
+    return Step::Lost;
+  if (signal.Stopped())
+    return Step::Stopped;
+  if (!who) {
+    problem_ = options_.path + ": nothing there answers like a Polhemus; is it on, and set to " + std::to_string(options_.baud) +
+               " bits per second?";
+    return Step::Again;
+  }
+  if (options_.model && *options_.model != who->model) {
+    problem_ = options_.path + ": it is a " + PolhemusModelText(who->model) + ", not a " + PolhemusModelText(*options_.model);
+    return Step::Impossible;
+  }
+
+  PolhemusSpeech speech;
+  speech.model = who->model;
+  speech.format = options_.format;
+  speech.rangeMm = options_.rangeMm;
+  speech.distortion = options_.distortion;
+  speech.stations = (1u << PolhemusStations(speech.model)) - 1;
+  const auto sensors = Ask(signal, std::string(1, ControlU) + "0\r", ControlU);
+  if (sensors && sensors->data.size() >= 4) {
+    speech.stations &= Bits(sensors->data, 0) & Bits(sensors->data, 2); // those that are plugged in, those that are on
+    if (speech.stations == 0) {
+      problem_ = options_.path + ": no sensor is plugged in";
+      return Step::Again;
+    }
+  }
+  for (int attempt = 0;; ++attempt) {
+    if (!Tell("U1\r"))
+      return Step::Lost;
+    const auto unit = Ask(signal, "U\r", 'U');
+    if (!unit || unit->data.size() < 2 || Bits(unit->data, 0) == 1)
+      break;
+    if (attempt == 2) {
+      problem_ = options_.path + ": it does not go over to centimetres";
+      return Step::Again;
+    }
+  }
+  if (!options_.hemisphere.empty()) {
+    const std::string one = options_.hemisphere[0] == '-' ? "-1" : "1";
+    const char axis = options_.hemisphere[1];
+    if (!Tell("H*," + (axis == 'x' ? one : "0") + "," + (axis == 'y' ? one : "0") + "," + (axis == 'z' ? one : "0") + "\r"))
+      return Step::Lost;
+  }
+  return TryLayouts(signal, speech);
+}
+
+PolhemusTracker::Step PolhemusTracker::TryLayouts(const Worker::Signal& signal, PolhemusSpeech speech)
+{
+  int stations = 0;
+  std::string list;
+  for (int station = 1; station <= PolhemusStations(speech.model); ++station)
+    if (speech.stations >> (station - 1) & 1) {
+      ++stations;
+      list += (list.empty() ? "" : ", ") + std::to_string(station);
+    }
+  std::string complaint;
+  for (const PolhemusLayout& layout : Layouts(speech.model, stations)) {
+    speech.layout = layout;
+    std::string items;
+    for (const PolhemusItem item : layout)
+      items += "," + std::to_string(static_cast<int>(item));
+    // What went wrong with the layout before may still lie in the line.
+    const Step quiet = Quiet(signal);
+    if (quiet != Step::Done)
+      return quiet;
+    if (!Tell("O*" + items + "\r") || (speech.format == PolhemusFormat::Ascii && !Tell("F0\r")) || !Tell("C\r"))
+      return Step::Lost;
+    speech_ = speech;
+    decoder_.emplace(speech);
+    clock_.Reset();
+    jumpsTold_ = 0;
+    const bool twofold = std::count(layout.begin(), layout.end(), PolhemusItem::Position) > 0;
+    const bool timed = std::count(layout.begin(), layout.end(), PolhemusItem::Time) > 0;
+    running_ = options_.path + ": " + PolhemusModelText(speech.model) + ", stations " + list + ", " +
+               (twofold ? "twofold"
+                : timed ? "single"
+                        : "bare") +
+               " records";
+    const Step step = Listen(signal, Patience);
+    if (step != Step::Again)
+      return step;
+    complaint = decoder_->LastComplaint();
+    if (speech.format == PolhemusFormat::Ascii && !Tell("F1\r"))
+      return Step::Lost;
+  }
+  problem_ = options_.path + ": its records cannot be read" + (complaint.empty() ? "; none came" : ": " + complaint);
+  return Step::Again;
+}
+
+/// With \a trial > 0: until the first record (Done), or until that many seconds have passed without one (Again). Else until
+/// something ends it.
+PolhemusTracker::Step PolhemusTracker::Listen(const Worker::Signal& signal, double trial)
+{
+  double lastRecord = ClockNow();
+  std::uint64_t malformed = decoder_->Malformed();
+  std::vector<unsigned char> bytes;
+  while (!signal.Stopped()) {
+    bytes.clear();
+    const auto outcome = port_.Read(bytes, Slice);
+    if (outcome == SerialPort::Outcome::Lost)
+      return Step::Lost;
+    const double arrival = ClockNow();
+    const auto records = decoder_->Take(bytes.data(), bytes.size());
+    Pass(records, arrival);
+    if (trial <= 0.0)
+      for (; malformed < decoder_->Malformed(); ++malformed)
+        poses_->Reject(Rejection::Malformed, options_.path + ": " + decoder_->LastComplaint());
+    if (!records.empty())
+      lastRecord = arrival;
+    if (trial > 0.0 && !records.empty())
+      return Step::Done;
+    if (arrival - lastRecord > (trial > 0.0 ? trial : LongSilence)) {
+      if (trial <= 0.0)
+        problem_ = options_.path + ": no record has come for " + NumberText(LongSilence) + " s";
+      return Step::Again;
+    }
+  }
+  return Step::Stopped;
+}
+
+void PolhemusTracker::Pass(const std::vector<PolhemusRecord>& records, double arrival)
+{
+  std::array<int, 32> left{}; // records of a station that came in one piece
+  for (const PolhemusRecord& record : records)
+    ++left[static_cast<std::size_t>(record.station - 1)];
+  for (const PolhemusRecord& record : records) {
+    const auto index = static_cast<std::size_t>(record.station - 1);
+    ToolPose pose;
+    const bool named = index < options_.names.size() && !options_.names[index].empty();
+    pose.name = ToolTransformName(named ? options_.names[index] : "Station" + std::to_string(record.station));
+    pose.arrival = arrival;
+    pose.pose = record.pose;
+    pose.status = record.status;
+    --left[index];
+    if (record.milliseconds)
+      pose.time = clock_.Map(*record.milliseconds, arrival);
+    else // the last has just come, those before it one frame earlier each
+      pose.time = std::max(arrival - left[index] / FramesPerSecond(speech_.model), lastTimes_[index] + 1e-6);
+    lastTimes_[index] = pose.time;
+    poses_->Add(pose);
+  }
+  if (clock_.Jumps() != jumpsTold_) {
+    jumpsTold_ = clock_.Jumps();
+    std::ostringstream text;
+    text.precision(3);
+    text << running_ << "; its clock has jumped by " << std::fixed << clock_.LastJump() << " s, and is mapped anew";
+    poses_->SetState(DeviceState::Running, text.str());
+  }
+}
+
+} // namespace echorama

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Tracking/Devices/DeviceClock.h"
+#include "Tracking/Devices/PolhemusDecoder.h"
+#include "Tracking/Devices/SerialPort.h"
+#include "Tracking/Devices/TrackerAddress.h"
+#include "Tracking/Devices/TrackerDevice.h"
+#include "Tracking/Stream/Worker.h"
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// What an address polhemus:/dev/ttyUSB0 may say.
+struct PolhemusOptions {
+  std::string path;
+  int baud = 115200;                              ///< as the switches on the device say
+  std::optional<PolhemusModel> model;             ///< else the device says; another one is refused
+  PolhemusFormat format = PolhemusFormat::Binary; ///< binary or ascii
+  std::vector<std::string> names;                 ///< of the stations; the rest are Station1, Station2 ...
+  std::string hemisphere; ///< "+x" ... "-z": on which side of the source the sensors are. Else as it is set
+  enum class Record { Auto, Twofold, Single, Bare };
+  Record record = Record::Auto; ///< Auto: twofold when the line is fast enough for it, else single
+  double rangeMm = 1800.0;      ///< see PolhemusSpeech
+  double distortion = 1e300;    ///< see PolhemusSpeech
+
+  /// The options baud, model (auto, patriot, liberty), format, names (separated by commas), hemisphere, record, range (mm) and
+  /// distortion. \throws Error(InvalidParameter) that names what does not fit.
+  static PolhemusOptions From(const TrackerAddress& address);
+};
+
+/// A Polhemus Patriot or Liberty on a serial line. It does the whole conversation: stops a device that talks already, asks what
+/// it is and which sensors it has, sets units and records, and starts and stops continuous output. When the line is lost or
+/// falls silent it begins again, every half a second, until it is stopped.
+class PolhemusTracker : public TrackerDevice {
+public:
+  /// \throws Error(InvalidParameter)
+  explicit PolhemusTracker(const PolhemusOptions& options);
+  ~PolhemusTracker() override { Stop(); }
+
+  static std::unique_ptr<TrackerDevice> Make(const TrackerAddress& address);
+
+  /// \throws Error(FileSystem) when the line cannot be opened.
+  void Start(PoseStream& poses, ImageStream* images) override;
+  void Stop() override;
+
+private:
+  /// How a step of the conversation ended.
+  enum class Step { Done, Again, Lost, Stopped, Impossible };
+
+  void Run(const Worker::Signal& signal);
+  Step Converse(const Worker::Signal& signal);
+  Step Listen(const Worker::Signal& signal, double trial);
+  Step Quiet(const Worker::Signal& signal);
+  bool Tell(const std::string& command);
+  std::optional<PolhemusReply> Ask(const Worker::Signal& signal, const std::string& command, unsigned char answers);
+  Step TryLayouts(const Worker::Signal& signal, PolhemusSpeech speech);
+  void Pass(const std::vector<PolhemusRecord>& records, double arrival);
+  std::vector<PolhemusLayout> Layouts(PolhemusModel model, int stations) const;
+
+  PolhemusOptions options_;
+  SerialPort port_;
+  Worker worker_;
+  PoseStream* poses_ = nullptr;
+
+  // of the worker alone
+  std::string problem_; ///< why the last conversation failed
+  std::string running_; ///< the message while all is well
+  std::optional<PolhemusDecoder> decoder_;
+  PolhemusSpeech speech_;
+  DeviceClock clock_;
+  std::uint64_t jumpsTold_ = 0;
+  std::array<double, 32> lastTimes_{}; ///< of the stations
+};
+
+} // namespace echorama
