@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The order of work: check the poses; refuse motions that cannot answer; find what the scans agree on, and who does not
+// (HandEyeSearch); when too few agree, look for the mistake (HandEyeDiagnosis); refuse again, for the scans that are left; then
+// state how well the target is known (HandEyeModel) and what would help (HandEyeAdvice).
+//
+// The covariance is the inverse of Fisher's information at the optimum, with the noise as stated or, on request, scaled to the
+// inliers' residuals.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Warray-bounds"
+#pragma GCC diagnostic ignored "-Wstringop-overread"
+#include "Tracking/Calibration/HandEye.h"
+#include "Core/Base/Error.h"
+#include "Tracking/Calibration/ConfidenceRadius.h"
+#include "Tracking/Calibration/HandEyeAdvice.h"
+#include "Tracking/Calibration/HandEyeClosedForms.h"
+#include "Tracking/Calibration/HandEyeDiagnosis.h"
+#include "Tracking/Calibration/HandEyeSearch.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <Eigen/Cholesky>
+
+namespace echorama {
+namespace {
+
+constexpr double DegreesPerRadian = 57.29577951308232;
+constexpr int LeastForNoise = 5; // scans
+// Residuals of so many times the noise are no noise.
+constexpr double HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
+
+struct MethodName {
+  HandEyeMethod method;
+  const char* name;
+};
+constexpr MethodName Methods[] = {
+    {HandEyeMethod::MaximumLikelihood, "maximum-likelihood"},
+    {HandEyeMethod::ShiuAhmad, "shiu-ahmad"},
+    {HandEyeMethod::TsaiLenz, "tsai-lenz"},
+    {HandEyeMethod::ParkMartin, "park-martin"},
+    {HandEyeMethod::Horaud, "horaud"},
+    {HandEyeMethod::Daniilidis, "daniilidis"},
+    {HandEyeMethod::Andreff, "andreff"},
+};
+
+[[noreturn]] void Refuse(const std::string& reason)
+{
+  throw Error(Error::Kind::NotPossible, "hand-eye calibration: " + reason);
+}
+
+template <class... Values>
+std::string Format(const char* format, Values... values)
+{
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+void CheckNoise(const PoseNoise& noise, const char* side)
+{
+  const auto complain = [side](const char* what, const char* range) {
+    throw Error(Error::Kind::InvalidParameter,
+                "hand-eye calibration: the noise of the " + std::string(side) + ", " + what + ", must be in " + range);
+  };
+  if (!(noise.degrees >= 0.0 && noise.degrees <= 45.0))
+    complain("degrees", "[0, 45]");
+  if (!(noise.mm >= 0.0 && noise.mm <= 100.0))
+    complain("mm", "[0, 100]");
+}
+
+PoseNoise Scaled(const PoseNoise& noise, double scale)
+{
+  return {noise.degrees * scale, noise.mm * scale};
+}
+
+// A sensor pose that comes again with another alignment was not read anew, or the scan was aligned twice.
+void NoteStalePoses(const std::vector<HandEyePair>& pairs, std::vector<std::string>& notes)
+{
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (pairs[i].sensorToTracker.isApprox(pairs[j].sensorToTracker, 1e-12)) {
+        notes.push_back("The sensor poses of " + pairs[j].name + " and " + pairs[i].name +
+                        " are the same, their alignments are not: was the tracker read anew?");
+        break;
+      }
+}
+
+// The typical residual, for messages.
+std::string TypicalResidual(const HandEyeModel& model, const HandEyeSolution& solution)
+{
+  std::vector<double> mm, degrees;
+  for (int i = 0; i < model.Count(); ++i) {
+    const Twist residual = model.Residual(i, solution);
+    mm.push_back(Exp(residual).translation().norm());
+    degrees.push_back(residual.tail<3>().norm() * DegreesPerRadian);
+  }
+  const auto median = [](std::vector<double>& values) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    return values[values.size() / 2];
+  };
+  return Format("%.3g mm and %.3g degrees", median(mm), median(degrees));
+}
+
+} // namespace
+
+const char* HandEyeMethodName(HandEyeMethod method)
+{
+  for (const MethodName& one : Methods)
+    if (one.method == method)
+      return one.name;
+  return "";
+}
+
+std::vector<std::string> HandEyeMethodNames()
+{
+  std::vector<std::string> names;
+  for (const MethodName& one : Methods)
+    names.emplace_back(one.name);
+  return names;
+}
+
+HandEyeMethod HandEyeMethodOf(const std::string& name)
+{
+  std::string list;
+  for (const MethodName& one : Methods) {
+    if (name == one.name)
+      return one.method;
+    list += (list.empty() ? "" : ", ") + std::string(one.name);
+  }
+  throw Error(Error::Kind::InvalidParameter,
+              "there is no hand-eye calibration method named \"" + name + "\"; there are: " + list);
+}
+
+void HandEyeParameters::Check() const
+{
+  CheckNoise(sensorNoise, "sensor");
+  CheckNoise(volumeNoise, "alignments");
+  if (!(std::max(sensorNoise.degrees, volumeNoise.degrees) >= 1e-6 && std::max(sensorNoise.mm, volumeNoise.mm) >= 1e-6))
+    throw Error(Error::Kind::InvalidParameter,
+                "hand-eye calibration: the noise of one side at least must not be zero (1e-6 degrees and mm)");
+  if (!target.allFinite())
+    throw Error(Error::Kind::InvalidParameter, "hand-eye calibration: the target must be finite");
+}
+
+HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const HandEyeParameters& parameters,
+                               const Progress& progress)
+{
+  parameters.Check();
+  const std::vector<HandEyePair> named = CheckedHandEyePairs(given);
+
+  // Each scan once.
+  HandEyeResult result;
+  const std::vector<int> repeats = HandEyeRepeats(named);
+  std::vector<HandEyePair> pairs;
+  std::vector<std::size_t> numbers; // in the order given
+  std::string repeatText;
+  for (std::size_t i = 0; i < named.size(); ++i)
+    if (repeats[i] < 0) {
+      pairs.push_back(named[i]);
+      numbers.push_back(i);
+    } else
+      repeatText +=
+          (repeatText.empty() ? "" : "; ") + named[i].name + " repeats " + named[static_cast<std::size_t>(repeats[i])].name;
+  if (pairs.size() < 3 && !repeatText.empty())
+    Refuse(Format("three different scans are needed at least, and there %s %d (", pairs.size() == 1 ? "is" : "are",
+                  static_cast<int>(pairs.size())) +
+           repeatText + ")");
+  RefuseTooLittleMotion(pairs, parameters.sensorNoise, parameters.volumeNoise);
+  if (!repeatText.empty())
+    result.notes.push_back("Counted once: " + repeatText + ".");
+  NoteStalePoses(pairs, result.notes);
+
+  // The solution.
+  const std::size_t count = pairs.size();
+  const bool likelihood = parameters.method == HandEyeMethod::MaximumLikelihood;
+  const HandEyeModel model(pairs, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
+  HandEyeConsensus consensus = FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood,
+                                                    parameters.estimateNoise, parameters.seed, progress.Part(0.0, 0.8));
+  const auto inliers = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
+  if (consensus.scale > (parameters.estimateNoise ? HopelessEstimatedScale : HopelessScale) || 2 * inliers < count) {
+    const std::string typical = TypicalResidual(model, consensus.fit.solution);
+    const std::string explanation = ExplainDisagreement(pairs, parameters, consensus.scale);
+    Refuse("the scans do not agree with each other: typically " + typical + " are left, " +
+           (explanation.empty()
+                ? Format("%.3g times the noise stated. Check that every sensor pose belongs to its volume", consensus.scale)
+                : explanation));
+  }
+  if (!likelihood) {
+    consensus.inlier.assign(count, 1);
+    consensus.fit.solution = SolveHandEyeClosedForm(parameters.method, pairs);
+    consensus.square.clear();
+    result.notes.push_back(std::string("The covariance is that of the maximum likelihood, which ") +
+                           HandEyeMethodName(parameters.method) + " does not reach.");
+  }
+  result.solution = consensus.fit.solution;
+  progress(0.9);
+
+  // How every scan fits.
+  double sumMm = 0.0, sumDegrees = 0.0, chiSquare = 0.0;
+  result.residuals.resize(named.size());
+  const Eigen::Matrix<double, 6, 6> weight =
+      model.Covariance(result.solution.volumeToSensor).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+  std::string outliers;
+  for (std::size_t i = 0; i < count; ++i) {
+    HandEyeResidual& residual = result.residuals[numbers[i]];
+    const Twist twist = model.Residual(static_cast<int>(i), result.solution);
+    residual.name = pairs[i].name;
+    residual.mm = Exp(twist).translation().norm();
+    residual.degrees = twist.tail<3>().norm() * DegreesPerRadian;
+    residual.inlier = consensus.inlier[i] != 0;
+    if (residual.inlier) {
+      ++result.inliers;
+      sumMm += residual.mm * residual.mm;
+      sumDegrees += residual.degrees * residual.degrees;
+      chiSquare += twist.dot(weight * twist);
+    } else {
+      residual.reason = Format("%.1f mm and %.1f degrees from where the others place it, %.0f times what the noise explains",
+                               residual.mm, residual.degrees, std::sqrt(consensus.square[i] / 6.0));
+      outliers += (outliers.empty() ? "" : ", ") + residual.name;
+    }
+  }
+  result.rmsMm = std::sqrt(sumMm / result.inliers);
+  result.rmsDegrees = std::sqrt(sumDegrees / result.inliers);
+  for (std::size_t i = 0; i < named.size(); ++i)
+    if (repeats[i] >= 0) {
+      result.residuals[i] = result.residuals[numbers[static_cast<std::size_t>(
+          std::find(numbers.begin(), numbers.end(), static_cast<std::size_t>(repeats[i])) - numbers.begin())]];
+      result.residuals[i].name = named[i].name;
+      result.residuals[i].inlier = false;
+      result.residuals[i].reason = "repeats " + named[static_cast<std::size_t>(repeats[i])].name;
+    }
+  if (!outliers.empty())
+    result.notes.push_back("Left out, because they do not agree with the others: " + outliers + ".");
+
+  // The noise that the residuals show.
+  const int degreesOfFreedom = 6 * result.inliers - 12;
+  const double shown = degreesOfFreedom > 0 ? std::sqrt(chiSquare / degreesOfFreedom) : 1.0;
+  if (parameters.estimateNoise && result.inliers < LeastForNoise)
+    Refuse(Format("the noise cannot be estimated from %d scans that agree; %d are needed", result.inliers, LeastForNoise));
+  if (parameters.estimateNoise)
+    result.noiseScale = std::max(shown, 1e-6);
+  else if (chiSquare > degreesOfFreedom + 4.0 * std::sqrt(2.0 * degreesOfFreedom))
+    result.notes.push_back(
+        Format("The residuals are %.1f times what the noise stated explains, so the 95%% region is too small: let the "
+               "noise be estimated, or state more.",
+               shown));
+  else if (degreesOfFreedom >= 18 && shown < 0.5)
+    result.notes.push_back(
+        Format("The residuals are %.2g times what the noise stated explains, so the 95%% region is too large: let the "
+               "noise be estimated, or state less.",
+               shown));
+
+  // Are those that are left enough?
+  std::vector<HandEyePair> agreed;
+  for (std::size_t i = 0; i < count; ++i)
+    if (consensus.inlier[i])
+      agreed.push_back(pairs[i]);
+  RefuseTooLittleMotion(agreed, Scaled(parameters.sensorNoise, result.noiseScale),
+                        Scaled(parameters.volumeNoise, result.noiseScale));
+
+  // How well it is known.
+  const HandEyeMatrix covariance =
+      result.noiseScale * result.noiseScale * model.CovarianceOfStep(result.solution, consensus.inlier);
+  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0)
+    Refuse("the motions do not determine the calibration; add scans that turn about other axes");
+  result.covariance = model.CovarianceOfPoses(covariance);
+  const Eigen::Matrix3d& R = result.solution.volumeToSensor.linear();
+  result.targetCovariance = R * covariance.topLeftCorner<3, 3>() * R.transpose();
+  result.targetRmsMm = std::sqrt(result.targetCovariance.trace());
+  result.targetRadius95Mm = ConfidenceRadius(result.targetCovariance, parameters.estimateNoise ? degreesOfFreedom : 0);
+
+  HandEyeParameters scaled = parameters;
+  scaled.sensorNoise = Scaled(parameters.sensorNoise, result.noiseScale);
+  scaled.volumeNoise = Scaled(parameters.volumeNoise, result.noiseScale);
+  result.advice = AdviseHandEye(pairs, consensus.inlier, result.solution, covariance, scaled);
+  for (const std::string& note : HandEyeSuspicions(agreed, result.solution, parameters))
+    result.notes.push_back(note);
+  progress(1.0);
+  return result;
+}
+
+} // namespace echorama

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A new scan adds its information to what is known, wherever it will turn out to be: its residual is expected to be noise. So
+// every candidate is judged by the covariance it would lead to, without a simulation. Some 100 candidates, 12x12 each.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Warray-bounds"
+#pragma GCC diagnostic ignored "-Wstringop-overread"
+#include "Tracking/Calibration/HandEyeAdvice.h"
+#include "Tracking/Calibration/ConfidenceRadius.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+
+namespace echorama {
+namespace {
+
+constexpr double RadiansPerDegree = 0.017453292519943295;
+
+Pose MeanPose(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier, const Eigen::Vector3d& target)
+{
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (inlier[i]) {
+      sum += pairs[i].volumeToWorld.linear();
+      place += pairs[i].volumeToWorld * target;
+      count += 1.0;
+    }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  Pose mean = Pose::Identity();
+  mean.linear() = svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
+  mean.translation() = place / count - mean.linear() * target;
+  return mean;
+}
+
+std::string AxisText(const Eigen::Vector3d& axis)
+{
+  std::string text;
+  for (int i = 0; i < 3; ++i)
+    if (std::abs(axis[i]) > 1e-9)
+      text += (text.empty() ? (axis[i] < 0.0 ? "-" : "") : (axis[i] < 0.0 ? " - " : " + ")) + std::string(1, "xyz"[i]);
+  return text;
+}
+
+} // namespace
+
+std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier,
+                                         const HandEyeSolution& solution, const HandEyeMatrix& covariance,
+                                         const HandEyeParameters& parameters)
+{
+  struct Candidate {
+    double variance = 0.0;
+    std::size_t axis = 0;
+    double degrees = 0.0;
+    Eigen::Matrix3d covariance;
+  };
+  std::vector<Eigen::Vector3d> axes;
+  for (int x = 0; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z)
+        if (x > 0 || y > 0 || (y == 0 && z > 0)) // one of each pair of opposite ones
+          axes.emplace_back(x, y, z);
+
+  const Pose mean = MeanPose(pairs, inlier, parameters.target);
+  std::vector<HandEyePair> asked;
+  std::vector<Candidate> candidates;
+  for (std::size_t axis = 0; axis < axes.size(); ++axis)
+    for (const double degrees : {15.0, -15.0, 30.0, -30.0, 45.0, -45.0, 60.0, -60.0}) {
+      HandEyePair pair;
+      const Eigen::Vector3d turn = axes[axis].normalized() * degrees * RadiansPerDegree;
+      pair.volumeToWorld = mean * MotionAbout(parameters.target, turn, Eigen::Vector3d::Zero());
+      pair.sensorToTracker = solution.worldToTracker * pair.volumeToWorld * solution.volumeToSensor.inverse();
+      asked.push_back(pair);
+      candidates.push_back({0.0, axis, degrees, Eigen::Matrix3d::Zero()});
+    }
+  // The model's step turns O about the middle of its scans; the candidates come behind the scans to keep it where it is.
+  std::vector<HandEyePair> together = pairs;
+  together.insert(together.end(), asked.begin(), asked.end());
+  const HandEyeModel model(together, parameters.sensorNoise, parameters.volumeNoise, parameters.target,
+                           static_cast<int>(pairs.size()));
+  const Eigen::Matrix<double, 6, 6> noise = model.Covariance(solution.volumeToSensor);
+  const Eigen::Matrix<double, 3, 12> top = covariance.topRows<3>();
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    // What is known of the target after it (Woodbury).
+    const Eigen::Matrix<double, 6, 12> jacobian = model.Jacobian(static_cast<int>(pairs.size() + i), Twist::Zero());
+    const Eigen::Matrix<double, 6, 3> gain = jacobian * top.transpose();
+    const Eigen::Matrix<double, 6, 6> seen = noise + jacobian * covariance * jacobian.transpose();
+    candidates[i].covariance = covariance.topLeftCorner<3, 3>() - gain.transpose() * seen.ldlt().solve(gain);
+    candidates[i].variance = candidates[i].covariance.trace();
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.variance < b.variance; });
+  const double before = ConfidenceRadius(covariance.topLeftCorner<3, 3>());
+  std::vector<HandEyeAdvice> advice;
+  std::vector<char> seen(axes.size(), 0);
+  for (const Candidate& candidate : candidates) {
+    if (seen[candidate.axis])
+      continue;
+    seen[candidate.axis] = 1;
+    HandEyeAdvice one;
+    one.axis = axes[candidate.axis].normalized();
+    one.degrees = candidate.degrees;
+    one.radiusMm = ConfidenceRadius(candidate.covariance);
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "Turn the volume by %.0f degrees about its axis %s from the mean of the scans: the 95%% radius falls from %.2f to "
+        "%.2f mm.",
+        one.degrees, AxisText(axes[candidate.axis]).c_str(), before, one.radiusMm);
+    one.text = text;
+    advice.push_back(one);
+    if (advice.size() == 3)
+      break;
+  }
+  return advice;
+}
+
+} // namespace echorama

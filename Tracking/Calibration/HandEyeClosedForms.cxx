@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A C = C B splits into rotations, R_A R_C = R_C R_B, and translations, (R_A - I) t_C = R_C t_B - t_A. All but Daniilidis solve
+// the first, then the second by linear least squares.
+//
+// The turns of a motion have one axis on either side, k_A = R_C k_B. Its sign is lost at 180 degrees, where noise turns a into
+// -a. So beyond 150 degrees the sign is taken from the rotation of the equation that knows no axes, R_A R_C - R_C R_B = 0 in all
+// nine numbers (Andreff's). Unit axes of small turns are mostly noise; where a method speaks of unit axes (Shiu-Ahmad, Horaud) a
+// motion counts by the sine of half its angle, squared.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Warray-bounds"
+#pragma GCC diagnostic ignored "-Wstringop-overread"
+#include "Tracking/Calibration/HandEyeClosedForms.h"
+#include "Core/Base/Error.h"
+#include <cmath>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+namespace echorama {
+namespace {
+
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+constexpr double LargeTurn = 2.6; // radians
+
+Eigen::Matrix3d Hat(const Eigen::Vector3d& v)
+{
+  Eigen::Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+// The rotation that has the largest trace with m.
+Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& m)
+{
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign < 0.0 ? -1.0 : 1.0).asDiagonal() * svd.matrixV().transpose();
+}
+
+// A rotation from nine numbers, column by column, that are one up to a factor of either sign.
+Eigen::Matrix3d RotationOf(const Vector9& numbers)
+{
+  const Eigen::Matrix3d m = Eigen::Map<const Eigen::Matrix3d>(numbers.data());
+  return NearestRotation(m.determinant() < 0.0 ? Eigen::Matrix3d(-m) : m);
+}
+
+// vec(A X B^T) = (B kron A) vec(X), columns one below the other.
+void AddKronecker(const Eigen::Matrix3d& B, const Eigen::Matrix3d& A, Matrix9& sum)
+{
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      sum.block<3, 3>(3 * row, 3 * column) += B(row, column) * A;
+}
+
+// A motion with its turns as vectors, whose signs belong together.
+struct Turn {
+  Eigen::Vector3d a, b; // rotation vectors of A and B
+  // sin(angle / 2) axis, and cos(angle / 2): the unit quaternions
+  Eigen::Vector4d QuaternionA() const { return Quaternion(a); }
+  Eigen::Vector4d QuaternionB() const { return Quaternion(b); }
+
+private:
+  static Eigen::Vector4d Quaternion(const Eigen::Vector3d& v) // x y z w
+  {
+    const double angle = v.norm();
+    const double s = angle < 1e-6 ? 0.5 : std::sin(0.5 * angle) / angle;
+    return {s * v.x(), s * v.y(), s * v.z(), std::cos(0.5 * angle)};
+  }
+};
+
+// R_A R_C = R_C R_B in all nine numbers: the eigenvector of the least eigenvalue (Andreff, Horaud, Espiau 1999).
+Eigen::Matrix3d AndreffRotation(const std::vector<HandEyeMotion>& motions)
+{
+  Matrix9 sum = Matrix9::Zero();
+  for (const HandEyeMotion& motion : motions)
+    AddKronecker(motion.volume.linear(), motion.sensor.linear(), sum); // R_A X R_B^T = X
+  const Matrix9 normal = 2.0 * static_cast<double>(motions.size()) * Matrix9::Identity() - sum - sum.transpose();
+  return RotationOf(Eigen::SelfAdjointEigenSolver<Matrix9>(normal).eigenvectors().col(0));
+}
+
+std::vector<Turn> TurnsOf(const std::vector<HandEyeMotion>& motions)
+{
+  std::vector<Turn> turns;
+  turns.reserve(motions.size());
+  bool large = false;
+  for (const HandEyeMotion& motion : motions) {
+    turns.push_back({LogRotation(motion.sensor.linear()), LogRotation(motion.volume.linear())});
+    large = large || turns.back().a.norm() > LargeTurn || turns.back().b.norm() > LargeTurn;
+  }
+  if (large) {
+    const Eigen::Matrix3d rotation = AndreffRotation(motions);
+    for (Turn& turn : turns)
+      if (turn.b.norm() > LargeTurn && turn.a.dot(rotation * turn.b) < 0.0)
+        turn.b *= (turn.b.norm() - 2.0 * EIGEN_PI) / turn.b.norm(); // the same turn, the other way round
+  }
+  return turns;
+}
+
+// Shiu and Ahmad 1989: each motion leaves the turn of C about its axis open, C = k_A k_B^T + cos(b) Y + sin(b) Z; all these are
+// linear in the nine numbers of C and each motion's cosine and sine, which are eliminated.
+Eigen::Matrix3d ShiuAhmadRotation(const std::vector<Turn>& turns)
+{
+  Matrix9 normal = Matrix9::Zero();
+  Vector9 right = Vector9::Zero();
+  for (const Turn& turn : turns) {
+    if (turn.a.norm() < 1e-9 || turn.b.norm() < 1e-9)
+      continue;
+    const Eigen::Vector3d a = turn.a.normalized(), b = turn.b.normalized();
+    const double weight = std::pow(std::sin(0.5 * turn.b.norm()), 2);
+    const Eigen::Matrix3d some = Eigen::Quaterniond::FromTwoVectors(b, a).toRotationMatrix(); // takes k_B to k_A
+    const Eigen::Matrix3d x = a * b.transpose(), y = some - x, z = Hat(a) * some;
+    const auto vec = [](const Eigen::Matrix3d& m) { return Vector9(Eigen::Map<const Vector9>(m.data())); };
+    // |Y|^2 = |Z|^2 = 2, and Y, Z are orthogonal to each other and to X.
+    const Matrix9 open = Matrix9::Identity() - 0.5 * vec(y) * vec(y).transpose() - 0.5 * vec(z) * vec(z).transpose();
+    normal += weight * open;
+    right += weight * vec(x);
+  }
+  return RotationOf(normal.ldlt().solve(right));
+}
+
+// Tsai and Lenz 1989: (P_A + P_B) x p = P_B - P_A with P the axis times 2 sin(angle / 2) and p that of C times tan(angle / 2).
+// p is infinite where C turns by 180 degrees. So C is sought as C' Q, with Q the identity or half a turn about an axis of the
+// volume: of the four, one C' turns by 120 degrees at most. The one that takes the axes of B closest to those of A counts.
+Eigen::Matrix3d TsaiLenzRotation(const std::vector<Turn>& turns)
+{
+  Eigen::Matrix3d best = Eigen::Matrix3d::Identity();
+  double bestError = -1.0;
+  for (int half = 0; half < 4; ++half) {
+    Eigen::Vector3d q = -Eigen::Vector3d::Ones(); // the diagonal of Q
+    if (half == 3)
+      q.setOnes();
+    else
+      q[half] = 1.0;
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    for (const Turn& turn : turns) {
+      const Eigen::Vector3d a = 2.0 * turn.QuaternionA().head<3>();
+      const Eigen::Vector3d b = q.cwiseProduct(2.0 * turn.QuaternionB().head<3>());
+      const Eigen::Matrix3d cross = Hat(a + b);
+      normal += cross.transpose() * cross;
+      right += cross.transpose() * (b - a);
+    }
+    const Eigen::Vector3d p = normal.ldlt().solve(right);
+    if (!p.allFinite())
+      continue;
+    const Eigen::Matrix3d rotation =
+        Eigen::Quaterniond(1.0, p.x(), p.y(), p.z()).normalized().toRotationMatrix() * q.asDiagonal();
+    double error = 0.0;
+    for (const Turn& turn : turns)
+      error += (turn.a - rotation * turn.b).squaredNorm();
+    if (bestError < 0.0 || error < bestError) {
+      bestError = error;
+      best = rotation;
+    }
+  }
+  return best;
+}
+
+// Park and Martin 1994: the rotation that takes the rotation vectors of B closest to those of A.
+Eigen::Matrix3d ParkMartinRotation(const std::vector<Turn>& turns)
+{
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Turn& turn : turns)
+    sum += turn.a * turn.b.transpose();
+  return NearestRotation(sum);
+}
+
+// The matrices of quaternion multiplication, x y z w: p q = Left(p) q = Right(q) p.
+Eigen::Matrix4d Left(const Eigen::Vector4d& p)
+{
+  Eigen::Matrix4d m;
+  m.topLeftCorner<3, 3>() = p[3] * Eigen::Matrix3d::Identity() + Hat(p.head<3>());
+  m.topRightCorner<3, 1>() = p.head<3>();
+  m.bottomLeftCorner<1, 3>() = -p.head<3>().transpose();
+  m(3, 3) = p[3];
+  return m;
+}
+Eigen::Matrix4d Right(const Eigen::Vector4d& q)
+{
+  Eigen::Matrix4d m = Left(q);
+  m.topLeftCorner<3, 3>() = q[3] * Eigen::Matrix3d::Identity() - Hat(q.head<3>());
+  return m;
+}
+
+Eigen::Matrix3d RotationOfQuaternion(const Eigen::Vector4d& q)
+{
+  return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
+}
+
+// Horaud and Dornaika 1995: q_A q = q q_B for unit quaternions, with |q| = 1.
+Eigen::Matrix3d HoraudRotation(const std::vector<Turn>& turns)
+{
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  for (const Turn& turn : turns) {
+    const Eigen::Matrix4d open = Left(turn.QuaternionA()) - Right(turn.QuaternionB());
+    normal += open.transpose() * open;
+  }
+  return RotationOfQuaternion(Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(normal).eigenvectors().col(0));
+}
+
+Eigen::Vector3d TranslationOf(const Eigen::Matrix3d& rotation, const std::vector<HandEyeMotion>& motions)
+{
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const HandEyeMotion& motion : motions) {
+    const Eigen::Matrix3d turn = motion.sensor.linear() - Eigen::Matrix3d::Identity();
+    normal += turn.transpose() * turn;
+    right += turn.transpose() * (rotation * motion.volume.translation() - motion.sensor.translation());
+  }
+  return normal.ldlt().solve(right);
+}
+
+// Daniilidis 1999: with dual quaternions, vector parts only, a motion gives six rows in the eight numbers (q, q') of C. Its
+// null space has two dimensions; |q| = 1 and q q' = 0 pick the answer. Rotations and translations are weighed against each other
+// by the unit of length, here the root mean square translation of the motions.
+Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector<Turn>& turns)
+{
+  using Matrix8 = Eigen::Matrix<double, 8, 8>;
+  double unit = 0.0;
+  for (const HandEyeMotion& motion : motions)
+    unit += motion.sensor.translation().squaredNorm() + motion.volume.translation().squaredNorm();
+  unit = std::sqrt(0.5 * unit / static_cast<double>(motions.size()));
+  unit = unit > 0.0 ? unit : 1.0;
+
+  Matrix8 normal = Matrix8::Zero();
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const Eigen::Vector4d a = turns[i].QuaternionA(), b = turns[i].QuaternionB();
+    const auto dual = [unit](const Eigen::Vector3d& t, const Eigen::Vector4d& q) {
+      return Eigen::Vector4d(0.5 / unit * (Left(Eigen::Vector4d(t.x(), t.y(), t.z(), 0.0)) * q));
+    };
+    const Eigen::Vector4d aDual = dual(motions[i].sensor.translation(), a), bDual = dual(motions[i].volume.translation(), b);
+    const auto open = [](const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
+      Eigen::Vector4d pv = p, qv = q;
+      pv[3] = qv[3] = 0.0; // the scalar parts are equal on both sides, and say nothing of C
+      return Eigen::Matrix<double, 3, 4>((Left(pv) - Right(qv)).topRows<3>());
+    };
+    Eigen::Matrix<double, 6, 8> rows = Eigen::Matrix<double, 6, 8>::Zero();
+    rows.topLeftCorner<3, 4>() = open(a, b);
+    rows.bottomLeftCorner<3, 4>() = open(aDual, bDual);
+    rows.bottomRightCorner<3, 4>() = rows.topLeftCorner<3, 4>();
+    normal.noalias() += rows.transpose() * rows;
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix8> solver(normal);
+  const Eigen::Matrix<double, 8, 1> first = solver.eigenvectors().col(0), second = solver.eigenvectors().col(1);
+  const Eigen::Vector4d u1 = first.head<4>(), v1 = first.tail<4>(), u2 = second.head<4>(), v2 = second.tail<4>();
+  // (x u1 + y u2) . (x v1 + y v2) = 0, and of the two answers the one with the larger rotational part.
+  const double aa = u1.dot(v1), ab = u1.dot(v2) + u2.dot(v1), bb = u2.dot(v2);
+  const double root = std::sqrt(std::fmax(0.0, ab * ab - 4.0 * aa * bb));
+  Eigen::Vector2d best(1.0, 0.0);
+  double bestSize = -1.0;
+  for (const double sign : {1.0, -1.0}) {
+    // The two ways to write the roots of aa x^2 + ab x y + bb y^2; the better conditioned one of each.
+    const double t = -0.5 * (ab + sign * root);
+    for (const Eigen::Vector2d& candidate : {Eigen::Vector2d(t, aa), Eigen::Vector2d(bb, t)}) {
+      if (candidate.norm() < 1e-300)
+        continue;
+      const Eigen::Vector2d xy = candidate.normalized();
+      const double size = (xy[0] * u1 + xy[1] * u2).squaredNorm();
+      if (size > bestSize) {
+        bestSize = size;
+        best = xy;
+      }
+    }
+  }
+  const double size = std::sqrt(std::fmax(bestSize, 1e-300));
+  const Eigen::Vector4d q = (best[0] * u1 + best[1] * u2) / size, qDual = (best[0] * v1 + best[1] * v2) / size;
+  const Eigen::Vector4d conjugate(-q[0], -q[1], -q[2], q[3]);
+  Pose pose = Pose::Identity();
+  pose.linear() = RotationOfQuaternion(q);
+  pose.translation() = 2.0 * unit * (Left(qDual) * conjugate).head<3>();
+  return pose;
+}
+
+// O, given C: the mean of the rotations S C M^-1, and the mean translation with it.
+Pose WorldToTrackerOf(const Pose& C, const std::vector<HandEyePair>& pairs)
+{
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const HandEyePair& pair : pairs)
+    sum += pair.sensorToTracker.linear() * C.linear() * pair.volumeToWorld.linear().transpose();
+  Pose O = Pose::Identity();
+  O.linear() = NearestRotation(sum);
+  for (const HandEyePair& pair : pairs)
+    O.translation() += (pair.sensorToTracker * C.translation() - O.linear() * pair.volumeToWorld.translation()) /
+                       static_cast<double>(pairs.size());
+  return O;
+}
+
+void NeedTwo(const std::vector<HandEyePair>& pairs)
+{
+  if (pairs.size() < 2)
+    throw Error(Error::Kind::NotPossible, "hand-eye calibration: a motion needs two scans at least");
+}
+
+} // namespace
+
+std::vector<HandEyeMotion> HandEyeMotions(const std::vector<HandEyePair>& pairs)
+{
+  std::vector<HandEyeMotion> motions;
+  motions.reserve(pairs.size() * (pairs.size() - 1) / 2);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (std::size_t j = i + 1; j < pairs.size(); ++j)
+      motions.push_back({pairs[i].sensorToTracker.inverse() * pairs[j].sensorToTracker,
+                         pairs[i].volumeToWorld.inverse() * pairs[j].volumeToWorld});
+  return motions;
+}
+
+HandEyeSolution SolveHandEyeClosedForm(HandEyeMethod method, const std::vector<HandEyePair>& pairs)
+{
+  NeedTwo(pairs);
+  const std::vector<HandEyeMotion> motions = HandEyeMotions(pairs);
+  HandEyeSolution solution;
+  Pose& C = solution.volumeToSensor;
+  switch (method) {
+  case HandEyeMethod::ShiuAhmad:
+    C.linear() = ShiuAhmadRotation(TurnsOf(motions));
+    break;
+  case HandEyeMethod::TsaiLenz:
+    C.linear() = TsaiLenzRotation(TurnsOf(motions));
+    break;
+  case HandEyeMethod::ParkMartin:
+    C.linear() = ParkMartinRotation(TurnsOf(motions));
+    break;
+  case HandEyeMethod::Horaud:
+    C.linear() = HoraudRotation(TurnsOf(motions));
+    break;
+  case HandEyeMethod::Andreff:
+    C.linear() = AndreffRotation(motions);
+    break;
+  case HandEyeMethod::Daniilidis:
+    C = DaniilidisPose(motions, TurnsOf(motions));
+    break;
+  case HandEyeMethod::MaximumLikelihood:
+    throw Error(Error::Kind::InvalidParameter, "hand-eye calibration: maximum-likelihood is no closed form");
+  }
+  if (method != HandEyeMethod::Daniilidis)
+    C.translation() = TranslationOf(C.linear(), motions);
+  solution.worldToTracker = WorldToTrackerOf(C, pairs);
+  return solution;
+}
+
+HandEyeSolution SolveHandEyeByKronecker(const std::vector<HandEyePair>& pairs)
+{
+  NeedTwo(pairs);
+  // R_S R_C R_M^T = R_O: the sum over scans of M kron S takes vec(R_C) to n vec(R_O).
+  Matrix9 sum = Matrix9::Zero();
+  for (const HandEyePair& pair : pairs)
+    AddKronecker(pair.volumeToWorld.linear(), pair.sensorToTracker.linear(), sum);
+  const Eigen::SelfAdjointEigenSolver<Matrix9> solver(sum.transpose() * sum);
+  HandEyeSolution solution;
+  Pose &C = solution.volumeToSensor, &O = solution.worldToTracker;
+  C.linear() = RotationOf(solver.eigenvectors().col(8));
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
+  for (const HandEyePair& pair : pairs)
+    turns += pair.sensorToTracker.linear() * C.linear() * pair.volumeToWorld.linear().transpose();
+  O.linear() = NearestRotation(turns);
+  // R_S t_C - t_O = R_O t_M - t_S, linear in both translations. With the mean over scans taken off, only t_C is left.
+  const double count = static_cast<double>(pairs.size());
+  Eigen::Matrix3d meanTurn = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const HandEyePair& pair : pairs) {
+    meanTurn += pair.sensorToTracker.linear() / count;
+    mean += (O.linear() * pair.volumeToWorld.translation() - pair.sensorToTracker.translation()) / count;
+  }
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const HandEyePair& pair : pairs) {
+    const Eigen::Matrix3d turn = pair.sensorToTracker.linear() - meanTurn;
+    normal += turn.transpose() * turn;
+    right += turn.transpose() * (O.linear() * pair.volumeToWorld.translation() - pair.sensorToTracker.translation() - mean);
+  }
+  C.translation() = normal.ldlt().solve(right);
+  O.translation() = meanTurn * C.translation() - mean;
+  return solution;
+}
+
+} // namespace echorama

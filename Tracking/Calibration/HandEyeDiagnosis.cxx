@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What people get wrong, told from what they gave. Noise turns the poses of a probe that is held still, too: so turns count
+// only when they are three times what noise alone would show. A wrong unit or an inverted side does not fit, and fits once
+// it is put right; 11 ways of putting right are tried, each with a fit of its own.
+//
+// Two mistakes leave no residual. S and M both inverted give S C' = O' M with C' and O' exchanged; both sides in metres give the
+// same answer in metres. Only the size of what comes out can make one suspicious.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Warray-bounds"
+#pragma GCC diagnostic ignored "-Wstringop-overread"
+#include "Tracking/Calibration/HandEyeDiagnosis.h"
+#include "Core/Base/Error.h"
+#include "Core/Geometry/ToolPose.h"
+#include "Tracking/Calibration/HandEyeSearch.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace echorama {
+namespace {
+
+constexpr double DegreesPerRadian = 57.29577951308232;
+
+[[noreturn]] void Refuse(const std::string& reason)
+{
+  throw Error(Error::Kind::NotPossible, "hand-eye calibration: " + reason);
+}
+
+template <class... Values>
+std::string Format(const char* format, Values... values)
+{
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+Pose CheckedPose(const Pose& pose, const std::string& name, const char* what)
+{
+  const auto complain = [&](const std::string& reason) {
+    throw Error(Error::Kind::BadInput, "hand-eye calibration: the " + std::string(what) + " of " + name + " " + reason);
+  };
+  if (!pose.matrix().allFinite())
+    complain("has numbers that are not finite");
+  Pose nearest;
+  if (!NearestPose(pose.matrix(), nearest)) {
+    const Eigen::Matrix3d R = pose.linear();
+    if (IsRotation(-R, 1e-3) || (R.determinant() < 0.0 && (R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-3))
+      complain("is a reflection, not a rotation: an axis points the wrong way, or two are exchanged");
+    complain(Format("is not rigid: the lengths of its axes are %.4g, %.4g and %.4g, and should be 1 and at right angles",
+                    R.col(0).norm(), R.col(1).norm(), R.col(2).norm()));
+  }
+  return nearest;
+}
+
+// Twice the root mean square distance of the positions from their middle.
+double Extent(const std::vector<Pose>& poses)
+{
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Pose& pose : poses)
+    middle += pose.translation() / static_cast<double>(poses.size());
+  double sum = 0.0;
+  for (const Pose& pose : poses)
+    sum += (pose.translation() - middle).squaredNorm() / static_cast<double>(poses.size());
+  return 2.0 * std::sqrt(sum);
+}
+
+struct Sides {
+  std::vector<Pose> sensors, volumes;
+};
+Sides SidesOf(const std::vector<HandEyePair>& pairs)
+{
+  Sides sides;
+  for (const HandEyePair& pair : pairs) {
+    sides.sensors.push_back(pair.sensorToTracker);
+    sides.volumes.push_back(pair.volumeToWorld);
+  }
+  return sides;
+}
+
+} // namespace
+
+std::string HandEyeScanName(const std::vector<HandEyePair>& pairs, std::size_t scan)
+{
+  return pairs[scan].name.empty() ? "scan " + std::to_string(scan + 1) : pairs[scan].name;
+}
+
+std::vector<HandEyePair> CheckedHandEyePairs(const std::vector<HandEyePair>& pairs)
+{
+  std::vector<HandEyePair> checked;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::string name = HandEyeScanName(pairs, i);
+    checked.push_back({CheckedPose(pairs[i].sensorToTracker, name, "sensor pose"),
+                       CheckedPose(pairs[i].volumeToWorld, name, "alignment"), name});
+  }
+  return checked;
+}
+
+std::vector<int> HandEyeRepeats(const std::vector<HandEyePair>& pairs)
+{
+  std::vector<int> repeats(pairs.size(), -1);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (std::size_t j = 0; j < i && repeats[i] < 0; ++j)
+      if (repeats[j] < 0 && pairs[i].sensorToTracker.isApprox(pairs[j].sensorToTracker, 1e-9) &&
+          pairs[i].volumeToWorld.isApprox(pairs[j].volumeToWorld, 1e-9))
+        repeats[i] = static_cast<int>(j);
+  return repeats;
+}
+
+void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise)
+{
+  if (pairs.size() < 3)
+    Refuse(Format("three different scans are needed at least, 8 to 20 for accuracy, and there %s %d",
+                  pairs.size() == 1 ? "is" : "are", static_cast<int>(pairs.size())));
+  const Sides sides = SidesOf(pairs);
+  const HandEyeSpread sensor = SpreadOf(sides.sensors), volume = SpreadOf(sides.volumes);
+  // Two of three axes count in a spread, so noise alone shows the root of two.
+  const auto limit = [](const PoseNoise& noise) { return 3.0 * std::sqrt(2.0) * std::max(noise.degrees, 0.01); };
+  struct Side {
+    const char* name;
+    double least, most, limit, extent;
+    PoseNoise noise;
+  };
+  for (const Side& side : {Side{"sensor", sensor.turns[0] * DegreesPerRadian, sensor.turns[2] * DegreesPerRadian,
+                                limit(sensorNoise), Extent(sides.sensors), sensorNoise},
+                           Side{"volumes", volume.turns[0] * DegreesPerRadian, volume.turns[2] * DegreesPerRadian,
+                                limit(volumeNoise), Extent(sides.volumes), volumeNoise}}) {
+    if (side.most < side.limit && side.extent < std::max(6.0 * side.noise.mm, 1e-6))
+      Refuse(Format("the poses of the %s are all the same; the probe must be turned between scans", side.name));
+    if (side.most < side.limit)
+      Refuse(Format(
+          "the %s turned by %.2g degrees only (root mean square), no more than the noise may be, and translations alone say "
+          "nothing of where the volume lies on the sensor; turn by 30 degrees and more, about different axes",
+          side.name, side.most));
+    if (side.least < side.limit)
+      Refuse(
+          Format("all turns of the %s are about one axis, or parallel ones (across it: %.2f degrees); the calibration may "
+                 "shift along it. Axis in the volume's frame: (%.2f, %.2f, %.2f). Add scans that turn about an axis across it by "
+                 "30 degrees and more",
+                 side.name, side.least, volume.axis.x(), volume.axis.y(), volume.axis.z()));
+  }
+}
+
+std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters, double scale)
+{
+  struct Repair {
+    double sensorUnit, volumeUnit;
+    bool invertSensor, invertVolume;
+    const char* text;
+  };
+  static const Repair repairs[] = {
+      {1000.0, 1.0, false, false, "the sensor poses are in metres, not mm: multiply their translations by 1000"},
+      {1.0, 1000.0, false, false, "the alignments are in metres, not mm: multiply their translations by 1000"},
+      {10.0, 1.0, false, false, "the sensor poses are in centimetres, not mm: multiply their translations by 10"},
+      {1.0, 10.0, false, false, "the alignments are in centimetres, not mm: multiply their translations by 10"},
+      {25.4, 1.0, false, false, "the sensor poses are in inches, not mm: multiply their translations by 25.4"},
+      {1.0, 25.4, false, false, "the alignments are in inches, not mm: multiply their translations by 25.4"},
+      {1.0, 1.0, true, false, "the sensor poses are the wrong way round (TrackerToSensor): invert them"},
+      {1.0, 1.0, false, true, "the alignments are the wrong way round (WorldToVolume): invert them"},
+      {1000.0, 1.0, true, false,
+       "the sensor poses are the wrong way round (TrackerToSensor) and in metres: invert them and multiply their translations by "
+       "1000"},
+      {1.0, 1000.0, false, true,
+       "the alignments are the wrong way round (WorldToVolume) and in metres: invert them and multiply their translations by "
+       "1000"},
+      {1000.0, 1.0, false, true,
+       "the sensor poses are in metres, and the alignments the wrong way round (WorldToVolume): multiply the translations of the "
+       "former by 1000 and invert the latter"},
+      {1.0, 1000.0, true, false,
+       "the alignments are in metres, and the sensor poses the wrong way round (TrackerToSensor): multiply the translations of "
+       "the "
+       "former by 1000 and invert the latter"},
+  };
+  const Repair* best = nullptr;
+  double bestScale = scale / 4.0; // a repair is one that makes residuals much smaller
+  for (const Repair& repair : repairs) {
+    std::vector<HandEyePair> repaired = pairs;
+    for (HandEyePair& pair : repaired) {
+      pair.sensorToTracker.translation() *= repair.sensorUnit;
+      pair.volumeToWorld.translation() *= repair.volumeUnit;
+      if (repair.invertSensor)
+        pair.sensorToTracker = pair.sensorToTracker.inverse();
+      if (repair.invertVolume)
+        pair.volumeToWorld = pair.volumeToWorld.inverse();
+    }
+    const HandEyeModel model(repaired, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
+    const double repairedScale = FindHandEyeConsensus(repaired, model, true, false, parameters.seed).scale;
+    if (repairedScale < bestScale) {
+      bestScale = repairedScale;
+      best = &repair;
+    }
+  }
+  return best ? std::string("they would agree if ") + best->text : std::string();
+}
+
+std::vector<std::string> HandEyeSuspicions(const std::vector<HandEyePair>& pairs, const HandEyeSolution& solution,
+                                           const HandEyeParameters& parameters)
+{
+  std::vector<std::string> notes;
+  const Sides sides = SidesOf(pairs);
+  const double lever = (solution.volumeToSensor * parameters.target).norm();
+  const double sensorExtent = Extent(sides.sensors), volumeExtent = Extent(sides.volumes);
+  if (sensorExtent < 3.0 && volumeExtent < 3.0 && lever < 3.0)
+    notes.push_back(
+        Format("All lengths are tiny: the sensor moved within %.3g mm, and lies %.3g mm from the target. The poses of both "
+               "sides may be in metres; then the result is, too.",
+               sensorExtent, lever));
+  const double other = solution.worldToTracker.inverse().translation().norm();
+  if (lever > 400.0 && lever > 2.0 * other)
+    notes.push_back(
+        Format("The volume's target lies %.0f mm from the sensor, which is far for a probe. If the poses of both sides were "
+               "given the wrong way round, VolumeToSensor and WorldToTracker have changed places; residuals cannot tell.",
+               lever));
+  return notes;
+}
+
+} // namespace echorama

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Tracking/Calibration/HandEye.h"
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// The name of a scan for messages: its own, or "scan 3".
+std::string HandEyeScanName(const std::vector<HandEyePair>& pairs, std::size_t scan);
+
+/// The pairs with rotations that are orthonormal to the last bit. \throws Error(BadInput) that names the scan and the side when a
+/// pose is not finite, not rigid (NearestPose) or a reflection.
+std::vector<HandEyePair> CheckedHandEyePairs(const std::vector<HandEyePair>& pairs);
+
+/// For every pair the first one that it repeats, both sides to 1e-9, or -1: the same scan entered twice is no evidence.
+std::vector<int> HandEyeRepeats(const std::vector<HandEyePair>& pairs);
+
+/// \throws Error(NotPossible) with the reason when the motions cannot determine C: fewer than three scans; no turns, or no more
+/// than the noise; turns about parallel axes only.
+void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise);
+
+/// When the scans do not agree: what would make them, as a sentence. Tried are lengths in metres, centimetres and inches on
+/// either side, and S, M given the wrong way round, each alone and together. Empty when nothing helps.
+std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters, double scale);
+
+/// What looks strange although the scans agree: both sides in metres, a lever that suggests both inverted. Sentences.
+std::vector<std::string> HandEyeSuspicions(const std::vector<HandEyePair>& pairs, const HandEyeSolution& solution,
+                                           const HandEyeParameters& parameters);
+
+} // namespace echorama

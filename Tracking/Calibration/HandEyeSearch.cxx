@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Starts are the closed forms from all scans, which are good when few are wrong, and from triples, which are good when a triple
+// holds no wrong one. Triples are drawn at random and sorted before anything is solved: the angle and the shift along the axis of
+// a motion are the same on both sides whatever C is, so a triple that holds a wrong scan mostly shows it at once; and
+// those that turn far are worth more. The starts that fit best, by a cost that grows with the logarithm and so lets no scan
+// dominate, are refined with that cost. From the best of them, wrong scans leave one at a time, the worst first, and the others
+// are solved anew by plain maximum likelihood; at the end those who agree after all come back.
+//
+// Cost: some 40 small eigenproblems and 15 refinements, 2 ms for 20 scans and linear in their number.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Warray-bounds"
+#pragma GCC diagnostic ignored "-Wstringop-overread"
+#include "Tracking/Calibration/HandEyeSearch.h"
+#include "Core/Base/Random.h"
+#include "Tracking/Calibration/HandEyeClosedForms.h"
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <Eigen/Eigenvalues>
+#include <numeric>
+
+namespace echorama {
+namespace {
+
+constexpr double MedianChiSquare6 = 5.348;
+constexpr double RareChiSquare6 = 22.458; // exceeded once in a thousand
+constexpr int ClosedFormScans = 40, DrawnTriples = 400, SolvedTriples = 40, RefinedStarts = 4;
+
+double Median(std::vector<double> values)
+{
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+// The fit follows 12 numbers of the 6 n, and residuals are smaller for it.
+double ScaleOf(const std::vector<double>& chiSquare)
+{
+  const double count = static_cast<double>(chiSquare.size());
+  return std::sqrt(Median(chiSquare) / (MedianChiSquare6 * std::max(0.1, (count - 2.0) / count)));
+}
+
+double SoftCost(const HandEyeModel& model, const Eigen::Matrix<double, 6, 6>& weight, const HandEyeSolution& solution,
+                double scale)
+{
+  double cost = 0.0;
+  const double soft = 6.0 * scale * scale;
+  for (int i = 0; i < model.Count(); ++i) {
+    const Twist residual = model.Residual(i, solution);
+    cost += std::log1p(residual.dot(weight * residual) / soft);
+  }
+  return cost;
+}
+
+double SoftCost(const HandEyeModel& model, const HandEyeSolution& solution, double scale)
+{
+  return SoftCost(model, model.Covariance(solution.volumeToSensor).inverse().eval(), solution, scale);
+}
+
+// A triple that is worth solving has a small value.
+double Doubt(const std::vector<HandEyePair>& pairs, const std::array<std::size_t, 3>& triple)
+{
+  constexpr double Angle = 0.01, Shift = 2.0; // of the order of noise: radians, mm
+  double contradiction = 0.0;
+  std::vector<Pose> sensors, volumes;
+  for (int i = 0; i < 3; ++i) {
+    const HandEyePair &one = pairs[triple[static_cast<std::size_t>(i)]],
+                      &other = pairs[triple[static_cast<std::size_t>((i + 1) % 3)]];
+    const Pose A = one.sensorToTracker.inverse() * other.sensorToTracker, B = one.volumeToWorld.inverse() * other.volumeToWorld;
+    const Eigen::Vector3d a = LogRotation(A.linear()), b = LogRotation(B.linear());
+    contradiction += std::pow((a.norm() - b.norm()) / Angle, 2);
+    if (b.norm() > 0.2 && a.norm() > 0.2) // the sign is lost at half a turn, so the size is compared
+      contradiction +=
+          std::pow((std::abs(a.normalized().dot(A.translation())) - std::abs(b.normalized().dot(B.translation()))) / Shift, 2);
+    sensors.push_back(one.sensorToTracker);
+    volumes.push_back(one.volumeToWorld);
+  }
+  const double turn = std::min(SpreadOf(sensors).turns[0], SpreadOf(volumes).turns[0]);
+  return (contradiction + 6.0) / std::max(turn * turn, 1e-12);
+}
+
+std::vector<HandEyeSolution> Starts(const std::vector<HandEyePair>& pairs, bool withTriples, std::uint64_t seed)
+{
+  const std::size_t count = pairs.size();
+  std::vector<HandEyeSolution> starts{SolveHandEyeByKronecker(pairs)};
+  std::vector<HandEyePair> some = pairs;
+  if (count > ClosedFormScans) { // evenly spread
+    some.clear();
+    for (std::size_t i = 0; i < ClosedFormScans; ++i)
+      some.push_back(pairs[i * count / ClosedFormScans]);
+  }
+  for (const HandEyeMethod method : {HandEyeMethod::ShiuAhmad, HandEyeMethod::TsaiLenz, HandEyeMethod::ParkMartin,
+                                     HandEyeMethod::Horaud, HandEyeMethod::Daniilidis, HandEyeMethod::Andreff})
+    starts.push_back(SolveHandEyeClosedForm(method, some));
+  if (!withTriples)
+    return starts;
+
+  std::vector<std::array<std::size_t, 3>> triples;
+  if (count * (count - 1) * (count - 2) / 6 <= DrawnTriples) {
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = i + 1; j < count; ++j)
+        for (std::size_t k = j + 1; k < count; ++k)
+          triples.push_back({i, j, k});
+  } else {
+    Random random(seed);
+    while (triples.size() < DrawnTriples) {
+      const std::array<std::size_t, 3> triple{random.Below(count), random.Below(count), random.Below(count)};
+      if (triple[0] != triple[1] && triple[0] != triple[2] && triple[1] != triple[2])
+        triples.push_back(triple);
+    }
+  }
+  std::vector<std::pair<double, std::size_t>> doubts;
+  for (std::size_t i = 0; i < triples.size(); ++i)
+    doubts.emplace_back(Doubt(pairs, triples[i]), i);
+  const std::size_t solved = std::min<std::size_t>(doubts.size(), SolvedTriples);
+  std::partial_sort(doubts.begin(), doubts.begin() + static_cast<std::ptrdiff_t>(solved), doubts.end());
+  for (std::size_t i = 0; i < solved; ++i) {
+    const std::array<std::size_t, 3>& triple = triples[doubts[i].second];
+    starts.push_back(SolveHandEyeByKronecker({pairs[triple[0]], pairs[triple[1]], pairs[triple[2]]}));
+  }
+  return starts;
+}
+
+} // namespace
+
+HandEyeSpread SpreadOf(const std::vector<Pose>& poses)
+{
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (const Pose& pose : poses)
+    mean += pose.linear() / static_cast<double>(poses.size());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.compute(Eigen::Matrix3d::Identity() - mean.transpose() * mean);
+  return {solver.eigenvalues().cwiseMax(0.0).cwiseSqrt(), solver.eigenvectors().col(0)};
+}
+
+HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, const HandEyeModel& model, bool rejectOutliers,
+                                      bool estimateNoise, std::uint64_t seed, const Progress& progress)
+{
+  const std::size_t count = pairs.size();
+  const bool reject = rejectOutliers && count > 3;
+  const std::vector<char> all(count, 1);
+
+  // 1. the best starts
+  std::vector<std::pair<double, HandEyeSolution>> starts;
+  for (const HandEyeSolution& start : Starts(pairs, reject, seed))
+    if (start.volumeToSensor.matrix().allFinite() && start.worldToTracker.matrix().allFinite())
+      starts.emplace_back(SoftCost(model, start, 1.0), start);
+  const auto byCost = [](const auto& a, const auto& b) { return a.first < b.first; };
+  std::stable_sort(starts.begin(), starts.end(), byCost);
+  starts.resize(std::min<std::size_t>(starts.size(), RefinedStarts));
+  progress(0.3);
+
+  // 2. refined; which of them is best is asked with one scale for all
+  std::vector<HandEyeModel::Fit> fits;
+  double scale = -1.0;
+  for (const auto& start : starts) {
+    double own = 1.0;
+    if (reject) {
+      std::vector<double> chiSquare;
+      const Eigen::Matrix<double, 6, 6> weight = model.Covariance(start.second.volumeToSensor).inverse();
+      for (int i = 0; i < model.Count(); ++i) {
+        const Twist residual = model.Residual(i, start.second);
+        chiSquare.push_back(residual.dot(weight * residual));
+      }
+      own = std::max(1.0, ScaleOf(chiSquare));
+    }
+    fits.push_back(model.Refine(start.second, all, reject ? own : 0.0, reject ? 12 : 60));
+    const double after = ScaleOf(fits.back().chiSquare);
+    scale = scale < 0.0 ? after : std::min(scale, after);
+    progress(0.3 + 0.4 * static_cast<double>(fits.size()) / static_cast<double>(starts.size()));
+  }
+  const double common = std::max(1.0, scale);
+  std::size_t best = 0;
+  double bestCost = -1.0;
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    const double cost = reject ? SoftCost(model, fits[i].solution, common) : fits[i].cost;
+    if (bestCost < 0.0 || cost < bestCost) {
+      bestCost = cost;
+      best = i;
+    }
+  }
+
+  // 3. outliers leave
+  HandEyeConsensus consensus;
+  consensus.fit = reject ? model.Refine(fits[best].solution, all, common) : fits[best];
+  consensus.inlier = all;
+  consensus.scale = ScaleOf(consensus.fit.chiSquare);
+  double limit = RareChiSquare6;
+  if (reject) {
+    const double tested = estimateNoise ? std::max(consensus.scale, 0.02) : std::max(consensus.scale, 1.0);
+    const double rough = estimateNoise ? 1.0 + 5.0 / (static_cast<double>(count) - 2.0) : 1.0; // the median of few
+    limit *= tested * tested * rough * rough;
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t i = 0; i < count; ++i)
+      order.emplace_back(consensus.fit.chiSquare[i], i);
+    std::sort(order.begin(), order.end());
+    for (std::size_t i = 3; i < count; ++i) // at least three stay
+      if (order[i].first > 2.0 * limit)
+        consensus.inlier[order[i].second] = 0;
+  }
+  bool returned = false;
+  for (std::size_t round = 0; round <= 2 * count; ++round) {
+    if (reject || round > 0)
+      consensus.fit = model.Refine(consensus.fit.solution, consensus.inlier);
+    const HandEyeMatrix covariance = model.CovarianceOfStep(consensus.fit.solution, consensus.inlier);
+    consensus.square.assign(count, 0.0);
+    std::size_t worst = count;
+    for (std::size_t i = 0; i < count; ++i) {
+      consensus.square[i] =
+          model.PredictedChiSquare(static_cast<int>(i), consensus.fit.solution, covariance, consensus.inlier[i] != 0);
+      if (consensus.inlier[i] && (worst == count || consensus.square[i] > consensus.square[worst]))
+        worst = i;
+    }
+    if (!reject)
+      break;
+    if (consensus.square[worst] > limit && std::count(consensus.inlier.begin(), consensus.inlier.end(), 1) > 3) {
+      consensus.inlier[worst] = 0;
+      continue;
+    }
+    bool changed = false;
+    if (!returned)
+      for (std::size_t i = 0; i < count; ++i)
+        if (!consensus.inlier[i] && consensus.square[i] <= limit) {
+          consensus.inlier[i] = 1;
+          changed = true;
+        }
+    returned = true;
+    if (!changed)
+      break;
+  }
+  progress(1.0);
+  return consensus;
+}
+
+} // namespace echorama

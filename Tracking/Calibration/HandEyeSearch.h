@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Tracking/Calibration/HandEyeModel.h"
+#include <vector>
+
+namespace echorama {
+
+/// What many scans, some of them wrong, agree on.
+struct HandEyeConsensus {
+  HandEyeModel::Fit fit;      ///< maximum likelihood of the inliers
+  std::vector<char> inlier;   ///< one per scan
+  std::vector<double> square; ///< chi^2 of every scan by PredictedChiSquare, six degrees of freedom
+  double scale = 1.0;         ///< what the noise is multiplied with by the median residual; robust, and rough for few scans
+};
+
+/// Finds the solution and the scans that agree with it. \a pairs: at least three, all different. \a rejectOutliers false: all are
+/// inliers. A scan is an outlier when its chi^2 is one in a thousand by chance, after the noise was scaled to the
+/// median residual (never down, unless \a estimateNoise). At least three stay.
+HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, const HandEyeModel& model, bool rejectOutliers,
+                                      bool estimateNoise, std::uint64_t seed, const Progress& progress = {});
+
+/// How far the poses of one side are turned from each other: the root of 1 - s^2 for the singular values s of their mean
+/// rotation, radians, least first. The least is what the calibration lives on: of small turns, the root mean square over
+/// the two lesser axes; 0 when all turns have one axis, which is \a axis then, in the frame of the sensor or the volume.
+struct HandEyeSpread {
+  Eigen::Vector3d turns = Eigen::Vector3d::Zero();
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();
+};
+HandEyeSpread SpreadOf(const std::vector<Pose>& poses);
+
+} // namespace echorama

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// True poses come from turning the volume about its target and moving it, which is what an examiner does with a probe over a
+// rig; the sensor follows by S = O M C^-1. Noise is drawn as the model of HandEyeModel.h says, not linearised.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Warray-bounds"
+#pragma GCC diagnostic ignored "-Wstringop-overread"
+#include "Tracking/Calibration/HandEyeSimulation.h"
+#include "Core/Base/Random.h"
+#include "Tracking/Calibration/HandEyeModel.h"
+
+namespace echorama {
+namespace {
+
+constexpr double RadiansPerDegree = 0.017453292519943295;
+
+Twist NoiseTwist(const PoseNoise& noise, Random& random)
+{
+  Twist twist;
+  for (int i = 0; i < 6; ++i)
+    twist[i] = random.Normal() * (i < 3 ? noise.mm : noise.degrees * RadiansPerDegree);
+  return twist;
+}
+
+Pose RandomPose(Random& random)
+{
+  Pose pose = Pose::Identity();
+  pose.linear() = ExpRotation(random.Direction() * random.Uniform(0.0, 3.0));
+  pose.translation() = random.Direction() * random.Uniform(100.0, 300.0);
+  return pose;
+}
+
+} // namespace
+
+HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
+{
+  Random random(scenario.seed);
+  HandEyeSimulation simulation;
+  Pose &C = simulation.truth.volumeToSensor, &O = simulation.truth.worldToTracker;
+  C.linear() = ExpRotation(random.Direction() * random.Uniform(0.0, 3.0));
+  C.translation() = random.Direction() * scenario.leverMm - C.linear() * scenario.target;
+  O = RandomPose(random);
+  const Pose middle = RandomPose(random); // of the volume in the world
+  const Eigen::Translation3d toTarget(scenario.target), fromTarget(-scenario.target);
+  for (int i = 0; i < scenario.poses; ++i) {
+    HandEyePair exact;
+    Pose turn = Pose::Identity();
+    turn.linear() = ExpRotation(random.Direction() * random.Uniform(0.0, scenario.degrees * RadiansPerDegree));
+    for (int axis = 0; axis < 3; ++axis)
+      turn.translation()[axis] = random.Uniform(-scenario.travelMm, scenario.travelMm);
+    exact.volumeToWorld = middle * turn * fromTarget;
+    exact.sensorToTracker = O * exact.volumeToWorld * C.inverse();
+    HandEyePair measured = exact;
+    measured.sensorToTracker = exact.sensorToTracker * Exp(NoiseTwist(scenario.sensorNoise, random));
+    measured.volumeToWorld = exact.volumeToWorld * toTarget * Exp(NoiseTwist(scenario.volumeNoise, random)) * fromTarget;
+    const bool isOutlier = i < scenario.outliers;
+    if (isOutlier)
+      measured.volumeToWorld = measured.volumeToWorld *
+                               MotionAbout(scenario.target, random.Direction() * random.Uniform(10.0, 40.0) * RadiansPerDegree,
+                                           random.Direction() * random.Uniform(20.0, 60.0));
+    simulation.isOutlier.push_back(isOutlier ? 1 : 0);
+    simulation.exactPairs.push_back(exact);
+    simulation.pairs.push_back(measured);
+  }
+  return simulation;
+}
+
+Eigen::Matrix3d HandEyeBound(const HandEyeScenario& scenario, const HandEyeSimulation& simulation)
+{
+  const HandEyeModel model(simulation.exactPairs, scenario.sensorNoise, scenario.volumeNoise, scenario.target);
+  std::vector<char> use;
+  for (const char isOutlier : simulation.isOutlier)
+    use.push_back(isOutlier ? 0 : 1);
+  const HandEyeMatrix covariance = model.CovarianceOfStep(simulation.truth, use);
+  const Eigen::Matrix3d& R = simulation.truth.volumeToSensor.linear();
+  return R * covariance.topLeftCorner<3, 3>() * R.transpose();
+}
+
+} // namespace echorama
