@@ -4,11 +4,12 @@
 // the body's buffer grows with what comes, not with what was announced. Every length inside a body is compared with what is
 // there before it is used.
 //
-// Debian's library (1.11) knows header version 1 alone and unpacks bodies in place without looking at their lengths, so the
-// layouts are read here by hand; its check sum is used, and the tests hold every layout against its own packing.
+// Layouts are read here by hand: Debian's library (1.11) knows header version 1 alone, unpacks bodies in place without looking at
+// their lengths, and has its own overruns. The tests hold every layout against what it packs and unpacks.
 #include "Tracking/Devices/OpenIgtLinkDecoder.h"
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/BigEndian.h"
+#include "Tracking/Devices/OpenIgtLinkSum.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -454,7 +455,7 @@ Message OpenIgtLinkDecoder::Begin()
 
 Message OpenIgtLinkDecoder::Finish()
 {
-  if (decoding_.checkSums && !body_.empty() && crc64(body_.data(), body_.size(), 0) != sum_)
+  if (decoding_.checkSums && !body_.empty() && OpenIgtLinkSum(body_.data(), body_.size()) != sum_)
     return Refused(message_, Rejection::Malformed, Name(message_) + " has a wrong check sum");
   try {
     DecodeBody(Content({body_.data(), body_.size()}, message_), message_, decoding_.turnImages);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Bodies are written number by number in the order of the protocol, then extended header, meta data, check sum and header are
-// put around them. An image is copied twice, which costs far less than its check sum.
+// put around them.
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/BigEndian.h"
+#include "Tracking/Devices/OpenIgtLinkSum.h"
 #include <algorithm>
 #include <cmath>
 #include <igtl_header.h>
@@ -88,7 +89,7 @@ Bytes OpenIgtLinkEncoder::Finished(const std::string& type, const std::string& d
        {static_cast<const Bytes*>(&extended), &content, static_cast<const Bytes*>(&index), static_cast<const Bytes*>(&text)})
     bytes.insert(bytes.end(), part->begin(), part->end());
   Bytes sum;
-  Write(sum, static_cast<std::uint64_t>(crc64(bytes.data() + IGTL_HEADER_SIZE, bodySize, 0)));
+  Write(sum, OpenIgtLinkSum(bytes.data() + IGTL_HEADER_SIZE, bodySize));
   std::copy(sum.begin(), sum.end(), bytes.begin() + IGTL_HEADER_SIZE - 8);
   return bytes;
 }

@@ -4,6 +4,7 @@
 #include "Tracking/Devices/BigEndian.h"
 #include "Tracking/Devices/OpenIgtLinkDecoder.h"
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
+#include "Tracking/Devices/OpenIgtLinkSum.h"
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
@@ -208,6 +209,16 @@ StreamedImage SomeImage()
 }
 
 } // namespace
+
+TEST(OpenIgtLinkSum, IsThatOfTheLibrary)
+{
+  Bytes bytes(300);
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    bytes[i] = static_cast<unsigned char>(i * i * 31 + 7 * i + 200);
+  for (std::size_t begin = 0; begin < 9; ++begin)
+    for (std::size_t size = 0; size < 280; ++size)
+      ASSERT_EQ(OpenIgtLinkSum(bytes.data() + begin, size), crc64(bytes.data() + begin, size, 0)) << begin << " " << size;
+}
 
 TEST(OpenIgtLinkDecoder, ReadsTheTransformsOfTheLibrary)
 {
