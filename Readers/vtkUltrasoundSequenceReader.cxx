@@ -69,17 +69,6 @@ vtkSmartPointer<vtkDoubleArray> NewMatrices(const std::string& name)
   return array;
 }
 
-// Grey out of colours, by the weights of ITU-R BT.601.
-template <class T>
-void MakeGrey(const T* colours, std::uint64_t components, T* grey, vtkIdType count)
-{
-  for (vtkIdType i = 0; i < count; ++i, colours += components) {
-    const double value = 0.299 * static_cast<double>(colours[0]) + 0.587 * static_cast<double>(colours[1]) +
-                         0.114 * static_cast<double>(colours[2]);
-    grey[i] = static_cast<T>(std::is_integral_v<T> ? std::floor(value + 0.5) : value);
-  }
-}
-
 // What tells a file from an earlier one of the same name.
 std::string StampOf(const std::string& path)
 {
@@ -338,8 +327,8 @@ void vtkUltrasoundSequenceReader::ReadFrame(int index, vtkImageData* output, con
       sequence.File.ReadFrame(index, colours.data(), progress);
       echorama::DispatchVoxelType(content.type, [&](auto zero) {
         using T = decltype(zero);
-        MakeGrey(reinterpret_cast<const T*>(colours.data()), content.components, static_cast<T*>(intensity->GetVoidPointer(0)),
-                 intensity->GetNumberOfTuples());
+        echorama::MakeGrey(reinterpret_cast<const T*>(colours.data()), content.components,
+                           static_cast<T*>(intensity->GetVoidPointer(0)), intensity->GetNumberOfTuples());
       });
     }
     output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
