@@ -65,6 +65,7 @@ struct ReplayTracker::Recording {
   double period = 0.0;                   // of a loop, seconds
   double round = 0.0;                    // how often the end was reached
   std::size_t next = 0;
+  int shown = -1; // frame, by ShowImage
 
   Recording(const ReplayParameters& p, PoseStream& poseStream, ImageStream* imageStream)
     : parameters(p), poses(poseStream), images(imageStream), log(ReadPoseLog(p.path, p.log))
@@ -159,6 +160,15 @@ struct ReplayTracker::Recording {
     images->Add(std::move(image));
   }
 
+  void AddPoses(const Moment& moment, double shift) const
+  {
+    for (std::size_t i = moment.begin; i < moment.end; ++i) {
+      ToolPose pose = log.poses[i];
+      pose.time += shift;
+      poses.Add(std::move(pose));
+    }
+  }
+
   // Hands out the next moment. \returns false at the end, or when the file turns out to be damaged.
   bool Play()
   {
@@ -174,11 +184,7 @@ struct ReplayTracker::Recording {
       poses.SetState(DeviceState::Failed, error.what());
       return false;
     }
-    for (std::size_t i = moment.begin; i < moment.end; ++i) {
-      ToolPose pose = log.poses[i];
-      pose.time += shift;
-      poses.Add(std::move(pose));
-    }
+    AddPoses(moment, shift);
     if (++next < moments.size())
       return true;
     if (parameters.loop) {
@@ -232,6 +238,39 @@ void ReplayTracker::Stop()
 bool ReplayTracker::Step()
 {
   return parameters_.step && recording_ && recording_->Play();
+}
+
+void ReplayTracker::ShowAll(PoseStream& poses, ImageStream* images)
+{
+  Stop();
+  recording_ = std::make_unique<Recording>(parameters_, poses, images);
+  poses.SetLive(false);
+  for (const Recording::Moment& moment : recording_->moments)
+    recording_->AddPoses(moment, 0.0);
+  recording_->next = recording_->moments.size();
+  poses.SetState(DeviceState::Ended, recording_->Summary());
+}
+
+std::vector<double> ReplayTracker::Times() const
+{
+  std::vector<double> times;
+  if (recording_)
+    for (const Recording::Moment& moment : recording_->moments)
+      times.push_back(moment.time);
+  return times;
+}
+
+void ReplayTracker::ShowImage(double time)
+{
+  const Recording::Moment* nearest = nullptr;
+  if (recording_ && recording_->images)
+    for (const Recording::Moment& moment : recording_->moments)
+      if (moment.frame >= 0 && (!nearest || std::fabs(moment.time - time) < std::fabs(nearest->time - time)))
+        nearest = &moment;
+  if (!nearest || nearest->frame == recording_->shown)
+    return;
+  recording_->ShowFrame(nearest->frame, nearest->time);
+  recording_->shown = nearest->frame;
 }
 
 std::unique_ptr<TrackerDevice> MakeReplayTracker(const TrackerAddress& address)

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace echorama {
 
@@ -42,6 +43,15 @@ public:
   /// The next poses of one time, and the image that goes with them, at once. \returns false when there are no more, or it was not
   /// started to be stepped.
   bool Step();
+
+  /// All poses at once, for those who want to see a recording at any of its times; \a poses must remember enough of them. Its end
+  /// is reached then. \throws as Start
+  void ShowAll(PoseStream& poses, ImageStream* images);
+  /// The times of the recording that was started, rising; empty when there is none.
+  std::vector<double> Times() const;
+  /// After ShowAll: puts the image nearest to \a time into the stream, unless it was the last one that was.
+  /// \throws Error(BadFile) when its pixels are damaged.
+  void ShowImage(double time);
 
 private:
   struct Recording;
