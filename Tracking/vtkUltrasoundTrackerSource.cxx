@@ -1,13 +1,705 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundTrackerSource.h"
 
+#include "Core/Base/Error.h"
+#include "Readers/SequencePoses.h"
+#include "Readers/TransformFile.h"
+#include "Tracking/Devices/ReplayTracker.h"
+#include "Tracking/Devices/TrackerDevice.h"
+#include "Tracking/Stream/Clock.h"
+#include "Tracking/Stream/LiveTransforms.h"
+#include "Tracking/Stream/StreamReport.h"
+
+#include "vtkCellArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkMatrix4x4.h"
+#include "vtkNew.h"
 #include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundVolume.h"
+#include "vtkUltrasoundVoxelTypes.h"
+#include "vtkUnsignedCharArray.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <optional>
+#include <vector>
+
+using echorama::Error;
+using echorama::LiveTransform;
+using echorama::LiveTransforms;
+using echorama::StreamedImage;
+using echorama::ToolPose;
+using echorama::ToolStatistics;
+using echorama::TransformStatus;
 
 vtkStandardNewMacro(vtkUltrasoundTrackerSource);
 
-vtkUltrasoundTrackerSource::vtkUltrasoundTrackerSource()
+namespace {
+constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+
+std::string TextOf(const char* text)
 {
-  this->SetNumberOfInputPorts(0);
+  return text ? text : "";
 }
 
-vtkUltrasoundTrackerSource::~vtkUltrasoundTrackerSource() = default;
+// Whether it was another one.
+bool Replace(char*& text, const char* by)
+{
+  if ((!text && !by) || (text && by && std::strcmp(text, by) == 0)) {
+    return false;
+  }
+  delete[] text;
+  text = by ? new char[std::strlen(by) + 1] : nullptr;
+  if (by) {
+    std::strcpy(text, by);
+  }
+  return true;
+}
+
+template <class Array>
+vtkSmartPointer<Array> NewArray(const char* name, int components = 1)
+{
+  auto array = vtkSmartPointer<Array>::New();
+  array->SetName(name);
+  array->SetNumberOfComponents(components);
+  return array;
+}
+
+// The frame of coordinates that most tools are seen in; of equals the first in the order of bytes.
+std::string UsualWorld(const std::vector<std::string>& tools)
+{
+  std::map<std::string, int> counts;
+  for (const std::string& tool : tools) {
+    if (const auto frames = echorama::FramesOf(tool)) {
+      ++counts[frames->second];
+    }
+  }
+  std::string world;
+  int most = 0;
+  for (const auto& [frame, count] : counts) {
+    if (count > most) {
+      world = frame;
+      most = count;
+    }
+  }
+  return world;
+}
+
+struct PlacedImage {
+  StreamedImage Image;
+  std::optional<Eigen::Affine3d> ToWorld;
+  echorama::ImageGeometry Geometry;
+};
+
+// Whether its numbers agree with its bytes, and we can show it.
+bool IsShowable(const StreamedImage& image)
+{
+  if (!image.voxels || (image.components != 1 && image.components != 3 && image.components != 4)) {
+    return false;
+  }
+  try {
+    image.geometry.Check(image.name);
+  } catch (const Error&) {
+    return false;
+  }
+  return image.voxels->size() == image.geometry.VoxelCount() * static_cast<std::size_t>(image.components) * SizeOf(image.type);
+}
+} // namespace
+
+// A device that was opened, and all that came from it.
+struct vtkUltrasoundTrackerSource::Session {
+  echorama::PoseStream Poses;
+  echorama::ImageStream Images;
+  std::unique_ptr<LiveTransforms> Transforms;      // empty: to be made anew
+  std::unique_ptr<echorama::TrackerDevice> Device; // which writes to what is above, so it goes first
+  std::vector<double> Times;                       // of a recording that is shown as a whole
+  std::optional<PlacedImage> Image;                // that output 1 shows
+  std::uint64_t PosesShown = 0, ImagesShown = 0;   // versions
+  double FreshUntil = 0.0;                         // our clock: when a tool that is shown becomes too old
+
+  explicit Session(const echorama::StreamLimits& limits) : Poses(limits) {}
+  bool IsWhole() const { return !Times.empty(); }
+};
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTrackerSource::vtkUltrasoundTrackerSource()
+  : Time(NaN), LongestGapSeconds(echorama::StreamLimits().longestGapSeconds)
+{
+  this->SetNumberOfInputPorts(0);
+  this->SetNumberOfOutputPorts(2);
+  this->SetImageFrame("Image");
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTrackerSource::~vtkUltrasoundTrackerSource()
+{
+  this->Close();
+  Replace(this->Device, nullptr);
+  Replace(this->TransformFile, nullptr);
+  this->SetWorldFrame(nullptr);
+  this->SetImageFrame(nullptr);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Device: " << (this->Device ? this->Device : "(none)") << "\n";
+  os << indent << "Active: " << this->Active << "\n";
+  os << indent << "TransformFile: " << (this->TransformFile ? this->TransformFile : "(none)") << "\n";
+  os << indent << "WorldFrame: " << TextOf(this->WorldFrame) << "\n";
+  os << indent << "ImageFrame: " << TextOf(this->ImageFrame) << "\n";
+  os << indent << "Time: " << this->Time << "\n";
+  os << indent << "FollowTime: " << this->FollowTime << "\n";
+  os << indent << "LongestGapSeconds: " << this->LongestGapSeconds << "\n";
+  os << indent << "FreshSeconds: " << this->FreshSeconds << "\n";
+  os << indent << "State: " << this->GetState() << "\n";
+  os << indent << "Message: " << this->GetMessage() << "\n";
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetDevice(const char* device)
+{
+  if (Replace(this->Device, device)) {
+    this->Close();
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetDeviceKinds()
+{
+  std::string text;
+  for (const std::string& scheme : echorama::TrackerSchemes()) {
+    text += (text.empty() ? "" : ", ") + scheme;
+  }
+  return text;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetActive(bool active)
+{
+  if (!active && this->Opened && this->Opened->Device) {
+    this->Opened->Device->Stop();
+    this->Opened->Device.reset();
+    this->Opened->Poses.SetState(echorama::DeviceState::Idle, "stopped");
+  }
+  if (this->Active != active) {
+    this->Active = active;
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::Start()
+{
+  this->SetActive(true);
+  return vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress&) { this->Open(); }) != 0;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetTransformFile(const char* fileName)
+{
+  if (Replace(this->TransformFile, fileName)) {
+    if (this->Opened) {
+      this->Opened->Transforms.reset();
+    }
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetFreshSeconds(double seconds)
+{
+  if (this->FreshSeconds != seconds) {
+    this->FreshSeconds = seconds;
+    if (this->Opened) {
+      this->Opened->Transforms.reset();
+    }
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetTime(double time)
+{
+  if (!(this->Time == time || (std::isnan(this->Time) && std::isnan(time)))) {
+    this->Time = time;
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetFollowTime(bool follow)
+{
+  if (this->FollowTime != follow) {
+    this->FollowTime = follow;
+    this->Close(); // it is opened in another way
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+// Opens the device when there is one that is not open, and is to be.
+void vtkUltrasoundTrackerSource::Open()
+{
+  if (!this->Active || (this->Opened && this->Opened->Device)) {
+    return;
+  }
+  this->Close();
+  try {
+    const std::string address = TextOf(this->Device);
+    if (address.empty()) {
+      throw Error(Error::Kind::InvalidParameter, "there is no Device; its kinds are " + GetDeviceKinds());
+    }
+    echorama::StreamLimits limits;
+    limits.longestGapSeconds = this->LongestGapSeconds;
+    auto device = echorama::MakeTracker(address);
+    auto* recording = this->FollowTime ? dynamic_cast<echorama::ReplayTracker*>(device.get()) : nullptr;
+    if (recording) {
+      limits.posesPerTool = 1000000; // whatever it holds; memory is taken as it is needed
+    }
+    auto session = std::make_unique<Session>(limits);
+    if (recording) {
+      recording->ShowAll(session->Poses, &session->Images);
+      session->Times = recording->Times();
+    } else {
+      device->Start(session->Poses, &session->Images);
+    }
+    session->Device = std::move(device);
+    this->Opened = std::move(session);
+    this->Updated();
+  } catch (const Error& error) {
+    this->Close();
+    this->Failure = error.what();
+    throw;
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::Close()
+{
+  this->Opened.reset();
+  this->Failure.clear();
+}
+
+//----------------------------------------------------------------------------
+// What is open, with its transforms; nullptr when nothing is.
+vtkUltrasoundTrackerSource::Session* vtkUltrasoundTrackerSource::Updated()
+{
+  if (this->Opened && !this->Opened->Transforms) {
+    const std::string file = TextOf(this->TransformFile);
+    this->Opened->Transforms = std::make_unique<LiveTransforms>(
+        this->Opened->Poses, file.empty() ? std::vector<echorama::NamedTransform>() : echorama::ReadTransforms(file),
+        this->FreshSeconds);
+  }
+  return this->Opened.get();
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::GetNeedsUpdate()
+{
+  const Session* session = this->Opened.get();
+  if (!session || !(session->Poses.Version() != session->PosesShown || session->Images.Version() != session->ImagesShown ||
+                    echorama::ClockNow() > session->FreshUntil)) {
+    return false;
+  }
+  this->Modified();
+  return true;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::WaitForPoses(int count, double seconds)
+{
+  if (!this->Start()) {
+    return false;
+  }
+  const double until = echorama::ClockNow() + seconds;
+  for (std::uint64_t version = this->Opened->Poses.Version();;) {
+    const echorama::StreamStatistics statistics = this->Opened->Poses.Statistics();
+    std::uint64_t taken = 0;
+    for (const ToolStatistics& tool : statistics.tools) {
+      taken += tool.valid + tool.missing + tool.outOfRange;
+    }
+    if (count <= 0 || taken >= static_cast<std::uint64_t>(count)) {
+      return true;
+    }
+    const double left = until - echorama::ClockNow();
+    if (!(left > 0.0) || statistics.state == echorama::DeviceState::Ended || statistics.state == echorama::DeviceState::Failed) {
+      return false;
+    }
+    version = this->Opened->Poses.WaitBeyond(version, left);
+  }
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::Step()
+{
+  if (!this->Start()) {
+    return false;
+  }
+  auto* recording = dynamic_cast<echorama::ReplayTracker*>(this->Opened->Device.get());
+  if (!recording || !recording->Step()) {
+    return false;
+  }
+  this->Modified();
+  return true;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetState() const
+{
+  return !this->Failure.empty()
+             ? DeviceStateText(echorama::DeviceState::Failed)
+             : DeviceStateText(this->Opened ? this->Opened->Poses.Statistics().state : echorama::DeviceState::Idle);
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetMessage() const
+{
+  return this->Opened ? this->Opened->Poses.Statistics().message : this->Failure;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetReport() const
+{
+  return this->Opened ? echorama::StreamReport(this->Opened->Poses.Statistics()) : "";
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundTrackerSource::GetNumberOfTools() const
+{
+  return this->Opened ? static_cast<int>(this->Opened->Poses.Tools().size()) : 0;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetToolName(int index) const
+{
+  const std::vector<std::string> tools = this->Opened ? this->Opened->Poses.Tools() : std::vector<std::string>();
+  return index >= 0 && static_cast<std::size_t>(index) < tools.size() ? tools[static_cast<std::size_t>(index)] : "";
+}
+
+namespace {
+// By its name, or that of its frame.
+std::optional<ToolStatistics> Find(const std::vector<ToolStatistics>& tools, const char* name)
+{
+  const std::string wanted = TextOf(name);
+  for (const ToolStatistics& tool : tools) {
+    const auto frames = echorama::FramesOf(tool.name);
+    if (tool.name == wanted || (frames && frames->first == wanted)) {
+      return tool;
+    }
+  }
+  return {};
+}
+} // namespace
+
+//----------------------------------------------------------------------------
+vtkIdType vtkUltrasoundTrackerSource::GetNumberOfPoses(const char* tool) const
+{
+  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
+  return found ? static_cast<vtkIdType>(found->valid + found->missing + found->outOfRange) : 0;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetRate(const char* tool) const
+{
+  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
+  return found ? found->rateHz : NaN;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetJitter(const char* tool) const
+{
+  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
+  return found ? found->jitterSeconds : NaN;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetLatency(const char* tool) const
+{
+  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
+  return found ? found->medianLatencySeconds : NaN;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetDropoutShare(const char* tool) const
+{
+  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
+  return found ? found->DropoutShare() : NaN;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetSecondsSinceLast(const char* tool) const
+{
+  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
+  return found ? found->secondsSinceLast : NaN;
+}
+
+//----------------------------------------------------------------------------
+vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRejected() const
+{
+  return this->Opened ? static_cast<vtkIdType>(this->Opened->Poses.Statistics().Rejected()) : 0;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundTrackerSource::GetTransform(const char* name, vtkMatrix4x4* matrix)
+{
+  LiveTransform found;
+  found.transform.status = TransformStatus::Missing;
+  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+    if (const Session* session = this->Updated()) {
+      found = session->Transforms->Find(TextOf(name), this->Time);
+    }
+  });
+  if (matrix) {
+    const bool known = found.Status() != TransformStatus::Missing;
+    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows =
+        known ? found.transform.matrix.matrix() : Eigen::Matrix4d(Eigen::Matrix4d::Identity());
+    matrix->DeepCopy(rows.data());
+  }
+  return static_cast<int>(found.Status());
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetTransformError(const char* name)
+{
+  double error = -1.0;
+  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+    if (const Session* session = this->Updated()) {
+      error = session->Transforms->Find(TextOf(name), this->Time).transform.errorMm.value_or(-1.0);
+    }
+  });
+  return error;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetTransformMessage(const char* name)
+{
+  std::string message = "the device is not open";
+  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+    if (const Session* session = this->Updated()) {
+      message = session->Transforms->Find(TextOf(name), this->Time).message;
+    }
+  });
+  return message;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundTrackerSource::FillOutputPortInformation(int port, vtkInformation* information)
+{
+  information->Set(vtkDataObject::DATA_TYPE_NAME(), port == 0 ? "vtkPolyData" : "vtkImageData");
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  vtkInformation* image = outputs->GetInformationObject(1);
+  const int nothing[6] = {0, -1, 0, -1, 0, -1};
+  image->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), nothing, 6);
+  for (int port = 0; port < 2; ++port) {
+    outputs->GetInformationObject(port)->Remove(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
+    outputs->GetInformationObject(port)->Remove(vtkStreamingDemandDrivenPipeline::TIME_RANGE());
+  }
+  return vtkUltrasoundVolume::Run(this, outputs, [this, outputs, image](const echorama::Progress&) {
+    this->Open();
+    const Session* session = this->Updated();
+    if (!session) {
+      return;
+    }
+    if (session->IsWhole()) {
+      const double range[2] = {session->Times.front(), session->Times.back()};
+      for (int port = 0; port < 2; ++port) {
+        vtkInformation* out = outputs->GetInformationObject(port);
+        out->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), session->Times.data(), static_cast<int>(session->Times.size()));
+        out->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
+      }
+    }
+    // Data have to agree with what is said here, so the image that will be shown is chosen here.
+    this->ChooseImage(session->IsWhole() ? session->Times.front() : this->Time);
+    if (session->Image) {
+      vtkUltrasoundVolume::SetGeometry(image, session->Image->Geometry);
+      vtkDataObject::SetPointDataActiveScalarInfo(image, echorama::VtkTypeOf(session->Image->Image.type), 1);
+    }
+  });
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress&) {
+    vtkPolyData* tools = vtkPolyData::GetData(outputs, 0);
+    vtkImageData* image = vtkImageData::GetData(outputs, 1);
+    tools->Initialize();
+    image->Initialize();
+    Session* session = this->Updated();
+    if (!session) {
+      return;
+    }
+    session->PosesShown = session->Poses.Version();
+    session->ImagesShown = session->Images.Version();
+    double time = this->Time;
+    if (session->IsWhole()) {
+      time = session->Times.front();
+      for (int port = 1; port >= 0; --port) {
+        vtkInformation* out = outputs->GetInformationObject(port);
+        if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())) {
+          time = out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP());
+        }
+      }
+      time = std::min(std::max(time, session->Times.front()), session->Times.back());
+      this->ChooseImage(time);
+      tools->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+      image->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+    }
+    this->ShowTools(tools, time);
+    this->ShowImage(image);
+  });
+}
+
+//----------------------------------------------------------------------------
+// The newest image that can be placed in the world, else the newest; with a time, the nearest to it.
+void vtkUltrasoundTrackerSource::ChooseImage(double time)
+{
+  Session& session = *this->Opened;
+  session.Image.reset();
+  if (session.IsWhole()) {
+    static_cast<echorama::ReplayTracker&>(*session.Device).ShowImage(time);
+  }
+  std::vector<StreamedImage> images = session.Images.Images();
+  images.erase(std::remove_if(images.begin(), images.end(), [](const StreamedImage& image) { return !IsShowable(image); }),
+               images.end());
+  std::reverse(images.begin(), images.end());
+  if (!std::isnan(time)) {
+    std::stable_sort(images.begin(), images.end(), [time](const StreamedImage& a, const StreamedImage& b) {
+      return std::abs(a.time - time) < std::abs(b.time - time);
+    });
+  }
+  const std::string world = TextOf(this->WorldFrame).empty() ? UsualWorld(session.Poses.Tools()) : std::string(this->WorldFrame);
+  for (const StreamedImage& image : images) {
+    const LiveTransform found = session.Transforms->Find(TextOf(this->ImageFrame), world, image.time);
+    const bool placed = !std::isnan(image.time) && found.Status() == TransformStatus::Valid &&
+                        std::abs(found.transform.matrix.linear().determinant()) > 1e-12;
+    if (placed) {
+      session.Image =
+          PlacedImage{image, found.transform.matrix, echorama::FrameGeometry(found.transform.matrix, image.geometry.dimensions)};
+      return;
+    }
+    if (!session.Image) {
+      session.Image = PlacedImage{image, {}, image.geometry};
+    }
+    if (!std::isnan(time)) {
+      return; // the one of that moment
+    }
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, double time)
+{
+  Session& session = *this->Opened;
+  const std::vector<std::string> names = session.Poses.Tools();
+  const std::string world = TextOf(this->WorldFrame).empty() ? UsualWorld(names) : std::string(this->WorldFrame);
+
+  const vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  const vtkNew<vtkCellArray> vertices;
+  const auto tool = NewArray<vtkIntArray>("Tool");
+  const auto times = NewArray<vtkDoubleArray>("TimeStamp");
+  const auto toWorld = NewArray<vtkDoubleArray>("ToolToWorld", 16);
+  const auto statuses = NewArray<vtkUnsignedCharArray>("Status");
+  const vtkSmartPointer<vtkDoubleArray> axes[3] = {NewArray<vtkDoubleArray>("XAxis", 3), NewArray<vtkDoubleArray>("YAxis", 3),
+                                                   NewArray<vtkDoubleArray>("ZAxis", 3)};
+  const auto toolNames = NewArray<vtkStringArray>("ToolNames"), worldFrame = NewArray<vtkStringArray>("WorldFrame");
+  worldFrame->InsertNextValue(world);
+  session.FreshUntil = std::numeric_limits<double>::infinity();
+  for (const std::string& name : names) {
+    const auto frames = echorama::FramesOf(name);
+    if (!frames || toolNames->LookupValue(frames->first) >= 0) {
+      continue; // no transform, or a second one of the same frame
+    }
+    LiveTransform found = session.Transforms->Find(frames->first, world, time);
+    if (frames->first == world) { // its place is known, but not whether it is seen
+      found = session.Transforms->Find(frames->first, frames->second, time);
+      found.transform.matrix.setIdentity();
+    }
+    const bool known = found.Status() != TransformStatus::Missing;
+    const Eigen::Affine3d matrix = known ? found.transform.matrix : Eigen::Affine3d::Identity();
+    const vtkIdType point = points->InsertNextPoint(matrix.translation().data());
+    if (found.Status() == TransformStatus::Valid) {
+      vertices->InsertNextCell(1, &point);
+      if (std::isnan(time) && session.Poses.Live()) {
+        session.FreshUntil = std::min(session.FreshUntil, session.Poses.Latest(name).arrival + this->FreshSeconds);
+      }
+    }
+    tool->InsertNextValue(static_cast<int>(toolNames->InsertNextValue(frames->first)));
+    times->InsertNextValue(known ? found.time : NaN);
+    statuses->InsertNextValue(static_cast<unsigned char>(found.Status()));
+    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix.matrix();
+    toWorld->InsertNextTuple(rows.data());
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d direction = matrix.linear().col(axis).normalized();
+      axes[axis]->InsertNextTuple(direction.data());
+    }
+  }
+  output->SetPoints(points);
+  output->SetVerts(vertices);
+  for (vtkDataArray* array :
+       {static_cast<vtkDataArray*>(tool), static_cast<vtkDataArray*>(times), static_cast<vtkDataArray*>(toWorld),
+        static_cast<vtkDataArray*>(statuses), static_cast<vtkDataArray*>(axes[0]), static_cast<vtkDataArray*>(axes[1]),
+        static_cast<vtkDataArray*>(axes[2])}) {
+    output->GetPointData()->AddArray(array);
+  }
+  output->GetFieldData()->AddArray(toolNames);
+  output->GetFieldData()->AddArray(worldFrame);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::ShowImage(vtkImageData* output)
+{
+  if (!this->Opened->Image) {
+    return;
+  }
+  const PlacedImage& placed = *this->Opened->Image;
+  const StreamedImage& image = placed.Image;
+  vtkUltrasoundVolume::SetGeometry(output, placed.Geometry);
+  const auto intensity = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(echorama::VtkTypeOf(image.type)));
+  intensity->SetName(vtkUltrasoundVolume::IntensityName());
+  intensity->SetNumberOfTuples(output->GetNumberOfPoints());
+  if (image.components == 1) {
+    std::memcpy(intensity->GetVoidPointer(0), image.voxels->data(), image.voxels->size());
+  } else {
+    echorama::DispatchVoxelType(image.type, [&](auto zero) {
+      using T = decltype(zero);
+      echorama::MakeGrey(reinterpret_cast<const T*>(image.voxels->data()), static_cast<std::uint64_t>(image.components),
+                         static_cast<T*>(intensity->GetVoidPointer(0)), intensity->GetNumberOfTuples());
+    });
+  }
+  output->GetPointData()->SetScalars(intensity);
+  const auto valid = NewArray<vtkUnsignedCharArray>(vtkUltrasoundVolume::ValidRegionName());
+  valid->SetNumberOfTuples(output->GetNumberOfPoints());
+  valid->Fill(1.0);
+  output->GetPointData()->AddArray(valid);
+  if (placed.ToWorld) {
+    vtkUltrasoundAcquisition::SetImageToWorld(output, *placed.ToWorld);
+  }
+  if (std::isfinite(image.time)) {
+    vtkUltrasoundAcquisition::SetTimeStamp(output, image.time);
+  }
+}

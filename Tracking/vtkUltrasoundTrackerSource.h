@@ -2,6 +2,35 @@
 /**
  * @class vtkUltrasoundTrackerSource
  * @brief where the tools of a tracker are: live, replayed or simulated
+ *
+ * No input. A device, named by one line (see Device), puts timed poses into a stream from a thread of its own; each update shows
+ * what the stream holds at that moment.
+ *
+ * Output 0: a vtkPolyData with one point per tool, the origin of its frame of coordinates in the world (mm). A tool whose pose is
+ * valid has a vertex; any other has a point without a cell, so that it is not drawn. Arrays as in the track of
+ * vtkUltrasoundSequenceReader:
+ *
+ * | array               | values                                                                                |
+ * | ------------------- | ------------------------------------------------------------------------------------- |
+ * | Tool                | point: an index into the field data ToolNames                                         |
+ * | TimeStamp           | point: seconds on the sender's clock (NaN: none)                                      |
+ * | ToolToWorld         | point: 16 numbers, row by row; identity when nothing is known                         |
+ * | Status              | point: 0 valid, 1 missing, 2 out of range: not to be trusted                          |
+ * | XAxis, YAxis, ZAxis | point: where the tool's axes point in the world, unit vectors                         |
+ * | ToolNames           | field: strings, "Probe" of ProbeToTracker; in the order of bytes                      |
+ * | WorldFrame          | field: a string                                                                       |
+ *
+ * Output 1: the newest image of the device, with `Intensity`, `ValidRegion`, `TimeStamp` and `ImageToWorld` where transforms lead
+ * from the image to the world; otherwise it lies where the sender puts it. Colours become grey. Empty when there is none.
+ *
+ * A live pose that is older than FreshSeconds is missing: what stands still is not shown as if it were live. When a device cannot
+ * be opened there is an error that names it and the reason, and both outputs are empty; what goes wrong later is told by
+ * GetState() and GetMessage().
+ *
+ * As a live source of ParaView it is asked by GetNeedsUpdate() every 40 ms. In a script, call that (or Modified()) before
+ * Update(), and WaitForPoses() to wait for what is to come.
+ *
+ * @sa vtkUltrasoundSequenceReader, echorama::PoseStream, echorama::LiveTransforms
  */
 #ifndef vtkUltrasoundTrackerSource_h
 #define vtkUltrasoundTrackerSource_h
@@ -9,18 +38,192 @@
 #include "EchoramaTrackingModule.h"
 #include "vtkPolyDataAlgorithm.h"
 
+#include <memory> // for what is open
+#include <string> // for texts
+
+class vtkImageData;
+class vtkMatrix4x4;
+
 class ECHORAMATRACKING_EXPORT vtkUltrasoundTrackerSource : public vtkPolyDataAlgorithm {
 public:
   static vtkUltrasoundTrackerSource* New();
   vtkTypeMacro(vtkUltrasoundTrackerSource, vtkPolyDataAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * The tracker, in one line: "igtl://localhost:18944", "replay:log.igs.mha?speed=2", "simulated:?rate=100&noiseMm=0.5" ...;
+   * GetDeviceKinds() lists what there is. Another one closes the present one. Default: none.
+   */
+  void SetDevice(const char* device);
+  vtkGetStringMacro(Device);
+  static std::string GetDeviceKinds();
+  ///@}
+
+  ///@{
+  /**
+   * Whether the device is opened with the next update. Off closes it; what has come stays. Start() opens it at once and
+   * returns whether that went well. Default: on.
+   */
+  void SetActive(bool active);
+  vtkGetMacro(Active, bool);
+  vtkBooleanMacro(Active, bool);
+  bool Start();
+  void Stop() { this->SetActive(false); }
+  ///@}
+
+  ///@{
+  /**
+   * Fixed transforms, such as ImageToProbe: a configuration of the Plus toolkit (XML) or our JSON. One that the device sends
+   * too is that of the device. Default: none.
+   */
+  void SetTransformFile(VTK_FILEPATH const char* fileName);
+  vtkGetFilePathMacro(TransformFile);
+  ///@}
+
+  ///@{
+  /**
+   * The frame of coordinates that is the world. Tools that no transforms lead from to it are missing. Default: empty, the frame
+   * that most tools are seen in, usually Tracker.
+   */
+  vtkSetStringMacro(WorldFrame);
+  vtkGetStringMacro(WorldFrame);
+  ///@}
+
+  ///@{
+  /** The frame of coordinates that counts pixels of the image. Default: Image, as in Plus. */
+  vtkSetStringMacro(ImageFrame);
+  vtkGetStringMacro(ImageFrame);
+  ///@}
+
+  ///@{
+  /**
+   * The moment that is shown, seconds on the sender's clock: poses are interpolated, between neighbours that are not further
+   * apart than LongestGapSeconds. NaN: the newest. Default NaN.
+   */
+  void SetTime(double time);
+  vtkGetMacro(Time, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether a recording (replay:) is shown at the time that the pipeline asks for, as by the animation of ParaView, instead of
+   * being played: it is read at once, its times are the time steps of this source, and Time is ignored. Of no meaning for other
+   * devices. Default: off.
+   */
+  void SetFollowTime(bool follow);
+  vtkGetMacro(FollowTime, bool);
+  vtkBooleanMacro(FollowTime, bool);
+  ///@}
+
+  ///@{
+  /** Poses that lie further apart in time are not interpolated; seconds, in (0, 600]. Counts when the device is opened. Default
+   * 0.5. */
+  vtkSetMacro(LongestGapSeconds, double);
+  vtkGetMacro(LongestGapSeconds, double);
+  ///@}
+
+  ///@{
+  /** A newest pose of a live device that came longer ago is missing; seconds, in (0, 3600]. Default 1. */
+  void SetFreshSeconds(double seconds);
+  vtkGetMacro(FreshSeconds, double);
+  ///@}
+
+  /**
+   * Whether something has come (or has become too old) since the last update; then this is Modified() too. What ParaView calls.
+   */
+  bool GetNeedsUpdate();
+
+  /**
+   * Opens the device if it is not open, and waits until so many poses, of all tools together, have come since then, or for
+   * \a seconds. Returns false when they have not: also at once when the device is at its end or has failed.
+   */
+  bool WaitForPoses(int count, double seconds);
+
+  /** The next poses of a recording that is to be stepped (replay:FILE?step=1). Returns false when there are no more. */
+  bool Step();
+
+  ///@{
+  /**
+   * What the device is doing: "idle", "connecting", "running", "lost", "ended" or "failed"; and a sentence about it.
+   */
+  std::string GetState() const;
+  std::string GetMessage() const;
+  ///@}
+
+  /** All statistics, as JSON (echorama::StreamReport). Empty when nothing was opened. */
+  std::string GetReport() const;
+
+  ///@{
+  /**
+   * Tools that have been heard of, by the names of their transforms ("ProbeToTracker"); "" beyond.
+   */
+  int GetNumberOfTools() const;
+  std::string GetToolName(int index) const;
+  ///@}
+
+  ///@{
+  /**
+   * Statistics of a tool, by its name or that of its frame ("Probe"): poses taken, rate in Hz, standard deviation of the
+   * intervals in seconds, median latency in seconds (of meaning when both clocks agree; NaN in recordings), share of poses that
+   * were not valid, and seconds since the last one. See echorama::ToolStatistics. 0 poses, and NaN, of a tool that is not there.
+   */
+  vtkIdType GetNumberOfPoses(const char* tool) const;
+  double GetRate(const char* tool) const;
+  double GetJitter(const char* tool) const;
+  double GetLatency(const char* tool) const;
+  double GetDropoutShare(const char* tool) const;
+  double GetSecondsSinceLast(const char* tool) const;
+  ///@}
+
+  /** How much came that was not taken: garbage, duplicates, poses that are none. GetReport() says why. */
+  vtkIdType GetNumberOfRejected() const;
+
+  ///@{
+  /**
+   * Any transform by its name, "ImageToReference", out of what the device sends and the fixed ones, at Time (see there), with its
+   * status: 0 valid, 1 missing (the matrix is identity then), 2 out of range. GetTransformError is its stated error in mm, -1
+   * when none is stated; GetTransformMessage says why it is not valid.
+   */
+  int GetTransform(const char* name, vtkMatrix4x4* matrix);
+  double GetTransformError(const char* name);
+  std::string GetTransformMessage(const char* name);
+  ///@}
 
 protected:
   vtkUltrasoundTrackerSource();
   ~vtkUltrasoundTrackerSource() override;
 
+  int FillOutputPortInformation(int port, vtkInformation* information) override;
+  int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+  char* Device = nullptr;
+  bool Active = true;
+  char* TransformFile = nullptr;
+  char* WorldFrame = nullptr;
+  char* ImageFrame = nullptr;
+  double Time;
+  bool FollowTime = false;
+  double LongestGapSeconds;
+  double FreshSeconds = 1.0;
+
 private:
   vtkUltrasoundTrackerSource(const vtkUltrasoundTrackerSource&) = delete;
   void operator=(const vtkUltrasoundTrackerSource&) = delete;
+
+#ifndef __VTK_WRAP__
+  struct Session;
+  void Open();
+  void Close();
+  Session* Updated();
+  void ChooseImage(double time);
+  void ShowTools(vtkPolyData* output, double time);
+  void ShowImage(vtkImageData* output);
+
+  std::unique_ptr<Session> Opened;
+  std::string Failure; // why it could not be opened
+#endif
 };
 
 #endif
