@@ -398,6 +398,19 @@ class SequenceWriter(Writer):
         return os.path.join(self.folder.name, "volume.seq.mha")
 
 
+class TrackerSource(Feed):
+    is_source = True
+    volumes = 0
+    same_grid = False
+    output = "points"
+
+    def filter(self, images=()):
+        filter = self.make()
+        filter.SetDevice("simulated:?rate=200")
+        filter.WaitForPoses(2, 60.0)
+        return filter
+
+
 Special = {
     "vtkUltrasoundReader": Reader,
     "vtkUltrasoundSequenceReader": SequenceReader,
@@ -421,6 +434,7 @@ Special = {
     "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundSynthesizer": Synthesizer,
+    "vtkUltrasoundTrackerSource": TrackerSource,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }
 

@@ -8,6 +8,7 @@
 #include "Tracking/Devices/TrackerDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/LiveTransforms.h"
+#include "Tracking/Stream/StreamRecorder.h"
 #include "Tracking/Stream/StreamReport.h"
 
 #include "vtkCellArray.h"
@@ -125,7 +126,8 @@ bool IsShowable(const StreamedImage& image)
 struct vtkUltrasoundTrackerSource::Session {
   echorama::PoseStream Poses;
   echorama::ImageStream Images;
-  std::unique_ptr<LiveTransforms> Transforms;      // empty: to be made anew
+  std::unique_ptr<LiveTransforms> Transforms; // empty: to be made anew
+  std::unique_ptr<echorama::StreamRecorder> Recorder;
   std::unique_ptr<echorama::TrackerDevice> Device; // which writes to what is above, so it goes first
   std::vector<double> Times;                       // of a recording that is shown as a whole
   std::optional<PlacedImage> Image;                // that output 1 shows
@@ -449,6 +451,52 @@ double vtkUltrasoundTrackerSource::GetSecondsSinceLast(const char* tool) const
 {
   const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
   return found ? found->secondsSinceLast : NaN;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::StartRecording(const char* fileName)
+{
+  const std::string path = TextOf(fileName);
+  if (path.empty()) {
+    return this->StopRecording();
+  }
+  if (!this->Start()) {
+    return false;
+  }
+  return vtkUltrasoundVolume::Run(this, nullptr, [this, &path](const echorama::Progress&) {
+           if (auto earlier = std::move(this->Opened->Recorder)) {
+             earlier->Stop();
+           }
+           this->Opened->Recorder = std::make_unique<echorama::StreamRecorder>(path, this->Opened->Poses.Subscribe());
+         }) != 0;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::StopRecording()
+{
+  return vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress&) {
+           if (auto recorder = this->Opened ? std::move(this->Opened->Recorder) : nullptr) {
+             recorder->Stop();
+           }
+         }) != 0;
+}
+
+//----------------------------------------------------------------------------
+vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRecordedPoses() const
+{
+  return this->Opened && this->Opened->Recorder ? static_cast<vtkIdType>(this->Opened->Recorder->State().poses) : 0;
+}
+
+//----------------------------------------------------------------------------
+vtkIdType vtkUltrasoundTrackerSource::GetNumberOfUnrecordedPoses() const
+{
+  return this->Opened && this->Opened->Recorder ? static_cast<vtkIdType>(this->Opened->Recorder->State().lost) : 0;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::GetRecordingProblem() const
+{
+  return this->Opened && this->Opened->Recorder ? this->Opened->Recorder->State().problem : "";
 }
 
 //----------------------------------------------------------------------------

@@ -176,6 +176,25 @@ public:
   double GetSecondsSinceLast(const char* tool) const;
   ///@}
 
+  ///@{
+  /**
+   * Records every pose from now on to a sequence (.igs.mha) that a crash leaves whole up to the last second; opens the device if
+   * it is not open. A file that is there already is refused. No name, or an empty one, ends the recording, as StopRecording()
+   * does. Ends with the device when another one is set. Returns false, with an error that names the reason, when it cannot be;
+   * StopRecording also when nothing was recorded. See echorama::StreamRecorder.
+   */
+  bool StartRecording(VTK_FILEPATH const char* fileName);
+  bool StopRecording();
+  ///@}
+
+  ///@{
+  /** Of the present recording: poses written, poses that came faster than that and were lost, and what is wrong; empty: nothing.
+   */
+  vtkIdType GetNumberOfRecordedPoses() const;
+  vtkIdType GetNumberOfUnrecordedPoses() const;
+  std::string GetRecordingProblem() const;
+  ///@}
+
   /** How much came that was not taken: garbage, duplicates, poses that are none. GetReport() says why. */
   vtkIdType GetNumberOfRejected() const;
 

@@ -12,7 +12,7 @@ namespace echorama {
 
 /// What a stream of poses remembers.
 struct StreamLimits {
-  std::size_t posesPerTool = 4096; ///< the newest ones, in [2, 1000000]: 16 s at 250 Hz, some 0.8 MB a tool
+  std::size_t posesPerTool = 4096; ///< the newest ones, in [2, 1000000]: 16 s at 250 Hz, 0.7 MB a tool
   std::size_t tools = 64;          ///< names that a peer may make up, in [1, 4096]
   double longestGapSeconds = 0.5;  ///< poses further apart are not interpolated, in (0, 600]
   /// In (0, 600]. A sender's clock that goes back by more than this has jumped, and so has one that runs ahead of ours by this

@@ -175,6 +175,26 @@ assert source.GetState() == "lost" and "unplugged" in source.GetMessage()
 assert list(tools_of(source)[0]) == ["Probe"]
 assert not source.errors
 
+# A recording of the device, replayed, is the same.
+recording = folder / "recorded.igs.mha"
+source = make("simulated:?rate=100&tools=2&start=5&unplugAfter=0.5&noiseMm=1")
+assert source.StartRecording(str(recording)) and source.WaitForPoses(100, 60.0)
+for _ in range(600):
+    if source.GetNumberOfRecordedPoses() == 100:
+        break
+    time.sleep(0.02)
+assert source.GetNumberOfRecordedPoses() == 100 and source.GetNumberOfUnrecordedPoses() == 0 and source.GetRecordingProblem() == ""
+assert source.StopRecording() and source.StopRecording() and not source.errors
+assert not source.StartRecording(str(recording)) and source.errors # it is there
+again = make(f"replay:{recording}?speed=0")
+assert again.WaitForPoses(100, 60.0)
+matrices = [vtkMatrix4x4(), vtkMatrix4x4()]
+for moment in (5.0, 5.2, 5.49):
+    for which, matrix in zip((source, again), matrices):
+        which.SetTime(moment)
+        assert which.GetTransform("ProbeToReference", matrix) == 0
+    assert all(matrices[0].GetElement(i, j) == matrices[1].GetElement(i, j) for i in range(4) for j in range(4))
+
 # A tool that becomes too old makes a picture of its own.
 source = make("simulated:?rate=100&tools=1&unplugAfter=0.05&motion=still", FreshSeconds=0.2)
 assert source.WaitForPoses(3, 60.0)
