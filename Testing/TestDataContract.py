@@ -273,6 +273,15 @@ class Reconstructor(ToOtherGrid):
         return filter
 
 
+class Sender(Feed):
+    """A server, each at a port of its own."""
+
+    def filter(self, images=()):
+        filter = super().filter(images)
+        filter.SetPort(0)
+        return filter
+
+
 class ProbeFit(Feed):
     keeps_fields = False # it replaces two of them
 
@@ -427,6 +436,7 @@ Special = {
     "vtkUltrasoundFeather": Feather,
     "vtkUltrasoundStitchQuality": StitchQuality,
     "vtkUltrasoundNoiseTiler": NoiseTiler,
+    "vtkUltrasoundOpenIGTLinkSender": Sender,
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundAnatomySource": TissueSource,

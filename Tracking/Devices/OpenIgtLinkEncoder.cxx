@@ -122,6 +122,8 @@ Bytes OpenIgtLinkEncoder::Image(const StreamedImage& image, bool turn) const
   const ImageGeometry& geometry = image.geometry;
   const std::string name = image.name.empty() ? "the image" : image.name;
   geometry.Check(name);
+  if (image.name.size() > IGTL_HEADER_NAME_SIZE)
+    throw Error(Error::Kind::BadInput, name + ": OpenIGTLink has no names of more than 20 bytes");
   for (const int size : geometry.dimensions)
     if (size > 65535)
       throw Error(Error::Kind::BadInput, name + ": OpenIGTLink has no images of more than 65535 voxels along an axis");

@@ -23,8 +23,8 @@ public:
   Bytes TrackingData(const std::vector<ToolPose>& poses) const;
   /// One IMAGE. Its axes are turned from L, P, S to R, A, S, which is what 3D Slicer takes all images for, unless \a turn
   /// is false; then its numbers stay as they are and are marked as R, A, S all the same, as Plus does.
-  /// \throws Error(BadInput) that names the image when its geometry cannot be, voxels are missing, or it has sizes or a type
-  /// that do not fit; Error(TooLarge) from 2 GiB on.
+  /// \throws Error(BadInput) that names the image when its geometry cannot be, voxels are missing, or its name, sizes
+  /// or type do not fit; Error(TooLarge) from 2 GiB on.
   Bytes Image(const StreamedImage& image, bool turn = true) const;
   /// \a code: 1 when all is well.
   Bytes Status(int code, const std::string& text) const;

@@ -740,6 +740,9 @@ TEST(OpenIgtLinkEncoder, RefusesImagesThatCannotBeSent)
   image.geometry.spacing[1] = 0.0;
   EXPECT_NE(complaint(image).find("spacing"), std::string::npos);
   image = SomeImage();
+  image.name = "a name of more than twenty bytes";
+  EXPECT_NE(complaint(image).find("20 bytes"), std::string::npos);
+  image = SomeImage();
   image.components = 0;
   EXPECT_FALSE(complaint(image).empty());
 }

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundOpenIGTLinkSender
+ * @brief gives a volume to 3D Slicer and every other OpenIGTLink client that is connected
+ *
+ * Input 0: vtkImageData with `Intensity` (else the active scalars). Output: the same, untouched. Each update sends the volume as
+ * an IMAGE to all clients; those that connect later get the newest one at once. The time is `TimeStamp`, else now. Voxels that
+ * are not valid are sent as they are.
+ *
+ * It is the server: peers connect to its port, which is open to this machine alone unless Host says otherwise. It listens
+ * from the first update, SendTransform() or Start() until Stop() or its end.
+ *
+ * Our coordinates are L, P, S; OpenIGTLink's images are R, A, S, and so the volume is turned on its way, see KeepCoordinates.
+ *
+ * Errors, as error events with an empty output: a port that is taken, a host that is not this machine's, a name of more than 20
+ * bytes, a volume of 2 GiB or more or with more than 65535 voxels along an axis.
+ *
+ * @sa vtkUltrasoundTrackerSource
+ */
+#ifndef vtkUltrasoundOpenIGTLinkSender_h
+#define vtkUltrasoundOpenIGTLinkSender_h
+
+#include "EchoramaTrackingModule.h"
+#include "vtkUltrasoundImageAlgorithm.h"
+
+#include <memory> // for the server
+
+class vtkMatrix4x4;
+
+class ECHORAMATRACKING_EXPORT vtkUltrasoundOpenIGTLinkSender : public vtkUltrasoundImageAlgorithm {
+public:
+  static vtkUltrasoundOpenIGTLinkSender* New();
+  vtkTypeMacro(vtkUltrasoundOpenIGTLinkSender, vtkUltrasoundImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * Where it listens: 127.0.0.1 for this machine alone, 0.0.0.0 for all that can reach it (OpenIGTLink knows no passwords).
+   * Default: 127.0.0.1.
+   */
+  vtkSetStringMacro(Host);
+  vtkGetStringMacro(Host);
+  ///@}
+
+  ///@{
+  /** The port, 0 to 65535; 0 takes one that is free, see GetListeningPort(). Default: 18944, OpenIGTLink's own. */
+  vtkSetClampMacro(Port, int, 0, 65535);
+  vtkGetMacro(Port, int);
+  ///@}
+
+  ///@{
+  /** What the volume is called there, 1 to 20 bytes. Default: Volume. */
+  vtkSetStringMacro(DeviceName);
+  vtkGetStringMacro(DeviceName);
+  ///@}
+
+  ///@{
+  /**
+   * On: volume and transforms are sent with their own numbers, so that they lie where the poses of a tracker lie that 3D Slicer
+   * is given as they are. Off: both are turned from L, P, S to R, A, S, so that patients lie in 3D Slicer as they should.
+   * Default: off.
+   */
+  vtkSetMacro(KeepCoordinates, vtkTypeBool);
+  vtkGetMacro(KeepCoordinates, vtkTypeBool);
+  vtkBooleanMacro(KeepCoordinates, vtkTypeBool);
+  ///@}
+
+  ///@{
+  /**
+   * How long, s, an update waits for a first client when there is none, and then again until the volume has been handed over;
+   * in [0, 3600]. For scripts that end after their update. Default: 0.
+   */
+  vtkSetClampMacro(WaitSeconds, double, 0.0, 3600.0);
+  vtkGetMacro(WaitSeconds, double);
+  ///@}
+
+  /** Listens from now on. Returns false, with an error event, when that is not possible. Does nothing when it does already. */
+  bool Start();
+  /** Closes the port and all connections. */
+  void Stop();
+
+  /**
+   * Sends a named transform to all clients, such as ProbeToTracker or VolumeToReference; in mm, as KeepCoordinates says. Returns
+   * false, with an error event, for a name that is empty or has more than 20 bytes, or a matrix that is not finite or
+   * not affine.
+   */
+  bool SendTransform(const char* name, vtkMatrix4x4* matrix);
+
+  /** Waits for up to \a seconds until all has been handed over. Returns whether it has. */
+  bool Flush(double seconds);
+
+  /** The port it listens at; 0 when it does not. */
+  int GetListeningPort();
+  /** The clients that are connected. */
+  int GetNumberOfClients();
+  /** Messages that went out whole, over all clients, since Start(). */
+  vtkIdType GetNumberOfSentMessages();
+  /** Messages that slow clients did not take in time, and volumes that a newer one replaced on their way. */
+  vtkIdType GetNumberOfDroppedMessages();
+
+protected:
+  vtkUltrasoundOpenIGTLinkSender();
+  ~vtkUltrasoundOpenIGTLinkSender() override;
+
+#ifndef __VTK_WRAP__
+  void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
+#endif
+
+  char* Host = nullptr;
+  int Port = 18944;
+  char* DeviceName = nullptr;
+  vtkTypeBool KeepCoordinates = 0;
+  double WaitSeconds = 0.0;
+
+private:
+  vtkUltrasoundOpenIGTLinkSender(const vtkUltrasoundOpenIGTLinkSender&) = delete;
+  void operator=(const vtkUltrasoundOpenIGTLinkSender&) = delete;
+
+  struct Internals;
+  std::unique_ptr<Internals> Parts;
+};
+
+#endif
