@@ -232,8 +232,8 @@ ImageGeometry DecodeGeometry(const unsigned char* header, bool turn, bool& mirro
   if (whole[2] == 1 && steps.col(2).isZero(0.0)) // a plane need not say how thick it is
     steps.col(2) = steps.col(0).cross(steps.col(1)).normalized();
   geometry.spacing = steps.colwise().norm();
-  if (!(geometry.spacing.minCoeff() > 0.0))
-    Complain("has voxels without size");
+  if (!(geometry.spacing.minCoeff() >= 1e-6 && geometry.spacing.maxCoeff() <= 1e6))
+    Complain("has voxels of a size that cannot be");
   geometry.origin = numbers.col(3) + steps * (first - half);
   geometry.direction = steps * geometry.spacing.cwiseInverse().asDiagonal();
   mirrored = geometry.direction.determinant() < 0.0;
