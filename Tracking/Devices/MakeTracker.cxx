@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkListener.h"
+#include "Tracking/Devices/PolhemusTracker.h"
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Devices/TrackerAddress.h"
@@ -29,6 +30,7 @@ const std::vector<Kind>& Kinds()
       {"simulated", MakeSimulatedTracker},
       {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>},
       {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
+      {PolhemusTracker::Scheme, Make<PolhemusTracker>},
   };
   return kinds;
 }

@@ -92,12 +92,10 @@ PolhemusOptions PolhemusOptions::From(const TrackerAddress& address)
   return options;
 }
 
-std::unique_ptr<TrackerDevice> PolhemusTracker::Make(const TrackerAddress& address)
+PolhemusTracker::PolhemusTracker(const TrackerAddress& address)
+  : options_(PolhemusOptions::From(address)), port_(options_.path, options_.baud)
 {
-  return std::make_unique<PolhemusTracker>(PolhemusOptions::From(address));
 }
-
-PolhemusTracker::PolhemusTracker(const PolhemusOptions& options) : options_(options), port_(options.path, options.baud) {}
 
 void PolhemusTracker::Start(PoseStream& poses, ImageStream*)
 {

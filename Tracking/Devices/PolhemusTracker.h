@@ -7,7 +7,6 @@
 #include "Tracking/Devices/TrackerDevice.h"
 #include "Tracking/Stream/Worker.h"
 #include <array>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,11 +36,11 @@ struct PolhemusOptions {
 /// falls silent it begins again, every half a second, until it is stopped.
 class PolhemusTracker : public TrackerDevice {
 public:
-  /// \throws Error(InvalidParameter)
-  explicit PolhemusTracker(const PolhemusOptions& options);
-  ~PolhemusTracker() override { Stop(); }
+  static constexpr const char* Scheme = "polhemus";
 
-  static std::unique_ptr<TrackerDevice> Make(const TrackerAddress& address);
+  /// \throws Error(InvalidParameter), see PolhemusOptions::From.
+  explicit PolhemusTracker(const TrackerAddress& address);
+  ~PolhemusTracker() override { Stop(); }
 
   /// \throws Error(FileSystem) when the line cannot be opened.
   void Start(PoseStream& poses, ImageStream* images) override;

@@ -186,7 +186,7 @@ private:
     speech_ = PolhemusSpeech();
     speech_.model = character_.model;
     speech_.format = PolhemusFormat::Ascii;
-    speech_.layout = {PolhemusItem::Position, PolhemusItem::Quaternion, PolhemusItem::LineEnd};
+    speech_.layout = {PolhemusItem::Position, PolhemusItem::EulerExtended, PolhemusItem::LineEnd};
     speech_.unitMm = 25.4;
     talks_ = character_.talksAlready;
     typed_.clear();
