@@ -7,6 +7,7 @@
 #include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
+#include "Tracking/Devices/UdpTracker.h"
 
 namespace echorama {
 namespace {
@@ -31,6 +32,7 @@ const std::vector<Kind>& Kinds()
       {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>},
       {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
       {PolhemusTracker::Scheme, Make<PolhemusTracker>},
+      {UdpTracker::Scheme, Make<UdpTracker>},
   };
   return kinds;
 }

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Tracking/Devices/UdpTracker.h"
+#include "Core/Base/Random.h"
+#include "Tracking/Stream/Clock.h"
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <unistd.h>
+
+namespace echorama {
+
+UdpTracker::UdpTracker(const TrackerAddress& address)
+{
+  address.CheckOptions({"from", "silence"});
+  endpoint_ = address.HostAndPort("127.0.0.1", DefaultPort);
+  from_ = address.Text("from", "");
+  silence_ = address.Number("silence", silence_, 0.1, 3600.0);
+}
+
+void UdpTracker::Start(PoseStream& poses, ImageStream*)
+{
+  Stop();
+  const auto senders = from_.empty() ? std::vector<std::string>() : HostNumbers(from_);
+  const auto socket = std::make_shared<UdpSocket>(UdpSocket::Receiving(endpoint_.host, endpoint_.port));
+  port_ = socket->Port();
+  const std::string here = "udp://" + endpoint_.host + ":" + std::to_string(port_);
+  poses.SetState(DeviceState::Connecting, here + ": nothing has come yet");
+
+  worker_.Start([socket, senders, here, silence = silence_, &poses](const Worker::Signal& signal) {
+    PosePacketOrder order(silence);
+    PosePacket packet;
+    std::vector<unsigned char> bytes;
+    std::string sender;
+    double last = 0.0;
+    bool running = false;
+    while (!signal.Stopped()) {
+      bytes.resize(PosePacket::MostBytes + 1);
+      const bool came = socket->Receive(bytes, sender, 0.05);
+      const double now = ClockNow();
+      if (running && now - last > silence) {
+        running = false;
+        poses.SetState(DeviceState::Lost, here + ": the sender is silent");
+      }
+      if (!came)
+        continue;
+      if (!senders.empty() && std::find(senders.begin(), senders.end(), sender) == senders.end()) {
+        poses.Reject(Rejection::Foreign, here + ": a packet from " + sender);
+        continue;
+      }
+      const std::string complaint = DecodePosePacket(bytes.data(), bytes.size(), packet);
+      if (!complaint.empty()) {
+        poses.Reject(bytes.size() > PosePacket::MostBytes ? Rejection::TooLarge : Rejection::Malformed,
+                     here + ": a packet from " + sender + ": " + complaint);
+        continue;
+      }
+      const auto verdict = order.Judge(packet, now);
+      if (verdict != PosePacketOrder::Verdict::New) {
+        const bool foreign = verdict == PosePacketOrder::Verdict::Foreign;
+        poses.Reject(foreign ? Rejection::Foreign : Rejection::Replayed,
+                     here + ": a packet from " + sender + (foreign ? " of another session" : " that is not newer than the last"));
+        continue;
+      }
+      last = now;
+      if (!running) {
+        running = true;
+        poses.SetState(DeviceState::Running, here + ": packets from " + sender);
+      }
+      for (ToolPose& pose : packet.poses) {
+        pose.name = ToolTransformName(pose.name);
+        pose.arrival = now;
+        poses.Add(pose);
+      }
+    }
+  });
+}
+
+UdpSender::UdpSender(const std::string& host, int port, std::uint64_t session)
+  : socket_(UdpSocket::SendingTo(host, port)), session_(session)
+{
+  if (session_ != 0)
+    return;
+  const double now = ClockNow();
+  std::uint64_t seed;
+  std::memcpy(&seed, &now, 8);
+  Random random(seed, static_cast<std::uint64_t>(getpid()));
+  while (session_ == 0) {
+    const std::uint64_t high = random.Bits();
+    session_ = high << 32 | random.Bits();
+  }
+}
+
+bool UdpSender::Send(double time, const std::vector<ToolPose>& poses)
+{
+  return socket_.Send(EncodePosePacket({session_, ++sequence_, time, poses}));
+}
+
+} // namespace echorama
