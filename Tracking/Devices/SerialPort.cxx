@@ -66,16 +66,16 @@ Clock::time_point After(double seconds)
 struct SerialPort::Line {
   int file = -1;
   termios before{};
-  bool isSet = false;
+  bool isOurs = false;
 
   ~Line()
   {
-    if (isSet) // once the last bytes are out; of no effect when the device is gone
-      tcsetattr(file, TCSADRAIN, &before);
-    if (file >= 0) {
+    if (isOurs) {
+      tcsetattr(file, TCSADRAIN, &before); // once the last bytes are out; of no effect when the device is gone
       ioctl(file, TIOCNXCL);
-      close(file);
     }
+    if (file >= 0)
+      close(file);
   }
 };
 
@@ -125,9 +125,10 @@ void SerialPort::Open()
     throw Error(Error::Kind::FileSystem, path_ + ": it is no serial line");
   if (flock(line->file, LOCK_EX | LOCK_NB) != 0)
     refuse(errno);
-  ioctl(line->file, TIOCEXCL); // a wish: pseudo-terminals of some systems do not know it
   if (tcgetattr(line->file, &line->before) != 0)
     refuse(errno);
+  line->isOurs = true;
+  ioctl(line->file, TIOCEXCL); // a wish: not every driver knows it
 
   termios raw = line->before;
   cfmakeraw(&raw);
@@ -141,7 +142,6 @@ void SerialPort::Open()
   cfsetospeed(&raw, speed->code);
   if (tcsetattr(line->file, TCSANOW, &raw) != 0)
     refuse(errno);
-  line->isSet = true;
   tcflush(line->file, TCIOFLUSH);
   line_ = std::move(line);
 }
