@@ -3,7 +3,6 @@
 // must be written again, to the same packet.
 #include "Testing/Fuzzing.h"
 #include "Tracking/Devices/PosePacket.h"
-#include <zlib.h>
 
 using namespace echorama;
 
@@ -24,6 +23,17 @@ void Try(const std::vector<unsigned char>& bytes)
       std::abort();
 }
 
+std::uint32_t Crc(const unsigned char* bytes, std::size_t count)
+{
+  std::uint32_t crc = 0xffffffffu;
+  for (std::size_t i = 0; i < count; ++i) {
+    crc ^= bytes[i];
+    for (int bit = 0; bit < 8; ++bit)
+      crc = crc >> 1 ^ (crc & 1 ? 0xedb88320u : 0);
+  }
+  return ~crc;
+}
+
 } // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
@@ -32,7 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Try(bytes);
   if (size < 4)
     return 0;
-  const uLong sum = crc32(0, bytes.data(), static_cast<uInt>(size - 4));
+  const std::uint32_t sum = Crc(bytes.data(), size - 4);
   for (std::size_t i = 0; i < 4; ++i)
     bytes[size - 4 + i] = static_cast<unsigned char>(sum >> (8 * i));
   Try(bytes);
