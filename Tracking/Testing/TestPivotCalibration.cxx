@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+#include "Core/Base/Random.h"
+#include "Readers/PoseLog.h"
+#include "Readers/Testing/TemporaryFolder.h"
+#include "Tracking/Calibration/PivotCalibration.h"
+#include <cmath>
+#include <functional>
+
+using namespace echorama;
+using namespace echorama::testing;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double DegreesPerRadian = 57.29577951308232;
+const Vector3d Tip(12.0, -8.0, 150.0), Pivot(210.0, -35.0, 320.0);
+
+struct Motion {
+  int poses = 100;
+  double tiltDegrees = 30.0; // standard deviation, about two axes
+  double spinDegrees = 30.0; // about the third, the way to the tip
+  PoseNoise noise{0.25, 0.7};
+};
+
+// A tool that is turned about its tip. \a noise: in the tool's axes.
+std::vector<TimedPose> Turned(const Motion& motion, std::uint64_t seed)
+{
+  Random random(seed);
+  std::vector<TimedPose> poses;
+  for (int i = 0; i < motion.poses; ++i) {
+    const Vector3d turn(motion.tiltDegrees * random.Normal(), motion.tiltDegrees * random.Normal(),
+                        motion.spinDegrees * random.Normal());
+    Pose pose = Pose::Identity();
+    pose.linear() = ExpRotation(Vector3d(0.4, -0.9, 1.7)) * ExpRotation(turn / DegreesPerRadian);
+    pose.translation() = Pivot - pose.linear() * Tip;
+    Pose noise = Pose::Identity();
+    const Vector3d w(random.Normal(), random.Normal(), random.Normal());
+    noise.linear() = ExpRotation(motion.noise.degrees / DegreesPerRadian * w);
+    noise.translation() = motion.noise.mm * Vector3d(random.Normal(), random.Normal(), random.Normal());
+    poses.push_back({i / 60.0, pose * noise});
+  }
+  return poses;
+}
+
+Motion Exact(Motion motion = {})
+{
+  motion.noise = {0.0, 0.0};
+  return motion;
+}
+
+void Refused(const std::vector<TimedPose>& poses, Error::Kind kind, const std::string& words,
+             const PivotParameters& parameters = {})
+{
+  ExpectRefused([&] { CalibratePivot(poses, parameters); }, kind, "pivot calibration", words);
+}
+
+bool HasNote(const PivotResult& result, const std::string& words)
+{
+  for (const std::string& note : result.notes)
+    if (note.find(words) != std::string::npos)
+      return true;
+  return false;
+}
+
+} // namespace
+
+TEST(PivotCalibration, Exact)
+{
+  const PivotResult result = CalibratePivot(Turned(Exact(), 1));
+  EXPECT_LT((result.tip - Tip).norm(), 1e-9);
+  EXPECT_LT((result.pivot - Pivot).norm(), 1e-9);
+  EXPECT_LT((result.algebraicTip - Tip).norm(), 1e-9);
+  EXPECT_EQ(result.inliers, 100);
+  EXPECT_LT(result.rmsMm, 1e-9);
+  ASSERT_TRUE(result.sphere.known);
+  EXPECT_LT((result.sphere.centre - Pivot).norm(), 1e-6);
+  EXPECT_NEAR(result.sphere.radiusMm, Tip.norm(), 1e-6);
+  EXPECT_TRUE(result.notes.empty()) << result.notes[0];
+
+  // The tip may be the sensor itself: then nothing moves.
+  std::vector<TimedPose> still = Turned(Exact(), 1);
+  for (TimedPose& pose : still)
+    pose.pose.translation() = Pivot;
+  const PivotResult zero = CalibratePivot(still);
+  EXPECT_LT(zero.tip.norm(), 1e-9);
+  EXPECT_FALSE(zero.sphere.known);
+}
+
+// Whether the stated region holds, and whether anything is gained over least squares.
+TEST(PivotCalibration, RegionHoldsAndBoundIsReached)
+{
+  struct Case {
+    Motion motion;
+    bool estimate;
+    std::uint64_t seed;
+  };
+  for (const Case& c : {Case{{100, 30.0, 30.0, {0.25, 0.7}}, false, 1000}, Case{{100, 30.0, 30.0, {0.25, 0.7}}, true, 11000},
+                        Case{{8, 30.0, 60.0, {0.25, 0.7}}, true, 21000}, Case{{200, 6.0, 6.0, {0.25, 0.3}}, false, 31000},
+                        Case{{200, 6.0, 6.0, {0.5, 0.2}}, true, 41000}, Case{{60, 20.0, 20.0, {0.75, 2.1}}, true, 51000}}) {
+    constexpr int Trials = 500;
+    int held = 0;
+    double squares = 0.0, stated = 0.0, algebraic = 0.0;
+    PivotParameters parameters;
+    parameters.noise = c.estimate ? PoseNoise{c.motion.noise.degrees / 2, c.motion.noise.mm / 2} : c.motion.noise;
+    parameters.estimateNoise = c.estimate;
+    parameters.rejectOutliers = c.seed == 1000; // the search takes most of the time, and must cost no accuracy
+    for (int trial = 0; trial < Trials; ++trial) {
+      const PivotResult result = CalibratePivot(Turned(c.motion, c.seed + static_cast<std::uint64_t>(trial)), parameters);
+      const double error = (result.tip - Tip).norm();
+      held += error <= result.tipRadius95Mm;
+      squares += error * error;
+      algebraic += (result.algebraicTip - Tip).squaredNorm();
+      stated += result.tipRmsMm * result.tipRmsMm;
+    }
+    const double rms = std::sqrt(squares / Trials), bound = std::sqrt(stated / Trials), plain = std::sqrt(algebraic / Trials);
+    SCOPED_TRACE("case " + std::to_string(c.seed) + ": held " + std::to_string(held) + ", rms " + std::to_string(rms) +
+                 ", stated " + std::to_string(bound) + ", plain " + std::to_string(plain));
+    EXPECT_GE(held, 465);
+    EXPECT_LE(held, 485);
+    EXPECT_NEAR(rms / bound, 1.0, 0.08);
+    EXPECT_LT(rms, 1.02 * plain);
+  }
+}
+
+TEST(PivotCalibration, OutliersAreNamed)
+{
+  for (const bool estimate : {false, true}) {
+    double clean = 0.0, dirty = 0.0;
+    for (std::uint64_t trial = 0; trial < 40; ++trial) {
+      std::vector<TimedPose> poses = Turned({}, 300 + trial);
+      PivotParameters parameters;
+      parameters.estimateNoise = estimate;
+      clean += (CalibratePivot(poses, parameters).tip - Tip).squaredNorm();
+      Random random(7, trial);
+      for (std::size_t i = 0; i < 15; ++i) // before the tip was put down
+        poses[i].pose.translation() += random.Uniform(15.0, 100.0) * random.Direction();
+      for (std::size_t i = 60; i < 75; ++i) // a tracker that errs
+        poses[i].pose.linear() = poses[i].pose.linear() * ExpRotation(random.Uniform(0.3, 3.0) * Vector3d(0.8, 0.6, 0.0));
+      const PivotResult result = CalibratePivot(poses, parameters);
+      dirty += (result.tip - Tip).squaredNorm();
+      EXPECT_GE(result.inliers, 65);
+      EXPECT_LE(result.inliers, 70);
+      EXPECT_FALSE(result.residuals[3].inlier);
+      EXPECT_FALSE(result.residuals[61].inlier);
+      EXPECT_TRUE(HasNote(result, "poses were left out")) << result.notes.size();
+      EXPECT_TRUE(HasNote(result, "pose 1 (at 0 s) to pose 15 (at 0.233333 s)"));
+    }
+    EXPECT_LT(std::sqrt(dirty / clean), 1.5);
+  }
+  PivotParameters all;
+  all.rejectOutliers = false;
+  std::vector<TimedPose> poses = Turned({}, 300);
+  poses[5].pose.translation().x() += 60.0;
+  const PivotResult result = CalibratePivot(poses, all);
+  EXPECT_EQ(result.inliers, 100);
+  EXPECT_TRUE(HasNote(result, "times what the noise explains"));
+}
+
+TEST(PivotCalibration, TooLittleTurning)
+{
+  Refused({}, Error::Kind::NotPossible, "at least 4 poses");
+  Refused(Turned({3, 30.0, 30.0, {}}, 1), Error::Kind::NotPossible, "at least 4 poses");
+  Refused(Turned({100, 0.0, 0.0, {0.25, 0.7}}, 1), Error::Kind::NotPossible, "turned by only");
+  Refused(Turned({100, 1.0, 1.0, {0.25, 0.7}}, 1), Error::Kind::NotPossible, "turned by only");
+  std::vector<TimedPose> moved = Turned(Exact({100, 0.0, 0.0, {}}), 1); // pure translation
+  for (std::size_t i = 0; i < moved.size(); ++i)
+    moved[i].pose.translation().x() += static_cast<double>(i);
+  Refused(moved, Error::Kind::NotPossible, "turned by only 0 degrees");
+  // About one axis, with and without noise: any axis.
+  Refused(Turned({100, 0.0, 40.0, {0.25, 0.7}}, 1), Error::Kind::NotPossible, "one axis only, (");
+  Refused(Turned(Exact({100, 0.0, 40.0, {}}), 1), Error::Kind::NotPossible, "known only up to a line along it");
+  // Half a turn about one axis, and full turns.
+  std::vector<TimedPose> half(Turned(Exact({100, 0.0, 0.0, {}}), 1));
+  for (std::size_t i = 0; i < half.size(); ++i) {
+    half[i].pose.linear() =
+        half[i].pose.linear() * ExpRotation(Vector3d(3.14159265358979 * static_cast<double>(i % 2), 0.0, 0.0));
+    half[i].pose.translation() = Pivot - half[i].pose.linear() * Tip;
+  }
+  Refused(half, Error::Kind::NotPossible, "one axis only");
+  // Outliers alone do not make a swing.
+  std::vector<TimedPose> still = Turned({100, 0.0, 0.0, {0.25, 0.7}}, 1);
+  const std::vector<TimedPose> others = Turned({100, 40.0, 40.0, {}}, 2);
+  for (std::size_t i = 0; i < 20; ++i) {
+    still[i] = others[i];
+    still[i].pose.translation() += Vector3d(50.0, 10.0 * static_cast<double>(i), 0.0);
+  }
+  Refused(still, Error::Kind::NotPossible, "turned by only");
+}
+
+TEST(PivotCalibration, BadPoses)
+{
+  std::vector<TimedPose> poses = Turned({}, 1);
+  poses[4].pose.translation().x() = NAN;
+  Refused(poses, Error::Kind::BadInput, "pose 5 (at 0.0666667 s) holds a number that is not finite");
+  poses = Turned({}, 1);
+  poses[4].pose.linear() *= 1.1;
+  poses[4].time = NAN;
+  Refused(poses, Error::Kind::BadInput, "pose 5 is not rigid");
+  poses = Turned({}, 1);
+  poses[0].pose.linear().col(0) *= -1.0;
+  Refused(poses, Error::Kind::BadInput, "pose 1 (at 0 s) is not rigid");
+}
+
+TEST(PivotCalibration, Mistakes)
+{
+  // Rotations the wrong way round.
+  std::vector<TimedPose> poses = Turned({}, 1);
+  for (TimedPose& pose : poses)
+    pose.pose.linear() = Eigen::Matrix3d(pose.pose.linear().transpose());
+  for (const bool estimate : {false, true}) {
+    PivotParameters parameters;
+    parameters.estimateNoise = estimate;
+    Refused(poses, Error::Kind::NotPossible, "is the convention another?", parameters);
+  }
+  // A tool that is carried about.
+  Random random(5);
+  poses = Turned({}, 1);
+  for (TimedPose& pose : poses)
+    pose.pose.translation() = 200.0 * random.Uniform() * random.Direction();
+  Refused(poses, Error::Kind::NotPossible, "do not turn about a fixed point");
+  // Metres.
+  poses = Turned({}, 1);
+  for (TimedPose& pose : poses)
+    pose.pose.translation() *= 0.001;
+  EXPECT_TRUE(HasNote(CalibratePivot(poses), "are they in metres?"));
+  // The tool seen by the tracker and the tracker seen by the tool differ by who is who.
+  poses = Turned({}, 1);
+  for (TimedPose& pose : poses)
+    pose.pose = Pose(pose.pose.inverse());
+  const PivotResult inverse = CalibratePivot(poses);
+  EXPECT_LT((inverse.pivot - Tip).norm(), 3.0);
+  EXPECT_TRUE(inverse.tip.norm() < 400.0 || HasNote(inverse, "farther than the pivot"));
+}
+
+TEST(PivotCalibration, Parameters)
+{
+  PivotParameters parameters;
+  parameters.noise.mm = 0.0;
+  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "(0, 100]", parameters);
+  parameters = {};
+  parameters.noise.degrees = NAN;
+  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "[0, 45]", parameters);
+  parameters = {};
+  parameters.leastSwingDegrees = 0.0;
+  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "least swing", parameters);
+  EXPECT_THROW(CalibratePivot(Turned({}, 1), {}, Progress([](double) { return false; })), Error);
+}
+
+// The stylus of Plus's landmark recording rests in landmarks; it is not turned enough for a pivot, and that is what is said.
+TEST(PivotCalibration, RecordedStylus)
+{
+  const std::string path =
+      std::string(ECHORAMA_SOURCE_DIR) + "/../shared/data/plus/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha";
+  if (!std::filesystem::exists(path))
+    GTEST_SKIP() << "the recordings are not there";
+  std::vector<TimedPose> poses;
+  for (const ToolPose& pose : ReadPoseLog(path).Of("StylusToTracker"))
+    if (pose.status == TransformStatus::Valid)
+      poses.push_back({pose.time, pose.pose});
+  ASSERT_GT(poses.size(), 10u);
+  Refused(poses, Error::Kind::NotPossible, "");
+}
