@@ -591,7 +591,8 @@ int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformati
 //----------------------------------------------------------------------------
 int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress&) {
+  return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress& progress) {
+    progress(0.0);
     vtkPolyData* tools = vtkPolyData::GetData(outputs, 0);
     vtkImageData* image = vtkImageData::GetData(outputs, 1);
     tools->Initialize();
