@@ -3,11 +3,37 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <exception>
 #include <mutex>
+#include <sys/syscall.h>
 #include <thread>
+#include <unistd.h>
 
 namespace echorama {
+namespace {
+
+// These threads sleep nearly always, and what they wake for is late when they must wait for a turn. Since 6.12, Linux lets a
+// thread ask for short turns, which come the sooner, by the field that holds the run time of other policies; before, it ignores
+// it.
+void AskForShortTurns()
+{
+#ifdef SYS_sched_getattr
+  struct {
+    std::uint32_t size, policy;
+    std::uint64_t flags;
+    std::int32_t nice;
+    std::uint32_t priority;
+    std::uint64_t runtime, deadline, period; // ns
+  } attributes{};
+  if (syscall(SYS_sched_getattr, 0, &attributes, sizeof attributes, 0) != 0)
+    return;
+  attributes.runtime = 100000;
+  syscall(SYS_sched_setattr, 0, &attributes, 0); // where it is not granted, nothing is lost
+#endif
+}
+
+} // namespace
 
 struct Worker::Signal::State {
   mutable std::mutex mutex;
@@ -40,6 +66,7 @@ void Worker::Start(std::function<void(const Signal&)> job)
   thread_ = std::make_shared<Thread>();
   thread_->signal.state_ = std::make_shared<Signal::State>();
   thread_->thread = std::thread([job = std::move(job), signal = thread_->signal] {
+    AskForShortTurns();
     std::string failure;
     try {
       job(signal);
