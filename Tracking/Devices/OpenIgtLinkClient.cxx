@@ -22,8 +22,13 @@ OpenIgtLinkClient::OpenIgtLinkClient(const TrackerAddress& address)
 
 void OpenIgtLinkClient::Start(PoseStream& poses, ImageStream* images)
 {
+  Stop();
+  poses.SetLive(true);
   poses.SetState(DeviceState::Connecting, "to " + endpoint_.host + ":" + std::to_string(endpoint_.port));
-  worker_.Start([this, &poses, images](const Worker::Signal& signal) { Run(signal, poses, images); });
+  worker_.Start([this, &poses, images](const Worker::Signal& signal) {
+    Run(signal, poses, images);
+    poses.SetState(DeviceState::Idle);
+  });
 }
 
 void OpenIgtLinkClient::Run(const Worker::Signal& signal, PoseStream& poses, ImageStream* images) const

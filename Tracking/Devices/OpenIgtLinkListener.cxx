@@ -19,8 +19,12 @@ void OpenIgtLinkListener::Start(PoseStream& poses, ImageStream* images)
 {
   Stop();
   listener_ = TcpSocket::Listen(endpoint_.host, endpoint_.port);
+  poses.SetLive(true);
   poses.SetState(DeviceState::Connecting, "listening on " + endpoint_.host + ":" + std::to_string(Port()));
-  worker_.Start([this, &poses, images](const Worker::Signal& signal) { Run(signal, poses, images); });
+  worker_.Start([this, &poses, images](const Worker::Signal& signal) {
+    Run(signal, poses, images);
+    poses.SetState(DeviceState::Idle);
+  });
 }
 
 void OpenIgtLinkListener::Stop()

@@ -249,6 +249,7 @@ TEST(OpenIgtLink, AClientStopsAtOnceWhateverItDoes)
     const double start = ClockNow();
     client.Stop();
     EXPECT_LT(ClockNow() - start, 2.0) << place; // 0.25 s on a machine that is not busy
+    EXPECT_EQ(poses.Statistics().state, DeviceState::Idle);
   }
 }
 
