@@ -195,6 +195,7 @@ private:
 
   void Live(const Worker::Signal& signal)
   {
+    signal_ = &signal;
     Random random(77, ++lives_);
     const double begin = ClockNow();
     std::uint32_t frame = 0;
@@ -228,9 +229,17 @@ private:
 
   void Say(const std::string& bytes)
   {
-    // What does not fit is lost, as on a line.
-    if (line_.Master() >= 0 && write(line_.Master(), bytes.data(), bytes.size()) < 0)
-      return;
+    // Waits a while for a reader that a busy machine holds up: what is lost is for LineNoise to say.
+    int waits = 0;
+    for (std::size_t at = 0; at < bytes.size() && waits < 500 && !signal_->Stopped();) {
+      const ssize_t count = write(line_.Master(), bytes.data() + at, bytes.size() - at);
+      if (count > 0) {
+        at += static_cast<std::size_t>(count);
+      } else {
+        signal_->Sleep(0.002);
+        ++waits;
+      }
+    }
   }
 
   void Answer(unsigned char command, const std::string& data, unsigned char error = 0)
@@ -316,6 +325,7 @@ private:
   PseudoTerminal line_;
   PolhemusSpeech speech_;
   std::string typed_;
+  const Worker::Signal* signal_ = nullptr;
   EmulatedMoment now_;
   std::uint64_t lives_ = 0;
   std::atomic<bool> talks_{false};

@@ -143,7 +143,7 @@ TEST(UdpTracker, SaysWhatIsTheMatterAndStopsSoon)
 
   const double begin = ClockNow();
   first.tracker.Stop();
-  EXPECT_LT(ClockNow() - begin, 1.0);
+  EXPECT_LT(ClockNow() - begin, 5.0);
   first.tracker.Stop();
   second.Start(poses, nullptr); // the port is free again
   EXPECT_EQ(second.Port(), first.tracker.Port());
