@@ -347,6 +347,22 @@ class TissueMeshes(TissueSource):
         return filter
 
 
+class RigFit(TissueSource):
+    """From a scan of the rig, which its own test makes as well; other volumes show none."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        rig, scan = echorama.vtkUltrasoundAnatomySource(), echorama.vtkUltrasoundSynthesizer()
+        rig.SetKindToCalibrationRig()
+        scan.SetInputConnection(rig.GetOutputPort())
+        for name, value in (("FanAngle", 70), ("FanRadius", 40), ("SweepAngle", 65), ("SweepRadius", 30), ("DepthMax", 118), ("Elements", 64),
+                            ("Steps", 48), ("Samples", 320), ("TgcDbPerCm", 0), ("DynamicRangeDb", 70), ("NoiseDb", -45), ("SpacingMm", 1.2)):
+            getattr(scan, "Set" + name)(value)
+        filter.SetInputConnection(scan.GetOutputPort())
+        filter.SetBalls("A -27 -22 -19 4; B -30 23 -45 5; C -5 -20 -49 3; D -2 18 -28 6; E 27 21 -20 7; F 12 -14 -58 3.5; G 30 -1 -47 4.5")
+        return filter
+
+
 class Files(Feed):
     def __init__(self, make):
         super().__init__(make)
@@ -440,7 +456,9 @@ Special = {
     "vtkUltrasoundProbeFit": ProbeFit,
     "vtkUltrasoundScanConverter": ScanConverter,
     "vtkUltrasoundAnatomySource": TissueSource,
+    "vtkUltrasoundPrintableSource": TissueSource,
     "vtkUltrasoundProbeSource": TissueSource,
+    "vtkUltrasoundRigFit": RigFit,
     "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundSynthesizer": Synthesizer,

@@ -88,7 +88,7 @@ TEST_F(TransformFile, KeepsAReport)
   const std::string path = Path("t.json");
   WriteTransforms(path, {SomeTransform(1)}, R"({"kind": "hand-eye", "inliers": 7})");
   EXPECT_EQ(ReadTransforms(path).size(), 1u);
-  EXPECT_EQ(ReadTransformReport(path), R"({"inliers":7,"kind":"hand-eye"})");
+  EXPECT_EQ(ReadTransformReport(path), R"({"kind":"hand-eye","inliers":7})");
   EXPECT_THROW(WriteTransforms(path, {SomeTransform(1)}, "{"), Error);
   EXPECT_THROW(WriteTransforms(path, {SomeTransform(1)}, "[1]"), Error);
   EXPECT_FALSE(ReadTransformReport(path).empty()) << "a refused report leaves the file";
