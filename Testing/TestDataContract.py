@@ -16,6 +16,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray, vtkStringArray, vtkTypeUInt64Array
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkImageData, vtkMultiBlockDataSet
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm, vtkStreamingDemandDrivenPipeline, vtkTrivialProducer
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 
 import echorama
@@ -360,6 +361,17 @@ class RigFit(TissueSource):
             getattr(scan, "Set" + name)(value)
         filter.SetInputConnection(scan.GetOutputPort())
         filter.SetBalls("A -27 -22 -19 4; B -30 23 -45 5; C -5 -20 -49 3; D -2 18 -28 6; E 27 21 -20 7; F 12 -14 -58 3.5; G 30 -1 -47 4.5")
+class HandEye(TissueSource):
+    """From poses, which are no volumes."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        for angles in ((0, 0, 0), (0.5, 0, 0), (0, 0.6, 0), (0, 0, 0.7), (0.3, 0.3, 0.2)):
+            pose = vtkMatrix4x4()
+            for i, row in enumerate(rotation(*angles)):
+                for j, element in enumerate(row):
+                    pose.SetElement(i, j, element)
+            filter.AddPair(pose, pose)
         return filter
 
 
@@ -450,6 +462,7 @@ Special = {
     "vtkUltrasoundEmbedder": Embedder,
     "vtkUltrasoundEmbedQuality": EmbedQuality,
     "vtkUltrasoundFeather": Feather,
+    "vtkUltrasoundHandEyeCalibration": HandEye,
     "vtkUltrasoundStitchQuality": StitchQuality,
     "vtkUltrasoundNoiseTiler": NoiseTiler,
     "vtkUltrasoundOpenIGTLinkSender": Sender,

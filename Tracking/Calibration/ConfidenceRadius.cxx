@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The error is s L v with L L^T the covariance, v uniform on the sphere of directions and s independent of it. In a direction
 // of size q = |L v| the sphere of radius r holds s <= r / q. The chance of that, averaged over directions (one octant is enough),
-// grows with r; bisection finds where it is the level.
+// grows with r, and where it is the level is found by false position.
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include <algorithm>
 #include <array>
@@ -65,12 +65,31 @@ double ConfidenceRadius(const Eigen::Matrix3d& covariance, int degrees, double l
       sum += Within(r / std::max(size, 1e-150), degrees);
     return sum / static_cast<double>(sizes.size());
   };
-  double low = 0.0, high = std::sqrt(variance.sum());
-  while (chance(high) < level && high < 1e150)
+  double low = 0.0, lowGap = -level, high = std::sqrt(variance.sum()), highGap = chance(high) - level;
+  for (int doubling = 0; highGap < 0.0 && doubling < 200; ++doubling) {
+    low = high;
+    lowGap = highGap;
     high *= 2.0;
-  for (int step = 0; step < 30; ++step) {
-    const double middle = 0.5 * (low + high);
-    (chance(middle) < level ? low : high) = middle;
+    highGap = chance(high) - level;
+  }
+  // False position, with the gap of an end that stays halved (Illinois).
+  int stayed = 0;
+  for (int step = 0; step < 60 && high - low > 1e-9 * high; ++step) {
+    const double middle = (low * highGap - high * lowGap) / (highGap - lowGap);
+    const double gap = chance(middle) - level;
+    if (std::abs(gap) < 1e-9)
+      return middle;
+    if (gap < 0.0) {
+      low = middle;
+      lowGap = gap;
+      highGap *= stayed == -1 ? 0.5 : 1.0;
+      stayed = -1;
+    } else {
+      high = middle;
+      highGap = gap;
+      lowGap *= stayed == 1 ? 0.5 : 1.0;
+      stayed = 1;
+    }
   }
   return 0.5 * (low + high);
 }

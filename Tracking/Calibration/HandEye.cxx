@@ -26,8 +26,8 @@ namespace {
 
 constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr int LeastForNoise = 5; // scans
-// Residuals of so many times the noise are no noise.
-constexpr double HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
+// Residuals of so many times the noise may come from a mistake; are no noise; are no noise either when it is to be estimated.
+constexpr double SuspectScale = 3.0, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
 
 struct MethodName {
   HandEyeMethod method;
@@ -177,13 +177,16 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   HandEyeConsensus consensus = FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood,
                                                     parameters.estimateNoise, parameters.seed, progress.Part(0.0, 0.8));
   const auto inliers = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
-  if (consensus.scale > (parameters.estimateNoise ? HopelessEstimatedScale : HopelessScale) || 2 * inliers < count) {
-    const std::string typical = TypicalResidual(model, consensus.fit.solution);
+  const bool hopeless =
+      consensus.scale > (parameters.estimateNoise ? HopelessEstimatedScale : HopelessScale) || 2 * inliers < count;
+  if (hopeless || consensus.scale > SuspectScale) {
     const std::string explanation = ExplainDisagreement(pairs, parameters, consensus.scale);
-    Refuse("the scans do not agree with each other: typically " + typical + " are left, " +
-           (explanation.empty()
-                ? Format("%.3g times the noise stated. Check that every sensor pose belongs to its volume", consensus.scale)
-                : explanation));
+    if (hopeless || !explanation.empty())
+      Refuse(
+          "the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) + " are left. " +
+          (explanation.empty() ? Format("That is %.3g times the noise stated. Check that every sensor pose belongs to its volume",
+                                        consensus.scale)
+                               : explanation));
   }
   if (!likelihood) {
     consensus.inlier.assign(count, 1);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What people get wrong, told from what they gave. Noise turns the poses of a probe that is held still, too: so turns count
 // only when they are three times what noise alone would show. A wrong unit or an inverted side does not fit, and fits once
-// it is put right; 11 ways of putting right are tried, each with a fit of its own.
+// it is put right; nine ways of putting right are tried, each with a fit of its own.
 //
 // Two mistakes leave no residual. S and M both inverted give S C' = O' M with C' and O' exchanged; both sides in metres give the
-// same answer in metres. Only the size of what comes out can make one suspicious.
+// same answer in metres. Only the size of what comes out can make one suspicious. For the first reason, too, S inverted alone and
+// M inverted alone look the same: what is said then names both, with the length of the lever that follows from each.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #pragma GCC diagnostic ignored "-Warray-bounds"
@@ -139,58 +140,73 @@ void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNois
                  "30 degrees and more",
                  side.name, side.least, volume.axis.x(), volume.axis.y(), volume.axis.z()));
   }
+  // Half turns about axes at right angles, and nothing else: they commute, and C may be turned by any of them.
+  const double small = limit(volumeNoise);
+  const bool halfTurnsOnly = std::all_of(pairs.begin(), pairs.end(), [&](const HandEyePair& pair) {
+    const double degrees = DegreesPerRadian * RotationAngle(pairs.front().volumeToWorld.inverse() * pair.volumeToWorld);
+    return degrees < small || degrees > 180.0 - small;
+  });
+  if (halfTurnsOnly)
+    Refuse("the volumes are turned by half turns about axes at right angles only, which leaves four answers; add a scan that is "
+           "turned by 30 to 90 degrees");
 }
 
 std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters, double scale)
 {
   struct Repair {
     double sensorUnit, volumeUnit;
-    bool invertSensor, invertVolume;
+    bool invert; // one side; which one, residuals cannot tell
     const char* text;
   };
   static const Repair repairs[] = {
-      {1000.0, 1.0, false, false, "the sensor poses are in metres, not mm: multiply their translations by 1000"},
-      {1.0, 1000.0, false, false, "the alignments are in metres, not mm: multiply their translations by 1000"},
-      {10.0, 1.0, false, false, "the sensor poses are in centimetres, not mm: multiply their translations by 10"},
-      {1.0, 10.0, false, false, "the alignments are in centimetres, not mm: multiply their translations by 10"},
-      {25.4, 1.0, false, false, "the sensor poses are in inches, not mm: multiply their translations by 25.4"},
-      {1.0, 25.4, false, false, "the alignments are in inches, not mm: multiply their translations by 25.4"},
-      {1.0, 1.0, true, false, "the sensor poses are the wrong way round (TrackerToSensor): invert them"},
-      {1.0, 1.0, false, true, "the alignments are the wrong way round (WorldToVolume): invert them"},
-      {1000.0, 1.0, true, false,
-       "the sensor poses are the wrong way round (TrackerToSensor) and in metres: invert them and multiply their translations by "
-       "1000"},
-      {1.0, 1000.0, false, true,
-       "the alignments are the wrong way round (WorldToVolume) and in metres: invert them and multiply their translations by "
-       "1000"},
-      {1000.0, 1.0, false, true,
-       "the sensor poses are in metres, and the alignments the wrong way round (WorldToVolume): multiply the translations of the "
-       "former by 1000 and invert the latter"},
-      {1.0, 1000.0, true, false,
-       "the alignments are in metres, and the sensor poses the wrong way round (TrackerToSensor): multiply the translations of "
-       "the "
-       "former by 1000 and invert the latter"},
+      {1000.0, 1.0, false, "the sensor poses are in metres, not mm: multiply their translations by 1000"},
+      {1.0, 1000.0, false, "the alignments are in metres, not mm: multiply their translations by 1000"},
+      {10.0, 1.0, false, "the sensor poses are in centimetres, not mm: multiply their translations by 10"},
+      {1.0, 10.0, false, "the alignments are in centimetres, not mm: multiply their translations by 10"},
+      {25.4, 1.0, false, "the sensor poses are in inches, not mm: multiply their translations by 25.4"},
+      {1.0, 25.4, false, "the alignments are in inches, not mm: multiply their translations by 25.4"},
+      {1.0, 1.0, true, ""},
+      {1000.0, 1.0, true, "the sensor poses are in metres (multiply their translations by 1000) and "},
+      {1.0, 1000.0, true, "the alignments are in metres (multiply their translations by 1000) and "},
+  };
+  const auto repaired = [&pairs](const Repair& repair, bool invertSensor) {
+    std::vector<HandEyePair> result = pairs;
+    for (HandEyePair& pair : result) {
+      pair.sensorToTracker.translation() *= repair.sensorUnit;
+      pair.volumeToWorld.translation() *= repair.volumeUnit;
+      if (repair.invert) {
+        Pose& pose = invertSensor ? pair.sensorToTracker : pair.volumeToWorld;
+        pose = pose.inverse();
+      }
+    }
+    return result;
+  };
+  const auto solve = [&parameters](const std::vector<HandEyePair>& tried) {
+    const HandEyeModel model(tried, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
+    return FindHandEyeConsensus(tried, model, true, false, parameters.seed);
   };
   const Repair* best = nullptr;
   double bestScale = scale / 4.0; // a repair is one that makes residuals much smaller
   for (const Repair& repair : repairs) {
-    std::vector<HandEyePair> repaired = pairs;
-    for (HandEyePair& pair : repaired) {
-      pair.sensorToTracker.translation() *= repair.sensorUnit;
-      pair.volumeToWorld.translation() *= repair.volumeUnit;
-      if (repair.invertSensor)
-        pair.sensorToTracker = pair.sensorToTracker.inverse();
-      if (repair.invertVolume)
-        pair.volumeToWorld = pair.volumeToWorld.inverse();
-    }
-    const HandEyeModel model(repaired, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
-    const double repairedScale = FindHandEyeConsensus(repaired, model, true, false, parameters.seed).scale;
+    const double repairedScale = solve(repaired(repair, true)).scale;
     if (repairedScale < bestScale) {
       bestScale = repairedScale;
       best = &repair;
     }
   }
-  return best ? std::string("they would agree if ") + best->text : std::string();
+  if (!best)
+    return "";
+  std::string text = std::string("They would agree if ") + best->text;
+  if (best->invert) {
+    double levers[2];
+    for (const bool sensor : {true, false})
+      levers[sensor ? 0 : 1] = (solve(repaired(*best, sensor)).fit.solution.volumeToSensor * parameters.target).norm();
+    text += Format(
+        "one side is the wrong way round: invert the sensor poses if they are TrackerToSensor (the target then lies %.0f mm "
+        "from the sensor), or the alignments if they are WorldToVolume (%.0f mm)",
+        levers[0], levers[1]);
+  }
+  return text;
 }
 
 std::vector<std::string> HandEyeSuspicions(const std::vector<HandEyePair>& pairs, const HandEyeSolution& solution,

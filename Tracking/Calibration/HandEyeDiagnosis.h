@@ -17,11 +17,11 @@ std::vector<HandEyePair> CheckedHandEyePairs(const std::vector<HandEyePair>& pai
 std::vector<int> HandEyeRepeats(const std::vector<HandEyePair>& pairs);
 
 /// \throws Error(NotPossible) with the reason when the motions cannot determine C: fewer than three scans; no turns, or no more
-/// than the noise; turns about parallel axes only.
+/// than the noise; turns about parallel axes only; half turns about axes at right angles only.
 void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise);
 
 /// When the scans do not agree: what would make them, as a sentence. Tried are lengths in metres, centimetres and inches on
-/// either side, and S, M given the wrong way round, each alone and together. Empty when nothing helps.
+/// either side, and one side given the wrong way round, alone and with a side in metres. Empty when nothing helps.
 std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters, double scale);
 
 /// What looks strange although the scans agree: both sides in metres, a lever that suggests both inverted. Sentences.

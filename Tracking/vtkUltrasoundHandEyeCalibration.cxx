@@ -1,0 +1,405 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundHandEyeCalibration.h"
+
+#include "Core/Base/JsonPlace.h"
+#include "vtkCellArray.h"
+#include "vtkDataSet.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMatrix4x4.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStringArray.h"
+#include "vtkTable.h"
+#include "vtkUltrasoundVolume.h"
+#include "vtkUnsignedCharArray.h"
+
+#include <limits>
+#include <map>
+
+using echorama::Error;
+
+vtkStandardNewMacro(vtkUltrasoundHandEyeCalibration);
+
+namespace {
+using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+
+// The poses of one input, as they stand: the kernel checks them.
+struct Side {
+  std::vector<echorama::Pose> Poses;
+  std::vector<std::string> Names; // empty when the input has none
+};
+
+Side SideOf(vtkDataObject* data, const std::string& arrayName, const std::string& nameArray, const char* what)
+{
+  const auto complain = [what](const std::string& reason) {
+    throw Error(Error::Kind::BadInput, std::string("the input of ") + what + " " + reason);
+  };
+  vtkFieldData* arrays = nullptr;
+  if (vtkDataSet* dataSet = vtkDataSet::SafeDownCast(data)) {
+    arrays = dataSet->GetPointData();
+  } else if (vtkTable* table = vtkTable::SafeDownCast(data)) {
+    arrays = table->GetRowData();
+  } else {
+    complain("is neither a data set nor a table");
+  }
+  vtkDataArray* numbers = arrays->GetArray(arrayName.c_str());
+  if (!numbers) {
+    int candidates = 0;
+    for (int i = 0; i < arrays->GetNumberOfArrays(); ++i) {
+      vtkDataArray* array = arrays->GetArray(i);
+      if (array && array->GetNumberOfComponents() == 16) {
+        numbers = array;
+        ++candidates;
+      }
+    }
+    if (candidates != 1) {
+      complain("has no array \"" + arrayName + "\", and " + std::to_string(candidates) + " others of 16 components");
+    }
+  }
+  if (numbers->GetNumberOfComponents() != 16) {
+    complain("has an array \"" + arrayName + "\" of " + std::to_string(numbers->GetNumberOfComponents()) +
+             " components; 16 are needed, a matrix row by row");
+  }
+  Side side;
+  for (vtkIdType i = 0; i < numbers->GetNumberOfTuples(); ++i) {
+    double values[16];
+    numbers->GetTuple(i, values);
+    side.Poses.emplace_back(RowMajor(values));
+  }
+  if (vtkStringArray* names = vtkStringArray::SafeDownCast(arrays->GetAbstractArray(nameArray.c_str()))) {
+    for (vtkIdType i = 0; i < numbers->GetNumberOfTuples(); ++i) {
+      side.Names.push_back(names->GetValue(i));
+    }
+  }
+  return side;
+}
+
+template <class Derived>
+void AddField(vtkDataObject* data, const char* name, const Eigen::MatrixBase<Derived>& matrix)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(static_cast<int>(matrix.size()));
+  array->SetNumberOfTuples(1);
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column) {
+      array->SetComponent(0, static_cast<int>(row * matrix.cols() + column), matrix(row, column));
+    }
+  }
+  data->GetFieldData()->AddArray(array);
+}
+
+void Copy(const echorama::Pose& pose, vtkMatrix4x4* matrix)
+{
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      matrix->SetElement(row, column, pose.matrix()(row, column));
+    }
+  }
+}
+} // namespace
+
+//----------------------------------------------------------------------------
+vtkUltrasoundHandEyeCalibration::vtkUltrasoundHandEyeCalibration()
+{
+  const echorama::HandEyeParameters defaults;
+  this->SensorNoiseDegrees = defaults.sensorNoise.degrees;
+  this->SensorNoiseMm = defaults.sensorNoise.mm;
+  this->VolumeNoiseDegrees = defaults.volumeNoise.degrees;
+  this->VolumeNoiseMm = defaults.volumeNoise.mm;
+  this->RejectOutliers = defaults.rejectOutliers;
+  this->EstimateNoise = defaults.estimateNoise;
+  this->Seed = static_cast<int>(defaults.seed);
+  this->SetNumberOfInputPorts(2);
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundHandEyeCalibration::~vtkUltrasoundHandEyeCalibration() = default;
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundHandEyeCalibration::SetAlignmentsConnection(vtkAlgorithmOutput* alignments)
+{
+  this->SetInputConnection(1, alignments);
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundHandEyeCalibration::FillInputPortInformation(int, vtkInformation* info)
+{
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkDataSet");
+  info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkTable");
+  info->Set(INPUT_IS_OPTIONAL(), 1);
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundHandEyeCalibration::AddPair(vtkMatrix4x4* sensorToTracker, vtkMatrix4x4* volumeToWorld, const std::string& name)
+{
+  if (!sensorToTracker || !volumeToWorld) {
+    vtkErrorMacro("a pair is two matrices");
+    return;
+  }
+  echorama::HandEyePair pair;
+  pair.sensorToTracker.matrix() = Eigen::Map<const RowMajor>(sensorToTracker->GetData());
+  pair.volumeToWorld.matrix() = Eigen::Map<const RowMajor>(volumeToWorld->GetData());
+  pair.name = name;
+  this->Pairs.push_back(pair);
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundHandEyeCalibration::RemoveAllPairs()
+{
+  if (!this->Pairs.empty()) {
+    this->Pairs.clear();
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundHandEyeCalibration::GetNumberOfPairs() const
+{
+  return static_cast<int>(this->Pairs.size());
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundHandEyeCalibration::SetMethod(const char* name)
+{
+  try {
+    const echorama::HandEyeMethod method = echorama::HandEyeMethodOf(name ? name : "");
+    if (method != this->Method) {
+      this->Method = method;
+      this->Modified();
+    }
+  } catch (const Error& error) {
+    vtkErrorMacro(<< error.what());
+  }
+}
+
+//----------------------------------------------------------------------------
+const char* vtkUltrasoundHandEyeCalibration::GetMethod() const
+{
+  return echorama::HandEyeMethodName(this->Method);
+}
+
+//----------------------------------------------------------------------------
+echorama::HandEyeParameters vtkUltrasoundHandEyeCalibration::Parameters() const
+{
+  echorama::HandEyeParameters parameters;
+  parameters.method = this->Method;
+  parameters.sensorNoise = {this->SensorNoiseDegrees, this->SensorNoiseMm};
+  parameters.volumeNoise = {this->VolumeNoiseDegrees, this->VolumeNoiseMm};
+  parameters.target = Eigen::Vector3d(this->Target);
+  parameters.rejectOutliers = this->RejectOutliers;
+  parameters.estimateNoise = this->EstimateNoise;
+  parameters.seed = static_cast<std::uint64_t>(this->Seed);
+  return parameters;
+}
+
+//----------------------------------------------------------------------------
+std::vector<echorama::HandEyePair> vtkUltrasoundHandEyeCalibration::CollectPairs(vtkDataObject* sensors, vtkDataObject* volumes,
+                                                                                 std::vector<std::string>& notes) const
+{
+  std::vector<echorama::HandEyePair> pairs = this->Pairs;
+  if (!sensors && !volumes) {
+    return pairs;
+  }
+  if (!sensors || !volumes) {
+    throw Error(Error::Kind::BadInput, sensors ? "there are sensor poses but no alignments (input 1)"
+                                               : "there are alignments (input 1) but no sensor poses (input 0)");
+  }
+  const Side s = SideOf(sensors, this->SensorArray, this->NameArray, "sensor poses");
+  const Side m = SideOf(volumes, this->VolumeArray, this->NameArray, "alignments");
+  if (!s.Names.empty() && !m.Names.empty()) {
+    const auto numbersOf = [](const Side& side, const char* what) {
+      std::map<std::string, std::size_t> numbers;
+      for (std::size_t i = 0; i < side.Names.size(); ++i) {
+        if (!numbers.emplace(side.Names[i], i).second) {
+          throw Error(Error::Kind::BadInput, std::string("the input of ") + what + " names \"" + side.Names[i] + "\" twice");
+        }
+      }
+      return numbers;
+    };
+    const auto sensorNumbers = numbersOf(s, "sensor poses"), volumeNumbers = numbersOf(m, "alignments");
+    for (std::size_t i = 0; i < s.Names.size(); ++i) {
+      const auto found = volumeNumbers.find(s.Names[i]);
+      if (found == volumeNumbers.end()) {
+        notes.push_back("Left out: " + s.Names[i] + " has a sensor pose and no alignment.");
+      } else {
+        pairs.push_back({s.Poses[i], m.Poses[found->second], s.Names[i]});
+      }
+    }
+    for (const std::string& name : m.Names) {
+      if (!sensorNumbers.count(name)) {
+        notes.push_back("Left out: " + name + " has an alignment and no sensor pose.");
+      }
+    }
+    return pairs;
+  }
+  if (s.Poses.size() != m.Poses.size()) {
+    throw Error(Error::Kind::BadInput, "there are " + std::to_string(s.Poses.size()) + " sensor poses and " +
+                                           std::to_string(m.Poses.size()) +
+                                           " alignments; one of each is needed for every scan, or names (array \"" +
+                                           this->NameArray + "\") on both sides");
+  }
+  const std::vector<std::string>& names = s.Names.empty() ? m.Names : s.Names;
+  for (std::size_t i = 0; i < s.Poses.size(); ++i) {
+    pairs.push_back({s.Poses[i], m.Poses[i], names.empty() ? "" : names[i]});
+  }
+  return pairs;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundHandEyeCalibration::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  this->HasResult = false;
+  this->Report.clear();
+  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+    std::vector<std::string> notes;
+    const auto pairs = this->CollectPairs(vtkDataObject::GetData(inputs[0]), vtkDataObject::GetData(inputs[1]), notes);
+    this->Result = echorama::CalibrateHandEye(pairs, this->Parameters(), progress);
+    notes.insert(notes.end(), this->Result.notes.begin(), this->Result.notes.end());
+    this->PutOut(vtkPolyData::GetData(outputs), pairs);
+    this->Report = this->ReportOf(notes);
+    this->HasResult = true;
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundHandEyeCalibration::PutOut(vtkPolyData* output, const std::vector<echorama::HandEyePair>& pairs) const
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> vertices;
+  vtkNew<vtkDoubleArray> residuals, degrees;
+  residuals->SetName("Residual");
+  residuals->SetNumberOfComponents(3);
+  degrees->SetName("ResidualDegrees");
+  vtkNew<vtkUnsignedCharArray> inliers;
+  inliers->SetName("Inlier");
+  vtkNew<vtkStringArray> names;
+  names->SetName("ScanName");
+  const Eigen::Vector3d target(this->Target);
+  const echorama::HandEyeSolution& solution = this->Result.solution;
+  const echorama::Pose trackerToWorld = solution.worldToTracker.inverse();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Eigen::Vector3d byAlignment = pairs[i].volumeToWorld * target;
+    const Eigen::Vector3d byTracker = trackerToWorld * pairs[i].sensorToTracker * solution.volumeToSensor * target;
+    const vtkIdType id = points->InsertNextPoint(byAlignment.data());
+    vertices->InsertNextCell(1, &id);
+    residuals->InsertNextTuple(Eigen::Vector3d(byTracker - byAlignment).data());
+    degrees->InsertNextValue(this->Result.residuals[i].degrees);
+    inliers->InsertNextValue(this->Result.residuals[i].inlier ? 1 : 0);
+    names->InsertNextValue(this->Result.residuals[i].name);
+  }
+  output->SetPoints(points);
+  output->SetVerts(vertices);
+  output->GetPointData()->SetVectors(residuals);
+  output->GetPointData()->AddArray(degrees);
+  output->GetPointData()->SetScalars(inliers);
+  output->GetPointData()->AddArray(names);
+  AddField(output, "VolumeToSensor", solution.volumeToSensor.matrix());
+  AddField(output, "WorldToTracker", solution.worldToTracker.matrix());
+  AddField(output, "Covariance", this->Result.covariance);
+  AddField(output, "TargetCovariance", this->Result.targetCovariance);
+  AddField(output, "TargetRadius95", Eigen::Matrix<double, 1, 1>::Constant(this->Result.targetRadius95Mm));
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundHandEyeCalibration::ReportOf(const std::vector<std::string>& notes) const
+{
+  using Json = nlohmann::ordered_json;
+  const auto rows = [](const auto& matrix) { return echorama::JsonPlace::RowsOf(matrix); };
+  const auto numbers = [](const auto& v) { return Json{v[0], v[1], v[2]}; };
+  Json scans = Json::array(), advice = Json::array();
+  for (const echorama::HandEyeResidual& residual : this->Result.residuals) {
+    scans.push_back({{"name", residual.name},
+                     {"inlier", residual.inlier},
+                     {"mm", residual.mm},
+                     {"degrees", residual.degrees},
+                     {"reason", residual.reason}});
+  }
+  for (const echorama::HandEyeAdvice& one : this->Result.advice) {
+    advice.push_back({{"text", one.text}, {"axis", numbers(one.axis)}, {"degrees", one.degrees}, {"radius95_mm", one.radiusMm}});
+  }
+  const Json report{{"method", this->GetMethod()},
+                    {"volume_to_sensor", rows(this->Result.solution.volumeToSensor.matrix())},
+                    {"world_to_tracker", rows(this->Result.solution.worldToTracker.matrix())},
+                    {"target", numbers(this->Target)},
+                    {"target_radius95_mm", this->Result.targetRadius95Mm},
+                    {"target_rms_mm", this->Result.targetRmsMm},
+                    {"target_covariance", rows(this->Result.targetCovariance)},
+                    {"covariance", rows(this->Result.covariance)},
+                    {"inliers", this->Result.inliers},
+                    {"rms_mm", this->Result.rmsMm},
+                    {"rms_degrees", this->Result.rmsDegrees},
+                    {"noise_scale", this->Result.noiseScale},
+                    {"scans", scans},
+                    {"advice", advice},
+                    {"notes", notes}};
+  return report.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundHandEyeCalibration::GetVolumeToSensor(vtkMatrix4x4* pose) const
+{
+  if (!this->HasResult || !pose) {
+    return false;
+  }
+  Copy(this->Result.solution.volumeToSensor, pose);
+  return true;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundHandEyeCalibration::GetWorldToTracker(vtkMatrix4x4* pose) const
+{
+  if (!this->HasResult || !pose) {
+    return false;
+  }
+  Copy(this->Result.solution.worldToTracker, pose);
+  return true;
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundHandEyeCalibration::GetTargetRadius95() const
+{
+  return this->HasResult ? this->Result.targetRadius95Mm : std::numeric_limits<double>::quiet_NaN();
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundHandEyeCalibration::GetTargetRms() const
+{
+  return this->HasResult ? this->Result.targetRmsMm : std::numeric_limits<double>::quiet_NaN();
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundHandEyeCalibration::GetNumberOfInliers() const
+{
+  return this->HasResult ? this->Result.inliers : 0;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundHandEyeCalibration::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Pairs: " << this->Pairs.size() << "\n";
+  os << indent << "SensorArray: " << this->SensorArray << "\n";
+  os << indent << "VolumeArray: " << this->VolumeArray << "\n";
+  os << indent << "NameArray: " << this->NameArray << "\n";
+  os << indent << "Method: " << this->GetMethod() << "\n";
+  os << indent << "Target: " << this->Target[0] << " " << this->Target[1] << " " << this->Target[2] << "\n";
+  os << indent << "SensorNoiseDegrees: " << this->SensorNoiseDegrees << "\n";
+  os << indent << "SensorNoiseMm: " << this->SensorNoiseMm << "\n";
+  os << indent << "VolumeNoiseDegrees: " << this->VolumeNoiseDegrees << "\n";
+  os << indent << "VolumeNoiseMm: " << this->VolumeNoiseMm << "\n";
+  os << indent << "RejectOutliers: " << (this->RejectOutliers ? "on" : "off") << "\n";
+  os << indent << "EstimateNoise: " << (this->EstimateNoise ? "on" : "off") << "\n";
+  os << indent << "Seed: " << this->Seed << "\n";
+  os << indent << "TargetRadius95: " << this->GetTargetRadius95() << "\n";
+}
