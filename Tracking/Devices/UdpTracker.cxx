@@ -24,6 +24,7 @@ void UdpTracker::Start(PoseStream& poses, ImageStream*)
   const auto socket = std::make_shared<UdpSocket>(UdpSocket::Receiving(endpoint_.host, endpoint_.port));
   port_ = socket->Port();
   const std::string here = "udp://" + endpoint_.host + ":" + std::to_string(port_);
+  poses_ = &poses;
   poses.SetState(DeviceState::Connecting, here + ": nothing has come yet");
 
   worker_.Start([socket, senders, here, silence = silence_, &poses](const Worker::Signal& signal) {
@@ -72,6 +73,14 @@ void UdpTracker::Start(PoseStream& poses, ImageStream*)
       }
     }
   });
+}
+
+void UdpTracker::Stop()
+{
+  worker_.Stop();
+  if (poses_)
+    poses_->SetState(DeviceState::Idle);
+  poses_ = nullptr;
 }
 
 UdpSender::UdpSender(const std::string& host, int port, std::uint64_t session)

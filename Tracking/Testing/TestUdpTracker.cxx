@@ -145,6 +145,7 @@ TEST(UdpTracker, SaysWhatIsTheMatterAndStopsSoon)
   first.tracker.Stop();
   EXPECT_LT(ClockNow() - begin, 5.0);
   first.tracker.Stop();
+  EXPECT_EQ(first.poses.Statistics().state, DeviceState::Idle);
   second.Start(poses, nullptr); // the port is free again
   EXPECT_EQ(second.Port(), first.tracker.Port());
 }
