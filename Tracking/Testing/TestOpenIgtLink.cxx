@@ -284,8 +284,8 @@ TEST(OpenIgtLink, ImagesGoToThoseWhoAreThereAndThoseWhoComeLater)
   server.SendImage(image);
   ASSERT_TRUE(Eventually([&] { return early.Version() == 2; }));
   EXPECT_TRUE(server.Flush(Patience));
-  OpenIgtLinkClient second(To(server.Port()));
   PoseStream others;
+  OpenIgtLinkClient second(To(server.Port()));
   second.Start(others, &late);
   ASSERT_TRUE(Eventually([&] { return late.Version() == 2; }));
   for (const ImageStream* stream : {&early, &late}) {
