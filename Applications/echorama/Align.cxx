@@ -2,6 +2,8 @@
 // echorama align: where do overlapping volumes belong?
 #include "Commands.h"
 #include "Outputs.h"
+#include "Readers/TransformFile.h"
+#include "TrackedVolumes.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
 #include <cstdlib>
@@ -21,6 +23,9 @@ struct AlignOptions {
   std::vector<std::string> files, settings;
   std::string output, poses, apply, start, metric, method;
   int fixed = 1;
+  TrackerOptions tracker;
+  std::string calibration;
+  bool trackerOnly = false;
 };
 
 // "name=value"
@@ -45,10 +50,41 @@ Pose PoseOf(vtkUltrasoundAligner* aligner, int volume)
   return pose;
 }
 
+// Puts each volume where the tracker says, as seen from the fixed one: with S the sensor's poses and C the calibration, a
+// volume's probe lies at C^-1 S_fixed^-1 S C of the fixed one's (dissertation eq. 4.4).
+void PlaceByTracker(Session& session, const AlignOptions& options, std::vector<LoadedVolume>& volumes)
+{
+  const TrackedTool tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
+  const TransformGraph graph(ReadTransforms(options.calibration));
+  const NamedTransform* edge = graph.Edge("Volume", tool.from);
+  if (!edge)
+    throw Error(Error::Kind::BadInput, options.calibration + ": it has no VolumeTo" + tool.from + ", which " + tool.name +
+                                           " of " + options.tracker.log + " needs; choose another tool with --tool");
+  if (!IsRotation(edge->matrix.linear()) || edge->status != TransformStatus::Valid)
+    throw Error(Error::Kind::BadInput, options.calibration + ": " + edge->Name() + " is not a rigid, valid pose");
+  Pose volumeToSensor = Pose::Identity();
+  volumeToSensor.matrix() = edge->matrix.matrix();
+  const std::string text = ReadTransformReport(options.calibration);
+  const auto report = nlohmann::json::parse(text.empty() ? "{}" : text);
+  const VolumeFrames frames = VolumeFrames::Of(session, volumes, report.value("volumeFrame", std::string()));
+  const std::vector<Pose> sensor = SensorPoses(session, options.tracker, tool, volumes);
+  const auto fixed = static_cast<std::size_t>(options.fixed - 1);
+  for (std::size_t i = 0; i < volumes.size(); ++i)
+    if (i != fixed)
+      MoveVolume(volumes[i], frames.toFile[fixed] * volumeToSensor.inverse() * sensor[fixed].inverse() * sensor[i] *
+                                 volumeToSensor * frames.toFile[i].inverse());
+  session.result["tracker"] = {{"recording", options.tracker.log}, {"tool", tool.name}, {"calibration", options.calibration}};
+  if (edge->errorMm)
+    session.Say("tracker: the calibration states an error of " + Fixed(*edge->errorMm, 2) + " mm");
+}
+
 void Align(Session& session, AlignOptions options)
 {
   options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
+  for (const std::string& input : {options.tracker.log, options.calibration})
+    if (!input.empty())
+      inputs.push_back(input);
   if (!options.poses.empty())
     inputs.push_back(options.poses);
   if (options.output.empty()) {
@@ -77,6 +113,25 @@ void Align(Session& session, AlignOptions options)
 
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
   ApplyPoses(volumes, options.poses);
+  if (!options.tracker.log.empty())
+    PlaceByTracker(session, options, volumes);
+  if (options.trackerOnly) {
+    std::vector<VolumePose> poses;
+    session.result["output"] = options.output;
+    session.result["fixed"] = options.fixed;
+    session.result["volumes"] = nlohmann::ordered_json::array();
+    for (const LoadedVolume& volume : volumes) {
+      poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
+      session.result["volumes"].push_back({{"file", volume.file}, {"VolumeToWorld", JsonOf(volume.volumeToWorld)}});
+    }
+    for (std::size_t i = 0; i < places.size(); ++i)
+      SaveVolume(session, volumes[i].image, places[i]);
+    WritePoses(options.output, poses);
+    if (folder)
+      folder->Commit();
+    session.Say("wrote " + options.output + ", as the tracker says");
+    return;
+  }
   aligner->SetInputDataObject(BlocksOf(volumes));
   session.Update(aligner, "align");
 
@@ -185,6 +240,13 @@ Command AlignCommand(CLI::App& program)
           " (up to 60), Repeats=" + std::to_string(search.repeats) + " (of a level, 0 to 100), Points=" +
           std::to_string(search.points) + " (compared, 1000 to 10000000), Seed=" + std::to_string(search.seed) +
           ", Pyramid=" + std::to_string(search.pyramid) + " (0 or 1)");
+  values->tracker.AddTo(*options, false);
+  options->add_option("--calibration", values->calibration,
+                      "Calibration of the tracked probe, as echorama calibrate hand-eye writes it");
+  options->add_flag("--tracker-only", values->trackerOnly, "Leave the volumes where the tracker says");
+  options->get_option("--tracker")->needs("--calibration")->excludes("--poses");
+  options->get_option("--calibration")->needs("--tracker");
+  options->get_option("--tracker-only")->needs("--tracker");
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry");
   return {options, [values](Session& session) { Align(session, *values); }};
 }

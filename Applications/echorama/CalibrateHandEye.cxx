@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// echorama calibrate hand-eye: from volumes of the calibration rig and a tracker's recording to where the volume is in the
+// sensor's frame (dissertation 4.1.2).
+#include "Calibrate.h"
+#include "CalibrationRigFile.h"
+#include "Outputs.h"
+#include "Readers/TransformFile.h"
+#include "TrackedVolumes.h"
+#include "Tracking/Calibration/HandEye.h"
+#include <CLI/Validators.hpp>
+#include <cmath>
+#include <memory>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkUltrasoundAligner.h>
+#include <vtkUltrasoundRigFit.h>
+
+namespace echorama {
+namespace {
+
+struct HandEyeOptions {
+  std::vector<std::string> volumes;
+  TrackerOptions tracker;
+  std::string poses, savePoses, output, method = HandEyeMethodName(HandEyeMethod::MaximumLikelihood), start;
+  std::vector<double> target;
+  PoseNoise sensorNoise, volumeNoise;
+  std::string rig = "1", align = "rig";
+  double depthScale = 0.0;
+  bool noiseGiven = false, keepAll = false;
+};
+
+// What was found of the rig in the volumes.
+struct RigReport {
+  double depthScale = 0.0, depthScaleError = 0.0;
+  std::vector<int> found;
+  std::vector<double> rmsMm;
+};
+
+// Finds the rig in each volume and moves the volumes so that it lies in one place: the rig's frame is the world. One bath, one
+// speed of sound: the depth scale is found from all volumes, weighted by how well each knows it. \returns in which volumes it was
+// found
+std::vector<bool> FindRig(Session& session, const HandEyeOptions& options, std::vector<LoadedVolume>& volumes, RigReport& report)
+{
+  const std::vector<RigBall> balls = RigBallsOf(options.rig);
+  std::vector<bool> found(volumes.size(), true);
+  report.depthScale = options.depthScale;
+  for (const bool last : {false, true}) {
+    if (!last && report.depthScale > 0.0)
+      continue; // it is given
+    double sum = 0.0, weights = 0.0;
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
+      if (!found[i])
+        continue;
+      vtkNew<vtkUltrasoundRigFit> fit;
+      for (const RigBall& ball : balls)
+        fit->AddBall(ball.name.c_str(), ball.centre.data(), ball.radius);
+      fit->SetInputData(volumes[i].image);
+      fit->SetDepthScale(report.depthScale);
+      try {
+        session.Update(fit, last ? "find rig" : "measure depth", volumes[i].file);
+      } catch (const Error& error) {
+        if (error.GetKind() == Error::Kind::Cancelled)
+          throw;
+        found[i] = false;
+        session.Note(volumes[i].file + ": it is left out: " + error.what());
+        continue;
+      }
+      if (last) {
+        vtkNew<vtkMatrix4x4> matrix;
+        fit->GetRigToWorld(matrix);
+        Pose rigToFile;
+        rigToFile.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+        MoveVolume(volumes[i], rigToFile.inverse());
+        report.found.push_back(fit->GetNumberOfFoundBalls());
+        report.rmsMm.push_back(fit->GetRmsMm());
+        session.Say("  " + volumes[i].file + ": " + std::to_string(fit->GetNumberOfFoundBalls()) + " of " +
+                    std::to_string(balls.size()) + " balls, " + Fixed(fit->GetRmsMm(), 2) + " mm");
+      } else {
+        const double error = std::max(fit->Fit().depthScaleError, 1e-4), weight = 1.0 / (error * error);
+        sum += weight * fit->GetFoundDepthScale();
+        weights += weight;
+      }
+    }
+    if (!last) {
+      if (weights <= 0.0)
+        throw Error(Error::Kind::NotPossible, "the rig was found in no volume");
+      report.depthScale = sum / weights;
+      report.depthScaleError = 1.0 / std::sqrt(weights);
+      session.Say("depth scale " + Fixed(report.depthScale, 4) + " (standard error " + Fixed(report.depthScaleError, 4) +
+                  "): a bath of " + Fixed(1540.0 / report.depthScale, 0) + " m/s for a scanner that assumes 1540");
+    }
+  }
+  return found;
+}
+
+// Moves the volumes to where they agree. \returns which of them are trusted
+std::vector<bool> AlignContents(Session& session, const HandEyeOptions& options, std::vector<LoadedVolume>& volumes)
+{
+  vtkNew<vtkUltrasoundAligner> aligner;
+  aligner->SetStart(options.start.c_str());
+  aligner->SetInputDataObject(BlocksOf(volumes));
+  session.Update(aligner, "align");
+  std::vector<bool> trusted;
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const int number = static_cast<int>(i);
+    vtkNew<vtkMatrix4x4> matrix;
+    aligner->GetPose(number, matrix);
+    Pose pose;
+    pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+    MoveVolume(volumes[i], pose);
+    trusted.push_back(aligner->GetVerdict(number) == "aligned");
+    if (!trusted.back())
+      session.Note(volumes[i].file + ": it is left out: " + aligner->GetVerdict(number) + " (" + aligner->GetReason(number) +
+                   ")");
+  }
+  return trusted;
+}
+
+nlohmann::ordered_json ReportOf(const HandEyeResult& result, const HandEyeOptions& options, const HandEyeParameters& parameters,
+                                const VolumeFrames& frames)
+{
+  nlohmann::ordered_json report;
+  report["kind"] = "hand-eye";
+  report["method"] = options.method;
+  report["volumeFrame"] = frames.Name();
+  report["target"] = JsonOf(parameters.target);
+  report["targetRmsMm"] = result.targetRmsMm;
+  report["targetRadius95Mm"] = result.targetRadius95Mm;
+  report["rmsMm"] = result.rmsMm;
+  report["rmsDegrees"] = result.rmsDegrees;
+  report["inliers"] = result.inliers;
+  report["noise"] = {{"sensorDegrees", parameters.sensorNoise.degrees * result.noiseScale},
+                     {"sensorMm", parameters.sensorNoise.mm * result.noiseScale},
+                     {"volumeDegrees", parameters.volumeNoise.degrees * result.noiseScale},
+                     {"volumeMm", parameters.volumeNoise.mm * result.noiseScale},
+                     {"estimated", parameters.estimateNoise}};
+  report["scans"] = nlohmann::ordered_json::array();
+  for (const HandEyeResidual& residual : result.residuals) {
+    nlohmann::ordered_json scan{
+        {"name", residual.name}, {"inlier", residual.inlier}, {"mm", residual.mm}, {"degrees", residual.degrees}};
+    if (!residual.reason.empty())
+      scan["reason"] = residual.reason;
+    report["scans"].push_back(scan);
+  }
+  report["advice"] = nlohmann::ordered_json::array();
+  for (const HandEyeAdvice& advice : result.advice)
+    report["advice"].push_back(advice.text);
+  return report;
+}
+
+void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
+{
+  options.volumes = WithoutCompanions(session, options.volumes);
+  std::vector<std::string> inputs = options.volumes;
+  inputs.push_back(options.tracker.log);
+  if (!options.poses.empty())
+    inputs.push_back(options.poses);
+  CheckOutput(options.output, inputs);
+  if (!options.savePoses.empty())
+    CheckOutput(options.savePoses, inputs);
+
+  HandEyeParameters parameters;
+  parameters.method = HandEyeMethodOf(options.method);
+  parameters.sensorNoise = options.sensorNoise;
+  parameters.volumeNoise = options.volumeNoise;
+  parameters.rejectOutliers = !options.keepAll;
+
+  const TrackedTool tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
+  std::vector<LoadedVolume> volumes = LoadVolumes(session, options.volumes);
+  const std::vector<Pose> sensor = SensorPoses(session, options.tracker, tool, volumes);
+  const VolumeFrames frames = VolumeFrames::Of(session, volumes);
+  // Where the error counts: the middle of what is seen.
+  for (std::size_t i = 0; i < volumes.size(); ++i)
+    parameters.target += frames.toFile[i].inverse() * volumes[i].geometry.Centre() / static_cast<double>(volumes.size());
+  if (!options.target.empty())
+    parameters.target = Eigen::Vector3d(options.target.data());
+
+  ApplyPoses(volumes, options.poses);
+  std::vector<bool> trusted(volumes.size(), true);
+  RigReport rig;
+  if (options.poses.empty())
+    trusted = options.align == "rig" ? FindRig(session, options, volumes, rig) : AlignContents(session, options, volumes);
+  std::vector<HandEyePair> pairs;
+  std::vector<VolumePose> poses;
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    poses.push_back({volumes[i].file, volumes[i].geometry, volumes[i].volumeToWorld});
+    if (trusted[i])
+      pairs.push_back({sensor[i], volumes[i].volumeToWorld * frames.toFile[i], volumes[i].file});
+  }
+  constexpr int fewest = 5; // below, residuals say too little about the noise
+  parameters.estimateNoise = !options.noiseGiven && pairs.size() >= fewest;
+
+  HandEyeResult result;
+  session.Work("calibrate", "", [&](const Progress& progress) { result = CalibrateHandEye(pairs, parameters, progress); });
+  for (const std::string& note : result.notes)
+    session.Note(note);
+
+  NamedTransform calibration, world;
+  calibration.from = "Volume";
+  calibration.to = tool.from;
+  calibration.matrix = result.solution.volumeToSensor;
+  calibration.errorMm = result.targetRmsMm;
+  world.from = "World";
+  world.to = tool.to;
+  world.matrix = result.solution.worldToTracker;
+  nlohmann::ordered_json report = ReportOf(result, options, parameters, frames);
+  if (rig.depthScale > 0.0)
+    report["rig"] = {{"rig", options.rig},
+                     {"depthScale", rig.depthScale},
+                     {"depthScaleError", rig.depthScaleError},
+                     {"balls", rig.found},
+                     {"rmsMm", rig.rmsMm}};
+  session.result["output"] = options.output;
+  session.result[calibration.Name()] = JsonOf(result.solution.volumeToSensor);
+  session.result[world.Name()] = JsonOf(result.solution.worldToTracker);
+  session.result["report"] = report;
+  const Eigen::Vector3d offset = result.solution.volumeToSensor.translation();
+  session.Say(calibration.Name() + ": " + Triple(offset, ", ", 2) + " mm, turned by " +
+              Fixed(RotationAngle(result.solution.volumeToSensor) * 57.29577951308232, 2) + " degrees, from " +
+              std::to_string(result.inliers) + " of " + std::to_string(options.volumes.size()) + " scans");
+  session.Say("error at the middle of the volume: " + Fixed(result.targetRmsMm, 2) + " mm RMS, within " +
+              Fixed(result.targetRadius95Mm, 2) + " mm with 95%" +
+              (parameters.estimateNoise ? " (noise from the residuals)" : ""));
+  for (const HandEyeResidual& residual : result.residuals)
+    session.Say("  " + residual.name + ": " + Fixed(residual.mm, 2) + " mm, " + Fixed(residual.degrees, 2) + " degrees" +
+                (residual.inlier ? "" : ", not used: " + residual.reason));
+  if (!result.advice.empty())
+    session.Say("what would help most: " + result.advice.front().text);
+  if (2 * result.inliers <= static_cast<int>(options.volumes.size())) {
+    session.status = Session::Doubtful;
+    session.Note("more than half of the scans were of no use: the calibration should not be used unseen");
+  }
+  if (!options.savePoses.empty())
+    WritePoses(options.savePoses, poses);
+  WriteTransforms(options.output, {calibration, world}, report.dump());
+  session.Say("wrote " + options.output);
+}
+
+} // namespace
+
+Command CalibrateHandEyeCommand(CLI::App& calibrate)
+{
+  auto values = std::make_shared<HandEyeOptions>();
+  CLI::App* options = calibrate.add_subcommand("hand-eye", "Where a volume is in the frame of the sensor on its probe");
+  options->add_option("--volumes", values->volumes, "Three or more volumes of the calibration rig (8 to 20 are better)")
+      ->required();
+  values->tracker.AddTo(*options, true);
+  options->add_option("-o,--output", values->output, "Calibration to write (JSON)")->required();
+  options->add_option("--poses", values->poses,
+                      "Pose file with the volumes' alignment, a person's for instance (default: they are aligned)");
+  options->add_option("--save-poses", values->savePoses, "Pose file to write the alignment to");
+  options
+      ->add_option("--align", values->align,
+                   "How the volumes are aligned without --poses: rig finds the balls of the rig in each, contents aligns "
+                   "whatever they show")
+      ->check(CLI::IsMember({"rig", "contents"}))
+      ->capture_default_str();
+  options
+      ->add_option("--rig", values->rig,
+                   "The rig: the size of the standard one, or a table of its balls (label,x,y,z,radius in mm)")
+      ->capture_default_str();
+  options
+      ->add_option(
+          "--depth-scale", values->depthScale,
+          "The scanner's speed of sound over the bath's, 1540 / 1482 in water at 20 degrees Celsius (default: from the rig)")
+      ->check(CLI::Range(0.9, 1.1));
+  const vtkNew<vtkUltrasoundAligner> defaults;
+  values->start = defaults->GetStart();
+  options
+      ->add_option("--start", values->start,
+                   "What is known about where the volumes belong, for --align contents; as for echorama align")
+      ->check(CLI::IsMember(AlignStartNames()))
+      ->capture_default_str();
+  options->add_option("--method", values->method, "How the calibration is solved")
+      ->check(CLI::IsMember(HandEyeMethodNames()))
+      ->capture_default_str();
+  options
+      ->add_option("--target", values->target,
+                   "Where the error counts, mm, in the volume's frame (default: the middle of the volumes)")
+      ->expected(3);
+  const auto noise = [values](PoseNoise& side) {
+    return [values, &side](const std::vector<double>& given) {
+      side = {given[0], given[1]};
+      values->noiseGiven = true;
+    };
+  };
+  options
+      ->add_option_function<std::vector<double>>("--sensor-noise", noise(values->sensorNoise),
+                                                 "Noise of the tracker: degrees and mm per axis (default: from the residuals, "
+                                                 "with five scans or more)")
+      ->expected(2);
+  options
+      ->add_option_function<std::vector<double>>("--volume-noise", noise(values->volumeNoise), "Noise of the alignment, likewise")
+      ->expected(2);
+  options->add_flag("--keep-all", values->keepAll, "Use every aligned scan, however badly it fits");
+  return {options, [values](Session& session) { CalibrateHandEyeFromVolumes(session, *values); }};
+}
+
+} // namespace echorama

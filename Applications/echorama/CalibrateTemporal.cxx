@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// echorama calibrate temporal: the offset between the clocks of two recordings of one motion.
+#include "Calibrate.h"
+#include "Outputs.h"
+#include "TrackedVolumes.h"
+#include "Tracking/Calibration/TemporalCalibration.h"
+#include <CLI/Validators.hpp>
+#include <fstream>
+#include <memory>
+
+namespace echorama {
+namespace {
+
+struct TemporalOptions {
+  std::string first, firstTool, second, secondTool, signal = "automatic", output;
+  double unitMm = 0.0;
+  TemporalParameters parameters;
+};
+
+std::vector<TimedPose> PosesOf(const TrackedTool& tool)
+{
+  std::vector<TimedPose> poses;
+  for (const ToolPose& pose : tool.poses)
+    poses.push_back({pose.time, pose.pose});
+  return poses;
+}
+
+void CalibrateClocks(Session& session, TemporalOptions options)
+{
+  if (!options.output.empty())
+    CheckOutput(options.output, {options.first, options.second});
+  options.parameters.signal = options.signal == "rotation"      ? SpeedSignal::Rotation
+                              : options.signal == "translation" ? SpeedSignal::Translation
+                                                                : SpeedSignal::Automatic;
+  const TrackedTool first = ReadTool(session, options.first, options.firstTool, options.unitMm);
+  const TrackedTool second = ReadTool(session, options.second, options.secondTool, options.unitMm);
+  TemporalResult result;
+  session.Work("calibrate", "", [&](const Progress& progress) {
+    result = CalibrateTime(PosesOf(first), PosesOf(second), options.parameters, progress);
+  });
+  for (const std::string& note : result.notes)
+    session.Note(note);
+  session.result["kind"] = "temporal";
+  session.result["offset_seconds"] = result.offsetSeconds;
+  session.result["standard_error_seconds"] = result.standardErrorSeconds;
+  session.result["signal"] = result.signal == SpeedSignal::Rotation ? "rotation" : "translation";
+  session.result["correlation"] = result.correlation;
+  session.result["confidence"] = result.confidence;
+  session.result["overlap_seconds"] = result.overlapSeconds;
+  session.result["drift_ppm"] = result.driftPpm;
+  session.result["drift_error_ppm"] = result.driftErrorPpm;
+  session.Say("offset: " + Fixed(1e3 * result.offsetSeconds, 2) + " ms (standard error " +
+              Fixed(1e3 * result.standardErrorSeconds, 2) + " ms) to be added to the times of " + options.second + " " +
+              second.name);
+  session.Say("from speeds of " + session.result["signal"].get<std::string>() + ", correlation " + Fixed(result.correlation, 3) +
+              ", over " + Fixed(result.overlapSeconds, 1) + " s");
+  if (!options.output.empty()) {
+    std::ofstream stream(options.output);
+    stream << session.result.dump(2) << '\n';
+    stream.close();
+    if (!stream)
+      throw Error(Error::Kind::FileSystem, options.output + ": it cannot be written (is the disk full?)");
+    session.Say("wrote " + options.output);
+  }
+}
+
+} // namespace
+
+Command CalibrateTemporalCommand(CLI::App& calibrate)
+{
+  auto values = std::make_shared<TemporalOptions>();
+  CLI::App* options = calibrate.add_subcommand("temporal", "The offset between the clocks of two recordings of one motion");
+  options->add_option("first", values->first, "Recording whose clock counts")->required();
+  options->add_option("second", values->second, "Recording of the same motion; may be the same file, with another tool")
+      ->required();
+  options->add_option("--tool", values->firstTool, "The tool in the first recording (default: its only one)");
+  options->add_option("--second-tool", values->secondTool, "The tool in the second (default: its only one)");
+  options->add_option("--signal", values->signal, "Speeds that are compared: rotation is the same for everything on one body")
+      ->check(CLI::IsMember({"automatic", "rotation", "translation"}))
+      ->capture_default_str();
+  options->add_option("--largest", values->parameters.largestOffsetSeconds, "How far the search goes either way, in seconds")
+      ->check(CLI::Range(1e-3, 3600.0))
+      ->capture_default_str();
+  options->add_option("--unit", values->unitMm, "Unit of the recordings' lengths in mm; 1000: metres (default: as the files say)")
+      ->check(CLI::Range(1e-3, 1e6));
+  options->add_option("-o,--output", values->output, "Write the result as JSON");
+  return {options, [values](Session& session) { CalibrateClocks(session, *values); }};
+}
+
+} // namespace echorama

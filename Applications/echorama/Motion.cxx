@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// echorama motion: a recorded motion, smoothed and resampled, as a path for a probe (dissertation 3.2).
+#include "Commands.h"
+#include "Core/Geometry/MotionPath.h"
+#include "Outputs.h"
+#include "Readers/SequenceWriter.h"
+#include "TrackedVolumes.h"
+#include <CLI/Validators.hpp>
+#include <cmath>
+#include <memory>
+
+namespace echorama {
+namespace {
+
+struct MotionOptions {
+  std::string log, tool, output;
+  double unitMm = 0.0, rate = 50.0, from = NAN, to = NAN;
+  MotionSmoothing smoothing;
+};
+
+void ResampleMotion(Session& session, const MotionOptions& options)
+{
+  CheckOutput(options.output, {options.log});
+  if (!NamesSequence(options.output))
+    throw Error(Error::Kind::InvalidParameter, options.output + ": a sequence ends in .igs.mha or .seq.mha");
+  const TrackedTool tool = ReadTool(session, options.log, options.tool, options.unitMm);
+  std::vector<TimedPose> recorded;
+  for (const ToolPose& pose : tool.poses)
+    if (recorded.empty() || pose.time > recorded.back().time)
+      recorded.push_back({pose.time, pose.pose});
+  std::unique_ptr<MotionPath> path;
+  session.Work("smooth", "", [&](const Progress& progress) {
+    try {
+      path = std::make_unique<MotionPath>(recorded, options.smoothing, progress);
+    } catch (const Error& error) {
+      throw Error(error.GetKind(), options.log + ": " + error.what());
+    }
+  });
+  const double first = std::isnan(options.from) ? path->FirstTime() : std::max(options.from, path->FirstTime());
+  const double last = std::isnan(options.to) ? path->LastTime() : std::min(options.to, path->LastTime());
+  if (!(last >= first))
+    throw Error(Error::Kind::InvalidParameter, options.log + ": there is nothing between --from and --to; it lasts from " +
+                                                   Fixed(path->FirstTime(), 3) + " to " + Fixed(path->LastTime(), 3) + " s");
+  const double steps = std::floor((last - first) * options.rate);
+  if (steps > 1e7)
+    throw Error(Error::Kind::TooLarge, options.log + ": at this rate it would have more than ten million poses");
+  SequenceContent content;
+  content.dimensions = {0, 0, 1};
+  FileReplacement files;
+  SequenceWriter writer(options.output, content, false, files);
+  int gaps = 0;
+  double length = 0.0, largest = 0.0;
+  std::optional<Pose> before;
+  for (int i = 0; i <= static_cast<int>(steps); ++i) {
+    SequenceFrame frame;
+    frame.time = first + i / options.rate;
+    SequenceTransform transform;
+    transform.name = tool.name;
+    if (path->Covers(frame.time)) {
+      const Pose pose = path->At(frame.time);
+      transform.matrix = pose;
+      if (before) {
+        const double step = (pose.translation() - before->translation()).norm();
+        length += step;
+        largest = std::max(largest, step * options.rate);
+      }
+      before = pose;
+    } else {
+      transform.status = TransformStatus::Missing;
+      transform.statusText = TransformStatusText(transform.status);
+      ++gaps;
+      before.reset();
+    }
+    frame.transforms = {transform};
+    writer.Append(frame, nullptr);
+  }
+  writer.Finish();
+  files.Commit();
+  session.result["output"] = options.output;
+  session.result["tool"] = tool.name;
+  session.result["poses"] = static_cast<int>(steps) + 1;
+  session.result["missing"] = gaps;
+  session.result["lasts_seconds"] = last - first; // "seconds" is the session's own
+  session.result["path_mm"] = length;
+  session.result["fastest_mm_per_second"] = largest;
+  session.Say(tool.name + ": " + std::to_string(static_cast<int>(steps) + 1) + " poses over " + Fixed(last - first, 2) +
+              " s, a path of " + Fixed(length, 1) + " mm, at most " + Fixed(largest, 1) + " mm/s");
+  if (gaps > 0)
+    session.Note(std::to_string(gaps) + " poses lie in gaps of the recording and are marked as missing");
+  session.Say("wrote " + options.output);
+}
+
+} // namespace
+
+Command MotionCommand(CLI::App& program)
+{
+  auto values = std::make_shared<MotionOptions>();
+  CLI::App* options = program.add_subcommand("motion", "Smooth and resample a recorded motion");
+  options->add_option("recording", values->log, "Recording of a tracker: a sequence or a table")->required();
+  options->add_option("-o,--output", values->output, "Sequence to write (.igs.mha)")->required();
+  options->add_option("--tool", values->tool, "The tool, as the recording calls it (default: its only one)");
+  options->add_option("--unit", values->unitMm, "Unit of the recording's lengths in mm (default: as the file says)")
+      ->check(CLI::Range(1e-3, 1e6));
+  options->add_option("--rate", values->rate, "Poses a second")->check(CLI::Range(1e-3, 1e5))->capture_default_str();
+  options->add_option("--smooth", values->smoothing.sigmaSeconds, "Standard deviation of the window, in seconds; 0: none")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
+  options->add_option("--gap", values->smoothing.longestGapSeconds, "Longest gap that is bridged, in seconds")
+      ->check(CLI::Range(1e-6, 600.0))
+      ->capture_default_str();
+  options->add_option("--from", values->from, "Begin at this time of the recording, in seconds");
+  options->add_option("--to", values->to, "End at this time");
+  return {options, [values](Session& session) { ResampleMotion(session, *values); }};
+}
+
+} // namespace echorama

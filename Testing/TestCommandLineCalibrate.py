@@ -1,0 +1,288 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""echorama calibrate, track, motion, and align with a tracker: from scans of the rig and a log to volumes that a tracker places."""
+import json
+import math
+import pathlib
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+import numpy
+
+from program_under_test import DATA, PLUS, PROGRAM, run, run_json, snapshot
+
+work = None
+
+
+def pose(translation, rotation_vector):
+    """A rigid 4 x 4 matrix; radians."""
+    matrix = numpy.eye(4)
+    angle = numpy.linalg.norm(rotation_vector)
+    if angle > 0:
+        x, y, z = numpy.asarray(rotation_vector) / angle
+        cross = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        matrix[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def quaternion(matrix):
+    values, vectors = numpy.linalg.eigh(numpy.array(
+        [[matrix[0, 0] + matrix[1, 1] + matrix[2, 2], matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]],
+         [0, matrix[0, 0] - matrix[1, 1] - matrix[2, 2], matrix[1, 0] + matrix[0, 1], matrix[2, 0] + matrix[0, 2]],
+         [0, 0, matrix[1, 1] - matrix[0, 0] - matrix[2, 2], matrix[2, 1] + matrix[1, 2]],
+         [0, 0, 0, matrix[2, 2] - matrix[0, 0] - matrix[1, 1]]]).T)
+    return vectors[:, -1]
+
+
+def write_log(path, tool, times, poses, unit=1.0):
+    lines = ["time,tool,tx,ty,tz,qw,qx,qy,qz"]
+    for moment, matrix in zip(times, poses):
+        numbers = [float(moment), *map(float, matrix[:3, 3] / unit), *map(float, quaternion(matrix))]
+        lines.append(",".join([repr(numbers[0]), tool, *map(repr, numbers[1:])]))
+    pathlib.Path(path).write_text("\n".join(lines) + "\n")
+    return path
+
+
+def looking(face, target, fan):
+    """ProbeToWorld of a probe at a place that looks at another (scenes)."""
+    z = numpy.subtract(target, face) / numpy.linalg.norm(numpy.subtract(target, face))
+    x = numpy.asarray(fan, float) - z * numpy.dot(z, fan)
+    x /= numpy.linalg.norm(x)
+    matrix = numpy.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = x, numpy.cross(z, x), z, face
+    return matrix
+
+
+class HandEye(unittest.TestCase):
+    """The way of dissertation 4.1.2: scans of the rig and the tracker's log give the calibration, which then places other scans."""
+
+    @classmethod
+    def setUpClass(cls):
+        random = numpy.random.default_rng(4)
+        views = [{"face": [0, 0, 0], "target": [0, 0, 80], "fan": [1, 0, 0]}]
+        for i in range(5):
+            angle = 2 * math.pi * i / 5
+            tilt = 0.6 * math.sin(2.4 * i + 0.7)
+            views.append({"face": [20 * math.cos(angle), 20 * math.sin(angle), 2 * math.sin(5 * i)], "target": [3 * math.sin(i), 2 * math.cos(i), 75],
+                          "fan": [math.cos(tilt), math.sin(tilt), 0]})
+        scene = {"schema": "echorama-scene-1", "name": "rig", "seed": 2,
+                 "probe": {"preset": "mechanical-3d", "depthMaxMm": 115, "elements": 64, "sweepSteps": 40, "samples": 300},
+                 "receiver": {"tgcDbPerCm": 0, "noiseDb": -45, "dynamicRangeDb": 70}, "background": "water",
+                 "tissue": [{"rig": {"waterCelsius": 20, "plateDepthMm": 105}}], "views": {"poses": views},
+                 "volume": {"spacingMm": 1.2, "knockMm": 8, "knockDegrees": 6}}
+        (work / "rig.json").write_text(json.dumps(scene))
+        run_json("synthesize", work / "rig.json", "-o", work / "rig")
+        cls.volumes = [work / "rig" / f"volume_{i + 1}.mha" for i in range(6)]
+        # Where the sensor was, with the noise of a good tracker: S = O M C^-1.
+        cls.calibration, cls.world = pose([12, -35, -150], [0.1, -0.2, 1.9]), pose([300, -120, 80], [0.4, 0.9, -0.3])
+        cls.probes = [looking(**view) for view in views]
+        cls.sensor = [cls.world @ probe @ numpy.linalg.inv(cls.calibration) @ pose(random.normal(0, 0.3, 3), random.normal(0, 0.002, 3))
+                      for probe in cls.probes]
+        cls.log = write_log(work / "log.csv", "SensorToTracker", 10.0 * numpy.arange(6), cls.sensor)
+        cls.told = run_json("calibrate", "hand-eye", "--volumes", *cls.volumes, "--tracker", cls.log, "-o", work / "calibration.json")
+
+    def error_of(self, matrix):
+        target = numpy.append(self.told["report"]["target"], 1)
+        return numpy.linalg.norm((numpy.asarray(matrix) - self.calibration) @ target)
+
+    def test_the_calibration_is_found_with_its_error(self):
+        report = self.told["report"]
+        error = self.error_of(self.told["VolumeToSensor"])
+        self.assertLess(error, 4.0)  # six scans that turn by some 30 degrees
+        self.assertLess(error, 2.0 * report["targetRadius95Mm"])
+        self.assertEqual(report["inliers"], 6)
+        self.assertAlmostEqual(report["rig"]["depthScale"], 1540 / 1482.4, delta=0.004)
+        self.assertGreaterEqual(min(report["rig"]["balls"]), 5)
+        self.assertIn("degrees", report["advice"][0])
+
+    def test_the_file_is_one_of_transforms(self):
+        content = json.loads((work / "calibration.json").read_text())
+        self.assertEqual(content["schema"], "echorama-transforms-1")
+        self.assertEqual([(t["from"], t["to"]) for t in content["transforms"]], [("Volume", "Sensor"), ("World", "Tracker")])
+        self.assertEqual(content["report"]["kind"], "hand-eye")
+        self.assertIn("VolumeToSensor", run("info", work / "calibration.json").stdout)
+
+    def test_align_starts_from_the_tracker(self):
+        told = run_json("align", *self.volumes[:3], "--tracker", write_log(work / "three.csv", "SensorToTracker", [0, 1, 2], self.sensor[:3]),
+                        "--calibration", work / "calibration.json", "--tracker-only", "-o", work / "tracked.json")
+        score = run_json("score", work / "tracked.json", "--truth", work / "rig" / "truth.json")["score_mm"]
+        self.assertLess(score, 6.0)
+        self.assertEqual(len(told["volumes"]), 3)
+        # What the knock made 8 mm and 6 degrees wrong is far better now.
+        untouched = {"schema": "echorama-poses-1", "unit": "mm", "frame": "LPS",
+                     "volumes": [{"file": str(v), "VolumeToWorld": numpy.eye(4).tolist()} for v in self.volumes[:3]]}
+        (work / "untouched.json").write_text(json.dumps(untouched))
+        self.assertLess(score, 0.7 * run_json("score", work / "untouched.json", "--truth", work / "rig" / "truth.json")["score_mm"])
+
+    def test_a_persons_alignment_will_do(self):
+        run_json("calibrate", "hand-eye", "--volumes", *self.volumes, "--tracker", self.log, "--poses", work / "rig" / "truth.json", "-o",
+                 work / "by_hand.json")
+        content = json.loads((work / "by_hand.json").read_text())
+        self.assertLess(self.error_of(content["transforms"][0]["matrix"]), 3.0)
+        self.assertNotIn("rig", content["report"])
+
+    def test_metres_are_told(self):
+        metres = write_log(work / "metres.csv", "SensorToTracker", range(6), self.sensor, unit=1000.0)
+        done = run("calibrate", "hand-eye", "--volumes", *self.volumes, "--tracker", metres, "--poses", work / "rig" / "truth.json", "-o",
+                   work / "no.json")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr.lower(), "metre|1000")
+        run_json("calibrate", "hand-eye", "--volumes", *self.volumes, "--tracker", metres, "--unit", 1000, "--poses",
+                 work / "rig" / "truth.json", "-o", work / "metres.json")
+
+    def test_refusals_leave_nothing(self):
+        before = snapshot(work)
+        volumes, log = list(map(str, self.volumes)), str(self.log)
+        five = write_log(work / "five.csv", "SensorToTracker", range(5), self.sensor[:5])
+        for arguments, words in (
+                ((["--volumes", *volumes[:2], "--tracker", write_log(work / "two.csv", "SensorToTracker", range(2), self.sensor[:2])]), "three"),
+                ((["--volumes", *volumes, "--tracker", five]), "5 valid poses"),
+                ((["--volumes", *volumes, "--tracker", log, "--at", "1", "2"]), "--at"),
+                ((["--volumes", *volumes, "--tracker", log, "--tool", "Nothing"]), "SensorToTracker"),
+                ((["--volumes", *volumes, "--tracker", work / "absent.csv"]), "absent.csv"),
+                ((["--volumes", *volumes, "--tracker", log, "--rig", "9"]), "scale"),
+                ((["--volumes", *volumes, "--tracker", log, "--rig", log]), "label")):
+            aligned = [] if "--rig" in arguments else ["--poses", work / "rig" / "truth.json"]
+            done = run("calibrate", "hand-eye", *arguments, *aligned, "-o", work / "refused.json")
+            self.assertIn(done.returncode, (1, 2), words)
+            self.assertIn(words, done.stderr)
+        for name in ("two.csv", "five.csv"):
+            (work / name).unlink()
+        self.assertEqual(before.keys(), snapshot(work).keys())
+        done = run("align", *volumes, "--tracker", log, "-o", work / "refused.json")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("--calibration", done.stderr)
+
+
+class Pivot(unittest.TestCase):
+    def test_the_tip(self):
+        random = numpy.random.default_rng(1)
+        tip, fixed = numpy.array([3.0, -5.0, 120.0]), numpy.array([10.0, 20.0, -80.0])
+        poses = []
+        for _ in range(60):
+            matrix = pose([0, 0, 0], random.normal(0, 0.4, 3))
+            matrix[:3, 3] = fixed - matrix[:3, :3] @ tip + random.normal(0, 0.2, 3)
+            poses.append(matrix)
+        log = write_log(work / "pivot.csv", "StylusToTracker", range(60), poses)
+        told = run_json("calibrate", "pivot", "--tracker", log, "-o", work / "pivot.json")
+        self.assertLess(numpy.linalg.norm(numpy.subtract(told["report"]["tip"], tip)), 0.3)
+        self.assertLess(told["report"]["tipRadius95Mm"], 0.5)
+        content = json.loads((work / "pivot.json").read_text())["transforms"][0]
+        self.assertEqual((content["from"], content["to"]), ("StylusTip", "Stylus"))
+        done = run("calibrate", "pivot", "--tracker", write_log(work / "still.csv", "StylusToTracker", range(20), poses[:1] * 20), "-o",
+                   work / "still.json")
+        self.assertEqual(done.returncode, 1)
+        self.assertFalse((work / "still.json").exists())
+
+    @unittest.skipUnless(PLUS.is_dir(), f"{PLUS} is not there")
+    def test_a_stylus_of_plus(self):
+        sequence = PLUS / "EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
+        tips = [run_json("calibrate", "pivot", "--tracker", sequence, "--tool", "StylusToReference", "--from", start, "--to", start + 4, "-o",
+                         work / "stylus.json")["report"]["tip"] for start in (300, 330)]
+        self.assertLess(numpy.linalg.norm(numpy.subtract(*tips)), 1.5)
+        done = run("calibrate", "pivot", "--tracker", sequence, "--tool", "StylusToReference", "-o", work / "none.json")
+        self.assertEqual(done.returncode, 1)  # it touches eight points, not one
+        self.assertIn("fixed point", done.stderr)
+
+
+class Temporal(unittest.TestCase):
+    def test_the_offset(self):
+        def smooth(t):
+            return pose([30 * math.sin(0.9 * t), 20 * math.cos(1.7 * t), 5 * t],
+                        [0.6 * math.sin(1.1 * t) + 0.2 * math.sin(4.3 * t), 0.5 * math.sin(0.12 * t * t), 0.4 * math.sin(0.5 * t)])
+
+        hand = pose([10, 0, 40], [0.2, 0.4, 0.1])
+        first, second = numpy.arange(0, 20, 0.02), numpy.arange(0.5, 18, 0.033)
+        a = write_log(work / "a.csv", "ProbeToTracker", first, [smooth(t) for t in first])
+        b = write_log(work / "b.csv", "MarkerToCamera", second - 0.137, [pose([1, 2, 3], [0.3, 0, 0]) @ smooth(t) @ hand for t in second])
+        told = run_json("calibrate", "temporal", a, b)
+        self.assertAlmostEqual(told["offset_seconds"], 0.137, delta=0.005)
+        still = write_log(work / "c.csv", "ProbeToTracker", first, [smooth(0)] * len(first))
+        done = run("calibrate", "temporal", a, still)
+        self.assertEqual(done.returncode, 1)
+
+
+class Rig(unittest.TestCase):
+    def test_prints_and_scenes(self):
+        told = run_json("calibrate", "rig", "-o", work / "prints", "--scale", 0.6, "--resolution", 1)
+        names = {path.name for path in (work / "prints").iterdir()}
+        self.assertEqual(names, {"rig_0.6.stl", "rig_0.6.json", "rig_0.6.csv", "clip.stl"})
+        count = int.from_bytes((work / "prints" / "clip.stl").read_bytes()[80:84], "little")
+        self.assertEqual((work / "prints" / "clip.stl").stat().st_size, 84 + 50 * count)
+        self.assertEqual(told["rigs"][0]["scale"], 0.6)
+        done = run("synthesize", work / "prints" / "rig_0.6.json", "-o", work / "small", "--spacing", 3)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("scale", run("calibrate", "rig", "-o", work / "huge", "--scale", 7).stderr)
+
+
+class Motion(unittest.TestCase):
+    def test_a_recording_becomes_a_path(self):
+        times = numpy.sort(numpy.random.default_rng(2).uniform(0, 5, 200))
+        log = write_log(work / "motion.csv", "ProbeToTracker", times, [pose([10 * t, 0, 0], [0, 0, 0.1 * t]) for t in times])
+        told = run_json("motion", log, "-o", work / "path.igs.mha", "--rate", 40)
+        self.assertAlmostEqual(told["poses"], 40 * (times[-1] - times[0]), delta=2)
+        self.assertEqual(told["missing"], 0)
+        self.assertAlmostEqual(told["path_mm"], 10 * told["lasts_seconds"], delta=1)
+        self.assertIn("ProbeToTracker", run("info", work / "path.igs.mha").stdout)
+        self.assertEqual(run("motion", log, "-o", work / "path.txt").returncode, 2)
+
+    @unittest.skipUnless((DATA / "aurora").is_dir(), f"{DATA / 'aurora'} is not there")
+    def test_a_log_of_an_aurora(self):
+        told = run_json("motion", next((DATA / "aurora").glob("*.csv")), "--tool", "SensorAToTracker", "-o", work / "aurora.igs.mha")
+        self.assertGreater(told["poses"], 100)
+
+
+class Track(unittest.TestCase):
+    def test_simulated_and_replayed(self):
+        told = run_json("track", "simulated:?rate=80", "--seconds", 1, "--record", work / "recorded.igs.mha")
+        recorded = sum(tool["valid"] + tool["missing"] + tool["out_of_range"] for tool in told["tools"])
+        self.assertGreater(recorded, 40)
+        again = run_json("track", f"replay:{work / 'recorded.igs.mha'}?speed=0")
+        self.assertEqual(again["state"], "ended")
+        self.assertLessEqual(abs(sum(tool["valid"] + tool["missing"] + tool["out_of_range"] for tool in again["tools"]) - recorded), 4)
+        self.assertEqual(run_json("track", work / "recorded.igs.mha")["state"], "ended")  # a file is a recording
+
+    def test_passed_on_over_openigtlink(self):
+        server = subprocess.Popen([PROGRAM, "track", "simulated:?rate=60", "--serve", "0", "--every", "3600"], stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE, text=True)
+        try:
+            line = server.stderr.readline()
+            self.assertIn("serving", line)
+            port = line.strip().rsplit(":", 1)[1]
+            told = run_json("track", f"igtl://127.0.0.1:{port}", "--seconds", 2, "--show", "ProbeToReference")
+            self.assertEqual({tool["name"] for tool in told["tools"]}, {"ProbeToTracker", "ReferenceToTracker"})
+            self.assertGreater(told["tools"][0]["valid"], 30)
+        finally:
+            server.send_signal(signal.SIGINT)
+            out, _ = server.communicate(timeout=20)
+        self.assertEqual(server.returncode, 0)  # how a live tracker is ended is no error
+        self.assertIn("poses", out)
+
+    def test_a_killed_recording_opens(self):
+        path = work / "killed.igs.mha"
+        recorder = subprocess.Popen([PROGRAM, "track", "simulated:?rate=100", "--record", path, "--every", "3600"], stdout=subprocess.DEVNULL,
+                                    stderr=subprocess.DEVNULL)
+        started = time.monotonic()
+        while time.monotonic() - started < 60 and not (path.exists() and path.stat().st_size > 200000):
+            time.sleep(0.05)
+        recorder.kill()
+        recorder.wait()
+        told = run_json("track", f"replay:{path}?speed=0")
+        self.assertGreater(told["tools"][0]["valid"], 100)
+
+    def test_what_is_refused(self):
+        for address, words in (("nothing:", "there is no tracker"), ("simulated:?rat=3", "rate"), ("replay:absent.mha", "absent.mha"),
+                               ("polhemus:/dev/absent", "/dev/absent"), ("just text", "SCHEME:PLACE")):
+            done = run("track", address, "--seconds", 0.5)
+            self.assertIn(done.returncode, (1, 2), address)
+            self.assertIn(words, done.stderr, address)
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        work = pathlib.Path(folder)
+        unittest.main()
