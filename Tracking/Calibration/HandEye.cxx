@@ -27,7 +27,7 @@ namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr int LeastForNoise = 5; // scans
 // Residuals of so many times the noise may come from a mistake; are no noise; are no noise either when it is to be estimated.
-constexpr double SuspectScale = 3.0, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
+constexpr double SuspectScale = 1.2, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
 
 struct MethodName {
   HandEyeMethod method;
