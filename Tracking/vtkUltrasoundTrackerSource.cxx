@@ -628,8 +628,8 @@ void vtkUltrasoundTrackerSource::ChooseImage(double time)
 {
   Session& session = *this->Opened;
   session.Image.reset();
-  if (session.IsWhole()) {
-    static_cast<echorama::ReplayTracker&>(*session.Device).ShowImage(time);
+  if (auto* recording = session.IsWhole() ? dynamic_cast<echorama::ReplayTracker*>(session.Device.get()) : nullptr) {
+    recording->ShowImage(time);
   }
   std::vector<StreamedImage> images = session.Images.Images();
   images.erase(std::remove_if(images.begin(), images.end(), [](const StreamedImage& image) { return !IsShowable(image); }),

@@ -143,6 +143,9 @@ for moment, frame in ((51.5, 6), (50.3, 1), (52.25, 9), (50, 0)):
     image = source.GetOutputDataObject(1)
     assert np.all(vtk_to_numpy(image.GetPointData().GetArray("Intensity")) == frame), moment
     assert np.allclose(image.GetOrigin(), (10 * frame, 0, 0)), (moment, image.GetOrigin())
+source.Stop() # what was read stays, but for images
+source.UpdateTimeStep(51.5)
+assert np.allclose(source.GetOutput().GetPoint(0), (60, 0, 0))
 assert not source.errors
 
 # A live device: it runs on by itself, is asked whether there is something new, and can be closed.
