@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundPivotCalibration.h"
+
+#include "Core/Base/JsonPlace.h"
+#include "Tracking/Calibration/PivotCalibration.h"
+#include "vtkUltrasoundTrackPoses.h"
+#include "vtkUltrasoundVolume.h"
+
+#include "vtkCellArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPoints.h"
+#include "vtkUnsignedCharArray.h"
+
+#include <algorithm>
+#include <limits>
+
+vtkStandardNewMacro(vtkUltrasoundPivotCalibration);
+
+namespace {
+void AddField(vtkPolyData* output, const char* name, const double* values, int count)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(count);
+  array->InsertNextTuple(values);
+  output->GetFieldData()->AddArray(array);
+}
+
+// The tips by their poses, and what follows from them.
+void Fill(vtkPolyData* output, const echorama::TrackPoses& track, const echorama::PivotResult& result)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> vertices;
+  vtkNew<vtkDoubleArray> residuals, times;
+  residuals->SetName("Residual");
+  residuals->SetNumberOfComponents(3);
+  times->SetName("TimeStamp");
+  vtkNew<vtkUnsignedCharArray> inliers;
+  inliers->SetName("Inlier");
+  for (std::size_t i = 0; i < track.poses.size(); ++i) {
+    const Eigen::Vector3d tip = track.poses[i].pose * result.tip, residual = tip - result.pivot;
+    const vtkIdType id = points->InsertNextPoint(tip.data());
+    vertices->InsertNextCell(1, &id);
+    residuals->InsertNextTuple(residual.data());
+    times->InsertNextValue(track.poses[i].time);
+    inliers->InsertNextValue(result.residuals[i].inlier ? 1 : 0);
+  }
+  output->SetPoints(points);
+  output->SetVerts(vertices);
+  output->GetPointData()->AddArray(residuals);
+  output->GetPointData()->AddArray(times);
+  output->GetPointData()->SetScalars(inliers);
+  const Eigen::Matrix3d covariance = result.covariance.topLeftCorner<3, 3>();
+  AddField(output, "Tip", result.tip.data(), 3);
+  AddField(output, "TipRadius95", &result.tipRadius95Mm, 1);
+  AddField(output, "TipCovariance", covariance.data(), 9);
+  AddField(output, "Pivot", result.pivot.data(), 3);
+}
+
+std::string ReportOf(const std::string& tool, const echorama::PivotResult& result)
+{
+  using Json = nlohmann::ordered_json;
+  const auto numbers = [](const Eigen::Vector3d& v) { return Json{v[0], v[1], v[2]}; };
+  const Eigen::Matrix3d covariance = result.covariance.topLeftCorner<3, 3>();
+  Json outliers = Json::array();
+  for (std::size_t i = 0; i < result.residuals.size(); ++i) {
+    if (!result.residuals[i].inlier) {
+      outliers.push_back(i);
+    }
+  }
+  Json sphere;
+  if (result.sphere.known) {
+    sphere = {{"centre", numbers(result.sphere.centre)},
+              {"radius_mm", result.sphere.radiusMm},
+              {"radius_error_mm", result.sphere.radiusErrorMm},
+              {"rms_mm", result.sphere.rmsMm}};
+  }
+  const Json report{{"tool", tool},
+                    {"tip", numbers(result.tip)},
+                    {"tip_radius95_mm", result.tipRadius95Mm},
+                    {"tip_rms_mm", result.tipRmsMm},
+                    {"tip_covariance", echorama::JsonPlace::RowsOf(covariance)},
+                    {"pivot", numbers(result.pivot)},
+                    {"poses", result.residuals.size()},
+                    {"inliers", result.inliers},
+                    {"outliers", outliers},
+                    {"rms_mm", result.rmsMm},
+                    {"noise_scale", result.noiseScale},
+                    {"swing_degrees", numbers(result.swingDegrees)},
+                    {"least_squares_tip", numbers(result.algebraicTip)},
+                    {"sphere", sphere},
+                    {"notes", result.notes}};
+  return report.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+} // namespace
+
+//----------------------------------------------------------------------------
+vtkUltrasoundPivotCalibration::vtkUltrasoundPivotCalibration()
+{
+  const echorama::PivotParameters defaults;
+  this->NoiseDegrees = defaults.noise.degrees;
+  this->NoiseMm = defaults.noise.mm;
+  this->EstimateNoise = defaults.estimateNoise;
+  this->RejectOutliers = defaults.rejectOutliers;
+  this->LeastSwing = defaults.leastSwingDegrees;
+  this->SetPoseArray("ToolToWorld");
+  this->Forget();
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundPivotCalibration::~vtkUltrasoundPivotCalibration()
+{
+  this->SetTool(nullptr);
+  this->SetPoseArray(nullptr);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundPivotCalibration::Forget()
+{
+  std::fill_n(this->Tip, 3, std::numeric_limits<double>::quiet_NaN());
+  std::fill_n(this->Pivot, 3, std::numeric_limits<double>::quiet_NaN());
+  this->Radius95 = std::numeric_limits<double>::quiet_NaN();
+  this->Report.clear();
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundPivotCalibration::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  this->Forget();
+  return vtkUltrasoundVolume::Run(this, outputs, [&](const echorama::Progress& progress) {
+    const echorama::TrackPoses track = echorama::TrackPosesOf(
+        vtkPolyData::GetData(inputs[0]), this->PoseArray ? this->PoseArray : "", this->Tool ? this->Tool : "", "the track");
+    echorama::PivotParameters parameters;
+    parameters.noise = {this->NoiseDegrees, this->NoiseMm};
+    parameters.estimateNoise = this->EstimateNoise;
+    parameters.rejectOutliers = this->RejectOutliers;
+    parameters.leastSwingDegrees = this->LeastSwing;
+    parameters.seed = static_cast<std::uint64_t>(this->Seed);
+    const echorama::PivotResult result = echorama::CalibratePivot(track.poses, parameters, progress);
+    Fill(vtkPolyData::GetData(outputs), track, result);
+    std::copy_n(result.tip.data(), 3, this->Tip);
+    std::copy_n(result.pivot.data(), 3, this->Pivot);
+    this->Radius95 = result.tipRadius95Mm;
+    this->Report = ReportOf(track.tool, result);
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundPivotCalibration::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Tool: " << (this->Tool ? this->Tool : "") << "\n";
+  os << indent << "PoseArray: " << (this->PoseArray ? this->PoseArray : "") << "\n";
+  os << indent << "NoiseDegrees: " << this->NoiseDegrees << "\n";
+  os << indent << "NoiseMm: " << this->NoiseMm << "\n";
+  os << indent << "EstimateNoise: " << (this->EstimateNoise ? "on" : "off") << "\n";
+  os << indent << "RejectOutliers: " << (this->RejectOutliers ? "on" : "off") << "\n";
+  os << indent << "LeastSwing: " << this->LeastSwing << "\n";
+  os << indent << "Seed: " << this->Seed << "\n";
+  os << indent << "Tip: " << this->Tip[0] << " " << this->Tip[1] << " " << this->Tip[2] << "\n";
+  os << indent << "Pivot: " << this->Pivot[0] << " " << this->Pivot[1] << " " << this->Pivot[2] << "\n";
+  os << indent << "Radius95: " << this->Radius95 << "\n";
+}
