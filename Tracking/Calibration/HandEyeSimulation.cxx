@@ -12,6 +12,13 @@
 namespace echorama {
 namespace {
 
+// In any direction, of a length in [low, high]. In two statements: compilers may call the functions of one in any order.
+Eigen::Vector3d Someway(Random& random, double low, double high)
+{
+  const Eigen::Vector3d direction = random.Direction();
+  return direction * random.Uniform(low, high);
+}
+
 constexpr double RadiansPerDegree = 0.017453292519943295;
 
 Twist NoiseTwist(const PoseNoise& noise, Random& random)
@@ -25,8 +32,8 @@ Twist NoiseTwist(const PoseNoise& noise, Random& random)
 Pose RandomPose(Random& random)
 {
   Pose pose = Pose::Identity();
-  pose.linear() = ExpRotation(random.Direction() * random.Uniform(0.0, 3.0));
-  pose.translation() = random.Direction() * random.Uniform(100.0, 300.0);
+  pose.linear() = ExpRotation(Someway(random, 0.0, 3.0));
+  pose.translation() = Someway(random, 100.0, 300.0);
   return pose;
 }
 
@@ -37,7 +44,7 @@ HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
   Random random(scenario.seed);
   HandEyeSimulation simulation;
   Pose &C = simulation.truth.volumeToSensor, &O = simulation.truth.worldToTracker;
-  C.linear() = ExpRotation(random.Direction() * random.Uniform(0.0, 3.0));
+  C.linear() = ExpRotation(Someway(random, 0.0, 3.0));
   C.translation() = random.Direction() * scenario.leverMm - C.linear() * scenario.target;
   O = RandomPose(random);
   const Pose middle = RandomPose(random); // of the volume in the world
@@ -45,7 +52,7 @@ HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
   for (int i = 0; i < scenario.poses; ++i) {
     HandEyePair exact;
     Pose turn = Pose::Identity();
-    turn.linear() = ExpRotation(random.Direction() * random.Uniform(0.0, scenario.degrees * RadiansPerDegree));
+    turn.linear() = ExpRotation(Someway(random, 0.0, scenario.degrees * RadiansPerDegree));
     for (int axis = 0; axis < 3; ++axis)
       turn.translation()[axis] = random.Uniform(-scenario.travelMm, scenario.travelMm);
     exact.volumeToWorld = middle * turn * fromTarget;
@@ -54,10 +61,10 @@ HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
     measured.sensorToTracker = exact.sensorToTracker * Exp(NoiseTwist(scenario.sensorNoise, random));
     measured.volumeToWorld = exact.volumeToWorld * toTarget * Exp(NoiseTwist(scenario.volumeNoise, random)) * fromTarget;
     const bool isOutlier = i < scenario.outliers;
-    if (isOutlier)
-      measured.volumeToWorld = measured.volumeToWorld *
-                               MotionAbout(scenario.target, random.Direction() * random.Uniform(10.0, 40.0) * RadiansPerDegree,
-                                           random.Direction() * random.Uniform(20.0, 60.0));
+    if (isOutlier) {
+      const Eigen::Vector3d turned = Someway(random, 10.0, 40.0) * RadiansPerDegree, moved = Someway(random, 20.0, 60.0);
+      measured.volumeToWorld = measured.volumeToWorld * MotionAbout(scenario.target, turned, moved);
+    }
     simulation.isOutlier.push_back(isOutlier ? 1 : 0);
     simulation.exactPairs.push_back(exact);
     simulation.pairs.push_back(measured);

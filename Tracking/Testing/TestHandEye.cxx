@@ -5,6 +5,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Tracking/Calibration/HandEyeModel.h"
 #include "Tracking/Calibration/HandEyeSimulation.h"
@@ -92,7 +93,7 @@ TEST(HandEye, IsExactOnExactData)
 {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     HandEyeScenario scenario;
-    scenario.poses = seed % 2 == 0 ? 3 : 9;
+    scenario.poses = seed % 2 == 0 ? 4 : 9;
     scenario.degrees = seed % 3 == 0 ? 179.0 : 40.0;
     scenario.seed = seed;
     const HandEyeSimulation simulation = SimulateHandEye(scenario);
@@ -133,6 +134,7 @@ Trials RunTrials(HandEyeScenario scenario, int trials)
 
 TEST(HandEye, ReachesTheBoundAndStatesIt)
 {
+  ECHORAMA_SKIP_SANITIZED();
   for (const int poses : {5, 8, 20})
     for (const bool sensorOnly : {false, true}) {
       HandEyeScenario scenario;
@@ -141,7 +143,7 @@ TEST(HandEye, ReachesTheBoundAndStatesIt)
       if (sensorOnly)
         scenario.volumeNoise = {0.0, 0.0};
       const Trials trials = RunTrials(scenario, 150);
-      EXPECT_LT(trials.errorOverBound, 1.1) << poses;
+      EXPECT_LT(trials.errorOverBound, 1.15) << poses; // 1.03 at most, and 0.04 by chance
       EXPECT_GT(trials.errorOverBound, 0.85) << poses;
       EXPECT_GT(trials.inside, 0.90) << poses; // 0.95, and 0.018 by chance
       EXPECT_LT(trials.inside, 0.995) << poses;
@@ -151,6 +153,7 @@ TEST(HandEye, ReachesTheBoundAndStatesIt)
 
 TEST(HandEye, EstimatesTheNoise)
 {
+  ECHORAMA_SKIP_SANITIZED();
   HandEyeScenario scenario;
   scenario.poses = 8;
   scenario.sensorNoise = {0.5, 1.4}; // twice what is stated below
@@ -184,6 +187,7 @@ TEST(HandEye, EstimatesTheNoise)
 
 TEST(HandEye, OutliersAreFoundAndNamed)
 {
+  ECHORAMA_SKIP_SANITIZED();
   double error = 0.0, clean = 0.0;
   for (const int poses : {5, 10, 20})
     for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -460,6 +464,7 @@ TEST(HandEye, StopsAndRepeats)
 
 TEST(HandEye, TwoRecordingsOfOneRigAgree)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const std::filesystem::path folder = std::filesystem::path(ECHORAMA_SOURCE_DIR) / "../shared/data/handeye_ethz";
   if (!std::filesystem::exists(folder))
     GTEST_SKIP() << folder << " is not there";

@@ -92,6 +92,7 @@ TEST(PivotCalibration, Exact)
 // Whether the stated region holds, and whether anything is gained over least squares.
 TEST(PivotCalibration, RegionHoldsAndBoundIsReached)
 {
+  ECHORAMA_SKIP_SANITIZED();
   struct Case {
     Motion motion;
     bool estimate;

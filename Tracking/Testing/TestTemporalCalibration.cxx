@@ -149,6 +149,7 @@ TEST(TemporalCalibration, Exact)
 // The error by the stated standard error, over many motions and noises.
 TEST(TemporalCalibration, StatedErrorHolds)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const ThreadLimit one(1); // its loops are too short to share
   for (const double noise : {0.05, 0.25}) {
     int held = 0;
