@@ -12,6 +12,7 @@
 #include "Tracking/Stream/StreamReport.h"
 
 #include "vtkCellArray.h"
+#include "vtkCellData.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
@@ -143,7 +144,7 @@ vtkUltrasoundTrackerSource::vtkUltrasoundTrackerSource()
   : Time(NaN), LongestGapSeconds(echorama::StreamLimits().longestGapSeconds)
 {
   this->SetNumberOfInputPorts(0);
-  this->SetNumberOfOutputPorts(2);
+  this->SetNumberOfOutputPorts(3);
   this->SetImageFrame("Image");
 }
 
@@ -170,6 +171,7 @@ void vtkUltrasoundTrackerSource::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "FollowTime: " << this->FollowTime << "\n";
   os << indent << "LongestGapSeconds: " << this->LongestGapSeconds << "\n";
   os << indent << "FreshSeconds: " << this->FreshSeconds << "\n";
+  os << indent << "AxisLengthMm: " << this->AxisLengthMm << "\n";
   os << indent << "State: " << this->GetState() << "\n";
   os << indent << "Message: " << this->GetMessage() << "\n";
 }
@@ -551,7 +553,7 @@ std::string vtkUltrasoundTrackerSource::GetTransformMessage(const char* name)
 //----------------------------------------------------------------------------
 int vtkUltrasoundTrackerSource::FillOutputPortInformation(int port, vtkInformation* information)
 {
-  information->Set(vtkDataObject::DATA_TYPE_NAME(), port == 0 ? "vtkPolyData" : "vtkImageData");
+  information->Set(vtkDataObject::DATA_TYPE_NAME(), port == 1 ? "vtkImageData" : "vtkPolyData");
   return 1;
 }
 
@@ -561,7 +563,7 @@ int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformati
   vtkInformation* image = outputs->GetInformationObject(1);
   const int nothing[6] = {0, -1, 0, -1, 0, -1};
   image->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), nothing, 6);
-  for (int port = 0; port < 2; ++port) {
+  for (int port = 0; port < 3; ++port) {
     outputs->GetInformationObject(port)->Remove(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
     outputs->GetInformationObject(port)->Remove(vtkStreamingDemandDrivenPipeline::TIME_RANGE());
   }
@@ -573,7 +575,7 @@ int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformati
     }
     if (session->IsWhole()) {
       const double range[2] = {session->Times.front(), session->Times.back()};
-      for (int port = 0; port < 2; ++port) {
+      for (int port = 0; port < 3; ++port) {
         vtkInformation* out = outputs->GetInformationObject(port);
         out->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), session->Times.data(), static_cast<int>(session->Times.size()));
         out->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
@@ -595,8 +597,11 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
     progress(0.0);
     vtkPolyData* tools = vtkPolyData::GetData(outputs, 0);
     vtkImageData* image = vtkImageData::GetData(outputs, 1);
-    tools->Initialize();
-    image->Initialize();
+    vtkPolyData* axes = vtkPolyData::GetData(outputs, 2);
+    for (vtkDataObject* output :
+         {static_cast<vtkDataObject*>(tools), static_cast<vtkDataObject*>(image), static_cast<vtkDataObject*>(axes)}) {
+      output->Initialize();
+    }
     Session* session = this->Updated();
     if (!session) {
       return;
@@ -606,7 +611,7 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
     double time = this->Time;
     if (session->IsWhole()) {
       time = session->Times.front();
-      for (int port = 1; port >= 0; --port) {
+      for (int port = 2; port >= 0; --port) {
         vtkInformation* out = outputs->GetInformationObject(port);
         if (out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())) {
           time = out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP());
@@ -614,10 +619,11 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
       }
       time = std::min(std::max(time, session->Times.front()), session->Times.back());
       this->ChooseImage(time);
-      tools->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
-      image->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+      for (int port = 0; port < 3; ++port) {
+        vtkDataObject::GetData(outputs, port)->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+      }
     }
-    this->ShowTools(tools, time);
+    this->ShowTools(tools, axes, time);
     this->ShowImage(image);
   });
 }
@@ -660,7 +666,7 @@ void vtkUltrasoundTrackerSource::ChooseImage(double time)
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, double time)
+void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, vtkPolyData* axesOutput, double time)
 {
   Session& session = *this->Opened;
   const std::vector<std::string> names = session.Poses.Tools();
@@ -675,6 +681,10 @@ void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, double time)
   const auto statuses = NewArray<vtkUnsignedCharArray>("Status");
   const vtkSmartPointer<vtkDoubleArray> axes[3] = {NewArray<vtkDoubleArray>("XAxis", 3), NewArray<vtkDoubleArray>("YAxis", 3),
                                                    NewArray<vtkDoubleArray>("ZAxis", 3)};
+  const vtkNew<vtkPoints> ends;
+  ends->SetDataTypeToDouble();
+  const vtkNew<vtkCellArray> lines;
+  const auto toolOfLine = NewArray<vtkIntArray>("Tool"), axisOfLine = NewArray<vtkIntArray>("Axis");
   const auto toolNames = NewArray<vtkStringArray>("ToolNames"), worldFrame = NewArray<vtkStringArray>("WorldFrame");
   worldFrame->InsertNextValue(world);
   session.FreshUntil = std::numeric_limits<double>::infinity();
@@ -697,7 +707,8 @@ void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, double time)
         session.FreshUntil = std::min(session.FreshUntil, session.Poses.Latest(name).arrival + this->FreshSeconds);
       }
     }
-    tool->InsertNextValue(static_cast<int>(toolNames->InsertNextValue(frames->first)));
+    const int number = static_cast<int>(toolNames->InsertNextValue(frames->first));
+    tool->InsertNextValue(number);
     times->InsertNextValue(known ? found.time : NaN);
     statuses->InsertNextValue(static_cast<unsigned char>(found.Status()));
     const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix.matrix();
@@ -705,6 +716,13 @@ void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, double time)
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3d direction = matrix.linear().col(axis).normalized();
       axes[axis]->InsertNextTuple(direction.data());
+      if (found.Status() == TransformStatus::Valid) {
+        const Eigen::Vector3d end = matrix.translation() + this->AxisLengthMm * direction;
+        const vtkIdType line[2] = {ends->InsertNextPoint(matrix.translation().data()), ends->InsertNextPoint(end.data())};
+        lines->InsertNextCell(2, line);
+        toolOfLine->InsertNextValue(number);
+        axisOfLine->InsertNextValue(axis);
+      }
     }
   }
   output->SetPoints(points);
@@ -715,8 +733,14 @@ void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, double time)
         static_cast<vtkDataArray*>(axes[2])}) {
     output->GetPointData()->AddArray(array);
   }
-  output->GetFieldData()->AddArray(toolNames);
-  output->GetFieldData()->AddArray(worldFrame);
+  axesOutput->SetPoints(ends);
+  axesOutput->SetLines(lines);
+  axesOutput->GetCellData()->AddArray(toolOfLine);
+  axesOutput->GetCellData()->AddArray(axisOfLine);
+  for (vtkPolyData* data : {output, axesOutput}) {
+    data->GetFieldData()->AddArray(toolNames);
+    data->GetFieldData()->AddArray(worldFrame);
+  }
 }
 
 //----------------------------------------------------------------------------

@@ -23,8 +23,11 @@
  * Output 1: the newest image of the device, with `Intensity`, `ValidRegion`, `TimeStamp` and `ImageToWorld` where transforms lead
  * from the image to the world; otherwise it lies where the sender puts it. Colours become grey. Empty when there is none.
  *
+ * Output 2: the axes of the tools that are valid, to be looked at: a vtkPolyData with three lines of AxisLengthMm per tool, from
+ * the origin of its frame along x, y and z, with the cell arrays Tool (as above) and Axis (0, 1, 2).
+ *
  * A live pose that is older than FreshSeconds is missing: what stands still is not shown as if it were live. When a device cannot
- * be opened there is an error that names it and the reason, and both outputs are empty; what goes wrong later is told by
+ * be opened there is an error that names it and the reason, and all outputs are empty; what goes wrong later is told by
  * GetState() and GetMessage().
  *
  * As a live source of ParaView it is asked by GetNeedsUpdate() every 40 ms. In a script, call that (or Modified()) before
@@ -129,6 +132,12 @@ public:
   vtkGetMacro(FreshSeconds, double);
   ///@}
 
+  ///@{
+  /** Length of the axes in output 2, mm, at least 0. Default 50. */
+  vtkSetMacro(AxisLengthMm, double);
+  vtkGetMacro(AxisLengthMm, double);
+  ///@}
+
   /**
    * Whether something has come (or has become too old) since the last update; then this is Modified() too. What ParaView calls.
    */
@@ -226,6 +235,7 @@ protected:
   bool FollowTime = false;
   double LongestGapSeconds;
   double FreshSeconds = 1.0;
+  double AxisLengthMm = 50.0;
 
 private:
   vtkUltrasoundTrackerSource(const vtkUltrasoundTrackerSource&) = delete;
@@ -237,7 +247,7 @@ private:
   void Close();
   Session* Updated();
   void ChooseImage(double time);
-  void ShowTools(vtkPolyData* output, double time);
+  void ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time);
   void ShowImage(vtkImageData* output);
 
   std::unique_ptr<Session> Opened;

@@ -39,14 +39,12 @@ view = CreateView("RenderView")
 view.ViewSize = [400, 300]
 display = Show(tracker, view)
 display.PointSize = 20
-glyphs = Glyph(Input=tracker, GlyphType="Arrow")
-glyphs.OrientationArray = ["POINTS", "ZAxis"]
-glyphs.ScaleArray = ["POINTS", "No scale array"]
-glyphs.ScaleFactor = 60
+axes = Show(OutputPort(tracker, 2), view)
+axes.LineWidth = 4
+ColorBy(axes, ("CELLS", "Axis"))
 places, pictures = set(), 0
 for _ in range(600):
     if needs_update(tracker):
-        Show(glyphs, view)
         if pictures == 0:
             ResetCamera(view)
         Render(view)
@@ -69,7 +67,6 @@ tracker.Active = 0
 tracker.UpdatePipeline()
 tracker.UpdatePipelineInformation()
 assert tracker.GetPropertyValue("State") == "idle", tracker.GetPropertyValue("State")
-Delete(glyphs)
 Delete(tracker)
 
 # A recording with images, at the time of the animation.

@@ -69,6 +69,13 @@ def tools_of(source):
         result[tool] = (np.array(output.GetPoint(point)), int(arrays.GetArray("Status").GetValue(point)),
                         arrays.GetArray("TimeStamp").GetValue(point), np.array(arrays.GetArray("ToolToWorld").GetTuple(point)))
         assert (output.GetPointData().GetArray("ToolToWorld").GetNumberOfComponents()) == 16
+    axes, valid = source.GetOutputDataObject(2), [tool for tool in result if result[tool][1] == 0]
+    assert axes.GetNumberOfLines() == 3 * len(valid)
+    for line in range(axes.GetNumberOfLines()):
+        axis, tool = axes.GetCellData().GetArray("Axis").GetValue(line), names.GetValue(axes.GetCellData().GetArray("Tool").GetValue(line))
+        start, end = (np.array(axes.GetCell(line).GetPoints().GetPoint(i)) for i in range(2))
+        assert tool in valid and np.allclose(start, result[tool][0])
+        assert np.allclose(end - start, source.GetAxisLengthMm() * result[tool][3].reshape(4, 4)[:3, axis])
     assert output.GetNumberOfVerts() == sum(status == 0 for _, status, _, _ in result.values())
     return result, (fields.GetAbstractArray("WorldFrame").GetValue(0) if fields.GetAbstractArray("WorldFrame") else None)
 
