@@ -17,6 +17,7 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/uio.h>
 #include <system_error>
 #include <unistd.h>
 
@@ -226,9 +227,16 @@ std::optional<std::size_t> TcpSocket::Receive(unsigned char* bytes, std::size_t 
   return {};
 }
 
-std::optional<std::size_t> TcpSocket::Send(const unsigned char* bytes, std::size_t size)
+std::optional<std::size_t> TcpSocket::Send(const std::vector<Piece>& pieces)
 {
-  const ssize_t gone = send(descriptor_, bytes, size, MSG_NOSIGNAL);
+  std::vector<iovec> vectors;
+  vectors.reserve(pieces.size());
+  for (const Piece& piece : pieces)
+    vectors.push_back({const_cast<unsigned char*>(piece.bytes), piece.size}); // it is only read
+  msghdr message{};
+  message.msg_iov = vectors.data();
+  message.msg_iovlen = vectors.size();
+  const ssize_t gone = sendmsg(descriptor_, &message, MSG_NOSIGNAL);
   if (gone >= 0)
     return static_cast<std::size_t>(gone);
   if (Again(errno))
@@ -271,28 +279,41 @@ void SendQueue::PushNewest(const std::string& name, Bytes message)
   newest_.emplace_back(name, std::move(message));
 }
 
+void SendQueue::Begin()
+{
+  offset_ = 0;
+  begun_.reset();
+  if (!waiting_.empty()) {
+    begun_ = std::move(waiting_.front());
+    waiting_.pop_front();
+    bytes_ -= begun_->size();
+  } else if (!newest_.empty()) {
+    begun_ = std::move(newest_.front().second);
+    newest_.pop_front();
+  }
+}
+
 bool SendQueue::Flush(TcpSocket& socket)
 {
-  while (!Empty()) {
-    if (!begun_) {
-      offset_ = 0;
-      if (!waiting_.empty()) {
-        begun_ = std::move(waiting_.front());
-        waiting_.pop_front();
-        bytes_ -= begun_->size();
-      } else {
-        begun_ = std::move(newest_.front().second);
-        newest_.pop_front();
-      }
-    }
-    const auto gone = socket.Send(begun_->data() + offset_, begun_->size() - offset_);
+  constexpr std::size_t Together = 64; // messages in one call: they leave together, and wake their reader once
+  if (!begun_)
+    Begin();
+  while (begun_) {
+    std::vector<TcpSocket::Piece> pieces{{begun_->data() + offset_, begun_->size() - offset_}};
+    for (std::size_t i = 0; i < std::min(Together, waiting_.size()); ++i)
+      pieces.push_back({waiting_[i]->data(), waiting_[i]->size()});
+    const auto gone = socket.Send(pieces);
     if (!gone)
       return false;
-    offset_ += *gone;
-    if (offset_ < begun_->size())
+    if (*gone == 0)
       return true; // it takes no more now
-    begun_.reset();
-    ++sent_;
+    std::size_t left = *gone;
+    while (begun_ && left >= begun_->size() - offset_) {
+      left -= begun_->size() - offset_;
+      ++sent_;
+      Begin();
+    }
+    offset_ += left;
   }
   return true;
 }

@@ -45,8 +45,14 @@ public:
   /// \returns nothing when the connection has ended; why() says how.
   std::optional<std::size_t> Receive(unsigned char* bytes, std::size_t size);
 
-  /// Gives what the system takes, without waiting. \returns nothing when the connection has ended.
-  std::optional<std::size_t> Send(const unsigned char* bytes, std::size_t size);
+  /// Bytes that lie elsewhere.
+  struct Piece {
+    const unsigned char* bytes = nullptr;
+    std::size_t size = 0;
+  };
+  /// Gives what the system takes of the pieces, one after the other, without waiting. \returns how many bytes; nothing when the
+  /// connection has ended.
+  std::optional<std::size_t> Send(const std::vector<Piece>& pieces);
 
   /// How the connection ended: "closed by the peer", "connection reset by peer" ...
   const std::string& EndReason() const { return end_; }
@@ -79,8 +85,11 @@ public:
   std::uint64_t Dropped() const { return dropped_; } ///< messages that did not go out
 
 private:
-  std::size_t bound_, bytes_ = 0, offset_ = 0;
-  Bytes begun_;
+  void Begin(); // the next, if there is one
+
+  std::size_t bound_, bytes_ = 0; // of what waits
+  Bytes begun_;                   // must be finished, whatever else is dropped
+  std::size_t offset_ = 0;        // how much of it has gone
   std::deque<Bytes> waiting_;
   std::deque<std::pair<std::string, Bytes>> newest_;
   std::uint64_t sent_ = 0, dropped_ = 0;

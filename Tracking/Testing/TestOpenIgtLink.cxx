@@ -122,7 +122,7 @@ TEST(TcpSocket, FindsNamesAndListensWhereItIsTold)
   server.Close();
   ASSERT_TRUE(Eventually([&] { return !client.Receive(&byte, 1); }));
   EXPECT_EQ(client.EndReason(), "closed by the peer");
-  EXPECT_TRUE(Eventually([&] { return !client.Send(&byte, 1); })); // and no signal
+  EXPECT_TRUE(Eventually([&] { return !client.Send({{&byte, 1}}); })); // and no signal
 }
 
 TEST(TcpSocket, ConnectingStopsWhenAsked)
@@ -517,7 +517,7 @@ TEST(OpenIgtLink, OptionsThatAreWrongAreNamed)
   parameters.clients = 0;
   EXPECT_THROW(OpenIgtLinkServer{parameters}, Error);
   const TcpSocket taken = TcpSocket::Listen("127.0.0.1", 0);
-  OpenIgtLinkListener listener(TrackerAddress::Parse("igtl-listen://127.0.0.1:" + std::to_string(taken.Port())));
   PoseStream poses;
+  OpenIgtLinkListener listener(TrackerAddress::Parse("igtl-listen://127.0.0.1:" + std::to_string(taken.Port())));
   EXPECT_THROW(listener.Start(poses, nullptr), Error);
 }
