@@ -78,6 +78,16 @@ bool SameCommand(unsigned char a, unsigned char b)
   return (a & 0x1f) == (b & 0x1f); // C, c and control-C
 }
 
+/// Whether a hand could have moved the sensor from \a a to \a b in the time between, or in \a pause seconds when they have none.
+bool WithinReach(const PolhemusRecord& a, const PolhemusRecord& b, double pause)
+{
+  constexpr double Mm = 10.0, MmPerSecond = 5000.0, Radians = 0.05, RadiansPerSecond = 35.0;
+  const double seconds =
+      a.milliseconds && b.milliseconds ? 0.001 * static_cast<std::int32_t>(*b.milliseconds - *a.milliseconds) : pause;
+  return (b.pose.translation() - a.pose.translation()).norm() <= Mm + MmPerSecond * std::fabs(seconds) &&
+         RotationAngle(a.pose.inverse() * b.pose) <= Radians + RadiansPerSecond * std::fabs(seconds);
+}
+
 /// Characters from the point on, those of an exponent too.
 std::size_t Decimals(std::string_view number)
 {
@@ -239,6 +249,7 @@ void PolhemusDecoder::Reset()
   columns_ = strangeColumns_ = 0;
   last_.reset();
   held_.reset();
+  seen_ = {};
 }
 
 void PolhemusDecoder::Complain(const std::string& what)
@@ -467,22 +478,44 @@ bool PolhemusDecoder::Moment::Follows(const Moment& before, PolhemusModel model)
   return !hasFrame || (frames >= 0 && ms >= duration[0] * frames - 2.0 && ms <= duration[1] * frames + 2.0);
 }
 
+void PolhemusDecoder::Settle(const PolhemusRecord& record, std::vector<PolhemusRecord>& out)
+{
+  constexpr double Pause = 0.02; // s between bare records
+  Station& station = seen_[static_cast<std::size_t>(record.station - 1)];
+  const bool missing = record.status == TransformStatus::Missing;
+  const bool goesOn = missing || !station.last || WithinReach(*station.last, record, Pause);
+  const bool confirms = !goesOn && station.leapt && WithinReach(*station.leapt, record, Pause);
+  if (confirms)
+    out.push_back(*station.leapt);
+  else if (station.leapt)
+    Complain("a leap that nothing confirms");
+  station.leapt.reset();
+  if (!goesOn && !confirms) {
+    station.leapt = record;
+    return;
+  }
+  station.last.reset();
+  if (!missing)
+    station.last = record;
+  out.push_back(record);
+}
+
 void PolhemusDecoder::Deliver(const Fields& fields, const PolhemusRecord& record, std::vector<PolhemusRecord>& out)
 {
   if (!fields.milliseconds) {
-    out.push_back(record);
+    Settle(record, out);
     return;
   }
   const Moment moment{*fields.milliseconds, fields.frame.value_or(0), fields.frame.has_value()};
   const bool goesOn = last_ && moment.Follows(*last_, speech_.model);
   if (goesOn || (held_ && moment.Follows(held_->first, speech_.model))) {
     if (held_ && !goesOn)
-      out.push_back(held_->second); // the clock has jumped
+      Settle(held_->second, out); // the clock has jumped
     else if (held_)
       Complain("a time that nothing confirms");
     held_.reset();
     last_ = moment;
-    out.push_back(record);
+    Settle(record, out);
     return;
   }
   if (held_)

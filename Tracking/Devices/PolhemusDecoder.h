@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/RigidTransform.h"
 #include "Core/Geometry/TransformGraph.h"
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -67,10 +68,11 @@ struct PolhemusRecord {
 /// Nothing is taken on trust. A record counts only when its tag, station, command, error and size are as agreed, every number
 /// is finite, the position lies within reach, the quaternion has unit length to 1e-3, position and orientation agree with their
 /// second copies (to the rounding of the shorter form), and time and frame number go on from the last record: a time more than
-/// \a LongestPause on, or back, is believed when a second record confirms it. Whatever is not a record is skipped to the next
-/// byte that can begin one, and each such stretch counts once.
+/// \a LongestPause on, or back, is believed when a second record confirms it; so is a pose that leaps further from the last one
+/// of its station than a hand moves it (10 mm and 3 degrees, and 5 m/s and 2000 degrees/s). Whatever is not a record is skipped
+/// to the next byte that can begin one, and each such stretch counts once.
 ///
-/// Not detected: without the second copies, damage to a number that leaves it plausible.
+/// Not detected: without the second copies, damage to a number that moves the pose by less than that.
 class PolhemusDecoder {
 public:
   static constexpr double LongestPause = 0.25; ///< s
@@ -96,6 +98,7 @@ private:
   bool NextBinary(std::vector<PolhemusRecord>& out);
   bool NextLine(std::vector<PolhemusRecord>& out);
   std::string Understand(const Fields& fields, PolhemusRecord& record) const;
+  void Settle(const PolhemusRecord& record, std::vector<PolhemusRecord>& out);
   void Deliver(const Fields& fields, const PolhemusRecord& record, std::vector<PolhemusRecord>& out);
   void Complain(const std::string& what);
   void Skip(std::size_t count, const std::string& why);
@@ -110,6 +113,10 @@ private:
   std::string complaint_;
   std::optional<Moment> last_;
   std::optional<std::pair<Moment, PolhemusRecord>> held_; // its time is not confirmed yet
+  struct Station {
+    std::optional<PolhemusRecord> last, leapt; // leapt: not confirmed yet
+  };
+  std::array<Station, 32> seen_;
 };
 
 /// What a device said to a command in binary form.
