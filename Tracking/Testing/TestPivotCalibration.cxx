@@ -5,6 +5,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
 #include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Calibration/PivotCalibration.h"
 #include <cmath>
 #include <functional>

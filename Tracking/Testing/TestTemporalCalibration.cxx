@@ -6,6 +6,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
 #include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Calibration/TemporalCalibration.h"
 #include <algorithm>
 #include <array>
