@@ -13,8 +13,8 @@ import tempfile
 
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray, vtkStringArray, vtkTypeUInt64Array
-from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkImageData, vtkMultiBlockDataSet
+from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray, vtkPoints, vtkStringArray, vtkTypeUInt64Array
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkImageData, vtkMultiBlockDataSet, vtkPolyData
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm, vtkStreamingDemandDrivenPipeline, vtkTrivialProducer
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkFiltersSources import vtkSphereSource
@@ -375,6 +375,41 @@ class HandEye(TissueSource):
         return filter
 
 
+def track(shift=0.0):
+    """A tool that is turned about its tip, without a rhythm."""
+    line, times, poses = vtkPolyData(), numpy_to_vtk(np.arange(0, 20, 0.02) + shift, deep=True), []
+    for t in np.arange(0, 20, 0.02):
+        pose = np.eye(4)
+        pose[:3, :3] = rotation(0.5 * np.sin(1.3 * t) * np.sin(0.37 * t), 0.4 * np.sin(2.1 * t + 1) * np.sin(0.23 * t), 0.3 * np.sin(1.7 * t))
+        pose[:3, 3] = np.array([10, 20, 30]) - pose[:3, :3] @ [0, 0, 100]
+        poses.append(pose)
+    points = vtkPoints()
+    points.SetData(numpy_to_vtk(np.array([pose[:3, 3] for pose in poses]), deep=True))
+    line.SetPoints(points)
+    matrices = numpy_to_vtk(np.array(poses).reshape(-1, 16), deep=True)
+    for name, array in (("TimeStamp", times), ("ToolToWorld", matrices)):
+        array.SetName(name)
+        line.GetPointData().AddArray(array)
+    return line
+
+
+class Pivot(TissueSource):
+    """From a track, which is no volume."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        filter.SetInputDataObject(track())
+        return filter
+
+
+class Temporal(TissueSource):
+    def filter(self, images=()):
+        filter = self.make()
+        filter.SetInputDataObject(0, track())
+        filter.SetInputDataObject(1, track(0.25))
+        return filter
+
+
 class Files(Feed):
     def __init__(self, make):
         super().__init__(make)
@@ -463,6 +498,8 @@ Special = {
     "vtkUltrasoundEmbedQuality": EmbedQuality,
     "vtkUltrasoundFeather": Feather,
     "vtkUltrasoundHandEyeCalibration": HandEye,
+    "vtkUltrasoundPivotCalibration": Pivot,
+    "vtkUltrasoundTemporalCalibration": Temporal,
     "vtkUltrasoundStitchQuality": StitchQuality,
     "vtkUltrasoundNoiseTiler": NoiseTiler,
     "vtkUltrasoundOpenIGTLinkSender": Sender,
