@@ -186,10 +186,12 @@ std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const Han
     return FindHandEyeConsensus(tried, model, true, false, parameters.seed);
   };
   const Repair* best = nullptr;
-  double bestScale = scale / 4.0; // a repair is one that makes residuals much smaller
+  double bestScale = scale;
   for (const Repair& repair : repairs) {
     const double repairedScale = solve(repaired(repair, true)).scale;
-    if (repairedScale < bestScale) {
+    // A repair makes residuals much smaller. Few scans may come close to agreeing by chance when one side is inverted, but hardly
+    // when lengths grow.
+    if (repairedScale < bestScale && repairedScale < scale / (repair.invert ? 4.0 : 2.0)) {
       bestScale = repairedScale;
       best = &repair;
     }
