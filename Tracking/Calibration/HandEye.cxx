@@ -27,7 +27,9 @@ namespace {
 constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr int LeastForNoise = 5; // scans
 // Residuals of so many times the noise may come from a mistake; are no noise; are no noise either when it is to be estimated.
-constexpr double SuspectScale = 1.2, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
+constexpr double SuspectScale = 1.3, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
+// Three scans agree by chance too easily to outvote another.
+constexpr std::size_t LeastMajority = 4, ManyScans = 8;
 
 struct MethodName {
   HandEyeMethod method;
@@ -177,16 +179,22 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   HandEyeConsensus consensus = FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood,
                                                     parameters.estimateNoise, parameters.seed, progress.Part(0.0, 0.8));
   const auto inliers = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
-  const bool hopeless =
-      consensus.scale > (parameters.estimateNoise ? HopelessEstimatedScale : HopelessScale) || 2 * inliers < count;
-  if (hopeless || consensus.scale > SuspectScale) {
-    const std::string explanation = ExplainDisagreement(pairs, parameters, consensus.scale);
-    if (hopeless || !explanation.empty())
+  const bool tooFew = inliers < count && (inliers < LeastMajority || 2 * inliers < count);
+  const bool hopeless = tooFew || consensus.scale > (parameters.estimateNoise ? HopelessEstimatedScale : HopelessScale);
+  if (hopeless || consensus.scale > SuspectScale || (inliers < count && (count < ManyScans || 4 * inliers < 3 * count))) {
+    const std::string explanation = ExplainDisagreement(pairs, parameters, consensus);
+    if (!explanation.empty())
+      Refuse("the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
+             " are left. " + explanation);
+    if (tooFew)
+      Refuse(Format(
+          "no more than %d of %d scans agree with each other, which may be chance. Check that every sensor pose belongs to "
+          "its volume, or add scans",
+          static_cast<int>(inliers), static_cast<int>(count)));
+    if (hopeless)
       Refuse(
-          "the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) + " are left. " +
-          (explanation.empty() ? Format("That is %.3g times the noise stated. Check that every sensor pose belongs to its volume",
-                                        consensus.scale)
-                               : explanation));
+          "the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
+          Format(" are left, %.3g times the noise stated. Check that every sensor pose belongs to its volume", consensus.scale));
   }
   if (!likelihood) {
     consensus.inlier.assign(count, 1);

@@ -27,7 +27,7 @@ enum class HandEyeMethod {
   ParkMartin, ///< 1994: logarithms of rotations
   Horaud,     ///< Horaud and Dornaika 1995: unit quaternions
   Daniilidis, ///< 1999: dual quaternions, rotation and translation together
-  Andreff,    ///< 1999: linear in all twelve numbers, then made rigid
+  Andreff,    ///< 1999: linear in the nine numbers of the rotation, made rigid, then translation
   MaximumLikelihood
 };
 const char* HandEyeMethodName(HandEyeMethod method); ///< "shiu-ahmad", "tsai-lenz" ... "maximum-likelihood"
@@ -90,7 +90,9 @@ struct HandEyeResult {
 /// \throws Error(InvalidParameter) as Check(); Error(BadInput) that names the pair when a pose is not finite or not rigid;
 /// Error(NotPossible) with the reason when the answer is not determined: fewer than three scans, turns that are too small
 /// or all about parallel axes, identical poses, pure translation; when the sides disagree in a way that units (metres against mm)
-/// or an exchanged convention (S or M inverted) explain, the message says so. Error(Cancelled).
+/// or an exchanged convention (S or M inverted) explain, the message says so. Where scans disagree, four must agree, and half of
+/// all: three do by chance too easily, and for the same reason three scans with a side inverted are not found out.
+/// Error(Cancelled). Cost: 2.5 ms for 20 scans; linear in their number, but for one pass over all pairs that looks for repeats.
 HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters = {},
                                const Progress& progress = {});
 

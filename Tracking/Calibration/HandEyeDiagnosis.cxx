@@ -151,7 +151,8 @@ void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNois
            "turned by 30 to 90 degrees");
 }
 
-std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters, double scale)
+std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters,
+                                const HandEyeConsensus& consensus)
 {
   struct Repair {
     double sensorUnit, volumeUnit;
@@ -186,13 +187,18 @@ std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const Han
     return FindHandEyeConsensus(tried, model, true, false, parameters.seed);
   };
   const Repair* best = nullptr;
-  double bestScale = scale;
+  // Minus the logarithm of the likelihood, of Student's distribution, which outliers do not rule.
+  const auto doubt = [](const HandEyeConsensus& found) {
+    double sum = 0.0;
+    for (const double chiSquare : found.fit.chiSquare)
+      sum += 6.0 * std::log1p(chiSquare / 6.0);
+    return sum;
+  };
+  double leastDoubt = doubt(consensus) - std::log(1000.0);
   for (const Repair& repair : repairs) {
-    const double repairedScale = solve(repaired(repair, true)).scale;
-    // A repair makes residuals much smaller. Few scans may come close to agreeing by chance when one side is inverted, but hardly
-    // when lengths grow.
-    if (repairedScale < bestScale && repairedScale < scale / (repair.invert ? 4.0 : 2.0)) {
-      bestScale = repairedScale;
+    const double repairedDoubt = doubt(solve(repaired(repair, true)));
+    if (repairedDoubt < leastDoubt) {
+      leastDoubt = repairedDoubt;
       best = &repair;
     }
   }

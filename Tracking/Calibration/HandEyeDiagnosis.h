@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Tracking/Calibration/HandEye.h"
+#include "Tracking/Calibration/HandEyeSearch.h"
 #include <string>
 #include <vector>
 
@@ -20,9 +20,11 @@ std::vector<int> HandEyeRepeats(const std::vector<HandEyePair>& pairs);
 /// than the noise; turns about parallel axes only; half turns about axes at right angles only.
 void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise);
 
-/// When the scans do not agree: what would make them, as a sentence. Tried are lengths in metres, centimetres and inches on
-/// either side, and one side given the wrong way round, alone and with a side in metres. Empty when nothing helps.
-std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters, double scale);
+/// When the scans do not agree well: what would make them, as a sentence. Tried are lengths in metres, centimetres and inches on
+/// either side, and one side given the wrong way round, alone and with a side in metres. Empty when nothing explains the scans a
+/// thousand times better than \a consensus, by their likelihoods.
+std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters,
+                                const HandEyeConsensus& consensus);
 
 /// What looks strange although the scans agree: both sides in metres, a lever that suggests both inverted. Sentences.
 std::vector<std::string> HandEyeSuspicions(const std::vector<HandEyePair>& pairs, const HandEyeSolution& solution,

@@ -349,6 +349,27 @@ TEST(HandEye, WrongUnitsAndConventionsAreSaid)
   }
 }
 
+TEST(HandEye, FewScansAreNotFooled)
+{
+  // With four or five scans, three of them fit almost anything: a side that is inverted must not pass as outliers.
+  for (const int poses : {4, 5})
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      HandEyeScenario scenario;
+      scenario.poses = poses;
+      scenario.seed = seed;
+      std::vector<HandEyePair> pairs = SimulateHandEye(scenario).pairs;
+      EXPECT_GE(CalibrateHandEye(pairs).inliers, 4);
+      for (HandEyePair& pair : pairs)
+        pair.sensorToTracker = pair.sensorToTracker.inverse();
+      EXPECT_TRUE(Says(Refusal(pairs), "wrong way round")) << poses << " " << seed;
+    }
+  // And of four scans, three do not outvote the fourth.
+  HandEyeScenario scenario;
+  scenario.poses = 4;
+  scenario.outliers = 1;
+  EXPECT_TRUE(Says(Refusal(SimulateHandEye(scenario).pairs), "3 of 4 scans agree"));
+}
+
 TEST(HandEye, WhatLeavesNoResidualIsSuspected)
 {
   HandEyeScenario scenario;
