@@ -93,7 +93,7 @@ class HandEye(unittest.TestCase):
         report = self.told["report"]
         error = self.error_of(self.told["VolumeToSensor"])
         self.assertLess(error, 4.0)  # six scans that turn by some 30 degrees
-        self.assertLess(error, 2.0 * report["targetRadius95Mm"])
+        self.assertLess(error, 1.5 * report["targetRadius95Mm"])  # 95% lie within 1, all but one in thousands within 1.5
         self.assertEqual(report["inliers"], 6)
         self.assertAlmostEqual(report["rig"]["depthScale"], 1540 / 1482.4, delta=0.004)
         self.assertGreaterEqual(min(report["rig"]["balls"]), 5)
@@ -134,6 +134,14 @@ class HandEye(unittest.TestCase):
         run_json("calibrate", "hand-eye", "--volumes", *self.volumes, "--tracker", metres, "--unit", 1000, "--poses",
                  work / "rig" / "truth.json", "-o", work / "metres.json")
 
+    def test_a_bad_fifth_scan_is_left_out(self):
+        sensor = [*self.sensor[:4], self.sensor[4] @ pose([30, 0, 0], [0.4, 0, 0])]
+        told = run_json("calibrate", "hand-eye", "--volumes", *self.volumes[:5], "--tracker",
+                        write_log(work / "fifth.csv", "SensorToTracker", range(5), sensor), "--poses", work / "rig" / "truth.json", "-o",
+                        work / "fifth.json")
+        self.assertEqual([scan["inlier"] for scan in told["report"]["scans"]], [True] * 4 + [False])
+        self.assertFalse(told["report"]["noise"]["estimated"])
+
     def test_refusals_leave_nothing(self):
         before = snapshot(work)
         volumes, log = list(map(str, self.volumes)), str(self.log)
@@ -153,6 +161,9 @@ class HandEye(unittest.TestCase):
         for name in ("two.csv", "five.csv"):
             (work / name).unlink()
         self.assertEqual(before.keys(), snapshot(work).keys())
+        done = run("calibrate", "hand-eye", "--volumes", *volumes, "--tracker", log, "--poses", work / "rig" / "truth.json", "--save-poses",
+                   work / "same.json", "-o", work / "same.json")
+        self.assertEqual(done.returncode, 2)
         done = run("align", *volumes, "--tracker", log, "-o", work / "refused.json")
         self.assertEqual(done.returncode, 2)
         self.assertIn("--calibration", done.stderr)
@@ -239,12 +250,26 @@ class Motion(unittest.TestCase):
 class Track(unittest.TestCase):
     def test_simulated_and_replayed(self):
         told = run_json("track", "simulated:?rate=80", "--seconds", 1, "--record", work / "recorded.igs.mha")
-        recorded = sum(tool["valid"] + tool["missing"] + tool["out_of_range"] for tool in told["tools"])
+        recorded = sum(tool["valid"] + tool["missing"] + tool["outOfRange"] for tool in told["tools"])
+        self.assertEqual(told["recording"]["poses"], recorded)
+        self.assertEqual(told["recording"]["lost"], 0)
         self.assertGreater(recorded, 40)
         again = run_json("track", f"replay:{work / 'recorded.igs.mha'}?speed=0")
         self.assertEqual(again["state"], "ended")
-        self.assertLessEqual(abs(sum(tool["valid"] + tool["missing"] + tool["out_of_range"] for tool in again["tools"]) - recorded), 4)
+        self.assertLessEqual(abs(sum(tool["valid"] + tool["missing"] + tool["outOfRange"] for tool in again["tools"]) - recorded), 4)
         self.assertEqual(run_json("track", work / "recorded.igs.mha")["state"], "ended")  # a file is a recording
+        # A recording is never replaced, and nothing that was there goes.
+        before = (work / "recorded.igs.mha").read_bytes()
+        done = run("track", "simulated:", "--seconds", 0.5, "--record", work / "recorded.igs.mha")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("recorded.igs.mha", done.stderr)
+        self.assertEqual((work / "recorded.igs.mha").read_bytes(), before)
+
+    def test_nobody_answers(self):
+        done = run("track", "igtl://127.0.0.1:1", "--seconds", 1, "--record", work / "nothing.igs.mha")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("refused", done.stderr.lower())
+        self.assertFalse((work / "nothing.igs.mha").exists())
 
     def test_passed_on_over_openigtlink(self):
         server = subprocess.Popen([PROGRAM, "track", "simulated:?rate=60", "--serve", "0", "--every", "3600"], stdout=subprocess.PIPE,

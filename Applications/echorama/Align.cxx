@@ -66,7 +66,10 @@ void PlaceByTracker(Session& session, const AlignOptions& options, std::vector<L
   volumeToSensor.matrix() = edge->matrix.matrix();
   const std::string text = ReadTransformReport(options.calibration);
   const auto report = nlohmann::json::parse(text.empty() ? "{}" : text);
-  const VolumeFrames frames = VolumeFrames::Of(session, volumes, report.value("volumeFrame", std::string()));
+  std::string frame;
+  if (report.is_object() && report.contains("volumeFrame") && report["volumeFrame"].is_string())
+    frame = report["volumeFrame"];
+  const VolumeFrames frames = VolumeFrames::Of(session, volumes, frame);
   const std::vector<Pose> sensor = SensorPoses(session, options.tracker, tool, volumes);
   const auto fixed = static_cast<std::size_t>(options.fixed - 1);
   for (std::size_t i = 0; i < volumes.size(); ++i)

@@ -9,6 +9,7 @@
 #include "Tracking/Calibration/HandEye.h"
 #include <CLI/Validators.hpp>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
@@ -156,8 +157,11 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   if (!options.poses.empty())
     inputs.push_back(options.poses);
   CheckOutput(options.output, inputs);
-  if (!options.savePoses.empty())
+  if (!options.savePoses.empty()) {
     CheckOutput(options.savePoses, inputs);
+    if (std::filesystem::weakly_canonical(options.savePoses) == std::filesystem::weakly_canonical(options.output))
+      throw Error(Error::Kind::InvalidParameter, options.savePoses + ": --save-poses and --output name the same file");
+  }
 
   HandEyeParameters parameters;
   parameters.method = HandEyeMethodOf(options.method);
@@ -226,13 +230,13 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
                 (residual.inlier ? "" : ", not used: " + residual.reason));
   if (!result.advice.empty())
     session.Say("what would help most: " + result.advice.front().text);
-  if (2 * result.inliers <= static_cast<int>(options.volumes.size())) {
+  if (2 * result.inliers < static_cast<int>(options.volumes.size())) {
     session.status = Session::Doubtful;
     session.Note("more than half of the scans were of no use: the calibration should not be used unseen");
   }
+  WriteTransforms(options.output, {calibration, world}, report.dump());
   if (!options.savePoses.empty())
     WritePoses(options.savePoses, poses);
-  WriteTransforms(options.output, {calibration, world}, report.dump());
   session.Say("wrote " + options.output);
 }
 
@@ -278,6 +282,8 @@ Command CalibrateHandEyeCommand(CLI::App& calibrate)
       ->add_option("--target", values->target,
                    "Where the error counts, mm, in the volume's frame (default: the middle of the volumes)")
       ->expected(3);
+  for (const char* name : {"--align", "--rig", "--depth-scale", "--start"})
+    options->get_option(name)->excludes("--poses");
   const auto noise = [values](PoseNoise& side) {
     return [values, &side](const std::vector<double>& given) {
       side = {given[0], given[1]};

@@ -82,7 +82,7 @@ void MakeRig(Session& session, const RigOptions& options)
     CalibrationRigParameters rig;
     rig.scale = scale;
     rig.waterCelsius = options.waterCelsius;
-    rig.plateDepthMm *= std::max(scale, 0.5); // so that a small rig is near the probe
+    rig.plateDepthMm = std::min(rig.plateDepthMm * std::max(scale, 0.5), 490.0); // so that a small rig is near the probe
     WriteText(folder.Stage(name + ".json"), SceneOf(rig, name).dump(2) + "\n");
     std::string table = "label,x,y,z,radius\n"; // in the world of the scene
     const std::vector<Landmark> centres = CalibrationLandmarks(rig);
@@ -100,6 +100,7 @@ void MakeRig(Session& session, const RigOptions& options)
   if (!options.handle.empty()) {
     clip->SetHandleWidthMm(options.handle[0]);
     clip->SetHandleThicknessMm(options.handle[1]);
+    clip->SetOpeningMm(std::min(clip->GetOpeningMm(), 0.4 * options.handle[0]));
   }
   if (!options.sensor.empty())
     clip->SetSensorMm(options.sensor.data());

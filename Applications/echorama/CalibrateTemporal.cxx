@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama calibrate temporal: the offset between the clocks of two recordings of one motion.
 #include "Calibrate.h"
+#include "Core/Base/FileReplacement.h"
 #include "Outputs.h"
 #include "TrackedVolumes.h"
 #include "Tracking/Calibration/TemporalCalibration.h"
@@ -55,11 +56,13 @@ void CalibrateClocks(Session& session, TemporalOptions options)
   session.Say("from speeds of " + session.result["signal"].get<std::string>() + ", correlation " + Fixed(result.correlation, 3) +
               ", over " + Fixed(result.overlapSeconds, 1) + " s");
   if (!options.output.empty()) {
-    std::ofstream stream(options.output);
+    FileReplacement files;
+    std::ofstream stream(files.Stage(options.output));
     stream << session.result.dump(2) << '\n';
     stream.close();
     if (!stream)
       throw Error(Error::Kind::FileSystem, options.output + ": it cannot be written (is the disk full?)");
+    files.Commit();
     session.Say("wrote " + options.output);
   }
 }

@@ -9,6 +9,7 @@
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/LiveTransforms.h"
 #include "Tracking/Stream/StreamRecorder.h"
+#include "Tracking/Stream/StreamReport.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
 #include <cmath>
@@ -52,43 +53,47 @@ void ShowNow(const TrackOptions& options, const PoseStream& poses, const LiveTra
 
 void Report(Session& session, const StreamStatistics& statistics)
 {
-  session.result["state"] = DeviceStateText(statistics.state);
-  if (!statistics.message.empty())
-    session.result["message"] = statistics.message;
-  session.result["tools"] = nlohmann::ordered_json::array();
-  for (const ToolStatistics& tool : statistics.tools) {
-    session.result["tools"].push_back({{"name", tool.name},
-                                       {"valid", tool.valid},
-                                       {"missing", tool.missing},
-                                       {"out_of_range", tool.outOfRange},
-                                       {"gaps", tool.gaps},
-                                       {"clock_jumps", tool.clockJumps},
-                                       {"rate_hz", tool.rateHz},
-                                       {"jitter_ms", 1e3 * tool.jitterSeconds},
-                                       {"latency_ms", 1e3 * tool.medianLatencySeconds},
-                                       {"latency_spread_ms", 1e3 * tool.latencySpreadSeconds}});
+  const auto report = nlohmann::ordered_json::parse(StreamReport(statistics));
+  for (const auto& [key, value] : report.items())
+    session.result[key] = value;
+  for (const ToolStatistics& tool : statistics.tools)
     session.Say(tool.name + ": " + std::to_string(tool.valid) + " poses, " + Fixed(tool.rateHz, 1) + " Hz, jitter " +
                 Fixed(1e3 * tool.jitterSeconds, 2) + " ms, " + Fixed(100.0 * tool.DropoutShare(), 1) +
-                "% lost or out of range, " + std::to_string(tool.gaps) + " gaps, latency within " +
-                Fixed(1e3 * tool.latencySpreadSeconds, 2) + " ms of the smallest");
-  }
-  nlohmann::ordered_json rejected = nlohmann::ordered_json::object();
+                "% lost or out of range, " + std::to_string(tool.gaps) + " gaps" +
+                (std::isfinite(tool.latencySpreadSeconds)
+                     ? ", latency within " + Fixed(1e3 * tool.latencySpreadSeconds, 2) + " ms of the smallest"
+                     : ""));
   std::uint64_t all = 0;
-  for (int i = 0; i < RejectionCount; ++i) {
-    const auto reason = static_cast<Rejection>(i);
-    if (statistics.Rejected(reason) > 0)
-      rejected[RejectionText(reason)] = statistics.Rejected(reason);
-    all += statistics.Rejected(reason);
-  }
-  session.result["rejected"] = rejected;
+  for (const std::uint64_t count : statistics.rejected)
+    all += count;
   if (all > 0)
     session.Note(std::to_string(all) + " messages were not taken; the last: " + statistics.lastRejection);
 }
 
+// What clients did not get.
+void ReportServer(Session& session, const OpenIgtLinkServer& server)
+{
+  const OpenIgtLinkServerStatistics statistics = server.Statistics();
+  session.result["served"] = {{"clients", statistics.accepted},
+                              {"sent", statistics.sent},
+                              {"dropped", statistics.dropped},
+                              {"lost", statistics.lost},
+                              {"unnameable", statistics.unnameable}};
+  if (statistics.dropped + statistics.lost > 0)
+    session.Note(std::to_string(statistics.dropped + statistics.lost) +
+                 " poses were not passed on: clients did not take them in time");
+  if (statistics.unnameable > 0)
+    session.Note(std::to_string(statistics.unnameable) +
+                 " poses were not passed on: their names do not fit into OpenIGTLink's 20 bytes");
+}
+
 void Track(Session& session, TrackOptions options)
 {
-  if (std::filesystem::exists(options.tracker))
+  std::error_code noFile;
+  if (std::filesystem::exists(options.tracker, noFile))
     options.tracker = "replay:" + options.tracker;
+  PoseStream poses; // outlives what writes to it
+  ImageStream images;
   const auto device = MakeTracker(options.tracker);
   std::vector<std::string> inputs;
   const TrackerAddress address = TrackerAddress::Parse(options.tracker);
@@ -97,7 +102,6 @@ void Track(Session& session, TrackOptions options)
   if (!options.record.empty())
     CheckOutput(options.record, inputs);
 
-  PoseStream poses;
   const LiveTransforms transforms(poses, options.transforms.empty() ? std::vector<NamedTransform>()
                                                                     : ReadTransforms(options.transforms));
   std::unique_ptr<OpenIgtLinkServer> server;
@@ -114,19 +118,29 @@ void Track(Session& session, TrackOptions options)
   }
   std::unique_ptr<StreamRecorder> recorder;
   if (!options.record.empty()) {
-    SequenceRecorderOptions recording;
-    recording.replace = true; // CheckOutput has looked at it
-    recorder = std::make_unique<StreamRecorder>(options.record, poses.Subscribe(), recording);
+    // A recording is never replaced: it grows in its place, so that the old one would be gone at once.
+    recorder = std::make_unique<StreamRecorder>(options.record, poses.Subscribe(1 << 20));
   }
-  device->Start(poses, nullptr);
+  device->Start(poses, server ? &images : nullptr);
 
   const double start = ClockNow();
-  double shown = start;
+  double shown = start, checked = start;
   try {
     session.Work("track", options.tracker, [&](const Progress& progress) {
+      std::uint64_t sentImages = 0;
       for (std::uint64_t seen = 0;;) {
         seen = poses.WaitBeyond(seen, 0.1);
         const double now = ClockNow();
+        if (server && images.Version() != sentImages) {
+          sentImages = images.Version();
+          server->SendImage(images.Latest());
+        }
+        if (recorder && now - checked > 0.5) {
+          checked = now;
+          const std::string problem = recorder->State().problem;
+          if (!problem.empty())
+            throw Error(Error::Kind::FileSystem, problem);
+        }
         if (now - shown >= options.everySeconds) {
           shown = now;
           ShowNow(options, poses, transforms);
@@ -142,21 +156,28 @@ void Track(Session& session, TrackOptions options)
     if (error.GetKind() != Error::Kind::Cancelled) // how a live tracker is ended is not an error
       throw;
   }
+  const StreamStatistics last = poses.Statistics(); // what it was doing; once stopped, it does nothing
   device->Stop();
-  const StreamStatistics statistics = poses.Statistics();
+  StreamStatistics statistics = poses.Statistics();
+  statistics.state = last.state;
+  statistics.message = last.message;
   session.result["tracker"] = options.tracker;
   session.result["lasted_seconds"] = ClockNow() - start;
   if (recorder) {
-    const RecordingState before = recorder->State();
-    recorder->Stop();
-    session.result["recording"] = options.record;
-    session.Say("recorded to " + options.record);
-    if (before.lost > 0)
-      session.Note(options.record + ": " + std::to_string(before.lost) + " poses came faster than they could be written");
+    if (!statistics.tools.empty())
+      recorder->Stop();
+    const RecordingState state = recorder->State();
+    session.result["recording"] = {
+        {"file", options.record}, {"poses", state.poses}, {"frames", state.frames}, {"lost", state.lost}};
+    session.Say("recorded " + std::to_string(state.poses) + " poses to " + options.record);
+    if (state.lost > 0)
+      session.Note(options.record + ": " + std::to_string(state.lost) + " poses came faster than they could be written");
   }
   if (server) {
-    server->Flush(1.0);
+    if (!server->Flush(5.0))
+      session.Note("clients had not taken everything when it ended");
     server->Stop();
+    ReportServer(session, *server);
   }
   Report(session, statistics);
   if (statistics.state == DeviceState::Failed)
@@ -181,9 +202,10 @@ Command TrackCommand(CLI::App& program)
           "The tracker, as SCHEME:PLACE?OPTION=VALUE (igtl://localhost:18944, polhemus:/dev/ttyUSB0, simulated: ...; schemes: " +
               schemes + "), or a recording")
       ->required();
-  options->add_option("--record", values->record, "Record to this sequence (.igs.mha); safe against a sudden end");
+  options->add_option("--record", values->record,
+                      "Record to this sequence (.igs.mha), which must not be there yet; safe against a sudden end");
   options->add_option("--serve", values->serve,
-                      "Pass everything on to OpenIGTLink clients at PORT or HOST:PORT (PORT alone: this machine only)");
+                      "Pass poses and images on to OpenIGTLink clients at PORT or HOST:PORT (PORT alone: this machine only)");
   options->add_option("--transforms", values->transforms, "Fixed transforms, such as a calibration");
   options->add_option("--show", values->shown, "A transform to show while it runs, such as VolumeToTracker; again for each");
   options->add_option("--every", values->everySeconds, "How often it is shown, in seconds")

@@ -126,8 +126,9 @@ std::vector<Pose> SensorPoses(Session& session, const TrackerOptions& options, c
     for (const LoadedVolume& volume : volumes)
       if (const auto stamp = vtkUltrasoundAcquisition::TimeStampOf(volume.image))
         times.push_back(*stamp);
-    if (times.size() != n)
-      times.clear();
+    if (times.size() != n && !times.empty())
+      throw Error(Error::Kind::BadInput, std::to_string(n - times.size()) + " of " + std::to_string(n) +
+                                             " volumes have no time stamp: say with --at when each was made");
     how = "at the volumes' time stamps";
   }
   std::vector<Pose> poses;
@@ -148,6 +149,9 @@ std::vector<Pose> SensorPoses(Session& session, const TrackerOptions& options, c
   for (const ToolPose& pose : tool.poses)
     if (timedPoses.empty() || pose.time > timedPoses.back().time)
       timedPoses.push_back({pose.time, pose.pose});
+  if (timedPoses.size() < tool.poses.size())
+    session.Note(options.log + ": " + std::to_string(tool.poses.size() - timedPoses.size()) + " poses of " + tool.name +
+                 " repeat a time and were left out");
   MotionSmoothing smoothing;
   smoothing.sigmaSeconds = options.windowSeconds;
   const MotionPath path(timedPoses, smoothing);

@@ -512,37 +512,33 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
                                               " at most lie as the rig's balls do");
 
   // The few best are refined; what counts is how well they fit then.
-  Refined best;
-  int rivals = 0;
-  for (const Match& match : matches) {
-    if (match.balls + 1 < most)
-      continue;
-    const Refined refined = Refine(scene, intensity, balls, match.rigToProbe, scale, p.toleranceMm);
-    const auto distance = [&](const Refined& other) {
-      double apart = 0.0;
-      for (const RigBall& ball : balls)
-        apart = std::max(apart, (other.pose * ball.centre - refined.pose * ball.centre).norm());
-      return apart;
-    };
-    if (refined.found > best.found || (refined.found == best.found && refined.squared < best.squared)) {
-      rivals =
-          best.found == refined.found && distance(best) > 2.0 * p.toleranceMm && best.squared < 2.0 * refined.squared ? 1 : 0;
-      best = refined;
-    } else if (refined.found == best.found && distance(best) > 2.0 * p.toleranceMm && refined.squared < 2.0 * best.squared) {
-      rivals = 1;
-    }
+  std::vector<Refined> fits;
+  for (const Match& match : matches)
+    if (match.balls + 1 >= most)
+      fits.push_back(Refine(scene, intensity, balls, match.rigToProbe, scale, p.toleranceMm));
+  Refined best = *std::min_element(fits.begin(), fits.end(), [](const Refined& a, const Refined& b) {
+    return a.found != b.found ? a.found > b.found : a.squared < b.squared;
+  });
+  const auto check = [&] {
+    if (best.found < p.fewestBalls)
+      throw Error(Error::Kind::NotPossible,
+                  "rig fit: the rig was not found: " + std::to_string(best.found) + " balls at most fit");
+    const double rms = std::sqrt(best.squared / best.found);
+    if (!(rms <= p.largestRmsMm))
+      throw Error(Error::Kind::NotPossible, "rig fit: the rig was not found: where it would fit best, " +
+                                                std::to_string(best.found) + " balls lie " +
+                                                NumberText(std::round(100.0 * rms) / 100.0) +
+                                                " mm (RMS) from their places, more than " + NumberText(p.largestRmsMm));
+  };
+  check();
+  for (const Refined& other : fits) {
+    double apart = 0.0;
+    for (const RigBall& ball : balls)
+      apart = std::max(apart, (other.pose * ball.centre - best.pose * ball.centre).norm());
+    if (other.found == best.found && apart > 2.0 * p.toleranceMm && other.squared < 2.0 * best.squared)
+      throw Error(Error::Kind::NotPossible, "rig fit: two places of the rig explain " + std::to_string(best.found) +
+                                                " balls equally well; more balls must be seen");
   }
-  if (best.found < p.fewestBalls)
-    throw Error(Error::Kind::NotPossible, "rig fit: the rig was not found: " + std::to_string(best.found) + " balls at most fit");
-  const double rms = std::sqrt(best.squared / best.found);
-  if (!(rms <= p.largestRmsMm))
-    throw Error(Error::Kind::NotPossible, "rig fit: the rig was not found: where it would fit best, " +
-                                              std::to_string(best.found) + " balls lie " +
-                                              NumberText(std::round(100.0 * rms) / 100.0) +
-                                              " mm (RMS) from their places, more than " + NumberText(p.largestRmsMm));
-  if (rivals > 0)
-    throw Error(Error::Kind::NotPossible, "rig fit: two places of the rig explain " + std::to_string(best.found) +
-                                              " balls equally well; more balls must be seen");
   progress(0.75);
 
   RigFit fit;
@@ -555,7 +551,7 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
     double step = 0.01;
     double here = cost(scale);
     for (int round = 0; round < 24 && step > 2e-4; ++round) {
-      const double low = scale > 0.905 ? cost(scale - step) : 1e30, high = scale < 1.095 ? cost(scale + step) : 1e30;
+      const double low = scale - step >= 0.9 ? cost(scale - step) : 1e30, high = scale + step <= 1.1 ? cost(scale + step) : 1e30;
       if (low < here && low <= high) {
         scale -= step;
         here = low;
@@ -573,6 +569,7 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
     const double variance = here / std::max(1, 3 * best.found - 7);
     fit.depthScaleError = curvature > 0.0 && curvature < 1e20 ? std::sqrt(2.0 * variance / curvature) : 0.1;
     best = Refine(scene, intensity, balls, best.pose, scale, p.toleranceMm);
+    check();
   }
   fit.rigToProbe = best.pose;
   fit.depthScale = scale;

@@ -36,10 +36,11 @@ double Box(const Vector3d& p, const Eigen::AlignedBox3d& box)
 // A bar of a square section along a line, ends included.
 double Bar(const Vector3d& p, const Vector3d& from, const Vector3d& to, double width)
 {
-  const Vector3d along = (to - from).normalized(), side = Vector3d::UnitX();
+  const double length = (to - from).norm();
+  const Vector3d along = length > 1e-9 ? Vector3d((to - from) / length) : Vector3d::UnitZ(), side = Vector3d::UnitX();
   const Vector3d local(side.dot(p - from), along.cross(side).dot(p - from), along.dot(p - from));
   const double h = 0.5 * width;
-  return Box(local, {Vector3d(-h, -h, -h), Vector3d(h, h, (to - from).norm() + h)});
+  return Box(local, {Vector3d(-h, -h, -h), Vector3d(h, h, length + h)});
 }
 
 // The outline of a handle, and distances from it.

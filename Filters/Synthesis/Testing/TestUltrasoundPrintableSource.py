@@ -90,6 +90,16 @@ assert not inside.any(), "the sensor does not fit in"
 near = np.abs(points[:, 0]) < 0.6
 assert points[near & (points[:, 1] > 9) & (points[:, 2] < 36), 2].size == 0, "the side is not open"
 
+# At the ends of its ranges it is whole, too.
+for arm in (0, 13, 300):
+    for stand_off in (0, 3, 100):
+        source = vtkUltrasoundPrintableSource()
+        source.SetKindToClip()
+        source.SetResolution(1)
+        source.SetArmMm(arm)
+        source.SetStandOffMm(stand_off)
+        mesh_of()
+
 for change, word in (
     (lambda: source.SetWallMm(0), "wallMm"),
     (lambda: source.SetOpeningMm(29), "openingMm"),
