@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The graph is built once; each question puts the poses of its moment into it and searches the way, which is short. The newest
 // poses of several tools need not be of one moment. Where they are not, the question is asked twice: of the newest poses, which
-// tells who is on the way, and then of the moment that the slowest of these has reached.
+// tells who is on the way, and then of the moment that the slowest of these has reached. Poses of different moments are never put
+// together, unless there is no moment that all of them have.
 #include "Tracking/Stream/LiveTransforms.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
@@ -104,10 +105,20 @@ LiveTransform LiveTransforms::Find(const std::string& from, const std::string& t
   const std::vector<std::string>& way = newest.transform.path;
   if (std::none_of(way.begin(), way.end(), isLater))
     return newest;
+  // No common moment: senders whose clocks do not agree, or a tool that has just come. Better the newest than none, and said so.
+  const auto isYounger = [this, &newest](const std::string& step) {
+    const auto tool = tools_.find(EdgeOf(step));
+    return tool != tools_.end() && !stream_.Covers(tool->second.name, newest.time);
+  };
+  if (std::any_of(way.begin(), way.end(), isYounger)) {
+    LiveTransform mixed = newest;
+    mixed.time = std::numeric_limits<double>::quiet_NaN();
+    mixed.message += (mixed.message.empty() ? "" : "; ") + std::string("poses of different moments");
+    return mixed;
+  }
+  // A tool that was not seen then is missing, whatever has come of it since.
   MoveTo(stream_.Poses(newest.time), false);
-  const LiveTransform common = Ask(from, to);
-  // Nothing there: senders whose clocks do not agree, or a tool that has just come. Better the newest than none.
-  return common.Status() == TransformStatus::Missing ? newest : common;
+  return Ask(from, to);
 }
 
 LiveTransform LiveTransforms::Find(const std::string& name, double time) const

@@ -13,9 +13,10 @@ namespace echorama {
 /// What a stream and fixed transforms say of a transform at one moment.
 struct LiveTransform {
   ComposedTransform transform; ///< its matrix means nothing when the status is Missing
-  /// Of the poses on the way, on the sender's clock; NaN when none of them moves, or none is there.
+  /// Of the poses on the way, on the sender's clock; NaN when none of them moves, none is there, or they have none in common.
   double time = std::numeric_limits<double>::quiet_NaN();
-  std::string message; ///< why the status is not Valid: a sentence; empty when it is
+  /// Why the status is not Valid: a sentence; empty when it is, but for "poses of different moments" (LiveTransforms::Find).
+  std::string message;
 
   TransformStatus Status() const { return transform.status; }
 };
@@ -34,7 +35,8 @@ public:
   explicit LiveTransforms(const PoseStream& stream, const std::vector<NamedTransform>& fixed = {}, double freshSeconds = 1.0);
 
   /// From a frame to another. When \a time is NaN, at the newest moment that all the tools on the way have reached; else at that
-  /// time on the sender's clock, as PoseStream::At.
+  /// time on the sender's clock, as PoseStream::At. Tools that have no moment in common at all, as those of senders whose clocks
+  /// do not agree, give their newest poses, the time NaN and the message "poses of different moments".
   LiveTransform Find(const std::string& from, const std::string& to,
                      double time = std::numeric_limits<double>::quiet_NaN()) const;
   /// The same by a name, "ImageToReference" (FramesOf).

@@ -437,6 +437,16 @@ ToolPose PoseStream::At(const std::string& name, double time) const
                                       : found->second.At(name, time, parts_->limits.longestGapSeconds);
 }
 
+bool PoseStream::Covers(const std::string& name, double time) const
+{
+  const std::lock_guard<std::mutex> lock(parts_->mutex);
+  const auto found = parts_->tools.find(name);
+  if (found == parts_->tools.end() || found->second.samples.Empty())
+    return false;
+  const Ring& samples = found->second.samples;
+  return samples[0].time <= time && time <= samples.Last().time;
+}
+
 std::vector<ToolPose> PoseStream::Poses(double time) const
 {
   const std::lock_guard<std::mutex> lock(parts_->mutex);

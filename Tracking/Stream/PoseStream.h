@@ -128,6 +128,8 @@ public:
   /// StreamLimits::longestGapSeconds. Missing in gaps, before the oldest that is remembered, and after the newest; OutOfRange
   /// when a neighbour is.
   ToolPose At(const std::string& name, double time) const;
+  /// Whether a moment on the sender's clock lies between the oldest that is remembered of a tool and the newest, both included.
+  bool Covers(const std::string& name, double time) const;
   /// All tools under one lock, in the order of bytes: as At, or as Latest when \a time is NaN.
   std::vector<ToolPose> Poses(double time) const;
   /// Those that are remembered, in the order of time.

@@ -114,8 +114,36 @@ TEST(LiveTransforms, SendersWithoutACommonMoment)
   Add(stream, "ReferenceToTracker", 5.0, SomePose(2));
   const LiveTransform found = live.Find("ProbeToReference");
   EXPECT_EQ(found.Status(), TransformStatus::Valid);
-  EXPECT_EQ(found.time, 5.0);
+  EXPECT_TRUE(std::isnan(found.time));
+  EXPECT_EQ(found.message, "poses of different moments");
   EXPECT_LT(Difference(found.transform.matrix, Affine(SomePose(2).inverse() * SomePose(1))), 1e-9);
+}
+
+TEST(LiveTransforms, ADropOutIsNotBridgedByALaterPose)
+{
+  const auto along = [](double x) {
+    Pose pose = Pose::Identity();
+    pose.translation().x() = x;
+    return pose;
+  };
+  for (const bool isMarked : {true, false}) { // the sender says that it was not seen, or sends nothing
+    PoseStream stream;
+    stream.SetLive(false);
+    const LiveTransforms live(stream);
+    Add(stream, "ProbeToTracker", 9.0, along(0.0));
+    Add(stream, "ReferenceToTracker", 10.0, along(0.0));
+    if (isMarked)
+      Add(stream, "ProbeToTracker", 10.0, along(0.0), TransformStatus::Missing);
+    Add(stream, "ProbeToTracker", 10.8, along(400.0));
+    const LiveTransform lost = live.Find("ProbeToReference");
+    EXPECT_EQ(lost.Status(), TransformStatus::Missing);
+    EXPECT_EQ(lost.message, "ProbeToTracker is missing");
+    Add(stream, "ReferenceToTracker", 10.8, along(0.0));
+    const LiveTransform back = live.Find("ProbeToReference");
+    EXPECT_EQ(back.Status(), TransformStatus::Valid);
+    EXPECT_EQ(back.time, 10.8);
+    EXPECT_EQ(back.transform.matrix.translation().x(), 400.0);
+  }
 }
 
 TEST(LiveTransforms, StatusesAndReasons)
