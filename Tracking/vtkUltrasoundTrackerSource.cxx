@@ -368,15 +368,14 @@ bool vtkUltrasoundTrackerSource::Step()
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::GetState() const
 {
-  return !this->Failure.empty()
-             ? DeviceStateText(echorama::DeviceState::Failed)
-             : DeviceStateText(this->Opened ? this->Opened->Poses.Statistics().state : echorama::DeviceState::Idle);
+  return !this->Failure.empty() ? DeviceStateText(echorama::DeviceState::Failed)
+                                : DeviceStateText(this->Opened ? this->Opened->Poses.State().first : echorama::DeviceState::Idle);
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::GetMessage() const
 {
-  return this->Opened ? this->Opened->Poses.Statistics().message : this->Failure;
+  return this->Opened ? this->Opened->Poses.State().second : this->Failure;
 }
 
 //----------------------------------------------------------------------------

@@ -174,8 +174,9 @@ public:
   ///@{
   /**
    * Statistics of a tool, by its name or that of its frame ("Probe"): poses taken, rate in Hz, standard deviation of the
-   * intervals in seconds, median latency in seconds (of meaning when both clocks agree; NaN in recordings), share of poses that
-   * were not valid, and seconds since the last one. See echorama::ToolStatistics. 0 poses, and NaN, of a tool that is not there.
+   * intervals in seconds, median latency in seconds (of meaning when both clocks agree; NaN in recordings and of senders without
+   * times), share of poses that were not valid, and seconds since the last one. See echorama::ToolStatistics. 0 poses, and NaN,
+   * of a tool that is not there.
    */
   vtkIdType GetNumberOfPoses(const char* tool) const;
   double GetRate(const char* tool) const;

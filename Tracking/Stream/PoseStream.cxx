@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // One lock guards everything: a pose is a hundred bytes, ten thousand of them a second are no load. What costs more (making a
-// matrix rigid, sorting latencies) is done outside of it, and nobody is woken while it is held.
+// matrix rigid, sorting latencies) is done outside of it, and nobody who needs it is woken while it is held: subscriptions have
+// locks of their own.
 //
 // Each tool keeps its newest poses, in the order of time, in a ring that grows to its bound and is then never allocated again.
 //
@@ -129,6 +130,7 @@ struct Sample {
   double time = 0.0, arrival = 0.0;
   Pose pose = Pose::Identity();
   TransformStatus status = TransformStatus::Missing;
+  bool isTimed = true; // by its sender; otherwise its time is that of its arrival, which says nothing of a latency
 
   ToolPose Named(const std::string& name) const { return {name, time, arrival, pose, status}; }
 };
@@ -216,7 +218,7 @@ struct Tool {
 
 // What statistics are made of, copied under the lock.
 struct Intervals {
-  std::vector<double> times, arrivals;
+  std::vector<double> times, arrivals, latencies;
 };
 
 void Summarize(const Intervals& window, bool live, ToolStatistics& statistics)
@@ -224,7 +226,7 @@ void Summarize(const Intervals& window, bool live, ToolStatistics& statistics)
   const double unknown = std::numeric_limits<double>::quiet_NaN();
   const std::size_t count = window.times.size();
   statistics.remembered = count;
-  if (!live)
+  if (!live || (count > 0 && window.latencies.empty()))
     statistics.medianLatencySeconds = statistics.latencySpreadSeconds = unknown;
   if (count > 0)
     statistics.secondsSinceLast = ClockNow() - window.arrivals.back();
@@ -249,13 +251,11 @@ void Summarize(const Intervals& window, bool live, ToolStatistics& statistics)
   }
   statistics.jitterSeconds = std::sqrt(squares / static_cast<double>(count - 1));
 
-  if (live) {
-    values.resize(count);
-    for (std::size_t i = 0; i < count; ++i)
-      values[i] = window.arrivals[i] - window.times[i];
+  if (live && !window.latencies.empty()) {
+    values = window.latencies;
     const double smallest = *std::min_element(values.begin(), values.end());
     statistics.medianLatencySeconds = Middle(values);
-    const auto high = values.begin() + static_cast<std::ptrdiff_t>((count - 1) * 95 / 100);
+    const auto high = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) * 95 / 100);
     std::nth_element(values.begin(), high, values.end());
     statistics.latencySpreadSeconds = *high - smallest;
   }
@@ -297,7 +297,8 @@ struct PoseStream::Parts {
 
     const bool first = tool.samples.Empty();
     double since = 0.0;
-    if (!std::isfinite(pose.time)) {
+    const bool isTimed = std::isfinite(pose.time);
+    if (!isTimed) {
       pose.time = pose.arrival;
       // Two may arrive within one tick of the clock; neither is a duplicate.
       if (!first && pose.time <= tool.samples.Last().time && tool.samples.Last().time - pose.time < limits.jumpSeconds)
@@ -323,7 +324,7 @@ struct PoseStream::Parts {
     }
     tool.clockOffset = first || jumped ? offset : std::max(offset, tool.clockOffset - ClockFading * since);
     ++tool.byStatus[static_cast<std::size_t>(pose.status)];
-    tool.samples.Add({pose.time, pose.arrival, pose.pose, pose.status}, limits.posesPerTool);
+    tool.samples.Add({pose.time, pose.arrival, pose.pose, pose.status, isTimed}, limits.posesPerTool);
     ++version;
     return true;
   }
@@ -490,12 +491,20 @@ StreamStatistics PoseStream::Statistics() const
       for (std::size_t i = 0; i < tool.samples.Size(); ++i) {
         window.times.push_back(tool.samples[i].time);
         window.arrivals.push_back(tool.samples[i].arrival);
+        if (tool.samples[i].isTimed)
+          window.latencies.push_back(tool.samples[i].arrival - tool.samples[i].time);
       }
     }
   }
   for (std::size_t i = 0; i < windows.size(); ++i)
     Summarize(windows[i], statistics.live, statistics.tools[i]);
   return statistics;
+}
+
+std::pair<DeviceState, std::string> PoseStream::State() const
+{
+  const std::lock_guard<std::mutex> lock(parts_->mutex);
+  return {parts_->total.state, parts_->total.message};
 }
 
 std::uint64_t PoseStream::Version() const

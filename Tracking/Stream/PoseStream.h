@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace echorama {
@@ -58,9 +59,9 @@ struct ToolStatistics {
   double longestGapSeconds = 0.0;                       ///< the longest interval on the sender's clock
   double rateHz = 0.0;                                  ///< poses of any status per second of ours; of the recording's
   double jitterSeconds = 0.0;                           ///< standard deviation of the intervals of arrival; of the recording's
-  /// Arrival minus time of measurement; of meaning when both clocks agree. NaN in recordings.
+  /// Arrival minus time of measurement; of meaning when both clocks agree. NaN in recordings, and of a sender without times.
   double medianLatencySeconds = 0.0;
-  /// 95% of the latencies are below the smallest plus this, whatever the clocks. NaN in recordings.
+  /// 95% of the latencies are below the smallest plus this, whatever the clocks. NaN as above.
   double latencySpreadSeconds = 0.0;
   double secondsSinceLast = 0.0; ///< on our clock
 
@@ -135,6 +136,8 @@ public:
   /// Those that are remembered, in the order of time.
   std::vector<ToolPose> History(const std::string& name) const;
   StreamStatistics Statistics() const;
+  /// What the device is doing and its message, as SetState said; cheap, where Statistics() sorts.
+  std::pair<DeviceState, std::string> State() const;
   /// Counts up with every pose and change of state, so that a reader knows whether there is something new.
   std::uint64_t Version() const;
   /// Waits for up to \a seconds (at most an hour) until the version is not \a seen any more. \returns the version

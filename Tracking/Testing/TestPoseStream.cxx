@@ -244,6 +244,19 @@ TEST(PoseStream, WithoutTimesArrivalStandsForThem)
   EXPECT_EQ(StatisticsOf(silent).valid, 1000u);
   EXPECT_EQ(silent.Statistics().Rejected(), 0u);
   EXPECT_NEAR(silent.Latest("ProbeToTracker").time, 1.7e9, 1e-3);
+  // How late such poses are was never measured, and those that have times are not mixed with them.
+  EXPECT_TRUE(std::isnan(StatisticsOf(silent).medianLatencySeconds));
+  EXPECT_TRUE(std::isnan(StatisticsOf(silent).latencySpreadSeconds));
+  silent.Add(Along(1.7e9 + 0.1, 1.7e9 + 0.13));
+  EXPECT_NEAR(StatisticsOf(silent).medianLatencySeconds, 0.03, 1e-6);
+}
+
+TEST(PoseStream, State)
+{
+  PoseStream stream;
+  EXPECT_EQ(stream.State(), std::make_pair(DeviceState::Idle, std::string()));
+  stream.SetState(DeviceState::Lost, "gone");
+  EXPECT_EQ(stream.State(), std::make_pair(DeviceState::Lost, std::string("gone")));
 }
 
 TEST(PoseStream, Statistics)
