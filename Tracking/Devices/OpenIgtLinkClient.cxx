@@ -3,6 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
 #include "Tracking/Devices/OpenIgtLinkReceiver.h"
+#include "Tracking/Devices/RunDevice.h"
 
 namespace echorama {
 
@@ -25,10 +26,7 @@ void OpenIgtLinkClient::Start(PoseStream& poses, ImageStream* images)
   Stop();
   poses.SetLive(true);
   poses.SetState(DeviceState::Connecting, "to " + endpoint_.host + ":" + std::to_string(endpoint_.port));
-  worker_.Start([this, &poses, images](const Worker::Signal& signal) {
-    Run(signal, poses, images);
-    poses.SetState(DeviceState::Idle);
-  });
+  RunDevice(worker_, poses, [this, &poses, images](const Worker::Signal& signal) { Run(signal, poses, images); });
 }
 
 void OpenIgtLinkClient::Run(const Worker::Signal& signal, PoseStream& poses, ImageStream* images) const

@@ -2,6 +2,7 @@
 #include "Tracking/Devices/OpenIgtLinkListener.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkReceiver.h"
+#include "Tracking/Devices/RunDevice.h"
 
 namespace echorama {
 
@@ -21,10 +22,7 @@ void OpenIgtLinkListener::Start(PoseStream& poses, ImageStream* images)
   listener_ = TcpSocket::Listen(endpoint_.host, endpoint_.port);
   poses.SetLive(true);
   poses.SetState(DeviceState::Connecting, "listening on " + endpoint_.host + ":" + std::to_string(Port()));
-  worker_.Start([this, &poses, images](const Worker::Signal& signal) {
-    Run(signal, poses, images);
-    poses.SetState(DeviceState::Idle);
-  });
+  RunDevice(worker_, poses, [this, &poses, images](const Worker::Signal& signal) { Run(signal, poses, images); });
 }
 
 void OpenIgtLinkListener::Stop()

@@ -8,6 +8,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Geometry/ToolPose.h"
+#include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include <algorithm>
 #include <cmath>
@@ -103,15 +104,13 @@ void PolhemusTracker::Start(PoseStream& poses, ImageStream*)
   port_.Open();
   poses_ = &poses;
   poses_->SetState(DeviceState::Connecting, options_.path);
-  worker_.Start([this](const Worker::Signal& signal) { Run(signal); });
+  RunDevice(worker_, poses, [this](const Worker::Signal& signal) { Run(signal); });
 }
 
 void PolhemusTracker::Stop()
 {
   worker_.Stop();
   port_.Close();
-  if (poses_)
-    poses_->SetState(DeviceState::Idle);
   poses_ = nullptr;
 }
 

@@ -6,6 +6,7 @@
 #include "Core/Base/NumberText.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/SequencePoses.h"
+#include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include <algorithm>
 #include <cmath>
@@ -215,7 +216,7 @@ void ReplayTracker::Start(PoseStream& poses, ImageStream* images)
   poses.SetState(DeviceState::Running, recording_->Summary());
   if (parameters_.step)
     return;
-  worker_.Start([recording = recording_.get()](const Worker::Signal& signal) {
+  RunDevice(worker_, poses, [recording = recording_.get()](const Worker::Signal& signal) {
     const double begun = ClockNow(), speed = recording->parameters.speed;
     while (!signal.Stopped() && recording->next < recording->moments.size()) {
       const double wait = speed > 0.0 ? begun + recording->Due() / speed - ClockNow() : 0.0;
@@ -232,6 +233,8 @@ void ReplayTracker::Start(PoseStream& poses, ImageStream* images)
 void ReplayTracker::Stop()
 {
   worker_.Stop();
+  if (recording_)
+    SetStopped(recording_->poses); // a thread has said so already; one that is stepped has none
   recording_.reset();
 }
 

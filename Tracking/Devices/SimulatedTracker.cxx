@@ -6,6 +6,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Random.h"
+#include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include <algorithm>
 #include <cmath>
@@ -220,10 +221,11 @@ SimulatedTracker::SimulatedTracker(const SimulatedTrackerParameters& parameters)
 
 void SimulatedTracker::Start(PoseStream& poses, ImageStream*)
 {
+  Stop();
   poses.SetLive(true);
   poses.SetState(DeviceState::Running, "simulated: " + std::to_string(parameters_.tools) + " tools at " +
                                            NumberText(parameters_.rateHz) + " Hz, " + SimulatedMotionName(parameters_.motion));
-  worker_.Start([&poses, p = parameters_](const Worker::Signal& signal) {
+  RunDevice(worker_, poses, [&poses, p = parameters_](const Worker::Signal& signal) {
     const double begun = ClockNow();
     const double start = std::isnan(p.start) ? begun : p.start; // the sender's clock, when ours says begun
     double sent = 0.0;
@@ -234,6 +236,8 @@ void SimulatedTracker::Start(PoseStream& poses, ImageStream*)
           if (!signal.Sleep(begun + p.unplugAfter - ClockNow()))
             return;
         poses.SetState(DeviceState::Lost, "simulated: unplugged after " + NumberText(p.unplugAfter) + " s");
+        while (signal.Sleep(3600.0)) { // lost until it is stopped
+        }
         return;
       }
       std::vector<ToolPose> set;

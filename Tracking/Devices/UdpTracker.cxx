@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Devices/UdpTracker.h"
 #include "Core/Base/Random.h"
+#include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include <algorithm>
 #include <cstring>
@@ -24,10 +25,9 @@ void UdpTracker::Start(PoseStream& poses, ImageStream*)
   const auto socket = std::make_shared<UdpSocket>(UdpSocket::Receiving(endpoint_.host, endpoint_.port));
   port_ = socket->Port();
   const std::string here = "udp://" + endpoint_.host + ":" + std::to_string(port_);
-  poses_ = &poses;
   poses.SetState(DeviceState::Connecting, here + ": nothing has come yet");
 
-  worker_.Start([socket, senders, here, silence = silence_, &poses](const Worker::Signal& signal) {
+  RunDevice(worker_, poses, [socket, senders, here, silence = silence_, &poses](const Worker::Signal& signal) {
     PosePacketOrder order(silence);
     PosePacket packet;
     std::vector<unsigned char> bytes;
@@ -73,14 +73,6 @@ void UdpTracker::Start(PoseStream& poses, ImageStream*)
       }
     }
   });
-}
-
-void UdpTracker::Stop()
-{
-  worker_.Stop();
-  if (poses_)
-    poses_->SetState(DeviceState::Idle);
-  poses_ = nullptr;
 }
 
 UdpSender::UdpSender(const std::string& host, int port, std::uint64_t session)

@@ -33,7 +33,7 @@ public:
 
   /// \throws Error(FileSystem) when the port is taken, HOST is not ours, or a name is not known.
   void Start(PoseStream& poses, ImageStream* images) override;
-  void Stop() override;
+  void Stop() override { worker_.Stop(); }
   /// That packets are received at, while it is started: of use when the address says 0.
   int Port() const { return port_; }
 
@@ -42,7 +42,6 @@ private:
   std::string from_;
   double silence_ = 2.0;
   int port_ = 0;
-  PoseStream* poses_ = nullptr; // while it is started
   Worker worker_;
 };
 

@@ -147,6 +147,11 @@ TEST_F(ReplayTrackerTest, StepByStep)
   EXPECT_FALSE(device.Step());
   device.Stop();
   EXPECT_FALSE(device.Step());
+  EXPECT_EQ(stream.State().first, DeviceState::Ended); // it has been, whoever stops it
+  device.Start(stream, nullptr);
+  EXPECT_TRUE(device.Step());
+  device.Stop();
+  EXPECT_EQ(stream.State().first, DeviceState::Idle);
 }
 
 TEST_F(ReplayTrackerTest, PartsAndRounds)
@@ -178,6 +183,7 @@ TEST_F(ReplayTrackerTest, SpeedIsKept)
   const auto slow = MakeTracker("replay:" + path + "?speed=0.001"); // stops in the middle at once
   slow->Start(stream, nullptr);
   slow->Stop();
+  EXPECT_EQ(stream.State().first, DeviceState::Idle);
 }
 
 TEST_F(ReplayTrackerTest, Tables)

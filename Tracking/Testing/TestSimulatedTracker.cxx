@@ -220,6 +220,15 @@ TEST(SimulatedTracker, Unplugged)
   EXPECT_EQ(statistics.state, DeviceState::Lost);
   EXPECT_NE(statistics.message.find("unplugged"), std::string::npos);
   EXPECT_EQ(statistics.tools[0].valid, 100u);
+  device.Stop();
+  EXPECT_EQ(stream.State().first, DeviceState::Idle);
+  SimulatedTracker other(Parameters("rate=1000"));
+  for (int i = 0; i < 2; ++i) {
+    other.Start(stream, nullptr);
+    EXPECT_EQ(stream.State().first, DeviceState::Running);
+  }
+  other.Stop();
+  EXPECT_EQ(stream.State().first, DeviceState::Idle);
 }
 
 TEST(SimulatedTracker, BadAddresses)
