@@ -279,13 +279,13 @@ void vtkUltrasoundTrackerSource::Open()
       limits.posesPerTool = 1000000; // whatever it holds; memory is taken as it is needed
     }
     auto session = std::make_unique<Session>(limits);
+    session->Device = std::move(device); // from here on: should anything throw, it goes before what it writes to
     if (recording) {
       recording->ShowAll(session->Poses, &session->Images);
       session->Times = recording->Times();
     } else {
-      device->Start(session->Poses, &session->Images);
+      session->Device->Start(session->Poses, &session->Images);
     }
-    session->Device = std::move(device);
     this->Opened = std::move(session);
     this->Updated();
   } catch (const Error& error) {
