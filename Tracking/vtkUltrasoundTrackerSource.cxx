@@ -580,7 +580,11 @@ int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformati
         out->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
       }
     }
-    // Data have to agree with what is said here, so the image that will be shown is chosen here.
+    // Data have to agree with what is said here, so the image that will be shown is chosen here. Those of a recording are all
+    // alike: one is read when there is none, and no other, because what is read makes this source need an update.
+    if (session->IsWhole() && session->Images.Version() == 0) {
+      this->ReadImage(session->Times.front());
+    }
     this->ChooseImage(session->IsWhole() ? session->Times.front() : this->Time);
     if (session->Image) {
       vtkUltrasoundVolume::SetGeometry(image, session->Image->Geometry);
@@ -606,7 +610,6 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
       return;
     }
     session->PosesShown = session->Poses.Version();
-    session->ImagesShown = session->Images.Version();
     double time = this->Time;
     if (session->IsWhole()) {
       time = session->Times.front();
@@ -617,6 +620,7 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
         }
       }
       time = std::min(std::max(time, session->Times.front()), session->Times.back());
+      this->ReadImage(time);
       this->ChooseImage(time);
       for (int port = 0; port < 3; ++port) {
         vtkDataObject::GetData(outputs, port)->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
@@ -628,14 +632,21 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
 }
 
 //----------------------------------------------------------------------------
+// Of a recording that is shown as a whole, the image of a moment.
+void vtkUltrasoundTrackerSource::ReadImage(double time)
+{
+  if (auto* recording = dynamic_cast<echorama::ReplayTracker*>(this->Opened->Device.get())) {
+    recording->ShowImage(time);
+  }
+}
+
+//----------------------------------------------------------------------------
 // The newest image that can be placed in the world, else the newest; with a time, the nearest to it.
 void vtkUltrasoundTrackerSource::ChooseImage(double time)
 {
   Session& session = *this->Opened;
   session.Image.reset();
-  if (auto* recording = session.IsWhole() ? dynamic_cast<echorama::ReplayTracker*>(session.Device.get()) : nullptr) {
-    recording->ShowImage(time);
-  }
+  session.ImagesShown = session.Images.Version();
   std::vector<StreamedImage> images = session.Images.Images();
   images.erase(std::remove_if(images.begin(), images.end(), [](const StreamedImage& image) { return !IsShowable(image); }),
                images.end());

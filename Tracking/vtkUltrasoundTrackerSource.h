@@ -247,6 +247,7 @@ private:
   void Open();
   void Close();
   Session* Updated();
+  void ReadImage(double time);
   void ChooseImage(double time);
   void ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time);
   void ShowImage(vtkImageData* output);

@@ -150,6 +150,10 @@ for moment, frame in ((51.5, 6), (50.3, 1), (52.25, 9), (50, 0)):
     image = source.GetOutputDataObject(1)
     assert np.all(vtk_to_numpy(image.GetPointData().GetArray("Intensity")) == frame), moment
     assert np.allclose(image.GetOrigin(), (10 * frame, 0, 0)), (moment, image.GetOrigin())
+    for _ in range(3): # nothing is new, however often it is asked, also after it was changed: else it would be updated for ever
+        assert not source.GetNeedsUpdate(), moment
+        source.Modified()
+        source.UpdateTimeStep(moment)
 source.Stop() # what was read stays, but for images
 source.UpdateTimeStep(51.5)
 assert np.allclose(source.GetOutput().GetPoint(0), (60, 0, 0))
