@@ -108,6 +108,12 @@ struct PlacedImage {
   echorama::ImageGeometry Geometry;
 };
 
+// An image without a time is further away than any other.
+double DistanceInTime(const StreamedImage& image, double time)
+{
+  return std::isnan(image.time) ? std::numeric_limits<double>::infinity() : std::abs(image.time - time);
+}
+
 // Whether its numbers agree with its bytes, and we can show it.
 bool IsShowable(const StreamedImage& image)
 {
@@ -131,6 +137,7 @@ struct vtkUltrasoundTrackerSource::Session {
   std::unique_ptr<echorama::StreamRecorder> Recorder;
   std::unique_ptr<echorama::TrackerDevice> Device; // which writes to what is above, so it goes first
   std::vector<double> Times;                       // of a recording that is shown as a whole
+  double TimeShown = NaN;                          // of that recording
   std::optional<PlacedImage> Image;                // that output 1 shows
   std::uint64_t PosesShown = 0, ImagesShown = 0;   // versions
   double FreshUntil = 0.0;                         // our clock: when a tool that is shown becomes too old
@@ -283,6 +290,7 @@ void vtkUltrasoundTrackerSource::Open()
     if (recording) {
       recording->ShowAll(session->Poses, &session->Images);
       session->Times = recording->Times();
+      session->TimeShown = session->Times.front();
     } else {
       session->Device->Start(session->Poses, &session->Images);
     }
@@ -507,13 +515,19 @@ vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRejected() const
 }
 
 //----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::ShownTime() const
+{
+  return this->Opened && this->Opened->IsWhole() ? this->Opened->TimeShown : this->Time;
+}
+
+//----------------------------------------------------------------------------
 int vtkUltrasoundTrackerSource::GetTransform(const char* name, vtkMatrix4x4* matrix)
 {
   LiveTransform found;
   found.transform.status = TransformStatus::Missing;
   vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
     if (const Session* session = this->Updated()) {
-      found = session->Transforms->Find(TextOf(name), this->Time);
+      found = session->Transforms->Find(TextOf(name), this->ShownTime());
     }
   });
   if (matrix) {
@@ -531,7 +545,7 @@ double vtkUltrasoundTrackerSource::GetTransformError(const char* name)
   double error = -1.0;
   vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
     if (const Session* session = this->Updated()) {
-      error = session->Transforms->Find(TextOf(name), this->Time).transform.errorMm.value_or(-1.0);
+      error = session->Transforms->Find(TextOf(name), this->ShownTime()).transform.errorMm.value_or(-1.0);
     }
   });
   return error;
@@ -543,7 +557,7 @@ std::string vtkUltrasoundTrackerSource::GetTransformMessage(const char* name)
   std::string message = "the device is not open";
   vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
     if (const Session* session = this->Updated()) {
-      message = session->Transforms->Find(TextOf(name), this->Time).message;
+      message = session->Transforms->Find(TextOf(name), this->ShownTime()).message;
     }
   });
   return message;
@@ -620,6 +634,7 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
         }
       }
       time = std::min(std::max(time, session->Times.front()), session->Times.back());
+      session->TimeShown = time;
       this->ReadImage(time);
       this->ChooseImage(time);
       for (int port = 0; port < 3; ++port) {
@@ -653,7 +668,7 @@ void vtkUltrasoundTrackerSource::ChooseImage(double time)
   std::reverse(images.begin(), images.end());
   if (!std::isnan(time)) {
     std::stable_sort(images.begin(), images.end(), [time](const StreamedImage& a, const StreamedImage& b) {
-      return std::abs(a.time - time) < std::abs(b.time - time);
+      return DistanceInTime(a, time) < DistanceInTime(b, time);
     });
   }
   const std::string world = TextOf(this->WorldFrame).empty() ? UsualWorld(session.Poses.Tools()) : std::string(this->WorldFrame);

@@ -210,9 +210,9 @@ public:
 
   ///@{
   /**
-   * Any transform by its name, "ImageToReference", out of what the device sends and the fixed ones, at Time (see there), with its
-   * status: 0 valid, 1 missing (the matrix is identity then), 2 out of range. GetTransformError is its stated error in mm, -1
-   * when none is stated; GetTransformMessage says why it is not valid.
+   * Any transform by its name, "ImageToReference", out of what the device sends and the fixed ones, at Time (with FollowTime,
+   * at the time that is shown), with its status: 0 valid, 1 missing (the matrix is identity then), 2 out of range.
+   * GetTransformError is its stated error in mm, -1 when none is stated; GetTransformMessage says why it is not valid.
    */
   int GetTransform(const char* name, vtkMatrix4x4* matrix);
   double GetTransformError(const char* name);
@@ -247,6 +247,7 @@ private:
   void Open();
   void Close();
   Session* Updated();
+  double ShownTime() const;
   void ReadImage(double time);
   void ChooseImage(double time);
   void ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time);

@@ -142,6 +142,7 @@ for moment, x in ((51.5, 60), (50, 0), (50.3, 12), (52.25, 90), (1000, 90), (-5,
     source.UpdateTimeStep(moment)
     output = source.GetOutput()
     assert np.allclose(output.GetPoint(0), (x, 0, 0)), (moment, output.GetPoint(0))
+    assert source.GetTransform("ProbeToTracker", matrix) == 0 and math.isclose(matrix.GetElement(0, 3), x, abs_tol=1e-9)
 source.UpdateTimeStep(50 + 0.25 * INVALID)
 assert source.GetOutput().GetPointData().GetArray("Status").GetValue(0) == 1 and source.GetOutput().GetNumberOfVerts() == 1
 for moment, frame in ((51.5, 6), (50.3, 1), (52.25, 9), (50, 0)):
