@@ -39,6 +39,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 using echorama::Error;
@@ -472,12 +473,29 @@ bool vtkUltrasoundTrackerSource::StartRecording(const char* fileName)
   if (!this->Start()) {
     return false;
   }
-  return vtkUltrasoundVolume::Run(this, nullptr, [this, &path](const echorama::Progress&) {
-           if (auto earlier = std::move(this->Opened->Recorder)) {
-             earlier->Stop();
-           }
-           this->Opened->Recorder = std::make_unique<echorama::StreamRecorder>(path, this->Opened->Poses.Subscribe());
-         }) != 0;
+  // The new one first: when it cannot be started, the earlier one goes on.
+  auto& recorder = this->Opened->Recorder;
+  std::unique_ptr<echorama::StreamRecorder> earlier;
+  const auto start = [&](const echorama::Progress&) {
+    auto next = std::make_unique<echorama::StreamRecorder>(path, this->Opened->Poses.Subscribe());
+    earlier = std::exchange(recorder, std::move(next));
+  };
+  if (!vtkUltrasoundVolume::Run(this, nullptr, start)) {
+    return false;
+  }
+  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+    try {
+      if (earlier) {
+        earlier->Stop();
+      }
+    } catch (const Error& error) {
+      const bool isEmpty = error.GetKind() == Error::Kind::BadInput && earlier->State().frames == 0;
+      if (!isEmpty) { // that nothing was recorded is no fault
+        throw;
+      }
+    }
+  });
+  return true;
 }
 
 //----------------------------------------------------------------------------

@@ -210,6 +210,21 @@ for moment in (5.0, 5.2, 5.49):
         assert which.GetTransform("ProbeToReference", matrix) == 0
     assert all(matrices[0].GetElement(i, j) == matrices[1].GetElement(i, j) for i in range(4) for j in range(4))
 
+# One recording after another: one that got no pose is none, and a new one that cannot be leaves the earlier one as it is.
+other = make(f"replay:{sequence}?step=1")
+first, second = folder / "first.igs.mha", folder / "second.igs.mha"
+assert other.StartRecording(str(first)) and other.StartRecording(str(second)) and not other.errors
+assert not first.exists()
+assert other.Step()
+for _ in range(600):
+    if other.GetNumberOfRecordedPoses() == 2:
+        break
+    time.sleep(0.02)
+assert other.GetNumberOfRecordedPoses() == 2
+assert not other.StartRecording(str(recording)) and other.errors and other.GetNumberOfRecordedPoses() == 2
+other.errors.clear()
+assert other.StopRecording() and second.exists() and not other.errors
+
 # A tool that becomes too old makes a picture of its own.
 source = make("simulated:?rate=100&tools=1&unplugAfter=0.05&motion=still", FreshSeconds=0.2)
 assert source.WaitForPoses(3, 60.0)
