@@ -23,6 +23,7 @@ constexpr std::size_t PairCells = 33; // a time and two matrices
 constexpr int LongestPreamble = 100;  // lines before the names of the columns
 constexpr double HalfADay = 43200.0;  // seconds
 constexpr double PairUnitMm = 1000.0; // metres
+constexpr double SmallestFieldMm = 10.0;
 
 // Sentences on what single rows or frames suffer from: one for each reason, with the first place and the number of others.
 class Faults {
@@ -188,6 +189,8 @@ public:
       lines_.Fail("it holds no poses");
     if (columns_.pairs && options_.unitMm == 0.0)
       log_.notes.push_back("lengths were taken as metres, which those who write pairs of poses use; the file does not say");
+    if (!columns_.pairs && options_.unitMm == 0.0)
+      NoteSmallness();
     faults_.Note(log_.notes);
     return std::move(log_);
   }
@@ -242,6 +245,24 @@ private:
         PlainName(keys[2]) == "year")
       log_.notes.push_back("it was recorded on day " + cells[0] + ", month " + cells[1] + ", year " + cells[2] +
                            "; times are seconds from the midnight before");
+  }
+
+  // Trackers see further than a centimetre, and no further than ten metres.
+  void NoteSmallness()
+  {
+    double largest = 0.0;
+    bool moves = false;
+    const ToolPose* first = nullptr;
+    for (const ToolPose& pose : log_.poses) {
+      if (pose.status == TransformStatus::Missing)
+        continue;
+      first = first ? first : &pose;
+      moves = moves || pose.pose.translation() != first->pose.translation();
+      largest = std::max(largest, pose.pose.translation().norm());
+    }
+    if (moves && largest < SmallestFieldMm)
+      log_.notes.push_back("all positions lie within " + NumberText(std::ceil(largest * 1000.0) / 1000.0) +
+                           " mm; if they are metres, give the unit 1000");
   }
 
   void AddTool(const std::string& name)

@@ -48,10 +48,10 @@ struct PoseLogOptions {
 ///
 /// A pose is Missing when all its numbers are zero or its cells are empty, and, with a note, when a number is not finite or
 /// beyond 1e7 mm, the quaternion's length is further than 0.01 from 1, or the matrix is no pose (NearestPose). Rows that end
-/// early give the poses that are whole, with a note. Rows without a time, and times that do not rise, are noted; the poses are
-/// sorted by time.
-/// \throws Error(InvalidParameter) for the options, Error(FileSystem), Error(BadFile) that names file, line and reason: no such
-/// columns, text where a number is needed, an open quotation mark, binary data, no poses.
+/// early give the poses that are whole, with a note. Positions of a table that all lie within 10 mm may be metres: that is noted,
+/// and left to \a options. Rows without a time, and times that do not rise, are noted; the poses are sorted by time. \throws
+/// Error(InvalidParameter) for the options, Error(FileSystem), Error(BadFile) that names file, line and reason: no such columns,
+/// text where a number is needed, an open quotation mark, binary data, no poses.
 PoseLog ReadPoseLog(const std::string& path, const PoseLogOptions& options = {});
 
 /// Whether a file that begins with \a bytes looks like one that ReadPoseLog reads, other than a sequence.

@@ -90,6 +90,16 @@ TEST_F(PoseLogFile, ColumnsByName)
   EXPECT_EQ(Read("t,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n", {1000.0}).poses[0].pose.translation(), Vector3d(1000, 2000, 3000));
 }
 
+TEST_F(PoseLogFile, MetresAreSuspected)
+{
+  const std::string names = "t,x,y,z,qw,qx,qy,qz\n", metres = names + "0,0.1,0.2,0,1,0,0,0\n1,0.1,-0.17,0,1,0,0,0\n";
+  EXPECT_TRUE(HasNote(Read(metres), "all positions lie within 0.224 mm; if they are metres, give the unit 1000"));
+  EXPECT_TRUE(Read(metres, {1000.0}).notes.empty());
+  EXPECT_TRUE(Read(metres, {1.0}).notes.empty());                                // they are mm: it has been said
+  EXPECT_TRUE(Read(metres + "2,0,0,10,1,0,0,0\n").notes.empty());                // a field of a tracker
+  EXPECT_TRUE(Read(names + "0,0,0,0,1,0,0,0\n1,0,0,0,1,0,0,0\n").notes.empty()); // nothing that moves
+}
+
 TEST_F(PoseLogFile, NdiTable)
 {
   const PoseLog log = Read(Ndi);
@@ -168,7 +178,7 @@ TEST_F(PoseLogFile, RowsThatEndEarlyAndTimesThatDoNotRise)
 
 TEST_F(PoseLogFile, RowsPerSecond)
 {
-  const PoseLog log = Read("t,x,y,z,qw,qx,qy,qz\n7,1,0,0,1,0,0,0\n7,2,0,0,1,0,0,0\n7,3,0,0,1,0,0,0\n", {0.0, 4.0});
+  const PoseLog log = Read("t,x,y,z,qw,qx,qy,qz\n7,10,0,0,1,0,0,0\n7,20,0,0,1,0,0,0\n7,30,0,0,1,0,0,0\n", {0.0, 4.0});
   ASSERT_EQ(log.poses.size(), 3u);
   EXPECT_EQ(log.poses[2].time, 0.5);
   EXPECT_TRUE(log.notes.empty());
