@@ -339,6 +339,7 @@ std::string vtkUltrasoundHandEyeCalibration::ReportOf(const std::vector<std::str
                     {"inliers", this->Result.inliers},
                     {"rms_mm", this->Result.rmsMm},
                     {"rms_degrees", this->Result.rmsDegrees},
+                    {"noise_estimated", this->Result.noiseEstimated},
                     {"noise_scale", this->Result.noiseScale},
                     {"scans", scans},
                     {"advice", advice},

@@ -25,7 +25,7 @@ namespace echorama {
 namespace {
 
 constexpr double DegreesPerRadian = 57.29577951308232;
-constexpr int LeastForNoise = 5; // scans
+constexpr std::size_t LeastForNoise = 5; // scans
 // Residuals of so many times the noise may come from a mistake; are no noise; are no noise either when it is to be estimated.
 constexpr double SuspectScale = 1.3, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
 // Three scans agree by chance too easily to outvote another.
@@ -176,11 +176,24 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   const std::size_t count = pairs.size();
   const bool likelihood = parameters.method == HandEyeMethod::MaximumLikelihood;
   const HandEyeModel model(pairs, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
-  HandEyeConsensus consensus = FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood,
-                                                    parameters.estimateNoise, parameters.seed, progress.Part(0.0, 0.8));
-  const auto inliers = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
+  const auto search = [&](bool estimate, const Progress& part) {
+    return FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood, estimate, parameters.seed, part);
+  };
+  const auto inliersOf = [](const HandEyeConsensus& found) {
+    return static_cast<std::size_t>(std::count(found.inlier.begin(), found.inlier.end(), 1));
+  };
+  result.noiseEstimated = parameters.estimateNoise && count >= LeastForNoise;
+  HandEyeConsensus consensus = search(result.noiseEstimated, progress.Part(0.0, 0.5));
+  if (result.noiseEstimated && likelihood && inliersOf(consensus) < LeastForNoise) {
+    result.noiseEstimated = false;
+    consensus = search(false, progress.Part(0.5, 0.8));
+  }
+  if (parameters.estimateNoise && !result.noiseEstimated)
+    result.notes.push_back(Format("The noise was taken as stated: it cannot be estimated from fewer than %d scans that agree.",
+                                  static_cast<int>(LeastForNoise)));
+  const std::size_t inliers = inliersOf(consensus);
   const bool tooFew = inliers < count && (inliers < LeastMajority || 2 * inliers < count);
-  const bool hopeless = tooFew || consensus.scale > (parameters.estimateNoise ? HopelessEstimatedScale : HopelessScale);
+  const bool hopeless = tooFew || consensus.scale > (result.noiseEstimated ? HopelessEstimatedScale : HopelessScale);
   if (hopeless || consensus.scale > SuspectScale || (inliers < count && (count < ManyScans || 4 * inliers < 3 * count))) {
     const std::string explanation = ExplainDisagreement(pairs, parameters, consensus);
     if (!explanation.empty())
@@ -246,9 +259,7 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   // The noise that the residuals show.
   const int degreesOfFreedom = 6 * result.inliers - 12;
   const double shown = degreesOfFreedom > 0 ? std::sqrt(chiSquare / degreesOfFreedom) : 1.0;
-  if (parameters.estimateNoise && result.inliers < LeastForNoise)
-    Refuse(Format("the noise cannot be estimated from %d scans that agree; %d are needed", result.inliers, LeastForNoise));
-  if (parameters.estimateNoise)
+  if (result.noiseEstimated)
     result.noiseScale = std::max(shown, 1e-6);
   else if (chiSquare > degreesOfFreedom + 4.0 * std::sqrt(2.0 * degreesOfFreedom))
     result.notes.push_back(
@@ -278,7 +289,7 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   const Eigen::Matrix3d& R = result.solution.volumeToSensor.linear();
   result.targetCovariance = R * covariance.topLeftCorner<3, 3>() * R.transpose();
   result.targetRmsMm = std::sqrt(result.targetCovariance.trace());
-  result.targetRadius95Mm = ConfidenceRadius(result.targetCovariance, parameters.estimateNoise ? degreesOfFreedom : 0);
+  result.targetRadius95Mm = ConfidenceRadius(result.targetCovariance, result.noiseEstimated ? degreesOfFreedom : 0);
 
   HandEyeParameters scaled = parameters;
   scaled.sensorNoise = Scaled(parameters.sensorNoise, result.noiseScale);

@@ -46,7 +46,7 @@ struct HandEyeParameters {
   /// Where in the volume the error counts: mm, in the volume's frame. Usually its centre.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
   bool rejectOutliers = true;
-  bool estimateNoise = false; ///< scale both noises to what the residuals say (needs 5 inliers at least)
+  bool estimateNoise = false; ///< scale both noises to what the residuals say; with fewer than 5 inliers they stay as stated
   std::uint64_t seed = 1;     ///< of the search among many pairs with outliers
 
   void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
@@ -80,6 +80,7 @@ struct HandEyeResult {
   double targetRmsMm = 0.0;             ///< root of its trace
   double targetRadius95Mm = 0.0;        ///< of the sphere that holds the true place with 95%, computed from all three axes
   double rmsMm = 0.0, rmsDegrees = 0.0; ///< of the inliers' residuals
+  bool noiseEstimated = false;          ///< whether it was asked for, and the inliers are enough
   double noiseScale = 1.0;              ///< what the noise was multiplied with; 1 unless estimated
   std::vector<HandEyeAdvice> advice;    ///< the best first
   std::vector<std::string> notes;       ///< what was noticed: units, conventions, outliers; sentences for people
