@@ -33,6 +33,9 @@ constexpr double BestResidual = 1e-3;        // 1 - rho^2: no recording agrees b
 constexpr double MostProducts = 4e8;         // of the correlation
 constexpr double LongestMemorySeconds = 5.0; // of the autocorrelations
 constexpr double SamplesPerWindow = 4.0;     // of the grid
+constexpr double MostSamples = 2e7;          // of the grid: three days
+constexpr double ManySamples = 1e6;          // and three hours, of which at least this share must be covered
+constexpr double LeastCovered = 0.01;
 
 [[noreturn]] void Refuse(const std::string& reason)
 {
@@ -99,6 +102,27 @@ struct SpeedTrack {
     return std::isfinite(value);
   }
 };
+
+// A clock that jumps would make a grid without an end, and nothing on it.
+void RefuseJump(const MotionPath& path, double step, const char* which)
+{
+  const double seconds = path.LastTime() - path.FirstTime(), samples = seconds / step;
+  double covered = seconds;
+  MotionPath::Gap longest;
+  for (const MotionPath::Gap& gap : path.Gaps()) {
+    covered -= gap.to - gap.from;
+    if (gap.to - gap.from > longest.to - longest.from)
+      longest = gap;
+  }
+  if (samples <= ManySamples || (samples <= MostSamples && covered >= LeastCovered * seconds))
+    return;
+  if (longest.to - longest.from > 0.5 * seconds)
+    Refuse(Format("the times of the %s stream jump from %.9g s to %.9g s, and its poses cover %.3g s in all: leave out what lies "
+                  "beyond the jump",
+                  which, longest.from, longest.to, covered));
+  Refuse(Format("the %s stream lasts for %.3g s, of which its poses cover %.3g s: compare a shorter piece", which, seconds,
+                covered));
+}
 
 SpeedTrack SpeedOf(const MotionPath& path, SpeedSignal signal, double step, double baseline)
 {
@@ -438,6 +462,8 @@ TemporalResult CalibrateTime(const std::vector<TimedPose>& first, const std::vec
   };
   const MotionPath firstPath = pathOf(std::move(a), "first", progress.Part(0.0, 0.3)),
                    secondPath = pathOf(std::move(b), "second", progress.Part(0.3, 0.6));
+  RefuseJump(firstPath, sigma / SamplesPerWindow, "first");
+  RefuseJump(secondPath, sigma / SamplesPerWindow, "second");
   if (parameters.signal != SpeedSignal::Automatic)
     return Compare(firstPath, secondPath, parameters.signal, sigma, parameters, progress.Part(0.6, 1.0));
   try {

@@ -204,6 +204,25 @@ TEST(TemporalCalibration, Gaps)
   EXPECT_EQ(CalibrateTime(first, second).offsetSeconds, result.offsetSeconds);
 }
 
+TEST(TemporalCalibration, ClocksThatJump)
+{
+  Recording a, b = Other(0.15);
+  const std::vector<TimedPose> first = Record(Moving(4), a, 1), second = Record(Moving(4), b, 2);
+  for (const double jump : {1e5, 1e6, 1.7e9, 1e15}) {
+    std::vector<TimedPose> jumped = first;
+    jumped.back().time = jump;
+    Refused(jumped, second, Error::Kind::NotPossible, "the times of the first stream jump from 29.9");
+    Refused(second, jumped, Error::Kind::NotPossible, "the times of the second stream jump from 29.9");
+    jumped = first;
+    jumped.front().time = -jump;
+    Refused(jumped, second, Error::Kind::NotPossible, "the times of the first stream jump from -1");
+  }
+  // A pause of an hour is none.
+  std::vector<TimedPose> paused = first;
+  paused.push_back({3600.0, paused.back().pose});
+  EXPECT_NEAR(CalibrateTime(paused, second).offsetSeconds, -0.15, 0.005);
+}
+
 TEST(TemporalCalibration, Drift)
 {
   Recording a, b = Other(0.2);
