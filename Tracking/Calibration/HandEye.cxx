@@ -289,12 +289,13 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   const Eigen::Matrix3d& R = result.solution.volumeToSensor.linear();
   result.targetCovariance = R * covariance.topLeftCorner<3, 3>() * R.transpose();
   result.targetRmsMm = std::sqrt(result.targetCovariance.trace());
-  result.targetRadius95Mm = ConfidenceRadius(result.targetCovariance, result.noiseEstimated ? degreesOfFreedom : 0);
+  const int residualFreedom = result.noiseEstimated ? degreesOfFreedom : 0;
+  result.targetRadius95Mm = ConfidenceRadius(result.targetCovariance, residualFreedom);
 
   HandEyeParameters scaled = parameters;
   scaled.sensorNoise = Scaled(parameters.sensorNoise, result.noiseScale);
   scaled.volumeNoise = Scaled(parameters.volumeNoise, result.noiseScale);
-  result.advice = AdviseHandEye(pairs, consensus.inlier, result.solution, covariance, scaled);
+  result.advice = AdviseHandEye(pairs, consensus.inlier, result.solution, covariance, scaled, residualFreedom);
   for (const std::string& note : HandEyeSuspicions(agreed, result.solution, parameters))
     result.notes.push_back(note);
   progress(1.0);

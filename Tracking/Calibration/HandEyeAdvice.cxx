@@ -50,7 +50,7 @@ std::string AxisText(const Eigen::Vector3d& axis)
 
 std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier,
                                          const HandEyeSolution& solution, const HandEyeMatrix& covariance,
-                                         const HandEyeParameters& parameters)
+                                         const HandEyeParameters& parameters, int degreesOfFreedom)
 {
   struct Candidate {
     double variance = 0.0;
@@ -94,7 +94,7 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.variance < b.variance; });
-  const double before = ConfidenceRadius(covariance.topLeftCorner<3, 3>());
+  const double before = ConfidenceRadius(covariance.topLeftCorner<3, 3>(), degreesOfFreedom);
   std::vector<HandEyeAdvice> advice;
   std::vector<char> seen(axes.size(), 0);
   for (const Candidate& candidate : candidates) {
@@ -104,7 +104,7 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
     HandEyeAdvice one;
     one.axis = axes[candidate.axis].normalized();
     one.degrees = candidate.degrees;
-    one.radiusMm = ConfidenceRadius(candidate.covariance);
+    one.radiusMm = ConfidenceRadius(candidate.covariance, degreesOfFreedom > 0 ? degreesOfFreedom + 6 : 0);
     char text[200];
     std::snprintf(
         text, sizeof text,

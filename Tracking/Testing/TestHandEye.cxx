@@ -470,6 +470,23 @@ TEST(HandEye, AdviceComesTrue)
   EXPECT_NEAR(after.targetRadius95Mm / best.radiusMm, 1.0, 0.15) << best.text;
 }
 
+TEST(HandEye, AdviceStartsFromTheRadiusStated)
+{
+  HandEyeScenario scenario;
+  scenario.poses = 5;
+  const HandEyeSimulation simulation = SimulateHandEye(scenario);
+  for (const bool estimate : {false, true}) {
+    HandEyeParameters parameters;
+    parameters.estimateNoise = estimate;
+    const HandEyeResult result = CalibrateHandEye(simulation.pairs, parameters);
+    EXPECT_EQ(result.noiseEstimated, estimate);
+    char before[40];
+    std::snprintf(before, sizeof before, "falls from %.2f to", result.targetRadius95Mm);
+    for (const HandEyeAdvice& one : result.advice)
+      EXPECT_TRUE(Says(one.text, before)) << one.text << " " << result.targetRadius95Mm;
+  }
+}
+
 TEST(HandEye, ClosedFormsByName)
 {
   HandEyeScenario scenario;
