@@ -157,6 +157,7 @@ TEST(Diffusion, FastAgreesWithExactForAllShapes)
 
 TEST(Diffusion, FastAgreesWithExactForAllExponents)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Grid grid{56, 56, 56};
   const Volume<unsigned char> region = Region(grid, Ball(26, 27, 30, 14));
   const DiffusionSources sources = Noise(SurfaceOf(region.View()));
@@ -213,6 +214,7 @@ TEST(Diffusion, EachSideHasItsExponent)
 
 TEST(Diffusion, ConstantsStay)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Grid grid{50, 40, 30};
   const Volume<unsigned char> region = Region(grid, Ball(25, 20, 15, 9));
   DiffusionSources sources = Noise(SurfaceOf(region.View()));

@@ -4,6 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Filters/Embedding/NoiseMatch.h"
+#include "Testing/Sanitized.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -69,6 +70,7 @@ double Distance(const std::vector<float>& a, const std::vector<float>& b)
 // From 1.2 voxels to two thirds of the window.
 TEST(NoiseMatch, FindsTheLengthsThatNoiseWasMadeWith)
 {
+  ECHORAMA_SKIP_SANITIZED();
   for (const auto& mm : {Eigen::Vector3d(0.6, 0.8, 1.0), Eigen::Vector3d(1.0, 2.0, 1.5), Eigen::Vector3d(0.9, 1.2, 1.8)})
     for (const NoiseIntensity kind : {NoiseIntensity::LogCompressed, NoiseIntensity::Rayleigh}) {
       BeamNoiseParameters p = NoiseOf(mm.x(), mm.y(), mm.z());
