@@ -18,8 +18,8 @@ public:
   /// Images are dropped when \a images is nullptr. Both must outlive the device, or its Stop().
   /// \throws Error(FileSystem) when what it names cannot be opened at all, Error(InvalidParameter).
   virtual void Start(PoseStream& poses, ImageStream* images) = 0;
-  /// Ends within a quarter of a second, whatever the device does. May be called twice. Then the state is Idle, but for a recording
-  /// that has ended and a device that has failed, whose message stays.
+  /// Ends within a quarter of a second, whatever the device does. May be called twice. Then the state is Idle, but for a
+  /// recording that has ended and a device that has failed, whose message stays.
   virtual void Stop() = 0;
 };
 
