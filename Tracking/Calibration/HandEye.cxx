@@ -177,7 +177,8 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   const bool likelihood = parameters.method == HandEyeMethod::MaximumLikelihood;
   const HandEyeModel model(pairs, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
   const auto search = [&](bool estimate, const Progress& part) {
-    return FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood, estimate, parameters.seed, part);
+    return FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood, parameters.target, estimate,
+                                parameters.seed, part);
   };
   const auto inliersOf = [](const HandEyeConsensus& found) {
     return static_cast<std::size_t>(std::count(found.inlier.begin(), found.inlier.end(), 1));
@@ -279,6 +280,8 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
       agreed.push_back(pairs[i]);
   RefuseTooLittleMotion(agreed, Scaled(parameters.sensorNoise, result.noiseScale),
                         Scaled(parameters.volumeNoise, result.noiseScale));
+
+  RefuseTwoAnswers(pairs, consensus.inlier, model, result.solution, parameters.target, result.noiseScale);
 
   // How well it is known.
   const HandEyeMatrix covariance =

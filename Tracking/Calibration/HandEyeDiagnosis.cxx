@@ -22,6 +22,8 @@ namespace echorama {
 namespace {
 
 constexpr double DegreesPerRadian = 57.29577951308232;
+constexpr double LeastRivalDegrees = 20.0; // apart
+constexpr double LeastRivalCost = 16.0;    // chi^2 by which another answer must fit worse: four standard deviations
 
 [[noreturn]] void Refuse(const std::string& reason)
 {
@@ -140,15 +142,37 @@ void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNois
                  "30 degrees and more",
                  side.name, side.least, volume.axis.x(), volume.axis.y(), volume.axis.z()));
   }
-  // Half turns about axes at right angles, and nothing else: they commute, and C may be turned by any of them.
-  const double small = limit(volumeNoise);
-  const bool halfTurnsOnly = std::all_of(pairs.begin(), pairs.end(), [&](const HandEyePair& pair) {
-    const double degrees = DegreesPerRadian * RotationAngle(pairs.front().volumeToWorld.inverse() * pair.volumeToWorld);
-    return degrees < small || degrees > 180.0 - small;
-  });
-  if (halfTurnsOnly)
-    Refuse("the volumes are turned by half turns about axes at right angles only, which leaves four answers; add a scan that is "
-           "turned by 30 to 90 degrees");
+}
+
+void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier, const HandEyeModel& model,
+                      const HandEyeSolution& solution, const Eigen::Vector3d& target, double noiseScale)
+{
+  const std::vector<Eigen::Vector3d> axes = HandEyeRivalAxes(pairs, inlier, model, solution, noiseScale);
+  if (axes.empty())
+    return;
+  const HandEyeModel::Fit best = model.Refine(solution, inlier);
+  std::vector<Eigen::Vector3d> rivals;
+  for (const Eigen::Vector3d& axis : axes) {
+    const HandEyeModel::Fit rival = model.Refine(HandEyeRival(pairs, inlier, best.solution, axis, target), inlier);
+    const double apart = DegreesPerRadian * RotationAngle(best.solution.volumeToSensor.inverse() * rival.solution.volumeToSensor);
+    if (apart > LeastRivalDegrees && rival.cost <= best.cost + LeastRivalCost * noiseScale * noiseScale)
+      rivals.push_back(axis);
+  }
+  if (rivals.empty())
+    return;
+  // A turn that keeps none of the axes: about one across a single axis, or between several.
+  Eigen::Vector3d between = Eigen::Vector3d::Zero();
+  std::string text;
+  for (const Eigen::Vector3d& axis : rivals) {
+    between += axis;
+    text += Format("%s(%.2f, %.2f, %.2f)", text.empty() ? "" : " or ", axis.x(), axis.y(), axis.z());
+  }
+  if (rivals.size() == 1)
+    between = rivals.front().unitOrthogonal();
+  between.normalize();
+  Refuse(Format("%s answers fit alike: the calibration may be turned by half a turn about the volume's axis %s, which every turn "
+                "between the scans keeps or reverses. Add a scan that is turned by 30 to 90 degrees about (%.2f, %.2f, %.2f)",
+                rivals.size() == 1 ? "two" : "several", text.c_str(), between.x(), between.y(), between.z()));
 }
 
 std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters,
@@ -184,7 +208,7 @@ std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const Han
   };
   const auto solve = [&parameters](const std::vector<HandEyePair>& tried) {
     const HandEyeModel model(tried, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
-    return FindHandEyeConsensus(tried, model, true, false, parameters.seed);
+    return FindHandEyeConsensus(tried, model, true, parameters.target, false, parameters.seed);
   };
   const Repair* best = nullptr;
   // Minus the logarithm of the likelihood, of Student's distribution, which outliers do not rule.

@@ -17,8 +17,13 @@ std::vector<HandEyePair> CheckedHandEyePairs(const std::vector<HandEyePair>& pai
 std::vector<int> HandEyeRepeats(const std::vector<HandEyePair>& pairs);
 
 /// \throws Error(NotPossible) with the reason when the motions cannot determine C: fewer than three scans; no turns, or no more
-/// than the noise; turns about parallel axes only; half turns about axes at right angles only.
+/// than the noise; turns about parallel axes only.
 void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise);
+
+/// \throws Error(NotPossible) when another calibration fits the inliers nearly as well as \a solution, the best: one turned by
+/// half a turn about an axis that all turns keep or reverse (HandEyeRivalAxes). Says which axis, and what scan would decide.
+void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier, const HandEyeModel& model,
+                      const HandEyeSolution& solution, const Eigen::Vector3d& target, double noiseScale);
 
 /// When the scans do not agree well: what would make them, as a sentence. Tried are lengths in metres, centimetres and inches on
 /// either side, and one side given the wrong way round, alone and with a side in metres. Empty when nothing explains the scans a

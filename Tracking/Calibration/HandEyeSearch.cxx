@@ -133,8 +133,71 @@ HandEyeSpread SpreadOf(const std::vector<Pose>& poses)
   return {solver.eigenvalues().cwiseMax(0.0).cwiseSqrt(), solver.eigenvectors().col(0)};
 }
 
+std::vector<Eigen::Vector3d> HandEyeRivalAxes(const std::vector<HandEyePair>& pairs, const std::vector<char>& use,
+                                              const HandEyeModel& model, const HandEyeSolution& solution, double scale)
+{
+  // An axis that turns keep or reverse is one of a symmetric matrix Q = R Q R^T; without a trace there are five of these, and
+  // I - (D + D^T) / 2, summed over the turns D of the five, is least at those that are kept.
+  const double root = std::sqrt(0.5), sixth = std::sqrt(1.0 / 6.0);
+  std::array<Eigen::Matrix3d, 5> basis;
+  basis.fill(Eigen::Matrix3d::Zero());
+  basis[0](0, 1) = basis[0](1, 0) = basis[1](0, 2) = basis[1](2, 0) = basis[2](1, 2) = basis[2](2, 1) = root;
+  basis[3].diagonal() << root, -root, 0.0;
+  basis[4].diagonal() << sixth, sixth, -2.0 * sixth;
+  std::vector<Eigen::Matrix3d> turns;
+  const std::size_t first = static_cast<std::size_t>(std::find(use.begin(), use.end(), 1) - use.begin());
+  for (std::size_t i = first + 1; i < pairs.size(); ++i)
+    if (use[i])
+      turns.emplace_back(pairs[first].volumeToWorld.linear().transpose() * pairs[i].volumeToWorld.linear());
+  if (turns.empty())
+    return {};
+  Eigen::Matrix<double, 5, 5> moved = Eigen::Matrix<double, 5, 5>::Zero();
+  for (const Eigen::Matrix3d& R : turns)
+    for (std::size_t b = 0; b < 5; ++b) {
+      const Eigen::Matrix3d turned = R * basis[b] * R.transpose();
+      for (std::size_t a = 0; a < 5; ++a) {
+        const double kept = 0.5 * basis[a].cwiseProduct(turned).sum();
+        moved(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) -= kept;
+        moved(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(a)) -= kept;
+      }
+    }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 5, 5>> kept(moved);
+
+  const double sigma = std::sqrt(model.Covariance(solution.volumeToSensor).bottomRightCorner<3, 3>().trace() / 3.0);
+  const double limit = 0.035 + 10.0 * sigma * scale;
+  std::vector<Eigen::Vector3d> axes;
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    Eigen::Matrix3d Q = Eigen::Matrix3d::Zero();
+    for (Eigen::Index a = 0; a < 5; ++a)
+      Q += kept.eigenvectors()(a, k) * basis[static_cast<std::size_t>(a)];
+    const Eigen::Matrix3d candidates = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Q).eigenvectors();
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const Eigen::Vector3d axis = candidates.col(c);
+      double off = 0.0;
+      for (const Eigen::Matrix3d& R : turns)
+        off += (R * axis).cross(axis).squaredNorm() / static_cast<double>(turns.size());
+      const bool seen =
+          std::any_of(axes.begin(), axes.end(), [&axis](const Eigen::Vector3d& a) { return std::abs(a.dot(axis)) > 0.9; });
+      if (std::sqrt(off) < limit && !seen)
+        axes.push_back(axis);
+    }
+  }
+  return axes;
+}
+
+HandEyeSolution HandEyeRival(const std::vector<HandEyePair>& pairs, const std::vector<char>& use, const HandEyeSolution& solution,
+                             const Eigen::Vector3d& axis, const Eigen::Vector3d& target)
+{
+  HandEyeSolution rival;
+  rival.volumeToSensor = solution.volumeToSensor * MotionAbout(target, EIGEN_PI * axis, Eigen::Vector3d::Zero());
+  const HandEyePair& first = pairs[static_cast<std::size_t>(std::find(use.begin(), use.end(), 1) - use.begin())];
+  rival.worldToTracker = first.sensorToTracker * rival.volumeToSensor * first.volumeToWorld.inverse();
+  return rival;
+}
+
 HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, const HandEyeModel& model, bool rejectOutliers,
-                                      bool estimateNoise, std::uint64_t seed, const Progress& progress)
+                                      const Eigen::Vector3d& target, bool estimateNoise, std::uint64_t seed,
+                                      const Progress& progress)
 {
   const std::size_t count = pairs.size();
   const bool reject = rejectOutliers && count > 3;
@@ -179,6 +242,18 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
     if (bestCost < 0.0 || cost < bestCost) {
       bestCost = cost;
       best = i;
+    }
+  }
+
+  // Turns that keep an axis leave the closed forms with a choice that only the shifts can make.
+  for (const Eigen::Vector3d& axis : HandEyeRivalAxes(pairs, all, model, fits[best].solution, common)) {
+    HandEyeModel::Fit rival =
+        model.Refine(HandEyeRival(pairs, all, fits[best].solution, axis, target), all, reject ? common : 0.0);
+    const double cost = reject ? SoftCost(model, rival.solution, common) : rival.cost;
+    if (cost < bestCost) {
+      bestCost = cost;
+      fits.push_back(std::move(rival));
+      best = fits.size() - 1;
     }
   }
 

@@ -17,7 +17,8 @@ struct HandEyeConsensus {
 /// inliers. A scan is an outlier when its chi^2 is one in a thousand by chance, after the noise was scaled to the
 /// median residual (never down, unless \a estimateNoise). At least three stay.
 HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, const HandEyeModel& model, bool rejectOutliers,
-                                      bool estimateNoise, std::uint64_t seed, const Progress& progress = {});
+                                      const Eigen::Vector3d& target, bool estimateNoise, std::uint64_t seed,
+                                      const Progress& progress = {});
 
 /// How far the poses of one side are turned from each other: the root of 1 - s^2 for the singular values s of their mean
 /// rotation, radians, least first. The least is what the calibration lives on: of small turns, the root mean square over
@@ -27,5 +28,16 @@ struct HandEyeSpread {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();
 };
 HandEyeSpread SpreadOf(const std::vector<Pose>& poses);
+
+/// Axes k of the volume that every turn among the scans with use[scan] != 0 keeps or reverses, to within what noise explains
+/// (some ten times the model's, \a scale times larger, and two degrees). Turns commute with the half turn about such an axis, so
+/// that the calibration may be turned by it: about z, when all turns are about z or half turns about axes across it; about x, y
+/// and z, when all are half turns about these. None for turns in general.
+std::vector<Eigen::Vector3d> HandEyeRivalAxes(const std::vector<HandEyePair>& pairs, const std::vector<char>& use,
+                                              const HandEyeModel& model, const HandEyeSolution& solution, double scale);
+
+/// The solution turned by half a turn about an axis of the volume through \a target, with O by the first scan that is used.
+HandEyeSolution HandEyeRival(const std::vector<HandEyePair>& pairs, const std::vector<char>& use, const HandEyeSolution& solution,
+                             const Eigen::Vector3d& axis, const Eigen::Vector3d& target);
 
 } // namespace echorama

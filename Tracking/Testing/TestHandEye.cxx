@@ -299,13 +299,48 @@ TEST(HandEye, RefusesWhatIsTooLittle)
     EXPECT_TRUE(Says(parallel, "about one axis")) << parallel;
     EXPECT_TRUE(Says(parallel, "0.6") && Says(parallel, "0.8")) << parallel; // which one
   }
-  // half turns that commute
-  const double pi = EIGEN_PI;
-  EXPECT_TRUE(Says(Refusal(PairsOf({{0, 0, 0}, {pi, 0, 0}, {0, pi, 0}, {0, 0, pi}}, shifts)), "four answers"));
   // A scan that is entered twice is one.
   std::vector<HandEyePair> twice = PairsOf({{0.3, 0, 0}, {0, 0.8, 0}}, shifts);
   twice.push_back(twice[0]);
   EXPECT_TRUE(Says(Refusal(twice), "scan 3 repeats scan 1"));
+}
+
+TEST(HandEye, TwoAnswersAreRefused)
+{
+  const double pi = EIGEN_PI;
+  for (const bool noise : {false, true}) {
+    // Half turns that commute.
+    const std::string klein = Refusal(PairsOf({{0, 0, 0}, {pi, 0, 0}, {0, pi, 0}, {0, 0, pi}}, NoShift, noise));
+    EXPECT_TRUE(Says(klein, "several answers fit alike")) << klein;
+    // About z by any angle, and half turns about axes across it.
+    std::vector<Eigen::Vector3d> turns{{0, 0, 0}, {0, 0, 0.7}, {0, 0, -1.2}, {pi, 0, 0}, {0, pi, 0}, {pi * 0.6, pi * 0.8, 0}};
+    const std::vector<Eigen::Vector3d> shifts{{0, 0, 0}, {0, 0, 30}, {0, 0, -20}, {0, 0, 10}};
+    const std::string aboutZ = Refusal(PairsOf(turns, shifts, noise));
+    EXPECT_TRUE(Says(aboutZ, "two answers fit alike") && Says(aboutZ, "turned by 30 to 90 degrees about (")) << aboutZ;
+    // What it asks for decides.
+    turns.emplace_back(0.9, 0.0, 0.0);
+    EXPECT_EQ(CalibrateHandEye(PairsOf(turns, shifts, noise)).inliers, 7);
+  }
+}
+
+TEST(HandEye, HalfTurnsThatDetermineWork)
+{
+  const double pi = EIGEN_PI, root = std::sqrt(0.5), third = std::sqrt(1.0 / 3.0);
+  const Eigen::Vector3d truth(30.0, -20.0, 140.0);
+  // Axes at angles that leave no half turn which commutes with all.
+  const std::vector<Eigen::Vector3d> oblique{
+      {0, 0, 0}, {pi, 0, 0}, {pi * root, pi * root, 0}, {pi * third, pi * third, pi * third}};
+  // Half turns about axes at right angles, told apart by shifts.
+  const std::vector<Eigen::Vector3d> klein{{0, 0, 0}, {pi, 0, 0}, {0, pi, 0}, {0, 0, pi}};
+  for (const bool noise : {false, true})
+    for (const bool shifted : {false, true}) {
+      const HandEyeResult result = CalibrateHandEye(
+          PairsOf(shifted ? klein : oblique,
+                  shifted ? std::vector<Eigen::Vector3d>{{0, 0, 0}, {30, 0, 0}, {0, 40, 0}, {0, 10, 50}} : NoShift, noise));
+      const double off = (result.solution.volumeToSensor.translation() - truth).norm();
+      EXPECT_LT(off, noise ? 1.5 * result.targetRadius95Mm : 1e-5) << noise << shifted;
+      EXPECT_EQ(result.inliers, 4) << noise << shifted;
+    }
 }
 
 TEST(HandEye, HalfTurnsWork)
