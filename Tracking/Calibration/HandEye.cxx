@@ -196,7 +196,7 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   const bool tooFew = inliers < count && (inliers < LeastMajority || 2 * inliers < count);
   const bool hopeless = tooFew || consensus.scale > (result.noiseEstimated ? HopelessEstimatedScale : HopelessScale);
   if (hopeless || consensus.scale > SuspectScale || (inliers < count && (count < ManyScans || 4 * inliers < 3 * count))) {
-    const std::string explanation = ExplainDisagreement(pairs, parameters, consensus);
+    const std::string explanation = ExplainDisagreement(pairs, parameters, consensus, progress.Part(0.8, 0.9));
     if (!explanation.empty())
       Refuse("the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
              " are left. " + explanation);

@@ -22,6 +22,7 @@ namespace echorama {
 namespace {
 
 constexpr double DegreesPerRadian = 57.29577951308232;
+constexpr std::size_t AskedScans = 60;     // for a mistake that they have in common
 constexpr double LeastRivalDegrees = 20.0; // apart
 constexpr double LeastRivalCost = 16.0;    // chi^2 by which another answer must fit worse: four standard deviations
 
@@ -175,9 +176,15 @@ void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<c
                 rivals.size() == 1 ? "two" : "several", text.c_str(), between.x(), between.y(), between.z()));
 }
 
-std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters,
-                                const HandEyeConsensus& consensus)
+std::string ExplainDisagreement(const std::vector<HandEyePair>& given, const HandEyeParameters& parameters,
+                                const HandEyeConsensus& consensus, const Progress& progress)
 {
+  std::vector<HandEyePair> pairs = given;
+  if (given.size() > AskedScans) {
+    pairs.clear();
+    for (std::size_t i = 0; i < AskedScans; ++i)
+      pairs.push_back(given[i * given.size() / AskedScans]);
+  }
   struct Repair {
     double sensorUnit, volumeUnit;
     bool invert; // one side; which one, residuals cannot tell
@@ -218,8 +225,10 @@ std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const Han
       sum += 6.0 * std::log1p(chiSquare / 6.0);
     return sum;
   };
-  double leastDoubt = doubt(consensus) - std::log(1000.0);
+  double leastDoubt = doubt(pairs.size() < given.size() ? solve(pairs) : consensus) - std::log(1000.0);
+  double tried = 0.0;
   for (const Repair& repair : repairs) {
+    progress(0.1 * tried++);
     const double repairedDoubt = doubt(solve(repaired(repair, true)));
     if (repairedDoubt < leastDoubt) {
       leastDoubt = repairedDoubt;

@@ -3,10 +3,12 @@
 // holds no wrong one. Triples are drawn at random and sorted before anything is solved: the angle and the shift along the axis of
 // a motion are the same on both sides whatever C is, so a triple that holds a wrong scan mostly shows it at once; and
 // those that turn far are worth more. The starts that fit best, by a cost that grows with the logarithm and so lets no scan
-// dominate, are refined with that cost. From the best of them, wrong scans leave one at a time, the worst first, and the others
-// are solved anew by plain maximum likelihood; at the end those who agree after all come back.
+// dominate, are refined with that cost. From the best of them, those that are far off leave at once; the others are solved anew
+// by plain maximum likelihood, and the worst leaves as long as one is wrong (of more than 40 scans the worst tenth of the wrong,
+// so that rounds grow with the logarithm of their number); at the end those who agree after all come back.
 //
-// Cost: some 30 small eigenproblems and a handful of refinements, 1.5 ms for 20 scans and linear in their number.
+// Cost: some 30 small eigenproblems, a handful of refinements and one for each round; 1.5 ms for 20 scans, and linear in their
+// number but for the logarithm.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #pragma GCC diagnostic ignored "-Warray-bounds"
@@ -26,6 +28,7 @@ namespace {
 constexpr double MedianChiSquare6 = 5.348;
 constexpr double RareChiSquare6 = 22.458; // exceeded once in a thousand
 constexpr double ExplainedScale = 1.5;    // noise alone explains the residuals of most scans: no start leads to a better fit
+constexpr std::size_t OneByOne = 40;      // scans, up to which they leave one at a time
 constexpr int ClosedFormScans = 40, DrawnTriples = 250, SolvedTriples = 25, RefinedStarts = 4;
 
 double Median(std::vector<double> values)
@@ -281,17 +284,22 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
       consensus.fit = model.Refine(consensus.fit.solution, consensus.inlier);
     const HandEyeMatrix covariance = model.CovarianceOfStep(consensus.fit.solution, consensus.inlier);
     consensus.square.assign(count, 0.0);
-    std::size_t worst = count;
+    std::vector<std::pair<double, std::size_t>> beyond;
     for (std::size_t i = 0; i < count; ++i) {
       consensus.square[i] =
           model.PredictedChiSquare(static_cast<int>(i), consensus.fit.solution, covariance, consensus.inlier[i] != 0);
-      if (consensus.inlier[i] && (worst == count || consensus.square[i] > consensus.square[worst]))
-        worst = i;
+      if (consensus.inlier[i] && consensus.square[i] > limit)
+        beyond.emplace_back(-consensus.square[i], i);
     }
     if (!reject)
       break;
-    if (consensus.square[worst] > limit && std::count(consensus.inlier.begin(), consensus.inlier.end(), 1) > 3) {
-      consensus.inlier[worst] = 0;
+    progress(1.0 - 0.3 / (1.0 + 0.1 * static_cast<double>(round)));
+    const auto present = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
+    if (!beyond.empty() && present > 3) {
+      std::sort(beyond.begin(), beyond.end());
+      const std::size_t some = count > OneByOne ? std::max<std::size_t>(1, beyond.size() / 10) : 1;
+      for (std::size_t i = 0; i < std::min(some, present - 3); ++i)
+        consensus.inlier[beyond[i].second] = 0;
       continue;
     }
     bool changed = false;

@@ -561,6 +561,34 @@ TEST(HandEye, StopsAndRepeats)
   EXPECT_EQ((a.solution.volumeToSensor.matrix() - b.solution.volumeToSensor.matrix()).norm(), 0.0);
 }
 
+TEST(HandEye, ManyScansLeaveTogether)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  // Every third scan is three times as noisy: most of these are wrong, none by far, so that rounds must find them.
+  HandEyeScenario scenario, noisy;
+  scenario.poses = noisy.poses = 600;
+  noisy.sensorNoise = noisy.volumeNoise = {0.75, 2.1};
+  HandEyeSimulation simulation = SimulateHandEye(scenario);
+  const HandEyeSimulation worse = SimulateHandEye(noisy);
+  ASSERT_TRUE(simulation.truth.volumeToSensor.isApprox(worse.truth.volumeToSensor, 1e-12));
+  for (std::size_t i = 0; i < 600; i += 3)
+    simulation.pairs[i] = worse.pairs[i];
+  int calls = 0;
+  const HandEyeResult result = CalibrateHandEye(simulation.pairs, {}, Progress([&calls](double) { return ++calls > 0; }));
+  EXPECT_GT(600 - result.inliers, 120);
+  EXPECT_GT(calls, 15); // every round can be stopped
+  EXPECT_LT(calls, 70);
+  int rightLeft = 0;
+  for (std::size_t i = 0; i < 600; ++i)
+    rightLeft += i % 3 != 0 && !result.residuals[i].inlier ? 1 : 0;
+  EXPECT_LE(rightLeft, 3);
+  // A mistake that all have in common is told, and can be stopped.
+  for (HandEyePair& pair : simulation.pairs)
+    pair.sensorToTracker.translation() *= 0.001;
+  EXPECT_TRUE(Says(Refusal(simulation.pairs), "sensor poses are in metres"));
+  EXPECT_THROW(CalibrateHandEye(simulation.pairs, {}, Progress([](double fraction) { return fraction < 0.85; })), Error);
+}
+
 TEST(HandEye, TwoRecordingsOfOneRigAgree)
 {
   ECHORAMA_SKIP_SANITIZED();
