@@ -74,6 +74,10 @@ Side SideOf(vtkDataObject* data, const std::string& arrayName, const std::string
     side.Poses.emplace_back(RowMajor(values));
   }
   if (vtkStringArray* names = vtkStringArray::SafeDownCast(arrays->GetAbstractArray(nameArray.c_str()))) {
+    if (names->GetNumberOfValues() != numbers->GetNumberOfTuples()) {
+      complain("has " + std::to_string(names->GetNumberOfValues()) + " names in the array \"" + nameArray + "\" for " +
+               std::to_string(numbers->GetNumberOfTuples()) + " poses");
+    }
     for (vtkIdType i = 0; i < numbers->GetNumberOfTuples(); ++i) {
       side.Names.push_back(names->GetValue(i));
     }

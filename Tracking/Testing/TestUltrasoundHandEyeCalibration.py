@@ -66,13 +66,13 @@ def numbers(name, matrices):
     return array
 
 
-def points_of(name, matrices, names=None):
+def points_of(name, matrices, names=None, named=False):
     data, points = vtkPolyData(), vtkPoints()
     for matrix in matrices:
         points.InsertNextPoint(matrix[:3, 3])
     data.SetPoints(points)
     data.GetPointData().AddArray(numbers(name, matrices))
-    if names:
+    if names or named:
         data.GetPointData().AddArray(strings("Name", names))
     return data
 
@@ -223,6 +223,9 @@ def check_refusals():
     refused("7 sensor poses and 6 alignments", sensors=points_of("S", sensors), volumes=points_of("M", volumes[:6]))
     refused("16 components", sensors=vtkPolyData(), volumes=points_of("M", volumes))
     refused("names \"a\" twice", sensors=points_of("S", sensors, list("aabcdef")), volumes=points_of("M", volumes, list("abcdefg")))
+    for count in (0, 5, 9):  # names that do not belong to the poses
+        refused(f"has {count} names in the array \"Name\" for 7 poses", volumes=points_of("M", volumes),
+                sensors=points_of("S", sensors, list("abcdefghi")[:count], named=True))
     refused("must not be zero", zip(sensors, volumes), SensorNoiseDegrees=0, VolumeNoiseDegrees=0)
     # and works again
     filter, _ = calibrate(zip(sensors[:2], volumes[:2]))
