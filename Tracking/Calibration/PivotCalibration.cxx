@@ -493,6 +493,18 @@ PivotResult CalibratePivot(const std::vector<TimedPose>& timed, const PivotParam
   if (estimated > 3.0)
     result.notes.push_back(
         Format("the residuals are %.1f times what the noise explains: the tip slipped, or the tracker is noisier", estimated));
+  const double freedom = 3.0 * result.inliers - 6.0, chiSquare = Cost(poses, use, parameters.noise, solution);
+  const double shown = std::sqrt(chiSquare / freedom);
+  if (!parameters.estimateNoise && chiSquare > freedom + 4.0 * std::sqrt(2.0 * freedom))
+    result.notes.push_back(
+        Format("the residuals are %.1f times what the noise stated explains, so the 95%% region is too small: let the noise be "
+               "estimated, or state more",
+               shown));
+  else if (!parameters.estimateNoise && freedom >= 18.0 && shown < 0.5)
+    result.notes.push_back(
+        Format("the residuals are %.2g times what the noise stated explains, so the 95%% region is too large: let the noise be "
+               "estimated, or state less",
+               shown));
   const PivotSphere& sphere = result.sphere;
   const double lever = result.tip.norm(), sphereError = std::hypot(sphere.radiusErrorMm, result.tipRmsMm);
   if (sphere.known && sphereError < 0.05 * lever && std::fabs(sphere.radiusMm - lever) > 4.0 * sphereError + 1.0)

@@ -161,6 +161,32 @@ TEST(PivotCalibration, OutliersAreNamed)
   EXPECT_TRUE(HasNote(result, "times what the noise explains"));
 }
 
+TEST(PivotCalibration, StatedNoiseIsComparedWithTheResiduals)
+{
+  PivotParameters parameters;
+  parameters.estimateNoise = false;
+  for (const bool reject : {false, true}) {
+    parameters.rejectOutliers = reject;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      parameters.noise = {0.25, 0.7};
+      EXPECT_FALSE(HasNote(CalibratePivot(Turned({}, seed), parameters), "the noise stated")) << seed;
+      parameters.noise = {0.15, 0.4};
+      EXPECT_TRUE(HasNote(CalibratePivot(Turned({}, seed), parameters), "region is too small")) << seed;
+      parameters.noise = {0.75, 2.1};
+      EXPECT_TRUE(HasNote(CalibratePivot(Turned({}, seed), parameters), "region is too large")) << seed;
+      parameters.estimateNoise = true;
+      EXPECT_FALSE(HasNote(CalibratePivot(Turned({}, seed), parameters), "the noise stated")) << seed;
+      parameters.estimateNoise = false;
+    }
+  }
+  // One pose that is far off, and none left out.
+  parameters.rejectOutliers = false;
+  parameters.noise = {0.25, 0.7};
+  std::vector<TimedPose> poses = Turned({}, 300);
+  poses[5].pose.translation().x() += 60.0;
+  EXPECT_TRUE(HasNote(CalibratePivot(poses, parameters), "region is too small"));
+}
+
 TEST(PivotCalibration, TooLittleTurning)
 {
   Refused({}, Error::Kind::NotPossible, "at least 4 poses");
