@@ -342,8 +342,12 @@ Refined Refine(const SpeedTrack& first, const SpeedTrack& second, Refined fit, b
       slopes.push_back(slope);
     }
     const Eigen::Index count = static_cast<Eigen::Index>(times.size());
-    if (count < 10)
+    if (count < 10) {
+      if (iteration == 0)
+        Refuse(Format("the streams overlap in too few moments (%d of the grid, %.3g s apart); record for longer, or smooth less",
+                      static_cast<int>(count), first.step));
       break;
+    }
     if (iteration == 0)
       fit.middle = 0.5 * (times.front() + times.back());
     fit.seconds = static_cast<double>(count) * first.step;
