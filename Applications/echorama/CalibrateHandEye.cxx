@@ -134,7 +134,7 @@ nlohmann::ordered_json ReportOf(const HandEyeResult& result, const HandEyeOption
                      {"sensorMm", parameters.sensorNoise.mm * result.noiseScale},
                      {"volumeDegrees", parameters.volumeNoise.degrees * result.noiseScale},
                      {"volumeMm", parameters.volumeNoise.mm * result.noiseScale},
-                     {"estimated", parameters.estimateNoise}};
+                     {"estimated", result.noiseEstimated}};
   report["scans"] = nlohmann::ordered_json::array();
   for (const HandEyeResidual& residual : result.residuals) {
     nlohmann::ordered_json scan{
@@ -224,7 +224,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
               std::to_string(result.inliers) + " of " + std::to_string(options.volumes.size()) + " scans");
   session.Say("error at the middle of the volume: " + Fixed(result.targetRmsMm, 2) + " mm RMS, within " +
               Fixed(result.targetRadius95Mm, 2) + " mm with 95%" +
-              (parameters.estimateNoise ? " (noise from the residuals)" : ""));
+              (result.noiseEstimated ? " (noise from the residuals)" : ""));
   for (const HandEyeResidual& residual : result.residuals)
     session.Say("  " + residual.name + ": " + Fixed(residual.mm, 2) + " mm, " + Fixed(residual.degrees, 2) + " degrees" +
                 (residual.inlier ? "" : ", not used: " + residual.reason));
