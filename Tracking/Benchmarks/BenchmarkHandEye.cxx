@@ -214,8 +214,8 @@ void Simulate(const std::string& name, HandEyeScenario scenario, int trials, boo
 
 // Two recordings of one rig: a camera on a hand that a motion-capture system follows, over a board. The camera is the volume, the
 // board the world. A camera that sees a board errs by turning about it more than by anything else, so the target is the mean
-// place of the board and all noise is given to the camera. The ratio of that noise, 10 mm for a degree, is chosen by hand; its size
-// is estimated.
+// place of the board and all noise is given to the camera. The ratio of that noise, 10 mm for a degree, is chosen by hand; its
+// size is estimated.
 void CompareRecordings()
 {
   const std::filesystem::path folder = std::filesystem::path(ECHORAMA_SOURCE_DIR) / "../shared/data/handeye_ethz";
