@@ -73,6 +73,12 @@ std::vector<HeaderField> MetaImageSequenceFields(const SequenceContent& content,
           {"UltrasoundImageType", content.imageType.empty() ? images ? "BRIGHTNESS" : "XX" : content.imageType}};
 }
 
+bool CanNameTransform(const std::string& name)
+{
+  const std::string key = name + "Transform"; // of "AToBTransform", it would be none
+  return FramesOf(name) && FramesOf(key) && CanHold({key, ""});
+}
+
 std::vector<HeaderField> SequenceFrameFields(const std::string& path, const SequenceFrame& frame, int number,
                                              const std::string& statusKey, bool hasPixels)
 {

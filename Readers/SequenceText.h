@@ -16,6 +16,9 @@ void CheckSequence(const std::string& path, SequenceContent& content);
 /// blank: the number of frames is to follow.
 std::vector<HeaderField> MetaImageSequenceFields(const SequenceContent& content, bool compressed);
 
+/// Whether a sequence can hold a transform of this name, so that it is read again as what it was.
+bool CanNameTransform(const std::string& name);
+
 /// The fields of frame \a number, without "Seq_Frame0000_". \a statusKey: that of its image, whose name differs between formats;
 /// the image is valid when the frame says so and \a hasPixels.
 /// \throws Error(InvalidParameter) when the names of its transforms and fields cannot be held or are given twice,

@@ -20,7 +20,9 @@ struct ToolPose {
   TransformStatus status = TransformStatus::Valid;
 };
 
-/// "ProbeToTracker" as it stands; "Probe", which names no two frames, becomes "ProbeToTracker". Blanks become "_".
+/// "ProbeToTracker" as it stands; "Probe", which names no two frames, becomes "ProbeToTracker". Always a name that FramesOf
+/// takes: blanks, signs other than "." and "-", control characters and bytes that are no UTF-8 become "_", and "AToBToC", which
+/// could be cut in two places, becomes "ATOBTOCToTracker".
 std::string ToolTransformName(const std::string& name);
 
 /// The rigid pose nearest to \a matrix, when it is one to within what single precision and a device's rounding explain: finite,

@@ -4,6 +4,7 @@
 // senders are written by people.
 #include "Tracking/Devices/PosePacket.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Utf8.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -112,6 +113,8 @@ std::string Complaint(const PosePacket& packet)
   for (const ToolPose& pose : packet.poses) {
     if (pose.name.empty() || pose.name.size() > PosePacket::LongestName)
       return "a name must have 1 to " + std::to_string(PosePacket::LongestName) + " bytes";
+    if (!IsPrintableUtf8(pose.name))
+      return "a name must be printable UTF-8";
     if (!names.insert(pose.name).second)
       return "two of its poses have one name";
     Pose rigid;
@@ -198,7 +201,7 @@ std::string DecodePosePacket(const unsigned char* bytes, std::size_t count, Pose
       const Eigen::Vector3d position(numbers[0], numbers[1], numbers[2]);
       const Eigen::Quaterniond turn(numbers[3], numbers[4], numbers[5], numbers[6]);
       if (!position.allFinite() || !(std::fabs(turn.norm() - 1.0) <= UnitTolerance)) // not >, for NaN
-        return "the pose of " + pose.name + " is none";
+        return "pose " + std::to_string(i + 1) + " is none";
       pose.pose.linear() = turn.normalized().toRotationMatrix();
       pose.pose.translation() = position;
     }

@@ -19,8 +19,8 @@ namespace echorama {
 /// | 16 - 23          | sequence: counts up from any number with every packet of the session                     |
 /// | 24 - 31          | time, double: seconds on the sender's clock                                              |
 /// | 32, 33           | number of poses, 16 bits, 1 to MostPoses                                                 |
-/// | then, for each   | length of the name (1 byte, 1 to 64), the name (UTF-8), status (1 byte: 0 valid,         |
-/// |                  | 1 missing, 2 out of range), x, y, z, and the unit quaternion qw, qx, qy, qz              |
+/// | then, for each   | length of the name (1 byte, 1 to 64), the name (printable UTF-8), status (1 byte:      |
+/// |                  | 0 valid, 1 missing, 2 out of range), x, y, z, and the unit quaternion qw, qx, qy, qz     |
 /// | the last 4       | CRC-32 (that of zlib, gzip and PNG) of all bytes before it                               |
 ///
 /// The numbers of a pose that is missing are 0, but for qw, which is 1.
@@ -35,7 +35,8 @@ struct PosePacket {
 };
 
 /// \throws Error(InvalidParameter) when that does not make a packet: session 0, a time that is not finite, no poses, too many, or
-/// two of one name, a name that is empty or too long, a pose that is not finite or not rigid, more bytes than MostBytes.
+/// two of one name, a name that is empty, too long or not printable UTF-8, a pose that is not finite or not rigid, more bytes
+/// than MostBytes.
 std::vector<unsigned char> EncodePosePacket(const PosePacket& packet, bool doubles = true);
 
 /// The packet in \a bytes. \returns what is wrong, as a sentence, else nothing: then \a packet holds what EncodePosePacket would

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Poses are taken as they come. A frame is closed when a pose of another time comes, when a tool comes for the second time, or
-// when nothing has come for a while.
+// when nothing has come for a while. One pose that the file cannot hold, because of what a peer calls its tool, costs that pose
+// alone: only the disk ends a recording.
 #include "Tracking/Stream/StreamRecorder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Readers/PoseLog.h"
+#include "Readers/SequenceText.h"
 #include "Tracking/Stream/Worker.h"
 #include <cmath>
+#include <exception>
 #include <mutex>
+#include <utility>
 
 namespace echorama {
 namespace {
@@ -17,6 +21,7 @@ constexpr double PatienceSeconds = 0.05; // for another tool of the same moment,
 } // namespace
 
 struct StreamRecorder::Parts {
+  const std::string path;
   std::shared_ptr<PoseSubscription> source;
   SequenceRecorder recorder;
   SequenceFrame frame; // not yet closed
@@ -26,8 +31,8 @@ struct StreamRecorder::Parts {
   bool stopped = false;
   Worker worker; // the last: it stops before the rest goes
 
-  Parts(const std::string& path, std::shared_ptr<PoseSubscription> poses, const SequenceRecorderOptions& options)
-    : source(std::move(poses)), recorder(path, {}, options)
+  Parts(const std::string& file, std::shared_ptr<PoseSubscription> poses, const SequenceRecorderOptions& options)
+    : path(file), source(std::move(poses)), recorder(file, {}, options)
   {
   }
 
@@ -35,14 +40,32 @@ struct StreamRecorder::Parts {
   {
     if (frame.transforms.empty())
       return;
-    recorder.Append(frame);
+    const SequenceFrame closed = std::exchange(frame, {});
+    try {
+      recorder.Append(closed);
+    } catch (const Error& refusal) {
+      if (refusal.GetKind() != Error::Kind::InvalidParameter && refusal.GetKind() != Error::Kind::BadInput)
+        throw;
+      LeaveOut(closed.transforms.size(), refusal.what());
+      return;
+    }
     const std::lock_guard<std::mutex> lock(mutex);
-    state.poses += frame.transforms.size();
-    frame = {};
+    state.poses += closed.transforms.size();
+  }
+
+  void LeaveOut(std::size_t poses, const std::string& why)
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    state.leftOut += poses;
+    state.lastLeftOut = why;
   }
 
   void Take(const ToolPose& pose)
   {
+    if (!CanNameTransform(pose.name)) {
+      LeaveOut(1, path + ": \"" + pose.name + "\" is no name that a recording can hold");
+      return;
+    }
     if (frame.time != pose.time || frame.Find(pose.name))
       CloseFrame();
     if (frame.transforms.empty()) {
@@ -71,6 +94,13 @@ struct StreamRecorder::Parts {
     return !poses.empty();
   }
 
+  void End(const Error& problem)
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    error = std::make_unique<Error>(problem);
+    state.problem = problem.what();
+  }
+
   void Run(const Worker::Signal& signal)
   {
     try {
@@ -80,9 +110,9 @@ struct StreamRecorder::Parts {
       }
       recorder.Finish();
     } catch (const Error& problem) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      error = std::make_unique<Error>(problem);
-      state.problem = problem.what();
+      End(problem);
+    } catch (const std::exception& problem) { // no memory, say
+      End(Error(Error::Kind::NotPossible, path + ": " + problem.what()));
     }
     const std::lock_guard<std::mutex> lock(mutex);
     state.safe = static_cast<std::uint64_t>(recorder.SafeFrames());

@@ -10,11 +10,13 @@ namespace echorama {
 
 /// How a stream is being recorded.
 struct RecordingState {
-  std::uint64_t poses = 0;  ///< written
-  std::uint64_t frames = 0; ///< into which they went
-  std::uint64_t safe = 0;   ///< frames that a crash cannot take away
-  std::uint64_t lost = 0;   ///< poses that came faster than they could be written
-  std::string problem;      ///< why it goes on no more (the disk is full); empty: it does
+  std::uint64_t poses = 0;   ///< written
+  std::uint64_t frames = 0;  ///< into which they went
+  std::uint64_t safe = 0;    ///< frames that a crash cannot take away
+  std::uint64_t lost = 0;    ///< poses that came faster than they could be written
+  std::uint64_t leftOut = 0; ///< poses that the file cannot hold; the others go on
+  std::string lastLeftOut;   ///< a sentence about the newest of these
+  std::string problem;       ///< why it goes on no more (the disk is full); empty: it does
 };
 
 /// Records every pose of a stream to a sequence, in a thread of its own, crash-safe (see SequenceRecorder).
@@ -37,6 +39,7 @@ public:
 
   /// Writes what has come, and closes the file. May be called twice.
   /// \throws Error(FileSystem) when the disk is full, Error(BadInput) when no pose came; there is no file then.
+  /// Error(NotPossible) when something else ended it, such as a lack of memory; what is safe stays.
   void Stop();
 
 private:

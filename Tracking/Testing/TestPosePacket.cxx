@@ -150,6 +150,8 @@ TEST(PosePacket, WhatIsWrongIsSaid)
   expect(with(74, {0, 0, 0, 0, 0, 0, 0xf8, 0x7f}), "is none");    // qw not a number
   expect(with(74, {0, 0, 0, 0, 0, 0, 0, 0x40}), "is none");       // qw 2
   expect(with(110 + 1, {'0'}), "two of its poses have one name"); // Tool1 becomes Tool0
+  for (const unsigned char byte : {0x00, 0x0a, 0x1b, 0x7f, 0x80, 0xc3, 0xff})
+    expect(with(110 + 1, {byte}), "printable");
   std::vector<unsigned char> nameless = good;
   nameless.erase(nameless.begin() + 35, nameless.begin() + 49);
   nameless[34] = 0;
@@ -178,6 +180,8 @@ TEST(PosePacket, RefusesToWriteWhatItWouldNotRead)
   refused(packet, "one name");
   packet.poses[1].name = std::string(65, 'a');
   refused(packet, "1 to 64");
+  packet.poses[1].name = "Probe\n";
+  refused(packet, "printable");
   packet = SomePacket(1, 1);
   packet.time = std::numeric_limits<double>::quiet_NaN();
   refused(packet, "time");

@@ -91,6 +91,27 @@ TEST_F(StreamRecorderTest, SafeWithoutAnotherPose)
   EXPECT_EQ(ReadPoseLog(Path("a.igs.mha")).poses.size(), 5u);
 }
 
+TEST_F(StreamRecorderTest, NamesThatCannotBeRecordedAreLeftOut)
+{
+  PoseStream stream;
+  StreamRecorder recorder(Path("a.igs.mha"), stream.Subscribe(), {false, 0.0, false});
+  Random random(2);
+  const std::string bad[] = {"AToBToC", "Probe", "A=BToTracker", "AToBTransform", "A\nSeq_Frame0000_BToTracker"};
+  for (int i = 0; i < 20; ++i) {
+    stream.Add(RandomPose(random, "ProbeToTracker", i));
+    for (const std::string& name : bad)
+      stream.Add(RandomPose(random, name, i));
+    stream.Add(RandomPose(random, "StylusToTracker", i));
+  }
+  recorder.Stop();
+  const RecordingState state = recorder.State();
+  EXPECT_EQ(state.problem, "");
+  EXPECT_EQ(state.poses, 40u);
+  EXPECT_EQ(state.leftOut, 100u);
+  EXPECT_NE(state.lastLeftOut.find("BToTracker"), std::string::npos) << state.lastLeftOut;
+  EXPECT_EQ(ReadPoseLog(Path("a.igs.mha")).poses.size(), 40u);
+}
+
 TEST_F(StreamRecorderTest, NothingCame)
 {
   PoseStream stream;
