@@ -13,6 +13,13 @@
 #include <optional>
 
 namespace echorama {
+namespace {
+
+// At speed 0: how full subscriptions may become before it waits for their readers, how often it looks, and how long it waits
+// until it takes them for dead.
+constexpr double HalfFull = 0.5, LookSeconds = 0.001, PatienceSeconds = 10.0;
+
+} // namespace
 
 void ReplayParameters::Check() const
 {
@@ -67,6 +74,7 @@ struct ReplayTracker::Recording {
   double round = 0.0;                    // how often the end was reached
   std::size_t next = 0;
   int shown = -1; // frame, by ShowImage
+  bool readersAreAlive = true;
 
   Recording(const ReplayParameters& p, PoseStream& poseStream, ImageStream* imageStream)
     : parameters(p), poses(poseStream), images(imageStream), log(ReadPoseLog(p.path, p.log))
@@ -170,6 +178,26 @@ struct ReplayTracker::Recording {
     }
   }
 
+  // Waits until those who want every pose have taken enough of them. \returns false when it was stopped.
+  bool WaitForReaders(const Worker::Signal& signal)
+  {
+    double backlog = poses.Backlog();
+    if (backlog <= HalfFull) {
+      readersAreAlive = true;
+      return true;
+    }
+    for (double seen = ClockNow(); readersAreAlive && backlog > HalfFull;) {
+      if (!signal.Sleep(LookSeconds))
+        return false;
+      const double left = poses.Backlog(), now = ClockNow();
+      if (left < backlog)
+        seen = now;
+      readersAreAlive = now - seen < PatienceSeconds;
+      backlog = left;
+    }
+    return true;
+  }
+
   // Hands out the next moment. \returns false at the end, or when the file turns out to be damaged.
   bool Play()
   {
@@ -223,7 +251,7 @@ void ReplayTracker::Start(PoseStream& poses, ImageStream* images)
       if (wait > 0.0) {
         if (!signal.Sleep(wait))
           return;
-      } else if (!recording->Play()) {
+      } else if ((speed == 0.0 && !recording->WaitForReaders(signal)) || !recording->Play()) {
         return;
       }
     }

@@ -13,7 +13,7 @@ namespace echorama {
 
 struct ReplayParameters {
   std::string path;
-  double speed = 1.0; ///< 1: as it was recorded, in [0, 1000]; 0: as fast as it can be read
+  double speed = 1.0; ///< 1: as it was recorded, in [0, 1000]; 0: as fast as it is taken
   bool loop = false;  ///< at the end it begins again; times go on. Not at speed 0
   bool step = false;  ///< nothing comes but by Step()
   /// The part that is replayed, seconds after the first pose, both included.
@@ -28,7 +28,9 @@ struct ReplayParameters {
 
 /// A recording, as if it were a tracker: everything that ReadPoseLog reads, and the images of sequences.
 ///
-/// All poses of one time come together. Their times are those of the file; when they come is told by the speed.
+/// All poses of one time come together. Their times are those of the file; when they come is told by the speed. At speed 0 it
+/// waits for those who subscribed to the poses, so that recorders and servers lose none; one that takes nothing for ten seconds
+/// is waited for no more.
 class ReplayTracker : public TrackerDevice {
 public:
   /// \throws Error(InvalidParameter) as Check()

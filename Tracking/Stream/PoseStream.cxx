@@ -528,4 +528,18 @@ std::shared_ptr<PoseSubscription> PoseStream::Subscribe(std::size_t bound)
   return subscription;
 }
 
+double PoseStream::Backlog() const
+{
+  double fullest = 0.0;
+  const std::lock_guard<std::mutex> lock(parts_->mutex);
+  for (const auto& pointer : parts_->subscriptions) {
+    if (const auto subscription = pointer.lock()) {
+      const PoseSubscription::Parts& queue = *subscription->parts_;
+      const std::lock_guard<std::mutex> queueLock(queue.mutex);
+      fullest = std::max(fullest, static_cast<double>(queue.poses.size()) / static_cast<double>(queue.bound));
+    }
+  }
+  return fullest;
+}
+
 } // namespace echorama

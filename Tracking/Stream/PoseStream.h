@@ -145,6 +145,8 @@ public:
 
   /// From now on. It goes when the last copy of the pointer goes. \a bound: poses it holds.
   std::shared_ptr<PoseSubscription> Subscribe(std::size_t bound = 65536);
+  /// How full the fullest subscription is, in [0, 1]: at 1, the next pose costs its oldest. Writers that can wait look at it.
+  double Backlog() const;
 
 private:
   struct Parts;

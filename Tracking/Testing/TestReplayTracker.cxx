@@ -186,6 +186,40 @@ TEST_F(ReplayTrackerTest, SpeedIsKept)
   EXPECT_EQ(stream.State().first, DeviceState::Idle);
 }
 
+TEST_F(ReplayTrackerTest, AsFastAsItIsTaken)
+{
+  std::string text = "time,tx,ty,tz,qw,qx,qy,qz\n";
+  const std::size_t count = 20000;
+  for (std::size_t i = 0; i < count; ++i)
+    text += std::to_string(i) + ",1,2,3,1,0,0,0\n";
+  const std::string path = WriteText("long.csv", text);
+  PoseStream stream;
+  const auto subscription = stream.Subscribe(1000);
+  auto idle = stream.Subscribe(100);
+  const auto device = MakeTracker("replay:" + path + "?speed=0");
+  device->Start(stream, nullptr);
+  for (int i = 0; i < 100 && stream.Backlog() <= 0.5; ++i)
+    stream.WaitBeyond(stream.Version(), 0.1);
+  EXPECT_GT(stream.Backlog(), 0.5);
+  EXPECT_LT(stream.Backlog(), 0.6);
+  EXPECT_EQ(stream.Statistics().state, DeviceState::Running); // it waits for the one that takes nothing
+  idle.reset();                                               // and no more
+  std::size_t taken = 0;
+  for (std::size_t last = 1; last > 0 && taken < count; taken += last) // the reader is slower than the file
+    last = subscription->Take(5.0).size();
+  WaitUntilNotRunning(stream);
+  EXPECT_EQ(taken, count);
+  EXPECT_EQ(subscription->Lost(), 0u);
+  EXPECT_EQ(stream.Statistics().state, DeviceState::Ended);
+
+  device->Start(stream, nullptr); // stops while it waits
+  while (stream.Backlog() <= 0.5)
+    stream.WaitBeyond(stream.Version(), 0.1);
+  const double begun = ClockNow();
+  device->Stop();
+  EXPECT_LT(ClockNow() - begun, 8.0); // before it would take the reader for dead
+}
+
 TEST_F(ReplayTrackerTest, Tables)
 {
   const std::string path = WriteText("log.csv", "time,tool,tx,ty,tz,qw,qx,qy,qz\n0,Probe,1,2,3,1,0,0,0\n0,Stylus,4,5,6,1,0,0,0\n"
