@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All sockets are non-blocking; waiting is done by poll alone, in slices of a tenth of a second where someone may want to
-// stop. Names are looked up by the system's asynchronous resolver, since the plain one can hang for half a minute where a
-// name server does not answer; a lookup that cannot be taken back is left to end by itself.
+// stop.
 #include "Tracking/Devices/TcpSocket.h"
 #include "Core/Base/Error.h"
+#include "Tracking/Devices/HostLookup.h"
 #include "Tracking/Stream/Clock.h"
 #include <algorithm>
 #include <arpa/inet.h>
@@ -38,57 +38,15 @@ std::string Reason(int error)
 
 std::string PlaceOf(const sockaddr_in& address)
 {
-  char text[INET_ADDRSTRLEN] = "";
-  inet_ntop(AF_INET, &address.sin_addr, text, sizeof text);
-  return std::string(text) + ":" + std::to_string(ntohs(address.sin_port));
+  return HostNumber(address.sin_addr) + ":" + std::to_string(ntohs(address.sin_port));
 }
 
-// What the system's resolver works on; it must stay where it is until the resolver has done with it.
-struct Lookup {
-  std::string host;
-  addrinfo hints{};
-  gaicb request{};
-  ~Lookup()
-  {
-    if (request.ar_result)
-      freeaddrinfo(request.ar_result);
-  }
-};
-
-// Nothing when it was stopped.
-std::optional<sockaddr_in> Resolve(const std::string& host, int port, const std::string& place, double until,
-                                   const TcpSocket::Stopped& stopped)
+sockaddr_in AddressOf(const in_addr& host, int port)
 {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  if (inet_pton(AF_INET, host.c_str(), &address.sin_addr) == 1)
-    return address;
-
-  auto lookup = std::make_unique<Lookup>();
-  lookup->host = host;
-  lookup->hints.ai_family = AF_INET;
-  lookup->hints.ai_socktype = SOCK_STREAM;
-  lookup->request.ar_name = lookup->host.c_str();
-  lookup->request.ar_request = &lookup->hints;
-  gaicb* list[1] = {&lookup->request};
-  if (const int failed = getaddrinfo_a(GAI_NOWAIT, list, 1, nullptr))
-    Refuse(place, gai_strerror(failed));
-  while (gai_error(&lookup->request) == EAI_INPROGRESS) {
-    const bool late = ClockNow() > until;
-    if (late || (stopped && stopped())) {
-      if (gai_cancel(&lookup->request) == EAI_NOTCANCELED)
-        lookup.release(); // the resolver still writes to it
-      if (!late)
-        return {};
-      Refuse(place, "the name was not found in time");
-    }
-    const timespec wait{0, static_cast<long>(Slice * 1e9)};
-    gai_suspend(list, 1, &wait);
-  }
-  if (const int failed = gai_error(&lookup->request))
-    Refuse(place, gai_strerror(failed));
-  address.sin_addr = reinterpret_cast<const sockaddr_in*>(lookup->request.ar_result->ai_addr)->sin_addr;
+  address.sin_addr = host;
   return address;
 }
 
@@ -154,14 +112,15 @@ TcpSocket TcpSocket::Connect(const std::string& host, int port, double seconds, 
 {
   const std::string place = host + ":" + std::to_string(port);
   const double until = ClockNow() + seconds;
-  const auto address = Resolve(host, port, place, until, stopped);
+  const auto hosts = LookUpHost(host, place, seconds, stopped);
   TcpSocket result;
-  if (!address)
+  if (hosts.empty())
     return result;
+  const sockaddr_in address = AddressOf(hosts[0], port);
   result.descriptor_ = NewSocket(place);
   result.peer_ = place;
   Tune(result.descriptor_);
-  if (connect(result.descriptor_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0)
+  if (connect(result.descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
     return result;
   if (errno != EINPROGRESS && errno != EINTR)
     Refuse(place, Reason(errno));
@@ -185,12 +144,12 @@ TcpSocket TcpSocket::Connect(const std::string& host, int port, double seconds, 
 TcpSocket TcpSocket::Listen(const std::string& host, int port)
 {
   const std::string place = host + ":" + std::to_string(port);
-  const auto address = Resolve(host, port, place, ClockNow() + 5.0, nullptr);
+  const sockaddr_in address = AddressOf(LookUpHost(host, place, 5.0)[0], port);
   TcpSocket result;
   result.descriptor_ = NewSocket(place);
   result.peer_ = place;
   Set(result.descriptor_, SOL_SOCKET, SO_REUSEADDR, 1);
-  if (bind(result.descriptor_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0 ||
+  if (bind(result.descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
       listen(result.descriptor_, 16) != 0)
     Refuse(place, Reason(errno));
   return result;
@@ -205,6 +164,8 @@ TcpSocket TcpSocket::Accept() const
   if (result.IsOpen()) {
     Tune(result.descriptor_);
     result.peer_ = PlaceOf(address);
+  } else if (!Again(errno)) {
+    result.end_ = Reason(errno);
   }
   return result;
 }

@@ -32,7 +32,8 @@ public:
   /// machine. Port 0: any that is free, see Port(). \throws Error(FileSystem) that names host, port and reason.
   static TcpSocket Listen(const std::string& host, int port);
 
-  /// Of a listening socket: the next that has connected; not open when there is none. Never waits.
+  /// Of a listening socket: the next that has connected; not open when there is none. Never waits. When there may be one
+  /// that cannot be taken, for want of descriptors, say, EndReason() of what is returned tells; it still counts as to be read.
   TcpSocket Accept() const;
 
   bool IsOpen() const { return descriptor_ >= 0; }

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Devices/UdpSocket.h"
 #include "Core/Base/Error.h"
+#include "Tracking/Devices/HostLookup.h"
 #include <algorithm>
-#include <arpa/inet.h>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>
-#include <memory>
-#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -22,37 +20,13 @@ namespace {
   throw Error(Error::Kind::FileSystem, "udp://" + host + ":" + std::to_string(port) + ": " + reason);
 }
 
-using Addresses = std::unique_ptr<addrinfo, void (*)(addrinfo*)>;
-
-Addresses Resolve(const std::string& host, std::string& reason)
-{
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  hints.ai_socktype = SOCK_DGRAM;
-  addrinfo* found = nullptr;
-  const int failed = getaddrinfo(host.c_str(), nullptr, &hints, &found);
-  if (failed != 0)
-    reason = gai_strerror(failed);
-  return Addresses(failed == 0 ? found : nullptr, freeaddrinfo);
-}
-
 sockaddr_in AddressOf(const std::string& host, int port)
 {
-  std::string reason;
-  const Addresses found = Resolve(host, reason);
-  if (!found)
-    Refuse(host, port, reason);
   sockaddr_in address{};
-  std::memcpy(&address, found->ai_addr, std::min(sizeof address, static_cast<std::size_t>(found->ai_addrlen)));
+  address.sin_family = AF_INET;
+  address.sin_addr = LookUpHost(host, "udp://" + host + ":" + std::to_string(port), 5.0)[0];
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   return address;
-}
-
-std::string NumberOf(const sockaddr_in& address)
-{
-  char text[INET_ADDRSTRLEN] = "";
-  inet_ntop(AF_INET, &address.sin_addr, text, sizeof text);
-  return text;
 }
 
 } // namespace
@@ -114,7 +88,7 @@ bool UdpSocket::Receive(std::vector<unsigned char>& bytes, std::string& sender, 
   if (count < 0)
     return false;
   bytes.resize(static_cast<std::size_t>(count));
-  sender = NumberOf(from);
+  sender = HostNumber(from.sin_addr);
   return true;
 }
 
@@ -128,22 +102,6 @@ bool UdpSocket::Send(const std::vector<unsigned char>& bytes)
       return false;
   }
   return false;
-}
-
-std::vector<std::string> HostNumbers(const std::string& host)
-{
-  std::string reason;
-  const Addresses found = Resolve(host, reason);
-  if (!found)
-    throw Error(Error::Kind::FileSystem, host + ": " + reason);
-  std::vector<std::string> numbers;
-  for (const addrinfo* info = found.get(); info; info = info->ai_next) {
-    sockaddr_in address{};
-    std::memcpy(&address, info->ai_addr, std::min(sizeof address, static_cast<std::size_t>(info->ai_addrlen)));
-    if (std::find(numbers.begin(), numbers.end(), NumberOf(address)) == numbers.end())
-      numbers.push_back(NumberOf(address));
-  }
-  return numbers;
 }
 
 } // namespace echorama

@@ -36,8 +36,4 @@ private:
   int descriptor_ = -1;
 };
 
-/// A name or number as its numbers, "192.168.0.3"; several when a name has several. \throws Error(FileSystem) that names it when
-/// it has none.
-std::vector<std::string> HostNumbers(const std::string& host);
-
 } // namespace echorama

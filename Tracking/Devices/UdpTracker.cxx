@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Devices/UdpTracker.h"
+#include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Tracking/Devices/HostLookup.h"
 #include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include <algorithm>
@@ -9,6 +11,31 @@
 #include <unistd.h>
 
 namespace echorama {
+namespace {
+
+constexpr const char* NothingYet = ": nothing has come yet";
+
+// The numbers that packets may come from; any when there are none. A name that is not known (yet) is asked for again and again,
+// and nobody is heard meanwhile.
+std::vector<std::string> Senders(const std::string& from, const std::string& here, const Worker::Signal& signal,
+                                 PoseStream& poses)
+{
+  std::vector<std::string> numbers;
+  while (!from.empty() && numbers.empty() && !signal.Stopped()) {
+    try {
+      for (const in_addr& address : LookUpHost(from, here + ": from=" + from, 30.0, [&signal] { return signal.Stopped(); }))
+        numbers.push_back(HostNumber(address));
+      if (!numbers.empty())
+        poses.SetState(DeviceState::Connecting, here + NothingYet);
+    } catch (const Error& error) {
+      poses.SetState(DeviceState::Connecting, error.what());
+      signal.Sleep(1.0);
+    }
+  }
+  return numbers;
+}
+
+} // namespace
 
 UdpTracker::UdpTracker(const TrackerAddress& address)
 {
@@ -21,13 +48,14 @@ UdpTracker::UdpTracker(const TrackerAddress& address)
 void UdpTracker::Start(PoseStream& poses, ImageStream*)
 {
   Stop();
-  const auto senders = from_.empty() ? std::vector<std::string>() : HostNumbers(from_);
   const auto socket = std::make_shared<UdpSocket>(UdpSocket::Receiving(endpoint_.host, endpoint_.port));
   port_ = socket->Port();
   const std::string here = "udp://" + endpoint_.host + ":" + std::to_string(port_);
-  poses.SetState(DeviceState::Connecting, here + ": nothing has come yet");
+  poses.SetLive(true);
+  poses.SetState(DeviceState::Connecting, here + NothingYet);
 
-  RunDevice(worker_, poses, [socket, senders, here, silence = silence_, &poses](const Worker::Signal& signal) {
+  RunDevice(worker_, poses, [socket, from = from_, here, silence = silence_, &poses](const Worker::Signal& signal) {
+    const auto senders = Senders(from, here, signal, poses);
     PosePacketOrder order(silence);
     PosePacket packet;
     std::vector<unsigned char> bytes;

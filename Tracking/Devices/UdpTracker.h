@@ -31,7 +31,8 @@ public:
   explicit UdpTracker(const TrackerAddress& address);
   ~UdpTracker() override { Stop(); }
 
-  /// \throws Error(FileSystem) when the port is taken, HOST is not ours, or a name is not known.
+  /// \throws Error(FileSystem) when the port is taken, HOST is not ours, or a name that is not known. The name behind from is
+  /// looked up later, and again and again; the state says so.
   void Start(PoseStream& poses, ImageStream* images) override;
   void Stop() override { worker_.Stop(); }
   /// That packets are received at, while it is started: of use when the address says 0.

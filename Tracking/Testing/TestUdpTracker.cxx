@@ -50,13 +50,15 @@ struct Receiver {
 TEST(UdpTracker, PosesArriveOnceAndInOrder)
 {
   Receiver receiver;
+  EXPECT_TRUE(receiver.poses.Live());
   EXPECT_EQ(receiver.poses.Statistics().state, DeviceState::Connecting);
   UdpSender sender("127.0.0.1", receiver.tracker.Port());
   for (int i = 0; i < 500; ++i) {
     EXPECT_TRUE(sender.Send(100.0 + 0.004 * i, {PoseAt("Probe", i), PoseAt("StylusToReference", -i)}));
-    usleep(200);
+    const std::uint64_t sent = 2 * static_cast<std::uint64_t>(i + 1); // the system keeps only so many for one who is held up
+    ASSERT_TRUE(WaitFor(30.0, [&] { return receiver.Taken() + 100 >= sent; })) << receiver.Taken();
   }
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.Taken() == 1000; })) << receiver.Taken();
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.Taken() == 1000; })) << receiver.Taken();
   EXPECT_EQ(receiver.poses.Statistics().state, DeviceState::Running);
   const auto history = receiver.poses.History("ProbeToTracker");
   ASSERT_EQ(history.size(), 500u);
@@ -70,7 +72,7 @@ TEST(UdpTracker, PosesArriveOnceAndInOrder)
 
 TEST(UdpTracker, BadPacketsAreCountedAndDropped)
 {
-  Receiver receiver("?silence=0.4");
+  Receiver receiver("?silence=2");
   UdpSocket socket = UdpSocket::SendingTo("127.0.0.1", receiver.tracker.Port());
   PosePacket packet;
   packet.session = 5;
@@ -85,8 +87,8 @@ TEST(UdpTracker, BadPacketsAreCountedAndDropped)
   auto damaged = encoded(1);
   damaged[50] ^= 4;
   socket.Send(damaged);
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.Rejected(Rejection::Malformed) == 2; }));
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.Rejected(Rejection::TooLarge) == 1; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.Rejected(Rejection::Malformed) == 2; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.Rejected(Rejection::TooLarge) == 1; }));
   EXPECT_EQ(receiver.Taken(), 0u);
 
   socket.Send(encoded(10));
@@ -95,17 +97,17 @@ TEST(UdpTracker, BadPacketsAreCountedAndDropped)
   UdpSender stranger("127.0.0.1", receiver.tracker.Port());
   stranger.Send(1.0, {PoseAt("Probe", 66.0)});
   socket.Send(encoded(11));
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.Taken() == 2; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.Taken() == 2; }));
   EXPECT_EQ(receiver.Rejected(Rejection::Replayed), 2u);
   EXPECT_EQ(receiver.Rejected(Rejection::Foreign), 1u);
   EXPECT_NE(receiver.poses.Statistics().lastRejection.find("another session"), std::string::npos);
 
   // The sender is gone; whoever is next is heard, and the old session is over.
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.poses.Statistics().state == DeviceState::Lost; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.poses.Statistics().state == DeviceState::Lost; }));
   stranger.Send(2.0, {PoseAt("Other", 66.0)});
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.poses.Statistics().state == DeviceState::Running; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.poses.Statistics().state == DeviceState::Running; }));
   socket.Send(encoded(12));
-  EXPECT_TRUE(WaitFor(10.0, [&] { return receiver.Rejected(Rejection::Foreign) == 2; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return receiver.Rejected(Rejection::Foreign) == 2; }));
   EXPECT_EQ(receiver.Taken(), 3u);
 }
 
@@ -115,10 +117,24 @@ TEST(UdpTracker, OnlyTheSenderThatWasNamed)
   UdpSender one("127.0.0.1", friendly.tracker.Port()), two("127.0.0.1", strict.tracker.Port());
   one.Send(1.0, {PoseAt("Probe", 1.0)});
   two.Send(1.0, {PoseAt("Probe", 1.0)});
-  EXPECT_TRUE(WaitFor(10.0, [&] { return friendly.Taken() == 1; }));
-  EXPECT_TRUE(WaitFor(10.0, [&] { return strict.Rejected(Rejection::Foreign) == 1; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return friendly.Taken() == 1; }));
+  EXPECT_TRUE(WaitFor(30.0, [&] { return strict.Rejected(Rejection::Foreign) == 1; }));
   EXPECT_EQ(strict.Taken(), 0u);
   EXPECT_NE(strict.poses.Statistics().lastRejection.find("127.0.0.1"), std::string::npos);
+}
+
+TEST(UdpTracker, ASenderThatIsNotKnownYetHoldsUpNobody)
+{
+  PoseStream poses;
+  poses.SetLive(false); // a recording was there before
+  UdpTracker tracker(TrackerAddress::Parse("udp://127.0.0.1:0?from=no.such.host.invalid"));
+  tracker.Start(poses, nullptr);
+  EXPECT_TRUE(poses.Live());
+  EXPECT_TRUE(WaitFor(60.0, [&] { return poses.Statistics().message.find("no.such.host.invalid") != std::string::npos; }));
+  EXPECT_EQ(poses.Statistics().state, DeviceState::Connecting);
+  const double begin = ClockNow();
+  tracker.Stop();
+  EXPECT_LT(ClockNow() - begin, 30.0);
 }
 
 TEST(UdpTracker, SaysWhatIsTheMatterAndStopsSoon)
@@ -143,7 +159,7 @@ TEST(UdpTracker, SaysWhatIsTheMatterAndStopsSoon)
 
   const double begin = ClockNow();
   first.tracker.Stop();
-  EXPECT_LT(ClockNow() - begin, 5.0);
+  EXPECT_LT(ClockNow() - begin, 30.0);
   first.tracker.Stop();
   EXPECT_EQ(first.poses.Statistics().state, DeviceState::Idle);
   second.Start(poses, nullptr); // the port is free again
