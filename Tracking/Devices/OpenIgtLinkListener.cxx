@@ -41,10 +41,13 @@ void OpenIgtLinkListener::Run(const Worker::Signal& signal, PoseStream& poses, I
     poses.SetState(DeviceState::Running, list);
   };
   while (!signal.Stopped()) {
+    bool starved = false; // somebody is there who cannot be taken: the listener would wake us at once
     while (true) {
       TcpSocket socket = listener_.Accept();
-      if (!socket.IsOpen())
+      if (!socket.IsOpen()) {
+        starved = !socket.EndReason().empty();
         break;
+      }
       if (peers.size() >= peers_) {
         poses.Reject(Rejection::Foreign, socket.Peer() + ": there are " + std::to_string(peers_) + " peers already");
         continue;
@@ -64,7 +67,9 @@ void OpenIgtLinkListener::Run(const Worker::Signal& signal, PoseStream& poses, I
       else
         tell();
     }
-    std::vector<const TcpSocket*> reading{&listener_}, writing;
+    std::vector<const TcpSocket*> reading, writing;
+    if (!starved)
+      reading.push_back(&listener_);
     for (const auto& peer : peers) {
       reading.push_back(&peer->Socket());
       if (!peer->Replies().Empty())

@@ -10,6 +10,7 @@
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/Worker.h"
 #include <algorithm>
+#include <deque>
 #include <list>
 #include <map>
 #include <mutex>
@@ -19,8 +20,9 @@ namespace {
 
 using Bytes = SendQueue::Bytes;
 
-constexpr double LookAround = 0.005;    // s
-constexpr std::size_t MostTools = 4096; // whose newest poses are remembered
+constexpr double LookAround = 0.005;     // s
+constexpr std::size_t MostTools = 4096;  // whose newest poses are remembered
+constexpr std::size_t MostGiven = 65536; // poses
 
 Bytes Shared(OpenIgtLinkEncoder::Bytes bytes)
 {
@@ -60,7 +62,8 @@ struct OpenIgtLinkServer::Parts {
   Worker worker;
 
   mutable std::mutex mutex; // guards what follows
-  std::vector<ToolPose> given;
+  std::deque<ToolPose> given;
+  std::uint64_t givenLost = 0;
   struct NamedImage {
     std::string name;
     Bytes bytes;
@@ -68,7 +71,9 @@ struct OpenIgtLinkServer::Parts {
   std::list<NamedImage> images; // the newest of each name, the oldest first
   std::vector<NamedImage> newImages;
   OpenIgtLinkServerStatistics statistics;
-  bool idle = true; // nothing waits to be sent
+  // Who wants to know when everything has gone draws the next number; whatever was there when a turn began and its last number
+  // was read has gone when nothing is left at the end of one.
+  std::uint64_t asked = 0, flushed = 0;
 
   // The thread's own.
   std::list<Client> clients;
@@ -92,6 +97,11 @@ struct OpenIgtLinkServer::Parts {
 void OpenIgtLinkServer::Parts::Run(const Worker::Signal& signal)
 {
   while (!signal.Stopped()) {
+    std::uint64_t ticket = 0;
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      ticket = asked;
+    }
     std::vector<ToolPose> poses;
     if (subscription)
       poses = subscription->Take(LookAround);
@@ -133,8 +143,9 @@ void OpenIgtLinkServer::Parts::Run(const Worker::Signal& signal)
     statistics.clients = clients.size();
     statistics.sent = sent;
     statistics.dropped = dropped;
-    statistics.lost = subscription ? subscription->Lost() : 0;
-    idle = nothingWaits && given.empty() && newImages.empty();
+    statistics.lost = givenLost + (subscription ? subscription->Lost() : 0);
+    if (nothingWaits)
+      flushed = ticket;
   }
   clients.clear();
   const std::lock_guard<std::mutex> lock(mutex);
@@ -322,9 +333,11 @@ void OpenIgtLinkServer::Send(const ToolPose& pose)
                 "\"" + pose.name + "\" is no name for OpenIGTLink, where names have 1 to 20 bytes");
   const std::lock_guard<std::mutex> lock(parts_->mutex);
   parts_->given.push_back(pose);
-  if (parts_->given.size() > 65536) // nobody serves
-    parts_->given.erase(parts_->given.begin());
-  parts_->idle = false;
+  if (parts_->given.size() > MostGiven) { // nobody serves
+    parts_->given.pop_front();
+    ++parts_->givenLost;
+    ++parts_->statistics.lost;
+  }
 }
 
 void OpenIgtLinkServer::SendImage(const StreamedImage& image)
@@ -341,16 +354,21 @@ void OpenIgtLinkServer::SendImage(const StreamedImage& image)
   };
   put(parts_->images);
   put(parts_->newImages);
-  parts_->idle = false;
 }
 
 bool OpenIgtLinkServer::Flush(double seconds) const
 {
   const double until = ClockNow() + seconds;
+  Parts& parts = *parts_;
+  std::uint64_t mine = 0;
+  {
+    const std::lock_guard<std::mutex> lock(parts.mutex);
+    mine = ++parts.asked;
+  }
   while (true) {
     {
-      const std::lock_guard<std::mutex> lock(parts_->mutex);
-      if (parts_->idle)
+      const std::lock_guard<std::mutex> lock(parts.mutex);
+      if (parts.flushed >= mine)
         return true;
     }
     if (ClockNow() >= until || !Running())

@@ -61,7 +61,8 @@ public:
   /// To every client, and to those that come later. \throws Error as OpenIgtLinkEncoder::Image.
   void SendImage(const StreamedImage& image);
 
-  /// Waits for up to \a seconds until everything has been handed to the system. \returns whether it has
+  /// Waits for up to \a seconds until everything that had come before has been handed to the system. \returns whether it has;
+  /// false when it is not started
   bool Flush(double seconds) const;
   /// Waits for up to \a seconds until there is a client. \returns whether there is
   bool WaitForClient(double seconds) const;
