@@ -28,6 +28,7 @@ using big_endian::Read;
 using big_endian::ReadText;
 
 constexpr std::uint64_t LargestSkip = std::uint64_t{1} << 30;
+constexpr std::size_t ImageOverhead = 65536; // header and meta data of an image
 constexpr std::size_t ExtendedHeaderSize = 12, StatusHeaderSize = 30;
 
 // Why a body is refused.
@@ -434,13 +435,13 @@ Message OpenIgtLinkDecoder::Begin()
     message_.device.clear();
     return Refused(message_, Rejection::Malformed, "what comes is not OpenIGTLink");
   }
-  if (bodySize_ > LargestSkip) {
+  const bool decoded = IsDecoded(message_.type), image = message_.type == "IMAGE";
+  const std::uint64_t most = image ? std::uint64_t{decoding_.imageBytes} + ImageOverhead : decoding_.otherBytes;
+  if (bodySize_ > std::max(LargestSkip, most)) {
     inStep_ = false;
     return Refused(message_, Rejection::TooLarge,
                    Name(message_) + " says that it is " + std::to_string(bodySize_) + " bytes long, which cannot be");
   }
-  const bool decoded = IsDecoded(message_.type);
-  const std::size_t most = message_.type == "IMAGE" ? decoding_.imageBytes : decoding_.otherBytes;
   if (decoded && bodySize_ > most) {
     skip_ = bodySize_;
     message_.kind = Message::Kind::Refused; // said once, now

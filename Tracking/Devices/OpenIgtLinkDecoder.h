@@ -14,7 +14,7 @@ namespace echorama {
 
 /// What a decoder takes.
 struct OpenIgtLinkDecoding {
-  std::size_t imageBytes = std::size_t{64} << 20; ///< largest IMAGE, in [1 KiB, 2 GiB)
+  std::size_t imageBytes = std::size_t{64} << 20; ///< voxels of the largest IMAGE, in [1 KiB, 2 GiB)
   std::size_t otherBytes = std::size_t{1} << 20;  ///< largest of all others that are decoded, in [1 KiB, 64 MiB]
   bool checkSums = true;                          ///< off: for peers that do not compute them
   /// Whether images that say that their axes are R, A, S become L, P, S. Off: their numbers stay as they are, so that images
@@ -57,10 +57,11 @@ struct OpenIgtLinkMessage {
 /// OpenIGTLink's bytes to messages, in whatever pieces they come. No I/O, no clock.
 ///
 /// Header versions 1, 2 and 3. The length in a header is believed up to the limits only: longer messages up to 1 GiB are
-/// skipped as they come, without being held, and count as TooLarge; beyond that, the stream cannot be what it says. A wrong check
-/// sum, or a body that contradicts itself, costs that message (Malformed). After a header that is none, the decoder is out of
-/// step for good and takes nothing more: TCP neither loses nor reorders, so such a peer never spoke OpenIGTLink or has stopped
-/// in the middle of a message, and where the next one begins could only be guessed. The connection should be closed.
+/// skipped as they come, without being held, and count as TooLarge; beyond that and the limits, the stream cannot be what it
+/// says. A wrong check sum, or a body that contradicts itself, costs that message (Malformed). After a header that is none, the
+/// decoder is out of step for good and takes nothing more: TCP neither loses nor reorders, so such a peer never spoke OpenIGTLink
+/// or has stopped in the middle of a message, and where the next one begins could only be guessed. The connection should be
+/// closed.
 class OpenIgtLinkDecoder {
 public:
   explicit OpenIgtLinkDecoder(const OpenIgtLinkDecoding& decoding = {});

@@ -571,7 +571,7 @@ TEST(OpenIgtLinkDecoder, SkipsWhatIsTooLargeAndGoesOn)
   OpenIgtLinkDecoding small;
   small.imageBytes = 1024;
   ImageGeometry geometry = SomeGeometry();
-  geometry.dimensions = {32, 32, 4};
+  geometry.dimensions = {64, 64, 32};
   Bytes bytes = LibraryImage(geometry, 1);
   const Bytes transform = LibraryTransform();
   bytes.insert(bytes.end(), transform.begin(), transform.end());
@@ -585,6 +585,30 @@ TEST(OpenIgtLinkDecoder, SkipsWhatIsTooLargeAndGoesOn)
     EXPECT_EQ(messages[0].reason, Rejection::TooLarge);
     EXPECT_EQ(messages[1].kind, Kind::Poses);
     EXPECT_TRUE(decoder.InStep());
+  }
+}
+
+TEST(OpenIgtLinkDecoder, TakesImagesUpToTheLimit)
+{
+  ImageGeometry geometry = SomeGeometry();
+  geometry.dimensions = {4, 4, 4};
+  for (const std::uint64_t mebibytes : {1, 64, 1024, 1025, 2047}) {
+    OpenIgtLinkDecoding decoding;
+    decoding.imageBytes = static_cast<std::size_t>(mebibytes) << 20;
+    Bytes header = LibraryImage(geometry, 1);
+    header.resize(58);
+    for (const std::uint64_t size : {(mebibytes << 20) + 72, (mebibytes << 20) + 65537}) { // voxels and their header; too many
+      SetSize(header, size);
+      OpenIgtLinkDecoder decoder(decoding);
+      const auto messages = decoder.Feed(header.data(), header.size());
+      if (size % 2 == 0) {
+        EXPECT_TRUE(messages.empty()) << mebibytes;
+      } else {
+        ASSERT_EQ(messages.size(), 1u) << mebibytes;
+        EXPECT_EQ(messages[0].reason, Rejection::TooLarge);
+      }
+      EXPECT_EQ(decoder.InStep(), size % 2 == 0 || mebibytes < 1024) << mebibytes;
+    }
   }
 }
 
