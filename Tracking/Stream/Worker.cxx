@@ -63,9 +63,9 @@ bool Worker::Signal::Sleep(double seconds) const
 void Worker::Start(std::function<void(const Signal&)> job)
 {
   Stop();
-  thread_ = std::make_shared<Thread>();
-  thread_->signal.state_ = std::make_shared<Signal::State>();
-  thread_->thread = std::thread([job = std::move(job), signal = thread_->signal] {
+  const auto thread = std::make_shared<Thread>();
+  thread->signal.state_ = std::make_shared<Signal::State>();
+  thread->thread = std::thread([job = std::move(job), signal = thread->signal] {
     AskForShortTurns();
     std::string failure;
     try {
@@ -79,6 +79,7 @@ void Worker::Start(std::function<void(const Signal&)> job)
     signal.state_->running = false;
     signal.state_->failure = failure;
   });
+  thread_ = thread; // now that there is one
 }
 
 void Worker::Stop()

@@ -30,6 +30,7 @@ public:
 
   /// Starts \a job, which must return soon after its signal says Stopped. Stops an earlier one first. A job that throws has
   /// ended; what it threw is told by Failure(). Neither this nor Stop may be called by the job itself.
+  /// \throws std::system_error when the system has no thread to give; there is no job then.
   void Start(std::function<void(const Signal&)> job);
   /// Tells the job to stop and waits for its end. Does nothing when there is none.
   void Stop();
