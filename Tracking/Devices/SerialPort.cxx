@@ -61,6 +61,19 @@ Clock::time_point After(double seconds)
          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::clamp(seconds, 0.0, 60.0)));
 }
 
+// Waits until the last bytes are out, as TCSADRAIN would, which waits forever for a device that takes none. These are dropped.
+void LetOut(int file)
+{
+  int left = 0;
+  for (const Clock::time_point end = After(0.05); ioctl(file, TIOCOUTQ, &left) == 0 && left > 0;) {
+    if (Clock::now() >= end) {
+      tcflush(file, TCOFLUSH);
+      return;
+    }
+    usleep(1000);
+  }
+}
+
 } // namespace
 
 struct SerialPort::Line {
@@ -71,7 +84,8 @@ struct SerialPort::Line {
   ~Line()
   {
     if (isOurs) {
-      tcsetattr(file, TCSADRAIN, &before); // once the last bytes are out; of no effect when the device is gone
+      LetOut(file);
+      tcsetattr(file, TCSANOW, &before); // of no effect when the device is gone
       ioctl(file, TIOCNXCL);
     }
     if (file >= 0)

@@ -25,7 +25,8 @@ public:
   /// \throws Error(FileSystem) that says what is the matter: not there, no permission, in use, no serial line.
   void Open();
   bool IsOpen() const;
-  /// Gives the line back as it was. Does nothing when it is closed.
+  /// Gives the line back as it was, once the last bytes are out; those that the device does not take within 50 ms are dropped.
+  /// Does nothing when it is closed.
   void Close();
 
   /// What a call came to.
