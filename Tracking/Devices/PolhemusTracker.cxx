@@ -103,6 +103,7 @@ void PolhemusTracker::Start(PoseStream& poses, ImageStream*)
   Stop();
   port_.Open();
   poses_ = &poses;
+  poses_->SetLive(true);
   poses_->SetState(DeviceState::Connecting, options_.path);
   RunDevice(worker_, poses, [this](const Worker::Signal& signal) { Run(signal); });
 }
