@@ -167,7 +167,7 @@ std::vector<Eigen::Vector3d> HandEyeRivalAxes(const std::vector<HandEyePair>& pa
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 5, 5>> kept(moved);
 
   const double sigma = std::sqrt(model.Covariance(solution.volumeToSensor).bottomRightCorner<3, 3>().trace() / 3.0);
-  const double limit = 0.035 + 10.0 * sigma * scale;
+  const double limit = std::min(0.035 + 10.0 * sigma * scale, 0.35);
   std::vector<Eigen::Vector3d> axes;
   for (Eigen::Index k = 0; k < 2; ++k) {
     Eigen::Matrix3d Q = Eigen::Matrix3d::Zero();

@@ -29,10 +29,10 @@ struct HandEyeSpread {
 };
 HandEyeSpread SpreadOf(const std::vector<Pose>& poses);
 
-/// Axes k of the volume that every turn among the scans with use[scan] != 0 keeps or reverses, to within what noise explains
-/// (some ten times the model's, \a scale times larger, and two degrees). Turns commute with the half turn about such an axis, so
-/// that the calibration may be turned by it: about z, when all turns are about z or half turns about axes across it; about x, y
-/// and z, when all are half turns about these. None for turns in general.
+/// Axes of the volume that every turn among the scans with use[scan] != 0 keeps or reverses, root mean square to within ten times
+/// the model's noise, \a scale times larger, and two degrees, but 20 degrees at most. Turns commute with the half turn about such
+/// an axis, so that the calibration may be turned by it: about z, when all turns are about z or half turns about axes across it;
+/// about x, y and z, when all are half turns about these. None for turns in general.
 std::vector<Eigen::Vector3d> HandEyeRivalAxes(const std::vector<HandEyePair>& pairs, const std::vector<char>& use,
                                               const HandEyeModel& model, const HandEyeSolution& solution, double scale);
 
