@@ -223,8 +223,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
               Fixed(RotationAngle(result.solution.volumeToSensor) * 57.29577951308232, 2) + " degrees, from " +
               std::to_string(result.inliers) + " of " + std::to_string(options.volumes.size()) + " scans");
   session.Say("error at the middle of the volume: " + Fixed(result.targetRmsMm, 2) + " mm RMS, within " +
-              Fixed(result.targetRadius95Mm, 2) + " mm with 95%" +
-              (result.noiseEstimated ? " (noise from the residuals)" : ""));
+              Fixed(result.targetRadius95Mm, 2) + " mm with 95%" + (result.noiseEstimated ? " (noise from the residuals)" : ""));
   for (const HandEyeResidual& residual : result.residuals)
     session.Say("  " + residual.name + ": " + Fixed(residual.mm, 2) + " mm, " + Fixed(residual.degrees, 2) + " degrees" +
                 (residual.inlier ? "" : ", not used: " + residual.reason));
