@@ -22,7 +22,7 @@ TEST(ToolTransformName, KeepsWhatIsOneAndMakesOneOfWhatIsNot)
            {"ToBack", "TOBackToTracker"},
            {"toXToTracker", "TOXToTracker"},
            {"A=B\n\x7f", "A_B__ToTracker"},
-           {"\xc3(\xff\xc2\x85", "____ToTracker"}}) // half a letter, no letter, a control character
+           {"\xc3(\xff\xc2\x85", "_____ToTracker"}}) // half a letter, no letter, a control character
     EXPECT_EQ(ToolTransformName(given), expected) << given;
 }
 
