@@ -172,6 +172,9 @@ void Track(Session& session, TrackOptions options)
     session.Say("recorded " + std::to_string(state.poses) + " poses to " + options.record);
     if (state.lost > 0)
       session.Note(options.record + ": " + std::to_string(state.lost) + " poses came faster than they could be written");
+    if (state.leftOut > 0)
+      session.Note(options.record + ": " + std::to_string(state.leftOut) +
+                   " poses were left out; the last: " + state.lastLeftOut);
   }
   if (server) {
     if (!server->Flush(5.0))

@@ -290,29 +290,6 @@ TEST(TemporalCalibration, MotionsThatDoNotTell)
 }
 
 // Enough to correlate, and too few to fit.
-TEST(TemporalCalibration, TooFewMoments)
-{
-  Recording a, b;
-  a.degrees = a.mm = b.degrees = b.mm = 0.0;
-  a.from = 5.0;
-  a.to = 11.5;
-  b.to = 30.0;
-  TemporalParameters parameters;
-  parameters.smoothingSeconds = 2.0;
-  parameters.longestGapSeconds = 5.0;
-  parameters.leastOverlapSeconds = 1.0;
-  parameters.largestOffsetSeconds = 1.5;
-  int few = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed)
-    try {
-      CalibrateTime(Record(Moving(seed), a, 1), Record(Moving(seed), b, 2), parameters);
-    } catch (const Error& error) {
-      EXPECT_EQ(static_cast<int>(error.GetKind()), static_cast<int>(Error::Kind::NotPossible));
-      few += std::string(error.what()).find("overlap in too few moments") != std::string::npos ? 1 : 0;
-    }
-  EXPECT_GT(few, 0);
-}
-
 TEST(TemporalCalibration, BadInput)
 {
   const std::vector<TimedPose> good = Record(Moving(1), Recording(), 1);
