@@ -289,7 +289,30 @@ TEST(TemporalCalibration, MotionsThatDoNotTell)
   Refused(Record(Moving(8), a, 1), Record(Moving(8), b, 2), Error::Kind::NotPossible, "end of what was looked at", parameters);
 }
 
-// Enough to correlate, and too few to fit.
+// Enough to correlate, and too few to fit: the ends of a piecewise cubic are not known.
+TEST(TemporalCalibration, TooFewMoments)
+{
+  Recording a;
+  a.degrees = a.mm = 0.0;
+  a.to = 1.75;
+  TemporalParameters parameters;
+  parameters.smoothingSeconds = 0.5;
+  parameters.leastOverlapSeconds = 0.5;
+  parameters.largestOffsetSeconds = 0.4;
+  int few = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const std::vector<TimedPose> poses = Record(Moving(seed), a, 1);
+    try {
+      CalibrateTime(poses, poses, parameters);
+      ADD_FAILURE() << "nothing was refused";
+    } catch (const Error& error) {
+      EXPECT_EQ(static_cast<int>(error.GetKind()), static_cast<int>(Error::Kind::NotPossible)) << error.what();
+      few += std::string(error.what()).find("overlap in too few moments") != std::string::npos ? 1 : 0;
+    }
+  }
+  EXPECT_GT(few, 0);
+}
+
 TEST(TemporalCalibration, BadInput)
 {
   const std::vector<TimedPose> good = Record(Moving(1), Recording(), 1);
