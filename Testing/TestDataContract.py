@@ -361,6 +361,9 @@ class RigFit(TissueSource):
             getattr(scan, "Set" + name)(value)
         filter.SetInputConnection(scan.GetOutputPort())
         filter.SetBalls("A -27 -22 -19 4; B -30 23 -45 5; C -5 -20 -49 3; D -2 18 -28 6; E 27 21 -20 7; F 12 -14 -58 3.5; G 30 -1 -47 4.5")
+        return filter
+
+
 class HandEye(TissueSource):
     """From poses, which are no volumes."""
 
