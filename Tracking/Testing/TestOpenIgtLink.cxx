@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Over loopback: our client, listener and server, and the library's own sockets as an outside peer.
 #include "Core/Base/Error.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
 #include "Tracking/Devices/OpenIgtLinkListener.h"
@@ -460,6 +461,9 @@ TEST(OpenIgtLink, TheListenerTakesWhatSeveralPeersPush)
 
 TEST(OpenIgtLink, TheListenerDoesNotSpinWhenThereAreNoDescriptors)
 {
+#ifdef ECHORAMA_SANITIZED
+  GTEST_SKIP() << "the sanitizers need descriptors of their own to look at objects";
+#endif
   PoseStream poses;
   OpenIgtLinkListener listener(TrackerAddress::Parse("igtl-listen://:0"));
   listener.Start(poses, nullptr);
