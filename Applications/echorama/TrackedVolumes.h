@@ -3,7 +3,6 @@
 #include "Core/Geometry/ToolPose.h"
 #include "Volumes.h"
 #include <CLI/App.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 

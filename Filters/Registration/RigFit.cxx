@@ -92,7 +92,7 @@ private:
 
 struct Candidate {
   Vector3d top, beam; // shown
-  double value = 0.0, score = 0.0;
+  double score = 0.0;
 };
 
 // Two unit vectors across a direction.
@@ -136,7 +136,6 @@ std::vector<Candidate> FindCandidates(const Scene& scene, const VolumeView<const
         if (!beam)
           continue;
         candidate.beam = *beam;
-        candidate.value = value;
         // Beside it, at the same depth, and before it, there is water.
         double around = 0.0, before = 0.0;
         const auto across = Across(*beam);
@@ -207,7 +206,7 @@ public:
     for (const Candidate& candidate : candidates) {
       const auto top = scene.True(candidate.top, scale);
       if (top)
-        tops_.push_back({*top, candidate.beam, candidate.score, candidate.score});
+        tops_.push_back({*top, candidate.beam});
     }
   }
 
@@ -240,7 +239,6 @@ public:
 private:
   struct Top {
     Vector3d place, beam;
-    double value, score;
   };
 
   const RigBall& Ball(std::ptrdiff_t ball) const { return balls_[static_cast<std::size_t>(ball)]; }
