@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+namespace echorama {
+
+/// What a brush does to the voxels that it touches.
+enum class BrushMode {
+  Paint,   ///< intensities go towards the brush's
+  Carve,   ///< voxels leave the valid region
+  Restore, ///< intensities and valid region become the file's again
+};
+
+/// A spherical brush.
+struct Brush {
+  BrushMode mode = BrushMode::Paint;
+  double radiusMm = 3.0;   ///< (0, 1000]
+  double intensity = 0.0;  ///< grey levels of the volume; clamped to its voxel type
+  double opacity = 1.0;    ///< [0, 1]: how far towards the intensity, at the middle of the brush; Paint only
+  double hardness = 0.5;   ///< [0, 1]: share of the radius that is painted in full; from there it falls off smoothly; Paint only
+  bool insideValid = true; ///< Paint leaves voxels alone that are not real; otherwise it makes them real
+  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  void Check() const;
+};
+
+/// One stroke from press to release: the brush goes along straight lines through the points. A voxel is painted once, however
+/// often the brush passes: what counts is its least distance from the path. So the result does not depend on how finely the
+/// mouse was sampled along a straight line.
+struct Stroke {
+  Brush brush;
+  std::vector<Eigen::Vector3d> pathMm; ///< in the physical space of the volume's file, mm: strokes go where the volume goes
+};
+
+/// All strokes on a volume, the last one first: a list that is never changed but only lengthened, so that copies are cheap and
+/// every earlier state of an editing session remains valid. nullptr: none.
+struct StrokeNode {
+  Stroke stroke;
+  std::shared_ptr<const StrokeNode> before;
+  int count = 1; ///< of strokes up to and with this one
+  StrokeNode(Stroke s, std::shared_ptr<const StrokeNode> b) : stroke(std::move(s)), before(std::move(b)), count(before ? before->count + 1 : 1) {}
+  ~StrokeNode(); ///< not recursive: chains are long
+};
+using StrokeChain = std::shared_ptr<const StrokeNode>;
+
+/// The chain with one more stroke. \throws Error(InvalidParameter) as Brush::Check, and for a path without points or with one
+/// that is not finite.
+StrokeChain Append(const StrokeChain& chain, Stroke stroke);
+/// From the first to the last.
+std::vector<Stroke> StrokesOf(const StrokeChain& chain);
+
+} // namespace echorama

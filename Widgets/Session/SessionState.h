@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ImageGeometry.h"
+#include "Widgets/Painting/Stroke.h"
+#include <array>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// A volume as an alignment session knows it, without its voxels.
+struct SessionVolume {
+  int id = 0;             ///< from 1; never given twice in a session
+  std::string name;       ///< for people; unique in the session
+  std::string file;       ///< where it was read from, absolute; empty: it came from a pipeline
+  ImageGeometry geometry; ///< of the file as it stands
+  Pose volumeToWorld = Pose::Identity(); ///< from the physical space of the file as it stands
+  std::array<double, 3> colour{1.0, 1.0, 1.0}; ///< RGB in [0, 1]
+  double opacity = 1.0;                        ///< [0, 1]
+  bool visible = true;
+  int group = 0;       ///< volumes of one group are selected together; 0: none
+  StrokeChain strokes; ///< painted and carved
+};
+
+/// All that undo brings back. Cheap to copy. The selection is not part of it: choosing is not an edit.
+struct SessionState {
+  std::vector<SessionVolume> volumes; ///< in the user's order; the first is the gauge of pose files
+  const SessionVolume* Find(int id) const;
+  SessionVolume* Find(int id);
+};
+
+bool operator==(const SessionVolume&, const SessionVolume&); ///< exact: to the last bit
+bool operator==(const SessionState&, const SessionState&);
+inline bool operator!=(const SessionState& a, const SessionState& b) { return !(a == b); }
+
+} // namespace echorama
