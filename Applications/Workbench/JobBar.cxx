@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "JobBar.h"
+#include "Job.h"
+#include <QHBoxLayout>
+#include <QLabel>
+#include <QProgressBar>
+#include <QToolButton>
+
+namespace echorama {
+
+JobBar::JobBar(QWidget* parent) : QWidget(parent)
+{
+  setObjectName("jobBar");
+  auto* layout = new QHBoxLayout(this);
+  layout->setContentsMargins(0, 0, 0, 0);
+}
+
+void JobBar::Watch(Job* job)
+{
+  auto* row = new QWidget(this);
+  auto* layout = new QHBoxLayout(row);
+  layout->setContentsMargins(0, 0, 0, 0);
+  auto* label = new QLabel(job->Label(), row);
+  auto* bar = new QProgressBar(row);
+  bar->setObjectName("jobProgress");
+  bar->setRange(0, 1000);
+  bar->setMaximumWidth(160);
+  auto* stop = new QToolButton(row);
+  stop->setObjectName("jobCancel");
+  stop->setText(tr("Cancel"));
+  stop->setToolTip(tr("Stop this. Everything stays as it was."));
+  layout->addWidget(label);
+  layout->addWidget(bar);
+  layout->addWidget(stop);
+  this->layout()->addWidget(row);
+  emit CountChanged(++count_);
+
+  connect(job, &Job::Progressed, bar, [bar](double fraction) { bar->setValue(static_cast<int>(1000.0 * fraction)); });
+  connect(stop, &QToolButton::clicked, job, [job, stop, label] {
+    job->Cancel();
+    stop->setEnabled(false);
+    label->setText(tr("Stopping: %1").arg(job->Label()));
+  });
+  connect(job, &QObject::destroyed, this, [this, row] {
+    row->deleteLater();
+    emit CountChanged(--count_);
+  });
+}
+
+} // namespace echorama

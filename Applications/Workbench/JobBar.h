@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <QWidget>
+
+namespace echorama {
+
+class Job;
+
+/// In the status bar: what runs in the background, how far it is, and a button to stop it. Empty when nothing runs.
+class JobBar : public QWidget {
+  Q_OBJECT
+
+public:
+  explicit JobBar(QWidget* parent = nullptr);
+  /// Shows \a job until it ends. Several are shown beside each other.
+  void Watch(Job* job);
+  /// How many are running.
+  int Count() const { return count_; }
+
+signals:
+  void CountChanged(int count);
+
+private:
+  int count_ = 0;
+};
+
+} // namespace echorama

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <functional>
+#include <string>
+
+namespace echorama {
+
+/// What VTK classes report as errors and warnings. VTK has one place for it in a process, and reports from any thread.
+class Messages {
+public:
+  /// Takes over VTK's output. What no OfThread gathers goes, as one sentence, to \a show, on the thread that reported it.
+  static void Install(std::function<void(const std::string& message, bool isError)> show);
+
+  /// While it lives, gathers what its thread reports.
+  class OfThread {
+  public:
+    OfThread();
+    ~OfThread();
+    OfThread(const OfThread&) = delete;
+    OfThread& operator=(const OfThread&) = delete;
+    /// The first error that gives a reason; empty: none.
+    std::string Error() const;
+    /// Throws it as Error(BadInput), if there is one.
+    void ThrowErrors() const;
+  };
+};
+
+} // namespace echorama
