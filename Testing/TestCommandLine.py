@@ -79,6 +79,8 @@ class Usage(unittest.TestCase):
                           ["align", *some, "-o", work / "no.json", "--method", "banana"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "0"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "4"],
+                          ["align", *some, "-o", work / "no.json", "--hold", "4"],
+                          ["align", *some, "-o", work / "no.json", "--hold", "1", "--method", "search"],
                           ["align", *some, "-o", work / "no.json", "--set", "banana=1"],
                           ["align", *some, "-o", work / "no.json", "--set", "Levels"],
                           ["align", *some, "-o", work / "no.json", "--set", "Levels=many"],
@@ -282,6 +284,15 @@ class MainJob(unittest.TestCase):
         numpy.testing.assert_allclose(again["volumes"][1]["VolumeToWorld"], affine_of(truth()["volumes"][1]), atol=1e-12)
         self.assertEqual(again["fixed"], 2)
         self.assertLess(run_json("score", work / "again.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1.25)
+
+    def test_held_volumes(self):
+        """With one volume held beside the fixed one, only the third moves."""
+        again = run_json("align", *volumes(), "-o", work / "held.json", "--poses", phantom / "truth.json", "--hold", "2", "--start",
+                         "tracked", *FEWER_POINTS)
+        for i in (0, 1):
+            numpy.testing.assert_allclose(again["volumes"][i]["VolumeToWorld"], affine_of(truth()["volumes"][i]), atol=1e-12)
+        self.assertEqual(sorted((pair["fixed"], pair["moving"]) for pair in again["pairs"]), [(1, 3), (2, 3)])
+        self.assertGreater(abs(numpy.array(again["volumes"][2]["VolumeToWorld"]) - affine_of(truth()["volumes"][2])).max(), 0)
 
     def test_stitch(self):
         """Stitched with poses, or from volumes that were moved there: the same."""

@@ -23,6 +23,7 @@ struct AlignOptions {
   std::vector<std::string> files, settings;
   std::string output, poses, apply, start, metric, method;
   int fixed = 1;
+  std::vector<int> held; // from 1
   TrackerOptions tracker;
   std::string calibration;
   bool trackerOnly = false;
@@ -100,6 +101,13 @@ void Align(Session& session, AlignOptions options)
     throw Error(Error::Kind::InvalidParameter, "--fixed: there are only " + std::to_string(options.files.size()) + " volumes");
   vtkNew<vtkUltrasoundAligner> aligner;
   aligner->SetFixedVolume(options.fixed - 1);
+  for (const int number : options.held) {
+    if (number > static_cast<int>(options.files.size()))
+      throw Error(Error::Kind::InvalidParameter, "--hold: there are only " + std::to_string(options.files.size()) + " volumes");
+    aligner->AddHeldVolume(number - 1);
+  }
+  if (!options.held.empty() && options.method != "global")
+    throw Error(Error::Kind::InvalidParameter, "--hold: only the method global holds volumes");
   aligner->SetMethod(options.method.c_str());
   aligner->SetStart(options.start.c_str());
   aligner->SetMetric(options.metric.c_str());
@@ -200,6 +208,11 @@ Command AlignCommand(CLI::App& program)
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output,
                       std::string("Pose file to write (default: ") + DefaultOutput + ", unless it is there)");
+  options
+      ->add_option("--hold", values->held,
+                   "A volume (from 1) that stays where it is beside the fixed one, for global; again for each")
+      ->allow_extra_args(false) // volumes may follow
+      ->check(CLI::Range(1, 1000000));
   options->add_option("--poses", values->poses, "Pose file to start from (default: where the volumes say)");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
       ->check(CLI::Range(1, 1000000))

@@ -21,6 +21,7 @@
 #include <cstdio>
 #include <map>
 #include <optional>
+#include <set>
 
 namespace echorama {
 namespace {
@@ -81,8 +82,12 @@ Information Turned(const Information& information, const Eigen::Matrix3d& rotati
 class Alignment {
 public:
   Alignment(const std::vector<PlacedVolume>& volumes, int fixed, const AlignVolumesParameters& p, const PairAligner& aligner)
-    : volumes_(volumes), fixed_(fixed), p_(p), aligner_(aligner), features_(volumes.size()), troubles_(volumes.size())
+    : volumes_(volumes), fixed_(fixed), p_(p), aligner_(aligner), features_(volumes.size()), troubles_(volumes.size()),
+      held_(volumes.size(), false)
   {
+    held_[Index(fixed)] = true;
+    for (const int v : p.held)
+      held_[Index(v)] = true;
   }
 
   AlignVolumesResult Run(const Progress& progress);
@@ -102,7 +107,9 @@ private:
   {
     return volumes_[Index(pair.first)].name + " and " + volumes_[Index(pair.second)].name;
   }
-  Numbers Ordered(int a, int b) const { return b == fixed_ || (a != fixed_ && b < a) ? Numbers(b, a) : Numbers(a, b); }
+  bool IsHeld(int v) const { return held_[Index(v)]; } // the fixed one too
+  bool IsPair(int a, int b) const { return CanBeAligned(a) && CanBeAligned(b) && !(IsHeld(a) && IsHeld(b)); }
+  Numbers Ordered(int a, int b) const { return IsHeld(b) || (!IsHeld(a) && b < a) ? Numbers(b, a) : Numbers(a, b); }
 
   void BuildFeatures(const Progress& progress);
   double Overlap(int a, int b, const std::vector<Pose>& poses, const Eigen::Vector3d& shift) const;
@@ -110,6 +117,7 @@ private:
   void Try(const Numbers& pair, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
   void TryAll(const std::vector<Numbers>& pairs, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
   void Solve(const Progress& progress);
+  PoseEdge AsSeenFromFixed(PoseEdge edge) const;
   void FindTheLost(const Progress& progress);
   std::vector<Numbers> PairsToTryAgain() const;
   AlignVolumesResult Report() const;
@@ -122,6 +130,7 @@ private:
   const PairAligner& aligner_;
   std::vector<Features> features_;
   std::vector<std::string> troubles_; // why a volume cannot be aligned
+  std::vector<bool> held_;
   std::vector<Size> sizes_;
   std::map<Numbers, Attempt> attempts_;
   std::vector<Numbers> edges_; // of the graph, as last solved
@@ -171,7 +180,7 @@ std::vector<Numbers> Alignment::PairsAt(const std::vector<Pose>& poses, double r
   std::vector<std::vector<Ranked>> near(volumes_.size()), far(volumes_.size());
   for (int a = 0; a < Count(); ++a)
     for (int b = a + 1; b < Count(); ++b) {
-      if (!CanBeAligned(a) || !CanBeAligned(b))
+      if (!IsPair(a, b))
         continue;
       const Eigen::Vector3d way = poses[Index(a)] * sizes_[Index(a)].centre - poses[Index(b)] * sizes_[Index(b)].centre;
       const double distance = way.norm();
@@ -263,7 +272,7 @@ void Alignment::Solve(const Progress& progress)
   for (const auto& [numbers, attempt] : attempts_)
     if (attempt.pair.alignment.verdict != Verdict::Failed) {
       edges_.push_back(numbers);
-      edges.push_back(attempt.edge);
+      edges.push_back(AsSeenFromFixed(attempt.edge));
       voxels.push_back(attempt.pair.alignment.voxelMm);
     }
   PoseGraphParameters graph;
@@ -289,7 +298,25 @@ void Alignment::Solve(const Progress& progress)
       attempt.residualMm = graph_.residualMm[e];
     }
   }
+  for (int v = 0; v < Count(); ++v)
+    if (IsHeld(v)) {
+      graph_.isPlaced[Index(v)] = graph_.isDetermined[Index(v)] = true;
+      graph_.information[Index(v)] = Information::Zero();
+    }
   graphSeconds_ += SecondsSince(clock);
+}
+
+// The volumes that are held are one body with the fixed one: what was measured against them was measured against it.
+PoseEdge Alignment::AsSeenFromFixed(PoseEdge edge) const
+{
+  if (edge.from != fixed_ && IsHeld(edge.from)) {
+    const Pose way = volumes_[Index(fixed_)].volumeToWorld.inverse(Eigen::Isometry) * volumes_[Index(edge.from)].volumeToWorld;
+    edge.from = fixed_;
+    edge.toInFrom = way * edge.toInFrom;
+    edge.centre = way * edge.centre;
+    edge.information = Turned(edge.information, way.linear());
+  }
+  return edge;
 }
 
 // Volumes that are not placed are looked for in any rotation beside those that are.
@@ -389,7 +416,7 @@ AlignVolumesResult Alignment::Report() const
     volume.centre = graph_.centre[Index(v)];
     if (graph_.isPlaced[Index(v)])
       volume.information = graph_.information[Index(v)];
-    if (v == fixed_) {
+    if (IsHeld(v)) {
       volume.verdict = Verdict::Aligned;
     } else if (!graph_.isPlaced[Index(v)]) {
       volume.reason = WhyFailed(v);
@@ -484,7 +511,7 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
   if (p_.pair.start == AlignStart::Unknown) {
     for (int a = 0; a < Count(); ++a)
       for (int b = a + 1; b < Count(); ++b)
-        if (CanBeAligned(a) && CanBeAligned(b))
+        if (IsPair(a, b))
           pairs.push_back(Ordered(a, b));
   } else {
     near = near == AlignStart::Automatic ? AlignStart::HandMade : near;
@@ -533,6 +560,15 @@ AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fi
   if (fixed < 0 || Index(fixed) >= count)
     throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(count) +
                                                    ", numbered from 0; it is " + std::to_string(fixed));
+  std::set<int> staying{fixed};
+  for (const int v : p.held) {
+    if (v < 0 || Index(v) >= count)
+      throw Error(Error::Kind::InvalidParameter, "those held must be among the " + std::to_string(count) +
+                                                     " volumes, numbered from 0; there is no " + std::to_string(v));
+    staying.insert(v);
+  }
+  if (staying.size() == count)
+    throw Error(Error::Kind::InvalidParameter, "every volume is fixed or held: none is left to be aligned");
   for (const PlacedVolume& volume : volumes)
     if (!volume.pyramid || volume.pyramid->empty())
       throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");

@@ -13,7 +13,9 @@ using PairAligner = std::function<PairAlignment(
 /// Which pairs are aligned, and when a pair is voted down.
 struct AlignVolumesParameters {
   AlignPairParameters pair; ///< of every pair
-  int pairsPerVolume = 6;   ///< a volume is paired with so many others, those it overlaps most, [1, 1000]
+  /// Volumes that stay where they are beside the fixed one: the others are aligned with all of them.
+  std::vector<int> held;
+  int pairsPerVolume = 6; ///< a volume is paired with so many others, those it overlaps most, [1, 1000]
   int rounds = 2; ///< 1: every pair is aligned once; more: pairs are aligned again from where the others place them, [1, 5]
   double floorVoxels = 0.3;   ///< no pair is believed to be better than this standard deviation, voxels, [0, 10]
   double outlierVoxels = 2.0; ///< pairs that disagree by less are never voted down, voxels, [0, 100]
@@ -27,10 +29,10 @@ struct AlignVolumesParameters {
 /// Where a volume belongs, and how sure that is.
 struct VolumeAlignment {
   Pose volumeToWorld = Pose::Identity(); ///< where it started if it Failed
-  Verdict verdict = Verdict::Failed;     ///< the fixed volume is Aligned
+  Verdict verdict = Verdict::Failed;     ///< the fixed volume and those held are Aligned
   std::string reason;                    ///< why it is not Aligned, for people; else empty
   /// Inverse covariance, relative to the fixed volume, of (translation mm, rotation vector radians) in
-  /// MotionAbout(centre, rotation, translation) * volumeToWorld; zero for the fixed volume and for those that Failed.
+  /// MotionAbout(centre, rotation, translation) * volumeToWorld; zero for the fixed volume, those held and those that Failed.
   Information information = Information::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world
   double overlap = 0.0;                             ///< of the pair that stands and overlaps most, share of the smaller volume
@@ -65,8 +67,8 @@ struct AlignVolumesResult {
 /// the volumes, pairs that failed, were voted down or were not thought of are tried again. With an automatic start, the search
 /// over all rotations is kept for volumes that no pair places otherwise.
 /// Two volumes are AlignPair and nothing else. Volumes that cannot be aligned (constant, nearly empty) fail for themselves.
-/// \throws Error(InvalidParameter) when \a fixed is not a volume, Error(BadInput) for fewer than two volumes or when the
-/// fixed one or all others cannot be aligned, Error(Cancelled).
+/// \throws Error(InvalidParameter) when \a fixed or one of those held is not a volume, or none is left to be moved,
+/// Error(BadInput) for fewer than two volumes or when the fixed one or all others cannot be aligned, Error(Cancelled).
 AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fixed,
                                 const AlignVolumesParameters& parameters = {}, const Progress& progress = {},
                                 const PairAligner& aligner = AlignPair);

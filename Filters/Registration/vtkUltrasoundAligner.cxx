@@ -122,6 +122,28 @@ bool vtkUltrasoundAligner::Choose(std::string& choice, const char* name, const c
 }
 
 //----------------------------------------------------------------------------
+void vtkUltrasoundAligner::AddHeldVolume(int volume)
+{
+  this->HeldVolumes.push_back(volume);
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::ClearHeldVolumes()
+{
+  if (!this->HeldVolumes.empty()) {
+    this->HeldVolumes.clear();
+    this->Modified();
+  }
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAligner::GetNumberOfHeldVolumes() const
+{
+  return static_cast<int>(this->HeldVolumes.size());
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundAligner::SetMethod(const char* name)
 {
   this->Choose(this->Method, name, "alignment method", {"global", "search"});
@@ -234,6 +256,7 @@ echorama::AlignSearchParameters vtkUltrasoundAligner::SearchParameters() const
 echorama::AlignVolumesParameters vtkUltrasoundAligner::GlobalParameters() const
 {
   echorama::AlignVolumesParameters p;
+  p.held = this->HeldVolumes;
   p.pair.start = echorama::AlignStartOf(this->Start);
   p.pair.metric = this->Metric;
   p.pair.minimumOverlap = this->MinimumOverlap > 0.0 ? this->MinimumOverlap : p.pair.minimumOverlap;
@@ -488,6 +511,7 @@ void vtkUltrasoundAligner::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FixedVolume: " << this->FixedVolume << "\n";
+  os << indent << "HeldVolumes: " << this->HeldVolumes.size() << "\n";
   os << indent << "Method: " << this->GetMethod() << "\n";
   os << indent << "Start: " << this->Start << "\n";
   os << indent << "Metric: " << this->Metric << "\n";

@@ -62,6 +62,16 @@ public:
   ///@}
 
   ///@{
+  /**
+   * Volumes, counted from 0, that stay where they are beside the fixed one, method `global`: the others are aligned with all of
+   * them, and their own pairs are not looked at. Default none.
+   */
+  void AddHeldVolume(int volume);
+  void ClearHeldVolumes();
+  int GetNumberOfHeldVolumes() const;
+  ///@}
+
+  ///@{
   /** How volumes are aligned: "global" (default) or "search". Another name is an error and changes nothing. */
   void SetMethod(const char* name);
   const char* GetMethod() const;
@@ -284,6 +294,7 @@ private:
   const Result* ResultOf(int volume) const;
 
   int FixedVolume = 0;
+  std::vector<int> HeldVolumes;
   std::string Method = "global";
   std::string Start;
   std::string Metric;

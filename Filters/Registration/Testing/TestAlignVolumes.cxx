@@ -282,6 +282,51 @@ TEST(AlignVolumes, ATriangleKnowsOnlyThatSomethingIsWrong)
   }
 }
 
+TEST(AlignVolumes, ThoseHeldStayAndTheOthersComeToThem)
+{
+  Ring ring;
+  AlignVolumesParameters parameters;
+  for (const int v : {1, 2, 3, 5, 6, 7, 9}) {
+    ring.starts[Index(v)] = ring.truth[Index(v)];
+    parameters.held.push_back(v);
+  }
+  ring.Lie(3, 4, 1); // four volumes hold the volume 4: one of them may be wrong
+  ring.isStubborn = true;
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, parameters, {}, ring.Aligner());
+  for (const int v : parameters.held) {
+    EXPECT_EQ(result.volumes[Index(v)].volumeToWorld.matrix(), ring.starts[Index(v)].matrix()) << v;
+    EXPECT_EQ(result.volumes[Index(v)].verdict, Verdict::Aligned);
+    EXPECT_TRUE(result.volumes[Index(v)].information.isZero());
+  }
+  for (const int v : {4, 8}) {
+    EXPECT_EQ(result.volumes[Index(v)].verdict, Verdict::Aligned) << result.volumes[Index(v)].reason;
+    EXPECT_LT((result.volumes[Index(v)].volumeToWorld * -Ring::Corner() - ring.truth[Index(v)] * -Ring::Corner()).norm(), 0.2)
+        << v;
+  }
+  for (const auto& [pair, start] : ring.calls)
+    EXPECT_TRUE(pair.second == 4 || pair.second == 8) << pair.first << " and " << pair.second;
+  std::ptrdiff_t standing = 0;
+  for (const PairOfVolumes& pair : result.pairs)
+    if (pair.alignment.overlap > 0.0) {
+      standing += pair.stands;
+      EXPECT_EQ(pair.stands, !(pair.fixed == 3 && pair.moving == 4)) << pair.fixed << " and " << pair.moving;
+    }
+  EXPECT_EQ(standing, 7);
+}
+
+TEST(AlignVolumes, AVolumeHeldFarAwayIsNoReasonToMoveOthers)
+{
+  Ring ring;
+  AlignVolumesParameters parameters;
+  parameters.held = {5}; // on the other side: no pair joins it to the fixed one but through others
+  ring.starts[5] = Eigen::Translation3d(500.0, 0.0, 0.0) * ring.truth[5];
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, parameters, {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[5].volumeToWorld.matrix(), ring.starts[5].matrix());
+  for (const int v : {1, 2, 3, 4, 6, 7, 8, 9})
+    EXPECT_LT((result.volumes[Index(v)].volumeToWorld * -Ring::Corner() - ring.truth[Index(v)] * -Ring::Corner()).norm(), 0.3)
+        << v;
+}
+
 TEST(AlignVolumes, TwoVolumesAreAPair)
 {
   Ring ring(2);
@@ -355,6 +400,11 @@ TEST(AlignVolumes, RefusesWhatIsWrong)
   EXPECT_THROW(AlignVolumes({volumes[0]}, 0), Error);
   EXPECT_THROW(AlignVolumes({}, 0), Error);
   EXPECT_THROW(AlignVolumes({volumes[0], {}, volumes[1]}, 0), Error);
+  AlignVolumesParameters held;
+  held.held = {3};
+  EXPECT_THROW(AlignVolumes(volumes, 0, held), Error);
+  held.held = {1, 2};
+  EXPECT_THROW(AlignVolumes(volumes, 0, held), Error);
   const auto wrong = [](void (*change)(AlignVolumesParameters&)) {
     AlignVolumesParameters p;
     change(p);
