@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "TrackerPanel.h"
+#include <QComboBox>
+#include <QFormLayout>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPushButton>
+#include <QSettings>
+#include <QTimer>
+#include <vtkMatrix4x4.h>
+
+namespace echorama {
+
+TrackerPanel::TrackerPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
+{
+  setObjectName("trackerPanel");
+  address_ = new QLineEdit(QSettings().value("tracker/address", "igtl://localhost:18944").toString(), this);
+  address_->setObjectName("trackerAddress");
+  address_->setToolTip(
+      tr("The tracker in one line: igtl://HOST:PORT, polhemus:/dev/ttyUSB0, udp://:PORT, replay:FILE or simulated:"));
+  tool_ = new QComboBox(this);
+  tool_->setObjectName("trackerTool");
+  tool_->setToolTip(tr("The tool that moves volumes"));
+  connect_ = new QPushButton(this);
+  connect_->setObjectName("trackerConnect");
+  grasp_ = new QPushButton(tr("&Grasp (hold)"), this);
+  grasp_->setObjectName("trackerGrasp");
+  grasp_->setToolTip(tr("While it is held down, the selected volumes follow the tool"));
+  state_ = new QLabel(this);
+  state_->setObjectName("trackerState");
+  state_->setWordWrap(true);
+  auto* form = new QFormLayout(this);
+  form->addRow(tr("Tracker"), address_);
+  form->addRow(connect_);
+  form->addRow(tr("Tool"), tool_);
+  form->addRow(grasp_);
+  form->addRow(tr("State"), state_);
+
+  timer_ = new QTimer(this);
+  timer_->setInterval(16);
+  connect(timer_, &QTimer::timeout, this, &TrackerPanel::Step);
+  connect(connect_, &QPushButton::clicked, this, &TrackerPanel::ConnectOrNot);
+  connect(grasp_, &QPushButton::pressed, this, [this] { SetGrasping(true); });
+  connect(grasp_, &QPushButton::released, this, [this] { SetGrasping(false); });
+  Step();
+}
+
+TrackerPanel::~TrackerPanel()
+{
+  tracker_->Stop();
+}
+
+void TrackerPanel::ConnectOrNot()
+{
+  SetGrasping(false);
+  if (tracker_->GetActive()) {
+    tracker_->Stop();
+    timer_->stop();
+    tool_->clear();
+  } else {
+    tracker_->SetDevice(address_->text().trimmed().toUtf8());
+    if (tracker_->Start()) { // else it has said why
+      QSettings().setValue("tracker/address", address_->text());
+      timer_->start();
+    }
+  }
+  Step();
+}
+
+void TrackerPanel::SetGrasping(bool grasping)
+{
+  isGrasping_ = grasping && tracker_->GetActive();
+  if (!isGrasping_) {
+    const vtkNew<vtkMatrix4x4> nowhere;
+    workspace_.moveByTool(nowhere, false);
+  }
+}
+
+void TrackerPanel::Step()
+{
+  const bool active = tracker_->GetActive();
+  connect_->setText(active ? tr("Disconnect") : tr("&Connect"));
+  address_->setEnabled(!active);
+  grasp_->setEnabled(active && tool_->count() > 0);
+  if (!active) {
+    state_->setText(tr("not connected"));
+    return;
+  }
+  tracker_->Update();
+  if (tool_->count() != tracker_->GetNumberOfTools()) {
+    const QString chosen = tool_->currentText();
+    tool_->clear();
+    for (int i = 0; i < tracker_->GetNumberOfTools(); ++i)
+      tool_->addItem(QString::fromStdString(tracker_->GetToolName(i)));
+    tool_->setCurrentIndex(std::max(0, tool_->findText(chosen)));
+  }
+  const std::string tool = tool_->currentText().toStdString();
+  QString state = QString::fromStdString(tracker_->GetState());
+  const QString message = QString::fromStdString(tracker_->GetMessage());
+  if (!message.isEmpty())
+    state += ": " + message;
+  if (!tool.empty()) {
+    const vtkNew<vtkMatrix4x4> toolToTracker;
+    // 0 is valid: a tool that is out of sight must not fling volumes about.
+    isSeen_ = tracker_->GetTransform(tool.c_str(), toolToTracker) == 0;
+    if (isGrasping_ && isSeen_)
+      workspace_.moveByTool(toolToTracker, true);
+    state += isSeen_ ? tr("; %1 poses a second").arg(tracker_->GetRate(tool.c_str()), 0, 'f', 0) : tr("; the tool is not seen");
+  }
+  if (state_->text() != state)
+    state_->setText(state);
+}
+
+} // namespace echorama

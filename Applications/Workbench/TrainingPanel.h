@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Workspace.h"
+#include <QElapsedTimer>
+#include <QWidget>
+#include <vtkSmartPointer.h>
+
+class QCheckBox;
+class QDoubleSpinBox;
+class QLabel;
+class QLineEdit;
+class QPushButton;
+class QSpinBox;
+class QTableWidget;
+class QTimer;
+class vtkCallbackCommand;
+
+namespace echorama {
+
+/// Evaluation and training (dissertation 4.4). With a truth loaded the score is shown while volumes move, with the errors as
+/// arrows in the 3D view. In training both are hidden from the start of an attempt until it is submitted; then score, errors and
+/// time taken are shown and added to a history, a CSV file that goes on across attempts and trainees.
+class TrainingPanel : public QWidget {
+  Q_OBJECT
+
+public:
+  explicit TrainingPanel(Workspace& workspace, QWidget* parent = nullptr);
+  ~TrainingPanel() override;
+
+  /// The pose file of the truth; a failure goes to the message bar.
+  bool LoadTruth(const QString& path);
+  /// Where attempts are kept; shows those that are there.
+  bool SetHistory(const QString& path);
+  bool IsTraining() const { return isTraining_; }
+
+signals:
+  void ScoreShown(const QString& text); ///< for the status bar; empty while it is hidden or there is none
+
+private:
+  void ChooseTruth();
+  void ChooseHistory();
+  void Scatter();
+  void StartOrGiveUp();
+  void Submit();
+  void ShowScore();
+  void ShowState();
+  void ShowHistory();
+
+  Workspace& workspace_;
+  vtkSmartPointer<vtkCallbackCommand> observer_;
+  QLabel *truth_, *score_, *time_;
+  QCheckBox *live_, *vectors_;
+  QLineEdit *trainee_, *history_;
+  QDoubleSpinBox *scatterMm_, *scatterDegrees_;
+  QSpinBox* seed_;
+  QPushButton *start_, *submit_;
+  QTableWidget* table_;
+  QTimer* clock_;
+  QElapsedTimer taken_;
+  QString historyPath_;
+  double startScore_ = 0.0;
+  int startEdits_ = 0;
+  bool isTraining_ = false;
+};
+
+} // namespace echorama
