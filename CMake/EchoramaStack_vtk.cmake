@@ -3,7 +3,7 @@ set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks 
   CommonCore CommonDataModel CommonExecutionModel CommonTransforms CommonMath CommonSystem CommonColor CommonMisc
   FiltersCore FiltersGeneral FiltersSources IOCore IOGeometry IOImage IOPLY IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
-  RenderingVolumeOpenGL2 RenderingImage)
+  RenderingVolume RenderingVolumeOpenGL2 RenderingImage)
 find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} ImagingFourier ImagingHybrid # the last two: peers in benchmarks
   Python WrappingPythonCore WrappingTools)
 include(EchoramaDependencies)

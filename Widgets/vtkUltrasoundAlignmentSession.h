@@ -30,6 +30,7 @@
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
 #include "Widgets/Session/AlignmentSession.h"
+#include <functional>
 #include <memory>
 #endif
 #include <string>
@@ -133,7 +134,8 @@ public:
 
   ///@{
   /** A stroke of the brush: Begin (mode "paint", "carve" or "restore"), then points of the world, then End: one entry of undo. */
-  bool BeginStroke(int id, const char* mode, double radiusMm, double intensity, double opacity, double hardness, bool insideValid);
+  bool BeginStroke(int id, const char* mode, double radiusMm, double intensity, double opacity, double hardness,
+                   bool insideValid);
   bool ExtendStroke(double x, double y, double z);
   bool EndStroke();
   ///@}
@@ -167,8 +169,8 @@ public:
   ///@}
 
   ///@{
-  /** The truth: a pose file that names the volumes. The score (mm, dissertation 4.4.2) follows poses at once: NaN without truth or
-   * with fewer than two volumes that have one. FixedVolume: on which both agree, default the first that has a truth. */
+  /** The truth: a pose file that names the volumes. The score (mm, dissertation 4.4.2) follows poses at once: NaN without truth
+   * or with fewer than two volumes that have one. FixedVolume: on which both agree, default the first that has a truth. */
   bool ReadTruth(const char* path);
   bool SetTruth(int id, vtkMatrix4x4* volumeToWorld);
   void ClearTruth();
@@ -197,6 +199,8 @@ public:
 
 private:
   struct Internals;
+  /** Does it, reports an error that it throws, and tells what has changed. Returns whether it went well. */
+  bool Change(const std::function<void()>& change);
   std::unique_ptr<Internals> Parts;
 #endif
 };

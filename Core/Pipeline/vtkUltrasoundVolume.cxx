@@ -137,7 +137,7 @@ vtkUltrasoundVolume::Input vtkUltrasoundVolume::CheckInput(vtkAlgorithm* filter,
   input.Name = name;
   // The filter's choice counts when somebody made one; the default choice of vtkImageAlgorithm (the active scalars) gives
   // way to the array that is named Intensity.
-  vtkInformation* choice = filter->GetInputArrayInformation(0);
+  vtkInformation* choice = filter ? filter->GetInputArrayInformation(0) : nullptr;
   const bool chosen = choice && choice->Has(vtkDataObject::FIELD_NAME());
   input.Intensity = chosen ? image->GetPointData()->GetArray(choice->Get(vtkDataObject::FIELD_NAME())) : GetIntensity(image);
   if (!input.Intensity) {

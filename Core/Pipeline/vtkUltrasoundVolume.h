@@ -99,7 +99,7 @@ public:
    */
   static vtkDataArray* CheckValidRegion(vtkImageData* volume, const std::string& name);
 
-  /** One volume, checked as above. */
+  /** One volume, checked as above. Without a filter (nullptr) its intensities are those of GetIntensity. */
   static Input CheckInput(vtkAlgorithm* filter, vtkImageData* image, const std::string& name);
 
   /** The view of a data array with the dimensions of its image. T must be its type. */

@@ -14,10 +14,10 @@ struct Project {
 };
 
 /// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "geometry",
-/// "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [...]}], "truth", "comment"}. It is a pose file too: the same
-/// fields with the same meaning, plus what a session knows. Paths are relative to the project's folder when they lie in or
-/// beside it, so that a folder can be moved or opened on another machine; absolute ones are kept as a second place to look ("path").
-/// \throws Error(FileSystem), Error(BadFile) that names file, volume and field.
+/// "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [...]}], "truth", "comment"}. It is a pose file too: the
+/// same fields with the same meaning, plus what a session knows. Paths are relative to the project's folder when they lie in or
+/// beside it, so that a folder can be moved or opened on another machine; absolute ones are kept as a second place to look
+/// ("path"). \throws Error(FileSystem), Error(BadFile) that names file, volume and field.
 Project ReadProject(const std::string& path);
 /// Atomic, and on the disk when it returns. \throws Error(FileSystem); what was there before then stays.
 void WriteProject(const std::string& path, const Project& project);

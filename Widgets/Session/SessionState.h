@@ -10,11 +10,11 @@ namespace echorama {
 
 /// A volume as an alignment session knows it, without its voxels.
 struct SessionVolume {
-  int id = 0;             ///< from 1; never given twice in a session
-  std::string name;       ///< for people; unique in the session
-  std::string file;       ///< where it was read from, absolute; empty: it came from a pipeline
-  ImageGeometry geometry; ///< of the file as it stands
-  Pose volumeToWorld = Pose::Identity(); ///< from the physical space of the file as it stands
+  int id = 0;                                  ///< from 1; never given twice in a session
+  std::string name;                            ///< for people; unique in the session
+  std::string file;                            ///< where it was read from, absolute; empty: it came from a pipeline
+  ImageGeometry geometry;                      ///< of the file as it stands
+  Pose volumeToWorld = Pose::Identity();       ///< from the physical space of the file as it stands
   std::array<double, 3> colour{1.0, 1.0, 1.0}; ///< RGB in [0, 1]
   double opacity = 1.0;                        ///< [0, 1]
   bool visible = true;
@@ -31,6 +31,9 @@ struct SessionState {
 
 bool operator==(const SessionVolume&, const SessionVolume&); ///< exact: to the last bit
 bool operator==(const SessionState&, const SessionState&);
-inline bool operator!=(const SessionState& a, const SessionState& b) { return !(a == b); }
+inline bool operator!=(const SessionState& a, const SessionState& b)
+{
+  return !(a == b);
+}
 
 } // namespace echorama

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Strokes hang together from the last to the first, so that a state of an editing session is one pointer and every earlier
+// state shares what it has in common with it.
+#include "Widgets/Painting/Stroke.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace echorama {
+namespace {
+
+void CheckRange(const char* name, double value, double from, double to, bool openBelow = false)
+{
+  if (!(value <= to && (openBelow ? value > from : value >= from)))
+    throw Error(Error::Kind::InvalidParameter, std::string("the brush's ") + name + " is " + NumberText(value) +
+                                                   "; it must be in " + (openBelow ? "(" : "[") + NumberText(from) + ", " +
+                                                   NumberText(to) + "]");
+}
+
+} // namespace
+
+void Brush::Check() const
+{
+  if (mode != BrushMode::Paint && mode != BrushMode::Carve && mode != BrushMode::Restore)
+    throw Error(Error::Kind::InvalidParameter, "the brush's mode is none of paint, carve and restore");
+  CheckRange("radius (mm)", radiusMm, 0.0, 1000.0, true);
+  if (!std::isfinite(intensity))
+    throw Error(Error::Kind::InvalidParameter, "the brush's intensity is not finite");
+  CheckRange("opacity", opacity, 0.0, 1.0);
+  CheckRange("hardness", hardness, 0.0, 1.0);
+}
+
+StrokeNode::~StrokeNode()
+{
+  // Each node would destroy the one before it, as deep as the chain is long; so those that only this chain holds are let go
+  // in a loop.
+  std::shared_ptr<const StrokeNode> rest = std::move(before);
+  while (rest && rest.use_count() == 1)
+    rest = std::move(const_cast<StrokeNode&>(*rest).before);
+}
+
+StrokeChain Append(const StrokeChain& chain, Stroke stroke)
+{
+  stroke.brush.Check();
+  if (stroke.pathMm.empty())
+    throw Error(Error::Kind::InvalidParameter, "the stroke has no points");
+  for (const Eigen::Vector3d& point : stroke.pathMm)
+    if (!point.allFinite())
+      throw Error(Error::Kind::InvalidParameter, "a point of the stroke is not finite");
+  return std::make_shared<StrokeNode>(std::move(stroke), chain);
+}
+
+std::vector<Stroke> StrokesOf(const StrokeChain& chain)
+{
+  std::vector<Stroke> strokes;
+  strokes.reserve(chain ? static_cast<std::size_t>(chain->count) : 0);
+  for (const StrokeNode* node = chain.get(); node; node = node->before.get())
+    strokes.push_back(node->stroke);
+  std::reverse(strokes.begin(), strokes.end());
+  return strokes;
+}
+
+} // namespace echorama
