@@ -8,7 +8,7 @@
 
 namespace echorama {
 
-void Update(vtkAlgorithm* algorithm, const Progress& progress)
+void Run(vtkAlgorithm* algorithm, const Progress& progress, const std::function<void()>& body)
 {
   bool isStopped = false;
   const auto onProgress = [&] {
@@ -25,11 +25,16 @@ void Update(vtkAlgorithm* algorithm, const Progress& progress)
       [](vtkObject*, unsigned long, void* function, void*) { (*static_cast<decltype(onProgress)*>(function))(); });
   const Messages::OfThread messages;
   const unsigned long tag = algorithm->AddObserver(vtkCommand::ProgressEvent, command);
-  algorithm->Update();
+  body();
   algorithm->RemoveObserver(tag);
   if (isStopped)
     throw Error(Error::Kind::Cancelled, "stopped on request");
   messages.ThrowErrors();
+}
+
+void Update(vtkAlgorithm* algorithm, const Progress& progress)
+{
+  Run(algorithm, progress, [algorithm] { algorithm->Update(); });
 }
 
 } // namespace echorama

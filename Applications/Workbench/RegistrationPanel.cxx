@@ -5,6 +5,7 @@
 #include "Filters/Registration/AlignPair.h"
 #include "Job.h"
 #include "JobBar.h"
+#include "Workbench.h"
 #include <array>
 #include <QCheckBox>
 #include <QComboBox>
@@ -20,6 +21,7 @@
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundAligner.h>
+#include <vtkUltrasoundAlignmentSession.h>
 
 namespace echorama {
 
@@ -57,7 +59,8 @@ struct RegistrationPanel::Result {
   std::vector<Volume> volumes;
 };
 
-RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
+RegistrationPanel::RegistrationPanel(Workbench* bench, JobBar* jobs, QWidget* parent)
+  : QWidget(parent), bench_(bench), jobs_(jobs)
 {
   setObjectName("registrationPanel");
   refine_ = new QPushButton(tr("&Refine selected"), this);
@@ -104,7 +107,7 @@ void RegistrationPanel::ShowState()
 
 void RegistrationPanel::Refine()
 {
-  vtkUltrasoundAlignmentSession* session = workspace_.session;
+  vtkUltrasoundAlignmentSession* session = bench_->Session();
   std::vector<int> ids, held;
   const int selected = session->GetNumberOfSelected(), count = session->GetNumberOfVolumes();
   const bool some = selected > 0 && selected < count;
@@ -124,8 +127,8 @@ void RegistrationPanel::Refine()
 void RegistrationPanel::AlignAll()
 {
   std::vector<int> ids;
-  for (int i = 0; i < workspace_.session->GetNumberOfVolumes(); ++i)
-    ids.push_back(workspace_.session->GetVolumeId(i));
+  for (int i = 0; i < bench_->Session()->GetNumberOfVolumes(); ++i)
+    ids.push_back(bench_->Session()->GetVolumeId(i));
   Run(tr("Align all"), ids, {}, start_->currentText().toStdString().c_str());
 }
 
@@ -134,7 +137,7 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
   if (job_)
     return;
   if (ids.size() < 2) {
-    workspace_.say(tr("%1: two volumes are needed; open another one").arg(label), true);
+    bench_->Warn(tr("%1: two volumes are needed; open another one").arg(label));
     return;
   }
   const auto result = std::make_shared<Result>();
@@ -143,13 +146,13 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
     Result::Volume volume;
     volume.id = id;
     vtkNew<vtkMatrix4x4> pose;
-    workspace_.session->GetVolumeToWorld(id, pose);
+    bench_->Session()->GetVolumeToWorld(id, pose);
     volume.before = volume.after = ElementsOf(pose);
     vtkNew<vtkImageData> image; // of its own: the session's moves on
-    image->ShallowCopy(workspace_.session->GetImage(id));
+    image->ShallowCopy(bench_->Session()->GetImage(id));
     const auto block = static_cast<unsigned int>(result->volumes.size());
     blocks->SetBlock(block, image);
-    blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), workspace_.session->GetName(id).c_str());
+    blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), bench_->Session()->GetName(id).c_str());
     result->volumes.push_back(volume);
   }
   vtkNew<vtkUltrasoundAligner> aligner;
@@ -195,15 +198,15 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
         }
       },
       [this, label, result] { Take(label, *result); },
-      [this, label](const QString& error) { workspace_.say(tr("%1: %2").arg(label, error), true); });
+      [this, label](const QString& error) { bench_->Warn(tr("%1: %2").arg(label, error)); });
   connect(job_, &QObject::destroyed, this, &RegistrationPanel::ShowState);
-  workspace_.jobs->Watch(job_);
+  jobs_->Watch(job_);
   ShowState();
 }
 
 void RegistrationPanel::Take(const QString& label, const Result& result)
 {
-  vtkUltrasoundAlignmentSession* session = workspace_.session;
+  vtkUltrasoundAlignmentSession* session = bench_->Session();
   const bool takesDoubtful = doubtful_->isChecked();
   int moved = 0, left = 0;
   table_->setRowCount(0);
@@ -242,12 +245,13 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
     }
   }
   session->EndEdit();
-  workspace_.say(left == 0 ? tr("%1: done, %2 moved").arg(label).arg(moved)
-                           : tr("%1: %2 of %3 volumes aligned; the others stay where they were, the table tells why")
-                                 .arg(label)
-                                 .arg(moved)
-                                 .arg(moved + left),
-                 left > 0);
+  if (left == 0)
+    bench_->Note(tr("%1: done, %2 moved").arg(label).arg(moved));
+  else
+    bench_->Warn(tr("%1: %2 of %3 volumes aligned; the others stay where they were, the table tells why")
+                     .arg(label)
+                     .arg(moved)
+                     .arg(moved + left));
 }
 
 } // namespace echorama

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Workspace.h"
 #include <QWidget>
 #include <vtkNew.h>
 #include <vtkUltrasoundTrackerSource.h>
@@ -10,6 +9,7 @@ class QLabel;
 class QLineEdit;
 class QPushButton;
 class QTimer;
+class vtkMatrix4x4;
 
 namespace echorama {
 
@@ -19,17 +19,20 @@ class TrackerPanel : public QWidget {
   Q_OBJECT
 
 public:
-  explicit TrackerPanel(Workspace& workspace, QWidget* parent = nullptr);
+  explicit TrackerPanel(QWidget* parent = nullptr);
   ~TrackerPanel() override;
 
 public slots:
   void SetGrasping(bool grasping);
 
+signals:
+  /// Where the tool is, while it grasps; once with false when it lets go (the matrix is then of no meaning).
+  void ToolMoved(vtkMatrix4x4* toolToTracker, bool grasping);
+
 private:
   void ConnectOrNot();
   void Step();
 
-  Workspace& workspace_;
   vtkNew<vtkUltrasoundTrackerSource> tracker_;
   QLineEdit* address_;
   QComboBox* tool_;

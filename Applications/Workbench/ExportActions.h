@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Workspace.h"
+#include <QObject>
+
+namespace echorama {
+
+/// What leaves the session as files of others: volumes with their new geometry, poses, and transforms of ITK (3D Slicer).
+class ExportActions : public QObject {
+  Q_OBJECT
+
+public:
+  explicit ExportActions(Workspace& workspace, QObject* parent = nullptr);
+
+  /// The volumes that are shown, each under its name, into \a folder, in the background. \a extension names the format
+  /// ("mha"). Files that are there are not replaced: then nothing is written.
+  void ExportVolumes(const QString& folder, const QString& extension = "mha");
+  /// One .tfm per volume that is shown.
+  void ExportTransforms(const QString& folder);
+  void ExportPoses(const QString& path);
+
+private:
+  Workspace& workspace_;
+};
+
+} // namespace echorama

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <QPointer>
+#include <QWidget>
+#include <vtkSmartPointer.h>
+
+class QCheckBox;
+class QComboBox;
+class QDoubleSpinBox;
+class QLabel;
+class QPushButton;
+class vtkImageData;
+
+namespace echorama {
+
+class Job;
+class JobBar;
+class Workbench;
+
+/// Makes one volume of those that are shown: stitched, and on request embedded in a background. A preview is made of voxels twice
+/// as large. The result is shown in a session of its own, beside the volumes, and can be saved; the volumes stay as they are.
+class ResultPanel : public QWidget {
+  Q_OBJECT
+
+public:
+  ResultPanel(Workbench* bench, JobBar* jobs, QWidget* parent = nullptr);
+
+  /// A bench of its own, whose session holds the result and nothing else.
+  Workbench* Result() const { return result_; }
+  /// Puts the view of the result into the panel.
+  void SetView(QWidget* view);
+  /// Writes the result in the background; the extension names the format.
+  void Save(const QString& path);
+
+signals:
+  void ResultChanged();
+
+private:
+  void Make(bool preview);
+  void Show(vtkImageData* volume, const QString& text);
+  void ShowState();
+
+  Workbench *bench_, *result_;
+  JobBar* jobs_;
+  vtkSmartPointer<vtkImageData> volume_;
+  QComboBox *method_, *texture_;
+  QDoubleSpinBox *spacing_, *margin_;
+  QCheckBox *gain_, *embed_;
+  QPushButton *preview_, *make_, *save_;
+  QLabel* text_;
+  QPointer<Job> job_;
+};
+
+} // namespace echorama
