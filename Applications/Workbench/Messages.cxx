@@ -68,24 +68,24 @@ void Messages::Install(std::function<void(const std::string&, bool)> show)
   vtkOutputWindow::SetInstance(window);
 }
 
-Messages::OfThread::OfThread()
+Messages::OfThread::OfThread() : begin_(gathered.errors.size())
 {
-  if (gathered.users++ == 0)
-    gathered.errors.clear();
+  ++gathered.users;
 }
 
 Messages::OfThread::~OfThread()
 {
   --gathered.users;
+  gathered.errors.resize(begin_);
 }
 
 std::string Messages::OfThread::Error() const
 {
   // The executive only tells that an algorithm failed, sometimes before the class that it ran tells why.
-  for (const std::string& error : gathered.errors)
-    if (error.find("returned failure for request") == std::string::npos)
-      return error;
-  return gathered.errors.empty() ? std::string() : gathered.errors.front();
+  for (std::size_t i = begin_; i < gathered.errors.size(); i++)
+    if (gathered.errors[i].find("returned failure for request") == std::string::npos)
+      return gathered.errors[i];
+  return begin_ < gathered.errors.size() ? gathered.errors[begin_] : std::string();
 }
 
 void Messages::OfThread::ThrowErrors() const

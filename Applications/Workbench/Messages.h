@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <cstddef>
 #include <functional>
 #include <string>
 
@@ -11,7 +12,8 @@ public:
   /// Takes over VTK's output. What no OfThread gathers goes, as one sentence, to \a show, on the thread that reported it.
   static void Install(std::function<void(const std::string& message, bool isError)> show);
 
-  /// While it lives, gathers what its thread reports.
+  /// While it lives, gathers what its thread reports; inside another, what was reported since it began, which the other then
+  /// does not hear of.
   class OfThread {
   public:
     OfThread();
@@ -22,6 +24,9 @@ public:
     std::string Error() const;
     /// Throws it as Error(BadInput), if there is one.
     void ThrowErrors() const;
+
+  private:
+    std::size_t begin_; ///< of its errors, among those of the thread
   };
 };
 
