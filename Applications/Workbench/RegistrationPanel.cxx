@@ -5,7 +5,6 @@
 #include "Filters/Registration/AlignPair.h"
 #include "Job.h"
 #include "JobBar.h"
-#include "Workbench.h"
 #include <array>
 #include <QCheckBox>
 #include <QComboBox>
@@ -21,7 +20,6 @@
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundAligner.h>
-#include <vtkUltrasoundAlignmentSession.h>
 
 namespace echorama {
 
@@ -59,8 +57,7 @@ struct RegistrationPanel::Result {
   std::vector<Volume> volumes;
 };
 
-RegistrationPanel::RegistrationPanel(Workbench* bench, JobBar* jobs, QWidget* parent)
-  : QWidget(parent), bench_(bench), jobs_(jobs)
+RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
 {
   setObjectName("registrationPanel");
   refine_ = new QPushButton(tr("&Refine selected"), this);
@@ -107,7 +104,7 @@ void RegistrationPanel::ShowState()
 
 void RegistrationPanel::Refine()
 {
-  vtkUltrasoundAlignmentSession* session = bench_->Session();
+  vtkUltrasoundAlignmentSession* session = workspace_.session;
   std::vector<int> ids, held;
   const int selected = session->GetNumberOfSelected(), count = session->GetNumberOfVolumes();
   const bool some = selected > 0 && selected < count;
@@ -127,8 +124,8 @@ void RegistrationPanel::Refine()
 void RegistrationPanel::AlignAll()
 {
   std::vector<int> ids;
-  for (int i = 0; i < bench_->Session()->GetNumberOfVolumes(); ++i)
-    ids.push_back(bench_->Session()->GetVolumeId(i));
+  for (int i = 0; i < workspace_.session->GetNumberOfVolumes(); ++i)
+    ids.push_back(workspace_.session->GetVolumeId(i));
   Run(tr("Align all"), ids, {}, start_->currentText().toStdString().c_str());
 }
 
@@ -137,7 +134,7 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
   if (job_)
     return;
   if (ids.size() < 2) {
-    bench_->Warn(tr("%1: two volumes are needed; open another one").arg(label));
+    workspace_.say(tr("%1: two volumes are needed; open another one").arg(label), true);
     return;
   }
   const auto result = std::make_shared<Result>();
@@ -146,13 +143,13 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
     Result::Volume volume;
     volume.id = id;
     vtkNew<vtkMatrix4x4> pose;
-    bench_->Session()->GetVolumeToWorld(id, pose);
+    workspace_.session->GetVolumeToWorld(id, pose);
     volume.before = volume.after = ElementsOf(pose);
     vtkNew<vtkImageData> image; // of its own: the session's moves on
-    image->ShallowCopy(bench_->Session()->GetImage(id));
+    image->ShallowCopy(workspace_.session->GetImage(id));
     const auto block = static_cast<unsigned int>(result->volumes.size());
     blocks->SetBlock(block, image);
-    blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), bench_->Session()->GetName(id).c_str());
+    blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), workspace_.session->GetName(id).c_str());
     result->volumes.push_back(volume);
   }
   vtkNew<vtkUltrasoundAligner> aligner;
@@ -198,15 +195,15 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
         }
       },
       [this, label, result] { Take(label, *result); },
-      [this, label](const QString& error) { bench_->Warn(tr("%1: %2").arg(label, error)); });
+      [this, label](const QString& error) { workspace_.say(tr("%1: %2").arg(label, error), true); });
   connect(job_, &QObject::destroyed, this, &RegistrationPanel::ShowState);
-  jobs_->Watch(job_);
+  workspace_.jobs->Watch(job_);
   ShowState();
 }
 
 void RegistrationPanel::Take(const QString& label, const Result& result)
 {
-  vtkUltrasoundAlignmentSession* session = bench_->Session();
+  vtkUltrasoundAlignmentSession* session = workspace_.session;
   const bool takesDoubtful = doubtful_->isChecked();
   int moved = 0, left = 0;
   table_->setRowCount(0);
@@ -245,13 +242,12 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
     }
   }
   session->EndEdit();
-  if (left == 0)
-    bench_->Note(tr("%1: done, %2 moved").arg(label).arg(moved));
-  else
-    bench_->Warn(tr("%1: %2 of %3 volumes aligned; the others stay where they were, the table tells why")
-                     .arg(label)
-                     .arg(moved)
-                     .arg(moved + left));
+  workspace_.say(left == 0 ? tr("%1: done, %2 moved").arg(label).arg(moved)
+                           : tr("%1: %2 of %3 volumes aligned; the others stay where they were, the table tells why")
+                                 .arg(label)
+                                 .arg(moved)
+                                 .arg(moved + left),
+                 left > 0);
 }
 
 } // namespace echorama

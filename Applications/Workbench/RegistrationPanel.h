@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Workspace.h"
 #include <QPointer>
 #include <QWidget>
 #include <vector>
@@ -12,8 +13,6 @@ class QTableWidget;
 namespace echorama {
 
 class Job;
-class JobBar;
-class Workbench;
 
 /// Automatic alignment of what is in the session: refining what is selected from where it is, or all volumes from scratch. It
 /// runs in the background, tells what each answer is worth, and its result is one edit. What was moved meanwhile stays where it
@@ -22,7 +21,7 @@ class RegistrationPanel : public QWidget {
   Q_OBJECT
 
 public:
-  RegistrationPanel(Workbench* bench, JobBar* jobs, QWidget* parent = nullptr);
+  explicit RegistrationPanel(Workspace& workspace, QWidget* parent = nullptr);
 
 public slots:
   void Refine();   ///< selected volumes onto the others, which stay; with all or none selected: all onto the first
@@ -34,8 +33,7 @@ private:
   void Take(const QString& label, const Result& result);
   void ShowState();
 
-  Workbench* bench_;
-  JobBar* jobs_;
+  Workspace& workspace_;
   QComboBox *start_, *metric_;
   QCheckBox* doubtful_;
   QPushButton *refine_, *alignAll_;

@@ -3,7 +3,6 @@
 #include "AlgorithmRun.h"
 #include "Job.h"
 #include "JobBar.h"
-#include "Workbench.h"
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
@@ -40,8 +39,7 @@ QComboBox* Choice(const char* (*nameOf)(int), const char* objectName, int chosen
 
 } // namespace
 
-ResultPanel::ResultPanel(Workbench* bench, JobBar* jobs, QWidget* parent)
-  : QWidget(parent), bench_(bench), result_(new Workbench(this)), jobs_(jobs)
+ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
 {
   setObjectName("resultPanel");
   const vtkNew<vtkUltrasoundStitcher> defaults;
@@ -129,10 +127,10 @@ void ResultPanel::Make(bool preview)
   if (job_)
     return;
   vtkNew<vtkMultiBlockDataSet> blocks;
-  bench_->Session()->GetVolumes(blocks, true);
+  workspace_.session->GetVolumes(blocks, true);
   const unsigned int count = blocks->GetNumberOfBlocks();
   if (count == 0) {
-    bench_->Warn(tr("Stitch: no volume is shown"));
+    workspace_.say(tr("Stitch: no volume is shown"), true);
     return;
   }
   vtkNew<vtkMultiBlockDataSet> shown; // the session's own images move on
@@ -178,16 +176,16 @@ void ResultPanel::Make(bool preview)
                         .arg(size[2])
                         .arg(spacing[0], 0, 'g', 3));
       },
-      [this, label](const QString& error) { bench_->Warn(tr("%1: %2").arg(label, error)); });
+      [this, label](const QString& error) { workspace_.say(tr("%1: %2").arg(label, error), true); });
   connect(job_, &QObject::destroyed, this, &ResultPanel::ShowState);
-  jobs_->Watch(job_);
+  workspace_.jobs->Watch(job_);
   ShowState();
 }
 
 void ResultPanel::Show(vtkImageData* volume, const QString& text)
 {
   volume_ = volume;
-  vtkUltrasoundAlignmentSession* session = result_->Session();
+  vtkUltrasoundAlignmentSession* session = result_.session;
   while (session->GetNumberOfVolumes() > 0)
     session->RemoveVolume(session->GetVolumeId(0));
   session->AddVolume(volume, nullptr, "result");
@@ -207,11 +205,11 @@ void ResultPanel::Save(const QString& path)
       this, tr("Save result"), [writer](const Progress& progress) { Run(writer, progress, [&] { writer->Write(); }); },
       [this, path, writer] {
         const QString notes = QString::fromStdString(writer->GetNotes());
-        bench_->Note(notes.isEmpty() ? tr("Saved %1").arg(path) : tr("Saved %1. %2").arg(path, notes));
+        workspace_.say(notes.isEmpty() ? tr("Saved %1").arg(path) : tr("Saved %1. %2").arg(path, notes), false);
       },
-      [this, path](const QString& error) { bench_->Warn(tr("Saving %1: %2").arg(path, error)); });
+      [this, path](const QString& error) { workspace_.say(tr("Saving %1: %2").arg(path, error), true); });
   connect(job_, &QObject::destroyed, this, &ResultPanel::ShowState);
-  jobs_->Watch(job_);
+  workspace_.jobs->Watch(job_);
   ShowState();
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Workspace.h"
 #include <QPointer>
 #include <QWidget>
 #include <vtkSmartPointer.h>
@@ -14,8 +15,6 @@ class vtkImageData;
 namespace echorama {
 
 class Job;
-class JobBar;
-class Workbench;
 
 /// Makes one volume of those that are shown: stitched, and on request embedded in a background. A preview is made of voxels twice
 /// as large. The result is shown in a session of its own, beside the volumes, and can be saved; the volumes stay as they are.
@@ -23,10 +22,10 @@ class ResultPanel : public QWidget {
   Q_OBJECT
 
 public:
-  ResultPanel(Workbench* bench, JobBar* jobs, QWidget* parent = nullptr);
+  explicit ResultPanel(Workspace& workspace, QWidget* parent = nullptr);
 
-  /// A bench of its own, whose session holds the result and nothing else.
-  Workbench* Result() const { return result_; }
+  /// A workspace of its own, whose session holds the result and nothing else.
+  Workspace& Result() { return result_; }
   /// Puts the view of the result into the panel.
   void SetView(QWidget* view);
   /// Writes the result in the background; the extension names the format.
@@ -40,8 +39,8 @@ private:
   void Show(vtkImageData* volume, const QString& text);
   void ShowState();
 
-  Workbench *bench_, *result_;
-  JobBar* jobs_;
+  Workspace& workspace_;
+  Workspace result_;
   vtkSmartPointer<vtkImageData> volume_;
   QComboBox *method_, *texture_;
   QDoubleSpinBox *spacing_, *margin_;

@@ -11,7 +11,7 @@
 
 namespace echorama {
 
-TrackerPanel::TrackerPanel(QWidget* parent) : QWidget(parent)
+TrackerPanel::TrackerPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
 {
   setObjectName("trackerPanel");
   address_ = new QLineEdit(QSettings().value("tracker/address", "igtl://localhost:18944").toString(), this);
@@ -72,7 +72,7 @@ void TrackerPanel::SetGrasping(bool grasping)
   isGrasping_ = grasping && tracker_->GetActive();
   if (!isGrasping_) {
     const vtkNew<vtkMatrix4x4> nowhere;
-    emit ToolMoved(nowhere, false);
+    workspace_.moveByTool(nowhere, false);
   }
 }
 
@@ -104,7 +104,7 @@ void TrackerPanel::Step()
     // 0 is valid: a tool that is out of sight must not fling volumes about.
     isSeen_ = tracker_->GetTransform(tool.c_str(), toolToTracker) == 0;
     if (isGrasping_ && isSeen_)
-      emit ToolMoved(toolToTracker, true);
+      workspace_.moveByTool(toolToTracker, true);
     state += isSeen_ ? tr("; %1 poses a second").arg(tracker_->GetRate(tool.c_str()), 0, 'f', 0) : tr("; the tool is not seen");
   }
   if (state_->text() != state)

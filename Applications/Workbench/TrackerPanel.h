@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Workspace.h"
 #include <QWidget>
 #include <vtkNew.h>
 #include <vtkUltrasoundTrackerSource.h>
@@ -9,7 +10,6 @@ class QLabel;
 class QLineEdit;
 class QPushButton;
 class QTimer;
-class vtkMatrix4x4;
 
 namespace echorama {
 
@@ -19,20 +19,17 @@ class TrackerPanel : public QWidget {
   Q_OBJECT
 
 public:
-  explicit TrackerPanel(QWidget* parent = nullptr);
+  explicit TrackerPanel(Workspace& workspace, QWidget* parent = nullptr);
   ~TrackerPanel() override;
 
 public slots:
   void SetGrasping(bool grasping);
 
-signals:
-  /// Where the tool is, while it grasps; once with false when it lets go (the matrix is then of no meaning).
-  void ToolMoved(vtkMatrix4x4* toolToTracker, bool grasping);
-
 private:
   void ConnectOrNot();
   void Step();
 
+  Workspace& workspace_;
   vtkNew<vtkUltrasoundTrackerSource> tracker_;
   QLineEdit* address_;
   QComboBox* tool_;

@@ -4,7 +4,6 @@
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Widgets/Session/LiveScore.h"
-#include "Workbench.h"
 #include <cmath>
 #include <QCheckBox>
 #include <QDateTime>
@@ -23,10 +22,10 @@
 #include <QTableWidget>
 #include <QTimer>
 #include <QVBoxLayout>
+#include <vtkCallbackCommand.h>
 #include <vtkImageData.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
-#include <vtkUltrasoundAlignmentSession.h>
 
 namespace echorama {
 
@@ -59,7 +58,7 @@ Eigen::Vector3d MiddleOf(vtkImageData* image)
 
 } // namespace
 
-TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
+TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
 {
   setObjectName("trainingPanel");
   auto* layout = new QVBoxLayout(this);
@@ -151,12 +150,27 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   connect(start_, &QPushButton::clicked, this, &TrainingPanel::StartOrGiveUp);
   connect(submit_, &QPushButton::clicked, this, &TrainingPanel::Submit);
 
-  connect(bench_, &Workbench::PosesChanged, this, &TrainingPanel::ShowScore);
-  connect(bench_, &Workbench::VolumesChanged, this, &TrainingPanel::ShowState); // a project brings its own truth
+  observer_ = vtkSmartPointer<vtkCallbackCommand>::New();
+  observer_->SetClientData(this);
+  observer_->SetCallback([](vtkObject*, unsigned long event, void* self, void*) {
+    auto* panel = static_cast<TrainingPanel*>(self);
+    if (event == vtkUltrasoundAlignmentSession::PosesChangedEvent)
+      panel->ShowScore();
+    else
+      panel->ShowState(); // a project brings its own truth
+  });
+  for (const unsigned long event :
+       {vtkUltrasoundAlignmentSession::PosesChangedEvent, vtkUltrasoundAlignmentSession::VolumesChangedEvent})
+    workspace_.session->AddObserver(event, observer_);
 
   historyPath_ = DefaultHistory();
   ShowHistory();
   ShowState();
+}
+
+TrainingPanel::~TrainingPanel()
+{
+  workspace_.session->RemoveObserver(observer_);
 }
 
 void TrainingPanel::ChooseTruth()
@@ -169,7 +183,7 @@ void TrainingPanel::ChooseTruth()
 bool TrainingPanel::LoadTruth(const QString& path)
 {
   // The session reports what is wrong, and that goes to the message bar.
-  if (!bench_->Session()->ReadTruth(path.toUtf8()))
+  if (!workspace_.session->ReadTruth(path.toUtf8()))
     return false;
   truth_->setText(QFileInfo(path).fileName());
   truth_->setToolTip(path);
@@ -194,7 +208,7 @@ bool TrainingPanel::SetHistory(const QString& path)
       ReadAttempts(path.toStdString());
   } catch (const Error& error) {
     historyPath_ = before;
-    bench_->Warn(QString::fromUtf8(error.what()));
+    workspace_.say(QString::fromUtf8(error.what()), true);
     return false;
   }
   QSettings().setValue("training/history", path);
@@ -218,15 +232,15 @@ void TrainingPanel::ShowHistory()
         table_->setItem(0, column, new QTableWidgetItem(texts[column]));
     }
   } catch (const Error& error) {
-    bench_->Warn(QString::fromUtf8(error.what()));
+    workspace_.say(QString::fromUtf8(error.what()), true);
   }
 }
 
 void TrainingPanel::Scatter()
 {
-  vtkUltrasoundAlignmentSession* session = bench_->Session();
+  vtkUltrasoundAlignmentSession* session = workspace_.session;
   if (session->GetNumberOfVolumes() < 2) {
-    bench_->Warn(tr("Scatter: two volumes are needed"));
+    workspace_.say(tr("Scatter: two volumes are needed"), true);
     return;
   }
   session->BeginEdit("Scatter volumes");
@@ -252,8 +266,8 @@ void TrainingPanel::Scatter()
 void TrainingPanel::StartOrGiveUp()
 {
   if (!isTraining_) {
-    startScore_ = bench_->Session()->GetScore();
-    startEdits_ = bench_->Session()->GetUndoCount();
+    startScore_ = workspace_.session->GetScore();
+    startEdits_ = workspace_.session->GetUndoCount();
     taken_.start();
     clock_->start();
   } else {
@@ -266,7 +280,7 @@ void TrainingPanel::StartOrGiveUp()
 
 void TrainingPanel::Submit()
 {
-  vtkUltrasoundAlignmentSession* session = bench_->Session();
+  vtkUltrasoundAlignmentSession* session = workspace_.session;
   clock_->stop();
   Attempt attempt;
   attempt.seconds = taken_.elapsed() * 1e-3;
@@ -296,19 +310,20 @@ void TrainingPanel::Submit()
   try {
     QDir().mkpath(QFileInfo(historyPath_).path());
     AppendAttempt(historyPath_.toStdString(), attempt);
-    bench_->Note(tr("Submitted: %1 mm after %2, from %3 mm at the start")
-                     .arg(attempt.scoreMm, 0, 'f', 2)
-                     .arg(TimeText(attempt.seconds))
-                     .arg(attempt.startMm, 0, 'f', 2));
+    workspace_.say(tr("Submitted: %1 mm after %2, from %3 mm at the start")
+                       .arg(attempt.scoreMm, 0, 'f', 2)
+                       .arg(TimeText(attempt.seconds))
+                       .arg(attempt.startMm, 0, 'f', 2),
+                   false);
   } catch (const Error& error) {
-    bench_->Warn(tr("The attempt (%1 mm) was not kept: %2").arg(attempt.scoreMm, 0, 'f', 2).arg(error.what()));
+    workspace_.say(tr("The attempt (%1 mm) was not kept: %2").arg(attempt.scoreMm, 0, 'f', 2).arg(error.what()), true);
   }
   ShowHistory();
 }
 
 void TrainingPanel::ShowScore()
 {
-  vtkUltrasoundAlignmentSession* session = bench_->Session();
+  vtkUltrasoundAlignmentSession* session = workspace_.session;
   const double score = session->HasTruth() ? session->GetScore() : std::nan("");
   const bool shown = !isTraining_ && live_->isChecked() && std::isfinite(score);
   const QString text = shown ? tr("%1 mm").arg(score, 0, 'f', 2) : QString();
@@ -318,7 +333,7 @@ void TrainingPanel::ShowScore()
 
 void TrainingPanel::ShowState()
 {
-  const bool hasTruth = bench_->Session()->HasTruth();
+  const bool hasTruth = workspace_.session->HasTruth();
   if (isTraining_ && !hasTruth) { // another project was opened
     isTraining_ = false;
     clock_->stop();
@@ -334,10 +349,7 @@ void TrainingPanel::ShowState()
   start_->setEnabled(hasTruth);
   submit_->setEnabled(isTraining_);
   submit_->setToolTip(tr("Shows score and errors, and adds the attempt to the history"));
-  bench_->SetScoreHidden(isTraining_);
-  VolumeLook look = bench_->Volume();
-  look.errorVectors = hasTruth && vectors_->isChecked();
-  bench_->SetVolume(look);
+  workspace_.showErrorVectors(hasTruth && !isTraining_ && vectors_->isChecked());
   ShowScore();
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Workspace.h"
 #include <QElapsedTimer>
 #include <QWidget>
+#include <vtkSmartPointer.h>
 
 class QCheckBox;
 class QDoubleSpinBox;
@@ -11,10 +13,9 @@ class QPushButton;
 class QSpinBox;
 class QTableWidget;
 class QTimer;
+class vtkCallbackCommand;
 
 namespace echorama {
-
-class Workbench;
 
 /// Evaluation and training (dissertation 4.4). With a truth loaded the score is shown while volumes move, with the errors as
 /// arrows in the 3D view. In training both are hidden from the start of an attempt until it is submitted; then score, errors and
@@ -23,7 +24,8 @@ class TrainingPanel : public QWidget {
   Q_OBJECT
 
 public:
-  explicit TrainingPanel(Workbench* bench, QWidget* parent = nullptr);
+  explicit TrainingPanel(Workspace& workspace, QWidget* parent = nullptr);
+  ~TrainingPanel() override;
 
   /// The pose file of the truth; a failure goes to the message bar.
   bool LoadTruth(const QString& path);
@@ -44,7 +46,8 @@ private:
   void ShowState();
   void ShowHistory();
 
-  Workbench* bench_;
+  Workspace& workspace_;
+  vtkSmartPointer<vtkCallbackCommand> observer_;
   QLabel *truth_, *score_, *time_;
   QCheckBox *live_, *vectors_;
   QLineEdit *trainee_, *history_;

@@ -4,6 +4,7 @@
 #include "Core/Geometry/PoseFile.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Base/JsonPlace.h"
+#include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
 #include <filesystem>
 #include <fstream>
@@ -16,6 +17,17 @@ namespace echorama {
 namespace {
 
 constexpr const char* Schema = "echorama-poses-1";
+
+void WriteText(const std::string& path, const std::string& text)
+{
+  FileReplacement replacement;
+  std::ofstream stream(replacement.Stage(path));
+  stream << text;
+  stream.close();
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+  replacement.Commit();
+}
 
 ordered_json ListOf(const Eigen::Vector3d& v)
 {
@@ -112,17 +124,27 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
   }
   const ordered_json root{{"schema", Schema}, {"unit", "mm"}, {"frame", "LPS"}, {"volumes", volumes}};
 
-  FileReplacement replacement;
-  std::ofstream stream(replacement.Stage(path));
+  std::string text;
   try {
-    stream << root.dump(2) << '\n';
+    text = root.dump(2);
   } catch (const nlohmann::json::exception&) {
     throw Error(Error::Kind::InvalidParameter, path + ": a file name is not UTF-8");
   }
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
-  replacement.Commit();
+  WriteText(path, text + '\n');
+}
+
+void WriteItkTransform(const std::string& path, const Pose& volumeToWorld)
+{
+  if (!IsRotation(volumeToWorld.linear()) || !volumeToWorld.translation().allFinite())
+    throw Error(Error::Kind::InvalidParameter, path + ": the pose is not rigid");
+  const Pose inverse = volumeToWorld.inverse(Eigen::Isometry);
+  std::string text = "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\nParameters:";
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      text += " " + NumberText(inverse(row, column));
+  for (int row = 0; row < 3; ++row)
+    text += " " + NumberText(inverse(row, 3));
+  WriteText(path, text + "\nFixedParameters: 0 0 0\n");
 }
 
 const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry)

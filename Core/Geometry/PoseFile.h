@@ -30,4 +30,9 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses);
 /// \throws Error(BadInput) when there is none, or when its recorded geometry differs (so that nothing is moved twice).
 const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry);
 
+/// Writes a pose as a transform of ITK (.tfm) for other programs. ITK maps points of the result to points of what is moved, so
+/// the file holds the inverse: a volume under it in 3D Slicer lies where \a volumeToWorld puts it.
+/// \throws Error(InvalidParameter) for a pose that is not rigid, Error(FileSystem).
+void WriteItkTransform(const std::string& path, const Pose& volumeToWorld);
+
 } // namespace echorama

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ExportActions.h"
+#include "AlgorithmRun.h"
+#include "Core/Base/FileReplacement.h"
+#include "Core/Geometry/PoseFile.h"
+#include "Job.h"
+#include "JobBar.h"
+#include <filesystem>
+#include <vector>
+#include <vtkImageData.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkUltrasoundWriter.h>
+
+namespace echorama {
+
+namespace {
+
+// A file for each volume that is shown, by its name. Throws Error(FileSystem) when one is there.
+std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession* session, const QString& folder,
+                                                  const std::string& extension)
+{
+  std::vector<std::pair<int, std::string>> files;
+  for (int i = 0; i < session->GetNumberOfVolumes(); ++i) {
+    const int id = session->GetVolumeId(i);
+    if (!session->GetVisible(id))
+      continue;
+    std::string name = session->GetName(id);
+    for (char& character : name)
+      if (character == '/' || character == '\\' || character == '\0')
+        character = '_';
+    const auto path = std::filesystem::path(folder.toStdString()) / (name + "." + extension);
+    if (std::filesystem::exists(path))
+      throw Error(Error::Kind::FileSystem, path.string() + ": it is there already; choose another folder");
+    files.emplace_back(id, path.string());
+  }
+  if (files.empty())
+    throw Error(Error::Kind::NotPossible, "no volume is shown");
+  return files;
+}
+
+} // namespace
+
+ExportActions::ExportActions(Workspace& workspace, QObject* parent) : QObject(parent), workspace_(workspace) {}
+
+void ExportActions::ExportVolumes(const QString& folder, const QString& extension)
+{
+  struct Item {
+    vtkSmartPointer<vtkImageData> image;
+    std::string path;
+  };
+  std::vector<Item> items;
+  try {
+    for (const auto& [id, path] : FilesFor(workspace_.session, folder, extension.toStdString())) {
+      items.push_back({vtkSmartPointer<vtkImageData>::New(), path});
+      items.back().image->ShallowCopy(workspace_.session->GetImage(id)); // the session's own moves on
+    }
+  } catch (const Error& error) {
+    workspace_.say(tr("Export volumes: %1").arg(error.what()), true);
+    return;
+  }
+  const int count = static_cast<int>(items.size());
+  Job* job = Job::Start(
+      this, tr("Export volumes"),
+      [items = std::move(items)](const Progress& progress) {
+        for (std::size_t i = 0; i < items.size(); ++i) {
+          const vtkNew<vtkUltrasoundWriter> writer;
+          writer->SetInputDataObject(items[i].image);
+          writer->SetFileName(items[i].path.c_str());
+          const double of = static_cast<double>(items.size());
+          Run(writer, progress.Part(static_cast<double>(i) / of, static_cast<double>(i + 1) / of), [&] { writer->Write(); });
+        }
+      },
+      [this, folder, count] { workspace_.say(tr("Exported %1 volumes to %2").arg(count).arg(folder), false); },
+      [this](const QString& error) { workspace_.say(tr("Export volumes: %1").arg(error), true); });
+  workspace_.jobs->Watch(job);
+}
+
+void ExportActions::ExportTransforms(const QString& folder)
+{
+  try {
+    const auto files = FilesFor(workspace_.session, folder, "tfm");
+    for (const auto& [id, path] : files) {
+      const vtkNew<vtkMatrix4x4> matrix;
+      workspace_.session->GetVolumeToWorld(id, matrix);
+      Pose pose;
+      pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+      WriteItkTransform(path, pose);
+    }
+    workspace_.say(tr("Exported %1 transforms to %2").arg(files.size()).arg(folder), false);
+  } catch (const Error& error) {
+    workspace_.say(tr("Export transforms: %1").arg(error.what()), true);
+  }
+}
+
+void ExportActions::ExportPoses(const QString& path)
+{
+  if (workspace_.session->WritePoses(path.toUtf8())) // else it has said why
+    workspace_.say(tr("Exported poses to %1").arg(path), false);
+}
+
+} // namespace echorama
