@@ -315,8 +315,8 @@ TEST_F(Attempts, Killed)
     finished = ReadAttempts(path).size();
     // The rest of what the child told.
     char rest[4096];
-    if (write(told[1], "e", 1) == 1)
-      EXPECT_GT(read(told[0], rest, sizeof rest), 0);
+    ASSERT_EQ(write(told[1], "e", 1), 1);
+    EXPECT_GT(read(told[0], rest, sizeof rest), 0);
   }
 }
 
