@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Messages.h"
 #include "Core/Base/Error.h"
-#include <algorithm>
+#include "Core/Base/VtkMessage.h"
 #include <vector>
 #include <vtkLogger.h>
 #include <vtkNew.h>
@@ -30,22 +30,9 @@ public:
   std::function<void(const std::string&, bool)> show;
 
 private:
-  // "ERROR: In FILE, line N\nvtkClass (0x1234): message\n\n" becomes "message", on one line.
-  static std::string Sentence(std::string text)
-  {
-    if (text.find(": In ") < text.find('\n') && text.find('\n') != std::string::npos)
-      text.erase(0, text.find('\n') + 1);
-    const std::size_t address = text.find(" (0x"), end = text.find("): ");
-    if (address != std::string::npos && end != std::string::npos && address < end && text.find(' ') == address)
-      text.erase(0, end + 3);
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    text.erase(text.find_last_not_of(' ') + 1);
-    return text;
-  }
-
   void Report(const char* text, bool isError)
   {
-    const std::string message = Sentence(text ? text : "");
+    const std::string message = echorama::SentenceOfVtkMessage(text ? text : "");
     if (gathered.users > 0) {
       if (isError)
         gathered.errors.push_back(message);
@@ -81,11 +68,7 @@ Messages::OfThread::~OfThread()
 
 std::string Messages::OfThread::Error() const
 {
-  // The executive only tells that an algorithm failed, sometimes before the class that it ran tells why.
-  for (std::size_t i = begin_; i < gathered.errors.size(); i++)
-    if (gathered.errors[i].find("returned failure for request") == std::string::npos)
-      return gathered.errors[i];
-  return begin_ < gathered.errors.size() ? gathered.errors[begin_] : std::string();
+  return ReasonAmong({gathered.errors.begin() + static_cast<std::ptrdiff_t>(begin_), gathered.errors.end()});
 }
 
 void Messages::OfThread::ThrowErrors() const

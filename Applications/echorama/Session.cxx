@@ -3,6 +3,7 @@
 // takes its place, so that a user sees one sentence: the first error with a reason that was reported while a stage ran. Errors
 // after it are complaints about it.
 #include "Session.h"
+#include "Core/Base/VtkMessage.h"
 
 #include <algorithm>
 #include <cmath>
@@ -40,29 +41,12 @@ private:
   void Gather(std::vector<std::string>& list, const char* text)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    list.push_back(Sentence(text ? text : ""));
+    list.push_back(echorama::SentenceOfVtkMessage(text ? text : ""));
   }
   std::vector<std::string> Take(std::vector<std::string>& list)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     return std::exchange(list, {});
-  }
-
-  // "ERROR: In FILE, line N\nvtkClass (0x1234): message\n\n" becomes "message", on one line.
-  static std::string Sentence(std::string text)
-  {
-    const auto isPrefixed = [&text](const char* word) {
-      return text.compare(0, std::char_traits<char>::length(word), word) == 0;
-    };
-    if (isPrefixed("ERROR: In ") || isPrefixed("Warning: In ") || isPrefixed("Generic Warning: In ")) {
-      text.erase(0, text.find('\n') == std::string::npos ? 0 : text.find('\n') + 1);
-      const std::size_t name = text.find(" (0x"), end = text.find("): ");
-      if (name != std::string::npos && end != std::string::npos && name < end && text.find(' ') == name)
-        text.erase(0, end + 3);
-    }
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    text.erase(text.find_last_not_of(' ') + 1);
-    return text;
   }
 
   std::mutex mutex_;
@@ -207,12 +191,7 @@ void Session::Work(const std::string& stage, const std::string& what, const std:
 
 std::string Session::TakeReportedError()
 {
-  std::vector<std::string> errors = Window()->TakeErrors();
-  // The executive only tells that an algorithm failed, sometimes before the class that used it tells why.
-  const auto why = std::find_if(errors.begin(), errors.end(), [](const std::string& error) {
-    return error.find("returned failure for request") == std::string::npos;
-  });
-  return errors.empty() ? std::string() : why == errors.end() ? errors.front() : *why;
+  return ReasonAmong(Window()->TakeErrors());
 }
 
 void Session::ThrowReported()
