@@ -3,9 +3,9 @@
 // are made on reading, with the place in the file in the message: a pose file is written by people and scripts too.
 #include "Core/Geometry/PoseFile.h"
 #include "Core/Base/FileReplacement.h"
-#include "Core/Base/JsonPlace.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "Core/Geometry/PoseJson.h"
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -17,6 +17,7 @@ namespace echorama {
 namespace {
 
 constexpr const char* Schema = "echorama-poses-1";
+constexpr const char* ProjectSchema = "echorama-project-1"; // of an alignment session: a pose file with more in it
 
 void WriteText(const std::string& path, const std::string& text)
 {
@@ -27,31 +28,6 @@ void WriteText(const std::string& path, const std::string& text)
   if (!stream)
     throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
   replacement.Commit();
-}
-
-ordered_json ListOf(const Eigen::Vector3d& v)
-{
-  return {v.x(), v.y(), v.z()};
-}
-
-ImageGeometry ReadGeometry(const ordered_json& value, const JsonPlace& place)
-{
-  ImageGeometry geometry;
-  geometry.origin = place.In("origin").Vector<3>(place.Member(value, "origin"));
-  geometry.spacing = place.In("spacing").Vector<3>(place.Member(value, "spacing"));
-  geometry.direction = place.In("direction").Rows<3>(place.Member(value, "direction"));
-  const Eigen::Vector3d dimensions = place.In("dimensions").Vector<3>(place.Member(value, "dimensions"));
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(dimensions[axis] >= 1.0 && dimensions[axis] <= 2147483647.0 && dimensions[axis] == std::floor(dimensions[axis])))
-      place.In("dimensions").Fail("positive whole numbers are needed");
-    geometry.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(dimensions[axis]);
-  }
-  try {
-    geometry.Check("geometry");
-  } catch (const Error& error) {
-    place.Fail(error.what());
-  }
-  return geometry;
 }
 
 fs::path Resolved(const fs::path& path)
@@ -67,7 +43,8 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
 {
   const JsonPlace file(path);
   const ordered_json root = file.Parse(ReadTextFile(path));
-  file.Need(root, "schema", Schema);
+  if (file.Member(root, "schema") != ProjectSchema)
+    file.Need(root, "schema", Schema);
   file.Need(root, "unit", "mm");
   file.Need(root, "frame", "LPS");
   const ordered_json& volumes = file.Member(root, "volumes");
@@ -87,12 +64,8 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
     if (!seen.insert(Resolved(pose.file).string()).second)
       place.Fail(name.get<std::string>() + " is named twice");
     if (volume.contains("geometry"))
-      pose.geometry = ReadGeometry(volume["geometry"], place.In("geometry"));
-    const JsonPlace matrixPlace = place.In("VolumeToWorld");
-    const Eigen::Matrix4d matrix = matrixPlace.Rows<4>(place.Member(volume, "VolumeToWorld"));
-    if (!IsRotation(matrix.topLeftCorner<3, 3>()) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-      matrixPlace.Fail("the matrix is not rigid (a rotation, a translation, and 0 0 0 1 below)");
-    pose.volumeToWorld.matrix() = matrix;
+      pose.geometry = PoseJson::ToGeometry(volume["geometry"], place.In("geometry"));
+    pose.volumeToWorld = PoseJson::ToPose(place.Member(volume, "VolumeToWorld"), place.In("VolumeToWorld"));
     poses.push_back(pose);
   }
   return poses;
@@ -112,14 +85,9 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
       fail("its geometry is not given");
     if (!IsRotation(pose.volumeToWorld.linear()) || !pose.volumeToWorld.translation().allFinite())
       fail("its pose is not rigid");
-    const ImageGeometry& g = *pose.geometry;
     const fs::path relative = Resolved(pose.file).lexically_relative(folder);
     volumes.push_back({{"file", (relative.empty() ? Resolved(pose.file) : relative).generic_string()},
-                       {"geometry",
-                        {{"origin", ListOf(g.origin)},
-                         {"spacing", ListOf(g.spacing)},
-                         {"direction", JsonPlace::RowsOf(g.direction)},
-                         {"dimensions", g.dimensions}}},
+                       {"geometry", PoseJson::Of(*pose.geometry)},
                        {"VolumeToWorld", JsonPlace::RowsOf(pose.volumeToWorld.matrix())}});
   }
   const ordered_json root{{"schema", Schema}, {"unit", "mm"}, {"frame", "LPS"}, {"volumes", volumes}};

@@ -122,6 +122,15 @@ TEST_F(PoseFile, GeometryAndFurtherKeysAreOptional)
   EXPECT_EQ(poses[0].volumeToWorld * Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(5, 7, 7));
 }
 
+TEST_F(PoseFile, AProjectIsAPoseFile)
+{
+  const auto poses =
+      ReadPoses(Write(Document(R"({"name":"liver","file":"a.mha","VolumeToWorld":)" + Identity + R"(,"opacity":0.5})",
+                               R"("schema":"echorama-project-1","unit":"mm","frame":"LPS","truth":"")")));
+  ASSERT_EQ(poses.size(), 1u);
+  EXPECT_EQ(fs::path(poses[0].file), folder / "a.mha");
+}
+
 TEST_F(PoseFile, FindsByPathThenByName)
 {
   std::vector<VolumePose> poses(3);
