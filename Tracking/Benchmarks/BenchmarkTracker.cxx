@@ -4,12 +4,12 @@
 // messages, which is the loop that programs are built around. And how long a volume of 16 MB takes.
 //
 // BenchmarkTracker [--seconds S] [ours] [library] [volume]
+#include "Core/Base/Worker.h"
 #include "Testing/Benchmark.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkServer.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/PoseStream.h"
-#include "Tracking/Stream/Worker.h"
 #include <atomic>
 #include <cmath>
 #include <cstdlib>

@@ -4,11 +4,11 @@
 // once per header version, whatever the number of clients.
 #include "Tracking/Devices/OpenIgtLinkServer.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Worker.h"
 #include "Tracking/Devices/OpenIgtLinkDecoder.h"
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
 #include "Tracking/Devices/TcpSocket.h"
 #include "Tracking/Stream/Clock.h"
-#include "Tracking/Stream/Worker.h"
 #include <algorithm>
 #include <deque>
 #include <list>

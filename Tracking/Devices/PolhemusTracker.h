@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Worker.h"
 #include "Tracking/Devices/DeviceClock.h"
 #include "Tracking/Devices/PolhemusDecoder.h"
 #include "Tracking/Devices/SerialPort.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
-#include "Tracking/Stream/Worker.h"
 #include <array>
 #include <optional>
 #include <string>

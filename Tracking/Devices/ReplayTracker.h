@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Worker.h"
 #include "Readers/PoseLog.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
-#include "Tracking/Stream/Worker.h"
 #include <limits>
 #include <memory>
 #include <string>

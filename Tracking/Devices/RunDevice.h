@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Worker.h"
 #include "Tracking/Stream/PoseStream.h"
-#include "Tracking/Stream/Worker.h"
 #include <functional>
 
 namespace echorama {

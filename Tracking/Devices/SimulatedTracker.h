@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Worker.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
-#include "Tracking/Stream/Worker.h"
 #include <cstdint>
 #include <limits>
 #include <memory>

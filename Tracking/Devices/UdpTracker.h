@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Worker.h"
 #include "Tracking/Devices/PosePacket.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
 #include "Tracking/Devices/UdpSocket.h"
-#include "Tracking/Stream/Worker.h"
 #include <cstdint>
 #include <optional>
 #include <string>

@@ -5,9 +5,9 @@
 #include "Tracking/Stream/StreamRecorder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Base/Worker.h"
 #include "Readers/PoseLog.h"
 #include "Readers/SequenceText.h"
-#include "Tracking/Stream/Worker.h"
 #include <cmath>
 #include <exception>
 #include <mutex>

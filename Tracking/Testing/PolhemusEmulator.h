@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Random.h"
+#include "Core/Base/Worker.h"
 #include "PseudoTerminal.h"
 #include "Tracking/Devices/PolhemusDecoder.h"
 #include "Tracking/Stream/Clock.h"
-#include "Tracking/Stream/Worker.h"
 #include <algorithm>
 #include <atomic>
 #include <cmath>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/Worker.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/LiveTransforms.h"
-#include "Tracking/Stream/Worker.h"
 #include <cmath>
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/Worker.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/ImageStream.h"
 #include "Tracking/Stream/PoseStream.h"
-#include "Tracking/Stream/Worker.h"
 #include <atomic>
 #include <cmath>
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Core/Base/Worker.h"
 #include "PseudoTerminal.h"
 #include "Tracking/Devices/SerialPort.h"
 #include "Tracking/Stream/Clock.h"
-#include "Tracking/Stream/Worker.h"
 #include <cstring>
 #include <fstream>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Tracking/Stream/Worker.h"
+#include "Core/Base/Worker.h"
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Tracking/Stream/Worker.h"
+#include "Core/Base/Worker.h"
 #include <cstddef>
 #include <gtest/gtest.h>
 #include <pthread.h>

@@ -6,8 +6,8 @@
 
 namespace echorama {
 
-/// A thread that waits for a device, and can be told to stop. (Parallel loops over data are Core/Base/Parallel.h; this is for
-/// waiting alone, and the only place of the house that makes threads for it.)
+/// A thread that waits for a device or the disk, and can be told to stop. (Parallel loops over data are Core/Base/Parallel.h;
+/// this is for waiting alone, and the only place of the house that makes threads for it.)
 class Worker {
 public:
   /// What a job asks now and then.
