@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "ProjectFile.h"
+#include "Widgets/Session/ProjectFile.h"
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,30 +17,46 @@ struct Backup {
   bool readable = true;  ///< false: damaged; it is kept, listed and not opened
 };
 
-/// A folder of numbered project files: one after each edit and at least one a second during long ones. Each is written under a
-/// temporary name, brought to the disk and renamed: a kill at any moment leaves every earlier one and nothing half-made. Old ones
-/// are thinned out: the last \a keep stay, of those before ever fewer (some per hour, then per day).
+/// A folder of numbered project files. Each is written under a temporary name, brought to the disk and renamed: a kill at any
+/// moment leaves every earlier one and nothing half-made. Old ones are thinned out: the last \a keep stay; of those before, the
+/// last of every hour for a day before the newest, and the last of every day before that.
+///
+/// Who has one of these holds a lock (flock) on the folder's file "lock". The system lets go of it when the process ends, however
+/// it ends; so whether a session is alive never depends on a process number that another process may have by now.
 class Backups {
 public:
-  /// Makes the folder. \throws Error(FileSystem).
+  /// Makes the folder, and removes what a killed process left half-written. \throws Error(FileSystem).
   explicit Backups(const std::string& folder, int keep = 100);
+  ~Backups();
+  Backups(const Backups&) = delete;
+  Backups& operator=(const Backups&) = delete;
 
-  /// Writes the next one, unless the state is that of the last. \throws Error(FileSystem) (full disk): earlier ones stay.
-  void Write(const Project& project, const std::string& label);
-  /// The newest first. Damaged ones are marked.
-  std::vector<Backup> List() const;
-  /// \throws as ReadProject.
-  static Project Read(const Backup& backup);
+  const std::string& Folder() const { return folder_; }
+  /// Writes the next one, unless it would say what the last said that was written here. \a inPlaceOfLast: that one goes
+  /// afterwards (a drag that goes on). \returns whether there is a new one. \throws Error(FileSystem) (full disk): earlier ones
+  /// stay.
+  bool Write(const Project& project, const std::string& label, bool inPlaceOfLast = false);
 
-  /// Where backups of the project \a path live: NAME.backups beside it; of an unsaved session under the user's data folder
-  /// (XDG_DATA_HOME or ~/.local/share, echorama/unsaved/...).
+  /// Of a folder, the newest first; damaged ones are marked. A folder that is not there has none.
+  static std::vector<Backup> List(const std::string& folder);
+  /// Under which name a backup lies in its folder.
+  static std::string FileName(int number, std::int64_t time);
+
+  /// Where backups of the project \a path live: NAME.backups beside it; of an unsaved session ("") a new folder under the user's
+  /// data folder (XDG_DATA_HOME or ~/.local/share: echorama/unsaved/...). \throws Error(FileSystem) when there is no such place.
   static std::string FolderFor(const std::string& path);
-  /// Sessions that ended without being saved: their folders, the newest first (the process that made them is gone).
+  /// Sessions that ended without being saved: their folders, the newest first. Those that still run are not among them.
   static std::vector<std::string> Abandoned();
+  /// Removes the backups of a folder, and the folder when nothing else is in it. \throws Error(NotPossible) when a session still
+  /// uses it.
+  static void Discard(const std::string& folder);
 
 private:
   std::string folder_;
-  int keep_, next_ = 1;
+  int keep_;
+  int lock_ = -1;
+  std::optional<Project> last_;
+  std::string lastPath_;
 };
 
 } // namespace echorama

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "SessionState.h"
+#include "Widgets/Session/SessionState.h"
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -8,22 +9,41 @@ namespace echorama {
 
 /// What a project file holds.
 struct Project {
-  SessionState state;
-  std::string truth;   ///< pose file of the ground truth, or empty
+  SessionState state;  ///< after reading: ids from 1, in order
+  std::string truth;   ///< pose file of the ground truth, absolute, or empty
   std::string comment; ///< for people: who, what
 };
 
-/// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "geometry",
-/// "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [...]}], "truth", "comment"}. It is a pose file too: the
-/// same fields with the same meaning, plus what a session knows. Paths are relative to the project's folder when they lie in or
-/// beside it, so that a folder can be moved or opened on another machine; absolute ones are kept as a second place to look
-/// ("path"). \throws Error(FileSystem), Error(BadFile) that names file, volume and field.
-Project ReadProject(const std::string& path);
-/// Atomic, and on the disk when it returns. \throws Error(FileSystem); what was there before then stays.
-void WriteProject(const std::string& path, const Project& project);
+/// What a backup knows beside its project.
+struct BackupStamp {
+  int number = 0;
+  std::int64_t time = 0; ///< of writing, seconds since 1970, UTC
+  std::string label;     ///< the edit it was made after
+};
 
-/// Where a volume of a project is now: where it says, else under the same name in the project's folder or one of \a folders.
-/// Empty when nowhere.
+/// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "path",
+/// "geometry", "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [{"mode", "radiusMm", "intensity", "opacity",
+/// "hardness", "insideValid", "pathMm": [[3], ...]}]}], "truth", "comment"}. Documentation/session.md tells of each.
+///
+/// A project is a pose file too (ReadPoses reads it): the same fields with the same meaning, plus what a session knows. And a
+/// pose file ("echorama-poses-1") is a project whose volumes have default looks: all keys of a volume but "file" and
+/// "VolumeToWorld" may be missing. "file" is relative to the project's folder, so that a folder can be moved or opened on
+/// another machine; "path" is absolute, and counts when there is nothing at "file". A volume that came from a pipeline has the
+/// file "".
+///
+/// Geometries are told apart from poses, so that nothing is moved twice: who opens the files compares. A volume without
+/// "geometry" has dimensions of zero.
+/// \param stamp receives what a backup knows; its number is 0 for other projects.
+/// \throws Error(FileSystem), Error(BadFile) that names file, volume and field; also for a backup that is not as it was written.
+Project ReadProject(const std::string& path, BackupStamp* stamp = nullptr);
+
+/// Atomic, and on the disk when it returns. Numbers come back to the last bit. \param stamp makes it a backup: with a checksum,
+/// on one line. \throws Error(FileSystem), Error(InvalidParameter) for a name that is not UTF-8; what was there before then
+/// stays.
+void WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp = nullptr);
+
+/// Where a volume of a project is now: at \a file, else under the same name in the project's folder (for a backup: in the folder
+/// of its project), else in one of \a folders. Empty when nowhere.
 std::string FindVolume(const std::string& projectPath, const std::string& file, const std::vector<std::string>& folders = {});
 
 } // namespace echorama

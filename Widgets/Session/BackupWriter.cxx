@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The thread lives only while something waits to be written: an idle session wakes nobody.
+#include "Widgets/Session/BackupWriter.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Worker.h"
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <mutex>
+#include <system_error>
+#include <utility>
+
+namespace echorama {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double Glance = 0.05; // seconds between looks at whether a waiting drag has ended
+constexpr double Repeat = 1.0;  // seconds within which edits of one label are one
+
+double Since(Clock::time_point time)
+{
+  return std::chrono::duration<double>(Clock::now() - time).count();
+}
+
+struct Item {
+  Project project;
+  std::string label;
+  bool finished = true;
+};
+
+} // namespace
+
+struct BackupWriter::Parts {
+  Backups backups;
+  double interval;
+
+  std::mutex mutex; // of what follows
+  std::deque<Item> queue;
+  bool active = false; // the thread will look at the queue again
+  std::string failure, told;
+
+  // Touched only by who writes: the thread, or its owner when there is none.
+  std::string lastLabel;
+  bool lastFinished = true;
+  Clock::time_point lastTime = Clock::now() - std::chrono::hours(1);
+
+  Worker worker; // the last member: it ends before the others go
+
+  Parts(const std::string& folder, double seconds, int keep) : backups(folder, keep), interval(seconds) {}
+
+  void Write(const Item& item)
+  {
+    std::string reason;
+    try {
+      const bool again = !lastFinished || (item.label == lastLabel && Since(lastTime) < Repeat);
+      if (backups.Write(item.project, item.label, again))
+        lastLabel = item.label;
+      lastFinished = item.finished;
+    } catch (const std::exception& error) {
+      reason = error.what();
+    }
+    lastTime = Clock::now();
+    const std::lock_guard<std::mutex> lock(mutex);
+    failure = reason;
+    if (reason.empty())
+      told.clear();
+  }
+
+  void Run(const Worker::Signal& signal)
+  {
+    for (;;) {
+      Item item;
+      double wait = 0.0;
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (queue.empty() || signal.Stopped()) {
+          active = false;
+          return;
+        }
+        if (!queue.front().finished)
+          wait = interval - Since(lastTime);
+        if (wait <= 0.0) {
+          item = std::move(queue.front());
+          queue.pop_front();
+        }
+      }
+      if (wait > 0.0)
+        signal.Sleep(std::min(wait, Glance));
+      else
+        Write(item);
+    }
+  }
+
+  void Drain()
+  {
+    worker.Stop();
+    active = false;
+    for (; !queue.empty(); queue.pop_front())
+      Write(queue.front());
+  }
+};
+
+BackupWriter::BackupWriter(const std::string& folder, double interval, int keep)
+  : parts_(std::make_unique<Parts>(folder, interval, keep))
+{
+}
+
+BackupWriter::~BackupWriter()
+{
+  parts_->Drain();
+}
+
+const std::string& BackupWriter::Folder() const
+{
+  return parts_->backups.Folder();
+}
+
+void BackupWriter::Post(Project project, const std::string& label, bool finished)
+{
+  {
+    const std::lock_guard<std::mutex> lock(parts_->mutex);
+    if (!parts_->queue.empty() && (!parts_->queue.back().finished || parts_->queue.back().label == label))
+      parts_->queue.pop_back(); // nobody has seen it yet
+    parts_->queue.push_back({std::move(project), label, finished});
+    if (parts_->active)
+      return;
+    parts_->active = true;
+  }
+  try {
+    parts_->worker.Start([this](const Worker::Signal& signal) { parts_->Run(signal); });
+  } catch (const std::system_error&) { // the system has no thread to give
+    parts_->Drain();
+  }
+}
+
+void BackupWriter::Flush()
+{
+  parts_->Drain();
+  const std::lock_guard<std::mutex> lock(parts_->mutex);
+  if (!parts_->failure.empty()) {
+    parts_->told = parts_->failure;
+    throw Error(Error::Kind::FileSystem, parts_->failure);
+  }
+}
+
+std::string BackupWriter::TakeFailure()
+{
+  const std::lock_guard<std::mutex> lock(parts_->mutex);
+  if (parts_->failure.empty() || parts_->failure == parts_->told)
+    return {};
+  return parts_->told = parts_->failure;
+}
+
+} // namespace echorama

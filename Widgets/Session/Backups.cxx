@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The name of a backup says its number and its time, so that thinning out need not open any. Listing opens all: only so is it
+// known which can be read.
+#include "Widgets/Session/Backups.h"
+#include "Core/Base/Error.h"
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <fcntl.h>
+#include <filesystem>
+#include <limits>
+#include <sys/file.h>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+constexpr const char* LockName = "lock";
+
+[[noreturn]] void Fail(const std::string& path, const std::string& reason)
+{
+  throw Error(Error::Kind::FileSystem, path + ": " + reason);
+}
+
+bool ParseName(const std::string& name, Backup& backup)
+{
+  std::tm time{};
+  int end = 0;
+  if (std::sscanf(name.c_str(), "backup-%9d-%4d%2d%2dT%2d%2d%2dZ.json%n", &backup.number, &time.tm_year, &time.tm_mon,
+                  &time.tm_mday, &time.tm_hour, &time.tm_min, &time.tm_sec, &end) != 7 ||
+      end != static_cast<int>(name.size()) || backup.number < 1)
+    return false;
+  time.tm_year -= 1900;
+  time.tm_mon -= 1;
+  backup.time = timegm(&time);
+  return true;
+}
+
+// By their names alone, the newest first.
+std::vector<Backup> Named(const std::string& folder)
+{
+  std::vector<Backup> backups;
+  std::error_code error;
+  for (fs::directory_iterator each(folder, error), end; !error && each != end; each.increment(error)) {
+    Backup backup;
+    backup.path = each->path().string();
+    if (ParseName(each->path().filename().string(), backup))
+      backups.push_back(backup);
+  }
+  std::sort(backups.begin(), backups.end(),
+            [](const Backup& a, const Backup& b) { return a.number != b.number ? a.number > b.number : a.path > b.path; });
+  return backups;
+}
+
+void ThinOut(const std::string& folder, int keep)
+{
+  const std::vector<Backup> backups = Named(folder);
+  std::int64_t lastSpan = std::numeric_limits<std::int64_t>::max();
+  for (std::size_t i = static_cast<std::size_t>(keep); i < backups.size(); ++i) {
+    const bool recent = backups.front().time - backups[i].time < 86400;
+    const std::int64_t length = recent ? 3600 : 86400;
+    const std::int64_t span = backups[i].time / length * length; // the hour or day in which it was made
+    std::error_code ignored;
+    if (span == lastSpan)
+      fs::remove(backups[i].path, ignored);
+    lastSpan = span;
+  }
+}
+
+int OpenLock(const std::string& folder)
+{
+  return open((fs::path(folder) / LockName).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+}
+
+bool InUse(const std::string& folder)
+{
+  const int lock = open((fs::path(folder) / LockName).c_str(), O_RDWR | O_CLOEXEC);
+  if (lock < 0)
+    return false;
+  const bool held = flock(lock, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  close(lock);
+  return held;
+}
+
+void RemoveHalfWritten(const std::string& folder)
+{
+  std::vector<fs::path> parts;
+  std::error_code error;
+  for (fs::directory_iterator each(folder, error), end; !error && each != end; each.increment(error))
+    if (each->path().filename().string().rfind(".part", 0) == 0)
+      parts.push_back(each->path());
+  for (const fs::path& part : parts)
+    fs::remove(part, error);
+}
+
+fs::path UnsavedRoot()
+{
+  const char* data = std::getenv("XDG_DATA_HOME");
+  if (data && fs::path(data).is_absolute())
+    return fs::path(data) / "echorama" / "unsaved";
+  const char* home = std::getenv("HOME");
+  if (!home || !fs::path(home).is_absolute())
+    Fail("backups", "neither XDG_DATA_HOME nor HOME tells where to keep them; save the project first");
+  return fs::path(home) / ".local" / "share" / "echorama" / "unsaved";
+}
+
+std::string Time(std::int64_t time, const char* format)
+{
+  const auto seconds = static_cast<std::time_t>(time);
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[40];
+  return std::string(text, std::strftime(text, sizeof text, format, &parts));
+}
+
+} // namespace
+
+Backups::Backups(const std::string& folder, int keep) : folder_(folder), keep_(std::max(keep, 1))
+{
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder))
+    Fail(folder, "the folder of backups cannot be made (" + error.message() + ")");
+  lock_ = OpenLock(folder);
+  if (lock_ < 0)
+    Fail(folder, std::string("the folder of backups cannot be written (") + std::strerror(errno) + ")");
+  if (flock(lock_, LOCK_EX | LOCK_NB) == 0)
+    RemoveHalfWritten(folder); // nobody else is writing here
+  flock(lock_, LOCK_SH);
+}
+
+Backups::~Backups()
+{
+  close(lock_);
+}
+
+bool Backups::Write(const Project& project, const std::string& label, bool inPlaceOfLast)
+{
+  if (last_ && last_->state == project.state && last_->truth == project.truth && last_->comment == project.comment)
+    return false;
+  const std::vector<Backup> earlier = Named(folder_);
+  BackupStamp stamp;
+  stamp.number = earlier.empty() ? 1 : earlier.front().number + 1;
+  stamp.time = std::time(nullptr);
+  stamp.label = label;
+  const std::string path = (fs::path(folder_) / FileName(stamp.number, stamp.time)).string();
+  WriteProject(path, project, &stamp);
+  if (inPlaceOfLast && !lastPath_.empty()) {
+    std::error_code ignored;
+    fs::remove(lastPath_, ignored);
+  }
+  last_ = project;
+  lastPath_ = path;
+  ThinOut(folder_, keep_);
+  return true;
+}
+
+std::vector<Backup> Backups::List(const std::string& folder)
+{
+  std::vector<Backup> backups = Named(folder);
+  for (Backup& backup : backups) {
+    try {
+      BackupStamp stamp;
+      ReadProject(backup.path, &stamp);
+      backup.label = stamp.label;
+      backup.readable = stamp.number > 0; // a project without a stamp was not written here
+    } catch (const Error&) {
+      backup.readable = false;
+    }
+  }
+  return backups;
+}
+
+std::string Backups::FileName(int number, std::int64_t time)
+{
+  char digits[16];
+  std::snprintf(digits, sizeof digits, "%06d", number);
+  return std::string("backup-") + digits + Time(time, "-%Y%m%dT%H%M%SZ.json");
+}
+
+std::string Backups::FolderFor(const std::string& path)
+{
+  if (!path.empty()) {
+    fs::path folder = fs::absolute(path);
+    return folder.replace_extension(".backups").string();
+  }
+  const fs::path root = UnsavedRoot();
+  const std::string name = Time(std::time(nullptr), "%Y%m%d-%H%M%S-") + std::to_string(getpid());
+  fs::path folder = root / name;
+  std::error_code error;
+  for (int copy = 2; fs::exists(folder, error); ++copy)
+    folder = root / (name + "-" + std::to_string(copy));
+  return folder.string();
+}
+
+std::vector<std::string> Backups::Abandoned()
+{
+  std::vector<std::pair<std::int64_t, std::string>> found;
+  std::error_code error;
+  for (fs::directory_iterator each(UnsavedRoot(), error), end; !error && each != end; each.increment(error)) {
+    const std::string folder = each->path().string();
+    const std::vector<Backup> backups = Named(folder);
+    if (!backups.empty() && !InUse(folder))
+      found.emplace_back(backups.front().time, folder);
+  }
+  std::sort(found.rbegin(), found.rend());
+  std::vector<std::string> folders;
+  for (const auto& [time, folder] : found)
+    folders.push_back(folder);
+  return folders;
+}
+
+void Backups::Discard(const std::string& folder)
+{
+  if (InUse(folder))
+    throw Error(Error::Kind::NotPossible, folder + ": a session that still runs writes its backups there");
+  std::error_code ignored;
+  for (const Backup& backup : Named(folder))
+    fs::remove(backup.path, ignored);
+  RemoveHalfWritten(folder);
+  fs::remove(fs::path(folder) / LockName, ignored);
+  fs::remove(folder, ignored); // only when it is empty
+}
+
+} // namespace echorama

@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A file counts as written when its bytes and its name are on the disk: write, fsync, rename, fsync of the folder. Everything
+// is checked on reading, with the place in the file in the message, because people and scripts write projects too.
+//
+// Nobody edits a backup, so it can carry a checksum: of the JSON as it is printed without it. A flipped digit is found that
+// would still be JSON and a plausible pose.
+#include "Widgets/Session/ProjectFile.h"
+#include "Core/Base/FileReplacement.h"
+#include "Core/Base/TextFile.h"
+#include "Core/Geometry/PoseJson.h"
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <set>
+#include <unistd.h>
+#include <utility>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+using Json = JsonPlace::Json;
+
+constexpr const char* Schema = "echorama-project-1";
+constexpr const char* PoseSchema = "echorama-poses-1";
+constexpr std::size_t Limit = std::size_t{512} << 20; // bytes of a file
+constexpr std::pair<const char*, BrushMode> Modes[] = {
+    {"paint", BrushMode::Paint}, {"carve", BrushMode::Carve}, {"restore", BrushMode::Restore}};
+
+fs::path Resolved(const fs::path& path)
+{
+  std::error_code error;
+  const fs::path resolved = fs::weakly_canonical(fs::absolute(path), error);
+  return error ? fs::absolute(path).lexically_normal() : resolved;
+}
+
+std::string Relative(const std::string& path, const fs::path& folder)
+{
+  if (path.empty())
+    return path;
+  const fs::path relative = Resolved(path).lexically_relative(folder);
+  return (relative.empty() ? Resolved(path) : relative).generic_string();
+}
+
+bool IsThere(const fs::path& path)
+{
+  std::error_code error;
+  return fs::exists(path, error) && !error;
+}
+
+// FNV-1a, 64 bits: against accidents, not against attacks.
+std::string Checksum(const std::string& text)
+{
+  std::uint64_t hash = 14695981039346656037u;
+  for (const char byte : text)
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211u;
+  char digits[17];
+  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
+  return digits;
+}
+
+Json JsonOf(const Stroke& stroke)
+{
+  const Brush& brush = stroke.brush;
+  const char* mode = "";
+  for (const auto& [name, value] : Modes)
+    if (value == brush.mode)
+      mode = name;
+  Json path = Json::array();
+  for (const Eigen::Vector3d& point : stroke.pathMm)
+    path.push_back(Json::array({point.x(), point.y(), point.z()}));
+  return {{"mode", mode},
+          {"radiusMm", brush.radiusMm},
+          {"intensity", brush.intensity},
+          {"opacity", brush.opacity},
+          {"hardness", brush.hardness},
+          {"insideValid", brush.insideValid},
+          {"pathMm", std::move(path)}};
+}
+
+bool YesOrNo(const Json& value, const JsonPlace& place)
+{
+  if (!value.is_boolean())
+    place.Fail("true or false is needed");
+  return value.get<bool>();
+}
+
+double UnitNumber(const Json& value, const JsonPlace& place)
+{
+  const double number = place.Number(value);
+  if (!(number >= 0.0 && number <= 1.0))
+    place.Fail("a number in [0, 1] is needed");
+  return number;
+}
+
+int Count(const Json& value, const JsonPlace& place)
+{
+  if (!value.is_number_integer() || value.get<double>() < 0.0 || value.get<double>() > 1e9)
+    place.Fail("a whole number, at least 0, is needed");
+  return value.get<int>();
+}
+
+Stroke ToStroke(const Json& value, const JsonPlace& place)
+{
+  Stroke stroke;
+  Brush& brush = stroke.brush;
+  const std::string mode = place.In("mode").Text(place.Member(value, "mode"));
+  bool known = false;
+  for (const auto& [name, each] : Modes)
+    if (mode == name) {
+      brush.mode = each;
+      known = true;
+    }
+  if (!known)
+    place.In("mode").Fail("paint, carve or restore is needed");
+  brush.radiusMm = place.In("radiusMm").Number(place.Member(value, "radiusMm"));
+  brush.intensity = place.In("intensity").Number(place.Member(value, "intensity"));
+  brush.opacity = place.In("opacity").Number(place.Member(value, "opacity"));
+  brush.hardness = place.In("hardness").Number(place.Member(value, "hardness"));
+  brush.insideValid = YesOrNo(place.Member(value, "insideValid"), place.In("insideValid"));
+  const JsonPlace pathPlace = place.In("pathMm");
+  const Json& path = place.Member(value, "pathMm");
+  if (!path.is_array())
+    pathPlace.Fail("a list of points is needed");
+  stroke.pathMm.reserve(path.size());
+  for (const Json& point : path)
+    stroke.pathMm.push_back(pathPlace.Vector<3>(point));
+  return stroke;
+}
+
+StrokeChain ToStrokes(const Json& value, const JsonPlace& place)
+{
+  if (!value.is_array())
+    place.Fail("a list is needed");
+  StrokeChain chain;
+  for (const Json& each : value) {
+    const JsonPlace strokePlace = place.In(std::to_string((chain ? chain->count : 0) + 1));
+    try {
+      chain = Append(chain, ToStroke(each, strokePlace));
+    } catch (const Error& error) {
+      if (error.GetKind() == Error::Kind::BadFile)
+        throw;
+      strokePlace.Fail(error.what());
+    }
+  }
+  return chain;
+}
+
+SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path& folder)
+{
+  SessionVolume volume;
+  const auto given = [&value](const char* key) { return value.contains(key) ? &value[key] : nullptr; };
+  const std::string file = place.In("file").Text(place.Member(value, "file"));
+  if (!file.empty()) {
+    fs::path found = (folder / file).lexically_normal(); // an absolute name replaces the folder
+    if (const Json* path = given("path")) {
+      const std::string second = place.In("path").Text(*path);
+      if (!IsThere(found) && !second.empty() && IsThere(second))
+        found = second;
+    }
+    volume.file = Resolved(found).string();
+  }
+  if (const Json* name = given("name"))
+    volume.name = place.In("name").Text(*name);
+  if (volume.name.empty())
+    volume.name = fs::path(volume.file).stem().string();
+  if (volume.name.empty())
+    place.Fail("it has neither a name nor a file");
+  if (const Json* geometry = given("geometry"))
+    volume.geometry = PoseJson::ToGeometry(*geometry, place.In("geometry"));
+  volume.volumeToWorld = PoseJson::ToPose(place.Member(value, "VolumeToWorld"), place.In("VolumeToWorld"));
+  if (const Json* colour = given("colour")) {
+    const Eigen::Vector3d rgb = place.In("colour").Vector<3>(*colour);
+    for (int i = 0; i < 3; ++i)
+      volume.colour[static_cast<std::size_t>(i)] = UnitNumber(rgb[i], place.In("colour"));
+  }
+  if (const Json* opacity = given("opacity"))
+    volume.opacity = UnitNumber(*opacity, place.In("opacity"));
+  if (const Json* visible = given("visible"))
+    volume.visible = YesOrNo(*visible, place.In("visible"));
+  if (const Json* group = given("group"))
+    volume.group = Count(*group, place.In("group"));
+  if (const Json* strokes = given("strokes"))
+    volume.strokes = ToStrokes(*strokes, place.In("stroke"));
+  return volume;
+}
+
+void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
+{
+  Json& backup = root["backup"];
+  const JsonPlace place = file.In("backup");
+  stamp.number = Count(place.Member(backup, "number"), place.In("number"));
+  const Json& time = place.Member(backup, "time");
+  if (!time.is_number_integer())
+    place.In("time").Fail("a whole number is needed");
+  stamp.time = time.get<std::int64_t>();
+  stamp.label = place.In("label").Text(place.Member(backup, "label"));
+  const std::string checksum = place.In("checksum").Text(place.Member(backup, "checksum"));
+  backup.erase("checksum");
+  if (Checksum(root.dump()) != checksum)
+    file.Fail("it is damaged: it is not as it was written");
+}
+
+// All of the text is on the disk when this returns.
+void WriteThrough(const std::string& path, const std::string& text, const std::string& shown)
+{
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  int problem = file < 0 ? errno : 0;
+  for (std::size_t written = 0; problem == 0 && written < text.size();) {
+    const ssize_t count = write(file, text.data() + written, text.size() - written);
+    if (count > 0)
+      written += static_cast<std::size_t>(count);
+    else if (count == 0 || errno != EINTR)
+      problem = count == 0 ? ENOSPC : errno;
+  }
+  if (problem == 0 && fsync(file) != 0 && errno != EINVAL) // EINVAL: a file system without fsync
+    problem = errno;
+  if (file >= 0 && close(file) != 0 && problem == 0)
+    problem = errno;
+  if (problem != 0)
+    throw Error(Error::Kind::FileSystem, shown + ": it cannot be written (" + std::strerror(problem) + ")");
+}
+
+void SyncFolder(const fs::path& folder)
+{
+  const int file = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file >= 0) {
+    fsync(file); // where a folder cannot be synced, the file system orders names itself
+    close(file);
+  }
+}
+
+} // namespace
+
+Project ReadProject(const std::string& path, BackupStamp* stamp)
+{
+  const JsonPlace file(path);
+  Json root = file.Parse(ReadTextFile(path, Limit));
+  if (file.Member(root, "schema") != PoseSchema)
+    file.Need(root, "schema", Schema);
+  file.Need(root, "unit", "mm");
+  file.Need(root, "frame", "LPS");
+  BackupStamp found;
+  if (root.contains("backup"))
+    CheckBackup(root, file, found);
+  const Json& volumes = file.Member(root, "volumes");
+  if (!volumes.is_array())
+    file.Fail("\"volumes\" is not a list");
+
+  const fs::path folder = fs::absolute(path).parent_path();
+  Project project;
+  std::set<std::string> names, files;
+  for (const Json& value : volumes) {
+    const int number = static_cast<int>(project.state.volumes.size()) + 1;
+    const JsonPlace place = file.In("volume " + std::to_string(number));
+    SessionVolume volume = ToVolume(value, place, folder);
+    volume.id = number;
+    if (!volume.file.empty() && !files.insert(volume.file).second)
+      place.Fail(volume.file + " is named twice");
+    if (value.contains("name") && names.count(volume.name))
+      place.Fail("another volume has the name " + volume.name);
+    const std::string wanted = volume.name;
+    for (int copy = 2; !names.insert(volume.name).second; ++copy)
+      volume.name = wanted + " (" + std::to_string(copy) + ")";
+    project.state.volumes.push_back(std::move(volume));
+  }
+  if (root.contains("truth")) {
+    const std::string truth = file.In("truth").Text(root["truth"]);
+    project.truth = truth.empty() ? truth : Resolved(folder / truth).string();
+  }
+  if (root.contains("comment"))
+    project.comment = file.In("comment").Text(root["comment"]);
+  if (stamp)
+    *stamp = found;
+  return project;
+}
+
+void WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp)
+{
+  const fs::path folder = Resolved(path).parent_path();
+  Json volumes = Json::array();
+  for (const SessionVolume& volume : project.state.volumes) {
+    Json strokes = Json::array();
+    for (const Stroke& stroke : StrokesOf(volume.strokes))
+      strokes.push_back(JsonOf(stroke));
+    volumes.push_back({{"name", volume.name},
+                       {"file", Relative(volume.file, folder)},
+                       {"path", volume.file.empty() ? std::string() : Resolved(volume.file).generic_string()},
+                       {"geometry", PoseJson::Of(volume.geometry)},
+                       {"VolumeToWorld", JsonPlace::RowsOf(volume.volumeToWorld.matrix())},
+                       {"colour", volume.colour},
+                       {"opacity", volume.opacity},
+                       {"visible", volume.visible},
+                       {"group", volume.group},
+                       {"strokes", std::move(strokes)}});
+  }
+  Json root{{"schema", Schema},
+            {"unit", "mm"},
+            {"frame", "LPS"},
+            {"volumes", std::move(volumes)},
+            {"truth", Relative(project.truth, folder)},
+            {"comment", project.comment}};
+  std::string text;
+  try {
+    if (stamp) {
+      root["backup"] = {{"number", stamp->number}, {"time", stamp->time}, {"label", stamp->label}};
+      root["backup"]["checksum"] = Checksum(root.dump());
+    }
+    text = root.dump(stamp ? -1 : 1) + '\n';
+  } catch (const nlohmann::json::exception&) {
+    throw Error(Error::Kind::InvalidParameter, path + ": a name in it is not UTF-8");
+  }
+
+  FileReplacement replacement;
+  WriteThrough(replacement.Stage(path), text, path);
+  replacement.Commit();
+  SyncFolder(folder);
+}
+
+std::string FindVolume(const std::string& projectPath, const std::string& file, const std::vector<std::string>& folders)
+{
+  if (file.empty())
+    return file;
+  if (IsThere(file))
+    return file;
+  const fs::path name = fs::path(file).filename();
+  const fs::path home = Resolved(projectPath).parent_path();
+  std::vector<fs::path> places{home};
+  if (home.extension() == ".backups")
+    places.push_back(home.parent_path());
+  places.insert(places.end(), folders.begin(), folders.end());
+  for (const fs::path& place : places)
+    if (IsThere(place / name))
+      return Resolved(place / name).string();
+  return {};
+}
+
+} // namespace echorama
