@@ -2,7 +2,6 @@
 #pragma once
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -10,27 +9,45 @@ namespace echorama {
 
 /// How a volume becomes particles (dissertation 4.3).
 struct ParticleParameters {
-  int downsampling = 2;      ///< one particle per block of so many voxels along each axis, [1, 64]
-  double opacity = 0.3;      ///< of each particle, [0, 1]
-  bool valueOpacity = true;  ///< opacity times grey level: dark regions become transparent
-  double minimum = 1.0, maximum = 1e300; ///< grey levels that are shown
-  double black = 0.0, white = 255.0;     ///< of the display
-  int budget = 2000000; ///< at most so many: beyond, downsampling grows
+  int downsampling = 2;     ///< one particle per block of so many voxels along each axis, [1, 64]
+  int coarsening = 1;       ///< level of detail: blocks so many times larger, each as opaque as what it stands for, [1, 64]
+  double opacity = 0.3;     ///< of a particle of one block of `downsampling` voxels, [0, 1]
+  bool valueOpacity = true; ///< opacity times grey level: dark regions become transparent
+  double minimum = 1.0, maximum = 1e300; ///< grey levels that are shown, both included
+  double black = 0.0, white = 255.0;     ///< grey levels that are drawn black and white; black < white
+  int budget = 2000000;                  ///< at most so many particles, >= 1: beyond, the coarsening grows
+  /// Throws Error(InvalidParameter) that names the parameter and its range.
   void Check() const;
 };
 
+/// A volume as small cubes, in the order of their blocks (x fastest).
 struct Particles {
-  std::vector<float> positions;     ///< x y z in the physical space of the volume's file, mm
+  std::vector<float> positions;     ///< x y z: middles of the blocks in the space of the given geometry, mm
   std::vector<std::uint8_t> values; ///< grey level through the window, 0 to 255
-  std::vector<std::uint8_t> alphas; ///< opacity, 0 to 255
-  float sizeMm = 0.0f;              ///< side of a block: the size at which particles touch
-  int downsampling = 1;             ///< what was used
+  std::vector<std::uint8_t> alphas; ///< opacity, 1 to 255
+  float sizeMm = 0.0f;              ///< side of a cube as large as a block: at this size particles touch
+  int block = 1;                    ///< voxels along a block's side that were used
+  std::size_t Count() const { return values.size(); }
 };
 
+/// The grey level of a particle is the mean of the real voxels of its block; a block without any gives no particle, nor does one
+/// that would be invisible. Blocks at the far faces may be smaller. A block that is larger than asked for, by the coarsening or
+/// by the budget, takes the opacity of as many layers: 1 - (1 - opacity)^(block / downsampling). Cost: one reading of the voxels.
+/// Independent of the number of threads. \throws Error(InvalidParameter), Error(BadInput) for a geometry that is none or not the
+/// voxels'.
 template <class T>
 Particles MakeParticles(const PosedVolume<T>& volume, const ParticleParameters& parameters, const Progress& progress = {});
 
-/// The order of particles from back to front along a viewing direction: a counting sort of 16-bit depths.
-std::vector<std::uint32_t> BackToFront(const std::vector<float>& positions, const Eigen::Vector3d& towardsViewer);
+/// Some particles, and how far each lies towards the viewer: direction . position + offset.
+struct ParticleDepths {
+  const std::vector<float>* positions = nullptr;
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  double offset = 0.0;
+};
+
+/// The order of the particles of several sets, counted through, from back to front: a stable counting sort of 16-bit depths.
+/// Sets that were moved need no moved copy of their positions: for a pose (R, t) and a direction d towards the viewer, the
+/// direction is R^T d and the offset d . t. Independent of the number of threads.
+std::vector<std::uint32_t> BackToFront(const std::vector<ParticleDepths>& sets);
 
 } // namespace echorama

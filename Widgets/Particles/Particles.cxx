@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Layers of blocks are independent: each sums its voxels row by row into the sums of its blocks and writes its particles into
+// lists of its own, which are then put one after the other. So the voxels are read once, in their order, and the result does not
+// depend on threads. When the budget is exceeded the blocks are made larger by what the count tells, and all is done once more.
+//
+// The sort: depths are cut into 65536 steps, steps are counted, and places follow from the counts. Its cost is two passes.
+#include "Particles.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/Sampling.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace echorama {
+namespace {
+
+[[noreturn]] void Refuse(const std::string& sentence)
+{
+  throw Error(Error::Kind::InvalidParameter, sentence);
+}
+
+struct Layer {
+  std::vector<float> positions;
+  std::vector<std::uint8_t> values, alphas;
+};
+
+// What grey levels become: value and opacity of a particle.
+struct Look {
+  double black, scale, minimum, maximum;
+  std::uint8_t alphaOfValue[256];
+
+  Look(const ParticleParameters& p, int block)
+    : black(p.black), scale(255.0 / (p.white - p.black)), minimum(p.minimum), maximum(p.maximum)
+  {
+    const double layers = static_cast<double>(block) / p.downsampling;
+    for (int value = 0; value < 256; ++value) {
+      const double one = p.valueOpacity ? p.opacity * value / 255.0 : p.opacity;
+      alphaOfValue[value] = static_cast<std::uint8_t>(std::lround(255.0 * (1.0 - std::pow(1.0 - one, layers))));
+    }
+  }
+
+  std::uint8_t ValueOf(double grey) const
+  {
+    return static_cast<std::uint8_t>(std::lround(std::clamp((grey - black) * scale, 0.0, 255.0)));
+  }
+};
+
+// The particles of the blocks whose voxels begin at slice \a block * number.
+template <class T>
+Layer LayerOf(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, const Look& look)
+{
+  const auto& n = volume.intensity.Dimensions();
+  const Sampler<T> sampler(volume.intensity, volume.valid);
+  const int columns = (n[0] + block - 1) / block, rows = (n[1] + block - 1) / block;
+  const int first = static_cast<int>(number) * block, last = std::min(first + block, n[2]);
+  const Eigen::Affine3d toWorld = volume.geometry.IndexToWorld();
+  const auto middle = [block](int index, int count) { return 0.5 * (index * block + std::min((index + 1) * block, count) - 1); };
+  std::vector<double> sums(static_cast<std::size_t>(columns));
+  std::vector<int> counts(sums.size());
+  Layer layer;
+  for (int row = 0; row < rows; ++row) {
+    std::fill(sums.begin(), sums.end(), 0.0);
+    std::fill(counts.begin(), counts.end(), 0);
+    for (int k = first; k < last; ++k)
+      for (int j = row * block; j < std::min((row + 1) * block, n[1]); ++j) {
+        const std::ptrdiff_t begin = volume.intensity.SliceStride() * k + volume.intensity.RowStride() * j;
+        std::size_t column = 0;
+        for (int i = 0; i < n[0]; ++column)
+          for (const int end = std::min(i + block, n[0]); i < end; ++i)
+            if (sampler.IsReal(begin + i)) {
+              sums[column] += static_cast<double>(volume.intensity[begin + i]);
+              ++counts[column];
+            }
+      }
+    for (int column = 0; column < columns; ++column) {
+      const auto at = static_cast<std::size_t>(column);
+      if (counts[at] == 0)
+        continue;
+      const double grey = sums[at] / counts[at];
+      if (!(grey >= look.minimum && grey <= look.maximum))
+        continue;
+      const std::uint8_t value = look.ValueOf(grey), alpha = look.alphaOfValue[value];
+      if (alpha == 0)
+        continue;
+      const Eigen::Vector3f position =
+          (toWorld * Eigen::Vector3d(middle(column, n[0]), middle(row, n[1]), 0.5 * (first + last - 1))).template cast<float>();
+      layer.positions.insert(layer.positions.end(), position.data(), position.data() + 3);
+      layer.values.push_back(value);
+      layer.alphas.push_back(alpha);
+    }
+  }
+  return layer;
+}
+
+} // namespace
+
+void ParticleParameters::Check() const
+{
+  if (downsampling < 1 || downsampling > 64)
+    Refuse("the downsampling must be in [1, 64]; it is " + std::to_string(downsampling));
+  if (coarsening < 1 || coarsening > 64)
+    Refuse("the coarsening must be in [1, 64]; it is " + std::to_string(coarsening));
+  if (!(opacity >= 0.0 && opacity <= 1.0))
+    Refuse("the opacity must be in [0, 1]; it is " + std::to_string(opacity));
+  if (std::isnan(minimum) || std::isnan(maximum))
+    Refuse("the minimum and the maximum must be numbers");
+  if (!std::isfinite(black) || !std::isfinite(white) || !(black < white))
+    Refuse("black must be below white; they are " + std::to_string(black) + " and " + std::to_string(white));
+  if (budget < 1)
+    Refuse("the budget must be at least 1; it is " + std::to_string(budget));
+}
+
+template <class T>
+Particles MakeParticles(const PosedVolume<T>& volume, const ParticleParameters& parameters, const Progress& progress)
+{
+  parameters.Check();
+  volume.geometry.Check("the volume");
+  const auto& n = volume.intensity.Dimensions();
+  if (n != volume.geometry.dimensions || (!volume.valid.Empty() && volume.valid.Dimensions() != n))
+    throw Error(Error::Kind::BadInput, "the volume: its voxels, valid region and geometry differ in their dimensions");
+
+  int block = parameters.downsampling * parameters.coarsening;
+  for (;;) {
+    const Look look(parameters, block);
+    std::vector<Layer> layers(static_cast<std::size_t>((n[2] + block - 1) / block));
+    ParallelFor(static_cast<std::ptrdiff_t>(layers.size()), progress,
+                [&](std::ptrdiff_t number) { layers[static_cast<std::size_t>(number)] = LayerOf(volume, block, number, look); });
+    std::size_t count = 0;
+    for (const Layer& layer : layers)
+      count += layer.values.size();
+    if (count > static_cast<std::size_t>(parameters.budget)) {
+      const double growth = std::cbrt(static_cast<double>(count) / parameters.budget);
+      block = std::max(block + 1, static_cast<int>(block * growth));
+      continue;
+    }
+    Particles particles;
+    particles.block = block;
+    particles.sizeMm = static_cast<float>(block * std::cbrt(volume.geometry.spacing.prod()));
+    particles.positions.reserve(3 * count);
+    particles.values.reserve(count);
+    particles.alphas.reserve(count);
+    for (Layer& layer : layers) {
+      particles.positions.insert(particles.positions.end(), layer.positions.begin(), layer.positions.end());
+      particles.values.insert(particles.values.end(), layer.values.begin(), layer.values.end());
+      particles.alphas.insert(particles.alphas.end(), layer.alphas.begin(), layer.alphas.end());
+      layer = Layer();
+    }
+    return particles;
+  }
+}
+
+std::vector<std::uint32_t> BackToFront(const std::vector<ParticleDepths>& sets)
+{
+  constexpr std::size_t Steps = 1 << 16;
+  std::vector<std::size_t> begins{0};
+  for (const ParticleDepths& set : sets)
+    begins.push_back(begins.back() + set.positions->size() / 3);
+  const std::size_t count = begins.back();
+  if (count > std::numeric_limits<std::uint32_t>::max())
+    throw Error(Error::Kind::TooLarge, "there are more particles than can be sorted");
+
+  std::vector<float> depths(count);
+  for (std::size_t s = 0; s < sets.size(); ++s) {
+    const Eigen::Vector3f d = sets[s].direction.cast<float>();
+    const float offset = static_cast<float>(sets[s].offset);
+    const float* positions = sets[s].positions->data();
+    float* out = depths.data() + begins[s];
+    ParallelRanges(static_cast<std::ptrdiff_t>(begins[s + 1] - begins[s]), 1 << 15, Progress(),
+                   [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                     for (std::ptrdiff_t p = begin; p < end; ++p)
+                       out[p] = positions[3 * p] * d[0] + positions[3 * p + 1] * d[1] + positions[3 * p + 2] * d[2] + offset;
+                   });
+  }
+  std::vector<std::uint32_t> order(count);
+  if (count == 0)
+    return order;
+  const auto [least, most] = std::minmax_element(depths.begin(), depths.end());
+  const float low = *least, range = *most - low;
+  const float scale = range > 0.0f ? static_cast<float>(Steps - 1) / range : 0.0f;
+  const auto step = [&](float depth) { return std::min(static_cast<std::size_t>((depth - low) * scale), Steps - 1); };
+  std::vector<std::uint32_t> places(Steps + 1, 0);
+  for (const float depth : depths)
+    ++places[step(depth) + 1];
+  for (std::size_t s = 1; s <= Steps; ++s)
+    places[s] += places[s - 1];
+  for (std::size_t p = 0; p < count; ++p)
+    order[places[step(depths[p])]++] = static_cast<std::uint32_t>(p);
+  return order;
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template Particles MakeParticles<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama
