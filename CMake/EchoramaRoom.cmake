@@ -92,9 +92,7 @@ macro(_echorama_add_tests name)
       target_link_libraries(${name}Tests PRIVATE Echorama::${name}Kernels ${room_KERNEL_LIBRARIES} GTest::gtest_main)
       target_compile_definitions(${name}Tests PRIVATE ECHORAMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
       echorama_compile_options(${name}Tests)
-      target_compile_options(${name}Tests PRIVATE -O1 # tests are compiled longer than they run
-        # and then GCC 12 warns of the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-        $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized> $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+      target_compile_options(${name}Tests PRIVATE -O1) # tests are compiled longer than they run
       gtest_discover_tests(${name}Tests TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
         PROPERTIES LABELS kernel TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
     endif()
