@@ -4,14 +4,18 @@
 // opened tell the same events, and none can be forgotten.
 #include "vtkUltrasoundAlignmentSession.h"
 
+#include "vtkCallbackCommand.h"
+#include "vtkDoubleArray.h"
 #include "vtkExecutive.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
+#include "vtkIntArray.h"
 #include "vtkMatrix4x4.h"
 #include "vtkMultiBlockDataSet.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
+#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 #include "vtkStringArray.h"
@@ -19,8 +23,14 @@
 #include "vtkUltrasoundVolume.h"
 
 #include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Base/VtkMessage.h"
 #include "Core/Geometry/PoseFile.h"
 #include "Filters/Registration/Percentile.h"
+#include "Filters/Registration/ValidPoints.h"
+#include "Widgets/Session/BackupWriter.h"
+#include "Widgets/Session/LiveScore.h"
+#include "Widgets/Session/ProjectFile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,6 +44,9 @@ namespace fs = std::filesystem;
 namespace {
 constexpr double RadiansPerDegree = EIGEN_PI / 180.0;
 constexpr std::ptrdiff_t GreySamples = 50000; // per volume
+constexpr int ScorePoints = 2000;             // per volume
+constexpr std::uint64_t ScoreSeed = 1;
+constexpr const char* Damaged = "damaged";
 
 Pose PoseOf(vtkMatrix4x4* matrix)
 {
@@ -82,6 +95,16 @@ std::string TextOf(const char* text)
   return text ? text : "";
 }
 
+// Throws when the pose was found for another geometry.
+std::optional<Pose> PoseAmong(const std::vector<VolumePose>& poses, const SessionVolume& volume)
+{
+  const std::string file = volume.file.empty() ? volume.name : volume.file;
+  const bool named = std::any_of(poses.begin(), poses.end(), [&](const VolumePose& pose) {
+    return fs::path(pose.file).filename() == fs::path(file).filename();
+  });
+  return named ? std::optional<Pose>(PoseFor(poses, file, volume.geometry).volumeToWorld) : std::nullopt;
+}
+
 // Some of the grey levels that are real.
 void SampleGreyLevels(vtkImageData* image, std::vector<double>& levels)
 {
@@ -98,6 +121,63 @@ void SampleGreyLevels(vtkImageData* image, std::vector<double>& levels)
     }
   });
 }
+
+// A file that is being read: made and let go by one thread, read by another.
+struct ReadingFile {
+  std::string Path;
+  vtkSmartPointer<vtkUltrasoundReader> Reader = vtkSmartPointer<vtkUltrasoundReader>::New();
+  vtkNew<vtkCallbackCommand> Listener;
+  std::vector<std::string> Errors;
+  bool Done = false;
+
+  explicit ReadingFile(const std::string& path) : Path(path)
+  {
+    this->Listener->SetClientData(&this->Errors);
+    this->Listener->SetCallback([](vtkObject*, unsigned long, void* errors, void* text) {
+      static_cast<std::vector<std::string>*>(errors)->push_back(SentenceOfVtkMessage(text ? static_cast<const char*>(text) : ""));
+    });
+    this->Reader->AddObserver(vtkCommand::ErrorEvent, this->Listener);
+    this->Reader->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, this->Listener);
+    this->Reader->SetFileName(path.c_str());
+  }
+
+  void Read() { this->Done = this->Reader->GetExecutive()->Update() != 0; }
+
+  vtkImageData* Image() const
+  {
+    if (this->Done && this->Errors.empty() && this->Reader->GetOutput()->GetNumberOfPoints() > 0) {
+      return this->Reader->GetOutput();
+    }
+    const std::string reason = ReasonAmong(this->Errors);
+    throw Error(Error::Kind::BadFile, reason.find(this->Path) != std::string::npos
+                                          ? reason
+                                          : this->Path + ": " + (reason.empty() ? "it cannot be read as a volume" : reason));
+  }
+};
+
+// Whatever can be read of \a paths, side by side. Throws for the first that cannot.
+std::vector<vtkSmartPointer<vtkImageData>> ReadImages(const std::vector<std::string>& paths)
+{
+  std::vector<std::unique_ptr<ReadingFile>> files;
+  for (const std::string& path : paths) {
+    files.push_back(std::make_unique<ReadingFile>(path));
+  }
+  ParallelFor(static_cast<std::ptrdiff_t>(files.size()),
+              [&files](std::ptrdiff_t i) { files[static_cast<std::size_t>(i)]->Read(); });
+  std::vector<vtkSmartPointer<vtkImageData>> images;
+  for (const auto& file : files) {
+    images.emplace_back(file->Image());
+  }
+  return images;
+}
+
+void CheckSameGeometry(const ImageGeometry& recorded, const ImageGeometry& found, const std::string& file)
+{
+  if (recorded.VoxelCount() > 0 && !recorded.AgreesWith(found)) {
+    throw Error(Error::Kind::BadInput, file + ": its geometry is not the one that the project was saved with "
+                                              "(has it been moved or resampled since?)");
+  }
+}
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -106,15 +186,31 @@ struct vtkUltrasoundAlignmentSession::Internals {
   struct Voxels {
     vtkSmartPointer<vtkImageData> Source; ///< as the file stands, sharing what was given
     vtkSmartPointer<vtkImageData> Image;  ///< where it lies now
+    SessionVolume Known;                  ///< as it came: file, name, geometry
   };
 
   AlignmentSession Session;
   std::map<int, Voxels> Volumes; ///< also those that undo could bring back
   std::optional<std::array<double, 2>> GreyWindow;
   bool GreyWindowChosen = false;
+
   std::vector<std::string> SearchFolders;
-  std::string ProjectPath;
-  SessionState Saved;
+  std::string ProjectPath, Comment;
+  Project Saved; ///< what is in the project file
+
+  bool AutomaticBackups = false;
+  std::unique_ptr<BackupWriter> Writer;
+  std::string BackupTrouble;       ///< why there is no writer, told once
+  bool BackedUpUnfinished = false; ///< the last backup is of an edit that goes on
+
+  std::string TruthFile;
+  std::vector<VolumePose> TruthPoses; ///< of the file, also of volumes that may still come
+  LiveScore Score;
+  int FixedVolume = -1; ///< chosen; -1: the first
+  std::optional<LiveScoreResult> Scored;
+  bool ScoreIsCurrent = false;
+
+  Project Now() const { return {this->Session.State(), this->TruthFile, this->Comment}; }
 
   const SessionVolume* Find(int id) const { return this->Session.State().Find(id); }
 
@@ -123,6 +219,151 @@ struct vtkUltrasoundAlignmentSession::Internals {
     Voxels& voxels = this->Volumes.at(volume.id);
     voxels.Image->ShallowCopy(voxels.Source);
     vtkUltrasoundVolume::Move(voxels.Image, volume.volumeToWorld);
+  }
+
+  void Hold(const SessionVolume& volume, vtkImageData* image)
+  {
+    Voxels voxels{vtkSmartPointer<vtkImageData>::New(), vtkSmartPointer<vtkImageData>::New(), volume};
+    voxels.Source->ShallowCopy(image);
+    vtkUltrasoundVolume::SetGeometry(voxels.Source, volume.geometry);
+    this->Volumes[volume.id] = std::move(voxels);
+  }
+
+  // The images of volumes from files: taken from blocks that have the names of the files, else read.
+  std::vector<vtkSmartPointer<vtkImageData>> Load(const std::vector<std::string>& files, vtkMultiBlockDataSet* blocks) const
+  {
+    std::vector<vtkSmartPointer<vtkImageData>> images(files.size());
+    std::vector<std::string> paths;
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      for (unsigned int block = 0; blocks && block < blocks->GetNumberOfBlocks(); ++block) {
+        const char* name = blocks->HasMetaData(block) ? blocks->GetMetaData(block)->Get(vtkCompositeDataSet::NAME()) : nullptr;
+        if (name && files[i] == AbsolutePath(name)) {
+          images[i] = vtkImageData::SafeDownCast(blocks->GetBlock(block));
+        }
+      }
+      if (!images[i]) {
+        paths.push_back(files[i]);
+        places.push_back(i);
+      }
+    }
+    const std::vector<vtkSmartPointer<vtkImageData>> read = ReadImages(paths);
+    for (std::size_t i = 0; i < read.size(); ++i) {
+      images[places[i]] = read[i];
+    }
+    return images;
+  }
+
+  // Where the volumes of a project are now. Throws an error that names all that are nowhere.
+  void FindFiles(const std::string& path, std::vector<SessionVolume*>& volumes) const
+  {
+    std::string missing;
+    int count = 0;
+    for (SessionVolume* volume : volumes) {
+      const std::string found = this->FindFile(path, volume->file);
+      if (found.empty()) {
+        missing += (count++ > 0 ? ", " : "") + (volume->file.empty() ? volume->name + " (it was in no file)" : volume->file);
+      } else {
+        volume->file = AbsolutePath(found);
+      }
+    }
+    if (count > 0) {
+      throw Error(Error::Kind::FileSystem, path + ": " + std::to_string(count) + " of its volumes are not there: " + missing +
+                                               " (they are also looked for beside the project and in the search folders)");
+    }
+  }
+
+  std::string FindFile(const std::string& path, const std::string& file) const
+  {
+    std::vector<std::string> folders = this->SearchFolders;
+    if (!this->ProjectPath.empty()) {
+      folders.push_back(fs::path(this->ProjectPath).parent_path().string());
+    }
+    return FindVolume(path, file, folders);
+  }
+
+  // The truth of a volume, when there is one for it.
+  void SetTruthOf(const SessionVolume& volume, const Pose& truth)
+  {
+    vtkImageData* image = this->Volumes.at(volume.id).Source;
+    vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(image);
+    const auto valid = vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(image), image);
+    std::vector<Eigen::Vector3d> points;
+    vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
+      points = ValidPoints(vtkUltrasoundVolume::ViewOf<const decltype(type)>(intensity, image), valid, ScorePoints, ScoreSeed);
+    });
+    this->Score.Set(volume.id, volume.name, volume.geometry.Moved(truth), std::move(points));
+    this->ScoreIsCurrent = false;
+  }
+
+  bool MatchTruth(const SessionVolume& volume)
+  {
+    const std::optional<Pose> truth = PoseAmong(this->TruthPoses, volume);
+    if (truth) {
+      this->SetTruthOf(volume, *truth);
+    }
+    return truth.has_value();
+  }
+
+  int Fixed() const
+  {
+    if (this->FixedVolume > 0 && this->Find(this->FixedVolume) && this->Score.Has(this->FixedVolume)) {
+      return this->FixedVolume;
+    }
+    for (const SessionVolume& volume : this->Session.State().volumes) {
+      if (this->Score.Has(volume.id)) {
+        return volume.id;
+      }
+    }
+    return -1;
+  }
+
+  // nullptr: there is none.
+  const LiveScoreResult* CurrentScore()
+  {
+    if (!this->ScoreIsCurrent) {
+      this->Scored.reset();
+      this->ScoreIsCurrent = true;
+      std::map<int, ImageGeometry> aligned;
+      for (const SessionVolume& volume : this->Session.State().volumes) {
+        if (this->Score.Has(volume.id)) {
+          aligned[volume.id] = volume.geometry.Moved(volume.volumeToWorld);
+        }
+      }
+      if (aligned.size() >= 2) {
+        this->Scored = this->Score.Update(aligned, this->Fixed());
+      }
+    }
+    return this->Scored ? &*this->Scored : nullptr;
+  }
+
+  // The folder of the project's backups, or of the session's while it was never saved.
+  std::string BackupFolder() const
+  {
+    if (this->Writer) {
+      return this->Writer->Folder();
+    }
+    return this->ProjectPath.empty() ? std::string() : Backups::FolderFor(this->ProjectPath);
+  }
+
+  BackupWriter& NeedWriter()
+  {
+    if (!this->Writer) {
+      this->Writer = std::make_unique<BackupWriter>(Backups::FolderFor(this->ProjectPath));
+    }
+    return *this->Writer;
+  }
+
+  // A session that was never saved leaves backups behind only while there is work in them.
+  void LeaveBackups(bool keep)
+  {
+    if (this->Writer) {
+      const std::string folder = this->Writer->Folder();
+      this->Writer.reset();
+      if (this->ProjectPath.empty() && !keep) {
+        Backups::Discard(folder);
+      }
+    }
   }
 
   // Voxels that nothing can bring back are let go.
@@ -140,7 +381,10 @@ vtkStandardNewMacro(vtkUltrasoundAlignmentSession);
 vtkUltrasoundAlignmentSession::vtkUltrasoundAlignmentSession() : Parts(std::make_unique<Internals>()) {}
 
 //----------------------------------------------------------------------------
-vtkUltrasoundAlignmentSession::~vtkUltrasoundAlignmentSession() = default;
+vtkUltrasoundAlignmentSession::~vtkUltrasoundAlignmentSession()
+{
+  this->Parts->LeaveBackups(this->GetModifiedSinceSave());
+}
 
 //----------------------------------------------------------------------------
 const AlignmentSession& vtkUltrasoundAlignmentSession::GetKernel() const
@@ -149,7 +393,7 @@ const AlignmentSession& vtkUltrasoundAlignmentSession::GetKernel() const
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change)
+bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, const std::string& label)
 {
   AlignmentSession& session = this->Parts->Session;
   const SessionState before = session.State();
@@ -199,6 +443,16 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change)
   if (history) {
     this->Parts->Forget();
   }
+  if (poses != 0 || volumes != 0) {
+    this->Parts->ScoreIsCurrent = false;
+  }
+  const bool ended = this->Parts->BackedUpUnfinished && !session.Editing();
+  if (this->Parts->AutomaticBackups && done && (poses != 0 || volumes != 0 || history || ended)) {
+    this->BackUpInTheBackground(!label.empty()      ? label
+                                : session.Editing() ? session.EditLabel()
+                                                    : session.UndoLabel(),
+                                !session.Editing());
+  }
 
   const bool selected = selection != session.Selection() || centre != session.ChosenCentre();
   const auto tell = [this](unsigned long event, int of) {
@@ -228,12 +482,16 @@ int vtkUltrasoundAlignmentSession::AddVolume(vtkImageData* image, const char* fi
     }
     vtkUltrasoundVolume::CheckInput(nullptr, image, called);
     volume.geometry = vtkUltrasoundVolume::GeometryOf(image);
-
-    Internals::Voxels voxels{vtkSmartPointer<vtkImageData>::New(), vtkSmartPointer<vtkImageData>::New()};
-    voxels.Source->ShallowCopy(image);
-    vtkUltrasoundVolume::SetGeometry(voxels.Source, volume.geometry);
-    id = this->Parts->Session.Add(std::move(volume));
-    this->Parts->Volumes[id] = std::move(voxels);
+    const int added = this->Parts->Session.Add(std::move(volume));
+    const SessionVolume& known = *this->Parts->Find(added);
+    this->Parts->Hold(known, image);
+    id = added;
+    try {
+      this->Parts->MatchTruth(known);
+    } catch (const Error& error) // the volume is welcome all the same
+    {
+      vtkWarningMacro("the truth was not taken: " << error.what());
+    }
   });
   return id;
 }
@@ -241,13 +499,14 @@ int vtkUltrasoundAlignmentSession::AddVolume(vtkImageData* image, const char* fi
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentSession::OpenVolume(const char* file)
 {
-  vtkNew<vtkUltrasoundReader> reader;
-  reader->SetFileName(file);
-  if (!file || !*file || !reader->GetExecutive()->Update() || reader->GetOutput()->GetNumberOfPoints() == 0) {
-    vtkErrorMacro(<< TextOf(file) << ": it cannot be read as a volume");
-    return 0;
-  }
-  return this->AddVolume(reader->GetOutput(), file);
+  vtkSmartPointer<vtkImageData> image;
+  const bool read = this->Change([&]() {
+    if (!file || !*file) {
+      throw Error(Error::Kind::InvalidParameter, "a volume's file needs a name");
+    }
+    image = ReadImages({file}).front();
+  });
+  return read ? this->AddVolume(image, file) : 0;
 }
 
 //----------------------------------------------------------------------------
@@ -569,7 +828,8 @@ void vtkUltrasoundAlignmentSession::CancelEdit()
 bool vtkUltrasoundAlignmentSession::Undo()
 {
   bool undone = false;
-  this->Change([&]() { undone = this->Parts->Session.Undo(); });
+  const std::string label = this->GetUndoLabel();
+  this->Change([&]() { undone = this->Parts->Session.Undo(); }, "Undo: " + label);
   return undone;
 }
 
@@ -577,7 +837,8 @@ bool vtkUltrasoundAlignmentSession::Undo()
 bool vtkUltrasoundAlignmentSession::Redo()
 {
   bool redone = false;
-  this->Change([&]() { redone = this->Parts->Session.Redo(); });
+  const std::string label = this->GetRedoLabel();
+  this->Change([&]() { redone = this->Parts->Session.Redo(); }, "Redo: " + label);
   return redone;
 }
 
@@ -627,24 +888,99 @@ bool vtkUltrasoundAlignmentSession::EndStroke()
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::OpenProject(const char*, vtkMultiBlockDataSet*)
+bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockDataSet* volumes)
 {
-  vtkErrorMacro("projects are not there yet");
-  return false;
+  Internals& parts = *this->Parts;
+  std::string truth;
+  const bool opened = this->Change(
+      [&]() {
+        const std::string name = TextOf(path);
+        BackupStamp stamp;
+        Project project = ReadProject(name, &stamp);
+        std::vector<SessionVolume*> all;
+        std::vector<std::string> files;
+        for (SessionVolume& volume : project.state.volumes) {
+          all.push_back(&volume);
+        }
+        parts.FindFiles(name, all);
+        for (const SessionVolume* volume : all) {
+          files.push_back(volume->file);
+        }
+        const std::vector<vtkSmartPointer<vtkImageData>> images = parts.Load(files, volumes);
+        for (std::size_t i = 0; i < images.size(); ++i) {
+          vtkUltrasoundVolume::CheckInput(nullptr, images[i], files[i]);
+          const ImageGeometry found = vtkUltrasoundVolume::GeometryOf(images[i]);
+          CheckSameGeometry(all[i]->geometry, found, files[i]);
+          all[i]->geometry = found;
+        }
+
+        const bool isBackup = stamp.number > 0;
+        parts.LeaveBackups(this->GetModifiedSinceSave());
+        parts.Session.Reset(project.state);
+        for (std::size_t i = 0; i < images.size(); ++i) {
+          parts.Hold(parts.Session.State().volumes[i], images[i]);
+        }
+        parts.ProjectPath = isBackup ? std::string() : AbsolutePath(name);
+        parts.Comment = project.comment;
+        parts.TruthFile.clear();
+        parts.TruthPoses.clear();
+        parts.Score.Clear();
+        parts.FixedVolume = -1;
+        truth = project.truth;
+        parts.Saved = isBackup ? Project() : parts.Now();
+        parts.Saved.truth = truth;
+      },
+      "Open");
+  if (opened && !truth.empty()) {
+    const std::string found = parts.FindFile(parts.ProjectPath, truth);
+    this->ReadTruth(found.empty() ? truth.c_str() : found.c_str()); // without it the project is open all the same
+  }
+  return opened;
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::SaveProject(const char*)
+bool vtkUltrasoundAlignmentSession::SaveProject(const char* path)
 {
-  vtkErrorMacro("projects are not there yet");
-  return false;
+  return this->Change(
+      [&]() {
+        Internals& parts = *this->Parts;
+        const std::string name = AbsolutePath(TextOf(path));
+        if (name.empty()) {
+          throw Error(Error::Kind::InvalidParameter, "a project needs a file name");
+        }
+        for (const SessionVolume& volume : parts.Session.State().volumes) {
+          if (volume.file.empty()) {
+            throw Error(Error::Kind::InvalidParameter,
+                        name + ": the volume " + volume.name + " is in no file; write it to one and add that instead");
+          }
+        }
+        const Project project = parts.Now();
+        WriteProject(name, project);
+        parts.Saved = project;
+        if (parts.ProjectPath == name) {
+          return;
+        }
+        // From now on backups lie beside the project. Those that were made before it was a project come along.
+        const std::string before = parts.Writer && parts.ProjectPath.empty() ? parts.Writer->Folder() : std::string();
+        parts.Writer.reset();
+        parts.ProjectPath = name;
+        if (!before.empty()) {
+          Backups::Move(before, Backups::FolderFor(name));
+        }
+      },
+      "Save");
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char*, vtkStringArray*)
+bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char* path, vtkStringArray* files)
 {
-  vtkErrorMacro("projects are not there yet");
-  return false;
+  return this->Change([&]() {
+    const std::string name = TextOf(path);
+    files->Initialize();
+    for (const SessionVolume& volume : ReadProject(name).state.volumes) {
+      files->InsertNextValue(this->Parts->FindFile(name, volume.file));
+    }
+  });
 }
 
 //----------------------------------------------------------------------------
@@ -664,7 +1000,21 @@ std::string vtkUltrasoundAlignmentSession::GetProjectPath() const
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::GetModifiedSinceSave() const
 {
-  return this->Parts->Session.State() != this->Parts->Saved;
+  const Internals& parts = *this->Parts;
+  return parts.Session.State() != parts.Saved.state || parts.TruthFile != parts.Saved.truth ||
+         parts.Comment != parts.Saved.comment;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundAlignmentSession::GetComment() const
+{
+  return this->Parts->Comment;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentSession::SetComment(const char* comment)
+{
+  this->Change([&]() { this->Parts->Comment = TextOf(comment); });
 }
 
 //----------------------------------------------------------------------------
@@ -675,12 +1025,8 @@ bool vtkUltrasoundAlignmentSession::ReadPoses(const char* path)
     const std::vector<VolumePose> poses = echorama::ReadPoses(name);
     std::map<int, Pose> found;
     for (const SessionVolume& volume : this->Parts->Session.State().volumes) {
-      const std::string file = volume.file.empty() ? volume.name : volume.file;
-      const bool named = std::any_of(poses.begin(), poses.end(), [&](const VolumePose& pose) {
-        return fs::path(pose.file).filename() == fs::path(file).filename();
-      });
-      if (named) {
-        found[volume.id] = PoseFor(poses, file, volume.geometry).volumeToWorld;
+      if (const std::optional<Pose> pose = PoseAmong(poses, volume)) {
+        found[volume.id] = *pose;
       }
     }
     if (found.empty()) {
@@ -711,99 +1057,309 @@ bool vtkUltrasoundAlignmentSession::WritePoses(const char* path)
 }
 
 //----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentSession::BackUpInTheBackground(const std::string& label, bool finished)
+{
+  Internals& parts = *this->Parts;
+  std::string trouble;
+  try {
+    parts.NeedWriter().Post(parts.Now(), label, finished);
+    parts.BackedUpUnfinished = !finished;
+    parts.BackupTrouble.clear();
+    trouble = parts.Writer->TakeFailure();
+  } catch (const std::exception& error) {
+    if (parts.BackupTrouble != error.what()) {
+      trouble = parts.BackupTrouble = error.what();
+    }
+  }
+  if (!trouble.empty()) {
+    vtkErrorMacro("there is no new backup: " << trouble);
+  }
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundAlignmentSession::SetAutomaticBackups(bool on)
 {
-  if (on) {
-    vtkErrorMacro("backups are not there yet");
+  if (this->Parts->AutomaticBackups == on) {
+    return;
+  }
+  this->Parts->AutomaticBackups = on;
+  this->Modified();
+  if (on && this->GetModifiedSinceSave()) {
+    this->BackUpInTheBackground(this->GetUndoLabel(), true);
   }
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::GetAutomaticBackups() const
 {
-  return false;
+  return this->Parts->AutomaticBackups;
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundAlignmentSession::GetBackupFolder() const
 {
-  return {};
+  return this->Parts->BackupFolder();
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::BackUp()
 {
-  vtkErrorMacro("backups are not there yet");
-  return false;
+  return this->Change([this]() {
+    BackupWriter& writer = this->Parts->NeedWriter();
+    writer.Post(this->Parts->Now(), this->GetUndoLabel(), !this->Parts->Session.Editing());
+    writer.Flush();
+  });
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundAlignmentSession::GetBackups(vtkStringArray*, vtkStringArray*)
+int vtkUltrasoundAlignmentSession::GetBackups(vtkStringArray* paths, vtkStringArray* labels, vtkDoubleArray* times)
 {
-  return 0;
+  if (this->Parts->Writer) {
+    try {
+      this->Parts->Writer->Flush();
+    } catch (const Error&) // of which the next edit will tell; the earlier ones are listed
+    {
+    }
+  }
+  return GetBackupsIn(this->GetBackupFolder().c_str(), paths, labels, times);
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::RestoreBackup(const char*)
+int vtkUltrasoundAlignmentSession::GetBackupsIn(const char* folder, vtkStringArray* paths, vtkStringArray* labels,
+                                                vtkDoubleArray* times)
 {
-  vtkErrorMacro("backups are not there yet");
-  return false;
+  const std::vector<Backup> backups = folder && *folder ? Backups::List(folder) : std::vector<Backup>();
+  for (vtkAbstractArray* array :
+       {static_cast<vtkAbstractArray*>(paths), static_cast<vtkAbstractArray*>(labels), static_cast<vtkAbstractArray*>(times)}) {
+    if (array) {
+      array->Initialize();
+    }
+  }
+  for (const Backup& backup : backups) {
+    if (paths) {
+      paths->InsertNextValue(backup.path);
+    }
+    if (labels) {
+      labels->InsertNextValue(backup.readable ? backup.label : Damaged);
+    }
+    if (times) {
+      times->InsertNextValue(static_cast<double>(backup.time));
+    }
+  }
+  return static_cast<int>(backups.size());
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::ReadTruth(const char*)
+int vtkUltrasoundAlignmentSession::GetAbandonedSessions(vtkStringArray* folders)
 {
-  vtkErrorMacro("the truth is not there yet");
-  return false;
+  std::vector<std::string> found;
+  try {
+    found = Backups::Abandoned();
+  } catch (const Error&) // no folder of the user, so nothing in it
+  {
+  }
+  if (folders) {
+    folders->Initialize();
+    for (const std::string& folder : found) {
+      folders->InsertNextValue(folder);
+    }
+  }
+  return static_cast<int>(found.size());
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::SetTruth(int, vtkMatrix4x4*)
+bool vtkUltrasoundAlignmentSession::DiscardBackups(const char* folder)
 {
-  vtkErrorMacro("the truth is not there yet");
-  return false;
+  return this->Change([&]() { Backups::Discard(TextOf(folder)); });
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::ClearTruth() {}
+bool vtkUltrasoundAlignmentSession::RestoreBackup(const char* path)
+{
+  return this->Change([&]() {
+    Internals& parts = *this->Parts;
+    const std::string name = TextOf(path);
+    BackupStamp stamp;
+    Project project = ReadProject(name, &stamp);
+    const auto here = [&parts](const SessionVolume& volume) {
+      int id = 0;
+      for (const auto& [each, voxels] : parts.Volumes) {
+        const SessionVolume& known = voxels.Known;
+        const bool same = volume.file.empty() ? known.file.empty() && known.name == volume.name
+                                              : fs::path(known.file).filename() == fs::path(volume.file).filename();
+        if (same && known.geometry.AgreesWith(volume.geometry) && (id == 0 || parts.Find(each))) {
+          id = each; // rather one that is to be seen than one that was removed
+        }
+      }
+      return id;
+    };
+    std::vector<SessionVolume*> others;
+    std::vector<std::string> files;
+    std::set<int> taken;
+    for (SessionVolume& volume : project.state.volumes) {
+      volume.id = here(volume);
+      if (volume.id > 0 && taken.insert(volume.id).second) {
+        volume.file = parts.Volumes.at(volume.id).Known.file;
+        volume.geometry = parts.Volumes.at(volume.id).Known.geometry;
+      } else {
+        volume.id = 0;
+        others.push_back(&volume);
+      }
+    }
+    parts.FindFiles(name, others);
+    for (const SessionVolume* volume : others) {
+      files.push_back(volume->file);
+    }
+    const std::vector<vtkSmartPointer<vtkImageData>> images = parts.Load(files, nullptr);
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      vtkUltrasoundVolume::CheckInput(nullptr, images[i], files[i]);
+      const ImageGeometry found = vtkUltrasoundVolume::GeometryOf(images[i]);
+      CheckSameGeometry(others[i]->geometry, found, files[i]);
+      others[i]->geometry = found;
+    }
+    parts.Session.Replace(project.state, "Restore " + fs::path(name).stem().string());
+    for (std::size_t i = 0, read = 0; i < project.state.volumes.size(); ++i) {
+      if (project.state.volumes[i].id == 0) {
+        parts.Hold(parts.Session.State().volumes[i], images[read++]);
+      }
+    }
+  });
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::ReadTruth(const char* path)
+{
+  const bool read = this->Change([&]() {
+    Internals& parts = *this->Parts;
+    const std::string name = TextOf(path);
+    std::vector<VolumePose> poses = echorama::ReadPoses(name);
+    bool found = false;
+    for (const SessionVolume& volume : parts.Session.State().volumes) {
+      found = PoseAmong(poses, volume).has_value() || found; // throws before anything has changed
+    }
+    if (!found) {
+      throw Error(Error::Kind::BadInput, name + ": it names none of the volumes");
+    }
+    parts.Score.Clear();
+    parts.TruthPoses = std::move(poses);
+    parts.TruthFile = AbsolutePath(name);
+    for (const SessionVolume& volume : parts.Session.State().volumes) {
+      parts.MatchTruth(volume);
+    }
+  });
+  this->Modified();
+  this->InvokeEvent(PosesChangedEvent, nullptr);
+  return read;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::SetTruth(int id, vtkMatrix4x4* volumeToWorld)
+{
+  const bool set = this->Change([&]() {
+    const SessionVolume* volume = this->Parts->Find(id);
+    if (!volume || !volumeToWorld) {
+      throw Error(Error::Kind::InvalidParameter, "there is no volume " + std::to_string(id) + ", or no truth for it");
+    }
+    const Pose truth = PoseOf(volumeToWorld);
+    if (!IsRotation(truth.linear()) || !truth.translation().allFinite() ||
+        truth.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+      throw Error(Error::Kind::InvalidParameter, "the truth is not rigid");
+    }
+    this->Parts->SetTruthOf(*volume, truth);
+  });
+  this->Modified();
+  this->InvokeEvent(PosesChangedEvent, nullptr);
+  return set;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentSession::ClearTruth()
+{
+  this->Change([this]() {
+    this->Parts->Score.Clear();
+    this->Parts->ScoreIsCurrent = false;
+    this->Parts->TruthPoses.clear();
+    this->Parts->TruthFile.clear();
+  });
+  this->Modified();
+  this->InvokeEvent(PosesChangedEvent, nullptr);
+}
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::HasTruth() const
 {
-  return false;
+  return !this->Parts->Score.Empty();
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundAlignmentSession::GetScore() const
 {
-  return std::numeric_limits<double>::quiet_NaN();
+  const LiveScoreResult* score = this->Parts->CurrentScore();
+  return score ? score->mean : std::numeric_limits<double>::quiet_NaN();
 }
 
 //----------------------------------------------------------------------------
-double vtkUltrasoundAlignmentSession::GetVolumeScore(int) const
+double vtkUltrasoundAlignmentSession::GetVolumeScore(int id) const
 {
-  return std::numeric_limits<double>::quiet_NaN();
+  const LiveScoreResult* score = this->Parts->CurrentScore();
+  const int index = score ? score->IndexOf(id) : -1;
+  return index >= 0 ? score->volumes[static_cast<std::size_t>(index)].mean : std::numeric_limits<double>::quiet_NaN();
 }
 
 //----------------------------------------------------------------------------
-double vtkUltrasoundAlignmentSession::GetRotationError(int) const
+double vtkUltrasoundAlignmentSession::GetRotationError(int id) const
 {
-  return std::numeric_limits<double>::quiet_NaN();
+  const LiveScoreResult* score = this->Parts->CurrentScore();
+  const int index = score ? score->IndexOf(id) : -1;
+  return index >= 0 ? score->degrees[static_cast<std::size_t>(index)] : std::numeric_limits<double>::quiet_NaN();
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::GetErrorVectors(vtkPolyData* vectors, int) const
+void vtkUltrasoundAlignmentSession::GetErrorVectors(vtkPolyData* vectors, int pointsPerVolume) const
 {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkDoubleArray> errors;
+  errors->SetName("Error");
+  errors->SetNumberOfComponents(3);
+  vtkNew<vtkIntArray> ids;
+  ids->SetName("Volume");
+  const LiveScoreResult* score = this->Parts->CurrentScore();
+  for (std::size_t i = 0; score && i < score->volumes.size(); ++i) {
+    const VolumeScore& volume = score->volumes[i];
+    const std::size_t count = std::min(volume.points.size(), static_cast<std::size_t>(std::max(pointsPerVolume, 0)));
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t at = k * volume.points.size() / count; // spread over all: they come in the order of their voxels
+      points->InsertNextPoint(volume.points[at].data());
+      errors->InsertNextTuple(volume.errors[at].data());
+      ids->InsertNextValue(score->ids[i]);
+    }
+  }
   vectors->Initialize();
+  vectors->SetPoints(points);
+  vectors->GetPointData()->AddArray(errors);
+  vectors->GetPointData()->AddArray(ids);
+  vectors->GetPointData()->SetActiveVectors("Error");
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::SetFixedVolume(int) {}
+void vtkUltrasoundAlignmentSession::SetFixedVolume(int id)
+{
+  this->Change([&]() {
+    if (id > 0 && !this->Parts->Score.Has(id)) {
+      throw Error(Error::Kind::InvalidParameter, "volume " + std::to_string(id) + " has no truth and cannot be the fixed one");
+    }
+    this->Parts->FixedVolume = id;
+    this->Parts->ScoreIsCurrent = false;
+  });
+  this->Modified();
+  this->InvokeEvent(PosesChangedEvent, nullptr);
+}
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentSession::GetFixedVolume() const
 {
-  return -1;
+  return this->Parts->Fixed();
 }
 
 //----------------------------------------------------------------------------

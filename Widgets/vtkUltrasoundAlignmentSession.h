@@ -35,6 +35,7 @@
 #endif
 #include <string>
 
+class vtkDoubleArray;
 class vtkImageData;
 class vtkMatrix4x4;
 class vtkMultiBlockDataSet;
@@ -141,8 +142,10 @@ public:
   ///@}
 
   ///@{
-  /** Projects: JSON, paths relative where they can be. What cannot be read is named by the error and nothing is opened.
-   * \a volumes: read already (blocks with NAME() the file as GetProjectFiles tells), so that a window need not wait. */
+  /** Projects: JSON, paths relative where they can be (see Documentation/session.md). What cannot be read is named by the error
+   * and nothing is opened. A pose file opens as well, as a project of its volumes; a backup opens as a session that was never
+   * saved. \a volumes: read already (blocks with NAME() the file as GetProjectFiles tells), so that a window need not wait.
+   * Without, files are read side by side. Saving is atomic; volumes that are in no file cannot be saved. */
   bool OpenProject(const char* path, vtkMultiBlockDataSet* volumes = nullptr);
   bool SaveProject(const char* path);
   /** The files a project needs, where they are now; an empty string for one that is nowhere. */
@@ -151,21 +154,36 @@ public:
   void AddSearchFolder(const char* folder);
   std::string GetProjectPath() const; ///< empty: never saved
   bool GetModifiedSinceSave() const;
-  /** Poses alone: the file that echorama align and stitch read and write. ReadPoses is an edit. */
+  /** For people: who, what. Saved with the project. */
+  std::string GetComment() const;
+  void SetComment(const char* comment);
+  /** Poses alone: the file that echorama align and stitch read and write. ReadPoses is an edit, of the volumes that the file
+   * names. */
   bool ReadPoses(const char* path);
   bool WritePoses(const char* path);
   ///@}
 
   ///@{
-  /** Backups: on by default once AutomaticBackups is on (default off: scripts do not write by surprise; the workbench turns it
-   * on). Restoring is an edit: it can be undone. */
+  /** Backups after each edit, and at least once a second while one goes on; a thread of its own waits for the disk. Default off:
+   * scripts do not write by surprise; the workbench turns it on. */
   void SetAutomaticBackups(bool on);
   bool GetAutomaticBackups() const;
+  /** NAME.backups beside the project NAME.json; of a session that was never saved a folder under the user's data folder. Empty:
+   * of a session without project and without backups. */
   std::string GetBackupFolder() const;
-  bool BackUp(); ///< now
-  /** Paths, newest first; labels and times (seconds since 1970) in the same order; unreadable ones have the label "damaged". */
-  int GetBackups(vtkStringArray* paths, vtkStringArray* labels = nullptr);
+  /** Now; returns when it is on the disk. */
+  bool BackUp();
+  /** Paths, newest first; labels and times (seconds since 1970) in the same order; unreadable ones have the label "damaged".
+   * Returns how many. GetBackupsIn: of another session's folder. */
+  int GetBackups(vtkStringArray* paths, vtkStringArray* labels = nullptr, vtkDoubleArray* times = nullptr);
+  static int GetBackupsIn(const char* folder, vtkStringArray* paths, vtkStringArray* labels = nullptr,
+                          vtkDoubleArray* times = nullptr);
+  /** Restoring is an edit: it can be undone. Volumes that are here keep their ids, others are read. */
   bool RestoreBackup(const char* path);
+  /** Folders of sessions that ended without being saved, and whose process is gone: the newest first. OpenProject opens the
+   * newest backup in one, DiscardBackups removes them. */
+  static int GetAbandonedSessions(vtkStringArray* folders);
+  bool DiscardBackups(const char* folder);
   ///@}
 
   ///@{
@@ -181,7 +199,7 @@ public:
   /** Points of the volumes where they are, with the array Error (3 doubles, mm) from where they belong, and Volume (ids). */
   void GetErrorVectors(vtkPolyData* vectors, int pointsPerVolume = 200) const;
   void SetFixedVolume(int id);
-  int GetFixedVolume() const;
+  int GetFixedVolume() const; ///< -1: none has a truth
   ///@}
 
 protected:
@@ -199,8 +217,10 @@ public:
 
 private:
   struct Internals;
-  /** Does it, reports an error that it throws, and tells what has changed. Returns whether it went well. */
-  bool Change(const std::function<void()>& change);
+  /** Does it, reports an error that it throws, and tells what has changed. \a label: of the backup, when it is not the edit's.
+   * Returns whether it went well. */
+  bool Change(const std::function<void()>& change, const std::string& label = {});
+  void BackUpInTheBackground(const std::string& label, bool finished);
   std::unique_ptr<Internals> Parts;
 #endif
 };

@@ -24,6 +24,7 @@ public:
   bool End();    ///< whether there is a new entry
   void Cancel(); ///< back to where the outermost Begin was; no edit is open afterwards
   bool Editing() const { return depth_ > 0; }
+  const std::string& EditLabel() const { return label_; } ///< of the edit that is open, or was the last
   ///@}
   ///@{ Undo and redo, one entry at a time; false when there is none. During an edit: Error(NotPossible).
   bool Undo();

@@ -215,6 +215,28 @@ std::vector<std::string> Backups::Abandoned()
   return folders;
 }
 
+void Backups::Move(const std::string& from, const std::string& to)
+{
+  const Backups target(to);
+  const std::vector<Backup> there = Named(to);
+  int number = there.empty() ? 1 : there.front().number + 1;
+  std::vector<Backup> moving = Named(from);
+  std::reverse(moving.begin(), moving.end());
+  for (const Backup& backup : moving) {
+    const fs::path path = fs::path(to) / FileName(number++, backup.time);
+    std::error_code error;
+    fs::rename(backup.path, path, error);
+    if (error) { // another disk
+      error.clear();
+      fs::copy_file(backup.path, path, error);
+      if (!error)
+        fs::remove(backup.path, error);
+    }
+  }
+  if (Named(from).empty() && !InUse(from))
+    Discard(from);
+}
+
 void Backups::Discard(const std::string& folder)
 {
   if (InUse(folder))

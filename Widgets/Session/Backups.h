@@ -37,8 +37,11 @@ public:
   /// stay.
   bool Write(const Project& project, const std::string& label, bool inPlaceOfLast = false);
 
-  /// Of a folder, the newest first; damaged ones are marked. A folder that is not there has none.
+  /// The newest first; damaged ones are marked. A folder that is not there has none.
   static std::vector<Backup> List(const std::string& folder);
+  std::vector<Backup> List() const { return List(folder_); }
+  /// \throws as ReadProject.
+  static Project Read(const Backup& backup) { return ReadProject(backup.path); }
   /// Under which name a backup lies in its folder.
   static std::string FileName(int number, std::int64_t time);
 
@@ -47,6 +50,9 @@ public:
   static std::string FolderFor(const std::string& path);
   /// Sessions that ended without being saved: their folders, the newest first. Those that still run are not among them.
   static std::vector<std::string> Abandoned();
+  /// Takes the backups of \a from over, as the next ones of \a to (a session that was saved for the first time); \a from goes
+  /// when nothing else is in it. What cannot be moved stays. \throws Error(FileSystem) when \a to cannot be made.
+  static void Move(const std::string& from, const std::string& to);
   /// Removes the backups of a folder, and the folder when nothing else is in it. \throws Error(NotPossible) when a session still
   /// uses it.
   static void Discard(const std::string& folder);
