@@ -32,6 +32,17 @@ void Brush::Check() const
   CheckRange("hardness", hardness, 0.0, 1.0);
 }
 
+bool operator==(const Brush& a, const Brush& b)
+{
+  return a.mode == b.mode && a.radiusMm == b.radiusMm && a.intensity == b.intensity && a.opacity == b.opacity &&
+         a.hardness == b.hardness && a.insideValid == b.insideValid;
+}
+
+bool operator==(const Stroke& a, const Stroke& b)
+{
+  return a.brush == b.brush && a.pathMm == b.pathMm;
+}
+
 StrokeNode::~StrokeNode()
 {
   // Each node would destroy the one before it, as deep as the chain is long; so those that only this chain holds are let go

@@ -2,6 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace echorama {
@@ -24,6 +25,7 @@ struct Brush {
   /// Throws Error(InvalidParameter) that names the parameter and its range.
   void Check() const;
 };
+bool operator==(const Brush&, const Brush&); ///< exact
 
 /// One stroke from press to release: the brush goes along straight lines through the points. A voxel is painted once, however
 /// often the brush passes: what counts is its least distance from the path. So the result does not depend on how finely the
@@ -32,6 +34,7 @@ struct Stroke {
   Brush brush;
   std::vector<Eigen::Vector3d> pathMm; ///< in the physical space of the volume's file, mm: strokes go where the volume goes
 };
+bool operator==(const Stroke&, const Stroke&); ///< exact
 
 /// All strokes on a volume, the last one first: a list that is never changed but only lengthened, so that copies are cheap and
 /// every earlier state of an editing session remains valid. nullptr: none.
@@ -39,7 +42,10 @@ struct StrokeNode {
   Stroke stroke;
   std::shared_ptr<const StrokeNode> before;
   int count = 1; ///< of strokes up to and with this one
-  StrokeNode(Stroke s, std::shared_ptr<const StrokeNode> b) : stroke(std::move(s)), before(std::move(b)), count(before ? before->count + 1 : 1) {}
+  StrokeNode(Stroke s, std::shared_ptr<const StrokeNode> b)
+    : stroke(std::move(s)), before(std::move(b)), count(before ? before->count + 1 : 1)
+  {
+  }
   ~StrokeNode(); ///< not recursive: chains are long
 };
 using StrokeChain = std::shared_ptr<const StrokeNode>;

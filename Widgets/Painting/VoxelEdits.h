@@ -8,28 +8,41 @@ namespace echorama {
 
 /// Keeps the voxels of a volume at a chain of strokes: paints forward, and goes back by giving touched voxels their old values.
 ///
+/// A voxel at the distance d from the path of a brush of radius r and hardness h weighs w = 1 for d <= h r, and falls off as
+/// w = 1 - s^2 (3 - 2 s), s = (d - h r) / (r - h r), to 0 at d = r. Paint makes v + w opacity (intensity - v) of the value v it
+/// had when the stroke began, rounded to the voxel type (a voxel that is not finite counts as 0); what it changes so becomes real
+/// unless the brush keeps inside what is. Carve and Restore take or give back all voxels with d <= r, at once.
+///
 /// The views are the session's own copies and are written to; they must outlive this object. What a stroke replaced is kept in
-/// small blocks, once per stroke, so that going back is exact to the bit and costs as much as the stroke.
+/// blocks of 8^3 voxels, once per stroke, so that going back is exact to the bit and costs as much as the stroke. Memory grows
+/// with the blocks that strokes touch, whatever the size of the volume.
 template <class T>
 class VoxelEdits {
 public:
   /// \param intensity, valid as read from the file; \a valid must not be empty. \param geometry of the file as it stands.
+  /// \throws Error(BadInput) when sizes do not agree.
   VoxelEdits(VolumeView<T> intensity, VolumeView<unsigned char> valid, const ImageGeometry& geometry);
   ~VoxelEdits();
 
-  /// A box of voxels that has changed, to tell views and textures; empty when nothing has.
+  /// The box of blocks in which voxels have changed, to tell views and textures; empty when none has.
   struct Box {
     int begin[3] = {0, 0, 0}, end[3] = {0, 0, 0};
+    bool Empty() const { return end[0] <= begin[0]; }
   };
 
-  /// Undoes back to the last stroke that both chains share, then paints forward.
+  /// Undoes back to the last stroke that both chains share, then paints forward. A stroke in the making is taken back first.
   Box GoTo(const StrokeChain& chain);
 
-  /// A stroke in the making, beyond the chain: adds points and paints at once. End() takes it back, as the finished stroke is
-  /// then painted by GoTo(), or (\a keep) keeps it as what \a chain added.
+  /// A stroke in the making, beyond the chain: adds points and paints at once. Distances count from the whole path so far, so
+  /// that the voxels are those of the finished stroke at any moment.
+  /// \throws Error(InvalidParameter) as Append; Extend throws Error(NotPossible) without Begin().
   void Begin(const Brush& brush);
   Box Extend(const Eigen::Vector3d& pointMm);
-  Box End(const StrokeChain& chain); ///< chain == where Begin() was plus this stroke; nullptr-like (unchanged) to take it back
+  /// Ends it, and goes to \a chain: where that is the chain before plus this very stroke, what is painted stays.
+  Box End(const StrokeChain& chain);
+
+  /// What is kept to go back, bytes.
+  std::size_t MemoryBytes() const;
 
 private:
   struct Parts;
