@@ -41,25 +41,23 @@ struct Look {
     }
   }
 
+  bool Shows(double grey) const { return grey >= minimum && grey <= maximum; }
   std::uint8_t ValueOf(double grey) const
   {
     return static_cast<std::uint8_t>(std::lround(std::clamp((grey - black) * scale, 0.0, 255.0)));
   }
 };
 
-// The particles of the blocks whose voxels begin at slice \a block * number.
-template <class T>
-Layer LayerOf(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, const Look& look)
+// Calls sink(column, row, mean) for the blocks with real voxels whose first slice is \a block * number.
+template <class T, class Sink>
+void VisitBlocks(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, const Sink& sink)
 {
   const auto& n = volume.intensity.Dimensions();
   const Sampler<T> sampler(volume.intensity, volume.valid);
   const int columns = (n[0] + block - 1) / block, rows = (n[1] + block - 1) / block;
   const int first = static_cast<int>(number) * block, last = std::min(first + block, n[2]);
-  const Eigen::Affine3d toWorld = volume.geometry.IndexToWorld();
-  const auto middle = [block](int index, int count) { return 0.5 * (index * block + std::min((index + 1) * block, count) - 1); };
   std::vector<double> sums(static_cast<std::size_t>(columns));
   std::vector<int> counts(sums.size());
-  Layer layer;
   for (int row = 0; row < rows; ++row) {
     std::fill(sums.begin(), sums.end(), 0.0);
     std::fill(counts.begin(), counts.end(), 0);
@@ -76,22 +74,44 @@ Layer LayerOf(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, co
       }
     for (int column = 0; column < columns; ++column) {
       const auto at = static_cast<std::size_t>(column);
-      if (counts[at] == 0)
-        continue;
-      const double grey = sums[at] / counts[at];
-      if (!(grey >= look.minimum && grey <= look.maximum))
-        continue;
-      const std::uint8_t value = look.ValueOf(grey), alpha = look.alphaOfValue[value];
-      if (alpha == 0)
-        continue;
-      const Eigen::Vector3f position =
-          (toWorld * Eigen::Vector3d(middle(column, n[0]), middle(row, n[1]), 0.5 * (first + last - 1))).template cast<float>();
-      layer.positions.insert(layer.positions.end(), position.data(), position.data() + 3);
-      layer.values.push_back(value);
-      layer.alphas.push_back(alpha);
+      if (counts[at] > 0)
+        sink(column, row, sums[at] / counts[at]);
     }
   }
+}
+
+template <class T>
+Layer LayerOf(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, const Look& look)
+{
+  const Eigen::Affine3d toWorld = volume.geometry.IndexToWorld();
+  const auto middle = [block, &volume](std::ptrdiff_t index, std::size_t axis) {
+    return 0.5 * static_cast<double>(index * block +
+                                     std::min<std::ptrdiff_t>((index + 1) * block, volume.intensity.Dimensions()[axis]) - 1);
+  };
+  const double z = middle(number, 2);
+  Layer layer;
+  VisitBlocks(volume, block, number, [&](int column, int row, double grey) {
+    if (!look.Shows(grey))
+      return;
+    const std::uint8_t value = look.ValueOf(grey), alpha = look.alphaOfValue[value];
+    if (alpha == 0)
+      return;
+    const Eigen::Vector3f position = (toWorld * Eigen::Vector3d(middle(column, 0), middle(row, 1), z)).cast<float>();
+    layer.positions.insert(layer.positions.end(), position.data(), position.data() + 3);
+    layer.values.push_back(value);
+    layer.alphas.push_back(alpha);
+  });
   return layer;
+}
+
+template <class T>
+void Check(const PosedVolume<T>& volume, const ParticleParameters& parameters)
+{
+  parameters.Check();
+  volume.geometry.Check("the volume");
+  const auto& n = volume.intensity.Dimensions();
+  if (n != volume.geometry.dimensions || (!volume.valid.Empty() && volume.valid.Dimensions() != n))
+    throw Error(Error::Kind::BadInput, "the volume: its voxels, valid region and geometry differ in their dimensions");
 }
 
 } // namespace
@@ -100,8 +120,8 @@ void ParticleParameters::Check() const
 {
   if (downsampling < 1 || downsampling > 64)
     Refuse("the downsampling must be in [1, 64]; it is " + std::to_string(downsampling));
-  if (coarsening < 1 || coarsening > 64)
-    Refuse("the coarsening must be in [1, 64]; it is " + std::to_string(coarsening));
+  if (block != 0 && (block < downsampling || block > 1 << 20))
+    Refuse("the block of a coarser level must be at least the downsampling; it is " + std::to_string(block));
   if (!(opacity >= 0.0 && opacity <= 1.0))
     Refuse("the opacity must be in [0, 1]; it is " + std::to_string(opacity));
   if (std::isnan(minimum) || std::isnan(maximum))
@@ -115,16 +135,11 @@ void ParticleParameters::Check() const
 template <class T>
 Particles MakeParticles(const PosedVolume<T>& volume, const ParticleParameters& parameters, const Progress& progress)
 {
-  parameters.Check();
-  volume.geometry.Check("the volume");
-  const auto& n = volume.intensity.Dimensions();
-  if (n != volume.geometry.dimensions || (!volume.valid.Empty() && volume.valid.Dimensions() != n))
-    throw Error(Error::Kind::BadInput, "the volume: its voxels, valid region and geometry differ in their dimensions");
-
-  int block = parameters.downsampling * parameters.coarsening;
+  Check(volume, parameters);
+  int block = std::max(parameters.downsampling, parameters.block);
   for (;;) {
     const Look look(parameters, block);
-    std::vector<Layer> layers(static_cast<std::size_t>((n[2] + block - 1) / block));
+    std::vector<Layer> layers(static_cast<std::size_t>((volume.intensity.Slices() + block - 1) / block));
     ParallelFor(static_cast<std::ptrdiff_t>(layers.size()), progress,
                 [&](std::ptrdiff_t number) { layers[static_cast<std::size_t>(number)] = LayerOf(volume, block, number, look); });
     std::size_t count = 0;
@@ -149,6 +164,26 @@ Particles MakeParticles(const PosedVolume<T>& volume, const ParticleParameters& 
     }
     return particles;
   }
+}
+
+template <class T>
+DisplayVolume MakeDisplayVolume(const PosedVolume<T>& volume, const ParticleParameters& parameters, const Progress& progress)
+{
+  Check(volume, parameters);
+  const int block = std::max(1, parameters.block);
+  const auto& n = volume.intensity.Dimensions();
+  const auto blocks = [block](int count) { return (count + block - 1) / block; };
+  const Look look(parameters, block);
+  DisplayVolume display{Volume<unsigned char>({blocks(n[0]), blocks(n[1]), blocks(n[2])}, 0),
+                        Eigen::Vector3d::Constant(0.5 * (block - 1))};
+  const VolumeView<unsigned char> values = display.values.View();
+  ParallelFor(values.Slices(), progress, [&](std::ptrdiff_t number) {
+    VisitBlocks(volume, block, number, [&](int column, int row, double grey) {
+      if (look.Shows(grey))
+        values(column, row, static_cast<int>(number)) = std::max<std::uint8_t>(1, look.ValueOf(grey));
+    });
+  });
+  return display;
 }
 
 std::vector<std::uint32_t> BackToFront(const std::vector<ParticleDepths>& sets)
@@ -191,7 +226,8 @@ std::vector<std::uint32_t> BackToFront(const std::vector<ParticleDepths>& sets)
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \
-  template Particles MakeParticles<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);
+  template Particles MakeParticles<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);                        \
+  template DisplayVolume MakeDisplayVolume<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -9,13 +9,13 @@ namespace echorama {
 
 /// How a volume becomes particles (dissertation 4.3).
 struct ParticleParameters {
-  int downsampling = 2;     ///< one particle per block of so many voxels along each axis, [1, 64]
-  int coarsening = 1;       ///< level of detail: blocks so many times larger, each as opaque as what it stands for, [1, 64]
-  double opacity = 0.3;     ///< of a particle of one block of `downsampling` voxels, [0, 1]
-  bool valueOpacity = true; ///< opacity times grey level: dark regions become transparent
+  int downsampling = 2;                  ///< one particle per block of so many voxels along each axis, [1, 64]
+  int block = 0;                         ///< level of detail: voxels along each axis of coarser blocks, >= downsampling; 0: none
+  double opacity = 0.3;                  ///< of a particle of one block of `downsampling` voxels, [0, 1]
+  bool valueOpacity = true;              ///< opacity times grey level: dark regions become transparent
   double minimum = 1.0, maximum = 1e300; ///< grey levels that are shown, both included
   double black = 0.0, white = 255.0;     ///< grey levels that are drawn black and white; black < white
-  int budget = 2000000;                  ///< at most so many particles, >= 1: beyond, the coarsening grows
+  int budget = 2000000;                  ///< at most so many particles, >= 1: beyond, blocks grow
   /// Throws Error(InvalidParameter) that names the parameter and its range.
   void Check() const;
 };
@@ -37,6 +37,18 @@ struct Particles {
 /// voxels'.
 template <class T>
 Particles MakeParticles(const PosedVolume<T>& volume, const ParticleParameters& parameters, const Progress& progress = {});
+
+/// A volume for volume rendering, of one byte per block.
+struct DisplayVolume {
+  Volume<unsigned char> values;                    ///< 0: nothing to show; 1 to 255: grey level through the window
+  Eigen::Vector3d first = Eigen::Vector3d::Zero(); ///< index, in the voxels of the volume, of the middle of the first block
+};
+
+/// Of `parameters`, block, minimum, maximum, black and white are used. Blocks are whole ones, also at the far faces: the first
+/// is centred on (block - 1) / 2 and the next lie `block` voxels apart. Cost, threads and errors as MakeParticles.
+template <class T>
+DisplayVolume MakeDisplayVolume(const PosedVolume<T>& volume, const ParticleParameters& parameters,
+                                const Progress& progress = {});
 
 /// Some particles, and how far each lies towards the viewer: direction . position + offset.
 struct ParticleDepths {

@@ -95,22 +95,44 @@ TYPED_TEST(ParticlesOf, AreMeansOfBlocks)
 {
   const Scene<TypeParam> scene;
   for (const int downsampling : {1, 2, 3, 5, 64})
-    for (const int coarsening : {1, 2})
+    for (const int coarser : {0, 3})
       for (const bool byValue : {true, false}) {
         ParticleParameters p;
         p.downsampling = downsampling;
-        p.coarsening = coarsening;
+        p.block = coarser > 0 ? downsampling + coarser : 0;
         p.valueOpacity = byValue;
         p.minimum = 40.0;
         p.maximum = 150.0;
         p.black = 20.0;
         p.white = 140.0;
         const Particles particles = MakeParticles(scene.Posed(), p);
-        ExpectSame(particles, ByForce(scene.Posed(), p, downsampling * coarsening));
-        EXPECT_EQ(particles.block, downsampling * coarsening);
-        EXPECT_NEAR(particles.sizeMm, downsampling * coarsening * std::cbrt(0.5 * 0.7 * 1.1), 1e-4);
+        ExpectSame(particles, ByForce(scene.Posed(), p, downsampling + coarser));
+        EXPECT_EQ(particles.block, downsampling + coarser);
+        EXPECT_NEAR(particles.sizeMm, (downsampling + coarser) * std::cbrt(0.5 * 0.7 * 1.1), 1e-4);
         EXPECT_GT(particles.Count(), 0u);
       }
+}
+
+TYPED_TEST(ParticlesOf, DisplayTheirBlocks)
+{
+  const Scene<TypeParam> scene;
+  ParticleParameters p;
+  p.downsampling = 1;
+  p.opacity = 1.0;
+  p.valueOpacity = false;
+  p.minimum = 30.0;
+  for (const int block : {1, 2, 3}) {
+    p.block = block;
+    const DisplayVolume display = MakeDisplayVolume(scene.Posed(), p);
+    const Particles particles = ByForce(scene.Posed(), p, block);
+    std::vector<std::uint8_t> shown;
+    for (const unsigned char value : display.values.View())
+      if (value > 0)
+        shown.push_back(value);
+    EXPECT_EQ(shown, particles.values); // none of them is black
+    EXPECT_EQ(display.values.Dimensions(), (std::array<int, 3>{(12 + block) / block, (9 + block) / block, (6 + block) / block}));
+    EXPECT_EQ(display.first, Eigen::Vector3d::Constant((block - 1) / 2.0));
+  }
 }
 
 TEST(Particles, WithoutAValidRegionAndWithHoles)
@@ -138,7 +160,7 @@ TEST(Particles, KeepTheOpacityOfWhatTheyStandFor)
     return std::pow(1.0 - particles.alphas[0] / 255.0, layers);
   };
   const Particles fine = MakeParticles<unsigned char>({grey.View(), {}, geometry}, p);
-  p.coarsening = 4;
+  p.block = 4;
   const Particles coarse = MakeParticles<unsigned char>({grey.View(), {}, geometry}, p);
   EXPECT_EQ(fine.Count(), 512u);
   EXPECT_EQ(coarse.Count(), 8u);
@@ -184,7 +206,7 @@ TEST(Particles, Refuse)
     return p;
   };
   for (const ParticleParameters& p : {with([](auto& q) { q.downsampling = 0; }), with([](auto& q) { q.downsampling = 65; }),
-                                      with([](auto& q) { q.coarsening = 0; }), with([](auto& q) { q.opacity = 1.5; }),
+                                      with([](auto& q) { q.block = 1; }), with([](auto& q) { q.opacity = 1.5; }),
                                       with([](auto& q) { q.opacity = std::nan(""); }), with([](auto& q) { q.white = 0.0; }),
                                       with([](auto& q) { q.minimum = std::nan(""); }), with([](auto& q) { q.budget = 0; })})
     EXPECT_THROW(MakeParticles(scene.Posed(), p), Error);
