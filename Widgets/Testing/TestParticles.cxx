@@ -179,8 +179,9 @@ TEST(Particles, StayWithinTheBudget)
     EXPECT_LE(particles.Count(), static_cast<std::size_t>(budget));
     EXPECT_GT(particles.Count(), 0u);
     ExpectSame(particles, ByForce(scene.Posed(), p, particles.block));
-    if (particles.block > 1) // it is the next that fits, or one that the estimate gave: never less than an eighth
+    if (particles.block > 1) { // it is the next that fits, or one that the estimate gave: never less than an eighth
       EXPECT_GT(particles.Count() * 27, static_cast<std::size_t>(budget));
+    }
   }
 }
 
@@ -249,8 +250,9 @@ TEST(Particles, OfSeveralVolumesAreSortedTogether)
   const double step = (*high - *low) / 65535.0;
   for (std::size_t i = 0; i < order.size(); ++i) {
     ++seen[order[i]];
-    if (i > 0)
+    if (i > 0) {
       EXPECT_GE(wanted[order[i]], wanted[order[i - 1]] - step - 1e-4);
+    }
   }
   EXPECT_EQ(seen, std::vector<int>(wanted.size(), 1));
 }
