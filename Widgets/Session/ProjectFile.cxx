@@ -133,10 +133,10 @@ Stroke ToStroke(const Json& value, const JsonPlace& place)
 StrokeChain ToStrokes(const Json& value, const JsonPlace& place)
 {
   if (!value.is_array())
-    place.Fail("a list is needed");
+    place.In("strokes").Fail("a list is needed");
   StrokeChain chain;
   for (const Json& each : value) {
-    const JsonPlace strokePlace = place.In(std::to_string((chain ? chain->count : 0) + 1));
+    const JsonPlace strokePlace = place.In("stroke " + std::to_string((chain ? chain->count : 0) + 1));
     try {
       chain = Append(chain, ToStroke(each, strokePlace));
     } catch (const Error& error) {
@@ -183,7 +183,7 @@ SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path
   if (const Json* group = given("group"))
     volume.group = Count(*group, place.In("group"));
   if (const Json* strokes = given("strokes"))
-    volume.strokes = ToStrokes(*strokes, place.In("stroke"));
+    volume.strokes = ToStrokes(*strokes, place);
   return volume;
 }
 
