@@ -28,6 +28,7 @@
 #include "Core/Geometry/PoseFile.h"
 #include "Filters/Registration/Percentile.h"
 #include "Filters/Registration/ValidPoints.h"
+#include "SessionVoxels.h"
 #include "Widgets/Session/BackupWriter.h"
 #include "Widgets/Session/LiveScore.h"
 #include "Widgets/Session/ProjectFile.h"
@@ -37,6 +38,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <utility>
 
 using namespace echorama;
 namespace fs = std::filesystem;
@@ -182,15 +184,15 @@ void CheckSameGeometry(const ImageGeometry& recorded, const ImageGeometry& found
 
 //----------------------------------------------------------------------------
 struct vtkUltrasoundAlignmentSession::Internals {
-  /** The voxels of one volume. */
-  struct Voxels {
-    vtkSmartPointer<vtkImageData> Source; ///< as the file stands, sharing what was given
-    vtkSmartPointer<vtkImageData> Image;  ///< where it lies now
-    SessionVolume Known;                  ///< as it came: file, name, geometry
+  /** A stroke in the making. */
+  struct Painting {
+    int Id = 0;
+    Stroke Drawn;
   };
 
   AlignmentSession Session;
-  std::map<int, Voxels> Volumes; ///< also those that undo could bring back
+  std::map<int, SessionVoxels> Volumes; ///< also those that undo could bring back
+  std::optional<Painting> Brushing;
   std::optional<std::array<double, 2>> GreyWindow;
   bool GreyWindowChosen = false;
 
@@ -210,23 +212,35 @@ struct vtkUltrasoundAlignmentSession::Internals {
   std::optional<LiveScoreResult> Scored;
   bool ScoreIsCurrent = false;
 
-  Project Now() const { return {this->Session.State(), this->TruthFile, this->Comment}; }
+  // With the stroke in the making, so that a backup has it too.
+  Project Now() const
+  {
+    Project now{this->Session.State(), this->TruthFile, this->Comment};
+    if (this->Brushing && !this->Brushing->Drawn.pathMm.empty()) {
+      SessionVolume* volume = now.state.Find(this->Brushing->Id);
+      volume->strokes = Append(volume->strokes, this->Brushing->Drawn);
+    }
+    return now;
+  }
+
+  // A stroke ends with its edit, and with its volume. Returns whether voxels have changed.
+  bool StopBrushing()
+  {
+    if (!this->Brushing || (this->Session.Editing() && this->Find(this->Brushing->Id))) {
+      return false;
+    }
+    const int id = this->Brushing->Id;
+    this->Brushing.reset();
+    this->Session.End();
+    const auto voxels = this->Volumes.find(id);
+    return voxels != this->Volumes.end() && voxels->second.TakeBack();
+  }
 
   const SessionVolume* Find(int id) const { return this->Session.State().Find(id); }
 
-  void Place(const SessionVolume& volume)
-  {
-    Voxels& voxels = this->Volumes.at(volume.id);
-    voxels.Image->ShallowCopy(voxels.Source);
-    vtkUltrasoundVolume::Move(voxels.Image, volume.volumeToWorld);
-  }
-
   void Hold(const SessionVolume& volume, vtkImageData* image)
   {
-    Voxels voxels{vtkSmartPointer<vtkImageData>::New(), vtkSmartPointer<vtkImageData>::New(), volume};
-    voxels.Source->ShallowCopy(image);
-    vtkUltrasoundVolume::SetGeometry(voxels.Source, volume.geometry);
-    this->Volumes[volume.id] = std::move(voxels);
+    this->Volumes.insert_or_assign(volume.id, SessionVoxels(volume, image));
   }
 
   // The images of volumes from files: taken from blocks that have the names of the files, else read.
@@ -285,7 +299,7 @@ struct vtkUltrasoundAlignmentSession::Internals {
   // The truth of a volume, when there is one for it.
   void SetTruthOf(const SessionVolume& volume, const Pose& truth)
   {
-    vtkImageData* image = this->Volumes.at(volume.id).Source;
+    vtkImageData* image = this->Volumes.at(volume.id).GetBase();
     vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(image);
     const auto valid = vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(image), image);
     std::vector<Eigen::Vector3d> points;
@@ -412,14 +426,24 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
   }
 
   // What is different, and of which volume: 0 of none, -1 of several.
-  int volumes = 0, poses = 0;
+  int volumes = 0, poses = 0, painted = 0;
   const auto add = [](int& to, int id) { to = to == 0 || to == id ? id : -1; };
+  if (this->Parts->StopBrushing()) {
+    painted = -1;
+  }
   const SessionState after = session.State();
   for (const SessionVolume& volume : after.volumes) {
     const SessionVolume* old = before.Find(volume.id);
     if (!old || old->volumeToWorld.matrix() != volume.volumeToWorld.matrix()) {
-      this->Parts->Place(volume);
+      this->Parts->Volumes.at(volume.id).Place(volume.volumeToWorld);
       add(poses, volume.id);
+    }
+    try {
+      if (this->Parts->Volumes.at(volume.id).GoTo(volume.strokes)) {
+        add(painted, volume.id);
+      }
+    } catch (const std::bad_alloc&) {
+      vtkErrorMacro(<< volume.name << ": there is not enough memory to paint it");
     }
     if (!old || old->name != volume.name || old->group != volume.group || old->colour != volume.colour ||
         old->opacity != volume.opacity || old->visible != volume.visible) {
@@ -463,6 +487,7 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
   };
   tell(VolumesChangedEvent, volumes);
   tell(PosesChangedEvent, poses);
+  tell(VoxelsChangedEvent, painted);
   tell(SelectionChangedEvent, selected ? -1 : 0);
   tell(HistoryChangedEvent, history || modified != this->GetModifiedSinceSave() ? -1 : 0);
   return done;
@@ -547,8 +572,7 @@ void vtkUltrasoundAlignmentSession::GetVolumes(vtkMultiBlockDataSet* blocks, boo
   blocks->Initialize();
   for (const SessionVolume& volume : this->Parts->Session.State().volumes) {
     if (volume.visible || !onlyVisible) {
-      vtkNew<vtkImageData> block;
-      block->ShallowCopy(this->Parts->Volumes.at(volume.id).Image);
+      const vtkSmartPointer<vtkImageData> block = this->Parts->Volumes.at(volume.id).Snapshot();
       const unsigned int index = blocks->GetNumberOfBlocks();
       blocks->SetBlock(index, block);
       blocks->GetMetaData(index)->Set(vtkCompositeDataSet::NAME(), volume.name.c_str());
@@ -632,7 +656,7 @@ void vtkUltrasoundAlignmentSession::GetGreyWindow(double window[2]) const
   if (!grey) {
     std::vector<double> levels;
     for (const SessionVolume& volume : this->Parts->Session.State().volumes) {
-      SampleGreyLevels(this->Parts->Volumes.at(volume.id).Source, levels);
+      SampleGreyLevels(this->Parts->Volumes.at(volume.id).GetBase(), levels);
     }
     grey = {0.0, 255.0};
     if (!levels.empty()) {
@@ -867,24 +891,84 @@ std::string vtkUltrasoundAlignmentSession::GetRedoLabel() const
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::BeginStroke(int, const char*, double, double, double, double, bool)
+bool vtkUltrasoundAlignmentSession::BeginStroke(int id, const char* mode, double radiusMm, double intensity, double opacity,
+                                                double hardness, bool insideValid)
 {
-  vtkErrorMacro("strokes are not there yet");
-  return false;
+  return this->Change([&]() {
+    Internals& parts = *this->Parts;
+    const SessionVolume* volume = parts.Find(id);
+    if (!volume) {
+      throw Error(Error::Kind::InvalidParameter, "there is no volume " + std::to_string(id));
+    }
+    if (parts.Brushing) {
+      throw Error(Error::Kind::NotPossible, "another stroke has not ended");
+    }
+    const std::string name = TextOf(mode);
+    Internals::Painting painting{id, {}};
+    Brush& brush = painting.Drawn.brush;
+    brush.mode = name == "paint" ? BrushMode::Paint : name == "carve" ? BrushMode::Carve : BrushMode::Restore;
+    if (brush.mode == BrushMode::Restore && name != "restore") {
+      throw Error(Error::Kind::InvalidParameter, "the brush's mode is \"" + name + "\"; paint, carve or restore is needed");
+    }
+    brush.radiusMm = radiusMm;
+    brush.intensity = intensity;
+    brush.opacity = opacity;
+    brush.hardness = hardness;
+    brush.insideValid = insideValid;
+    parts.Volumes.at(id).Begin(brush);
+    parts.Session.Begin((brush.mode == BrushMode::Paint   ? "Paint "
+                         : brush.mode == BrushMode::Carve ? "Carve "
+                                                          : "Restore ") +
+                        volume->name);
+    parts.Brushing = std::move(painting);
+  });
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::ExtendStroke(double, double, double)
+bool vtkUltrasoundAlignmentSession::ExtendStroke(double x, double y, double z)
 {
-  vtkErrorMacro("no stroke was begun");
-  return false;
+  Internals& parts = *this->Parts;
+  if (!parts.Brushing) {
+    vtkErrorMacro("no stroke was begun");
+    return false;
+  }
+  int id = parts.Brushing->Id;
+  bool changed = false;
+  try {
+    const Eigen::Vector3d point = parts.Find(id)->volumeToWorld.inverse() * Eigen::Vector3d(x, y, z);
+    changed = parts.Volumes.at(id).Extend(point);
+    parts.Brushing->Drawn.pathMm.push_back(point);
+  } catch (const std::exception& error) {
+    vtkErrorMacro(<< error.what());
+    return false;
+  }
+  if (parts.AutomaticBackups) {
+    this->BackUpInTheBackground(parts.Session.EditLabel(), false);
+  }
+  if (changed) {
+    this->Modified();
+    this->InvokeEvent(VoxelsChangedEvent, &id);
+  }
+  return true;
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::EndStroke()
 {
-  vtkErrorMacro("no stroke was begun");
-  return false;
+  return this->Change([this]() {
+    Internals& parts = *this->Parts;
+    if (!parts.Brushing) {
+      throw Error(Error::Kind::NotPossible, "no stroke was begun");
+    }
+    if (parts.Brushing->Drawn.pathMm.empty()) {
+      parts.Session.End();
+      return;
+    }
+    const Internals::Painting painting = *std::exchange(parts.Brushing, std::nullopt);
+    parts.Session.AddStroke(painting.Id, painting.Drawn);
+    parts.Volumes.at(painting.Id).End(parts.Find(painting.Id)->strokes);
+    parts.Session.End();
+  });
 }
 
 //----------------------------------------------------------------------------
