@@ -359,26 +359,36 @@ void DrawRows(const std::vector<Drawn>& drawn, const SliceParameters& parameters
   }
 }
 
-// Fills pixels between samples: bilinear where the four samples around are equally opaque, else the nearest, so that what is
-// not real keeps its shape and no black bleeds in.
-void FillRow(const std::uint8_t* lower, const std::uint8_t* upper, int samples, int step, int part, int width, std::uint8_t* rgba)
+// The samples of two rows, mixed: (step - part) lower + part upper, per byte.
+ECHORAMA_HOT void MixRows(const std::uint8_t* lower, const std::uint8_t* upper, int bytes, int step, int part,
+                          std::uint16_t* __restrict mixed)
 {
-  const int square = step * step;
-  for (int i = 0; i < width; ++i) {
-    const int left = i / step, along = i - left * step, right = std::min(left + 1, samples - 1);
-    const std::uint8_t* a = lower + 4 * left;
-    const std::uint8_t* b = lower + 4 * right;
-    const std::uint8_t* c = upper + 4 * left;
-    const std::uint8_t* d = upper + 4 * right;
-    if (a[3] == b[3] && a[3] == c[3] && a[3] == d[3]) {
-      const int wa = (step - along) * (step - part), wb = along * (step - part), wc = (step - along) * part, wd = along * part;
+  for (int i = 0; i < bytes; ++i)
+    mixed[i] = static_cast<std::uint16_t>((step - part) * lower[i] + part * upper[i]);
+}
+
+// Fills the pixels of a row between samples: bilinear where the four samples around are equally opaque, else the nearest, so that
+// what is not real keeps its shape and no black bleeds in. \a part: rows above the lower samples.
+void FillRow(const std::uint8_t* lower, const std::uint8_t* upper, int samples, int step, int part, int width,
+             std::uint16_t* mixed, std::uint8_t* rgba)
+{
+  MixRows(lower, upper, 4 * samples, step, part, mixed);
+  const std::uint8_t* nearer = 2 * part < step ? lower : upper;
+  const unsigned square = static_cast<unsigned>(step * step), inverse = (65536u + square / 2u) / square;
+  for (int left = 0; left < samples; ++left) {
+    const int right = std::min(left + 1, samples - 1), count = std::min(step, width - left * step);
+    const std::uint8_t opaque = lower[4 * left + 3];
+    const bool even = lower[4 * right + 3] == opaque && upper[4 * left + 3] == opaque && upper[4 * right + 3] == opaque;
+    for (int along = 0; along < count; ++along, rgba += 4) {
+      if (!even) {
+        std::memcpy(rgba, nearer + 4 * (2 * along < step ? left : right), 4);
+        continue;
+      }
+      const unsigned toLeft = static_cast<unsigned>(step - along), toRight = static_cast<unsigned>(along);
       for (int channel = 0; channel < 3; ++channel)
-        rgba[4 * i + channel] = static_cast<std::uint8_t>(
-            (wa * a[channel] + wb * b[channel] + wc * c[channel] + wd * d[channel] + square / 2) / square);
-      rgba[4 * i + 3] = a[3];
-    } else {
-      const std::uint8_t* nearest = 2 * part < step ? (2 * along < step ? a : b) : (2 * along < step ? c : d);
-      std::memcpy(rgba + 4 * i, nearest, 4);
+        rgba[channel] = static_cast<std::uint8_t>(
+            ((toLeft * mixed[4 * left + channel] + toRight * mixed[4 * right + channel]) * inverse + 32768u) >> 16);
+      rgba[3] = opaque;
     }
   }
 }
@@ -415,10 +425,11 @@ void DrawSlice(const std::vector<SliceLayer>& layers, const SlicePlane& plane, c
   if (step == 1)
     return;
   ParallelRanges(plane.height, 4 * RowsPerTask, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    std::vector<std::uint16_t> mixed(4 * static_cast<std::size_t>(width));
     for (int j = static_cast<int>(begin); j < end; ++j) {
       const int below = j / step, above = std::min(below + 1, height - 1);
       FillRow(sampled + 4 * static_cast<std::ptrdiff_t>(width) * below, sampled + 4 * static_cast<std::ptrdiff_t>(width) * above,
-              width, step, j - below * step, plane.width, rgba + 4 * static_cast<std::ptrdiff_t>(plane.width) * j);
+              width, step, j - below * step, plane.width, mixed.data(), rgba + 4 * static_cast<std::ptrdiff_t>(plane.width) * j);
     }
   });
 }
