@@ -48,7 +48,7 @@ TEST_F(ProjectFile, EveryBitComesBack)
     EXPECT_EQ(back.comment, project.comment);
   }
   Project extreme = SomeProject(3, Path());
-  extreme.state.volumes[0].volumeToWorld.translation() = {-0.0, 5e-324, 1.7976931348623157e308};
+  extreme.state.volumes[0].volumeToWorld.translation() = Eigen::Vector3d(-0.0, 5e-324, 1.7976931348623157e308);
   extreme.state.volumes[1].name = "\u00e4\u6f22 \\ \n";
   WriteProject(Path("p.json"), extreme);
   EXPECT_TRUE(ReadProject(Path("p.json")).state == extreme.state);
