@@ -5,7 +5,9 @@ set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks 
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
   RenderingVolume RenderingVolumeOpenGL2 RenderingImage)
 find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} ImagingFourier ImagingHybrid # the last two: peers in benchmarks
-  Python WrappingPythonCore WrappingTools)
+  Python WrappingPythonCore WrappingTools
+  OPTIONAL_COMPONENTS GUISupportQt) # the workbench's alone: other projects need no Qt
+find_package(Qt5 QUIET COMPONENTS OpenGL Widgets Test) # here, where VTK's targets look for it
 include(EchoramaDependencies)
 set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH
 set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages)

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "FileActions.h"
+#include "Controls.h"
+#include "Job.h"
+#include "JobBar.h"
+#include "VolumeReading.h"
+#include "Workbench.h"
+#include <memory>
+#include <QAction>
+#include <QDateTime>
+#include <QFile>
+#include <QFileDialog>
+#include <QFileInfo>
+#include <QMenu>
+#include <QSettings>
+#include <vtkCompositeDataSet.h>
+#include <vtkImageData.h>
+#include <vtkInformation.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkStringArray.h>
+
+namespace echorama {
+
+namespace {
+
+constexpr const char* VolumeFilter = "*.mha *.mhd *.nrrd *.nhdr *.nii *.nii.gz *.vdb *.vti *.dcm *.vol *.png *.tif *.tiff *.jpg";
+
+QString LastFolder()
+{
+  return QSettings().value("files/folder").toString();
+}
+
+void RememberFolder(const QString& path)
+{
+  QSettings().setValue("files/folder", QFileInfo(path).absolutePath());
+}
+
+} // namespace
+
+FileActions::FileActions(Workbench* bench, JobBar* jobs, QWidget* window)
+  : QObject(window), bench_(bench), jobs_(jobs), window_(window)
+{
+  const QString volumes = tr("Volumes (%1);;All files (*)").arg(VolumeFilter), projects = tr("Projects (*.json);;All files (*)");
+  open_ = MakeAction(this, "open", tr("&Open volumes..."), "Ctrl+O", tr("Open volumes; files can be dropped on the window, too"),
+                     [this, volumes] { AskOpen(tr("Open volumes"), volumes, true); });
+  openProject_ = MakeAction(this, "openProject", tr("Open &project..."), "Ctrl+Shift+O", tr("Open volumes with their poses and strokes"),
+                            [this, projects] { AskOpen(tr("Open a project"), projects, false); });
+  save_ = MakeAction(this, "save", tr("&Save project"), "Ctrl+S", tr("Save poses, strokes and how volumes are shown"), [this] { Save(); });
+  saveAs_ = MakeAction(this, "saveAs", tr("Save project &as..."), "Ctrl+Shift+S", tr("Save the project under another name"), [this] {
+    afterSave_ = nullptr;
+    AskSave(tr("Save the project"), tr("Projects (*.json)"), "alignment.json", [this](const QString& path) { SaveTo(path); });
+  });
+  readPoses_ = MakeAction(this, "readPoses", tr("&Read poses..."), "", tr("Put the volumes where a pose file says; can be undone"),
+                          [this] { AskOpen(tr("Read poses"), tr("Poses (*.json);;All files (*)"), false); });
+  for (auto changed : {&Workbench::HistoryChanged, &Workbench::VolumesChanged, &Workbench::SelectionChanged})
+    connect(bench, changed, this, &FileActions::ShowHistory);
+  ShowHistory();
+}
+
+void FileActions::AddTo(QMenu* menu)
+{
+  menu->addActions({open_, openProject_});
+  menu->addSeparator();
+  menu->addActions({save_, saveAs_});
+  menu->addSeparator();
+  menu->addAction(readPoses_);
+}
+
+void FileActions::ShowHistory()
+{
+  const bool any = bench_->Session()->GetNumberOfVolumes() > 0;
+  save_->setEnabled(any && bench_->Session()->GetModifiedSinceSave());
+  for (QAction* action : {saveAs_, readPoses_})
+    action->setEnabled(any);
+}
+
+FileActions::Kind FileActions::KindOf(const QString& path)
+{
+  if (!path.endsWith(".json", Qt::CaseInsensitive))
+    return Kind::Volume;
+  QFile file(path);
+  const QByteArray beginning = file.open(QIODevice::ReadOnly) ? file.read(4096) : QByteArray();
+  return beginning.contains("echorama-poses-") ? Kind::Poses : Kind::Project;
+}
+
+void FileActions::Open(const QStringList& paths)
+{
+  QStringList volumes, projects, poses;
+  for (const QString& path : paths) {
+    const Kind kind = KindOf(path);
+    (kind == Kind::Volume ? volumes : kind == Kind::Project ? projects : poses).append(QFileInfo(path).absoluteFilePath());
+  }
+  if (projects.size() > 1)
+    bench_->Warn(tr("One project can be open at a time; %1 is opened.").arg(QFileInfo(projects.first()).fileName()));
+  if (!projects.isEmpty())
+    OpenProject(projects.first());
+  if (!volumes.isEmpty())
+    OpenVolumes(volumes);
+  for (const QString& path : poses)
+    bench_->Session()->ReadPoses(path.toUtf8().constData());
+}
+
+void FileActions::OpenVolumes(const QStringList& files)
+{
+  const QStringList volumes = WithoutCompanions(files);
+  const QString label = volumes.size() == 1 ? tr("Reading %1").arg(QFileInfo(volumes.first()).fileName())
+                                            : tr("Reading %1 volumes").arg(volumes.size());
+  const auto read = std::make_shared<std::vector<ReadVolume>>();
+  Job* job = Job::Start(
+    this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
+    [this, read] {
+      auto* session = bench_->Session();
+      const bool wasEmpty = session->GetNumberOfVolumes() == 0;
+      int last = 0;
+      for (const ReadVolume& volume : *read) {
+        if (volume.image)
+          last = session->AddVolume(volume.image, volume.file.toUtf8().constData());
+        else
+          bench_->Warn(volume.error);
+      }
+      // The first volume stays where it is, as a rule: what comes later is to be moved.
+      if (last > 0 && !(wasEmpty && read->size() == 1))
+        session->Select(last, true, true);
+    },
+    [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
+  jobs_->Watch(job);
+}
+
+void FileActions::OpenProject(const QString& path)
+{
+  WhenSaved(tr("Save what you did before %1 is opened?").arg(QFileInfo(path).fileName()), [this, path] { ReadProject(path, path); });
+}
+
+void FileActions::OpenAbandoned(const QString& backup)
+{
+  ReadProject(backup, {});
+}
+
+// \a saveAs: where Save writes later; empty: it asks.
+void FileActions::ReadProject(const QString& path, const QString& saveAs)
+{
+  auto* session = bench_->Session();
+  vtkNew<vtkStringArray> files;
+  if (!session->GetProjectFiles(path.toUtf8().constData(), files))
+    return; // the session said why
+  QStringList there;
+  bool isMissing = false;
+  for (vtkIdType i = 0; i < files->GetNumberOfValues(); i++) {
+    const QString file = QString::fromStdString(files->GetValue(i));
+    isMissing |= file.isEmpty();
+    if (!file.isEmpty() && !there.contains(file))
+      there.append(file);
+  }
+  if (isMissing) {
+    session->OpenProject(path.toUtf8().constData()); // names what is missing
+    bench_->Ask(tr("Files of %1 have moved. Where are they now?").arg(QFileInfo(path).fileName()),
+                {{tr("Look in a folder..."),
+                  [this, path, saveAs] {
+                    auto* dialog = new QFileDialog(window_, tr("Where the volumes are"), QFileInfo(path).absolutePath());
+                    dialog->setAttribute(Qt::WA_DeleteOnClose);
+                    dialog->setFileMode(QFileDialog::Directory);
+                    dialog->setObjectName("folderDialog");
+                    connect(dialog, &QFileDialog::fileSelected, this, [this, path, saveAs](const QString& folder) {
+                      bench_->Session()->AddSearchFolder(folder.toUtf8().constData());
+                      ReadProject(path, saveAs);
+                    });
+                    dialog->open();
+                  }},
+                 {tr("Do not open it"), {}}});
+    return;
+  }
+  const QString label = tr("Opening %1").arg(QFileInfo(path).fileName());
+  const auto read = std::make_shared<std::vector<ReadVolume>>();
+  Job* job = Job::Start(
+    this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress); },
+    [this, path, saveAs, read] {
+      bool isWhole = true;
+      vtkNew<vtkMultiBlockDataSet> blocks;
+      for (const ReadVolume& volume : *read) {
+        if (!volume.image) {
+          bench_->Warn(volume.error);
+          isWhole = false;
+          continue;
+        }
+        const unsigned int block = blocks->GetNumberOfBlocks();
+        blocks->SetBlock(block, volume.image);
+        blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.file.toUtf8().constData());
+      }
+      if (!isWhole || !bench_->Session()->OpenProject(path.toUtf8().constData(), blocks))
+        return;
+      emit Opened();
+      if (!saveAs.isEmpty())
+        OfferNewerBackup(saveAs);
+    },
+    [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
+  jobs_->Watch(job);
+}
+
+// After a crash the newest backup beside the project is younger than the project.
+void FileActions::OfferNewerBackup(const QString& path)
+{
+  vtkNew<vtkStringArray> paths, labels;
+  const int count = bench_->Session()->GetBackups(paths, labels);
+  for (int i = 0; i < count; i++) {
+    if (labels->GetValue(i) == "damaged")
+      continue;
+    const QString backup = QString::fromStdString(paths->GetValue(i));
+    const QDateTime time = QFileInfo(backup).lastModified();
+    if (time > QFileInfo(path).lastModified().addSecs(1))
+      bench_->Ask(tr("There is later work on this project, of %1, that was not saved.").arg(time.toString("yyyy-MM-dd hh:mm:ss")),
+                  {{tr("Go on with it"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},
+                   {tr("Leave it"), {}}});
+    return;
+  }
+}
+
+bool FileActions::Save()
+{
+  const std::string path = bench_->Session()->GetProjectPath();
+  if (!path.empty())
+    return SaveTo(QString::fromStdString(path));
+  AskSave(tr("Save the project"), tr("Projects (*.json)"), "alignment.json", [this](const QString& chosen) { SaveTo(chosen); });
+  return false;
+}
+
+bool FileActions::SaveTo(const QString& path)
+{
+  const auto then = std::exchange(afterSave_, nullptr);
+  if (!bench_->Session()->SaveProject(path.toUtf8().constData()))
+    return false;
+  bench_->Note(tr("Saved %1").arg(path));
+  if (then)
+    then();
+  return true;
+}
+
+bool FileActions::HasUnsavedWork() const
+{
+  const auto* session = bench_->Session();
+  if (!session->GetModifiedSinceSave() || session->GetNumberOfVolumes() == 0)
+    return false;
+  if (!session->GetProjectPath().empty())
+    return true;
+  for (const SessionVolume& volume : session->GetKernel().State().volumes)
+    if (volume.strokes || volume.group > 0 || volume.volumeToWorld.matrix() != Pose::Identity().matrix())
+      return true;
+  return false;
+}
+
+void FileActions::WhenSaved(const QString& question, const std::function<void()>& then)
+{
+  if (!HasUnsavedWork()) {
+    then();
+    return;
+  }
+  bench_->Ask(question, {{tr("Save"),
+                          [this, then] {
+                            afterSave_ = then;
+                            Save();
+                          }},
+                         {tr("Do not save"), then},
+                         {tr("Cancel"), {}}});
+}
+
+void FileActions::AskOpen(const QString& title, const QString& filter, bool several)
+{
+  auto* dialog = new QFileDialog(window_, title, LastFolder(), filter);
+  dialog->setObjectName("openDialog");
+  dialog->setAttribute(Qt::WA_DeleteOnClose);
+  dialog->setFileMode(several ? QFileDialog::ExistingFiles : QFileDialog::ExistingFile);
+  connect(dialog, &QFileDialog::filesSelected, this, [this](const QStringList& files) {
+    RememberFolder(files.value(0));
+    Open(files);
+  });
+  dialog->open();
+}
+
+void FileActions::AskSave(const QString& title, const QString& filter, const QString& name,
+                          const std::function<void(const QString&)>& save)
+{
+  auto* dialog = new QFileDialog(window_, title, LastFolder(), filter);
+  dialog->setObjectName("saveDialog");
+  dialog->setAttribute(Qt::WA_DeleteOnClose);
+  dialog->setAcceptMode(QFileDialog::AcceptSave);
+  dialog->setDefaultSuffix(QFileInfo(name).suffix());
+  dialog->selectFile(name);
+  connect(dialog, &QFileDialog::fileSelected, this, [save](const QString& file) {
+    RememberFolder(file);
+    save(file);
+  });
+  connect(dialog, &QFileDialog::rejected, this, [this] { afterSave_ = nullptr; });
+  dialog->open();
+}
+
+} // namespace echorama

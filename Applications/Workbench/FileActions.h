@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <functional>
+#include <QObject>
+#include <QStringList>
+
+class QAction;
+class QMenu;
+class QWidget;
+
+namespace echorama {
+
+class JobBar;
+class Workbench;
+
+/// Opening and saving: volumes, projects, poses. Volumes are read in the background; what cannot be read is named in the message
+/// bar, and the rest is opened.
+class FileActions : public QObject {
+  Q_OBJECT
+
+public:
+  /// \a window: where dialogs belong.
+  FileActions(Workbench* bench, JobBar* jobs, QWidget* window);
+  void AddTo(QMenu* menu);
+  QAction* OpenAction() const { return open_; }
+  QAction* SaveAction() const { return save_; }
+
+  /// Volumes, folders of slices, a project or poses, in any mixture: by drop, dialog or command line.
+  void Open(const QStringList& paths);
+  void OpenVolumes(const QStringList& files);
+  /// Asks first when there is unsaved work.
+  void OpenProject(const QString& path);
+  /// A project that a session left that ended without being saved.
+  void OpenAbandoned(const QString& backup);
+  /// Returns false when it did not work, or a name has to be asked for first.
+  bool Save();
+  bool SaveTo(const QString& path);
+
+  /// Whether anything would be lost that a person did: moved, painted, grouped, renamed. Volumes that were only opened are not work.
+  bool HasUnsavedWork() const;
+  /// Calls \a then at once, or after the user said what to do with unsaved work.
+  void WhenSaved(const QString& question, const std::function<void()>& then);
+
+signals:
+  void Opened(); ///< a project took the place of what was there
+
+private:
+  enum class Kind { Volume, Project, Poses };
+  static Kind KindOf(const QString& path);
+  void ReadProject(const QString& path, const QString& saveAs);
+  void OfferNewerBackup(const QString& path);
+  void AskOpen(const QString& title, const QString& filter, bool several);
+  void AskSave(const QString& title, const QString& filter, const QString& name, const std::function<void(const QString&)>& save);
+  void ShowHistory();
+
+  Workbench* bench_;
+  JobBar* jobs_;
+  QWidget* window_;
+  QAction *open_, *openProject_, *save_, *saveAs_, *readPoses_;
+  std::function<void()> afterSave_; ///< what waits for a name to be given
+};
+
+} // namespace echorama

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "MainWindow.h"
+#include "AlignmentHandles.h"
+#include "BrushPanel.h"
+#include "Controls.h"
+#include "EditActions.h"
+#include "FileActions.h"
+#include "HistoryPanel.h"
+#include "JobBar.h"
+#include "KeysPage.h"
+#include "MessageBar.h"
+#include "Messages.h"
+#include "PosePanel.h"
+#include "Recovery.h"
+#include "RegistrationPanel.h"
+#include "ResultPanel.h"
+#include "SliceCanvas.h"
+#include "SlicePane.h"
+#include "StatusReadout.h"
+#include "TrackerPanel.h"
+#include "TrainingPanel.h"
+#include "ViewActions.h"
+#include "ViewGrid.h"
+#include "ViewPanel.h"
+#include "VolumePane.h"
+#include "VolumePanel.h"
+#include "vtkUltrasoundAlignmentWidget.h"
+#include "Workbench.h"
+#include <QCloseEvent>
+#include <QDockWidget>
+#include <QFileInfo>
+#include <QLabel>
+#include <QMenuBar>
+#include <QMimeData>
+#include <QPointer>
+#include <QScrollArea>
+#include <QSettings>
+#include <QStatusBar>
+#include <QToolBar>
+#include <QUrl>
+#include <QVBoxLayout>
+
+namespace echorama {
+
+namespace {
+constexpr int LayoutVersion = 1; ///< of the panels: a layout of other panels is not restored
+}
+
+MainWindow::MainWindow(Workspace& workspace, QWidget* parent)
+  : QMainWindow(parent), bench_(new Workbench(workspace, this)), jobs_(new JobBar(this)), messages_(new MessageBar(this)),
+    views_(new ViewGrid(bench_, this)), readout_(new StatusReadout(bench_, this)), files_(new FileActions(bench_, jobs_, this)),
+    edits_(new EditActions(bench_, this)), looks_(new ViewActions(bench_, views_, this))
+{
+  setObjectName("workbench");
+  setAcceptDrops(true);
+  auto* middle = new QWidget(this);
+  auto* layout = new QVBoxLayout(middle);
+  layout->setContentsMargins(2, 2, 2, 2);
+  layout->setSpacing(2);
+  layout->addWidget(messages_);
+  layout->addWidget(views_, 1);
+  setCentralWidget(middle);
+  workspace.jobs = jobs_;
+  workspace.moveByTool = [this](vtkMatrix4x4* pose, bool grasping) {
+    views_->Volume()->Handles()->Widget()->StepTool(pose, grasping);
+  };
+  connect(bench_, &Workbench::Said, messages_, &MessageBar::Show);
+  // VTK classes report on whatever thread they run.
+  Messages::Install([bench = QPointer<Workbench>(bench_)](const std::string& text, bool isError) {
+    const QString message = QString::fromUtf8(text.c_str());
+    QMetaObject::invokeMethod(bench, [bench, message, isError] {
+      if (bench)
+        isError ? bench->Warn(message) : bench->Note(message);
+    });
+  });
+
+  MakeMenus();
+  MakePanels();
+  statusBar()->addWidget(readout_, 1);
+  statusBar()->addPermanentWidget(jobs_);
+  for (SlicePane* pane : views_->Slices())
+    connect(pane->Canvas(), &SliceCanvas::CursorAt, readout_, &StatusReadout::ShowAt);
+  for (auto changed : {&Workbench::HistoryChanged, &Workbench::VolumesChanged})
+    connect(bench_, changed, this, &MainWindow::ShowTitle);
+  ShowTitle();
+  RestoreLayout();
+}
+
+MainWindow::~MainWindow()
+{
+  bench_->Shared().moveByTool = [](vtkMatrix4x4*, bool) {};
+  Messages::Install({});
+}
+
+void MainWindow::MakeMenus()
+{
+  const char* const titles[] = {QT_TR_NOOP("&File"),  QT_TR_NOOP("&Edit"),   QT_TR_NOOP("&View"), QT_TR_NOOP("&Tools"),
+                                QT_TR_NOOP("&Align"), QT_TR_NOOP("&Stitch"), QT_TR_NOOP("&Help")};
+  for (std::size_t i = 0; i < menus_.size(); i++) {
+    menus_[i] = menuBar()->addMenu(tr(titles[i]));
+    menus_[i]->setToolTipsVisible(true);
+  }
+  auto* bar = addToolBar(tr("Tools"));
+  bar->setObjectName("toolBar");
+  bar->setMovable(false);
+  bar->addAction(files_->OpenAction());
+  bar->addAction(files_->SaveAction());
+  bar->addSeparator();
+  bar->addAction(edits_->UndoAction());
+  bar->addAction(edits_->RedoAction());
+  edits_->UndoAction()->setIconText(tr("Undo"));
+  edits_->RedoAction()->setIconText(tr("Redo"));
+  bar->addSeparator();
+  looks_->AddTools(Menu(Place::Tools), bar);
+  bar->addSeparator();
+  looks_->AddTo(Menu(Place::View), bar);
+  edits_->AddTo(Menu(Place::Edit));
+  files_->AddTo(Menu(Place::File));
+  Menu(Place::Help)->addAction(
+    MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"), [this] { ShowKeysPage(this); }));
+}
+
+void MainWindow::MakePanels()
+{
+  setDockOptions(QMainWindow::AnimatedDocks | QMainWindow::AllowTabbedDocks);
+  setTabPosition(Qt::RightDockWidgetArea, QTabWidget::North);
+  AddLeft(new VolumePanel(bench_, this), tr("Volumes"));
+  AddLeft(new PosePanel(bench_, this), tr("Pose"));
+  AddPanel(new ViewPanel(bench_, this), tr("View"));
+  AddPanel(new BrushPanel(bench_, this), tr("Brush"));
+  AddPanel(new HistoryPanel(bench_, this), tr("History"));
+  Workspace& workspace = bench_->Shared();
+  AddPanel(new RegistrationPanel(workspace, this), tr("Align"));
+  auto* result = new ResultPanel(workspace, this);
+  auto* resultBench = new Workbench(result->Result(), result);
+  resultBench->SetTool(Tool::Look);
+  result->SetView(new SlicePane(resultBench, "resultSlice", "z", result));
+  AddPanel(result, tr("Stitch"));
+  auto* training = new TrainingPanel(workspace, this);
+  AddPanel(training, tr("Train"));
+  auto* score = new QLabel(this);
+  score->setObjectName("scoreReadout");
+  connect(training, &TrainingPanel::ScoreShown, score, &QLabel::setText);
+  AddStatus(score);
+  AddPanel(new TrackerPanel(workspace, this), tr("Tracker"));
+}
+
+void MainWindow::AddLeft(QWidget* panel, const QString& title)
+{
+  auto* dock = new QDockWidget(title, this);
+  dock->setObjectName(panel->objectName() + "Dock");
+  dock->setWidget(panel);
+  addDockWidget(Qt::LeftDockWidgetArea, dock);
+  Menu(Place::View)->addAction(dock->toggleViewAction());
+}
+
+void MainWindow::AddPanel(QWidget* panel, const QString& title)
+{
+  auto* dock = new QDockWidget(title, this);
+  dock->setObjectName(panel->objectName() + "Dock");
+  auto* scroll = new QScrollArea(dock); // at 800 lines of screen some panels are longer than the window
+  scroll->setWidgetResizable(true);
+  scroll->setFrameShape(QFrame::NoFrame);
+  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  scroll->setWidget(panel);
+  scroll->setMinimumWidth(210);
+  dock->setWidget(scroll);
+  addDockWidget(Qt::RightDockWidgetArea, dock);
+  if (lastPanel_) {
+    tabifyDockWidget(lastPanel_, dock);
+    lastPanel_->raise();
+  }
+  Menu(Place::View)->addAction(dock->toggleViewAction());
+  if (!lastPanel_)
+    lastPanel_ = dock;
+}
+
+void MainWindow::AddStatus(QWidget* widget)
+{
+  statusBar()->addPermanentWidget(widget);
+}
+
+void MainWindow::RestoreLayout()
+{
+  resize(1280, 800);
+  resizeDocks(findChildren<QDockWidget*>(), QList<int>(), Qt::Horizontal);
+  QSettings settings;
+  restoreGeometry(settings.value("window/geometry").toByteArray());
+  restoreState(settings.value("window/state").toByteArray(), LayoutVersion);
+  BrushSettings brush;
+  SliceLook slices;
+  VolumeLook volume;
+  Handling hand;
+  Load(settings, brush);
+  Load(settings, slices);
+  Load(settings, volume);
+  Load(settings, hand);
+  bench_->SetBrush(brush);
+  bench_->SetSlices(slices);
+  bench_->SetVolume(volume);
+  bench_->SetHand(hand);
+}
+
+void MainWindow::Start(const QString& project, const QStringList& volumes)
+{
+  bench_->Session()->SetAutomaticBackups(true);
+  OfferAbandoned(bench_, files_);
+  if (!project.isEmpty())
+    files_->Open({project});
+  if (!volumes.isEmpty())
+    files_->Open(volumes);
+}
+
+void MainWindow::ShowTitle()
+{
+  const auto* session = bench_->Session();
+  const QString path = QString::fromStdString(session->GetProjectPath());
+  const QString name = !path.isEmpty()                        ? QFileInfo(path).fileName()
+                       : session->GetNumberOfVolumes() > 0 ? tr("Not saved yet")
+                                                              : QString();
+  setWindowTitle(name.isEmpty() ? QString("Echorama") : QString("%1[*] \u2014 Echorama").arg(name));
+  setWindowFilePath(path);
+  setWindowModified(files_->HasUnsavedWork());
+}
+
+void MainWindow::closeEvent(QCloseEvent* event)
+{
+  if (!mayClose_ && files_->HasUnsavedWork()) {
+    event->ignore();
+    files_->WhenSaved(tr("Save what you did before the window closes?"), [this] {
+      mayClose_ = true;
+      close();
+    });
+    return;
+  }
+  QSettings settings;
+  settings.setValue("window/geometry", saveGeometry());
+  settings.setValue("window/state", saveState(LayoutVersion));
+  Save(settings, bench_->Brush());
+  Save(settings, bench_->Slices());
+  Save(settings, bench_->Volume());
+  Save(settings, bench_->Hand());
+  event->accept();
+}
+
+void MainWindow::dragEnterEvent(QDragEnterEvent* event)
+{
+  if (event->mimeData()->hasUrls())
+    event->acceptProposedAction();
+}
+
+void MainWindow::dropEvent(QDropEvent* event)
+{
+  QStringList paths;
+  for (const QUrl& url : event->mimeData()->urls())
+    if (url.isLocalFile())
+      paths.append(url.toLocalFile());
+  if (paths.isEmpty())
+    return;
+  event->acceptProposedAction();
+  activateWindow();
+  files_->Open(paths);
+}
+
+} // namespace echorama

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "MessageBar.h"
+#include "Workbench.h"
+#include <QHBoxLayout>
+#include <QLabel>
+#include <QPushButton>
+#include <QTimer>
+#include <QToolButton>
+#include <QVBoxLayout>
+
+namespace echorama {
+
+namespace {
+
+constexpr int MostRows = 4, NoteMs = 6000;
+
+const char* StyleOf(Message::Kind kind)
+{
+  switch (kind) {
+  case Message::Note:
+    return "#messageRow { background: #2f4a5f; border-radius: 3px; }";
+  case Message::Warning:
+    return "#messageRow { background: #6b3a34; border-radius: 3px; }";
+  default:
+    return "#messageRow { background: #62532a; border-radius: 3px; }";
+  }
+}
+
+} // namespace
+
+MessageBar::MessageBar(QWidget* parent) : QWidget(parent)
+{
+  setObjectName("messageBar");
+  auto* layout = new QVBoxLayout(this);
+  layout->setContentsMargins(4, 0, 4, 0);
+  layout->setSpacing(2);
+}
+
+QWidget* MessageBar::RowOf(const QString& text) const
+{
+  for (auto* label : findChildren<QLabel*>("messageText"))
+    if (label->text() == text && !label->parentWidget()->isHidden())
+      return label->parentWidget();
+  return nullptr;
+}
+
+QStringList MessageBar::Texts() const
+{
+  QStringList texts;
+  for (auto* label : findChildren<QLabel*>("messageText"))
+    if (!label->parentWidget()->isHidden())
+      texts.append(label->text());
+  return texts;
+}
+
+void MessageBar::Clear()
+{
+  for (auto* row : findChildren<QFrame*>("messageRow")) {
+    row->hide();
+    row->deleteLater();
+  }
+}
+
+void MessageBar::Show(const Message& message)
+{
+  if (message.text.isEmpty() || RowOf(message.text))
+    return; // it is there already
+  auto* row = new QFrame(this);
+  row->setObjectName("messageRow");
+  row->setStyleSheet(StyleOf(message.kind));
+  auto* layout = new QHBoxLayout(row);
+  layout->setContentsMargins(8, 3, 4, 3);
+  auto* text = new QLabel(message.text, row);
+  text->setObjectName("messageText");
+  text->setTextFormat(Qt::PlainText);
+  text->setWordWrap(true);
+  text->setTextInteractionFlags(Qt::TextSelectableByMouse);
+  layout->addWidget(text, 1);
+  const auto close = [row] {
+    row->hide();
+    row->deleteLater();
+  };
+  for (const Message::Answer& answer : message.answers) {
+    auto* button = new QPushButton(answer.label, row);
+    button->setObjectName("messageAnswer");
+    layout->addWidget(button);
+    connect(button, &QPushButton::clicked, row, [close, action = answer.action] {
+      close(); // first: the action may end the window
+      if (action)
+        action();
+    });
+    if (&answer == &message.answers.first())
+      QTimer::singleShot(0, button, [button] { button->setFocus(); });
+  }
+  if (message.kind != Message::Question) {
+    auto* cross = new QToolButton(row);
+    cross->setObjectName("messageClose");
+    cross->setText(QString(QChar(0x00d7)));
+    cross->setAutoRaise(true);
+    cross->setToolTip(tr("Close this message"));
+    layout->addWidget(cross);
+    connect(cross, &QToolButton::clicked, row, close);
+  }
+  if (message.kind == Message::Note && message.answers.isEmpty())
+    QTimer::singleShot(NoteMs, row, close);
+  this->layout()->addWidget(row);
+
+  // The oldest notes and warnings make room; questions stay.
+  const auto rows = findChildren<QFrame*>("messageRow");
+  int shown = 0;
+  for (auto* other : rows)
+    shown += !other->isHidden();
+  for (auto* other : rows)
+    if (shown > MostRows && !other->isHidden() && other != row && other->findChild<QToolButton*>("messageClose")) {
+      other->hide();
+      other->deleteLater();
+      shown--;
+    }
+}
+
+} // namespace echorama

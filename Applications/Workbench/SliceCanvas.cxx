@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// VTK sees the events that belong to the alignment widget (the left button and keys, with the tool Align) and no others: the
+// rest is the same with every tool and is done here.
+#include "SliceCanvas.h"
+#include "AlignmentHandles.h"
+#include "Redraw.h"
+#include "vtkUltrasoundAlignmentSession.h"
+#include "vtkUltrasoundSliceView.h"
+#include "Workbench.h"
+#include <algorithm>
+#include <cmath>
+#include <QApplication>
+#include <QMouseEvent>
+#include <QVTKInteractor.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkNew.h>
+#include <vtkRenderer.h>
+
+namespace echorama {
+
+namespace {
+
+constexpr int WatchingMs = 60; ///< how often a slice redraws while something is dragged in another view
+
+const char* BrushModeOf(Tool tool)
+{
+  return tool == Tool::Paint ? "paint" : tool == Tool::Carve ? "carve" : "restore";
+}
+
+bool IsBrush(Tool tool)
+{
+  return tool == Tool::Paint || tool == Tool::Carve || tool == Tool::Restore;
+}
+
+} // namespace
+
+SliceCanvas::SliceCanvas(Workbench* bench, QWidget* parent)
+  : QVTKOpenGLNativeWidget(parent), bench_(bench), view_(vtkSmartPointer<vtkUltrasoundSliceView>::New())
+{
+  setFocusPolicy(Qt::StrongFocus);
+  setMouseTracking(true);
+  setMinimumSize(120, 100);
+  vtkNew<vtkGenericOpenGLRenderWindow> window;
+  window->SetMultiSamples(0);
+  setRenderWindow(window);
+  interactor()->SetInteractorStyle(nullptr);
+  view_->SetSession(bench->Session());
+  window->AddRenderer(view_->GetRenderer());
+  redraw_ = new Redraw(this, [this] { DrawNow(); });
+  handles_ = new AlignmentHandles(bench, interactor(), view_->GetRenderer(), this);
+
+  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged, &Workbench::VoxelsChanged, &Workbench::ToolChanged})
+    connect(bench, changed, this, &SliceCanvas::Ask);
+  connect(bench, &Workbench::ToolChanged, this, [this] { view_->HideBrush(); });
+  connect(bench, &Workbench::LookChanged, this, &SliceCanvas::Look);
+  connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {
+    view_->SetInteractive(on);
+    Ask();
+  });
+  Look();
+}
+
+SliceCanvas::~SliceCanvas() = default;
+
+vtkUltrasoundSliceView* SliceCanvas::View() const
+{
+  return view_;
+}
+
+void SliceCanvas::Look()
+{
+  const SliceLook& look = bench_->Slices();
+  view_->SetShown(look.shown.toUtf8().constData());
+  view_->SetMode(look.mode.toUtf8().constData());
+  view_->SetLinear(look.linear);
+  view_->SetSquarePixels(look.squarePixels);
+  Ask();
+}
+
+void SliceCanvas::Ask()
+{
+  const bool isWatching = bench_->Interacting() && drag_ == Drag::None;
+  redraw_->Ask(isWatching ? WatchingMs : 0);
+}
+
+void SliceCanvas::DrawNow()
+{
+  if (!isVisible())
+    return;
+  view_->Update();
+  renderWindow()->Render();
+  emit Drawn();
+}
+
+QPointF SliceCanvas::PixelOf(const QPointF& position) const
+{
+  const double ratio = devicePixelRatioF();
+  return {position.x() * ratio, (height() - position.y()) * ratio - 1.0};
+}
+
+QPointF SliceCanvas::PositionOf(const QPointF& pixel) const
+{
+  const double ratio = devicePixelRatioF();
+  return {pixel.x() / ratio, height() - (pixel.y() + 1.0) / ratio};
+}
+
+bool SliceCanvas::IsForHandles(QEvent* event) const
+{
+  if (bench_->CurrentTool() != Tool::Align)
+    return false;
+  switch (event->type()) {
+  case QEvent::MouseButtonPress:
+  case QEvent::MouseButtonRelease:
+    return static_cast<QMouseEvent*>(event)->button() == Qt::LeftButton;
+  case QEvent::MouseMove:
+    return drag_ == Drag::None || drag_ == Drag::Widget;
+  case QEvent::KeyPress:
+  case QEvent::KeyRelease:
+  case QEvent::Enter:
+  case QEvent::Leave:
+    return true;
+  default:
+    return false;
+  }
+}
+
+bool SliceCanvas::event(QEvent* event)
+{
+  switch (event->type()) {
+  case QEvent::MouseButtonPress:
+  case QEvent::MouseButtonRelease:
+  case QEvent::MouseButtonDblClick:
+  case QEvent::MouseMove:
+  case QEvent::Wheel:
+  case QEvent::KeyPress:
+  case QEvent::KeyRelease:
+  case QEvent::Enter:
+  case QEvent::Leave:
+  case QEvent::ContextMenu:
+    if (!IsForHandles(event))
+      return QOpenGLWidget::event(event);
+    break;
+  default:
+    break;
+  }
+  return QVTKOpenGLNativeWidget::event(event);
+}
+
+void SliceCanvas::resizeEvent(QResizeEvent* event)
+{
+  QVTKOpenGLNativeWidget::resizeEvent(event);
+  const double ratio = devicePixelRatioF();
+  view_->SetPixelSize(std::max(1, qRound(width() * ratio)), std::max(1, qRound(height() * ratio)));
+  Ask();
+}
+
+void SliceCanvas::mousePressEvent(QMouseEvent* event)
+{
+  event->accept();
+  setFocus(Qt::MouseFocusReason);
+  if (drag_ != Drag::None)
+    return; // one button at a time
+  last_ = event->localPos();
+  double point[3];
+  const QPointF pixel = PixelOf(last_);
+  view_->PixelToWorld(pixel.x(), pixel.y(), point);
+  if (event->button() == Qt::MiddleButton) {
+    drag_ = event->modifiers() & Qt::ShiftModifier ? Drag::Turn : Drag::Pan;
+  } else if (event->button() == Qt::RightButton) {
+    drag_ = Drag::Window;
+  } else if (event->button() == Qt::LeftButton && bench_->CurrentTool() == Tool::Align) {
+    drag_ = Drag::Widget;
+  } else if (event->button() == Qt::LeftButton && IsBrush(bench_->CurrentTool())) {
+    BeginStroke(point);
+  } else if (event->button() == Qt::LeftButton) {
+    drag_ = Drag::Cursor;
+    view_->SetCursor(point[0], point[1], point[2]);
+    emit PlaneChanged();
+    Ask();
+  }
+}
+
+void SliceCanvas::BeginStroke(const double point[3])
+{
+  auto* session = bench_->Session();
+  const QVector<int> volumes = bench_->Volumes();
+  const int id = volumes.size() == 1 ? volumes.first() : bench_->ActiveVolume();
+  if (id == 0 || bench_->SelectedVolumes().size() > 1) {
+    bench_->Note(volumes.isEmpty() ? tr("Open a volume to paint in.") : tr("Select the one volume to paint in."));
+    return;
+  }
+  const BrushSettings& brush = bench_->Brush();
+  if (!session->BeginStroke(id, BrushModeOf(bench_->CurrentTool()), brush.radiusMm, brush.intensity, brush.opacity, brush.hardness,
+                            brush.insideValid))
+    return;
+  drag_ = Drag::Stroke;
+  bench_->SetInteracting(true);
+  view_->SetInteractive(false); // what is painted in is seen as it is
+  session->ExtendStroke(point[0], point[1], point[2]);
+}
+
+void SliceCanvas::mouseMoveEvent(QMouseEvent* event)
+{
+  event->accept();
+  const QPointF now = event->localPos(), by = now - last_;
+  const QPointF pixel = PixelOf(now);
+  const double ratio = devicePixelRatioF();
+  double point[3];
+  view_->PixelToWorld(pixel.x(), pixel.y(), point);
+  switch (drag_) {
+  case Drag::Cursor:
+    view_->SetCursor(point[0], point[1], point[2]);
+    emit PlaneChanged();
+    Ask();
+    break;
+  case Drag::Stroke:
+    bench_->Session()->ExtendStroke(point[0], point[1], point[2]);
+    break;
+  case Drag::Pan:
+    view_->Pan(by.x() * ratio, -by.y() * ratio);
+    emit PlaneChanged();
+    Ask();
+    break;
+  case Drag::Turn:
+    view_->Turn(-0.4 * by.y(), 0.4 * by.x());
+    emit PlaneChanged();
+    Ask();
+    break;
+  case Drag::Window:
+    ChangeWindow(by);
+    break;
+  default:
+    break;
+  }
+  last_ = now;
+  ShowBrush(point);
+  emit CursorAt(point[0], point[1], point[2]);
+}
+
+void SliceCanvas::ShowBrush(const double point[3])
+{
+  if (!IsBrush(bench_->CurrentTool()))
+    return;
+  view_->SetBrush(point[0], point[1], point[2], bench_->Brush().radiusMm);
+  Ask();
+}
+
+void SliceCanvas::mouseReleaseEvent(QMouseEvent* event)
+{
+  event->accept();
+  const Qt::MouseButton wanted = drag_ == Drag::Pan || drag_ == Drag::Turn ? Qt::MiddleButton
+                                 : drag_ == Drag::Window                   ? Qt::RightButton
+                                                                           : Qt::LeftButton;
+  if (event->button() == wanted)
+    EndDrag();
+}
+
+void SliceCanvas::EndDrag()
+{
+  const Drag drag = drag_;
+  drag_ = Drag::None;
+  if (drag == Drag::Stroke) {
+    bench_->Session()->EndStroke();
+    bench_->SetInteracting(false);
+  }
+  Ask();
+}
+
+void SliceCanvas::mouseDoubleClickEvent(QMouseEvent* event)
+{
+  event->accept();
+  if (event->button() == Qt::LeftButton && !IsBrush(bench_->CurrentTool()))
+    emit LargeAsked();
+  else
+    mousePressEvent(event); // dabs in quick succession
+}
+
+void SliceCanvas::wheelEvent(QWheelEvent* event)
+{
+  event->accept();
+  // With Alt or Shift some systems turn the wheel sideways.
+  const double steps = (event->angleDelta().y() ? event->angleDelta().y() : event->angleDelta().x()) / 120.0;
+  if (event->modifiers() & Qt::ControlModifier) {
+    const QPointF pixel = PixelOf(event->position());
+    view_->Zoom(std::pow(1.2, steps), pixel.x(), pixel.y());
+    emit PlaneChanged();
+    Ask();
+  } else {
+    Scroll(event->modifiers() & Qt::ShiftModifier ? 10.0 * steps : steps);
+  }
+}
+
+void SliceCanvas::Scroll(double steps)
+{
+  double range[2];
+  view_->GetPositionRange(range);
+  view_->SetPosition(std::clamp(view_->GetPosition() + steps * bench_->SmallestSpacing(), range[0], range[1]));
+  emit PlaneChanged();
+  Ask();
+}
+
+// The whole width of the window through the middle of the view, so that the drag is as fine as the data are dark or bright.
+void SliceCanvas::ChangeWindow(const QPointF& by)
+{
+  double window[2];
+  bench_->Session()->GetGreyWindow(window);
+  const double width = window[1] - window[0], middle = 0.5 * (window[0] + window[1]);
+  const double newWidth = width * std::exp(by.x() / 200.0), newMiddle = middle + width * by.y() / 300.0;
+  bench_->Session()->SetGreyWindow(newMiddle - 0.5 * newWidth, newMiddle + 0.5 * newWidth);
+}
+
+void SliceCanvas::enterEvent(QEvent* event)
+{
+  QVTKOpenGLNativeWidget::enterEvent(event);
+  // Keys go where the mouse is, unless somebody types elsewhere.
+  const QWidget* typing = QApplication::focusWidget();
+  if (!typing || typing->inherits("QVTKOpenGLNativeWidget"))
+    setFocus(Qt::MouseFocusReason);
+}
+
+void SliceCanvas::leaveEvent(QEvent* event)
+{
+  QVTKOpenGLNativeWidget::leaveEvent(event);
+  view_->HideBrush();
+  Ask();
+  emit CursorLeft();
+}
+
+void SliceCanvas::keyPressEvent(QKeyEvent* event)
+{
+  // The alignment widget has had it; arrows must not wander off to the next field.
+  if (bench_->CurrentTool() == Tool::Align && event->key() != Qt::Key_Tab && event->key() != Qt::Key_Backtab)
+    event->accept();
+  else
+    QVTKOpenGLNativeWidget::keyPressEvent(event);
+}
+
+} // namespace echorama

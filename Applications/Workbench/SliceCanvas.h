@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <QVTKOpenGLNativeWidget.h>
+#include <vtkSmartPointer.h>
+
+class vtkUltrasoundSliceView;
+
+namespace echorama {
+
+class AlignmentHandles;
+class Redraw;
+class Workbench;
+
+/// The picture of one slice, and what mouse and keys do in it.
+///
+/// | mouse                 | does                                                                            |
+/// | --------------------- | ------------------------------------------------------------------------------- |
+/// | left                  | what the tool in hand does: moves volumes, paints, carves, restores, or points    |
+/// | wheel                 | goes through the slices, by one voxel (Shift: ten)                              |
+/// | Ctrl + wheel          | zooms at the mouse                                                              |
+/// | middle drag           | moves the picture; with Shift: turns the plane, which becomes oblique           |
+/// | right drag            | grey levels: contrast to the sides, brightness up and down                      |
+/// | double click          | makes the view large, and back                                                  |
+class SliceCanvas : public QVTKOpenGLNativeWidget {
+  Q_OBJECT
+
+public:
+  SliceCanvas(Workbench* bench, QWidget* parent = nullptr);
+  ~SliceCanvas() override;
+
+  vtkUltrasoundSliceView* View() const;
+  void Ask();     ///< redraw soon
+  void DrawNow(); ///< for tests and screenshots
+  /// A widget position as a pixel of the view (from the lower left, device pixels).
+  QPointF PixelOf(const QPointF& position) const;
+  QPointF PositionOf(const QPointF& pixel) const;
+
+signals:
+  void PlaneChanged();
+  void Drawn();
+  void CursorAt(double x, double y, double z);
+  void CursorLeft();
+  void LargeAsked();
+
+protected:
+  bool event(QEvent* event) override;
+  void resizeEvent(QResizeEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
+  void mouseDoubleClickEvent(QMouseEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+  void enterEvent(QEvent* event) override;
+  void leaveEvent(QEvent* event) override;
+  void keyPressEvent(QKeyEvent* event) override;
+
+private:
+  enum class Drag { None, Widget, Cursor, Stroke, Pan, Turn, Window };
+
+  bool IsForHandles(QEvent* event) const;
+  void Look();
+  void BeginStroke(const double point[3]);
+  void EndDrag();
+  void ShowBrush(const double point[3]);
+  void Scroll(double steps);
+  void ChangeWindow(const QPointF& by);
+
+  Workbench* bench_;
+  vtkSmartPointer<vtkUltrasoundSliceView> view_;
+  AlignmentHandles* handles_;
+  Redraw* redraw_;
+  Drag drag_ = Drag::None;
+  QPointF last_;
+};
+
+} // namespace echorama

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Settings.h"
+#include <QWidget>
+
+class QCheckBox;
+class QComboBox;
+class QDoubleSpinBox;
+
+namespace echorama {
+
+class Workbench;
+
+/// How slices and the 3D view show the volumes.
+class ViewPanel : public QWidget {
+  Q_OBJECT
+
+public:
+  explicit ViewPanel(Workbench* bench, QWidget* parent = nullptr);
+
+private:
+  QWidget* SliceControls();
+  QWidget* VolumeControls();
+  void ShowLook();
+  void ShowWindow();
+  QCheckBox* Check(const char* name, const QString& label, const QString& help, bool VolumeLook::*field);
+
+  Workbench* bench_;
+  QComboBox *shown_, *mode_, *interpolation_, *style_;
+  QDoubleSpinBox *squares_, *black_, *white_;
+  QDoubleSpinBox *downsampling_, *particleSize_, *opacity_, *minimum_, *maximum_;
+  QCheckBox *valueOpacity_, *slices_;
+};
+
+} // namespace echorama

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Full quality can take longer than a person waits for a mouse: it is drawn once nothing has moved for a moment.
+#include "VolumePane.h"
+#include "AlignmentHandles.h"
+#include "Controls.h"
+#include "Redraw.h"
+#include "SliceCanvas.h"
+#include "vtkUltrasoundAlignmentSession.h"
+#include "vtkUltrasoundSliceView.h"
+#include "vtkUltrasoundVolumeView.h"
+#include "Workbench.h"
+#include <QComboBox>
+#include <QHBoxLayout>
+#include <QMouseEvent>
+#include <QToolButton>
+#include <QVBoxLayout>
+#include <QVTKInteractor.h>
+#include <QVTKOpenGLNativeWidget.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkInteractorStyleTrackballCamera.h>
+#include <vtkNew.h>
+#include <vtkRenderer.h>
+
+namespace echorama {
+
+namespace {
+constexpr int WatchingMs = 80;  ///< how often 3D redraws while something is dragged in a slice
+constexpr int RefineMs = 250;   ///< how long nothing must move before it is drawn in full
+} // namespace
+
+VolumePane::VolumePane(Workbench* bench, QWidget* parent)
+  : QWidget(parent), bench_(bench), canvas_(new QVTKOpenGLNativeWidget(this)), view_(vtkSmartPointer<vtkUltrasoundVolumeView>::New())
+{
+  setObjectName("volumePane");
+  canvas_->setObjectName("volumeCanvas");
+  canvas_->setAccessibleName(tr("3D view"));
+  canvas_->setFocusPolicy(Qt::StrongFocus);
+  canvas_->setMinimumSize(120, 100);
+  canvas_->installEventFilter(this);
+  vtkNew<vtkGenericOpenGLRenderWindow> window;
+  window->SetMultiSamples(0);
+  canvas_->setRenderWindow(window);
+  view_->SetSession(bench->Session());
+  window->AddRenderer(view_->GetRenderer());
+  vtkNew<vtkInteractorStyleTrackballCamera> style;
+  style->SetDefaultRenderer(view_->GetRenderer());
+  style->AddObserver(vtkCommand::StartInteractionEvent, this, &VolumePane::OnTurning);
+  style->AddObserver(vtkCommand::EndInteractionEvent, this, &VolumePane::OnTurning);
+  canvas_->interactor()->SetInteractorStyle(style);
+  redraw_ = new Redraw(this, [this] { DrawNow(); });
+  refine_ = new Redraw(this, [this] { SetCoarse(false); });
+  handles_ = new AlignmentHandles(bench, canvas_->interactor(), view_->GetRenderer(), this);
+
+  style_ = ChoiceField(this, "volumeStyle", tr("How volumes are drawn in 3D"),
+                       {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}}, [this](const QString& word) {
+                         VolumeLook look = bench_->Volume();
+                         look.style = word;
+                         bench_->SetVolume(look);
+                       });
+  auto* fit = new QToolButton(this);
+  fit->setObjectName("volumeFit");
+  fit->setText(tr("Fit"));
+  fit->setToolTip(tr("Show everything (F)"));
+  auto* large = new QToolButton(this);
+  large->setObjectName("volumeLarge");
+  large->setText(QString(QChar(0x2922)));
+  large->setToolTip(tr("Make this view large, and back (M, or a double click)"));
+  auto* row = new QHBoxLayout;
+  row->setContentsMargins(2, 0, 2, 0);
+  row->setSpacing(3);
+  row->addWidget(style_);
+  row->addStretch(1);
+  for (QToolButton* button : {fit, large}) {
+    button->setAutoRaise(true);
+    row->addWidget(button);
+  }
+  auto* layout = new QVBoxLayout(this);
+  layout->setContentsMargins(0, 0, 0, 0);
+  layout->setSpacing(1);
+  layout->addLayout(row);
+  layout->addWidget(canvas_, 1);
+  connect(fit, &QToolButton::clicked, this, &VolumePane::Fit);
+  connect(large, &QToolButton::clicked, this, &VolumePane::LargeAsked);
+
+  connect(bench, &Workbench::VolumesChanged, this, [this] {
+    if (!fitted_ && bench_->Session()->GetNumberOfVolumes() > 0) {
+      fitted_ = true;
+      Fit();
+    }
+    Ask();
+  });
+  for (auto changed : {&Workbench::PosesChanged, &Workbench::SelectionChanged, &Workbench::VoxelsChanged, &Workbench::ToolChanged})
+    connect(bench, changed, this, &VolumePane::Ask);
+  connect(bench, &Workbench::LookChanged, this, &VolumePane::Look);
+  connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {
+    if (on)
+      SetCoarse(true);
+    else
+      refine_->Ask(RefineMs);
+  });
+  Look();
+}
+
+VolumePane::~VolumePane()
+{
+  canvas_->interactor()->SetInteractorStyle(nullptr);
+}
+
+vtkUltrasoundVolumeView* VolumePane::View() const
+{
+  return view_;
+}
+
+void VolumePane::AddSlice(SliceCanvas* slice)
+{
+  slices_.append(slice->View());
+  connect(slice, &SliceCanvas::Drawn, this, &VolumePane::Ask);
+}
+
+void VolumePane::Look()
+{
+  const VolumeLook& look = bench_->Volume();
+  view_->SetStyle(look.style.toUtf8().constData());
+  view_->SetDownsampling(look.downsampling);
+  view_->SetParticleSize(look.particleSize);
+  view_->SetOpacity(look.opacity);
+  view_->SetValueOpacity(look.valueOpacity);
+  view_->SetMinimum(look.minimum);
+  view_->SetMaximum(look.maximum);
+  view_->SetShowPlanes(look.slices);
+  view_->SetErrorVectors(look.errorVectors);
+  Show(style_, look.style);
+  Ask();
+}
+
+void VolumePane::Fit()
+{
+  view_->Fit();
+  Ask();
+}
+
+void VolumePane::Ask()
+{
+  redraw_->Ask(bench_->Interacting() ? WatchingMs : 0);
+}
+
+void VolumePane::DrawNow()
+{
+  if (!isVisible())
+    return;
+  if (bench_->Volume().slices)
+    for (int i = 0; i < slices_.size(); i++) {
+      double corners[12];
+      slices_[i]->GetPlaneCorners(corners);
+      view_->SetPlane(i, corners, slices_[i]->GetPicture());
+    }
+  view_->Update();
+  canvas_->renderWindow()->Render();
+}
+
+void VolumePane::SetCoarse(bool coarse)
+{
+  view_->SetInteractive(coarse);
+  Ask();
+}
+
+void VolumePane::OnTurning(vtkObject*, unsigned long event, void*)
+{
+  if (event == vtkCommand::StartInteractionEvent)
+    view_->SetInteractive(true);
+  else
+    refine_->Ask(RefineMs);
+}
+
+bool VolumePane::eventFilter(QObject* object, QEvent* event)
+{
+  if (event->type() == QEvent::MouseButtonDblClick && static_cast<QMouseEvent*>(event)->button() == Qt::LeftButton) {
+    emit LargeAsked();
+    return true;
+  }
+  return QWidget::eventFilter(object, event);
+}
+
+} // namespace echorama

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "MainWindow.h"
+#include "Theme.h"
+#include "Workspace.h"
+#include <QApplication>
+#include <QCommandLineParser>
+#include <QSurfaceFormat>
+#include <QVTKOpenGLNativeWidget.h>
+
+int main(int argc, char** argv)
+{
+  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
+  format.setSamples(0); // slices are pictures; without a GPU smoothed edges cost more than they are worth
+  QSurfaceFormat::setDefaultFormat(format);
+  QApplication application(argc, argv);
+  QApplication::setOrganizationName("Echorama");
+  QApplication::setApplicationName("Workbench");
+  QApplication::setApplicationVersion(ECHORAMA_VERSION);
+
+  QCommandLineParser options;
+  options.setApplicationDescription("Aligns, paints, stitches and scores overlapping 3D ultrasound volumes by hand.");
+  options.addHelpOption();
+  options.addVersionOption();
+  const QCommandLineOption project("project", "Open a project.", "FILE");
+  options.addOption(project);
+  options.addPositionalArgument("VOLUME", "Volumes (or folders of slices, or poses) to open.", "[VOLUME...]");
+  options.process(application);
+
+  echorama::ApplyTheme(application);
+  echorama::Workspace workspace;
+  echorama::MainWindow window(workspace);
+  window.show();
+  window.Start(options.value(project), options.positionalArguments());
+  return QApplication::exec();
+}
