@@ -179,6 +179,16 @@ class DeformableAligner(Several):
         return filter
 
 
+class PoseEditor(Several):
+    output = "blocks"
+
+    def filter(self, images=()):
+        filter = super().filter(images)
+        filter.SetTranslation(1.0, 2.0, 3.0)
+        filter.SetRotation(10.0, 20.0, 30.0)
+        return filter
+
+
 class Score(Several):
     output = "points"
     same_grid = False
@@ -496,6 +506,7 @@ Special = {
     "vtkUltrasoundAligner": Aligner,
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundDeformableAligner": DeformableAligner,
+    "vtkUltrasoundPoseEditor": PoseEditor,
     "vtkUltrasoundStitcher": Stitcher,
     "vtkUltrasoundEmbedder": Embedder,
     "vtkUltrasoundEmbedQuality": EmbedQuality,

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pose editor in ParaView: properties, the handle that its XML asks for, and the score as an information property.
+
+Usage: pvbatch TestPoseEditor.py
+"""
+import math
+import os
+
+import numpy
+from paraview import servermanager
+from paraview.simple import *
+
+LoadPlugin(os.environ["ECHORAMA_PLUGIN"], remote=False, ns=globals())
+
+a = UltrasoundPhantomSource(SpacingMm=2.0)
+b = UltrasoundPhantomSource(SpacingMm=2.0, Position=[20.0, 0.0, 0.0])
+editor = UltrasoundPoseEditor(Input=[a, b])
+editor.UpdatePipeline()
+editor.UpdatePropertyInformation()
+assert math.isnan(editor.Score), editor.Score
+before = numpy.array(servermanager.Fetch(editor).GetBlock(1).GetOrigin())
+
+# Connect the truth, where they are now: moved by (3, 4, 0), volume B scores 5.
+editor.Truth = [a, b]
+editor.Translation = [3.0, 4.0, 0.0]
+editor.UpdatePipeline()
+editor.UpdatePropertyInformation()
+print("score", editor.Score)
+assert abs(editor.Score - 5.0) < 1e-9, editor.Score
+blocks = servermanager.Fetch(editor)
+assert numpy.allclose(numpy.array(blocks.GetBlock(1).GetOrigin()) - before, [3.0, 4.0, 0.0])
+assert abs(blocks.GetFieldData().GetArray("Score").GetValue(0) - 5.0) < 1e-9
+
+# Volumes by number, about their middle.
+editor.Volumes = [0]
+editor.Translation = [0.0, 0.0, 0.0]
+editor.RotateAbout = "middle of the volumes"
+editor.Rotation = [0.0, 0.0, 180.0]
+editor.UpdatePipeline()
+blocks = servermanager.Fetch(editor)
+assert numpy.allclose(blocks.GetBlock(1).GetOrigin(), before)
+assert not numpy.allclose(blocks.GetBlock(0).GetOrigin(), servermanager.Fetch(a).GetOrigin())
+
+# The handle: a group with a box, its position and rotation.
+groups = [editor.SMProxy.GetPropertyGroup(i) for i in range(editor.SMProxy.GetNumberOfPropertyGroups())]
+box = [group for group in groups if group.GetPanelWidget() == "InteractiveBox"]
+assert len(box) == 1 and all(box[0].GetProperty(function) for function in ("Position", "Rotation", "Input"))
+assert box[0].GetProperty("Scale") is None, "a pose does not scale"
+Show(editor, CreateView("RenderView"))
+Render()
