@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "MainWindow.h"
+#include "Workspace.h"
+#include <array>
+#include <functional>
+#include <memory>
+#include <QDir>
+#include <QPoint>
+#include <QString>
+#include <QStringList>
+#include <vtkNew.h>
+
+class vtkMatrix4x4;
+
+namespace echorama {
+class SliceCanvas;
+}
+
+/// A workbench on the screen, and hands to use it with.
+class WindowUnderTest {
+public:
+  WindowUnderTest();
+  ~WindowUnderTest();
+
+  echorama::MainWindow& Window() { return *window_; }
+  vtkUltrasoundAlignmentSession* Session() const { return workspace_.session; }
+  echorama::SliceCanvas* Slice(int i);
+  /// A part by its object name; the test fails when there is none.
+  template <class T>
+  T* Part(const char* name)
+  {
+    T* part = window_->findChild<T*>(name);
+    if (!part)
+      qFatal("there is no %s", name);
+    return part;
+  }
+
+  ///@{ Real events, through the window.
+  void Drop(const QStringList& paths);
+  void Press(QWidget* widget, const QPoint& at, Qt::MouseButton button = Qt::LeftButton, Qt::KeyboardModifiers keys = {});
+  void Move(QWidget* widget, const QPoint& to, Qt::KeyboardModifiers keys = {});
+  void Release(QWidget* widget, const QPoint& at, Qt::MouseButton button = Qt::LeftButton, Qt::KeyboardModifiers keys = {});
+  void Drag(QWidget* widget, const QPoint& from, const QPoint& to, Qt::MouseButton button = Qt::LeftButton,
+            Qt::KeyboardModifiers keys = {});
+  void Click(QWidget* widget, const QPoint& at);
+  void Wheel(QWidget* widget, int steps, Qt::KeyboardModifiers keys = {});
+  void Key(Qt::Key key, Qt::KeyboardModifiers keys = {});
+  void Type(QWidget* field, const QString& text);
+  /// Presses the button of a message.
+  bool Answer(const QString& label);
+  ///@}
+
+  /// Opens files and waits until they are there.
+  bool Open(const QStringList& paths);
+  /// Draws what waits to be drawn.
+  void Settle();
+  QStringList Messages();
+  bool HasMessage(const QString& part);
+  std::array<double, 16> Pose(int id) const;
+  /// Into ECHORAMA_BUILD_DIR/screenshots; returns the picture.
+  QImage Screenshot(const QString& name);
+
+private:
+  echorama::Workspace workspace_;
+  std::unique_ptr<echorama::MainWindow> window_;
+};
+
+/// Writes a MetaImage of bytes: a bright shell and some blobs in speckle, with a border that is not real. \a seed makes
+/// different ones. Spacing 1 mm, the middle at \a middle.
+QString WriteVolume(const QDir& folder, const QString& name, int seed, std::array<double, 3> middle, int side = 48);
