@@ -20,6 +20,7 @@
 #include "vtkSmartPointer.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundReader.h"
+#include "vtkUltrasoundSessionVoxels.h"
 #include "vtkUltrasoundVolume.h"
 
 #include "Core/Base/Error.h"
@@ -28,7 +29,6 @@
 #include "Core/Geometry/PoseFile.h"
 #include "Filters/Registration/Percentile.h"
 #include "Filters/Registration/ValidPoints.h"
-#include "SessionVoxels.h"
 #include "Widgets/Session/BackupWriter.h"
 #include "Widgets/Session/LiveScore.h"
 #include "Widgets/Session/ProjectFile.h"

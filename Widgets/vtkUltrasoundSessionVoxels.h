@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The voxels of one volume of vtkUltrasoundAlignmentSession: shared with what was given until the first stroke, from then on a
 // copy that VoxelEdits writes to. For vtkUltrasoundAlignmentSession.cxx alone.
-#ifndef SessionVoxels_h
-#define SessionVoxels_h
+#ifndef vtkUltrasoundSessionVoxels_h
+#define vtkUltrasoundSessionVoxels_h
 
 #include "Widgets/Painting/VoxelEdits.h"
 #include "Widgets/Session/SessionState.h"
