@@ -6,6 +6,7 @@ Usage: TestUltrasoundAlignmentWidget.py [FOLDER]   (FOLDER: pictures of the hand
 """
 import math
 import os
+import pathlib
 import shutil
 import sys
 
@@ -18,19 +19,20 @@ if not os.environ.get("DISPLAY"):
     os.execvp("xvfb-run", ["xvfb-run", "-a", "-n", "131", "-s", "-screen 0 1280x1024x24 -noreset", sys.executable, *sys.argv])
 
 import vtkmodules.vtkInteractionStyle
+import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2
+import vtkmodules.vtkRenderingVolumeOpenGL2
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
-from vtkmodules.vtkFiltersSources import vtkCubeSource
 from vtkmodules.vtkIOImage import vtkPNGWriter
-from vtkmodules.vtkRenderingCore import (vtkActor, vtkImageSlice, vtkImageSliceMapper, vtkInteractorEventRecorder, vtkPolyDataMapper, vtkRenderer,
-                                         vtkRenderWindow, vtkRenderWindowInteractor, vtkWindowToImageFilter)
+from vtkmodules.vtkRenderingCore import (vtkInteractorEventRecorder, vtkRenderer, vtkRenderWindow, vtkRenderWindowInteractor,
+                                         vtkWindowToImageFilter)
 
 from echorama.EchoramaWidgets import vtkUltrasoundAlignmentRepresentation as Representation
-from echorama.EchoramaWidgets import vtkUltrasoundAlignmentSession, vtkUltrasoundAlignmentWidget
+from echorama.EchoramaWidgets import vtkUltrasoundAlignmentSession, vtkUltrasoundAlignmentWidget, vtkUltrasoundSliceView
 
 WIDTH, HEIGHT, MM = 400, 300, 0.5
 SHIFT, CONTROL = 1, 2
@@ -580,40 +582,55 @@ def test_names_that_are_not_there():
     assert len(errors) == 2 and bench.widget.GetConstraint() == "free" and bench.shape.GetViewKind() == "automatic"
 
 
-def pictures():
+def test_the_views_of_a_session():
+    """The widget in the renderers that the workbench puts into its windows; the pictures of the manual are made here."""
+    liver = pathlib.Path(__file__).resolve().parents[2] / ".." / "shared" / "data" / "liver"
     bench = Bench()
-    bench.window.SetSize(520, 400)
-    bench.renderer.GetActiveCamera().SetParallelScale(0.25 * 400 / 2)
-    for id, colour in ((bench.a, (1.0, 0.8, 0.6)), (bench.b, (0.6, 0.8, 1.0))):
-        mapper = vtkImageSliceMapper()
-        mapper.SetInputData(bench.session.GetImage(id))
-        mapper.SetOrientationToZ()
-        mapper.SetSliceNumber(20)
-        image = vtkImageSlice()
-        image.SetMapper(mapper)
-        image.GetProperty().SetOpacity(0.6)
-        bench.renderer.AddViewProp(image)
-    bench.session.Select(bench.a, True, True)
-    bench.play(("MouseMoveEvent", bench.handle(Representation.OnArrowX)))
-    bench.widget.SetConstraint("xy")
-    bench.save("alignment-widget-slice.png")
-    bench = Bench(three_d=True)
-    bench.window.SetSize(520, 400)
-    for id in (bench.a, bench.b):
-        cube = vtkCubeSource()
-        cube.SetBounds(bench.session.GetImage(id).GetBounds())
-        mapper = vtkPolyDataMapper()
-        mapper.SetInputConnection(cube.GetOutputPort())
-        actor = vtkActor()
-        actor.SetMapper(mapper)
-        actor.GetProperty().SetColor((0.55, 0.5, 0.45) if id == bench.a else (0.35, 0.4, 0.5))
-        bench.renderer.AddActor(actor)
-    bench.session.Select(bench.a, True, True)
-    bench.play(("MouseMoveEvent", bench.handle(Representation.OnRingZ)))
-    bench.save("alignment-widget-3d.png")
+    if liver.is_dir():
+        session = bench.session = vtkUltrasoundAlignmentSession()
+        bench.a, bench.b = (session.OpenVolume(str(liver / f"liver_volume_{letter}.mha")) for letter in "AB")
+    session = bench.session
+    session.Select(bench.b, True, True)
+    slice = vtkUltrasoundSliceView()
+    for view, name, state in ((slice, "slice", Representation.OnArrowX),):
+        bench.widget.Off()
+        bench.widget.SetSession(session)
+        bench.window.RemoveRenderer(bench.renderer)
+        bench.renderer = view.GetRenderer()
+        bench.window.AddRenderer(bench.renderer)
+        bench.window.SetSize(560, 420)
+        bench.widget.SetDefaultRenderer(bench.renderer)
+        bench.widget.SetCurrentRenderer(bench.renderer)
+        view.SetSession(session)
+        if view is slice:
+            view.SetPixelSize(560, 420)
+        view.Fit()
+        view.Update()
+        bench.window.Render()
+        bench.widget.On()
+        if view is slice:
+            # What both say of a pixel is the same.
+            for pixel in ((0, 0), (300, 123), (559, 419)):
+                one, other = [0.0] * 3, [0.0] * 3
+                view.PixelToWorld(*pixel, one)
+                assert bench.shape.PositionToWorld(*pixel, other)
+                near(one, other, 1e-6)
+            # A drag of what is seen there, by millimetres of this view.
+            before, count = bench.pose(bench.b), session.GetUndoCount()
+            place = next((x, y) for y in range(100, 400, 20) for x in range(60, 500, 20)
+                         if bench.shape.ComputeInteractionState(x, y) == Representation.OnSelected)
+            bench.drag(place, (place[0] + 30, place[1] - 10))
+            right, up, mm = [0.0] * 3, [0.0] * 3, view.GetMillimetresPerPixel()
+            view.GetRight(right)
+            view.GetUp(up)
+            near((bench.pose(bench.b) - before)[:3, 3], mm * (30 * np.array(right) - 10 * np.array(up)), 1e-9)
+            assert session.GetUndoCount() == count + 1
+            session.Undo()
+        bench.play(("MouseMoveEvent", bench.handle(state)))
+        view.Update()
+        bench.save(f"alignment-widget-{name}.png")
 
 
 for name, test in sorted((name, value) for name, value in globals().items() if name.startswith("test_")):
     test()
     print(name)
-pictures()
