@@ -31,6 +31,7 @@ vtkUltrasoundAlignmentWidget::vtkUltrasoundAlignmentWidget()
   this->CallbackMapper->SetCallbackMethod(vtkCommand::LeftButtonPressEvent, vtkWidgetEvent::Select, this, SelectAction);
   this->CallbackMapper->SetCallbackMethod(vtkCommand::MouseMoveEvent, vtkWidgetEvent::Move, this, MoveAction);
   this->CallbackMapper->SetCallbackMethod(vtkCommand::LeftButtonReleaseEvent, vtkWidgetEvent::EndSelect, this, EndSelectAction);
+  this->CallbackMapper->SetCallbackMethod(vtkCommand::LeaveEvent, vtkWidgetEvent::HoverLeave, this, LeaveAction);
   this->CallbackMapper->SetCallbackMethod(vtkCommand::KeyPressEvent, vtkWidgetEvent::ModifyEvent, this, KeyAction);
 }
 
@@ -218,16 +219,18 @@ void vtkUltrasoundAlignmentWidget::SelectAction(vtkAbstractWidget* widget)
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentWidget::Hover(bool draw)
+void vtkUltrasoundAlignmentWidget::Hover(bool draw, bool here)
 {
   const int x = this->Interactor->GetEventPosition()[0], y = this->Interactor->GetEventPosition()[1];
-  if (!this->GetSession() || !this->CurrentRenderer || !this->CurrentRenderer->IsInViewport(x, y)) {
+  here = here && this->GetSession() && this->CurrentRenderer && this->CurrentRenderer->IsInViewport(x, y);
+  if (!here && !this->Hovers) { // the mouse belongs to others
     return;
   }
+  this->Hovers = here;
   Representation* representation = this->GetAlignmentRepresentation();
   const vtkMTimeType before = representation->GetMTime();
-  const int state = representation->ComputeInteractionState(x, y);
-  representation->Highlight(1);
+  const int state = here ? representation->ComputeInteractionState(x, y) : static_cast<int>(Representation::Outside);
+  representation->Highlight(here ? 1 : 0);
   this->RequestCursorShape(state == Representation::Outside      ? VTK_CURSOR_DEFAULT
                            : state == Representation::OnSelected ? VTK_CURSOR_SIZEALL
                                                                  : VTK_CURSOR_HAND);
@@ -241,7 +244,7 @@ void vtkUltrasoundAlignmentWidget::MoveAction(vtkAbstractWidget* widget)
 {
   auto* self = static_cast<vtkUltrasoundAlignmentWidget*>(widget);
   if (self->Now == Gesture::None) {
-    self->Hover(true);
+    self->Hover(true, true);
     return;
   }
   double position[2] = {static_cast<double>(self->Interactor->GetEventPosition()[0]),
@@ -256,6 +259,15 @@ void vtkUltrasoundAlignmentWidget::MoveAction(vtkAbstractWidget* widget)
     self->Render();
   }
   self->EventCallbackCommand->SetAbortFlag(1);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentWidget::LeaveAction(vtkAbstractWidget* widget)
+{
+  auto* self = static_cast<vtkUltrasoundAlignmentWidget*>(widget);
+  if (self->Now == Gesture::None) {
+    self->Hover(true, false);
+  }
 }
 
 //----------------------------------------------------------------------------
@@ -278,7 +290,7 @@ void vtkUltrasoundAlignmentWidget::EndSelectAction(vtkAbstractWidget* widget)
   if (!self->Moved && (gesture == Gesture::Click || (gesture == Gesture::Drag && onVolume))) {
     representation->SelectAt(self->Pressed[0], self->Pressed[1], self->Adding);
   }
-  self->Hover(false);
+  self->Hover(false, true);
   self->EventCallbackCommand->SetAbortFlag(1);
   self->Render();
 }
@@ -340,8 +352,9 @@ bool vtkUltrasoundAlignmentWidget::Key(const std::string& key, bool control)
   if (control) { // Ctrl+Z and its kind belong to the window
     return false;
   }
-  if (key == "plus" || key == "KP_Add" || key == "minus" || key == "KP_Subtract") {
-    const double factor = key == "plus" || key == "KP_Add" ? 2.0 : 0.5;
+  const bool more = key == "plus" || key == "KP_Add" || key == "equal"; // + without Shift
+  if (more || key == "minus" || key == "KP_Subtract") {
+    const double factor = more ? 2.0 : 0.5;
     this->SetTranslationStep(factor * this->TranslationStep);
     this->SetRotationStep(factor * this->RotationStep);
     return true;

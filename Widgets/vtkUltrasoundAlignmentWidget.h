@@ -93,6 +93,7 @@ protected:
 
   static void SelectAction(vtkAbstractWidget* widget);
   static void MoveAction(vtkAbstractWidget* widget);
+  static void LeaveAction(vtkAbstractWidget* widget);
   static void EndSelectAction(vtkAbstractWidget* widget);
   static void KeyAction(vtkAbstractWidget* widget);
 
@@ -106,7 +107,7 @@ private:
   void Begin(bool turn);
   void Release();
   bool Key(const std::string& key, bool control);
-  void Hover(bool draw);
+  void Hover(bool draw, bool here);
 
   Gesture Now = Gesture::None;
   double TranslationStep = 1.0;
@@ -115,6 +116,7 @@ private:
   bool Moved = false;
   bool Adding = false;
   bool ToolHolds = false;
+  bool Hovers = false;
 #endif
 };
 

@@ -388,7 +388,7 @@ def test_keys():
         near(bench.pose(bench.a), turn(axis, 1.0), 1e-12)
         bench.session.Undo()
     bench.key("plus")
-    bench.key("plus")
+    bench.key("equal")
     bench.key("minus")
     assert bench.widget.GetTranslationStep() == 2.0 and bench.widget.GetRotationStep() == 2.0
     before = bench.session.GetUndoCount()
@@ -563,6 +563,8 @@ def test_handles_are_seen_and_marked():
     assert changed.sum() > 100 and columns.min() > WIDTH // 2 and np.abs(rows - HEIGHT / 2).max() < 12, "the arrow alone is marked"
     bench.play(("MouseMoveEvent", (5, 5)))
     assert np.array_equal(pixels_of(bench.window), plain)
+    bench.play(("MouseMoveEvent", bench.handle(Representation.OnArrowX)), ("LeaveEvent", (300, 150)))
+    assert np.array_equal(pixels_of(bench.window), plain), "the mouse has left the window"
     # As large at another zoom.
     bench.renderer.GetActiveCamera().SetParallelScale(20)
     bench.window.Render()
