@@ -11,6 +11,7 @@
 #include "vtkActor.h"
 #include "vtkActor2D.h"
 #include "vtkArrowSource.h"
+#include "vtkAutoInit.h"
 #include "vtkBoundingBox.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
@@ -62,6 +63,11 @@
 #include <map>
 #include <vector>
 
+// The view makes text and ray casters at once: whoever uses it need not know what draws them.
+VTK_MODULE_INIT(vtkRenderingFreeType);
+VTK_MODULE_INIT(vtkRenderingOpenGL2);
+VTK_MODULE_INIT(vtkRenderingVolumeOpenGL2);
+
 using echorama::DetailLevel;
 using echorama::ParticleParameters;
 using echorama::Pose;
@@ -74,6 +80,16 @@ class ParticleMapper : public vtkOpenGLPolyDataMapper {
 public:
   static ParticleMapper* New();
   vtkTypeMacro(ParticleMapper, vtkOpenGLPolyDataMapper);
+
+  void ComputeBounds() override // of all points, whether they are sorted already or not
+  {
+    vtkPoints* points = this->GetInput() ? this->GetInput()->GetPoints() : nullptr;
+    if (points && points->GetNumberOfPoints() > 0) {
+      points->GetBounds(this->Bounds);
+    } else {
+      vtkMath::UninitializeBounds(this->Bounds);
+    }
+  }
 
   void RenderPieceDraw(vtkRenderer* renderer, vtkActor* actor) override
   {
@@ -102,12 +118,13 @@ struct Look {
 /** A volume as this view keeps it. */
 struct Shown {
   Look Of;
+  bool VoxelsDirty = false;
   std::map<int, echorama::Particles> Particles;       ///< by the block that was asked for
   std::map<int, vtkSmartPointer<vtkImageData>> Bytes; ///< of volume rendering, by block
   vtkNew<vtkVolume> Volume;
   vtkNew<vtkFixedPointVolumeRayCastMapper> RayCaster;
   vtkNew<vtkActor> Box;
-  vtkNew<vtkCubeSource> Cube;
+  vtkNew<vtkCubeSource> Cube; ///< around its real voxels
 };
 
 /** The plane of a slice view. */
@@ -156,7 +173,7 @@ struct vtkUltrasoundVolumeView::Internals {
 
   std::string Style = "points";
   ParticleParameters Parameters;
-  double ParticleSize = 1.0;
+  double ParticleSize = 1.25;
   bool ShowPlanes = true, ShowErrors = false, ShowMarker = true;
 
   bool Interactive = false, EverFitted = false, Updating = false;
@@ -175,7 +192,7 @@ struct vtkUltrasoundVolumeView::Internals {
   vtkSmartPointer<ParticleMapper> CloudMapper = vtkSmartPointer<ParticleMapper>::New();
   std::vector<int> CloudIds; ///< the volumes of the sets
   std::vector<int> CloudBlocks;
-  vtkMTimeType SortedCamera = 0;
+  std::array<double, 3> SortedAlong{0.0, 0.0, 0.0}; ///< the direction of view; zero: not sorted
 
   // Error vectors.
   vtkNew<vtkPolyData> Errors;
@@ -382,6 +399,7 @@ struct vtkUltrasoundVolumeView::Internals {
   void UpdateRayCaster(const SessionVolume& volume, Shown& shown);
   void UpdateErrors();
   void UpdateMarker();
+  void FitCamera();
 };
 
 //----------------------------------------------------------------------------
@@ -416,14 +434,6 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
       shown.Box->SetMapper(box);
       shown.Box->GetProperty()->SetRepresentationToWireframe();
       MakeLine(shown.Box);
-      const Eigen::Vector3d size =
-          Eigen::Vector3d(volume.geometry.dimensions[0], volume.geometry.dimensions[1], volume.geometry.dimensions[2])
-              .cwiseProduct(volume.geometry.spacing);
-      const Eigen::Vector3d middle = 0.5 * (size - volume.geometry.spacing);
-      shown.Cube->SetXLength(size.x());
-      shown.Cube->SetYLength(size.y());
-      shown.Cube->SetZLength(size.z());
-      shown.Cube->SetCenter(middle.x(), middle.y(), middle.z());
       shown.Volume->SetMapper(shown.RayCaster);
       shown.Volume->PickableOff();
       shown.RayCaster->AutoAdjustSampleDistancesOff();
@@ -434,10 +444,25 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
       this->Renderer->AddViewProp(shown.Volume);
       this->Renderer->AddViewProp(this->CloudActor);
     }
-    if (isNew || !(shown.Of == Look{parameters})) {
+    if (isNew || shown.VoxelsDirty) {
+      Eigen::AlignedBox3i real;
+      this->WithVoxels(volume, [&](const auto& posed) { real = echorama::RealBox(posed); });
+      if (real.isEmpty()) {
+        real.extend(Eigen::Vector3i::Zero());
+      }
+      const Eigen::Vector3d spacing = volume.geometry.spacing;
+      const Eigen::Vector3d size = (real.sizes() + Eigen::Vector3i::Ones()).cast<double>().cwiseProduct(spacing);
+      const Eigen::Vector3d middle = 0.5 * (real.min() + real.max()).cast<double>().cwiseProduct(spacing);
+      shown.Cube->SetXLength(size.x());
+      shown.Cube->SetYLength(size.y());
+      shown.Cube->SetZLength(size.z());
+      shown.Cube->SetCenter(middle.x(), middle.y(), middle.z());
+    }
+    if (isNew || shown.VoxelsDirty || !(shown.Of == Look{parameters})) {
       shown.Of = {parameters};
       shown.Particles.clear();
       shown.Bytes.clear();
+      shown.VoxelsDirty = false;
     }
     shown.Box->SetVisibility(volume.visible && (this->Style == "outline" || this->Session->IsSelected(volume.id)));
     shown.Box->GetProperty()->SetColor(volume.colour[0], volume.colour[1], volume.colour[2]);
@@ -551,15 +576,19 @@ void vtkUltrasoundVolumeView::Internals::MoveCloud()
   }
   points->Modified();
   this->Cloud->Modified();
-  this->SortedCamera = 0;
+  this->SortedAlong = {0.0, 0.0, 0.0};
 }
 
 //----------------------------------------------------------------------------
 // Seen from the camera, from back to front.
 void vtkUltrasoundVolumeView::Internals::SortCloud()
 {
-  double normal[3];
-  this->Renderer->GetActiveCamera()->GetViewPlaneNormal(normal);
+  std::array<double, 3> normal;
+  this->Renderer->GetActiveCamera()->GetViewPlaneNormal(normal.data());
+  if (normal == this->SortedAlong) {
+    return;
+  }
+  this->SortedAlong = normal;
   const Eigen::Vector3d towards(normal[0], normal[1], normal[2]);
   std::vector<echorama::ParticleDepths> sets;
   for (std::size_t s = 0; s < this->CloudIds.size(); ++s) {
@@ -604,34 +633,37 @@ void vtkUltrasoundVolumeView::Internals::UpdatePlaces()
 //----------------------------------------------------------------------------
 void vtkUltrasoundVolumeView::Internals::UpdateErrors()
 {
-  this->Errors->Initialize();
-  if (this->ShowErrors && this->Session && this->Session->HasTruth()) {
-    this->Session->GetErrorVectors(this->Errors);
-  }
-  vtkDataArray* errors = this->Errors->GetPointData()->GetArray("Error");
-  const bool any = errors && errors->GetNumberOfTuples() > 0;
-  this->ArrowActor->SetVisibility(any);
-  this->Scale->SetVisibility(any);
-  if (!any) {
-    return;
-  }
+  vtkNew<vtkPoints> points;
   vtkNew<vtkFloatArray> ways, lengths;
   ways->SetName("Way");
   ways->SetNumberOfComponents(3);
   lengths->SetName("Length");
   double longest = 0.0;
-  for (vtkIdType p = 0; p < errors->GetNumberOfTuples(); ++p) {
-    double error[3];
-    errors->GetTuple(p, error);
-    const double length = vtkMath::Norm(error);
-    ways->InsertNextTuple3(-error[0], -error[1], -error[2]);
-    lengths->InsertNextValue(static_cast<float>(length));
-    longest = std::max(longest, length);
+  if (this->ShowErrors && this->Session && this->Session->HasTruth()) {
+    vtkNew<vtkPolyData> vectors;
+    this->Session->GetErrorVectors(vectors);
+    vtkDataArray* errors = vectors->GetPointData()->GetArray("Error");
+    vtkDataArray* ids = vectors->GetPointData()->GetArray("Volume");
+    for (vtkIdType p = 0; p < vectors->GetNumberOfPoints(); ++p) {
+      const SessionVolume* volume = this->Find(static_cast<int>(ids->GetComponent(p, 0)));
+      if (volume && volume->visible) {
+        double error[3];
+        errors->GetTuple(p, error);
+        const double length = vtkMath::Norm(error);
+        points->InsertNextPoint(vectors->GetPoint(p));
+        ways->InsertNextTuple3(-error[0], -error[1], -error[2]);
+        lengths->InsertNextValue(static_cast<float>(length));
+        longest = std::max(longest, length);
+      }
+    }
   }
+  this->Errors->Initialize();
+  this->Errors->SetPoints(points);
   this->Errors->GetPointData()->AddArray(ways);
   this->Errors->GetPointData()->AddArray(lengths);
-  this->Errors->Modified();
   this->ErrorColours->SetTableRange(0.0, RoundUp(longest));
+  this->ArrowActor->SetVisibility(points->GetNumberOfPoints() > 0);
+  this->Scale->SetVisibility(points->GetNumberOfPoints() > 0);
 }
 
 //----------------------------------------------------------------------------
@@ -651,6 +683,33 @@ void vtkUltrasoundVolumeView::Internals::UpdateMarker()
   points->Modified();
   this->MarkerLines->Modified();
   this->Marker->SetVisibility(this->ShowMarker);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeView::Internals::FitCamera()
+{
+  vtkBoundingBox box;
+  for (const SessionVolume& volume : this->State()) {
+    if (volume.visible) {
+      double bounds[6];
+      this->Volumes.at(volume.id).Box->GetBounds(bounds);
+      box.AddBounds(bounds);
+    }
+  }
+  if (!box.IsValid()) {
+    return;
+  }
+  if (!this->EverFitted) {
+    // Towards posterior, a little from the left and above.
+    vtkCamera* camera = this->Renderer->GetActiveCamera();
+    camera->SetFocalPoint(0.0, 0.0, 0.0);
+    camera->SetPosition(0.6, -1.0, 0.45);
+    camera->SetViewUp(0.0, 0.0, 1.0);
+    this->EverFitted = true;
+  }
+  double bounds[6];
+  box.GetBounds(bounds);
+  this->Renderer->ResetCamera(bounds);
 }
 
 vtkStandardNewMacro(vtkUltrasoundVolumeView);
@@ -717,8 +776,7 @@ void vtkUltrasoundVolumeView::OnSession(vtkObject*, unsigned long event, void* d
   if (event == vtkUltrasoundAlignmentSession::VoxelsChangedEvent) {
     for (auto& [id, shown] : parts.Volumes) {
       if (!data || *static_cast<int*>(data) == id) {
-        shown.Particles.clear();
-        shown.Bytes.clear();
+        shown.VoxelsDirty = true;
       }
     }
   }
@@ -746,8 +804,7 @@ void vtkUltrasoundVolumeView::Update()
     }
     parts.PosesDirty = false;
     if (!parts.EverFitted && parts.Session && parts.VisibleCount() > 0) {
-      parts.Updating = false;
-      this->Fit();
+      parts.FitCamera();
     }
   } catch (const std::exception& error) {
     parts.VolumesDirty = parts.PosesDirty = false; // said once
@@ -763,12 +820,10 @@ void vtkUltrasoundVolumeView::OnStart()
   Internals& parts = *this->Parts;
   parts.Begin = std::chrono::steady_clock::now();
   this->Update();
+  parts.Renderer->ResetCameraClippingRange(); // planes and arrows come and go
   vtkCamera* camera = parts.Renderer->GetActiveCamera();
   if (parts.CloudActor->GetVisibility()) {
-    if (parts.SortedCamera != camera->GetMTime()) {
-      parts.SortCloud();
-      parts.SortedCamera = camera->GetMTime();
-    }
+    parts.SortCloud();
     const double height = parts.Renderer->GetSize()[1];
     const double pixels = camera->GetParallelProjection()
                               ? height / (2.0 * camera->GetParallelScale())
@@ -853,33 +908,10 @@ int vtkUltrasoundVolumeView::GetNumberOfParticles() const
 //----------------------------------------------------------------------------
 void vtkUltrasoundVolumeView::Fit()
 {
-  Internals& parts = *this->Parts;
   this->Update();
-  if (!parts.Session) {
-    return;
+  if (this->Parts->Session) {
+    this->Parts->FitCamera();
   }
-  vtkBoundingBox box;
-  for (const SessionVolume& volume : parts.State()) {
-    if (volume.visible) {
-      double bounds[6];
-      parts.Volumes.at(volume.id).Box->GetBounds(bounds);
-      box.AddBounds(bounds);
-    }
-  }
-  if (!box.IsValid()) {
-    return;
-  }
-  if (!parts.EverFitted) {
-    // Towards posterior, a little from the left and above.
-    vtkCamera* camera = parts.Renderer->GetActiveCamera();
-    camera->SetFocalPoint(0.0, 0.0, 0.0);
-    camera->SetPosition(0.6, -1.0, 0.45);
-    camera->SetViewUp(0.0, 0.0, 1.0);
-    parts.EverFitted = true;
-  }
-  double bounds[6];
-  box.GetBounds(bounds);
-  parts.Renderer->ResetCamera(bounds);
   this->Modified();
 }
 

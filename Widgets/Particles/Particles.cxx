@@ -28,19 +28,23 @@ struct Layer {
 
 // What grey levels become: value and opacity of a particle.
 struct Look {
-  double black, scale, minimum, maximum;
-  std::uint8_t alphaOfValue[256];
+  double black, scale, minimum, maximum, opacity, layers;
+  bool valueOpacity;
+  std::uint8_t alphaOfValue[256]; // of blocks that are real as a whole: most
 
   Look(const ParticleParameters& p, int block)
-    : black(p.black), scale(255.0 / (p.white - p.black)), minimum(p.minimum), maximum(p.maximum)
+    : black(p.black), scale(255.0 / (p.white - p.black)), minimum(p.minimum), maximum(p.maximum), opacity(p.opacity),
+      layers(static_cast<double>(block) / p.downsampling), valueOpacity(p.valueOpacity)
   {
-    const double layers = static_cast<double>(block) / p.downsampling;
-    for (int value = 0; value < 256; ++value) {
-      const double one = p.valueOpacity ? p.opacity * value / 255.0 : p.opacity;
-      alphaOfValue[value] = static_cast<std::uint8_t>(std::lround(255.0 * (1.0 - std::pow(1.0 - one, layers))));
-    }
+    for (int value = 0; value < 256; ++value)
+      alphaOfValue[value] = Alpha(value, 1.0);
   }
 
+  std::uint8_t Alpha(int value, double share) const
+  {
+    const double one = valueOpacity ? opacity * value / 255.0 : opacity;
+    return static_cast<std::uint8_t>(std::lround(255.0 * (1.0 - std::pow(1.0 - one, share * layers))));
+  }
   bool Shows(double grey) const { return grey >= minimum && grey <= maximum; }
   std::uint8_t ValueOf(double grey) const
   {
@@ -48,7 +52,7 @@ struct Look {
   }
 };
 
-// Calls sink(column, row, mean) for the blocks with real voxels whose first slice is \a block * number.
+// Calls sink(column, row, mean, real voxels) for the blocks with real voxels whose first slice is \a block * number.
 template <class T, class Sink>
 void VisitBlocks(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, const Sink& sink)
 {
@@ -75,7 +79,7 @@ void VisitBlocks(const PosedVolume<T>& volume, int block, std::ptrdiff_t number,
     for (int column = 0; column < columns; ++column) {
       const auto at = static_cast<std::size_t>(column);
       if (counts[at] > 0)
-        sink(column, row, sums[at] / counts[at]);
+        sink(column, row, sums[at] / counts[at], counts[at]);
     }
   }
 }
@@ -89,11 +93,13 @@ Layer LayerOf(const PosedVolume<T>& volume, int block, std::ptrdiff_t number, co
                                      std::min<std::ptrdiff_t>((index + 1) * block, volume.intensity.Dimensions()[axis]) - 1);
   };
   const double z = middle(number, 2);
+  const std::ptrdiff_t all = static_cast<std::ptrdiff_t>(block) * block * block;
   Layer layer;
-  VisitBlocks(volume, block, number, [&](int column, int row, double grey) {
+  VisitBlocks(volume, block, number, [&](int column, int row, double grey, int real) {
     if (!look.Shows(grey))
       return;
-    const std::uint8_t value = look.ValueOf(grey), alpha = look.alphaOfValue[value];
+    const std::uint8_t value = look.ValueOf(grey);
+    const std::uint8_t alpha = real == all ? look.alphaOfValue[value] : look.Alpha(value, static_cast<double>(real) / all);
     if (alpha == 0)
       return;
     const Eigen::Vector3f position = (toWorld * Eigen::Vector3d(middle(column, 0), middle(row, 1), z)).cast<float>();
@@ -178,12 +184,38 @@ DisplayVolume MakeDisplayVolume(const PosedVolume<T>& volume, const ParticlePara
                         Eigen::Vector3d::Constant(0.5 * (block - 1))};
   const VolumeView<unsigned char> values = display.values.View();
   ParallelFor(values.Slices(), progress, [&](std::ptrdiff_t number) {
-    VisitBlocks(volume, block, number, [&](int column, int row, double grey) {
+    VisitBlocks(volume, block, number, [&](int column, int row, double grey, int) {
       if (look.Shows(grey))
         values(column, row, static_cast<int>(number)) = std::max<std::uint8_t>(1, look.ValueOf(grey));
     });
   });
   return display;
+}
+
+template <class T>
+Eigen::AlignedBox3i RealBox(const PosedVolume<T>& volume)
+{
+  struct Box : Eigen::AlignedBox3i {
+    void operator+=(const Box& other) { extend(other); }
+  };
+  const auto& n = volume.intensity.Dimensions();
+  const Sampler<T> sampler(volume.intensity, volume.valid);
+  return ParallelSum<Box>(n[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
+    Box box;
+    for (int j = 0; j < n[1]; ++j) {
+      const std::ptrdiff_t row = volume.intensity.SliceStride() * k + volume.intensity.RowStride() * j;
+      int first = 0, last = n[0] - 1;
+      while (first <= last && !sampler.IsReal(row + first))
+        ++first;
+      while (last > first && !sampler.IsReal(row + last))
+        --last;
+      if (first <= last) {
+        box.extend(Eigen::Vector3i(first, j, static_cast<int>(k)));
+        box.extend(Eigen::Vector3i(last, j, static_cast<int>(k)));
+      }
+    }
+    return box;
+  });
 }
 
 std::vector<std::uint32_t> BackToFront(const std::vector<ParticleDepths>& sets)
@@ -227,7 +259,8 @@ std::vector<std::uint32_t> BackToFront(const std::vector<ParticleDepths>& sets)
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template Particles MakeParticles<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);                        \
-  template DisplayVolume MakeDisplayVolume<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);
+  template DisplayVolume MakeDisplayVolume<T>(const PosedVolume<T>&, const ParticleParameters&, const Progress&);                \
+  template Eigen::AlignedBox3i RealBox<T>(const PosedVolume<T>&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -32,7 +32,8 @@ struct Particles {
 
 /// The grey level of a particle is the mean of the real voxels of its block; a block without any gives no particle, nor does one
 /// that would be invisible. Blocks at the far faces may be smaller. A block that is larger than asked for, by the coarsening or
-/// by the budget, takes the opacity of as many layers: 1 - (1 - opacity)^(block / downsampling). Cost: one reading of the voxels.
+/// by the budget, takes the opacity of as many layers, and one of which only a share is real takes the opacity of so much:
+/// 1 - (1 - opacity)^(share * block / downsampling). Cost: one reading of the voxels.
 /// Independent of the number of threads. \throws Error(InvalidParameter), Error(BadInput) for a geometry that is none or not the
 /// voxels'.
 template <class T>
@@ -49,6 +50,10 @@ struct DisplayVolume {
 template <class T>
 DisplayVolume MakeDisplayVolume(const PosedVolume<T>& volume, const ParticleParameters& parameters,
                                 const Progress& progress = {});
+
+/// The least box of indices that holds all real voxels; empty when there are none. Cost: one reading of the valid region.
+template <class T>
+Eigen::AlignedBox3i RealBox(const PosedVolume<T>& volume);
 
 /// Some particles, and how far each lies towards the viewer: direction . position + offset.
 struct ParticleDepths {

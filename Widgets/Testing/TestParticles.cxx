@@ -62,9 +62,10 @@ Particles ByForce(const PosedVolume<T>& volume, const ParticleParameters& p, int
         const double grey = sum / real;
         if (real == 0 || grey < p.minimum || grey > p.maximum)
           continue;
-        const double value = std::round(255.0 * std::clamp((grey - p.black) / (p.white - p.black), 0.0, 1.0));
-        const double one = p.opacity * (p.valueOpacity ? value / 255.0 : 1.0);
-        const double alpha = std::round(255.0 * (1.0 - std::pow(1.0 - one, static_cast<double>(block) / p.downsampling)));
+        const double value = std::round(std::clamp((grey - p.black) * (255.0 / (p.white - p.black)), 0.0, 255.0));
+        const double one = p.valueOpacity ? p.opacity * value / 255.0 : p.opacity;
+        const double layers = static_cast<double>(real) / (block * block * block) * (static_cast<double>(block) / p.downsampling);
+        const double alpha = std::round(255.0 * (1.0 - std::pow(1.0 - one, layers)));
         if (alpha == 0.0)
           continue;
         const Eigen::Vector3d place = volume.geometry.IndexToWorld() * (middle / all);
@@ -214,6 +215,17 @@ TEST(Particles, Refuse)
   auto wrong = scene.Posed();
   wrong.geometry.dimensions = {13, 10, 8};
   EXPECT_THROW(MakeParticles(wrong, {}), Error);
+}
+
+TEST(Particles, LieInTheBoxOfWhatIsReal)
+{
+  Scene<float> scene;
+  scene.valid = Volume<unsigned char>(scene.n, 0);
+  EXPECT_TRUE(RealBox(scene.Posed()).isEmpty());
+  scene.valid.View()(4, 7, 2) = scene.valid.View()(9, 3, 5) = scene.valid.View()(12, 9, 6) = 1;
+  scene.intensity.View()(12, 9, 6) = std::nanf("");
+  EXPECT_EQ(RealBox(scene.Posed()).min(), Eigen::Vector3i(4, 3, 2));
+  EXPECT_EQ(RealBox(scene.Posed()).max(), Eigen::Vector3i(9, 7, 5));
 }
 
 TEST(Particles, AreEmptyWhereNothingIsReal)
