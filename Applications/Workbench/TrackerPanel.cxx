@@ -14,6 +14,7 @@ namespace echorama {
 TrackerPanel::TrackerPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
 {
   setObjectName("trackerPanel");
+  tracker_->SetActive(false); // until Connect
   address_ = new QLineEdit(QSettings().value("tracker/address", "igtl://localhost:18944").toString(), this);
   address_->setObjectName("trackerAddress");
   address_->setToolTip(
