@@ -32,8 +32,9 @@ constexpr std::pair<const char*, BrushMode> Modes[] = {
 fs::path Resolved(const fs::path& path)
 {
   std::error_code error;
-  const fs::path resolved = fs::weakly_canonical(fs::absolute(path), error);
-  return error ? fs::absolute(path).lexically_normal() : resolved;
+  const fs::path whole = fs::absolute(path, error);
+  const fs::path resolved = fs::weakly_canonical(whole, error);
+  return error ? whole.lexically_normal() : resolved;
 }
 
 std::string Relative(const std::string& path, const fs::path& folder)

@@ -194,6 +194,7 @@ TEST_F(ProjectFile, AFullDiskLeavesWhatWasThere)
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
   EXPECT_THROW(WriteProject(Path("missing/p.json"), before), Error);
   EXPECT_THROW(WriteProject("/dev/full", before), Error);
+  EXPECT_THROW(WriteProject("", before), Error);
   Project odd = before;
   odd.state.volumes[0].name = "\xff";
   EXPECT_THROW(WriteProject(Path("p.json"), odd), Error);
