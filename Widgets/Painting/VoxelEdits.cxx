@@ -2,7 +2,7 @@
 // The grid of a volume is cut into blocks of 8^3 voxels. A stroke in the making holds, for each block that its brush has come
 // near, the old voxels and each voxel's least squared distance from the path so far; a new piece of path looks at the blocks
 // around it alone, lowers distances, and where one is lowered makes the voxel anew from its old value. So a stroke is the same
-// however it is cut into pieces, and a piece costs what lies under the brush: a ball of 20 voxels' radius some 0.3 ms.
+// however it is cut into pieces, and a piece costs what lies under the brush.
 //
 // Finished, a stroke keeps its old blocks and forgets the distances. To go back is to copy them. A block's first stroke holds
 // what the file had there: that is what Restore reads.

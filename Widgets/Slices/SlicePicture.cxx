@@ -8,7 +8,7 @@
 // none is there is nothing to see, and only the pixels on the rim of the valid region go through Sampler, one by one. A voxel
 // that is not finite makes the interpolated value not finite, whatever its weight, so that needs no look-up of its own.
 //
-// Cost: some 3 ns per pixel and volume of bytes with a valid region, on one core. Rows are shared out among threads.
+// Cost: mostly the memory's. Rows are shared out among threads.
 #include "SlicePicture.h"
 
 #include "Core/Base/Error.h"
