@@ -72,8 +72,8 @@ public:
   ///@}
 
   ///@{
-  /** Width of a particle, in sides of its block: at 1 they touch when seen along the axes. In [0.1, 10]. Default 1.25: closed also
-   * when seen obliquely. */
+  /** Width of a particle, in sides of its block: at 1 they touch when seen along the axes. In [0.1, 10]. Default 1.25: closed
+   * also when seen obliquely. */
   void SetParticleSize(double factor);
   double GetParticleSize() const;
   ///@}

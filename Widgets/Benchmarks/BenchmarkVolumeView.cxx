@@ -10,15 +10,15 @@
 #include <cstdlib>
 
 #ifdef ECHORAMA_WITH_VTK
-#include "Widgets/vtkUltrasoundAlignmentSession.h"
-#include "Widgets/vtkUltrasoundVolumeView.h"
 #include "vtkImageData.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
-#include "vtkRenderWindow.h"
 #include "vtkRenderer.h"
+#include "vtkRenderWindow.h"
 #include "vtkUnsignedCharArray.h"
+#include "Widgets/vtkUltrasoundAlignmentSession.h"
+#include "Widgets/vtkUltrasoundVolumeView.h"
 #endif
 
 using namespace echorama;
@@ -86,8 +86,8 @@ void BenchParticles(const std::vector<Scene>& scenes)
     Particles particles;
     const double seconds = benchmark::MedianSeconds([&] { particles = MakeParticles(scenes[0].Posed(), parameters); });
     const double sort = benchmark::MedianSeconds([&] { BackToFront({{&particles.positions, {0.5, 0.7, 0.1}, 0.0}}); });
-    benchmark::Report("workbench", "particles of one volume, downsampling " + std::to_string(downsampling), "MakeParticles", seconds,
-                      0.0, "", {{"particles", particles.Count()}, {"sort_seconds", sort}});
+    benchmark::Report("workbench", "particles of one volume, downsampling " + std::to_string(downsampling), "MakeParticles",
+                      seconds, 0.0, "", {{"particles", particles.Count()}, {"sort_seconds", sort}});
   }
 }
 
@@ -157,7 +157,8 @@ void BenchFrames(const std::vector<Scene>& scenes)
     place(1, 0.0);
     const auto picture = PictureOf(window);
     const int particles = view->GetNumberOfParticles();
-    const auto report = [&, style = std::string(style)](const std::string& how, std::vector<double> seconds, double rms, int count) {
+    const auto report = [&, style = std::string(style)](const std::string& how, std::vector<double> seconds, double rms,
+                                                        int count) {
       std::sort(seconds.begin(), seconds.end());
       benchmark::Report("workbench", "3D " + style + ", three volumes, 800 x 600", how, seconds[seconds.size() / 2], rms,
                         "grey levels RMS",

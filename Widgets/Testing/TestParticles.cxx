@@ -110,7 +110,7 @@ TYPED_TEST(ParticlesOf, AreMeansOfBlocks)
         ExpectSame(particles, ByForce(scene.Posed(), p, downsampling + coarser));
         EXPECT_EQ(particles.block, downsampling + coarser);
         EXPECT_NEAR(particles.sizeMm, (downsampling + coarser) * std::cbrt(0.5 * 0.7 * 1.1), 1e-4);
-        EXPECT_GT(particles.Count(), 0u);
+        EXPECT_EQ(particles.Count() > 0, downsampling < 64); // so little of so large a block is not seen
       }
 }
 
