@@ -206,6 +206,7 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
   vtkUltrasoundAlignmentSession* session = workspace_.session;
   const bool takesDoubtful = doubtful_->isChecked();
   int moved = 0, left = 0;
+  QString why;
   table_->setRowCount(0);
   session->BeginEdit(label.toUtf8());
   for (const Result::Volume& volume : result.volumes) {
@@ -229,12 +230,16 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
       if (taken)
         session->SetVolumeToWorld(volume.id, after);
       ++(taken ? moved : left);
+      if (!taken)
+        why += (why.isEmpty() ? QString() : QStringLiteral("; ")) +
+               tr("%1: %2, %3").arg(QString::fromStdString(session->GetName(volume.id)), answer, reason);
     }
     const int row = table_->rowCount();
     table_->insertRow(row);
     const QString way = volume.held ? QString() : tr("%1 mm, %2°").arg(volume.mm, 0, 'f', 2).arg(volume.degrees, 0, 'f', 2);
-    const QStringList texts{QString::fromStdString(session->GetName(volume.id)), answer, way,
-                            volume.held ? QString() : tr("%1%").arg(100.0 * volume.overlap, 0, 'f', 0)};
+    const QStringList texts{
+        QString::fromStdString(session->GetName(volume.id)), answer, way,
+        volume.held || volume.verdict == NameOf(Verdict::Failed) ? QString() : tr("%1%").arg(100.0 * volume.overlap, 0, 'f', 0)};
     for (int column = 0; column < texts.size(); ++column) {
       auto* item = new QTableWidgetItem(texts[column]);
       item->setToolTip(reason);
@@ -242,12 +247,12 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
     }
   }
   session->EndEdit();
-  workspace_.say(left == 0 ? tr("%1: done, %2 moved").arg(label).arg(moved)
-                           : tr("%1: %2 of %3 volumes aligned; the others stay where they were, the table tells why")
-                                 .arg(label)
-                                 .arg(moved)
-                                 .arg(moved + left),
-                 left > 0);
+  if (left == 0)
+    workspace_.say(tr("%1: done, %2 moved").arg(label).arg(moved), false);
+  else
+    workspace_.say(
+        tr("%1: %2 of %3 aligned; what is not taken stays where it was. %4").arg(label).arg(moved).arg(moved + left).arg(why),
+        true);
 }
 
 } // namespace echorama
