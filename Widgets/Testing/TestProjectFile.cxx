@@ -156,6 +156,7 @@ TEST_F(ProjectFile, AChangedBackupIsFoundOut)
   // Any digit of it.
   const std::string text = Text(Path("good.json"));
   Random random(4);
+  int found = 0;
   for (int i = 0; i < 300; ++i) {
     std::string damaged = text;
     char& letter = damaged[random.Below(text.size() - 1)]; // but the last line break
@@ -164,8 +165,14 @@ TEST_F(ProjectFile, AChangedBackupIsFoundOut)
       continue;
     letter = other;
     Put(Path("bad.json"), damaged);
-    EXPECT_THROW(ReadProject(Path("bad.json")), Error) << damaged.substr(0, 200);
+    try {
+      // The last digit of seventeen may stand for the same number.
+      EXPECT_TRUE(ReadProject(Path("bad.json")).state == SomeProject(5, Path()).state) << damaged;
+    } catch (const Error&) {
+      ++found;
+    }
   }
+  EXPECT_GT(found, 200);
   for (std::size_t length = 0; length + 1 < text.size(); length += 1 + text.size() / 50) {
     Put(Path("bad.json"), text.substr(0, length));
     EXPECT_THROW(ReadProject(Path("bad.json")), Error);
