@@ -1006,18 +1006,20 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
         }
         parts.ProjectPath = isBackup ? std::string() : AbsolutePath(name);
         parts.Comment = project.comment;
-        parts.TruthFile.clear();
+        parts.TruthFile = project.truth;
         parts.TruthPoses.clear();
         parts.Score.Clear();
         parts.FixedVolume = -1;
         truth = project.truth;
         parts.Saved = isBackup ? Project() : parts.Now();
-        parts.Saved.truth = truth;
       },
       "Open");
   if (opened && !truth.empty()) {
     const std::string found = parts.FindFile(parts.ProjectPath, truth);
     this->ReadTruth(found.empty() ? truth.c_str() : found.c_str()); // without it the project is open all the same
+    if (!parts.ProjectPath.empty()) {
+      parts.Saved.truth = parts.TruthFile;
+    }
   }
   return opened;
 }
