@@ -47,8 +47,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 namespace {
-constexpr double FrameSeconds = 1.0 / 30.0;
-constexpr int CoarsestStep = 4; // beyond, speckle is gone
+constexpr double DrawSeconds = 1.0 / 60.0; // half a frame's at 30 a second: the other half is the rendering's
+constexpr int CoarsestStep = 4;            // beyond, speckle is gone
 
 struct Axis {
   const char* Name;
@@ -309,7 +309,7 @@ struct vtkUltrasoundSliceView::Internals {
     if (this->InteractiveStep > 0) {
       return this->InteractiveStep;
     }
-    return std::clamp(static_cast<int>(std::ceil(std::sqrt(this->FullSeconds / FrameSeconds))), 1, CoarsestStep);
+    return std::clamp(static_cast<int>(std::ceil(std::sqrt(this->FullSeconds / DrawSeconds))), 1, CoarsestStep);
   }
 
   void Draw()

@@ -149,9 +149,9 @@ public:
   ///@}
 
   ///@{
-  /** While dragging: pictures that take longer than a thirtieth of a second are drawn from fewer samples. Turning it off makes
-   * the picture whole again. Default off. InteractiveStep: every so many pixels both ways, in [1, 16]; 0 (default): as needed, at
-   * most 4. */
+  /** While dragging: pictures that take longer than a sixtieth of a second (the other half of a frame is the rendering's) are
+   * drawn from fewer samples. Turning it off makes the picture whole again. Default off. InteractiveStep: every so many pixels
+   * both ways, in [1, 16]; 0 (default): as needed, at most 4. */
   void SetInteractive(bool on);
   bool GetInteractive() const;
   void SetInteractiveStep(int step);
