@@ -305,12 +305,14 @@ class SliceView(unittest.TestCase):
     def test_bad_input_is_reported_and_changes_nothing(self):
         view, nan = self.view, float("nan")
         before = self.picture()
-        for call, word in ((lambda: view.SetAxis("w"), "axis"), (lambda: view.SetMode(None), "mode"), (lambda: view.SetShown("some"), "shows"),
+        for call, word in ((lambda: view.SetAxis("w"), "axis"), (lambda: view.SetMode(None), "mode"),
+                           (lambda: view.SetShown("some"), "shows"),
                            (lambda: view.SetSquarePixels(1), "squares"), (lambda: view.SetMillimetresPerPixel(0), "pixel"),
                            (lambda: view.SetMillimetresPerPixel(nan), "pixel"), (lambda: view.SetPixelSize(0, 5), "size"),
                            (lambda: view.SetPosition(nan), "position"), (lambda: view.SetFocus(nan, 0, 0), "focus"),
                            (lambda: view.SetCursor(0, nan, 0), "cursor"), (lambda: view.Zoom(-1, 0, 0), "factor"),
-                           (lambda: view.SetNormalAndUp(1, 0, 0, 2, 0, 0), "parallel"), (lambda: view.SetBrush(0, 0, 0, -1), "brush"),
+                           (lambda: view.SetNormalAndUp(1, 0, 0, 2, 0, 0), "parallel"),
+                           (lambda: view.SetBrush(0, 0, 0, -1), "brush"),
                            (lambda: view.SetInteractiveStep(17), "step"), (lambda: view.Turn(nan, 0), "angles")):
             with Errors(view) as messages:
                 call()
