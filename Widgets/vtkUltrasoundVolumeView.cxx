@@ -8,6 +8,7 @@
 // ray caster on the CPU does not know oblique directions.
 #include "vtkUltrasoundVolumeView.h"
 
+#include "Core/Base/Parallel.h"
 #include "vtkActor.h"
 #include "vtkActor2D.h"
 #include "vtkArrowSource.h"
@@ -149,6 +150,9 @@ void MakeLine(vtkActor* actor)
   actor->PickableOff();
 }
 
+// Voxels along a block's side in volume rendering, by level.
+constexpr int Blocks[DetailLevel::Coarsest + 1] = {1, 1, 2, 3, 4, 5};
+
 // The least of 1, 2, 5, 10, ... that is not below x: a scale that does not change with every millimetre.
 double RoundUp(double x)
 {
@@ -183,6 +187,7 @@ struct vtkUltrasoundVolumeView::Internals {
   double LastSeconds = 0.0;
 
   bool VolumesDirty = true, PosesDirty = true;
+  bool Remade = false; ///< this frame began with new particles: its time says nothing about the next
   std::map<int, Shown> Volumes;
   std::map<int, Plane> Planes;
 
@@ -356,10 +361,10 @@ struct vtkUltrasoundVolumeView::Internals {
     return particles;
   }
 
-  // The block to ask for at this level: the number of particles falls to about a third with each.
-  int ParticleBlock(const SessionVolume& volume, Shown& shown)
+  // The block to ask for at a level: the number of particles falls to about a third with each.
+  int ParticleBlock(const SessionVolume& volume, Shown& shown, int level)
   {
-    const int asked = this->Parameters.downsampling, level = this->Level();
+    const int asked = this->Parameters.downsampling;
     if (level == 0) {
       return asked;
     }
@@ -389,6 +394,20 @@ struct vtkUltrasoundVolumeView::Internals {
       std::copy(values.begin(), values.end(), static_cast<unsigned char*>(image->GetScalarPointer()));
     });
     return image;
+  }
+
+  // What a drag will begin with, while nobody waits for it.
+  void Prepare()
+  {
+    const int level = this->Detail.LevelFor(this->FullSeconds[this->Style]);
+    for (auto& [id, shown] : this->Volumes) {
+      const SessionVolume* volume = this->Session ? this->Find(id) : nullptr;
+      if (volume && volume->visible && this->Style == "points") {
+        this->ParticlesOf(*volume, shown, this->ParticleBlock(*volume, shown, level));
+      } else if (volume && volume->visible && this->Style == "volume") {
+        this->BytesOf(*volume, shown, Blocks[level]);
+      }
+    }
   }
 
   void UpdateVolumes();
@@ -480,9 +499,8 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
 //----------------------------------------------------------------------------
 void vtkUltrasoundVolumeView::Internals::UpdateRayCaster(const SessionVolume& volume, Shown& shown)
 {
-  static const int blocks[DetailLevel::Coarsest + 1] = {1, 1, 2, 2, 3, 4, 5, 6, 8};
-  static const float rays[DetailLevel::Coarsest + 1] = {1.0f, 1.7f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 8.0f, 10.0f};
-  const int level = this->Level(), block = blocks[level];
+  static const float rays[DetailLevel::Coarsest + 1] = {1.0f, 1.7f, 2.0f, 3.0f, 4.0f, 6.0f};
+  const int level = this->Level(), block = Blocks[level];
   vtkImageData* bytes = this->BytesOf(volume, shown, block);
   if (shown.RayCaster->GetInput() != bytes) {
     shown.RayCaster->SetInputData(bytes);
@@ -518,7 +536,7 @@ void vtkUltrasoundVolumeView::Internals::FillCloud()
   for (const SessionVolume& volume : this->State()) {
     if (volume.visible) {
       Shown& shown = this->Volumes.at(volume.id);
-      const int block = this->ParticleBlock(volume, shown);
+      const int block = this->ParticleBlock(volume, shown, this->Level());
       count += static_cast<vtkIdType>(this->ParticlesOf(volume, shown, block).Count());
       this->CloudIds.push_back(volume.id);
       this->CloudBlocks.push_back(block);
@@ -570,9 +588,14 @@ void vtkUltrasoundVolumeView::Internals::MoveCloud()
     const std::vector<float>& positions = this->ParticlesOf(volume, this->Volumes.at(volume.id), this->CloudBlocks[s]).positions;
     const Eigen::Matrix3f R = volume.volumeToWorld.linear().cast<float>();
     const Eigen::Vector3f t = volume.volumeToWorld.translation().cast<float>();
-    for (std::size_t p = 0; p < positions.size(); p += 3, out += 3) {
-      Eigen::Map<Eigen::Vector3f>{out} = R * Eigen::Map<const Eigen::Vector3f>(positions.data() + p) + t;
-    }
+    echorama::ParallelRanges(static_cast<std::ptrdiff_t>(positions.size() / 3), 1 << 15, echorama::Progress(),
+                             [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                               for (std::ptrdiff_t p = 3 * begin; p < 3 * end; p += 3) {
+                                 Eigen::Map<Eigen::Vector3f>{out + p} =
+                                     R * Eigen::Map<const Eigen::Vector3f>(positions.data() + p) + t;
+                               }
+                             });
+    out += positions.size();
   }
   points->Modified();
   this->Cloud->Modified();
@@ -795,6 +818,7 @@ void vtkUltrasoundVolumeView::Update()
     if (parts.VolumesDirty) {
       parts.UpdateVolumes();
       parts.VolumesDirty = false;
+      parts.Remade = true;
       parts.PosesDirty = true;
     }
     if (parts.PosesDirty && parts.Session) {
@@ -839,10 +863,21 @@ void vtkUltrasoundVolumeView::OnEnd()
   Internals& parts = *this->Parts;
   parts.Renderer->GetRenderWindow()->WaitForCompletion();
   parts.LastSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - parts.Begin).count();
-  if (!parts.Interactive) {
+  const bool representative = !parts.Remade;
+  parts.Remade = false;
+  if (parts.Interactive) {
+    if (representative && parts.Detail.Measure(parts.LastSeconds)) {
+      parts.VolumesDirty = true;
+    }
+    return;
+  }
+  if (representative || parts.FullSeconds.count(parts.Style) == 0) {
     parts.FullSeconds[parts.Style] = parts.LastSeconds;
-  } else if (parts.Detail.Measure(parts.LastSeconds)) {
-    parts.VolumesDirty = true;
+  }
+  try {
+    parts.Prepare();
+  } catch (const std::exception& error) {
+    vtkErrorMacro(<< error.what());
   }
 }
 

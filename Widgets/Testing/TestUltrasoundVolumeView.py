@@ -296,7 +296,7 @@ def test_dragging():
         check(style == "volume" or 0 < shown.view.GetNumberOfParticles() < particles / 2, "fewer particles")
         rms = math.sqrt(((coarse - full) ** 2).mean())
         check(0 < rms < 40, f"{style}: level {level} differs by {rms:.1f} grey levels")
-        check(abs(coarse.mean() - full.mean()) < 0.15 * full.mean(), f"{style}: brightness {coarse.mean():.1f} for {full.mean():.1f}")
+        check(abs(coarse.mean() - full.mean()) < 0.25 * full.mean(), f"{style}: brightness {coarse.mean():.1f} for {full.mean():.1f}")
         shown.view.SetInteractive(False)
         check(shown.view.GetDetailLevel() == 0 and np.array_equal(shown.picture(), full), f"{style}: full again")
         check(shown.view.GetLastFrameSeconds() > 0, "frames are timed")
