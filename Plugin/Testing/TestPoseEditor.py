@@ -12,21 +12,25 @@ from paraview.simple import *
 
 LoadPlugin(os.environ["ECHORAMA_PLUGIN"], remote=False, ns=globals())
 
-a = UltrasoundPhantomSource(SpacingMm=2.0)
-b = UltrasoundPhantomSource(SpacingMm=2.0, Position=[20.0, 0.0, 0.0])
+a = UltrasoundPhantom(SpacingMm=2.0)
+b = UltrasoundPhantom(SpacingMm=2.0, Position=[20.0, 0.0, 0.0])
 editor = UltrasoundPoseEditor(Input=[a, b])
-editor.UpdatePipeline()
-editor.UpdatePropertyInformation()
-assert math.isnan(editor.Score), editor.Score
+
+
+def score():
+    editor.UpdatePipeline()
+    editor.UpdatePropertyInformation()
+    return editor.SMProxy.GetProperty("Score").GetElement(0)
+
+
+assert math.isnan(score())
 before = numpy.array(servermanager.Fetch(editor).GetBlock(1).GetOrigin())
 
 # Connect the truth, where they are now: moved by (3, 4, 0), volume B scores 5.
 editor.Truth = [a, b]
 editor.Translation = [3.0, 4.0, 0.0]
-editor.UpdatePipeline()
-editor.UpdatePropertyInformation()
-print("score", editor.Score)
-assert abs(editor.Score - 5.0) < 1e-9, editor.Score
+print("score", score())
+assert abs(score() - 5.0) < 1e-9, score()
 blocks = servermanager.Fetch(editor)
 assert numpy.allclose(numpy.array(blocks.GetBlock(1).GetOrigin()) - before, [3.0, 4.0, 0.0])
 assert abs(blocks.GetFieldData().GetArray("Score").GetValue(0) - 5.0) < 1e-9
