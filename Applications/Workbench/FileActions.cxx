@@ -14,6 +14,7 @@
 #include <QMenu>
 #include <QSettings>
 #include <vtkCompositeDataSet.h>
+#include <vtkDoubleArray.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkMultiBlockDataSet.h>
@@ -192,6 +193,8 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs)
       emit Opened();
       if (!saveAs.isEmpty())
         OfferNewerBackup(saveAs);
+      else if (bench_->Session()->BackUp()) // what was left is now this session's: it is not offered twice
+        bench_->Session()->DiscardBackups(QFileInfo(path).absolutePath().toUtf8().constData());
     },
     [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
   jobs_->Watch(job);
@@ -201,12 +204,13 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs)
 void FileActions::OfferNewerBackup(const QString& path)
 {
   vtkNew<vtkStringArray> paths, labels;
-  const int count = bench_->Session()->GetBackups(paths, labels);
+  vtkNew<vtkDoubleArray> times;
+  const int count = bench_->Session()->GetBackups(paths, labels, times);
   for (int i = 0; i < count; i++) {
     if (labels->GetValue(i) == "damaged")
       continue;
     const QString backup = QString::fromStdString(paths->GetValue(i));
-    const QDateTime time = QFileInfo(backup).lastModified();
+    const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
     if (time > QFileInfo(path).lastModified().addSecs(1))
       bench_->Ask(tr("There is later work on this project, of %1, that was not saved.").arg(time.toString("yyyy-MM-dd hh:mm:ss")),
                   {{tr("Go on with it"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},

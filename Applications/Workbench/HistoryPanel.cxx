@@ -5,11 +5,11 @@
 #include "vtkUltrasoundAlignmentSession.h"
 #include "Workbench.h"
 #include <QDateTime>
-#include <QFileInfo>
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
 #include <QVBoxLayout>
+#include <vtkDoubleArray.h>
 #include <vtkNew.h>
 #include <vtkStringArray.h>
 
@@ -65,11 +65,12 @@ void HistoryPanel::ShowHistory()
 void HistoryPanel::ListBackups()
 {
   vtkNew<vtkStringArray> paths, labels;
-  const int count = bench_->Session()->GetBackups(paths, labels);
+  vtkNew<vtkDoubleArray> times;
+  const int count = bench_->Session()->GetBackups(paths, labels, times);
   backups_->clear();
   for (int i = 0; i < count; i++) {
     const QString path = QString::fromStdString(paths->GetValue(i)), label = QString::fromStdString(labels->GetValue(i));
-    const QDateTime time = QFileInfo(path).lastModified();
+    const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
     const bool isToday = time.date() == QDate::currentDate();
     auto* item = new QListWidgetItem(QString("%1  %2").arg(time.toString(isToday ? "hh:mm:ss" : "yyyy-MM-dd hh:mm"), label), backups_);
     item->setData(Qt::UserRole, path);

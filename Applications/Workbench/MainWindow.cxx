@@ -183,7 +183,6 @@ void MainWindow::AddStatus(QWidget* widget)
 void MainWindow::RestoreLayout()
 {
   resize(1280, 800);
-  resizeDocks(findChildren<QDockWidget*>(), QList<int>(), Qt::Horizontal);
   QSettings settings;
   restoreGeometry(settings.value("window/geometry").toByteArray());
   restoreState(settings.value("window/state").toByteArray(), LayoutVersion);

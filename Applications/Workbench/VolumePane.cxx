@@ -20,6 +20,7 @@
 #include <vtkInteractorStyleTrackballCamera.h>
 #include <vtkNew.h>
 #include <vtkRenderer.h>
+#include <vtkRenderingVolumeModule.h> // the OpenGL part of the mappers that the view makes is registered here
 
 namespace echorama {
 
@@ -82,14 +83,7 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   connect(fit, &QToolButton::clicked, this, &VolumePane::Fit);
   connect(large, &QToolButton::clicked, this, &VolumePane::LargeAsked);
 
-  connect(bench, &Workbench::VolumesChanged, this, [this] {
-    if (!fitted_ && bench_->Session()->GetNumberOfVolumes() > 0) {
-      fitted_ = true;
-      Fit();
-    }
-    Ask();
-  });
-  for (auto changed : {&Workbench::PosesChanged, &Workbench::SelectionChanged, &Workbench::VoxelsChanged, &Workbench::ToolChanged})
+  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged, &Workbench::VoxelsChanged, &Workbench::ToolChanged})
     connect(bench, changed, this, &VolumePane::Ask);
   connect(bench, &Workbench::LookChanged, this, &VolumePane::Look);
   connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {

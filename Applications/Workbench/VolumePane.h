@@ -54,7 +54,6 @@ private:
   QComboBox* style_;
   Redraw* redraw_;
   Redraw* refine_;
-  bool fitted_ = false;
 };
 
 } // namespace echorama
