@@ -206,6 +206,7 @@ struct vtkUltrasoundAlignmentSession::Internals {
   bool BackedUpUnfinished = false; ///< the last backup is of an edit that goes on
 
   std::string TruthFile;
+  std::map<int, Pose> Truths;         ///< of those that the score has
   std::vector<VolumePose> TruthPoses; ///< of the file, also of volumes that may still come
   LiveScore Score;
   int FixedVolume = -1; ///< chosen; -1: the first
@@ -307,6 +308,7 @@ struct vtkUltrasoundAlignmentSession::Internals {
       points = ValidPoints(vtkUltrasoundVolume::ViewOf<const decltype(type)>(intensity, image), valid, ScorePoints, ScoreSeed);
     });
     this->Score.Set(volume.id, volume.name, volume.geometry.Moved(truth), std::move(points));
+    this->Truths[volume.id] = truth;
     this->ScoreIsCurrent = false;
   }
 
@@ -858,6 +860,12 @@ bool vtkUltrasoundAlignmentSession::Undo()
 }
 
 //----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::ForgetHistory()
+{
+  return this->Change([&]() { this->Parts->Session.ForgetHistory(); });
+}
+
+//----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::Redo()
 {
   bool redone = false;
@@ -1369,6 +1377,18 @@ void vtkUltrasoundAlignmentSession::ClearTruth()
   });
   this->Modified();
   this->InvokeEvent(PosesChangedEvent, nullptr);
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::GetTruth(int id, vtkMatrix4x4* volumeToWorld) const
+{
+  const auto truth = this->Parts->Truths.find(id);
+  if (truth == this->Parts->Truths.end() || !this->Parts->Score.Has(id) || !volumeToWorld) {
+    return false;
+  }
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = truth->second.matrix();
+  volumeToWorld->DeepCopy(rows.data());
+  return true;
 }
 
 //----------------------------------------------------------------------------

@@ -131,6 +131,8 @@ public:
   int GetRedoCount() const;
   std::string GetUndoLabel() const;
   std::string GetRedoLabel() const;
+  /** What was done stays done: nothing before can be undone, and volumes that were removed are let go. */
+  bool ForgetHistory();
   ///@}
 
   ///@{
@@ -193,6 +195,8 @@ public:
   bool SetTruth(int id, vtkMatrix4x4* volumeToWorld);
   void ClearTruth();
   bool HasTruth() const;
+  /** Where a volume belongs: its VolumeToWorld by the truth. Returns false, and leaves the pose alone, when nothing is known. */
+  bool GetTruth(int id, vtkMatrix4x4* volumeToWorld) const;
   double GetScore() const;
   double GetVolumeScore(int id) const;
   double GetRotationError(int id) const; ///< degrees

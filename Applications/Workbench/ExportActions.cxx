@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ExportActions.h"
 #include "AlgorithmRun.h"
+#include "Controls.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Geometry/PoseFile.h"
 #include "Job.h"
 #include "JobBar.h"
 #include <filesystem>
+#include <QAction>
+#include <QFileDialog>
+#include <QMenu>
 #include <vector>
 #include <vtkImageData.h>
 #include <vtkMatrix4x4.h>
+#include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundWriter.h>
 
@@ -43,6 +48,30 @@ std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession*
 
 ExportActions::ExportActions(Workspace& workspace, QObject* parent) : QObject(parent), workspace_(workspace) {}
 
+void ExportActions::AddTo(QMenu* menu, QWidget* window)
+{
+  const auto folder = [window](const QString& title) { return QFileDialog::getExistingDirectory(window, title); };
+  menu->addSeparator();
+  menu->addAction(MakeAction(
+      this, "exportPoses", tr("Export &poses..."), "", tr("For echorama stitch, and all that reads pose files"), [this, window] {
+        const QString path = QFileDialog::getSaveFileName(window, tr("Export poses"), "poses.json", tr("Poses (*.json)"));
+        if (!path.isEmpty())
+          ExportPoses(path);
+      }));
+  menu->addAction(MakeAction(this, "exportVolumes", tr("Export &volumes..."), "",
+                             tr("The volumes that are shown, with their new geometry and what was painted"), [this, folder] {
+                               const QString path = folder(tr("Export volumes to"));
+                               if (!path.isEmpty())
+                                 ExportVolumes(path);
+                             }));
+  menu->addAction(MakeAction(this, "exportTransforms", tr("Export &transforms..."), "",
+                             tr("One transform of ITK (.tfm) per volume that is shown, for 3D Slicer"), [this, folder] {
+                               const QString path = folder(tr("Export transforms to"));
+                               if (!path.isEmpty())
+                                 ExportTransforms(path);
+                             }));
+}
+
 void ExportActions::ExportVolumes(const QString& folder, const QString& extension)
 {
   struct Item {
@@ -50,10 +79,15 @@ void ExportActions::ExportVolumes(const QString& folder, const QString& extensio
     std::string path;
   };
   std::vector<Item> items;
+  vtkNew<vtkMultiBlockDataSet> all; // what stays as it is, whatever the session does
+  workspace_.session->GetVolumes(all);
   try {
     for (const auto& [id, path] : FilesFor(workspace_.session, folder, extension.toStdString())) {
-      items.push_back({vtkSmartPointer<vtkImageData>::New(), path});
-      items.back().image->ShallowCopy(workspace_.session->GetImage(id)); // the session's own moves on
+      items.push_back({nullptr, path});
+      int index = 0;
+      while (workspace_.session->GetVolumeId(index) != id)
+        ++index;
+      items.back().image = vtkImageData::SafeDownCast(all->GetBlock(static_cast<unsigned int>(index)));
     }
   } catch (const Error& error) {
     workspace_.say(tr("Export volumes: %1").arg(error.what()), true);

@@ -3,6 +3,9 @@
 #include "Workspace.h"
 #include <QObject>
 
+class QMenu;
+class QWidget;
+
 namespace echorama {
 
 /// What leaves the session as files of others: volumes with their new geometry, poses, and transforms of ITK (3D Slicer).
@@ -11,6 +14,9 @@ class ExportActions : public QObject {
 
 public:
   explicit ExportActions(Workspace& workspace, QObject* parent = nullptr);
+
+  /// Adds its entries to a menu; dialogs belong to \a window.
+  void AddTo(QMenu* menu, QWidget* window);
 
   /// The volumes that are shown, each under its name, into \a folder, in the background. \a extension names the format
   /// ("mha"). Files that are there are not replaced: then nothing is written.

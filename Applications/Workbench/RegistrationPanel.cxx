@@ -96,6 +96,11 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : QW
   connect(alignAll_, &QPushButton::clicked, this, &RegistrationPanel::AlignAll);
 }
 
+RegistrationPanel::~RegistrationPanel()
+{
+  delete job_; // before the buttons
+}
+
 void RegistrationPanel::ShowState()
 {
   refine_->setEnabled(!job_);
@@ -138,17 +143,19 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
     return;
   }
   const auto result = std::make_shared<Result>();
-  vtkNew<vtkMultiBlockDataSet> blocks;
+  vtkNew<vtkMultiBlockDataSet> all, blocks; // what stays as it is, whatever the session does
+  workspace_.session->GetVolumes(all);
   for (const int id : ids) {
     Result::Volume volume;
     volume.id = id;
     vtkNew<vtkMatrix4x4> pose;
     workspace_.session->GetVolumeToWorld(id, pose);
     volume.before = volume.after = ElementsOf(pose);
-    vtkNew<vtkImageData> image; // of its own: the session's moves on
-    image->ShallowCopy(workspace_.session->GetImage(id));
     const auto block = static_cast<unsigned int>(result->volumes.size());
-    blocks->SetBlock(block, image);
+    int index = 0;
+    while (workspace_.session->GetVolumeId(index) != id)
+      ++index;
+    blocks->SetBlock(block, all->GetBlock(static_cast<unsigned int>(index)));
     blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), workspace_.session->GetName(id).c_str());
     result->volumes.push_back(volume);
   }
@@ -196,7 +203,10 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
       },
       [this, label, result] { Take(label, *result); },
       [this, label](const QString& error) { workspace_.say(tr("%1: %2").arg(label, error), true); });
-  connect(job_, &QObject::destroyed, this, &RegistrationPanel::ShowState);
+  connect(job_, &Job::Ended, this, [this] {
+    job_ = nullptr;
+    ShowState();
+  });
   workspace_.jobs->Watch(job_);
   ShowState();
 }
@@ -205,6 +215,15 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
 {
   vtkUltrasoundAlignmentSession* session = workspace_.session;
   const bool takesDoubtful = doubtful_->isChecked();
+  // The answer holds beside the volumes that stayed, where they were.
+  for (const Result::Volume& volume : result.volumes) {
+    vtkNew<vtkMatrix4x4> now;
+    if (volume.held && (!session->GetVolumeToWorld(volume.id, now) || ElementsOf(now) != volume.before)) {
+      workspace_.say(tr("%1: not taken, for a volume that the others were aligned with has been moved meanwhile").arg(label),
+                     true);
+      return;
+    }
+  }
   int moved = 0, left = 0;
   QString why;
   table_->setRowCount(0);

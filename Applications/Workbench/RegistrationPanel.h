@@ -22,6 +22,7 @@ class RegistrationPanel : public QWidget {
 
 public:
   explicit RegistrationPanel(Workspace& workspace, QWidget* parent = nullptr);
+  ~RegistrationPanel() override;
 
 public slots:
   void Refine();   ///< selected volumes onto the others, which stay; with all or none selected: all onto the first

@@ -108,6 +108,11 @@ ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : QWidget(parent
   ShowState();
 }
 
+ResultPanel::~ResultPanel()
+{
+  delete job_; // before the buttons
+}
+
 void ResultPanel::SetView(QWidget* view)
 {
   view->setMinimumHeight(220);
@@ -126,15 +131,13 @@ void ResultPanel::Make(bool preview)
 {
   if (job_)
     return;
-  vtkNew<vtkMultiBlockDataSet> blocks;
-  workspace_.session->GetVolumes(blocks, true);
-  const unsigned int count = blocks->GetNumberOfBlocks();
+  vtkNew<vtkMultiBlockDataSet> shown; // it stays as it is, whatever the session does
+  workspace_.session->GetVolumes(shown, true);
+  const unsigned int count = shown->GetNumberOfBlocks();
   if (count == 0) {
     workspace_.say(tr("Stitch: no volume is shown"), true);
     return;
   }
-  vtkNew<vtkMultiBlockDataSet> shown; // the session's own images move on
-  shown->DeepCopy(blocks);
   const auto stitcher = vtkSmartPointer<vtkUltrasoundStitcher>::New();
   stitcher->SetInputDataObject(shown);
   stitcher->SetMethod(method_->currentIndex());
@@ -177,7 +180,10 @@ void ResultPanel::Make(bool preview)
                         .arg(spacing[0], 0, 'g', 3));
       },
       [this, label](const QString& error) { workspace_.say(tr("%1: %2").arg(label, error), true); });
-  connect(job_, &QObject::destroyed, this, &ResultPanel::ShowState);
+  connect(job_, &Job::Ended, this, [this] {
+    job_ = nullptr;
+    ShowState();
+  });
   workspace_.jobs->Watch(job_);
   ShowState();
 }
@@ -189,6 +195,7 @@ void ResultPanel::Show(vtkImageData* volume, const QString& text)
   while (session->GetNumberOfVolumes() > 0)
     session->RemoveVolume(session->GetVolumeId(0));
   session->AddVolume(volume, nullptr, "result");
+  session->ForgetHistory(); // else every result would be kept
   text_->setText(text);
   ShowState();
   emit ResultChanged();
@@ -208,7 +215,10 @@ void ResultPanel::Save(const QString& path)
         workspace_.say(notes.isEmpty() ? tr("Saved %1").arg(path) : tr("Saved %1. %2").arg(path, notes), false);
       },
       [this, path](const QString& error) { workspace_.say(tr("Saving %1: %2").arg(path, error), true); });
-  connect(job_, &QObject::destroyed, this, &ResultPanel::ShowState);
+  connect(job_, &Job::Ended, this, [this] {
+    job_ = nullptr;
+    ShowState();
+  });
   workspace_.jobs->Watch(job_);
   ShowState();
 }

@@ -23,6 +23,7 @@ class ResultPanel : public QWidget {
 
 public:
   explicit ResultPanel(Workspace& workspace, QWidget* parent = nullptr);
+  ~ResultPanel() override;
 
   /// A workspace of its own, whose session holds the result and nothing else.
   Workspace& Result() { return result_; }
@@ -34,8 +35,10 @@ public:
 signals:
   void ResultChanged();
 
-private:
+public slots:
   void Make(bool preview);
+
+private:
   void Show(vtkImageData* volume, const QString& text);
   void ShowState();
 

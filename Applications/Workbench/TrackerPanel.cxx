@@ -7,7 +7,6 @@
 #include <QPushButton>
 #include <QSettings>
 #include <QTimer>
-#include <vtkMatrix4x4.h>
 
 namespace echorama {
 
@@ -70,11 +69,10 @@ void TrackerPanel::ConnectOrNot()
 
 void TrackerPanel::SetGrasping(bool grasping)
 {
+  const bool letsGo = isGrasping_ && !grasping;
   isGrasping_ = grasping && tracker_->GetActive();
-  if (!isGrasping_) {
-    const vtkNew<vtkMatrix4x4> nowhere;
-    workspace_.moveByTool(nowhere, false);
-  }
+  if (letsGo)
+    workspace_.moveByTool(seen_, false);
 }
 
 void TrackerPanel::Step()
@@ -104,8 +102,10 @@ void TrackerPanel::Step()
     const vtkNew<vtkMatrix4x4> toolToTracker;
     // 0 is valid: a tool that is out of sight must not fling volumes about.
     isSeen_ = tracker_->GetTransform(tool.c_str(), toolToTracker) == 0;
-    if (isGrasping_ && isSeen_)
+    if (isGrasping_ && isSeen_) {
+      seen_->DeepCopy(toolToTracker);
       workspace_.moveByTool(toolToTracker, true);
+    }
     state += isSeen_ ? tr("; %1 poses a second").arg(tracker_->GetRate(tool.c_str()), 0, 'f', 0) : tr("; the tool is not seen");
   }
   if (state_->text() != state)

@@ -2,6 +2,7 @@
 #pragma once
 #include "Workspace.h"
 #include <QWidget>
+#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundTrackerSource.h>
 
@@ -31,6 +32,7 @@ private:
 
   Workspace& workspace_;
   vtkNew<vtkUltrasoundTrackerSource> tracker_;
+  vtkNew<vtkMatrix4x4> seen_; ///< where the tool was seen last while it grasped
   QLineEdit* address_;
   QComboBox* tool_;
   QPushButton *connect_, *grasp_;

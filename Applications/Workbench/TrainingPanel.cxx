@@ -45,6 +45,13 @@ QString TimeText(double seconds)
   return QStringLiteral("%1:%2").arg(whole / 60).arg(whole % 60, 2, 10, QLatin1Char('0'));
 }
 
+Pose PoseOf(vtkMatrix4x4* matrix)
+{
+  Pose pose;
+  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+  return pose;
+}
+
 Eigen::Vector3d MiddleOf(vtkImageData* image)
 {
   double index[3];
@@ -246,14 +253,15 @@ void TrainingPanel::Scatter()
   session->BeginEdit("Scatter volumes");
   for (int i = 0; i < session->GetNumberOfVolumes(); ++i) {
     const int id = session->GetVolumeId(i);
-    if (id == session->GetFixedVolume())
+    if (id == (session->GetFixedVolume() > 0 ? session->GetFixedVolume() : session->GetVolumeId(0)))
       continue;
     Random random(static_cast<std::uint64_t>(seed_->value()), static_cast<std::uint64_t>(i));
     vtkNew<vtkMatrix4x4> pose;
-    Pose before;
     session->GetVolumeToWorld(id, pose);
-    before.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(pose->GetData());
-    Eigen::Vector3d middle = MiddleOf(session->GetImage(id));
+    const Pose now = PoseOf(pose);
+    session->GetTruth(id, pose); // else from where it is
+    const Pose before = PoseOf(pose);
+    const Eigen::Vector3d middle = before * now.inverse(Eigen::Isometry) * MiddleOf(session->GetImage(id));
     const Eigen::Vector3d turn = random.Direction() * (scatterDegrees_->value() / DegreesPerRadian);
     const Eigen::Vector3d shift = random.Direction() * scatterMm_->value();
     const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> after = (MotionAbout(middle, turn, shift) * before).matrix();
@@ -266,8 +274,8 @@ void TrainingPanel::Scatter()
 void TrainingPanel::StartOrGiveUp()
 {
   if (!isTraining_) {
+    workspace_.session->ForgetHistory(); // undo would lead to the solution
     startScore_ = workspace_.session->GetScore();
-    startEdits_ = workspace_.session->GetUndoCount();
     taken_.start();
     clock_->start();
   } else {
@@ -289,7 +297,7 @@ void TrainingPanel::Submit()
   attempt.project = QFileInfo(QString::fromStdString(session->GetProjectPath())).fileName().toStdString();
   attempt.startMm = startScore_;
   attempt.scoreMm = session->GetScore();
-  attempt.edits = std::max(0, session->GetUndoCount() - startEdits_);
+  attempt.edits = session->GetUndoCount();
   int count = 0;
   for (int i = 0; i < session->GetNumberOfVolumes(); ++i) {
     const int id = session->GetVolumeId(i);
@@ -345,7 +353,9 @@ void TrainingPanel::ShowState()
   live_->setEnabled(hasTruth && !isTraining_);
   vectors_->setEnabled(hasTruth && !isTraining_);
   start_->setText(isTraining_ ? tr("Give up") : tr("Start"));
-  start_->setToolTip(isTraining_ ? tr("Ends the attempt; nothing is kept") : tr("Hides score and errors, and starts the clock"));
+  start_->setToolTip(isTraining_
+                         ? tr("Ends the attempt; nothing is kept")
+                         : tr("Hides score and errors, and starts the clock; what was done before can no longer be undone"));
   start_->setEnabled(hasTruth);
   submit_->setEnabled(isTraining_);
   submit_->setToolTip(tr("Shows score and errors, and adds the attempt to the history"));

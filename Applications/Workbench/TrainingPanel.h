@@ -59,7 +59,6 @@ private:
   QElapsedTimer taken_;
   QString historyPath_;
   double startScore_ = 0.0;
-  int startEdits_ = 0;
   bool isTraining_ = false;
 };
 

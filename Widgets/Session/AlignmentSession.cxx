@@ -383,6 +383,17 @@ void AlignmentSession::SetCentreOfRotation(const std::optional<Eigen::Vector3d>&
   centre_ = centre;
 }
 
+void AlignmentSession::ForgetHistory()
+{
+  if (Editing())
+    throw Error(Error::Kind::NotPossible, "an edit has not ended yet");
+  if (done_.empty() && undone_.empty())
+    return;
+  done_.clear();
+  undone_.clear();
+  ++version_;
+}
+
 void AlignmentSession::Reset(SessionState state)
 {
   for (const SessionVolume& volume : state.volumes)

@@ -33,6 +33,8 @@ public:
   int RedoCount() const { return static_cast<int>(undone_.size()); }
   std::string UndoLabel() const; ///< empty: nothing to undo
   std::string RedoLabel() const;
+  /// What was done stays done from now on. During an edit: Error(NotPossible).
+  void ForgetHistory();
   /// Counts every change of the history: the same number means the same entries.
   long long HistoryVersion() const { return version_; }
   ///@}
