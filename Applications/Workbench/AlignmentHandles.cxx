@@ -8,7 +8,8 @@
 
 namespace echorama {
 
-AlignmentHandles::AlignmentHandles(Workbench* bench, vtkRenderWindowInteractor* interactor, vtkRenderer* renderer, QObject* parent)
+AlignmentHandles::AlignmentHandles(Workbench* bench, vtkRenderWindowInteractor* interactor, vtkRenderer* renderer,
+                                   QObject* parent)
   : QObject(parent), bench_(bench), widget_(vtkSmartPointer<vtkUltrasoundAlignmentWidget>::New())
 {
   widget_->SetInteractor(interactor);

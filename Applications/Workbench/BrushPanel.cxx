@@ -53,11 +53,12 @@ BrushPanel::BrushPanel(Workbench* bench, QWidget* parent) : QWidget(parent), ben
                         change(&BrushSettings::radiusMm));
   intensity_ = NumberField(this, {"brushIntensity", tr("Grey level that is painted"), -1e6, 1e6, 0, 10.0, {}},
                            change(&BrushSettings::intensity));
-  opacity_ = NumberField(this, {"brushOpacity", tr("How much of the grey level covers what is there, 0 to 1"), 0.0, 1.0, 2, 0.1, {}},
-                         change(&BrushSettings::opacity));
+  opacity_ =
+      NumberField(this, {"brushOpacity", tr("How much of the grey level covers what is there, 0 to 1"), 0.0, 1.0, 2, 0.1, {}},
+                  change(&BrushSettings::opacity));
   hardness_ = NumberField(
-    this, {"brushHardness", tr("Share of the radius that is painted in full; outside it fades, 0 to 1"), 0.0, 1.0, 2, 0.1, {}},
-    change(&BrushSettings::hardness));
+      this, {"brushHardness", tr("Share of the radius that is painted in full; outside it fades, 0 to 1"), 0.0, 1.0, 2, 0.1, {}},
+      change(&BrushSettings::hardness));
   insideValid_ = new QCheckBox(tr("Only where there are data"), this);
   insideValid_->setObjectName("brushInsideValid");
   insideValid_->setToolTip(tr("The brush does not reach beyond the borders of the volume's data"));

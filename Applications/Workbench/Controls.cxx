@@ -34,7 +34,7 @@ QDoubleSpinBox* NumberField(QWidget* parent, const Number& number, const std::fu
   field->setAlignment(Qt::AlignRight);
   field->setLocale(QLocale::c()); // a point, as in every file and report
   field->setFocusPolicy(Qt::StrongFocus);
-  field->setMinimumWidth(62);
+  field->setMinimumWidth(52);
   QObject::connect(field, qOverload<double>(&QDoubleSpinBox::valueChanged), field, edited);
   return field;
 }
@@ -66,7 +66,8 @@ void Show(QComboBox* field, const QString& word)
   field->setCurrentIndex(field->findData(word));
 }
 
-QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help, const std::function<void()>& pressed)
+QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help,
+                    const std::function<void()>& pressed)
 {
   auto* button = new QPushButton(label, parent);
   Describe(button, name, help);
@@ -82,7 +83,8 @@ QAction* MakeAction(QObject* parent, const char* name, const QString& label, con
   action->setObjectName(name);
   if (!shortcut.isEmpty())
     action->setShortcut(QKeySequence(shortcut));
-  action->setToolTip(shortcut.isEmpty() ? help : QString("%1 (%2)").arg(help, action->shortcut().toString(QKeySequence::NativeText)));
+  action->setToolTip(shortcut.isEmpty() ? help
+                                        : QString("%1 (%2)").arg(help, action->shortcut().toString(QKeySequence::NativeText)));
   action->setStatusTip(help);
   QObject::connect(action, &QAction::triggered, parent, triggered);
   return action;

@@ -38,7 +38,8 @@ QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, c
                        const std::function<void(const QString&)>& chosen);
 void Show(QComboBox* field, const QString& word);
 
-QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help, const std::function<void()>& pressed);
+QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help,
+                    const std::function<void()>& pressed);
 
 /// A menu entry with a shortcut ("" for none); the help is its tool tip and status tip.
 QAction* MakeAction(QObject* parent, const char* name, const QString& label, const QString& shortcut, const QString& help,

@@ -45,15 +45,19 @@ FileActions::FileActions(Workbench* bench, JobBar* jobs, QWidget* window)
   const QString volumes = tr("Volumes (%1);;All files (*)").arg(VolumeFilter), projects = tr("Projects (*.json);;All files (*)");
   open_ = MakeAction(this, "open", tr("&Open volumes..."), "Ctrl+O", tr("Open volumes; files can be dropped on the window, too"),
                      [this, volumes] { AskOpen(tr("Open volumes"), volumes, true); });
-  openProject_ = MakeAction(this, "openProject", tr("Open &project..."), "Ctrl+Shift+O", tr("Open volumes with their poses and strokes"),
-                            [this, projects] { AskOpen(tr("Open a project"), projects, false); });
-  save_ = MakeAction(this, "save", tr("&Save project"), "Ctrl+S", tr("Save poses, strokes and how volumes are shown"), [this] { Save(); });
-  saveAs_ = MakeAction(this, "saveAs", tr("Save project &as..."), "Ctrl+Shift+S", tr("Save the project under another name"), [this] {
-    afterSave_ = nullptr;
-    AskSave(tr("Save the project"), tr("Projects (*.json)"), "alignment.json", [this](const QString& path) { SaveTo(path); });
-  });
-  readPoses_ = MakeAction(this, "readPoses", tr("&Read poses..."), "", tr("Put the volumes where a pose file says; can be undone"),
-                          [this] { AskOpen(tr("Read poses"), tr("Poses (*.json);;All files (*)"), false); });
+  openProject_ =
+      MakeAction(this, "openProject", tr("Open &project..."), "Ctrl+Shift+O", tr("Open volumes with their poses and strokes"),
+                 [this, projects] { AskOpen(tr("Open a project"), projects, false); });
+  save_ = MakeAction(this, "save", tr("&Save project"), "Ctrl+S", tr("Save poses, strokes and how volumes are shown"),
+                     [this] { Save(); });
+  saveAs_ =
+      MakeAction(this, "saveAs", tr("Save project &as..."), "Ctrl+Shift+S", tr("Save the project under another name"), [this] {
+        afterSave_ = nullptr;
+        AskSave(tr("Save the project"), tr("Projects (*.json)"), "alignment.json", [this](const QString& path) { SaveTo(path); });
+      });
+  readPoses_ =
+      MakeAction(this, "readPoses", tr("&Read poses..."), "", tr("Put the volumes where a pose file says; can be undone"),
+                 [this] { AskOpen(tr("Read poses"), tr("Poses (*.json);;All files (*)"), false); });
   for (auto changed : {&Workbench::HistoryChanged, &Workbench::VolumesChanged, &Workbench::SelectionChanged})
     connect(bench, changed, this, &FileActions::ShowHistory);
   ShowHistory();
@@ -109,28 +113,29 @@ void FileActions::OpenVolumes(const QStringList& files)
                                             : tr("Reading %1 volumes").arg(volumes.size());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
   Job* job = Job::Start(
-    this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
-    [this, read] {
-      auto* session = bench_->Session();
-      const bool wasEmpty = session->GetNumberOfVolumes() == 0;
-      int last = 0;
-      for (const ReadVolume& volume : *read) {
-        if (volume.image)
-          last = session->AddVolume(volume.image, volume.file.toUtf8().constData());
-        else
-          bench_->Warn(volume.error);
-      }
-      // The first volume stays where it is, as a rule: what comes later is to be moved.
-      if (last > 0 && !(wasEmpty && read->size() == 1))
-        session->Select(last, true, true);
-    },
-    [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
+      this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
+      [this, read] {
+        auto* session = bench_->Session();
+        const bool wasEmpty = session->GetNumberOfVolumes() == 0;
+        int last = 0;
+        for (const ReadVolume& volume : *read) {
+          if (volume.image)
+            last = session->AddVolume(volume.image, volume.file.toUtf8().constData());
+          else
+            bench_->Warn(volume.error);
+        }
+        // The first volume stays where it is, as a rule: what comes later is to be moved.
+        if (last > 0 && !(wasEmpty && read->size() == 1))
+          session->Select(last, true, true);
+      },
+      [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
   jobs_->Watch(job);
 }
 
 void FileActions::OpenProject(const QString& path)
 {
-  WhenSaved(tr("Save what you did before %1 is opened?").arg(QFileInfo(path).fileName()), [this, path] { ReadProject(path, path); });
+  WhenSaved(tr("Save what you did before %1 is opened?").arg(QFileInfo(path).fileName()),
+            [this, path] { ReadProject(path, path); });
 }
 
 void FileActions::OpenAbandoned(const QString& backup)
@@ -174,29 +179,29 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs)
   const QString label = tr("Opening %1").arg(QFileInfo(path).fileName());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
   Job* job = Job::Start(
-    this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress); },
-    [this, path, saveAs, read] {
-      bool isWhole = true;
-      vtkNew<vtkMultiBlockDataSet> blocks;
-      for (const ReadVolume& volume : *read) {
-        if (!volume.image) {
-          bench_->Warn(volume.error);
-          isWhole = false;
-          continue;
+      this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress); },
+      [this, path, saveAs, read] {
+        bool isWhole = true;
+        vtkNew<vtkMultiBlockDataSet> blocks;
+        for (const ReadVolume& volume : *read) {
+          if (!volume.image) {
+            bench_->Warn(volume.error);
+            isWhole = false;
+            continue;
+          }
+          const unsigned int block = blocks->GetNumberOfBlocks();
+          blocks->SetBlock(block, volume.image);
+          blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.file.toUtf8().constData());
         }
-        const unsigned int block = blocks->GetNumberOfBlocks();
-        blocks->SetBlock(block, volume.image);
-        blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.file.toUtf8().constData());
-      }
-      if (!isWhole || !bench_->Session()->OpenProject(path.toUtf8().constData(), blocks))
-        return;
-      emit Opened();
-      if (!saveAs.isEmpty())
-        OfferNewerBackup(saveAs);
-      else if (bench_->Session()->BackUp()) // what was left is now this session's: it is not offered twice
-        bench_->Session()->DiscardBackups(QFileInfo(path).absolutePath().toUtf8().constData());
-    },
-    [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
+        if (!isWhole || !bench_->Session()->OpenProject(path.toUtf8().constData(), blocks))
+          return;
+        emit Opened();
+        if (!saveAs.isEmpty())
+          OfferNewerBackup(saveAs);
+        else if (bench_->Session()->BackUp()) // what was left is now this session's: it is not offered twice
+          bench_->Session()->DiscardBackups(QFileInfo(path).absolutePath().toUtf8().constData());
+      },
+      [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
   jobs_->Watch(job);
 }
 

@@ -36,7 +36,8 @@ public:
   bool Save();
   bool SaveTo(const QString& path);
 
-  /// Whether anything would be lost that a person did: moved, painted, grouped, renamed. Volumes that were only opened are not work.
+  /// Whether anything would be lost that a person did: moved, painted, grouped, renamed. Volumes that were only opened are not
+  /// work.
   bool HasUnsavedWork() const;
   /// Calls \a then at once, or after the user said what to do with unsaved work.
   void WhenSaved(const QString& question, const std::function<void()>& then);

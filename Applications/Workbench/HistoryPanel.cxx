@@ -72,7 +72,8 @@ void HistoryPanel::ListBackups()
     const QString path = QString::fromStdString(paths->GetValue(i)), label = QString::fromStdString(labels->GetValue(i));
     const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
     const bool isToday = time.date() == QDate::currentDate();
-    auto* item = new QListWidgetItem(QString("%1  %2").arg(time.toString(isToday ? "hh:mm:ss" : "yyyy-MM-dd hh:mm"), label), backups_);
+    auto* item =
+        new QListWidgetItem(QString("%1  %2").arg(time.toString(isToday ? "hh:mm:ss" : "yyyy-MM-dd hh:mm"), label), backups_);
     item->setData(Qt::UserRole, path);
     item->setToolTip(path);
     if (label == "damaged")

@@ -10,22 +10,22 @@ namespace echorama {
 namespace {
 
 constexpr const char* Mouse[][2] = {
-  {"Left", "the tool in hand: move volumes, paint, carve, restore, or point"},
-  {"Shift + left (Align)", "turn volumes"},
-  {"Wheel", "through the slices (Shift: ten at a time)"},
-  {"Ctrl + wheel", "zoom"},
-  {"Middle", "move the picture"},
-  {"Shift + middle", "turn the plane of the slice"},
-  {"Right", "contrast (sideways) and brightness (up and down)"},
-  {"Double click", "make a view large, and back"},
+    {"Left", "the tool in hand: move volumes, paint, carve, restore, or point"},
+    {"Shift + left (Align)", "turn volumes"},
+    {"Wheel", "through the slices (Shift: ten at a time)"},
+    {"Ctrl + wheel", "zoom"},
+    {"Middle", "move the picture"},
+    {"Shift + middle", "turn the plane of the slice"},
+    {"Right", "contrast (sideways) and brightness (up and down)"},
+    {"Double click", "make a view large, and back"},
 };
 constexpr const char* Aligning[][2] = {
-  {"x, y, z", "keep to an axis; again: to the plane across it; again: free"},
-  {"Arrows, Page up, Page down", "move by one step"},
-  {"Ctrl + arrows", "turn by one step"},
-  {"+, -", "larger and smaller steps"},
-  {"c, then click", "put the centre of rotation"},
-  {"Escape", "take a drag back"},
+    {"x, y, z", "keep to an axis; again: to the plane across it; again: free"},
+    {"Arrows, Page up, Page down", "move by one step"},
+    {"Ctrl + arrows", "turn by one step"},
+    {"+, -", "larger and smaller steps"},
+    {"c, then click", "put the centre of rotation"},
+    {"Escape", "take a drag back"},
 };
 
 template <std::size_t N>
@@ -33,7 +33,8 @@ QString Table(const QString& title, const char* const (&rows)[N][2])
 {
   QString html = QString("<h3>%1</h3><table cellpadding=2>").arg(title);
   for (const auto& row : rows)
-    html += QString("<tr><td><b>%1</b></td><td>%2</td></tr>").arg(QObject::tr(row[0]).toHtmlEscaped(), QObject::tr(row[1]).toHtmlEscaped());
+    html += QString("<tr><td><b>%1</b></td><td>%2</td></tr>")
+                .arg(QObject::tr(row[0]).toHtmlEscaped(), QObject::tr(row[1]).toHtmlEscaped());
   return html + "</table>";
 }
 
@@ -46,8 +47,9 @@ void ShowKeysPage(QWidget* parent)
   html += QString("<h3>%1</h3><table cellpadding=2>").arg(QObject::tr("Keys"));
   for (const QAction* action : parent->findChildren<QAction*>())
     if (!action->shortcut().isEmpty())
-      html += QString("<tr><td><b>%1</b></td><td>%2</td></tr>")
-                .arg(action->shortcut().toString(QKeySequence::NativeText).toHtmlEscaped(), action->statusTip().toHtmlEscaped());
+      html +=
+          QString("<tr><td><b>%1</b></td><td>%2</td></tr>")
+              .arg(action->shortcut().toString(QKeySequence::NativeText).toHtmlEscaped(), action->statusTip().toHtmlEscaped());
   html += "</table>";
   auto* dialog = parent->findChild<QDialog*>("keysPage");
   if (!dialog) {

@@ -116,14 +116,15 @@ void MainWindow::MakeMenus()
   looks_->AddTo(Menu(Place::View), bar);
   edits_->AddTo(Menu(Place::Edit));
   files_->AddTo(Menu(Place::File));
-  Menu(Place::Help)->addAction(
-    MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"), [this] { ShowKeysPage(this); }));
+  Menu(Place::Help)
+      ->addAction(MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"),
+                             [this] { ShowKeysPage(this); }));
 }
 
 void MainWindow::MakePanels()
 {
   setDockOptions(QMainWindow::AnimatedDocks | QMainWindow::AllowTabbedDocks);
-  setTabPosition(Qt::RightDockWidgetArea, QTabWidget::North);
+  setTabPosition(Qt::RightDockWidgetArea, QTabWidget::East); // all of their names can be read
   AddLeft(new VolumePanel(bench_, this), tr("Volumes"));
   AddLeft(new PosePanel(bench_, this), tr("Pose"));
   AddPanel(new ViewPanel(bench_, this), tr("View"));
@@ -183,6 +184,8 @@ void MainWindow::AddStatus(QWidget* widget)
 void MainWindow::RestoreLayout()
 {
   resize(1280, 800);
+  // The views get what the panels can spare.
+  resizeDocks({findChild<QDockWidget*>("volumePanelDock"), findChild<QDockWidget*>("viewPanelDock")}, {250, 240}, Qt::Horizontal);
   QSettings settings;
   restoreGeometry(settings.value("window/geometry").toByteArray());
   restoreState(settings.value("window/state").toByteArray(), LayoutVersion);
@@ -214,9 +217,9 @@ void MainWindow::ShowTitle()
 {
   const auto* session = bench_->Session();
   const QString path = QString::fromStdString(session->GetProjectPath());
-  const QString name = !path.isEmpty()                        ? QFileInfo(path).fileName()
+  const QString name = !path.isEmpty()                     ? QFileInfo(path).fileName()
                        : session->GetNumberOfVolumes() > 0 ? tr("Not saved yet")
-                                                              : QString();
+                                                           : QString();
   setWindowTitle(name.isEmpty() ? QString("Echorama") : QString("%1[*] \u2014 Echorama").arg(name));
   setWindowFilePath(path);
   setWindowModified(files_->HasUnsavedWork());

@@ -104,6 +104,7 @@ void MessageBar::Show(const Message& message)
   if (message.kind == Message::Note && message.answers.isEmpty())
     QTimer::singleShot(NoteMs, row, close);
   this->layout()->addWidget(row);
+  row->show(); // now, not when the layout gets to it: it counts
 
   // The oldest notes and warnings make room; questions stay.
   const auto rows = findChildren<QFrame*>("messageRow");

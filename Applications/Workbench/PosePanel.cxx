@@ -76,8 +76,8 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
     }
   };
   const auto takePose = [this](double) { TakePose(); };
-  addRow(1, tr("Middle, mm"), "middle", tr("Where the middle of the volume is: x to the left, y to the back, z to the head"), 2, {},
-         middle_, takePose);
+  addRow(1, tr("Middle, mm"), "middle", tr("Where the middle of the volume is: x to the left, y to the back, z to the head"), 2,
+         {}, middle_, takePose);
   addRow(2, tr("Turned, \u00b0"), "degrees", tr("Rotation about the world's z, then y, then x"), 2, {}, degrees_, takePose);
   for (int axis = 0; axis < 3; axis++)
     degrees_[axis]->setRange(-360.0, 360.0);
@@ -92,8 +92,8 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
       both->setContentsMargins(0, 0, 0, 0);
       both->setSpacing(1);
       for (int sign : {-1, 1}) {
-        auto* button = Button(pair, "", sign < 0 ? QString(QChar(0x2212)) : "+", help.arg(sign < 0 ? tr("back") : tr("on"), Axes[axis]),
-                              [step, axis, sign] { step(axis, sign); });
+        auto* button = Button(pair, "", sign < 0 ? QString(QChar(0x2212)) : "+",
+                              help.arg(sign < 0 ? tr("back") : tr("on"), Axes[axis]), [step, axis, sign] { step(axis, sign); });
         button->setObjectName(QString("%1%2%3").arg(name, sign < 0 ? "Less" : "More", Axes[axis]));
         button->setAutoRepeat(true);
         button->setMinimumWidth(24);
@@ -114,19 +114,21 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
     };
   };
   grid->addWidget(new QLabel(tr("Step"), this), 5, 0);
-  mmStep_ = NumberField(this, {"translationStep", tr("One step of the keys and of the buttons above, mm"), 0.001, 100.0, 3, 0.5, " mm"},
-                        setHand(&Handling::translationStepMm));
-  degreeStep_ = NumberField(this, {"rotationStep", tr("One turn of the keys and of the buttons above"), 0.001, 90.0, 3, 0.5, "\u00b0"},
-                            setHand(&Handling::rotationStepDegrees));
+  mmStep_ =
+      NumberField(this, {"translationStep", tr("One step of the keys and of the buttons above, mm"), 0.001, 100.0, 3, 0.5, " mm"},
+                  setHand(&Handling::translationStepMm));
+  degreeStep_ =
+      NumberField(this, {"rotationStep", tr("One turn of the keys and of the buttons above"), 0.001, 90.0, 3, 0.5, "\u00b0"},
+                  setHand(&Handling::rotationStepDegrees));
   grid->addWidget(mmStep_, 5, 1);
   grid->addWidget(degreeStep_, 5, 2);
   grid->addWidget(new QLabel(tr("Mouse speed"), this), 6, 0);
   mmSensitivity_ = NumberField(
-    this, {"translationSensitivity", tr("How far volumes move: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
-    setHand(&Handling::translationSensitivity));
+      this, {"translationSensitivity", tr("How far volumes move: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
+      setHand(&Handling::translationSensitivity));
   degreeSensitivity_ = NumberField(
-    this, {"rotationSensitivity", tr("How far volumes turn: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
-    setHand(&Handling::rotationSensitivity));
+      this, {"rotationSensitivity", tr("How far volumes turn: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
+      setHand(&Handling::rotationSensitivity));
   grid->addWidget(mmSensitivity_, 6, 1);
   grid->addWidget(degreeSensitivity_, 6, 2);
   grid->addWidget(new QLabel(tr("<small>moving</small>"), this), 7, 1, Qt::AlignHCenter | Qt::AlignTop);

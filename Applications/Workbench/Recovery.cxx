@@ -23,11 +23,12 @@ bool Offer(Workbench* bench, FileActions* files, const std::string& folder)
     if (label == "damaged")
       continue;
     const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
-    bench->Ask(QObject::tr("A session ended at %1 without being saved%2.")
-                 .arg(time.toString("yyyy-MM-dd hh:mm:ss"), label.isEmpty() ? QString() : QObject::tr(" (last: %1)").arg(label)),
-               {{QObject::tr("Open it"), [files, path] { files->OpenAbandoned(path); }},
-                {QObject::tr("Later"), {}},
-                {QObject::tr("Delete it"), [bench, folder] { bench->Session()->DiscardBackups(folder.c_str()); }}});
+    bench->Ask(
+        QObject::tr("A session ended at %1 without being saved%2.")
+            .arg(time.toString("yyyy-MM-dd hh:mm:ss"), label.isEmpty() ? QString() : QObject::tr(" (last: %1)").arg(label)),
+        {{QObject::tr("Open it"), [files, path] { files->OpenAbandoned(path); }},
+         {QObject::tr("Later"), {}},
+         {QObject::tr("Delete it"), [bench, folder] { bench->Session()->DiscardBackups(folder.c_str()); }}});
     return true;
   }
   return false;

@@ -5,7 +5,8 @@
 
 namespace echorama {
 
-/// Redraws a view once, however often it was asked for since the last time: mouse and session tell more often than a screen shows.
+/// Redraws a view once, however often it was asked for since the last time: mouse and session tell more often than a screen
+/// shows.
 class Redraw : public QObject {
 public:
   Redraw(QObject* parent, std::function<void()> draw) : QObject(parent), draw_(std::move(draw))

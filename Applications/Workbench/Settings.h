@@ -20,7 +20,7 @@ struct BrushSettings {
 
 /// How slices are drawn; the words are those of vtkUltrasoundSliceView.
 struct SliceLook {
-  QString shown = "all"; ///< all, selected, others
+  QString shown = "all";  ///< all, selected, others
   QString mode = "blend"; ///< blend, difference, checkerboard
   bool linear = true;
   int squarePixels = 40;

@@ -49,7 +49,8 @@ SliceCanvas::SliceCanvas(Workbench* bench, QWidget* parent)
   redraw_ = new Redraw(this, [this] { DrawNow(); });
   handles_ = new AlignmentHandles(bench, interactor(), view_->GetRenderer(), this);
 
-  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged, &Workbench::VoxelsChanged, &Workbench::ToolChanged})
+  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged,
+                       &Workbench::VoxelsChanged, &Workbench::ToolChanged})
     connect(bench, changed, this, &SliceCanvas::Ask);
   connect(bench, &Workbench::ToolChanged, this, [this] { view_->HideBrush(); });
   connect(bench, &Workbench::LookChanged, this, &SliceCanvas::Look);
@@ -190,8 +191,8 @@ void SliceCanvas::BeginStroke(const double point[3])
     return;
   }
   const BrushSettings& brush = bench_->Brush();
-  if (!session->BeginStroke(id, BrushModeOf(bench_->CurrentTool()), brush.radiusMm, brush.intensity, brush.opacity, brush.hardness,
-                            brush.insideValid))
+  if (!session->BeginStroke(id, BrushModeOf(bench_->CurrentTool()), brush.radiusMm, brush.intensity, brush.opacity,
+                            brush.hardness, brush.insideValid))
     return;
   drag_ = Drag::Stroke;
   bench_->SetInteracting(true);

@@ -48,7 +48,8 @@ SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis,
                           [this](double mm) { SetPosition(mm); });
   position_->setButtonSymbols(QAbstractSpinBox::NoButtons);
   auto* fit = SmallButton(this, name + "Fit", tr("Fit"), tr("Show everything (F)"));
-  auto* large = SmallButton(this, name + "Large", QString(QChar(0x2922)), tr("Make this view large, and back (M, or a double click)"));
+  auto* large =
+      SmallButton(this, name + "Large", QString(QChar(0x2922)), tr("Make this view large, and back (M, or a double click)"));
 
   auto* row = new QHBoxLayout;
   row->setContentsMargins(2, 0, 2, 0);
@@ -116,7 +117,8 @@ void SlicePane::ShowPlane()
   Show(position_, position);
   const QSignalBlocker quiet(slider_);
   slider_->setEnabled(length > 0.0);
-  slider_->setValue(length > 0.0 ? static_cast<int>(std::lround(SliderSteps * std::clamp((position - range[0]) / length, 0.0, 1.0))) : 0);
+  slider_->setValue(
+      length > 0.0 ? static_cast<int>(std::lround(SliderSteps * std::clamp((position - range[0]) / length, 0.0, 1.0))) : 0);
 }
 
 } // namespace echorama

@@ -27,7 +27,8 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
     addTo(tools_, name, label, key, help, static_cast<int>(tool), [this, tool] { bench_->SetTool(tool); });
   };
   addTool("toolLook", tr("&Look"), "1", tr("Point with the left button: the other slices go there"), Tool::Look);
-  addTool("toolAlign", tr("&Align"), "2", tr("Drag selected volumes; with Shift they turn; keys x y z keep to an axis"), Tool::Align);
+  addTool("toolAlign", tr("&Align"), "2", tr("Drag selected volumes; with Shift they turn; keys x y z keep to an axis"),
+          Tool::Align);
   addTool("toolPaint", tr("&Paint"), "3", tr("Paint in the selected volume"), Tool::Paint);
   addTool("toolCarve", tr("&Carve"), "4", tr("Take away parts of the selected volume"), Tool::Carve);
   addTool("toolRestore", tr("&Restore"), "5", tr("Bring back what was painted over or carved away"), Tool::Restore);
@@ -47,13 +48,15 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   };
   addMode("modeBlend", tr("&Blend"), "B", tr("Volumes are mixed; tints add up to grey where they agree"), "blend");
   addMode("modeDifference", tr("&Difference"), "D", tr("Where selected volumes and the others agree it is dark"), "difference");
-  addMode("modeCheckerboard", tr("&Checkerboard"), "K", tr("Squares of the selected volumes and of the others in turn"), "checkerboard");
+  addMode("modeCheckerboard", tr("&Checkerboard"), "K", tr("Squares of the selected volumes and of the others in turn"),
+          "checkerboard");
 
-  linear_ = MakeAction(this, "linear", tr("&Trilinear interpolation"), "N", tr("Smooth between voxels, or the nearest voxel"), [this] {
-    SliceLook look = bench_->Slices();
-    look.linear = !look.linear;
-    bench_->SetSlices(look);
-  });
+  linear_ =
+      MakeAction(this, "linear", tr("&Trilinear interpolation"), "N", tr("Smooth between voxels, or the nearest voxel"), [this] {
+        SliceLook look = bench_->Slices();
+        look.linear = !look.linear;
+        bench_->SetSlices(look);
+      });
   linear_->setCheckable(true);
   linked_ = MakeAction(this, "linked", tr("&Link slices"), "L", tr("Slices share the point in focus and the zoom"),
                        [this] { views_->SetLinked(!views_->Linked()); });

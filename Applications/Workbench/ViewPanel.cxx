@@ -57,10 +57,12 @@ QWidget* ViewPanel::SliceControls()
                            bench_->SetSlices(look);
                          });
   const auto setWindow = [this](double) { bench_->Session()->SetGreyWindow(black_->value(), white_->value()); };
-  black_ = NumberField(box, {"black", tr("Grey level that is drawn black (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
-                       setWindow);
-  white_ = NumberField(box, {"white", tr("Grey level that is drawn white (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
-                       setWindow);
+  black_ = NumberField(
+      box, {"black", tr("Grey level that is drawn black (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
+      setWindow);
+  white_ = NumberField(
+      box, {"white", tr("Grey level that is drawn white (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
+      setWindow);
   form->addRow(tr("Show"), shown_);
   form->addRow(tr("Mode"), mode_);
   form->addRow(tr("Voxels"), interpolation_);
@@ -96,26 +98,33 @@ QWidget* ViewPanel::VolumeControls()
     };
   };
   style_ = ChoiceField(box, "style", tr("How volumes are drawn in 3D"),
-                       {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}}, [this](const QString& word) {
+                       {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}},
+                       [this](const QString& word) {
                          VolumeLook look = bench_->Volume();
                          look.style = word;
                          bench_->SetVolume(look);
                        });
   downsampling_ = NumberField(
-    box, {"downsampling", tr("One particle for so many voxels along each axis; more is faster and coarser"), 1.0, 64.0, 0, 1.0, {}},
-    [this](double value) {
-      VolumeLook look = bench_->Volume();
-      look.downsampling = static_cast<int>(value);
-      bench_->SetVolume(look);
-    });
+      box,
+      {"downsampling", tr("One particle for so many voxels along each axis; more is faster and coarser"), 1.0, 64.0, 0, 1.0, {}},
+      [this](double value) {
+        VolumeLook look = bench_->Volume();
+        look.downsampling = static_cast<int>(value);
+        bench_->SetVolume(look);
+      });
   particleSize_ = NumberField(box, {"particleSize", tr("Size of particles; at 1 they touch"), 0.1, 10.0, 2, 0.1, {}},
                               set(&VolumeLook::particleSize));
-  opacity_ = NumberField(box, {"volumeOpacity", tr("Low: one sees into the volumes"), 0.0, 1.0, 2, 0.05, {}}, set(&VolumeLook::opacity));
-  valueOpacity_ = Check("valueOpacity", tr("Dark is transparent"), tr("Opacity grows with the grey level, so that fluid and shadows are seen through"),
-                        &VolumeLook::valueOpacity);
-  minimum_ = NumberField(box, {"minimum", tr("Darker voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}}, set(&VolumeLook::minimum));
-  maximum_ = NumberField(box, {"maximum", tr("Brighter voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}}, set(&VolumeLook::maximum));
-  slices_ = Check("slicesIn3D", tr("Slices in 3D"), tr("Draws the slices with their pictures in the 3D view"), &VolumeLook::slices);
+  opacity_ =
+      NumberField(box, {"volumeOpacity", tr("Low: one sees into the volumes"), 0.0, 1.0, 2, 0.05, {}}, set(&VolumeLook::opacity));
+  valueOpacity_ =
+      Check("valueOpacity", tr("Dark is transparent"),
+            tr("Opacity grows with the grey level, so that fluid and shadows are seen through"), &VolumeLook::valueOpacity);
+  minimum_ =
+      NumberField(box, {"minimum", tr("Darker voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}}, set(&VolumeLook::minimum));
+  maximum_ =
+      NumberField(box, {"maximum", tr("Brighter voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}}, set(&VolumeLook::maximum));
+  slices_ =
+      Check("slicesIn3D", tr("Slices in 3D"), tr("Draws the slices with their pictures in the 3D view"), &VolumeLook::slices);
   form->addRow(tr("Drawn as"), style_);
   form->addRow(tr("Downsampling"), downsampling_);
   form->addRow(tr("Particle size"), particleSize_);
@@ -142,8 +151,7 @@ void ViewPanel::ShowLook()
   Show(opacity_, volume.opacity);
   Show(minimum_, volume.minimum);
   Show(maximum_, volume.maximum);
-  const std::pair<QCheckBox*, bool> checks[] = {
-    {valueOpacity_, volume.valueOpacity}, {slices_, volume.slices}};
+  const std::pair<QCheckBox*, bool> checks[] = {{valueOpacity_, volume.valueOpacity}, {slices_, volume.slices}};
   for (const auto& [box, on] : checks) {
     const QSignalBlocker quiet(box);
     box->setChecked(on);

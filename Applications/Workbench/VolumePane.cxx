@@ -25,12 +25,13 @@
 namespace echorama {
 
 namespace {
-constexpr int WatchingMs = 80;  ///< how often 3D redraws while something is dragged in a slice
-constexpr int RefineMs = 250;   ///< how long nothing must move before it is drawn in full
+constexpr int WatchingMs = 80; ///< how often 3D redraws while something is dragged in a slice
+constexpr int RefineMs = 250;  ///< how long nothing must move before it is drawn in full
 } // namespace
 
 VolumePane::VolumePane(Workbench* bench, QWidget* parent)
-  : QWidget(parent), bench_(bench), canvas_(new QVTKOpenGLNativeWidget(this)), view_(vtkSmartPointer<vtkUltrasoundVolumeView>::New())
+  : QWidget(parent), bench_(bench), canvas_(new QVTKOpenGLNativeWidget(this)),
+    view_(vtkSmartPointer<vtkUltrasoundVolumeView>::New())
 {
   setObjectName("volumePane");
   canvas_->setObjectName("volumeCanvas");
@@ -53,7 +54,8 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   handles_ = new AlignmentHandles(bench, canvas_->interactor(), view_->GetRenderer(), this);
 
   style_ = ChoiceField(this, "volumeStyle", tr("How volumes are drawn in 3D"),
-                       {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}}, [this](const QString& word) {
+                       {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}},
+                       [this](const QString& word) {
                          VolumeLook look = bench_->Volume();
                          look.style = word;
                          bench_->SetVolume(look);
@@ -83,7 +85,8 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   connect(fit, &QToolButton::clicked, this, &VolumePane::Fit);
   connect(large, &QToolButton::clicked, this, &VolumePane::LargeAsked);
 
-  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged, &Workbench::VoxelsChanged, &Workbench::ToolChanged})
+  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged,
+                       &Workbench::VoxelsChanged, &Workbench::ToolChanged})
     connect(bench, changed, this, &VolumePane::Ask);
   connect(bench, &Workbench::LookChanged, this, &VolumePane::Look);
   connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {

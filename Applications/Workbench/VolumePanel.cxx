@@ -32,7 +32,7 @@ VolumePanel::VolumePanel(Workbench* bench, QWidget* parent)
   QHeaderView* header = view_->horizontalHeader();
   header->setMinimumSectionSize(20);
   header->setSectionResizeMode(VolumeTable::Name, QHeaderView::Stretch);
-  const int widths[] = {44, 22, 0, 60, 46};
+  const int widths[] = {42, 26, 0, 54, 44};
   for (int column = 0; column < VolumeTable::Columns; column++)
     if (column != VolumeTable::Name) {
       header->setSectionResizeMode(column, QHeaderView::Fixed);

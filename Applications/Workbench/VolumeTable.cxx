@@ -51,7 +51,7 @@ QVariant VolumeTable::data(const QModelIndex& index, int role) const
       return session->GetVisible(id) ? Qt::Checked : Qt::Unchecked;
     break;
   case Colour:
-    if (role == Qt::BackgroundRole || role == Qt::EditRole) {
+    if (role == Qt::DecorationRole || role == Qt::EditRole) {
       double rgb[3] = {1.0, 1.0, 1.0};
       session->GetColour(id, rgb);
       return QColor::fromRgbF(rgb[0], rgb[1], rgb[2]);
@@ -109,15 +109,16 @@ QVariant VolumeTable::headerData(int section, Qt::Orientation orientation, int r
   if (orientation != Qt::Horizontal)
     return {};
   if (role == Qt::DisplayRole) {
-    static const char* const titles[Columns] = {QT_TR_NOOP("Show"), "", QT_TR_NOOP("Name"), QT_TR_NOOP("Opacity"), QT_TR_NOOP("Group")};
+    static const char* const titles[Columns] = {QT_TR_NOOP("Show"), "", QT_TR_NOOP("Name"), QT_TR_NOOP("Opacity"),
+                                                QT_TR_NOOP("Group")};
     return tr(titles[section]);
   }
   if (role == Qt::ToolTipRole) {
     static const char* const help[Columns] = {
-      QT_TR_NOOP("Shown in the views, and used by what aligns and stitches what is shown"),
-      QT_TR_NOOP("Tint of the volume; double click to change it"), QT_TR_NOOP("Double click to rename"),
-      QT_TR_NOOP("Weight of the volume where several overlap; double click to change it"),
-      QT_TR_NOOP("Volumes of one group are selected and moved together")};
+        QT_TR_NOOP("Shown in the views, and used by what aligns and stitches what is shown"),
+        QT_TR_NOOP("Tint of the volume; double click to change it"), QT_TR_NOOP("Double click to rename"),
+        QT_TR_NOOP("Weight of the volume where several overlap; double click to change it"),
+        QT_TR_NOOP("Volumes of one group are selected and moved together")};
     return tr(help[section]);
   }
   return {};

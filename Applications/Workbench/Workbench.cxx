@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <QPointer>
 #include <vtkImageData.h>
 
 namespace echorama {
@@ -10,16 +11,22 @@ namespace echorama {
 Workbench::Workbench(Workspace& workspace, QObject* parent) : QObject(parent), workspace_(workspace)
 {
   // Errors are not observed here: what VTK classes report comes through Messages.
-  for (unsigned long event : {vtkUltrasoundAlignmentSession::VolumesChangedEvent, vtkUltrasoundAlignmentSession::PosesChangedEvent,
-                              vtkUltrasoundAlignmentSession::SelectionChangedEvent,
-                              vtkUltrasoundAlignmentSession::VoxelsChangedEvent,
-                              vtkUltrasoundAlignmentSession::HistoryChangedEvent})
+  for (unsigned long event :
+       {vtkUltrasoundAlignmentSession::VolumesChangedEvent, vtkUltrasoundAlignmentSession::PosesChangedEvent,
+        vtkUltrasoundAlignmentSession::SelectionChangedEvent, vtkUltrasoundAlignmentSession::VoxelsChangedEvent,
+        vtkUltrasoundAlignmentSession::HistoryChangedEvent})
     observers_.append(Session()->AddObserver(event, this, &Workbench::OnSessionEvent));
-  workspace_.say = [this](const QString& text, bool isError) { isError ? Warn(text) : Note(text); };
-  workspace_.showErrorVectors = [this](bool shown) {
-    VolumeLook look = volume_;
+  // Either may go before the other.
+  workspace_.say = [bench = QPointer<Workbench>(this)](const QString& text, bool isError) {
+    if (bench)
+      isError ? bench->Warn(text) : bench->Note(text);
+  };
+  workspace_.showErrorVectors = [bench = QPointer<Workbench>(this)](bool shown) {
+    if (!bench)
+      return;
+    VolumeLook look = bench->Volume();
     look.errorVectors = shown;
-    SetVolume(look);
+    bench->SetVolume(look);
   };
 }
 
@@ -27,8 +34,6 @@ Workbench::~Workbench()
 {
   for (unsigned long tag : observers_)
     Session()->RemoveObserver(tag);
-  workspace_.say = [](const QString&, bool) {};
-  workspace_.showErrorVectors = [](bool) {};
 }
 
 void Workbench::OnSessionEvent(vtkObject*, unsigned long event, void*)

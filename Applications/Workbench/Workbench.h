@@ -7,7 +7,6 @@
 #include <QString>
 #include <QVector>
 
-
 namespace echorama {
 
 /// A sentence for the user, with what can be done about it.
@@ -28,12 +27,12 @@ class Workbench : public QObject {
   Q_OBJECT
 
 public:
-  /// \a workspace outlives it; what is said there goes to the message bar, and its error vectors to the 3D view.
+  /// What is said in \a workspace goes to the message bar, and its error vectors to the 3D view.
   explicit Workbench(Workspace& workspace, QObject* parent = nullptr);
   ~Workbench() override;
 
   Workspace& Shared() const { return workspace_; }
-  vtkUltrasoundAlignmentSession* Session() const { return workspace_.session; }
+  vtkUltrasoundAlignmentSession* Session() const { return session_; }
 
   /// The volume that single numbers and the brush belong to: the first that is selected; 0: none is.
   int ActiveVolume() const;
@@ -84,6 +83,7 @@ private:
   void OnSessionEvent(vtkObject* session, unsigned long event, void* data);
 
   Workspace& workspace_;
+  vtkSmartPointer<vtkUltrasoundAlignmentSession> session_ = workspace_.session;
   QVector<unsigned long> observers_;
   Tool tool_ = Tool::Align;
   BrushSettings brush_;

@@ -32,7 +32,8 @@ namespace {
 
 QByteArray BytesOf(vtkDataArray* array)
 {
-  return {static_cast<const char*>(array->GetVoidPointer(0)), static_cast<int>(array->GetNumberOfValues() * array->GetDataTypeSize())};
+  return {static_cast<const char*>(array->GetVoidPointer(0)),
+          static_cast<int>(array->GetNumberOfValues() * array->GetDataTypeSize())};
 }
 
 QByteArray IntensitiesOf(WindowUnderTest& window, int id)
@@ -188,8 +189,9 @@ void TestWorkbench::aDragMovesTheSelectedVolume()
   const auto after = window.Pose(2);
   for (std::size_t axis = 0; axis < 3; axis++) {
     const double expected = mm * (right[axis] * by.x() - up[axis] * by.y());
-    QVERIFY2(std::abs(after[4 * axis + 3] - before[4 * axis + 3] - expected) < 1.01 * mm,
-             qPrintable(QString("axis %1: %2 mm for %3").arg(axis).arg(after[4 * axis + 3] - before[4 * axis + 3]).arg(expected)));
+    QVERIFY2(
+        std::abs(after[4 * axis + 3] - before[4 * axis + 3] - expected) < 1.01 * mm,
+        qPrintable(QString("axis %1: %2 mm for %3").arg(axis).arg(after[4 * axis + 3] - before[4 * axis + 3]).arg(expected)));
   }
   QCOMPARE(window.Pose(1), other);
   QVERIFY(window.Window().isWindowModified());

@@ -70,7 +70,8 @@ void WindowUnderTest::Release(QWidget* widget, const QPoint& at, Qt::MouseButton
   QTest::mouseRelease(window_->windowHandle(), button, keys, widget->mapTo(window_.get(), at));
 }
 
-void WindowUnderTest::Drag(QWidget* widget, const QPoint& from, const QPoint& to, Qt::MouseButton button, Qt::KeyboardModifiers keys)
+void WindowUnderTest::Drag(QWidget* widget, const QPoint& from, const QPoint& to, Qt::MouseButton button,
+                           Qt::KeyboardModifiers keys)
 {
   constexpr int steps = 10;
   Press(widget, from, button, keys);
@@ -194,7 +195,7 @@ QString WriteVolume(const QDir& folder, const QString& name, int seed, std::arra
   const QByteArray size = QByteArray::number(side);
   file.write("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
              "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = " +
-             corner(0) + " " + corner(1) + " " + corner(2) + "\nElementSpacing = 1 1 1\nDimSize = " + size + " " + size + " " + size +
-             "\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + voxels);
+             corner(0) + " " + corner(1) + " " + corner(2) + "\nElementSpacing = 1 1 1\nDimSize = " + size + " " + size + " " +
+             size + "\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + voxels);
   return path;
 }
