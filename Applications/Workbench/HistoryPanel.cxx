@@ -25,6 +25,9 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
   undo_ = Button(this, "undo", tr("Undo"), tr("Takes the last edit back (Ctrl+Z)"), [this] { bench_->Session()->Undo(); });
   redo_ = Button(this, "redo", tr("Redo"), tr("Makes it again (Ctrl+Shift+Z)"), [this] { bench_->Session()->Redo(); });
   auto* title = new QLabel(tr("Backups (click: back to it; can be undone)"), this);
+  title->setWordWrap(true);
+  for (QPushButton* button : {undo_, redo_}) // labels of edits can be long
+    button->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Fixed);
   backups_ = new QListWidget(this);
   backups_->setObjectName("backups");
   backups_->setAccessibleName(tr("Backups, the newest first"));

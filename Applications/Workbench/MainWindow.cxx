@@ -131,12 +131,27 @@ void MainWindow::MakePanels()
   AddPanel(new BrushPanel(bench_, this), tr("Brush"));
   AddPanel(new HistoryPanel(bench_, this), tr("History"));
   Workspace& workspace = bench_->Shared();
-  AddPanel(new RegistrationPanel(workspace, this), tr("Align"));
+  auto* registration = new RegistrationPanel(workspace, this);
+  AddPanel(registration, tr("Align"));
+  Menu(Place::Align)
+      ->addAction(MakeAction(this, "refineAction", tr("&Refine from here"), "R",
+                             tr("Align the selected volumes to the others from where they are; can be undone"),
+                             [registration] { registration->Refine(); }));
+  Menu(Place::Align)
+      ->addAction(MakeAction(this, "alignAllAction", tr("Align &all"), "Shift+R",
+                             tr("Align all volumes to the first; can be undone"), [registration] { registration->AlignAll(); }));
   auto* result = new ResultPanel(workspace, this);
   auto* resultBench = new Workbench(result->Result(), result);
   resultBench->SetTool(Tool::Look);
   result->SetView(new SlicePane(resultBench, "resultSlice", "z", result));
   AddPanel(result, tr("Stitch"));
+  Menu(Place::Stitch)
+      ->addAction(MakeAction(this, "stitchAction", tr("&Stitch and embed"), "",
+                             tr("Make one volume of those that are shown: the panel Stitch"), [result] {
+                               auto* dock = result->window()->findChild<QDockWidget*>(result->objectName() + "Dock");
+                               dock->show();
+                               dock->raise();
+                             }));
   auto* training = new TrainingPanel(workspace, this);
   AddPanel(training, tr("Train"));
   auto* score = new QLabel(this);

@@ -63,6 +63,8 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
   layout->addStretch(1);
 
   for (int axis = 0; axis < 3; axis++)
+    grid->setColumnStretch(axis + 1, 1);
+  for (int axis = 0; axis < 3; axis++)
     grid->addWidget(new QLabel(QString("<b>%1</b>").arg(Axes[axis]), this), 0, axis + 1, Qt::AlignHCenter);
   const auto addRow = [&](int row, const QString& title, const char* name, const QString& help, int digits, const QString& unit,
                           std::array<QDoubleSpinBox*, 3>& fields, const std::function<void(double)>& edited) {
@@ -113,12 +115,12 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
       bench_->SetHand(hand);
     };
   };
-  grid->addWidget(new QLabel(tr("Step"), this), 5, 0);
+  grid->addWidget(new QLabel(tr("Step, mm, \u00b0"), this), 5, 0);
   mmStep_ =
-      NumberField(this, {"translationStep", tr("One step of the keys and of the buttons above, mm"), 0.001, 100.0, 3, 0.5, " mm"},
+      NumberField(this, {"translationStep", tr("One step of the keys and of the buttons above, mm"), 0.01, 100.0, 2, 0.5, ""},
                   setHand(&Handling::translationStepMm));
   degreeStep_ =
-      NumberField(this, {"rotationStep", tr("One turn of the keys and of the buttons above"), 0.001, 90.0, 3, 0.5, "\u00b0"},
+      NumberField(this, {"rotationStep", tr("One turn of the keys and of the buttons above"), 0.01, 90.0, 2, 0.5, "\u00b0"},
                   setHand(&Handling::rotationStepDegrees));
   grid->addWidget(mmStep_, 5, 1);
   grid->addWidget(degreeStep_, 5, 2);

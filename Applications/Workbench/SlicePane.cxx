@@ -74,7 +74,7 @@ SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis,
   connect(large, &QToolButton::clicked, this, &SlicePane::LargeAsked);
   connect(canvas_, &SliceCanvas::LargeAsked, this, &SlicePane::LargeAsked);
   connect(canvas_, &SliceCanvas::PlaneChanged, this, &SlicePane::ShowPlane);
-  connect(bench, &Workbench::VolumesChanged, this, &SlicePane::ShowPlane);
+  connect(canvas_, &SliceCanvas::Drawn, this, &SlicePane::ShowPlane); // a view fits itself when the first volumes come
   SetAxis(axis);
 }
 
