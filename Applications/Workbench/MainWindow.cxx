@@ -4,6 +4,7 @@
 #include "BrushPanel.h"
 #include "Controls.h"
 #include "EditActions.h"
+#include "ExportActions.h"
 #include "FileActions.h"
 #include "HistoryPanel.h"
 #include "JobBar.h"
@@ -116,6 +117,7 @@ void MainWindow::MakeMenus()
   looks_->AddTo(Menu(Place::View), bar);
   edits_->AddTo(Menu(Place::Edit));
   files_->AddTo(Menu(Place::File));
+  (new ExportActions(bench_->Shared(), this))->AddTo(Menu(Place::File), this);
   Menu(Place::Help)
       ->addAction(MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"),
                              [this] { ShowKeysPage(this); }));
