@@ -27,6 +27,7 @@ VolumePanel::VolumePanel(Workbench* bench, QWidget* parent)
   view_->setShowGrid(false);
   view_->setAlternatingRowColors(true);
   view_->setTabKeyNavigation(false);
+  view_->setEditTriggers(QAbstractItemView::DoubleClicked | QAbstractItemView::EditKeyPressed); // letters are shortcuts
   view_->verticalHeader()->hide();
   view_->verticalHeader()->setDefaultSectionSize(24);
   QHeaderView* header = view_->horizontalHeader();

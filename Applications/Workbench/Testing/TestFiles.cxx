@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where keys go after real clicks; and opening, leaving and coming back to work. No test here gives the focus to anything by
+// itself.
+#include "FileActions.h"
+#include "SliceCanvas.h"
+#include "Theme.h"
+#include "VolumePane.h"
+#include "vtkUltrasoundSliceView.h"
+#include "WindowUnderTest.h"
+#include "Workbench.h"
+#include <cmath>
+#include <QApplication>
+#include <QComboBox>
+#include <QDockWidget>
+#include <QDoubleSpinBox>
+#include <QLineEdit>
+#include <QListWidget>
+#include <QPushButton>
+#include <QSurfaceFormat>
+#include <QTableView>
+#include <QTemporaryDir>
+#include <QtTest>
+#include <QVTKOpenGLNativeWidget.h>
+
+using namespace echorama;
+
+class TestFiles : public QObject {
+  Q_OBJECT
+
+private slots:
+  void init();
+  void keysMoveVolumesAfterAClickInTheTable();
+  void keysAreShortcutsAfterANumber();
+  void keysMoveVolumesAfterAButton();
+  void aNameIsTypedAfterADoubleClick();
+  void theWheelChangesNoFieldInPassing();
+  void spacePressesTheButtonOfTheFocus();
+  void returnAnswers();
+
+private:
+  QDir Folder() const { return QDir(folder_->path()); }
+  QString A() { return WriteVolume(Folder(), "left.mha", 1, {0, 0, 0}); }
+  QString B() { return WriteVolume(Folder(), "right.mha", 2, {12, 4, 0}); }
+
+  std::unique_ptr<QTemporaryDir> folder_;
+};
+
+namespace {
+
+// A click in the window, as a person makes it: the focus goes where Qt takes it.
+void ClickInWindow(WindowUnderTest& window, QWidget* widget, const QPoint& at)
+{
+  QTest::mouseClick(window.Window().windowHandle(), Qt::LeftButton, {}, widget->mapTo(&window.Window(), at));
+  window.Settle();
+}
+
+// How far an arrow to the right moves a volume in the first slice, mm.
+double ArrowMoves(WindowUnderTest& window, int id)
+{
+  const auto before = window.Pose(id);
+  window.Move(window.Slice(0), window.Slice(0)->rect().center() + QPoint(5, 50));
+  window.Key(Qt::Key_Right);
+  const auto after = window.Pose(id);
+  return std::hypot(after[3] - before[3], after[7] - before[7], after[11] - before[11]);
+}
+
+} // namespace
+
+void TestFiles::init()
+{
+  folder_ = std::make_unique<QTemporaryDir>();
+  qputenv("XDG_DATA_HOME", folder_->filePath("data").toLocal8Bit());
+  QSettings::setPath(QSettings::NativeFormat, QSettings::UserScope, folder_->filePath("settings"));
+}
+
+void TestFiles::keysMoveVolumesAfterAClickInTheTable()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  auto* table = window.Part<QTableView>("volumes");
+  ClickInWindow(window, table->viewport(), table->visualRect(table->model()->index(0, 2)).center());
+  QVERIFY(window.Session()->IsSelected(1) && !window.Session()->IsSelected(2));
+  QVERIFY(std::abs(ArrowMoves(window, 1) - 1.0) < 1e-9);
+  QVERIFY(window.Session()->IsSelected(1) && !window.Session()->IsSelected(2));
+  for (Qt::Key key : {Qt::Key_X, Qt::Key_Z, Qt::Key_Plus})
+    window.Key(key);
+  QVERIFY(!table->findChild<QLineEdit*>());
+}
+
+void TestFiles::keysAreShortcutsAfterANumber()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  const auto before = window.Pose(2);
+  auto* field = window.Part<QDoubleSpinBox>("middleX");
+  ClickInWindow(window, field, field->rect().center());
+  QVERIFY(field->hasFocus());
+  window.Key(Qt::Key_A, Qt::ControlModifier);
+  QTest::keyClicks(field, "31");
+  window.Key(Qt::Key_Return);
+  QVERIFY(window.Pose(2) != before);
+  window.Key(Qt::Key_3);
+  QVERIFY(window.Window().Bench()->CurrentTool() == Tool::Paint);
+  window.Key(Qt::Key_2);
+  window.Key(Qt::Key_Z, Qt::ControlModifier);
+  QCOMPARE(window.Pose(2), before);
+}
+
+void TestFiles::keysMoveVolumesAfterAButton()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  for (const char* name : {"selectNone", "selectAll"}) {
+    auto* button = window.Part<QPushButton>(name);
+    ClickInWindow(window, button, button->rect().center());
+  }
+  QCOMPARE(window.Session()->GetNumberOfSelected(), 2);
+  QVERIFY(std::abs(ArrowMoves(window, 1) - 1.0) < 1e-9);
+}
+
+void TestFiles::aNameIsTypedAfterADoubleClick()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  auto* table = window.Part<QTableView>("volumes");
+  const QPoint at = table->visualRect(table->model()->index(0, 2)).center();
+  ClickInWindow(window, table->viewport(), at);
+  QTest::mouseDClick(window.Window().windowHandle(), Qt::LeftButton, {}, table->viewport()->mapTo(&window.Window(), at));
+  window.Settle();
+  auto* editor = qobject_cast<QLineEdit*>(QApplication::focusWidget());
+  QVERIFY(editor);
+  QTest::keyClicks(editor, "before d");
+  window.Key(Qt::Key_Return);
+  QCOMPARE(window.Session()->GetName(1), std::string("before d"));
+  QCOMPARE(window.Slice(0)->View()->GetMode(), std::string("blend"));
+  QVERIFY(std::abs(ArrowMoves(window, 1) - 1.0) < 1e-9);
+}
+
+void TestFiles::theWheelChangesNoFieldInPassing()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A()}));
+  auto* field = window.Part<QDoubleSpinBox>("translationStep");
+  const double value = field->value();
+  window.Wheel(field, 1);
+  QCOMPARE(field->value(), value);
+  for (auto* choice : window.Window().findChildren<QComboBox*>()) {
+    const int chosen = choice->currentIndex();
+    window.Wheel(choice, -1);
+    QCOMPARE(choice->currentIndex(), chosen);
+  }
+  ClickInWindow(window, field, field->rect().center());
+  window.Wheel(field, 1);
+  QVERIFY(field->value() > value);
+}
+
+void TestFiles::spacePressesTheButtonOfTheFocus()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  const std::string shown = window.Slice(0)->View()->GetShown();
+  for (int i = 0; i < 100 && QApplication::focusWidget() != window.Part<QPushButton>("selectAll"); i++)
+    window.Key(Qt::Key_Tab);
+  QVERIFY(window.Part<QPushButton>("selectAll")->hasFocus());
+  window.Key(Qt::Key_Space);
+  QCOMPARE(window.Session()->GetNumberOfSelected(), 2);
+  QCOMPARE(window.Slice(0)->View()->GetShown(), shown);
+}
+
+void TestFiles::returnAnswers()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  int answers = 0;
+  for (Qt::Key key : {Qt::Key_Return, Qt::Key_Space}) {
+    window.Window().Bench()->Ask(QString("Now, by %1?").arg(key), {{"Yes", [&answers] { answers++; }}, {"No", {}}});
+    window.Settle();
+    window.Key(key);
+  }
+  QCOMPARE(answers, 2);
+  QVERIFY(window.Messages().isEmpty());
+  QVERIFY(std::abs(ArrowMoves(window, 2) - 1.0) < 1e-9);
+}
+
+int main(int argc, char** argv)
+{
+  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
+  format.setSamples(0);
+  QSurfaceFormat::setDefaultFormat(format);
+  QApplication application(argc, argv);
+  QApplication::setOrganizationName("Echorama");
+  QApplication::setApplicationName("WorkbenchTest");
+  ApplyTheme(application);
+  TestFiles test;
+  return QTest::qExec(&test, argc, argv);
+}
+
+#include "TestFiles.moc"
