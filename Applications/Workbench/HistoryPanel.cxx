@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "HistoryPanel.h"
 #include "Controls.h"
-#include "Redraw.h"
+#include "Job.h"
 #include "vtkUltrasoundAlignmentSession.h"
 #include "Workbench.h"
 #include <QDateTime>
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
+#include <QShortcut>
 #include <QVBoxLayout>
 #include <vtkDoubleArray.h>
 #include <vtkNew.h>
@@ -16,7 +17,7 @@
 namespace echorama {
 
 namespace {
-constexpr int ListMs = 300; ///< listing reads a folder; a person who holds a key down does not need it each time
+constexpr int ListMs = 1000; ///< after the last edit: by then its backup is on the disk
 }
 
 HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
@@ -38,9 +39,12 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
   layout->addWidget(redo_);
   layout->addWidget(title);
   layout->addWidget(backups_, 1);
-  list_ = new Redraw(this, [this] { ListBackups(); });
+  list_.setSingleShot(true);
+  list_.setInterval(ListMs);
+  connect(&list_, &QTimer::timeout, this, &HistoryPanel::ListBackups);
   connect(backups_, &QListWidget::itemClicked, this, [this](QListWidgetItem* item) { Restore(backups_->row(item)); });
-  connect(backups_, &QListWidget::itemActivated, this, [this](QListWidgetItem* item) { Restore(backups_->row(item)); });
+  auto* enter = new QShortcut(Qt::Key_Return, backups_, nullptr, nullptr, Qt::WidgetShortcut);
+  connect(enter, &QShortcut::activated, this, [this] { Restore(backups_->currentRow()); });
   connect(bench, &Workbench::HistoryChanged, this, &HistoryPanel::ShowHistory);
   ShowHistory();
 }
@@ -48,7 +52,7 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
 void HistoryPanel::showEvent(QShowEvent* event)
 {
   QWidget::showEvent(event);
-  list_->Ask();
+  ListBackups();
 }
 
 void HistoryPanel::ShowHistory()
@@ -62,18 +66,42 @@ void HistoryPanel::ShowHistory()
   undo_->setText(label(tr("Undo"), session->GetUndoLabel()));
   redo_->setText(label(tr("Redo"), session->GetRedoLabel()));
   if (isVisible())
-    list_->Ask(ListMs);
+    list_.start(); // again from the beginning: only when edits have ended
 }
 
+// Labels are inside the files, and there are a hundred of them: they are read on another thread.
 void HistoryPanel::ListBackups()
 {
-  vtkNew<vtkStringArray> paths, labels;
-  vtkNew<vtkDoubleArray> times;
-  const int count = bench_->Session()->GetBackups(paths, labels, times);
+  if (isListing_) {
+    list_.start();
+    return;
+  }
+  isListing_ = true;
+  const std::string folder = bench_->Session()->GetBackupFolder();
+  const auto read = std::make_shared<std::vector<Line>>();
+  const Job* job = Job::Start(
+      this, tr("Listing backups"),
+      [folder, read](const Progress&) {
+        vtkNew<vtkStringArray> paths, labels;
+        vtkNew<vtkDoubleArray> times;
+        const int count = vtkUltrasoundAlignmentSession::GetBackupsIn(folder.c_str(), paths, labels, times);
+        for (int i = 0; i < count; i++)
+          read->push_back({paths->GetValue(i), labels->GetValue(i), times->GetValue(i)});
+      },
+      [this, read] { ShowBackups(*read); },
+      [this](const QString& error) { bench_->Warn(tr("Backups cannot be listed: %1").arg(error)); });
+  connect(job, &Job::Ended, this, [this] { isListing_ = false; });
+}
+
+void HistoryPanel::ShowBackups(const std::vector<Line>& lines)
+{
+  if (lines == shown_ && backups_->count() > 0)
+    return; // it stays where it was scrolled to
+  shown_ = lines;
   backups_->clear();
-  for (int i = 0; i < count; i++) {
-    const QString path = QString::fromStdString(paths->GetValue(i)), label = QString::fromStdString(labels->GetValue(i));
-    const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
+  for (const Line& line : lines) {
+    const QString path = QString::fromStdString(line.path), label = QString::fromStdString(line.label);
+    const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * line.time));
     const bool isToday = time.date() == QDate::currentDate();
     auto* item =
         new QListWidgetItem(QString("%1  %2").arg(time.toString(isToday ? "hh:mm:ss" : "yyyy-MM-dd hh:mm"), label), backups_);

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <QTimer>
 #include <QWidget>
+#include <string>
+#include <vector>
 
 class QListWidget;
 class QPushButton;
 
 namespace echorama {
 
-class Redraw;
 class Workbench;
 
 /// Undo and redo, and the backups: one after every edit, also of earlier days; a click brings one back (which can be undone).
@@ -21,14 +23,22 @@ protected:
   void showEvent(QShowEvent* event) override;
 
 private:
+  struct Line {
+    std::string path, label;
+    double time;
+    bool operator==(const Line& other) const { return path == other.path && label == other.label && time == other.time; }
+  };
   void ShowHistory();
   void ListBackups();
+  void ShowBackups(const std::vector<Line>& lines);
   void Restore(int row);
 
   Workbench* bench_;
   QPushButton *undo_, *redo_;
   QListWidget* backups_;
-  Redraw* list_;
+  QTimer list_;
+  bool isListing_ = false;
+  std::vector<Line> shown_;
 };
 
 } // namespace echorama
