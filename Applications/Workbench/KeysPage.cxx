@@ -21,10 +21,12 @@ constexpr const char* Mouse[][2] = {
 };
 constexpr const char* Aligning[][2] = {
     {"x, y, z", "keep to an axis; again: to the plane across it; again: free"},
-    {"Arrows, Page up, Page down", "move by one step"},
-    {"Ctrl + arrows", "turn by one step"},
-    {"+, -", "larger and smaller steps"},
-    {"c, then click", "put the centre of rotation"},
+    {"Arrows", "move by one step in the view"},
+    {"Page up, Page down", "move by one step towards you, and away"},
+    {"Ctrl + arrows, Ctrl + Page up, Page down", "turn by one step"},
+    {"+, -", "steps twice and half as large"},
+    {"c", "put the centre of rotation where the mouse is"},
+    {"Shift + c", "put it back in the middle of what is selected"},
     {"Escape", "take a drag back"},
 };
 
