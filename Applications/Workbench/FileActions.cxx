@@ -3,7 +3,6 @@
 #include "Controls.h"
 #include "Job.h"
 #include "JobBar.h"
-#include "VolumeReading.h"
 #include "Workbench.h"
 #include <memory>
 #include <QAction>
@@ -60,6 +59,7 @@ FileActions::FileActions(Workbench* bench, JobBar* jobs, QWidget* window)
                  [this] { AskOpen(tr("Read poses"), tr("Poses (*.json);;All files (*)"), false); });
   for (auto changed : {&Workbench::HistoryChanged, &Workbench::VolumesChanged, &Workbench::SelectionChanged})
     connect(bench, changed, this, &FileActions::ShowHistory);
+  connect(bench, &Workbench::HistoryChanged, this, [this] { edits_++; });
   ShowHistory();
 }
 
@@ -98,15 +98,24 @@ void FileActions::Open(const QStringList& paths)
   }
   if (projects.size() > 1)
     bench_->Warn(tr("One project can be open at a time; %1 is opened.").arg(QFileInfo(projects.first()).fileName()));
-  if (!projects.isEmpty())
-    OpenProject(projects.first());
-  if (!volumes.isEmpty())
-    OpenVolumes(volumes);
-  for (const QString& path : poses)
-    bench_->Session()->ReadPoses(path.toUtf8().constData());
+  // One after the other: a project takes the place of what is there, and poses are for volumes that are there.
+  const auto readPoses = [this, poses] {
+    for (const QString& path : poses)
+      bench_->Session()->ReadPoses(path.toUtf8().constData());
+  };
+  const auto openVolumes = [this, volumes, readPoses] {
+    if (volumes.isEmpty())
+      readPoses();
+    else
+      OpenVolumes(volumes, readPoses);
+  };
+  if (projects.isEmpty())
+    openVolumes();
+  else
+    OpenProject(projects.first(), openVolumes);
 }
 
-void FileActions::OpenVolumes(const QStringList& files)
+void FileActions::OpenVolumes(const QStringList& files, const std::function<void()>& then)
 {
   const QStringList volumes = WithoutCompanions(files);
   const QString label = volumes.size() == 1 ? tr("Reading %1").arg(QFileInfo(volumes.first()).fileName())
@@ -114,37 +123,58 @@ void FileActions::OpenVolumes(const QStringList& files)
   const auto read = std::make_shared<std::vector<ReadVolume>>();
   Job* job = Job::Start(
       this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
-      [this, read] {
+      [this, read, then] {
         auto* session = bench_->Session();
-        const bool wasEmpty = session->GetNumberOfVolumes() == 0;
+        const bool wasEmpty = session->GetNumberOfVolumes() == 0, wasUntouched = !HasUnsavedWork();
         int last = 0;
-        for (const ReadVolume& volume : *read) {
+        for (const ReadVolume& volume : *read)
           if (volume.image)
             last = session->AddVolume(volume.image, volume.file.toUtf8().constData());
-          else
-            bench_->Warn(volume.error);
-        }
+        WarnOfUnread(*read);
+        if (wasUntouched)
+          opened_ = session->GetKernel().State();
         // The first volume stays where it is, as a rule: what comes later is to be moved.
         if (last > 0 && !(wasEmpty && read->size() == 1))
           session->Select(last, true, true);
+        ShowHistory();
+        if (then)
+          then();
       },
       [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
   jobs_->Watch(job);
 }
 
-void FileActions::OpenProject(const QString& path)
+// All in one message, so that none pushes another away.
+void FileActions::WarnOfUnread(const std::vector<ReadVolume>& volumes)
 {
-  WhenSaved(tr("Save what you did before %1 is opened?").arg(QFileInfo(path).fileName()),
-            [this, path] { ReadProject(path, path); });
+  constexpr int most = 20; // lines: a window has no more room
+  QStringList errors;
+  for (const ReadVolume& volume : volumes)
+    if (!volume.image)
+      errors.append(volume.error);
+  if (errors.size() > most)
+    errors = errors.mid(0, most) + QStringList(tr("and %1 more that cannot be read").arg(errors.size() - most));
+  if (!errors.isEmpty())
+    bench_->Warn(errors.join('\n'));
+}
+
+void FileActions::OpenProject(const QString& path, const std::function<void()>& then)
+{
+  WhenSaved(QuestionBefore(path), [this, path, then] { ReadProject(path, path, then); });
+}
+
+QString FileActions::QuestionBefore(const QString& path)
+{
+  return tr("Save what you did before %1 is opened?").arg(QFileInfo(path).fileName());
 }
 
 void FileActions::OpenAbandoned(const QString& backup)
 {
-  ReadProject(backup, {});
+  WhenSaved(tr("Save what you did before the other session is opened?"), [this, backup] { ReadProject(backup, {}, {}); });
 }
 
 // \a saveAs: where Save writes later; empty: it asks.
-void FileActions::ReadProject(const QString& path, const QString& saveAs)
+void FileActions::ReadProject(const QString& path, const QString& saveAs, const std::function<void()>& then)
 {
   auto* session = bench_->Session();
   vtkNew<vtkStringArray> files;
@@ -162,14 +192,14 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs)
     session->OpenProject(path.toUtf8().constData()); // names what is missing
     bench_->Ask(tr("Files of %1 have moved. Where are they now?").arg(QFileInfo(path).fileName()),
                 {{tr("Look in a folder..."),
-                  [this, path, saveAs] {
+                  [this, path, saveAs, then] {
                     auto* dialog = new QFileDialog(window_, tr("Where the volumes are"), QFileInfo(path).absolutePath());
                     dialog->setAttribute(Qt::WA_DeleteOnClose);
                     dialog->setFileMode(QFileDialog::Directory);
                     dialog->setObjectName("folderDialog");
-                    connect(dialog, &QFileDialog::fileSelected, this, [this, path, saveAs](const QString& folder) {
+                    connect(dialog, &QFileDialog::fileSelected, this, [this, path, saveAs, then](const QString& folder) {
                       bench_->Session()->AddSearchFolder(folder.toUtf8().constData());
-                      ReadProject(path, saveAs);
+                      ReadProject(path, saveAs, then);
                     });
                     dialog->open();
                   }},
@@ -180,29 +210,41 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs)
   const auto read = std::make_shared<std::vector<ReadVolume>>();
   Job* job = Job::Start(
       this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress); },
-      [this, path, saveAs, read] {
-        bool isWhole = true;
-        vtkNew<vtkMultiBlockDataSet> blocks;
-        for (const ReadVolume& volume : *read) {
-          if (!volume.image) {
-            bench_->Warn(volume.error);
-            isWhole = false;
-            continue;
-          }
-          const unsigned int block = blocks->GetNumberOfBlocks();
-          blocks->SetBlock(block, volume.image);
-          blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.file.toUtf8().constData());
-        }
-        if (!isWhole || !bench_->Session()->OpenProject(path.toUtf8().constData(), blocks))
-          return;
-        emit Opened();
-        if (!saveAs.isEmpty())
-          OfferNewerBackup(saveAs);
-        else if (bench_->Session()->BackUp()) // what was left is now this session's: it is not offered twice
-          bench_->Session()->DiscardBackups(QFileInfo(path).absolutePath().toUtf8().constData());
+      [this, path, saveAs, then, read, before = edits_] {
+        WarnOfUnread(*read);
+        for (const ReadVolume& volume : *read)
+          if (!volume.image)
+            return;
+        const auto take = [this, path, saveAs, then, read] { TakeProject(path, saveAs, *read, then); };
+        if (edits_ == before)
+          take();
+        else // work went on while files were read
+          WhenSaved(QuestionBefore(path), take);
       },
       [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
   jobs_->Watch(job);
+}
+
+void FileActions::TakeProject(const QString& path, const QString& saveAs, const std::vector<ReadVolume>& volumes,
+                              const std::function<void()>& then)
+{
+  vtkNew<vtkMultiBlockDataSet> blocks;
+  for (const ReadVolume& volume : volumes) {
+    const unsigned int block = blocks->GetNumberOfBlocks();
+    blocks->SetBlock(block, volume.image);
+    blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.file.toUtf8().constData());
+  }
+  auto* session = bench_->Session();
+  if (!session->OpenProject(path.toUtf8().constData(), blocks))
+    return;
+  opened_ = {};
+  emit Opened();
+  if (!saveAs.isEmpty())
+    OfferNewerBackup(saveAs);
+  else if (session->BackUp()) // what was left is now this session's: it is not offered twice
+    session->DiscardBackups(QFileInfo(path).absolutePath().toUtf8().constData());
+  if (then)
+    then();
 }
 
 // After a crash the newest backup beside the project is younger than the project.
@@ -249,12 +291,7 @@ bool FileActions::HasUnsavedWork() const
   const auto* session = bench_->Session();
   if (!session->GetModifiedSinceSave() || session->GetNumberOfVolumes() == 0)
     return false;
-  if (!session->GetProjectPath().empty())
-    return true;
-  for (const SessionVolume& volume : session->GetKernel().State().volumes)
-    if (volume.strokes || volume.group > 0 || volume.volumeToWorld.matrix() != Pose::Identity().matrix())
-      return true;
-  return false;
+  return !session->GetProjectPath().empty() || session->GetKernel().State() != opened_;
 }
 
 void FileActions::WhenSaved(const QString& question, const std::function<void()>& then)

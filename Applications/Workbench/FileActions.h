@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "VolumeReading.h"
+#include "Widgets/Session/SessionState.h"
 #include <functional>
 #include <QObject>
 #include <QStringList>
+#include <vector>
 
 class QAction;
 class QMenu;
@@ -27,17 +30,19 @@ public:
 
   /// Volumes, folders of slices, a project or poses, in any mixture: by drop, dialog or command line.
   void Open(const QStringList& paths);
-  void OpenVolumes(const QStringList& files);
-  /// Asks first when there is unsaved work.
-  void OpenProject(const QString& path);
+  /// \a then: when those that could be read are open.
+  void OpenVolumes(const QStringList& files, const std::function<void()>& then = {});
+  /// Asks first when there is unsaved work, and again when there is new work once its files are read.
+  /// \a then: when it is open; not when it is not.
+  void OpenProject(const QString& path, const std::function<void()>& then = {});
   /// A project that a session left that ended without being saved.
   void OpenAbandoned(const QString& backup);
   /// Returns false when it did not work, or a name has to be asked for first.
   bool Save();
   bool SaveTo(const QString& path);
 
-  /// Whether anything would be lost that a person did: moved, painted, grouped, renamed. Volumes that were only opened are not
-  /// work.
+  /// Whether anything would be lost that a person did: moved, painted, grouped, renamed, taken out. Volumes that were only opened
+  /// are not work.
   bool HasUnsavedWork() const;
   /// Calls \a then at once, or after the user said what to do with unsaved work.
   void WhenSaved(const QString& question, const std::function<void()>& then);
@@ -48,7 +53,11 @@ signals:
 private:
   enum class Kind { Volume, Project, Poses };
   static Kind KindOf(const QString& path);
-  void ReadProject(const QString& path, const QString& saveAs);
+  static QString QuestionBefore(const QString& path);
+  void WarnOfUnread(const std::vector<ReadVolume>& volumes);
+  void ReadProject(const QString& path, const QString& saveAs, const std::function<void()>& then);
+  void TakeProject(const QString& path, const QString& saveAs, const std::vector<ReadVolume>& volumes,
+                   const std::function<void()>& then);
   void OfferNewerBackup(const QString& path);
   void AskOpen(const QString& title, const QString& filter, bool several);
   void AskSave(const QString& title, const QString& filter, const QString& name, const std::function<void(const QString&)>& save);
@@ -58,6 +67,8 @@ private:
   JobBar* jobs_;
   QWidget* window_;
   QAction *open_, *openProject_, *save_, *saveAs_, *readPoses_;
+  SessionState opened_; ///< as files had it, of a session that was never saved: what is different is work
+  int edits_ = 0;
   std::function<void()> afterSave_; ///< what waits for a name to be given
 };
 
