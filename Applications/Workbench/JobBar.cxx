@@ -33,6 +33,7 @@ void JobBar::Watch(Job* job)
   layout->addWidget(bar);
   layout->addWidget(stop);
   this->layout()->addWidget(row);
+  jobs_.append(job);
   emit CountChanged(++count_);
 
   connect(job, &Job::Progressed, bar, [bar](double fraction) { bar->setValue(static_cast<int>(1000.0 * fraction)); });
@@ -43,8 +44,25 @@ void JobBar::Watch(Job* job)
   });
   connect(job, &QObject::destroyed, this, [this, row] {
     row->deleteLater();
+    jobs_.removeAll(nullptr);
     emit CountChanged(--count_);
   });
+}
+
+QStringList JobBar::Labels() const
+{
+  QStringList labels;
+  for (const auto& job : jobs_)
+    if (job)
+      labels.append(job->Label());
+  return labels;
+}
+
+void JobBar::StopAll()
+{
+  for (const auto& job : jobs_)
+    if (job)
+      job->Cancel();
 }
 
 } // namespace echorama

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <QPointer>
+#include <QStringList>
+#include <QVector>
 #include <QWidget>
 
 namespace echorama {
@@ -16,12 +19,15 @@ public:
   void Watch(Job* job);
   /// How many are running.
   int Count() const { return count_; }
+  QStringList Labels() const;
+  void StopAll();
 
 signals:
   void CountChanged(int count);
 
 private:
   int count_ = 0;
+  QVector<QPointer<Job>> jobs_;
 };
 
 } // namespace echorama

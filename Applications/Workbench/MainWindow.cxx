@@ -6,6 +6,7 @@
 #include "EditActions.h"
 #include "ExportActions.h"
 #include "FileActions.h"
+#include "Focus.h"
 #include "HistoryPanel.h"
 #include "JobBar.h"
 #include "KeysPage.h"
@@ -37,6 +38,7 @@
 #include <QScrollArea>
 #include <QSettings>
 #include <QStatusBar>
+#include <QTimer>
 #include <QToolBar>
 #include <QUrl>
 #include <QVBoxLayout>
@@ -85,6 +87,7 @@ MainWindow::MainWindow(Workspace& workspace, QWidget* parent)
     connect(bench_, changed, this, &MainWindow::ShowTitle);
   ShowTitle();
   RestoreLayout();
+  new Focus(this, views_->Slices()[0]->Canvas());
 }
 
 MainWindow::~MainWindow()
@@ -178,6 +181,7 @@ void MainWindow::AddPanel(QWidget* panel, const QString& title)
   dock->setObjectName(panel->objectName() + "Dock");
   auto* scroll = new QScrollArea(dock); // at 800 lines of screen some panels are longer than the window
   scroll->setWidgetResizable(true);
+  scroll->setFocusPolicy(Qt::NoFocus); // keys are for the views
   scroll->setFrameShape(QFrame::NoFrame);
   scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
   scroll->setWidget(panel);
@@ -242,14 +246,45 @@ void MainWindow::ShowTitle()
   setWindowModified(files_->HasUnsavedWork());
 }
 
+// What runs comes first: it may make what is to be saved. No question stops the window.
+bool MainWindow::AsksBeforeClosing()
+{
+  if (jobs_->Count() > 0) {
+    const auto closeThen = [this] {
+      if (jobs_->Count() == 0)
+        close();
+      else
+        connect(jobs_, &JobBar::CountChanged, this, &MainWindow::CloseWhenDone, Qt::UniqueConnection);
+    };
+    bench_->Ask(tr("%1 is still running.").arg(jobs_->Labels().join(", ")),
+                {{tr("Stay"), {}}, {tr("Close when it is done"), closeThen}, {tr("Stop it and close"), [this, closeThen] {
+                                                                                jobs_->StopAll();
+                                                                                closeThen();
+                                                                              }}});
+    return true;
+  }
+  if (mayClose_ || !files_->HasUnsavedWork())
+    return false;
+  files_->WhenSaved(tr("Save what you did before the window closes?"), [this] {
+    mayClose_ = true;
+    close();
+    mayClose_ = false; // it may have stayed
+  });
+  return true;
+}
+
+void MainWindow::CloseWhenDone(int running)
+{
+  if (running > 0)
+    return;
+  disconnect(jobs_, &JobBar::CountChanged, this, &MainWindow::CloseWhenDone);
+  QTimer::singleShot(0, this, &QWidget::close); // the job that ended is not quite gone
+}
+
 void MainWindow::closeEvent(QCloseEvent* event)
 {
-  if (!mayClose_ && files_->HasUnsavedWork()) {
+  if (AsksBeforeClosing()) {
     event->ignore();
-    files_->WhenSaved(tr("Save what you did before the window closes?"), [this] {
-      mayClose_ = true;
-      close();
-    });
     return;
   }
   QSettings settings;

@@ -54,6 +54,8 @@ private:
   void MakePanels();
   void AddLeft(QWidget* panel, const QString& title);
   void ShowTitle();
+  bool AsksBeforeClosing();
+  void CloseWhenDone(int running);
   void RestoreLayout();
 
   Workbench* bench_;

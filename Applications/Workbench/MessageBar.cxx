@@ -67,6 +67,7 @@ void MessageBar::Show(const Message& message)
     return; // it is there already
   auto* row = new QFrame(this);
   row->setObjectName("messageRow");
+  row->setProperty("isNote", message.kind == Message::Note);
   row->setStyleSheet(StyleOf(message.kind));
   auto* layout = new QHBoxLayout(row);
   layout->setContentsMargins(8, 3, 4, 3);
@@ -83,6 +84,7 @@ void MessageBar::Show(const Message& message)
   for (const Message::Answer& answer : message.answers) {
     auto* button = new QPushButton(answer.label, row);
     button->setObjectName("messageAnswer");
+    button->setAutoDefault(true); // Return presses it
     layout->addWidget(button);
     connect(button, &QPushButton::clicked, row, [close, action = answer.action] {
       close(); // first: the action may end the window
@@ -106,13 +108,13 @@ void MessageBar::Show(const Message& message)
   this->layout()->addWidget(row);
   row->show(); // now, not when the layout gets to it: it counts
 
-  // The oldest notes and warnings make room; questions stay.
+  // The oldest notes make room; what went wrong and what is asked stays until somebody has read it.
   const auto rows = findChildren<QFrame*>("messageRow");
   int shown = 0;
   for (auto* other : rows)
     shown += !other->isHidden();
   for (auto* other : rows)
-    if (shown > MostRows && !other->isHidden() && other != row && other->findChild<QToolButton*>("messageClose")) {
+    if (shown > MostRows && !other->isHidden() && other != row && other->property("isNote").toBool()) {
       other->hide();
       other->deleteLater();
       shown--;
