@@ -1,0 +1,403 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the panels at the right do: alignment, stitching, export, training, trackers. With the pair of a liver it makes the
+// pictures of the manual, and holds them against those in Documentation/pictures (ECHORAMA_UPDATE_PICTURES=1 replaces these).
+#include "ExportActions.h"
+#include "Job.h"
+#include "JobBar.h"
+#include "RegistrationPanel.h"
+#include "ResultPanel.h"
+#include "SliceCanvas.h"
+#include "Theme.h"
+#include "TrainingPanel.h"
+#include "ViewGrid.h"
+#include "VolumePane.h"
+#include "Widgets/Session/LiveScore.h"
+#include "WindowUnderTest.h"
+#include "Workbench.h"
+#include <cmath>
+#include <QApplication>
+#include <QCheckBox>
+#include <QDockWidget>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPushButton>
+#include <QSettings>
+#include <QSurfaceFormat>
+#include <QTableWidget>
+#include <QTemporaryDir>
+#include <QtTest>
+#include <QVTKOpenGLNativeWidget.h>
+#include <vtkImageData.h>
+#include <vtkUltrasoundAlignmentSession.h>
+
+using namespace echorama;
+
+namespace {
+
+const QDir Liver(ECHORAMA_SOURCE_DIR "/../shared/data/liver");
+
+// How far two poses put a volume's points apart, about.
+double Distance(const std::array<double, 16>& a, const std::array<double, 16>& b)
+{
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 16; ++i)
+    sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return std::sqrt(sum);
+}
+
+} // namespace
+
+class TestPanels : public QObject {
+  Q_OBJECT
+
+private slots:
+  void init();
+  void refineBringsAVolumeBack();
+  void aCancelledJobChangesNothing();
+  void whatMovedMeanwhileStays();
+  void aWindowMayCloseWhileAJobRuns();
+  void stitchingMakesAndSavesOneVolume();
+  void exportWritesAndNeverReplaces();
+  void trainingHidesScoreAndKeepsAttempts();
+  void aToolThatIsLetGoLeavesVolumes();
+  void thePicturesOfTheManual();
+
+private:
+  QString A() const { return folder_->filePath("a.mha"); }
+  QString B() const { return folder_->filePath("b.mha"); }
+  bool Wait(WindowUnderTest& window)
+  {
+    const bool done = QTest::qWaitFor([&] { return window.Window().Jobs()->Count() == 0; }, 120000);
+    window.Settle();
+    return done;
+  }
+  void Raise(WindowUnderTest& window, const char* panel)
+  {
+    auto* dock = window.Part<QDockWidget>((QByteArray(panel) + "Dock").constData());
+    dock->show();
+    dock->raise();
+    window.Settle();
+  }
+  void Picture(WindowUnderTest& window, const QString& name);
+
+  std::unique_ptr<QTemporaryDir> folder_;
+};
+
+void TestPanels::init()
+{
+  folder_ = std::make_unique<QTemporaryDir>();
+  qputenv("XDG_DATA_HOME", folder_->filePath("data").toUtf8());
+  QSettings().clear();
+  WriteVolume(QDir(folder_->path()), "a.mha", 1, {0.0, 0.0, 0.0}, 64);
+  WriteVolume(QDir(folder_->path()), "b.mha", 1, {0.0, 0.0, 0.0}, 64);
+}
+
+void TestPanels::refineBringsAVolumeBack()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  const auto belongs = window.Pose(2);
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(3.0, -2.0, 1.0);
+  const int entries = window.Session()->GetUndoCount();
+  const auto moved = window.Pose(2);
+  Raise(window, "registrationPanel");
+  QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
+  QVERIFY(!window.Part<QPushButton>("refine")->isEnabled());
+  QVERIFY(Wait(window));
+  QVERIFY(window.Part<QPushButton>("refine")->isEnabled());
+  auto* table = window.Part<QTableWidget>("alignResults");
+  QCOMPARE(table->rowCount(), 2);
+  QCOMPARE(table->item(1, 1)->text(), QString("aligned"));
+  QVERIFY2(Distance(window.Pose(2), belongs) < 0.3, qPrintable(QString::number(Distance(window.Pose(2), belongs))));
+  QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
+  window.Session()->Undo();
+  QVERIFY(window.Pose(2) == moved);
+}
+
+void TestPanels::aCancelledJobChangesNothing()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(5.0, 0.0, 0.0);
+  const auto before = window.Pose(2);
+  const int entries = window.Session()->GetUndoCount();
+  window.Part<RegistrationPanel>("registrationPanel")->AlignAll();
+  QCOMPARE(window.Window().Jobs()->Count(), 1);
+  QTest::mouseClick(window.Part<QToolButton>("jobCancel"), Qt::LeftButton);
+  QVERIFY(Wait(window));
+  QVERIFY(window.Pose(2) == before);
+  QCOMPARE(window.Session()->GetUndoCount(), entries);
+  QCOMPARE(window.Part<QTableWidget>("alignResults")->rowCount(), 0);
+}
+
+void TestPanels::whatMovedMeanwhileStays()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(3.0, 0.0, 0.0);
+  window.Part<RegistrationPanel>("registrationPanel")->Refine();
+  window.Session()->TranslateSelection(0.0, 1.0, 0.0);
+  auto put = window.Pose(2);
+  QVERIFY(Wait(window));
+  QVERIFY(window.Pose(2) == put);
+  QVERIFY(window.HasMessage("moved meanwhile"));
+  // And when the volume that stays is moved, nothing is taken.
+  window.Part<RegistrationPanel>("registrationPanel")->Refine();
+  window.Session()->Select(1, true, true);
+  window.Session()->TranslateSelection(0.0, 0.0, 2.0);
+  put = window.Pose(2);
+  QVERIFY(Wait(window));
+  QVERIFY(window.Pose(2) == put);
+}
+
+void TestPanels::aWindowMayCloseWhileAJobRuns()
+{
+  for (int i = 0; i < 2; ++i) {
+    WindowUnderTest window;
+    QVERIFY(window.Open({A(), B()}));
+    if (i == 0)
+      window.Part<RegistrationPanel>("registrationPanel")->AlignAll();
+    else
+      window.Part<ResultPanel>("resultPanel")->Make(false);
+    QCOMPARE(window.Window().Jobs()->Count(), 1);
+  }
+}
+
+void TestPanels::stitchingMakesAndSavesOneVolume()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(20.0, 0.0, 0.0);
+  Raise(window, "resultPanel");
+  auto* panel = window.Part<ResultPanel>("resultPanel");
+  QTest::mouseClick(window.Part<QPushButton>("stitchPreview"), Qt::LeftButton);
+  QVERIFY(Wait(window));
+  auto* result = panel->Result().session.Get();
+  QCOMPARE(result->GetNumberOfVolumes(), 1);
+  double coarse[3], fine[3];
+  result->GetImage(result->GetVolumeId(0))->GetSpacing(coarse);
+  QTest::mouseClick(window.Part<QPushButton>("stitchMake"), Qt::LeftButton);
+  QVERIFY(Wait(window));
+  QCOMPARE(result->GetNumberOfVolumes(), 1);
+  QCOMPARE(result->GetUndoCount(), 0); // else results would pile up in memory
+  result->GetImage(result->GetVolumeId(0))->GetSpacing(fine);
+  QCOMPARE(coarse[0], 2.0 * fine[0]);
+  QVERIFY(result->GetImage(result->GetVolumeId(0))->GetDimensions()[0] > 64);
+  QCOMPARE(window.Session()->GetNumberOfVolumes(), 2);
+  const QString path = folder_->filePath("stitched.mha");
+  panel->Save(path);
+  QVERIFY(Wait(window));
+  QVERIFY(QFileInfo(path).size() > 1000);
+  QVERIFY(window.HasMessage("Saved"));
+  panel->Save("/nowhere/stitched.mha");
+  QVERIFY(Wait(window));
+  QVERIFY(window.HasMessage("/nowhere"));
+}
+
+void TestPanels::exportWritesAndNeverReplaces()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(20.0, 0.0, 0.0);
+  QVERIFY(window.Part<QAction>("exportVolumes")->isEnabled());
+  ExportActions& actions = *window.Window().findChild<ExportActions*>();
+  const QDir out(folder_->filePath("out"));
+  QVERIFY(QDir().mkpath(out.path()));
+  actions.ExportVolumes(out.path());
+  actions.ExportTransforms(out.path());
+  actions.ExportPoses(out.filePath("poses.json"));
+  QVERIFY(Wait(window));
+  for (const char* name : {"a.mha", "b.mha", "a.tfm", "b.tfm", "poses.json"})
+    QVERIFY2(out.exists(name), name);
+  QFile transform(out.filePath("b.tfm"));
+  QVERIFY(transform.open(QIODevice::ReadOnly));
+  QVERIFY(transform.readAll().contains("Parameters: 1 0 0 0 1 0 0 0 1 -20 "));
+  // What was exported lies where it was put.
+  WindowUnderTest other;
+  QVERIFY(other.Open({out.filePath("b.mha")}));
+  double here[3], there[3], degrees[3];
+  window.Session()->GetPlacement(2, here, degrees);
+  other.Session()->GetPlacement(1, there, degrees);
+  QVERIFY(std::fabs(here[0] - there[0]) < 1e-6);
+  // A second time nothing is replaced.
+  const QDateTime before = QFileInfo(out.filePath("b.mha")).lastModified();
+  actions.ExportVolumes(out.path());
+  QVERIFY(Wait(window));
+  QVERIFY(window.HasMessage("it is there already"));
+  QCOMPARE(QFileInfo(out.filePath("b.mha")).lastModified(), before);
+}
+
+void TestPanels::trainingHidesScoreAndKeepsAttempts()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  const QString truth = folder_->filePath("truth.json");
+  QVERIFY(window.Session()->WritePoses(truth.toUtf8()));
+  auto* panel = window.Part<TrainingPanel>("trainingPanel");
+  Raise(window, "trainingPanel");
+  QVERIFY(panel->SetHistory(folder_->filePath("attempts.csv")));
+  QVERIFY(panel->LoadTruth(truth));
+  QCOMPARE(window.Part<QLabel>("score")->text(), QString("0.00 mm"));
+  // Twice the same exercise.
+  QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
+  const auto scattered = window.Pose(2);
+  QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
+  QVERIFY(Distance(window.Pose(2), scattered) < 1e-9);
+  const double start = window.Session()->GetScore();
+  QVERIFY(start > 5.0);
+  window.Settle();
+  QCOMPARE(window.Part<QLabel>("score")->text(), QString::number(start, 'f', 2) + " mm");
+
+  QTest::mouseClick(window.Part<QPushButton>("trainingStart"), Qt::LeftButton);
+  QVERIFY(panel->IsTraining());
+  QCOMPARE(window.Part<QLabel>("score")->text(), QString("hidden until you submit"));
+  QCOMPARE(window.Part<QLabel>("scoreReadout")->text(), QString());
+  QCOMPARE(window.Session()->GetUndoCount(), 0); // it would lead to the solution
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(1.0, 0.0, 0.0);
+  QCOMPARE(window.Part<QLabel>("score")->text(), QString("hidden until you submit"));
+  QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
+  QVERIFY(!panel->IsTraining());
+  const std::vector<Attempt> attempts = ReadAttempts(folder_->filePath("attempts.csv").toStdString());
+  QCOMPARE(attempts.size(), std::size_t(1));
+  QCOMPARE(attempts[0].scoreMm, window.Session()->GetScore());
+  QCOMPARE(attempts[0].startMm, start);
+  QCOMPARE(attempts[0].edits, 1);
+  QCOMPARE(window.Part<QTableWidget>("attempts")->rowCount(), 1);
+  QCOMPARE(window.Part<QLabel>("score")->text(), QString::number(window.Session()->GetScore(), 'f', 2) + " mm");
+  // A file that is something else is refused, and stays.
+  QVERIFY(!panel->SetHistory(truth));
+  QVERIFY(QFile(truth).size() > 0);
+}
+
+void TestPanels::aToolThatIsLetGoLeavesVolumes()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  Raise(window, "trackerPanel");
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+  auto* address = window.Part<QLineEdit>("trackerAddress");
+  address->setText("nonsense:");
+  QTest::mouseClick(window.Part<QPushButton>("trackerConnect"), Qt::LeftButton);
+  QTRY_VERIFY(!window.Messages().isEmpty());
+  address->setText("simulated:");
+  QTest::mouseClick(window.Part<QPushButton>("trackerConnect"), Qt::LeftButton);
+  QTRY_VERIFY_WITH_TIMEOUT(window.Part<QPushButton>("trackerGrasp")->isEnabled(), 10000);
+  window.Session()->Select(2, true, true);
+  const int entries = window.Session()->GetUndoCount();
+  const auto before = window.Pose(2);
+  auto* grasp = window.Part<QPushButton>("trackerGrasp");
+  QTest::mousePress(grasp, Qt::LeftButton);
+  QTRY_VERIFY_WITH_TIMEOUT(Distance(window.Pose(2), before) > 0.01, 10000);
+  QTest::qWait(300);
+  const auto held = window.Pose(2);
+  QTest::mouseRelease(grasp, Qt::LeftButton);
+  // It may have been moved once more on the way to the release, and never back.
+  QVERIFY2(Distance(window.Pose(2), held) < 0.5 * Distance(held, before) + 1e-6, "the volume jumped when it was let go");
+  QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
+  const auto left = window.Pose(2);
+  QTest::qWait(200);
+  QVERIFY(window.Pose(2) == left);
+  QTest::mouseClick(window.Part<QPushButton>("trackerConnect"), Qt::LeftButton);
+  QVERIFY(window.Pose(2) == left);
+}
+
+// The picture, made small, must be that of the manual but for a few grey levels: fonts and drivers differ.
+void TestPanels::Picture(WindowUnderTest& window, const QString& name)
+{
+  // What moved is drawn in full again.
+  QTest::qWait(1500);
+  window.Settle();
+  const QImage picture = window.Screenshot(name);
+  const QString path = QString(ECHORAMA_SOURCE_DIR "/Documentation/pictures/%1.png").arg(name);
+  if (qEnvironmentVariableIsSet("ECHORAMA_UPDATE_PICTURES")) {
+    QVERIFY(picture.convertToFormat(QImage::Format_RGB888).save(path));
+    return;
+  }
+  const QSize size(picture.width() / 16, picture.height() / 16);
+  const auto small = [&size](const QImage& image) {
+    return image.scaled(size, Qt::IgnoreAspectRatio, Qt::SmoothTransformation).convertToFormat(QImage::Format_RGB888);
+  };
+  const QImage wanted(path);
+  QVERIFY2(!wanted.isNull(), qPrintable(path));
+  QCOMPARE(picture.size(), wanted.size());
+  const QImage a = small(picture), b = small(wanted);
+  double sum = 0.0;
+  for (int y = 0; y < size.height(); ++y)
+    for (int x = 0; x < 3 * size.width(); ++x)
+      sum += std::abs(static_cast<int>(a.constScanLine(y)[x]) - static_cast<int>(b.constScanLine(y)[x]));
+  const double difference = sum / (3.0 * size.width() * size.height());
+  QVERIFY2(difference < 4.0, qPrintable(QString("%1 differs by %2 grey levels").arg(name).arg(difference)));
+}
+
+void TestPanels::thePicturesOfTheManual()
+{
+  if (!Liver.exists("liver_volume_A.mha"))
+    QSKIP("the liver pair is not there");
+  WindowUnderTest window;
+  QVERIFY(window.Open({Liver.filePath("liver_volume_A.mha"), Liver.filePath("liver_volume_B.mha")}));
+  const QString truth = folder_->filePath("truth.json");
+  QVERIFY(window.Session()->WritePoses(truth.toUtf8())); // both are from one sweep: they lie where they belong
+  window.Session()->Select(2, true, true);
+  Raise(window, "registrationPanel");
+  Picture(window, "workbench");
+
+  // A bright stroke across one volume, and a hole in the other.
+  Raise(window, "brushPanel");
+  window.Slice(0)->setFocus();
+  window.Key(Qt::Key_3);
+  const QPoint middle = window.Slice(0)->rect().center();
+  window.Drag(window.Slice(0), middle + QPoint(-60, 20), middle + QPoint(50, 45));
+  window.Key(Qt::Key_4);
+  window.Drag(window.Slice(1), window.Slice(1)->rect().center(), window.Slice(1)->rect().center() + QPoint(30, 20));
+  Picture(window, "workbench-paint");
+  window.Session()->Undo();
+  window.Session()->Undo();
+  window.Key(Qt::Key_2);
+
+  Raise(window, "viewPanel");
+  VolumeLook look = window.Window().Bench()->Volume();
+  look.minimum = 75.0;
+  look.slices = false;
+  window.Window().Bench()->SetVolume(look);
+  window.Window().Views()->ToggleLarge(window.Window().Views()->Volume());
+  Picture(window, "workbench-3d");
+  window.Window().Views()->ToggleLarge(window.Window().Views()->Volume());
+  look.minimum = 1.0;
+  look.slices = true;
+  window.Window().Bench()->SetVolume(look);
+
+  Raise(window, "resultPanel");
+  window.Part<QCheckBox>("embed")->setChecked(true);
+  window.Part<ResultPanel>("resultPanel")->Make(true);
+  QVERIFY(Wait(window));
+  Picture(window, "workbench-stitch");
+
+  Raise(window, "trainingPanel");
+  auto* training = window.Part<TrainingPanel>("trainingPanel");
+  QVERIFY(training->SetHistory(folder_->filePath("attempts.csv")));
+  QVERIFY(training->LoadTruth(truth));
+  QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
+  window.Part<QCheckBox>("showErrors")->setChecked(true);
+  Picture(window, "workbench-train");
+}
+
+int main(int argc, char** argv)
+{
+  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
+  format.setSamples(0);
+  QSurfaceFormat::setDefaultFormat(format);
+  QApplication application(argc, argv);
+  QApplication::setOrganizationName("Echorama");
+  QApplication::setApplicationName("WorkbenchPanelsTest");
+  ApplyTheme(application);
+  TestPanels test;
+  return QTest::qExec(&test, argc, argv);
+}
+
+#include "TestPanels.moc"
