@@ -126,6 +126,7 @@ struct Shown {
   vtkNew<vtkFixedPointVolumeRayCastMapper> RayCaster;
   vtkNew<vtkActor> Box;
   vtkNew<vtkCubeSource> Cube; ///< around its real voxels
+  double RealVoxels = 0.0;    ///< in that box
 };
 
 /** The plane of a slice view. */
@@ -182,9 +183,14 @@ struct vtkUltrasoundVolumeView::Internals {
 
   bool Interactive = false, EverFitted = false, Updating = false;
   DetailLevel Detail;
+  int Refined = -1;                          ///< the level of Refine; -1: that of the drag
+  bool Deferred = false;                     ///< voxels or grey window changed and are not shown yet
+  double RestSeconds = 1.0;                  ///< what a frame of Refine may take
+  double Coarser = 0.0;                      ///< what the frame of the level before took to draw; 0: not known
   std::map<std::string, double> FullSeconds; ///< of the last full picture, by style
-  std::chrono::steady_clock::time_point Begin;
-  double LastSeconds = 0.0;
+  std::vector<int> VisibleIds;               ///< of the last frame
+  std::chrono::steady_clock::time_point Begin, DrawBegin;
+  double LastSeconds = 0.0, DrawSeconds = 0.0;
 
   bool VolumesDirty = true, PosesDirty = true;
   bool Remade = false; ///< this frame began with new particles: its time says nothing about the next
@@ -333,7 +339,34 @@ struct vtkUltrasoundVolumeView::Internals {
         std::count_if(this->State().begin(), this->State().end(), [](const SessionVolume& volume) { return volume.visible; }));
   }
 
-  int Level() const { return this->Interactive ? this->Detail.Level() : 0; }
+  int Level() const { return !this->Interactive ? 0 : this->Refined >= 0 ? this->Refined : this->Detail.Level(); }
+
+  // What the full picture takes, s. Before one was drawn: what it takes where there is no graphics card.
+  double ExpectedSeconds() const
+  {
+    const auto known = this->FullSeconds.find(this->Style);
+    if (known != this->FullSeconds.end()) {
+      return known->second;
+    }
+    if (this->Style == "outline") {
+      return 0.0;
+    }
+    constexpr double PerParticle = 2e-6, PerVoxel = 2e-7;
+    double blocks = 0.0, voxels = 0.0;
+    for (const int id : this->VisibleIds) {
+      const double count = this->Volumes.at(id).RealVoxels;
+      voxels += count;
+      blocks += count / std::pow(this->Parameters.downsampling, 3);
+    }
+    return this->Style == "points" ? PerParticle * std::min<double>(blocks, this->Parameters.budget) : PerVoxel * voxels;
+  }
+
+  void BeginDetail()
+  {
+    this->Refined = -1;
+    this->Coarser = 0.0;
+    this->Detail.Begin(this->ExpectedSeconds());
+  }
 
   // Calls functor(PosedVolume) with the voxels of a volume in the space of its file.
   template <class Functor>
@@ -362,13 +395,17 @@ struct vtkUltrasoundVolumeView::Internals {
   }
 
   // The block to ask for at a level: the number of particles falls to about a third with each.
-  int ParticleBlock(const SessionVolume& volume, Shown& shown, int level)
+  int ParticleBlock(const Shown& shown, int level)
   {
     const int asked = this->Parameters.downsampling;
     if (level == 0) {
       return asked;
     }
-    const int full = this->ParticlesOf(volume, shown, asked).block; // the budget may have made it larger
+    // The budget makes the full picture's blocks larger; it need not be there to know by how much, about.
+    const auto made = shown.Particles.find(asked);
+    const double over = shown.RealVoxels / std::pow(asked, 3) / shown.Of.Parameters.budget;
+    const int full =
+        made != shown.Particles.end() ? made->second.block : static_cast<int>(asked * std::cbrt(std::max(1.0, over)));
     return std::max(full + level, static_cast<int>(std::lround(full * std::pow(DetailLevel::Step, level / 3.0))));
   }
 
@@ -399,11 +436,11 @@ struct vtkUltrasoundVolumeView::Internals {
   // What a drag will begin with, while nobody waits for it.
   void Prepare()
   {
-    const int level = this->Detail.LevelFor(this->FullSeconds[this->Style]);
+    const int level = this->Detail.LevelFor(this->ExpectedSeconds());
     for (auto& [id, shown] : this->Volumes) {
       const SessionVolume* volume = this->Session ? this->Find(id) : nullptr;
       if (volume && volume->visible && this->Style == "points") {
-        this->ParticlesOf(*volume, shown, this->ParticleBlock(*volume, shown, level));
+        this->ParticlesOf(*volume, shown, this->ParticleBlock(shown, level));
       } else if (volume && volume->visible && this->Style == "volume") {
         this->BytesOf(*volume, shown, Blocks[level]);
       }
@@ -435,9 +472,15 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
     each = this->Volumes.erase(each);
   }
   if (!this->Session) {
+    this->VisibleIds.clear();
     this->CloudActor->VisibilityOff();
     return;
   }
+  // A stroke and a drag of the grey window change all particles at each step: those of a volume that is shown already wait for
+  // the end of the gesture.
+  const bool waits = this->Interactive && this->Refined < 0;
+  this->Deferred = false;
+  std::vector<int> visible;
   ParticleParameters parameters = this->Parameters;
   double window[2];
   this->Session->GetGreyWindow(window);
@@ -463,31 +506,56 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
       this->Renderer->AddViewProp(shown.Volume);
       this->Renderer->AddViewProp(this->CloudActor);
     }
-    if (isNew || shown.VoxelsDirty) {
+    const bool takes = isNew || (shown.VoxelsDirty && !waits);
+    if (takes) {
       Eigen::AlignedBox3i real;
       this->WithVoxels(volume, [&](const auto& posed) { real = echorama::RealBox(posed); });
       if (real.isEmpty()) {
         real.extend(Eigen::Vector3i::Zero());
       }
       const Eigen::Vector3d spacing = volume.geometry.spacing;
-      const Eigen::Vector3d size = (real.sizes() + Eigen::Vector3i::Ones()).cast<double>().cwiseProduct(spacing);
+      const Eigen::Vector3d sides = (real.sizes() + Eigen::Vector3i::Ones()).cast<double>(), size = sides.cwiseProduct(spacing);
       const Eigen::Vector3d middle = 0.5 * (real.min() + real.max()).cast<double>().cwiseProduct(spacing);
       shown.Cube->SetXLength(size.x());
       shown.Cube->SetYLength(size.y());
       shown.Cube->SetZLength(size.z());
       shown.Cube->SetCenter(middle.x(), middle.y(), middle.z());
+      shown.RealVoxels = sides.prod();
     }
-    if (isNew || shown.VoxelsDirty || !(shown.Of == Look{parameters})) {
-      shown.Of = {parameters};
+    Look wanted{parameters};
+    if (waits && !isNew) {
+      wanted.Parameters.black = shown.Of.Parameters.black;
+      wanted.Parameters.white = shown.Of.Parameters.white;
+      this->Deferred = this->Deferred || shown.VoxelsDirty || !(wanted == Look{parameters});
+    }
+    const bool looksOther = !(shown.Of == wanted);
+    if (takes || looksOther) {
+      shown.Of = wanted;
       shown.Particles.clear();
       shown.Bytes.clear();
+    }
+    if (takes) {
       shown.VoxelsDirty = false;
+    } else if (looksOther) {
+      this->FullSeconds.clear();
+    }
+    if (volume.visible) {
+      visible.push_back(volume.id);
     }
     shown.Box->SetVisibility(volume.visible && (this->Style == "outline" || this->Session->IsSelected(volume.id)));
     shown.Box->GetProperty()->SetColor(volume.colour[0], volume.colour[1], volume.colour[2]);
     shown.Volume->SetVisibility(volume.visible && this->Style == "volume");
-    if (shown.Volume->GetVisibility()) {
-      this->UpdateRayCaster(volume, shown);
+  }
+  if (visible != this->VisibleIds) {
+    this->VisibleIds = visible;
+    this->FullSeconds.clear();
+    if (this->Interactive) {
+      this->BeginDetail();
+    }
+  }
+  if (this->Style == "volume") {
+    for (const int id : visible) {
+      this->UpdateRayCaster(*this->Find(id), this->Volumes.at(id));
     }
   }
   this->CloudActor->SetVisibility(this->Style == "points");
@@ -536,7 +604,7 @@ void vtkUltrasoundVolumeView::Internals::FillCloud()
   for (const SessionVolume& volume : this->State()) {
     if (volume.visible) {
       Shown& shown = this->Volumes.at(volume.id);
-      const int block = this->ParticleBlock(volume, shown, this->Level());
+      const int block = this->ParticleBlock(shown, this->Level());
       count += static_cast<vtkIdType>(this->ParticlesOf(volume, shown, block).Count());
       this->CloudIds.push_back(volume.id);
       this->CloudBlocks.push_back(block);
@@ -855,6 +923,7 @@ void vtkUltrasoundVolumeView::OnStart()
     parts.CloudActor->GetShaderProperty()->GetVertexCustomUniforms()->SetUniformf("particlePixels", static_cast<float>(pixels));
   }
   parts.UpdateMarker();
+  parts.DrawBegin = std::chrono::steady_clock::now();
 }
 
 //----------------------------------------------------------------------------
@@ -862,17 +931,22 @@ void vtkUltrasoundVolumeView::OnEnd()
 {
   Internals& parts = *this->Parts;
   parts.Renderer->GetRenderWindow()->WaitForCompletion();
-  parts.LastSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - parts.Begin).count();
+  const auto now = std::chrono::steady_clock::now();
+  parts.LastSeconds = std::chrono::duration<double>(now - parts.Begin).count();
+  parts.DrawSeconds = std::chrono::duration<double>(now - parts.DrawBegin).count();
   const bool representative = !parts.Remade;
   parts.Remade = false;
-  if (parts.Interactive) {
-    if (representative && parts.Detail.Measure(parts.LastSeconds)) {
+  if (parts.Interactive && parts.Refined != 0) {
+    if (parts.Refined < 0 && representative && parts.Detail.Measure(parts.LastSeconds)) {
       parts.VolumesDirty = true;
     }
     return;
   }
   if (representative || parts.FullSeconds.count(parts.Style) == 0) {
     parts.FullSeconds[parts.Style] = parts.LastSeconds;
+  }
+  if (parts.Interactive) {
+    return; // coarser levels are there already
   }
   try {
     parts.Prepare();
@@ -885,18 +959,66 @@ void vtkUltrasoundVolumeView::OnEnd()
 void vtkUltrasoundVolumeView::SetInteractive(bool on)
 {
   Internals& parts = *this->Parts;
-  if (parts.Interactive == on) {
+  if (parts.Interactive == on && parts.Refined < 0) {
     return;
   }
   const int before = parts.Level();
   parts.Interactive = on;
+  parts.Refined = -1;
   if (on) {
-    parts.Detail.Begin(parts.FullSeconds[parts.Style]);
+    parts.BeginDetail();
   }
-  if (parts.Level() != before) {
+  if (parts.Level() != before || (!on && parts.Deferred)) {
     parts.VolumesDirty = true;
   }
   this->Modified();
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundVolumeView::Refine()
+{
+  Internals& parts = *this->Parts;
+  if (!parts.Interactive) {
+    return false;
+  }
+  this->Update();
+  const int level = parts.Level();
+  if (parts.Deferred) {
+    parts.Refined = level;
+  } else if (level == 0) {
+    this->SetInteractive(false); // the same picture
+    return false;
+  } else {
+    // As much more as the last step took; of the first step what is known of levels.
+    const double known = level == 1 && parts.FullSeconds.count(parts.Style) > 0 ? parts.FullSeconds[parts.Style] : 0.0;
+    const double growth =
+        parts.Coarser > 0.0 ? std::clamp(parts.DrawSeconds / parts.Coarser, 1.2, DetailLevel::Step) : DetailLevel::Step;
+    if ((known > 0.0 ? known : growth * parts.DrawSeconds) > parts.RestSeconds) {
+      return false;
+    }
+    parts.Coarser = parts.DrawSeconds;
+    parts.Refined = level - 1;
+  }
+  parts.VolumesDirty = true;
+  this->Modified();
+  return true;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeView::SetRestBudget(double milliseconds)
+{
+  if (milliseconds >= 5.0 && milliseconds <= 1e6) {
+    this->Parts->RestSeconds = milliseconds / 1000.0;
+    this->Modified();
+  } else {
+    vtkErrorMacro("the time of a frame at rest must be in [5, 1000000] ms; it is " << milliseconds);
+  }
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundVolumeView::GetRestBudget() const
+{
+  return this->Parts->RestSeconds * 1000.0;
 }
 
 //----------------------------------------------------------------------------
@@ -961,7 +1083,7 @@ bool vtkUltrasoundVolumeView::SetStyle(const char* style)
   if (name != this->Parts->Style) {
     this->Parts->Style = name;
     if (this->Parts->Interactive) {
-      this->Parts->Detail.Begin(this->Parts->FullSeconds[name]);
+      this->Parts->BeginDetail();
     }
     this->Parts->VolumesDirty = true;
     this->Modified();
@@ -1137,6 +1259,7 @@ void vtkUltrasoundVolumeView::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Maximum: " << parts.Parameters.maximum << "\n";
   os << indent << "Interactive: " << parts.Interactive << "\n";
   os << indent << "FrameBudget: " << this->GetFrameBudget() << "\n";
+  os << indent << "RestBudget: " << this->GetRestBudget() << "\n";
   os << indent << "DetailLevel: " << parts.Level() << "\n";
   os << indent << "Planes: " << parts.Planes.size() << "\n";
 }

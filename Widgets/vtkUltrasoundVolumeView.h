@@ -13,8 +13,9 @@
  * voxels or parameters change.
  *
  * While something is dragged (SetInteractive), frames are timed and the level of detail is chosen so that they stay below
- * FrameBudget: fewer and larger particles of the same total opacity, or coarser volumes and rays. Turning it off shows the full
- * picture again.
+ * FrameBudget: fewer and larger particles of the same total opacity, or coarser volumes and rays. Voxels and the grey window that
+ * change meanwhile are shown afterwards. Turning it off shows the full picture again, however long that takes; Refine() goes
+ * there step by step.
  *
  * Source: dissertation 4.3 (particles), 4.4.2 (error vectors).
  *
@@ -99,6 +100,16 @@ public:
   /** Level of detail while something is dragged; off shows the full picture. Default off. */
   void SetInteractive(bool on);
   bool GetInteractive() const;
+  ///@}
+
+  /** After a drag: makes the next frame one level finer, or takes what waited. False: there is nothing to add, or it would take
+   * longer than RestBudget, going by the frames before. SetInteractive(true) begins anew. */
+  bool Refine();
+
+  ///@{
+  /** The time that a frame of Refine() may take to draw, ms, in [5, 1000000]. Default 1000. */
+  void SetRestBudget(double milliseconds);
+  double GetRestBudget() const;
   ///@}
 
   ///@{

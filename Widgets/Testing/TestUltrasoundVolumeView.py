@@ -306,6 +306,38 @@ def test_dragging():
     check(0 < shown.view.GetNumberOfParticles() <= 20000, "the budget is kept by all together")
 
 
+def test_refining():
+    """After a drag the picture becomes finer step by step, as far as the time of a frame allows; a stroke and the grey window are
+    shown then, and not during the drag."""
+    grey, ball = texture(96, 1)
+    shown = Shown(volume(grey, valid=ball), volume(grey, (40, 10, 0), valid=ball))
+    shown.view.SetDownsampling(1)
+    full = shown.picture()
+    shown.view.SetFrameBudget(5)
+    shown.view.SetRestBudget(1e6)
+    shown.view.SetInteractive(True)
+    coarse = shown.picture()
+    levels = [shown.view.GetDetailLevel()]
+    shown.session.SetGreyWindow(100.0, 200.0)
+    check(np.array_equal(shown.picture(), coarse) or shown.view.GetDetailLevel() != levels[0], "the grey window waits")
+    shown.session.SetGreyWindow(0.0, 255.0)
+    levels[0] = shown.view.GetDetailLevel()
+    while shown.view.Refine() and len(levels) < 10:
+        shown.window.Render()
+        levels.append(shown.view.GetDetailLevel())
+    check(levels[0] > 0 and levels == list(range(levels[0], -1, -1)), f"levels {levels}")
+    check(not shown.view.GetInteractive() and np.array_equal(shown.picture(), full), "refined to the full picture")
+    shown.view.SetInteractive(True)
+    shown.picture()
+    shown.view.SetRestBudget(5)  # no machine can
+    before = shown.view.GetDetailLevel()
+    check(not shown.view.Refine() and shown.view.GetDetailLevel() == before > 0, "what would take too long is not drawn")
+    shown.session.SetGreyWindow(100.0, 200.0)
+    waited = shown.picture()
+    check(shown.view.Refine(), "what waited is drawn all the same")
+    check(not np.array_equal(shown.picture(), waited), "and seen")
+
+
 def test_planes():
     """A picture on a plane lies in its place: opaque where it shows something, see-through elsewhere."""
     shown = Shown(cube_at(0, 0))
