@@ -300,7 +300,9 @@ void vtkUltrasoundAlignmentWidget::KeyAction(vtkAbstractWidget* widget)
 {
   auto* self = static_cast<vtkUltrasoundAlignmentWidget*>(widget);
   const int x = self->Interactor->GetEventPosition()[0], y = self->Interactor->GetEventPosition()[1];
-  if (!self->GetSession() || !self->CurrentRenderer || !self->CurrentRenderer->IsInViewport(x, y)) {
+  // A drag may have left the view: its Escape is still meant.
+  const bool here = self->Now != Gesture::None || (self->CurrentRenderer && self->CurrentRenderer->IsInViewport(x, y));
+  if (!self->GetSession() || !here) {
     return;
   }
   const char* key = self->Interactor->GetKeySym();

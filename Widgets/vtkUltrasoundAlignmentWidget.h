@@ -7,20 +7,22 @@
  * computed by its vtkUltrasoundAlignmentRepresentation. A drag is one entry of undo; a click or a drag that comes back to where
  * it began is none.
  *
- * | event                                  | what happens                                                                       |
- * | -------------------------------------- | ---------------------------------------------------------------------------------- |
- * | drag a handle                          | arrow: along it; square: in its plane; ring: about its axis; ball in the middle:
- * moves the centre of rotation | | drag a selected volume (slice)         | moves all that is selected with the mouse | |
- * Shift-drag a selected volume (slice)   | turns all that is selected about the line of sight                                 |
- * | Shift-drag (3D)                        | turns like a ball whose front follows the mouse                                    |
- * | click on a volume (slice)              | selects it alone; click again: the next one below                                  |
- * | Ctrl-click on a volume (slice)         | adds it to the selection, or takes it away                                         |
- * | arrows, Page Up, Page Down             | move by TranslationStep right, left, up, down, towards and away from the viewer    |
- * | Ctrl + these                           | turn by RotationStep: left, right in the plane of the view; up, down about its
- * horizontal; pages about its vertical | | + and -                                | double and halve both steps | | x, y, z |
- * hold drags to this axis of the world; again: to the plane across it; again: free   | | c, Shift + c                           |
- * the centre of rotation goes under the mouse; back to the middle of the selection   | | Escape                                 |
- * cancels the drag                                                                   |
+ * | event                                | what happens                                                                  |
+ * | ------------------------------------ | ----------------------------------------------------------------------------- |
+ * | drag a handle                        | arrow: along it; square: in its plane; ring: about it; ball: moves the centre |
+ * | drag a selected volume (slice)       | moves all that is selected with the mouse                                     |
+ * | Shift-drag a selected volume (slice) | turns all that is selected about the line of sight                            |
+ * | Shift-drag (3D)                      | turns like a ball whose front follows the mouse                               |
+ * | click on a volume (slice)            | selects it alone; click again: the next one below                             |
+ * | Ctrl-click on a volume (slice)       | adds it to the selection, or takes it away                                    |
+ * | arrows, Page Up, Page Down           | move by TranslationStep; pages: towards and away from the viewer              |
+ * | Ctrl + left, right                   | turn by RotationStep in the plane of the view                                 |
+ * | Ctrl + up, down                      | turn by RotationStep about the horizontal of the view                         |
+ * | Ctrl + Page Up, Page Down            | turn by RotationStep about the vertical of the view                           |
+ * | + and -                              | double and halve both steps                                                   |
+ * | x, y, z                              | hold drags to this axis of the world; again: to the plane across; again: free |
+ * | c, Shift + c                         | the centre of rotation goes under the mouse; back to the middle               |
+ * | Escape                               | cancels the drag, also when the mouse has left the view                       |
  *
  * Mouse events that mean nothing here go on to the interactor's style. Invokes StartInteractionEvent, InteractionEvent and
  * EndInteractionEvent (drags, keys and tools), and ModifiedEvent when a key changed a step or the constraint.
