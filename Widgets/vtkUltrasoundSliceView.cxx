@@ -609,6 +609,18 @@ void vtkUltrasoundSliceView::SetAxis(const char* name)
     parts.Along = parts.Towards();
   }
   this->Outdate();
+  this->OutdateLines();
+}
+
+// Of the linked views: where this one's plane cuts theirs.
+void vtkUltrasoundSliceView::OutdateLines()
+{
+  for (vtkUltrasoundSliceView* view : *this->Parts->Linked) {
+    if (view != this) {
+      view->Parts->LinesDirty = true;
+      view->Modified();
+    }
+  }
 }
 
 std::string vtkUltrasoundSliceView::GetAxis() const
@@ -630,6 +642,7 @@ void vtkUltrasoundSliceView::SetNormalAndUp(double nx, double ny, double nz, dou
   parts.Up = parts.Along.cross(parts.Right);
   parts.FollowCursor();
   this->Outdate();
+  this->OutdateLines();
 }
 
 void vtkUltrasoundSliceView::Turn(double degreesAboutRight, double degreesAboutUp)

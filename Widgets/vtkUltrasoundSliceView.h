@@ -192,6 +192,7 @@ private:
   struct Internals;
   void SessionChanged(vtkObject*, unsigned long event, void*);
   void Outdate();
+  void OutdateLines();
   std::unique_ptr<Internals> Parts;
 #endif
 };
