@@ -3,6 +3,7 @@
 #include <QObject>
 #include <vtkSmartPointer.h>
 
+class QWidget;
 class vtkObject;
 class vtkRenderer;
 class vtkRenderWindowInteractor;
@@ -11,6 +12,9 @@ class vtkUltrasoundAlignmentWidget;
 namespace echorama {
 
 class Workbench;
+
+/// Keys go to the view under the mouse, unless somebody types elsewhere.
+void FocusUnlessTyping(QWidget* view);
 
 /// The alignment widget of one view: there while volumes are moved by hand (the tool Align), with the sensitivity and the steps
 /// that the pose panel sets.
@@ -24,10 +28,12 @@ public:
 
 private:
   void Follow();
+  void OnKey(vtkObject* widget, unsigned long event, void* data);
   void OnWidgetEvent(vtkObject* widget, unsigned long event, void* data);
 
   Workbench* bench_;
   vtkSmartPointer<vtkUltrasoundAlignmentWidget> widget_;
+  bool isFollowing_ = false;
 };
 
 } // namespace echorama

@@ -20,6 +20,9 @@ public:
     if (!timer_.isActive() || timer_.remainingTime() > milliseconds)
       timer_.start(milliseconds);
   }
+  /// Once nothing has asked anew for \a milliseconds.
+  void AskAnew(int milliseconds) { timer_.start(milliseconds); }
+  void Stop() { timer_.stop(); }
   bool Waiting() const { return timer_.isActive(); }
 
 private:

@@ -42,6 +42,7 @@ struct VolumeLook {
 struct Handling {
   double translationSensitivity = 1.0, rotationSensitivity = 1.0;
   double translationStepMm = 1.0, rotationStepDegrees = 1.0;
+  QString constraint = "free"; ///< the word of vtkUltrasoundAlignmentRepresentation; not remembered
 };
 
 ///@{ Remembered from one start to the next; values out of range are left as they are by default.

@@ -9,9 +9,9 @@
 #include "Workbench.h"
 #include <algorithm>
 #include <cmath>
-#include <QApplication>
 #include <QMouseEvent>
 #include <QVTKInteractor.h>
+#include <vtkCommand.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkNew.h>
 #include <vtkRenderer.h>
@@ -53,6 +53,7 @@ SliceCanvas::SliceCanvas(Workbench* bench, QWidget* parent)
                        &Workbench::VoxelsChanged, &Workbench::ToolChanged})
     connect(bench, changed, this, &SliceCanvas::Ask);
   connect(bench, &Workbench::ToolChanged, this, [this] { view_->HideBrush(); });
+  connect(bench, &Workbench::HandChanged, this, &SliceCanvas::Ask); // the axis that motions keep to is drawn
   connect(bench, &Workbench::LookChanged, this, &SliceCanvas::Look);
   connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {
     view_->SetInteractive(on);
@@ -128,6 +129,25 @@ bool SliceCanvas::IsForHandles(QEvent* event) const
 bool SliceCanvas::event(QEvent* event)
 {
   switch (event->type()) {
+  case QEvent::Show:
+    Ask(); // what was asked for while it was hidden was not drawn
+    break;
+  case QEvent::Hide:
+  case QEvent::WindowDeactivate:
+  case QEvent::WindowBlocked:
+    EndDrag(); // the button is released elsewhere
+    break;
+  case QEvent::MouseMove:
+    if (drag_ != Drag::None && !(static_cast<QMouseEvent*>(event)->buttons() & ButtonOfDrag()))
+      EndDrag();
+    break;
+  case QEvent::MouseButtonPress:
+    selected_ = bench_->SelectedVolumes();
+    break;
+  default:
+    break;
+  }
+  switch (event->type()) {
   case QEvent::MouseButtonPress:
   case QEvent::MouseButtonRelease:
   case QEvent::MouseButtonDblClick:
@@ -169,6 +189,7 @@ void SliceCanvas::mousePressEvent(QMouseEvent* event)
     drag_ = event->modifiers() & Qt::ShiftModifier ? Drag::Turn : Drag::Pan;
   } else if (event->button() == Qt::RightButton) {
     drag_ = Drag::Window;
+    bench_->SetInteracting(true);
   } else if (event->button() == Qt::LeftButton && bench_->CurrentTool() == Tool::Align) {
     drag_ = Drag::Widget;
   } else if (event->button() == Qt::LeftButton && IsBrush(bench_->CurrentTool())) {
@@ -176,9 +197,15 @@ void SliceCanvas::mousePressEvent(QMouseEvent* event)
   } else if (event->button() == Qt::LeftButton) {
     drag_ = Drag::Cursor;
     view_->SetCursor(point[0], point[1], point[2]);
-    emit PlaneChanged();
-    Ask();
+    ChangePlane();
   }
+}
+
+void SliceCanvas::ChangePlane()
+{
+  isPlaced_ = true;
+  emit PlaneChanged();
+  Ask();
 }
 
 void SliceCanvas::BeginStroke(const double point[3])
@@ -211,21 +238,18 @@ void SliceCanvas::mouseMoveEvent(QMouseEvent* event)
   switch (drag_) {
   case Drag::Cursor:
     view_->SetCursor(point[0], point[1], point[2]);
-    emit PlaneChanged();
-    Ask();
+    ChangePlane();
     break;
   case Drag::Stroke:
     bench_->Session()->ExtendStroke(point[0], point[1], point[2]);
     break;
   case Drag::Pan:
     view_->Pan(by.x() * ratio, -by.y() * ratio);
-    emit PlaneChanged();
-    Ask();
+    ChangePlane();
     break;
   case Drag::Turn:
     view_->Turn(-0.4 * by.y(), 0.4 * by.x());
-    emit PlaneChanged();
-    Ask();
+    ChangePlane();
     break;
   case Drag::Window:
     ChangeWindow(by);
@@ -249,31 +273,51 @@ void SliceCanvas::ShowBrush(const double point[3])
 void SliceCanvas::mouseReleaseEvent(QMouseEvent* event)
 {
   event->accept();
-  const Qt::MouseButton wanted = drag_ == Drag::Pan || drag_ == Drag::Turn ? Qt::MiddleButton
-                                 : drag_ == Drag::Window                   ? Qt::RightButton
-                                                                           : Qt::LeftButton;
-  if (event->button() == wanted)
+  if (event->button() == ButtonOfDrag())
     EndDrag();
+}
+
+Qt::MouseButton SliceCanvas::ButtonOfDrag() const
+{
+  return drag_ == Drag::Pan || drag_ == Drag::Turn ? Qt::MiddleButton : drag_ == Drag::Window ? Qt::RightButton : Qt::LeftButton;
 }
 
 void SliceCanvas::EndDrag()
 {
   const Drag drag = drag_;
+  if (drag == Drag::None)
+    return;
   drag_ = Drag::None;
-  if (drag == Drag::Stroke) {
+  if (drag == Drag::Widget)
+    interactor()->InvokeEvent(vtkCommand::LeftButtonReleaseEvent); // the widget knows it already, unless the release was lost
+  if (drag == Drag::Stroke)
     bench_->Session()->EndStroke();
+  if (drag == Drag::Stroke || drag == Drag::Window)
     bench_->SetInteracting(false);
-  }
   Ask();
+}
+
+void SliceCanvas::CancelStroke()
+{
+  drag_ = Drag::None;
+  bench_->Session()->CancelEdit();
+  bench_->SetInteracting(false);
 }
 
 void SliceCanvas::mouseDoubleClickEvent(QMouseEvent* event)
 {
   event->accept();
-  if (event->button() == Qt::LeftButton && !IsBrush(bench_->CurrentTool()))
-    emit LargeAsked();
-  else
+  if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool())) {
     mousePressEvent(event); // dabs in quick succession
+    return;
+  }
+  // Its first click was meant as no choice of a volume.
+  if (bench_->SelectedVolumes() != selected_) {
+    bench_->Session()->SelectNone();
+    for (int id : selected_)
+      bench_->Session()->Select(id);
+  }
+  emit LargeAsked();
 }
 
 void SliceCanvas::wheelEvent(QWheelEvent* event)
@@ -284,8 +328,7 @@ void SliceCanvas::wheelEvent(QWheelEvent* event)
   if (event->modifiers() & Qt::ControlModifier) {
     const QPointF pixel = PixelOf(event->position());
     view_->Zoom(std::pow(1.2, steps), pixel.x(), pixel.y());
-    emit PlaneChanged();
-    Ask();
+    ChangePlane();
   } else {
     Scroll(event->modifiers() & Qt::ShiftModifier ? 10.0 * steps : steps);
   }
@@ -296,8 +339,7 @@ void SliceCanvas::Scroll(double steps)
   double range[2];
   view_->GetPositionRange(range);
   view_->SetPosition(std::clamp(view_->GetPosition() + steps * bench_->SmallestSpacing(), range[0], range[1]));
-  emit PlaneChanged();
-  Ask();
+  ChangePlane();
 }
 
 // The whole width of the window through the middle of the view, so that the drag is as fine as the data are dark or bright.
@@ -313,10 +355,7 @@ void SliceCanvas::ChangeWindow(const QPointF& by)
 void SliceCanvas::enterEvent(QEvent* event)
 {
   QVTKOpenGLNativeWidget::enterEvent(event);
-  // Keys go where the mouse is, unless somebody types elsewhere.
-  const QWidget* typing = QApplication::focusWidget();
-  if (!typing || typing->inherits("QVTKOpenGLNativeWidget"))
-    setFocus(Qt::MouseFocusReason);
+  FocusUnlessTyping(this);
 }
 
 void SliceCanvas::leaveEvent(QEvent* event)
@@ -329,6 +368,11 @@ void SliceCanvas::leaveEvent(QEvent* event)
 
 void SliceCanvas::keyPressEvent(QKeyEvent* event)
 {
+  if (event->key() == Qt::Key_Escape && drag_ == Drag::Stroke) {
+    event->accept();
+    CancelStroke();
+    return;
+  }
   // The alignment widget has had it; arrows must not wander off to the next field.
   if (bench_->CurrentTool() == Tool::Align && event->key() != Qt::Key_Tab && event->key() != Qt::Key_Backtab)
     event->accept();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <QVector>
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkSmartPointer.h>
 
@@ -21,6 +22,7 @@ class Workbench;
 /// | middle drag           | moves the picture; with Shift: turns the plane, which becomes oblique           |
 /// | right drag            | grey levels: contrast to the sides, brightness up and down                      |
 /// | double click          | makes the view large, and back                                                  |
+/// | Escape while painting | takes the stroke back                                                           |
 class SliceCanvas : public QVTKOpenGLNativeWidget {
   Q_OBJECT
 
@@ -34,6 +36,9 @@ public:
   /// A widget position as a pixel of the view (from the lower left, device pixels).
   QPointF PixelOf(const QPointF& position) const;
   QPointF PositionOf(const QPointF& pixel) const;
+  /// Whether somebody has chosen what is seen here, so that it is not to be fitted again.
+  bool IsPlaced() const { return isPlaced_; }
+  void SetPlaced(bool placed) { isPlaced_ = placed; }
 
 signals:
   void PlaneChanged();
@@ -60,10 +65,13 @@ private:
   bool IsForHandles(QEvent* event) const;
   void Look();
   void BeginStroke(const double point[3]);
+  void CancelStroke();
+  Qt::MouseButton ButtonOfDrag() const;
   void EndDrag();
   void ShowBrush(const double point[3]);
   void Scroll(double steps);
   void ChangeWindow(const QPointF& by);
+  void ChangePlane();
 
   Workbench* bench_;
   vtkSmartPointer<vtkUltrasoundSliceView> view_;
@@ -71,6 +79,8 @@ private:
   Redraw* redraw_;
   Drag drag_ = Drag::None;
   QPointF last_;
+  QVector<int> selected_; ///< before the last press
+  bool isPlaced_ = false;
 };
 
 } // namespace echorama

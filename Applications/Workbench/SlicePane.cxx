@@ -83,7 +83,7 @@ void SlicePane::SetAxis(const QString& axis)
   axis_ = axis;
   canvas_->View()->SetAxis(axis.toUtf8().constData());
   canvas_->Ask();
-  ShowPlane();
+  emit canvas_->PlaneChanged();
 }
 
 void SlicePane::NextAxis()
@@ -94,13 +94,15 @@ void SlicePane::NextAxis()
 void SlicePane::Fit()
 {
   canvas_->View()->Fit();
+  canvas_->SetPlaced(false);
   canvas_->Ask();
-  ShowPlane();
+  emit canvas_->PlaneChanged();
 }
 
 void SlicePane::SetPosition(double mm)
 {
   canvas_->View()->SetPosition(mm);
+  canvas_->SetPlaced(true);
   canvas_->Ask();
   emit canvas_->PlaneChanged();
 }

@@ -39,7 +39,20 @@ ViewGrid::ViewGrid(Workbench* bench, QWidget* parent) : QWidget(parent)
     connect(pane->Canvas(), &SliceCanvas::PlaneChanged, this, [this, pane] { FollowSlice(pane); });
   }
   connect(volume_, &VolumePane::LargeAsked, this, [this] { ToggleLarge(volume_); });
+  connect(bench, &Workbench::VolumesChanged, this, [this, bench] { FitToNew(bench->Session()->GetNumberOfVolumes()); });
   SetLinked(true);
+}
+
+// Volumes come one after the other: all are to be seen, until somebody has chosen what to look at.
+void ViewGrid::FitToNew(int volumes)
+{
+  bool isPlaced = false;
+  for (const SlicePane* pane : slices_)
+    isPlaced = isPlaced || pane->Canvas()->IsPlaced();
+  if (volumes > volumes_ && (!isPlaced || volumes_ == 0))
+    for (SlicePane* pane : slices_)
+      pane->Fit();
+  volumes_ = volumes;
 }
 
 QVector<QWidget*> ViewGrid::Views() const

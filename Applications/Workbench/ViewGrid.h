@@ -33,12 +33,14 @@ public:
 private:
   QVector<QWidget*> Views() const;
   void FollowSlice(SlicePane* changed);
+  void FitToNew(int volumes);
 
   std::array<SlicePane*, 3> slices_;
   VolumePane* volume_;
   QSplitter *rows_, *above_, *below_;
   QWidget* large_ = nullptr;
   bool linked_ = false;
+  int volumes_ = 0;
 };
 
 } // namespace echorama

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Full quality can take longer than a person waits for a mouse: it is drawn once nothing has moved for a moment.
+// Full quality can take longer than a person waits for a mouse. So whatever happens is drawn coarsely first; once nothing has
+// happened for a moment the picture becomes finer step by step, with a look at the mouse in between. VTK's own wishes to draw
+// (turning, handles under the mouse) go the same way.
 #include "VolumePane.h"
 #include "AlignmentHandles.h"
 #include "Controls.h"
@@ -17,8 +19,10 @@
 #include <QVTKInteractor.h>
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkImageData.h>
 #include <vtkInteractorStyleTrackballCamera.h>
 #include <vtkNew.h>
+#include <vtkObjectFactory.h>
 #include <vtkRenderer.h>
 #include <vtkRenderingVolumeModule.h> // the OpenGL part of the mappers that the view makes is registered here
 
@@ -26,7 +30,17 @@ namespace echorama {
 
 namespace {
 constexpr int WatchingMs = 80; ///< how often 3D redraws while something is dragged in a slice
-constexpr int RefineMs = 250;  ///< how long nothing must move before it is drawn in full
+constexpr int RefineMs = 300;  ///< how long nothing must happen before the picture becomes finer
+constexpr int StepMs = 20;     ///< between its steps
+
+/// Turns and pans. VTK's own keys (wireframe, stereo, leaving the program) would come between those of the workbench.
+class CameraStyle : public vtkInteractorStyleTrackballCamera {
+public:
+  static CameraStyle* New();
+  vtkTypeMacro(CameraStyle, vtkInteractorStyleTrackballCamera);
+  void OnChar() override {}
+};
+vtkStandardNewMacro(CameraStyle);
 } // namespace
 
 VolumePane::VolumePane(Workbench* bench, QWidget* parent)
@@ -44,13 +58,15 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   canvas_->setRenderWindow(window);
   view_->SetSession(bench->Session());
   window->AddRenderer(view_->GetRenderer());
-  vtkNew<vtkInteractorStyleTrackballCamera> style;
+  vtkNew<CameraStyle> style;
   style->SetDefaultRenderer(view_->GetRenderer());
   style->AddObserver(vtkCommand::StartInteractionEvent, this, &VolumePane::OnTurning);
   style->AddObserver(vtkCommand::EndInteractionEvent, this, &VolumePane::OnTurning);
   canvas_->interactor()->SetInteractorStyle(style);
   redraw_ = new Redraw(this, [this] { DrawNow(); });
-  refine_ = new Redraw(this, [this] { SetCoarse(false); });
+  refine_ = new Redraw(this, [this] { Refine(); });
+  canvas_->interactor()->EnableRenderOff();
+  canvas_->interactor()->AddObserver(vtkCommand::RenderEvent, this, &VolumePane::OnRender);
   handles_ = new AlignmentHandles(bench, canvas_->interactor(), view_->GetRenderer(), this);
 
   style_ = ChoiceField(this, "volumeStyle", tr("How volumes are drawn in 3D"),
@@ -88,19 +104,17 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::SelectionChanged,
                        &Workbench::VoxelsChanged, &Workbench::ToolChanged})
     connect(bench, changed, this, &VolumePane::Ask);
+  connect(bench, &Workbench::HandChanged, this, &VolumePane::Ask);
   connect(bench, &Workbench::LookChanged, this, &VolumePane::Look);
-  connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {
-    if (on)
-      SetCoarse(true);
-    else
-      refine_->Ask(RefineMs);
-  });
+  connect(bench, &Workbench::VolumesChanged, this, &VolumePane::FitToNew);
+  connect(bench, &Workbench::InteractingChanged, this, &VolumePane::Ask);
   Look();
 }
 
 VolumePane::~VolumePane()
 {
   canvas_->interactor()->SetInteractorStyle(nullptr);
+  canvas_->interactor()->RemoveObservers(vtkCommand::RenderEvent);
 }
 
 vtkUltrasoundVolumeView* VolumePane::View() const
@@ -110,8 +124,26 @@ vtkUltrasoundVolumeView* VolumePane::View() const
 
 void VolumePane::AddSlice(SliceCanvas* slice)
 {
-  slices_.append(slice->View());
-  connect(slice, &SliceCanvas::Drawn, this, &VolumePane::Ask);
+  const int i = slices_.size();
+  slices_.append({slice->View()});
+  connect(slice, &SliceCanvas::Drawn, this, [this, i] {
+    if (TakePlane(i))
+      Ask();
+  });
+}
+
+// False: what is seen of it here is what was seen before.
+bool VolumePane::TakePlane(int i)
+{
+  Plane& plane = slices_[i];
+  std::array<double, 12> corners;
+  plane.view->GetPlaneCorners(corners.data());
+  const vtkMTimeType drawn = plane.view->GetPicture()->GetMTime();
+  if (!bench_->Volume().slices || (drawn == plane.drawn && corners == plane.corners))
+    return false;
+  plane.corners = corners;
+  plane.drawn = drawn;
+  return view_->SetPlane(i, corners.data(), plane.view->GetPicture());
 }
 
 void VolumePane::Look()
@@ -133,40 +165,57 @@ void VolumePane::Look()
 void VolumePane::Fit()
 {
   view_->Fit();
+  isPlaced_ = false;
   Ask();
+}
+
+// Volumes come one after the other: all are to be seen, until somebody has chosen what to look at.
+void VolumePane::FitToNew()
+{
+  const int count = bench_->Session()->GetNumberOfVolumes();
+  if (count > volumes_ && (!isPlaced_ || volumes_ == 0))
+    Fit();
+  volumes_ = count;
 }
 
 void VolumePane::Ask()
 {
+  view_->SetInteractive(true);
   redraw_->Ask(bench_->Interacting() ? WatchingMs : 0);
+  if (turning_ || bench_->Interacting())
+    refine_->Stop();
+  else
+    refine_->AskAnew(RefineMs);
 }
 
 void VolumePane::DrawNow()
 {
   if (!isVisible())
     return;
-  if (bench_->Volume().slices)
-    for (int i = 0; i < slices_.size(); i++) {
-      double corners[12];
-      slices_[i]->GetPlaneCorners(corners);
-      view_->SetPlane(i, corners, slices_[i]->GetPicture());
-    }
+  for (int i = 0; i < slices_.size(); i++)
+    TakePlane(i);
   view_->Update();
   canvas_->renderWindow()->Render();
 }
 
-void VolumePane::SetCoarse(bool coarse)
+void VolumePane::Refine()
 {
-  view_->SetInteractive(coarse);
-  Ask();
+  if (turning_ || bench_->Interacting() || !isVisible() || !view_->Refine())
+    return;
+  DrawNow();
+  refine_->AskAnew(StepMs);
 }
 
 void VolumePane::OnTurning(vtkObject*, unsigned long event, void*)
 {
-  if (event == vtkCommand::StartInteractionEvent)
-    view_->SetInteractive(true);
-  else
-    refine_->Ask(RefineMs);
+  turning_ = event == vtkCommand::StartInteractionEvent;
+  isPlaced_ = true;
+  Ask();
+}
+
+void VolumePane::OnRender(vtkObject*, unsigned long, void*)
+{
+  Ask();
 }
 
 bool VolumePane::eventFilter(QObject* object, QEvent* event)
@@ -175,6 +224,10 @@ bool VolumePane::eventFilter(QObject* object, QEvent* event)
     emit LargeAsked();
     return true;
   }
+  if (event->type() == QEvent::Enter)
+    FocusUnlessTyping(canvas_);
+  else if (event->type() == QEvent::Show)
+    Ask(); // what was asked for while it was hidden was not drawn
   return QWidget::eventFilter(object, event);
 }
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <array>
 #include <QVector>
 #include <QWidget>
 #include <vtkSmartPointer.h>
+#include <vtkType.h>
 
 class QComboBox;
 class QVTKOpenGLNativeWidget;
@@ -32,6 +34,7 @@ public:
   /// Shows the plane of a slice, with its picture.
   void AddSlice(SliceCanvas* slice);
   void Fit();
+  /// Redraws soon, as coarsely as it takes to keep up; the fine picture follows when nothing happens any more.
   void Ask();
   void DrawNow();
 
@@ -43,17 +46,29 @@ protected:
 
 private:
   void Look();
+  void FitToNew();
   void OnTurning(vtkObject* style, unsigned long event, void* data);
-  void SetCoarse(bool coarse);
+  void OnRender(vtkObject* interactor, unsigned long event, void* data);
+  void Refine();
 
   Workbench* bench_;
   QVTKOpenGLNativeWidget* canvas_;
   vtkSmartPointer<vtkUltrasoundVolumeView> view_;
-  QVector<vtkUltrasoundSliceView*> slices_;
+  /// A slice, and when what is seen of it here was drawn.
+  struct Plane {
+    vtkUltrasoundSliceView* view;
+    std::array<double, 12> corners{};
+    vtkMTimeType drawn = 0;
+  };
+  bool TakePlane(int i);
+  QVector<Plane> slices_;
   AlignmentHandles* handles_;
   QComboBox* style_;
   Redraw* redraw_;
   Redraw* refine_;
+  bool turning_ = false;
+  bool isPlaced_ = false; ///< the camera was moved by hand
+  int volumes_ = 0;
 };
 
 } // namespace echorama

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The workbench as a person uses it: the real window on a screen, real mouse and key events. What is asked is what the session
 // then holds, and what the window shows.
+#include "AlignmentHandles.h"
 #include "FileActions.h"
 #include "SliceCanvas.h"
 #include "SlicePane.h"
 #include "Theme.h"
 #include "ViewGrid.h"
 #include "VolumePane.h"
+#include "vtkUltrasoundAlignmentWidget.h"
 #include "vtkUltrasoundSliceView.h"
+#include "vtkUltrasoundVolumeView.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
 #include <csignal>
@@ -24,6 +27,7 @@
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkDataArray.h>
 #include <vtkImageData.h>
+#include <vtkRenderer.h>
 #include <vtkUltrasoundVolume.h>
 
 using namespace echorama;
@@ -83,6 +87,13 @@ private slots:
   void closingAsksOnlyForWork();
   void nothingIsLostWhenTheProgramIsKilled();
   void theLiverPair();
+  void whateverHappensIsDrawnCoarselyFirst();
+  void escapeTakesAStrokeBack();
+  void escapeIsMeantOutsideTheViewToo();
+  void aLostReleaseEndsTheDrag();
+  void aDoubleClickKeepsTheSelection();
+  void stepsAndConstraintsAreThoseOfAllViews();
+  void aBatchIsSeenAsAWhole();
 
 private:
   QDir Folder() const { return QDir(folder_->path()); }
@@ -559,6 +570,159 @@ void TestWorkbench::theLiverPair()
   window.Drag(window.Slice(0), from, from + QPoint(25, 10));
   QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
   window.Screenshot("liver-dragged");
+}
+
+void TestWorkbench::whateverHappensIsDrawnCoarselyFirst()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  vtkUltrasoundVolumeView* view = window.Window().Views()->Volume()->View();
+  QTRY_VERIFY(!view->GetInteractive()); // small volumes are drawn in full everywhere
+  SliceCanvas* slice = window.Slice(0);
+  window.Wheel(slice, 1);
+  QVERIFY(view->GetInteractive());
+  QTRY_VERIFY(!view->GetInteractive());
+  // A drag that begins when the fine picture is about to come, and that rests.
+  window.Wheel(slice, 1);
+  QTest::qWait(200);
+  const QPoint from = slice->rect().center() + QPoint(18, 34);
+  window.Press(slice, from);
+  window.Move(slice, from + QPoint(20, 0));
+  QTest::qWait(600);
+  QVERIFY(view->GetInteractive());
+  window.Release(slice, from + QPoint(20, 0));
+  QTRY_VERIFY(!view->GetInteractive());
+  QCOMPARE(view->GetDetailLevel(), 0);
+}
+
+void TestWorkbench::escapeTakesAStrokeBack()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  SliceCanvas* slice = window.Slice(0);
+  slice->setFocus();
+  window.Key(Qt::Key_3);
+  const QByteArray before = IntensitiesOf(window, 2);
+  const int entries = window.Session()->GetUndoCount();
+  const QPoint centre = slice->rect().center();
+  window.Press(slice, centre - QPoint(30, 0));
+  window.Move(slice, centre);
+  window.Settle();
+  QVERIFY(IntensitiesOf(window, 2) != before);
+  window.Key(Qt::Key_Escape);
+  QCOMPARE(IntensitiesOf(window, 2), before);
+  window.Move(slice, centre + QPoint(20, 0));
+  window.Release(slice, centre + QPoint(20, 0));
+  window.Settle();
+  QCOMPARE(IntensitiesOf(window, 2), before);
+  QCOMPARE(window.Session()->GetUndoCount(), entries);
+  QVERIFY(!window.Window().Bench()->Interacting());
+}
+
+void TestWorkbench::escapeIsMeantOutsideTheViewToo()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  SliceCanvas* slice = window.Slice(0);
+  slice->setFocus();
+  const auto before = window.Pose(2);
+  const QPoint from = slice->rect().center() + QPoint(18, 34), outside(-30, 60);
+  window.Press(slice, from);
+  window.Move(slice, from + QPoint(20, 0));
+  window.Move(slice, outside);
+  QVERIFY(window.Pose(2) != before);
+  QTest::keyClick(slice, Qt::Key_Escape);
+  QCOMPARE(window.Pose(2), before);
+  window.Release(slice, outside);
+  QCOMPARE(window.Pose(2), before);
+}
+
+void TestWorkbench::aLostReleaseEndsTheDrag()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  SliceCanvas* slice = window.Slice(0);
+  const int entries = window.Session()->GetUndoCount();
+  const QPoint from = slice->rect().center() + QPoint(18, 34);
+  for (int i = 0; i < 2; i++) {
+    window.Press(slice, from);
+    window.Move(slice, from + QPoint(20, 0));
+    QVERIFY(window.Window().Bench()->Interacting());
+    if (i == 0) {
+      QEvent blocked(QEvent::WindowBlocked); // a question came up
+      QApplication::sendEvent(slice, &blocked);
+    } else {
+      const QPointF at = from;
+      QMouseEvent moved(QEvent::MouseMove, at, at, slice->mapToGlobal(from), Qt::NoButton, Qt::NoButton, Qt::NoModifier);
+      QApplication::sendEvent(slice, &moved);
+    }
+    QVERIFY(!window.Window().Bench()->Interacting());
+    const auto pose = window.Pose(2);
+    window.Move(slice, from + QPoint(40, 0));
+    QCOMPARE(window.Pose(2), pose);
+    window.Release(slice, from + QPoint(40, 0));
+    QCOMPARE(window.Session()->GetUndoCount(), entries + 1 + i);
+  }
+}
+
+void TestWorkbench::aDoubleClickKeepsTheSelection()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  SliceCanvas* slice = window.Slice(1);
+  const int selected = window.Window().Bench()->ActiveVolume();
+  const QPoint at = slice->rect().center() + QPoint(25, 31);
+  for (int i = 0; i < 2; i++) {
+    window.Press(slice, at);
+    window.Release(slice, at);
+  }
+  window.Settle();
+  QVERIFY(!window.Slice(0)->isVisible()); // it was a double click
+  QCOMPARE(window.Session()->GetNumberOfSelected(), 1);
+  QCOMPARE(window.Window().Bench()->ActiveVolume(), selected);
+}
+
+void TestWorkbench::stepsAndConstraintsAreThoseOfAllViews()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  SliceCanvas* slice = window.Slice(0);
+  auto* step = window.Part<QDoubleSpinBox>("translationStep");
+  vtkUltrasoundAlignmentWidget* other = window.Window().Views()->Volume()->Handles()->Widget();
+  slice->setFocus();
+  window.Move(slice, slice->rect().center());
+  const double before = step->value();
+  window.Key(Qt::Key_Plus);
+  QCOMPARE(step->value(), 2.0 * before);
+  QCOMPARE(other->GetTranslationStep(), 2.0 * before);
+  window.Key(Qt::Key_X);
+  QCOMPARE(std::string(other->GetConstraint()), std::string("x"));
+  window.Screenshot("constraint");
+  window.Key(Qt::Key_X);
+  window.Key(Qt::Key_X);
+  QCOMPARE(std::string(other->GetConstraint()), std::string("free"));
+  window.Key(Qt::Key_Minus);
+  QCOMPARE(step->value(), before);
+}
+
+void TestWorkbench::aBatchIsSeenAsAWhole()
+{
+  WindowUnderTest window;
+  const double far = 90.0;
+  QVERIFY(window.Open({A(), WriteVolume(Folder(), "far.mha", 3, {far, 0, 0})}));
+  QTest::qWait(100);
+  double pixel[2];
+  SliceCanvas* slice = window.Slice(0);
+  slice->View()->WorldToPixel(far + 20.0, 0.0, 0.0, pixel);
+  QVERIFY(pixel[0] > 0 && pixel[0] < slice->width());
+  vtkRenderer* renderer = window.Window().Views()->Volume()->View()->GetRenderer();
+  for (const double x : {-20.0, far + 20.0}) {
+    renderer->SetWorldPoint(x, 0.0, 0.0, 1.0);
+    renderer->WorldToDisplay();
+    const double* at = renderer->GetDisplayPoint();
+    QVERIFY(renderer->IsInViewport(static_cast<int>(at[0]), static_cast<int>(at[1])));
+  }
+  window.Screenshot("batch");
 }
 
 // The child of nothingIsLostWhenTheProgramIsKilled: says "seconds x" at each step of a drag that never ends.
