@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "MessageBar.h"
 #include "Workbench.h"
+#include <exception>
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QPushButton>
@@ -86,10 +87,15 @@ void MessageBar::Show(const Message& message)
     button->setObjectName("messageAnswer");
     button->setAutoDefault(true); // Return presses it
     layout->addWidget(button);
-    connect(button, &QPushButton::clicked, row, [close, action = answer.action] {
+    connect(button, &QPushButton::clicked, row, [this, close, action = answer.action] {
       close(); // first: the action may end the window
-      if (action)
-        action();
+      try {
+        if (action)
+          action();
+      } catch (const std::exception& error) // Qt cannot pass it on
+      {
+        Show({Message::Warning, QString::fromUtf8(error.what()), {}});
+      }
     });
     if (&answer == &message.answers.first())
       QTimer::singleShot(0, button, [button] { button->setFocus(); });
