@@ -15,6 +15,7 @@
 #include "WindowUnderTest.h"
 #include "Workbench.h"
 #include <cmath>
+#include <QAction>
 #include <QApplication>
 #include <QCheckBox>
 #include <QDockWidget>
@@ -25,6 +26,7 @@
 #include <QSurfaceFormat>
 #include <QTableWidget>
 #include <QTemporaryDir>
+#include <QToolButton>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkImageData.h>
