@@ -51,7 +51,7 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
   if (!volumes.is_array())
     file.Fail("\"volumes\" is not a list");
 
-  const fs::path folder = fs::absolute(path).parent_path();
+  const fs::path folder = Resolved(path).parent_path(), beside = fs::absolute(path).parent_path();
   std::vector<VolumePose> poses;
   std::set<std::string> seen;
   for (const ordered_json& volume : volumes) {
@@ -60,7 +60,11 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
     if (!name.is_string() || name.get<std::string>().empty())
       place.Fail("\"file\" is not a file name");
     VolumePose pose;
-    pose.file = (folder / name.get<std::string>()).lexically_normal().string(); // an absolute name replaces the folder
+    fs::path found = (folder / name.get<std::string>()).lexically_normal(); // an absolute name replaces the folder
+    std::error_code error;
+    if (!fs::exists(found, error) && fs::exists(beside / name.get<std::string>(), error))
+      found = beside / name.get<std::string>(); // beside a link to the pose file
+    pose.file = found.string();
     if (!seen.insert(Resolved(pose.file).string()).second)
       place.Fail(name.get<std::string>() + " is named twice");
     if (volume.contains("geometry"))

@@ -149,13 +149,20 @@ StrokeChain ToStrokes(const Json& value, const JsonPlace& place)
   return chain;
 }
 
-SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path& folder)
+// A relative name counts from the folder; from \a beside (where a link to the project lies) when only there is something.
+fs::path Located(const fs::path& name, const fs::path& folder, const fs::path& beside)
+{
+  fs::path found = (folder / name).lexically_normal(); // an absolute name replaces the folder
+  return !IsThere(found) && IsThere(beside / name) ? beside / name : found;
+}
+
+SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path& folder, const fs::path& beside)
 {
   SessionVolume volume;
   const auto given = [&value](const char* key) { return value.contains(key) ? &value[key] : nullptr; };
   const std::string file = place.In("file").Text(place.Member(value, "file"));
   if (!file.empty()) {
-    fs::path found = (folder / file).lexically_normal(); // an absolute name replaces the folder
+    fs::path found = Located(file, folder, beside);
     if (const Json* path = given("path")) {
       const std::string second = place.In("path").Text(*path);
       if (!IsThere(found) && !second.empty() && IsThere(second))
@@ -250,13 +257,13 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
   if (!volumes.is_array())
     file.Fail("\"volumes\" is not a list");
 
-  const fs::path folder = fs::absolute(path).parent_path();
+  const fs::path folder = Resolved(path).parent_path(), beside = fs::absolute(path).parent_path();
   Project project;
   std::set<std::string> names, files;
   for (const Json& value : volumes) {
     const int number = static_cast<int>(project.state.volumes.size()) + 1;
     const JsonPlace place = file.In("volume " + std::to_string(number));
-    SessionVolume volume = ToVolume(value, place, folder);
+    SessionVolume volume = ToVolume(value, place, folder, beside);
     volume.id = number;
     if (!volume.file.empty() && !files.insert(volume.file).second)
       place.Fail(volume.file + " is named twice");
@@ -269,7 +276,7 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
   }
   if (root.contains("truth")) {
     const std::string truth = file.In("truth").Text(root["truth"]);
-    project.truth = truth.empty() ? truth : Resolved(folder / truth).string();
+    project.truth = truth.empty() ? truth : Resolved(Located(truth, folder, beside)).string();
   }
   if (root.contains("comment"))
     project.comment = file.In("comment").Text(root["comment"]);
@@ -278,7 +285,7 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
   return project;
 }
 
-void WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp)
+bool WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp, bool replace)
 {
   const fs::path folder = Resolved(path).parent_path();
   Json volumes = Json::array();
@@ -315,9 +322,15 @@ void WriteProject(const std::string& path, const Project& project, const BackupS
   }
 
   FileReplacement replacement;
-  WriteThrough(replacement.Stage(path), text, path);
-  replacement.Commit();
+  const std::string staged = replacement.Stage(path);
+  WriteThrough(staged, text, path);
+  const bool linked = !replace && link(staged.c_str(), path.c_str()) == 0;
+  if (!replace && !linked && errno == EEXIST)
+    return false;
+  if (!linked) // also on a file system without links
+    replacement.Commit();
   SyncFolder(folder);
+  return true;
 }
 
 std::string FindVolume(const std::string& projectPath, const std::string& file, const std::vector<std::string>& folders)

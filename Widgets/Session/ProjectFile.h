@@ -31,6 +31,9 @@ struct BackupStamp {
 /// another machine; "path" is absolute, and counts when there is nothing at "file". A volume that came from a pipeline has the
 /// file "".
 ///
+/// Relative names count from where the file really is: symbolic links are followed. What is not there is looked for beside the
+/// link, too.
+///
 /// Geometries are told apart from poses, so that nothing is moved twice: who opens the files compares. A volume without
 /// "geometry" has dimensions of zero.
 /// \param stamp receives what a backup knows; its number is 0 for other projects.
@@ -39,8 +42,8 @@ Project ReadProject(const std::string& path, BackupStamp* stamp = nullptr);
 
 /// Atomic, and on the disk when it returns. Numbers come back to the last bit. \param stamp makes it a backup: with a checksum,
 /// on one line. \throws Error(FileSystem), Error(InvalidParameter) for a name that is not UTF-8; what was there before then
-/// stays.
-void WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp = nullptr);
+/// stays. \param replace false: leaves a file alone that is there already. \returns whether it was written.
+bool WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp = nullptr, bool replace = true);
 
 /// Where a volume of a project is now: at \a file, else under the same name in the project's folder (for a backup: in the folder
 /// of its project), else in one of \a folders. Empty when nowhere.
