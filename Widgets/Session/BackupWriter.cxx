@@ -7,7 +7,6 @@
 #include <chrono>
 #include <deque>
 #include <mutex>
-#include <system_error>
 #include <utility>
 
 namespace echorama {
@@ -38,7 +37,8 @@ struct BackupWriter::Parts {
   std::mutex mutex; // of what follows
   std::deque<Item> queue;
   bool active = false; // the thread will look at the queue again
-  std::string failure, told;
+  std::string failure;
+  bool told = false; // of the failure; until something is written
 
   // Touched only by who writes: the thread, or its owner when there is none.
   std::string lastLabel;
@@ -64,7 +64,7 @@ struct BackupWriter::Parts {
     const std::lock_guard<std::mutex> lock(mutex);
     failure = reason;
     if (reason.empty())
-      told.clear();
+      told = false;
   }
 
   void Run(const Worker::Signal& signal)
@@ -129,17 +129,22 @@ void BackupWriter::Post(Project project, const std::string& label, bool finished
   }
   try {
     parts_->worker.Start([this](const Worker::Signal& signal) { parts_->Run(signal); });
-  } catch (const std::system_error&) { // the system has no thread to give
+  } catch (const std::exception&) { // the system has no thread to give, or no memory for one
     parts_->Drain();
   }
 }
 
-void BackupWriter::Flush()
+void BackupWriter::Wait()
 {
   parts_->Drain();
+}
+
+void BackupWriter::Flush()
+{
+  Wait();
   const std::lock_guard<std::mutex> lock(parts_->mutex);
   if (!parts_->failure.empty()) {
-    parts_->told = parts_->failure;
+    parts_->told = true;
     throw Error(Error::Kind::FileSystem, parts_->failure);
   }
 }
@@ -147,9 +152,23 @@ void BackupWriter::Flush()
 std::string BackupWriter::TakeFailure()
 {
   const std::lock_guard<std::mutex> lock(parts_->mutex);
-  if (parts_->failure.empty() || parts_->failure == parts_->told)
+  if (parts_->failure.empty() || std::exchange(parts_->told, true))
     return {};
-  return parts_->told = parts_->failure;
+  return parts_->failure;
+}
+
+void BackupWriter::MarkSaved()
+{
+  Wait();
+  parts_->backups.MarkSaved();
+}
+
+void BackupWriter::DiscardUnsaved()
+{
+  parts_->worker.Stop();
+  parts_->active = false;
+  parts_->queue.clear();
+  parts_->backups.DiscardUnsaved();
 }
 
 } // namespace echorama

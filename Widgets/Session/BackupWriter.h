@@ -21,10 +21,16 @@ public:
 
   const std::string& Folder() const;
   void Post(Project project, const std::string& label, bool finished);
-  /// Waits until all that was posted is on the disk. \throws what writing the last threw.
+  /// Waits until all that was posted is on the disk, or could not be written.
+  void Wait();
+  /// Wait(). \throws what writing the last threw.
   void Flush();
-  /// Why a backup could not be written, told once for as long as the reason stays the same; empty: all is well.
+  /// Why a backup could not be written: told once, until one could be written again; empty: all is well.
   std::string TakeFailure();
+  ///@{ As those of Backups, of all that was posted.
+  void MarkSaved();
+  void DiscardUnsaved();
+  ///@}
 
 private:
   struct Parts;

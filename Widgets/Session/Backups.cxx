@@ -98,15 +98,71 @@ void RemoveHalfWritten(const std::string& folder)
     fs::remove(part, error);
 }
 
-fs::path UnsavedRoot()
+fs::path DataRoot()
 {
   const char* data = std::getenv("XDG_DATA_HOME");
   if (data && fs::path(data).is_absolute())
-    return fs::path(data) / "echorama" / "unsaved";
+    return fs::path(data) / "echorama";
   const char* home = std::getenv("HOME");
   if (!home || !fs::path(home).is_absolute())
     Fail("backups", "neither XDG_DATA_HOME nor HOME tells where to keep them; save the project first");
-  return fs::path(home) / ".local" / "share" / "echorama" / "unsaved";
+  return fs::path(home) / ".local" / "share" / "echorama";
+}
+
+fs::path UnsavedRoot()
+{
+  return DataRoot() / "unsaved";
+}
+
+fs::path Beside(const std::string& project)
+{
+  return fs::absolute(project).replace_extension(".backups");
+}
+
+// For a project beside which nothing can be written. The number tells projects of one name in different folders apart.
+fs::path Away(const std::string& project)
+{
+  const fs::path whole = fs::absolute(project).lexically_normal();
+  std::uint64_t hash = 14695981039346656037u; // FNV-1a
+  for (const char byte : whole.string())
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211u;
+  char digits[18];
+  std::snprintf(digits, sizeof digits, "-%016llx", static_cast<unsigned long long>(hash));
+  return DataRoot() / "projects" / (whole.stem().string() + digits);
+}
+
+bool CanHold(const fs::path& folder)
+{
+  std::error_code error;
+  if (fs::is_directory(folder, error))
+    return access(folder.c_str(), W_OK | X_OK) == 0;
+  const fs::path parent = folder.parent_path();
+  // A parent that is missing is told of by who makes the folder.
+  return !fs::exists(folder, error) && (!fs::exists(parent, error) || access(parent.c_str(), W_OK | X_OK) == 0);
+}
+
+std::vector<Backup> NamedFor(const std::string& project)
+{
+  std::vector<Backup> backups = Named(Beside(project).string());
+  try {
+    const std::vector<Backup> away = Named(Away(project).string());
+    backups.insert(backups.end(), away.begin(), away.end());
+  } catch (const Error&) { // no folder of the user
+  }
+  std::stable_sort(backups.begin(), backups.end(), [](const Backup& a, const Backup& b) { return a.time > b.time; });
+  return backups;
+}
+
+void Read(Backup& backup)
+{
+  try {
+    BackupStamp stamp;
+    ReadProject(backup.path, &stamp);
+    backup.label = stamp.label;
+    backup.readable = stamp.number > 0; // a project without a stamp was not written here
+  } catch (const Error&) {
+    backup.readable = false;
+  }
 }
 
 std::string Time(std::int64_t time, const char* format)
@@ -148,14 +204,24 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
   stamp.number = earlier.empty() ? 1 : earlier.front().number + 1;
   stamp.time = std::time(nullptr);
   stamp.label = label;
-  const std::string path = (fs::path(folder_) / FileName(stamp.number, stamp.time)).string();
-  WriteProject(path, project, &stamp);
+  std::string path;
+  try {
+    do
+      path = (fs::path(folder_) / FileName(stamp.number, stamp.time)).string();
+    while (!WriteProject(path, project, &stamp, false) && ++stamp.number); // another session took the number
+  } catch (const Error& error) {                                           // the same reason has the same words
+    std::string reason = error.what();
+    for (std::size_t at = 0; (at = reason.find(path)) != std::string::npos;)
+      reason.replace(at, path.size(), folder_);
+    throw Error(error.GetKind(), reason);
+  }
   if (inPlaceOfLast && !lastPath_.empty()) {
     std::error_code ignored;
     fs::remove(lastPath_, ignored);
   }
   last_ = project;
   lastPath_ = path;
+  unsaved_.push_back(path);
   ThinOut(folder_, keep_);
   return true;
 }
@@ -163,17 +229,37 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
 std::vector<Backup> Backups::List(const std::string& folder)
 {
   std::vector<Backup> backups = Named(folder);
-  for (Backup& backup : backups) {
-    try {
-      BackupStamp stamp;
-      ReadProject(backup.path, &stamp);
-      backup.label = stamp.label;
-      backup.readable = stamp.number > 0; // a project without a stamp was not written here
-    } catch (const Error&) {
-      backup.readable = false;
-    }
-  }
+  for (Backup& backup : backups)
+    echorama::Read(backup);
   return backups;
+}
+
+std::vector<Backup> Backups::ListFor(const std::string& path)
+{
+  std::vector<Backup> backups = NamedFor(path);
+  for (Backup& backup : backups)
+    echorama::Read(backup);
+  return backups;
+}
+
+std::optional<Backup> Backups::NewestFor(const std::string& path, std::int64_t time)
+{
+  for (Backup& backup : NamedFor(path)) {
+    if (backup.time < time)
+      break;
+    echorama::Read(backup);
+    if (backup.readable)
+      return backup;
+  }
+  return std::nullopt;
+}
+
+void Backups::DiscardUnsaved()
+{
+  std::error_code ignored;
+  for (const std::string& path : unsaved_)
+    fs::remove(path, ignored);
+  unsaved_.clear();
 }
 
 std::string Backups::FileName(int number, std::int64_t time)
@@ -186,8 +272,8 @@ std::string Backups::FileName(int number, std::int64_t time)
 std::string Backups::FolderFor(const std::string& path)
 {
   if (!path.empty()) {
-    fs::path folder = fs::absolute(path);
-    return folder.replace_extension(".backups").string();
+    const fs::path folder = Beside(path);
+    return (CanHold(folder) ? folder : Away(path)).string();
   }
   const fs::path root = UnsavedRoot();
   const std::string name = Time(std::time(nullptr), "%Y%m%d-%H%M%S-") + std::to_string(getpid());
@@ -222,8 +308,23 @@ void Backups::Move(const std::string& from, const std::string& to)
   int number = there.empty() ? 1 : there.front().number + 1;
   std::vector<Backup> moving = Named(from);
   std::reverse(moving.begin(), moving.end());
+  const bool neighbours = fs::path(from).parent_path() == fs::path(to).parent_path();
   for (const Backup& backup : moving) {
     const fs::path path = fs::path(to) / FileName(number++, backup.time);
+    if (!neighbours) {
+      try { // names that are relative to the folder become others
+        BackupStamp stamp;
+        const Project project = ReadProject(backup.path, &stamp);
+        stamp.number = number - 1;
+        std::error_code ignored;
+        if (WriteProject(path.string(), project, &stamp, false))
+          fs::remove(backup.path, ignored);
+        continue;
+      } catch (const Error& reason) {
+        if (reason.GetKind() == Error::Kind::FileSystem)
+          continue; // it stays
+      }             // a damaged one comes along as it is
+    }
     std::error_code error;
     fs::rename(backup.path, path, error);
     if (error) { // another disk

@@ -36,6 +36,10 @@ public:
   /// afterwards (a drag that goes on). \returns whether there is a new one. \throws Error(FileSystem) (full disk): earlier ones
   /// stay.
   bool Write(const Project& project, const std::string& label, bool inPlaceOfLast = false);
+  /// What was written here is in the project file now; DiscardUnsaved() leaves it.
+  void MarkSaved() { unsaved_.clear(); }
+  /// Removes what was written here since the last MarkSaved().
+  void DiscardUnsaved();
 
   /// The newest first; damaged ones are marked. A folder that is not there has none.
   static std::vector<Backup> List(const std::string& folder);
@@ -45,13 +49,19 @@ public:
   /// Under which name a backup lies in its folder.
   static std::string FileName(int number, std::int64_t time);
 
-  /// Where backups of the project \a path live: NAME.backups beside it; of an unsaved session ("") a new folder under the user's
-  /// data folder (XDG_DATA_HOME or ~/.local/share: echorama/unsaved/...). \throws Error(FileSystem) when there is no such place.
+  /// Where backups of the project \a path live: NAME.backups beside it; under the user's data folder (XDG_DATA_HOME or
+  /// ~/.local/share: echorama/projects/...) when that cannot be written; of an unsaved session ("") a new folder there
+  /// (echorama/unsaved/...). \throws Error(FileSystem) when there is no such place.
   static std::string FolderFor(const std::string& path);
+  /// All backups of a project, in either folder: the newest first.
+  static std::vector<Backup> ListFor(const std::string& path);
+  /// The newest that can be read, when it was made at \a time or later: its label is not told.
+  static std::optional<Backup> NewestFor(const std::string& path, std::int64_t time);
   /// Sessions that ended without being saved: their folders, the newest first. Those that still run are not among them.
   static std::vector<std::string> Abandoned();
-  /// Takes the backups of \a from over, as the next ones of \a to (a session that was saved for the first time); \a from goes
-  /// when nothing else is in it. What cannot be moved stays. \throws Error(FileSystem) when \a to cannot be made.
+  /// Takes the backups of \a from over, as the next ones of \a to (a session that was saved for the first time, or recovered);
+  /// \a from goes when nothing else is in it. They name the same files from their new place. What cannot be moved stays. \throws
+  /// Error(FileSystem) when \a to cannot be made.
   static void Move(const std::string& from, const std::string& to);
   /// Removes the backups of a folder, and the folder when nothing else is in it. \throws Error(NotPossible) when a session still
   /// uses it.
@@ -63,6 +73,7 @@ private:
   int lock_ = -1;
   std::optional<Project> last_;
   std::string lastPath_;
+  std::vector<std::string> unsaved_;
 };
 
 } // namespace echorama

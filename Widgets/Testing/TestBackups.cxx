@@ -91,6 +91,29 @@ TEST_F(BackupFolder, NumberedTheNewestFirst)
   EXPECT_TRUE(Backups::List(Path("nowhere")).empty());
 }
 
+TEST_F(BackupFolder, TwoSessionsNeverReplaceEachOthers)
+{
+  constexpr int Each = 25;
+  std::thread other([this] {
+    Backups backups(Path());
+    for (int step = 1; step <= Each; ++step)
+      backups.Write(Step(1000 + step), "theirs");
+  });
+  {
+    Backups backups(Path());
+    for (int step = 1; step <= Each; ++step)
+      backups.Write(Step(step), "ours");
+  }
+  other.join();
+  const std::vector<Backup> all = Backups::List(Path());
+  EXPECT_EQ(all.size(), 2u * Each);
+  for (const Backup& backup : all)
+    EXPECT_TRUE(backup.readable) << backup.path;
+  const BackupStamp stamp{all.front().number, all.front().time, "taken"};
+  EXPECT_FALSE(WriteProject(all.front().path, Step(5), &stamp, false));
+  EXPECT_NE(StepOf(Backups::Read(all.front())), 5);
+}
+
 TEST_F(BackupFolder, OldOnesAreThinnedOut)
 {
   // One every ten minutes for three days.
@@ -162,8 +185,8 @@ TEST_F(BackupFolder, AFullDiskCostsTheNewOneAlone)
     EXPECT_THROW(writer.Flush(), Error);
     EXPECT_EQ(writer.TakeFailure(), "") << "it was told";
     writer.Post(Step(4), "four", true);
-    for (int i = 0; i < 500 && writer.TakeFailure().empty(); ++i) // another file name in the message
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    writer.Wait();
+    EXPECT_EQ(writer.TakeFailure(), "") << "nor is the next of the same episode";
   }
   writer.Post(Step(5), "five", true);
   EXPECT_NO_THROW(writer.Flush());
