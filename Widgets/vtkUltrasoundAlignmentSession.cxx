@@ -25,6 +25,7 @@
 
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/TextFile.h"
 #include "Core/Base/VtkMessage.h"
 #include "Core/Geometry/PoseFile.h"
 #include "Filters/Registration/Percentile.h"
@@ -36,8 +37,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <map>
+#include <set>
+#include <sys/stat.h>
 #include <utility>
 
 using namespace echorama;
@@ -173,12 +177,78 @@ std::vector<vtkSmartPointer<vtkImageData>> ReadImages(const std::vector<std::str
   return images;
 }
 
+// No two volumes of a project are one file: where a name was looked for, both may have been found in the same place.
+void CheckDistinct(const std::string& path, const std::vector<SessionVolume>& volumes)
+{
+  std::set<std::string> files;
+  for (const SessionVolume& volume : volumes) {
+    if (!volume.file.empty() && !files.insert(volume.file).second) {
+      throw Error(Error::Kind::BadInput, path + ": two of its volumes are the file " + volume.file + " (" + volume.name +
+                                             " is the second); put each where the project names it");
+    }
+  }
+}
+
+// What a project file says, to notice that somebody else has written it. 0: it cannot be read.
+std::size_t Fingerprint(const std::string& path)
+{
+  try {
+    return std::hash<std::string>()(ReadTextFile(path, std::size_t{512} << 20)) | 1;
+  } catch (const Error&) {
+    return 0;
+  }
+}
+
+// The same work, whatever the ids: geometries pass through files.
+bool SameWork(const SessionState& a, const SessionState& b)
+{
+  return std::equal(a.volumes.begin(), a.volumes.end(), b.volumes.begin(), b.volumes.end(),
+                    [](const SessionVolume& left, SessionVolume right) {
+                      if (left.geometry.AgreesWith(right.geometry)) {
+                        right.geometry = left.geometry;
+                      }
+                      right.id = left.id;
+                      return left == right;
+                    });
+}
+
 void CheckSameGeometry(const ImageGeometry& recorded, const ImageGeometry& found, const std::string& file)
 {
   if (recorded.VoxelCount() > 0 && !recorded.AgreesWith(found)) {
     throw Error(Error::Kind::BadInput, file + ": its geometry is not the one that the project was saved with "
                                               "(has it been moved or resampled since?)");
   }
+}
+std::vector<std::string> AbandonedFolders()
+{
+  try {
+    return Backups::Abandoned();
+  } catch (const Error&) // no folder of the user, so nothing in it
+  {
+    return {};
+  }
+}
+
+int Tell(const std::vector<Backup>& backups, vtkStringArray* paths, vtkStringArray* labels, vtkDoubleArray* times)
+{
+  for (vtkAbstractArray* array :
+       {static_cast<vtkAbstractArray*>(paths), static_cast<vtkAbstractArray*>(labels), static_cast<vtkAbstractArray*>(times)}) {
+    if (array) {
+      array->Initialize();
+    }
+  }
+  for (const Backup& backup : backups) {
+    if (paths) {
+      paths->InsertNextValue(backup.path);
+    }
+    if (labels) {
+      labels->InsertNextValue(backup.readable ? backup.label : Damaged);
+    }
+    if (times) {
+      times->InsertNextValue(static_cast<double>(backup.time));
+    }
+  }
+  return static_cast<int>(backups.size());
 }
 } // namespace
 
@@ -198,7 +268,11 @@ struct vtkUltrasoundAlignmentSession::Internals {
 
   std::vector<std::string> SearchFolders;
   std::string ProjectPath, Comment;
-  Project Saved; ///< what is in the project file
+  Project Saved;             ///< what is in the project file
+  std::size_t SavedText = 0; ///< its Fingerprint
+  SessionState Unworked;     ///< the state as it would be if volumes had been opened and nothing else was done
+  bool Forgotten = false;    ///< a person does not want what is not saved
+  std::string Recovered;     ///< the folder of the abandoned session that goes on here
 
   bool AutomaticBackups = false;
   std::unique_ptr<BackupWriter> Writer;
@@ -218,8 +292,9 @@ struct vtkUltrasoundAlignmentSession::Internals {
   {
     Project now{this->Session.State(), this->TruthFile, this->Comment};
     if (this->Brushing && !this->Brushing->Drawn.pathMm.empty()) {
-      SessionVolume* volume = now.state.Find(this->Brushing->Id);
-      volume->strokes = Append(volume->strokes, this->Brushing->Drawn);
+      if (SessionVolume* volume = now.state.Find(this->Brushing->Id)) {
+        volume->strokes = Append(volume->strokes, this->Brushing->Drawn);
+      }
     }
     return now;
   }
@@ -235,6 +310,29 @@ struct vtkUltrasoundAlignmentSession::Internals {
     this->Session.End();
     const auto voxels = this->Volumes.find(id);
     return voxels != this->Volumes.end() && voxels->second.TakeBack();
+  }
+
+  // Before all volumes become others.
+  void DropStroke()
+  {
+    if (this->Brushing) {
+      const auto voxels = this->Volumes.find(this->Brushing->Id);
+      this->Brushing.reset();
+      if (voxels != this->Volumes.end()) {
+        voxels->second.TakeBack();
+      }
+    }
+  }
+
+  // A mistyped name must not cost a volume.
+  void CheckIsNoVolume(const std::string& path) const
+  {
+    std::error_code error;
+    for (const SessionVolume& volume : this->Session.State().volumes) {
+      if (!volume.file.empty() && (volume.file == path || fs::equivalent(volume.file, path, error))) {
+        throw Error(Error::Kind::InvalidParameter, path + ": it is the file of the volume " + volume.name + " and stays");
+      }
+    }
   }
 
   const SessionVolume* Find(int id) const { return this->Session.State().Find(id); }
@@ -362,24 +460,46 @@ struct vtkUltrasoundAlignmentSession::Internals {
     return this->ProjectPath.empty() ? std::string() : Backups::FolderFor(this->ProjectPath);
   }
 
+  // With the backups of the abandoned session that goes on here: so it is offered no more, and nothing is lost.
   BackupWriter& NeedWriter()
   {
     if (!this->Writer) {
       this->Writer = std::make_unique<BackupWriter>(Backups::FolderFor(this->ProjectPath));
+      this->TakeOver(this->Writer->Folder());
     }
     return *this->Writer;
   }
 
-  // A session that was never saved leaves backups behind only while there is work in them.
-  void LeaveBackups(bool keep)
+  void TakeOver(const std::string& folder)
   {
-    if (this->Writer) {
-      const std::string folder = this->Writer->Folder();
+    const std::string from = std::exchange(this->Recovered, {});
+    try {
+      if (!from.empty()) {
+        Backups::Move(from, folder);
+      }
+    } catch (const Error&) // they are offered again
+    {
+    }
+  }
+
+  // A session that was never saved leaves backups behind only while there is work in them. Never throws.
+  void LeaveBackups()
+  {
+    try {
+      const bool work = this->Session.State() != this->Unworked || this->Comment != this->Saved.comment;
+      if (this->Writer && this->Forgotten) {
+        this->Writer->DiscardUnsaved();
+      }
+      const std::string folder = this->Writer ? this->Writer->Folder() : std::string();
       this->Writer.reset();
-      if (this->ProjectPath.empty() && !keep) {
+      if (!folder.empty() && this->ProjectPath.empty() && (this->Forgotten || !work)) {
         Backups::Discard(folder);
       }
+    } catch (const std::exception&) // what cannot be removed stays
+    {
     }
+    this->Recovered.clear();
+    this->Forgotten = false;
   }
 
   // Voxels that nothing can bring back are let go.
@@ -399,7 +519,7 @@ vtkUltrasoundAlignmentSession::vtkUltrasoundAlignmentSession() : Parts(std::make
 //----------------------------------------------------------------------------
 vtkUltrasoundAlignmentSession::~vtkUltrasoundAlignmentSession()
 {
-  this->Parts->LeaveBackups(this->GetModifiedSinceSave());
+  this->Parts->LeaveBackups();
 }
 
 //----------------------------------------------------------------------------
@@ -468,12 +588,15 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
   const bool history = version != session.HistoryVersion();
   if (history) {
     this->Parts->Forget();
+    this->Parts->Forgotten = false;
   }
   if (poses != 0 || volumes != 0) {
     this->Parts->ScoreIsCurrent = false;
   }
   const bool ended = this->Parts->BackedUpUnfinished && !session.Editing();
-  if (this->Parts->AutomaticBackups && done && (poses != 0 || volumes != 0 || history || ended)) {
+  // A project that was just opened is its own backup: another would be later than the last work that was not saved.
+  const bool fresh = !this->Parts->Writer && session.State() == this->Parts->Saved.state;
+  if (this->Parts->AutomaticBackups && done && !fresh && (poses != 0 || volumes != 0 || history || ended)) {
     this->BackUpInTheBackground(!label.empty()      ? label
                                 : session.Editing() ? session.EditLabel()
                                                     : session.UndoLabel(),
@@ -509,13 +632,24 @@ int vtkUltrasoundAlignmentSession::AddVolume(vtkImageData* image, const char* fi
     }
     vtkUltrasoundVolume::CheckInput(nullptr, image, called);
     volume.geometry = vtkUltrasoundVolume::GeometryOf(image);
-    const int added = this->Parts->Session.Add(std::move(volume));
-    const SessionVolume& known = *this->Parts->Find(added);
-    this->Parts->Hold(known, image);
+    Internals& parts = *this->Parts;
+    const bool unworked = parts.Session.State() == parts.Unworked;
+    const int added = parts.Session.Add(std::move(volume));
+    const SessionVolume& known = *parts.Find(added);
+    try {
+      parts.Hold(known, image);
+    } catch (...) // no memory
+    {
+      parts.Session.Remove(added);
+      throw;
+    }
+    if (unworked) {
+      parts.Unworked = parts.Session.State();
+    }
     id = added;
     try {
-      this->Parts->MatchTruth(known);
-    } catch (const Error& error) // the volume is welcome all the same
+      parts.MatchTruth(known);
+    } catch (const std::exception& error) // the volume is welcome all the same
     {
       vtkWarningMacro("the truth was not taken: " << error.what());
     }
@@ -580,6 +714,16 @@ void vtkUltrasoundAlignmentSession::GetVolumes(vtkMultiBlockDataSet* blocks, boo
       blocks->GetMetaData(index)->Set(vtkCompositeDataSet::NAME(), volume.name.c_str());
     }
   }
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::GetSnapshot(int id, vtkImageData* image) const
+{
+  const bool there = image && this->Parts->Find(id);
+  if (there) {
+    image->ShallowCopy(this->Parts->Volumes.at(id).Snapshot());
+  }
+  return there;
 }
 
 //----------------------------------------------------------------------------
@@ -973,10 +1117,46 @@ bool vtkUltrasoundAlignmentSession::EndStroke()
       return;
     }
     const Internals::Painting painting = *std::exchange(parts.Brushing, std::nullopt);
-    parts.Session.AddStroke(painting.Id, painting.Drawn);
-    parts.Volumes.at(painting.Id).End(parts.Find(painting.Id)->strokes);
+    try {
+      parts.Session.AddStroke(painting.Id, painting.Drawn);
+      parts.Volumes.at(painting.Id).End(parts.Find(painting.Id)->strokes);
+    } catch (...) // no memory: what was painted goes, and the edit ends all the same
+    {
+      parts.Session.Cancel();
+      parts.Volumes.at(painting.Id).TakeBack();
+      throw;
+    }
     parts.Session.End();
   });
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::PrepareToPaint(int id)
+{
+  return this->Change([&]() {
+    if (!this->Parts->Find(id)) {
+      throw Error(Error::Kind::InvalidParameter, "there is no volume " + std::to_string(id));
+    }
+    this->Parts->Volumes.at(id).Prepare();
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentSession::LeaveOut(const std::string& path, std::vector<SessionVolume>& volumes,
+                                             const std::function<bool(const SessionVolume&)>& out)
+{
+  const auto end = std::stable_partition(volumes.begin(), volumes.end(), [&](const SessionVolume& each) { return !out(each); });
+  std::string names;
+  for (auto each = end; each != volumes.end(); ++each) {
+    names += (names.empty() ? "" : ", ") + each->name;
+  }
+  volumes.erase(end, volumes.end());
+  if (volumes.empty() && !names.empty()) {
+    throw Error(Error::Kind::BadInput, path + ": its volumes were in no file: " + names);
+  }
+  if (!names.empty()) {
+    vtkWarningMacro(<< path << ": it opens without what was in no file: " << names);
+  }
 }
 
 //----------------------------------------------------------------------------
@@ -988,13 +1168,19 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
       [&]() {
         const std::string name = TextOf(path);
         BackupStamp stamp;
+        const std::size_t text = Fingerprint(name);
         Project project = ReadProject(name, &stamp);
+        const bool isBackup = stamp.number > 0;
+        if (isBackup) {
+          this->LeaveOut(name, project.state.volumes, [](const SessionVolume& volume) { return volume.file.empty(); });
+        }
         std::vector<SessionVolume*> all;
         std::vector<std::string> files;
         for (SessionVolume& volume : project.state.volumes) {
           all.push_back(&volume);
         }
         parts.FindFiles(name, all);
+        CheckDistinct(name, project.state.volumes);
         for (const SessionVolume* volume : all) {
           files.push_back(volume->file);
         }
@@ -1006,12 +1192,26 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
           all[i]->geometry = found;
         }
 
-        const bool isBackup = stamp.number > 0;
-        parts.LeaveBackups(this->GetModifiedSinceSave());
-        parts.Session.Reset(project.state);
+        std::vector<SessionVoxels> held;
         for (std::size_t i = 0; i < images.size(); ++i) {
-          parts.Hold(parts.Session.State().volumes[i], images[i]);
+          held.emplace_back(*all[i], images[i]);
         }
+        parts.DropStroke();
+        parts.LeaveBackups();
+        parts.Session.Reset(project.state);
+        for (std::size_t i = 0; i < held.size(); ++i) {
+          const int id = parts.Session.State().volumes[i].id;
+          held[i].Known.id = id;
+          parts.Volumes.insert_or_assign(id, std::move(held[i]));
+        }
+        parts.BackedUpUnfinished = false;
+        parts.Unworked = isBackup ? SessionState() : parts.Session.State();
+        if (isBackup) {
+          const std::vector<std::string> abandoned = AbandonedFolders();
+          const std::string folder = fs::absolute(name).parent_path().lexically_normal().string();
+          parts.Recovered = std::count(abandoned.begin(), abandoned.end(), folder) > 0 ? folder : std::string();
+        }
+        parts.SavedText = text;
         parts.ProjectPath = isBackup ? std::string() : AbsolutePath(name);
         parts.Comment = project.comment;
         parts.TruthFile = project.truth;
@@ -1048,9 +1248,21 @@ bool vtkUltrasoundAlignmentSession::SaveProject(const char* path)
                         name + ": the volume " + volume.name + " is in no file; write it to one and add that instead");
           }
         }
+        parts.CheckIsNoVolume(name);
+        const std::size_t there = Fingerprint(name);
+        if (parts.ProjectPath == name && there != 0 && there != std::exchange(parts.SavedText, there)) {
+          throw Error(Error::Kind::NotPossible, name + ": somebody else has changed it since it was opened or saved here; "
+                                                       "save again to replace it, or save under another name");
+        }
         const Project project = parts.Now();
         WriteProject(name, project);
         parts.Saved = project;
+        parts.SavedText = Fingerprint(name);
+        parts.Unworked = parts.Session.State();
+        parts.Forgotten = false;
+        if (parts.Writer) {
+          parts.Writer->MarkSaved();
+        }
         if (parts.ProjectPath == name) {
           return;
         }
@@ -1058,8 +1270,14 @@ bool vtkUltrasoundAlignmentSession::SaveProject(const char* path)
         const std::string before = parts.Writer && parts.ProjectPath.empty() ? parts.Writer->Folder() : std::string();
         parts.Writer.reset();
         parts.ProjectPath = name;
-        if (!before.empty()) {
-          Backups::Move(before, Backups::FolderFor(name));
+        try {
+          parts.TakeOver(Backups::FolderFor(name));
+          if (!before.empty()) {
+            Backups::Move(before, Backups::FolderFor(name));
+          }
+        } catch (const std::exception& error) // the project is saved all the same
+        {
+          vtkWarningMacro("the earlier backups stay in " << before << ": " << error.what());
         }
       },
       "Save");
@@ -1071,8 +1289,12 @@ bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char* path, vtkStringA
   return this->Change([&]() {
     const std::string name = TextOf(path);
     files->Initialize();
-    for (const SessionVolume& volume : ReadProject(name).state.volumes) {
-      files->InsertNextValue(this->Parts->FindFile(name, volume.file));
+    BackupStamp stamp;
+    for (const SessionVolume& volume : ReadProject(name, &stamp).state.volumes) {
+      if (stamp.number == 0 || !volume.file.empty()) // a backup opens without those that were in no file
+      {
+        files->InsertNextValue(this->Parts->FindFile(name, volume.file));
+      }
     }
   });
 }
@@ -1146,6 +1368,7 @@ bool vtkUltrasoundAlignmentSession::WritePoses(const char* path)
       }
       poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
     }
+    this->Parts->CheckIsNoVolume(AbsolutePath(TextOf(path)));
     echorama::WritePoses(TextOf(path), poses);
   });
 }
@@ -1161,8 +1384,9 @@ void vtkUltrasoundAlignmentSession::BackUpInTheBackground(const std::string& lab
     parts.BackupTrouble.clear();
     trouble = parts.Writer->TakeFailure();
   } catch (const std::exception& error) {
-    if (parts.BackupTrouble != error.what()) {
-      trouble = parts.BackupTrouble = error.what();
+    if (std::exchange(parts.BackupTrouble, error.what()).empty()) // once: the folder's name may be another each time
+    {
+      trouble = parts.BackupTrouble;
     }
   }
   if (!trouble.empty()) {
@@ -1209,49 +1433,61 @@ bool vtkUltrasoundAlignmentSession::BackUp()
 int vtkUltrasoundAlignmentSession::GetBackups(vtkStringArray* paths, vtkStringArray* labels, vtkDoubleArray* times)
 {
   if (this->Parts->Writer) {
-    try {
-      this->Parts->Writer->Flush();
-    } catch (const Error&) // of which the next edit will tell; the earlier ones are listed
-    {
+    this->Parts->Writer->Wait();
+    const std::string trouble = this->Parts->Writer->TakeFailure();
+    if (!trouble.empty()) {
+      vtkErrorMacro("there is no new backup: " << trouble);
     }
   }
+  if (!this->Parts->ProjectPath.empty()) {
+    return Tell(Backups::ListFor(this->Parts->ProjectPath), paths, labels, times);
+  }
   return GetBackupsIn(this->GetBackupFolder().c_str(), paths, labels, times);
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundAlignmentSession::GetLaterBackup()
+{
+  Internals& parts = *this->Parts;
+  struct stat saved {};
+  if (parts.ProjectPath.empty() || stat(parts.ProjectPath.c_str(), &saved) != 0) {
+    return {};
+  }
+  if (parts.Writer) {
+    parts.Writer->Wait();
+  }
+  try {
+    if (const std::optional<Backup> newest = Backups::NewestFor(parts.ProjectPath, saved.st_mtime)) {
+      SessionState state = ReadProject(newest->path).state;
+      for (SessionVolume& volume : state.volumes) {
+        const std::string found = parts.FindFile(newest->path, volume.file);
+        volume.file = found.empty() ? volume.file : AbsolutePath(found);
+      }
+      return SameWork(parts.Session.State(), state) ? std::string() : newest->path;
+    }
+  } catch (const Error&) // it went meanwhile
+  {
+  }
+  return {};
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAlignmentSession::ForgetUnsavedWork()
+{
+  this->Parts->Forgotten = true;
 }
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentSession::GetBackupsIn(const char* folder, vtkStringArray* paths, vtkStringArray* labels,
                                                 vtkDoubleArray* times)
 {
-  const std::vector<Backup> backups = folder && *folder ? Backups::List(folder) : std::vector<Backup>();
-  for (vtkAbstractArray* array :
-       {static_cast<vtkAbstractArray*>(paths), static_cast<vtkAbstractArray*>(labels), static_cast<vtkAbstractArray*>(times)}) {
-    if (array) {
-      array->Initialize();
-    }
-  }
-  for (const Backup& backup : backups) {
-    if (paths) {
-      paths->InsertNextValue(backup.path);
-    }
-    if (labels) {
-      labels->InsertNextValue(backup.readable ? backup.label : Damaged);
-    }
-    if (times) {
-      times->InsertNextValue(static_cast<double>(backup.time));
-    }
-  }
-  return static_cast<int>(backups.size());
+  return Tell(folder && *folder ? Backups::List(folder) : std::vector<Backup>(), paths, labels, times);
 }
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentSession::GetAbandonedSessions(vtkStringArray* folders)
 {
-  std::vector<std::string> found;
-  try {
-    found = Backups::Abandoned();
-  } catch (const Error&) // no folder of the user, so nothing in it
-  {
-  }
+  const std::vector<std::string> found = AbandonedFolders();
   if (folders) {
     folders->Initialize();
     for (const std::string& folder : found) {
@@ -1275,32 +1511,58 @@ bool vtkUltrasoundAlignmentSession::RestoreBackup(const char* path)
     const std::string name = TextOf(path);
     BackupStamp stamp;
     Project project = ReadProject(name, &stamp);
-    const auto here = [&parts](const SessionVolume& volume) {
+    if (parts.Session.Editing()) {
+      throw Error(Error::Kind::NotPossible, "no backup can be restored during an edit");
+    }
+    std::set<int> taken;
+    const auto take = [&](SessionVolume& volume, const std::function<bool(const SessionVolume&)>& same) {
       int id = 0;
       for (const auto& [each, voxels] : parts.Volumes) {
-        const SessionVolume& known = voxels.Known;
-        const bool same = volume.file.empty() ? known.file.empty() && known.name == volume.name
-                                              : fs::path(known.file).filename() == fs::path(volume.file).filename();
-        if (same && known.geometry.AgreesWith(volume.geometry) && (id == 0 || parts.Find(each))) {
+        if (taken.count(each) == 0 && same(voxels.Known) && voxels.Known.geometry.AgreesWith(volume.geometry) &&
+            (id == 0 || parts.Find(each))) {
           id = each; // rather one that is to be seen than one that was removed
         }
       }
-      return id;
+      volume.id = id;
+      if (id > 0) {
+        taken.insert(id);
+        volume.file = parts.Volumes.at(id).Known.file;
+        volume.geometry = parts.Volumes.at(id).Known.geometry;
+      }
     };
+    std::vector<SessionVolume>& volumes = project.state.volumes;
+    for (SessionVolume& volume : volumes) {
+      take(volume, [&](const SessionVolume& known) {
+        return known.file == volume.file && (!volume.file.empty() || known.name == volume.name);
+      });
+    }
+    // The same name in another folder: only when the recorded file is gone and no other is meant.
+    const auto called = [](const SessionVolume& volume) { return fs::path(volume.file).filename().string(); };
+    std::map<std::string, std::set<std::string>> known, wanted;
+    for (const auto& [id, voxels] : parts.Volumes) {
+      known[called(voxels.Known)].insert(voxels.Known.file);
+    }
+    for (const SessionVolume& volume : volumes) {
+      wanted[called(volume)].insert(volume.file);
+    }
+    std::error_code error;
+    for (SessionVolume& volume : volumes) {
+      const std::string file = called(volume);
+      if (volume.id == 0 && !file.empty() && known[file].size() == 1 && wanted[file].size() == 1 &&
+          !fs::exists(volume.file, error)) {
+        take(volume, [&](const SessionVolume& each) { return called(each) == file; });
+      }
+    }
+    this->LeaveOut(name, volumes, [](const SessionVolume& volume) { return volume.id == 0 && volume.file.empty(); });
     std::vector<SessionVolume*> others;
     std::vector<std::string> files;
-    std::set<int> taken;
-    for (SessionVolume& volume : project.state.volumes) {
-      volume.id = here(volume);
-      if (volume.id > 0 && taken.insert(volume.id).second) {
-        volume.file = parts.Volumes.at(volume.id).Known.file;
-        volume.geometry = parts.Volumes.at(volume.id).Known.geometry;
-      } else {
-        volume.id = 0;
+    for (SessionVolume& volume : volumes) {
+      if (volume.id == 0) {
         others.push_back(&volume);
       }
     }
     parts.FindFiles(name, others);
+    CheckDistinct(name, volumes);
     for (const SessionVolume* volume : others) {
       files.push_back(volume->file);
     }
@@ -1334,12 +1596,20 @@ bool vtkUltrasoundAlignmentSession::ReadTruth(const char* path)
     if (!found) {
       throw Error(Error::Kind::BadInput, name + ": it names none of the volumes");
     }
-    parts.Score.Clear();
-    parts.TruthPoses = std::move(poses);
-    parts.TruthFile = AbsolutePath(name);
-    for (const SessionVolume& volume : parts.Session.State().volumes) {
-      parts.MatchTruth(volume);
+    const LiveScore score = parts.Score;
+    std::swap(parts.TruthPoses, poses);
+    try {
+      parts.Score.Clear();
+      for (const SessionVolume& volume : parts.Session.State().volumes) {
+        parts.MatchTruth(volume);
+      }
+    } catch (...) // no memory
+    {
+      parts.Score = score;
+      std::swap(parts.TruthPoses, poses);
+      throw;
     }
+    parts.TruthFile = AbsolutePath(name);
   });
   this->Modified();
   this->InvokeEvent(PosesChangedEvent, nullptr);

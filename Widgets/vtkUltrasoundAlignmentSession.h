@@ -69,6 +69,8 @@ public:
   vtkImageData* GetImage(int id) const;
   /** All (or the visible) volumes as blocks with NAME(): for filters. Voxels are shared. */
   void GetVolumes(vtkMultiBlockDataSet* blocks, bool onlyVisible = false) const;
+  /** The same for one volume: as it is now, whatever is painted later. For jobs beside the work. */
+  bool GetSnapshot(int id, vtkImageData* image) const;
   ///@}
 
   ///@{
@@ -141,13 +143,18 @@ public:
                    bool insideValid);
   bool ExtendStroke(double x, double y, double z);
   bool EndStroke();
+  /** Copies the voxels of a volume, which the first stroke on it would do otherwise: when a brush is taken in hand. */
+  bool PrepareToPaint(int id);
   ///@}
 
   ///@{
   /** Projects: JSON, paths relative where they can be (see Documentation/session.md). What cannot be read is named by the error
    * and nothing is opened. A pose file opens as well, as a project of its volumes; a backup opens as a session that was never
    * saved. \a volumes: read already (blocks with NAME() the file as GetProjectFiles tells), so that a window need not wait.
-   * Without, files are read side by side. Saving is atomic; volumes that are in no file cannot be saved. */
+   * Without, files are read side by side. A backup opens without its volumes that were in no file, with a warning that names
+   * them; the backups of an abandoned session become those of the session that opens one. Saving is atomic; volumes that are in
+   * no file cannot be saved. When somebody else has changed the project file since it was opened or saved here, saving is
+   * refused once; saving again replaces it. A file of one of the volumes is never replaced. */
   bool OpenProject(const char* path, vtkMultiBlockDataSet* volumes = nullptr);
   bool SaveProject(const char* path);
   /** The files a project needs, where they are now; an empty string for one that is nowhere. */
@@ -180,6 +187,12 @@ public:
   int GetBackups(vtkStringArray* paths, vtkStringArray* labels = nullptr, vtkDoubleArray* times = nullptr);
   static int GetBackupsIn(const char* folder, vtkStringArray* paths, vtkStringArray* labels = nullptr,
                           vtkDoubleArray* times = nullptr);
+  /** Of the project that is open: its newest readable backup, when that is later than the project file and differs from what is
+   * open. Empty: there is none. For a window that has opened a project: work that was not saved. */
+  std::string GetLaterBackup();
+  /** A person decided not to keep what was not saved: its backups go at the end of the session, or when it opens another project.
+   * A further edit takes this back. Without edits (volumes were opened, no more) an unsaved session leaves no backups anyway. */
+  void ForgetUnsavedWork();
   /** Restoring is an edit: it can be undone. Volumes that are here keep their ids, others are read. */
   bool RestoreBackup(const char* path);
   /** Folders of sessions that ended without being saved, and whose process is gone: the newest first. OpenProject opens the
@@ -225,6 +238,9 @@ private:
    * Returns whether it went well. */
   bool Change(const std::function<void()>& change, const std::string& label = {});
   void BackUpInTheBackground(const std::string& label, bool finished);
+  /** Takes volumes out, with a warning that names them. Throws when nothing is left. */
+  void LeaveOut(const std::string& path, std::vector<echorama::SessionVolume>& volumes,
+                const std::function<bool(const echorama::SessionVolume&)>& out);
   std::unique_ptr<Internals> Parts;
 #endif
 };

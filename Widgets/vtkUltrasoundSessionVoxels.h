@@ -48,7 +48,7 @@ public:
     if (chain == this->At) {
       return false;
     }
-    this->NeedEdits();
+    this->Prepare();
     const bool changed = this->Edits->GoTo(chain);
     this->At = chain;
     return this->Touched(changed);
@@ -59,10 +59,10 @@ public:
   void Begin(const Brush& brush)
   {
     brush.Check();
-    this->NeedEdits();
+    this->Prepare();
     this->Edits->Begin(brush);
   }
-  bool TakeBack() { return this->Touched(this->Edits->End(this->At)); }
+  bool TakeBack() { return this->Edits && this->Touched(this->Edits->End(this->At)); }
   bool Extend(const Eigen::Vector3d& point) { return this->Touched(this->Edits->Extend(point)); }
   bool End(const StrokeChain& chain)
   {
@@ -71,6 +71,14 @@ public:
     return this->Touched(changed);
   }
   ///@}
+
+  /** Copies the voxels ahead of the first stroke. */
+  void Prepare()
+  {
+    if (!this->Edits) {
+      this->MakeEdits();
+    }
+  }
 
   /** The image as it is, for somebody who keeps it: what is painted later does not reach it. */
   vtkSmartPointer<vtkImageData> Snapshot()
@@ -127,12 +135,11 @@ private:
     arrays->AddArray(valid);
   }
 
-  void NeedEdits()
+  void MakeEdits()
   {
-    if (this->Edits) {
-      return;
-    }
-    this->Intensity = CopyOf(vtkUltrasoundVolume::GetIntensity(this->Base));
+    vtkDataArray* given = vtkUltrasoundVolume::GetIntensity(this->Base);
+    this->Intensity = CopyOf(given);
+    const bool named = given->GetName() != nullptr;
     if (!this->Intensity->GetName()) {
       this->Intensity->SetName(vtkUltrasoundVolume::IntensityName());
     }
@@ -152,6 +159,11 @@ private:
       this->Edits = std::make_unique<EditsOf<T>>(voxels, vtkUltrasoundVolume::ViewOf<unsigned char>(this->Valid, this->Base),
                                                  this->Known.geometry);
     });
+    if (named && valid) // what was given serves as a snapshot until something is painted
+    {
+      this->KeptIntensity = given;
+      this->KeptValid = valid;
+    }
     SetArrays(this->Base, this->Intensity, this->Valid);
     SetArrays(this->Image, this->Intensity, this->Valid);
   }

@@ -335,6 +335,105 @@ class Session(unittest.TestCase):
         self.assertEqual(ids(session), [one, two])
         np.testing.assert_array_equal(voxels(session.GetImage(one)), original)
 
+    def test_a_brush_that_is_taken_in_hand(self):
+        session, given = self.session(), volume()
+        one = session.AddVolume(given, None, "one")
+        original, middle, told = voxels(given), placement(session, one)[0], []
+        session.AddObserver("AnyEvent", lambda _, event: told.append(event) if "User" in event else None)
+        self.assertTrue(session.PrepareToPaint(one))
+        array = session.GetImage(one).GetPointData().GetArray("Intensity")
+        self.assertIsNot(array, given.GetPointData().GetArray("Intensity"), "it has its own voxels")
+        self.assertEqual((told, session.GetUndoCount()), ([], 1))
+        before, after = vtkImageData(), vtkImageData()
+        self.assertTrue(session.GetSnapshot(one, before))
+        session.BeginStroke(one, "paint", 2.0, 255, 1.0, 1.0, False)
+        session.ExtendStroke(*middle)
+        session.EndStroke()
+        self.assertIs(session.GetImage(one).GetPointData().GetArray("Intensity"), array, "nothing was left to copy")
+        self.assertTrue(session.GetSnapshot(one, after))
+        painted = voxels(session.GetImage(one))
+        self.assertTrue((painted != original).any())
+        session.Undo()
+        np.testing.assert_array_equal(voxels(before), original)
+        np.testing.assert_array_equal(voxels(after), painted)
+        self.assertFalse(session.GetSnapshot(9, after) or session.GetSnapshot(one, None))
+        self.refuses(session, "no volume 9", session.PrepareToPaint, 9)
+
+    def test_five_hundred_operations_and_back(self):
+        random = np.random.default_rng(17)
+        session = self.session()
+        for i, dtype in enumerate((np.uint8, np.int16, np.float32)):
+            session.AddVolume(volume(i, (3 + 4 * i, -7, 11), dtype, valid=i != 1), None)
+        session.SelectAll()
+        start = session.GetUndoCount()
+
+        def everything():
+            found = {}
+            for i in ids(session):
+                image, colour = session.GetImage(i), [0.0] * 3
+                session.GetColour(i, colour)
+                direction = image.GetDirectionMatrix()
+                found[i] = (session.GetName(i), colour, session.GetOpacity(i), session.GetVisible(i), session.GetGroup(i),
+                            pose(session, i).tobytes(), image.GetOrigin(), image.GetSpacing(), image.GetDimensions(),
+                            [direction.GetData()[k] for k in range(9)], voxels(image).tobytes())
+            return found
+
+        def valid():
+            found = {}
+            for i in ids(session):
+                array = session.GetImage(i).GetPointData().GetArray("ValidRegion")
+                found[i] = vtk_to_numpy(array).tobytes() if array else bytes([1]) * session.GetImage(i).GetNumberOfPoints()
+            return found
+
+        def stroke():
+            i = int(random.choice(ids(session)))
+            session.BeginStroke(i, str(random.choice(["paint", "carve", "restore"])), random.uniform(0.5, 3), random.uniform(0, 255),
+                                random.uniform(), random.uniform(), bool(random.integers(2)))
+            for _ in range(random.integers(0, 4)):
+                session.ExtendStroke(*(placement(session, i)[0] + random.uniform(-4, 4, 3)))
+            session.CancelEdit() if random.integers(8) == 0 else session.EndStroke()
+
+        def select():
+            session.Select(int(random.choice(ids(session))), bool(random.integers(2)), bool(random.integers(2)))
+
+        def remove():
+            if session.GetNumberOfVolumes() > 1:
+                session.RemoveVolume(int(random.choice(ids(session))))
+
+        def group():
+            session.GroupSelection() if session.GetNumberOfSelected() > 1 else session.UngroupSelection()
+
+        def drag():
+            session.BeginEdit("drag")
+            for _ in range(3):
+                session.TranslateSelection(*random.uniform(-2, 2, 3))
+                session.RotateSelection(*random.uniform(-9, 9, 3))
+            session.CancelEdit() if random.integers(4) == 0 else session.EndEdit()
+
+        operations = [stroke, stroke, stroke, select, drag, group, session.InvertSelection, session.Undo, session.Redo,
+                      lambda: session.TranslateSelection(*random.uniform(-5, 5, 3)),
+                      lambda: session.SetOpacity(int(random.choice(ids(session))), random.uniform()),
+                      lambda: session.SetVisible(int(random.choice(ids(session))), bool(random.integers(2)))]
+        begun, begunValid = everything(), valid()
+        for step in range(500):
+            if step % 60 == 30:
+                remove()
+            else:
+                while session.GetUndoCount() > start and random.integers(40) == 0:
+                    session.Undo()
+                operation = operations[random.integers(len(operations))]
+                if operation != session.Undo or session.GetUndoCount() > start:
+                    operation()
+        self.assertEqual(self.errors, [])
+        end, endValid, entries = everything(), valid(), session.GetUndoCount() - start
+        self.assertGreater(entries, 50)
+        for _ in range(entries):
+            self.assertTrue(session.Undo())
+        self.assertTrue(everything() == begun and valid() == begunValid, "the start, to the bit")
+        for _ in range(entries):
+            self.assertTrue(session.Redo())
+        self.assertTrue(everything() == end and valid() == endValid, "and the end again")
+
     # ----------------------------------------------------------------------------------------------------------- projects
 
     def test_a_project_comes_back_to_the_last_bit_also_elsewhere(self):
@@ -557,9 +656,16 @@ class Session(unittest.TestCase):
         handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (500, limits[1]))
         session.SetOpacity(session.GetVolumeId(0), 0.5)
+        seen = len(backups(session))
+        for step in range(3): # all of it is one trouble
+            time.sleep(1.1 if step == 1 else 0)
+            session.SetOpacity(session.GetVolumeId(0), 0.1 * step)
+            backups(session)
+        told = list(self.errors)
         written = session.BackUp()
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
+        self.assertEqual((seen, len(told)), (len(before), 1), told)
         self.assertFalse(written)
         self.assertTrue(any("cannot be written" in error for error in self.errors), self.errors)
         self.assertEqual(backups(session), before)
@@ -590,8 +696,8 @@ for step in range(1, 100000):
         folders = vtkStringArray()
         self.assertEqual(vtkUltrasoundAlignmentSession.GetAbandonedSessions(folders), 0, "it is alive")
         child.send_signal(signal.SIGKILL)
-        killed = time.time()
         child.wait()
+        steps += [(int(number), float(when)) for number, when in (line.split() for line in child.stdout if line.endswith("\n"))]
         child.stdout.close()
 
         self.assertEqual(vtkUltrasoundAlignmentSession.GetAbandonedSessions(folders), 1)
@@ -603,11 +709,264 @@ for step in range(1, 100000):
         self.assertTrue(session.GetModifiedSinceSave(), "it was never saved")
         self.assertEqual(session.GetProjectPath(), "")
         done = round(pose(session, session.GetVolumeId(0))[0, 3] / 0.25)
-        lost = killed - next(when for number, when in steps + [(done, killed)] if number >= done)
+        lost = steps[-1][1] - next((when for number, when in steps if number >= done), steps[-1][1])
         print(f"killed after {len(steps)} steps; {done} are there; lost {lost:.2f} s")
-        self.assertLess(lost, 2.5) # 0.85 s and what a busy machine adds
+        self.assertLessEqual(lost, 1.0)
         self.assertTrue(session.DiscardBackups(folders.GetValue(0)))
         self.assertEqual(vtkUltrasoundAlignmentSession.GetAbandonedSessions(folders), 0)
+
+    def run_and_kill(self, script):
+        """Another process does it with \c session and \c folder, and is killed."""
+        child = subprocess.Popen([sys.executable, "-c", f"""
+import os, signal
+from echorama import vtkUltrasoundAlignmentSession
+folder, session = {str(self.folder)!r}, vtkUltrasoundAlignmentSession()
+session.SetAutomaticBackups(True)
+{script}
+session.GetBackups(None) # waits for the disk
+os.kill(os.getpid(), signal.SIGKILL)
+"""])
+        self.assertEqual(child.wait(), -signal.SIGKILL)
+
+    def test_work_on_a_saved_project_survives_a_kill_and_is_offered(self):
+        project = str(self.folder / "p.json")
+        self.opened().SaveProject(project)
+        fresh = self.session()
+        fresh.SetAutomaticBackups(True)
+        self.assertTrue(fresh.OpenProject(project))
+        self.assertEqual((backups(fresh), fresh.GetLaterBackup()), ([], ""), "nothing was done")
+        del fresh
+        self.run_and_kill("""
+session.OpenProject(folder + "/p.json")
+session.SelectAll()
+session.TranslateSelection(3, 0, 0)
+""")
+        for _ in range(2): # looking does not hide it
+            session = self.session()
+            session.SetAutomaticBackups(True)
+            self.assertTrue(session.OpenProject(project))
+            later = session.GetLaterBackup()
+            self.assertEqual([path for path, _, _ in backups(session)], [later])
+        self.assertTrue(session.RestoreBackup(later), self.errors)
+        self.assertEqual(pose(session, session.GetVolumeId(1))[0, 3], 3)
+        self.assertEqual(session.GetLaterBackup(), "", "it is here now")
+        self.assertTrue(session.SaveProject(project))
+        self.assertEqual(session.GetLaterBackup(), "")
+        del session
+
+        # Work that a person did not want is not offered, what was saved before stays.
+        session = self.session()
+        session.SetAutomaticBackups(True)
+        session.OpenProject(project)
+        count = len(backups(session))
+        session.SelectAll()
+        session.TranslateSelection(5, 0, 0)
+        session.ForgetUnsavedWork()
+        del session
+        session = self.session()
+        session.OpenProject(project)
+        self.assertEqual((session.GetLaterBackup(), len(backups(session))), ("", count))
+        session.SetAutomaticBackups(True)
+        session.SelectAll()
+        session.TranslateSelection(5, 0, 0)
+        session.ForgetUnsavedWork()
+        session.TranslateSelection(1, 0, 0) # the person went on
+        del session
+        session = self.session()
+        session.OpenProject(project)
+        self.assertNotEqual(session.GetLaterBackup(), "")
+
+    def test_what_is_kept_of_a_session_that_was_never_saved(self):
+        def left():
+            folders = vtkStringArray()
+            return [folders.GetValue(i) for i in range(vtkUltrasoundAlignmentSession.GetAbandonedSessions(folders))]
+
+        paths = self.files(2)
+
+        def begun():
+            session = self.session()
+            session.SetAutomaticBackups(True)
+            for path in paths:
+                session.OpenVolume(str(path))
+            session.SelectAll()
+            return session
+
+        session = begun()
+        self.assertEqual(len(backups(session)), 2)
+        del session
+        self.assertEqual(left(), [], "volumes were opened, and no more")
+        session = begun()
+        session.TranslateSelection(1, 0, 0)
+        session.ForgetUnsavedWork()
+        del session
+        self.assertEqual(left(), [])
+        session = begun()
+        session.TranslateSelection(1, 0, 0)
+        del session
+        self.assertEqual(len(left()), 1)
+
+        # Who opens it takes it over, history and all, and it is offered no more.
+        old = left()[0]
+        session = self.session()
+        session.SetAutomaticBackups(True)
+        newest = vtkStringArray()
+        vtkUltrasoundAlignmentSession.GetBackupsIn(old, newest)
+        self.assertTrue(session.OpenProject(newest.GetValue(0)), self.errors)
+        self.assertEqual(left(), [])
+        self.assertFalse(os.path.exists(old))
+        self.assertEqual([label for _, label, _ in backups(session)], ["Open", "Move 2 volumes", "Add v1", "Add v0"])
+        del session
+        self.assertEqual(len(left()), 1, "it is still not saved")
+        session = self.session()
+        vtkUltrasoundAlignmentSession.GetBackupsIn(left()[0], newest)
+        session.OpenProject(newest.GetValue(0))
+        self.assertTrue(session.SaveProject(str(self.folder / "p.json")), self.errors)
+        self.assertEqual(left(), [])
+        self.assertEqual(len(backups(session)), 4)
+        for path, _, _ in backups(session): # names count from the new folder
+            self.assertEqual(json.loads(pathlib.Path(path).read_text())["volumes"][0]["file"], "../v0.mha")
+
+    def test_a_project_is_opened_during_a_stroke(self):
+        session = self.opened()
+        project = str(self.folder / "p.json")
+        session.SaveProject(project)
+        self.assertTrue(session.BackUp())
+        one = session.GetVolumeId(0)
+        original = voxels(session.GetImage(one))
+        for automatic in (False, True):
+            session.SetAutomaticBackups(automatic)
+            for path in (project, backups(session)[0][0]):
+                one = session.GetVolumeId(0)
+                middle = placement(session, one)[0]
+                self.assertTrue(session.BeginStroke(one, "paint", 2.0, 255, 1.0, 1.0, False))
+                self.assertTrue(session.ExtendStroke(*middle))
+                self.refuses(session, "during an edit", session.RestoreBackup, path)
+                self.assertTrue(session.OpenProject(path), self.errors)
+                self.refuses(session, "no stroke", session.ExtendStroke, *middle)
+                np.testing.assert_array_equal(voxels(session.GetImage(session.GetVolumeId(0))), original)
+                session.BeginStroke(session.GetVolumeId(0), "paint", 2.0, 255, 1.0, 1.0, False)
+                session.CancelEdit()
+                self.assertTrue(session.OpenProject(project), self.errors)
+
+    def test_restored_volumes_are_the_very_ones(self):
+        places = [self.folder / name for name in ("one", "two", "three")]
+        for i, place in enumerate(places):
+            place.mkdir()
+            write(volume(i), place / "scan.mha") # one name, one geometry
+        session = self.session()
+        for place in places[:2]:
+            session.OpenVolume(str(place / "scan.mha"))
+        one, two = ids(session)
+        session.SetVolumeToWorld(two, shift(2))
+        self.assertTrue(session.BackUp())
+        backup = backups(session)[0][0]
+        swapped = self.session()
+        for place in (places[1], places[0]):
+            swapped.OpenVolume(str(place / "scan.mha"))
+        self.assertTrue(swapped.RestoreBackup(backup), self.errors)
+        self.assertEqual([swapped.GetFile(i) for i in ids(swapped)], [str(place / "scan.mha") for place in places[:2]])
+        np.testing.assert_array_equal(voxels(swapped.GetImage(ids(swapped)[0])), voxels(volume(0)))
+        self.assertEqual(pose(swapped, ids(swapped)[1])[0, 3], 2)
+        # Another file of the name is not taken for one that is there.
+        other = self.session()
+        other.OpenVolume(str(places[2] / "scan.mha"))
+        self.assertTrue(other.RestoreBackup(backup), self.errors)
+        self.assertEqual([other.GetFile(i) for i in ids(other)], [str(place / "scan.mha") for place in places[:2]])
+        # Two that are gone are not one and the same.
+        session.SaveProject(str(self.folder / "p.json"))
+        backup = backups(session)[0][0]
+        for place in places[:2]:
+            (place / "scan.mha").unlink()
+        third = self.session()
+        third.AddSearchFolder(str(places[2]))
+        self.refuses(third, ("two of its volumes", "scan.mha"), third.OpenProject, str(self.folder / "p.json"))
+        third.OpenVolume(str(places[2] / "scan.mha"))
+        self.refuses(third, ("two of its volumes", "scan.mha"), third.RestoreBackup, backup)
+
+    def test_a_backup_with_a_volume_that_was_in_no_file(self):
+        session = self.opened(1)
+        session.AddVolume(volume(4), None, "of a pipeline")
+        session.BackUp()
+        backup = backups(session)[0][0]
+        warnings = []
+        other = self.session()
+
+        def listen(_, __, text):
+            warnings.append(text)
+
+        listen.CallDataType = "string0"
+        other.AddObserver("WarningEvent", listen)
+        files = vtkStringArray()
+        other.GetProjectFiles(backup, files)
+        self.assertEqual(files.GetNumberOfValues(), 1)
+        for call in (other.OpenProject, other.RestoreBackup):
+            self.assertTrue(call(backup), self.errors)
+            self.assertEqual([other.GetName(i) for i in ids(other)], ["v0"])
+            self.assertIn("of a pipeline", warnings.pop())
+        self.assertTrue(session.RestoreBackup(backup), "where it still is, it stays")
+        self.assertEqual(session.GetNumberOfVolumes(), 2)
+
+    def test_a_project_whose_folder_cannot_be_written(self):
+        session = self.opened()
+        session.SaveProject(str(self.folder / "p.json"))
+        (self.folder / "p.backups").write_text("in the way, as a folder on a read-only disk")
+        session.SelectAll()
+        session.SetAutomaticBackups(True)
+        session.TranslateSelection(1, 0, 0)
+        self.assertEqual((len(backups(session)), self.errors), (1, []))
+        self.assertIn(str(self.folder / "data" / "echorama" / "projects"), session.GetBackupFolder())
+        del session
+        again = self.session()
+        again.OpenProject(str(self.folder / "p.json"))
+        self.assertEqual([again.GetLaterBackup()], [path for path, _, _ in backups(again)])
+        self.assertTrue(again.RestoreBackup(again.GetLaterBackup()), self.errors)
+        self.assertEqual(pose(again, ids(again)[0])[0, 3], 1)
+
+    def test_a_project_that_somebody_else_saves(self):
+        project = self.folder / "p.json"
+        session = self.opened()
+        session.SaveProject(str(project))
+        other = self.session()
+        other.OpenProject(str(project))
+        other.SelectAll()
+        other.TranslateSelection(1, 0, 0)
+        other.SaveProject(str(project))
+        theirs = project.read_text()
+        session.SelectAll()
+        session.TranslateSelection(0, 2, 0)
+        self.refuses(session, ("p.json", "changed"), session.SaveProject, str(project))
+        self.assertEqual(project.read_text(), theirs)
+        self.assertTrue(session.SaveProject(str(project)), "who insists may")
+        self.assertTrue(session.SaveProject(str(project)))
+
+    def test_a_volume_is_not_replaced_by_a_project(self):
+        session = self.opened()
+        write_protected = self.folder / "v0.mha"
+        before = write_protected.read_bytes()
+        os.symlink(write_protected, self.folder / "link.json")
+        for path in (write_protected, self.folder / "link.json"):
+            self.refuses(session, ("v0.mha", "stays"), session.SaveProject, str(path))
+            self.refuses(session, ("v0.mha", "stays"), session.WritePoses, str(path))
+        self.assertEqual(write_protected.read_bytes(), before)
+
+    def test_names_count_from_where_a_linked_folder_really_is(self):
+        session = self.opened()
+        deep = self.folder / "a" / "b" / "c"
+        deep.mkdir(parents=True)
+        session.SaveProject(str(deep / "p.json"))
+        session.WritePoses(str(deep / "poses.json"))
+        data = json.loads((deep / "p.json").read_text())
+        for each in data["volumes"]:
+            each["path"] = ""
+        (deep / "p.json").write_text(json.dumps(data))
+        os.symlink(deep, self.folder / "link")
+        for name in ("p.json", "poses.json"):
+            again = self.session()
+            self.assertTrue(again.OpenProject(str(self.folder / "link" / name)), self.errors)
+        again.SelectAll()
+        again.TranslateSelection(1, 0, 0)
+        self.assertTrue(again.ReadPoses(str(self.folder / "link" / "poses.json")), self.errors)
+        self.assertEqual(pose(again, ids(again)[0])[0, 3], 0)
 
     def test_who_ends_well_leaves_nothing_behind(self):
         session = self.opened()
