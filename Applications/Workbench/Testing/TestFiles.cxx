@@ -2,6 +2,8 @@
 // Where keys go after real clicks; and opening, leaving and coming back to work. No test here gives the focus to anything by
 // itself.
 #include "FileActions.h"
+#include "Job.h"
+#include "JobBar.h"
 #include "SliceCanvas.h"
 #include "Theme.h"
 #include "VolumePane.h"
@@ -19,6 +21,7 @@
 #include <QSurfaceFormat>
 #include <QTableView>
 #include <QTemporaryDir>
+#include <QThread>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
 
@@ -36,6 +39,11 @@ private slots:
   void theWheelChangesNoFieldInPassing();
   void spacePressesTheButtonOfTheFocus();
   void returnAnswers();
+  void everyFileThatCannotBeReadIsNamed();
+  void posesComeAfterTheirVolumes();
+  void volumesComeAfterTheirProject();
+  void anyEditIsWork();
+  void closingWaitsForWorkThatRuns();
 
 private:
   QDir Folder() const { return QDir(folder_->path()); }
@@ -180,6 +188,99 @@ void TestFiles::returnAnswers()
   QCOMPARE(answers, 2);
   QVERIFY(window.Messages().isEmpty());
   QVERIFY(std::abs(ArrowMoves(window, 2) - 1.0) < 1e-9);
+}
+
+void TestFiles::everyFileThatCannotBeReadIsNamed()
+{
+  QStringList files;
+  for (int i = 0; i < 8; i++)
+    files.append(Folder().filePath(QString("missing%1.mha").arg(i)));
+  WindowUnderTest window;
+  QVERIFY(window.Open(files + QStringList(A())));
+  QCOMPARE(window.Session()->GetNumberOfVolumes(), 1);
+  for (int i = 0; i < 8; i++)
+    QVERIFY(window.HasMessage(QString("missing%1.mha").arg(i)));
+  window.Screenshot("eight-missing");
+}
+
+void TestFiles::posesComeAfterTheirVolumes()
+{
+  const QString poses = Folder().filePath("poses.json");
+  std::array<double, 16> pose{};
+  {
+    WindowUnderTest window;
+    QVERIFY(window.Open({A(), B()}));
+    window.Session()->SetPlacement(2, 10, -3, 5, 10, 20, 30);
+    QVERIFY(window.Session()->WritePoses(poses.toUtf8().constData()));
+    pose = window.Pose(2);
+  }
+  WindowUnderTest window;
+  window.Drop({poses, A(), B()});
+  QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+  window.Settle();
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+  for (std::size_t i = 0; i < pose.size(); i++)
+    QVERIFY(std::abs(window.Pose(2)[i] - pose[i]) < 1e-9);
+}
+
+void TestFiles::volumesComeAfterTheirProject()
+{
+  const QString project = Folder().filePath("pair.json");
+  {
+    WindowUnderTest window;
+    QVERIFY(window.Open({A(), B()}));
+    QVERIFY(window.Window().Files()->SaveTo(project));
+  }
+  const QString third = WriteVolume(Folder(), "third.mha", 3, {0, 9, 4});
+  WindowUnderTest window;
+  window.Drop({third, project});
+  QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 3);
+  QCOMPARE(window.Session()->GetProjectPath(), project.toStdString());
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+}
+
+void TestFiles::anyEditIsWork()
+{
+  using Edit = std::function<bool(vtkUltrasoundAlignmentSession*)>;
+  const Edit edits[] = {[](auto* session) { return session->SetName(1, "liver"); },
+                        [](auto* session) { return session->SetColour(1, 0.1, 0.2, 0.3); },
+                        [](auto* session) { return session->SetOpacity(1, 0.5); },
+                        [](auto* session) { return session->SetVisible(1, false); },
+                        [](auto* session) { return session->RemoveVolume(1); }};
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  for (const Edit& edit : edits) {
+    QVERIFY(!window.Window().Files()->HasUnsavedWork());
+    QVERIFY(edit(window.Session()));
+    QVERIFY(window.Window().Files()->HasUnsavedWork());
+    QVERIFY(window.Session()->Undo());
+  }
+}
+
+void TestFiles::closingWaitsForWorkThatRuns()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A()}));
+  const auto start = [&window] {
+    window.Window().Jobs()->Watch(Job::Start(
+        &window.Window(), "Something long",
+        [](const Progress& progress) {
+          for (int i = 0; i < 3000; i++) {
+            progress(0.5);
+            QThread::msleep(10);
+          }
+        },
+        [] {}, [](const QString&) {}));
+  };
+  start();
+  window.Window().close();
+  QVERIFY(window.Window().isVisible() && window.HasMessage("Something long is still running"));
+  window.Screenshot("closing-while-running");
+  QVERIFY(window.Answer("Stay"));
+  QVERIFY(window.Window().isVisible() && window.Messages().isEmpty());
+  window.Window().close();
+  QVERIFY(window.Answer("Stop it and close"));
+  QTRY_VERIFY(!window.Window().isVisible());
 }
 
 int main(int argc, char** argv)
