@@ -13,7 +13,6 @@
 #include <QMenu>
 #include <QSettings>
 #include <vtkCompositeDataSet.h>
-#include <vtkDoubleArray.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkMultiBlockDataSet.h>
@@ -240,30 +239,23 @@ void FileActions::TakeProject(const QString& path, const QString& saveAs, const 
   opened_ = {};
   emit Opened();
   if (!saveAs.isEmpty())
-    OfferNewerBackup(saveAs);
+    OfferLaterBackup();
   else if (session->BackUp()) // what was left is now this session's: it is not offered twice
     session->DiscardBackups(QFileInfo(path).absolutePath().toUtf8().constData());
   if (then)
     then();
 }
 
-// After a crash the newest backup beside the project is younger than the project.
-void FileActions::OfferNewerBackup(const QString& path)
+// After a crash the newest backup of the project is later than the project, and says something else.
+void FileActions::OfferLaterBackup()
 {
-  vtkNew<vtkStringArray> paths, labels;
-  vtkNew<vtkDoubleArray> times;
-  const int count = bench_->Session()->GetBackups(paths, labels, times);
-  for (int i = 0; i < count; i++) {
-    if (labels->GetValue(i) == "damaged")
-      continue;
-    const QString backup = QString::fromStdString(paths->GetValue(i));
-    const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
-    if (time > QFileInfo(path).lastModified().addSecs(1))
-      bench_->Ask(tr("There is later work on this project, of %1, that was not saved.").arg(time.toString("yyyy-MM-dd hh:mm:ss")),
-                  {{tr("Go on with it"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},
-                   {tr("Leave it"), {}}});
+  const QString backup = QString::fromStdString(bench_->Session()->GetLaterBackup());
+  if (backup.isEmpty())
     return;
-  }
+  bench_->Ask(tr("There is later work on this project, of %1, that was not saved.")
+                  .arg(QFileInfo(backup).lastModified().toString("yyyy-MM-dd hh:mm:ss")),
+              {{tr("Go on with it"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},
+               {tr("Leave it"), {}}});
 }
 
 bool FileActions::Save()
@@ -305,7 +297,11 @@ void FileActions::WhenSaved(const QString& question, const std::function<void()>
                             afterSave_ = then;
                             Save();
                           }},
-                         {tr("Do not save"), then},
+                         {tr("Do not save"),
+                          [this, then] {
+                            bench_->Session()->ForgetUnsavedWork();
+                            then();
+                          }},
                          {tr("Cancel"), {}}});
 }
 

@@ -58,7 +58,7 @@ private:
   void ReadProject(const QString& path, const QString& saveAs, const std::function<void()>& then);
   void TakeProject(const QString& path, const QString& saveAs, const std::vector<ReadVolume>& volumes,
                    const std::function<void()>& then);
-  void OfferNewerBackup(const QString& path);
+  void OfferLaterBackup();
   void AskOpen(const QString& title, const QString& filter, bool several);
   void AskSave(const QString& title, const QString& filter, const QString& name, const std::function<void(const QString&)>& save);
   void ShowHistory();

@@ -3,7 +3,7 @@
 #include "FileActions.h"
 #include "Workbench.h"
 #include <QDateTime>
-#include <string>
+#include <QStringList>
 #include <vtkDoubleArray.h>
 #include <vtkNew.h>
 #include <vtkStringArray.h>
@@ -12,37 +12,54 @@ namespace echorama {
 
 namespace {
 
-// Asks about the newest backup of a folder that can be read; false when there is none.
-bool Offer(Workbench* bench, FileActions* files, const std::string& folder)
+QString TimeOf(double seconds)
+{
+  return QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * seconds)).toString("yyyy-MM-dd hh:mm:ss");
+}
+
+// Asks about the first of some sessions that has a backup which can be read; the others come after it.
+void Offer(Workbench* bench, FileActions* files, QStringList folders)
 {
   vtkNew<vtkStringArray> paths, labels;
   vtkNew<vtkDoubleArray> times;
-  const int count = vtkUltrasoundAlignmentSession::GetBackupsIn(folder.c_str(), paths, labels, times);
-  for (int i = 0; i < count; i++) {
-    const QString path = QString::fromStdString(paths->GetValue(i)), label = QString::fromStdString(labels->GetValue(i));
-    if (label == "damaged")
+  while (!folders.isEmpty()) {
+    const QString folder = folders.takeFirst();
+    const int count = vtkUltrasoundAlignmentSession::GetBackupsIn(folder.toUtf8().constData(), paths, labels, times);
+    int newest = 0;
+    while (newest < count && labels->GetValue(newest) == "damaged")
+      newest++;
+    if (newest == count)
       continue;
-    const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * times->GetValue(i)));
-    bench->Ask(
-        QObject::tr("A session ended at %1 without being saved%2.")
-            .arg(time.toString("yyyy-MM-dd hh:mm:ss"), label.isEmpty() ? QString() : QObject::tr(" (last: %1)").arg(label)),
-        {{QObject::tr("Open it"), [files, path] { files->OpenAbandoned(path); }},
-         {QObject::tr("Later"), {}},
-         {QObject::tr("Delete it"), [bench, folder] { bench->Session()->DiscardBackups(folder.c_str()); }}});
-    return true;
+    const QString path = QString::fromStdString(paths->GetValue(newest)),
+                  label = QString::fromStdString(labels->GetValue(newest));
+    QString text = QObject::tr("A session ended at %1 without being saved%2.")
+                       .arg(TimeOf(times->GetValue(newest)), label.isEmpty() ? QString() : QObject::tr(" (last: %1)").arg(label));
+    const auto next = [bench, files, folders] { Offer(bench, files, folders); };
+    QVector<Message::Answer> answers{{QObject::tr("Open it"), [files, path] { files->OpenAbandoned(path); }},
+                                     {QObject::tr("Later"), {}},
+                                     {QObject::tr("Delete it"), [bench, folder, next] {
+                                        bench->Session()->DiscardBackups(folder.toUtf8().constData());
+                                        next();
+                                      }}};
+    if (!folders.isEmpty()) {
+      text += QObject::tr(" Earlier ones: %1.").arg(folders.size());
+      answers.insert(1, {QObject::tr("Show the one before"), next});
+    }
+    bench->Ask(text, answers);
+    return;
   }
-  return false;
 }
 
 } // namespace
 
 void OfferAbandoned(Workbench* bench, FileActions* files)
 {
-  vtkNew<vtkStringArray> folders;
-  const int count = vtkUltrasoundAlignmentSession::GetAbandonedSessions(folders);
+  vtkNew<vtkStringArray> found;
+  const int count = vtkUltrasoundAlignmentSession::GetAbandonedSessions(found);
+  QStringList folders;
   for (int i = 0; i < count; i++)
-    if (Offer(bench, files, folders->GetValue(i)))
-      return;
+    folders.append(QString::fromStdString(found->GetValue(i)));
+  Offer(bench, files, folders);
 }
 
 } // namespace echorama

@@ -6,7 +6,7 @@ namespace echorama {
 class FileActions;
 class Workbench;
 
-/// Offers the newest session that ended without being saved (a crash, a power cut), if there is one.
+/// Offers the sessions that ended without being saved (a crash, a power cut), the newest first, one at a time.
 void OfferAbandoned(Workbench* bench, FileActions* files);
 
 } // namespace echorama

@@ -44,6 +44,9 @@ private slots:
   void volumesComeAfterTheirProject();
   void anyEditIsWork();
   void closingWaitsForWorkThatRuns();
+  void laterWorkOnAProjectIsOffered();
+  void whatWasNotSavedOnPurposeIsNotOffered();
+  void severalSessionsAreOffered();
 
 private:
   QDir Folder() const { return QDir(folder_->path()); }
@@ -281,6 +284,78 @@ void TestFiles::closingWaitsForWorkThatRuns()
   window.Window().close();
   QVERIFY(window.Answer("Stop it and close"));
   QTRY_VERIFY(!window.Window().isVisible());
+}
+
+void TestFiles::laterWorkOnAProjectIsOffered()
+{
+  const QString project = Folder().filePath("pair.json");
+  std::array<double, 16> moved{};
+  {
+    WindowUnderTest window;
+    QVERIFY(window.Open({A(), B()}));
+    QVERIFY(window.Window().Files()->SaveTo(project));
+  }
+  {
+    WindowUnderTest window;
+    window.Window().Start(project, {});
+    QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+    window.Settle();
+    QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n'))); // there is none
+    QTest::qWait(1100);                                                              // times of files are whole seconds
+    window.Session()->SetPlacement(window.Session()->GetVolumeId(1), 10, -3, 5, 10, 20, 30);
+    QVERIFY(window.Session()->BackUp());
+    moved = window.Pose(window.Session()->GetVolumeId(1));
+  } // it ends without being asked, as in a crash
+  WindowUnderTest window;
+  window.Window().Start(project, {});
+  QTRY_VERIFY(window.HasMessage("later work on this project"));
+  QVERIFY(window.Answer("Go on with it"));
+  QTRY_COMPARE(window.Pose(window.Session()->GetVolumeId(1)), moved);
+}
+
+void TestFiles::whatWasNotSavedOnPurposeIsNotOffered()
+{
+  {
+    WindowUnderTest window;
+    window.Window().Start({}, {A(), B()}); // only looked at
+    QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+    window.Window().close();
+    QVERIFY(!window.Window().isVisible());
+  }
+  {
+    WindowUnderTest window;
+    window.Window().Start({}, {A(), B()});
+    QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+    QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+    window.Session()->TranslateSelection(5, 0, 0);
+    QVERIFY(window.Session()->BackUp());
+    window.Window().close();
+    QVERIFY(window.Answer("Do not save"));
+    QTRY_VERIFY(!window.Window().isVisible());
+  }
+  WindowUnderTest window;
+  window.Window().Start({}, {});
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+}
+
+void TestFiles::severalSessionsAreOffered()
+{
+  for (int i = 0; i < 2; i++) {
+    WindowUnderTest window;
+    window.Window().Start({}, {A(), B()});
+    QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+    window.Session()->TranslateSelection(5, 0, 0);
+    QVERIFY(window.Session()->BackUp());
+  }
+  WindowUnderTest window;
+  window.Window().Start({}, {});
+  QVERIFY(window.HasMessage("Earlier ones: 1"));
+  window.Screenshot("abandoned");
+  QVERIFY(window.Answer("Delete it"));
+  QVERIFY(window.HasMessage("without being saved") && !window.HasMessage("Earlier ones"));
+  QVERIFY(window.Answer("Open it"));
+  QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+  QVERIFY(window.Window().Files()->HasUnsavedWork());
 }
 
 int main(int argc, char** argv)
