@@ -41,6 +41,7 @@ AlignmentHandles::AlignmentHandles(Workbench* bench, vtkRenderWindowInteractor* 
   widget_->AddObserver(vtkCommand::StartInteractionEvent, this, &AlignmentHandles::OnWidgetEvent);
   widget_->AddObserver(vtkCommand::EndInteractionEvent, this, &AlignmentHandles::OnWidgetEvent);
   widget_->AddObserver(vtkCommand::ModifiedEvent, this, &AlignmentHandles::OnKey);
+  connect(bench, &QObject::destroyed, this, [this] { widget_->RemoveAllObservers(); }); // a window that closes
   connect(bench, &Workbench::ToolChanged, this, &AlignmentHandles::Follow);
   connect(bench, &Workbench::HandChanged, this, &AlignmentHandles::Follow);
   connect(bench, &Workbench::SelectionChanged, this, &AlignmentHandles::Follow);
@@ -80,7 +81,8 @@ void AlignmentHandles::OnKey(vtkObject*, unsigned long, void*)
   Handling hand = bench_->Hand();
   const QString constraint = widget_->GetConstraint();
   const double mm = std::clamp(widget_->GetTranslationStep(), 0.001, 100.0), degrees = widget_->GetRotationStep();
-  if (isFollowing_ || (hand.constraint == constraint && hand.translationStepMm == mm && hand.rotationStepDegrees == degrees))
+  if (isFollowing_ || !widget_->GetInteractor() ||
+      (hand.constraint == constraint && hand.translationStepMm == mm && hand.rotationStepDegrees == degrees))
     return;
   hand.constraint = constraint;
   hand.translationStepMm = mm;

@@ -578,11 +578,11 @@ void TestWorkbench::whateverHappensIsDrawnCoarselyFirst()
   QVERIFY(window.Open({A(), B()}));
   vtkUltrasoundVolumeView* view = window.Window().Views()->Volume()->View();
   QTRY_VERIFY(!view->GetInteractive()); // small volumes are drawn in full everywhere
-  SliceCanvas* slice = window.Slice(0);
-  window.Wheel(slice, 1);
+  window.Window().Views()->Volume()->Ask();
   QVERIFY(view->GetInteractive());
   QTRY_VERIFY(!view->GetInteractive());
   // A drag that begins when the fine picture is about to come, and that rests.
+  SliceCanvas* slice = window.Slice(0);
   window.Wheel(slice, 1);
   QTest::qWait(200);
   const QPoint from = slice->rect().center() + QPoint(18, 34);
@@ -672,10 +672,8 @@ void TestWorkbench::aDoubleClickKeepsTheSelection()
   SliceCanvas* slice = window.Slice(1);
   const int selected = window.Window().Bench()->ActiveVolume();
   const QPoint at = slice->rect().center() + QPoint(25, 31);
-  for (int i = 0; i < 2; i++) {
-    window.Press(slice, at);
-    window.Release(slice, at);
-  }
+  window.Move(slice, at);
+  QTest::mouseDClick(window.Window().windowHandle(), Qt::LeftButton, {}, slice->mapTo(&window.Window(), at));
   window.Settle();
   QVERIFY(!window.Slice(0)->isVisible()); // it was a double click
   QCOMPARE(window.Session()->GetNumberOfSelected(), 1);
