@@ -49,9 +49,13 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
   ShowHistory();
 }
 
-void HistoryPanel::showEvent(QShowEvent* event)
+// A panel behind another tab counts as visible, but is not painted.
+void HistoryPanel::paintEvent(QPaintEvent* event)
 {
-  QWidget::showEvent(event);
+  QWidget::paintEvent(event);
+  if (!isOld_)
+    return;
+  isOld_ = false;
   ListBackups();
 }
 
@@ -65,7 +69,9 @@ void HistoryPanel::ShowHistory()
   redo_->setEnabled(session->GetRedoCount() > 0);
   undo_->setText(label(tr("Undo"), session->GetUndoLabel()));
   redo_->setText(label(tr("Redo"), session->GetRedoLabel()));
-  if (isVisible())
+  if (visibleRegion().isEmpty())
+    isOld_ = true;
+  else
     list_.start(); // again from the beginning: only when edits have ended
 }
 

@@ -20,7 +20,7 @@ public:
   explicit HistoryPanel(Workbench* bench, QWidget* parent = nullptr);
 
 protected:
-  void showEvent(QShowEvent* event) override;
+  void paintEvent(QPaintEvent* event) override;
 
 private:
   struct Line {
@@ -38,6 +38,7 @@ private:
   QListWidget* backups_;
   QTimer list_;
   bool isListing_ = false;
+  bool isOld_ = true; ///< the list, because nobody saw it
   std::vector<Line> shown_;
 };
 
