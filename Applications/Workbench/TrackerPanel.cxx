@@ -62,6 +62,8 @@ void TrackerPanel::ConnectOrNot()
     if (tracker_->Start()) { // else it has said why
       QSettings().setValue("tracker/address", address_->text());
       timer_->start();
+    } else {
+      tracker_->Stop();
     }
   }
   Step();
