@@ -141,7 +141,7 @@ TEST(AlignmentSession, FiveHundredOperationsUndoneAndDoneAgain)
         states.push_back(session.State());
       ASSERT_EQ(session.UndoCount(), static_cast<int>(states.size()) - 1);
     }
-    ASSERT_GT(states.size(), 150u);
+    ASSERT_GT(states.size(), 100u);
     for (std::size_t i = states.size() - 1; i > 0; --i) {
       ASSERT_TRUE(session.State() == states[i]) << "back at " << i;
       ASSERT_FALSE(session.UndoLabel().empty());
