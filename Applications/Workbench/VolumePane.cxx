@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Full quality can take longer than a person waits for a mouse. So whatever happens is drawn coarsely first; once nothing has
-// happened for a moment the picture becomes finer step by step, with a look at the mouse in between. VTK's own wishes to draw
-// (turning, handles under the mouse) go the same way.
+// happened for a moment the picture becomes finer step by step, with a look at the mouse in between.
 #include "VolumePane.h"
 #include "AlignmentHandles.h"
 #include "Controls.h"
@@ -65,8 +64,6 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   canvas_->interactor()->SetInteractorStyle(style);
   redraw_ = new Redraw(this, [this] { DrawNow(); });
   refine_ = new Redraw(this, [this] { Refine(); });
-  canvas_->interactor()->EnableRenderOff();
-  canvas_->interactor()->AddObserver(vtkCommand::RenderEvent, this, &VolumePane::OnRender);
   handles_ = new AlignmentHandles(bench, canvas_->interactor(), view_->GetRenderer(), this);
 
   style_ = ChoiceField(this, "volumeStyle", tr("How volumes are drawn in 3D"),
@@ -114,7 +111,6 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
 VolumePane::~VolumePane()
 {
   canvas_->interactor()->SetInteractorStyle(nullptr);
-  canvas_->interactor()->RemoveObservers(vtkCommand::RenderEvent);
 }
 
 vtkUltrasoundVolumeView* VolumePane::View() const
@@ -210,11 +206,6 @@ void VolumePane::OnTurning(vtkObject*, unsigned long event, void*)
 {
   turning_ = event == vtkCommand::StartInteractionEvent;
   isPlaced_ = true;
-  Ask();
-}
-
-void VolumePane::OnRender(vtkObject*, unsigned long, void*)
-{
   Ask();
 }
 

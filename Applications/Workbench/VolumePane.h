@@ -48,7 +48,6 @@ private:
   void Look();
   void FitToNew();
   void OnTurning(vtkObject* style, unsigned long event, void* data);
-  void OnRender(vtkObject* interactor, unsigned long event, void* data);
   void Refine();
 
   Workbench* bench_;
