@@ -97,8 +97,16 @@ macro(_echorama_add_tests name)
       echorama_compile_options(${name}Tests)
       target_compile_options(${name}Tests PRIVATE -O1) # tests are compiled longer than they run
       echorama_precompile(${name}Tests tests)
-      gtest_discover_tests(${name}Tests TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
-        PROPERTIES LABELS kernel TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+      # In shards, so that all cores are busy to the end: one for every four files.
+      list(LENGTH tests shards)
+      math(EXPR shards "(${shards} + 3) / 4")
+      foreach(shard RANGE 1 ${shards})
+        set(test ${name}.shard${shard})
+        math(EXPR index "${shard} - 1")
+        add_test(NAME ${test} COMMAND ${name}Tests)
+        set_tests_properties(${test} PROPERTIES LABELS "kernel;reports" TIMEOUT 900
+          ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${index};GTEST_OUTPUT=xml:${ECHORAMA_TEST_REPORTS}/${test}.xml")
+      endforeach()
     endif()
     if(ECHORAMA_STACK STREQUAL "vtk")
       file(GLOB tests CONFIGURE_DEPENDS Testing/Test*.py)
@@ -161,12 +169,48 @@ function(echorama_add_benchmark file name)
   target_compile_definitions(${target} PRIVATE ECHORAMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   echorama_compile_options(${target})
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/benchmarks)
+  if(ECHORAMA_TESTING) # that it starts and reports
+    set(screen)
+    if(target IN_LIST ECHORAMA_TESTS_ON_SCREEN)
+      echorama_on_screen(screen)
+    endif()
+    string(REPLACE "Benchmark" "Benchmark." test ${target})
+    add_test(NAME ${test} COMMAND ${screen} /usr/bin/python3 ${PROJECT_SOURCE_DIR}/Testing/smoke.py $<TARGET_FILE:${target}>)
+    set_tests_properties(${test} PROPERTIES LABELS benchmark TIMEOUT 600 SKIP_RETURN_CODE 77)
+  endif()
 endfunction()
+
+# Tests run beside each other: each that draws has an X screen of its own. The numbers begin elsewhere in every build tree; should
+# one be taken all the same, xvfb-run takes the next.
+# echorama_on_screen(VARIABLE): the words before a command that give it such a screen.
+function(echorama_on_screen variable)
+  get_property(number GLOBAL PROPERTY ECHORAMA_SCREEN)
+  if(NOT number)
+    string(MD5 number ${CMAKE_BINARY_DIR})
+    string(SUBSTRING ${number} 0 2 number)
+    math(EXPR number "200 + 100 * 0x${number}")
+  endif()
+  # Without -noreset the screen is gone for a moment whenever its last client leaves.
+  set(${variable} xvfb-run -a -n ${number} -s "-screen 0 1600x1200x24 -noreset" PARENT_SCOPE)
+  math(EXPR number "${number} + 1")
+  set_property(GLOBAL PROPERTY ECHORAMA_SCREEN ${number})
+endfunction()
+set(ECHORAMA_TESTS_ON_SCREEN TestCommandLine TestDemo TestExamples TestUltrasoundAlignmentWidget TestUltrasoundSliceView
+  TestUltrasoundVolumeView BenchmarkVolumeView BenchmarkWorkbench)
+
+# Where tests leave reports of their single tests; Testing/run_tests.py reads those of the tests labelled "reports".
+set(ECHORAMA_TEST_REPORTS ${CMAKE_BINARY_DIR}/Testing/reports)
+file(MAKE_DIRECTORY ${ECHORAMA_TEST_REPORTS})
 
 # echorama_add_python_test(FILE [args...]): a test on the wrapped classes; exit status 77 means skipped.
 function(echorama_add_python_test file)
   get_filename_component(test ${file} NAME_WE)
-  add_test(NAME Python.${test} COMMAND ${ECHORAMA_PYTHON} ${file} ${ARGN})
-  set_tests_properties(Python.${test} PROPERTIES LABELS python TIMEOUT 600 SKIP_RETURN_CODE 77
+  set(screen)
+  if(test IN_LIST ECHORAMA_TESTS_ON_SCREEN)
+    echorama_on_screen(screen)
+  endif()
+  add_test(NAME Python.${test} COMMAND ${screen} ${ECHORAMA_PYTHON} ${PROJECT_SOURCE_DIR}/Testing/python_test.py
+    ${ECHORAMA_TEST_REPORTS}/Python.${test}.xml ${file} ${ARGN})
+  set_tests_properties(Python.${test} PROPERTIES LABELS "python;reports" TIMEOUT 900 SKIP_RETURN_CODE 77
     ENVIRONMENT "PYTHONPATH=${ECHORAMA_PYTHON_PATH}:${PROJECT_SOURCE_DIR}/Testing;ECHORAMA_SOURCE_DIR=${PROJECT_SOURCE_DIR};ECHORAMA_BUILD_DIR=${CMAKE_BINARY_DIR}")
 endfunction()

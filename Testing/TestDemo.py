@@ -10,11 +10,10 @@ import tempfile
 
 source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
 program = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"]) / "bin" / "echorama"
-screen = [] if os.environ.get("DISPLAY") else ["xvfb-run", "-a", "-n", "117", "-s", "-screen 0 1280x1024x24"]
 
 
-def demo(out, *arguments, prefix=screen):
-    return subprocess.run([*prefix, "/usr/bin/python3", source / "Applications" / "demo" / "demo.py", "--program", program,
+def demo(out, *arguments):
+    return subprocess.run(["/usr/bin/python3", source / "Applications" / "demo" / "demo.py", "--program", program,
                            "--out", out, "--quick", *arguments], capture_output=True, text=True)
 
 

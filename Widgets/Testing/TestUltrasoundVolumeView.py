@@ -7,17 +7,9 @@ Usage: TestUltrasoundVolumeView.py [FOLDER]   (FOLDER: the pictures are written 
 import math
 import os
 import pathlib
-import shutil
 import sys
 
 import numpy as np
-
-if not os.environ.get("DISPLAY"):
-    if not shutil.which("xvfb-run"):
-        print("skipped: there is no screen and no xvfb-run")
-        sys.exit(77)
-    os.execvp("xvfb-run", ["xvfb-run", "-a", "-n", "141", "-s", "-screen 0 1280x1024x24 -noreset", sys.executable, *sys.argv])
-
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
