@@ -47,7 +47,9 @@ macro(_echorama_add_kernels name)
   add_library(Echorama::${target} ALIAS ${target})
   set_target_properties(${target} PROPERTIES OUTPUT_NAME Echorama${target} VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
     # Kernels have no export macros: their whole interface is public.
-    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF)
+    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF
+    # Templates of Eigen are instantiated once for several files. So no two kernels of a room may use one name for two things.
+    UNITY_BUILD ${ECHORAMA_UNITY} UNITY_BUILD_BATCH_SIZE 6)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama>)
   target_compile_features(${target} PUBLIC cxx_std_17)
   # Eigen's alignment would follow each compiler call's instruction set; the interface must not.

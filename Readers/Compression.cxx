@@ -22,11 +22,6 @@ constexpr std::uint64_t BatchBlocks = 32;
 // Speckle hardly compresses: higher levels cost several times the time for a few per cent.
 constexpr int Level = 2;
 
-[[noreturn]] void Fail(const std::string& name, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, name + ": " + reason);
-}
-
 struct Block {
   std::vector<unsigned char> data;
   uLong checksum = 0;
@@ -186,14 +181,14 @@ struct Inflater::Parts {
       z.next_in = input.data();
       now.input += stream.gcount();
       if (z.avail_in == 0)
-        Fail(name, "the compressed data end early, after " + std::to_string(now.position) + " of " + std::to_string(total) +
-                       " bytes: the file is truncated or its dimensions are wrong");
+        FailFile(name, "the compressed data end early, after " + std::to_string(now.position) + " of " + std::to_string(total) +
+                           " bytes: the file is truncated or its dimensions are wrong");
     }
     z.next_out = out;
     z.avail_out = static_cast<uInt>(room);
     const int status = inflate(&z, Z_NO_FLUSH);
     if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR)
-      Fail(name, std::string("the compressed data are damaged (") + (z.msg ? z.msg : "not a zlib or gzip stream") + ")");
+      FailFile(name, std::string("the compressed data are damaged (") + (z.msg ? z.msg : "not a zlib or gzip stream") + ")");
     now.ended = status == Z_STREAM_END;
     now.position += room - z.avail_out;
     return room - z.avail_out;
@@ -232,7 +227,7 @@ void Inflater::Finish()
   unsigned char beyond = 0;
   while (!parts_->now.ended)
     if (parts_->Step(&beyond, 1) > 0)
-      Fail(parts_->name, "the compressed data hold more than the dimensions say");
+      FailFile(parts_->name, "the compressed data hold more than the dimensions say");
 }
 
 std::uint64_t Inflater::Position() const

@@ -25,11 +25,6 @@ constexpr double evenness = 1e-3; // of a step; and in mm, because files round
 constexpr double sameDirection = 1e-4;
 constexpr std::size_t filesLookedAt = 32; // of a folder, to tell what it holds
 
-[[noreturn]] void Fail(const std::string& path, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
-
 bool BeginsLikeDicom(const std::string& path)
 {
   std::error_code error;
@@ -93,7 +88,7 @@ public:
     else if (files_.size() == 1)
       PlaceUnplaced();
     else
-      Fail(content_.path, "its " + std::to_string(files_.size()) + " pictures do not say where they lie");
+      FailFile(content_.path, "its " + std::to_string(files_.size()) + " pictures do not say where they lie");
     ChooseType();
     try {
       content_.geometry.Check(content_.path);
@@ -139,7 +134,7 @@ public:
           std::ifstream stream(file.path, std::ios::binary);
           stream.seekg(static_cast<std::streamoff>(file.pixelOffset + place));
           if (!stream.read(stored.data(), static_cast<std::streamsize>(bytes)))
-            Fail(file.path, "the data end early: the file has changed since it was opened");
+            FailFile(file.path, "the data end early: the file has changed since it was opened");
           pixels = stored.data();
         }
         char* out = static_cast<char*>(voxels) + (i * slicesOfPicture + k) * sliceBytes;
@@ -167,12 +162,12 @@ private:
         files_.push_back(std::move(header));
       }
       if (files_.empty())
-        Fail(path, "it holds no DICOM pictures");
+        FailFile(path, "it holds no DICOM pictures");
       if (series.size() > 1) {
         std::string list;
         for (const auto& [uid, names] : series)
           list += (list.empty() ? "" : ", ") + uid + " (" + std::to_string(names.size()) + " files, the first " + names[0] + ")";
-        Fail(path, "it holds " + std::to_string(series.size()) + " series; name one by one of its files: " + list);
+        FailFile(path, "it holds " + std::to_string(series.size()) + " series; name one by one of its files: " + list);
       }
     } else {
       files_.push_back(ReadDicomHeader(path));
@@ -180,7 +175,7 @@ private:
       if (header.kretzBytes > 0)
         return;
       if (header.pictures.empty())
-        Fail(path, header.holdsMovieGroup ? MovieGroup() : "it holds no pictures");
+        FailFile(path, header.holdsMovieGroup ? MovieGroup() : "it holds no pictures");
       if (header.pictures.size() == 1 && !header.grouped && header.volumeSlices == 0 && header.pictures[0].patient.IsKnown() &&
           !header.series.empty())
         FindSiblings();
@@ -188,7 +183,7 @@ private:
     if (files_.size() > 1)
       for (const DicomHeader& header : files_)
         if (header.pictures.size() != 1 || header.volumeSlices > 0 || header.kretzBytes > 0)
-          Fail(path, "it holds several files of more than one picture; name one of them, such as " + NameOf(header.path));
+          FailFile(path, "it holds several files of more than one picture; name one of them, such as " + NameOf(header.path));
   }
 
   // The other slices of the series of the one that was named.
@@ -224,9 +219,9 @@ private:
     for (const DicomHeader& file : files_)
       if (file.rows != first.rows || file.columns != first.columns || file.samples != first.samples ||
           file.bitsAllocated != first.bitsAllocated || file.isSigned != first.isSigned || file.photometric != first.photometric)
-        Fail(file.path, "its pictures are not like those of " + NameOf(first.path) + " in the same series (" +
-                            std::to_string(file.columns) + " x " + std::to_string(file.rows) + " pixels and " +
-                            std::to_string(first.columns) + " x " + std::to_string(first.rows) + ", or of another type)");
+        FailFile(file.path, "its pictures are not like those of " + NameOf(first.path) + " in the same series (" +
+                                std::to_string(file.columns) + " x " + std::to_string(file.rows) + " pixels and " +
+                                std::to_string(first.columns) + " x " + std::to_string(first.rows) + ", or of another type)");
   }
 
   bool AllPlaced(DicomPlane DicomPicture::*plane) const
@@ -267,7 +262,7 @@ private:
         all.push_back({f, p});
       }
     if (all.empty())
-      Fail(content_.path, "none of its pictures holds tissue intensities");
+      FailFile(content_.path, "none of its pictures holds tissue intensities");
     if (others > 0)
       content_.notes.push_back(std::to_string(others) + " pictures that hold no tissue intensities are left out.");
     std::map<double, std::vector<Slice>> volumes;
@@ -280,9 +275,9 @@ private:
       if (slices_.empty())
         content_.geometry = geometry;
       else if (!content_.geometry.AgreesWith(geometry, 1e-2))
-        Fail(content_.path, "its volumes at different times do not lie on one grid (the first has " +
-                                std::to_string(content_.geometry.dimensions[2]) + " slices, that at time " + NumberText(time) +
-                                " has " + std::to_string(geometry.dimensions[2]) + ")");
+        FailFile(content_.path, "its volumes at different times do not lie on one grid (the first has " +
+                                    std::to_string(content_.geometry.dimensions[2]) + " slices, that at time " +
+                                    NumberText(time) + " has " + std::to_string(geometry.dimensions[2]) + ")");
       slices_.insert(slices_.end(), slices.begin(), slices.end());
       if (volumes.size() > 1)
         content_.times.push_back(time);
@@ -301,16 +296,16 @@ private:
     const DicomPicture& one = PictureOf(slices[0]);
     Eigen::Matrix<double, 3, 2> axes = *(one.*plane).directions;
     if (!(axes.transpose() * axes).isIdentity(1e-3))
-      Fail(files_[slices[0].file].path, "its image orientation is not two unit vectors at a right angle");
+      FailFile(files_[slices[0].file].path, "its image orientation is not two unit vectors at a right angle");
     Eigen::Vector3d x = axes.col(0).normalized(), y = axes.col(1);
     y = (y - x * x.dot(y)).normalized();
     const Eigen::Vector3d normal = x.cross(y);
     for (Slice& slice : slices) {
       const DicomPicture& picture = PictureOf(slice);
       if (!(picture.*plane).directions->isApprox(axes, sameDirection))
-        Fail(content_.path, WhereIs(slice) + " is turned against " + WhereIs(slices[0]) + ": the pictures are not parallel");
+        FailFile(content_.path, WhereIs(slice) + " is turned against " + WhereIs(slices[0]) + ": the pictures are not parallel");
       if (!picture.spacing.isApprox(one.spacing, 1e-6))
-        Fail(content_.path, WhereIs(slice) + " has another pixel spacing than " + WhereIs(slices[0]));
+        FailFile(content_.path, WhereIs(slice) + " has another pixel spacing than " + WhereIs(slices[0]));
       slice.along = normal.dot(*(picture.*plane).position);
     }
     std::stable_sort(slices.begin(), slices.end(), [](const Slice& a, const Slice& b) { return a.along < b.along; });
@@ -320,7 +315,7 @@ private:
     geometry.origin = *(PictureOf(slices[0]).*plane).position;
     geometry.direction << x, y, normal;
     if (!(one.spacing.minCoeff() > 0.0))
-      Fail(files_[slices[0].file].path, "its pixel spacing is missing or not positive");
+      FailFile(files_[slices[0].file].path, "its pixel spacing is missing or not positive");
     geometry.spacing << one.spacing, one.sliceSpacing > 0.0 ? one.sliceSpacing : 1.0;
     if (slices.size() == 1)
       return geometry;
@@ -337,15 +332,16 @@ private:
     for (std::size_t i = 0; i < steps.size(); ++i) {
       const std::string between = "between " + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]);
       if (!(steps[i] > tolerance))
-        Fail(content_.path, "two pictures lie at the same place (" + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]) + ")");
+        FailFile(content_.path,
+                 "two pictures lie at the same place (" + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]) + ")");
       if (std::abs(steps[i] - median) > tolerance)
-        Fail(content_.path, "its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + NumberText(median) +
-                                " mm elsewhere; are slices missing?");
+        FailFile(content_.path, "its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + NumberText(median) +
+                                    " mm elsewhere; are slices missing?");
       const Eigen::Vector3d there = geometry.origin + normal * (slices[i + 1].along - slices[0].along);
       const double aside = (*(PictureOf(slices[i + 1]).*plane).position - there).norm();
       if (aside > std::max(evenness, 1e-2 * one.spacing.minCoeff()))
-        Fail(content_.path,
-             WhereIs(slices[i + 1]) + " lies " + Mm(aside) + " beside the normal of the others: the volume is sheared");
+        FailFile(content_.path,
+                 WhereIs(slices[i + 1]) + " lies " + Mm(aside) + " beside the normal of the others: the volume is sheared");
     }
     geometry.spacing[2] = step;
     return geometry;
@@ -391,7 +387,7 @@ private:
     content_.geometry.dimensions = {file.columns, file.rows, file.volumeSlices};
     content_.geometry.spacing = file.volumeSpacing;
     if (file.storage != DicomStorage::Plain || file.samples != 1)
-      Fail(file.path, "it is a Cartesian volume of Philips whose pixels are compressed or coloured, which is not known");
+      FailFile(file.path, "it is a Cartesian volume of Philips whose pixels are compressed or coloured, which is not known");
     for (std::size_t i = 0; i < file.pictures.size(); ++i) {
       slices_.push_back({0, i});
       if (file.pictures.size() > 1)
@@ -409,18 +405,18 @@ private:
     const DicomPicture& one = file.pictures[0];
     const int count = static_cast<int>(file.pictures.size());
     if (file.grouped && count > 1)
-      Fail(file.path, "not all of its pictures say where they lie (Plane Position and Orientation)");
+      FailFile(file.path, "not all of its pictures say where they lie (Plane Position and Orientation)");
     if (count > 1 && (file.frameIncrement == "time" || !(one.sliceSpacing > 0.0)))
-      Fail(file.path, file.holdsMovieGroup
-                          ? MovieGroup()
-                          : "it is a cine: " + std::to_string(count) +
-                                " pictures of a plane over time, not a volume; it does not say how far apart in space "
-                                "they lie");
+      FailFile(file.path, file.holdsMovieGroup
+                              ? MovieGroup()
+                              : "it is a cine: " + std::to_string(count) +
+                                    " pictures of a plane over time, not a volume; it does not say how far apart in space "
+                                    "they lie");
     content_.geometry.dimensions = {file.columns, file.rows, count};
     Eigen::Vector2d spacing = one.spacing;
     if (spacing.isZero()) {
       if (count > 1)
-        Fail(file.path, "its pixel spacing is missing");
+        FailFile(file.path, "its pixel spacing is missing");
       spacing.setOnes();
       content_.notes.push_back("The file does not say how large its pixels are; 1 mm is taken.");
     }

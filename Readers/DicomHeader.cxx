@@ -75,11 +75,6 @@ bool IsKeptValue(Tag tag)
          (tag >> 16 == 0x200D && ((tag & 0xFFFF) < 0x100 || (tag & 0xFF) == 0x03));
 }
 
-[[noreturn]] void Fail(const std::string& path, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
-
 std::string TextOf(Tag tag)
 {
   char text[16];
@@ -162,7 +157,7 @@ private:
   void Take(void* bytes, std::size_t count)
   {
     if (end_ - at_ < count || !stream_.read(static_cast<char*>(bytes), static_cast<std::streamsize>(count)))
-      Fail(path_, "the data end early, in the head of an element: the file is truncated");
+      FailFile(path_, "the data end early, in the head of an element: the file is truncated");
     at_ += count;
   }
 
@@ -183,15 +178,15 @@ private:
   void CheckLength(Tag tag, std::uint64_t bytes, std::uint64_t end) const
   {
     if (at_ > end || bytes > end - at_)
-      Fail(path_, "the element " + TextOf(tag) + " says that it is " + std::to_string(bytes) + " bytes long, and only " +
-                      std::to_string(at_ > end ? 0 : end - at_) + " follow: the file is truncated or damaged");
+      FailFile(path_, "the element " + TextOf(tag) + " says that it is " + std::to_string(bytes) + " bytes long, and only " +
+                          std::to_string(at_ > end ? 0 : end - at_) + " follow: the file is truncated or damaged");
   }
 
   // Elements up to \a end or a mark of the end of an item. \a data may be null: then they are only walked over.
   void Elements(DataSet* data, bool explicitTypes, std::uint64_t end, int depth)
   {
     if (depth > deepest)
-      Fail(path_, "its sequences are nested more than " + std::to_string(deepest) + " deep");
+      FailFile(path_, "its sequences are nested more than " + std::to_string(deepest) + " deep");
     while (at_ < end) {
       if (depth == 0 && pixels.bytes > 0 && end - at_ < 8)
         return; // padding
@@ -216,7 +211,7 @@ private:
       type.assign(reinterpret_cast<const char*>(b), 2);
       const auto letter = [](char c) { return c >= 'A' && c <= 'Z'; };
       if (!letter(type[0]) || !letter(type[1]))
-        Fail(path_, "the element " + TextOf(tag) + " has no type: the file is damaged");
+        FailFile(path_, "the element " + TextOf(tag) + " has no type: the file is damaged");
       static const std::string longTypes = "OB OW OF OD OL OV SQ UN UC UR UT SV UV ";
       bytes = longTypes.find(type + " ") != std::string::npos ? ReadLength() : std::uint64_t{b[2]} | std::uint64_t{b[3]} << 8;
     } else
@@ -257,7 +252,7 @@ private:
       if (tag == SequenceEnd)
         return;
       if (tag != ItemTag)
-        Fail(path_, "a sequence holds " + TextOf(tag) + " where an item should begin: the file is damaged");
+        FailFile(path_, "a sequence holds " + TextOf(tag) + " where an item should begin: the file is damaged");
       if (bytes != Undefined)
         CheckLength(tag, bytes, end);
       const std::uint64_t itemEnd = bytes == Undefined ? end : at_ + bytes;
@@ -278,11 +273,11 @@ private:
       if (tag == SequenceEnd)
         return;
       if (tag != ItemTag)
-        Fail(path_, "its compressed pixels are damaged");
+        FailFile(path_, "its compressed pixels are damaged");
       CheckLength(tag, bytes, end);
       Skip(bytes);
     }
-    Fail(path_, "its compressed pixels end early: the file is truncated");
+    FailFile(path_, "its compressed pixels end early: the file is truncated");
   }
 
   std::istream& stream_;
@@ -297,7 +292,7 @@ std::string Inflated(std::ifstream& stream, std::uint64_t at, std::uint64_t byte
   stream.clear();
   stream.seekg(static_cast<std::streamoff>(at));
   if (!stream.read(packed.data(), static_cast<std::streamsize>(bytes)))
-    Fail(path, "it cannot be read");
+    FailFile(path, "it cannot be read");
   z_stream z{};
   inflateInit2(&z, -MAX_WBITS);
   z.next_in = reinterpret_cast<Bytef*>(packed.data());
@@ -315,7 +310,7 @@ std::string Inflated(std::ifstream& stream, std::uint64_t at, std::uint64_t byte
   }
   inflateEnd(&z);
   if (status != Z_STREAM_END)
-    Fail(path, "its deflated data are damaged or end early");
+    FailFile(path, "its deflated data are damaged or end early");
   return out;
 }
 
@@ -510,13 +505,13 @@ private:
     std::string start(before, '\0');
     stream.read(start.data(), static_cast<std::streamsize>(start.size()));
     if (!stream || !LooksLikeDicom(start))
-      Fail(path_, "it is not DICOM: DICM is missing after its first 128 bytes");
+      FailFile(path_, "it is not DICOM: DICM is missing after its first 128 bytes");
     Parser parser(stream, bytes, path_);
     header_.transferSyntax = parser.MetaInformation();
     if (header_.transferSyntax.empty())
-      Fail(path_, "its transfer syntax is missing");
+      FailFile(path_, "its transfer syntax is missing");
     if (header_.transferSyntax == BigEndian)
-      Fail(path_, "its numbers are big-endian, a retired way to write DICOM that is not supported");
+      FailFile(path_, "its numbers are big-endian, a retired way to write DICOM that is not supported");
     if (header_.transferSyntax == Deflated) {
       const std::string plain = Inflated(stream, parser.At(), bytes - parser.At(), path_);
       std::istringstream inflated(plain);
@@ -583,12 +578,12 @@ private:
     if (const std::string text = Text(data, 0x00280008); !text.empty()) {
       const auto n = Decimals(data, 0x00280008, 1);
       if (n.empty() || !(n[0] >= 1.0 && n[0] <= static_cast<double>(mostPictures)) || n[0] != std::floor(n[0]))
-        Fail(path_,
-             "its number of frames is \"" + text.substr(0, 40) + "\"; it must be from 1 to " + std::to_string(mostPictures));
+        FailFile(path_,
+                 "its number of frames is \"" + text.substr(0, 40) + "\"; it must be from 1 to " + std::to_string(mostPictures));
       count = static_cast<std::size_t>(n[0]);
     }
     if (count > header_.pixelBytes)
-      Fail(path_, "it says that it holds " + std::to_string(count) + " frames, more than it has bytes for");
+      FailFile(path_, "it says that it holds " + std::to_string(count) + " frames, more than it has bytes for");
 
     const std::vector<DataSet>* groups = Sequence(data, PictureGroups);
     if (!groups) {
@@ -598,7 +593,8 @@ private:
       return;
     }
     if (groups->size() != count)
-      Fail(path_, "it holds " + std::to_string(count) + " frames and functional groups for " + std::to_string(groups->size()));
+      FailFile(path_,
+               "it holds " + std::to_string(count) + " frames and functional groups for " + std::to_string(groups->size()));
     header_.grouped = true;
     const std::vector<DataSet>* shared = Sequence(data, SharedGroups);
     for (const DataSet& own : *groups)
@@ -634,27 +630,28 @@ private:
   void CheckPixels()
   {
     if (header_.rows < 1 || header_.columns < 1)
-      Fail(path_, "its pictures have " + std::to_string(header_.columns) + " x " + std::to_string(header_.rows) + " pixels");
+      FailFile(path_, "its pictures have " + std::to_string(header_.columns) + " x " + std::to_string(header_.rows) + " pixels");
     if (header_.bitsAllocated != 8 && header_.bitsAllocated != 16 && header_.bitsAllocated != 32)
-      Fail(path_, "its pixels have " + std::to_string(header_.bitsAllocated) + " bits; 8, 16 or 32 are supported");
+      FailFile(path_, "its pixels have " + std::to_string(header_.bitsAllocated) + " bits; 8, 16 or 32 are supported");
     if (header_.bitsStored < 1 || header_.bitsStored > header_.bitsAllocated || highBit_ != header_.bitsStored - 1)
-      Fail(path_, "its pixels use " + std::to_string(header_.bitsStored) + " bits up to bit " + std::to_string(highBit_) +
-                      " of " + std::to_string(header_.bitsAllocated) + ", which is not supported");
+      FailFile(path_, "its pixels use " + std::to_string(header_.bitsStored) + " bits up to bit " + std::to_string(highBit_) +
+                          " of " + std::to_string(header_.bitsAllocated) + ", which is not supported");
     const std::string& colour = header_.photometric;
     const bool grey = colour == "MONOCHROME1" || colour == "MONOCHROME2";
     const bool coloured = colour == "RGB" || colour.compare(0, 4, "YBR_") == 0;
     if (!(grey && header_.samples == 1) && !(coloured && header_.samples == 3 && header_.bitsAllocated == 8))
-      Fail(path_, "its pixels are " + std::to_string(header_.samples) + " numbers of " + std::to_string(header_.bitsAllocated) +
-                      " bits that mean " + (colour.empty() ? "nothing known" : colour) + ", which is not supported");
+      FailFile(path_, "its pixels are " + std::to_string(header_.samples) + " numbers of " +
+                          std::to_string(header_.bitsAllocated) + " bits that mean " +
+                          (colour.empty() ? "nothing known" : colour) + ", which is not supported");
     const double decoded = static_cast<double>(header_.PictureBytes()) * static_cast<double>(header_.pictures.size()) *
                            std::max(1, header_.volumeSlices);
     const double there = static_cast<double>(header_.pixelBytes);
     const bool encapsulated = header_.storage == DicomStorage::Encapsulated;
     if (encapsulated ? decoded > mostCompressed * there : decoded > there)
-      Fail(path_, "its " + std::to_string(header_.pictures.size()) + " frames of " + std::to_string(header_.columns) + " x " +
-                      std::to_string(header_.rows) + " pixels need " + NumberText(decoded) + " bytes, " +
-                      (encapsulated ? "more than can be compressed to the " : "and it holds ") + NumberText(there) +
-                      ": it is truncated or its sizes are wrong");
+      FailFile(path_, "its " + std::to_string(header_.pictures.size()) + " frames of " + std::to_string(header_.columns) + " x " +
+                          std::to_string(header_.rows) + " pixels need " + NumberText(decoded) + " bytes, " +
+                          (encapsulated ? "more than can be compressed to the " : "and it holds ") + NumberText(there) +
+                          ": it is truncated or its sizes are wrong");
   }
 
   std::string path_;
@@ -801,7 +798,7 @@ DicomHeader ReadDicomHeader(const std::string& path)
 std::vector<char> DecodeDicomPixels(const DicomHeader& header)
 {
   const auto fail = [&header]() {
-    Fail(header.path, "its pixels cannot be decoded: they are damaged or of a kind that is not supported");
+    FailFile(header.path, "its pixels cannot be decoded: they are damaged or of a kind that is not supported");
   };
   const std::uint64_t wanted = header.PictureBytes() * header.pictures.size();
   std::ifstream stream(header.path, std::ios::binary);

@@ -226,7 +226,7 @@ TiffPointer OpenTiff(const std::string& path, Info* info)
 }
 
 template <class T>
-T Tag(TIFF* tiff, std::uint32_t tag)
+T TiffTag(TIFF* tiff, std::uint32_t tag)
 {
   T value{};
   TIFFGetFieldDefaulted(tiff, tag, &value);
@@ -240,15 +240,16 @@ bool ReadTiffPage(TIFF* tiff, Info* info)
     std::snprintf(info->message, sizeof info->message, format, number);
     return false;
   };
-  info->width = Tag<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH);
-  info->height = Tag<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH);
-  const int bits = Tag<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE), format = Tag<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT),
-            photometric = Tag<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC),
-            compression = Tag<std::uint16_t>(tiff, TIFFTAG_COMPRESSION);
-  info->channels = Tag<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
+  info->width = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH);
+  info->height = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH);
+  const int bits = TiffTag<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE),
+            format = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT),
+            photometric = TiffTag<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC),
+            compression = TiffTag<std::uint16_t>(tiff, TIFFTAG_COMPRESSION);
+  info->channels = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
   if (info->channels < 1 || info->channels > 4)
     return refuse("it has %d numbers per pixel; 1 to 4 are read", info->channels);
-  if (info->channels > 1 && Tag<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG)
+  if (info->channels > 1 && TiffTag<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG)
     return refuse("its %d colours are stored apart, which is not supported", info->channels);
   if (bits != 8 && bits != 16 && bits != 32)
     return refuse("it has %d bits per number; 8, 16 and 32 are read", bits);
@@ -262,10 +263,10 @@ bool ReadTiffPage(TIFF* tiff, Info* info)
     return refuse("its colours are stored in a way that is not supported (photometric interpretation %d)", photometric);
   info->inverted = photometric == PHOTOMETRIC_MINISWHITE;
   info->bytes = bits / 8;
-  const int unit = Tag<std::uint16_t>(tiff, TIFFTAG_RESOLUTIONUNIT);
+  const int unit = TiffTag<std::uint16_t>(tiff, TIFFTAG_RESOLUTIONUNIT);
   const double perMm = unit == RESUNIT_INCH ? 1.0 / 25.4 : unit == RESUNIT_CENTIMETER ? 0.1 : 0.0;
-  info->dotsPerMm[0] = static_cast<double>(Tag<float>(tiff, TIFFTAG_XRESOLUTION)) * perMm;
-  info->dotsPerMm[1] = static_cast<double>(Tag<float>(tiff, TIFFTAG_YRESOLUTION)) * perMm;
+  info->dotsPerMm[0] = static_cast<double>(TiffTag<float>(tiff, TIFFTAG_XRESOLUTION)) * perMm;
+  info->dotsPerMm[1] = static_cast<double>(TiffTag<float>(tiff, TIFFTAG_YRESOLUTION)) * perMm;
   if (!info->pixels)
     return true;
   if (info->Size() > info->room)
@@ -282,7 +283,8 @@ bool ReadTiffPage(TIFF* tiff, Info* info)
         return damaged();
     return true;
   }
-  const std::uint32_t across = Tag<std::uint32_t>(tiff, TIFFTAG_TILEWIDTH), down = Tag<std::uint32_t>(tiff, TIFFTAG_TILELENGTH);
+  const std::uint32_t across = TiffTag<std::uint32_t>(tiff, TIFFTAG_TILEWIDTH),
+                      down = TiffTag<std::uint32_t>(tiff, TIFFTAG_TILELENGTH);
   const std::uint64_t size = TIFFTileSize64(tiff);
   if (across == 0 || down == 0 || size != across * sample * down || size > (std::uint64_t{1} << 28))
     return refuse("its tiles have not the size of their %d numbers per pixel", info->channels);
@@ -299,20 +301,15 @@ bool ReadTiffPage(TIFF* tiff, Info* info)
 }
 
 //------------------------------------------------------------------------------------------------ the stack
-struct Slice {
+struct Picture {
   std::string path;
   Kind kind = Kind::None;
   std::uint64_t page = 0; // TIFF: where its directory is, 0 for the first
   Info info{};
 };
 
-[[noreturn]] void FailFile(const std::string& path, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
-
 // Reads the header of a slice into its info, and the pixels where they are wanted.
-void ReadSlice(Slice& slice)
+void ReadSlice(Picture& slice)
 {
   bool good = false;
   slice.info.message[0] = '\0';
@@ -426,7 +423,7 @@ private:
   void FindSpacing(const VolumeReadParameters& parameters);
   double ImageJSpacing(Eigen::Vector3d& spacing) const;
 
-  std::vector<Slice> slices_;
+  std::vector<Picture> slices_;
   std::string description_; // of a TIFF
   float resolution_[2] = {0.f, 0.f};
 };
@@ -472,7 +469,7 @@ void ImageStack::Collect()
           slices_.push_back({(folder / entry.path().filename()).string(), otherKind});
     }
   }
-  std::sort(slices_.begin(), slices_.end(), [](const Slice& a, const Slice& b) {
+  std::sort(slices_.begin(), slices_.end(), [](const Picture& a, const Picture& b) {
     return NaturallyBefore(fs::path(a.path).filename().string(), fs::path(b.path).filename().string());
   });
   if (slices_.size() == 1 && slices_[0].kind == Kind::Tiff)
@@ -484,18 +481,18 @@ void ImageStack::Collect()
 
 void ImageStack::CollectPages(std::string path) // a copy: the slices are made anew
 {
-  Slice first{path, Kind::Tiff};
+  Picture first{path, Kind::Tiff};
   const TiffPointer tiff = OpenTiff(path, &first.info);
   if (!tiff)
     FailFile(path, "the image cannot be read (" + std::string(first.info.message) + ")");
   if (const char* text = nullptr; TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) == 1 && text)
     description_ = text;
-  resolution_[0] = Tag<float>(tiff.get(), TIFFTAG_XRESOLUTION);
-  resolution_[1] = Tag<float>(tiff.get(), TIFFTAG_YRESOLUTION);
+  resolution_[0] = TiffTag<float>(tiff.get(), TIFFTAG_XRESOLUTION);
+  resolution_[1] = TiffTag<float>(tiff.get(), TIFFTAG_YRESOLUTION);
   slices_.clear();
   bool more = true;
   for (; more; more = TIFFReadDirectory(tiff.get()) == 1) {
-    if ((Tag<std::uint32_t>(tiff.get(), TIFFTAG_SUBFILETYPE) & FILETYPE_REDUCEDIMAGE) != 0)
+    if ((TiffTag<std::uint32_t>(tiff.get(), TIFFTAG_SUBFILETYPE) & FILETYPE_REDUCEDIMAGE) != 0)
       continue; // a thumbnail
     first.page = TIFFCurrentDirOffset(tiff.get());
     slices_.push_back(first);
@@ -541,7 +538,7 @@ void ImageStack::CheckSlices()
   bool colours = false, alpha = false, inverted = false;
   double fileBytes = 0.0, needed = 0.0;
   std::string last;
-  for (Slice& slice : slices_) {
+  for (Picture& slice : slices_) {
     ReadSlice(slice);
     const Info &info = slice.info, &first = slices_[0].info;
     const auto size = [](const Info& i) { return std::to_string(i.width) + " x " + std::to_string(i.height); };
@@ -662,7 +659,7 @@ void ImageStack::Read(std::size_t, void* voxels, unsigned char*, const Progress&
 {
   const std::size_t count = static_cast<std::size_t>(slices_[0].info.width) * slices_[0].info.height;
   ParallelFor(static_cast<std::ptrdiff_t>(slices_.size()), progress, [&](std::ptrdiff_t k) {
-    Slice slice = slices_[static_cast<std::size_t>(k)];
+    Picture slice = slices_[static_cast<std::size_t>(k)];
     const Info expected = slice.info;
     std::vector<std::uint32_t> memory((expected.Size() + 3) / 4); // aligned for every type
     slice.info.pixels = reinterpret_cast<unsigned char*>(memory.data());

@@ -42,17 +42,17 @@ constexpr double unevenSteps = 0.01;
 // Far more items than any file has; a file of nothing but empty items must not keep us for minutes.
 constexpr int mostItems = 100000;
 
-struct Tag {
+struct KretzTag {
   std::uint16_t group, element;
-  bool operator<(const Tag& other) const { return std::pair(group, element) < std::pair(other.group, other.element); }
+  bool operator<(const KretzTag& other) const { return std::pair(group, element) < std::pair(other.group, other.element); }
 };
 
-constexpr Tag ProbeName{0x0130, 1}, Manufacturer{0x0140, 2}, ModelName{0x0150, 0x29}, CartesianSpacing{0x0010, 0x22},
+constexpr KretzTag ProbeName{0x0130, 1}, Manufacturer{0x0140, 2}, ModelName{0x0150, 0x29}, CartesianSpacing{0x0010, 0x22},
     DimensionI{0xC000, 1}, DimensionJ{0xC000, 2}, DimensionK{0xC000, 3}, Resolution{0xC100, 1}, FirstRadius{0xC200, 1},
     AxisOffset{0xC200, 2}, FaceRadius{0xC200, 4}, SweepAngles{0xC300, 1}, FanAngles{0xC300, 2}, Samples{0xD000, 1},
     MovieCount{0xD400, 1}, MovieTimes{0xD400, 5}, MovieSamples{0xD600, 1}, End{0xFFFF, 0xFFFF};
 
-std::string TextOf(Tag tag)
+std::string TextOf(KretzTag tag)
 {
   constexpr char digits[] = "0123456789ABCDEF";
   std::string text = "(";
@@ -159,7 +159,7 @@ private:
       stream_.seekg(static_cast<std::streamoff>(at));
       if (!stream_.read(reinterpret_cast<char*>(head), sizeof head))
         Fail("the data end early, in the head of an item");
-      const Tag tag{LittleEndian<std::uint16_t>(head), LittleEndian<std::uint16_t>(head + 2)};
+      const KretzTag tag{LittleEndian<std::uint16_t>(head), LittleEndian<std::uint16_t>(head + 2)};
       const std::uint64_t bytes = LittleEndian<std::uint32_t>(head + 4);
       at += sizeof head;
       if (!(tag < End))
@@ -173,9 +173,9 @@ private:
     }
   }
 
-  bool Has(Tag tag) const { return items_.count(tag) > 0; }
+  bool Has(KretzTag tag) const { return items_.count(tag) > 0; }
 
-  const Item& Find(Tag tag, const char* what) const
+  const Item& Find(KretzTag tag, const char* what) const
   {
     const auto found = items_.find(tag);
     if (found == items_.end())
@@ -193,7 +193,7 @@ private:
     return bytes;
   }
 
-  int Dimension(Tag tag)
+  int Dimension(KretzTag tag)
   {
     const Item& item = Find(tag, "a dimension");
     if (item.bytes != 2)
@@ -204,7 +204,7 @@ private:
     return n;
   }
 
-  std::vector<double> Doubles(Tag tag, const char* what, std::size_t count)
+  std::vector<double> Doubles(KretzTag tag, const char* what, std::size_t count)
   {
     const Item& item = Find(tag, what);
     if (item.bytes != count * sizeof(double))
@@ -220,10 +220,10 @@ private:
     return numbers;
   }
 
-  double Number(Tag tag, const char* what) { return Doubles(tag, what, 1)[0]; }
+  double Number(KretzTag tag, const char* what) { return Doubles(tag, what, 1)[0]; }
 
   // Latin-1 without its end, as UTF-8.
-  std::string Text(Tag tag)
+  std::string Text(KretzTag tag)
   {
     const auto found = items_.find(tag);
     std::string text;
@@ -308,7 +308,7 @@ private:
     return std::to_string(dimensions_[0]) + " x " + std::to_string(dimensions_[1]) + " x " + std::to_string(dimensions_[2]);
   }
 
-  Angles ReadAngles(Tag tag, const char* what, int count)
+  Angles ReadAngles(KretzTag tag, const char* what, int count)
   {
     const std::vector<double> angles = Doubles(tag, what, static_cast<std::size_t>(count));
     if (std::adjacent_find(angles.begin(), angles.end(), std::greater_equal<>()) != angles.end())
@@ -455,7 +455,7 @@ private:
 
   std::ifstream stream_;
   std::uint64_t begin_, end_;
-  std::map<Tag, Item> items_;
+  std::map<KretzTag, Item> items_;
   std::array<int, 3> dimensions_{0, 0, 0};
   std::uint64_t first_ = 0; // where the samples of the first volume begin
   Angles fan_, sweep_;

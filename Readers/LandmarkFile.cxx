@@ -95,7 +95,7 @@ std::string Lower(std::string_view text)
   return lower;
 }
 
-struct Columns {
+struct LandmarkColumns {
   int label = -1, defined = -1;
   std::array<int, 3> axes{-1, -1, -1};
   Frame frame = Frame::Lps;
@@ -104,7 +104,7 @@ struct Columns {
   bool IsWhole() const { return label >= 0 && *std::min_element(axes.begin(), axes.end()) >= 0; }
 };
 
-Columns ColumnsOf(const std::vector<std::string>& names)
+LandmarkColumns ColumnsOf(const std::vector<std::string>& names)
 {
   const auto find = [&names](const char* name) {
     for (std::size_t i = 0; i < names.size(); ++i)
@@ -112,7 +112,7 @@ Columns ColumnsOf(const std::vector<std::string>& names)
         return static_cast<int>(i);
     return -1;
   };
-  Columns columns;
+  LandmarkColumns columns;
   columns.label = std::max(find("label"), find("name"));
   columns.defined = find("defined");
   columns.count = names.size();
@@ -138,7 +138,7 @@ bool CommentValue(std::string_view line, const char* key, std::string& value)
 
 std::vector<Landmark> TableLandmarks(std::string_view text, const JsonPlace& file)
 {
-  Columns columns{0, -1, {1, 2, 3}, Frame::Lps, 4};
+  LandmarkColumns columns{0, -1, {1, 2, 3}, Frame::Lps, 4};
   bool isFcsv = false, mayBeNames = true;
   std::vector<Landmark> landmarks;
   int number = 0;

@@ -18,7 +18,7 @@ struct TypeName {
   VoxelType type;
 };
 // The first name of each type is the one that we write.
-constexpr TypeName TypeNames[] = {
+constexpr TypeName MetaImageTypeNames[] = {
     {"MET_CHAR", VoxelType::Int8},         {"MET_UCHAR", VoxelType::UInt8},   {"MET_SHORT", VoxelType::Int16},
     {"MET_USHORT", VoxelType::UInt16},     {"MET_INT", VoxelType::Int32},     {"MET_UINT", VoxelType::UInt32},
     {"MET_LONG", VoxelType::Int32},        {"MET_ULONG", VoxelType::UInt32},  {"MET_LONG_LONG", VoxelType::Int64},
@@ -57,9 +57,9 @@ const std::set<std::string> OwnKeys = {"ObjectType",
                                        "ElementToIntensityFunctionOffset",
                                        "ElementDataFile"};
 
-class Values {
+class HeaderValues {
 public:
-  Values(const HeaderLines& lines, const std::map<std::string, std::string>& values) : lines_(lines), values_(values) {}
+  HeaderValues(const HeaderLines& lines, const std::map<std::string, std::string>& values) : lines_(lines), values_(values) {}
 
   const std::string* Find(const std::string& key) const
   {
@@ -91,7 +91,7 @@ private:
 };
 
 // How many of the axes lie in space; the last may count frames.
-int SpatialAxes(const HeaderLines& lines, const Values& values, int axes, FrameAxis* sequence)
+int SpatialAxes(const HeaderLines& lines, const HeaderValues& values, int axes, FrameAxis* sequence)
 {
   if (!sequence)
     return axes;
@@ -106,7 +106,7 @@ int SpatialAxes(const HeaderLines& lines, const Values& values, int axes, FrameA
   return frames == words.end() ? axes : axes - 1;
 }
 
-void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const Values& values, int all, FrameAxis* sequence)
+void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const HeaderValues& values, int all, FrameAxis* sequence)
 {
   const int axes = SpatialAxes(lines, values, all, sequence);
   if (axes != 2 && axes != 3)
@@ -149,15 +149,16 @@ void ParseGeometry(ImageHeader& header, const HeaderLines& lines, const Values& 
   PlaceAxes(header, axes);
 }
 
-void ParseData(ImageHeader& header, const HeaderLines& lines, const Values& values)
+void ParseData(ImageHeader& header, const HeaderLines& lines, const HeaderValues& values)
 {
   if (const std::string* channels = values.Find("ElementNumberOfChannels"))
     header.components = lines.Numbers<std::uint64_t>("ElementNumberOfChannels", *channels, 1)[0];
   const std::string& typeName = values.Need("ElementType");
   // Arrays of numbers have types of their own (MET_UCHAR_ARRAY), which mean the same together with the channels.
   const std::string single = typeName.substr(0, typeName.find("_ARRAY"));
-  const auto type = std::find_if(std::begin(TypeNames), std::end(TypeNames), [&](const TypeName& t) { return single == t.name; });
-  header.typeIsKnown = type != std::end(TypeNames);
+  const auto type = std::find_if(std::begin(MetaImageTypeNames), std::end(MetaImageTypeNames),
+                                 [&](const TypeName& t) { return single == t.name; });
+  header.typeIsKnown = type != std::end(MetaImageTypeNames);
   if (header.typeIsKnown)
     header.type = type->type;
 
@@ -209,7 +210,7 @@ void ParseMetaImage(ImageHeader& header, FrameAxis* axis)
 
   if (std::any_of(header.fields.begin(), header.fields.end(), [](const HeaderField& field) { return IsFrameField(field.first); }))
     lines.Fail(NotAVolume);
-  const Values values(lines, known);
+  const HeaderValues values(lines, known);
   if (const std::string* object = values.Find("ObjectType"); object && *object != "Image")
     lines.Fail("it holds an object of type " + *object + ", not an image");
   const int axes = lines.Numbers<int>("NDims", values.Need("NDims"), 1)[0];
@@ -223,7 +224,9 @@ void ParseMetaImage(ImageHeader& header, FrameAxis* axis)
 
 const char* MetaImageTypeName(VoxelType type)
 {
-  return std::find_if(std::begin(TypeNames), std::end(TypeNames), [&](const TypeName& t) { return t.type == type; })->name;
+  return std::find_if(std::begin(MetaImageTypeNames), std::end(MetaImageTypeNames),
+                      [&](const TypeName& t) { return t.type == type; })
+      ->name;
 }
 
 std::string MetaImageHeaderText(const ImageHeader& header, const std::string& dataFile, std::size_t& compressedSizeAt)

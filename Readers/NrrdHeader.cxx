@@ -16,7 +16,7 @@ namespace echorama {
 namespace {
 
 // All names of each type, blanks dropped; the first is the one that we write.
-const std::vector<std::pair<VoxelType, std::string>> TypeNames = {
+const std::vector<std::pair<VoxelType, std::string>> NrrdTypeNames = {
     {VoxelType::Int8, "int8 int8_t signedchar"},
     {VoxelType::UInt8, "uint8 uint8_t uchar unsignedchar"},
     {VoxelType::Int16, "int16 int16_t short shortint signedshort signedshortint"},
@@ -30,7 +30,7 @@ const std::vector<std::pair<VoxelType, std::string>> TypeNames = {
 
 std::optional<VoxelType> TypeNamed(const std::string& name)
 {
-  for (const auto& [type, names] : TypeNames)
+  for (const auto& [type, names] : NrrdTypeNames)
     for (const std::string_view word : HeaderLines::Words(names))
       if (word == name)
         return type;
@@ -393,7 +393,7 @@ std::string EscapedNrrd(const std::string& text)
 
 std::string NrrdTypeName(VoxelType type)
 {
-  const std::string& names = TypeNames[static_cast<std::size_t>(type)].second;
+  const std::string& names = NrrdTypeNames[static_cast<std::size_t>(type)].second;
   return names.substr(0, names.find(' '));
 }
 

@@ -15,6 +15,7 @@
 // signs, so there is one loop that turns them all. A code of two letters leaves the third axis to be right-handed.
 #include "Readers/SequenceFile.h"
 #include "Core/Base/Error.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceText.h"
@@ -33,16 +34,10 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
 constexpr std::size_t MostMoments = 256;              // of a decoder, 40 kB each
 constexpr std::uint64_t FirstStretch = 1u << 18;      // bytes between two of them at first
 constexpr std::uint64_t InterleavedBytes = 64u << 20; // of frames that are taken from an interleaved file in one pass
 constexpr std::uint64_t PassBytes = 4u << 20;         // of such a file that are looked at together
-
-[[noreturn]] void FailFile(const std::string& path, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
 
 bool EndsWith(std::string_view text, std::string_view end)
 {
@@ -264,13 +259,6 @@ bool TurnPixels(std::size_t pixelBytes, const Turn& turn, const std::array<int, 
 }
 
 // Swaps the bytes of numbers.
-void SwapBytes(char* bytes, std::size_t size, std::uint64_t count)
-{
-  if (size > 1)
-    for (std::uint64_t i = 0; i < count; ++i, bytes += size)
-      std::reverse(bytes, bytes + size);
-}
-
 std::string SizeText(const std::array<int, 3>& size)
 {
   return std::to_string(size[0]) + " x " + std::to_string(size[1]) + (size[2] == 1 ? "" : " x " + std::to_string(size[2]));

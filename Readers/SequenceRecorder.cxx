@@ -9,6 +9,7 @@
 // Pixels are appended to a file of their own before the header counts their frame; what a kill leaves there beyond the frames of
 // the header is passed over by readers, and known to ours by the field Recorder.
 #include "Readers/SequenceRecorder.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceText.h"
@@ -25,7 +26,6 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr std::uint64_t SectorBytes = 512;
 
 // A file that is written by position, and closed in the end.

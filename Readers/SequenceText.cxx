@@ -2,13 +2,12 @@
 #include "Readers/SequenceText.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Readers/ByteOrder.h"
 #include <cmath>
 #include <set>
 
 namespace echorama {
 namespace {
-
-constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
 
 [[noreturn]] void Fail(const std::string& path, Error::Kind kind, const std::string& reason)
 {

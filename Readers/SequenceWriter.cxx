@@ -6,6 +6,7 @@
 // the compressor.
 #include "Readers/SequenceWriter.h"
 #include "Core/Base/Error.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceText.h"
@@ -17,13 +18,7 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
 constexpr std::size_t FrameDigits = 10, SizeDigits = 20; // blanks that are left for numbers
-
-std::string VectorText(const Eigen::Vector3d& v)
-{
-  return "(" + NumberText(v[0]) + "," + NumberText(v[1]) + "," + NumberText(v[2]) + ")";
-}
 
 } // namespace
 

@@ -37,13 +37,8 @@ const char* const TypeKey = "echorama:type";
 const char* const DimensionsKey = "echorama:dimensions";
 const std::string FieldPrefix = "field:"; // keeps our fields apart from the keys of OpenVDB and other programs
 
-constexpr const char* TypeNames[] = {"int8",   "uint8", "int16",  "uint16",  "int32",
-                                     "uint32", "int64", "uint64", "float32", "float64"};
-
-[[noreturn]] void FailFile(const std::string& path, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
+constexpr const char* VdbTypeNames[] = {"int8",   "uint8", "int16",  "uint16",  "int32",
+                                        "uint32", "int64", "uint64", "float32", "float64"};
 
 // Calls function, and turns what OpenVDB and the stream throw into errors of ours.
 template <class Function>
@@ -536,8 +531,8 @@ bool VdbSource::IsOurs(const openvdb::CoordBBox& box)
   const auto type = grid_->getMetadata<openvdb::StringMetadata>(TypeKey);
   if (!dimensions || !type)
     return false;
-  const auto* name = std::find(std::begin(TypeNames), std::end(TypeNames), type->value());
-  if (name == std::end(TypeNames))
+  const auto* name = std::find(std::begin(VdbTypeNames), std::end(VdbTypeNames), type->value());
+  if (name == std::end(VdbTypeNames))
     Fail("its metadata name the type \"" + type->value() + "\", which is none");
   for (int axis = 0; axis < 3; ++axis) {
     const int length = dimensions->value()[axis];
@@ -550,7 +545,7 @@ bool VdbSource::IsOurs(const openvdb::CoordBBox& box)
     }
     stored_.geometry.dimensions[static_cast<std::size_t>(axis)] = length;
   }
-  content_.type = static_cast<VoxelType>(name - TypeNames);
+  content_.type = static_cast<VoxelType>(name - VdbTypeNames);
   // The grid must be one that holds the type without loss.
   const bool fits =
       DispatchVoxelType(content_.type, [this](auto zero) { return grid_->isType<GridOf<StoredOf<decltype(zero)>>>(); });
@@ -688,7 +683,7 @@ void WriteVdb(const std::string& path, const ImageHeader& header, const void* vo
     grid->setName(GridName);
     grid->setCreator("Echorama");
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-    grid->insertMeta(TypeKey, openvdb::StringMetadata(TypeNames[static_cast<int>(header.type)]));
+    grid->insertMeta(TypeKey, openvdb::StringMetadata(VdbTypeNames[static_cast<int>(header.type)]));
     grid->insertMeta(DimensionsKey, openvdb::Vec3IMetadata(openvdb::Vec3i(g.dimensions[0], g.dimensions[1], g.dimensions[2])));
     for (const HeaderField& field : header.fields)
       grid->insertMeta(FieldPrefix + field.first, openvdb::StringMetadata(field.second));

@@ -4,6 +4,7 @@
 #include "Readers/VolumeFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
@@ -19,13 +20,7 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
 constexpr std::uint64_t ChunkBytes = 1 << 24;
-
-[[noreturn]] void FailFile(const std::string& path, const std::string& reason)
-{
-  throw Error(Error::Kind::BadFile, path + ": " + reason);
-}
 
 std::uint64_t SizeOfData(const ImageHeader& header)
 {
@@ -82,23 +77,6 @@ void ReadText(std::istream& stream, const ImageHeader& header, T* out, const Pro
   }
   if (stream >> word)
     FailFile(header.dataPath, "it holds more numbers than its dimensions (" + DimensionsText(header.geometry) + ") say");
-}
-
-template <std::size_t Size>
-void SwapBytes(char* bytes, std::size_t count)
-{
-  for (std::size_t i = 0; i < count; ++i, bytes += Size)
-    std::reverse(bytes, bytes + Size);
-}
-
-void SwapBytes(char* bytes, std::size_t size, std::size_t count)
-{
-  if (size == 2)
-    SwapBytes<2>(bytes, count);
-  else if (size == 4)
-    SwapBytes<4>(bytes, count);
-  else if (size == 8)
-    SwapBytes<8>(bytes, count);
 }
 
 void ReverseSlices(char* bytes, std::size_t slice, int slices)

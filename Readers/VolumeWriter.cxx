@@ -4,6 +4,7 @@
 // held.
 #include "Readers/VolumeWriter.h"
 #include "Core/Base/Error.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/NiftiFile.h"
@@ -18,8 +19,7 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr bool HostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
-constexpr std::uint64_t ChunkBytes = 1 << 24;
+constexpr std::uint64_t WrittenAtOnce = 1 << 24;
 
 // The extension of a name, in small letters: ".nii.gz" has ".gz".
 std::string ExtensionOf(const std::string& path)
@@ -108,8 +108,9 @@ void VolumeWriter::Append(const void* voxels, std::uint64_t bytes, const Progres
   if (p.deflater)
     p.deflater->Append(voxels, bytes, progress);
   else
-    for (std::uint64_t done = 0; done < bytes && p.Target(); done += ChunkBytes) {
-      p.Target().write(static_cast<const char*>(voxels) + done, static_cast<std::streamsize>(std::min(ChunkBytes, bytes - done)));
+    for (std::uint64_t done = 0; done < bytes && p.Target(); done += WrittenAtOnce) {
+      p.Target().write(static_cast<const char*>(voxels) + done,
+                       static_cast<std::streamsize>(std::min(WrittenAtOnce, bytes - done)));
       progress(static_cast<double>(done) / static_cast<double>(bytes));
     }
   p.CheckStreams();

@@ -23,6 +23,7 @@
 #include "vtkUltrasoundSessionVoxels.h"
 #include "vtkUltrasoundVolume.h"
 
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/TextFile.h"
@@ -48,7 +49,6 @@ using namespace echorama;
 namespace fs = std::filesystem;
 
 namespace {
-constexpr double RadiansPerDegree = EIGEN_PI / 180.0;
 constexpr std::ptrdiff_t GreySamples = 50000; // per volume
 constexpr int ScorePoints = 2000;             // per volume
 constexpr std::uint64_t ScoreSeed = 1;

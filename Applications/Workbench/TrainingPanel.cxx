@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrainingPanel.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
@@ -30,8 +31,6 @@
 namespace echorama {
 
 namespace {
-
-constexpr double DegreesPerRadian = 57.29577951308232;
 
 QString DefaultHistory()
 {

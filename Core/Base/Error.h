@@ -25,4 +25,10 @@ private:
   Kind kind_;
 };
 
+/// \throws Error(BadFile): the path, and why it cannot be read.
+[[noreturn]] inline void FailFile(const std::string& path, const std::string& reason)
+{
+  throw Error(Error::Kind::BadFile, path + ": " + reason);
+}
+
 } // namespace echorama

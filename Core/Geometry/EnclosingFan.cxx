@@ -14,6 +14,7 @@
 // A bend is written as b in [0, 1], 0 flat and 1 a point: (1 - b) of the width halfway down is there at the face, and b comes
 // with depth. Neither end is infinite, and across the beams the unit is a millimetre at that depth.
 #include "Core/Geometry/EnclosingFan.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Geometry/ProbeFit.h"
@@ -26,12 +27,11 @@
 namespace echorama {
 namespace {
 
-constexpr double pi = 3.141592653589793;
-constexpr double widestTurn = 85.0 * pi / 180.0; // of a beam, from the middle one
+constexpr double widestTurn = 85.0 * Pi / 180.0; // of a beam, from the middle one
 constexpr int blocksAlong = 16;                  // the longest side of the region, for the points of the search
 constexpr std::size_t mostPoints = 700;
 constexpr double asGoodAsInside = 0.01; // voxels
-constexpr double leastBend = 1e-9;      // less is flat
+constexpr double flatBend = 1e-9;       // less is flat
 constexpr double slack = 1e-7;          // that extremes are widened by, as a part of the fan's size: rounding
 
 // Calls body(i, j, k) for the voxels of slice k that are on the surface of the region.
@@ -72,7 +72,7 @@ struct Range {
 };
 
 // The region as the search sees it.
-struct Region {
+struct ValidVoxels {
   VolumeView<const unsigned char> valid;
   ImageGeometry geometry;
   bool plane = false;
@@ -82,9 +82,10 @@ struct Region {
   double size = 0.0; // mm, of the box around it
 };
 
-Region RegionOf(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, double marginMm, const Progress& progress)
+ValidVoxels RegionOf(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, double marginMm,
+                     const Progress& progress)
 {
-  Region region{valid, geometry, geometry.dimensions[2] == 1, 0.0, {}, Eigen::Vector3d::Zero(), 0.0};
+  ValidVoxels region{valid, geometry, geometry.dimensions[2] == 1, 0.0, {}, Eigen::Vector3d::Zero(), 0.0};
   const Eigen::Vector3d& spacing = geometry.spacing;
   region.beyond = marginMm + 0.5 * (region.plane ? std::sqrt(spacing.x() * spacing.y()) : std::cbrt(spacing.prod()));
 
@@ -181,7 +182,7 @@ struct Extent {
 
 class Measure {
 public:
-  Measure(const Head& head, const Least& least, const Region& region)
+  Measure(const Head& head, const Least& least, const ValidVoxels& region)
     : worldToProbe_(head.probeToWorld.inverse()), fan_(least.Unit(head.fanBend)), sweep_(least.Unit(head.sweepBend)),
       beyond_(region.beyond), plane_(region.plane && !(least.shape && !least.shape->IsPlane()))
   {
@@ -249,13 +250,13 @@ std::pair<ProbeGeometry, double> FanOf(const Head& head, const Least& least, Ext
     found.sweepAngle = 2.0 * across * sweep.angle;
     found.sweepWidth = 2.0 * across * sweep.width;
     excess += std::max(0.0, sweep.angle * across - least.sweepTurn);
-    if (found.sweepAngle >= pi && found.ReachesBehindAxis())
+    if (found.sweepAngle >= Pi && found.ReachesBehindAxis())
       excess += 1.0;
   }
   return {found, excess};
 }
 
-double CostOf(const Head& head, const Least& least, const Region& region)
+double CostOf(const Head& head, const Least& least, const ValidVoxels& region)
 {
   const Measure measure(head, least, region);
   Extent extent;
@@ -268,7 +269,8 @@ double CostOf(const Head& head, const Least& least, const Region& region)
 // The numbers that the search turns, each in steps of about equal effect.
 class Knobs {
 public:
-  Knobs(const Head& start, const Least& least, const Region& region, bool plane) : start_(start), least_(least), region_(region)
+  Knobs(const Head& start, const Least& least, const ValidVoxels& region, bool plane)
+    : start_(start), least_(least), region_(region)
   {
     for (int knob = 0; knob < Count; ++knob)
       if (!plane || knob == AlongX || knob == AlongZ || knob == AboutY || knob == FanBend)
@@ -293,9 +295,9 @@ public:
         start_.probeToWorld;
     head.fanBend = std::clamp(start_.fanBend + bend * all[FanBend], 0.0, least_.fanBend);
     head.sweepBend = std::clamp(start_.sweepBend + bend * all[SweepBend], 0.0, least_.sweepBend);
-    if (head.fanBend < leastBend)
+    if (head.fanBend < flatBend)
       head.fanBend = 0.0;
-    if (head.sweepBend < leastBend)
+    if (head.sweepBend < flatBend)
       head.sweepBend = 0.0;
     head.fanMiddle += length * all[FanMiddle];
     return head;
@@ -305,17 +307,17 @@ private:
   enum Knob { AlongX, AlongY, AlongZ, AboutX, AboutY, AboutZ, FanBend, SweepBend, FanMiddle, Count };
   const Head& start_;
   const Least& least_;
-  const Region& region_;
+  const ValidVoxels& region_;
   std::vector<int> used_;
 };
 
-struct Rated {
+struct Priced {
   Head head;
   double cost = 0.0;
 };
 
 // One run of the simplex method from a corner at the start; \a steps evaluations at most.
-Rated Simplex(const Rated& start, const Least& least, const Region& region, bool plane, double step, int steps)
+Priced Simplex(const Priced& start, const Least& least, const ValidVoxels& region, bool plane, double step, int steps)
 {
   const Knobs knobs(start.head, least, region, plane);
   struct Corner {
@@ -374,7 +376,7 @@ Rated Simplex(const Rated& start, const Least& least, const Region& region, bool
 }
 
 // A plain fan that looks along the axes of \a pose, its face at the near end of the region, across its middle.
-Head PlainHead(const Pose& pose, double fanBend, double sweepBend, const Region& region)
+Head PlainHead(const Pose& pose, double fanBend, double sweepBend, const ValidVoxels& region)
 {
   Range x, y, z;
   for (const Eigen::Vector3d& point : region.points) {
@@ -394,7 +396,7 @@ double BendOf(const ProbeArc& arc, double halfway)
 }
 
 // Whether the fan as it is holds every voxel, with the margin, to within a part of a voxel.
-bool Holds(const PlacedProbe& fan, const Region& region, double marginMm, const Progress& progress)
+bool Holds(const PlacedProbe& fan, const ValidVoxels& region, double marginMm, const Progress& progress)
 {
   const Pose worldToProbe = fan.probeToWorld.inverse();
   const Eigen::Affine3d toProbe = worldToProbe * region.geometry.IndexToWorld();
@@ -420,7 +422,7 @@ bool Holds(const PlacedProbe& fan, const Region& region, double marginMm, const 
   return std::none_of(outside.begin(), outside.end(), [](char out) { return out != 0; });
 }
 
-Extent ExtentOf(const Measure& measure, const Region& region, const Progress& progress)
+Extent ExtentOf(const Measure& measure, const ValidVoxels& region, const Progress& progress)
 {
   const Eigen::Affine3d toWorld = region.geometry.IndexToWorld();
   std::vector<Extent> extents(static_cast<std::size_t>(region.geometry.dimensions[2]));
@@ -450,7 +452,7 @@ void BeginAtNearEdge(PlacedProbe& fan)
 }
 
 // Where the search starts from when no shape is given: the fit, however bad, or a box along the axes of the grid.
-PlacedProbe FoundFrom(const Region& region, const Progress& progress)
+PlacedProbe FoundFrom(const ValidVoxels& region, const Progress& progress)
 {
   ProbeFitParameters anything;
   anything.minimumOverlap = 0.0;
@@ -516,7 +518,7 @@ PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeom
   if (valid.Dimensions() != geometry.dimensions)
     throw Error(Error::Kind::BadInput, "enclosing fan: the valid region has other dimensions than the volume");
 
-  const Region region = RegionOf(valid, geometry, parameters.marginMm, progress.Part(0.0, 0.2));
+  const ValidVoxels region = RegionOf(valid, geometry, parameters.marginMm, progress.Part(0.0, 0.2));
   if (parameters.shape && Holds(*parameters.shape, region, parameters.marginMm, progress.Part(0.2, 0.3)))
     return *parameters.shape;
 
@@ -538,19 +540,19 @@ PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeom
       least.sweepBend = start.sweepBend;
   }
 
-  std::vector<Rated> starts;
+  std::vector<Priced> starts;
   for (const double part : {0.0, 0.3, 0.6, 1.0})
     starts.push_back(
         {PlainHead(base.probeToWorld, part * std::min(least.fanBend, 0.6), part * std::min(least.sweepBend, 0.6), region), 0.0});
   starts.push_back({start, 0.0});
-  for (Rated& rated : starts)
+  for (Priced& rated : starts)
     rated.cost = CostOf(rated.head, least, region);
-  const auto cheaper = [](const Rated& a, const Rated& b) { return a.cost < b.cost; };
+  const auto cheaper = [](const Priced& a, const Priced& b) { return a.cost < b.cost; };
   std::stable_sort(starts.begin(), starts.end() - 1, cheaper);
   std::swap(starts[2], starts.back()); // two plain ones, and the base
   starts.resize(3);
   ParallelFor(static_cast<std::ptrdiff_t>(starts.size()), progress.Part(0.5, 0.9), [&](std::ptrdiff_t i) {
-    Rated& rated = starts[static_cast<std::size_t>(i)];
+    Priced& rated = starts[static_cast<std::size_t>(i)];
     rated = Simplex(rated, least, region, plane, 1.0, 600);
     rated = Simplex(rated, least, region, plane, 0.4, 600); // a simplex may have become flat
   });

@@ -20,6 +20,7 @@
 // A point at the end of the grid must not lie outside the model; when it lies inside, the model goes on beyond the grid, which
 // costs next to nothing.
 #include "Core/Geometry/ProbeFit.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/RegionOutline.h"
@@ -32,9 +33,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr double pi = 3.141592653589793;
-constexpr double degree = pi / 180.0;
 
 constexpr int mostCells = 1 << 18;
 // Ratings (overlap less misfit) that differ by less say the same, and nearly so.
@@ -342,8 +340,8 @@ private:
       if (IsFree(unknown))
         moved[unknown] =
             unknown == FanOffset ? model[unknown] + change[unknown] : std::max(0.0, model[unknown] + change[unknown]);
-    moved.shape.fanAngle = std::min(moved.shape.fanAngle, 1.999 * pi);
-    moved.shape.sweepAngle = std::min(moved.shape.sweepAngle, 1.999 * pi);
+    moved.shape.fanAngle = std::min(moved.shape.fanAngle, 1.999 * Pi);
+    moved.shape.sweepAngle = std::min(moved.shape.sweepAngle, 1.999 * Pi);
     moved.shape.depthMax = std::max(moved.shape.depthMax, 0.5 * model.shape.depthMax);
     return moved;
   }
@@ -440,11 +438,11 @@ Frames StartFrames(const Region& region)
   std::vector<Eigen::Vector3d> turns;
   if (region.plane)
     for (int turn = 0; turn < 4; ++turn)
-      turns.emplace_back(0.0, 0.0, turn * pi / 8.0);
+      turns.emplace_back(0.0, 0.0, turn * Pi / 8.0);
   else
     for (int axis = -1; axis < 3; ++axis)
       turns.push_back(axis < 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero())
-                               : Eigen::Vector3d(0.25 * pi * Eigen::Vector3d::Unit(axis)));
+                               : Eigen::Vector3d(0.25 * Pi * Eigen::Vector3d::Unit(axis)));
   Frames frames;
   for (const Eigen::Vector3d& turn : turns) {
     const Frames more = FramesAlong(region.axes * ExpRotation(turn), region.plane);
@@ -458,7 +456,7 @@ double WidthFor(double angle, double extent, double length)
 {
   if (angle == 0.0)
     return extent;
-  return angle * std::max(0.0, 0.5 * extent / std::sin(std::min(0.5 * angle, 0.5 * pi)) - length);
+  return angle * std::max(0.0, 0.5 * extent / std::sin(std::min(0.5 * angle, 0.5 * Pi)) - length);
 }
 
 struct Rated {
@@ -526,10 +524,10 @@ bool IsAlike(const Model& a, const Model& b, double size)
 {
   const Eigen::Matrix3d turn = a.probeToWorld.linear().transpose() * b.probeToWorld.linear();
   // Turned by half about the middle beam a fan is the same.
-  return turn(2, 2) > std::cos(5.0 * degree) && std::abs(turn(0, 0)) > std::cos(5.0 * degree) &&
+  return turn(2, 2) > std::cos(5.0 * RadiansPerDegree) && std::abs(turn(0, 0)) > std::cos(5.0 * RadiansPerDegree) &&
          (a.probeToWorld.translation() - b.probeToWorld.translation()).norm() < 0.05 * size &&
-         std::abs(a.shape.fanAngle - b.shape.fanAngle) < 5.0 * degree &&
-         std::abs(a.shape.sweepAngle - b.shape.sweepAngle) < 5.0 * degree;
+         std::abs(a.shape.fanAngle - b.shape.fanAngle) < 5.0 * RadiansPerDegree &&
+         std::abs(a.shape.sweepAngle - b.shape.sweepAngle) < 5.0 * RadiansPerDegree;
 }
 
 std::vector<Rated> Distinct(const std::vector<Rated>& sorted, std::size_t most, double size)
@@ -627,7 +625,8 @@ Choice Choose(const Region& region, const Progress& progress)
     Refine(candidates[i].model, region.many, freedom, 4.0 * region.Reach(), region.Reach(), 30);
     candidates[i].rating = RatingOf(candidates[i].model, region, region.cells, region.many);
     // A fan that is not centred on its array is a solid of its own only when the array bends and turns.
-    if (region.plane || std::min(candidates[i].model.shape.fanAngle, candidates[i].model.shape.sweepAngle) < 5.0 * degree)
+    if (region.plane ||
+        std::min(candidates[i].model.shape.fanAngle, candidates[i].model.shape.sweepAngle) < 5.0 * RadiansPerDegree)
       return;
     Rated offset = candidates[i];
     Refine(offset.model, region.many, Freedom::Offset, 0.1 * region.size, region.Reach(), 40);
@@ -681,7 +680,7 @@ void SharpenTip(Model& model, VolumeView<const unsigned char> valid, const Regio
 {
   ProbeGeometry& shape = model.shape;
   const double cell = region.outline.cellMm, inside = 4.0 * cell;
-  const auto isTip = [&](const ProbeArc& arc) { return arc.angle > 5.0 * degree && arc.width < 8.0 * cell; };
+  const auto isTip = [&](const ProbeArc& arc) { return arc.angle > 5.0 * RadiansPerDegree && arc.width < 8.0 * cell; };
   if (!(isTip(shape.Fan()) || (!region.plane && isTip(shape.Sweep()))) || shape.depthMax < 2.0 * inside)
     return;
   double behind = 10.0 * cell;
@@ -825,7 +824,7 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
   double exchangedRating = 0.0;
   for (const Rated& other : choice.others) {
     const Eigen::Matrix3d turn = choice.best.probeToWorld.linear().transpose() * other.model.probeToWorld.linear();
-    if (turn(2, 2) < std::cos(20.0 * degree)) {
+    if (turn(2, 2) < std::cos(20.0 * RadiansPerDegree)) {
       otherAxis = true;
     } else if (std::abs(turn(0, 0)) < 0.7 && !exchanged) {
       exchanged = true;
@@ -841,7 +840,7 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
   if (shape.fanOffset != 0.0)
     notes.push_back(
         Text("The fan is not centred (fanOffset): its middle beam is turned by %.1f degrees from where the sweep looks.",
-             shape.fanAngle * shape.fanOffset / degree));
+             shape.fanAngle * shape.fanOffset / RadiansPerDegree));
   if (!region.plane && IsThin(shape.Sweep().Span(0.5 * shape.depthMax), region))
     notes.push_back(Text("The region is only %.3g mm thick along the sweep, too little to tell its angle from its width.",
                          shape.Sweep().Span(0.5 * shape.depthMax)));

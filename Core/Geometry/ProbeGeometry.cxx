@@ -17,7 +17,7 @@ constexpr double twoPi = 6.283185307179586;
 // A face that bends by less is straight to all digits, and dividing by its angle would lose some.
 constexpr double straight = 1e-100;
 
-double Sinc(double a)
+double SineQuotient(double a)
 {
   return a == 0.0 ? 1.0 : std::sin(a) / a;
 }
@@ -36,7 +36,8 @@ bool ClampToFace(const ProbeArc& arc, ProbeArc::Place& place, double slack)
 Eigen::Vector2d ProbeArc::PointOf(const Place& place) const
 {
   const double turn = angle * place.along, half = 0.5 * turn, arc = width * place.along;
-  return {arc * Sinc(turn) + place.depth * std::sin(turn), -arc * std::sin(half) * Sinc(half) + place.depth * std::cos(turn)};
+  return {arc * SineQuotient(turn) + place.depth * std::sin(turn),
+          -arc * std::sin(half) * SineQuotient(half) + place.depth * std::cos(turn)};
 }
 
 ProbeArc::Bend ProbeArc::GetBend() const

@@ -5,7 +5,6 @@
 #include <cmath>
 
 namespace echorama {
-namespace {
 
 Eigen::Matrix3d Hat(const Eigen::Vector3d& v)
 {
@@ -13,6 +12,8 @@ Eigen::Matrix3d Hat(const Eigen::Vector3d& v)
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
   return m;
 }
+
+namespace {
 
 // (1 - cos a) / a^2 and (a - sin a) / a^3
 double CosineQuotient(double a)

@@ -10,6 +10,9 @@ using Pose = Eigen::Isometry3d;
 /// A twist: translational part first, rotation vector (axis times angle, radians) last.
 using Twist = Eigen::Matrix<double, 6, 1>;
 
+/// The matrix of the cross product: Hat(v) * x is v x x.
+Eigen::Matrix3d Hat(const Eigen::Vector3d& v);
+
 /// The rotation by |v| radians about v; exact to rounding for |v| -> 0.
 Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& v);
 

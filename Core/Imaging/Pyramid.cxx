@@ -12,7 +12,7 @@
 namespace echorama {
 namespace {
 
-constexpr float Unreal = std::numeric_limits<float>::quiet_NaN();
+constexpr float NoValue = std::numeric_limits<float>::quiet_NaN();
 
 std::ptrdiff_t CountReal(const Volume<float>& volume)
 {
@@ -31,7 +31,7 @@ PyramidLevel Finest(const PosedVolume<T>& volume, const Progress& progress)
     for (std::ptrdiff_t i = k * out.SliceStride(), end = i + out.SliceStride(); i < end; ++i) {
       const float value = static_cast<float>(volume.intensity[i]);
       const bool real = (volume.valid.Empty() || volume.valid[i] != 0) && std::isfinite(value);
-      out[i] = real ? value : Unreal;
+      out[i] = real ? value : NoValue;
     }
   });
   level.realVoxels = CountReal(level.intensity);
@@ -49,7 +49,7 @@ PyramidLevel Halved(const PyramidLevel& fine, const std::array<int, 3>& factor)
     coarse.geometry.spacing[axis] *= factor[axis];
     coarse.geometry.origin += 0.5 * (factor[axis] - 1) * fine.geometry.spacing[axis] * fine.geometry.direction.col(axis);
   }
-  coarse.intensity = Volume<float>(coarse.geometry.dimensions, Unreal);
+  coarse.intensity = Volume<float>(coarse.geometry.dimensions, NoValue);
   const VolumeView<float> out = coarse.intensity.View();
   const auto& m = out.Dimensions();
   const int needed = (factor[0] * factor[1] * factor[2] + 1) / 2;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundAcquisition.h"
 
+#include "Core/Base/Angles.h"
 #include "Core/Base/NumberText.h"
 
 #include "vtkDataObject.h"
@@ -17,7 +18,6 @@
 vtkStandardNewMacro(vtkUltrasoundAcquisition);
 
 namespace {
-constexpr double DegreesPerRadian = 57.29577951308232;
 const char* const ProbeGeometryComponents[] = {"FanAngleDegrees", "FanWidthMm", "SweepAngleDegrees", "SweepWidthMm",
                                                "DepthMinMm",      "DepthMaxMm", "FanOffset"};
 
@@ -117,9 +117,9 @@ std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf
     return {};
   }
   echorama::ProbeGeometry geometry;
-  geometry.fanAngle = (*n)[0] / DegreesPerRadian;
+  geometry.fanAngle = (*n)[0] / echorama::DegreesPerRadian;
   geometry.fanWidth = (*n)[1];
-  geometry.sweepAngle = (*n)[2] / DegreesPerRadian;
+  geometry.sweepAngle = (*n)[2] / echorama::DegreesPerRadian;
   geometry.sweepWidth = (*n)[3];
   geometry.depthMin = (*n)[4];
   geometry.depthMax = (*n)[5];
@@ -130,8 +130,12 @@ std::optional<echorama::ProbeGeometry> vtkUltrasoundAcquisition::ProbeGeometryOf
 //----------------------------------------------------------------------------
 void vtkUltrasoundAcquisition::SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& g)
 {
-  std::vector<double> numbers{
-      g.fanAngle * DegreesPerRadian, g.fanWidth, g.sweepAngle * DegreesPerRadian, g.sweepWidth, g.depthMin, g.depthMax};
+  std::vector<double> numbers{g.fanAngle * echorama::DegreesPerRadian,
+                              g.fanWidth,
+                              g.sweepAngle * echorama::DegreesPerRadian,
+                              g.sweepWidth,
+                              g.depthMin,
+                              g.depthMax};
   if (g.fanOffset != 0.0) {
     numbers.push_back(g.fanOffset);
   }

@@ -26,11 +26,11 @@ namespace echorama {
 
 namespace {
 
-constexpr int Tile = 8;
+constexpr int TileSide = 8;
 constexpr std::size_t FewSources = 512;  // their sums cost no more than lattices, which are at their worst with them
 constexpr std::size_t ExactChunk = 1024; // sources whose sums are floats, before they are added to doubles
 
-struct Spread { // of one channel
+struct ChannelRange { // of one channel
   float middle = 0.0f, least = 0.0f, most = 0.0f;
 };
 
@@ -40,7 +40,7 @@ struct Problem {
   const Eigen::Vector3d& spacing;
   VolumeView<const float> squaredDistance;
   std::vector<std::vector<float>> rows; // ones, then channels relative to their middle
-  std::vector<Spread> spreads;
+  std::vector<ChannelRange> spreads;
   const std::vector<VolumeView<float>>& result;
 };
 
@@ -97,7 +97,7 @@ float Finished(const Problem& problem, std::size_t channel, float value, bool vo
 {
   if (!voxels)
     return value;
-  const Spread& spread = problem.spreads[channel];
+  const ChannelRange& spread = problem.spreads[channel];
   return std::min(std::max(value + spread.middle, spread.least), spread.most);
 }
 
@@ -114,7 +114,7 @@ public:
   {
     std::array<int, 3> end;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      end[axis] = std::min(begin[axis] + Tile, level.size[axis]);
+      end[axis] = std::min(begin[axis] + TileSide, level.size[axis]);
     Gather(level, begin, end);
     if (points_.empty())
       return;
@@ -285,7 +285,7 @@ void DiffuseWith(const Problem& problem, double d, const Wanted& wanted, const P
     const Progress part = progress.Part(voxels ? 0.3 : 0.1 + 0.2 * done / all, voxels ? 1.0 : 0.1 + 0.2 * (done + 1.0) / all);
     for (std::size_t channel = 0; channel < channels; ++channel) {
       const VolumeView<float> values = voxels ? problem.result[channel] : level.values[channel].View();
-      const Spread& spread = problem.spreads[channel];
+      const ChannelRange& spread = problem.spreads[channel];
       if (number + 1 < levels.size())
         RefineDiffusionLevel(levels[number + 1], level, channel, values, voxels ? spread.middle : 0.0f,
                              voxels ? spread.least : spread.least - spread.middle,
@@ -295,14 +295,15 @@ void DiffuseWith(const Problem& problem, double d, const Wanted& wanted, const P
     }
     std::array<int, 3> tiles;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      tiles[axis] = (level.size[axis] + Tile - 1) / Tile;
-    ParallelRanges(static_cast<std::ptrdiff_t>(tiles[0]) * tiles[1] * tiles[2], exact ? 1 : 16, part.Part(0.1, 1.0),
-                   [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-                     TileSum sum(problem, exponent, tree.get(), ToleranceFor(accuracy));
-                     for (auto tile = static_cast<int>(begin); tile < static_cast<int>(end); ++tile)
-                       sum.Run(level, voxels,
-                               {tile % tiles[0] * Tile, tile / tiles[0] % tiles[1] * Tile, tile / (tiles[0] * tiles[1]) * Tile});
-                   });
+      tiles[axis] = (level.size[axis] + TileSide - 1) / TileSide;
+    ParallelRanges(
+        static_cast<std::ptrdiff_t>(tiles[0]) * tiles[1] * tiles[2], exact ? 1 : 16, part.Part(0.1, 1.0),
+        [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+          TileSum sum(problem, exponent, tree.get(), ToleranceFor(accuracy));
+          for (auto tile = static_cast<int>(begin); tile < static_cast<int>(end); ++tile)
+            sum.Run(level, voxels,
+                    {tile % tiles[0] * TileSide, tile / tiles[0] % tiles[1] * TileSide, tile / (tiles[0] * tiles[1]) * TileSide});
+        });
   }
 }
 
@@ -323,7 +324,7 @@ void Diffuse(const DiffusionParameters& parameters, const DiffusionSources& sour
   for (std::size_t channel = 0; channel < static_cast<std::size_t>(sources.channels); ++channel) {
     const float* const values = sources.values.data() + channel * count;
     const auto [least, most] = std::minmax_element(values, values + count);
-    const Spread spread{0.5f * *least + 0.5f * *most, *least, *most};
+    const ChannelRange spread{0.5f * *least + 0.5f * *most, *least, *most};
     problem.spreads.push_back(spread);
     problem.rows.emplace_back(values, values + count);
     for (float& value : problem.rows.back())

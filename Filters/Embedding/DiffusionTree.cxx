@@ -18,8 +18,8 @@ namespace echorama {
 namespace {
 
 constexpr int LeafSize = 8;
-constexpr int Moments = 10;
-constexpr int FewSources = 6; // an expansion costs about as much as this many
+constexpr int MomentCount = 10;
+constexpr int SummedSources = 6; // an expansion costs about as much as this many
 
 double SquaredGap(const Eigen::Vector3d& point, const Eigen::Vector3d& low, const Eigen::Vector3d& high)
 {
@@ -44,7 +44,7 @@ DiffusionTree::DiffusionTree(const std::vector<std::array<int, 3>>& voxels, cons
   for (std::size_t row = 0; row < rows.size(); ++row)
     for (const int s : order)
       values_[row].push_back(rows[row][static_cast<std::size_t>(s)]);
-  moments_.assign(clusters_.size() * rows.size() * Moments, 0.0);
+  moments_.assign(clusters_.size() * rows.size() * MomentCount, 0.0);
   terms_.assign(clusters_.size() * rows.size() * DiffusionFar::Terms, 0.0f);
   for (int number = static_cast<int>(clusters_.size()) - 1; number >= 0; --number) // children come after their parents
     Expand(number);
@@ -88,7 +88,7 @@ void DiffusionTree::Expand(int number)
   Cluster& cluster = clusters_[static_cast<std::size_t>(number)];
   const auto rows = static_cast<std::size_t>(rows_);
   const auto momentsOf = [&](int of, std::size_t row) {
-    return moments_.data() + (static_cast<std::size_t>(of) * rows + row) * Moments;
+    return moments_.data() + (static_cast<std::size_t>(of) * rows + row) * MomentCount;
   };
   const auto add = [](double* m, const double* from, const Eigen::Vector3d& e) { // from: about a point that is off by e
     const double sum = from[0];
@@ -111,7 +111,7 @@ void DiffusionTree::Expand(int number)
       const Eigen::Vector3d e = places_[static_cast<std::size_t>(s)] - cluster.centre;
       cluster.radius = std::max(cluster.radius, e.norm());
       for (std::size_t row = 0; row < rows; ++row) {
-        const double one[Moments] = {values_[row][static_cast<std::size_t>(s)]};
+        const double one[MomentCount] = {values_[row][static_cast<std::size_t>(s)]};
         add(momentsOf(number, row), one, e);
       }
     }
@@ -136,10 +136,10 @@ void DiffusionTree::Expand(int number)
   for (std::size_t row = 0; row < rows; ++row) {
     const double* const m = momentsOf(number, row);
     float* const t = terms_.data() + (static_cast<std::size_t>(number) * rows + row) * DiffusionFar::Terms;
-    const double factors[Moments] = {1.0, d, d, d, 0.5 * twice, twice, twice, 0.5 * twice, twice, 0.5 * twice};
-    for (int a = 0; a < Moments; ++a)
+    const double factors[MomentCount] = {1.0, d, d, d, 0.5 * twice, twice, twice, 0.5 * twice, twice, 0.5 * twice};
+    for (int a = 0; a < MomentCount; ++a)
       t[a] = static_cast<float>(factors[a] * m[a]);
-    t[Moments] = static_cast<float>(-0.5 * d * (m[4] + m[7] + m[9]));
+    t[MomentCount] = static_cast<float>(-0.5 * d * (m[4] + m[7] + m[9]));
   }
 }
 
@@ -169,7 +169,7 @@ void DiffusionTree::List(const DiffusionExponent& exponent, const DiffusionToler
     if (share < tolerance.left)
       continue;
     const double distance2 = SquaredGap(cluster.centre, low, high);
-    const bool few = cluster.count <= FewSources;
+    const bool few = cluster.count <= SummedSources;
     if (!few && distance2 > cluster.radius * cluster.radius) {
       const double ratio2 = cluster.radius * cluster.radius / distance2;
       if (third * ratio2 * std::sqrt(ratio2) * std::min(1.0, share) <= tolerance.expansion) {

@@ -41,7 +41,7 @@ struct Moments {
 };
 
 template <class T>
-bool Counts(T value)
+bool IsCounted(T value)
 {
   if constexpr (std::is_floating_point_v<T>)
     return std::isfinite(value);
@@ -97,7 +97,7 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
   const auto lattice = std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5));
   lattice->fromTrend = trend != nullptr;
   const Blocks& blocks = lattice->blocks;
-  const auto real = [&](std::ptrdiff_t at) { return (region.Empty() || region[at]) && Counts(intensity[at]); };
+  const auto real = [&](std::ptrdiff_t at) { return (region.Empty() || region[at]) && IsCounted(intensity[at]); };
 
   // 1. the whole
   const auto whole = ParallelSum<Moments>(intensity.Size(), 1 << 16, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {

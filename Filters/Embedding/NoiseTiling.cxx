@@ -5,6 +5,7 @@
 // the volumes and those of the result.
 #include "NoiseTiling.h"
 #include "BeamSampling.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
@@ -18,8 +19,7 @@ namespace echorama {
 
 namespace {
 
-constexpr double degree = 0.017453292519943295;
-constexpr double leastTurn = 0.5 * degree; // what turns by less runs straight
+constexpr double leastTurn = 0.5 * RadiansPerDegree; // what turns by less runs straight
 
 bool Turns(const ProbeArc& arc)
 {
@@ -106,7 +106,8 @@ Volume<float> UsedAgain(const Volume<float>& samples, int use)
 
 int OverlapBeams(const ProbeArc& arc, double pitch, const NoiseTilingParameters& parameters)
 {
-  return static_cast<int>(std::lround((Turns(arc) ? parameters.overlapDegrees * degree : parameters.overlapMm) / pitch));
+  return static_cast<int>(
+      std::lround((Turns(arc) ? parameters.overlapDegrees * RadiansPerDegree : parameters.overlapMm) / pitch));
 }
 
 void RefuseOverlap(const NoiseInput& input, const ProbeArc& arc, const char* what, const NoiseTilingParameters& parameters)
@@ -115,7 +116,7 @@ void RefuseOverlap(const NoiseInput& input, const ProbeArc& arc, const char* wha
   throw Error(Error::Kind::InvalidParameter,
               std::string("noise tiling: ") + (turns ? "overlapDegrees" : "overlapMm") +
                   Text(" is %.4g, but the ", turns ? parameters.overlapDegrees : parameters.overlapMm) + what + " of " +
-                  input.name + Text(" is %.4g", turns ? arc.angle / degree : arc.width) + (turns ? " degrees" : " mm") +
+                  input.name + Text(" is %.4g", turns ? arc.angle / RadiansPerDegree : arc.width) + (turns ? " degrees" : " mm") +
                   ": nothing would be left of it beside its neighbour");
 }
 
@@ -224,10 +225,11 @@ Plan PlanOf(const NoiseTilingParameters& parameters, const std::vector<NoiseInpu
   } catch (const Error& error) {
     if (error.GetKind() == Error::Kind::TooLarge)
       throw;
-    throw Error(Error::Kind::NotPossible,
-                "noise tiling: " + std::to_string(columns) + " columns and " + std::to_string(rows) + " rows make a fan of " +
-                    Text("%.1f degrees that sweeps over %.1f degrees", fan.fanAngle / degree, fan.sweepAngle / degree) +
-                    ", and no probe has that (" + error.what() + ")");
+    throw Error(Error::Kind::NotPossible, "noise tiling: " + std::to_string(columns) + " columns and " + std::to_string(rows) +
+                                              " rows make a fan of " +
+                                              Text("%.1f degrees that sweeps over %.1f degrees", fan.fanAngle / RadiansPerDegree,
+                                                   fan.sweepAngle / RadiansPerDegree) +
+                                              ", and no probe has that (" + error.what() + ")");
   }
   const double halfway = 0.5 * (head.depthMin + head.depthMax);
   plan.pitchMm = {lattice.depthStep, head.Fan().Span(halfway) / (full[1] - 1), lattice.depthStep};

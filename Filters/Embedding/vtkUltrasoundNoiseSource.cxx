@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundNoiseSource.h"
 
+#include "Core/Base/Angles.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "LatticeNoise.h"
 #include "NoiseMatch.h"
@@ -19,10 +20,6 @@
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundNoiseSource);
-
-namespace {
-constexpr double DegreesPerRadian = 57.29577951308232;
-} // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundNoiseSource::vtkUltrasoundNoiseSource()
@@ -68,13 +65,14 @@ echorama::PlacedProbe vtkUltrasoundNoiseSource::FanFor(vtkInformationVector** in
     }
   }
   echorama::PlacedProbe fan;
-  fan.geometry.fanAngle = this->FanAngle / DegreesPerRadian;
+  fan.geometry.fanAngle = this->FanAngle / echorama::DegreesPerRadian;
   fan.geometry.fanWidth = this->FanWidth;
-  fan.geometry.sweepAngle = this->SweepAngle / DegreesPerRadian;
+  fan.geometry.sweepAngle = this->SweepAngle / echorama::DegreesPerRadian;
   fan.geometry.sweepWidth = this->SweepWidth;
   fan.geometry.depthMin = this->DepthMin;
   fan.geometry.depthMax = this->DepthMax;
-  fan.probeToWorld.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
+  fan.probeToWorld.linear() =
+      echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
   fan.probeToWorld.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
   return fan;
 }

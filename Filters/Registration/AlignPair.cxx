@@ -16,6 +16,7 @@
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
 #endif
 #include "AlignPair.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <array>
@@ -33,13 +34,6 @@ constexpr int MostPoints = 1000;
 constexpr int MostCandidates = 1000;
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start)
-{
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 std::string Number(double value, int digits)
 {

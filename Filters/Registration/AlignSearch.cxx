@@ -11,6 +11,7 @@
 //
 // Cost: rounds * n^6 * points trilinear reads.
 #include "AlignSearch.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
@@ -23,22 +24,21 @@
 namespace echorama {
 namespace {
 
-constexpr double RadiansPerDegree = 0.017453292519943295;
-constexpr std::ptrdiff_t FewestVoxels = 100;
+constexpr std::ptrdiff_t FewestSearchVoxels = 100;
 
 // The voxels of one resolution of a fixed volume, NaN where not real; at least two along each axis.
-struct Field {
+struct PlainField {
   const float* voxels;
   int nx, ny, nz;
 };
 
 // From a point to the index coordinates of a field.
-struct Map {
+struct IndexMap {
   float xx, xy, xz, x0, yx, yy, yz, y0, zx, zy, zz, z0;
 };
 
 // Points with the moving volume's values there, one array per component.
-struct Points {
+struct SearchPoints {
   std::vector<float> x, y, z, value;
   std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(x.size()); }
 };
@@ -59,8 +59,8 @@ struct Comparison {
 };
 
 // Points that are read together. Their voxels fit in the second cache and stay there while all poses pass.
-constexpr int BlockSize = 512;
-constexpr int Lanes = 16;
+constexpr int ReadTogether = 512;
+constexpr int SearchLanes = 16;
 
 // One corner of a cell: adds weight w and the weighted difference to v0, unless the corner is not real.
 inline void AddCorner(float v, float v0, float w, float& sum, float& weights)
@@ -73,7 +73,7 @@ inline void AddCorner(float v, float v0, float w, float& sum, float& weights)
 // Reads a field at up to BlockSize moved points: the difference to the values they carry, and whether they lie inside.
 // The reading is Sampler::Linear in single precision on voxels that are their own mask: the nearest voxel decides what is
 // inside, corners that are not real have no say. No branches, so that compilers make it wide.
-ECHORAMA_HOT void Differences(const Field& field, const Map& m, const float* px, const float* py, const float* pz,
+ECHORAMA_HOT void Differences(const PlainField& field, const IndexMap& m, const float* px, const float* py, const float* pz,
                               const float* value, int count, float* difference, int* inside)
 {
   const float* voxels = field.voxels;
@@ -113,18 +113,19 @@ ECHORAMA_HOT void Differences(const Field& field, const Map& m, const float* px,
 
 // Compares a block of points with every field. Sums run in lanes of their own, so that their order, and with it the last
 // digit, does not depend on how wide the machine is.
-Comparison Compare(const std::vector<Field>& fields, const Map* maps, const Points& points, std::ptrdiff_t begin, int count)
+Comparison Compare(const std::vector<PlainField>& fields, const IndexMap* maps, const SearchPoints& points, std::ptrdiff_t begin,
+                   int count)
 {
   Comparison result;
-  float difference[BlockSize];
-  int inside[BlockSize], covered[BlockSize] = {};
+  float difference[ReadTogether];
+  int inside[ReadTogether], covered[ReadTogether] = {};
   for (std::size_t f = 0; f < fields.size(); ++f) {
     Differences(fields[f], maps[f], &points.x[begin], &points.y[begin], &points.z[begin], &points.value[begin], count, difference,
                 inside);
-    float lanes[Lanes] = {};
+    float lanes[SearchLanes] = {};
     int pairs = 0, p = 0;
-    for (; p + Lanes <= count; p += Lanes)
-      for (int lane = 0; lane < Lanes; ++lane)
+    for (; p + SearchLanes <= count; p += SearchLanes)
+      for (int lane = 0; lane < SearchLanes; ++lane)
         lanes[lane] += difference[p + lane];
     for (; p < count; ++p)
       lanes[0] += difference[p];
@@ -171,10 +172,10 @@ public:
   }
 
   /// Compares the points at each of the poses.
-  std::vector<Comparison> At(const std::vector<Pose>& poses, const Points& points, const Progress& progress) const
+  std::vector<Comparison> At(const std::vector<Pose>& poses, const SearchPoints& points, const Progress& progress) const
   {
     const std::size_t fields = fields_.size();
-    std::vector<Map> maps;
+    std::vector<IndexMap> maps;
     maps.reserve(poses.size() * fields);
     for (const Pose& pose : poses)
       for (const Eigen::Affine3d& toIndex : worldToIndex_) {
@@ -183,15 +184,15 @@ public:
             {m(0, 0), m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1), m(2, 2), m(2, 3)});
       }
     // Neighbouring blocks form a task when there are many, so that the parts of the sums stay few.
-    const std::ptrdiff_t blocks = (points.Count() + BlockSize - 1) / BlockSize, blocksPerTask = (blocks + 63) / 64;
+    const std::ptrdiff_t blocks = (points.Count() + ReadTogether - 1) / ReadTogether, blocksPerTask = (blocks + 63) / 64;
     const std::ptrdiff_t tasks = (blocks + blocksPerTask - 1) / blocksPerTask;
     const std::size_t share = poses.size();
     std::vector<Comparison> parts(static_cast<std::size_t>(tasks) * share), sums(share);
     ParallelFor(tasks, progress, [&](std::ptrdiff_t task) {
       Comparison* part = &parts[static_cast<std::size_t>(task) * share];
       for (std::ptrdiff_t block = task * blocksPerTask; block < std::min(blocks, (task + 1) * blocksPerTask); ++block) {
-        const std::ptrdiff_t begin = block * BlockSize;
-        const int count = static_cast<int>(std::min<std::ptrdiff_t>(BlockSize, points.Count() - begin));
+        const std::ptrdiff_t begin = block * ReadTogether;
+        const int count = static_cast<int>(std::min<std::ptrdiff_t>(ReadTogether, points.Count() - begin));
         for (std::size_t i = 0; i < share; ++i)
           part[i] += Compare(fields_, &maps[i * fields], points, begin, count);
       }
@@ -202,17 +203,17 @@ public:
   }
 
 private:
-  std::vector<Field> fields_;
+  std::vector<PlainField> fields_;
   std::vector<Eigen::Affine3d> worldToIndex_;
 };
 
 // The points (mm, as the geometry of the volume stands, relative to \a centre) with the volume's values at one
 // resolution. Points that the coarse volume does not hold are left out.
-Points Read(const PyramidLevel& level, const std::vector<Eigen::Vector3d>& world, const Eigen::Vector3d& centre)
+SearchPoints Read(const PyramidLevel& level, const std::vector<Eigen::Vector3d>& world, const Eigen::Vector3d& centre)
 {
   const Sampler<float> sampler(level.intensity.View(), {});
   const Eigen::Affine3d toIndex = level.geometry.WorldToIndex();
-  Points points;
+  SearchPoints points;
   for (const Eigen::Vector3d& p : world) {
     const Eigen::Vector3d at = toIndex * p;
     double value = 0.0;
@@ -236,9 +237,10 @@ void CheckVolume(const PlacedVolume& volume)
     throw Error(Error::Kind::BadInput, volume.name + ": it is not a volume (one voxel thick); the search needs three dimensions");
   if (finest.geometry.VoxelCount() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw Error(Error::Kind::TooLarge, volume.name + ": the search works on volumes of at most 2^31 voxels");
-  if (finest.realVoxels < FewestVoxels)
+  if (finest.realVoxels < FewestSearchVoxels)
     throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) +
-                                           " of its voxels are real; at least " + std::to_string(FewestVoxels) + " are needed");
+                                           " of its voxels are real; at least " + std::to_string(FewestSearchVoxels) +
+                                           " are needed");
   const VolumeView<const float> view = finest.intensity.View();
   const float* first = std::find_if(view.begin(), view.end(), [](float v) { return v == v; });
   if (std::all_of(first, view.end(), [first](float v) { return !(v == v) || v == *first; }))
@@ -322,7 +324,7 @@ AlignSearchResult AlignSearch(const std::vector<PlacedVolume>& fixed, const Plac
   for (int level = 0; level < p.levels; ++level, stepMm *= 0.5, stepDegrees *= 0.5) {
     const double spacing = p.pyramid ? stepMm : 0.0;
     const Target target(fixed, spacing);
-    const Points points = Read(LevelFor(moving, spacing), drawn.points, drawn.centre);
+    const SearchPoints points = Read(LevelFor(moving, spacing), drawn.points, drawn.centre);
     const double m = static_cast<double>(points.Count()), needed = p.minimumOverlap * m;
     AlignSearchLevel trace{stepMm, stepDegrees, LargestSpacing(LevelFor(fixed.front(), spacing)), 0, 0, 0.0, 0.0};
 
@@ -396,7 +398,7 @@ double OverlapOf(const std::vector<PlacedVolume>& fixed, const PlacedVolume& mov
     return 0.0;
   const PyramidLevel& coarsest = moving.pyramid->back();
   const Moving drawn(coarsest, p);
-  const Points points = Read(coarsest, drawn.points, drawn.centre);
+  const SearchPoints points = Read(coarsest, drawn.points, drawn.centre);
   const Target target(fixed, std::numeric_limits<double>::infinity());
   const Comparison c = target.At({FromCentre(moving.volumeToWorld, drawn.centre)}, points, {}).front();
   return static_cast<double>(c.covered) / static_cast<double>(points.Count());

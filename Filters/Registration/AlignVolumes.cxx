@@ -12,6 +12,7 @@
 #endif
 #include "AlignVolumes.h"
 #include "AlignSearch.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "PoseGraph.h"
 #include "ValidPoints.h"
@@ -30,14 +31,8 @@ constexpr int EnoughPairs = 3; // a volume with fewer overlaps at the start is a
 constexpr int FarTries = 3;    // searches over all rotations for one volume
 constexpr double TrackedReachMm = 20.0;
 
-using Clock = std::chrono::steady_clock;
 using Features = std::shared_ptr<const MetricPyramid>;
 using Numbers = std::pair<int, int>; // of two volumes, the one that stays first
-
-double SecondsSince(Clock::time_point start)
-{
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 std::string Millimetres(double mm)
 {

@@ -550,7 +550,7 @@ std::vector<Level::Weighing> WeighingOf(const Commons& now, const Commons& rigid
   return weighing;
 }
 
-void CheckRange(const char* name, double value, double from, double to)
+void CheckDeformableRange(const char* name, double value, double from, double to)
 {
   if (!(value >= from && value <= to)) {
     std::string text = std::string(name) + " is " + std::to_string(value) + "; it must be in [" + std::to_string(from) + ", " +
@@ -572,12 +572,12 @@ void CheckVolume(const DeformableVolume& volume)
 
 void DeformableAlignParameters::Check() const
 {
-  CheckRange("ControlSpacingMm", controlSpacingMm, 5.0, 500.0);
-  CheckRange("BendingWeight", bendingWeight, 1e-6, 1e12);
-  CheckRange("Levels", levels, 1, 6);
-  CheckRange("Iterations", iterations, 1, 1000);
-  CheckRange("FinestMm", finestMm, 0.01, 100.0);
-  CheckRange("MinimumOverlap", minimumOverlap, 0.001, 1.0);
+  CheckDeformableRange("ControlSpacingMm", controlSpacingMm, 5.0, 500.0);
+  CheckDeformableRange("BendingWeight", bendingWeight, 1e-6, 1e12);
+  CheckDeformableRange("Levels", levels, 1, 6);
+  CheckDeformableRange("Iterations", iterations, 1, 1000);
+  CheckDeformableRange("FinestMm", finestMm, 0.01, 100.0);
+  CheckDeformableRange("MinimumOverlap", minimumOverlap, 0.001, 1.0);
 }
 
 DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving,

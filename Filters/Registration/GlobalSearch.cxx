@@ -11,6 +11,7 @@
 // With all rotations the first pass is most of the cost: per rotation a resampling and two transforms of some 40^3. In a
 // narrow cone the climb is.
 #include "GlobalSearch.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include "MaskedCorrelation.h"
@@ -24,8 +25,7 @@ namespace {
 
 using Complex = MaskedCorrelator::Complex;
 
-constexpr double RadiansPerDegree = 0.017453292519943295;
-constexpr int FewestVoxels = 100;
+constexpr int FewestGlobalVoxels = 100;
 
 // All measured (BenchmarkGlobalSearch).
 constexpr double DefaultStepDegrees = 20.0;
@@ -43,7 +43,7 @@ constexpr std::size_t FinishedPeaks = 30;      // that climb to the end
 constexpr int FirstLevels = 2, LastLevels = 2, Sweeps = 3;
 constexpr float NoScore = -1e9f;
 
-void CheckVolume(const PlacedVolume& volume)
+void CheckGlobalVolume(const PlacedVolume& volume)
 {
   if (!volume.pyramid || volume.pyramid->empty())
     throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");
@@ -51,9 +51,10 @@ void CheckVolume(const PlacedVolume& volume)
   const auto& n = finest.geometry.dimensions;
   if (*std::min_element(n.begin(), n.end()) < 2)
     throw Error(Error::Kind::BadInput, volume.name + ": it is not a volume (one voxel thick); the search needs three dimensions");
-  if (finest.realVoxels < FewestVoxels)
+  if (finest.realVoxels < FewestGlobalVoxels)
     throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) +
-                                           " of its voxels are real; at least " + std::to_string(FewestVoxels) + " are needed");
+                                           " of its voxels are real; at least " + std::to_string(FewestGlobalVoxels) +
+                                           " are needed");
   const VolumeView<const float> view = finest.intensity.View();
   const float* first = std::find_if(view.begin(), view.end(), [](float v) { return v == v; });
   if (std::all_of(first, view.end(), [first](float v) { return !(v == v) || v == *first; }))
@@ -273,7 +274,7 @@ private:
 
 // Turns the moving volume about its centroid, which comes to lie in the middle of \a out. Voxels further away than the
 // region reaches are not looked at.
-void Turn(const LowResolution& low, const Eigen::Matrix3d& turn, double radius, VolumeView<Complex> out)
+void TurnInto(const LowResolution& low, const Eigen::Matrix3d& turn, double radius, VolumeView<Complex> out)
 {
   const Reader reader(low);
   const auto& n = out.Dimensions();
@@ -419,7 +420,7 @@ public:
   /// The largest sum of products over sqrt(n).
   float Best(const Eigen::Matrix3d& turn, Work& work) const
   {
-    Turn(moving_, turn, radius_, work.turned.View());
+    TurnInto(moving_, turn, radius_, work.turned.View());
     correlator_.Products(work.turned.View(), work.sums.View(), work.transforms);
     const float least = static_cast<float>(least_);
     float best = NoScore;
@@ -432,7 +433,7 @@ public:
   /// The highest peaks of the significance of the normalised correlation, the best first.
   std::vector<Peak> Peaks(const Eigen::Matrix3d& turn, Work& work) const
   {
-    Turn(moving_, turn, radius_, work.turned.View());
+    TurnInto(moving_, turn, radius_, work.turned.View());
     correlator_.Normalised(work.turned.View(), least_, work.sums.View(), work.transforms);
     const VolumeView<const Complex> sums = std::as_const(work.sums).View();
     const VolumeView<float> scores = work.scores.View();
@@ -632,8 +633,8 @@ GlobalSearchResult GlobalSearch(const PlacedVolume& fixed, const PlacedVolume& m
                                 const Progress& progress)
 {
   p.Check();
-  CheckVolume(fixed);
-  CheckVolume(moving);
+  CheckGlobalVolume(fixed);
+  CheckGlobalVolume(moving);
   progress(0.0);
 
   // 1. The volumes at low resolution, and the frames they are compared in.

@@ -14,7 +14,7 @@ void SeeIntensity(const MetricSource& source, MetricLevel& level);
 
 namespace {
 
-void See(const MetricSource& source, MetricLevel& level)
+void SeeLc2(const MetricSource& source, MetricLevel& level)
 {
   SeeIntensity(source, level);
   const auto& n = level.geometry.dimensions;
@@ -51,6 +51,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric Lc2Metric{"lc2", 1e3, false, NoLimit, See};
+const Metric Lc2Metric{"lc2", 1e3, false, NoLimit, SeeLc2};
 
 } // namespace echorama

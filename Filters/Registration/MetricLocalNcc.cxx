@@ -20,7 +20,7 @@ constexpr double SmoothVoxels = 0.6; // of what is compared
 constexpr float CutWindow = 0.6f, WholeWindow = 0.95f;
 constexpr double FloorShare = 0.6; // of the level's own standard deviation: the floor under the local one
 
-void See(const MetricSource& source, MetricLevel& level)
+void SeeLocalNcc(const MetricSource& source, MetricLevel& level)
 {
   const auto& n = level.geometry.dimensions;
   const std::ptrdiff_t count = source.intensity.Size();
@@ -68,6 +68,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric LocalNccMetric{"local-ncc", 0.25, false, NoLimit, See};
+const Metric LocalNccMetric{"local-ncc", 0.25, false, NoLimit, SeeLocalNcc};
 
 } // namespace echorama

@@ -18,7 +18,7 @@
 namespace echorama {
 namespace {
 
-void See(const MetricSource& source, MetricLevel& level)
+void SeeMindSsc(const MetricSource& source, MetricLevel& level)
 {
   const auto& n = level.geometry.dimensions;
   const std::ptrdiff_t count = source.intensity.Size();
@@ -109,6 +109,6 @@ void See(const MetricSource& source, MetricLevel& level)
 
 } // namespace
 
-const Metric MindSscMetric{"mind-ssc", 0.3, false, 1 << 22, See};
+const Metric MindSscMetric{"mind-ssc", 0.3, false, 1 << 22, SeeMindSsc};
 
 } // namespace echorama

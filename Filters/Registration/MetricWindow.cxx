@@ -11,21 +11,21 @@
 namespace echorama {
 namespace {
 
-constexpr int Lanes = 64;
+constexpr int WindowLanes = 64;
 
 // out[i] = sum over t of taps[t] * rows[t][i].
 ECHORAMA_HOT void SumRows(const float* const* rows, const float* taps, int count, int width, float* out)
 {
   int i = 0;
-  for (; i + Lanes <= width; i += Lanes) {
-    float sum[Lanes] = {};
+  for (; i + WindowLanes <= width; i += WindowLanes) {
+    float sum[WindowLanes] = {};
     for (int t = 0; t < count; ++t) {
       const float* row = rows[t] + i;
       const float tap = taps[t];
-      for (int lane = 0; lane < Lanes; ++lane)
+      for (int lane = 0; lane < WindowLanes; ++lane)
         sum[lane] += tap * row[lane];
     }
-    for (int lane = 0; lane < Lanes; ++lane)
+    for (int lane = 0; lane < WindowLanes; ++lane)
       out[i + lane] = sum[lane];
   }
   for (; i < width; ++i) {

@@ -39,7 +39,7 @@ constexpr int Rounds = 50;                 // of putting edges aside and taking 
 constexpr int MostFalls = 3;               // an edge that was put aside so often stays there
 constexpr int Regroupings = 5;             // of parts that a majority of edges wants elsewhere
 
-std::size_t Index(int number)
+std::size_t At(int number)
 {
   return static_cast<std::size_t>(number);
 }
@@ -50,15 +50,15 @@ public:
   explicit Sets(std::size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0); }
   int Of(int v)
   {
-    while (parents_[Index(v)] != v)
-      v = parents_[Index(v)] = parents_[Index(parents_[Index(v)])];
+    while (parents_[At(v)] != v)
+      v = parents_[At(v)] = parents_[At(parents_[At(v)])];
     return v;
   }
   bool Join(int a, int b) // whether they were apart
   {
     a = Of(a);
     b = Of(b);
-    parents_[Index(std::max(a, b))] = std::min(a, b);
+    parents_[At(std::max(a, b))] = std::min(a, b);
     return a != b;
   }
 
@@ -85,8 +85,8 @@ public:
       neighbours_(poses.size())
   {
     for (std::size_t e = 0; e < edges_.size(); ++e) {
-      neighbours_[Index(edges_[e].from)].push_back({edges_[e].to, e});
-      neighbours_[Index(edges_[e].to)].push_back({edges_[e].from, e});
+      neighbours_[At(edges_[e].from)].push_back({edges_[e].to, e});
+      neighbours_[At(edges_[e].to)].push_back({edges_[e].from, e});
     }
   }
 
@@ -120,10 +120,7 @@ private:
   };
 
   Judgement Judge(std::size_t e, const MarginalCovariances& covariances) const;
-  Twist ResidualOf(std::size_t e) const
-  {
-    return Disagreement(edges_[e], poses[Index(edges_[e].from)], poses[Index(edges_[e].to)]);
-  }
+  Twist ResidualOf(std::size_t e) const { return Disagreement(edges_[e], poses[At(edges_[e].from)], poses[At(edges_[e].to)]); }
   const Pose& Step(std::size_t e, int from) const { return edges_[e].from == from ? edges_[e].toInFrom : edges_[e].fromInTo; }
   double GateMm(double variance) const { return std::max(p_.outlierMm, p_.outlierSigmas * std::sqrt(variance / 3.0)); }
 
@@ -188,16 +185,16 @@ Flags Graph::Bridges(const Flags& used) const
     order[root] = low[root] = count++;
     while (!stack.empty()) {
       Visit& visit = stack.back();
-      const std::size_t v = Index(visit.volume);
+      const std::size_t v = At(visit.volume);
       if (visit.next < neighbours_[v].size()) {
         const Neighbour& n = neighbours_[v][visit.next++];
         if (!used[n.edge] || n.edge == visit.arrived)
           continue;
-        if (order[Index(n.volume)] >= 0) {
-          low[v] = std::min(low[v], order[Index(n.volume)]);
+        if (order[At(n.volume)] >= 0) {
+          low[v] = std::min(low[v], order[At(n.volume)]);
           continue;
         }
-        order[Index(n.volume)] = low[Index(n.volume)] = count++;
+        order[At(n.volume)] = low[At(n.volume)] = count++;
         stack.push_back({n.volume, n.edge, 0});
         continue;
       }
@@ -205,7 +202,7 @@ Flags Graph::Bridges(const Flags& used) const
       stack.pop_back();
       if (stack.empty())
         continue;
-      const std::size_t above = Index(stack.back().volume);
+      const std::size_t above = At(stack.back().volume);
       low[above] = std::min(low[above], low[v]);
       bridges[done.arrived] = low[v] > order[above];
     }
@@ -223,7 +220,7 @@ std::vector<double> Graph::CycleWeights(const Flags& take) const
     const WeighedEdge& edge = edges_[e];
     int closed = 0, tried = 0;
     const auto walk = [&](const auto& self, int at, const Pose& pose, double variance, int steps) -> void {
-      for (const Neighbour& n : neighbours_[Index(at)]) {
+      for (const Neighbour& n : neighbours_[At(at)]) {
         if (tried >= CyclesPerEdge)
           return;
         if (!take[n.edge] || n.edge == e || n.volume == edge.from)
@@ -284,13 +281,13 @@ Graph::Tree Graph::GrowTree(const Flags& take, const Flags& isRoot, const std::v
     isDone[v] = true;
     tree.order.push_back(v);
     if (tree.parents[v] >= 0) {
-      const std::size_t parent = Index(tree.parents[v]), e = tree.edges[v];
+      const std::size_t parent = At(tree.parents[v]), e = tree.edges[v];
       tree.poses[v] = tree.poses[parent] * Step(e, tree.parents[v]);
       tree.depths[v] = tree.depths[parent] + 1;
       tree.variances[v] = tree.variances[parent] + edges_[e].variance;
     }
     for (const Neighbour& n : neighbours_[v]) {
-      const std::size_t to = Index(n.volume);
+      const std::size_t to = At(n.volume);
       if (!allowed[n.edge] || isDone[to] || ways[v] + lengths[n.edge] >= ways[to])
         continue;
       ways[to] = ways[v] + lengths[n.edge];
@@ -327,22 +324,22 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       if (!take[e])
         continue;
-      const std::size_t from = Index(edges_[e].from), to = Index(edges_[e].to);
+      const std::size_t from = At(edges_[e].from), to = At(edges_[e].to);
       if (tree.edges[from] == e || tree.edges[to] == e) {
-        votes[Index(roots[from])] += 1.0;
+        votes[At(roots[from])] += 1.0;
         continue;
       }
       std::size_t a = from, b = to; // up to where their ways meet
       while (a != b)
-        (tree.depths[a] >= tree.depths[b] ? a : b) = Index(tree.parents[tree.depths[a] >= tree.depths[b] ? a : b]);
+        (tree.depths[a] >= tree.depths[b] ? a : b) = At(tree.parents[tree.depths[a] >= tree.depths[b] ? a : b]);
       const double variance = edges_[e].variance + tree.variances[from] + tree.variances[to] - 2.0 * tree.variances[a];
       const double distance = DistanceMm(Disagreement(edges_[e], tree.poses[from], tree.poses[to]), p_.radiusMm);
       const double gate = GateMm(variance);
-      votes[Index(roots[from])] += 1.0 / (1.0 + distance * distance / (gate * gate));
+      votes[At(roots[from])] += 1.0 / (1.0 + distance * distance / (gate * gate));
       isUnanimous = isUnanimous && distance <= gate;
     }
     for (std::size_t v = 0; v < volumes; ++v)
-      if (votes[Index(roots[v])] > best[Index(roots[v])])
+      if (votes[At(roots[v])] > best[At(roots[v])])
         bestPoses[v] = tree.poses[v];
     for (std::size_t v = 0; v < volumes; ++v)
       best[v] = std::max(best[v], votes[v]);
@@ -404,7 +401,7 @@ void Graph::Settle(const Flags& take, const Flags& keep)
       std::sort(bad.begin(), bad.end());
       Flags isTouched(poses.size(), false);
       for (const auto& [minusSigmas, e] : bad) {
-        const std::size_t from = Index(edges_[e].from), to = Index(edges_[e].to);
+        const std::size_t from = At(edges_[e].from), to = At(edges_[e].to);
         if (minusSigmas > 0.7 * bad.front().first || isTouched[from] || isTouched[to] || Bridges(stands)[e])
           continue;
         stands[e] = false;
@@ -454,7 +451,7 @@ std::vector<Party> Graph::Parties(const Flags& asked) const
   std::vector<Party> parties;
   Flags isDone(edges_.size(), false);
   const auto motionOf = [&](std::size_t e) {
-    return poses[Index(edges_[e].from)] * edges_[e].toInFrom * poses[Index(edges_[e].to)].inverse(Eigen::Isometry);
+    return poses[At(edges_[e].from)] * edges_[e].toInFrom * poses[At(edges_[e].to)].inverse(Eigen::Isometry);
   };
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     if (!asked[e] || stands[e] || isDone[e])
@@ -463,13 +460,13 @@ std::vector<Party> Graph::Parties(const Flags& asked) const
     isDone[e] = true;
     for (std::size_t other = e + 1; other < edges_.size(); ++other) {
       const WeighedEdge& edge = edges_[other];
-      if (!asked[other] || stands[other] || isDone[other] || roots[Index(edge.from)] != roots[Index(edges_[e].from)])
+      if (!asked[other] || stands[other] || isDone[other] || roots[At(edge.from)] != roots[At(edges_[e].from)])
         continue;
       const double gate = 2.0 * GateMm(edges_[e].variance + edge.variance);
       const Pose motion = motionOf(other);
       const auto differs = [&](const Pose& wanted) {
         const Pose gap = wanted.inverse(Eigen::Isometry) * party.motion;
-        const Eigen::Vector3d centre = poses[Index(edge.to)] * (edge.fromInTo * edge.centre);
+        const Eigen::Vector3d centre = poses[At(edge.to)] * (edge.fromInTo * edge.centre);
         Twist twist;
         twist << gap * centre - centre, LogRotation(gap.linear());
         return DistanceMm(twist, p_.radiusMm);
@@ -495,13 +492,13 @@ int Graph::Cut(const Party& party, Flags& isMoved) const
   const std::size_t volumes = poses.size();
   const int enough = static_cast<int>(party.edges.size()) + 1;
   const std::vector<int> roots = Roots(stands);
-  const int root = roots[Index(party.still.front())];
+  const int root = roots[At(party.still.front())];
   Flags isSource(volumes, false), isSink(volumes, false);
-  isSource[Index(root)] = true;
+  isSource[At(root)] = true;
   for (const int v : party.still)
-    isSource[Index(v)] = true;
+    isSource[At(v)] = true;
   for (const int v : party.moved)
-    isSink[Index(v)] = true;
+    isSink[At(v)] = true;
   for (std::size_t v = 0; v < volumes; ++v)
     if (isSource[v] && isSink[v])
       return enough;
@@ -518,14 +515,14 @@ int Graph::Cut(const Party& party, Flags& isMoved) const
     while (!queue.empty() && at < 0) {
       const int v = queue.front();
       queue.pop();
-      for (const Neighbour& n : neighbours_[Index(v)]) {
+      for (const Neighbour& n : neighbours_[At(v)]) {
         const bool isOpen = edges_[n.edge].from == v ? flow[n.edge] < 1 : flow[n.edge] > -1;
-        if (!stands[n.edge] || isReached[Index(n.volume)] || !isOpen)
+        if (!stands[n.edge] || isReached[At(n.volume)] || !isOpen)
           continue;
-        isReached[Index(n.volume)] = true;
-        arrivals[Index(n.volume)] = n.edge;
+        isReached[At(n.volume)] = true;
+        arrivals[At(n.volume)] = n.edge;
         queue.push(n.volume);
-        if (isSink[Index(n.volume)])
+        if (isSink[At(n.volume)])
           at = n.volume;
       }
     }
@@ -535,8 +532,8 @@ int Graph::Cut(const Party& party, Flags& isMoved) const
         isMoved[v] = roots[v] == root && !isReached[v];
       return units;
     }
-    while (!isSource[Index(at)]) {
-      const std::size_t e = arrivals[Index(at)];
+    while (!isSource[At(at)]) {
+      const std::size_t e = arrivals[At(at)];
       flow[e] += edges_[e].to == at ? 1 : -1;
       at = edges_[e].to == at ? edges_[e].from : edges_[e].to;
     }
@@ -558,7 +555,7 @@ void Graph::Regroup(const Flags& take, const Progress& progress)
         if (isMoved[v])
           poses[v] = party.motion * poses[v];
       for (std::size_t e = 0; e < edges_.size(); ++e)
-        stands[e] = stands[e] && isMoved[Index(edges_[e].from)] == isMoved[Index(edges_[e].to)];
+        stands[e] = stands[e] && isMoved[At(edges_[e].from)] == isMoved[At(edges_[e].to)];
       for (const std::size_t e : party.edges)
         stands[e] = true;
       Settle(take, Flags(edges_.size(), false));
@@ -594,7 +591,7 @@ void CheckGraph(const std::vector<Pose>& start, const std::vector<PoseEdge>& edg
   check(fixed >= 0 && fixed < volumes,
         "the fixed volume must be one of the " + std::to_string(volumes) + ", numbered from 0; it is " + std::to_string(fixed));
   for (int v = 0; v < volumes; ++v)
-    check(start[Index(v)].matrix().allFinite() && IsRotation(start[Index(v)].linear()),
+    check(start[At(v)].matrix().allFinite() && IsRotation(start[At(v)].linear()),
           "the start pose of volume " + std::to_string(v) + " is not a rotation and a translation");
   for (const PoseEdge& edge : edges) {
     const std::string name = "the edge " + std::to_string(edge.from) + "-" + std::to_string(edge.to);
@@ -636,11 +633,11 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
     weighed.emplace_back(edges[e], p);
     isVerified[e] = edges[e].verified;
   }
-  const Pose toFixed = start[Index(fixed)].inverse(Eigen::Isometry);
+  const Pose toFixed = start[At(fixed)].inverse(Eigen::Isometry);
   std::vector<Pose> local;
   for (const Pose& pose : start)
     local.push_back(toFixed * pose);
-  local[Index(fixed)] = Pose::Identity();
+  local[At(fixed)] = Pose::Identity();
 
   Graph graph(weighed, local, fixed, p);
   graph.Solve(isVerified, none, progress.Part(0.0, 0.5));
@@ -672,12 +669,12 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
     result.isPlaced[v] = roots[v] == fixed;
     result.isDoubtful[v] = result.isPlaced[v] && (result.isDoubtful[v] || sureRoots[v] != fixed);
     if (result.isPlaced[v] && static_cast<int>(v) != fixed)
-      result.volumeToWorld[v] = start[Index(fixed)] * graph.poses[v];
+      result.volumeToWorld[v] = start[At(fixed)] * graph.poses[v];
   }
   double chiSquare = 0.0;
   int freedom = 0;
   for (std::size_t e = 0; e < count; ++e) {
-    if (roots[Index(edges[e].from)] != fixed || roots[Index(edges[e].to)] != fixed)
+    if (roots[At(edges[e].from)] != fixed || roots[At(edges[e].to)] != fixed)
       continue;
     result.residualMm[e] = graph.ResidualMm(e);
     result.residualSigmas[e] = graph.ResidualSigmas(e);
@@ -694,10 +691,10 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
   Twist scale;
   scale << 1.0, 1.0, 1.0, p.radiusMm, p.radiusMm, p.radiusMm;
   Information turn = Information::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = start[Index(fixed)].linear();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = start[At(fixed)].linear();
   for (std::size_t v = 0; v < volumes; ++v) {
     const int number = static_cast<int>(v);
-    result.centre.push_back(start[Index(fixed)] * covariances.Centre(number));
+    result.centre.push_back(start[At(fixed)] * covariances.Centre(number));
     if (number == fixed || !result.isPlaced[v]) {
       result.isDetermined[v] = number == fixed;
       continue;

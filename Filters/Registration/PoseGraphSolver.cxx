@@ -21,13 +21,6 @@ namespace {
 
 constexpr double WorstMm = 1000.0; // standard deviation of what an edge says nothing about
 
-Eigen::Matrix3d Hat(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 // The disagreement of an edge as Ceres wants it, from the unknowns of its volumes: a quaternion (x, y, z, w) and a place.
 class EdgeCost {
 public:

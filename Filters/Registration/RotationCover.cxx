@@ -5,6 +5,7 @@
 // are added as long as nothing lies near. Points just beyond the cone are drawn back onto its rim, so that the rim is
 // covered as well as the inside.
 #include "RotationCover.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <algorithm>
@@ -14,7 +15,6 @@
 namespace echorama {
 namespace {
 
-constexpr double RadiansPerDegree = 0.017453292519943295;
 constexpr double LargestPlainCone = 60.0 * RadiansPerDegree;
 constexpr double LargestInPiece = 63.0 * RadiansPerDegree;
 constexpr double FillDistance = 0.65; // of the step

@@ -10,12 +10,12 @@
 // result and the step before (conjugate gradients: a cycle alone is slow where the border of the overlap is rough). Passes
 // over the unknowns are fused (MembraneLevels::Sweep): a round reads and writes the finest level about four times.
 #include "Membrane.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Multiversion.h"
 #include "MembraneDescent.h"
 #include "MembraneLanes.h"
 #include "MembraneLevels.h"
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -23,11 +23,6 @@
 
 namespace echorama {
 namespace {
-
-double SecondsSince(std::chrono::steady_clock::time_point start)
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 float OfBits(std::int32_t bits)
 {

@@ -34,7 +34,7 @@ constexpr double coarseVoxels = 1.5e6;
 // Details are made stronger or weaker by no more than this: a shadow holds nothing but noise.
 constexpr float mostAmplified = 2.0f;
 
-constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+constexpr float noValue = std::numeric_limits<float>::quiet_NaN();
 
 // Sums are kept in float, those of doubles in double.
 template <class T>
@@ -225,7 +225,7 @@ std::vector<CoarseVolume> StitchPlan::Parts::CoarseVolumes(const ImageGeometry& 
       sampler.Inside(j, k, inside);
       sampler.Values(j, k, inside, volume.value.Row(j, k));
       // Outside of the overlap there is no smooth part, and no use for one.
-      low.Row(j, k, box.first[0], box.first[0] + box.size[0], inside, nothing, volume.low.Row(j, k));
+      low.Row(j, k, box.first[0], box.first[0] + box.size[0], inside, noValue, volume.low.Row(j, k));
       for (int i = 0; i < box.size[0]; ++i)
         if (std::isnan(volume.low.Row(j, k)[i]))
           volume.low.Row(j, k)[i] = volume.value.Row(j, k)[i];
@@ -529,7 +529,7 @@ private:
       if (parts_.textured) {
         layer.low.resize(static_cast<std::size_t>(n));
         layer.deviation.resize(static_cast<std::size_t>(n));
-        parts_.lowSamplers[v].Row(j, k, first, first + n, layer.shared.data(), nothing, layer.low.data());
+        parts_.lowSamplers[v].Row(j, k, first, first + n, layer.shared.data(), noValue, layer.low.data());
         parts_.deviationSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.deviation.data());
       }
       if (!parts_.shareSamplers.empty()) {

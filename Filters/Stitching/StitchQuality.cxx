@@ -124,18 +124,18 @@ struct Sums {
   }
 };
 
-using Field = std::vector<float>;
+using Floats = std::vector<float>;
 
 // A volume in a tile: NaN where it is not.
 struct TileVolume {
   int number = 0;
-  Field values, trust; // trust may be empty
+  Floats values, trust; // trust may be empty
 };
 
 // Sums over the window around each voxel, as much of it as lies in the tile.
-void BoxSum(Field& field, const std::array<int, 3>& size, const std::array<int, 3>& radius)
+void BoxSum(Floats& field, const std::array<int, 3>& size, const std::array<int, 3>& radius)
 {
-  Field sum(field.size());
+  Floats sum(field.size());
   const std::ptrdiff_t strides[3] = {1, size[0], static_cast<std::ptrdiff_t>(size[0]) * size[1]};
   for (int axis = 0; axis < 3; ++axis) {
     if (radius[axis] == 0)
@@ -215,7 +215,7 @@ public:
   {
     FindFollowed();
     const int s = shape_.stride;
-    Field truth;
+    Floats truth;
     if (reference)
       std::visit([&](const auto& sampler) { Read(sampler, 0, truth, false); }, *reference);
     for (int k = core_.first[2]; k < core_.first[2] + core_.size[2]; ++k)
@@ -255,7 +255,7 @@ private:
   std::ptrdiff_t At(int i, int j, int k) const { return i + j * strides_[1] + k * strides_[2]; }
 
   template <class Sampler>
-  void Read(const Sampler& sampler, std::uint64_t mark, Field& values, bool count = true)
+  void Read(const Sampler& sampler, std::uint64_t mark, Floats& values, bool count = true)
   {
     const GridBox there = sampler.Box().Intersected(box_);
     if (there.Empty())
@@ -290,9 +290,9 @@ private:
   void FindFollowed()
   {
     followed_.assign(box_.VoxelCount(), -1);
-    Field least(box_.VoxelCount(), std::numeric_limits<float>::infinity());
+    Floats least(box_.VoxelCount(), std::numeric_limits<float>::infinity());
     for (const TileVolume& volume : volumes_) {
-      Field counts(box_.VoxelCount(), 0.0f), differences = counts, squares = counts;
+      Floats counts(box_.VoxelCount(), 0.0f), differences = counts, squares = counts;
       bool overlaps = false;
       for (std::size_t at = 0; at < counts.size(); ++at) {
         const float difference = result_[at] - volume.values[at];
@@ -307,7 +307,7 @@ private:
       }
       if (!overlaps)
         continue;
-      for (Field* field : {&counts, &differences, &squares})
+      for (Floats* field : {&counts, &differences, &squares})
         BoxSum(*field, box_.size, shape_.radius);
       for (std::size_t at = 0; at < counts.size(); ++at) {
         if (count_[at] < 2 || std::isnan(volume.values[at]) || std::isnan(result_[at]))
@@ -322,7 +322,7 @@ private:
     }
   }
 
-  Moments MomentsOf(const Field& field, const Window& window) const
+  Moments MomentsOf(const Floats& field, const Window& window) const
   {
     Moments m;
     double sum = 0.0, energy = 0.0;
@@ -377,7 +377,7 @@ private:
   }
 
   // \returns false where the windows are not wholly covered
-  bool JumpOf(const Field& field, const Window windows[2], double& mean, double& gradient) const
+  bool JumpOf(const Floats& field, const Window windows[2], double& mean, double& gradient) const
   {
     const Moments a = MomentsOf(field, windows[0]), b = MomentsOf(field, windows[1]);
     if (!a.whole || !b.whole)
@@ -425,7 +425,7 @@ private:
   // How little the result resembles a volume: how its difference varies; among those that vary alike, which is nearer.
   double Unlikeness(int number, const Window& window) const
   {
-    const Field& values =
+    const Floats& values =
         std::find_if(volumes_.begin(), volumes_.end(), [number](const TileVolume& v) { return v.number == number; })->values;
     double sum = 0.0, squares = 0.0;
     const std::ptrdiff_t origin = At(window.first[0], window.first[1], window.first[2]);
@@ -508,7 +508,7 @@ private:
   GridBox core_, box_;
   std::array<std::ptrdiff_t, 3> strides_{};
   std::vector<TileVolume> volumes_;
-  Field result_;
+  Floats result_;
   std::vector<int> count_, followed_;
   std::vector<std::uint64_t> sets_;
 };

@@ -76,7 +76,7 @@ bool BodySet::operator==(const BodySet& other) const
 
 namespace {
 
-using Triangle = std::array<std::uint32_t, 3>;
+using CornerNumbers = std::array<std::uint32_t, 3>;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double step = 1.0 / 8388608.0; // of single precision
@@ -116,7 +116,7 @@ struct Groups {
   std::vector<std::uint32_t> parent;
 };
 
-struct Shell {
+struct ClosedShell {
   std::int32_t body = 0;
   double volume = 0.0; // with the order of corners
   double area = 0.0;
@@ -133,9 +133,9 @@ public:
   Shells(const TissueSurface& surface, const Eigen::Vector3d& centre);
 
   std::vector<Eigen::Vector3f> points; // about the centre
-  std::vector<Triangle> triangles;
+  std::vector<CornerNumbers> triangles;
   std::vector<std::int32_t> shellOf; // of each triangle
-  std::vector<Shell> shells;
+  std::vector<ClosedShell> shells;
   AcousticScene::Notes notes;
 
 private:
@@ -174,7 +174,7 @@ Shells::Shells(const TissueSurface& surface, const Eigen::Vector3d& centre) : tr
   }
 
   Split(surface);
-  if (std::any_of(shells.begin(), shells.end(), [](const Shell& shell) { return shell.balance != 0; })) {
+  if (std::any_of(shells.begin(), shells.end(), [](const ClosedShell& shell) { return shell.balance != 0; })) {
     Weld(surface);
     Split(surface);
     std::vector<std::vector<std::uint32_t>> members(shells.size());
@@ -198,7 +198,7 @@ void Shells::Split(const TissueSurface& surface)
   }
   // Numbered in the order of bodies, then of triangles.
   std::vector<std::int32_t> shellOfRoot(points.size(), -1);
-  std::vector<Shell> found;
+  std::vector<ClosedShell> found;
   shellOf.resize(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     std::int32_t& shell = shellOfRoot[groups.Root(triangles[i][0])];
@@ -230,7 +230,7 @@ void Shells::Split(const TissueSurface& surface)
 void Shells::Weld(const TissueSurface& surface)
 {
   std::vector<char> open(surface.bodies.size(), 0);
-  for (const Shell& shell : shells)
+  for (const ClosedShell& shell : shells)
     if (shell.balance != 0)
       open[static_cast<std::size_t>(shell.body)] = 1;
   using Key = std::pair<std::int32_t, std::array<float, 3>>;
@@ -349,14 +349,14 @@ void Shells::Mend(std::int32_t shell, const std::vector<std::uint32_t>& members)
 void Shells::Measure()
 {
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    Shell& shell = shells[static_cast<std::size_t>(shellOf[i])];
+    ClosedShell& shell = shells[static_cast<std::size_t>(shellOf[i])];
     const Eigen::Vector3d origin = Point(triangles[shell.first][0]);
     const Eigen::Vector3d a = Point(triangles[i][0]) - origin, b = Point(triangles[i][1]) - origin,
                           c = Point(triangles[i][2]) - origin;
     shell.volume += a.dot(b.cross(c)) / 6.0;
     shell.area += 0.5 * (b - a).cross(c - a).norm();
   }
-  for (Shell& shell : shells)
+  for (ClosedShell& shell : shells)
     shell.facing = shell.volume < 0.0 ? -1 : 1;
 }
 
@@ -514,7 +514,7 @@ struct AcousticScene::State {
 
   std::vector<Material> materials;
   std::vector<int> materialOf; // of a body
-  std::vector<Shell> shells;
+  std::vector<ClosedShell> shells;
   std::vector<Record> records; // of the tree's triangles
   Notes notes;
   std::size_t triangles = 0;
@@ -647,13 +647,13 @@ void AcousticScene::State::FindCavities(const Shells& parts)
     std::stable_sort(order.begin(), order.end(),
                      [this](std::size_t a, std::size_t b) { return std::abs(shells[a].volume) > std::abs(shells[b].volume); });
     for (const std::size_t s : order) {
-      Shell& shell = shells[s];
+      ClosedShell& shell = shells[s];
       const int said = (shell.volume < 0.0) != (volume < 0.0) ? -1 : 1;
       shell.sign = 1;
       if (said < 0) {
         int depth = 0;
         for (const std::int32_t holder : BodiesAt(centre + parts.points[parts.triangles[shell.first][0]].cast<double>())) {
-          const Shell& other = shells[static_cast<std::size_t>(holder)];
+          const ClosedShell& other = shells[static_cast<std::size_t>(holder)];
           if (other.body == shell.body && std::abs(other.volume) > std::abs(shell.volume))
             depth += other.sign;
         }
@@ -731,7 +731,7 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
   for (const Hit& hit : collector.hits) {
     last = std::max(last, hit.distance);
     const std::int32_t shell = records[hit.triangle].shell;
-    const Shell& about = shells[static_cast<std::size_t>(shell)];
+    const ClosedShell& about = shells[static_cast<std::size_t>(shell)];
     const bool enters = (hit.normal.dot(line.direction) < 0.0f) == (about.facing > 0);
     const int change = about.sheet ? 0 : enters ? 1 : -1;
     const auto found = std::find_if(meeting.changes.begin(), meeting.changes.end(),
@@ -815,10 +815,10 @@ BodySet AcousticScene::State::BodiesAt(const Eigen::Vector3d& point) const
 void AcousticScene::State::MakeNormals(const Shells& parts, const std::vector<std::uint32_t>& kept, double creaseDegrees)
 {
   std::vector<Eigen::Vector3f> normals(parts.points.size(), Eigen::Vector3f::Zero());
-  const auto normalOf = [&parts](const Triangle& t) -> Eigen::Vector3f {
+  const auto normalOf = [&parts](const CornerNumbers& t) -> Eigen::Vector3f {
     return (parts.points[t[1]] - parts.points[t[0]]).cross(parts.points[t[2]] - parts.points[t[0]]);
   };
-  for (const Triangle& triangle : parts.triangles) {
+  for (const CornerNumbers& triangle : parts.triangles) {
     const Eigen::Vector3f normal = normalOf(triangle);
     for (const std::uint32_t corner : triangle)
       normals[corner] += normal;
@@ -827,7 +827,7 @@ void AcousticScene::State::MakeNormals(const Shells& parts, const std::vector<st
     normal.normalize();
   const auto least = static_cast<float>(std::cos(creaseDegrees * 0.017453292519943295));
   std::vector<bool> edged(normals.size(), false);
-  for (const Triangle& triangle : parts.triangles) {
+  for (const CornerNumbers& triangle : parts.triangles) {
     const Eigen::Vector3f normal = normalOf(triangle).normalized();
     for (const std::uint32_t corner : triangle)
       if (normals[corner].dot(normal) < least && normal.squaredNorm() > 0.5f)
@@ -835,7 +835,7 @@ void AcousticScene::State::MakeNormals(const Shells& parts, const std::vector<st
   }
   constexpr float plane = 1.0f - 1e-6f; // so flat that the triangle's own normal is more exact
   for (std::size_t i = 0; i < kept.size(); ++i) {
-    const Triangle& triangle = parts.triangles[kept[i]];
+    const CornerNumbers& triangle = parts.triangles[kept[i]];
     const Eigen::Vector3f normal = normalOf(triangle).normalized();
     for (std::size_t corner = 0; corner < 3; ++corner) {
       const std::uint32_t point = triangle[corner];
@@ -947,7 +947,7 @@ void AcousticScene::State::MakeLattice(const Shells& parts, const Progress& prog
 
   // Cells near triangles: those of its box that lie close to its plane.
   const double reach = 0.5 * lattice.size.norm() + tolerance;
-  for (const Triangle& triangle : parts.triangles) {
+  for (const CornerNumbers& triangle : parts.triangles) {
     const Eigen::Vector3d a = parts.points[triangle[0]].cast<double>(), b = parts.points[triangle[1]].cast<double>(),
                           c = parts.points[triangle[2]].cast<double>();
     const Eigen::Array3d margin = Eigen::Array3d::Constant(tolerance);
@@ -1048,7 +1048,7 @@ bool AcousticScene::NextCrossing(SceneRay& ray, double limit, Crossing& crossing
     const Meeting::Change* border = nullptr;
     crossing.sheet = -1;
     for (const Meeting::Change& change : meeting.changes) {
-      const Shell& shell = s.shells[static_cast<std::size_t>(change.shell)];
+      const ClosedShell& shell = s.shells[static_cast<std::size_t>(change.shell)];
       if (shell.sheet) { // not the one that the ray has just left, which it may graze by rounding
         const double cosine = std::abs(change.hit.normal.normalized().dot(line.direction));
         if (ray.fromSurface && begins && meeting.first * cosine < s.tolerance)
@@ -1076,8 +1076,9 @@ bool AcousticScene::NextCrossing(SceneRay& ray, double limit, Crossing& crossing
 std::size_t AcousticScene::MemoryBytes() const
 {
   const State& s = *state_;
-  std::size_t bytes = static_cast<std::size_t>(std::max<std::int64_t>(0, s.treeBytes)) + s.shells.capacity() * sizeof(Shell) +
-                      s.records.capacity() * sizeof(Record) + s.lattice.setOf.capacity() * sizeof(std::int32_t);
+  std::size_t bytes = static_cast<std::size_t>(std::max<std::int64_t>(0, s.treeBytes)) +
+                      s.shells.capacity() * sizeof(ClosedShell) + s.records.capacity() * sizeof(Record) +
+                      s.lattice.setOf.capacity() * sizeof(std::int32_t);
   for (const BodySet& set : s.lattice.sets)
     bytes += sizeof(BodySet) + (set.Count() > 10 ? sizeof(std::int32_t) * static_cast<std::size_t>(set.Count()) : 0);
   return bytes;

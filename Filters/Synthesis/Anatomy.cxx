@@ -8,6 +8,7 @@
 // In the liver lesions take their places first, then the trees grow around them, the portal vein before the hepatic veins.
 #include "Anatomy.h"
 #include "BodyShapes.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Random.h"
@@ -22,8 +23,6 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double pi = 3.14159265358979323846;
 
 enum class Part : std::uint64_t {
   Layers = 1,
@@ -52,9 +51,9 @@ public:
   {
     double sum = 0.0;
     for (Wave& wave : waves_) {
-      const double angle = random.Uniform(0.0, 2.0 * pi), length = random.Uniform(45.0, 160.0);
-      wave.number = 2.0 * pi / length * Vector2d(std::cos(angle), std::sin(angle));
-      wave.phase = random.Uniform(0.0, 2.0 * pi);
+      const double angle = random.Uniform(0.0, 2.0 * Pi), length = random.Uniform(45.0, 160.0);
+      wave.number = 2.0 * Pi / length * Vector2d(std::cos(angle), std::sin(angle));
+      wave.phase = random.Uniform(0.0, 2.0 * Pi);
       wave.share = length;
       sum += length;
     }
@@ -199,9 +198,11 @@ struct Organ {
   RadiusOf inner;  // within its capsule
 };
 
-class Maker {
+class AnatomyMaker {
 public:
-  Maker(const AnatomyParameters& p, const Progress& progress) : p_(p), progress_(progress), wall_(p), scale_(p.organScale) {}
+  AnatomyMaker(const AnatomyParameters& p, const Progress& progress) : p_(p), progress_(progress), wall_(p), scale_(p.organScale)
+  {
+  }
 
   TissueSurface Make()
   {
@@ -299,7 +300,7 @@ private:
         const double y = random.Uniform(-0.5, 0.5) * (p_.trunkLengthMm - 50.0);
         const double from = wall_.Depth(layer, x, y), to = wall_.Depth(layer + 1, x, y);
         const double z = random.Uniform(from, to), tilt = random.Uniform(-0.12, 0.12);
-        const double turn = inFat ? random.Uniform(0.0, pi) : 0.6 + random.Uniform(-0.1, 0.1);
+        const double turn = inFat ? random.Uniform(0.0, Pi) : 0.6 + random.Uniform(-0.1, 0.1);
         const Eigen::Matrix3d axes =
             (Eigen::AngleAxisd(turn, Vector3d::UnitZ()) * Eigen::AngleAxisd(tilt, Vector3d::UnitY())).toRotationMatrix();
         const auto inside = [&](double along, double across) {
@@ -375,7 +376,7 @@ private:
   void AddPipe(const std::string& name, double x, double z, double radius, Random& random)
   {
     const double half = 0.5 * p_.trunkLengthMm - 8.0 - 1.5 * radius;
-    const double sway = 2.5 * p_.variation * scale_, phase = random.Uniform(0.0, 2.0 * pi);
+    const double sway = 2.5 * p_.variation * scale_, phase = random.Uniform(0.0, 2.0 * Pi);
     std::vector<Vector3d> path;
     for (double y = -half; y <= half; y += 2.0)
       path.push_back(Place(x, 0.0, z) + Vector3d(sway * std::sin(y / 35.0 + phase), y, 0.3 * sway * std::cos(y / 28.0 + phase)));
@@ -535,7 +536,7 @@ private:
     const Material medulla = Mixed("kidney", "kidney-medulla", -9.0);
     constexpr int pyramids = 9;
     for (int i = 0; i < pyramids; ++i) {
-      const double angle = pi * (0.22 + 1.56 * i / (pyramids - 1)), tilt = i % 2 == 0 ? 0.35 : -0.35;
+      const double angle = Pi * (0.22 + 1.56 * i / (pyramids - 1)), tilt = i % 2 == 0 ? 0.35 : -0.35;
       const Vector3d d = axes * Vector3d(-std::cos(angle) * std::cos(tilt), std::sin(angle) * std::cos(tilt), std::sin(tilt));
       const double r = kidney.inner(d);
       const auto [u, v] = std::pair(d.unitOrthogonal(), d.cross(d.unitOrthogonal()));
@@ -584,7 +585,7 @@ private:
   TissueSurface tissue_;
 };
 
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefuseAnatomy(const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, "anatomy: " + reason);
 }
@@ -636,13 +637,14 @@ void AnatomyParameters::Check() const
   for (const AnatomyParameter& one : AnatomyParameterTable()) {
     const double value = std::visit([this](auto member) { return static_cast<double>(this->*member); }, one.member);
     if (!(value >= one.from && value <= one.to))
-      Refuse(std::string(one.name) + " is " + NumberText(value) + "; it must be in [" + NumberText(one.from) + ", " +
-             NumberText(one.to) + "]");
+      RefuseAnatomy(std::string(one.name) + " is " + NumberText(value) + "; it must be in [" + NumberText(one.from) + ", " +
+                    NumberText(one.to) + "]");
   }
   const double shift = shiftMm * variation;
   const auto atLeast = [](const char* what, double value, double least) {
     if (value < least)
-      Refuse(std::string(what) + " is " + NumberText(value) + "; the organs need " + NumberText(std::ceil(least)) + " at least");
+      RefuseAnatomy(std::string(what) + " is " + NumberText(value) + "; the organs need " + NumberText(std::ceil(least)) +
+                    " at least");
   };
   atLeast("trunkWidthMm", trunkWidthMm, 2.0 * (organScale * (halfWidth + shift) + edge));
   atLeast("trunkLengthMm", trunkLengthMm, 2.0 * (organScale * (halfLength + shift) + edge));
@@ -654,7 +656,7 @@ TissueSurface MakeAnatomy(const AnatomyParameters& parameters, const Progress& p
 {
   parameters.Check();
   progress(0.0);
-  return Maker(parameters, progress).Make();
+  return AnatomyMaker(parameters, progress).Make();
 }
 
 } // namespace echorama

@@ -4,6 +4,7 @@
 // blocks. Edges of a few degrees of curvature keep the normals, which decide how a wall mirrors sound, close to the true ones.
 // Cost: one evaluation of the shape per point.
 #include "BodyShapes.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Icosphere.h"
@@ -15,8 +16,6 @@ namespace echorama {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double pi = 3.14159265358979323846;
 
 [[noreturn]] void Refuse(const std::string& name, const std::string& reason)
 {
@@ -125,7 +124,7 @@ int AddTube(TissueSurface& tissue, const std::string& name, const Material& mate
     if (!(radius[i] > 0.0) || (i > 0 && !((path[i] - path[i - 1]).norm() > 0.0)))
       Refuse(name, "a radius of the tube is not above 0, or two of its points are one");
   const double largest = *std::max_element(radius.begin(), radius.end());
-  const int quarter = static_cast<int>(std::clamp(std::ceil(0.5 * pi * largest / detailMm), 3.0, 64.0));
+  const int quarter = static_cast<int>(std::clamp(std::ceil(0.5 * Pi * largest / detailMm), 3.0, 64.0));
   const auto sides = static_cast<std::uint32_t>(4 * quarter);
 
   // Frames are carried along the path with as little turning as may be, so that the sides run straight.
@@ -135,7 +134,7 @@ int AddTube(TissueSurface& tissue, const std::string& name, const Material& mate
     const Vector3d w = axis.cross(u);
     std::uint32_t first = 0;
     for (std::uint32_t k = 0; k < sides; ++k) {
-      const double angle = 2.0 * pi * k / sides;
+      const double angle = 2.0 * Pi * k / sides;
       const std::uint32_t id = body.Point(centre + r * (std::cos(angle) * u + std::sin(angle) * w));
       if (k == 0)
         first = id;
@@ -156,7 +155,7 @@ int AddTube(TissueSurface& tissue, const std::string& name, const Material& mate
       u = axis.unitOrthogonal();
       pole = body.Point(path[0] - radius[0] * axis);
       for (int k = 1; k < quarter; ++k) {
-        const double angle = 0.5 * pi * k / quarter;
+        const double angle = 0.5 * Pi * k / quarter;
         const std::uint32_t now = ring(path[0] - radius[0] * std::cos(angle) * axis, axis, radius[0] * std::sin(angle));
         if (k > 1)
           join(before, now);
@@ -172,7 +171,7 @@ int AddTube(TissueSurface& tissue, const std::string& name, const Material& mate
     before = now;
   }
   for (int k = quarter - 1; k > 0; --k) {
-    const double angle = 0.5 * pi * k / quarter, r = radius.back();
+    const double angle = 0.5 * Pi * k / quarter, r = radius.back();
     const std::uint32_t now = ring(path.back() + r * std::cos(angle) * axis, axis, r * std::sin(angle));
     join(before, now);
     before = now;

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefuseRig(const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, "calibration rig: " + reason);
 }
@@ -54,7 +54,7 @@ void CalibrationRigParameters::Check() const
 {
   const auto check = [](const std::string& what, double value, double from, double to) {
     if (!(value >= from && value <= to))
-      Refuse(what + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
+      RefuseRig(what + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
   };
   check("scale", scale, 0.2, 5.0);
   check("plateDepthMm", plateDepthMm, 10.0, 500.0);
@@ -72,10 +72,11 @@ void CalibrationRigParameters::Check() const
     for (int axis = 0; axis < 3; ++axis)
       check("a coordinate of " + name, ball.centre[axis], -1000.0, 1000.0);
     if (ball.centre.z() + ball.radius >= -baseMm / scale)
-      Refuse(name + " touches the plate or the base; its centre's z must be below " + NumberText(-ball.radius - baseMm / scale));
+      RefuseRig(name + " touches the plate or the base; its centre's z must be below " +
+                NumberText(-ball.radius - baseMm / scale));
     for (std::size_t j = 0; j < i; ++j)
       if ((ball.centre - balls[j].centre).norm() <= ball.radius + balls[j].radius)
-        Refuse(name + " touches ball " + std::to_string(j + 1));
+        RefuseRig(name + " touches ball " + std::to_string(j + 1));
   }
 }
 

@@ -12,6 +12,7 @@
 //    precision holds phases to 1e-5 of a turn, whatever the depth and wherever the world is.
 // 4. Pulse: the fine row is split into its phases, so that the sum over the pulse is a sum of whole rows.
 #include "EchoSum.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
@@ -22,7 +23,6 @@
 namespace echorama {
 namespace {
 
-constexpr double pi = 3.141592653589793;
 constexpr double pulseReach = 4.0;    // standard deviations in depth: 70 dB down
 constexpr double finePerSigma = 10.0; // samples of the fine row
 constexpr double nodeMm = 1.0;        // between the widths that are worked out
@@ -199,7 +199,7 @@ public:
     for (int i = 0; i <= pieces; ++i) {
       const BeamWidth width = WidthAt(transducer, segment.way + i * step_);
       // Mean power of speckle is the integral of the squared response.
-      const double volume = std::pow(pi, 1.5) * pulse * width.lateralSigma * width.elevationSigma;
+      const double volume = std::pow(Pi, 1.5) * pulse * width.lateralSigma * width.elevationSigma;
       nodes_.push_back({{std::pow(width.lateralSigma, -2), std::pow(width.elevationSigma, -2), 0.5 * width.lateralCurvature,
                          0.5 * width.elevationCurvature, -0.5 * std::log(volume)}});
     }
@@ -237,7 +237,7 @@ public:
   SegmentSum(const SoundSegment& segment, const Scatterers& scatterers, const Transducer& transducer, double reach, FineRow& fine,
              const BeamNodes& nodes)
     : segment_(segment), scatterers_(scatterers), reach_(reach), fine_(fine), nodes_(nodes),
-      up_(segment.direction.cross(segment.across)), turnsPerMm_(transducer.PhasePerMm() / (2.0 * pi)),
+      up_(segment.direction.cross(segment.across)), turnsPerMm_(transducer.PhasePerMm() / (2.0 * Pi)),
       negative_(segment.amplitude < 0.0), logAmplitude_(std::log(std::abs(segment.amplitude)))
   {
     for (int axis = 0; axis < 3; ++axis) {

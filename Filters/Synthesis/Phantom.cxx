@@ -16,6 +16,7 @@
 // beside the spread of the beams. Cost: one hash (Philox) and one inverse of the geometry per lattice cell in the box, some
 // 40 short vector operations per scatterer.
 #include "Phantom.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -28,7 +29,6 @@
 namespace echorama {
 namespace {
 
-constexpr double pi = 3.141592653589793;
 constexpr int depthTaps = 8; // samples in depth that an echo reaches
 constexpr int margin = depthTaps - 1;
 constexpr float reach = 2.75f; // standard deviations that an echo reaches across: 33 dB down
@@ -80,7 +80,7 @@ struct Scatterer {
 };
 
 // The scatterers of a few layers of the lattice, and which of them reach which slab of planes.
-struct Part {
+struct ScattererPart {
   std::vector<Scatterer> scatterers;
   std::vector<std::vector<std::uint32_t>> bySlab;
 };
@@ -137,9 +137,9 @@ public:
   int Layers() const { return count_.z(); }
 
   // The scatterers of the layers [begin, end) of the lattice.
-  Part Make(int begin, int end) const
+  ScattererPart Make(int begin, int end) const
   {
-    Part part;
+    ScattererPart part;
     part.bySlab.resize(static_cast<std::size_t>((grid_.size[2] + planesPerSlab - 1) / planesPerSlab));
     for (int k = begin; k < end; ++k)
       for (int j = 0; j < count_.y(); ++j)
@@ -149,7 +149,7 @@ public:
   }
 
 private:
-  void Add(const Eigen::Array3i& cell, Part& part) const
+  void Add(const Eigen::Array3i& cell, ScattererPart& part) const
   {
     const auto bits = Random::Block(
         {static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y()), static_cast<std::uint32_t>(cell.z()), 0u},
@@ -185,9 +185,9 @@ private:
       return;
     // A uniform strength of variance 1 needs fewer scatterers for full speckle than a Gaussian one. The mean power of
     // uniform tissue is the density times the integral of the squared point spread.
-    const double power = p_.scatterersPerMm3 * std::pow(pi, 1.5) * p_.pulseSigmaMm * lateral * elevation;
+    const double power = p_.scatterersPerMm3 * std::pow(Pi, 1.5) * p_.pulseSigmaMm * lateral * elevation;
     const double strength = Strength(cell, uniform(3)) * scene_.AmplitudeAt(world) / std::sqrt(power);
-    const double phase = -4.0 * pi / p_.wavelengthMm * beam.depth;
+    const double phase = -4.0 * Pi / p_.wavelengthMm * beam.depth;
     s.re = static_cast<float>(strength * std::cos(phase));
     s.im = static_cast<float>(strength * std::sin(phase));
     const auto index = static_cast<std::uint32_t>(part.scatterers.size());
@@ -224,13 +224,13 @@ private:
 };
 
 // Adds the echoes of all scatterers of a slab of planes to \a rows: [plane][beam][depth with margins][re, im].
-ECHORAMA_HOT void AddEchoes(const std::vector<Part>& parts, std::size_t slab, const BeamGrid& grid, const GaussTable& gauss,
-                            float* rows)
+ECHORAMA_HOT void AddEchoes(const std::vector<ScattererPart>& parts, std::size_t slab, const BeamGrid& grid,
+                            const GaussTable& gauss, float* rows)
 {
   const std::ptrdiff_t rowLength = 2 * (grid.size[0] + 2 * margin);
   const int slabBegin = static_cast<int>(slab) * planesPerSlab;
   const int slabEnd = std::min(grid.size[2], slabBegin + planesPerSlab);
-  for (const Part& part : parts)
+  for (const ScattererPart& part : parts)
     for (const std::uint32_t index : part.bySlab[slab]) {
       const Scatterer& s = part.scatterers[index];
       const int firstDepth = static_cast<int>(std::floor(s.depth)) - depthTaps / 2 + 1;
@@ -261,7 +261,7 @@ ECHORAMA_HOT void AddEchoes(const std::vector<Part>& parts, std::size_t slab, co
 }
 
 // Where a beam runs through a body, in mm of depth, and what each mm there takes.
-struct Crossing {
+struct Passage {
   double begin, end, dbPerMm;
 };
 
@@ -282,9 +282,9 @@ public:
   }
 
   // The crossings of one beam with all of them.
-  std::vector<Crossing> Of(double fan, double sweep) const
+  std::vector<Passage> Of(double fan, double sweep) const
   {
-    std::vector<Crossing> crossings;
+    std::vector<Passage> crossings;
     const BeamPoint start{0.0, fan, sweep};
     const Eigen::Vector3d origin = p_.probeToWorld * PointOf(p_.probe, start);
     const Eigen::Vector3d along = p_.probeToWorld.linear() * DirectionOf(p_.probe, start);
@@ -294,7 +294,7 @@ public:
       const double bb = b.squaredNorm(), ab = a.dot(b), discriminant = ab * ab - bb * (a.squaredNorm() - 1.0);
       if (!(discriminant > 0.0))
         continue;
-      Crossing crossing{std::max(0.0, (-ab - std::sqrt(discriminant)) / bb), (-ab + std::sqrt(discriminant)) / bb, body.dbPerMm};
+      Passage crossing{std::max(0.0, (-ab - std::sqrt(discriminant)) / bb), (-ab + std::sqrt(discriminant)) / bb, body.dbPerMm};
       if (p_.press.mm == 0.0 || Narrow(body, origin, along, crossing))
         crossings.push_back(crossing);
     }
@@ -309,7 +309,7 @@ private:
   };
 
   // From where the beam may cross a body to where it crosses what the probe has made of it; false when it does not.
-  bool Narrow(const Body& body, const Eigen::Vector3d& origin, const Eigen::Vector3d& along, Crossing& crossing) const
+  bool Narrow(const Body& body, const Eigen::Vector3d& origin, const Eigen::Vector3d& along, Passage& crossing) const
   {
     constexpr int steps = 64;
     const Pose worldToProbe = p_.probeToWorld.inverse();
@@ -347,7 +347,7 @@ void AddNoise(const PhantomParameters& p, float amplitude, std::uint64_t row, st
   for (int i = 0; i < count; ++i) {
     // Of a complex Gaussian number, the square of the size is exponentially distributed and the angle uniformly.
     const auto size = amplitude * static_cast<float>(std::sqrt(-std::log1p(-random.Uniform())));
-    const auto angle = static_cast<float>(2.0 * pi * random.Uniform());
+    const auto angle = static_cast<float>(2.0 * Pi * random.Uniform());
     samples[i] += std::complex<float>(size * std::cos(angle), size * std::sin(angle));
   }
 }
@@ -369,7 +369,7 @@ void PhantomParameters::Check() const
   if (probe.fanOffset != 0.0)
     fail("the fan of the probe must be centred on its array");
   // Beams of a fan of half a turn or more, or planes that meet, would show one scatterer twice.
-  if (!(probe.fanAngle < pi && probe.sweepAngle < pi))
+  if (!(probe.fanAngle < Pi && probe.sweepAngle < Pi))
     fail("fan and sweep must be below 180 degrees");
   for (const double depth : {probe.depthMin, probe.depthMax})
     if (!(probe.Sweep().Span(probe.Fan().PointOf({0.5, depth}).y()) > 0.0))
@@ -432,7 +432,7 @@ BeamEchoes SimulateEchoes(const PhantomParameters& p, const Progress& progress)
   const BeamGrid grid(p);
   const ScattererSource source(p, grid);
   const int layers = source.Layers();
-  std::vector<Part> parts(static_cast<std::size_t>((layers + layersPerPart - 1) / layersPerPart));
+  std::vector<ScattererPart> parts(static_cast<std::size_t>((layers + layersPerPart - 1) / layersPerPart));
   ParallelFor(static_cast<std::ptrdiff_t>(parts.size()), progress.Part(0.0, 0.5), [&](std::ptrdiff_t i) {
     const int begin = static_cast<int>(i) * layersPerPart;
     parts[static_cast<std::size_t>(i)] = source.Make(begin, std::min(layers, begin + layersPerPart));
@@ -457,7 +457,7 @@ BeamEchoes SimulateEchoes(const PhantomParameters& p, const Progress& progress)
         for (int d = 0; d < grid.size[0]; ++d)
           out[d] = {row[2 * d], row[2 * d + 1]};
         if (p.shadows)
-          for (const Crossing& crossing : attenuation.Of(beam / (grid.size[1] - 1.0) - 0.5, plane / (grid.size[2] - 1.0) - 0.5))
+          for (const Passage& crossing : attenuation.Of(beam / (grid.size[1] - 1.0) - 0.5, plane / (grid.size[2] - 1.0) - 0.5))
             for (int d = 0; d < grid.size[0]; ++d) {
               const double way = std::min(grid.DepthOf(d), crossing.end) - crossing.begin;
               if (way > 0.0)

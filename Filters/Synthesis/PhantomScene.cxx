@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Eigen::Vector3d;
 
-constexpr const char* schemaName = "echorama-phantom-1";
+constexpr const char* phantomSchema = "echorama-phantom-1";
 
 std::string NameOf(const PhantomScene& scene, std::size_t index)
 {
@@ -229,7 +229,7 @@ std::string SceneToJson(const PhantomScene& scene)
     item["attenuationDbPerMm"] = inclusion.attenuationDbPerMm;
     list.push_back(std::move(item));
   }
-  return Json{{"schema", schemaName}, {"inclusions", std::move(list)}}.dump();
+  return Json{{"schema", phantomSchema}, {"inclusions", std::move(list)}}.dump();
 }
 
 PhantomScene SceneFromJson(const std::string& text)
@@ -238,8 +238,8 @@ PhantomScene SceneFromJson(const std::string& text)
   if (!root.is_object())
     Refuse("the text", "is not a JSON object");
   const Json& schema = Field(root, "schema", "the text");
-  if (schema != schemaName)
-    Refuse("the text", std::string("has a schema other than \"") + schemaName + "\"");
+  if (schema != phantomSchema)
+    Refuse("the text", std::string("has a schema other than \"") + phantomSchema + "\"");
   const Json& list = Field(root, "inclusions", "the text");
   if (!list.is_array())
     Refuse("\"inclusions\"", "is not a list");

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-double Sphere(const Vector3d& p, const Vector3d& centre, double radius)
+double SphereDistance(const Vector3d& p, const Vector3d& centre, double radius)
 {
   return (p - centre).norm() - radius;
 }
@@ -27,7 +27,7 @@ double Cylinder(const Vector3d& p, const Vector2d& axis, double radius, double l
   return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
 }
 
-double Box(const Vector3d& p, const Eigen::AlignedBox3d& box)
+double BoxDistance(const Vector3d& p, const Eigen::AlignedBox3d& box)
 {
   const Vector3d beyond = (p - box.center()).cwiseAbs() - 0.5 * box.sizes();
   return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
@@ -40,7 +40,7 @@ double Bar(const Vector3d& p, const Vector3d& from, const Vector3d& to, double w
   const Vector3d along = length > 1e-9 ? Vector3d((to - from) / length) : Vector3d::UnitZ(), side = Vector3d::UnitX();
   const Vector3d local(side.dot(p - from), along.cross(side).dot(p - from), along.dot(p - from));
   const double h = 0.5 * width;
-  return Box(local, {Vector3d(-h, -h, -h), Vector3d(h, h, length + h)});
+  return BoxDistance(local, {Vector3d(-h, -h, -h), Vector3d(h, h, length + h)});
 }
 
 // The outline of a handle, and distances from it.
@@ -132,9 +132,10 @@ PrintableSolid PrintableRig(const CalibrationRigParameters& p)
     solid.bounds.extend(Vector3d(pin.top - Vector3d::Constant(pin.ball)).cwiseMax(Vector3d(-1e9, -1e9, 0.0)));
   }
   solid.distance = [pins, base](const Vector3d& x) {
-    double nearest = Box(x, base);
+    double nearest = BoxDistance(x, base);
     for (const Pin& pin : pins)
-      nearest = std::min({nearest, Sphere(x, pin.top, pin.ball), Cylinder(x, pin.top.head<2>(), pin.radius, 0.0, pin.top.z())});
+      nearest =
+          std::min({nearest, SphereDistance(x, pin.top, pin.ball), Cylinder(x, pin.top.head<2>(), pin.radius, 0.0, pin.top.z())});
     return nearest;
   };
   return solid;
@@ -210,12 +211,13 @@ PrintableSolid PrintableClip(const ProbeClipParameters& p)
     double sleeve = std::max(outline - outside, ends);
     for (const double at : grooves) // where both the depth and the width are a groove's
       sleeve = std::max(sleeve, std::min(outline - outside + p.wallMm / 3.0, 0.5 * p.tieWidthMm - std::abs(x.z() - at)));
-    double solidHere = std::min({sleeve, Bar(x, root, bend, p.armWidthMm), Bar(x, bend, end, p.armWidthMm), Box(x, holder)});
+    double solidHere =
+        std::min({sleeve, Bar(x, root, bend, p.armWidthMm), Bar(x, bend, end, p.armWidthMm), BoxDistance(x, holder)});
     // Cuts: the handle, all along it; the open side; the pocket.
     solidHere = std::max(solidHere, p.clearanceMm - outline);
     if (p.openingMm > 0.0)
       solidHere = std::max(solidHere, -std::max(std::abs(x.x()) - 0.5 * p.openingMm, -x.y()));
-    return std::max({solidHere, -Box(x, entry), -Box(x, cable), -x.z()});
+    return std::max({solidHere, -BoxDistance(x, entry), -BoxDistance(x, cable), -x.z()});
   };
   return solid;
 }

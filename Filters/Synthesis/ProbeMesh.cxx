@@ -6,6 +6,7 @@
 // loops at one height each, whose radius goes from the wall's to the handle's (neck, handle, rounded end). Each loop is a
 // star again, and each lies below the one before; hence nothing is cut.
 #include "ProbeMesh.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -17,10 +18,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double pi = 3.141592653589793;
-constexpr double degree = pi / 180.0;
-
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefuseProbe(const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, "probe mesh: " + reason);
 }
@@ -43,16 +41,16 @@ ProbeGeometry FaceOf(const ProbeGeometry& geometry, const ProbeHousing& housing)
     face.sweepAngle = 0.0;
     face.sweepWidth = housing.faceThicknessMm;
   }
-  if (face.fanAngle > pi * (1.0 + 1e-9))
-    Refuse("the fan is " + NumberText(face.fanAngle / degree) +
-           " degrees wide; a face of more than 180 cannot be put on a handle");
-  if (face.sweepAngle >= 178.0 * degree)
-    Refuse("the sweep is " + NumberText(face.sweepAngle / degree) + " degrees wide; it must be below 178");
+  if (face.fanAngle > Pi * (1.0 + 1e-9))
+    RefuseProbe("the fan is " + NumberText(face.fanAngle / RadiansPerDegree) +
+                " degrees wide; a face of more than 180 cannot be put on a handle");
+  if (face.sweepAngle >= 178.0 * RadiansPerDegree)
+    RefuseProbe("the sweep is " + NumberText(face.sweepAngle / RadiansPerDegree) + " degrees wide; it must be below 178");
   const double edge = face.Fan().PointOf({0.5, 0.0}).y(), span = face.Sweep().Span(edge);
   if (span < 0.1)
-    Refuse("the ends of the fan lie " + NumberText(-edge) + " mm behind its middle and so reach the axis of the sweep, " +
-           NumberText(face.sweepWidth / face.sweepAngle) +
-           " mm behind it, where the face would cut itself; a larger sweep radius or a smaller fan avoids that");
+    RefuseProbe("the ends of the fan lie " + NumberText(-edge) + " mm behind its middle and so reach the axis of the sweep, " +
+                NumberText(face.sweepWidth / face.sweepAngle) +
+                " mm behind it, where the face would cut itself; a larger sweep radius or a smaller fan avoids that");
   return face;
 }
 
@@ -132,7 +130,7 @@ private:
       column.radius = point.head<2>().norm();
       column.away = point.head<2>() / column.radius;
       column.height = point.z();
-      column.slope = std::clamp(std::atan2(normal.head<2>().dot(column.away), normal.z()), 0.0, 0.5 * pi);
+      column.slope = std::clamp(std::atan2(normal.head<2>().dot(column.away), normal.z()), 0.0, 0.5 * Pi);
       column.wall = column.radius + housing_.rimMm * (1.0 - std::sin(column.slope));
       column.handle = std::pow(std::pow(std::abs(column.away.x()) / (0.5 * housing_.handleWidthMm), handleRoundness) +
                                    std::pow(std::abs(column.away.y()) / (0.5 * housing_.handleThicknessMm), handleRoundness),
@@ -170,9 +168,9 @@ private:
   {
     using Place = std::pair<double, double>;
     const double rim = housing_.rimMm;
-    const int bends = std::max(3, Steps(0.5 * pi * rim, housing_.resolutionMm));
+    const int bends = std::max(3, Steps(0.5 * Pi * rim, housing_.resolutionMm));
     const auto edge = [rim](const Column& column, double t) {
-      const double angle = column.slope + t * (0.5 * pi - column.slope);
+      const double angle = column.slope + t * (0.5 * Pi - column.slope);
       // A face that ends straight down has no edge; its loops must not fall into one.
       const double drop = rim * (std::cos(column.slope) - std::cos(angle)) + 1e-3 * t * rim;
       return Place{column.radius + rim * (std::sin(angle) - std::sin(column.slope)), column.height - drop};
@@ -211,12 +209,12 @@ private:
     height_ -= housing_.neckMm;
     const double round = std::min(0.3 * std::min(housing_.handleWidthMm, housing_.handleThicknessMm), 0.9 * housing_.handleMm);
     const double straight = housing_.handleMm - round;
-    const int steps = Steps(straight, r), bends = std::max(3, Steps(0.5 * pi * round, r));
+    const int steps = Steps(straight, r), bends = std::max(3, Steps(0.5 * Pi * round, r));
     for (int i = 1; i <= steps; ++i)
       AddLoop([&](const Column& column) { return Place{column.handle, height_ - straight * i / steps}; }, ProbeMesh::Handle);
     height_ -= straight;
     for (int i = 1; i <= bends; ++i) {
-      const double angle = 0.5 * pi * i / bends;
+      const double angle = 0.5 * Pi * i / bends;
       AddLoop(
           [&](const Column& column) {
             return Place{column.handle - round * (1.0 - std::cos(angle)), height_ - round * std::sin(angle)};
@@ -241,8 +239,8 @@ void ProbeHousing::Check() const
 {
   const auto check = [](const char* what, double value, double from, double to) {
     if (!(value >= from && value <= to))
-      Refuse(std::string(what) + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " + NumberText(to) +
-             "]");
+      RefuseProbe(std::string(what) + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " +
+                  NumberText(to) + "]");
   };
   check("rimMm", rimMm, 0.1, 50.0);
   check("skirtMm", skirtMm, 0.1, 200.0);

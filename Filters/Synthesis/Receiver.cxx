@@ -2,6 +2,7 @@
 // One row of samples (a beam) after the other, in parallel: noise, envelope, gain and decimation in a buffer of the row,
 // then compression. Cost: two logarithms and a sine per sample with noise, one logarithm per grey value.
 #include "Receiver.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
@@ -13,7 +14,6 @@
 namespace echorama {
 namespace {
 
-constexpr double pi = 3.141592653589793;
 // The mean of 20 log10 of a Rayleigh envelope lies 10 gamma / ln 10 dB (Euler's gamma) below the dB of its mean power.
 constexpr double meanLogDb = -2.5068155;
 
@@ -62,7 +62,7 @@ public:
       std::complex<double> value = samples[i];
       if (noise_ > 0.0) {
         // Of a complex Gaussian number, the square of the size is exponentially distributed and the angle uniformly.
-        const double size = noise_ * std::sqrt(-std::log1p(-random.Uniform())), angle = 2.0 * pi * random.Uniform();
+        const double size = noise_ * std::sqrt(-std::log1p(-random.Uniform())), angle = 2.0 * Pi * random.Uniform();
         value += std::complex<double>(size * std::cos(angle), size * std::sin(angle));
       }
       const auto k = static_cast<std::size_t>(i);

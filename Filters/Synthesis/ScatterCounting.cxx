@@ -11,6 +11,7 @@
 //
 // Its grain is the noise of counting: it fades as rays are added. Beams are independent and parallel.
 #include "ScatterCounting.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
@@ -22,8 +23,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr double pi = 3.14159265358979323846;
 
 void Check(const char* name, double value, double from, double to)
 {
@@ -37,7 +36,7 @@ Eigen::Vector3d WithinCone(const Eigen::Vector3d& axis, double cosOfCone, double
 {
   const double cosine = 1.0 - u * (1.0 - cosOfCone), sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
   const Eigen::Vector3d first = axis.unitOrthogonal(), second = axis.cross(first);
-  const double angle = 2.0 * pi * v;
+  const double angle = 2.0 * Pi * v;
   return (sine * std::cos(angle) * first + sine * std::sin(angle) * second + cosine * axis).normalized();
 }
 
@@ -66,7 +65,7 @@ struct Beam {
 class Counting {
 public:
   Counting(const AcousticScene& scene, const ScatterCounting& parameters, double maxDepth)
-    : scene_(scene), p_(parameters), maxDepth_(maxDepth), cosOfCone_(std::cos(parameters.coneDegrees * pi / 180.0))
+    : scene_(scene), p_(parameters), maxDepth_(maxDepth), cosOfCone_(std::cos(parameters.coneDegrees * Pi / 180.0))
   {
     for (const Material& material : scene.Materials())
       media_.push_back({{material.Impedance(), material.soundSpeed},

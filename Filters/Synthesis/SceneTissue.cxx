@@ -9,9 +9,10 @@ namespace {
 using Eigen::Vector3d;
 
 // Makes bodies of one item after the other.
-class Maker {
+class SceneTissueMaker {
 public:
-  Maker(const SynthesisScene& scene, const MeshReader& readMesh, std::vector<std::string>& notes, TissueSurface& tissue)
+  SceneTissueMaker(const SynthesisScene& scene, const MeshReader& readMesh, std::vector<std::string>& notes,
+                   TissueSurface& tissue)
     : scene_(scene), readMesh_(readMesh), notes_(notes), tissue_(tissue)
   {
   }
@@ -133,7 +134,7 @@ TissueSurface TissueOf(const SynthesisScene& scene, const MeshReader& readMesh, 
 {
   TissueSurface tissue;
   tissue.materials = {scene.MaterialOf(scene.background)};
-  Maker maker(scene, readMesh, notes, tissue);
+  SceneTissueMaker maker(scene, readMesh, notes, tissue);
   const double count = static_cast<double>(scene.tissue.size());
   for (std::size_t i = 0; i < scene.tissue.size(); ++i)
     maker.Make(scene.tissue[i], progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count));

@@ -7,6 +7,7 @@
 // Cost: two questions to the scene's tree per surface (the nearest hit, and what lies at the same place), one at the end of
 // each way.
 #include "SoundTransport.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -17,9 +18,7 @@
 namespace echorama {
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
-
-void Check(const char* name, double value, double from, double to)
+void CheckTransport(const char* name, double value, double from, double to)
 {
   if (!(value >= from && value <= to))
     throw Error(Error::Kind::InvalidParameter, std::string(name) + " is " + NumberText(value) + "; it must be in [" +
@@ -35,7 +34,7 @@ Eigen::Vector3d MirroredAcross(const Eigen::Vector3d& across, const Eigen::Vecto
 Eigen::Vector3d LambertDirection(const Eigen::Vector3d& normal, double u, double v)
 {
   const Eigen::Vector3d first = normal.unitOrthogonal(), second = normal.cross(first);
-  const double radius = std::sqrt(u), angle = 2.0 * pi * v;
+  const double radius = std::sqrt(u), angle = 2.0 * Pi * v;
   return (radius * std::cos(angle) * first + radius * std::sin(angle) * second + std::sqrt(1.0 - u) * normal).normalized();
 }
 
@@ -79,7 +78,7 @@ SoundTracer::SoundTracer(const AcousticScene& scene, const SoundTransport& trans
                       conditions.assumedSoundSpeed / material.soundSpeed,
                       material.roughness});
   leastAmplitude_ = std::pow(10.0, -transport.dynamicRangeDb / 20.0);
-  const double acceptance = transport.acceptanceDegrees * pi / 180.0;
+  const double acceptance = transport.acceptanceDegrees * Pi / 180.0;
   mirrorFactor_ = 0.5 / (acceptance * acceptance);
   caught_ = std::min(1.0, acceptance * acceptance);
 }

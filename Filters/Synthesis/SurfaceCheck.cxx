@@ -29,7 +29,7 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 using Corners = std::array<std::uint32_t, 3>;
-using Box = Eigen::AlignedBox3f;
+using FloatBox = Eigen::AlignedBox3f;
 
 class Mesh {
 public:
@@ -42,9 +42,9 @@ public:
   {
     return ((Corner(triangle, 0) + Corner(triangle, 1) + Corner(triangle, 2)) / 3.0).cast<float>();
   }
-  Box Bounds(std::size_t triangle) const
+  FloatBox Bounds(std::size_t triangle) const
   {
-    Box box;
+    FloatBox box;
     for (const std::uint32_t corner : At(triangle))
       box.extend(surface_.points[corner]);
     return box;
@@ -135,9 +135,9 @@ public:
 
   // Calls visit(triangle) for all whose box meets one.
   template <class Function>
-  void Meet(const Box& box, const Function& visit) const
+  void Meet(const FloatBox& box, const Function& visit) const
   {
-    Walk([&box](const Box& other) { return box.intersects(other); }, visit);
+    Walk([&box](const FloatBox& other) { return box.intersects(other); }, visit);
   }
 
   // Calls visit(triangle) for all that a ray crosses.
@@ -146,7 +146,7 @@ public:
   {
     const Vector3d inverse = direction.cwiseInverse();
     Walk(
-        [&](const Box& box) {
+        [&](const FloatBox& box) {
           const Eigen::Array3d a = ((box.min().cast<double>() - origin).cwiseProduct(inverse)).array();
           const Eigen::Array3d b = ((box.max().cast<double>() - origin).cwiseProduct(inverse)).array();
           return a.min(b).maxCoeff() <= a.max(b).minCoeff() && a.max(b).minCoeff() >= 0.0;
@@ -162,11 +162,11 @@ public:
         });
   }
 
-  const Box& BoxOf(std::size_t triangle) const { return boxes_[triangle]; }
+  const FloatBox& BoxOf(std::size_t triangle) const { return boxes_[triangle]; }
 
 private:
   struct Node {
-    Box box;
+    FloatBox box;
     std::uint32_t first, last; // of order_
     std::uint32_t right;       // the left one follows; 0: a leaf
   };
@@ -174,8 +174,8 @@ private:
   std::uint32_t Build(std::size_t first, std::size_t last)
   {
     const auto self = static_cast<std::uint32_t>(nodes_.size());
-    nodes_.push_back({Box(), static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last), 0});
-    Box box, middles;
+    nodes_.push_back({FloatBox(), static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last), 0});
+    FloatBox box, middles;
     for (std::size_t i = first; i < last; ++i) {
       box.extend(boxes_[order_[i]]);
       middles.extend(boxes_[order_[i]].center());
@@ -220,7 +220,7 @@ private:
 
   const Mesh& mesh_;
   std::vector<std::uint32_t> order_;
-  std::vector<Box> boxes_;
+  std::vector<FloatBox> boxes_;
   std::vector<Node> nodes_;
 };
 

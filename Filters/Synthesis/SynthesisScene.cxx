@@ -3,6 +3,7 @@
 // (JSON to struct, with every check), Writer (back) and SchemaMaker (the JSON Schema). So the reader, the text that is written
 // and the schema cannot drift apart. Check() writes a scene and reads it again, and so says the same as the reader.
 #include "SynthesisScene.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
@@ -18,7 +19,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Eigen::Vector3d;
 
-constexpr double degree = 0.017453292519943295;
 constexpr const char* schemaName = "echorama-scene-1";
 constexpr std::size_t longestText = 4096, longestList = 100000;
 
@@ -65,7 +65,7 @@ bool IsAffine(const Eigen::Matrix4d& rows)
 
 // ---- checks beyond the ranges; a message without its place ----
 
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefuseScene(const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, reason);
 }
@@ -80,24 +80,24 @@ void Validate(const ScenePlace& place)
   if (!place.rows)
     return;
   if (!IsAffine(*place.rows))
-    Refuse("the last row must be 0 0 0 1");
+    RefuseScene("the last row must be 0 0 0 1");
   const Eigen::Matrix3d linear = place.rows->topLeftCorner<3, 3>();
   if (!(linear.determinant() > 1e-12 * std::pow(linear.norm(), 3)))
-    Refuse("the matrix mirrors or flattens what it moves");
+    RefuseScene("the matrix mirrors or flattens what it moves");
 }
 
 void Validate(const ScenePose& pose)
 {
   if (pose.rows) {
     if (!IsAffine(*pose.rows) || !IsRotation(pose.rows->topLeftCorner<3, 3>()))
-      Refuse("the matrix is not rigid: a rotation and a translation, with 0 0 0 1 as its last row");
+      RefuseScene("the matrix is not rigid: a rotation and a translation, with 0 0 0 1 as its last row");
     return;
   }
   const Vector3d beam = pose.target - pose.face;
   if (!(beam.norm() > 1e-6))
-    Refuse("face and target are the same point");
+    RefuseScene("face and target are the same point");
   if (!(pose.fan.cross(beam).norm() > 1e-6 * pose.fan.norm() * beam.norm()))
-    Refuse("the fan lies along the beam");
+    RefuseScene("the fan lies along the beam");
 }
 
 void Validate(const SceneProbe& probe)
@@ -109,7 +109,7 @@ void Validate(const ScenePacking& packing)
 {
   packing.spheres.Check();
   if (std::none_of(packing.materials.begin(), packing.materials.end(), [](const auto& share) { return share.weight > 0.0; }))
-    Refuse("no material has a weight above 0");
+    RefuseScene("no material has a weight above 0");
 }
 
 void Validate(const AnatomyParameters& anatomy)
@@ -141,14 +141,14 @@ void Validate(const Receiver& receiver)
 void Validate(const SceneCylinder& cylinder)
 {
   if (!((cylinder.to - cylinder.from).norm() > 1e-6))
-    Refuse("from and to are the same point");
+    RefuseScene("from and to are the same point");
 }
 
 void Validate(const SceneRecording& recording)
 {
   const Eigen::Matrix4d matrix = recording.trackerToWorld.Matrix().matrix();
   if (!IsRotation(matrix.topLeftCorner<3, 3>()))
-    Refuse("trackerToWorld is not rigid");
+    RefuseScene("trackerToWorld is not rigid");
 }
 
 constexpr std::uint64_t largestSeed = 9223372036854775807u; // VTK's seeds have a sign
@@ -1111,7 +1111,7 @@ Eigen::Affine3d ScenePlace::Matrix() const
   if (rows)
     return Eigen::Affine3d(*rows);
   Eigen::Affine3d matrix = Eigen::Affine3d::Identity();
-  matrix.linear() = scale * ExpRotation(degree * rotationDegrees);
+  matrix.linear() = scale * ExpRotation(RadiansPerDegree * rotationDegrees);
   matrix.translation() = translation;
   return matrix;
 }
@@ -1142,11 +1142,11 @@ ProbePreset SceneProbe::Resolve() const
   const auto bend = [](const char* what, const std::optional<double>& angleDegrees, const std::optional<double>& radius,
                        const std::optional<double>& newWidth, double& angle, double& width) {
     if (radius && newWidth)
-      Refuse(std::string(what) + "RadiusMm and " + what + "WidthMm say the same; give one of them");
+      RefuseScene(std::string(what) + "RadiusMm and " + what + "WidthMm say the same; give one of them");
     const double oldRadius = angle > 0.0 ? width / angle : 0.0;
     const bool bent = angle > 0.0;
     if (angleDegrees)
-      angle = degree * *angleDegrees;
+      angle = RadiansPerDegree * *angleDegrees;
     if (newWidth)
       width = *newWidth;
     else if (radius)
@@ -1162,9 +1162,9 @@ ProbePreset SceneProbe::Resolve() const
   probe.samples = samples.value_or(probe.samples);
   probe.sweepSteps = sweepSteps.value_or(probe.sweepSteps);
   if (!sweepSteps && probe.sweepSteps == 1 && !head.IsPlane())
-    Refuse("the preset is of a single plane; say sweepSteps to sweep it");
+    RefuseScene("the preset is of a single plane; say sweepSteps to sweep it");
   if (probe.sweepSteps > 1 && head.IsPlane())
-    Refuse("sweepSteps is " + std::to_string(probe.sweepSteps) + ", but the sweep has neither angle nor width");
+    RefuseScene("sweepSteps is " + std::to_string(probe.sweepSteps) + ", but the sweep has neither angle nor width");
   head.Check();
   if (probe.sweepSteps == 1)
     head.sweepAngle = head.sweepWidth = 0.0;
@@ -1181,7 +1181,7 @@ Eigen::Affine3d SceneMesh::ToWorld() const
 
 Pose SceneSweep::ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) const
 {
-  Pose motion(ExpRotation(secondsFromMiddle * degree * turnDegreesPerSecond));
+  Pose motion(ExpRotation(secondsFromMiddle * RadiansPerDegree * turnDegreesPerSecond));
   motion.translation() = secondsFromMiddle * velocityMmPerSecond;
   return middle * motion;
 }

@@ -13,7 +13,7 @@ auto Numbers(const Material& m)
                   m.roughness, m.scatterProbability, m.youngsModulusKPa);
 }
 
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefuseSurface(const std::string& reason)
 {
   throw Error(Error::Kind::BadInput, "the tissue surface " + reason);
 }
@@ -23,28 +23,28 @@ auto Numbers(const Material& m)
 void TissueSurface::Check() const
 {
   if (materials.empty())
-    Refuse("has no material; the first is that of the background");
+    RefuseSurface("has no material; the first is that of the background");
   for (const Material& material : materials)
     material.Check();
   for (const Body& body : bodies)
     if (body.material < 0 || static_cast<std::size_t>(body.material) >= materials.size())
-      Refuse("has a body \"" + body.name + "\" whose material (" + std::to_string(body.material) + ") is none of its " +
-             std::to_string(materials.size()));
+      RefuseSurface("has a body \"" + body.name + "\" whose material (" + std::to_string(body.material) + ") is none of its " +
+                    std::to_string(materials.size()));
   if (bodyOfTriangle.size() != triangles.size())
-    Refuse("has " + std::to_string(triangles.size()) + " triangles, but names the body of " +
-           std::to_string(bodyOfTriangle.size()));
+    RefuseSurface("has " + std::to_string(triangles.size()) + " triangles, but names the body of " +
+                  std::to_string(bodyOfTriangle.size()));
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     if (bodyOfTriangle[i] < 0 || static_cast<std::size_t>(bodyOfTriangle[i]) >= bodies.size())
-      Refuse("has a triangle (" + std::to_string(i) + ") whose body (" + std::to_string(bodyOfTriangle[i]) + ") is none of its " +
-             std::to_string(bodies.size()));
+      RefuseSurface("has a triangle (" + std::to_string(i) + ") whose body (" + std::to_string(bodyOfTriangle[i]) +
+                    ") is none of its " + std::to_string(bodies.size()));
     for (const std::uint32_t corner : triangles[i])
       if (corner >= points.size())
-        Refuse("has a triangle (" + std::to_string(i) + ") with a corner (" + std::to_string(corner) + ") that is none of its " +
-               std::to_string(points.size()) + " points");
+        RefuseSurface("has a triangle (" + std::to_string(i) + ") with a corner (" + std::to_string(corner) +
+                      ") that is none of its " + std::to_string(points.size()) + " points");
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     if (!points[i].allFinite())
-      Refuse("has a point (" + std::to_string(i) + ") that is not finite");
+      RefuseSurface("has a point (" + std::to_string(i) + ") that is not finite");
 }
 
 int TissueSurface::MaterialIndex(const Material& material)

@@ -5,6 +5,7 @@
 // which at the focus are z / (k s) and 1 / z. Two ways multiply: the inverse squares of the widths add up, and the delay of
 // the echo is the mean of both fronts'.
 #include "Transducer.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -13,8 +14,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr double pi = 3.141592653589793;
 
 // Of one way: 1 / sigma^2 and the curvature.
 struct OneWay {
@@ -33,7 +32,7 @@ OneWay FocusedBeam(double sigma, double focus, double way, double waveNumber)
 double Transducer::PulseSigmaMm() const
 {
   // A Gaussian of standard deviation t has the spectrum exp(-2 (pi t f)^2): one half at half the bandwidth.
-  const double sigmaMicroseconds = std::sqrt(2.0 * std::log(2.0)) / (pi * bandwidth * frequencyMHz);
+  const double sigmaMicroseconds = std::sqrt(2.0 * std::log(2.0)) / (Pi * bandwidth * frequencyMHz);
   return 0.5e-3 * assumedSoundSpeed * sigmaMicroseconds;
 }
 
@@ -56,7 +55,7 @@ void Transducer::Check() const
 
 BeamWidth WidthAt(const Transducer& transducer, double wayMm)
 {
-  const double waveNumber = 2.0 * pi / transducer.WavelengthMm();
+  const double waveNumber = 2.0 * Pi / transducer.WavelengthMm();
   const double way = std::max(wayMm, 4.0 * transducer.WavelengthMm());
   const double lateral = transducer.lateralApertureMm / Transducer::sigmasPerAperture;
   const double elevation = transducer.elevationApertureMm / Transducer::sigmasPerAperture;

@@ -4,6 +4,7 @@
 // furthest from everything is taken; with shorter children where long ones find no room.
 // Cost: candidates x samples x (branches so far + one look-up of room); below a millisecond for a hundred branches.
 #include "VesselTree.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Random.h"
@@ -17,8 +18,6 @@ namespace echorama {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double pi = 3.14159265358979323846;
 
 double DistanceToSegment(const Vector3d& p, const Vector3d& a, const Vector3d& b)
 {
@@ -87,7 +86,7 @@ std::vector<VesselBranch> GrowVessels(const VesselTreeParameters& p, const Vesse
     };
     const double angle1 = angle(r1, r2), angle2 = angle(r2, r1);
     const double stretch1 = random.Uniform(0.8, 1.2), stretch2 = random.Uniform(0.8, 1.2);
-    const double turn = planes[at] + 0.5 * pi + random.Uniform(-0.3, 0.3);
+    const double turn = planes[at] + 0.5 * Pi + random.Uniform(-0.3, 0.3);
     const Vector3d axis = (parent.to - parent.from).normalized(), u = axis.unitOrthogonal(), v = axis.cross(u);
 
     constexpr int candidates = 16;
@@ -95,7 +94,7 @@ std::vector<VesselBranch> GrowVessels(const VesselTreeParameters& p, const Vesse
     double bestRoom = 0.0, bestPlane = 0.0;
     for (const double length : {1.0, 0.75, 0.55, 0.4}) {
       for (int k = 0; k < candidates; ++k) {
-        const double plane = turn + 2.0 * pi * k / candidates;
+        const double plane = turn + 2.0 * Pi * k / candidates;
         const Vector3d side = std::cos(plane) * u + std::sin(plane) * v;
         const std::array<VesselBranch, 2> children{
             {{parent.to,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundPhantomSource.h"
 
+#include "Core/Base/Angles.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -18,7 +19,6 @@ using echorama::Error;
 vtkStandardNewMacro(vtkUltrasoundPhantomSource);
 
 namespace {
-constexpr double DegreesPerRadian = 57.29577951308232;
 
 // Applies a map of the probe frame to points of the world.
 template <class Map>
@@ -57,9 +57,9 @@ vtkUltrasoundPhantomSource::vtkUltrasoundPhantomSource()
   this->RibShare = defaults.ribShare;
   this->Jets = defaults.jets;
   this->WavelengthMm = defaults.wavelengthMm;
-  this->FanAngle = defaults.probe.fanAngle * DegreesPerRadian;
+  this->FanAngle = defaults.probe.fanAngle * echorama::DegreesPerRadian;
   this->FanRadius = defaults.probe.fanWidth / defaults.probe.fanAngle;
-  this->SweepAngle = defaults.probe.sweepAngle * DegreesPerRadian;
+  this->SweepAngle = defaults.probe.sweepAngle * echorama::DegreesPerRadian;
   this->SweepRadius = defaults.probe.sweepWidth / defaults.probe.sweepAngle;
   this->DepthMin = defaults.probe.depthMin;
   this->DepthMax = defaults.probe.depthMax;
@@ -82,9 +82,9 @@ echorama::PhantomParameters vtkUltrasoundPhantomSource::Parameters() const
   if (this->Scene && *this->Scene) {
     parameters.scene = echorama::SceneFromJson(this->Scene);
   }
-  parameters.probe =
-      echorama::ProbeGeometry::Convex(this->FanAngle / DegreesPerRadian, this->FanRadius, this->SweepAngle / DegreesPerRadian,
-                                      this->SweepRadius, this->DepthMin, this->DepthMax);
+  parameters.probe = echorama::ProbeGeometry::Convex(this->FanAngle / echorama::DegreesPerRadian, this->FanRadius,
+                                                     this->SweepAngle / echorama::DegreesPerRadian, this->SweepRadius,
+                                                     this->DepthMin, this->DepthMax);
   parameters.probeToWorld = this->ProbeToWorld();
   parameters.seed = static_cast<std::uint64_t>(this->Seed);
   parameters.spacingMm = this->SpacingMm;
@@ -105,7 +105,7 @@ echorama::PhantomParameters vtkUltrasoundPhantomSource::Parameters() const
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::SetView(const echorama::Pose& probeToWorld, double gainDb)
 {
-  const Eigen::Vector3d turn = echorama::LogRotation(probeToWorld.linear()) * DegreesPerRadian;
+  const Eigen::Vector3d turn = echorama::LogRotation(probeToWorld.linear()) * echorama::DegreesPerRadian;
   const Eigen::Vector3d place = probeToWorld.translation();
   this->SetOrientation(turn.x(), turn.y(), turn.z());
   this->SetPosition(place.x(), place.y(), place.z());
@@ -129,7 +129,7 @@ void vtkUltrasoundPhantomSource::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
 echorama::Pose vtkUltrasoundPhantomSource::ProbeToWorld() const
 {
   echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
+  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
   pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
   return pose;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundProbeSource.h"
 
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Filters/Synthesis/ProbePresets.h"
 #include "vtkCellArray.h"
@@ -23,7 +24,6 @@
 vtkStandardNewMacro(vtkUltrasoundProbeSource);
 
 namespace {
-constexpr double DegreesPerRadian = 57.29577951308232;
 
 using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
@@ -104,10 +104,10 @@ vtkUltrasoundProbeSource::vtkUltrasoundProbeSource() : Preset(Mechanical3D)
   this->SetNumberOfInputPorts(0);
   this->SetNumberOfOutputPorts(2);
   const echorama::ProbePreset& preset = *PresetOf(Mechanical3D);
-  this->FanAngle = std::round(preset.probe.fanAngle * DegreesPerRadian);
+  this->FanAngle = std::round(preset.probe.fanAngle * echorama::DegreesPerRadian);
   this->FanRadius = std::round(preset.probe.fanWidth / preset.probe.fanAngle);
   this->FanWidth = 40.0;
-  this->SweepAngle = std::round(preset.probe.sweepAngle * DegreesPerRadian);
+  this->SweepAngle = std::round(preset.probe.sweepAngle * echorama::DegreesPerRadian);
   this->SweepRadius = std::round(preset.probe.sweepWidth / preset.probe.sweepAngle);
   this->SweepWidth = 0.0;
   this->DepthMin = preset.probe.depthMin;
@@ -143,9 +143,9 @@ echorama::ProbeGeometry vtkUltrasoundProbeSource::Geometry() const
     return preset->probe;
   }
   echorama::ProbeGeometry geometry;
-  geometry.fanAngle = this->FanAngle / DegreesPerRadian;
+  geometry.fanAngle = this->FanAngle / echorama::DegreesPerRadian;
   geometry.fanWidth = geometry.fanAngle > 0.0 ? geometry.fanAngle * this->FanRadius : this->FanWidth;
-  geometry.sweepAngle = this->SweepAngle / DegreesPerRadian;
+  geometry.sweepAngle = this->SweepAngle / echorama::DegreesPerRadian;
   geometry.sweepWidth = geometry.sweepAngle > 0.0 ? geometry.sweepAngle * this->SweepRadius : this->SweepWidth;
   geometry.depthMin = this->DepthMin;
   geometry.depthMax = this->DepthMax;
@@ -172,7 +172,7 @@ echorama::ProbeHousing vtkUltrasoundProbeSource::Housing() const
 echorama::Pose vtkUltrasoundProbeSource::ProbeToWorld() const
 {
   echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
+  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
   pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
   return pose;
 }
@@ -187,7 +187,7 @@ void vtkUltrasoundProbeSource::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
     vtkErrorMacro("ProbeToWorld is not a rigid transform; the pose was not changed");
     return;
   }
-  const Eigen::Vector3d turn = echorama::LogRotation(pose.linear()) * DegreesPerRadian;
+  const Eigen::Vector3d turn = echorama::LogRotation(pose.linear()) * echorama::DegreesPerRadian;
   this->SetOrientation(turn.x(), turn.y(), turn.z());
   this->SetPosition(pose.translation().x(), pose.translation().y(), pose.translation().z());
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundSynthesizer.h"
 
+#include "Core/Base/Angles.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "vtkAlgorithmOutput.h"
@@ -26,7 +27,6 @@ using echorama::SynthesisParameters;
 vtkStandardNewMacro(vtkUltrasoundSynthesizer);
 
 namespace {
-constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr std::size_t MaximumVoxels = 536870912; // 2^29
 
 enum Port { Tissue, Probe, Displacement };
@@ -88,9 +88,9 @@ vtkUltrasoundSynthesizer::vtkUltrasoundSynthesizer()
   this->SetNumberOfInputPorts(3);
   this->SetNumberOfOutputPorts(2);
   const echorama::ProbeGeometry& probe = this->Values.probe;
-  this->FanAngle = probe.fanAngle * DegreesPerRadian;
+  this->FanAngle = probe.fanAngle * echorama::DegreesPerRadian;
   this->FanRadius = probe.fanWidth / probe.fanAngle;
-  this->SweepAngle = probe.sweepAngle * DegreesPerRadian;
+  this->SweepAngle = probe.sweepAngle * echorama::DegreesPerRadian;
   this->SweepRadius = probe.sweepWidth / probe.sweepAngle;
   this->DepthMin = probe.depthMin;
   this->DepthMax = probe.depthMax;
@@ -169,7 +169,7 @@ void vtkUltrasoundSynthesizer::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
     vtkErrorMacro("ProbeToWorld is not a rigid transform; the pose was not changed");
     return;
   }
-  const Eigen::Vector3d turn = echorama::LogRotation(pose.linear()) * DegreesPerRadian;
+  const Eigen::Vector3d turn = echorama::LogRotation(pose.linear()) * echorama::DegreesPerRadian;
   this->SetOrientation(turn.x(), turn.y(), turn.z());
   this->SetPosition(pose.translation().x(), pose.translation().y(), pose.translation().z());
 }
@@ -185,7 +185,7 @@ void vtkUltrasoundSynthesizer::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 echorama::Pose vtkUltrasoundSynthesizer::OwnPose() const
 {
   echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / DegreesPerRadian);
+  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
   pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
   return pose;
 }
@@ -222,9 +222,9 @@ vtkUltrasoundSynthesizer::Job vtkUltrasoundSynthesizer::Prepare(vtkInformationVe
     p.probe = *geometry;
     p.probeToWorld = vtkUltrasoundAcquisition::ProbeToWorldOf(probe).value_or(echorama::Pose::Identity());
   } else {
-    p.probe =
-        echorama::ProbeGeometry::Convex(this->FanAngle / DegreesPerRadian, this->FanRadius, this->SweepAngle / DegreesPerRadian,
-                                        this->SweepRadius, this->DepthMin, this->DepthMax);
+    p.probe = echorama::ProbeGeometry::Convex(this->FanAngle / echorama::DegreesPerRadian, this->FanRadius,
+                                              this->SweepAngle / echorama::DegreesPerRadian, this->SweepRadius, this->DepthMin,
+                                              this->DepthMax);
     p.probeToWorld = this->OwnPose();
   }
   p.probe.Check();

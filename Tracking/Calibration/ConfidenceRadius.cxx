@@ -3,6 +3,7 @@
 // of size q = |L v| the sphere of radius r holds s <= r / q. The chance of that, averaged over directions (one octant is enough),
 // grows with r, and where it is the level is found by false position.
 #include "Tracking/Calibration/ConfidenceRadius.h"
+#include "Core/Base/Angles.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,8 +11,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr double Pi = 3.14159265358979323846;
 
 // The chance that |t| <= x for Student's t (Abramowitz and Stegun 26.7.3 and 26.7.4), and its density at x.
 struct Student {

@@ -10,7 +10,9 @@
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEye.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/HandEyeAdvice.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
@@ -24,7 +26,6 @@
 namespace echorama {
 namespace {
 
-constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr std::size_t LeastForNoise = 5; // scans
 // Residuals of so many times the noise may come from a mistake; are no noise; are no noise either when it is to be estimated.
 constexpr double SuspectScale = 1.3, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
@@ -44,19 +45,6 @@ constexpr MethodName Methods[] = {
     {HandEyeMethod::Daniilidis, "daniilidis"},
     {HandEyeMethod::Andreff, "andreff"},
 };
-
-[[noreturn]] void Refuse(const std::string& reason)
-{
-  throw Error(Error::Kind::NotPossible, "hand-eye calibration: " + reason);
-}
-
-template <class... Values>
-std::string Format(const char* format, Values... values)
-{
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
 
 void CheckNoise(const PoseNoise& noise, const char* side)
 {
@@ -164,9 +152,9 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
       repeatText +=
           (repeatText.empty() ? "" : "; ") + named[i].name + " repeats " + named[static_cast<std::size_t>(repeats[i])].name;
   if (pairs.size() < 3 && !repeatText.empty())
-    Refuse(Format("three different scans are needed at least, and there %s %d (", pairs.size() == 1 ? "is" : "are",
-                  static_cast<int>(pairs.size())) +
-           repeatText + ")");
+    RefuseHandEye(Format("three different scans are needed at least, and there %s %d (", pairs.size() == 1 ? "is" : "are",
+                         static_cast<int>(pairs.size())) +
+                  repeatText + ")");
   RefuseTooLittleMotion(pairs, parameters.sensorNoise, parameters.volumeNoise);
   if (!repeatText.empty())
     result.notes.push_back("Counted once: " + repeatText + ".");
@@ -198,15 +186,15 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   if (hopeless || consensus.scale > SuspectScale || (inliers < count && (count < ManyScans || 4 * inliers < 3 * count))) {
     const std::string explanation = ExplainDisagreement(pairs, parameters, consensus, progress.Part(0.8, 0.9));
     if (!explanation.empty())
-      Refuse("the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
-             " are left. " + explanation);
+      RefuseHandEye("the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
+                    " are left. " + explanation);
     if (tooFew)
-      Refuse(Format(
+      RefuseHandEye(Format(
           "no more than %d of %d scans agree with each other, which may be chance. Check that every sensor pose belongs to "
           "its volume, or add scans",
           static_cast<int>(inliers), static_cast<int>(count)));
     if (hopeless)
-      Refuse(
+      RefuseHandEye(
           "the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
           Format(" are left, %.3g times the noise stated. Check that every sensor pose belongs to its volume", consensus.scale));
   }
@@ -287,7 +275,7 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   const HandEyeMatrix covariance =
       result.noiseScale * result.noiseScale * model.CovarianceOfStep(result.solution, consensus.inlier);
   if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0)
-    Refuse("the motions do not determine the calibration; add scans that turn about other axes");
+    RefuseHandEye("the motions do not determine the calibration; add scans that turn about other axes");
   result.covariance = model.CovarianceOfPoses(covariance);
   const Eigen::Matrix3d& R = result.solution.volumeToSensor.linear();
   result.targetCovariance = R * covariance.topLeftCorner<3, 3>() * R.transpose();

@@ -6,6 +6,7 @@
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeAdvice.h"
+#include "Core/Base/Angles.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include <algorithm>
 #include <cmath>
@@ -15,8 +16,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr double RadiansPerDegree = 0.017453292519943295;
 
 Pose MeanPose(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier, const Eigen::Vector3d& target)
 {

@@ -25,13 +25,6 @@ using Vector9 = Eigen::Matrix<double, 9, 1>;
 
 constexpr double LargeTurn = 2.6; // radians
 
-Eigen::Matrix3d Hat(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 // The rotation that has the largest trace with m.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& m)
 {

@@ -11,8 +11,10 @@
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeDiagnosis.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Geometry/ToolPose.h"
+#include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/HandEyeSearch.h"
 #include <algorithm>
 #include <cmath>
@@ -21,23 +23,9 @@
 namespace echorama {
 namespace {
 
-constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr std::size_t AskedScans = 60;     // for a mistake that they have in common
 constexpr double LeastRivalDegrees = 20.0; // apart
 constexpr double LeastRivalCost = 16.0;    // chi^2 by which another answer must fit worse: four standard deviations
-
-[[noreturn]] void Refuse(const std::string& reason)
-{
-  throw Error(Error::Kind::NotPossible, "hand-eye calibration: " + reason);
-}
-
-template <class... Values>
-std::string Format(const char* format, Values... values)
-{
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
 
 Pose CheckedPose(const Pose& pose, const std::string& name, const char* what)
 {
@@ -114,8 +102,8 @@ std::vector<int> HandEyeRepeats(const std::vector<HandEyePair>& pairs)
 void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise)
 {
   if (pairs.size() < 3)
-    Refuse(Format("three different scans are needed at least, 8 to 20 for accuracy, and there %s %d",
-                  pairs.size() == 1 ? "is" : "are", static_cast<int>(pairs.size())));
+    RefuseHandEye(Format("three different scans are needed at least, 8 to 20 for accuracy, and there %s %d",
+                         pairs.size() == 1 ? "is" : "are", static_cast<int>(pairs.size())));
   const Sides sides = SidesOf(pairs);
   const HandEyeSpread sensor = SpreadOf(sides.sensors), volume = SpreadOf(sides.volumes);
   // Two of three axes count in a spread, so noise alone shows the root of two.
@@ -130,14 +118,14 @@ void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNois
                            Side{"volumes", volume.turns[0] * DegreesPerRadian, volume.turns[2] * DegreesPerRadian,
                                 limit(volumeNoise), Extent(sides.volumes), volumeNoise}}) {
     if (side.most < side.limit && side.extent < std::max(6.0 * side.noise.mm, 1e-6))
-      Refuse(Format("the poses of the %s are all the same; the probe must be turned between scans", side.name));
+      RefuseHandEye(Format("the poses of the %s are all the same; the probe must be turned between scans", side.name));
     if (side.most < side.limit)
-      Refuse(Format(
+      RefuseHandEye(Format(
           "the %s turned by %.2g degrees only (root mean square), no more than the noise may be, and translations alone say "
           "nothing of where the volume lies on the sensor; turn by 30 degrees and more, about different axes",
           side.name, side.most));
     if (side.least < side.limit)
-      Refuse(
+      RefuseHandEye(
           Format("all turns of the %s are about one axis, or parallel ones (across it: %.2f degrees); the calibration may "
                  "shift along it. Axis in the volume's frame: (%.2f, %.2f, %.2f). Add scans that turn about an axis across it by "
                  "30 degrees and more",
@@ -171,9 +159,10 @@ void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<c
   if (rivals.size() == 1)
     between = rivals.front().unitOrthogonal();
   between.normalize();
-  Refuse(Format("%s answers fit alike: the calibration may be turned by half a turn about the volume's axis %s, which every turn "
-                "between the scans keeps or reverses. Add a scan that is turned by 30 to 90 degrees about (%.2f, %.2f, %.2f)",
-                rivals.size() == 1 ? "two" : "several", text.c_str(), between.x(), between.y(), between.z()));
+  RefuseHandEye(
+      Format("%s answers fit alike: the calibration may be turned by half a turn about the volume's axis %s, which every turn "
+             "between the scans keeps or reverses. Add a scan that is turned by 30 to 90 degrees about (%.2f, %.2f, %.2f)",
+             rivals.size() == 1 ? "two" : "several", text.c_str(), between.x(), between.y(), between.z()));
 }
 
 std::string ExplainDisagreement(const std::vector<HandEyePair>& given, const HandEyeParameters& parameters,

@@ -13,6 +13,7 @@
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeModel.h"
+#include "Core/Base/Angles.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Cholesky>
@@ -22,15 +23,6 @@ namespace echorama {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-constexpr double RadiansPerDegree = 0.017453292519943295;
-
-Eigen::Matrix3d Hat(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
 
 // ad(e): the derivative of the adjoint.
 Matrix6 SmallAdjoint(const Twist& e)

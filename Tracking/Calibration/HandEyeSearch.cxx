@@ -14,6 +14,7 @@
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeSearch.h"
+#include "Core/Base/Median.h"
 #include "Core/Base/Random.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include <algorithm>
@@ -30,12 +31,6 @@ constexpr double RareChiSquare6 = 22.458; // exceeded once in a thousand
 constexpr double ExplainedScale = 1.5;    // noise alone explains the residuals of most scans: no start leads to a better fit
 constexpr std::size_t OneByOne = 40;      // scans, up to which they leave one at a time
 constexpr int ClosedFormScans = 40, DrawnTriples = 250, SolvedTriples = 25, RefinedStarts = 4;
-
-double Median(std::vector<double> values)
-{
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 // The fit follows 12 numbers of the 6 n, and residuals are smaller for it.
 double ScaleOf(const std::vector<double>& chiSquare)

@@ -6,6 +6,7 @@
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeSimulation.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Tracking/Calibration/HandEyeModel.h"
 
@@ -18,8 +19,6 @@ Eigen::Vector3d Someway(Random& random, double low, double high)
   const Eigen::Vector3d direction = random.Direction();
   return direction * random.Uniform(low, high);
 }
-
-constexpr double RadiansPerDegree = 0.017453292519943295;
 
 Twist NoiseTwist(const PoseNoise& noise, Random& random)
 {

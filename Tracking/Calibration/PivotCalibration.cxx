@@ -14,9 +14,12 @@
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
 #endif
 #include "Tracking/Calibration/PivotCalibration.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Median.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/ToolPose.h"
+#include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include <algorithm>
 #include <array>
@@ -33,26 +36,17 @@ using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr int LeastPoses = 4;
-constexpr double OutlierChiSquare = 16.27; // three degrees of freedom, one in a thousand
-constexpr double MedianChiSquare = 2.366;  // of three degrees of freedom
-constexpr double HopelessScale = 10.0;     // residuals of so many times the noise are no noise
+constexpr double OutlierChiSquare = 16.27;  // three degrees of freedom, one in a thousand
+constexpr double MedianChiSquare = 2.366;   // of three degrees of freedom
+constexpr double HopelessPivotScale = 10.0; // residuals of so many times the noise are no noise
 constexpr int Samples = 100, SampleSize = 5;
 constexpr std::size_t ScoredPoses = 200;
 constexpr double TinyMm = 1e-9; // the least scale of residuals, for poses without any noise
 
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefusePivot(const std::string& reason)
 {
   throw Error(Error::Kind::NotPossible, "pivot calibration: " + reason);
-}
-
-template <class... Values>
-std::string Format(const char* format, Values... values)
-{
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
 }
 
 // "pose 12 (at 3.4 s)", counted from 1.
@@ -101,13 +95,6 @@ LeastSquares Solve(const std::vector<Pose>& poses, const Weight& weightOf)
     result.solution.pivot = turn * result.solution.tip + place;
   }
   return result;
-}
-
-double Median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::vector<Pose> SomeOf(const std::vector<Pose>& poses, std::size_t most)
@@ -278,13 +265,14 @@ void MeasureSwing(const std::vector<Pose>& poses, const std::vector<char>& use, 
     result.swingAxes.col(k) = fit.swing.eigenvectors().col(2 - k);
   }
   if (result.swingDegrees[0] < leastDegrees)
-    Refuse(Format("the tool turned by only %.2g degrees (RMS); tilt it by 30 degrees and more, to all sides",
-                  result.swingDegrees[0]));
+    RefusePivot(Format("the tool turned by only %.2g degrees (RMS); tilt it by 30 degrees and more, to all sides",
+                       result.swingDegrees[0]));
   const Vector3d axis = result.swingAxes.col(2);
   if (result.swingDegrees[2] < leastDegrees)
-    Refuse(Format("the tool turned about one axis only, (%.2f, %.2f, %.2f) in its own frame, which itself swung by %.2g degrees "
-                  "(RMS): the tip is known only up to a line along it; tilt the tool to other sides too",
-                  axis[0], axis[1], axis[2], result.swingDegrees[2]));
+    RefusePivot(
+        Format("the tool turned about one axis only, (%.2f, %.2f, %.2f) in its own frame, which itself swung by %.2g degrees "
+               "(RMS): the tip is known only up to a line along it; tilt the tool to other sides too",
+               axis[0], axis[1], axis[2], result.swingDegrees[2]));
 }
 
 // Algebraic, then by distance.
@@ -408,7 +396,7 @@ PivotResult CalibratePivot(const std::vector<TimedPose>& timed, const PivotParam
 {
   parameters.Check();
   if (timed.size() < LeastPoses)
-    Refuse("at least " + std::to_string(LeastPoses) + " poses are needed, and there are " + std::to_string(timed.size()));
+    RefusePivot("at least " + std::to_string(LeastPoses) + " poses are needed, and there are " + std::to_string(timed.size()));
   const std::vector<Pose> poses = RigidPoses(timed);
   const std::size_t count = poses.size();
   PivotResult result;
@@ -445,7 +433,7 @@ PivotResult CalibratePivot(const std::vector<TimedPose>& timed, const PivotParam
     const std::size_t agreeing = static_cast<std::size_t>(std::count(agree.begin(), agree.end(), 1));
     if (2 * agreeing < count || agreeing < LeastPoses) {
       const double median = MedianResidual(poses, solution);
-      Refuse(
+      RefusePivot(
           Format("only %d of %d poses agree on a fixed point to within the noise; the tips of half of them lie more than %.2g mm "
                  "from it",
                  static_cast<int>(agreeing), static_cast<int>(count), median) +
@@ -460,15 +448,15 @@ PivotResult CalibratePivot(const std::vector<TimedPose>& timed, const PivotParam
       scale = std::max(tinyScale, std::sqrt(Cost(poses, use, parameters.noise, solution) / freedom));
     }
   }
-  if (parameters.estimateNoise && scale > HopelessScale) {
+  if (parameters.estimateNoise && scale > HopelessPivotScale) {
     const double median = MedianResidual(poses, solution);
-    Refuse(
+    RefusePivot(
         Format("the poses do not turn about a fixed point: half of them place the tip more than %.2g mm from it, %.0f times what "
                "the noise explains",
                median, scale) +
         ExplainDisagreement(poses, median, parameters.seed));
   }
-  const double estimated = parameters.estimateNoise ? std::min(scale, HopelessScale) : 1.0;
+  const double estimated = parameters.estimateNoise ? std::min(scale, HopelessPivotScale) : 1.0;
   MeasureSwing(poses, use, parameters.noise.degrees * estimated, parameters.leastSwingDegrees, result);
 
   result.tip = solution.tip;

@@ -13,8 +13,10 @@
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
 #endif
 #include "Tracking/Calibration/TemporalCalibration.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Tracking/Calibration/CalibrationText.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -24,7 +26,6 @@ namespace echorama {
 namespace {
 
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double DegreesPerRadian = 57.29577951308232;
 constexpr double LeastSpeed = 1.0;           // degrees or mm per second, standard deviation
 constexpr double LeastStructure = 0.1;       // standard deviation of the speed over its mean
 constexpr double LeastEvidence = 8.0;        // logarithm of the likelihood, against no common motion
@@ -37,17 +38,9 @@ constexpr double MostSamples = 2e7;          // of the grid: three days
 constexpr double ManySamples = 1e6;          // and three hours, of which at least this share must be covered
 constexpr double LeastCovered = 0.01;
 
-[[noreturn]] void Refuse(const std::string& reason)
+[[noreturn]] void RefuseTemporal(const std::string& reason)
 {
   throw Error(Error::Kind::NotPossible, "temporal calibration: " + reason);
-}
-
-template <class... Values>
-std::string Format(const char* format, Values... values)
-{
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
 }
 
 const char* UnitOf(SpeedSignal signal)
@@ -67,7 +60,8 @@ std::vector<TimedPose> Sorted(std::vector<TimedPose> poses, const char* which)
   poses.erase(std::unique(poses.begin(), poses.end(), [](const TimedPose& a, const TimedPose& b) { return a.time == b.time; }),
               poses.end());
   if (poses.size() < 10)
-    Refuse(std::string("the ") + which + " stream has only " + std::to_string(poses.size()) + " poses at different times");
+    RefuseTemporal(std::string("the ") + which + " stream has only " + std::to_string(poses.size()) +
+                   " poses at different times");
   return poses;
 }
 
@@ -117,11 +111,12 @@ void RefuseJump(const MotionPath& path, double step, const char* which)
   if (samples <= ManySamples || (samples <= MostSamples && covered >= LeastCovered * seconds))
     return;
   if (longest.to - longest.from > 0.5 * seconds)
-    Refuse(Format("the times of the %s stream jump from %.9g s to %.9g s, and its poses cover %.3g s in all: leave out what lies "
-                  "beyond the jump",
-                  which, longest.from, longest.to, covered));
-  Refuse(Format("the %s stream lasts for %.3g s, of which its poses cover %.3g s: compare a shorter piece", which, seconds,
-                covered));
+    RefuseTemporal(
+        Format("the times of the %s stream jump from %.9g s to %.9g s, and its poses cover %.3g s in all: leave out what lies "
+               "beyond the jump",
+               which, longest.from, longest.to, covered));
+  RefuseTemporal(Format("the %s stream lasts for %.3g s, of which its poses cover %.3g s: compare a shorter piece", which,
+                        seconds, covered));
 }
 
 SpeedTrack SpeedOf(const MotionPath& path, SpeedSignal signal, double step, double baseline)
@@ -169,14 +164,14 @@ void RefuseTooLittleMotion(const SpeedTrack& track, SpeedSignal signal, const ch
   const Moments m = MomentsOf(track.values);
   const char* kind = signal == SpeedSignal::Rotation ? "turns" : "moves";
   if (m.mean < LeastSpeed)
-    Refuse(Format("the %s stream hardly %s: %.2g %s in the mean", which, kind, m.mean, UnitOf(signal)));
+    RefuseTemporal(Format("the %s stream hardly %s: %.2g %s in the mean", which, kind, m.mean, UnitOf(signal)));
   if (m.deviation < LeastStructure * m.mean)
-    Refuse(
+    RefuseTemporal(
         Format("the speed of the %s stream hardly changes (%.3g +- %.2g %s), so that every offset fits; move it back and forth, "
                "with pauses",
                which, m.mean, m.deviation, UnitOf(signal)));
   if (m.deviation < LeastSpeed)
-    Refuse(Format("the %s stream hardly %s: its speed varies by %.2g %s", which, kind, m.deviation, UnitOf(signal)));
+    RefuseTemporal(Format("the %s stream hardly %s: its speed varies by %.2g %s", which, kind, m.deviation, UnitOf(signal)));
 }
 
 // Of the samples first[i] and second[i - lag] that are both known; NaN when there are fewer than \a least. \a pairs: their
@@ -257,14 +252,14 @@ std::size_t FindPeak(const SpeedTrack& first, const SpeedTrack& second, double c
     if (std::isfinite(rho[i]) && (peak == rho.size() || rho[i] > rho[peak]))
       peak = i;
   if (peak == rho.size())
-    Refuse(Format("the streams overlap for less than %.3g s at every offset within %.3g s", parameters.leastOverlapSeconds,
-                  parameters.largestOffsetSeconds));
+    RefuseTemporal(Format("the streams overlap for less than %.3g s at every offset within %.3g s",
+                          parameters.leastOverlapSeconds, parameters.largestOffsetSeconds));
   double pairs = 0.0;
   Correlation(a, b, low + static_cast<std::ptrdiff_t>(peak), least, &pairs);
   const double independent = IndependentPairs(a, b, step, pairs);
   result.correlation = rho[peak];
   if (!(rho[peak] > 0.0) || -0.5 * independent * LogResidual(rho[peak]) < LeastEvidence)
-    Refuse(
+    RefuseTemporal(
         Format("the speeds agree at no offset within %.3g s (the correlation is %.2f at the best): did both see the same motion, "
                "or is the offset larger?",
                parameters.largestOffsetSeconds, rho[peak]));
@@ -276,8 +271,9 @@ std::size_t FindPeak(const SpeedTrack& first, const SpeedTrack& second, double c
   while (right + 1 < rho.size() && rho[right + 1] <= rho[right])
     ++right;
   if (left == peak || right == peak)
-    Refuse(Format("the best offset, %.3g s, lies at the end of what was looked at; allow larger ones, or record for longer",
-                  result.offsets[peak]));
+    RefuseTemporal(
+        Format("the best offset, %.3g s, lies at the end of what was looked at; allow larger ones, or record for longer",
+               result.offsets[peak]));
   std::size_t next = rho.size();
   for (std::size_t i = 0; i < rho.size(); ++i)
     if ((i < left || i > right) && std::isfinite(rho[i]) && (next == rho.size() || rho[i] > rho[next]))
@@ -290,7 +286,7 @@ std::size_t FindPeak(const SpeedTrack& first, const SpeedTrack& second, double c
   }
   result.confidence = 1.0 / (1.0 + std::exp(-lead));
   if (lead < LeastLead)
-    Refuse(Format(
+    RefuseTemporal(Format(
         "the offsets %.3g s and %.3g s fit nearly alike (correlations %.3f and %.3f): the motion repeats itself; move without "
         "a rhythm",
         result.offsets[peak], result.nextOffsetSeconds, rho[peak], rho[next]));
@@ -344,8 +340,9 @@ Refined Refine(const SpeedTrack& first, const SpeedTrack& second, Refined fit, b
     const Eigen::Index count = static_cast<Eigen::Index>(times.size());
     if (count < 10) {
       if (iteration == 0)
-        Refuse(Format("the streams overlap in too few moments (%d of the grid, %.3g s apart); record for longer, or smooth less",
-                      static_cast<int>(count), first.step));
+        RefuseTemporal(
+            Format("the streams overlap in too few moments (%d of the grid, %.3g s apart); record for longer, or smooth less",
+                   static_cast<int>(count), first.step));
       break;
     }
     if (iteration == 0)
@@ -419,7 +416,7 @@ TemporalResult Compare(const MotionPath& first, const MotionPath& second, SpeedS
                result.driftPpm, result.driftErrorPpm, 1e3 * atTheEnds));
   }
   if (!std::isfinite(fit.offset) || std::fabs(fit.offset - start.offset) > 4.0 * sigma)
-    Refuse("the peak of the correlation is too blunt for an offset; move faster, with pauses");
+    RefuseTemporal("the peak of the correlation is too blunt for an offset; move faster, with pauses");
   result.offsetSeconds = fit.offset;
   result.standardErrorSeconds = fit.offsetError;
   result.speedRatio = fit.ratio;

@@ -32,13 +32,13 @@ constexpr std::size_t ImageOverhead = 65536; // header and meta data of an image
 constexpr std::size_t ExtendedHeaderSize = 12, StatusHeaderSize = 30;
 
 // Why a body is refused.
-struct Complaint {
+struct DecodingComplaint {
   std::string text;
 };
 
 [[noreturn]] void Complain(const std::string& text)
 {
-  throw Complaint{text};
+  throw DecodingComplaint{text};
 }
 
 // Names end up in files and on screens.
@@ -69,13 +69,13 @@ std::string Lower(std::string text)
 }
 
 // A piece of the body.
-struct Bytes {
+struct BodyBytes {
   const unsigned char* data;
   std::size_t size;
 };
 
 // Cuts extended header and meta data off the body.
-Bytes Content(Bytes body, Message& message)
+BodyBytes Content(BodyBytes body, Message& message)
 {
   if (message.headerVersion < 2)
     return body;
@@ -85,7 +85,7 @@ Bytes Content(Bytes body, Message& message)
                     textSize = Read<std::uint32_t>(body.data + 4);
   if (extended < ExtendedHeaderSize || extended > body.size || indexSize + textSize > body.size - extended)
     Complain("is too short for its meta data");
-  const Bytes content{body.data + extended, body.size - extended - indexSize - textSize};
+  const BodyBytes content{body.data + extended, body.size - extended - indexSize - textSize};
   if (indexSize == 0)
     return content;
   // The index is a count and entries of eight bytes; some senders leave out the count.
@@ -136,7 +136,7 @@ ToolPose PoseFrom(const Message& message, const std::string& name)
   return pose;
 }
 
-void DecodeTransform(Bytes content, Message& message)
+void DecodeTransform(BodyBytes content, Message& message)
 {
   if (content.size != IGTL_TRANSFORM_SIZE)
     Complain("holds " + std::to_string(content.size) + " bytes, not " + std::to_string(IGTL_TRANSFORM_SIZE));
@@ -145,7 +145,7 @@ void DecodeTransform(Bytes content, Message& message)
   ReadTransform(content.data, message.poses[0].pose);
 }
 
-void DecodePosition(Bytes content, Message& message)
+void DecodePosition(BodyBytes content, Message& message)
 {
   std::array<double, 7> numbers{0, 0, 0, 0, 0, 0, 1}; // place; x, y, z, w of the quaternion
   if (content.size != IGTL_POSITION_MESSAGE_DEFAULT_SIZE && content.size != IGTL_POSITION_MESSAGE_WITH_QUATERNION3_SIZE &&
@@ -168,7 +168,7 @@ void DecodePosition(Bytes content, Message& message)
     pose.linear().setZero(); // no pose: the stream says so
 }
 
-void DecodeTrackingData(Bytes content, Message& message)
+void DecodeTrackingData(BodyBytes content, Message& message)
 {
   if (content.size % IGTL_TDATA_ELEMENT_SIZE != 0)
     Complain("holds " + std::to_string(content.size) + " bytes, which is no multiple of " +
@@ -251,7 +251,7 @@ ImageGeometry DecodeGeometry(const unsigned char* header, bool turn, bool& mirro
   return geometry;
 }
 
-void DecodeImage(Bytes content, Message& message, bool turnImages)
+void DecodeImage(BodyBytes content, Message& message, bool turnImages)
 {
   if (content.size < IGTL_IMAGE_HEADER_SIZE)
     Complain("is too short for its header");
@@ -288,7 +288,7 @@ void DecodeImage(Bytes content, Message& message, bool turnImages)
   message.kind = Message::Kind::Image;
 }
 
-void DecodeStatus(Bytes content, Message& message)
+void DecodeStatus(BodyBytes content, Message& message)
 {
   if (content.size < StatusHeaderSize)
     Complain("is too short for its header");
@@ -299,7 +299,7 @@ void DecodeStatus(Bytes content, Message& message)
   message.statusText = Clean(name.empty() || text.empty() ? name + text : name + ": " + text);
 }
 
-void DecodeStartTracking(Bytes content, Message& message)
+void DecodeStartTracking(BodyBytes content, Message& message)
 {
   message.kind = Message::Kind::StartTracking;
   if (content.size == 0)
@@ -316,7 +316,7 @@ bool IsDecoded(const std::string& type)
          type == "STT_TDATA" || type == "STP_TDATA" || IsRequest(type);
 }
 
-void DecodeBody(Bytes content, Message& message, bool turnImages)
+void DecodeBody(BodyBytes content, Message& message, bool turnImages)
 {
   if (message.type == "TRANSFORM")
     DecodeTransform(content, message);
@@ -460,7 +460,7 @@ Message OpenIgtLinkDecoder::Finish()
     return Refused(message_, Rejection::Malformed, Name(message_) + " has a wrong check sum");
   try {
     DecodeBody(Content({body_.data(), body_.size()}, message_), message_, decoding_.turnImages);
-  } catch (const Complaint& complaint) {
+  } catch (const DecodingComplaint& complaint) {
     return Refused(message_, Rejection::Malformed, Name(message_) + " " + complaint.text);
   }
   return std::move(message_);

@@ -18,13 +18,13 @@
 namespace echorama {
 namespace {
 
-using Bytes = SendQueue::Bytes;
+using SharedBytes = SendQueue::Bytes;
 
 constexpr double LookAround = 0.005;     // s
 constexpr std::size_t MostTools = 4096;  // whose newest poses are remembered
 constexpr std::size_t MostGiven = 65536; // poses
 
-Bytes Shared(OpenIgtLinkEncoder::Bytes bytes)
+SharedBytes Shared(OpenIgtLinkEncoder::Bytes bytes)
 {
   return std::make_shared<const std::vector<unsigned char>>(std::move(bytes));
 }
@@ -66,7 +66,7 @@ struct OpenIgtLinkServer::Parts {
   std::uint64_t givenLost = 0;
   struct NamedImage {
     std::string name;
-    Bytes bytes;
+    SharedBytes bytes;
   };
   std::list<NamedImage> images; // the newest of each name, the oldest first
   std::vector<NamedImage> newImages;
@@ -181,7 +181,7 @@ void OpenIgtLinkServer::Parts::Serve(const std::vector<ToolPose>& poses)
     }
     if (newest.size() < MostTools || newest.count(pose.name) > 0)
       newest[pose.name] = pose;
-    Bytes plain, marked; // by header version
+    SharedBytes plain, marked; // by header version
     for (Client& client : clients) {
       if (client.wants == Client::Wants::TrackingData) {
         Collect(client, pose);
@@ -189,7 +189,7 @@ void OpenIgtLinkServer::Parts::Serve(const std::vector<ToolPose>& poses)
         const bool knowsStatus = client.headerVersion >= 2;
         if (pose.status != TransformStatus::Valid && !knowsStatus)
           continue;
-        Bytes& bytes = knowsStatus ? marked : plain;
+        SharedBytes& bytes = knowsStatus ? marked : plain;
         if (!bytes)
           bytes = Shared(OpenIgtLinkEncoder(knowsStatus ? 2 : 1).Transform(pose));
         client.queue.Push(bytes);
@@ -343,7 +343,7 @@ void OpenIgtLinkServer::Send(const ToolPose& pose)
 void OpenIgtLinkServer::SendImage(const StreamedImage& image)
 {
   const std::string& name = image.name;
-  const Bytes bytes = Shared(OpenIgtLinkEncoder().Image(image, parts_->parameters.turnImages));
+  const SharedBytes bytes = Shared(OpenIgtLinkEncoder().Image(image, parts_->parameters.turnImages));
   const std::lock_guard<std::mutex> lock(parts_->mutex);
   const auto put = [&](auto& list) {
     list.erase(std::remove_if(list.begin(), list.end(), [&](const Parts::NamedImage& other) { return other.name == name; }),

@@ -18,10 +18,10 @@
 namespace echorama {
 namespace {
 
-constexpr double Slice = 0.05;      // s: how often the worker asks whether it should stop
-constexpr double Silence = 0.1;     // s without a byte: it has stopped talking
-constexpr double Patience = 0.5;    // s for an answer
-constexpr double LongSilence = 2.0; // s without a record: it is gone
+constexpr double ListenSeconds = 0.05; // s: how often the worker asks whether it should stop
+constexpr double Silence = 0.1;        // s without a byte: it has stopped talking
+constexpr double AnswerSeconds = 0.5;  // s for an answer
+constexpr double LongSilence = 2.0;    // s without a record: it is gone
 constexpr char ControlU = 0x15, ControlV = 0x16;
 
 double FramesPerSecond(PolhemusModel model)
@@ -145,7 +145,7 @@ void PolhemusTracker::Run(const Worker::Signal& signal)
       break;
   }
   if (port_.IsOpen())
-    port_.Write("P", Slice); // ends continuous output
+    port_.Write("P", ListenSeconds); // ends continuous output
 }
 
 bool PolhemusTracker::Tell(const std::string& command)
@@ -160,7 +160,7 @@ PolhemusTracker::Step PolhemusTracker::Quiet(const Worker::Signal& signal)
       return Step::Lost;
     const double begin = ClockNow();
     std::vector<unsigned char> bytes;
-    while (ClockNow() - begin < 2.0 * Patience) {
+    while (ClockNow() - begin < 2.0 * AnswerSeconds) {
       if (signal.Stopped())
         return Step::Stopped;
       bytes.clear();
@@ -182,9 +182,9 @@ std::optional<PolhemusReply> PolhemusTracker::Ask(const Worker::Signal& signal, 
     return std::nullopt;
   std::string bytes;
   std::vector<unsigned char> piece;
-  for (const double begin = ClockNow(); ClockNow() - begin < Patience && !signal.Stopped();) {
+  for (const double begin = ClockNow(); ClockNow() - begin < AnswerSeconds && !signal.Stopped();) {
     piece.clear();
-    const auto outcome = port_.Read(piece, Slice);
+    const auto outcome = port_.Read(piece, ListenSeconds);
     if (outcome == SerialPort::Outcome::Lost)
       break;
     bytes.append(piece.begin(), piece.end());
@@ -303,7 +303,7 @@ PolhemusTracker::Step PolhemusTracker::TryLayouts(const Worker::Signal& signal, 
                 : timed ? "single"
                         : "bare") +
                " records";
-    const Step step = Listen(signal, Patience);
+    const Step step = Listen(signal, AnswerSeconds);
     if (step != Step::Again)
       return step;
     complaint = decoder_->LastComplaint();
@@ -323,7 +323,7 @@ PolhemusTracker::Step PolhemusTracker::Listen(const Worker::Signal& signal, doub
   std::vector<unsigned char> bytes;
   while (!signal.Stopped()) {
     bytes.clear();
-    const auto outcome = port_.Read(bytes, Slice);
+    const auto outcome = port_.Read(bytes, ListenSeconds);
     if (outcome == SerialPort::Outcome::Lost)
       return Step::Lost;
     const double arrival = ClockNow();

@@ -17,7 +17,7 @@ namespace {
 constexpr char Magic[] = "EPPK";
 constexpr std::size_t HeadBytes = 34, SumBytes = 4;
 constexpr std::uint16_t Version = 1, Doubles = 1;
-constexpr double UnitTolerance = 1e-4; // of a quaternion in floats: 1e-6 is usual
+constexpr double PacketUnitTolerance = 1e-4; // of a quaternion in floats: 1e-6 is usual
 
 std::uint32_t SumOf(const unsigned char* bytes, std::size_t count)
 {
@@ -200,7 +200,7 @@ std::string DecodePosePacket(const unsigned char* bytes, std::size_t count, Pose
     if (pose.status != TransformStatus::Missing) {
       const Eigen::Vector3d position(numbers[0], numbers[1], numbers[2]);
       const Eigen::Quaterniond turn(numbers[3], numbers[4], numbers[5], numbers[6]);
-      if (!position.allFinite() || !(std::fabs(turn.norm() - 1.0) <= UnitTolerance)) // not >, for NaN
+      if (!position.allFinite() || !(std::fabs(turn.norm() - 1.0) <= PacketUnitTolerance)) // not >, for NaN
         return "pose " + std::to_string(i + 1) + " is none";
       pose.pose.linear() = turn.normalized().toRotationMatrix();
       pose.pose.translation() = position;

@@ -3,6 +3,7 @@
 // so that "no byte yet" (EAGAIN) and "hung up" (0, or EIO) stay apart. Two locks keep others away: TIOCEXCL holds against
 // everybody but root, flock against programs that ask for it, root's among them.
 #include "Tracking/Devices/SerialPort.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <cerrno>
@@ -47,7 +48,6 @@ std::string WhyNot(int error)
   }
 }
 
-using Clock = std::chrono::steady_clock;
 
 int MillisecondsUntil(Clock::time_point end)
 {

@@ -24,7 +24,7 @@
 namespace echorama {
 namespace {
 
-constexpr double Slice = 0.1; // s
+constexpr double PollSeconds = 0.1; // s
 
 std::string Reason(int error)
 {
@@ -126,7 +126,7 @@ TcpSocket TcpSocket::Connect(const std::string& host, int port, double seconds, 
     Refuse(place, Reason(errno));
   while (true) {
     std::vector<pollfd> waiting{{result.descriptor_, POLLOUT, 0}};
-    if (Poll(waiting, Slice) > 0)
+    if (Poll(waiting, PollSeconds) > 0)
       break;
     if (stopped && stopped())
       return {};

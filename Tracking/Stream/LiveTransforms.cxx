@@ -13,11 +13,11 @@
 namespace echorama {
 namespace {
 
-const std::string InverseOf = "inverse of "; // as ComposedTransform::path says it
+const std::string InverseWords = "inverse of "; // as ComposedTransform::path says it
 
 std::string EdgeOf(const std::string& step)
 {
-  return step.compare(0, InverseOf.size(), InverseOf) == 0 ? step.substr(InverseOf.size()) : step;
+  return step.compare(0, InverseWords.size(), InverseWords) == 0 ? step.substr(InverseWords.size()) : step;
 }
 
 std::string Tenths(double seconds)

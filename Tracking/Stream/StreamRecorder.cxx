@@ -16,7 +16,7 @@
 namespace echorama {
 namespace {
 
-constexpr double PatienceSeconds = 0.05; // for another tool of the same moment, and between two looks at the signal
+constexpr double StepSeconds = 0.05; // for another tool of the same moment, and between two looks at the signal
 
 } // namespace
 
@@ -105,7 +105,7 @@ struct StreamRecorder::Parts {
   {
     try {
       while (!signal.Stopped())
-        Step(PatienceSeconds);
+        Step(StepSeconds);
       while (Step(0.0)) {
       }
       recorder.Finish();

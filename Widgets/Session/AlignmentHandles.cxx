@@ -2,13 +2,13 @@
 // Handles are made in the world, at a size that is measured in pixels at the depth of their centre, and kept as they are seen:
 // drawing and taking hold of them then use the same few numbers, and both are exact at any zoom and in any projection.
 #include "AlignmentHandles.h"
+#include "Core/Base/Angles.h"
 #include <cmath>
 #include <limits>
 
 namespace echorama {
 namespace {
 
-constexpr double Pi = 3.14159265358979323846;
 constexpr int RingPieces = 96;
 constexpr double ShortestArrow = 0.15; // share of its length that must be seen
 constexpr double FlattestSquare = 0.2; // sine of the angle between sight and plane

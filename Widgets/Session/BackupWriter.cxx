@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The thread lives only while something waits to be written: an idle session wakes nobody.
 #include "Widgets/Session/BackupWriter.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Worker.h"
 #include <algorithm>
@@ -12,7 +13,6 @@
 namespace echorama {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 
 constexpr double Glance = 0.05; // seconds between looks at whether a waiting drag has ended
 constexpr double Repeat = 1.0;  // seconds within which edits of one label are one

@@ -22,7 +22,7 @@ namespace {
 
 constexpr const char* LockName = "lock";
 
-[[noreturn]] void Fail(const std::string& path, const std::string& reason)
+[[noreturn]] void FailBackup(const std::string& path, const std::string& reason)
 {
   throw Error(Error::Kind::FileSystem, path + ": " + reason);
 }
@@ -105,7 +105,7 @@ fs::path DataRoot()
     return fs::path(data) / "echorama";
   const char* home = std::getenv("HOME");
   if (!home || !fs::path(home).is_absolute())
-    Fail("backups", "neither XDG_DATA_HOME nor HOME tells where to keep them; save the project first");
+    FailBackup("backups", "neither XDG_DATA_HOME nor HOME tells where to keep them; save the project first");
   return fs::path(home) / ".local" / "share" / "echorama";
 }
 
@@ -181,10 +181,10 @@ Backups::Backups(const std::string& folder, int keep) : folder_(folder), keep_(s
   std::error_code error;
   fs::create_directories(folder, error);
   if (!fs::is_directory(folder))
-    Fail(folder, "the folder of backups cannot be made (" + error.message() + ")");
+    FailBackup(folder, "the folder of backups cannot be made (" + error.message() + ")");
   lock_ = OpenLock(folder);
   if (lock_ < 0)
-    Fail(folder, std::string("the folder of backups cannot be written (") + std::strerror(errno) + ")");
+    FailBackup(folder, std::string("the folder of backups cannot be written (") + std::strerror(errno) + ")");
   if (flock(lock_, LOCK_EX | LOCK_NB) == 0)
     RemoveHalfWritten(folder); // nobody else is writing here
   flock(lock_, LOCK_SH);

@@ -6,13 +6,13 @@
 // Such questions have no good answer where the line or plane is seen nearly end-on or edge-on: a pixel then means a long way, or
 // any way. This is decided once, at the press, as the view stands still during a drag. Cost: a few operations per mouse event.
 #include "DragMotion.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include <cmath>
 
 namespace echorama {
 namespace {
 
-constexpr double Pi = 3.14159265358979323846;
 // The sine of the angle between ray and axis or plane below which a pixel would be magnified more than tenfold.
 constexpr double Oblique = 0.1;
 
