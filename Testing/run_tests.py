@@ -175,7 +175,7 @@ def run(options, count):
     for room, program in {entry.room: entry.program for entry in entries if entry.room}.items():
         names = gtest_names(program)
         if names is None:
-            count.fail(room, f"{program} does not list its tests")
+            count.fail(room, f"{program} does not list its tests" if program else "its test program is not there")
         wanted[room] = {name for name in names or () if not options.regex or re.search(options.regex, f"{room}.{name}")}
     environment = dict(os.environ)
     environment.pop("GTEST_FILTER", None)
