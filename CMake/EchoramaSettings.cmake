@@ -18,7 +18,7 @@ set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/..;$ORIGIN/../../..;$ORIGIN/../${CMAKE_
 find_program(ECHORAMA_CCACHE ccache)
 if(ECHORAMA_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1
-      CCACHE_SLOPPINESS=pch_defines,time_macros ${ECHORAMA_CCACHE})
+      CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${ECHORAMA_CCACHE})
 endif()
 
 # echorama_compile_options(TARGET): instruction set, and warnings for our own (never for generated) code.
@@ -28,8 +28,8 @@ function(echorama_compile_options target)
   # Nobody reads errno or floating-point traps; without these two, loops with a square root or a comparison are not
   # vectorised. Neither changes a result.
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math)
-  if(ECHORAMA_NATIVE)
-    target_compile_options(${target} PRIVATE -march=native)
+  if(NOT ECHORAMA_CPU STREQUAL "any")
+    target_compile_options(${target} PRIVATE -march=${ECHORAMA_CPU})
   elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     target_compile_options(${target} PRIVATE -march=x86-64-v2)
     target_compile_definitions(${target} PRIVATE ECHORAMA_MULTIVERSION)
@@ -38,4 +38,40 @@ function(echorama_compile_options target)
     # & between truths is meant where a branch would keep a loop from being vectorised.
     $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical;-Wno-bitwise-conditional-parentheses>
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
+endfunction()
+
+# echorama_precompile(TARGET KIND): the headers that most files of its kind include are parsed once. KIND is
+#   kernels, classes   shared libraries: the numerical ones, those of vtk classes
+#   tests              GoogleTest programs
+# Each kind has one precompiled header, made by the first target that asks for it. A file still includes what it uses.
+set(ECHORAMA_HEADERS_kernels <algorithm> <array> <cmath> <cstdint> <cstring> <filesystem> <fstream> <functional> <limits> <map>
+  <memory> <mutex> <numeric> <optional> <set> <sstream> <string> <string_view> <tuple> <utility> <vector>
+  <Eigen/Core> <Eigen/Geometry> <Eigen/Cholesky> <Eigen/Eigenvalues> <Eigen/SVD>)
+set(ECHORAMA_HEADERS_classes ${ECHORAMA_HEADERS_kernels} <vtkDataObjectTree.h> <vtkImageData.h> <vtkInformation.h>
+  <vtkInformationVector.h> <vtkMatrix4x4.h> <vtkNew.h> <vtkObjectFactory.h> <vtkPointData.h> <vtkPolyData.h> <vtkSmartPointer.h>
+  <vtkStreamingDemandDrivenPipeline.h> <vtkUnsignedCharArray.h>)
+set(ECHORAMA_HEADERS_tests ${ECHORAMA_HEADERS_kernels} <gtest/gtest.h>)
+function(echorama_precompile target kind)
+  set(maker Echorama_headers_of_${kind})
+  if(NOT TARGET ${maker})
+    file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${maker}.cxx CONTENT "// holds a precompiled header\n")
+    if(kind STREQUAL "tests")
+      add_executable(${maker} EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/${maker}.cxx)
+      target_link_libraries(${maker} PRIVATE GTest::gtest_main)
+      target_compile_options(${maker} PRIVATE -O1)
+    else()
+      add_library(${maker} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/${maker}.cxx)
+    endif()
+    echorama_compile_options(${maker})
+    target_compile_definitions(${maker} PRIVATE EIGEN_MAX_ALIGN_BYTES=16)
+    target_link_libraries(${maker} PRIVATE Eigen3::Eigen)
+    if(kind STREQUAL "classes")
+      target_link_libraries(${maker} PRIVATE VTK::CommonCore VTK::CommonDataModel VTK::CommonExecutionModel)
+    elseif(kind STREQUAL "kernels")
+      set_target_properties(${maker} PROPERTIES CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF)
+    endif()
+    target_precompile_headers(${maker} PRIVATE ${ECHORAMA_HEADERS_${kind}})
+  endif()
+  target_precompile_headers(${target} REUSE_FROM ${maker})
+  target_compile_options(${target} PRIVATE -Winvalid-pch)
 endfunction()
