@@ -154,7 +154,7 @@ class Counting(unittest.TestCase):
     def test_saying_skipped_does_not_help(self):
         self.add("Plain", self.program("plain", "#!/bin/sh\necho 'skipped: [  SKIPPED ]'\nexit 1\n"), SKIP_RETURN_CODE=77)
         self.add_python("import sys\nprint('skipped')\nsys.exit(1)")
-        self.expect((0, 2, 0), "Plain: ", "Python.Test: exit status 1")
+        self.expect((0, 2, 0), "Plain: it ended badly", "skipped: [  SKIPPED ]", "Python.Test: exit status 1")
 
     def test_a_crash_at_start_fails(self):
         self.add("Plain", self.program("plain", "#!/bin/sh\nkill -SEGV $$\n"))
@@ -219,7 +219,7 @@ class Counting(unittest.TestCase):
         self.add("Slow", "/bin/sleep", "60", TIMEOUT=1)
         self.add_gtest("import time; time.sleep(0 if name.endswith('One') else 60)", shards=4)
         self.lines.append('set_tests_properties("Fake.shard2" "Fake.shard3" "Fake.shard4" PROPERTIES TIMEOUT 1)')
-        self.expect((1, 1 + 3 + 3, 0), "Slow: ", "Timeout", "Fake.Suite.Three: it did not run")
+        self.expect((1, 1 + 3 + 3, 0), "Slow: it ended badly", "Timeout", "Fake.Suite.Three: it did not run")
 
     # ---------------------------------------------------------------------------------------------------------------- skips
 
