@@ -20,6 +20,12 @@ inline bool Smoke()
   return std::getenv("ECHORAMA_SMOKE") != nullptr;
 }
 
+/// How often to try what is tried \a count times.
+inline int Trials(int count)
+{
+  return Smoke() ? 1 : count;
+}
+
 /// Seconds of one call.
 template <class Function>
 double Seconds(const Function& function)

@@ -126,8 +126,8 @@ class Counting(unittest.TestCase):
 
     def test_a_missing_gtest_program_fails(self):
         self.add_gtest().unlink()
-        self.expect((0, 3, 0), "Fake.shard1: it left no report", "does not list its tests")
-        self.expect((0, 1, 0), "does not list its tests", arguments=("-R", "Suite.One"))
+        self.expect((0, 3, 0), "Fake.shard1: it left no report", "its test program is not there")
+        self.expect((0, 1, 0), "its test program is not there", arguments=("-R", "Suite.One"))
 
     def test_a_tree_without_tests_fails(self):
         self.expect((0, 1, 0), "there are no tests")
@@ -154,7 +154,7 @@ class Counting(unittest.TestCase):
     def test_saying_skipped_does_not_help(self):
         self.add("Plain", self.program("plain", "#!/bin/sh\necho 'skipped: [  SKIPPED ]'\nexit 1\n"), SKIP_RETURN_CODE=77)
         self.add_python("import sys\nprint('skipped')\nsys.exit(1)")
-        self.expect((0, 2, 0), "Plain: ", "Python.Test: exit status 1")
+        self.expect((0, 2, 0), "Plain: it ended badly", "skipped: [  SKIPPED ]", "Python.Test: exit status 1")
 
     def test_a_crash_at_start_fails(self):
         self.add("Plain", self.program("plain", "#!/bin/sh\nkill -SEGV $$\n"))
@@ -209,7 +209,7 @@ class Counting(unittest.TestCase):
         self.add_python("assert False, 'wrong'", name="Python.Script")
         self.add_qt("<TestFunction name='a'><Incident type='fail'><Description>bad</Description></Incident></TestFunction>"
                     "<TestFunction name='b'/><TestFunction name='c'><Incident type='xpass'/></TestFunction></TestCase>", status=3)
-        self.expect((1, 5 + 1 + 3, 0), "Window.Test.a: bad", "Window.Test.b: it did not end", "A.test_parts", "setUpClass", "Python.Script")
+        self.expect((1, 5 + 1 + 3, 0), "Window.Test.a: bad", "Window.Test.b: it did not end", "A.test_parts", "setUpClass", "Python.Script: AssertionError('wrong')")
 
     def test_a_window_test_that_dies_fails(self):
         self.add_qt("<TestFunction name='a'><Incident type='pass'/>")
@@ -219,7 +219,7 @@ class Counting(unittest.TestCase):
         self.add("Slow", "/bin/sleep", "60", TIMEOUT=1)
         self.add_gtest("import time; time.sleep(0 if name.endswith('One') else 60)", shards=4)
         self.lines.append('set_tests_properties("Fake.shard2" "Fake.shard3" "Fake.shard4" PROPERTIES TIMEOUT 1)')
-        self.expect((1, 1 + 3 + 3, 0), "Slow: ", "Timeout", "Fake.Suite.Three: it did not run")
+        self.expect((1, 1 + 3 + 3, 0), "Slow: it ended badly", "Timeout", "Fake.Suite.Three: it did not run")
 
     # ---------------------------------------------------------------------------------------------------------------- skips
 

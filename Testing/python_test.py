@@ -69,7 +69,7 @@ def main(report, file, *arguments):
     unittest.TextTestRunner.resultclass = Recorder
     sys.argv = [file, *arguments]
     sys.path[0] = os.path.dirname(file)
-    status = 1
+    status, why = 1, ""
     with tempfile.TemporaryDirectory(prefix="echorama-", ignore_cleanup_errors=True) as folder:
         os.environ["TMPDIR"] = tempfile.tempdir = folder
         os.chdir(folder)
@@ -78,14 +78,16 @@ def main(report, file, *arguments):
             status = 0
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else 0 if end.code is None else 1
+            why = f"exit status {status}" if status == end.code else str(end.code)
+            raise
+        except BaseException as error:
+            why = repr(error)
             raise
         finally:
             os.chdir("/")
             tempfile.tempdir = None
-            if results is None:
-                write(report, {"": ({0: "passed", 77: "skipped"}.get(status, "failure"), "" if status == 77 else f"exit status {status}")})
-            else:
-                write(report, results)
+            outcome = {0: "passed", 77: "skipped"}.get(status, "failure")
+            write(report, {"": (outcome, why if outcome == "failure" else "")} if results is None else results)
 
 
 if __name__ == "__main__":

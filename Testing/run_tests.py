@@ -130,8 +130,10 @@ def of_ctest(case, name):
     skip, failure = case.find("skipped"), case.find("failure")
     if status == "notrun" and skip is not None and skip.get("message", "").startswith("SKIP_RETURN_CODE"):
         return Case(name, "skipped", case.findtext("system-out") or "")
-    told = failure if failure is not None else skip
-    return Case(name, "failed", (told.get("message") if told is not None else "") or f"ctest says: {status}")
+    if failure is not None:
+        last = (case.findtext("system-out") or "").strip().splitlines()[-1:]
+        return Case(name, "failed", " ".join([f"it ended badly after {float(case.get('time', 0)):.1f} s", *last]))
+    return Case(name, "failed", (skip.get("message") if skip is not None else "") or f"ctest says: {status}")
 
 
 def count_entry(entry, verdict, reports, filtered, count):
@@ -175,7 +177,7 @@ def run(options, count):
     for room, program in {entry.room: entry.program for entry in entries if entry.room}.items():
         names = gtest_names(program)
         if names is None:
-            count.fail(room, f"{program} does not list its tests")
+            count.fail(room, f"{program} does not list its tests" if program else "its test program is not there")
         wanted[room] = {name for name in names or () if not options.regex or re.search(options.regex, f"{room}.{name}")}
     environment = dict(os.environ)
     environment.pop("GTEST_FILTER", None)

@@ -281,7 +281,7 @@ void CompareRecordings()
 
 int main(int argc, char** argv)
 {
-  const int trials = argc > 1 ? std::max(1, std::atoi(argv[1])) : 500;
+  const int trials = argc > 1 ? std::max(1, std::atoi(argv[1])) : benchmark::Trials(500);
   std::vector<std::string> cases(argv + std::min(argc, 2), argv + argc);
   if (cases.empty())
     cases = {"both", "sensor", "outliers", "estimated", "ethz"};

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double DegreesPerRadian = 57.29577951308232;
-constexpr int Trials = 500;
+const int Trials = benchmark::Trials(500);
 const Vector3d Tip(12.0, -8.0, 150.0), Pivot(210.0, -35.0, 320.0);
 
 struct Case {

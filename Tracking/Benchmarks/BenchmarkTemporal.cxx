@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double DegreesPerRadian = 57.29577951308232, Offset = -0.4137;
-constexpr int Trials = 100;
+const int Trials = benchmark::Trials(100);
 
 struct Case {
   const char* name;

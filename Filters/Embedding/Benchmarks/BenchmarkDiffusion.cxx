@@ -122,7 +122,7 @@ const Shepard& ShepardMethod(double power)
   shepard->SetMaximumDistance(1.0);
   shepard->SetPowerParameter(power);
   double seconds = std::numeric_limits<double>::infinity();
-  for (int run = 0; run < 3; ++run)
+  for (int run = 0; run < benchmark::Trials(3); ++run)
     seconds = std::min(seconds, benchmark::Seconds([&] {
                          shepard->Modified();
                          shepard->Update();
@@ -237,6 +237,10 @@ void Sweep(int n)
 
 int main(int count, char** arguments)
 {
+  if (benchmark::Smoke()) {
+    Compare(48);
+    return 0;
+  }
   std::set<std::string> chosen(arguments + 1, arguments + count);
   if (chosen.empty())
     chosen = {"128", "256", "sweep"};

@@ -229,7 +229,7 @@ std::vector<Start> Anywhere(const std::vector<BenchmarkPair>& pairs, std::uint64
 
 int main(int argc, char** argv)
 {
-  const int count = argc > 1 ? std::atoi(argv[1]) : 12;
+  const int count = argc > 1 ? std::atoi(argv[1]) : benchmark::Trials(12);
   const std::vector<std::string> names(argv + std::min(argc, 2), argv + argc);
   const auto wanted = [&names](const char* name) {
     return names.empty() || std::find(names.begin(), names.end(), name) != names.end();

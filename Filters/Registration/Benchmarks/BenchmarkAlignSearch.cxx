@@ -58,6 +58,7 @@ public:
 
   void Run(const std::string& method, const AlignSearchParameters& p, int trials, bool isOverT = false) const
   {
+    trials = benchmark::Trials(trials);
     std::vector<double> scores, seconds;
     const std::clock_t started = std::clock();
     int within = 0, refused = 0;

@@ -324,7 +324,8 @@ void OneRotation(int side)
 
 int main(int argc, char** argv)
 {
-  const int trials = argc > 1 ? std::max(1, std::atoi(argv[1])) : 3, count = argc > 2 ? std::max(0, std::atoi(argv[2])) : 4;
+  const int trials = argc > 1 ? std::max(1, std::atoi(argv[1])) : benchmark::Trials(3),
+            count = argc > 2 ? std::max(0, std::atoi(argv[2])) : benchmark::Trials(4);
   const bool conesOnly = argc > 3 && std::atoi(argv[3]) != 0;
   OneRotation(24);
   std::vector<Start> starts{{20.0, 25.0, "20 degrees and 25 mm off"}, {25.0, 40.0, "25 degrees and 40 mm off"}};
@@ -346,6 +347,6 @@ int main(int argc, char** argv)
   std::vector<Pair> liver;
   liver.emplace_back(Liver(folder / "liver_volume_A.mha"), Liver(folder / "liver_volume_B.mha"));
   for (const Start& start : starts)
-    Search("liver", liver, start, 20);
+    Search("liver", liver, start, benchmark::Trials(20));
   return 0;
 }

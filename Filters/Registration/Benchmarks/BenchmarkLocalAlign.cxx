@@ -148,7 +148,7 @@ void RunAll(const std::string& name, const Pairs& pairs, const std::vector<std::
 int main(int argc, char** argv)
 {
   std::vector<std::string> metrics;
-  int trials = 20;
+  int trials = benchmark::Trials(20);
   for (int i = 1; i < argc; ++i)
     if (std::string(argv[i]) == "--trials" && i + 1 < argc)
       trials = std::stoi(argv[++i]);

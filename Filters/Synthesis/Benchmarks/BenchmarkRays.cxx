@@ -298,9 +298,10 @@ void ScatterErrors()
 
 int main(int argc, char** argv)
 {
-  const double millions = argc > 1 ? std::atof(argv[1]) : 1.0;
+  const double millions = argc > 1 ? std::atof(argv[1]) : benchmark::Smoke() ? 0.05 : 1.0;
   const TissueSurface surface = Spheres(millions);
-  const std::string name = argc > 1 ? std::to_string(surface.triangles.size()) + " triangles" : "a million triangles";
+  const std::string name =
+      argc > 1 || benchmark::Smoke() ? std::to_string(surface.triangles.size()) + " triangles" : "a million triangles";
   std::unique_ptr<AcousticScene> scene;
   const double seconds = benchmark::MedianSeconds([&] { scene = std::make_unique<AcousticScene>(surface); }, 3);
   benchmark::Report("rays", name + ", scene", "built", seconds, std::nan(""), "",

@@ -158,6 +158,10 @@ void Peer()
 
 int main(int count, char** arguments)
 {
+  if (benchmark::Smoke()) {
+    Modes();
+    return 0;
+  }
   const bool whole = count < 2 || std::strcmp(arguments[1], "--quick") != 0;
   if (whole) {
     WholeVolume(1000000, "1 million triangles, 128 x 128 x 512");
