@@ -34,9 +34,11 @@ function(echorama_compile_options target)
     target_compile_options(${target} PRIVATE -march=x86-64-v2)
     target_compile_definitions(${target} PRIVATE ECHORAMA_MULTIVERSION)
   endif()
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wnon-virtual-dtor -Woverloaded-virtual
     # & between truths is meant where a branch would keep a loop from being vectorised.
     $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical;-Wno-bitwise-conditional-parentheses>
+    # Files that are compiled together neither hide each other's names by mistake nor share types that they should not.
+    $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local;-Wno-subobject-linkage>
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
 endfunction()
 

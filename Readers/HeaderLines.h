@@ -73,6 +73,9 @@ bool TakeFrameField(const HeaderLines& lines, FrameAxis& axis, std::string_view 
 void ParseMetaImage(ImageHeader& header, FrameAxis* axis);
 void ParseNrrd(ImageHeader& header, FrameAxis* axis);
 
+/// (x,y,z), as NRRD wants it.
+std::string VectorText(const Eigen::Vector3d& v);
+
 /// A value without line breaks, as NRRD wants it.
 std::string EscapedNrrd(const std::string& text);
 

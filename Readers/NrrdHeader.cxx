@@ -376,12 +376,12 @@ private:
   std::map<std::string, std::string> fields_;
 };
 
+} // namespace
+
 std::string VectorText(const Eigen::Vector3d& v)
 {
   return "(" + NumberText(v[0]) + "," + NumberText(v[1]) + "," + NumberText(v[2]) + ")";
 }
-
-} // namespace
 
 std::string EscapedNrrd(const std::string& text)
 {

@@ -17,7 +17,7 @@ constexpr double twoPi = 6.283185307179586;
 // A face that bends by less is straight to all digits, and dividing by its angle would lose some.
 constexpr double straight = 1e-100;
 
-double SineQuotient(double a)
+double SineOver(double a)
 {
   return a == 0.0 ? 1.0 : std::sin(a) / a;
 }
@@ -36,8 +36,8 @@ bool ClampToFace(const ProbeArc& arc, ProbeArc::Place& place, double slack)
 Eigen::Vector2d ProbeArc::PointOf(const Place& place) const
 {
   const double turn = angle * place.along, half = 0.5 * turn, arc = width * place.along;
-  return {arc * SineQuotient(turn) + place.depth * std::sin(turn),
-          -arc * std::sin(half) * SineQuotient(half) + place.depth * std::cos(turn)};
+  return {arc * SineOver(turn) + place.depth * std::sin(turn),
+          -arc * std::sin(half) * SineOver(half) + place.depth * std::cos(turn)};
 }
 
 ProbeArc::Bend ProbeArc::GetBend() const
