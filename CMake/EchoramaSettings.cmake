@@ -37,5 +37,7 @@ function(echorama_compile_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
     # & between truths is meant where a branch would keep a loop from being vectorised.
     $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical;-Wno-bitwise-conditional-parentheses>
+    # GCC 12's vector intrinsics leave variables undefined by initialising them with themselves (GCC bug 105593).
+    $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-init-self>
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
 endfunction()
