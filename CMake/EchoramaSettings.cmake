@@ -39,6 +39,8 @@ function(echorama_compile_options target)
     $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical;-Wno-bitwise-conditional-parentheses>
     # Files that are compiled together neither hide each other's names by mistake nor share types that they should not.
     $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local;-Wno-subobject-linkage>
+    # GCC 12's vector intrinsics leave variables undefined by initialising them with themselves (GCC bug 105593).
+    $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-init-self>
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
 endfunction()
 

@@ -1,8 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wuninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/PoseFile.h"

@@ -12,9 +12,6 @@
 //
 // The automatic start widens its search as long as there is no clear answer: near the start a search costs a few
 // milliseconds, over all rotations some seconds. What is clear already at the middle level to be no answer is not refined.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"

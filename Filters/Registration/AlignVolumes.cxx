@@ -7,9 +7,6 @@
 // overlap. That round is cheap, because the start is then as good as a tracker's.
 //
 // Cost: pairs times AlignPair. Which pairs may overlap costs a millisecond each, at the coarsest resolution.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "AlignVolumes.h"
 #include "AlignSearch.h"
 #include "Core/Base/ElapsedTime.h"

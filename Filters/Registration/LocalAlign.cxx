@@ -14,9 +14,6 @@
 // Covariance. The curvature is measured: central differences of the analytic gradient. The noise of the gradient is measured
 // too: its parts, summed over blocks of tissue larger than the speckle's and the windows' correlation, vary from block to block,
 // whatever the correlation inside. Both give the covariance of the estimate as H^-1 B H^-1.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "LocalAlign.h"
 #include "Metric.h"
 #include <algorithm>

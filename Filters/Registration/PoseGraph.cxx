@@ -12,9 +12,6 @@
 // of the graph win if less than k edges hold that part in place, which a minimum cut tells. With exactly k nobody knows.
 //
 // Cost: trees times edges; a solution is a few sparse Cholesky factors. Ten volumes take milliseconds.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "PoseGraph.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
@@ -468,7 +465,8 @@ std::vector<Party> Graph::Parties(const Flags& asked) const
         const Pose gap = wanted.inverse(Eigen::Isometry) * party.motion;
         const Eigen::Vector3d centre = poses[At(edge.to)] * (edge.fromInTo * edge.centre);
         Twist twist;
-        twist << gap * centre - centre, LogRotation(gap.linear());
+        twist.head<3>() = gap * centre - centre;
+        twist.tail<3>() = LogRotation(gap.linear());
         return DistanceMm(twist, p_.radiusMm);
       };
       const bool isAlike = differs(motion) <= gate;

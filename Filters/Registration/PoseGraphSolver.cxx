@@ -5,9 +5,6 @@
 // Covariances are blocks of the inverse of J^T J. Only blocks of volumes that share an edge are ever asked for, and these
 // lie on the pattern of the Cholesky factor, where the inverse follows from the factor column by column, from the last to
 // the first (Takahashi, Fagan, Chin 1973). The cost is that of the factor; no column of the inverse is formed whole.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "PoseGraphSolver.h"
 #include <algorithm>
 #include <ceres/ceres.h>
@@ -80,7 +77,8 @@ Twist Disagreement(const WeighedEdge& edge, const Pose& from, const Pose& to)
 {
   const Pose motion = from.inverse(Eigen::Isometry) * to * edge.fromInTo;
   Twist twist;
-  twist << motion * edge.centre - edge.centre, LogRotation(motion.linear());
+  twist.head<3>() = motion * edge.centre - edge.centre;
+  twist.tail<3>() = LogRotation(motion.linear());
   return twist;
 }
 

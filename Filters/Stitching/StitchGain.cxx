@@ -5,7 +5,6 @@
 //   2. voxels further than three standard deviations off are left out, slope and centre are found again from moments, and so on.
 // Then two small least-squares problems over the graph of pairs: log gains, and, with these, offsets. The mean of each
 // connected group is fixed; what is contradicted by more than a hundredth counts by its size, not its square (Huber).
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
 #include "StitchGain.h"
 #include "Core/Base/Error.h"
 #include <algorithm>

@@ -12,6 +12,7 @@ namespace echorama {
 namespace {
 
 // Primitive polynomials and first direction numbers: Joe and Kuo, SIAM J. Sci. Comput. 30 (2008), file new-joe-kuo-6.
+// Their licence is in THIRD_PARTY.md.
 struct Polynomial {
   unsigned degree, coefficients;
   std::array<std::uint32_t, 7> m;

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pivot calibration: time, error of the tip and how often the stated 95% region holds, beside the plain least squares that most
 // programs solve: all poses stacked into [R -I] [tip; pivot] = -t, by the singular value decomposition.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
 #include "Core/Base/Random.h"
 #include "Testing/Benchmark.h"
 #include "Tracking/Calibration/PivotCalibration.h"

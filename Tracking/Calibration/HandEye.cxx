@@ -5,10 +5,6 @@
 //
 // The covariance is the inverse of Fisher's information at the optimum, with the noise as stated or, on request, scaled to the
 // inliers' residuals.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEye.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A new scan adds its information to what is known, wherever it will turn out to be: its residual is expected to be noise. So
 // every candidate is judged by the covariance it would lead to, without a simulation. Some 100 candidates, 12x12 each.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeAdvice.h"
 #include "Core/Base/Angles.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"

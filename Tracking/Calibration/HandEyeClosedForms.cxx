@@ -6,10 +6,6 @@
 // -a. So beyond 150 degrees the sign is taken from the rotation of the equation that knows no axes, R_A R_C - R_C R_B = 0 in all
 // nine numbers (Andreff's). Unit axes of small turns are mostly noise; where a method speaks of unit axes (Shiu-Ahmad, Horaud) a
 // motion counts by the sine of half its angle, squared.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Core/Base/Error.h"
 #include <cmath>

@@ -6,10 +6,6 @@
 // Two mistakes leave no residual. S and M both inverted give S C' = O' M with C' and O' exchanged; both sides in metres give the
 // same answer in metres. Only the size of what comes out can make one suspicious. For the first reason, too, S inverted alone and
 // M inverted alone look the same: what is said then names both, with the length of the lever that follows from each.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeDiagnosis.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"

@@ -8,10 +8,6 @@
 // Twelve unknowns and six residuals per scan: the normal matrix is made in some 0.3 microseconds per scan. The weights
 // depend on C through the lever; they follow it from step to step and are not differentiated, as in iteratively weighted least
 // squares.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeModel.h"
 #include "Core/Base/Angles.h"
 #include <algorithm>

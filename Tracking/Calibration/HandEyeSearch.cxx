@@ -9,10 +9,6 @@
 //
 // Cost: some 30 small eigenproblems, a handful of refinements and one for each round; 1.5 ms for 20 scans, and linear in their
 // number but for the logarithm.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeSearch.h"
 #include "Core/Base/Median.h"
 #include "Core/Base/Random.h"

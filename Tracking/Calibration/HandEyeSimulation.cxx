@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // True poses come from turning the volume about its target and moving it, which is what an examiner does with a probe over a
 // rig; the sensor follows by S = O M C^-1. Noise is drawn as the model of HandEyeModel.h says, not linearised.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Warray-bounds"
-#pragma GCC diagnostic ignored "-Wstringop-overread"
 #include "Tracking/Calibration/HandEyeSimulation.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"

@@ -10,9 +10,6 @@
 // the left says how far each direction of the tool swings; where it is singular, the tip is known only up to a line. Poses
 // at which the tip was not in place: start from the best of small samples by the median residual, then Cauchy weights, then
 // a chi-square test, all linear in the number of poses.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "Tracking/Calibration/PivotCalibration.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"

@@ -9,9 +9,6 @@
 //    noise depend on their neighbours, so the standard error is that of a jackknife over blocks.
 //
 // Cost: poses times neighbours for 1, samples times offsets for 2.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#endif
 #include "Tracking/Calibration/TemporalCalibration.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"

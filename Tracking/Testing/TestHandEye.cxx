@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The whole calibration: as good as the Cramer-Rao bound allows, honest about it, and hard to fool.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"

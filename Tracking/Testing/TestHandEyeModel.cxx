@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The statistics: derivatives by differences, covariances by drawing, radii by closed forms.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wuninitialized"
 #include "Core/Base/Random.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/HandEyeAdvice.h"

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
 #include "Readers/Testing/TemporaryFolder.h"

@@ -9,10 +9,6 @@
 //
 //   BenchmarkAlignGraph [graph|volumes|both [START]]     default: both, tracked
 // ECHORAMA_TRACE=1 tells of each pair.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wuninitialized" // GCC 12 on the intrinsics below Eigen's AVX-512 (GCC bug 105593)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
 #include "Core/Base/Random.h"
 #include "Filters/Registration/AlignInTurn.h"
 #include "Filters/Registration/AlignmentScore.h"

@@ -3,9 +3,6 @@
 // balanced accuracy (the mean of sensitivity and specificity) of "reliability below 0.5". Beside it, on the same beams:
 // confidence by random walks (Karamalis et al. 2012, 3D with 6 neighbours, alpha 2, beta 90, gamma 0.05) by Eigen's sparse
 // conjugate gradients; its threshold is the best there is for each volume, as its authors give none.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" // false alarms of GCC 12 in its own vector instructions
-#endif
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Imaging/ShadowMap.h"
