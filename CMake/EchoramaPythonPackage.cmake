@@ -10,3 +10,9 @@ file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${ECHORAMA_PYTHON_PACKAGES}/echorama/_
 " @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/${ECHORAMA_PYTHON_PACKAGES}/echorama/__init__.py
   DESTINATION ${ECHORAMA_PYTHON_PACKAGES}/echorama)
+# What one builds to have it. Wrappers are compiled longer than they run.
+foreach(module IN LISTS modules)
+  string(REPLACE "::" "" target ${module}Python)
+  target_compile_options(${target} PRIVATE -O1)
+  add_dependencies(python ${target})
+endforeach()

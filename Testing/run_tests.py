@@ -30,7 +30,43 @@ class Entry:
         self.program = description.get("command", [None])[0]
         self.labels = properties.get("LABELS", [])
         # The shards of a GoogleTest program: Room.shard1, Room.shard2 ... hold the tests Room.Suite.Test.
+        self.folder = properties.get("WORKING_DIRECTORY", "")
         self.room = self.name.split(".shard")[0] if any(each.startswith("GTEST_TOTAL_SHARDS=") for each in properties.get("ENVIRONMENT", [])) else None
+
+
+def told_by_sources(entry, tree, regex):
+    """Whether the regular expression matches a test in the sources of a GoogleTest program, which need not be built."""
+    for path in (SOURCE / pathlib.Path(entry.folder).relative_to(tree) / "Testing").glob("Test*.cxx"):
+        for suite, name in re.findall(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)", path.read_text(), re.MULTILINE):
+            if re.search(regex, f"{entry.room}.{suite}.{name}"):
+                return True
+    return False
+
+
+def matching(entries, options):
+    """The entries that may hold a test of that name. When the sources know none, it may be made by a parameter: all programs do."""
+    if not options.regex:
+        return entries
+    found = [entry for entry in entries
+             if (told_by_sources(entry, options.tree, options.regex) if entry.room else re.search(options.regex, entry.name))]
+    return found or [entry for entry in entries if entry.room]
+
+
+def targets_of(entries):
+    """What must be built for them."""
+    targets = set()
+    for entry in entries:
+        if entry.room:
+            targets.add(entry.room + "Tests")
+        elif "benchmark" in entry.labels:
+            targets.add(entry.name.replace(".", ""))
+        elif "fuzz" in entry.labels:
+            targets.add(entry.name.split(".")[1])
+        elif "window" in entry.labels:
+            targets.add(entry.name.split(".")[1] + "WindowTests")
+        else:
+            targets.add("all")  # scripts may start any program
+    return sorted(targets)
 
 
 def gtest_names(program):
@@ -159,18 +195,27 @@ def count_entry(entry, verdict, reports, filtered, count):
     return {case.name for case in cases}
 
 
+def listed_by_ctest(tree):
+    """The entries of a build tree; raises ValueError where there is none."""
+    listed = subprocess.run(["ctest", "--test-dir", str(tree), "--show-only=json-v1"], capture_output=True, text=True)
+    try:
+        return [Entry(each) for each in json.loads(listed.stdout)["tests"]]
+    except (ValueError, KeyError):
+        raise ValueError(f"ctest lists no tests; {listed.stderr.strip()}") from None
+
+
 def run(options, count):
     ctest = ["ctest", "--test-dir", str(options.tree)]
-    listed = subprocess.run([*ctest, "--show-only=json-v1"], capture_output=True, text=True)
     try:
-        entries = [Entry(each) for each in json.loads(listed.stdout)["tests"]]
-    except (ValueError, KeyError):
-        return count.fail(options.tree.name, f"ctest lists no tests; {listed.stderr.strip()}")
+        entries = listed_by_ctest(options.tree)
+    except ValueError as problem:
+        return count.fail(options.tree.name, str(problem))
     if len({entry.name for entry in entries}) != len(entries):
         count.fail(options.tree.name, "two tests have the same name")
     entries = [entry for entry in entries if not set(options.without) & set(entry.labels)]
     if not entries:
         return count.fail(options.tree.name, "there are no tests")
+    entries = matching(entries, options)
 
     # The GoogleTest programs tell what they hold, so that what did not run shows.
     wanted = {}
@@ -223,8 +268,12 @@ def main():
     parser.add_argument("--counts", type=pathlib.Path, metavar="FILE", help="write the three numbers there, too")
     parser.add_argument("--skips", type=pathlib.Path, default=SOURCE / "Testing" / "expected_skips.txt")
     parser.add_argument("--data", type=pathlib.Path, default=SOURCE.parent / "shared" / "data", help="where real data would be")
+    parser.add_argument("--targets", action="store_true", help="run nothing; say what must be built for the tests that match")
     options = parser.parse_args()
 
+    if options.targets:
+        print(*targets_of(matching(listed_by_ctest(options.tree), options)), sep="\n")
+        return 0
     count = Count(ExpectedSkips(options.skips, options.tree.name, options.data))
     run(options, count)
     for title, cases in (("skipped, as expected", count.skipped), ("failed", count.failed)):
