@@ -346,7 +346,8 @@ public:
   }
 };
 
-// Four types of grid hold the ten types of voxels. What touches trees is compiled for the four alone: it takes long.
+// Four types of grid hold the ten types of voxels. What touches trees is compiled for the four alone: it takes long. Grids come
+// from the library's registry, with a background of zero: a constructor called here would compile all that they can do.
 template <class T>
 using StoredOf =
     std::conditional_t<sizeof(T) <= 2 || std::is_same_v<T, float>, float,
@@ -405,14 +406,14 @@ template <class Stored>
 void CopyLayer(const openvdb::GridBase& base, const Box& box, std::int64_t z0, std::int64_t end, Stored* values,
                unsigned char* active)
 {
-  const auto accessor = static_cast<const GridOf<Stored>&>(base).getConstAccessor();
+  const auto& tree = static_cast<const GridOf<Stored>&>(base).tree();
   const std::int64_t endX = std::int64_t{box.first.x()} + box.size[0], endY = std::int64_t{box.first.y()} + box.size[1];
   for (std::int64_t by = BlockOf(box.first.y()); by < endY; by += Edge)
     for (std::int64_t bx = BlockOf(box.first.x()); bx < endX; bx += Edge) {
       const openvdb::Coord block(static_cast<int>(bx), static_cast<int>(by), static_cast<int>(BlockOf(z0)));
-      const auto* leaf = accessor.probeConstLeaf(block);
-      const Stored tile = leaf ? Stored(0) : accessor.getValue(block);
-      const bool tileActive = !leaf && accessor.isValueOn(block);
+      const auto* leaf = tree.probeConstLeaf(block);
+      const Stored tile = leaf ? Stored(0) : tree.getValue(block);
+      const bool tileActive = !leaf && tree.isValueOn(block);
       const std::int64_t fromX = std::max<std::int64_t>(bx, box.first.x()), toX = std::min(bx + Edge, endX);
       for (std::int64_t z = z0; z < end; ++z)
         for (std::int64_t y = std::max<std::int64_t>(by, box.first.y()); y < std::min(by + Edge, endY); ++y) {
@@ -630,7 +631,7 @@ template <class T>
 openvdb::GridBase::Ptr MakeGrid(const ImageGeometry& g, const T* voxels, const unsigned char* valid, const Progress& progress)
 {
   using Stored = StoredOf<T>;
-  const openvdb::GridBase::Ptr grid = GridOf<Stored>::create(Stored(0));
+  const openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(GridOf<Stored>::gridType());
   const std::size_t slice = static_cast<std::size_t>(g.dimensions[0]) * static_cast<std::size_t>(g.dimensions[1]);
   std::vector<Stored> values(slice * Edge);
   for (int z0 = 0; z0 < g.dimensions[2]; z0 += Edge) {
@@ -679,7 +680,7 @@ void WriteVdb(const std::string& path, const ImageHeader& header, const void* vo
     for (int row = 0; row < 3; ++row)
       for (int column = 0; column < 4; ++column)
         matrix(column, row) = map(row, column);
-    grid->setTransform(std::make_shared<openvdb::math::Transform>(std::make_shared<openvdb::math::AffineMap>(matrix)));
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
     grid->setName(GridName);
     grid->setCreator("Echorama");
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);

@@ -66,7 +66,7 @@ void PlaceByTracker(Session& session, const AlignOptions& options, std::vector<L
   Pose volumeToSensor = Pose::Identity();
   volumeToSensor.matrix() = edge->matrix.matrix();
   const std::string text = ReadTransformReport(options.calibration);
-  const auto report = nlohmann::json::parse(text.empty() ? "{}" : text);
+  const auto report = nlohmann::ordered_json::parse(text.empty() ? "{}" : text);
   std::string frame;
   if (report.is_object() && report.contains("volumeFrame") && report["volumeFrame"].is_string())
     frame = report["volumeFrame"];

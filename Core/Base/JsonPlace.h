@@ -19,40 +19,10 @@ public:
   [[noreturn]] void Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, name_ + ": " + reason); }
 
   /// The whole \a text as JSON, of at most 32 levels: deeper nesting is an attack on the stack.
-  Json Parse(std::string_view text) const
-  {
-    const auto shallow = [this](int depth, nlohmann::json::parse_event_t, const Json&) {
-      if (depth > 32)
-        Fail("its lists are nested more than 32 deep");
-      return true;
-    };
-    try {
-      return Json::parse(text.begin(), text.end(), shallow);
-    } catch (const nlohmann::json::exception& problem) {
-      Fail("it is not JSON (" + std::string(problem.what()).substr(0, 200) + ")"); // it quotes what it read
-    }
-  }
-
-  const Json& Member(const Json& object, const char* key) const
-  {
-    if (!object.is_object() || !object.contains(key))
-      Fail(std::string("\"") + key + "\" is missing");
-    return object.at(key);
-  }
-
-  double Number(const Json& value) const
-  {
-    if (!value.is_number())
-      Fail("a number is needed, not " + Shown(value));
-    return value.get<double>(); // JSON has no NaN; overflowing numbers are refused by the parser
-  }
-
-  std::string Text(const Json& value) const
-  {
-    if (!value.is_string())
-      Fail("a text is needed, not " + Shown(value));
-    return value.get<std::string>();
-  }
+  Json Parse(std::string_view text) const;
+  const Json& Member(const Json& object, const char* key) const;
+  double Number(const Json& value) const;
+  std::string Text(const Json& value) const;
 
   template <int Size>
   Eigen::Matrix<double, Size, 1> Vector(const Json& value) const
@@ -77,12 +47,7 @@ public:
   }
 
   /// Checks that the member \a key is the text \a wanted.
-  void Need(const Json& object, const char* key, const std::string& wanted) const
-  {
-    const Json& value = Member(object, key);
-    if (!value.is_string() || value.get<std::string>() != wanted)
-      Fail(std::string("\"") + key + "\" is " + Shown(value) + "; \"" + wanted + "\" is needed");
-  }
+  void Need(const Json& object, const char* key, const std::string& wanted) const;
 
   /// A matrix as a list of rows.
   template <class Derived>
@@ -99,12 +64,6 @@ public:
   }
 
 private:
-  static std::string Shown(const Json& value)
-  {
-    const std::string text = value.dump(-1, ' ', true);
-    return text.size() <= 60 ? text : text.substr(0, 60) + " ...";
-  }
-
   std::string name_;
 };
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Here, so that the parser and the printer of JSON are compiled once.
+#include "Core/Base/JsonPlace.h"
+
+namespace echorama {
+namespace {
+
+std::string Shown(const JsonPlace::Json& value)
+{
+  const std::string text = value.dump(-1, ' ', true);
+  return text.size() <= 60 ? text : text.substr(0, 60) + " ...";
+}
+
+} // namespace
+
+JsonPlace::Json JsonPlace::Parse(std::string_view text) const
+{
+  const auto shallow = [this](int depth, nlohmann::json::parse_event_t, const Json&) {
+    if (depth > 32)
+      Fail("its lists are nested more than 32 deep");
+    return true;
+  };
+  try {
+    return Json::parse(text.begin(), text.end(), shallow);
+  } catch (const nlohmann::json::exception& problem) {
+    Fail("it is not JSON (" + std::string(problem.what()).substr(0, 200) + ")"); // it quotes what it read
+  }
+}
+
+const JsonPlace::Json& JsonPlace::Member(const Json& object, const char* key) const
+{
+  if (!object.is_object() || !object.contains(key))
+    Fail(std::string("\"") + key + "\" is missing");
+  return object.at(key);
+}
+
+double JsonPlace::Number(const Json& value) const
+{
+  if (!value.is_number())
+    Fail("a number is needed, not " + Shown(value));
+  return value.get<double>(); // JSON has no NaN; overflowing numbers are refused by the parser
+}
+
+std::string JsonPlace::Text(const Json& value) const
+{
+  if (!value.is_string())
+    Fail("a text is needed, not " + Shown(value));
+  return value.get<std::string>();
+}
+
+void JsonPlace::Need(const Json& object, const char* key, const std::string& wanted) const
+{
+  const Json& value = Member(object, key);
+  if (!value.is_string() || value.get<std::string>() != wanted)
+    Fail(std::string("\"") + key + "\" is " + Shown(value) + "; \"" + wanted + "\" is needed");
+}
+
+} // namespace echorama
