@@ -36,11 +36,13 @@ find_path(ECHORAMA_POCKETFFT_INCLUDE_DIR pocketfft.hpp
   PATHS /usr/lib/python3/dist-packages/pythran/pythonic/numpy/fft REQUIRED)
 add_library(Echorama_PocketFFT INTERFACE IMPORTED)
 target_include_directories(Echorama_PocketFFT SYSTEM INTERFACE ${ECHORAMA_POCKETFFT_INCLUDE_DIR})
-# Embree's own configuration looks for a TBB of another name.
-find_path(ECHORAMA_EMBREE_INCLUDE_DIR embree3/rtcore.h REQUIRED)
-find_library(ECHORAMA_EMBREE embree3 REQUIRED)
+# Embree's own configuration looks for a TBB of another name. Its headers and library bear the major version in their names;
+# what differs between versions 3 and 4 is in Filters/Synthesis/EmbreeQuery.h.
+find_path(ECHORAMA_EMBREE_HEADERS rtcore.h PATH_SUFFIXES embree4 embree3 REQUIRED)
+get_filename_component(embree ${ECHORAMA_EMBREE_HEADERS} NAME)
+find_library(ECHORAMA_EMBREE ${embree} REQUIRED)
 add_library(Echorama_Embree INTERFACE IMPORTED)
-target_include_directories(Echorama_Embree SYSTEM INTERFACE ${ECHORAMA_EMBREE_INCLUDE_DIR})
+target_include_directories(Echorama_Embree SYSTEM INTERFACE ${ECHORAMA_EMBREE_HEADERS})
 target_link_libraries(Echorama_Embree INTERFACE ${ECHORAMA_EMBREE})
 # OpenIGTLink's own configuration sets compiler flags of its build.
 find_path(ECHORAMA_OPENIGTLINK_INCLUDE_DIR igtlMessageHeader.h PATH_SUFFIXES openigtlink REQUIRED)

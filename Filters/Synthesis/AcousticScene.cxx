@@ -18,11 +18,11 @@
 // Cost: the tree dominates (Embree), some 0.4 s per million triangles on two cores.
 #include "AcousticScene.h"
 #include "Core/Base/Parallel.h"
+#include "EmbreeQuery.h"
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <Eigen/Geometry>
-#include <embree3/rtcore.h>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -369,7 +369,7 @@ struct Hit {
 };
 
 struct Collector {
-  RTCIntersectContext context;
+  EmbreeQuery query;
   std::vector<Hit> hits;
 };
 
@@ -598,7 +598,7 @@ std::vector<std::uint32_t> AcousticScene::State::Build(const Shells& parts)
     throw Error(Error::Kind::NotPossible, "Embree does not start on this machine");
   rtcSetDeviceMemoryMonitorFunction(device, CountMemory, &treeBytes);
   scene.handle = rtcNewScene(device);
-  rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | embreeQueryFilters));
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* const coordinates = static_cast<float*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), parts.points.size()));
@@ -709,9 +709,8 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
   };
   thread_local Collector collector;
   collector.hits.clear();
-  rtcInitIntersectContext(&collector.context);
   ask(query);
-  rtcIntersect1(scene, &collector.context, &query);
+  collector.query.Ask(scene, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID)
     return false;
   const float first = query.ray.tfar;
@@ -723,8 +722,7 @@ bool AcousticScene::State::Meet(const Line& line, double from, double to, Meetin
   others.ray.tnear = std::max(query.ray.tnear, first - static_cast<float>(0.01 * tolerance));
   others.ray.tfar = first + static_cast<float>(tolerance);
   ask(others);
-  collector.context.filter = Collect;
-  rtcIntersect1(scene, &collector.context, &others);
+  collector.query.Ask(scene, others, Collect);
 
   meeting.changes.clear();
   float last = first;
@@ -1084,31 +1082,19 @@ std::size_t AcousticScene::MemoryBytes() const
   return bytes;
 }
 
-std::int64_t AcousticScene::Ask(const SceneRay::Question* questions, std::size_t count, int packet) const
+std::int64_t AcousticScene::Ask(const SceneRay::Question* questions, std::size_t count) const
 {
   if (Empty())
     return 0;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  if (packet > 1)
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  std::vector<RTCRayHit> rays(static_cast<std::size_t>(std::max(1, packet)));
+  EmbreeQuery query;
   std::int64_t hits = 0;
-  for (std::size_t begin = 0; begin < count; begin += rays.size()) {
-    const std::size_t end = std::min(count, begin + rays.size());
-    for (std::size_t i = begin; i < end; ++i) {
-      const SceneRay::Question& question = questions[i];
-      Line line;
-      line.origin = Eigen::Map<const Eigen::Vector3f>(question.origin.data());
-      line.direction = Eigen::Map<const Eigen::Vector3f>(question.direction.data());
-      rays[i - begin] = line.From(question.from, question.to);
-    }
-    if (packet > 1)
-      rtcIntersect1M(state_->scene, &context, rays.data(), static_cast<unsigned int>(end - begin), sizeof(RTCRayHit));
-    else
-      rtcIntersect1(state_->scene, &context, rays.data());
-    for (std::size_t i = begin; i < end; ++i)
-      hits += rays[i - begin].hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  for (std::size_t i = 0; i < count; ++i) {
+    Line line;
+    line.origin = Eigen::Map<const Eigen::Vector3f>(questions[i].origin.data());
+    line.direction = Eigen::Map<const Eigen::Vector3f>(questions[i].direction.data());
+    RTCRayHit ray = line.From(questions[i].from, questions[i].to);
+    query.Ask(state_->scene, ray);
+    hits += ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   }
   return hits;
 }

@@ -61,7 +61,7 @@ struct SceneRay {
   std::vector<Question>* record = nullptr;
 };
 
-/// The surfaces of a scene, ready for rays (Embree 3).
+/// The surfaces of a scene, ready for rays (Embree).
 ///
 /// A *shell* is a connected piece of a body's surface. A ray that enters a shell puts it into its set, one that leaves takes it
 /// out; both may be repeated, so a hit that was missed (or met twice) does no lasting harm. Hits closer together than
@@ -117,9 +117,8 @@ public:
   /// All that the scene holds, bytes.
   std::size_t MemoryBytes() const;
 
-  /// For benchmarks: asks the tree again what was asked, in the same order; the rays one by one (\a packet 1), or in
-  /// streams of \a packet. \returns how many were hits.
-  std::int64_t Ask(const SceneRay::Question* questions, std::size_t count, int packet = 1) const;
+  /// For benchmarks: asks the tree again what was asked, one by one in the same order. \returns how many were hits.
+  std::int64_t Ask(const SceneRay::Question* questions, std::size_t count) const;
 
 private:
   struct State;

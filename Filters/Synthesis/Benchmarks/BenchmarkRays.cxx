@@ -133,17 +133,13 @@ void Transport(const AcousticScene& scene, const std::string& name)
   report("transport", ours, oursProcessor);
   report("the same questions to Embree (peer)", bare, bareProcessor);
 
-  for (const int packet : {1, 16, 64}) {
-    const double seconds = benchmark::MedianSeconds([&] {
-      ParallelRanges(static_cast<std::ptrdiff_t>(primary.size()), 1024, Progress(),
-                     [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-                       scene.Ask(primary.data() + begin, static_cast<std::size_t>(end - begin), packet);
-                     });
+  const double seconds = benchmark::MedianSeconds([&] {
+    ParallelRanges(static_cast<std::ptrdiff_t>(primary.size()), 1024, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      scene.Ask(primary.data() + begin, static_cast<std::size_t>(end - begin));
     });
-    benchmark::Report("rays", name + ", first rays alone",
-                      "Embree, " + (packet == 1 ? "one by one" : "streams of " + std::to_string(packet)), seconds, std::nan(""),
-                      "", {{"rays_per_second", static_cast<double>(primary.size()) / seconds}});
-  }
+  });
+  benchmark::Report("rays", name + ", first rays alone", "Embree, one by one", seconds, std::nan(""), "",
+                    {{"rays_per_second", static_cast<double>(primary.size()) / seconds}});
 }
 
 void Media(const AcousticScene& scene, const std::string& name)
