@@ -68,6 +68,7 @@ function(echorama_precompile target kind)
     target_compile_definitions(${maker} PRIVATE EIGEN_MAX_ALIGN_BYTES=16)
     target_link_libraries(${maker} PRIVATE Eigen3::Eigen)
     if(kind STREQUAL "classes")
+      target_compile_options(${maker} PRIVATE -O1) # as the classes: GCC 14 takes no header made at another level
       target_link_libraries(${maker} PRIVATE VTK::CommonCore VTK::CommonDataModel VTK::CommonExecutionModel)
     elseif(kind STREQUAL "kernels")
       set_target_properties(${maker} PROPERTIES CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF)
