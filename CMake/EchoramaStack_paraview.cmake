@@ -1,14 +1,13 @@
-# The ParaView 5.11 stack: the same modules as one plugin, over the kernels that the vtk stack built.
+# The ParaView stack (5.11 or later): the same modules as one plugin, over the kernels that the vtk stack built.
 set(ECHORAMA_KERNELS_DIR "" CACHE PATH "build tree of the vtk stack")
 set(ECHORAMA_PARAVIEW_PREFIX "" CACHE PATH "what CMake/paraview-overlay.sh made")
 if(NOT EXISTS ${ECHORAMA_KERNELS_DIR}/EchoramaKernels-targets.cmake)
   message(FATAL_ERROR "ECHORAMA_KERNELS_DIR (${ECHORAMA_KERNELS_DIR}) holds no kernels; configure the vtk stack there first")
 endif()
-if(ECHORAMA_PARAVIEW_PREFIX)
-  set(ParaView_DIR ${ECHORAMA_PARAVIEW_PREFIX}/prefix/usr/lib/x86_64-linux-gnu/cmake/paraview-5.11)
-endif()
 # RemotingViews brings the X11 and GLEW targets; without COMPONENTS ParaView asks for more than the plugin needs.
-find_package(ParaView 5.11 REQUIRED COMPONENTS RemotingCore RemotingServerManager RemotingViews VTKExtensionsCore VTKExtensionsMisc)
+find_package(ParaView 5.11 REQUIRED COMPONENTS RemotingCore RemotingServerManager RemotingViews VTKExtensionsCore VTKExtensionsMisc
+  HINTS ${ECHORAMA_PARAVIEW_PREFIX}/prefix/usr)
+message(STATUS "ParaView ${ParaView_VERSION}")
 include(EchoramaDependencies)
 include(${ECHORAMA_KERNELS_DIR}/EchoramaKernels-targets.cmake)
 set(ECHORAMA_PYTHON_PACKAGES python3/paraview-packages)
@@ -22,7 +21,7 @@ paraview_plugin_scan(PLUGIN_FILES ${PROJECT_SOURCE_DIR}/Plugin/paraview.plugin
 paraview_plugin_build(PLUGINS ${plugins}
   RUNTIME_DESTINATION ${CMAKE_INSTALL_BINDIR}
   LIBRARY_DESTINATION ${CMAKE_INSTALL_LIBDIR}
-  LIBRARY_SUBDIRECTORY paraview-5.11/plugins)
+  LIBRARY_SUBDIRECTORY paraview-${ParaView_VERSION_MAJOR}.${ParaView_VERSION_MINOR}/plugins)
 # paraview_plugin_build does not wrap the modules for Python.
 vtk_module_wrap_python(MODULES ${modules} INSTALL_EXPORT EchoramaParaViewPython PYTHON_PACKAGE echorama
   MODULE_DESTINATION ${ECHORAMA_PYTHON_PACKAGES} CMAKE_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama-paraview

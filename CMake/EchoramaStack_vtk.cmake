@@ -1,4 +1,4 @@
-# The VTK 9.1 stack: kernels, modules, Python package, programs, installation.
+# The VTK stack (9.1 or later): kernels, modules, Python package, programs, installation.
 set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks for the same
   CommonCore CommonDataModel CommonExecutionModel CommonTransforms CommonMath CommonSystem CommonColor CommonMisc
   FiltersCore FiltersGeneral FiltersSources IOCore IOGeometry IOImage IOPLY IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath
