@@ -145,9 +145,9 @@ def count_entry(entry, verdict, reports, filtered, count):
     if cases is None:
         count.fail(entry.name, "it left no report of its tests" + (f"; {verdict.message}" if verdict.outcome == "failed" else ""))
         return set()
-    if not cases and not filtered:
-        count.fail(entry.name, "it has no tests")
     before = len(count.failed)
+    if not cases and not filtered:
+        count.fail(entry.name, "it has no tests")  # later Pythons' unittest also fails then: that is not counted twice
     for case in cases:
         if not case.name:  # a script that is one test
             case = case._replace(name=entry.name, message=case.message or verdict.message)

@@ -716,7 +716,7 @@ for step in range(1, 100000):
         self.assertEqual(vtkUltrasoundAlignmentSession.GetAbandonedSessions(folders), 0)
 
     def run_and_kill(self, script):
-        """Another process does it with \c session and \c folder, and is killed."""
+        """Another process does it with `session` and `folder`, and is killed."""
         child = subprocess.Popen([sys.executable, "-c", f"""
 import os, signal
 from echorama import vtkUltrasoundAlignmentSession
