@@ -39,6 +39,8 @@ function(echorama_compile_options target)
     $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical;-Wno-bitwise-conditional-parentheses>
     # Files that are compiled together neither hide each other's names by mistake nor share types that they should not.
     $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local;-Wno-subobject-linkage>
+    # GCC 14 takes what a function returns by reference for part of a temporary argument, a key's name for instance.
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-dangling-reference>
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
 endfunction()
 
