@@ -8,6 +8,7 @@
 // The matrix couples control points at most three apart: it is kept as a stencil of 7^3 blocks of 3 x 3 per control point, the
 // penalty is added to it, and conjugate gradients solve it.
 #include "DeformableAlign.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -550,15 +551,6 @@ std::vector<Level::Weighing> WeighingOf(const Commons& now, const Commons& rigid
   return weighing;
 }
 
-void CheckDeformableRange(const char* name, double value, double from, double to)
-{
-  if (!(value >= from && value <= to)) {
-    std::string text = std::string(name) + " is " + std::to_string(value) + "; it must be in [" + std::to_string(from) + ", " +
-                       std::to_string(to) + "]";
-    throw Error(Error::Kind::InvalidParameter, text);
-  }
-}
-
 void CheckVolume(const DeformableVolume& volume)
 {
   if (!volume.features || volume.features->levels.empty())
@@ -572,12 +564,12 @@ void CheckVolume(const DeformableVolume& volume)
 
 void DeformableAlignParameters::Check() const
 {
-  CheckDeformableRange("ControlSpacingMm", controlSpacingMm, 5.0, 500.0);
-  CheckDeformableRange("BendingWeight", bendingWeight, 1e-6, 1e12);
-  CheckDeformableRange("Levels", levels, 1, 6);
-  CheckDeformableRange("Iterations", iterations, 1, 1000);
-  CheckDeformableRange("FinestMm", finestMm, 0.01, 100.0);
-  CheckDeformableRange("MinimumOverlap", minimumOverlap, 0.001, 1.0);
+  CheckRange("ControlSpacingMm", controlSpacingMm, 5.0, 500.0);
+  CheckRange("BendingWeight", bendingWeight, 1e-6, 1e12);
+  CheckRange("Levels", levels, 1, 6);
+  CheckRange("Iterations", iterations, 1, 1000);
+  CheckRange("FinestMm", finestMm, 0.01, 100.0);
+  CheckRange("MinimumOverlap", minimumOverlap, 0.001, 1.0);
 }
 
 DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving,

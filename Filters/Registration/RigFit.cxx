@@ -12,6 +12,7 @@
 // beam through the centre, which ties the centre down across the beam better than a shallow cap's curvature does. Poses follow
 // from the centres by least squares; the scale is the one with which the centres fit best, by a parabola through a search.
 #include "RigFit.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
@@ -27,13 +28,6 @@ namespace echorama {
 namespace {
 
 using Eigen::Vector3d;
-
-void CheckRange(const char* what, double value, double from, double to)
-{
-  if (!(value >= from && value <= to))
-    throw Error(Error::Kind::InvalidParameter, std::string("rig fit: ") + what + " is " + NumberText(value) +
-                                                   "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
-}
 
 // A volume in the frame of its probe.
 class Scene {
@@ -479,11 +473,11 @@ Refined Refine(const Scene& scene, const VolumeView<const float>& intensity, con
 void RigFitParameters::Check() const
 {
   if (depthScale != 0.0)
-    CheckRange("depthScale", depthScale, 0.9, 1.1);
-  CheckRange("toleranceMm", toleranceMm, 0.1, 20.0);
-  CheckRange("largestRmsMm", largestRmsMm, 0.01, 20.0);
-  CheckRange("fewestBalls", fewestBalls, 3, 1000);
-  CheckRange("candidates", candidates, 4, 1000);
+    CheckRange("rig fit: depthScale", depthScale, 0.9, 1.1);
+  CheckRange("rig fit: toleranceMm", toleranceMm, 0.1, 20.0);
+  CheckRange("rig fit: largestRmsMm", largestRmsMm, 0.01, 20.0);
+  CheckRange("rig fit: fewestBalls", fewestBalls, 3, 1000);
+  CheckRange("rig fit: candidates", candidates, 4, 1000);
 }
 
 RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const unsigned char>& valid,

@@ -12,6 +12,7 @@
 // Its grain is the noise of counting: it fades as rays are added. Beams are independent and parallel.
 #include "ScatterCounting.h"
 #include "Core/Base/Angles.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
@@ -23,13 +24,6 @@
 
 namespace echorama {
 namespace {
-
-void Check(const char* name, double value, double from, double to)
-{
-  if (!(value >= from && value <= to))
-    throw Error(Error::Kind::InvalidParameter, std::string(name) + " is " + NumberText(value) + "; it must be in [" +
-                                                   NumberText(from) + ", " + NumberText(to) + "]");
-}
 
 // Uniform in solid angle within a cone.
 Eigen::Vector3d WithinCone(const Eigen::Vector3d& axis, double cosOfCone, double u, double v)
@@ -158,11 +152,11 @@ private:
 
 void ScatterCounting::Check() const
 {
-  echorama::Check("raysPerElement", raysPerElement, 1, 1e7);
-  echorama::Check("clarity", clarity, 0.0, 200.0);
-  echorama::Check("coneDegrees", coneDegrees, 0.0, 180.0);
-  echorama::Check("maxEvents", maxEvents, 1, 1e6);
-  echorama::Check("assumedSoundSpeed (m/s)", assumedSoundSpeed, 100.0, 10000.0);
+  CheckRange("raysPerElement", raysPerElement, 1, 1e7);
+  CheckRange("clarity", clarity, 0.0, 200.0);
+  CheckRange("coneDegrees", coneDegrees, 0.0, 180.0);
+  CheckRange("maxEvents", maxEvents, 1, 1e6);
+  CheckRange("assumedSoundSpeed (m/s)", assumedSoundSpeed, 100.0, 10000.0);
 }
 
 double ScatterDistance(double p, double u)
@@ -189,9 +183,9 @@ Volume<float> CountScatters(const AcousticScene& scene, const ScatterCounting& p
 {
   parameters.Check();
   probe.Check();
-  echorama::Check("number of samples", dimensions[0], 2, 1e6);
-  echorama::Check("number of elements", dimensions[1], 1, 1e6);
-  echorama::Check("number of planes", dimensions[2], 1, 1e6);
+  CheckRange("number of samples", dimensions[0], 2, 1e6);
+  CheckRange("number of elements", dimensions[1], 1, 1e6);
+  CheckRange("number of planes", dimensions[2], 1, 1e6);
   Volume<float> intensities(dimensions, 0.0f);
   const VolumeView<float> rows = intensities.View();
   const Counting counting(scene, parameters, probe.depthMax);

@@ -8,6 +8,7 @@
 // each way.
 #include "SoundTransport.h"
 #include "Core/Base/Angles.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -17,13 +18,6 @@
 
 namespace echorama {
 namespace {
-
-void CheckTransport(const char* name, double value, double from, double to)
-{
-  if (!(value >= from && value <= to))
-    throw Error(Error::Kind::InvalidParameter, std::string(name) + " is " + NumberText(value) + "; it must be in [" +
-                                                   NumberText(from) + ", " + NumberText(to) + "]");
-}
 
 Eigen::Vector3d MirroredAcross(const Eigen::Vector3d& across, const Eigen::Vector3d& normal)
 {
@@ -42,19 +36,19 @@ Eigen::Vector3d LambertDirection(const Eigen::Vector3d& normal, double u, double
 
 void SoundTransport::Check() const
 {
-  echorama::Check("maxBounces", maxBounces, 0, 100);
-  echorama::Check("dynamicRangeDb", dynamicRangeDb, 10.0, 300.0);
-  echorama::Check("faceReflection", faceReflection, 0.0, 1.0);
-  echorama::Check("faceRadius (mm)", faceRadius, 0.0, 1000.0);
-  echorama::Check("acceptanceDegrees", acceptanceDegrees, 0.1, 90.0);
-  echorama::Check("maxSegments", maxSegments, 1, 1e8);
+  CheckRange("maxBounces", maxBounces, 0, 100);
+  CheckRange("dynamicRangeDb", dynamicRangeDb, 10.0, 300.0);
+  CheckRange("faceReflection", faceReflection, 0.0, 1.0);
+  CheckRange("faceRadius (mm)", faceRadius, 0.0, 1000.0);
+  CheckRange("acceptanceDegrees", acceptanceDegrees, 0.1, 90.0);
+  CheckRange("maxSegments", maxSegments, 1, 1e8);
 }
 
 void SoundConditions::Check() const
 {
-  echorama::Check("frequencyMHz", frequencyMHz, 0.1, 100.0);
-  echorama::Check("assumedSoundSpeed (m/s)", assumedSoundSpeed, 100.0, 10000.0);
-  echorama::Check("maxScanDepth (mm)", maxScanDepth, std::numeric_limits<double>::min(), 1e5);
+  CheckRange("frequencyMHz", frequencyMHz, 0.1, 100.0);
+  CheckRange("assumedSoundSpeed (m/s)", assumedSoundSpeed, 100.0, 10000.0);
+  CheckRange("maxScanDepth (mm)", maxScanDepth, std::numeric_limits<double>::min(), 1e5);
 }
 
 // A way that is still to be followed.

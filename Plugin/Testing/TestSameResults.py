@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The same numbers for VTK and ParaView, tuned and portable kernels, one thread and two."""
+"""The same numbers for VTK and ParaView, tuned and portable kernels, one thread and two.
+
+TestSameResults.py TREE...: under VTK with the kernels of other build trees instead (./run test --cpus).
+"""
 import os
 import pathlib
 import subprocess
@@ -11,17 +14,17 @@ import numpy
 
 here = pathlib.Path(__file__).resolve().parent
 release = pathlib.Path(os.environ["ECHORAMA_KERNELS_DIR"])
-portable = release.parent / "portable"
-paraview_path = os.environ["ECHORAMA_PARAVIEW_PYTHONPATH"]
 release_path = f"{release}/python3/dist-packages"
-runs = {
-    "VTK": ([], {"PYTHONPATH": release_path}),
-    "VTK, one thread": (["taskset", "-c", "0"], {"PYTHONPATH": release_path}),
-    "ParaView": ([], {"PYTHONPATH": paraview_path}),
-    "VTK, portable kernels": ([], {"PYTHONPATH": release_path, "LD_LIBRARY_PATH": f"{portable}/lib"}),
-}
-if not (portable / "lib" / "libEchoramaCoreKernels.so").exists():  # else the others would be found, and agree
-    sys.exit(f"{portable} was not built: there are no portable kernels to compare with")
+runs = {"VTK": ([], {"PYTHONPATH": release_path})}
+trees = [pathlib.Path(path).resolve() for path in sys.argv[1:]]
+if not trees:
+    runs["VTK, one thread"] = (["taskset", "-c", "0"], {"PYTHONPATH": release_path})
+    runs["ParaView"] = ([], {"PYTHONPATH": os.environ["ECHORAMA_PARAVIEW_PYTHONPATH"]})
+    trees = [release.parent / "portable"]
+for tree in trees:
+    if not (tree / "lib" / "libEchoramaCoreKernels.so").exists():  # else those of the release would be found, and agree
+        sys.exit(f"{tree} was not built: there are no kernels to compare with")
+    runs[f"VTK, {tree.name} kernels"] = ([], {"PYTHONPATH": release_path, "LD_LIBRARY_PATH": f"{tree}/lib"})
 
 results = {}
 with tempfile.TemporaryDirectory() as folder:
