@@ -29,6 +29,7 @@ namespace {
 constexpr double HighestRatio = 99.0;
 constexpr int MostPoints = 1000;
 constexpr int MostCandidates = 1000;
+constexpr double FinalStop = 2e-5; // voxels: where the answer stops must not tell one CPU from another
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
 
@@ -176,7 +177,7 @@ public:
       result.localSeconds = SecondsSince(start);
       return result;
     }
-    const LocalAlignResult best = Local(found.front().volumeToWorld, middleMm, finestMm_, 0, progress.Part(0.8, 0.9));
+    const LocalAlignResult best = Local(found.front().volumeToWorld, middleMm, finestMm_, 0, progress.Part(0.8, 0.9), FinalStop);
     result.localSeconds = SecondsSince(start);
 
     // 3. what that is worth
@@ -204,7 +205,8 @@ public:
   double ReachHandMade() const { return std::max(shape_.extent, fixedShape_.extent) / 3.0; }
 
 private:
-  LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int part, const Progress& progress) const
+  LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int part, const Progress& progress,
+                         double stopVoxels = LocalAlignParameters().stopVoxels) const
   {
     LocalAlignParameters local;
     local.coarsestMm = coarsestMm;
@@ -212,6 +214,7 @@ private:
     local.points = p_.points;
     local.minimumOverlap = 0.5 * p_.minimumOverlap;
     local.part = part;
+    local.stopVoxels = stopVoxels;
     local.seed = p_.seed;
     return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, start, local, progress);
   }

@@ -142,11 +142,13 @@ private:
 
   void Descend(bool isLast, double fraction, const Progress& progress)
   {
-    const double tolerance = (isLast ? 0.002 : 0.02) * voxelMm_, longest = 1.5 * voxelMm_;
+    const double small = (isLast ? 0.002 : 0.02) * voxelMm_, stop = isLast ? p_.stopVoxels * voxelMm_ : small;
+    const double longest = 1.5 * voxelMm_;
     const double leastShare = std::min(std::max(p_.minimumOverlap, isLast ? 0.7 * sums_.share : 0.0), sums_.share);
     double damping = 1e-3, stretch = 1.0, merit = Merit(sums_, isLast);
     converged_ = false;
-    for (int iteration = 0; iteration < p_.iterations && !converged_; ++iteration) {
+    bool isDone = false;
+    for (int iteration = 0; iteration < p_.iterations && !isDone; ++iteration) {
       progress(fraction);
       Matrix6 damped = sums_.hessian;
       const double most = damped.diagonal().maxCoeff();
@@ -172,12 +174,12 @@ private:
         sums_ = sums;
         merit = trialMerit;
         damping = std::max(damping * 0.2, 1e-6);
-        converged_ = length < tolerance;
       } else {
-        converged_ = length < tolerance;
         stretch = 1.0;
         damping = std::min(std::max(damping * 8.0, 1e-2), 1e6);
       }
+      converged_ = length < small;
+      isDone = length < stop;
     }
   }
 
@@ -282,6 +284,7 @@ void LocalAlignParameters::Check() const
   check(iterations >= 1 && iterations <= 1000, "the number of iterations must be in [1, 1000]");
   check(points >= 100 && points <= 10000000, "the points must be in [100, 10000000]");
   check(minimumOverlap >= 0.001 && minimumOverlap <= 1.0, "the minimum overlap must be in [0.001, 1]");
+  check(stopVoxels >= 1e-7 && stopVoxels <= 0.002, "the step that ends must be in [1e-7, 0.002] voxels");
   check(part >= 0 && part <= 2, "the part must be 0, 1 or 2");
 }
 

@@ -31,6 +31,7 @@ struct LocalAlignParameters {
   int iterations = 30;          ///< per level, at most, [1, 1000]
   int points = 200000;          ///< drawn in each volume on each level, at most, [100, 10 million]
   double minimumOverlap = 0.05; ///< steps to less overlap are not taken, share of the smaller volume, [0.001, 1]
+  double stopVoxels = 0.002;    ///< the last level ends with a step that moves no point further, voxels, [1e-7, 0.002]
   int part = 0;                 ///< 0: all points; 1 or 2: one of two disjoint halves, a 3D checkerboard of blocks of 12 voxels
   std::uint64_t seed = 1;       ///< of the points
 
@@ -52,7 +53,7 @@ struct LocalAlignResult {
   /// nothing is known (no overlap). Speckle is correlated, so it counts independent blocks of tissue, not voxels.
   Information information = Information::Zero();
   double independentVoxels = 0.0; ///< how many voxels with independent residuals would tell as much
-  bool converged = false;         ///< the last step of the last level was small, and the volumes overlap
+  bool converged = false;         ///< the last step of the last level was below 0.002 voxels, and the volumes overlap
 };
 
 /// Aligns the moving volume with the fixed one from \a movingToWorld, coarse to fine, by Levenberg-Marquardt over rigid

@@ -62,6 +62,25 @@ TEST_P(LocalAlignTest, FindsTheWayHome)
   }
 }
 
+// Where it would stop if it never stopped: the points are the same, so the answers differ by what the last steps left.
+TEST_P(LocalNccAlignTest, ATighterStopEndsCloserToTheOptimum)
+{
+  const auto a = fixed.As(GetParam()), b = moving.As(GetParam());
+  LocalAlignParameters p = Quick();
+  p.iterations = 1000;
+  const auto stoppedAt = [&](double voxels) {
+    p.stopVoxels = voxels;
+    const LocalAlignResult result = LocalAlign(*a, Pose::Identity(), *b, Knocked(0), p);
+    EXPECT_TRUE(result.converged);
+    return result.volumeToWorld;
+  };
+  const Pose optimum = stoppedAt(1e-7);
+  const double loose = Distance(stoppedAt(0.002), optimum, movingGeometry),
+               tight = Distance(stoppedAt(2e-5), optimum, movingGeometry);
+  EXPECT_LT(tight, 1e-4); // mm, voxels of 1 mm
+  EXPECT_LT(tight, 0.2 * loose);
+}
+
 TEST_P(LocalAlignTest, SwappedVolumesGiveTheInverse)
 {
   const auto a = fixed.As(GetParam()), b = moving.As(GetParam());
