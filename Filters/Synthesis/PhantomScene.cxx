@@ -63,7 +63,7 @@ double DistanceFromAxes(const Vector3d& radii, const Vector3d& local)
 }
 
 // The reader: every failure names the place.
-[[noreturn]] void Refuse(const std::string& place, const std::string& reason)
+[[noreturn]] void RefusePhantom(const std::string& place, const std::string& reason)
 {
   throw Error(Error::Kind::BadInput, "phantom scene: " + place + " " + reason);
 }
@@ -72,40 +72,40 @@ const Json& Field(const Json& parent, const char* key, const std::string& place)
 {
   const auto found = parent.find(key);
   if (found == parent.end())
-    Refuse(place, std::string("has no \"") + key + "\"");
+    RefusePhantom(place, std::string("has no \"") + key + "\"");
   return *found;
 }
 
 double NumberFrom(const Json& value, const std::string& place)
 {
   if (!value.is_number())
-    Refuse(place, "is not a number");
+    RefusePhantom(place, "is not a number");
   return value.get<double>();
 }
 
 Vector3d VectorFrom(const Json& value, const std::string& place)
 {
   if (!value.is_array() || value.size() != 3)
-    Refuse(place, "is not a list of three numbers");
+    RefusePhantom(place, "is not a list of three numbers");
   return {NumberFrom(value[0], place), NumberFrom(value[1], place), NumberFrom(value[2], place)};
 }
 
 Inclusion InclusionFrom(const Json& value, const std::string& place)
 {
   if (!value.is_object())
-    Refuse(place, "is not an object");
+    RefusePhantom(place, "is not an object");
   Inclusion inclusion;
   if (const auto name = value.find("name"); name != value.end()) {
     if (!name->is_string())
-      Refuse(place, "has a name that is not a string");
+      RefusePhantom(place, "has a name that is not a string");
     inclusion.name = name->get<std::string>();
   }
   const auto ellipsoid = value.find("ellipsoid"), tube = value.find("tube");
   if ((ellipsoid != value.end()) == (tube != value.end()))
-    Refuse(place, "must have either \"ellipsoid\" or \"tube\"");
+    RefusePhantom(place, "must have either \"ellipsoid\" or \"tube\"");
   if (ellipsoid != value.end()) {
     if (!ellipsoid->is_object())
-      Refuse(place + ", ellipsoid", "is not an object");
+      RefusePhantom(place + ", ellipsoid", "is not an object");
     Ellipsoid shape;
     shape.centre = VectorFrom(Field(*ellipsoid, "centre", place), place + ", centre");
     shape.radii = VectorFrom(Field(*ellipsoid, "radii", place), place + ", radii");
@@ -114,11 +114,11 @@ Inclusion InclusionFrom(const Json& value, const std::string& place)
     inclusion.shape = shape;
   } else {
     if (!tube->is_object())
-      Refuse(place + ", tube", "is not an object");
+      RefusePhantom(place + ", tube", "is not an object");
     Tube shape;
     const Json& path = Field(*tube, "path", place);
     if (!path.is_array())
-      Refuse(place + ", path", "is not a list of points");
+      RefusePhantom(place + ", path", "is not a list of points");
     for (const Json& point : path)
       shape.path.push_back(VectorFrom(point, place + ", path"));
     shape.radius = NumberFrom(Field(*tube, "radius", place), place + ", radius");
@@ -236,13 +236,13 @@ PhantomScene SceneFromJson(const std::string& text)
 {
   const Json root = Json::parse(text, nullptr, false);
   if (!root.is_object())
-    Refuse("the text", "is not a JSON object");
+    RefusePhantom("the text", "is not a JSON object");
   const Json& schema = Field(root, "schema", "the text");
   if (schema != phantomSchema)
-    Refuse("the text", std::string("has a schema other than \"") + phantomSchema + "\"");
+    RefusePhantom("the text", std::string("has a schema other than \"") + phantomSchema + "\"");
   const Json& list = Field(root, "inclusions", "the text");
   if (!list.is_array())
-    Refuse("\"inclusions\"", "is not a list");
+    RefusePhantom("\"inclusions\"", "is not a list");
   PhantomScene scene;
   for (const Json& item : list)
     scene.inclusions.push_back(InclusionFrom(item, "inclusion " + std::to_string(scene.inclusions.size() + 1)));

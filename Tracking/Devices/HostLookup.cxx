@@ -26,7 +26,7 @@ struct Lookup {
   }
 };
 
-[[noreturn]] void Refuse(const std::string& place, const std::string& reason)
+[[noreturn]] void RefuseHost(const std::string& place, const std::string& reason)
 {
   throw Error(Error::Kind::FileSystem, place + ": " + reason);
 }
@@ -49,7 +49,7 @@ std::vector<in_addr> LookUpHost(const std::string& host, const std::string& plac
   lookup->request.ar_request = &lookup->hints;
   gaicb* list[1] = {&lookup->request};
   if (const int failed = getaddrinfo_a(GAI_NOWAIT, list, 1, nullptr))
-    Refuse(place, gai_strerror(failed));
+    RefuseHost(place, gai_strerror(failed));
   while (gai_error(&lookup->request) == EAI_INPROGRESS) {
     const bool late = ClockNow() > until;
     if (late || (stopped && stopped())) {
@@ -57,13 +57,13 @@ std::vector<in_addr> LookUpHost(const std::string& host, const std::string& plac
         lookup.release(); // the resolver still writes to it
       if (!late)
         return {};
-      Refuse(place, "the name was not found in time");
+      RefuseHost(place, "the name was not found in time");
     }
     const timespec wait{0, SliceNanoseconds};
     gai_suspend(list, 1, &wait);
   }
   if (const int failed = gai_error(&lookup->request))
-    Refuse(place, gai_strerror(failed));
+    RefuseHost(place, gai_strerror(failed));
   std::vector<in_addr> found;
   for (const addrinfo* info = lookup->request.ar_result; info; info = info->ai_next) {
     const in_addr address = reinterpret_cast<const sockaddr_in*>(info->ai_addr)->sin_addr;

@@ -7,7 +7,7 @@
 namespace echorama {
 namespace {
 
-[[noreturn]] void Refuse(const std::string& address, const std::string& reason)
+[[noreturn]] void RefuseAddress(const std::string& address, const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, address + ": " + reason);
 }
@@ -25,7 +25,7 @@ TrackerAddress TrackerAddress::Parse(const std::string& text)
   address.text = text;
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos || colon == 0)
-    Refuse(text, "a tracker is named as SCHEME:PLACE, such as igtl://localhost:18944");
+    RefuseAddress(text, "a tracker is named as SCHEME:PLACE, such as igtl://localhost:18944");
   address.scheme = text.substr(0, colon);
   const std::size_t question = text.find('?', colon);
   address.place = text.substr(colon + 1, question == std::string::npos ? std::string::npos : question - colon - 1);
@@ -37,9 +37,9 @@ TrackerAddress TrackerAddress::Parse(const std::string& text)
     const std::string option = text.substr(at, next - at);
     const std::size_t equals = option.find('=');
     if (equals == std::string::npos || equals == 0)
-      Refuse(text, "\"" + option + "\" is not OPTION=VALUE");
+      RefuseAddress(text, "\"" + option + "\" is not OPTION=VALUE");
     if (!address.options.emplace(option.substr(0, equals), option.substr(equals + 1)).second)
-      Refuse(text, "the option " + option.substr(0, equals) + " is given twice");
+      RefuseAddress(text, "the option " + option.substr(0, equals) + " is given twice");
     at = next + 1;
   }
   return address;
@@ -55,7 +55,7 @@ void TrackerAddress::CheckOptions(const std::vector<std::string>& known) const
       list += (list.empty() ? "" : ", ") + option;
     }
     if (!found)
-      Refuse(text, "there is no option " + name + "; there are: " + (list.empty() ? "none" : list));
+      RefuseAddress(text, "there is no option " + name + "; there are: " + (list.empty() ? "none" : list));
   }
 }
 
@@ -66,7 +66,7 @@ double TrackerAddress::Number(const std::string& option, double fallback, double
     return fallback;
   double number = 0.0;
   if (!ReadNumber(found->second, number) || number < low || number > high)
-    Refuse(text, option + " must be a number from " + NumberText(low) + " to " + NumberText(high));
+    RefuseAddress(text, option + " must be a number from " + NumberText(low) + " to " + NumberText(high));
   return number;
 }
 
@@ -88,7 +88,7 @@ TrackerAddress::Endpoint TrackerAddress::HostAndPort(const std::string& fallback
   if (colon != std::string::npos) {
     double port = 0.0;
     if (!ReadNumber(rest.substr(colon + 1), port) || port < 0.0 || port > 65535.0 || port != std::floor(port))
-      Refuse(text, "the port must be a whole number from 0 to 65535");
+      RefuseAddress(text, "the port must be a whole number from 0 to 65535");
     endpoint.port = static_cast<int>(port);
     rest.erase(colon);
   }

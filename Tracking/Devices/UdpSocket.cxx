@@ -15,7 +15,7 @@
 namespace echorama {
 namespace {
 
-[[noreturn]] void Refuse(const std::string& host, int port, const std::string& reason)
+[[noreturn]] void RefuseUdp(const std::string& host, int port, const std::string& reason)
 {
   throw Error(Error::Kind::FileSystem, "udp://" + host + ":" + std::to_string(port) + ": " + reason);
 }
@@ -55,7 +55,7 @@ UdpSocket UdpSocket::Receiving(const std::string& host, int port)
   UdpSocket made;
   made.descriptor_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (!made.IsOpen() || bind(made.descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    Refuse(host, port, std::strerror(errno));
+    RefuseUdp(host, port, std::strerror(errno));
   return made;
 }
 
@@ -65,7 +65,7 @@ UdpSocket UdpSocket::SendingTo(const std::string& host, int port)
   UdpSocket made;
   made.descriptor_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (!made.IsOpen() || connect(made.descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    Refuse(host, port, std::strerror(errno));
+    RefuseUdp(host, port, std::strerror(errno));
   return made;
 }
 
