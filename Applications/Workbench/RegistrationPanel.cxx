@@ -34,7 +34,7 @@ Elements ElementsOf(vtkMatrix4x4* matrix)
   return elements;
 }
 
-QComboBox* Choice(const std::vector<std::string>& names, const char* objectName, const QString& tip, QWidget* parent)
+QComboBox* ChoiceOfNames(const std::vector<std::string>& names, const char* objectName, const QString& tip, QWidget* parent)
 {
   auto* box = new QComboBox(parent);
   box->setObjectName(objectName);
@@ -66,11 +66,12 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : QW
   alignAll_ = new QPushButton(tr("&Align all"), this);
   alignAll_->setObjectName("alignAll");
   alignAll_->setToolTip(tr("Looks for the place of every volume beside the first"));
-  start_ = Choice(AlignStartNames(), "alignStart",
-                  tr("Where all volumes are before: tracked, within 12 degrees and 20 mm of their places; hand-made, within 35 "
-                     "degrees and a third of a volume; unknown, anywhere; automatic, one after the other while it is not clear"),
-                  this);
-  metric_ = Choice(MetricNames(), "alignMetric", tr("The likeness by which places are compared"), this);
+  start_ = ChoiceOfNames(
+      AlignStartNames(), "alignStart",
+      tr("Where all volumes are before: tracked, within 12 degrees and 20 mm of their places; hand-made, within 35 "
+         "degrees and a third of a volume; unknown, anywhere; automatic, one after the other while it is not clear"),
+      this);
+  metric_ = ChoiceOfNames(MetricNames(), "alignMetric", tr("The likeness by which places are compared"), this);
   doubtful_ = new QCheckBox(tr("Take doubtful answers too"), this);
   doubtful_->setObjectName("alignDoubtful");
   doubtful_->setToolTip(tr("Also move volumes whose answer is ambiguous. Failed ones never move."));

@@ -26,7 +26,7 @@ namespace echorama {
 namespace {
 
 // A combination box of names by number, as the stitcher tells them.
-QComboBox* Choice(const char* (*nameOf)(int), const char* objectName, int chosen, const QString& tip, QWidget* parent)
+QComboBox* ChoiceOfMethods(const char* (*nameOf)(int), const char* objectName, int chosen, const QString& tip, QWidget* parent)
 {
   auto* box = new QComboBox(parent);
   box->setObjectName(objectName);
@@ -43,10 +43,10 @@ ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : QWidget(parent
 {
   setObjectName("resultPanel");
   const vtkNew<vtkUltrasoundStitcher> defaults;
-  method_ = Choice(&vtkUltrasoundStitcher::GetMethodName, "stitchMethod", defaults->GetMethod(),
-                   tr("How one volume goes over into the next"), this);
-  texture_ = Choice(&vtkUltrasoundStitcher::GetTextureName, "stitchTexture", defaults->GetTexture(),
-                    tr("What happens to speckle where volumes overlap: mixing blurs it, the others keep it"), this);
+  method_ = ChoiceOfMethods(&vtkUltrasoundStitcher::GetMethodName, "stitchMethod", defaults->GetMethod(),
+                            tr("How one volume goes over into the next"), this);
+  texture_ = ChoiceOfMethods(&vtkUltrasoundStitcher::GetTextureName, "stitchTexture", defaults->GetTexture(),
+                             tr("What happens to speckle where volumes overlap: mixing blurs it, the others keep it"), this);
   const vtkNew<vtkUltrasoundEmbedder> embedding;
   spacing_ = new QDoubleSpinBox(this);
   spacing_->setObjectName("stitchSpacing");

@@ -20,7 +20,7 @@ namespace echorama {
 
 namespace {
 
-constexpr int WatchingMs = 60; ///< how often a slice redraws while something is dragged in another view
+constexpr int SliceWatchingMs = 60; ///< how often a slice redraws while something is dragged in another view
 
 const char* BrushModeOf(Tool tool)
 {
@@ -82,7 +82,7 @@ void SliceCanvas::Look()
 void SliceCanvas::Ask()
 {
   const bool isWatching = bench_->Interacting() && drag_ == Drag::None;
-  redraw_->Ask(isWatching ? WatchingMs : 0);
+  redraw_->Ask(isWatching ? SliceWatchingMs : 0);
 }
 
 void SliceCanvas::DrawNow()

@@ -28,9 +28,9 @@
 namespace echorama {
 
 namespace {
-constexpr int WatchingMs = 80; ///< how often 3D redraws while something is dragged in a slice
-constexpr int RefineMs = 300;  ///< how long nothing must happen before the picture becomes finer
-constexpr int StepMs = 20;     ///< between its steps
+constexpr int VolumeWatchingMs = 80; ///< how often 3D redraws while something is dragged in a slice
+constexpr int RefineMs = 300;        ///< how long nothing must happen before the picture becomes finer
+constexpr int StepMs = 20;           ///< between its steps
 
 /// Turns and pans. VTK's own keys (wireframe, stereo, leaving the program) would come between those of the workbench.
 class CameraStyle : public vtkInteractorStyleTrackballCamera {
@@ -177,7 +177,7 @@ void VolumePane::FitToNew()
 void VolumePane::Ask()
 {
   view_->SetInteractive(true);
-  redraw_->Ask(bench_->Interacting() ? WatchingMs : 0);
+  redraw_->Ask(bench_->Interacting() ? VolumeWatchingMs : 0);
   if (turning_ || bench_->Interacting())
     refine_->Stop();
   else

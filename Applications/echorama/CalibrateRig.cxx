@@ -58,15 +58,6 @@ nlohmann::ordered_json SceneOf(const CalibrationRigParameters& rig, const std::s
           {"volume", {{"spacingMm", 0.8}, {"knockMm", 8}, {"knockDegrees", 6}}}};
 }
 
-void WriteText(const std::string& path, const std::string& text)
-{
-  std::ofstream stream(path);
-  stream << text;
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
-}
-
 void MakeRig(Session& session, const RigOptions& options)
 {
   OutputFolder folder(session, options.folder, {});

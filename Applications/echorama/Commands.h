@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Error.h"
 #include "Session.h"
 #include <CLI/App.hpp>
 #include <functional>
+#include <string>
 
 namespace echorama {
 
@@ -12,6 +14,12 @@ struct Command {
   CLI::App* options = nullptr;
   std::function<void(Session&)> run;
 };
+
+/// Throws Error(InvalidParameter).
+[[noreturn]] inline void Misused(const std::string& reason)
+{
+  throw Error(Error::Kind::InvalidParameter, reason);
+}
 
 // Each adds one subcommand to the program; they lie in files of their own.
 Command InfoCommand(CLI::App& program);

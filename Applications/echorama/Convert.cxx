@@ -22,11 +22,6 @@ struct ConvertOptions {
   std::vector<double> stackSpacingMm;
 };
 
-[[noreturn]] void Misused(const std::string& reason)
-{
-  throw Error(Error::Kind::InvalidParameter, reason);
-}
-
 void ConvertVolume(Session& session, const ConvertOptions& options)
 {
   CheckVolumeOutput(options.output, {options.input});

@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // One transform over all frames.
-struct Track {
+struct TransformTrack {
   std::vector<std::pair<std::string, int>> statuses; // how often each, in order of appearance
   int valid = 0;
   Eigen::AlignedBox3d places; // of the first frame's origin in the second
@@ -65,7 +65,7 @@ Json DescribeSequence(Session& session, const std::string& file)
   const SequenceContent& content = sequence.Content();
   for (const std::string& note : content.notes)
     session.Note(file + ": " + note);
-  std::map<std::string, Track> tracks;
+  std::map<std::string, TransformTrack> tracks;
   std::vector<double> times;
   int validImages = 0;
   session.Time("measure", [&] {
@@ -110,7 +110,7 @@ Json DescribeSequence(Session& session, const std::string& file)
 
   json["transforms"] = Json::object();
   for (const std::string& name : content.transforms) {
-    const Track& track = tracks[name];
+    const TransformTrack& track = tracks[name];
     Json one{{"statuses", Json::object()}};
     std::string line;
     for (const auto& [status, count] : track.statuses) {

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <unistd.h>
 
 namespace fs = std::filesystem;
@@ -146,6 +147,15 @@ void OutputFolder::Commit()
     fs::rename(entry.path(), replacement.Stage(Final(entry.path().filename().string())));
   replacement.Commit();
   made_.clear();
+}
+
+void WriteText(const std::string& path, const std::string& text)
+{
+  std::ofstream stream(path);
+  stream << text;
+  stream.close();
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
 }
 
 } // namespace echorama

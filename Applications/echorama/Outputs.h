@@ -15,6 +15,9 @@ void CheckOutput(const std::string& path, const std::vector<std::string>& inputs
 /// As CheckOutput, for a volume: also throws Error(InvalidParameter) when the extension names no format.
 void CheckVolumeOutput(const std::string& path, const std::vector<std::string>& inputs);
 
+/// Throws Error(FileSystem).
+void WriteText(const std::string& path, const std::string& text);
+
 /// A folder of files that appear all together, or not at all.
 ///
 /// Files are written under their own names into a hidden folder beside their places and moved from there at the end, with

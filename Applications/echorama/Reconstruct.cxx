@@ -47,11 +47,6 @@ struct ReconstructOptions {
   int reach = HoleFillingParameters().reach;
 };
 
-[[noreturn]] void Misused(const std::string& reason)
-{
-  throw Error(Error::Kind::InvalidParameter, reason);
-}
-
 // "FROM:TO:STEP", checked against what is there.
 void SetFrames(Reconstructor* reconstructor, const std::string& text, const SequenceContent& content)
 {

@@ -31,14 +31,14 @@ struct SynthesizeOptions {
 };
 
 // A view: where the probe is, and at each step of its sweep if it moves meanwhile.
-struct View {
+struct SceneView {
   Pose probeToWorld;
   std::vector<Pose> steps;
 };
 
-std::vector<View> ViewsOf(const SynthesisScene& scene, const SynthesisParameters& parameters)
+std::vector<SceneView> ViewsOf(const SynthesisScene& scene, const SynthesisParameters& parameters)
 {
-  std::vector<View> views;
+  std::vector<SceneView> views;
   if (const auto* row = std::get_if<SceneRow>(&scene.views)) {
     for (const PhantomView& view : PhantomViews(parameters.probe, row->count, row->overlap)) {
       const Pose pose = row->middle.ProbeToWorld() * view.probeToWorld;
@@ -58,15 +58,6 @@ std::vector<View> ViewsOf(const SynthesisScene& scene, const SynthesisParameters
     }
   }
   return views;
-}
-
-void WriteText(const std::string& path, const std::string& text)
-{
-  std::ofstream stream(path);
-  stream << text << '\n';
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
 }
 
 void WriteTissue(Session& session, vtkPolyData* tissue, const std::string& path)
@@ -96,7 +87,8 @@ nlohmann::ordered_json JsonOf(const SynthesisCost& cost)
 }
 
 // Where the balls of rigs are, or places at random.
-std::vector<Landmark> PlacesOf(const SynthesisScene& scene, int count, const ProbeGeometry& probe, const std::vector<View>& views)
+std::vector<Landmark> PlacesOf(const SynthesisScene& scene, int count, const ProbeGeometry& probe,
+                               const std::vector<SceneView>& views)
 {
   std::vector<Landmark> places;
   for (const SceneItem& item : scene.tissue)
@@ -104,7 +96,7 @@ std::vector<Landmark> PlacesOf(const SynthesisScene& scene, int count, const Pro
       for (const Landmark& ball : CalibrationLandmarks(*rig))
         places.push_back(ball);
   std::vector<Pose> poses;
-  for (const View& view : views)
+  for (const SceneView& view : views)
     poses.push_back(view.probeToWorld);
   const auto more = SharedPlaces(scene.seed, count, probe, poses);
   places.insert(places.end(), more.begin(), more.end());
@@ -118,9 +110,9 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
   if (options.spacingMm)
     scene.volume.spacingMm = *options.spacingMm;
   SynthesisParameters parameters = scene.Parameters();
-  const std::vector<View> views = ViewsOf(scene, parameters);
+  const std::vector<SceneView> views = ViewsOf(scene, parameters);
   std::vector<Landmark> places = PlacesOf(scene, options.landmarks, parameters.probe, views);
-  if (!places.empty() && std::any_of(views.begin(), views.end(), [](const View& view) { return !view.steps.empty(); })) {
+  if (!places.empty() && std::any_of(views.begin(), views.end(), [](const SceneView& view) { return !view.steps.empty(); })) {
     session.Note("no landmarks are listed: the probe moves while it sweeps, so that a place is not seen where it lies");
     places.clear();
   }
@@ -147,7 +139,7 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
     session.Note(note);
   session.result["triangles"] = tissue->GetNumberOfPolys();
   session.result["seed"] = scene.seed;
-  WriteText(folder.Stage("scene.json"), SceneToJson(scene));
+  WriteText(folder.Stage("scene.json"), SceneToJson(scene) + "\n");
   WriteTissue(session, tissue, folder.Stage("geometry.vtp"));
 
   vtkNew<vtkUltrasoundSynthesizer> synthesizer;

@@ -14,7 +14,7 @@ using namespace echorama;
 
 namespace {
 
-constexpr int Done = 0, Failed = 1, Misused = 2;
+constexpr int ExitDone = 0, ExitFailed = 1, ExitMisused = 2;
 
 int Run(const Command& command, bool json, int threads)
 {
@@ -25,11 +25,11 @@ int Run(const Command& command, bool json, int threads)
     command.run(session);
     return session.Finish();
   } catch (const Error& error) {
-    return session.Fail(error.what(), error.GetKind() == Error::Kind::InvalidParameter ? Misused : Failed);
+    return session.Fail(error.what(), error.GetKind() == Error::Kind::InvalidParameter ? ExitMisused : ExitFailed);
   } catch (const std::bad_alloc&) {
-    return session.Fail(command.options->get_name() + ": there is not enough memory", Failed);
+    return session.Fail(command.options->get_name() + ": there is not enough memory", ExitFailed);
   } catch (const std::exception& error) {
-    return session.Fail(error.what(), Failed);
+    return session.Fail(error.what(), ExitFailed);
   }
 }
 
@@ -69,10 +69,10 @@ int main(int argc, char** argv)
     const std::string name = chosen.empty() ? "" : chosen.front()->get_name();
     const bool unknown = chosen.empty() && argc > 1 && argv[1][0] != '-';
     const std::string reason = unknown ? argv[1] + std::string(": there is no such command") : error.what();
-    return Session(name, json).Fail(reason + " (see echorama " + (name.empty() ? "" : name + " ") + "--help)", Misused);
+    return Session(name, json).Fail(reason + " (see echorama " + (name.empty() ? "" : name + " ") + "--help)", ExitMisused);
   }
   for (const Command& command : commands)
     if (command.options->parsed())
       return Run(command, json, threads);
-  return Misused; // not reached: the parser requires a subcommand
+  return ExitMisused; // not reached: the parser requires a subcommand
 }
