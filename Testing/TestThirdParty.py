@@ -22,7 +22,7 @@ def run(*command):
 def stems(packages):
     """The source of each installed package, by package: libceres3 -> ceres-solver, libboost1.74-dev -> boost."""
     lines = run("dpkg-query", "-W", "-f", "${binary:Package} ${source:Package}\n", *packages).split("\n")
-    return {line.split()[0].split(":")[0]: re.sub(r"(-defaults|[-\d.]+)$", "", line.split()[1]) for line in lines if " " in line}
+    return {line.split()[0].split(":")[0]: re.sub(r"[-\d.]*(-defaults)?$", "", line.split()[1]) for line in lines if " " in line}
 
 
 def owners(paths):
