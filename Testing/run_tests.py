@@ -272,7 +272,8 @@ def main():
     options = parser.parse_args()
 
     if options.targets:
-        print(*targets_of(matching(listed_by_ctest(options.tree), options)), sep="\n")
+        entries = [entry for entry in listed_by_ctest(options.tree) if not set(options.without) & set(entry.labels)]
+        print(*targets_of(matching(entries, options)), sep="\n")
         return 0
     count = Count(ExpectedSkips(options.skips, options.tree.name, options.data))
     run(options, count)
