@@ -138,10 +138,13 @@ endmacro()
 # that Fuzzing/Seeds<Name>.py, if there is one, writes to the folder it is given.
 macro(_echorama_add_fuzzers name)
   file(GLOB fuzzers CONFIGURE_DEPENDS Fuzzing/Fuzz*.cxx)
+  # clang takes a precompiled header only with the sanitizers that it was made with.
   if(room_FUZZED)
     set_property(SOURCE ${room_FUZZED} APPEND PROPERTY COMPILE_OPTIONS -fsanitize=fuzzer-no-link)
+    set_property(SOURCE ${room_FUZZED} PROPERTY SKIP_PRECOMPILE_HEADERS ON)
   elseif(fuzzers)
     target_compile_options(${name}Kernels PRIVATE -fsanitize=fuzzer-no-link)
+    set_property(TARGET ${name}Kernels PROPERTY DISABLE_PRECOMPILE_HEADERS ON)
   endif()
   foreach(fuzzer IN LISTS fuzzers)
     get_filename_component(target ${fuzzer} NAME_WE)

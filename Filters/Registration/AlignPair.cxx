@@ -29,7 +29,7 @@ namespace {
 constexpr double HighestRatio = 99.0;
 constexpr int MostPoints = 1000;
 constexpr int MostCandidates = 1000;
-constexpr double FinalStop = 2e-5; // voxels: where the answer stops must not tell one CPU from another
+constexpr double FinalStop = 2e-5; // voxels: where the answer stops should tell little of the CPU
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
 

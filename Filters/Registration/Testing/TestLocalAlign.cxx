@@ -68,17 +68,20 @@ TEST_P(LocalNccAlignTest, ATighterStopEndsCloserToTheOptimum)
   const auto a = fixed.As(GetParam()), b = moving.As(GetParam());
   LocalAlignParameters p = Quick();
   p.iterations = 1000;
-  const auto stoppedAt = [&](double voxels) {
-    p.stopVoxels = voxels;
-    const LocalAlignResult result = LocalAlign(*a, Pose::Identity(), *b, Knocked(0), p);
-    EXPECT_TRUE(result.converged);
-    return result.volumeToWorld;
-  };
-  const Pose optimum = stoppedAt(1e-7);
-  const double loose = Distance(stoppedAt(0.002), optimum, movingGeometry),
-               tight = Distance(stoppedAt(2e-5), optimum, movingGeometry);
-  EXPECT_LT(tight, 1e-4); // mm, voxels of 1 mm
-  EXPECT_LT(tight, 0.2 * loose);
+  double loose = 0.0, tight = 0.0; // mm, of three starts; voxels of 1 mm
+  for (std::uint64_t item = 0; item < 3; ++item) {
+    const auto stoppedAt = [&](double voxels) {
+      p.stopVoxels = voxels;
+      const LocalAlignResult result = LocalAlign(*a, Pose::Identity(), *b, Knocked(item), p);
+      EXPECT_TRUE(result.converged);
+      return result.volumeToWorld;
+    };
+    const Pose optimum = stoppedAt(1e-7);
+    loose += Distance(stoppedAt(0.002), optimum, movingGeometry);
+    tight += Distance(stoppedAt(2e-5), optimum, movingGeometry);
+  }
+  EXPECT_LT(tight, 3e-4);
+  EXPECT_LT(tight, 0.5 * loose);
 }
 
 TEST_P(LocalAlignTest, SwappedVolumesGiveTheInverse)
