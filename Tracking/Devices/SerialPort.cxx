@@ -48,7 +48,6 @@ std::string WhyNot(int error)
   }
 }
 
-
 int MillisecondsUntil(Clock::time_point end)
 {
   const auto left = std::chrono::duration_cast<std::chrono::microseconds>(end - Clock::now()).count();

@@ -13,7 +13,6 @@
 namespace echorama {
 namespace {
 
-
 constexpr double Glance = 0.05; // seconds between looks at whether a waiting drag has ended
 constexpr double Repeat = 1.0;  // seconds within which edits of one label are one
 
