@@ -31,8 +31,7 @@ std::vector<TimedPose> PosesOf(const std::string& path, const std::string& trans
     Pose pose = Pose::Identity();
     pose.translation() = found.matrix.translation();
     // Trackers write some six digits: the nearest rotation is meant.
-    Eigen::JacobiSVD<Eigen::Matrix3d> svd(found.matrix.linear(), Eigen::ComputeFullU | Eigen::ComputeFullV);
-    pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+    pose.linear() = NearestRotation(found.matrix.linear());
     if (!IsRotation(pose.linear()) || (found.matrix.linear() - pose.linear()).norm() > 1e-2)
       throw Error(Error::Kind::BadInput,
                   path + ": " + transform + " of frame " + std::to_string(i) + " is not a pose: it has scale, shear or a mirror");

@@ -3,6 +3,7 @@
 // the rotation (through the quaternion), because the antisymmetric part vanishes there.
 #include "Core/Geometry/RigidTransform.h"
 #include <cmath>
+#include <Eigen/SVD>
 
 namespace echorama {
 
@@ -93,6 +94,13 @@ Pose MotionAbout(const Eigen::Vector3d& centre, const Eigen::Vector3d& rotation,
 double RotationAngle(const Pose& pose)
 {
   return LogRotation(pose.linear()).norm();
+}
+
+Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& M)
+{
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const bool isMirror = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0;
+  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, isMirror ? -1.0 : 1.0).asDiagonal() * svd.matrixV().transpose();
 }
 
 bool IsRotation(const Eigen::Matrix3d& M, double tolerance)

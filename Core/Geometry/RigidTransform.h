@@ -34,6 +34,9 @@ Pose MotionAbout(const Eigen::Vector3d& centre, const Eigen::Vector3d& rotation,
 /// Angle of the rotation of a pose, radians in [0, pi].
 double RotationAngle(const Pose& pose);
 
+/// The proper rotation R that is nearest to M: it has the largest trace of R^T M.
+Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& M);
+
 /// Whether M is a proper rotation: orthonormal with determinant +1, to within \a tolerance per entry.
 bool IsRotation(const Eigen::Matrix3d& M, double tolerance = 1e-5);
 

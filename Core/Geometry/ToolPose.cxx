@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Geometry/ToolPose.h"
 #include "Core/Base/Utf8.h"
-#include <Eigen/SVD>
 #include <string_view>
 
 namespace echorama {
@@ -56,12 +55,8 @@ bool NearestPose(const Eigen::Matrix4d& matrix, Pose& pose)
   const Eigen::Matrix3d turn = matrix.topLeftCorner<3, 3>();
   if (!IsRotation(turn, 1e-3))
     return false;
-  if (IsRotation(turn, 1e-13)) { // one already, and stays so to the last bit however often it is written and read
-    pose.linear() = turn;
-  } else {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turn, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    pose.linear() = svd.matrixU() * svd.matrixV().transpose();
-  }
+  // One already stays so to the last bit however often it is written and read.
+  pose.linear() = IsRotation(turn, 1e-13) ? turn : NearestRotation(turn);
   pose.translation() = matrix.topRightCorner<3, 1>();
   pose.makeAffine();
   return true;

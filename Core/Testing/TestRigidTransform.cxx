@@ -106,6 +106,24 @@ TEST(RigidTransform, MotionAboutACentreLeavesItThere)
   EXPECT_NEAR(RotationAngle(motion), std::sqrt(0.14), 1e-14);
 }
 
+TEST(RigidTransform, NoRotationIsNearerThanTheNearest)
+{
+  Random random(4);
+  for (int i = 0; i < 200; ++i) {
+    Eigen::Matrix3d M = ExpRotation(3.0 * random.Direction());
+    for (int k = 0; k < 9; ++k)
+      M(k / 3, k % 3) += random.Uniform(-0.4, 0.4);
+    if (i % 2 == 1)
+      M.col(0) = -M.col(0); // nearly a mirror
+    const Eigen::Matrix3d nearest = NearestRotation(M);
+    ASSERT_TRUE(IsRotation(nearest, 1e-13));
+    for (int k = 0; k < 20; ++k) {
+      const Eigen::Matrix3d other = ExpRotation(random.Uniform(0.0, k < 10 ? 0.1 : 3.0) * random.Direction()) * nearest;
+      EXPECT_LE((nearest - M).norm(), (other - M).norm() + 1e-13);
+    }
+  }
+}
+
 TEST(RigidTransform, WhatIsARotation)
 {
   EXPECT_TRUE(IsRotation(Eigen::Matrix3d::Identity()));

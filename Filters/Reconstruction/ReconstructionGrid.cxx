@@ -6,12 +6,12 @@
 #include "ReconstructionGrid.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
+#include "Core/Geometry/RigidTransform.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <limits>
 #include <optional>
 #include <string>
@@ -38,14 +38,6 @@ Eigen::AlignedBox3d BoxAlong(const Eigen::Matrix3d& directions, const std::vecto
 double Cost(const Eigen::AlignedBox3d& box, double spacing)
 {
   return (box.sizes().array() + spacing).prod();
-}
-
-// The nearest rotation.
-Eigen::Matrix3d Orthonormal(const Eigen::Matrix3d& m)
-{
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1.0, 1.0, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0);
-  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
 // The line that is nearest to an axis of all images, pointing as most of them do: whatever their order, and with images that were
@@ -83,7 +75,7 @@ std::optional<Eigen::Matrix3d> MeanImage(const std::vector<FramePlace>& frames)
     return std::nullopt;
   Eigen::Matrix3d axes;
   axes << *across, *down, across->cross(*down).normalized();
-  return Orthonormal(axes);
+  return NearestRotation(axes);
 }
 
 // Principal directions, each along the axis of \a image that it is nearest to.

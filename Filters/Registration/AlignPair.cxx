@@ -15,12 +15,12 @@
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <Eigen/Eigenvalues>
 #include <limits>
 
 namespace echorama {
@@ -102,8 +102,8 @@ std::string LeastDetermined(const Information& covariance, double radius)
   Information scaled = covariance; // rotations by what they move at the rim
   scaled.rightCols<3>() *= radius;
   scaled.bottomRows<3>() *= radius;
-  const Eigen::SelfAdjointEigenSolver<Information> eigen(scaled);
-  const Eigen::Matrix<double, 6, 1> worst = eigen.eigenvectors().col(5);
+  const SymmetricEigen eigen = EigenOfSymmetric(scaled);
+  const Eigen::Matrix<double, 6, 1> worst = eigen.vectors.col(5);
   const bool turns = worst.tail<3>().norm() > worst.head<3>().norm();
   const Eigen::Vector3d axis = (turns ? worst.tail<3>() : worst.head<3>()).normalized();
   return std::string(turns ? "a turn about" : "a move along") + " the direction (" + Number(axis.x(), 2) + ", " +
@@ -345,9 +345,10 @@ Information CovarianceOf(const Information& information, double radiusMm)
   Information scaled = unit.cwiseInverse().asDiagonal() * information * unit.cwiseInverse().asDiagonal();
   if (!scaled.allFinite())
     scaled.setZero(); // nothing is known
-  const Eigen::SelfAdjointEigenSolver<Information> eigen(0.5 * (scaled + scaled.transpose()));
-  const Eigen::Matrix<double, 6, 1> variances = eigen.eigenvalues().cwiseMax(1.0 / (FarMm * FarMm)).cwiseInverse();
-  return unit.cwiseInverse().asDiagonal() * eigen.eigenvectors() * variances.asDiagonal() * eigen.eigenvectors().transpose() *
+  scaled = 0.5 * (scaled + scaled.transpose()).eval();
+  const SymmetricEigen eigen = EigenOfSymmetric(scaled);
+  const Eigen::Matrix<double, 6, 1> variances = eigen.values.cwiseMax(1.0 / (FarMm * FarMm)).cwiseInverse();
+  return unit.cwiseInverse().asDiagonal() * eigen.vectors * variances.asDiagonal() * eigen.vectors.transpose() *
          unit.cwiseInverse().asDiagonal();
 }
 

@@ -15,11 +15,10 @@
 // too: its parts, summed over blocks of tissue larger than the speckle's and the windows' correlation, vary from block to block,
 // whatever the correlation inside. Both give the covariance of the estimate as H^-1 B H^-1.
 #include "LocalAlign.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Metric.h"
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <limits>
 
 namespace echorama {
@@ -156,7 +155,7 @@ private:
         return;
       for (int d = 0; d < 6; ++d)
         damped(d, d) += damping * damped(d, d) + 1e-9 * std::max(damped(d, d), 1e-6 * most);
-      Vector6 step = -stretch * damped.ldlt().solve(sums_.gradient);
+      Vector6 step = -stretch * SolveSymmetric(damped, sums_.gradient);
       if (!step.allFinite())
         return;
       // What the step does to the points of the overlap, at most.
@@ -236,23 +235,23 @@ private:
       noise += g * g.transpose();
       ++counted;
     }
-    const Eigen::SelfAdjointEigenSolver<Matrix6> gn(gaussNewton);
-    const double largest = gn.eigenvalues().maxCoeff();
+    const SymmetricEigen gn = EigenOfSymmetric(gaussNewton);
+    const double largest = gn.values.maxCoeff();
     if (!(largest > 0.0) || counted < 2)
       return;
     const Matrix6 regular = gaussNewton + 1e-9 * largest * Matrix6::Identity();
-    const double factor = (regular.ldlt().solve(noise)).trace() / 6.0;
+    const double factor = SolveSymmetric(regular, noise).trace() / 6.0;
     if (!(factor > 0.0) || !std::isfinite(factor))
       return;
     // Few blocks say little about 21 numbers: they are drawn towards what all directions have in common.
     constexpr double Prior = 12.0;
     noise = (counted * noise + Prior * factor * regular) / (counted + Prior);
     // Directions in which the measure does not curve down at all are as good as not known.
-    const Eigen::SelfAdjointEigenSolver<Matrix6> bent(curvature);
-    const Vector6 kept = bent.eigenvalues().cwiseMax(1e-3 * largest);
-    const Matrix6 hessian = bent.eigenvectors() * kept.asDiagonal() * bent.eigenvectors().transpose();
+    const SymmetricEigen bent = EigenOfSymmetric(curvature);
+    const Vector6 kept = bent.values.cwiseMax(1e-3 * largest);
+    const Matrix6 hessian = bent.vectors * kept.asDiagonal() * bent.vectors.transpose();
     const Matrix6 unscale = scale.cwiseInverse().asDiagonal();
-    Information information = unscale * (hessian * noise.ldlt().solve(hessian)) * unscale;
+    Information information = unscale * (hessian * SolveSymmetric(noise, hessian)) * unscale;
     information = 0.5 * (information + information.transpose()).eval();
     if (!information.allFinite())
       return;

@@ -15,10 +15,10 @@
 #include "PoseGraph.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "PoseGraphSolver.h"
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Eigenvalues>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -353,19 +353,21 @@ Graph::Judgement Graph::Judge(std::size_t e, const MarginalCovariances& covarian
   const Information predicted = edges_[e].root * covariances.OfEdge(e) * edges_[e].root.transpose();
   if (!stands[e]) {
     const Information covariance = Information::Identity() + predicted;
-    return {DistanceMm(gap, p_.radiusMm), std::sqrt(whitened.dot(covariance.ldlt().solve(whitened)))};
+    const Twist weighed = SolveSymmetric(covariance, whitened);
+    return {DistanceMm(gap, p_.radiusMm), std::sqrt(whitened.dot(weighed))};
   }
   // It stands, and has pulled the prediction towards itself: that is taken back. Directions in which nothing but the edge
   // itself holds its volumes cannot be judged.
-  const Eigen::SelfAdjointEigenSolver<Information> solver(Information::Identity() - predicted);
+  const Information others = Information::Identity() - predicted;
+  const SymmetricEigen solver = EigenOfSymmetric(others);
   Twist alone = Twist::Zero();
   double square = 0.0;
   for (int i = 0; i < 6; ++i) {
-    const double share = solver.eigenvalues()[i];
+    const double share = solver.values[i];
     if (share < 1e-6)
       continue;
-    const double along = solver.eigenvectors().col(i).dot(whitened);
-    alone += solver.eigenvectors().col(i) * (along / share);
+    const double along = solver.vectors.col(i).dot(whitened);
+    alone += solver.vectors.col(i) * (along / share);
     square += along * along / share;
   }
   return {DistanceMm(edges_[e].root.partialPivLu().solve(alone), p_.radiusMm), std::sqrt(square)};
@@ -700,10 +702,9 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
     // Edges that disagree more than they claim are less sure than they claim.
     const Information covariance = covariances.OfVolume(number) * std::max(1.0, result.consistency * result.consistency);
     const Information alike = scale.asDiagonal() * covariance * scale.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Information> solver(alike);
-    result.isDetermined[v] = std::sqrt(solver.eigenvalues().maxCoeff()) <= p.undeterminedMm;
-    const Information inverse =
-        solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+    const SymmetricEigen solver = EigenOfSymmetric(alike);
+    result.isDetermined[v] = std::sqrt(solver.values.maxCoeff()) <= p.undeterminedMm;
+    const Information inverse = solver.vectors * solver.values.cwiseInverse().asDiagonal() * solver.vectors.transpose();
     result.information[v] = turn * (scale.asDiagonal() * inverse * scale.asDiagonal()) * turn.transpose();
   }
   progress(1.0);

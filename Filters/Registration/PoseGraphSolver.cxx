@@ -6,11 +6,11 @@
 // lie on the pattern of the Cholesky factor, where the inverse follows from the factor column by column, from the last to
 // the first (Takahashi, Fagan, Chin 1973). The cost is that of the factor; no column of the inverse is formed whole.
 #include "PoseGraphSolver.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include <algorithm>
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 #include <cmath>
-#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 
 namespace echorama {
@@ -61,13 +61,13 @@ WeighedEdge::WeighedEdge(const PoseEdge& edge, const PoseGraphParameters& p)
   Twist scale;
   scale << 1.0, 1.0, 1.0, p.radiusMm, p.radiusMm, p.radiusMm;
   const Information symmetric = 0.5 * (edge.information + edge.information.transpose());
-  const Eigen::SelfAdjointEigenSolver<Information> solver(scale.cwiseInverse().asDiagonal() * symmetric *
-                                                          scale.cwiseInverse().asDiagonal());
+  const Information scaled = scale.cwiseInverse().asDiagonal() * symmetric * scale.cwiseInverse().asDiagonal();
+  const SymmetricEigen solver = EigenOfSymmetric(scaled);
   variance = 0.0;
   for (int i = 0; i < 6; ++i) {
-    const double own = std::max(0.0, solver.eigenvalues()[i]);
+    const double own = std::max(0.0, solver.values[i]);
     const double weight = own / (1.0 + own * p.floorMm * p.floorMm) + 1.0 / (WorstMm * WorstMm);
-    const Twist direction = solver.eigenvectors().col(i);
+    const Twist direction = solver.vectors.col(i);
     root.row(i) = std::sqrt(weight) * direction.cwiseProduct(scale).transpose();
     variance += (direction.head<3>().squaredNorm() + direction.tail<3>().squaredNorm() * 2.0 / 3.0) / weight;
   }

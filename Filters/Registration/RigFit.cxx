@@ -16,12 +16,11 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Core/Imaging/Sampling.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <optional>
 
 namespace echorama {
@@ -175,13 +174,9 @@ Pose Nearest(const std::vector<Vector3d>& from, const std::vector<Vector3d>& to)
   Eigen::Matrix3d product = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < from.size(); ++i)
     product += (to[i] - b) * (from[i] - a).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
-  if (turn.determinant() < 0.0) // a mirror: three points lie in a plane, which both fit
-    turn = svd.matrixU() * Vector3d(1.0, 1.0, -1.0).asDiagonal() * svd.matrixV().transpose();
   Pose pose = Pose::Identity();
-  pose.linear() = turn;
-  pose.translation() = b - turn * a;
+  pose.linear() = NearestRotation(product); // no mirror, though three points, which lie in a plane, would fit as well
+  pose.translation() = b - pose.linear() * a;
   return pose;
 }
 
@@ -418,7 +413,7 @@ std::optional<Vector3d> FitBall(const Scene& scene, const VolumeView<const float
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - direction * direction.transpose();
     normal += 0.5 * total * across;
     right += 0.5 * total * across * (centroid - centre);
-    const Vector3d step = normal.ldlt().solve(right);
+    const Vector3d step = SolveSymmetric(normal, right);
     centre += step;
     if (step.norm() < 1e-4)
       break;

@@ -7,9 +7,9 @@
 // connected group is fixed; what is contradicted by more than a hundredth counts by its size, not its square (Huber).
 #include "StitchGain.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Cholesky>
 #include <numeric>
 
 namespace echorama {
@@ -255,7 +255,7 @@ std::vector<double> SolveGraph(int count, const std::vector<Equation>& equations
       right[e.a] += weight * e.difference;
       right[e.b] -= weight * e.difference;
     }
-    x = matrix.ldlt().solve(right);
+    x = SolveSymmetric(matrix, right);
     for (std::size_t i = 0; i < equations.size(); ++i)
       residuals[i] = std::abs(x[equations[i].a] - x[equations[i].b] - equations[i].difference);
   }

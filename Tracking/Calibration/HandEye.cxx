@@ -8,6 +8,7 @@
 #include "Tracking/Calibration/HandEye.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/HandEyeAdvice.h"
@@ -17,7 +18,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <Eigen/Cholesky>
 
 namespace echorama {
 namespace {
@@ -207,8 +207,7 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   // How every scan fits.
   double sumMm = 0.0, sumDegrees = 0.0, chiSquare = 0.0;
   result.residuals.resize(named.size());
-  const Eigen::Matrix<double, 6, 6> weight =
-      model.Covariance(result.solution.volumeToSensor).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+  const Eigen::Matrix<double, 6, 6> weight = InverseOfSymmetric(model.Covariance(result.solution.volumeToSensor));
   std::string outliers;
   for (std::size_t i = 0; i < count; ++i) {
     HandEyeResidual& residual = result.residuals[numbers[i]];

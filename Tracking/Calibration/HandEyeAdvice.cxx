@@ -3,11 +3,11 @@
 // every candidate is judged by the covariance it would lead to, without a simulation. Some 100 candidates, 12x12 each.
 #include "Tracking/Calibration/HandEyeAdvice.h"
 #include "Core/Base/Angles.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <Eigen/Cholesky>
 #include <Eigen/SVD>
 
 namespace echorama {
@@ -84,7 +84,7 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
     const Eigen::Matrix<double, 6, 12> jacobian = model.Jacobian(static_cast<int>(pairs.size() + i), Twist::Zero());
     const Eigen::Matrix<double, 6, 3> gain = jacobian * top.transpose();
     const Eigen::Matrix<double, 6, 6> seen = noise + jacobian * covariance * jacobian.transpose();
-    candidates[i].covariance = covariance.topLeftCorner<3, 3>() - gain.transpose() * seen.ldlt().solve(gain);
+    candidates[i].covariance = covariance.topLeftCorner<3, 3>() - gain.transpose() * SolveSymmetric(seen, gain);
     candidates[i].variance = candidates[i].covariance.trace();
   }
   std::stable_sort(candidates.begin(), candidates.end(),

@@ -8,26 +8,15 @@
 // motion counts by the sine of half its angle, squared.
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include <cmath>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 
 namespace echorama {
 namespace {
 
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
 using Vector9 = Eigen::Matrix<double, 9, 1>;
 
 constexpr double LargeTurn = 2.6; // radians
-
-// The rotation that has the largest trace with m.
-Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& m)
-{
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign < 0.0 ? -1.0 : 1.0).asDiagonal() * svd.matrixV().transpose();
-}
 
 // A rotation from nine numbers, column by column, that are one up to a factor of either sign.
 Eigen::Matrix3d RotationOf(const Vector9& numbers)
@@ -37,7 +26,7 @@ Eigen::Matrix3d RotationOf(const Vector9& numbers)
 }
 
 // vec(A X B^T) = (B kron A) vec(X), columns one below the other.
-void AddKronecker(const Eigen::Matrix3d& B, const Eigen::Matrix3d& A, Matrix9& sum)
+void AddKronecker(const Eigen::Matrix3d& B, const Eigen::Matrix3d& A, Eigen::MatrixXd& sum)
 {
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column)
@@ -63,11 +52,12 @@ private:
 // R_A R_C = R_C R_B in all nine numbers: the eigenvector of the least eigenvalue (Andreff, Horaud, Espiau 1999).
 Eigen::Matrix3d AndreffRotation(const std::vector<HandEyeMotion>& motions)
 {
-  Matrix9 sum = Matrix9::Zero();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, 9);
   for (const HandEyeMotion& motion : motions)
     AddKronecker(motion.volume.linear(), motion.sensor.linear(), sum); // R_A X R_B^T = X
-  const Matrix9 normal = 2.0 * static_cast<double>(motions.size()) * Matrix9::Identity() - sum - sum.transpose();
-  return RotationOf(Eigen::SelfAdjointEigenSolver<Matrix9>(normal).eigenvectors().col(0));
+  const Eigen::MatrixXd all = 2.0 * static_cast<double>(motions.size()) * Eigen::MatrixXd::Identity(9, 9);
+  const Eigen::MatrixXd normal = all - sum - sum.transpose();
+  return RotationOf(EigenOfSymmetric(normal).vectors.col(0));
 }
 
 std::vector<Turn> TurnsOf(const std::vector<HandEyeMotion>& motions)
@@ -92,7 +82,7 @@ std::vector<Turn> TurnsOf(const std::vector<HandEyeMotion>& motions)
 // linear in the nine numbers of C and each motion's cosine and sine, which are eliminated.
 Eigen::Matrix3d ShiuAhmadRotation(const std::vector<Turn>& turns)
 {
-  Matrix9 normal = Matrix9::Zero();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(9, 9);
   Vector9 right = Vector9::Zero();
   for (const Turn& turn : turns) {
     if (turn.a.norm() < 1e-9 || turn.b.norm() < 1e-9)
@@ -101,13 +91,15 @@ Eigen::Matrix3d ShiuAhmadRotation(const std::vector<Turn>& turns)
     const double weight = std::pow(std::sin(0.5 * turn.b.norm()), 2);
     const Eigen::Matrix3d some = Eigen::Quaterniond::FromTwoVectors(b, a).toRotationMatrix(); // takes k_B to k_A
     const Eigen::Matrix3d x = a * b.transpose(), y = some - x, z = Hat(a) * some;
-    const auto vec = [](const Eigen::Matrix3d& m) { return Vector9(Eigen::Map<const Vector9>(m.data())); };
     // |Y|^2 = |Z|^2 = 2, and Y, Z are orthogonal to each other and to X.
-    const Matrix9 open = Matrix9::Identity() - 0.5 * vec(y) * vec(y).transpose() - 0.5 * vec(z) * vec(z).transpose();
-    normal += weight * open;
-    right += weight * vec(x);
+    normal.diagonal().array() += weight;
+    for (const Eigen::Matrix3d* m : {&y, &z}) {
+      const Eigen::Map<const Eigen::VectorXd> vec(m->data(), 9);
+      normal -= 0.5 * weight * vec * vec.transpose();
+    }
+    right += weight * Eigen::Map<const Vector9>(x.data());
   }
-  return RotationOf(normal.ldlt().solve(right));
+  return RotationOf(SolveSymmetric(normal, right));
 }
 
 // Tsai and Lenz 1989: (P_A + P_B) x p = P_B - P_A with P the axis times 2 sin(angle / 2) and p that of C times tan(angle / 2).
@@ -132,7 +124,7 @@ Eigen::Matrix3d TsaiLenzRotation(const std::vector<Turn>& turns)
       normal += cross.transpose() * cross;
       right += cross.transpose() * (b - a);
     }
-    const Eigen::Vector3d p = normal.ldlt().solve(right);
+    const Eigen::Vector3d p = SolveSymmetric(normal, right);
     if (!p.allFinite())
       continue;
     const Eigen::Matrix3d rotation =
@@ -187,7 +179,7 @@ Eigen::Matrix3d HoraudRotation(const std::vector<Turn>& turns)
     const Eigen::Matrix4d open = Left(turn.QuaternionA()) - Right(turn.QuaternionB());
     normal += open.transpose() * open;
   }
-  return RotationOfQuaternion(Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(normal).eigenvectors().col(0));
+  return RotationOfQuaternion(EigenOfSymmetric(normal).vectors.col(0));
 }
 
 Eigen::Vector3d TranslationOf(const Eigen::Matrix3d& rotation, const std::vector<HandEyeMotion>& motions)
@@ -199,7 +191,7 @@ Eigen::Vector3d TranslationOf(const Eigen::Matrix3d& rotation, const std::vector
     normal += turn.transpose() * turn;
     right += turn.transpose() * (rotation * motion.volume.translation() - motion.sensor.translation());
   }
-  return normal.ldlt().solve(right);
+  return SolveSymmetric(normal, right);
 }
 
 // Daniilidis 1999: with dual quaternions, vector parts only, a motion gives six rows in the eight numbers (q, q') of C. Its
@@ -207,14 +199,13 @@ Eigen::Vector3d TranslationOf(const Eigen::Matrix3d& rotation, const std::vector
 // by the unit of length, here the root mean square translation of the motions.
 Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector<Turn>& turns)
 {
-  using Matrix8 = Eigen::Matrix<double, 8, 8>;
   double unit = 0.0;
   for (const HandEyeMotion& motion : motions)
     unit += motion.sensor.translation().squaredNorm() + motion.volume.translation().squaredNorm();
   unit = std::sqrt(0.5 * unit / static_cast<double>(motions.size()));
   unit = unit > 0.0 ? unit : 1.0;
 
-  Matrix8 normal = Matrix8::Zero();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(8, 8);
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const Eigen::Vector4d a = turns[i].QuaternionA(), b = turns[i].QuaternionB();
     const auto dual = [unit](const Eigen::Vector3d& t, const Eigen::Vector4d& q) {
@@ -226,14 +217,14 @@ Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector
       pv[3] = qv[3] = 0.0; // the scalar parts are equal on both sides, and say nothing of C
       return Eigen::Matrix<double, 3, 4>((Left(pv) - Right(qv)).topRows<3>());
     };
-    Eigen::Matrix<double, 6, 8> rows = Eigen::Matrix<double, 6, 8>::Zero();
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, 8);
     rows.topLeftCorner<3, 4>() = open(a, b);
     rows.bottomLeftCorner<3, 4>() = open(aDual, bDual);
     rows.bottomRightCorner<3, 4>() = rows.topLeftCorner<3, 4>();
     normal.noalias() += rows.transpose() * rows;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix8> solver(normal);
-  const Eigen::Matrix<double, 8, 1> first = solver.eigenvectors().col(0), second = solver.eigenvectors().col(1);
+  const Eigen::MatrixXd axes = EigenOfSymmetric(normal).vectors;
+  const Eigen::Matrix<double, 8, 1> first = axes.col(0), second = axes.col(1);
   const Eigen::Vector4d u1 = first.head<4>(), v1 = first.tail<4>(), u2 = second.head<4>(), v2 = second.tail<4>();
   // (x u1 + y u2) . (x v1 + y v2) = 0, and of the two answers the one with the larger rotational part.
   const double aa = u1.dot(v1), ab = u1.dot(v2) + u2.dot(v1), bb = u2.dot(v2);
@@ -334,13 +325,12 @@ HandEyeSolution SolveHandEyeByKronecker(const std::vector<HandEyePair>& pairs)
 {
   NeedTwo(pairs);
   // R_S R_C R_M^T = R_O: the sum over scans of M kron S takes vec(R_C) to n vec(R_O).
-  Matrix9 sum = Matrix9::Zero();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, 9);
   for (const HandEyePair& pair : pairs)
     AddKronecker(pair.volumeToWorld.linear(), pair.sensorToTracker.linear(), sum);
-  const Eigen::SelfAdjointEigenSolver<Matrix9> solver(sum.transpose() * sum);
   HandEyeSolution solution;
   Pose &C = solution.volumeToSensor, &O = solution.worldToTracker;
-  C.linear() = RotationOf(solver.eigenvectors().col(8));
+  C.linear() = RotationOf(EigenOfSymmetric(sum.transpose() * sum).vectors.col(8));
   Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   for (const HandEyePair& pair : pairs)
     turns += pair.sensorToTracker.linear() * C.linear() * pair.volumeToWorld.linear().transpose();
@@ -360,7 +350,7 @@ HandEyeSolution SolveHandEyeByKronecker(const std::vector<HandEyePair>& pairs)
     normal += turn.transpose() * turn;
     right += turn.transpose() * (O.linear() * pair.volumeToWorld.translation() - pair.sensorToTracker.translation() - mean);
   }
-  C.translation() = normal.ldlt().solve(right);
+  C.translation() = SolveSymmetric(normal, right);
   O.translation() = meanTurn * C.translation() - mean;
   return solution;
 }

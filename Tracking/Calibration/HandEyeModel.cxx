@@ -10,10 +10,10 @@
 // squares.
 #include "Tracking/Calibration/HandEyeModel.h"
 #include "Core/Base/Angles.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 namespace echorama {
 namespace {
@@ -36,12 +36,6 @@ Matrix6 CovarianceOf(const PoseNoise& noise)
   m.diagonal().head<3>().setConstant(noise.mm * noise.mm);
   m.diagonal().tail<3>().setConstant(radians * radians);
   return m;
-}
-
-// (I - A)^-1 and the like stay finite where a side is nearly without noise.
-Matrix6 InverseOf(const Matrix6& covariance)
-{
-  return covariance.ldlt().solve(Matrix6::Identity());
 }
 
 } // namespace
@@ -129,7 +123,7 @@ HandEyeModel::Fit HandEyeModel::Refine(const HandEyeSolution& start, const std::
   std::vector<Twist> twists(count);
   double damping = 1e-6;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    weight = InverseOf(Covariance(fit.solution.volumeToSensor));
+    weight = InverseOfSymmetric(Covariance(fit.solution.volumeToSensor));
     fit.cost = evaluate(fit.solution, fit.chiSquare, residuals);
     HandEyeMatrix normal = HandEyeMatrix::Zero();
     HandEyeStep gradient = HandEyeStep::Zero();
@@ -147,7 +141,7 @@ HandEyeModel::Fit HandEyeModel::Refine(const HandEyeSolution& start, const std::
     while (!moved && damping < 1e8) {
       HandEyeMatrix damped = normal;
       damped.diagonal() *= 1.0 + damping;
-      step = -damped.ldlt().solve(gradient);
+      step = -SolveSymmetric(damped, gradient);
       const HandEyeSolution next = Moved(fit.solution, step);
       moved = step.allFinite() && evaluate(next, chiSquare, twists) <= fit.cost * (1.0 + 1e-14);
       if (moved) {
@@ -163,14 +157,14 @@ HandEyeModel::Fit HandEyeModel::Refine(const HandEyeSolution& start, const std::
   // Orthonormal to the last bit after many products.
   for (Pose* pose : {&fit.solution.volumeToSensor, &fit.solution.worldToTracker})
     pose->linear() = Eigen::Quaterniond(pose->linear()).normalized().toRotationMatrix();
-  weight = InverseOf(Covariance(fit.solution.volumeToSensor));
+  weight = InverseOfSymmetric(Covariance(fit.solution.volumeToSensor));
   fit.cost = evaluate(fit.solution, fit.chiSquare, residuals);
   return fit;
 }
 
 HandEyeMatrix HandEyeModel::Information(const HandEyeSolution& solution, const std::vector<char>& use) const
 {
-  const Matrix6 weight = InverseOf(Covariance(solution.volumeToSensor));
+  const Matrix6 weight = InverseOfSymmetric(Covariance(solution.volumeToSensor));
   HandEyeMatrix information = HandEyeMatrix::Zero();
   for (std::size_t i = 0; i < scans_.size(); ++i)
     if (use[i]) {
@@ -182,7 +176,7 @@ HandEyeMatrix HandEyeModel::Information(const HandEyeSolution& solution, const s
 
 HandEyeMatrix HandEyeModel::CovarianceOfStep(const HandEyeSolution& solution, const std::vector<char>& use) const
 {
-  return Information(solution, use).ldlt().solve(HandEyeMatrix::Identity());
+  return InverseOfSymmetric(Information(solution, use));
 }
 
 double HandEyeModel::PredictedChiSquare(int scan, const HandEyeSolution& solution, const HandEyeMatrix& covariance,
@@ -195,12 +189,12 @@ double HandEyeModel::PredictedChiSquare(int scan, const HandEyeSolution& solutio
   const Eigen::LLT<Matrix6> noise(Covariance(solution.volumeToSensor));
   const Eigen::Matrix<double, 6, 12> white = noise.matrixL().solve(jacobian);
   const Twist whiteResidual = noise.matrixL().solve(residual);
-  const Matrix6 followed = white * covariance * white.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6> axes(Matrix6::Identity() + (used ? -1.0 : 1.0) * followed);
+  const Matrix6 followed = white * covariance * white.transpose(), own = Matrix6::Identity() + (used ? -1.0 : 1.0) * followed;
+  const SymmetricEigen axes = EigenOfSymmetric(own);
   double chiSquare = 0.0;
   for (int i = 0; i < 6; ++i)
-    if (axes.eigenvalues()[i] > 1e-3)
-      chiSquare += std::pow(axes.eigenvectors().col(i).dot(whiteResidual), 2) / axes.eigenvalues()[i];
+    if (axes.values[i] > 1e-3)
+      chiSquare += std::pow(axes.vectors.col(i).dot(whiteResidual), 2) / axes.values[i];
   return chiSquare;
 }
 

@@ -12,6 +12,7 @@
 #include "Tracking/Calibration/HandEyeSearch.h"
 #include "Core/Base/Median.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include <algorithm>
 #include <array>
@@ -49,7 +50,7 @@ double SoftCost(const HandEyeModel& model, const Eigen::Matrix<double, 6, 6>& we
 
 double SoftCost(const HandEyeModel& model, const HandEyeSolution& solution, double scale)
 {
-  return SoftCost(model, model.Covariance(solution.volumeToSensor).inverse().eval(), solution, scale);
+  return SoftCost(model, InverseOfSymmetric(model.Covariance(solution.volumeToSensor)), solution, scale);
 }
 
 // A triple that is worth solving has a small value.
@@ -155,7 +156,7 @@ std::vector<Eigen::Vector3d> HandEyeRivalAxes(const std::vector<HandEyePair>& pa
         moved(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(a)) -= kept;
       }
     }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 5, 5>> kept(moved);
+  const SymmetricEigen kept = EigenOfSymmetric(moved);
 
   const double sigma = std::sqrt(model.Covariance(solution.volumeToSensor).bottomRightCorner<3, 3>().trace() / 3.0);
   const double limit = std::min(0.035 + 10.0 * sigma * scale, 0.35);
@@ -163,7 +164,7 @@ std::vector<Eigen::Vector3d> HandEyeRivalAxes(const std::vector<HandEyePair>& pa
   for (Eigen::Index k = 0; k < 2; ++k) {
     Eigen::Matrix3d Q = Eigen::Matrix3d::Zero();
     for (Eigen::Index a = 0; a < 5; ++a)
-      Q += kept.eigenvectors()(a, k) * basis[static_cast<std::size_t>(a)];
+      Q += kept.vectors(a, k) * basis[static_cast<std::size_t>(a)];
     const Eigen::Matrix3d candidates = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Q).eigenvectors();
     for (Eigen::Index c = 0; c < 3; ++c) {
       const Eigen::Vector3d axis = candidates.col(c);
@@ -214,7 +215,7 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
     double own = 1.0;
     if (reject) {
       std::vector<double> chiSquare;
-      const Eigen::Matrix<double, 6, 6> weight = model.Covariance(start.second.volumeToSensor).inverse();
+      const Eigen::Matrix<double, 6, 6> weight = InverseOfSymmetric(model.Covariance(start.second.volumeToSensor));
       for (int i = 0; i < model.Count(); ++i) {
         const Twist residual = model.Residual(i, start.second);
         chiSquare.push_back(residual.dot(weight * residual));

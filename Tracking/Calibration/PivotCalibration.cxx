@@ -15,6 +15,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Median.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Core/Geometry/ToolPose.h"
 #include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
@@ -22,7 +23,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 namespace echorama {
@@ -203,7 +203,7 @@ Solution MaximumLikelihood(const std::vector<Pose>& poses, const std::vector<cha
     for (; damping < 1e12 && !better && !settled; damping *= better ? 0.1 : 10.0) {
       Matrix6d damped = normal;
       damped.diagonal() *= 1.0 + damping;
-      const Vector6d step = -damped.ldlt().solve(gradient);
+      const Vector6d step = -SolveSymmetric(damped, gradient);
       const Solution next{solution.tip + step.head<3>(), solution.pivot + step.tail<3>()};
       const double nextCost = Cost(poses, use, noise, next);
       settled = step.norm() <= 1e-10 * (1.0 + solution.tip.norm() + solution.pivot.norm());
@@ -234,7 +234,7 @@ Matrix6d Covariance(const std::vector<Pose>& poses, const std::vector<char>& use
     jacobian.rightCols<3>() = -poses[i].linear().transpose();
     information += jacobian.transpose() * weight * jacobian;
   }
-  const Matrix6d covariance = information.ldlt().solve(Matrix6d::Identity());
+  const Matrix6d covariance = InverseOfSymmetric(information);
   return 0.5 * (covariance + covariance.transpose());
 }
 
@@ -293,7 +293,7 @@ PivotSphere FitSphere(const std::vector<Pose>& poses, const std::vector<char>& u
       normal += row * row.transpose();
       right += row * x.squaredNorm();
     }
-  const Eigen::Vector4d algebraic = normal.ldlt().solve(right);
+  const Eigen::Vector4d algebraic = SolveSymmetric(normal, right);
   Vector3d centre = algebraic.head<3>();
   double radius = std::sqrt(std::max(0.0, algebraic[3] + centre.squaredNorm()));
   Eigen::Matrix4d inverse = Eigen::Matrix4d::Zero();
@@ -312,10 +312,10 @@ PivotSphere FitSphere(const std::vector<Pose>& poses, const std::vector<char>& u
         right -= row * residual;
         squares += residual * residual;
       }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(normal);
-    if (!(eigen.eigenvalues()[0] > 1e-7 * eigen.eigenvalues()[3]))
+    const SymmetricEigen eigen = EigenOfSymmetric(normal);
+    if (!(eigen.values[0] > 1e-7 * eigen.values[3]))
       return sphere;
-    inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+    inverse = eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
     const Eigen::Vector4d step = inverse * right;
     centre += step.head<3>();
     radius += step[3];

@@ -13,6 +13,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Tracking/Calibration/CalibrationText.h"
 #include <algorithm>
 #include <cmath>
@@ -297,7 +298,7 @@ double StandardError(const Eigen::MatrixXd& rows, const Eigen::VectorXd& residua
   Eigen::MatrixXd others(rows.rows(), rows.cols() - 1);
   others << rows.leftCols(k), rows.rightCols(rows.cols() - k - 1);
   const Eigen::MatrixXd normal = others.transpose() * others;
-  const Eigen::VectorXd own = rows.col(k) - others * normal.ldlt().solve(others.transpose() * rows.col(k));
+  const Eigen::VectorXd own = rows.col(k) - others * SolveSymmetric(normal, others.transpose() * rows.col(k));
   const double information = own.squaredNorm();
   double sum = 0.0;
   for (Eigen::Index begin = 0; begin < rows.rows(); begin += block) {
@@ -357,7 +358,7 @@ Refined Refine(const SpeedTrack& first, const SpeedTrack& second, Refined fit, b
       residuals[i] = a[k] - mean - fit.ratio * b[k];
     }
     const Eigen::MatrixXd normal = rows.transpose() * rows;
-    const Eigen::VectorXd step = normal.ldlt().solve(rows.transpose() * residuals);
+    const Eigen::VectorXd step = SolveSymmetric(normal, rows.transpose() * residuals);
     if (!step.allFinite())
       break;
     mean += step[0];
