@@ -50,7 +50,8 @@ for path in binaries:
     found.update(re.findall(r"(\S+) => (/\S+)", run("ldd", str(path))))
 libraries = {found[name] for name in linked if name in found and not found[name].startswith(str(build))}
 
-depended = run("ninja", "-C", str(build), "-t", "deps")
+# What objects and precompiled headers were compiled from; ninja knows too what programs were linked from, and what CMake read.
+depended = "\n".join(each for each in run("ninja", "-C", str(build), "-t", "deps").split("\n\n") if re.match(r"\S+\.(o|gch): ", each))
 headers = {os.path.normpath(path) for path in re.findall(r"^    (/usr/\S+)", depended, re.MULTILINE)}
 if not libraries or not headers:
     complaints.append(f"{build} tells of no libraries or no headers: was it built with ninja?")

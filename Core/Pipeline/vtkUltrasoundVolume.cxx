@@ -214,6 +214,8 @@ int vtkUltrasoundVolume::Run(vtkAlgorithm* filter, vtkInformationVector* outputs
     }
     return 0;
   };
+  // VTK 9.1 takes an earlier request to stop back before data are made, later ones leave that to the algorithm.
+  filter->SetAbortExecute(0);
   const echorama::Progress progress([filter](double fraction) {
     filter->UpdateProgress(fraction);
     return !filter->GetAbortExecute();

@@ -392,8 +392,6 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
 int vtkUltrasoundVolumeReconstructor::RequestInformation(vtkInformation*, vtkInformationVector** inputs,
                                                          vtkInformationVector* outputs)
 {
-  // The pipeline takes a request to stop back when data are made; all frames are gone through before that.
-  this->SetAbortExecute(0);
   // A failure here ends the update: an earlier output would stay.
   const int done = vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
     vtkInformation* out = outputs->GetInformationObject(0);

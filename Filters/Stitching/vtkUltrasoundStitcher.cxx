@@ -144,15 +144,12 @@ vtkUltrasoundStitcher::~vtkUltrasoundStitcher() = default;
 int vtkUltrasoundStitcher::FillInputPortInformation(int port, vtkInformation* information)
 {
   information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
+  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
+  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+  information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
   if (port == 1) {
-    // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-    information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-    information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
     information->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
-    return 1;
   }
-  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
-  information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
   return 1;
 }
 

@@ -57,8 +57,10 @@ void OpenIgtLinkClient::Run(const Worker::Signal& signal, PoseStream& poses, Ima
           complaint = connection.PeerComplaint();
           poses.SetState(DeviceState::Running, "connected to " + place + (complaint.empty() ? "" : ", which says: " + complaint));
         }
-        const std::vector<const TcpSocket*> socket{&connection.Socket()};
-        WaitForSockets(socket, connection.Replies().Empty() ? std::vector<const TcpSocket*>() : socket, 0.1);
+        std::vector<const TcpSocket*> writing;
+        if (!connection.Replies().Empty())
+          writing.push_back(&connection.Socket());
+        WaitForSockets({&connection.Socket()}, writing, 0.1);
       }
       if (there)
         return;
