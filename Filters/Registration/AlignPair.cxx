@@ -216,7 +216,21 @@ private:
     local.part = part;
     local.stopVoxels = stopVoxels;
     local.seed = p_.seed;
-    return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, start, local, progress);
+    return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, Rounded(start), local, progress);
+  }
+
+  // To a thousandth of a voxel. The last bits of what an earlier step found depend on the CPU, and would choose other points to
+  // compare and so end elsewhere. A quaternion and its negative, the same rotation, are rounded to the same rotation.
+  Pose Rounded(const Pose& pose) const
+  {
+    const double mm = 1e-3 * finestMm_, part = 0.5 * mm / std::max(shape_.radius, finestMm_);
+    const auto toMultiple = [](double step) { return [step](double x) { return step * std::round(x / step); }; };
+    const Eigen::Vector3d middle = (pose * shape_.centroid).unaryExpr(toMultiple(mm));
+    const Eigen::Vector4d turn = Eigen::Quaterniond(pose.linear()).coeffs().unaryExpr(toMultiple(part));
+    Pose rounded = Pose::Identity();
+    rounded.linear() = Eigen::Quaterniond(turn).normalized().toRotationMatrix();
+    rounded.translation() = middle - rounded.linear() * shape_.centroid;
+    return rounded;
   }
 
   // How much speaks for a pose, as a test of correlation weighs it: the likeness times the square root of how much is compared.
