@@ -399,6 +399,7 @@ void TestPanels::thePicturesOfTheManual()
 
 int main(int argc, char** argv)
 {
+  qputenv("QT_FONT_DPI", "96"); // whatever the screen claims, of which Qt's versions think differently: texts have one size
   QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
   format.setSamples(0);
   QSurfaceFormat::setDefaultFormat(format);
