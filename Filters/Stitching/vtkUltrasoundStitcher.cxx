@@ -62,10 +62,12 @@ int CommonType(int a, int b)
 }
 
 // The geometry that a pipeline announces, when it announces all of it. Filters that know nothing of images (calculators,
-// programmable filters) announce the extent alone, and composite data announces nothing.
+// programmable filters) announce the extent alone; composite data nothing of its own, but VTK 9.3 passes on what its maker's
+// first input announced.
 bool Announced(vtkInformation* information, echorama::ImageGeometry& geometry)
 {
-  if (!information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()) || !information->Has(vtkDataObject::ORIGIN()) ||
+  if (!vtkImageData::SafeDownCast(information->Get(vtkDataObject::DATA_OBJECT())) ||
+      !information->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()) || !information->Has(vtkDataObject::ORIGIN()) ||
       !information->Has(vtkDataObject::SPACING()) || !information->Has(vtkDataObject::DIRECTION())) {
     return false;
   }

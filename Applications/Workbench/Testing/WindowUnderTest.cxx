@@ -172,7 +172,7 @@ QImage WindowUnderTest::Screenshot(const QString& name)
   return picture;
 }
 
-QString WriteVolume(const QDir& folder, const QString& name, int seed, std::array<double, 3> middle, int side)
+QString WriteVolume(const QDir& folder, const QString& name, int seed, std::array<double, 3> middle, int side, bool repeats)
 {
   QByteArray voxels(side * side * side, '\0');
   unsigned int state = 12345u + static_cast<unsigned int>(seed);
@@ -184,7 +184,9 @@ QString WriteVolume(const QDir& folder, const QString& name, int seed, std::arra
         const double x = i - side / 2 + middle[0], y = j - side / 2 + middle[1], z = k - side / 2 + middle[2];
         const double wave = std::sin(0.21 * x + 0.5) * std::cos(0.17 * y) * std::sin(0.19 * z + 1.0);
         const double shell = std::exp(-std::pow(std::sqrt(x * x + y * y + 0.6 * z * z) - 17.0, 2) / 6.0);
-        const double grey = (70.0 + 60.0 * wave + 90.0 * shell) * (0.7 + 0.6 * (random() % 1000) / 1000.0);
+        const double anatomy = (70.0 + 60.0 * wave + 90.0 * shell) * (0.7 + 0.6 * (random() % 1000) / 1000.0);
+        const double turn = 2.0 * M_PI / 16.0; // per voxel
+        const double grey = repeats ? 100.0 + 60.0 * std::sin(turn * x) * std::sin(turn * y) * std::sin(turn * z) : anatomy;
         voxels[(k * side + j) * side + i] = static_cast<char>(static_cast<unsigned char>(std::fmin(std::fmax(grey, 1.0), 255.0)));
       }
   const QString path = folder.filePath(name);

@@ -67,5 +67,6 @@ private:
 };
 
 /// Writes a MetaImage of bytes: a bright shell and some blobs in speckle, with a border that is not real. \a seed makes
-/// different ones. Spacing 1 mm, the middle at \a middle.
-QString WriteVolume(const QDir& folder, const QString& name, int seed, std::array<double, 3> middle, int side = 48);
+/// different ones. Spacing 1 mm, the middle at \a middle. With \a repeats, the same every 16 mm instead, without speckle.
+QString WriteVolume(const QDir& folder, const QString& name, int seed, std::array<double, 3> middle, int side = 48,
+                    bool repeats = false);
