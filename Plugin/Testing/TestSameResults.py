@@ -51,10 +51,7 @@ for name, other in results.items():
         # them, at a tie of rounding, a byte by one.
         exact = numpy.array_equal(got, expected, equal_nan=got.dtype.kind == "f")
         if not exact and got.dtype.kind == "f":
-            # A pose is where an iteration stopped: the FFT sums in the order of the machine's vectors, and the candidates that
-            # the refinement starts from differ in their last bits.
-            close = 5e-4 if key == "pose" else 1e-5
-            fine = "thread" not in name and numpy.allclose(got, expected, rtol=1e-5, atol=close)
+            fine = "thread" not in name and numpy.allclose(got, expected, rtol=1e-5, atol=1e-5)
         elif not exact:
             difference = numpy.abs(got.astype(int) - expected.astype(int))
             fine = "thread" not in name and difference.max() <= 1 and (difference > 0).mean() < 1e-5
