@@ -87,6 +87,9 @@ macro(_echorama_add_classes name)
   _vtk_module_real_target(module_target Echorama::${name})
   echorama_compile_options(${module_target})
   target_compile_options(${module_target} PRIVATE -O1) # nothing here is hot: that lies in the kernels
+  if(ECHORAMA_STACK STREQUAL "paraview")
+    target_compile_definitions(${module_target} PRIVATE ECHORAMA_FOR_PARAVIEW) # see Core/Base/Json.h
+  endif()
   echorama_precompile(${module_target} classes)
 endmacro()
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundTemporalCalibration.h"
 
+#include "Core/Base/Json.h"
 #include "Tracking/Calibration/TemporalCalibration.h"
 #include "vtkUltrasoundTrackPoses.h"
 #include "vtkUltrasoundVolume.h"
@@ -12,7 +13,6 @@
 #include "vtkObjectFactory.h"
 
 #include <limits>
-#include <nlohmann/json.hpp>
 
 vtkStandardNewMacro(vtkUltrasoundTemporalCalibration);
 

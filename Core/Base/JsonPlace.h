@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Error.h"
+#include "Core/Base/Json.h"
 #include <Eigen/Core>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 

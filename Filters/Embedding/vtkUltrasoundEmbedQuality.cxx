@@ -2,6 +2,7 @@
 #include "vtkUltrasoundEmbedQuality.h"
 
 #include "Core/Base/Error.h"
+#include "Core/Base/Json.h"
 #include "vtkUltrasoundAcquisition.h"
 
 #include "vtkImageData.h"
@@ -10,7 +11,6 @@
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 
-#include <nlohmann/json.hpp>
 #include <optional>
 
 using echorama::Error;

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundAligner.h"
 
 #include "AlignInTurn.h"
+#include "Core/Base/Json.h"
 #include "Core/Imaging/ShadowMap.h"
 #include "vtkDataObjectTree.h"
 #include "vtkDoubleArray.h"
@@ -21,7 +22,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 vtkStandardNewMacro(vtkUltrasoundAligner);
 

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundStitchQuality.h"
 
 #include "Core/Base/Error.h"
+#include "Core/Base/Json.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -9,7 +10,6 @@
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 
-#include <nlohmann/json.hpp>
 #include <optional>
 
 using echorama::Error;

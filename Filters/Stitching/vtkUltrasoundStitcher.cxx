@@ -2,6 +2,7 @@
 #include "vtkUltrasoundStitcher.h"
 
 #include "Core/Base/Error.h"
+#include "Core/Base/Json.h"
 #include "Filters/Stitching/StitchGrid.h"
 #include "Filters/Stitching/StitchMemory.h"
 
@@ -22,7 +23,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 using echorama::Error;
 

@@ -307,7 +307,8 @@ PivotSphere FitSphere(const std::vector<Pose>& poses, const std::vector<char>& u
         const Vector3d out = poses[i].translation() - mean - centre;
         const double distance = std::max(out.norm(), TinyMm), residual = distance - radius;
         Eigen::Vector4d row;
-        row << -out / distance, -1.0;
+        row.head<3>() = -out / distance;
+        row[3] = -1.0;
         normal += row * row.transpose();
         right -= row * residual;
         squares += residual * residual;
