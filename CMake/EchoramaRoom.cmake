@@ -88,7 +88,7 @@ macro(_echorama_add_classes name)
   echorama_compile_options(${module_target})
   target_compile_options(${module_target} PRIVATE -O1) # nothing here is hot: that lies in the kernels
   if(ECHORAMA_STACK STREQUAL "paraview")
-    target_compile_definitions(${module_target} PRIVATE ECHORAMA_FOR_PARAVIEW) # see Core/Base/Json.h
+    target_compile_definitions(${module_target} PRIVATE ECHORAMA_JSON="Plugin/VtkJson.h")
   endif()
   echorama_precompile(${module_target} classes)
 endmacro()
