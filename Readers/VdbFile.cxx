@@ -7,7 +7,8 @@
 // into a node as a damaged length says. Therefore the file is taken into memory and walked through here first: every length in
 // its header, metadata and tree must be the one that its place allows. Then the library reads from a stream that throws at
 // the end, through io::Archive, the base class of its own readers. What remains: damage within voxels that were compressed
-// with Blosc, or not at all, is not noticed, as in every format without checksums. The walk costs one pass over the file.
+// with Blosc (behind the header of their chunk), or not at all, is not noticed, as in every format without checksums. The walk
+// costs one pass over the file.
 #include "Readers/VdbFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
@@ -280,7 +281,22 @@ private:
     const std::int64_t length = Number<std::int64_t>();
     if (length > 2 * bytes + 1024 || (length <= 0 && length != -bytes))
       Fail();
-    Skip(static_cast<std::uint64_t>(std::abs(length)));
+    const std::istream::pos_type begin = stream_.tellg();
+    if (length > 0 && (compression_ & io::COMPRESS_BLOSC))
+      BloscHeader(length, bytes);
+    stream_.seekg(begin + static_cast<std::streamoff>(std::abs(length)));
+  }
+  // Blosc is not told how many bytes it is given: it believes the header in them.
+  // Format: https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst
+  void BloscHeader(std::int64_t compressedBytes, std::int64_t bytes)
+  {
+    if (compressedBytes < 16)
+      Fail();
+    Skip(4); // versions, flags, the size of a value
+    const std::int32_t nbytes = Number<std::int32_t>(), blocksize = Number<std::int32_t>(), cbytes = Number<std::int32_t>();
+    const bool blocks = nbytes == 0 || (blocksize > 0 && blocksize <= nbytes);
+    if (nbytes != bytes || cbytes != compressedBytes || !blocks)
+      Fail();
   }
 
   std::istream& stream_;

@@ -6,6 +6,7 @@
 #include "Readers/VdbFile.h"
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 // Programs hide what they do not export; OpenVDB's static members must be one with those of its library.
 #pragma GCC visibility push(default)
@@ -348,6 +349,34 @@ TEST_F(VdbFile, LengthsOfVoxelsAreChecked)
     std::memcpy(bad.data() + form + 1, &length, sizeof length);
     Refused(Put("bad.vdb", bad), "damaged");
   }
+}
+
+TEST_F(VdbFile, SizesInBloscChunksAreChecked)
+{
+  // Blosc reads as many bytes as the header of a chunk says.
+  ASSERT_TRUE(openvdb::io::Archive::hasBloscCompression());
+  ImageHeader header;
+  header.geometry.dimensions = {8, 8, 8};
+  header.type = VoxelType::Float32;
+  std::vector<float> ramp(512);
+  std::iota(ramp.begin(), ramp.end(), 0.0f);
+  const std::string good = Bytes(Write("a.vdb", header, ramp.data(), nullptr));
+  // The one leaf is the end of the file: its mask, the byte that tells its form, the length, the chunk.
+  const std::size_t chunk = good.rfind(std::string(64, '\xff')) + 64 + 1 + 8;
+  ASSERT_LT(chunk + 16, good.size());
+  const auto number = [&](std::size_t at) {
+    std::int32_t value;
+    std::memcpy(&value, good.data() + chunk + at, sizeof value);
+    return value;
+  };
+  ASSERT_EQ(number(4), 2048); // bytes of voxels: this is the header of a chunk
+  ASSERT_EQ(static_cast<std::size_t>(number(12)), good.size() - chunk);
+  for (const std::size_t at : {4, 8, 12}) // bytes of voxels, of a block, of the chunk
+    for (const std::int32_t value : {-1, 0, 1 << 30}) {
+      std::string bad = good;
+      std::memcpy(bad.data() + chunk + at, &value, sizeof value);
+      Refused(Put("bad.vdb", bad), "damaged");
+    }
 }
 
 TEST_F(VdbFile, RandomDamageNeverCrashes)
