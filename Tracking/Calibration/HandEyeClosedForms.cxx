@@ -15,6 +15,8 @@ namespace echorama {
 namespace {
 
 using Vector9 = Eigen::Matrix<double, 9, 1>;
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
 constexpr double LargeTurn = 2.6; // radians
 
@@ -26,7 +28,7 @@ Eigen::Matrix3d RotationOf(const Vector9& numbers)
 }
 
 // vec(A X B^T) = (B kron A) vec(X), columns one below the other.
-void AddKronecker(const Eigen::Matrix3d& B, const Eigen::Matrix3d& A, Eigen::MatrixXd& sum)
+void AddKronecker(const Eigen::Matrix3d& B, const Eigen::Matrix3d& A, Matrix9& sum)
 {
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column)
@@ -52,11 +54,11 @@ private:
 // R_A R_C = R_C R_B in all nine numbers: the eigenvector of the least eigenvalue (Andreff, Horaud, Espiau 1999).
 Eigen::Matrix3d AndreffRotation(const std::vector<HandEyeMotion>& motions)
 {
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, 9);
+  Matrix9 sum = Matrix9::Zero();
   for (const HandEyeMotion& motion : motions)
     AddKronecker(motion.volume.linear(), motion.sensor.linear(), sum); // R_A X R_B^T = X
-  const Eigen::MatrixXd all = 2.0 * static_cast<double>(motions.size()) * Eigen::MatrixXd::Identity(9, 9);
-  const Eigen::MatrixXd normal = all - sum - sum.transpose();
+  Matrix9 normal = -sum - sum.transpose();
+  normal.diagonal().array() += 2.0 * static_cast<double>(motions.size());
   return RotationOf(EigenOfSymmetric(normal).vectors.col(0));
 }
 
@@ -82,7 +84,7 @@ std::vector<Turn> TurnsOf(const std::vector<HandEyeMotion>& motions)
 // linear in the nine numbers of C and each motion's cosine and sine, which are eliminated.
 Eigen::Matrix3d ShiuAhmadRotation(const std::vector<Turn>& turns)
 {
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(9, 9);
+  Matrix9 normal = Matrix9::Zero();
   Vector9 right = Vector9::Zero();
   for (const Turn& turn : turns) {
     if (turn.a.norm() < 1e-9 || turn.b.norm() < 1e-9)
@@ -94,7 +96,7 @@ Eigen::Matrix3d ShiuAhmadRotation(const std::vector<Turn>& turns)
     // |Y|^2 = |Z|^2 = 2, and Y, Z are orthogonal to each other and to X.
     normal.diagonal().array() += weight;
     for (const Eigen::Matrix3d* m : {&y, &z}) {
-      const Eigen::Map<const Eigen::VectorXd> vec(m->data(), 9);
+      const Eigen::Map<const Vector9> vec(m->data());
       normal -= 0.5 * weight * vec * vec.transpose();
     }
     right += weight * Eigen::Map<const Vector9>(x.data());
@@ -205,7 +207,7 @@ Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector
   unit = std::sqrt(0.5 * unit / static_cast<double>(motions.size()));
   unit = unit > 0.0 ? unit : 1.0;
 
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(8, 8);
+  Matrix8 normal = Matrix8::Zero();
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const Eigen::Vector4d a = turns[i].QuaternionA(), b = turns[i].QuaternionB();
     const auto dual = [unit](const Eigen::Vector3d& t, const Eigen::Vector4d& q) {
@@ -217,7 +219,7 @@ Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector
       pv[3] = qv[3] = 0.0; // the scalar parts are equal on both sides, and say nothing of C
       return Eigen::Matrix<double, 3, 4>((Left(pv) - Right(qv)).topRows<3>());
     };
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, 8);
+    Eigen::Matrix<double, 6, 8> rows = Eigen::Matrix<double, 6, 8>::Zero();
     rows.topLeftCorner<3, 4>() = open(a, b);
     rows.bottomLeftCorner<3, 4>() = open(aDual, bDual);
     rows.bottomRightCorner<3, 4>() = rows.topLeftCorner<3, 4>();
@@ -325,12 +327,13 @@ HandEyeSolution SolveHandEyeByKronecker(const std::vector<HandEyePair>& pairs)
 {
   NeedTwo(pairs);
   // R_S R_C R_M^T = R_O: the sum over scans of M kron S takes vec(R_C) to n vec(R_O).
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, 9);
+  Matrix9 sum = Matrix9::Zero();
   for (const HandEyePair& pair : pairs)
     AddKronecker(pair.volumeToWorld.linear(), pair.sensorToTracker.linear(), sum);
   HandEyeSolution solution;
   Pose &C = solution.volumeToSensor, &O = solution.worldToTracker;
-  C.linear() = RotationOf(EigenOfSymmetric(sum.transpose() * sum).vectors.col(8));
+  const Matrix9 squared = sum.transpose() * sum;
+  C.linear() = RotationOf(EigenOfSymmetric(squared).vectors.col(8));
   Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   for (const HandEyePair& pair : pairs)
     turns += pair.sensorToTracker.linear() * C.linear() * pair.volumeToWorld.linear().transpose();
