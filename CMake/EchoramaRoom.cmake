@@ -53,8 +53,9 @@ macro(_echorama_add_kernels name)
     UNITY_BUILD ${ECHORAMA_UNITY} UNITY_BUILD_BATCH_SIZE 6)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama>)
   target_compile_features(${target} PUBLIC cxx_std_17)
-  # Eigen's alignment would follow each compiler call's instruction set; the interface must not.
-  target_compile_definitions(${target} PUBLIC EIGEN_MAX_ALIGN_BYTES=16)
+  # Eigen's alignment, and whether it allocates with malloc alone, would follow each compiler call's instruction set; the interface
+  # must not: what one side allocates the other frees.
+  target_compile_definitions(${target} PUBLIC ${ECHORAMA_EIGEN_INTERFACE})
   target_link_libraries(${target} PUBLIC Eigen3::Eigen PRIVATE ${room_KERNEL_LIBRARIES})
   foreach(other IN LISTS room_KERNEL_DEPENDS)
     target_link_libraries(${target} PUBLIC Echorama::${other}Kernels)
