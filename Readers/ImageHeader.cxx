@@ -156,36 +156,6 @@ bool TakeFrameField(const HeaderLines& lines, FrameAxis& axis, std::string_view 
   return true;
 }
 
-std::vector<std::string> CheckVtkXmlGeometry(const std::string& path)
-{
-  const HeaderLines lines(path);
-  std::ifstream stream(path, std::ios::binary);
-  std::string start(1 << 16, '\0');
-  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
-  start.resize(static_cast<std::size_t>(stream.gcount()));
-  const std::size_t open = start.find("<ImageData"), close = start.find('>', open);
-  if (open == std::string::npos || close == std::string::npos)
-    lines.Fail("it is not a VTK image file: it has no ImageData element");
-  const std::string element = start.substr(open, close - open);
-
-  std::vector<std::string> notes;
-  const auto check = [&](const std::string& name, std::size_t count, const char* missing) {
-    const std::size_t key = element.find(" " + name + "=");
-    if (key == std::string::npos) {
-      notes.push_back(missing);
-      return;
-    }
-    const std::size_t first = key + name.size() + 3, last = element.find(element[first - 1], first);
-    if (last == std::string::npos)
-      lines.Fail(name + " has no end");
-    lines.Numbers<double>(name, std::string_view(element).substr(first, last - first), count);
-  };
-  check("Origin", 3, "the file has no origin: 0 0 0 was assumed");
-  check("Spacing", 3, "the file has no spacing: 1 mm was assumed");
-  check("Direction", 9, "the file has no direction: its axes were taken as those of the world");
-  return notes;
-}
-
 HeaderLines::HeaderLines(const std::string& path) : path_(path), stream_(path, std::ios::binary)
 {
   if (!stream_)

@@ -76,12 +76,6 @@ ImageHeader ReadSequenceHeader(const std::string& path, FrameAxis& axis);
 /// Whether a field is one of a frame of a sequence: "Seq_Frame0012_Timestamp".
 bool IsFrameField(std::string_view key);
 
-/// Checks the numbers of a .vti file that say where its voxels lie (Origin, Spacing, Direction): VTK's parser silently puts
-/// others in the place of those that it cannot read.
-/// \returns notes on those that are missing
-/// \throws Error(BadFile) when there is no ImageData element, or a number is missing or not finite.
-std::vector<std::string> CheckVtkXmlGeometry(const std::string& path);
-
 /// The name of a type of numbers in headers of each format.
 const char* MetaImageTypeName(VoxelType type);
 std::string NrrdTypeName(VoxelType type);

@@ -5,6 +5,7 @@
 #include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeSource.h"
+#include "Readers/VtkXmlFile.h"
 
 #include "vtkCallbackCommand.h"
 #include "vtkFieldData.h"
@@ -158,10 +159,10 @@ private:
   std::string Text;
 };
 
-// Reads what a .vti file says of itself, and refuses sizes that cannot be.
-echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string& path)
+// Reads what a .vti file says of itself.
+echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string& path, std::vector<std::string>& notes)
 {
-  echorama::CheckVtkXmlGeometry(path);
+  notes = echorama::CheckVtkXmlFile(path);
   reader->SetFileName(path.c_str());
   const Complaints complaints(reader);
   reader->UpdateInformation();
@@ -175,11 +176,7 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
   echorama::ImageGeometry geometry;
   Eigen::Vector3d first;
   for (int axis = 0; axis < 3; ++axis) {
-    const long long size = static_cast<long long>(extent[2 * axis + 1]) - extent[2 * axis] + 1;
-    if (size < 1 || size > VTK_INT_MAX) {
-      throw Error(Error::Kind::BadFile, path + ": its WholeExtent is empty or overflows");
-    }
-    geometry.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(size);
+    geometry.dimensions[static_cast<std::size_t>(axis)] = extent[2 * axis + 1] - extent[2 * axis] + 1;
     first[axis] = extent[2 * axis];
   }
   information->Get(vtkDataObject::ORIGIN(), geometry.origin.data());
@@ -195,12 +192,7 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
   } catch (const Error& error) {
     throw Error(Error::Kind::BadFile, error.what());
   }
-  // Compressed or not, a file does not hold ten thousand times its bytes.
-  const double voxels = static_cast<double>(geometry.VoxelCount());
-  if (voxels > 1e4 * static_cast<double>(std::filesystem::file_size(path))) {
-    throw Error(Error::Kind::BadFile, path + ": its WholeExtent needs more voxels than the file can hold");
-  }
-  echorama::CheckMemory(path, voxels);
+  echorama::CheckMemory(path, static_cast<double>(geometry.VoxelCount()));
   return geometry;
 }
 } // namespace
@@ -274,7 +266,8 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
     beams->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), nothing, 6);
     if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
       const vtkNew<vtkXMLImageDataReader> reader;
-      vtkUltrasoundVolume::SetGeometry(out, OpenXml(reader, path));
+      std::vector<std::string> unused;
+      vtkUltrasoundVolume::SetGeometry(out, OpenXml(reader, path, unused));
       return;
     }
     const auto source = echorama::OpenVolume(path, this->Parameters());
@@ -430,8 +423,7 @@ void vtkUltrasoundReader::ReadXml(vtkImageData* output)
   const std::string path = this->FileName;
   const auto fail = [&path](const std::string& reason) { throw Error(Error::Kind::BadFile, path + ": " + reason); };
   const vtkNew<vtkXMLImageDataReader> reader;
-  OpenXml(reader, path);
-  this->Notes = echorama::CheckVtkXmlGeometry(path);
+  OpenXml(reader, path, this->Notes);
   {
     const Complaints complaints(reader);
     reader->Update();

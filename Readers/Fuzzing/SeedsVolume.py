@@ -34,12 +34,6 @@ encoding: {encoding}
 key:=value\\nof two lines
 
 """
-vti = """<?xml version="1.0"?>
-<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian">
-  <ImageData WholeExtent="0 1 0 1 0 1" Origin="0 0 0" Spacing="1 1 1" Direction="1 0 0 0 1 0 0 0 1">
-  </ImageData>
-</VTKFile>
-"""
 gzip = zlib.compressobj(wbits=31)
 seeds = {
     "plain.mha": meta.format(compressed=False, type="MET_UCHAR").encode() + voxels,
@@ -52,7 +46,6 @@ seeds = {
     "text.nrrd": nrrd.format(type="float", space="LPS", endian="big", encoding="text").encode()
     + b" ".join(b"%d" % v for v in voxels),
     "big.nrrd": nrrd.format(type="float", space="RAS", endian="big", encoding="raw").encode() + struct.pack(">60f", *voxels),
-    "image.vti": vti.encode(),
 }
 for name, content in seeds.items():
     (folder / name).write_bytes(content)

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// That VTK reads the good ones is checked in TestUltrasoundReader.py, and by the fuzzer, which reads with VTK.
+#include "Readers/Testing/TemporaryFolder.h"
+#include "Readers/VtkXmlFile.h"
+
+using namespace echorama;
+using namespace echorama::testing;
+
+namespace {
+
+class VtkXmlFile : public TemporaryFolder {
+protected:
+  // A file in which \a from, which must be there, is replaced.
+  std::string File(const std::string& from = "", const std::string& to = "") const
+  {
+    std::string text =
+        "<?xml version=\"1.0\"?>\n<!-- a > b <DataArray type=\"x\"/> -->\n"
+        "<VTKFile type='ImageData' version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n"
+        "<ImageData WholeExtent=\"2 3 0 1 0 0\" Origin=\"0 0 0\" Spacing=\"1 1 1\" Direction=\"1 0 0 0 1 0 0 0 1\">\n"
+        "<Piece Extent=\"2 3 0 1 0 0\"><PointData>\n"
+        "<DataArray type=\"UInt8\" Name=\"a > b\" format=\"binary\" offset=\"0\">BAAAAAECAwQ=</DataArray>\n" // 4 bytes: 1 2 3 4
+        "</PointData></Piece></ImageData>\n</VTKFile>\n";
+    if (!from.empty()) {
+      const std::size_t at = text.find(from);
+      EXPECT_NE(at, std::string::npos) << from;
+      text.replace(at, from.size(), to);
+    }
+    return Put("a.vti", text);
+  }
+  void Refused(const std::string& from, const std::string& to, const std::string& words) const
+  {
+    const std::string path = File(from, to);
+    ExpectRefused([&] { CheckVtkXmlFile(path); }, Error::Kind::BadFile, path, words);
+  }
+  // Compressed, with these base64 lengths in front of 8 bytes.
+  void Blocks(const std::string& lengths, const std::string& words) const
+  {
+    std::string text = "BAAAAAECAwQ=";
+    const std::string path = File("header_type=\"UInt32\"", "compressor=\"vtkZLibDataCompressor\"");
+    std::ifstream stream(path);
+    std::string whole((std::istreambuf_iterator<char>(stream)), {});
+    whole.replace(whole.find(text), text.size(), lengths + "AAAAAAAAAAA=");
+    Put("a.vti", whole);
+    if (words.empty())
+      EXPECT_NO_THROW(CheckVtkXmlFile(path));
+    else
+      ExpectRefused([&] { CheckVtkXmlFile(path); }, Error::Kind::BadFile, path, words);
+  }
+};
+
+} // namespace
+
+TEST_F(VtkXmlFile, GoodFilesPassAndMissingGeometryIsNoted)
+{
+  EXPECT_TRUE(CheckVtkXmlFile(File()).empty());
+  EXPECT_EQ(CheckVtkXmlFile(File("Origin=\"0 0 0\" Spacing=\"1 1 1\" ")).size(), 2u);
+  EXPECT_TRUE(CheckVtkXmlFile(File("binary", "ascii")).empty());
+}
+
+TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
+{
+  Refused("UInt8", "Floatnan", "type \"Floatnan\"");
+  Refused("type=\"UInt8\" ", "", "no type");
+  Refused("binary", "binarx", "binarx");
+  Refused("LittleEndian", "MiddleEndian", "MiddleEndian");
+  Refused("UInt32", "UInt31", "UInt31");
+  Refused("Name", "NumberOfComponents=\"-3\" Name", "NumberOfComponents");
+  Refused("Name", "NumberOfTuples=\"100000000000\" Name", "NumberOfTuples");
+  Refused("Piece Extent=\"2 3", "Piece Extent=\"1 3", "beyond the WholeExtent");
+  Refused("Piece Extent=\"2 3", "Piece Extent=\"3 2", "empty");
+  Refused("Piece Extent=\"2 3 0 1 0 0\"", "Piece", "no Extent");
+  Refused("2 3 0 1 0 0", "2 3 0 1 0", "6 are needed");
+  Refused("2 3 0 1 0 0", "-2147483648 2147483647 0 1 0 0", "overflows");
+  Refused("2 3 0 1 0 0", "0 99999 0 99999 0 99999", "more voxels than the file can hold");
+  Refused("Spacing=\"1 1 1\"", "Spacing=\"1 x 1\"", "Spacing");
+  Refused("type='ImageData'", "type='PolyData'", "PolyData");
+  Refused("<ImageData", "<ImageDatum", "lies in no image");
+  Refused("<VTKFile", "<!DOCTYPE x><VTKFile", "declaration");
+  Refused(" -->", "", "comment has no end");
+  Refused("Name=\"a > b\"", "Name=\"a > b", "has no end");
+  Refused("Name", "type=\"UInt8\" Name", "twice");
+}
+
+TEST_F(VtkXmlFile, LengthsInFrontOfDataAreChecked)
+{
+  Refused("BAAAAAECAwQ=", "BAAA", "end early");
+  Refused("BAAAAAECAwQ=", "////fwECAwQ=", "length");
+  Refused("\"binary\"", "\"appended\"", "appended, and there are none");
+  Blocks("AQAAAAgAAAAAAAAACAAAAA==", "");       // one block of 8 bytes, none of them in a last one, 8 compressed
+  Blocks("AQAAAAAAAAAAAAAACAAAAA==", "length"); // blocks of no bytes
+  Blocks("AQAAAAgAAAAAAAAA////fw==", "length"); // more compressed bytes than the file has
+  Blocks("AQAAAAgAAAAJAAAACAAAAA==", "length"); // the last is larger than the others
+  Blocks("////fwgAAAAAAAAACAAAAA==", "length"); // more blocks than the file has bytes
+  Blocks("AQAAAP///38AAAAACAAAAA==", "length"); // a block larger than could be
+}
+
+TEST_F(VtkXmlFile, AppendedDataAreCheckedWhereTheyLie)
+{
+  const auto appended = [&](const std::string& data, const std::string& encoding, const std::string& offset = "0") {
+    std::string text = "<VTKFile type=\"ImageData\" byte_order=\"BigEndian\">\n<ImageData WholeExtent=\"0 1 0 1 0 0\">"
+                       "<Piece Extent=\"0 1 0 1 0 0\"><PointData><DataArray type=\"UInt8\" format=\"appended\" offset=\"" +
+                       offset + "\"/></PointData></Piece></ImageData><AppendedData encoding=\"" + encoding + "\">\n _";
+    return Put("a.vti", text + data + "</AppendedData></VTKFile>");
+  };
+  const std::string good("\0\0\0\4\1\2\3\4", 8), bad("\4\0\0\0\1\2\3\4", 8);
+  EXPECT_EQ(CheckVtkXmlFile(appended(good, "raw")).size(), 3u);
+  EXPECT_EQ(CheckVtkXmlFile(appended("AAAABAECAwQ=", "base64")).size(), 3u);
+  const auto refused = [&](const std::string& path) {
+    ExpectRefused([&] { CheckVtkXmlFile(path); }, Error::Kind::BadFile, path, "");
+  };
+  refused(appended(bad, "raw"));
+  refused(appended("BAAAAAECAwQ=", "base64"));
+  refused(appended(good, "raw", "400"));
+  refused(appended(good, "raw", "-1"));
+}

@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Format: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html. An array's data follow its element as text or
+// as base64, or lie behind AppendedData, as base64 or as they are. Binary data begin with a length, or, compressed, with the
+// number of their blocks, the bytes of a block and of the last one, and the compressed bytes of each.
+//
+// Only the elements and those lengths are read here. What lies between them is skipped: it is most of the file.
+#include "Readers/VtkXmlFile.h"
+#include "Core/Base/NumberText.h"
+#include "Readers/ByteOrder.h"
+#include "Readers/HeaderLines.h"
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <optional>
+
+namespace echorama {
+namespace {
+
+constexpr std::size_t LongestElement = 1 << 20;
+constexpr std::uint64_t LargestRatio = 10000; // of what compressed data can become
+
+struct XmlElement {
+  std::string name; // "/name" at its end
+  std::map<std::string, std::string> attributes;
+
+  const std::string* Find(const std::string& key) const
+  {
+    const auto found = attributes.find(key);
+    return found == attributes.end() ? nullptr : &found->second;
+  }
+};
+
+enum class VtkXmlEncoding { Raw, Base64 };
+
+class VtkXmlCheck {
+public:
+  explicit VtkXmlCheck(const std::string& path)
+    : lines_(path), path_(path), stream_(path, std::ios::binary), bytes_(std::filesystem::file_size(path))
+  {
+  }
+
+  std::vector<std::string> Run()
+  {
+    std::vector<std::string> notes;
+    bool image = false;
+    for (std::optional<XmlElement> element = Next(); element; element = Next()) {
+      const std::string& name = element->name;
+      if (name == "VTKFile")
+        File(*element);
+      else if (name == "ImageData") {
+        if (image)
+          lines_.Fail("it has two ImageData elements");
+        image = true;
+        notes = Geometry(*element);
+      } else if (name == "Piece")
+        Piece(*element);
+      else if (name == "DataArray" || name == "Array")
+        Array(*element);
+      else if (name == "AppendedData") {
+        Appended(*element);
+        break; // what follows is no XML
+      }
+    }
+    if (!image)
+      lines_.Fail("it is not a VTK image file: it has no ImageData element");
+    if (!later_.empty() && !appended_)
+      lines_.Fail("its data are said to be appended, and there are none");
+    return notes;
+  }
+
+private:
+  std::uint64_t Position() { return static_cast<std::uint64_t>(stream_.tellg()); }
+
+  // The next element, or nothing at the end of the file. Comments and declarations are passed over.
+  std::optional<XmlElement> Next()
+  {
+    while (stream_.ignore(std::numeric_limits<std::streamsize>::max(), '<') && !stream_.eof()) {
+      std::string text;
+      char quote = 0;
+      for (int c = stream_.get(); c != '>' || quote != 0; c = stream_.get()) {
+        if (c == std::char_traits<char>::eof() || text.size() > LongestElement)
+          lines_.Fail("it cannot be read as a VTK image file: an element has no end");
+        text.push_back(static_cast<char>(c));
+        if (text == "!--") {
+          SkipComment();
+          text.clear();
+          break;
+        }
+        if (quote == 0 && (c == '"' || c == '\''))
+          quote = static_cast<char>(c);
+        else if (c == quote)
+          quote = 0;
+      }
+      if (text.empty() || text[0] == '?')
+        continue;
+      if (text[0] == '!')
+        lines_.Fail("it cannot be read as a VTK image file: it holds a declaration <" + text.substr(0, 40) + ">");
+      return Parsed(text);
+    }
+    return std::nullopt;
+  }
+
+  void SkipComment()
+  {
+    char before[2] = {0, 0};
+    for (int c = stream_.get(); c != std::char_traits<char>::eof(); c = stream_.get()) {
+      if (c == '>' && before[0] == '-' && before[1] == '-')
+        return;
+      before[0] = before[1];
+      before[1] = static_cast<char>(c);
+    }
+    lines_.Fail("it cannot be read as a VTK image file: a comment has no end");
+  }
+
+  // name key="value" key='value' /
+  XmlElement Parsed(std::string_view text) const
+  {
+    constexpr const char* blanks = " \t\r\n";
+    XmlElement element;
+    std::size_t at = std::min(text.find_first_of(" \t\r\n", 1), text.size());
+    element.name = text.substr(0, at);
+    if (element.name.back() == '/' && element.name.size() > 1) // <name/>
+      element.name.pop_back();
+    for (at = text.find_first_not_of(blanks, at); at < text.size(); at = text.find_first_not_of(blanks, at)) {
+      if (text[at] == '/')
+        break;
+      const std::size_t equals = text.find('=', at);
+      const std::size_t open = equals == std::string_view::npos ? equals : text.find_first_not_of(blanks, equals + 1);
+      const std::size_t close = open == std::string_view::npos || (text[open] != '"' && text[open] != '\'')
+                                    ? std::string_view::npos
+                                    : text.find(text[open], open + 1);
+      if (close == std::string_view::npos)
+        lines_.Fail("it cannot be read as a VTK image file: the attributes of " + element.name + " are damaged");
+      const std::string key(HeaderLines::Trimmed(text.substr(at, equals - at)));
+      if (!element.attributes.emplace(key, text.substr(open + 1, close - open - 1)).second)
+        lines_.Fail(element.name + " says " + key + " twice");
+      at = close + 1;
+    }
+    return element;
+  }
+
+  // One of some words.
+  void Need(const XmlElement& element, const std::string& key, std::initializer_list<const char*> words, bool mayBeMissing) const
+  {
+    const std::string* value = element.Find(key);
+    if (value ? std::find(words.begin(), words.end(), *value) == words.end() : !mayBeMissing)
+      lines_.Fail(element.name + (value ? " has the " + key + " \"" + *value + "\", which is not known" : " has no " + key));
+  }
+
+  // A whole number from least to most, or \a missing.
+  std::int64_t Number(const XmlElement& element, const std::string& key, std::int64_t least, std::int64_t most,
+                      std::int64_t missing) const
+  {
+    const std::string* value = element.Find(key);
+    if (!value)
+      return missing;
+    const std::int64_t number = lines_.Numbers<std::int64_t>(key, *value, 1)[0];
+    if (number < least || number > most)
+      lines_.Fail(key + " of " + element.name + " is " + std::to_string(number) + ", which cannot be");
+    return number;
+  }
+
+  std::array<int, 6> Extent(const std::string& key, const std::string& text) const
+  {
+    const std::vector<int> numbers = lines_.Numbers<int>(key, text, 6);
+    std::array<int, 6> extent;
+    std::copy(numbers.begin(), numbers.end(), extent.begin());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::int64_t size = std::int64_t{extent[2 * axis + 1]} - extent[2 * axis] + 1;
+      if (size < 1 || size > std::numeric_limits<int>::max())
+        lines_.Fail("its " + key + " is empty or overflows");
+    }
+    return extent;
+  }
+
+  void File(const XmlElement& element)
+  {
+    Need(element, "type", {"ImageData"}, false);
+    Need(element, "byte_order", {"LittleEndian", "BigEndian"}, true);
+    Need(element, "header_type", {"UInt32", "UInt64"}, true);
+    const std::string* order = element.Find("byte_order");
+    const std::string* header = element.Find("header_type");
+    swap_ = order && (*order == "BigEndian") != HostIsBigEndian;
+    wordBytes_ = header && *header == "UInt64" ? 8 : 4;
+    compressed_ = element.Find("compressor") && !element.Find("compressor")->empty();
+    if (compressed_)
+      Need(element, "compressor", {"vtkZLibDataCompressor", "vtkLZ4DataCompressor", "vtkLZMADataCompressor"}, false);
+  }
+
+  std::vector<std::string> Geometry(const XmlElement& element)
+  {
+    const std::string* whole = element.Find("WholeExtent");
+    if (!whole)
+      lines_.Fail("it cannot be read as a VTK image file: it has no WholeExtent");
+    whole_ = Extent("WholeExtent", *whole);
+    double voxels = 1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      voxels *= 1.0 + (*whole_)[2 * axis + 1] - (*whole_)[2 * axis];
+    if (voxels > static_cast<double>(LargestRatio * bytes_))
+      lines_.Fail("its WholeExtent needs more voxels than the file can hold");
+    std::vector<std::string> notes;
+    const auto check = [&](const std::string& name, std::size_t count, const char* missing) {
+      if (const std::string* value = element.Find(name))
+        lines_.Numbers<double>(name, *value, count);
+      else
+        notes.push_back(missing);
+    };
+    check("Origin", 3, "the file has no origin: 0 0 0 was assumed");
+    check("Spacing", 3, "the file has no spacing: 1 mm was assumed");
+    check("Direction", 9, "the file has no direction: its axes were taken as those of the world");
+    return notes;
+  }
+
+  void Piece(const XmlElement& element) const
+  {
+    const std::string* text = element.Find("Extent");
+    if (!text || !whole_)
+      lines_.Fail("it cannot be read as a VTK image file: a piece has no Extent, or lies in no image");
+    const std::array<int, 6> piece = Extent("Extent", *text);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (piece[2 * axis] < (*whole_)[2 * axis] || piece[2 * axis + 1] > (*whole_)[2 * axis + 1])
+        lines_.Fail("the Extent of a piece lies beyond the WholeExtent");
+  }
+
+  void Array(const XmlElement& element)
+  {
+    Need(element, "type",
+         {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Float32", "Float64", "String"}, false);
+    Need(element, "format", {"ascii", "binary", "appended"}, true);
+    // An array in memory is never much larger than in the file.
+    const std::int64_t most =
+        static_cast<std::int64_t>(std::min<std::uint64_t>(LargestRatio * bytes_, std::numeric_limits<std::int64_t>::max() / 64));
+    const std::int64_t components = Number(element, "NumberOfComponents", 1, 1000000, 1);
+    Number(element, "NumberOfTuples", 0, most / components, 0);
+    const std::string* format = element.Find("format");
+    if (format && *format == "appended") {
+      if (!element.Find("offset"))
+        lines_.Fail(element.name + " has no offset of its appended data");
+      later_.push_back(static_cast<std::uint64_t>(Number(element, "offset", 0, static_cast<std::int64_t>(bytes_), 0)));
+    } else if (format && *format == "binary") {
+      const std::uint64_t begin = Position();
+      stream_.ignore(std::numeric_limits<std::streamsize>::max(), '<');
+      const std::uint64_t end = stream_.eof() ? bytes_ : Position() - 1;
+      Lengths(begin, end, VtkXmlEncoding::Base64);
+      stream_.clear();
+      stream_.seekg(static_cast<std::streamoff>(end));
+    }
+  }
+
+  void Appended(const XmlElement& element)
+  {
+    appended_ = true;
+    Need(element, "encoding", {"raw", "base64"}, true);
+    const std::string* encoding = element.Find("encoding");
+    stream_.ignore(std::numeric_limits<std::streamsize>::max(), '_');
+    if (stream_.eof() || !stream_)
+      lines_.Fail("it cannot be read as a VTK image file: its appended data have no beginning");
+    const std::uint64_t begin = Position();
+    for (const std::uint64_t offset : later_)
+      Lengths(begin + offset, bytes_, encoding && *encoding == "raw" ? VtkXmlEncoding::Raw : VtkXmlEncoding::Base64);
+  }
+
+  // The lengths in front of an array's data, which lie within [begin, end) of the file.
+  void Lengths(std::uint64_t begin, std::uint64_t end, VtkXmlEncoding encoding)
+  {
+    const auto words = [&](std::size_t count) { return Words(begin, end, count, encoding); };
+    const std::uint64_t room = end - std::min(begin, end);
+    const auto fail = [this] { lines_.Fail("the data are truncated or damaged (a length in them is not possible)"); };
+    if (!compressed_) {
+      if (words(1)[0] > room)
+        fail();
+      return;
+    }
+    const std::vector<std::uint64_t> first = words(3);
+    const std::uint64_t blocks = first[0], block = first[1], last = first[2];
+    if (blocks > room / wordBytes_ || (blocks > 0 && block == 0) || last > block || block > LargestRatio * bytes_)
+      fail();
+    std::uint64_t sum = 0;
+    const std::vector<std::uint64_t> all = words(3 + blocks);
+    for (std::size_t i = 3; i < all.size(); ++i) {
+      if (all[i] > room - std::min(sum, room))
+        fail();
+      sum += all[i];
+    }
+  }
+
+  std::vector<std::uint64_t> Words(std::uint64_t begin, std::uint64_t end, std::size_t count, VtkXmlEncoding encoding)
+  {
+    const std::size_t wanted = count * wordBytes_;
+    std::string bytes;
+    stream_.clear();
+    stream_.seekg(static_cast<std::streamoff>(begin));
+    if (encoding == VtkXmlEncoding::Raw) {
+      bytes.resize(std::min<std::uint64_t>(wanted, end - std::min(begin, end)));
+      stream_.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+      bytes.resize(static_cast<std::size_t>(stream_.gcount()));
+    } else {
+      std::uint32_t bits = 0;
+      int held = 0;
+      for (std::uint64_t at = begin; at < end && bytes.size() < wanted; ++at) {
+        const int c = stream_.get();
+        if (c == ' ' || c == '\n' || c == '\r' || c == '\t')
+          continue;
+        const int value = Digit(c);
+        if (value < 0)
+          break;
+        bits = bits << 6 | static_cast<std::uint32_t>(value);
+        held += 6;
+        if (held >= 8) {
+          held -= 8;
+          bytes.push_back(static_cast<char>(bits >> held & 0xFF));
+        }
+      }
+    }
+    if (bytes.size() != wanted)
+      lines_.Fail("the data are truncated or damaged (they end early)");
+    if (swap_)
+      SwapBytes(bytes.data(), wordBytes_, count);
+    std::vector<std::uint64_t> words(count);
+    for (std::size_t i = 0; i < count; ++i)
+      if (wordBytes_ == 8)
+        std::memcpy(&words[i], bytes.data() + 8 * i, 8);
+      else {
+        std::uint32_t word;
+        std::memcpy(&word, bytes.data() + 4 * i, 4);
+        words[i] = word;
+      }
+    return words;
+  }
+
+  // Of base64; -1 when it is none.
+  static int Digit(int c)
+  {
+    return c >= 'A' && c <= 'Z'   ? c - 'A'
+           : c >= 'a' && c <= 'z' ? c - 'a' + 26
+           : c >= '0' && c <= '9' ? c - '0' + 52
+           : c == '+'             ? 62
+           : c == '/'             ? 63
+                                  : -1;
+  }
+
+  HeaderLines lines_; // says what is wrong
+  std::string path_;
+  std::ifstream stream_;
+  std::uint64_t bytes_;
+  bool swap_ = false, compressed_ = false, appended_ = false;
+  std::size_t wordBytes_ = 4;
+  std::optional<std::array<int, 6>> whole_;
+  std::vector<std::uint64_t> later_; // offsets of appended arrays
+};
+
+} // namespace
+
+std::vector<std::string> CheckVtkXmlFile(const std::string& path)
+{
+  return VtkXmlCheck(path).Run();
+}
+
+} // namespace echorama
