@@ -126,7 +126,7 @@ public:
         const std::uint64_t place = (slice.picture * slicesOfPicture + k) * bytes;
         if (file.storage != DicomStorage::Plain) {
           if (decodedFile != slice.file)
-            decoded = DecodeDicomPixels(file);
+            decoded = DecodeDicomPixels(file, progress, static_cast<double>(i * slicesOfPicture + k) / n[2]);
           decodedFile = slice.file;
           pixels = decoded.data() + place;
         } else {

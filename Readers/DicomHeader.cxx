@@ -8,14 +8,12 @@
 // assertion or worse, so they run in a process of their own, which writes to memory shared with this one.
 #include "Readers/DicomHeader.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/IsolatedTask.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
-#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <gdcmImage.h>
@@ -26,9 +24,6 @@
 #include <new>
 #include <sstream>
 #include <sys/mman.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <zlib.h>
 
 namespace fs = std::filesystem;
@@ -659,59 +654,25 @@ private:
   int highBit_ = 7;
 };
 
-// The compressed pixels as gdcm's codecs take them; null where they are none that are known. What does not begin as its
-// syntax says is kept from the codecs.
-gdcm::SmartPointer<gdcm::SequenceOfFragments> Fragments(const DicomHeader& header, std::ifstream& stream)
+[[noreturn]] void FailPixels(const DicomHeader& header)
 {
-  const gdcm::TransferSyntax::TSType syntax = gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str());
-  std::vector<std::string> fragments;
-  std::uint64_t at = header.pixelOffset;
-  const std::uint64_t end = at + header.pixelBytes;
-  stream.seekg(static_cast<std::streamoff>(at));
-  for (bool table = true; at < end; table = false) {
-    unsigned char b[8];
-    if (end - at < 8 || !stream.read(reinterpret_cast<char*>(b), 8))
-      return nullptr;
-    at += 8;
-    const std::uint32_t bytes = std::uint32_t{b[7]} << 24 | std::uint32_t{b[6]} << 16 | std::uint32_t{b[5]} << 8 | b[4];
-    if (b[2] == 0xDD) // the end of the sequence
-      break;
-    if (bytes > end - at)
-      return nullptr;
-    std::string fragment(bytes, '\0');
-    if (!stream.read(fragment.data(), static_cast<std::streamsize>(bytes)))
-      return nullptr;
-    at += bytes;
-    if (!table) // the first item is a table of offsets
-      fragments.push_back(std::move(fragment));
-  }
-  // One per picture, or all of one.
-  const std::size_t pictures = header.pictures.size();
-  if (syntax == gdcm::TransferSyntax::TS_END || fragments.size() < pictures || (pictures > 1 && fragments.size() != pictures))
-    return nullptr;
-  const bool isRle = syntax == gdcm::TransferSyntax::RLELossless;
-  auto sequence = gdcm::SequenceOfFragments::New();
-  for (std::size_t i = 0; i < fragments.size(); ++i) {
-    const std::string& f = fragments[i];
-    const auto begins = [&f](const char* mark, std::size_t count) { return f.compare(0, count, mark, count) == 0; };
-    const bool first = pictures > 1 || i == 0;
-    if (first && (isRle ? f.size() < 64 : !begins("\xFF\xD8", 2) && !begins("\xFF\x4F\xFF\x51", 4) && !begins("\0\0\0\x0CjP", 6)))
-      return nullptr;
-    gdcm::Fragment fragment;
-    fragment.SetByteValue(f.data(), static_cast<std::uint32_t>(f.size()));
-    sequence->AddFragment(fragment);
-  }
-  return sequence;
+  FailFile(header.path, "its pixels cannot be decoded: they are damaged or of a kind that is not supported");
 }
 
-bool Decode(const DicomHeader& header, const gdcm::SequenceOfFragments& fragments, std::uint64_t bytes, char* out)
+bool Decode(const DicomHeader& header, const std::vector<std::string>& fragments, std::uint64_t bytes, char* out)
 {
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
   gdcm::Trace::DebugOff();
   gdcm::DataElement element(gdcm::Tag(0x7FE0, 0x0010));
   element.SetVR(gdcm::VR::OB);
-  element.SetValue(fragments);
+  const auto sequence = gdcm::SequenceOfFragments::New();
+  for (const std::string& bytesOfOne : fragments) {
+    gdcm::Fragment fragment;
+    fragment.SetByteValue(bytesOfOne.data(), static_cast<std::uint32_t>(bytesOfOne.size()));
+    sequence->AddFragment(fragment);
+  }
+  element.SetValue(*sequence);
   gdcm::Image image;
   const auto pictures = static_cast<unsigned>(header.pictures.size());
   image.SetNumberOfDimensions(pictures > 1 ? 3 : 2);
@@ -750,31 +711,6 @@ private:
   void* data_;
 };
 
-// Runs \a task in a process of its own, silently. Whether it came to its end must be seen in shared memory.
-template <class Task>
-void InAnotherProcess(const std::string& path, const Task& task)
-{
-  const pid_t child = fork();
-  if (child < 0)
-    throw Error(Error::Kind::NotPossible, path + ": its pixels are compressed, and no process to decode them can be started");
-  if (child == 0) {
-    for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL})
-      std::signal(number, SIG_DFL); // the program's own handlers are not for this
-    const rlimit none{0, 0};
-    setrlimit(RLIMIT_CORE, &none);
-    const int nothing = open("/dev/null", O_WRONLY);
-    dup2(nothing, STDOUT_FILENO);
-    dup2(nothing, STDERR_FILENO);
-    try {
-      task();
-    } catch (...) {
-    }
-    _exit(0);
-  }
-  while (waitpid(child, nullptr, 0) < 0 && errno == EINTR)
-    ;
-}
-
 } // namespace
 
 std::uint64_t DicomHeader::PictureBytes() const
@@ -795,33 +731,74 @@ DicomHeader ReadDicomHeader(const std::string& path)
   return HeaderReader(path).Read();
 }
 
-std::vector<char> DecodeDicomPixels(const DicomHeader& header)
+std::vector<std::string> ReadDicomFragments(const DicomHeader& header)
 {
-  const auto fail = [&header]() {
-    FailFile(header.path, "its pixels cannot be decoded: they are damaged or of a kind that is not supported");
-  };
-  const std::uint64_t wanted = header.PictureBytes() * header.pictures.size();
   std::ifstream stream(header.path, std::ios::binary);
+  const gdcm::TransferSyntax::TSType syntax = gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str());
+  std::vector<std::string> fragments;
+  std::uint64_t at = header.pixelOffset;
+  const std::uint64_t end = at + header.pixelBytes;
+  stream.seekg(static_cast<std::streamoff>(at));
+  for (bool table = true; at < end; table = false) {
+    unsigned char b[8];
+    if (end - at < 8 || !stream.read(reinterpret_cast<char*>(b), 8))
+      FailPixels(header);
+    at += 8;
+    const std::uint32_t bytes = std::uint32_t{b[7]} << 24 | std::uint32_t{b[6]} << 16 | std::uint32_t{b[5]} << 8 | b[4];
+    if (b[2] == 0xDD) // the end of the sequence
+      break;
+    if (bytes > end - at)
+      FailPixels(header);
+    std::string fragment(bytes, '\0');
+    if (!stream.read(fragment.data(), static_cast<std::streamsize>(bytes)))
+      FailPixels(header);
+    at += bytes;
+    if (!table) // the first item is a table of offsets
+      fragments.push_back(std::move(fragment));
+  }
+  const std::size_t pictures = header.pictures.size();
+  if (syntax == gdcm::TransferSyntax::TS_END || fragments.size() < pictures || (pictures > 1 && fragments.size() != pictures))
+    FailPixels(header);
+  const bool isRle = syntax == gdcm::TransferSyntax::RLELossless;
+  for (std::size_t i = 0; i < fragments.size(); ++i) {
+    const std::string& f = fragments[i];
+    const auto begins = [&f](const char* mark, std::size_t count) { return f.compare(0, count, mark, count) == 0; };
+    const bool first = pictures > 1 || i == 0;
+    if (first && (isRle ? f.size() < 64 : !begins("\xFF\xD8", 2) && !begins("\xFF\x4F\xFF\x51", 4) && !begins("\0\0\0\x0CjP", 6)))
+      FailPixels(header);
+  }
+  return fragments;
+}
+
+std::vector<char> DecodeDicomPixels(const DicomHeader& header, const Progress& progress, double fraction)
+{
+  const std::uint64_t wanted = header.PictureBytes() * header.pictures.size();
   if (header.storage == DicomStorage::Deflated) {
+    std::ifstream stream(header.path, std::ios::binary);
     const std::uint64_t bytes = fs::file_size(header.path);
     Parser parser(stream, bytes, header.path);
     parser.MetaInformation();
     const std::string plain = Inflated(stream, parser.At(), bytes - parser.At(), header.path);
     if (plain.size() < header.pixelOffset || plain.size() - header.pixelOffset < wanted)
-      fail();
+      FailPixels(header);
     const auto first = plain.begin() + static_cast<std::ptrdiff_t>(header.pixelOffset);
     return {first, first + static_cast<std::ptrdiff_t>(wanted)};
   }
 
-  const auto fragments = Fragments(header, stream);
-  if (!fragments)
-    fail();
-  const SharedMemory memory(wanted + 1);
+  const std::vector<std::string> fragments = ReadDicomFragments(header);
+  const SharedMemory memory(wanted);
   char* const out = memory.Data();
-  char& finished = out[wanted];
-  InAnotherProcess(header.path, [&] { finished = Decode(header, *fragments, wanted, out) ? 1 : 0; });
-  if (finished == 0)
-    fail();
+  // The slowest codec, JPEG 2000, makes some 10 MB in a second, and holds several copies of what it makes.
+  const double megabytes = 1e-6 * static_cast<double>(wanted);
+  const TaskLimits limits{30.0 + megabytes, (std::uint64_t{1} << 28) + 16 * wanted};
+  switch (RunIsolated([&] { return Decode(header, fragments, wanted, out); }, limits, progress, fraction)) {
+  case TaskOutcome::Succeeded:
+    break;
+  case TaskOutcome::Failed:
+    FailPixels(header);
+  case TaskOutcome::TimedOut:
+    FailFile(header.path, "its pixels are damaged: decoding them did not come to an end");
+  }
   return {out, out + wanted};
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any bytes as a DICOM file. Compressed pixels are left out: gdcm's codecs are not ours, and run in a process of their own.
+// Any bytes as a DICOM file. Compressed pixels are read, but not decoded: gdcm's codecs are not ours, and run in a process of
+// their own.
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Testing/Fuzzing.h"
@@ -11,8 +12,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 {
   const MemoryFile file(data, size);
   return Survives([&] {
-    if (ReadDicomHeader(file.Path()).storage == DicomStorage::Encapsulated)
+    const DicomHeader header = ReadDicomHeader(file.Path());
+    if (header.storage == DicomStorage::Encapsulated) {
+      ReadDicomFragments(header);
       return;
+    }
     const auto source = OpenDicom(file.Path());
     const VolumeContent& content = source->Content();
     if (content.geometry.VoxelCount() > (1u << 20)) // more would only cost time

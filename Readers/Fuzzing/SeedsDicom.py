@@ -54,6 +54,13 @@ def image(e, frames=1, kind=b"1.2.840.10008.5.1.4.1.1.6.1", before=b"", incremen
             e(0x7FE0, 0x10, "OB", bytes(range(12 * samples)) * frames))
 
 
+def compressed(syntax, *fragments):
+    """Its table of offsets, then the fragments as they are."""
+    whole = file(syntax, image(explicit, max(1, len(fragments))))
+    pixels = whole.rindex(tag(0x7FE0, 0x10))
+    return (whole[:pixels] + tag(0x7FE0, 0x10) + b"OB\0\0" + struct.pack("<I", UNDEFINED) + item(b"") + b"".join(map(item, fragments)) + END)
+
+
 def groups(e, item, length):
     end = END if length else b""
     sequence = lambda group, element, value: e(group, element, "SQ", item(value) + end, length)
@@ -84,6 +91,9 @@ seeds = {
     "enhanced_open": file(b"1.2.840.10008.1.2.1", enhanced(explicit, open_item, UNDEFINED)),
     "enhanced_implicit": file(b"1.2.840.10008.1.2", enhanced(implicit, item, None)),
     "deflated": file(b"1.2.840.10008.1.2.1.99", packer.compress(enhanced(explicit, item, None)) + packer.flush()),
+    "rle": compressed(b"1.2.840.10008.1.2.5", struct.pack("<16I", 1, 64, *[0] * 14) + b"\x0b" + bytes(range(12)) + b"\0"),
+    "jpegs": compressed(b"1.2.840.10008.1.2.4.50", *[b"\xff\xd8\xff\xe0" + bytes(12)] * 3),
+    "jpeg2000": compressed(b"1.2.840.10008.1.2.4.90", b"\xff\x4f\xff\x51" + bytes(12)),
     "cine": file(b"1.2.840.10008.1.2.1", image(explicit, 3, increment=explicit(0x28, 9, "AT", tag(0x18, 0x1063)))),
     "stack": file(b"1.2.840.10008.1.2.1", image(explicit, 3, before=explicit(0x18, 0x88, "DS", b"2"))),
     "philips": file(b"1.2.840.10008.1.2.1", image(explicit, 4, before=philips, after=philips_after)),
