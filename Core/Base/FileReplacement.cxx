@@ -5,6 +5,9 @@
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <system_error>
 #include <unistd.h>
@@ -26,6 +29,21 @@ std::string NameBeside(const fs::path& target, const char* purpose)
   return (target.parent_path() / ("." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" +
                                   target.filename().string()))
       .string();
+}
+
+// An empty file beside the target that was not there before: whoever put a link in its place is not followed.
+std::string NewFileBeside(const fs::path& target)
+{
+  for (;;) {
+    const std::string name = NameBeside(target, "part");
+    const int file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    if (file >= 0) {
+      close(file);
+      return name;
+    }
+    if (errno != EEXIST)
+      Fail(target.string(), std::string("no temporary file can be made beside it (") + std::strerror(errno) + ")");
+  }
 }
 
 } // namespace
@@ -53,7 +71,7 @@ std::string FileReplacement::Stage(const std::string& path)
     Fail(path, "it is there and is not a plain file");
   if (access(folder.c_str(), W_OK) != 0)
     Fail(path, "the folder " + folder.string() + " cannot be written");
-  items_.push_back({NameBeside(target, "part"), target.string(), {}, false});
+  items_.push_back({NewFileBeside(target), target.string(), {}, false});
   return items_.back().temporary;
 }
 
@@ -73,6 +91,9 @@ void FileReplacement::Remove(const std::string& path)
 void FileReplacement::Commit()
 {
   std::error_code error;
+  for (const Item& item : items_)
+    if (!item.temporary.empty() && fs::file_size(item.temporary, error) == 0)
+      Fail(item.target, "nothing was written; what was there is left as it was");
   const bool alone = items_.size() == 1 && !items_.front().temporary.empty();
   if (!alone) {
     for (auto item = items_.rbegin(); item != items_.rend(); ++item)

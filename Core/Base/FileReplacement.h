@@ -16,8 +16,8 @@ public:
   FileReplacement(const FileReplacement&) = delete;
   FileReplacement& operator=(const FileReplacement&) = delete;
 
-  /// The temporary path to write now, for the file \a path; it ends in the same file name, extension included. A symbolic
-  /// link is followed. The file that is staged last is the one that the others belong to.
+  /// An empty temporary file to write now, for the file \a path; its name ends in the same one, extension included. A symbolic
+  /// link at \a path is followed. The file that is staged last is the one that the others belong to.
   /// \throws Error(FileSystem) when the folder is missing or not writable, or \a path is there and not a plain file.
   std::string Stage(const std::string& path);
 
@@ -27,6 +27,7 @@ public:
   /// \a path shall not be there afterwards (it may be missing already): a companion of an earlier version.
   void Remove(const std::string& path);
 
+  /// \throws Error(FileSystem) when a temporary file is still empty or cannot be put in place; then nothing has changed.
   /// One file is renamed over its predecessor. With several, all predecessors are put aside first and the last staged
   /// file appears last: others see the old set, none, or the new set, and never a mixed one.
   /// \throws Error(FileSystem), after which everything is as it was.

@@ -89,7 +89,23 @@ TEST_F(FileReplacementTest, AFailureHalfwayRollsBack)
   {
     FileReplacement replacement;
     Put(replacement.Stage(Path("b")), "companion");
-    replacement.Stage(Path("a")); // never written, so it cannot be put in place
+    const std::string gone = replacement.Stage(Path("a"));
+    fs::remove(gone); // so it cannot be put in place
+    replacement.Remove(Path("stale"));
+    EXPECT_THROW(replacement.Commit(), Error);
+  }
+  EXPECT_EQ(Contents(), (Files{{"a", "old"}, {"b", "old companion"}, {"stale", "old"}}));
+}
+
+TEST_F(FileReplacementTest, NothingIsReplacedByAFileThatWasNeverWritten)
+{
+  Put(Path("a"), "old");
+  Put(Path("b"), "old companion");
+  Put(Path("stale"), "old");
+  {
+    FileReplacement replacement;
+    Put(replacement.Stage(Path("b")), "companion");
+    replacement.Stage(Path("a"));
     replacement.Remove(Path("stale"));
     EXPECT_THROW(replacement.Commit(), Error);
   }
@@ -105,6 +121,21 @@ TEST_F(FileReplacementTest, ASymbolicLinkIsFollowed)
   replacement.Commit();
   EXPECT_TRUE(fs::is_symlink(Path("link")));
   EXPECT_EQ(Contents(), (Files{{"real", "new"}, {"link", "new"}}));
+}
+
+TEST_F(FileReplacementTest, ALinkInTheTemporaryPlaceIsNotFollowed)
+{
+  Put(Path("victim"), "untouched");
+  FileReplacement first, second;
+  const std::string name = fs::path(first.Stage(Path("a"))).filename().string(); // .partPID-NUMBER-a
+  const std::size_t dash = name.find('-');
+  const int number = std::stoi(name.substr(dash + 1));
+  for (int next = number + 1; next < number + 4; ++next)
+    fs::create_symlink("victim", Path(name.substr(0, dash + 1) + std::to_string(next) + "-a"));
+  Put(second.Stage(Path("a")), "new");
+  second.Commit();
+  EXPECT_EQ(Contents()["victim"], "untouched");
+  EXPECT_EQ(Contents()["a"], "new");
 }
 
 TEST_F(FileReplacementTest, RefusesPlacesWhereNoFileCanBe)

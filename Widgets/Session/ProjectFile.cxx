@@ -214,7 +214,7 @@ void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
 // All of the text is on the disk when this returns.
 void WriteThrough(const std::string& path, const std::string& text, const std::string& shown)
 {
-  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  const int file = open(path.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC);
   int problem = file < 0 ? errno : 0;
   for (std::size_t written = 0; problem == 0 && written < text.size();) {
     const ssize_t count = write(file, text.data() + written, text.size() - written);
