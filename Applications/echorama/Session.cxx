@@ -3,6 +3,7 @@
 // takes its place, so that a user sees one sentence: the first error with a reason that was reported while a stage ran. Errors
 // after it are complaints about it.
 #include "Session.h"
+#include "Core/Base/Utf8.h"
 #include "Core/Base/VtkMessage.h"
 
 #include <algorithm>
@@ -82,6 +83,22 @@ void InstallSignalHandlers()
   std::signal(SIGPIPE, SIG_IGN);
 }
 
+// Bytes of files that are not UTF-8 are replaced. Control characters are escaped, also those that JSON would allow.
+std::string TextOf(const nlohmann::ordered_json& object)
+{
+  const std::string text = object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  std::string safe;
+  safe.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool pair = text[i] == '\xc2' && static_cast<unsigned char>(text[i + 1]) < 0xa0; // U+0080 to U+009F
+    char escaped[8];
+    if (pair || text[i] == '\x7f')
+      std::snprintf(escaped, sizeof escaped, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(text[pair ? ++i : i])));
+    safe += pair || text[i] == '\x7f' ? std::string(escaped) : std::string(1, text[i]);
+  }
+  return safe;
+}
+
 } // namespace
 
 namespace echorama {
@@ -113,7 +130,7 @@ double Session::Seconds() const
 
 void Session::Say(const std::string& line)
 {
-  text_ += line + "\n";
+  text_ += Printable(line) + "\n";
 }
 
 void Session::Note(const std::string& text)
@@ -129,7 +146,7 @@ std::string Session::Line(std::string message) const
     for (std::size_t at = message.find(path); at != std::string::npos; at = message.find(path, at + shown.size()))
       message.replace(at, path.size(), shown);
   std::replace(message.begin(), message.end(), '\n', ' ');
-  return message;
+  return Printable(message);
 }
 
 void Session::Update(vtkAlgorithm* algorithm, const std::string& stage, const std::string& what)
@@ -236,8 +253,7 @@ int Session::Finish()
     object["seconds"] = Seconds();
     object["stages"] = stages_;
     object["notes"] = notes_;
-    // File names may hold bytes that are not UTF-8.
-    std::cout << object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;
+    std::cout << TextOf(object) << std::endl;
   } else {
     std::cout << text_ << std::flush;
   }
@@ -251,7 +267,7 @@ int Session::Fail(const std::string& message, int exitStatus)
   std::cerr << "echorama: " << line << std::endl;
   if (json_ && std::cout) {
     const nlohmann::ordered_json object{{"command", command_}, {"error", line}, {"seconds", Seconds()}, {"notes", notes_}};
-    std::cout << object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;
+    std::cout << TextOf(object) << std::endl;
   }
   return exitStatus;
 }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Utf8.h"
 #include <stdexcept>
 #include <string>
 
 namespace echorama {
 
-/// Why a kernel did not return a value. The message is a whole sentence that names the file or parameter and the reason.
+/// Why a kernel did not return a value. The message is a whole sentence that names the file or parameter and the reason;
+/// what it quotes of a file is made printable.
 class Error : public std::runtime_error {
 public:
   enum class Kind {
@@ -18,7 +20,7 @@ public:
     Cancelled,        ///< the caller's Progress asked to stop
   };
 
-  Error(Kind kind, const std::string& message) : std::runtime_error(message), kind_(kind) {}
+  Error(Kind kind, const std::string& message) : std::runtime_error(Printable(message)), kind_(kind) {}
   Kind GetKind() const { return kind_; }
 
 private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 namespace echorama {
@@ -37,6 +38,25 @@ inline bool IsPrintableUtf8(std::string_view text)
     text.remove_prefix(size);
   }
   return true;
+}
+
+/// \a text for a person's terminal, a message or a log: bytes that are no such character become \\x1b and the like, so that those
+/// of a damaged or malicious file do nothing there. Line ends stay.
+inline std::string Printable(std::string_view text)
+{
+  constexpr const char* digits = "0123456789abcdef";
+  std::string printable;
+  printable.reserve(text.size());
+  while (!text.empty()) {
+    const std::size_t size = PrintableUtf8(text);
+    const auto byte = static_cast<unsigned char>(text.front());
+    if (size > 0 || byte == '\n')
+      printable.append(text.substr(0, size > 0 ? size : 1));
+    else
+      printable.append({'\\', 'x', digits[byte >> 4], digits[byte & 15]});
+    text.remove_prefix(size > 0 ? size : 1);
+  }
+  return printable;
 }
 
 } // namespace echorama

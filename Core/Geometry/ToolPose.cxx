@@ -9,7 +9,7 @@ namespace {
 
 // What the key of a line "key = value" cannot hold becomes "_". Letters beyond ASCII stay: to drop them would make one tool of
 // two.
-std::string Printable(std::string_view name)
+std::string PlainName(std::string_view name)
 {
   std::string clean;
   while (!name.empty()) {
@@ -40,7 +40,7 @@ std::string Uncut(std::string frame)
 
 std::string ToolTransformName(const std::string& name)
 {
-  const std::string clean = Printable(name);
+  const std::string clean = PlainName(name);
   if (const auto frames = FramesOf(clean)) {
     const std::string whole = frames->first + "To" + frames->second;
     return FramesOf(whole) == frames ? whole : Uncut(frames->first) + "To" + Uncut(frames->second);

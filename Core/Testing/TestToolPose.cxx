@@ -57,3 +57,17 @@ TEST(PrintableUtf8, TellsCharactersFromBytes)
                            "\xf0\x80\x80\x80", "\xf4\x90\x80\x80", "\xf5\x80\x80\x80", "\xff"})
     EXPECT_EQ(size(none), 0u) << none;
 }
+
+TEST(PrintableUtf8, BytesThatATerminalWouldObeyAreSpeltOut)
+{
+  EXPECT_EQ(Printable("gr\xc3\xb6\xc3\x9f"
+                      "e\n"),
+            "gr\xc3\xb6\xc3\x9f"
+            "e\n");
+  EXPECT_EQ(Printable("\x1b[2J\t\x7f"), "\\x1b[2J\\x09\\x7f");
+  EXPECT_EQ(Printable(std::string("a\0b\xff", 4)), "a\\x00b\\xff");
+  EXPECT_EQ(Printable("\xc2\x9b"
+                      "1m"),
+            "\\xc2\\x9b1m"); // what begins such an order, as one character
+  EXPECT_EQ(Printable("\xc3"), "\\xc3");
+}
