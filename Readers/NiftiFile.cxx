@@ -722,7 +722,7 @@ std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, 
   }
   comment.resize((comment.size() + 8 + 15) / 16 * 16 - 8, '\0');
   if (comment.size() > (1u << 27)) // vox_offset is a float
-    throw Error(Error::Kind::InvalidParameter, path + ": its fields are too long for a header");
+    throw Error(Error::Kind::BadInput, path + ": its fields are too long for a header");
 
   const int version = *std::max_element(g.dimensions.begin(), g.dimensions.end()) > 32767 ? 2 : 1;
   const std::size_t offset = static_cast<std::size_t>(SizeOfHeader[version]) + 4 + 8 + comment.size();

@@ -26,7 +26,7 @@ std::unique_ptr<VolumeSource> OpenNifti(const std::string& path);
 /// it exactly, and the fields.
 /// \param path the file, for messages
 /// \param roundingMm by how many millimetres other programs see a voxel displaced, at most: the rounding to floats
-/// \throws Error(InvalidParameter) for fields that are too long, Error(BadInput) for a geometry beyond the range of floats.
+/// \throws Error(BadInput) for fields that are too long, or a geometry beyond the range of floats.
 std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, double& roundingMm);
 
 } // namespace echorama

@@ -28,7 +28,7 @@ class SequenceRecorder {
 public:
   /// \param content dimensions (0 x 0: poses alone), type, components, imageType, geometry and fields are used; transforms may
   /// come and go from frame to frame
-  /// \throws Error(InvalidParameter) for another extension, a field that cannot be held or the options, Error(BadInput) for
+  /// \throws Error(InvalidParameter) for another extension or the options, Error(BadInput) for a field that cannot be held or
   /// dimensions that are not possible, Error(FileSystem) when a file is there that must not be replaced, or none can be made.
   explicit SequenceRecorder(const std::string& path, const SequenceContent& content = {},
                             const SequenceRecorderOptions& options = {});
@@ -38,7 +38,7 @@ public:
   SequenceRecorder& operator=(const SequenceRecorder&) = delete;
 
   /// Adds a frame, and flushes when it is time. \a pixels are FrameBytes() bytes in this machine's byte order; nullptr: zeros,
-  /// with the status INVALID. \throws Error(InvalidParameter), Error(BadInput) as SequenceWriter::Append, after which the
+  /// with the status INVALID. \throws Error(BadInput) as SequenceWriter::Append, after which the
   /// recording goes on without the frame; Error(FileSystem) when the disk is full: what was safe stays, and every later call
   /// throws the same.
   void Append(const SequenceFrame& frame, const void* pixels = nullptr);

@@ -17,7 +17,7 @@ namespace {
 void CheckField(const std::string& path, const HeaderField& field)
 {
   if (!CanHold(field))
-    Fail(path, Error::Kind::InvalidParameter, "the header cannot hold the field \"" + field.first + "\"");
+    Fail(path, Error::Kind::BadInput, "the header cannot hold the field \"" + field.first + "\"");
 }
 
 // 16 numbers, row by row.
@@ -39,7 +39,7 @@ void CheckSequence(const std::string& path, SequenceContent& content)
   for (const HeaderField& field : content.fields) {
     CheckField(path, field);
     if (IsFrameField(field.first) || field.first == "UltrasoundImageOrientation" || field.first == "UltrasoundImageType")
-      Fail(path, Error::Kind::InvalidParameter, "the field \"" + field.first + "\" is one that the writer makes itself");
+      Fail(path, Error::Kind::BadInput, "the field \"" + field.first + "\" is one that the writer makes itself");
   }
   CheckField(path, {"type", content.imageType});
   content.geometry.dimensions = images ? content.dimensions : std::array<int, 3>{1, 1, 1};
@@ -89,12 +89,12 @@ std::vector<HeaderField> SequenceFrameFields(const std::string& path, const Sequ
   const auto add = [&](const std::string& key, const std::string& value) {
     CheckField(path, {key, value});
     if (!given.insert(key).second)
-      Fail(path, Error::Kind::InvalidParameter, "the field \"" + key + "\" of " + frameText + " is given twice");
+      Fail(path, Error::Kind::BadInput, "the field \"" + key + "\" of " + frameText + " is given twice");
     fields.emplace_back(key, value);
   };
   for (const SequenceTransform& transform : frame.transforms) {
     if (!FramesOf(transform.name))
-      Fail(path, Error::Kind::InvalidParameter, "\"" + transform.name + "\" is not the name of a transform, FrameAToFrameB");
+      Fail(path, Error::Kind::BadInput, "\"" + transform.name + "\" is not the name of a transform, FrameAToFrameB");
     const bool finite = transform.matrix.matrix().allFinite();
     if (!finite && transform.status == TransformStatus::Valid)
       Fail(path, Error::Kind::BadInput, transform.name + "Transform of " + frameText + " is not finite");

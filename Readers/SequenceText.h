@@ -9,7 +9,7 @@ namespace echorama {
 /// How the headers of sequences are worded, for the writer and the recorder. Messages begin with \a path.
 
 /// What both need of \a content: possible dimensions, a geometry (identity where there are no images), and fields that a header
-/// can hold. \throws Error(BadInput), Error(InvalidParameter)
+/// can hold. \throws Error(BadInput)
 void CheckSequence(const std::string& path, SequenceContent& content);
 
 /// The header of a MetaImage before the fields of its frames, in order. "DimSize" holds the dimensions of a frame and ends in a
@@ -21,8 +21,8 @@ bool CanNameTransform(const std::string& name);
 
 /// The fields of frame \a number, without "Seq_Frame0000_". \a statusKey: that of its image, whose name differs between formats;
 /// the image is valid when the frame says so and \a hasPixels.
-/// \throws Error(InvalidParameter) when the names of its transforms and fields cannot be held or are given twice,
-/// Error(BadInput) when a matrix is not finite though its status is Valid, or the time is infinite.
+/// \throws Error(BadInput) when the names of its transforms and fields cannot be held or are given twice, when a matrix is not
+/// finite though its status is Valid, or the time is infinite.
 std::vector<HeaderField> SequenceFrameFields(const std::string& path, const SequenceFrame& frame, int number,
                                              const std::string& statusKey, bool hasPixels);
 

@@ -16,7 +16,7 @@ public:
   /// \param content dimensions (0 x 0: poses alone, not in NRRD), type, components, imageType, geometry and fields are used;
   /// frames are written in MF orientation
   /// The files appear when \a files is committed, after Finish(). It must outlive the writer.
-  /// \throws Error(InvalidParameter) for another extension or a field that cannot be held (CanHold), Error(BadInput) for
+  /// \throws Error(InvalidParameter) for another extension, Error(BadInput) for a field that cannot be held (CanHold) or
   /// dimensions that are not possible, Error(FileSystem).
   SequenceWriter(const std::string& path, const SequenceContent& content, bool compress, FileReplacement& files);
   ~SequenceWriter();
@@ -24,9 +24,8 @@ public:
   SequenceWriter& operator=(const SequenceWriter&) = delete;
 
   /// Adds a frame. \a pixels are FrameBytes() bytes in this machine's byte order; nullptr: zeros, with the status INVALID.
-  /// \throws Error(InvalidParameter) when the names of its transforms and fields cannot be held or are given twice,
-  /// Error(BadInput) when a matrix is not finite though its status is Valid, or the time is infinite, Error(FileSystem),
-  /// Error(Cancelled).
+  /// \throws Error(BadInput) when the names of its transforms and fields cannot be held or are given twice, when a matrix is not
+  /// finite though its status is Valid, or the time is infinite, Error(FileSystem), Error(Cancelled).
   void Append(const SequenceFrame& frame, const void* pixels, const Progress& progress = {});
 
   /// Completes the files. \throws Error(BadInput) when there are no frames, Error(FileSystem) when the disk is full.

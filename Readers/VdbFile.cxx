@@ -681,7 +681,7 @@ void WriteVdb(const std::string& path, const ImageHeader& header, const void* vo
   g.Check(path);
   for (const HeaderField& field : header.fields)
     if (!CanHold(field))
-      throw Error(Error::Kind::InvalidParameter, path + ": the metadata cannot hold the field \"" + field.first + "\"");
+      throw Error(Error::Kind::BadInput, path + ": the metadata cannot hold the field \"" + field.first + "\"");
   Initialize();
   std::ofstream stream(files.Stage(path), std::ios::binary);
   const auto failed = [&path](const std::string& reason) {

@@ -67,7 +67,7 @@ VolumeWriter::VolumeWriter(const std::string& path, ImageHeader header, bool com
   header.geometry.Check(path);
   for (const HeaderField& field : header.fields)
     if (!CanHold(field))
-      p.Fail(Error::Kind::InvalidParameter, "the header cannot hold the field \"" + field.first + "\"");
+      p.Fail(Error::Kind::BadInput, "the header cannot hold the field \"" + field.first + "\"");
   const std::string extension = ExtensionOf(path);
   if (nifti)
     compress = extension == ".gz";

@@ -15,8 +15,8 @@ class VolumeWriter {
 public:
   /// Writes the header, from geometry, type and fields of \a header. \a compress: NIfTI goes by its extension instead (.nii,
   /// .nii.gz). The files appear when \a files is committed, after Finish(); the main file is staged last. It must outlive this.
-  /// \throws Error(InvalidParameter) when the name has none of these extensions or a field cannot be held (CanHold),
-  /// Error(BadInput) for a geometry that is none, Error(FileSystem) when the folder cannot be written.
+  /// \throws Error(InvalidParameter) when the name has none of these extensions, Error(BadInput) for a field that cannot
+  /// be held (CanHold) or a geometry that is none, Error(FileSystem) when the folder cannot be written.
   VolumeWriter(const std::string& path, ImageHeader header, bool compress, FileReplacement& files);
   ~VolumeWriter();
   VolumeWriter(const VolumeWriter&) = delete;

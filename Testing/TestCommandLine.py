@@ -201,8 +201,11 @@ class MainJob(unittest.TestCase):
         self.assertEqual(set(told["align_seconds"]), {"prepare", "pairs", "graph"})
 
     def test_the_search_of_the_dissertation(self):
-        told = run_json("align", *volumes(), "-o", work / "search.json", "--method", "search", *FEWER_POINTS)
-        self.assertNotIn("verdict", told)
+        done = run("align", *volumes(), "-o", work / "search.json", "--method", "search", *FEWER_POINTS, "--json")
+        self.assertEqual(done.returncode, 3, done.stderr)  # it may be right, and does not know
+        told = json.loads(done.stdout)
+        self.assertEqual([volume["verdict"] for volume in told["volumes"]], ["aligned"] + ["unjudged"] * (len(told["volumes"]) - 1))
+        self.assertEqual(told["verdict"], "doubtful")
         self.assertGreater(told["volumes"][1]["error_grey"], 0)
         self.assertLess(run_json("score", work / "search.json", "--truth", phantom / "truth.json")["score_mm"], 1.25)
 
@@ -311,6 +314,30 @@ class MainJob(unittest.TestCase):
         self.assertTrue((results["average"] != results["feather"]).any())
         run_json("stitch", *volumes(), "-o", work / "blunt.mha", "--poses", self.poses, "--spacing", 3, "--sharpness", 0, "--texture", "mix")
         self.assertLessEqual(abs(read_mha(work / "blunt.mha")[1].astype(int) - results["average"]).max(), 1)
+
+    def test_a_project_paints_and_carves(self):
+        """Strokes of a project are part of its volumes: what was carved does not come back."""
+        folder = work / "project"
+        folder.mkdir()
+        for name in ("a.mha", "b.mha"):
+            write_mha(folder / name, numpy.full((20, 20, 20), 100, "u1"))
+        brush = {"radiusMm": 3, "intensity": 200, "opacity": 1, "hardness": 1, "insideValid": True}
+        carve = {**brush, "mode": "carve", "pathMm": [[5, 10, 10]]}
+        paint = {**brush, "mode": "paint", "pathMm": [[14, 10, 10]]}
+        pose = numpy.eye(4).tolist()
+        project = {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [
+            {"name": "a", "file": "a.mha", "VolumeToWorld": pose, "strokes": [carve, paint]},
+            {"name": "b", "file": "b.mha", "VolumeToWorld": pose, "strokes": [carve, paint]}]}
+        (folder / "project.json").write_text(json.dumps(project))
+        told = run_json("stitch", folder / "a.mha", folder / "b.mha", "--poses", folder / "project.json", "-o", folder / "out.mha",
+                        "--spacing", 1)
+        self.assertEqual(sum("2 strokes" in note for note in told["notes"]), 2)
+        _, voxels = read_mha(folder / "out.mha")
+        _, valid = read_mha(folder / "out.ValidRegion.mha")
+        self.assertEqual((valid[10, 10, 5], valid[10, 10, 14], valid[10, 10, 1]), (0, 1, 1))
+        self.assertEqual(int(valid.size - valid.sum()), sum((z - 10) ** 2 + (y - 10) ** 2 + (x - 5) ** 2 <= 9
+                                                            for z in range(20) for y in range(20) for x in range(20)))
+        self.assertEqual((voxels[10, 10, 14], voxels[10, 10, 18]), (200, 100))
 
     def test_stitch_in_every_way(self):
         """All methods and textures give a volume of the same shape and valid region, and no two of them the same voxels."""
@@ -547,6 +574,18 @@ class Manners(unittest.TestCase):
         self.assertIn("note: ", done.stderr)
         self.assertTrue(json.loads(done.stdout)["notes"])
 
+    def test_nothing_that_a_terminal_would_obey(self):
+        """Names of files and what stands in them reach the terminal as characters, not as orders to it."""
+        name = work / "a\x1b[31m\xc2\x9b.mha"
+        write_mha(name, numpy.ones((4, 4, 4), "u1"), header={"Comment": "b\x7f\u009b"})
+        for arguments in (["info", name], ["info", name, "--json"], ["info", work / "missing\x1b[31m.mha", "--json"]):
+            done = run(*arguments)
+            for text in (done.stdout, done.stderr):
+                self.assertFalse([c for c in text if (ord(c) < 32 and c != "\n") or 0x7f <= ord(c) < 0xa0], ascii(text))
+            if "--json" in arguments:
+                json.loads(done.stdout)
+        self.assertIn("missing\\x1b[31m.mha", done.stderr)
+
     def test_every_command_tells_seconds(self):
         told = run_json("convert", phantom / "volume_1.mha", work / "seconds.nrrd")
         self.assertGreaterEqual(told["seconds"], sum(told["stages"].values()))
@@ -568,7 +607,7 @@ class Manners(unittest.TestCase):
             shown += piece
         os.close(terminal)
         output = process.communicate(timeout=300)[0]
-        self.assertEqual(process.returncode, 0)
+        self.assertEqual(process.returncode, 3)
         self.assertIn(b"align", shown)
         self.assertIn(b"%", shown)
         self.assertNotIn(b"%\r\n", shown)  # the bar is wiped, and leaves no line

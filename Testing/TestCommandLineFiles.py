@@ -145,6 +145,14 @@ class Sequences(unittest.TestCase):
                 self.assertEqual(frames[frame][name + "TransformStatus"], status)
                 numpy.testing.assert_array_equal(numpy.array(frames[frame][name + "Transform"].split(), float).reshape(4, 4), matrix)
 
+    def test_fields_that_a_header_cannot_hold_are_left_out(self):
+        path = work / "umlauts.igs.mha"
+        write_sequence(path, self.pixels, self.transforms, header={"Prüfer": "nobody", "Seq_Frame0002_Größe": "3", "Seq_Frame0003_Size": "4"})
+        told = run_json("convert", path, work / "plain.igs.mha")
+        self.assertEqual(told["lost"], ["Größe", "Prüfer"])
+        self.assertTrue(all(any(f"the field {name}" in note for note in told["notes"]) for name in told["lost"]))
+        self.assertEqual(read_sequence(work / "plain.igs.mha")[1][3]["Size"], "4")
+
     def test_some_frames(self):
         for text, expected in (("1", [1]), ("1:3", [1, 2, 3]), ("::2", [0, 2, 4]), ("3:", [3, 4]), (":1,4", [0, 1, 4]), ("4,0:1", [4, 0, 1])):
             run_json("convert", self.path, work / "some.igs.mha", "--frames", text)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The voxels of one volume of vtkUltrasoundAlignmentSession: shared with what was given until the first stroke, from then on a
-// copy that VoxelEdits writes to. For vtkUltrasoundAlignmentSession.cxx alone.
+// The voxels of one volume of vtkUltrasoundAlignmentSession, or of a project that a command reads: shared with what was given
+// until the first stroke, from then on a copy that VoxelEdits writes to.
 #ifndef vtkUltrasoundSessionVoxels_h
 #define vtkUltrasoundSessionVoxels_h
 

@@ -123,7 +123,7 @@ void Align(Session& session, AlignOptions options)
   }
 
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
-  ApplyPoses(volumes, options.poses);
+  ApplyPoses(session, volumes, options.poses);
   if (!options.tracker.log.empty())
     PlaceByTracker(session, options, volumes);
   if (options.trackerOnly) {
@@ -168,11 +168,10 @@ void Align(Session& session, AlignOptions options)
     const int number = static_cast<int>(i);
     const std::string verdict = aligner->GetVerdict(number), reason = aligner->GetReason(number);
     session.Say(volume.file + ": " +
-                (number + 1 == options.fixed
-                     ? "fixed"
-                     : (verdict.empty() ? "" : verdict + (reason.empty() ? "" : " (" + reason + ")") + "; ") + "turned by " +
-                           Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) + " mm, overlap " +
-                           Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
+                (number + 1 == options.fixed ? "fixed"
+                                             : verdict + (reason.empty() ? "" : " (" + reason + ")") + "; turned by " +
+                                                   Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
+                                                   " mm, overlap " + Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
   }
   if (report.contains("pairs")) {
     session.result["pairs"] = report["pairs"];
@@ -181,8 +180,8 @@ void Align(Session& session, AlignOptions options)
       pair["moving"] = pair["moving"].get<int>() + 1;
     }
     session.result["align_seconds"] = report["seconds"];
-    session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
   }
+  session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
   if (!aligner->GetAllAligned()) {
     session.status = Session::Doubtful;
     session.Note("not every volume is aligned: the poses should not be used unseen");

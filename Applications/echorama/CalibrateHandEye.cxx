@@ -179,7 +179,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   if (!options.target.empty())
     parameters.target = Eigen::Vector3d(options.target.data());
 
-  ApplyPoses(volumes, options.poses);
+  ApplyPoses(session, volumes, options.poses);
   std::vector<bool> trusted(volumes.size(), true);
   RigReport rig;
   if (options.poses.empty())

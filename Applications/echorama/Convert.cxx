@@ -4,6 +4,7 @@
 #include "Commands.h"
 #include "Files.h"
 #include "Outputs.h"
+#include "Readers/ImageHeader.h"
 #include "Readers/SequenceWriter.h"
 #include "Readers/TransformFile.h"
 #include "Volumes.h"
@@ -11,7 +12,9 @@
 #include <cctype>
 #include <CLI/Validators.hpp>
 #include <filesystem>
+#include <iterator>
 #include <memory>
+#include <set>
 
 namespace echorama {
 namespace {
@@ -47,17 +50,25 @@ void ConvertSequence(Session& session, const ConvertOptions& options)
     Misused(options.output +
             ": a tracked sequence becomes .mha, .mhd, .nrrd or .nhdr; echorama reconstruct makes a volume of it");
   SequenceFile sequence(options.input);
-  const SequenceContent& content = sequence.Content();
+  SequenceContent content = sequence.Content();
   for (const std::string& note : content.notes)
     session.Note(options.input + ": " + note);
   const std::vector<int> frames = FramesInList(options.frames, content.frames);
+  std::set<std::string> lost;
+  const auto drop = [&lost](std::vector<HeaderField>& fields) {
+    const auto last = std::stable_partition(fields.begin(), fields.end(), CanHold);
+    std::transform(last, fields.end(), std::inserter(lost, lost.end()), [](const HeaderField& field) { return field.first; });
+    fields.erase(last, fields.end());
+  };
+  drop(content.fields);
   FileReplacement files;
   session.Work("convert", options.input, [&](const Progress& progress) {
     SequenceWriter writer(options.output, content, true, files);
     std::vector<char> pixels(content.FrameBytes());
     for (std::size_t i = 0; i < frames.size(); ++i) {
       progress(static_cast<double>(i) / static_cast<double>(frames.size()));
-      const SequenceFrame frame = sequence.Frame(frames[i]);
+      SequenceFrame frame = sequence.Frame(frames[i]);
+      drop(frame.fields);
       if (content.HasImages())
         sequence.ReadFrame(frames[i], pixels.data());
       writer.Append(frame, content.HasImages() ? pixels.data() : nullptr);
@@ -65,8 +76,10 @@ void ConvertSequence(Session& session, const ConvertOptions& options)
     writer.Finish();
   });
   files.Commit();
+  for (const std::string& name : lost)
+    session.Note(options.output + ": the format cannot hold the field " + name);
   session.result["frames"] = frames.size();
-  session.result["lost"] = nlohmann::ordered_json::array();
+  session.result["lost"] = std::vector<std::string>(lost.begin(), lost.end());
   session.Say("wrote " + options.output + ": " + std::to_string(frames.size()) + " frames");
 }
 

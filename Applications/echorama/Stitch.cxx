@@ -181,7 +181,7 @@ void Stitch(Session& session, StitchOptions options)
     inputs.push_back(options.poses);
   CheckVolumeOutput(options.output, inputs);
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
-  ApplyPoses(volumes, options.poses);
+  ApplyPoses(session, volumes, options.poses);
   if (options.reliability)
     AddReliability(session, volumes);
 

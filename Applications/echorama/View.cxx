@@ -464,7 +464,7 @@ void View(Session& session, ViewOptions options)
     CheckOutput(options.screenshot, inputs);
   CheckDisplay();
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
-  ApplyPoses(volumes, options.poses);
+  ApplyPoses(session, volumes, options.poses);
   session.result["files"] = options.files;
 
   ViewWindow view(volumes, options, !options.screenshot.empty());

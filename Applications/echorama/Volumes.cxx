@@ -2,6 +2,8 @@
 #include "Volumes.h"
 
 #include "Readers/VolumeFile.h"
+#include "Widgets/Session/ProjectFile.h"
+#include "Widgets/vtkUltrasoundSessionVoxels.h"
 #include <algorithm>
 #include <filesystem>
 #include <sstream>
@@ -107,13 +109,25 @@ const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string
   }
 }
 
-void ApplyPoses(std::vector<LoadedVolume>& volumes, const std::string& path)
+void ApplyPoses(Session& session, std::vector<LoadedVolume>& volumes, const std::string& path)
 {
   if (path.empty())
     return;
   const std::vector<VolumePose> poses = ReadPoses(path);
-  for (LoadedVolume& volume : volumes)
-    MoveVolume(volume, PoseIn(poses, path, volume).volumeToWorld);
+  const std::vector<SessionVolume> known = ReadProject(path).state.volumes; // the same ones, in the same order
+  for (LoadedVolume& volume : volumes) {
+    const VolumePose& pose = PoseIn(poses, path, volume);
+    const StrokeChain strokes = known[static_cast<std::size_t>(&pose - poses.data())].strokes;
+    if (strokes) {
+      SessionVolume asRead;
+      asRead.geometry = volume.geometry;
+      SessionVoxels voxels(asRead, volume.image);
+      voxels.GoTo(strokes);
+      volume.image = voxels.GetBase();
+      session.Note(volume.file + ": painted and carved with the " + std::to_string(strokes->count) + " strokes of " + path);
+    }
+    MoveVolume(volume, pose.volumeToWorld);
+  }
 }
 
 vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>& volumes)

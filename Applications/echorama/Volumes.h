@@ -44,8 +44,9 @@ void MoveVolume(LoadedVolume&, const Pose&);
 /// none, or knows the volume with another geometry.
 const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string& path, const LoadedVolume&);
 
-/// Puts each volume where the pose file \a path says; throws as PoseIn. An empty path leaves the volumes where their files say.
-void ApplyPoses(std::vector<LoadedVolume>&, const std::string& path);
+/// Puts each volume where the pose file \a path says, painted and carved where that is a project with strokes; throws as PoseIn. An
+/// empty path leaves the volumes as their files are.
+void ApplyPoses(Session&, std::vector<LoadedVolume>&, const std::string& path);
 
 /// The volumes as the blocks of one data set, named by their files, so that filters name them in what they report.
 vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>&);

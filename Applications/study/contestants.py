@@ -71,8 +71,8 @@ class Echorama:
             second = said["volumes"][1]
             (_, first), (_, moved) = read_poses(out)
             seconds = stage_seconds(said.get("stages", {}), "align", said["seconds"])
-            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, second.get("verdict", said.get("verdict", "")),
-                          second.get("reason", said.get("reason", "")) or "")
+            verdict = second["verdict"] if second["verdict"] != "unjudged" else ""
+            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, verdict, second["reason"])
 
 
 def stage_seconds(stages, name, otherwise):

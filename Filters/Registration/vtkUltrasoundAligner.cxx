@@ -282,7 +282,17 @@ std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignBySearch(co
     result.VolumeToWorld = found.volumeToWorld;
     result.Error = found.error;
     result.Overlap = found.overlap;
-    report.push_back({{"name", volumes[results.size()].name}, {"error_grey", found.error}, {"overlap", found.overlap}});
+    if (static_cast<int>(results.size()) == this->FixedVolume) {
+      result.Verdict = echorama::NameOf(echorama::Verdict::Aligned);
+    } else {
+      result.Verdict = "unjudged";
+      result.Reason = "the method search does not tell whether its answer is right";
+    }
+    report.push_back({{"name", volumes[results.size()].name},
+                      {"verdict", result.Verdict},
+                      {"reason", result.Reason},
+                      {"error_grey", found.error},
+                      {"overlap", found.overlap}});
     results.push_back(result);
   }
   this->Report = nlohmann::ordered_json{{"method", this->Method}, {"volumes", report}}.dump();
@@ -422,9 +432,9 @@ int vtkUltrasoundAligner::RequestData(vtkInformation*, vtkInformationVector** in
       }
       const RowMajor rows = result.VolumeToWorld.matrix();
       AddField(moved, VolumeToWorldName(), rows.data(), 16);
+      AddField(moved, AlignmentVerdictName(), result.Verdict);
+      AddField(moved, AlignmentReasonName(), result.Reason);
       if (this->IsGlobal()) {
-        AddField(moved, AlignmentVerdictName(), result.Verdict);
-        AddField(moved, AlignmentReasonName(), result.Reason);
         AddField(moved, AlignmentSimilarityName(), &result.Similarity, 1);
         AddField(moved, AlignmentCovarianceName(), result.Covariance.data(), 36); // symmetric: rows are columns
         AddField(moved, AlignmentCentreName(), result.Centre.data(), 3);
@@ -501,9 +511,8 @@ std::string vtkUltrasoundAligner::GetReason(int volume) const
 bool vtkUltrasoundAligner::GetAllAligned() const
 {
   const std::string aligned = echorama::NameOf(echorama::Verdict::Aligned);
-  return !this->Results.empty() && std::all_of(this->Results.begin(), this->Results.end(), [&aligned](const Result& result) {
-    return result.Verdict.empty() || result.Verdict == aligned;
-  });
+  return !this->Results.empty() && std::all_of(this->Results.begin(), this->Results.end(),
+                                               [&aligned](const Result& result) { return result.Verdict == aligned; });
 }
 
 //----------------------------------------------------------------------------

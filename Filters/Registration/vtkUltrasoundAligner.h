@@ -12,7 +12,7 @@
  * local refinement and a verdict (echorama::AlignPair); a pose graph over all pairs places the volumes and names wrong pairs
  * (echorama::AlignVolumes). A volume whose verdict is `failed` stays where it was. The method `search` is the coarse-to-fine
  * search over six dimensions of dissertation 4.2 with the error of eq. 4.13, from a start that is near (echorama::AlignSearch);
- * it has no verdict, and compares intensities as they are.
+ * it does not judge its answer, and compares intensities as they are.
  *
  * Field data of each block, * where the method is `global`, ** where it is `search` (not on the fixed volume):
  *
@@ -20,8 +20,8 @@
  * | --------------------- | --------------------------------------------------------------------------------------------- |
  * | VolumeToWorld         | 16 doubles, row by row: the motion found, from where the input was to where the output is       |
  * | AlignmentOverlap      | 1 double: the share of the volume that overlaps others, [0, 1] (not on the fixed volume)         |
- * | AlignmentVerdict *    | a string: aligned, ambiguous or failed                                                         |
- * | AlignmentReason *     | a string: why it is not aligned; else empty                                                    |
+ * | AlignmentVerdict      | a string: aligned, ambiguous or failed; of `search` unjudged                                    |
+ * | AlignmentReason       | a string: why it is not aligned; else empty                                                    |
  * | AlignmentSimilarity * | 1 double: 1 identical, 0 chance                                                                |
  * | AlignmentCovariance * | 36 doubles, row by row: covariance of (translation mm, rotation vector radians), relative to     |
  * |                       | the fixed volume                                                                              |
@@ -226,14 +226,15 @@ public:
 
   ///@{
   /**
-   * "aligned", "ambiguous" or "failed", and why it is not aligned (empty when it is). The fixed volume is aligned. Empty when
-   * there is no such volume or the method has no verdicts.
+   * "aligned", "ambiguous" or "failed", and why it is not aligned (empty when it is); of the method `search` "unjudged". The
+   * fixed volume is aligned. Empty when there is no such volume.
    */
   std::string GetVerdict(int volume) const;
   std::string GetReason(int volume) const;
   ///@}
 
-  /** Whether every volume is aligned; also true for the method `search`, which fails otherwise. False before the first update. */
+  /** Whether every verdict is "aligned": never after the method `search`, which does not judge its answer, nor before the first
+   * update. */
   bool GetAllAligned() const;
 
   /**
@@ -242,8 +243,8 @@ public:
    * "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds": {"global",
    * "local", "confidence"}},
    * ...], "seconds":
-   * {"prepare", "pairs", "graph"}}; of the method `search`: {"method", "volumes": [{"name", "error_grey", "overlap"}, ...]}.
-   * Empty when it failed.
+   * {"prepare", "pairs", "graph"}}; of the method `search`: {"method", "volumes": [{"name", "verdict", "reason", "error_grey",
+   * "overlap"}, ...]}. Empty when it failed.
    */
   std::string GetReport() const { return this->Report; }
 

@@ -107,7 +107,7 @@ int main()
       return nlohmann::ordered_json{{"frames_per_second", std::round(frames / seconds)},
                                     {"file_mb", static_cast<double>(fs::file_size(path)) / 1e6}};
     };
-    Report("sequence", name, "ours, written", writing, 0.0, "pixels", more(writing, Frames));
+    ReportTime("sequence", name, "ours, written", writing, more(writing, Frames));
 
     std::vector<char> frame(FrameBytes), whole(pixels.size());
     const auto forward = [&] {

@@ -548,7 +548,7 @@ TEST_F(NiftiFile, WhatCannotBeWritten)
   refused("a.nii", bad, Error::Kind::BadInput, "32-bit");
   bad = good;
   bad.fields.emplace_back("two words", "2");
-  refused("a.nii", bad, Error::Kind::InvalidParameter, "two words");
+  refused("a.nii", bad, Error::Kind::BadInput, "two words");
   ImageHeader large = good;
   large.geometry.dimensions = {100, 100, 100};
   {

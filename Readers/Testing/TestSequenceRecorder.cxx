@@ -215,7 +215,7 @@ TEST_F(SequenceRecorderTest, FramesThatCannotBe)
   ExpectRefused([&] { recorder.Append(bad); }, Error::Kind::BadInput, path, "not finite");
   bad = FrameOf(1, 1.0);
   bad.transforms.push_back(bad.transforms[0]);
-  ExpectRefused([&] { recorder.Append(bad); }, Error::Kind::InvalidParameter, path, "given twice");
+  ExpectRefused([&] { recorder.Append(bad); }, Error::Kind::BadInput, path, "given twice");
   recorder.Append(FrameOf(1, 1.0)); // it goes on
   recorder.Finish();
   EXPECT_EQ(CheckRecording(path), 2);
@@ -237,7 +237,7 @@ TEST_F(SequenceRecorderTest, Refused)
   refused("b.mhd", content, Error::Kind::BadInput, "dimensions");
   content = Images(2, 2);
   content.fields = {{"two words", "x"}};
-  refused("b.mhd", content, Error::Kind::InvalidParameter, "cannot hold");
+  refused("b.mhd", content, Error::Kind::BadInput, "cannot hold");
   Put("b.raw", "pixels");
   refused("b.mhd", Images(2, 2), Error::Kind::FileSystem, "it is there already");
   EXPECT_EQ(std::filesystem::file_size(Path("b.raw")), 6u);

@@ -170,28 +170,28 @@ TEST_F(SequenceWriterTest, WhatCannotBeWrittenLeavesWhatWasThere)
   frame = {};
   frame.transforms.emplace_back();
   frame.transforms[0].name = "Probe";
-  refused(Error::Kind::InvalidParameter, "\"Probe\"", content, frame);
+  refused(Error::Kind::BadInput, "\"Probe\"", content, frame);
   frame.transforms[0].name = "ProbeToTracker";
   frame.transforms[0].matrix(1, 1) = NAN;
   refused(Error::Kind::BadInput, "ProbeToTrackerTransform", content, frame);
   frame.transforms[0].matrix(1, 1) = 1.0;
   frame.transforms.push_back(frame.transforms[0]);
-  refused(Error::Kind::InvalidParameter, "given twice", content, frame);
+  refused(Error::Kind::BadInput, "given twice", content, frame);
   frame = {};
   for (const char* key : {"Timestamp", "ImageStatus", "Status"}) {
     frame.fields = {{key, "1"}};
-    refused(Error::Kind::InvalidParameter, "given twice", content, frame);
+    refused(Error::Kind::BadInput, "given twice", content, frame);
   }
   for (const HeaderField& field :
        {HeaderField{"two words", "x"}, {"Key", "two\nlines"}, {"Key", " blank"}, {"", "x"}, {"DimSize", "1"}}) {
     frame.fields = {field};
-    refused(Error::Kind::InvalidParameter, "cannot hold", content, frame);
+    refused(Error::Kind::BadInput, "cannot hold", content, frame);
   }
   frame = {};
   SequenceContent wrong = content;
   for (const char* key : {"Seq_Frame0000_Note", "UltrasoundImageType", "UltrasoundImageOrientation"}) {
     wrong.fields = {{key, "x"}};
-    refused(Error::Kind::InvalidParameter, "makes itself", wrong, frame);
+    refused(Error::Kind::BadInput, "makes itself", wrong, frame);
   }
   wrong = content;
   wrong.dimensions = {100, 100, 0};

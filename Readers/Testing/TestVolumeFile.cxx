@@ -323,7 +323,7 @@ TEST_F(VolumeFile, WhatCannotBeWritten)
   refused("a.mha", bad, Error::Kind::BadInput, "direction");
   bad = good;
   bad.fields.emplace_back("NDims", "2");
-  refused("a.nrrd", bad, Error::Kind::InvalidParameter, "NDims");
+  refused("a.nrrd", bad, Error::Kind::BadInput, "NDims");
 }
 
 TEST_F(VolumeFile, PiecesMakeTheSameFile)
