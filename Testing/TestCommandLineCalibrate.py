@@ -106,7 +106,19 @@ class HandEye(unittest.TestCase):
         self.assertEqual(content["report"]["kind"], "hand-eye")
         self.assertIn("VolumeToSensor", run("info", work / "calibration.json").stdout)
 
-    def test_align_starts_from_the_tracker(self):
+    def test_align_refines_what_the_tracker_says(self):
+        """The example of the README. A rig alone can be turned about the axis of the probe and looks the same: what the voxels do not
+        determine must not be worse for it than the tracker left it."""
+        log = write_log(work / "refined.csv", "SensorToTracker", [0, 1, 2], self.sensor[:3])
+        scores = {}
+        for name, options in (("tracked", ["--tracker-only"]), ("refined", ["--start", "tracked"])):
+            done = run("align", *self.volumes[:3], "--tracker", log, "--calibration", work / "calibration.json", *options, "-o",
+                       work / f"{name}_poses.json")
+            self.assertIn(done.returncode, (0, 3), done.stderr)
+            scores[name] = run_json("score", work / f"{name}_poses.json", "--truth", work / "rig" / "truth.json")["score_mm"]
+        self.assertLess(scores["refined"], 1.5 * scores["tracked"], done.stdout)
+
+    def test_the_tracker_alone_places_volumes(self):
         told = run_json("align", *self.volumes[:3], "--tracker", write_log(work / "three.csv", "SensorToTracker", [0, 1, 2], self.sensor[:3]),
                         "--calibration", work / "calibration.json", "--tracker-only", "-o", work / "tracked.json")
         score = run_json("score", work / "tracked.json", "--truth", work / "rig" / "truth.json")["score_mm"]

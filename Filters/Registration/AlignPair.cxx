@@ -30,6 +30,7 @@ constexpr double HighestRatio = 99.0;
 constexpr int MostPoints = 1000;
 constexpr int MostCandidates = 1000;
 constexpr double FinalStop = 2e-5; // voxels: where the answer stops should tell little of the CPU
+constexpr double Slack = 1.5;      // how much further from the start than was said an answer may be
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
 
@@ -124,9 +125,12 @@ public:
   }
 
   /// \param isLast whether nobody will search further, so that a doubtful answer is worth its refinement
-  PairAlignment Align(double coneDegrees, double reachMm, bool isLast, const Progress& progress)
+  /// \param isKnown whether the true pose is said to lie in the cone and reach: what slides out of them is no answer
+  PairAlignment Align(double coneDegrees, double reachMm, bool isLast, bool isKnown, const Progress& progress)
   {
     PairAlignment result;
+    largestTurn_ = isKnown ? Slack * coneDegrees * EIGEN_PI / 180.0 : HUGE_VAL;
+    largestMoveMm_ = isKnown ? Slack * reachMm : HUGE_VAL;
     result.volumeToWorld = moving_.volumeToWorld;
     result.anywhere = coneDegrees >= 180.0;
 
@@ -146,8 +150,8 @@ public:
     start = Clock::now();
     std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.7));
     if (found.empty()) {
-      result.reason =
-          "no pose was found in which they overlap by " + Number(100.0 * p_.minimumOverlap, 0) + "% of the smaller one";
+      result.reason = "no pose was found " + std::string(isKnown && !result.anywhere ? "near the start " : "") +
+                      "in which they overlap by " + Number(100.0 * p_.minimumOverlap, 0) + "% of the smaller one";
       return result;
     }
     poses.clear();
@@ -156,7 +160,9 @@ public:
     double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
     found = Refine(poses, coarseMm_, middleMm, progress.Part(0.7, 0.8));
     if (found.empty()) {
-      result.reason = "every pose that fits at a coarse level loses its overlap at a finer one";
+      result.reason = isKnown && !result.anywhere
+                          ? "every pose that fits at a coarse level loses its overlap, or leaves the start, at a finer one"
+                          : "every pose that fits at a coarse level loses its overlap at a finer one";
       return result;
     }
     // What this level cannot tell apart a finer one may.
@@ -179,6 +185,10 @@ public:
     }
     const LocalAlignResult best = Local(found.front().volumeToWorld, middleMm, finestMm_, 0, progress.Part(0.8, 0.9), FinalStop);
     result.localSeconds = SecondsSince(start);
+    if (!IsNearStart(best.volumeToWorld)) {
+      result.reason = "the pose that fits best is not near the start";
+      return result;
+    }
 
     // 3. what that is worth
     start = Clock::now();
@@ -236,7 +246,15 @@ private:
   // How much speaks for a pose, as a test of correlation weighs it: the likeness times the square root of how much is compared.
   static double Evidence(const LocalAlignResult& found) { return found.similarity * std::sqrt(found.overlap); }
 
-  // Refines the poses and keeps those that are different and overlap, the best first.
+  // Whether a pose is as near the start as that is known.
+  bool IsNearStart(const Pose& pose) const
+  {
+    const Pose& start = moving_.volumeToWorld;
+    return RotationAngle(pose * start.inverse()) <= largestTurn_ &&
+           (pose * shape_.centroid - start * shape_.centroid).norm() <= largestMoveMm_;
+  }
+
+  // Refines the poses and keeps those that are different, overlap and are near the start, the best first.
   std::vector<LocalAlignResult> Refine(const std::vector<Pose>& poses, double coarsestMm, double finestMm,
                                        const Progress& progress) const
   {
@@ -248,7 +266,7 @@ private:
     std::stable_sort(all.begin(), all.end(),
                      [](const LocalAlignResult& a, const LocalAlignResult& b) { return Evidence(a) > Evidence(b); });
     for (const LocalAlignResult& one : all)
-      if (one.overlap >= p_.minimumOverlap &&
+      if (one.overlap >= p_.minimumOverlap && IsNearStart(one.volumeToWorld) &&
           std::none_of(different.begin(), different.end(), [&](const LocalAlignResult& other) {
             return shape_.Distance(one.volumeToWorld, other.volumeToWorld) < 3.0 * coarseMm_;
           }))
@@ -293,6 +311,7 @@ private:
   const AlignPairParameters& p_;
   Shape shape_, fixedShape_;
   double finestMm_ = 0.0, coarseMm_ = 0.0;
+  double largestTurn_ = HUGE_VAL, largestMoveMm_ = HUGE_VAL; // from the start, radians and mm
 };
 
 // The start's names, how far it may be off, and whether the whole world is searched when that has no clear answer.
@@ -381,14 +400,14 @@ PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const M
                                      {AlignStart::Unknown, 180.0, std::numeric_limits<double>::infinity(), 0.75}}};
   if (p.start != AlignStart::Automatic) {
     const Stage& stage = *std::find_if(stages.begin(), stages.end(), [&p](const Stage& s) { return s.start == p.start; });
-    return pair.Align(stage.coneDegrees, stage.reachMm, true, progress);
+    return pair.Align(stage.coneDegrees, stage.reachMm, true, true, progress);
   }
   // A wider search sees what a narrower one has seen: its answer is the one that counts.
   PairAlignment result;
   double done = 0.0;
   for (const Stage& stage : stages) {
     const bool isLast = stage.start == AlignStart::Unknown;
-    PairAlignment found = pair.Align(stage.coneDegrees, stage.reachMm, isLast, progress.Part(done, done + stage.costs));
+    PairAlignment found = pair.Align(stage.coneDegrees, stage.reachMm, isLast, false, progress.Part(done, done + stage.costs));
     done += stage.costs;
     found.globalSeconds += result.globalSeconds;
     found.localSeconds += result.localSeconds;

@@ -11,8 +11,8 @@ namespace echorama {
 /// What is known about where the moving volume belongs.
 enum class AlignStart {
   Automatic, ///< nothing for sure: as Tracked first, then as HandMade and as Unknown while there is no clear answer
-  Tracked,   ///< within some 12 degrees and 20 mm of the start: a calibrated tracker
-  HandMade,  ///< within some 35 degrees and a third of the volume's size: placed by eye
+  Tracked,   ///< within some 12 degrees and 20 mm of the start: a calibrated tracker. An answer half as far again is none
+  HandMade,  ///< within some 35 degrees and a third of the volume's size: placed by eye. The same holds
   Unknown,   ///< any rotation and any translation
 };
 
