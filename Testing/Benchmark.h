@@ -76,17 +76,27 @@ inline double PeakMb()
   return usage.ru_maxrss / 1024.0;
 }
 
-/// One line of output. Further keys are welcome.
-inline void Report(const std::string& bench, const std::string& testCase, const std::string& method, double seconds, double error,
-                   const std::string& errorUnit, nlohmann::ordered_json more = {})
+/// One line of output of what has no error, or whose error another line tells. Further keys are welcome.
+inline void ReportTime(const std::string& bench, const std::string& testCase, const std::string& method, double seconds,
+                       const nlohmann::ordered_json& more = {})
 {
-  nlohmann::ordered_json line{{"bench", bench}, {"case", testCase},        {"method", method},   {"seconds", seconds},
-                              {"error", error}, {"error_unit", errorUnit}, {"peak_mb", PeakMb()}};
+  nlohmann::ordered_json line{{"bench", bench}, {"case", testCase}, {"method", method}, {"seconds", seconds}};
   if (more.is_object())
     line.update(more);
+  line["peak_mb"] = PeakMb();
   std::cout << line.dump() << std::endl;
   if (Smoke() && std::clock() > 3 * CLOCKS_PER_SEC)
     std::_Exit(0);
+}
+
+/// The same with an error, which was measured.
+inline void Report(const std::string& bench, const std::string& testCase, const std::string& method, double seconds, double error,
+                   const std::string& errorUnit, const nlohmann::ordered_json& more = {})
+{
+  nlohmann::ordered_json all{{"error", error}, {"error_unit", errorUnit}};
+  if (more.is_object())
+    all.update(more);
+  ReportTime(bench, testCase, method, seconds, all);
 }
 
 } // namespace echorama::benchmark

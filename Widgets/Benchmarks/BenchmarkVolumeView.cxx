@@ -87,8 +87,8 @@ void BenchParticles(const std::vector<Scene>& scenes)
     Particles particles;
     const double seconds = benchmark::MedianSeconds([&] { particles = MakeParticles(scenes[0].Posed(), parameters); });
     const double sort = benchmark::MedianSeconds([&] { BackToFront({{&particles.positions, {0.5, 0.7, 0.1}, 0.0}}); });
-    benchmark::Report("workbench", "particles of one volume, downsampling " + std::to_string(downsampling), "MakeParticles",
-                      seconds, 0.0, "", {{"particles", particles.Count()}, {"sort_seconds", sort}});
+    benchmark::ReportTime("workbench", "particles of one volume, downsampling " + std::to_string(downsampling), "MakeParticles",
+                          seconds, {{"particles", particles.Count()}, {"sort_seconds", sort}});
   }
 }
 

@@ -244,7 +244,7 @@ void MeasureSlices(const std::vector<Seen>& volumes)
       ErrorOf(drawn, static_cast<std::size_t>(peer.blend->GetOutput()->GetNumberOfScalarComponents()), exact);
   benchmark::Report(Bench, name, "vtkImageReslice and vtkImageBlend", theirs, error.rms, "grey levels rms",
                     {{"p99", error.p99}, {"processor_seconds", ProcessorSeconds([&] { peer.Draw(); }, 9)}});
-  benchmark::Report(Bench, name, "echorama beside vtk", ours, 0.0, "", {{"times_faster", theirs / ours}});
+  benchmark::ReportTime(Bench, name, "echorama beside vtk", ours, {{"times_faster", theirs / ours}});
 #endif
 }
 
@@ -302,8 +302,7 @@ void MeasurePainting()
     std::sort(peerSeconds.begin(), peerSeconds.end());
     benchmark::Report(Bench, name, "echorama, a dab", dabSeconds[2], static_cast<double>(different), "voxels",
                       {{"voxels", painted}});
-    benchmark::Report(Bench, name, "every voxel, a dab", peerSeconds[2], 0.0, "voxels",
-                      {{"times_slower", peerSeconds[2] / dabSeconds[2]}});
+    benchmark::ReportTime(Bench, name, "every voxel, a dab", peerSeconds[2], {{"times_slower", peerSeconds[2] / dabSeconds[2]}});
 
     // A stroke of a second's mouse events, undone and done again.
     edits.GoTo(nullptr);
@@ -383,7 +382,7 @@ void MeasureOpening(const std::vector<Seen>& volumes)
       },
       3);
   benchmark::Report(Bench, "opening five 256^3", "echorama", seconds, 5.0 - opened, "volumes missing");
-  benchmark::Report(Bench, "opening five 256^3", "reading the bytes", plain, 0.0, "volumes missing");
+  benchmark::ReportTime(Bench, "opening five 256^3", "reading the bytes", plain);
   std::filesystem::remove_all(folder);
 }
 
@@ -421,8 +420,9 @@ void MeasureView(const std::vector<Seen>& volumes)
     };
     const double seconds = benchmark::MedianSeconds(redraw, 15), processor = ProcessorSeconds(redraw, 15);
     std::sort(pictures.begin(), pictures.end());
-    benchmark::Report(Bench, "slice view of three 256^3, 800 x 800, to the screen", "every " + std::to_string(step) + " pixels",
-                      seconds, 0.0, "", {{"picture_seconds", pictures[pictures.size() / 2]}, {"processor_seconds", processor}});
+    benchmark::ReportTime(Bench, "slice view of three 256^3, 800 x 800, to the screen",
+                          "every " + std::to_string(step) + " pixels", seconds,
+                          {{"picture_seconds", pictures[pictures.size() / 2]}, {"processor_seconds", processor}});
   }
 }
 #endif

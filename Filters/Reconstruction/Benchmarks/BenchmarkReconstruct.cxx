@@ -184,8 +184,8 @@ int main()
     const double processor = ProcessorSeconds(ours);
     ReportErrors(sweep, way.name, seconds, processor, result);
     const std::vector<double>& each = latency.seconds;
-    benchmark::Report(
-        "reconstruct", "one live frame", way.name, each[each.size() / 2], 0.0, "",
+    benchmark::ReportTime(
+        "reconstruct", "one live frame", way.name, each[each.size() / 2],
         {{"cpu_seconds", latency.processorSeconds}, {"slowest_of_20", each[each.size() * 19 / 20]}, {"slowest", each.back()}});
   }
   for (const auto& [method, name] : {std::pair{HoleFilling::Mean, "mean"}, std::pair{HoleFilling::Stick, "stick"}}) {

@@ -117,6 +117,6 @@ int main()
   TissueSurface surface;
   const std::vector<Sphere> spheres = PackSpheres(mixed).spheres;
   const double seconds = benchmark::MedianSeconds([&] { surface = MeshSpheres(tissue, spheres); }, 3);
-  benchmark::Report("packing", "sizes 1 to 10", "meshes for a cell of 1 mm", seconds, 0.0, "none",
-                    {{"spheres", spheres.size()}, {"triangles", surface.triangles.size()}});
+  benchmark::ReportTime("packing", "sizes 1 to 10", "meshes for a cell of 1 mm", seconds,
+                        {{"spheres", spheres.size()}, {"triangles", surface.triangles.size()}});
 }

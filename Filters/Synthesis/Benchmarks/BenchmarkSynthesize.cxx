@@ -150,8 +150,8 @@ void Peer()
   phantom.probe.depthMin = 5.0;
   BeamEchoes echoes;
   const double seconds = benchmark::Seconds([&] { echoes = SimulateEchoes(phantom); });
-  benchmark::Report("synthesize", "default scene, its own sampling", "phantom (peer)", seconds, 0.0, "",
-                    {{"samples", echoes.baseband.View().Size()}});
+  benchmark::ReportTime("synthesize", "default scene, its own sampling", "phantom (peer)", seconds,
+                        {{"samples", echoes.baseband.View().Size()}});
 }
 
 } // namespace
