@@ -27,7 +27,7 @@ for path in [*ours("*.h"), *ours("*.cxx")]:
     text = path.read_text()
     if "SPDX-License-Identifier: BSD-3-Clause" not in text[:200]:
         complaints.append(f"{name}: no licence line")
-    if path.parent.name in ("Testing", "Benchmarks"):
+    if path.parent.name in ("Testing", "Benchmarks", "Fuzzing"):
         continue
     if not path.name.startswith("vtk") and re.search(r'#include [<"]vtk', text):
         complaints.append(f"{name}: a kernel includes VTK")
@@ -50,8 +50,9 @@ for path in ours("vtk*.cxx"):
         continue
     if not path.with_suffix(".xml").exists():
         complaints.append(f"{name}: no ParaView XML beside it")
-    if name not in tests:
-        complaints.append(f"{name}: no test names it")
+    called = [name, *re.findall(rf"\b{name} as (\w+)", tests)]
+    if not re.search(rf"\b({'|'.join(called)})\(\)|vtkNew<{name}>", tests):
+        complaints.append(f"{name}: no test makes one")
     if name not in pages:
         complaints.append(f"{name}: no page of Documentation names it")
 

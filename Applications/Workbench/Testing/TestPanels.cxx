@@ -319,7 +319,8 @@ void TestPanels::aToolThatIsLetGoLeavesVolumes()
   QVERIFY(window.Pose(2) == left);
 }
 
-// The picture, made small, must be that of the manual but for a few grey levels: fonts and drivers differ.
+// The picture must be that of the manual, as a whole and in every square of 32 pixels, but for some grey levels: fonts and
+// drivers differ. A stroke of the brush that is missing is a square that differs.
 void TestPanels::Picture(WindowUnderTest& window, const QString& name)
 {
   // What moved is drawn in full again.
@@ -331,7 +332,7 @@ void TestPanels::Picture(WindowUnderTest& window, const QString& name)
     QVERIFY(picture.convertToFormat(QImage::Format_RGB888).save(path));
     return;
   }
-  const QSize size(picture.width() / 16, picture.height() / 16);
+  const QSize size(picture.width() / 4, picture.height() / 4);
   const auto small = [&size](const QImage& image) {
     return image.scaled(size, Qt::IgnoreAspectRatio, Qt::SmoothTransformation).convertToFormat(QImage::Format_RGB888);
   };
@@ -339,12 +340,30 @@ void TestPanels::Picture(WindowUnderTest& window, const QString& name)
   QVERIFY2(!wanted.isNull(), qPrintable(path));
   QCOMPARE(picture.size(), wanted.size());
   const QImage a = small(picture), b = small(wanted);
-  double sum = 0.0;
-  for (int y = 0; y < size.height(); ++y)
-    for (int x = 0; x < 3 * size.width(); ++x)
-      sum += std::abs(static_cast<int>(a.constScanLine(y)[x]) - static_cast<int>(b.constScanLine(y)[x]));
-  const double difference = sum / (3.0 * size.width() * size.height());
-  QVERIFY2(difference < 4.0, qPrintable(QString("%1 differs by %2 grey levels").arg(name).arg(difference)));
+  double sum = 0.0, worst = 0.0;
+  QPoint where;
+  constexpr int Block = 8;
+  for (int top = 0; top < size.height(); top += Block)
+    for (int left = 0; left < size.width(); left += Block) {
+      double block = 0.0;
+      for (int y = top; y < std::min(top + Block, size.height()); ++y)
+        for (int x = 3 * left; x < 3 * std::min(left + Block, size.width()); ++x)
+          block += std::abs(static_cast<int>(a.constScanLine(y)[x]) - static_cast<int>(b.constScanLine(y)[x]));
+      sum += block;
+      if (block > worst) {
+        worst = block;
+        where = QPoint(4 * left, 4 * top);
+      }
+    }
+  const double mean = sum / (3.0 * size.width() * size.height()), square = worst / (3.0 * Block * Block);
+  const QString told = QString("%1 differs by %2 grey levels, and by %3 in the square of 32 pixels at %4, %5")
+                           .arg(name)
+                           .arg(mean)
+                           .arg(square)
+                           .arg(where.x())
+                           .arg(where.y());
+  qInfo("%s", qPrintable(told));
+  QVERIFY2(mean < 1.0 && square < 20.0, qPrintable(told));
 }
 
 void TestPanels::thePicturesOfTheManual()

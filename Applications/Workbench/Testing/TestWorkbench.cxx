@@ -96,6 +96,8 @@ private slots:
   void aBatchIsSeenAsAWhole();
 
 private:
+  void ExpectDragged(SliceCanvas* slice, const std::array<double, 16>& before, const std::array<double, 16>& after,
+                     const QPoint& by);
   QDir Folder() const { return QDir(folder_->path()); }
   QString A() { return WriteVolume(Folder(), "left.mha", 1, {0, 0, 0}); }
   QString B() { return WriteVolume(Folder(), "right.mha", 2, {12, 4, 0}); }
@@ -182,6 +184,24 @@ void TestWorkbench::aGroupIsSelectedTogether()
   QCOMPARE(window.Session()->GetNumberOfSelected(), 2);
 }
 
+// A volume follows the mouse by as many millimetres as it went over the slice, to a pixel, and does not turn.
+void TestWorkbench::ExpectDragged(SliceCanvas* slice, const std::array<double, 16>& before, const std::array<double, 16>& after,
+                                  const QPoint& by)
+{
+  const double mm = slice->View()->GetMillimetresPerPixel();
+  double right[3], up[3];
+  slice->View()->GetRight(right);
+  slice->View()->GetUp(up);
+  for (std::size_t axis = 0; axis < 3; axis++) {
+    const double expected = mm * (right[axis] * by.x() - up[axis] * by.y());
+    QVERIFY2(
+        std::abs(after[4 * axis + 3] - before[4 * axis + 3] - expected) < 1.01 * mm,
+        qPrintable(QString("axis %1: %2 mm for %3").arg(axis).arg(after[4 * axis + 3] - before[4 * axis + 3]).arg(expected)));
+    for (std::size_t column = 0; column < 3; column++)
+      QVERIFY(std::abs(after[4 * axis + column] - before[4 * axis + column]) < 1e-12);
+  }
+}
+
 void TestWorkbench::aDragMovesTheSelectedVolume()
 {
   WindowUnderTest window;
@@ -193,17 +213,8 @@ void TestWorkbench::aDragMovesTheSelectedVolume()
   const QPoint from = slice->rect().center() + QPoint(18, 34), by(30, -20);
   window.Drag(slice, from, from + by);
   QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
-  const double mm = slice->View()->GetMillimetresPerPixel();
-  double right[3], up[3];
-  slice->View()->GetRight(right);
-  slice->View()->GetUp(up);
   const auto after = window.Pose(2);
-  for (std::size_t axis = 0; axis < 3; axis++) {
-    const double expected = mm * (right[axis] * by.x() - up[axis] * by.y());
-    QVERIFY2(
-        std::abs(after[4 * axis + 3] - before[4 * axis + 3] - expected) < 1.01 * mm,
-        qPrintable(QString("axis %1: %2 mm for %3").arg(axis).arg(after[4 * axis + 3] - before[4 * axis + 3]).arg(expected)));
-  }
+  ExpectDragged(slice, before, after, by);
   QCOMPARE(window.Pose(1), other);
   QVERIFY(window.Window().isWindowModified());
   window.Screenshot("dragged");
@@ -567,8 +578,11 @@ void TestWorkbench::theLiverPair()
   window.Key(Qt::Key_B);
   const QPoint from = window.Slice(0)->rect().center() - QPoint(40, 30); // in B, off the handles
   const int entries = window.Session()->GetUndoCount();
+  const auto before = window.Pose(2), other = window.Pose(1);
   window.Drag(window.Slice(0), from, from + QPoint(25, 10));
   QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
+  ExpectDragged(window.Slice(0), before, window.Pose(2), QPoint(25, 10));
+  QCOMPARE(window.Pose(1), other);
   window.Screenshot("liver-dragged");
 }
 

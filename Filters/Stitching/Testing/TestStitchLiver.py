@@ -58,7 +58,9 @@ def main():
     for reader in readers[:2]:
         stitcher.AddInputConnection(reader.GetOutputPort())
     errors = {}
-    for method in range(4):
+    default = stitcher.GetMethodAsString()
+    methods = range(stitcher.GetMethodMaxValue() + 1)
+    for method in methods:
         stitcher.SetMethod(method)
         stitcher.Update()
         out = stitcher.GetOutput()
@@ -76,7 +78,8 @@ def main():
         assert known.sum() > 0.8 * (array(out, "ValidRegion") > 0).sum()
         assert outside < 1.0, "where a volume is alone it must be as it was, but for interpolation"
         assert inside < 1.0
-    assert errors["distance"] < errors["maximum"] and errors["feather"] < errors["maximum"]
+    assert default in errors and len(errors) == len(methods), errors
+    assert all(errors[name] < errors["maximum"] for name in ("distance", "feather", default)), errors
     return 0
 
 
