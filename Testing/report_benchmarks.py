@@ -1,0 +1,170 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fills the tables of the pages from the benchmarks that measure them (./run bench --report), and says which are out of date.
+
+A table stands between two comments of a page. The first names the benchmarks, the kernels that they measure, and how their lines
+become rows; the text in between begins with the head of the table and ends with a line that says when, where and how it was measured:
+
+    <!-- bench distance_map
+    kernels: Core/Imaging/DistanceMap.cxx
+    by: case
+    row: {case} | {echorama.seconds:.2g} | {vtk.seconds:.2g} | {vtk.seconds / echorama.seconds:.1f}
+    -->
+    | mask | ours, s | VTK, s | ratio |
+    | --- | --- | --- | --- |
+    <!-- end bench 0123456789ab -->
+
+Lines with the same values of "by" make one row. In it the keys of the first of them are names, and so is each method, up to the first
+character that is no letter or digit: echorama.seconds. "only: EXPRESSION" leaves lines out. There may be several "row"s, each with what
+was said before it. The number at the end is that of the kernels' contents: when it is not theirs any more, a test fails.
+"""
+import argparse
+import datetime
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+import types
+
+source = pathlib.Path(__file__).resolve().parents[1]
+TABLE = re.compile(r"<!-- bench (?P<names>[\w ]+)\n(?P<spec>.*?)-->\n(?P<head>\|[^\n]*\n\|[^\n]*\n)(?P<rows>.*?)<!-- end bench(?P<stamp> \w+)? -->", re.S)
+
+
+class Table:
+    def __init__(self, page, match):
+        self.page, self.names = page, match["names"].split()
+        self.stamp = (match["stamp"] or "").strip()
+        self.begin, self.end = match.start("rows"), match.end()
+        self.kernels, self.rows = [], []
+        by, only = ["case"], "True"
+        for line in match["spec"].splitlines():
+            key, _, value = line.partition(": ")
+            if key == "kernels":
+                self.kernels += value.split()
+            elif key == "by":
+                by = [name.strip() for name in value.split(",")]
+            elif key == "only":
+                only = value
+            elif key == "row":
+                self.rows.append((by, only, value.strip()))
+            else:
+                sys.exit(f"{self}: \"{line}\" is none of kernels, by, only, row")
+        if not self.kernels or not self.rows:
+            sys.exit(f"{self}: it names no kernels, or no row")
+
+    def __str__(self):
+        return f"{os.path.relpath(self.page, source)}, table of {' '.join(self.names)}"
+
+    def digest(self):
+        """Of the kernels' contents as they are now."""
+        told = hashlib.sha256()
+        for kernel in self.kernels:
+            if not (source / kernel).is_file():
+                sys.exit(f"{self}: there is no kernel {kernel}")
+            told.update((source / kernel).read_bytes())
+        return told.hexdigest()[:12]
+
+    def filled(self, lines, how):
+        """The rows, the line that says how they were measured, and the end."""
+        text = ""
+        for by, only, row in self.rows:
+            groups = {}
+            for line in lines:
+                if eval(only, {}, dict(line)):  # the expression is ours: it stands in the page
+                    groups.setdefault(tuple(str(line.get(key, "")) for key in by), []).append(line)
+            if not groups:
+                sys.exit(f"{self}: the benchmark printed no line for \"{row}\"")
+            for group in groups.values():
+                names = dict(group[0])
+                for line in group:
+                    names[re.match(r"\w*", str(line.get("method", "")))[0]] = types.SimpleNamespace(**line)
+                try:
+                    text += "| " + eval("f" + repr(row), {}, names) + " |\n"
+                except Exception as problem:
+                    sys.exit(f"{self}: the row \"{row}\" cannot be made ({problem})")
+        return f"{text}\n*{how}: `./run bench --report {' '.join(self.names)}`*\n<!-- end bench {self.digest()} -->"
+
+
+def tables():
+    found = []
+    for page in [source / "README.md", *sorted((source / "Documentation").rglob("*.md"))]:
+        found += [Table(page, match) for match in TABLE.finditer(page.read_text())]
+    return found
+
+
+def cpu():
+    with open("/proc/cpuinfo") as text:
+        names = [line.split(":", 1)[1].strip() for line in text if line.startswith("model name")]
+    flags = pathlib.Path("/proc/cpuinfo").read_text()
+    level = "AVX-512" if "avx512f" in flags else "AVX2" if "avx2" in flags else "no AVX2"
+    return f"{names[0]} ({level}), {len(names)} cores"
+
+
+def busy_share(seconds=2.0):
+    """How much of all processors others use now, in [0, 1]."""
+    def ticks():
+        numbers = [int(number) for number in pathlib.Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
+        return sum(numbers), numbers[3] + numbers[4]
+    before, time_slept = ticks(), time.sleep(seconds)
+    after = ticks()
+    return 1 - (after[1] - before[1]) / max(1, after[0] - before[0])
+
+
+def wait_until_quiet(limit):
+    """Whether nothing else runs; waits for it as long as \"limit\" seconds."""
+    end, quiet = time.monotonic() + limit, 0
+    while True:
+        quiet = quiet + 1 if busy_share() < 0.05 else 0
+        if quiet == 3:
+            return True
+        if time.monotonic() > end:
+            return False
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", nargs="*", help="benchmarks (default: all that fill a table)")
+    parser.add_argument("--programs", type=pathlib.Path, default=source / "build" / "release" / "benchmarks")
+    parser.add_argument("--list", action="store_true", help="print the names of the benchmarks that fill tables")
+    parser.add_argument("--check", action="store_true", help="name the tables that are older than what they measure")
+    parser.add_argument("--wait", type=float, default=600, help="how long to wait for a quiet machine, seconds")
+    options = parser.parse_args()
+    wanted = [table for table in tables() if not options.name or set(table.names) & set(options.name)]
+    names = sorted({name for table in wanted for name in table.names})
+    missing = set(options.name) - set(names)
+    if missing:
+        sys.exit(f"report_benchmarks: no table is filled by {', '.join(sorted(missing))}")
+    if options.list:
+        print("\n".join(names))
+        return
+    if options.check:
+        old = [str(table) for table in wanted if table.stamp != table.digest()]
+        if old:
+            sys.exit("older than the kernels that they measure; ./run bench --report fills them:\n  " + "\n  ".join(old))
+        print(f"{len(wanted)} tables are those of the kernels as they are")
+        return
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=source, stdout=subprocess.PIPE, text=True).stdout.strip()
+    results, all_quiet = [], True
+    for name in names:
+        program = options.programs / ("Benchmark" + "".join(part.capitalize() for part in name.split("_")))
+        quiet = wait_until_quiet(options.wait)
+        print(f"{name}{'' if quiet else ': the machine is not quiet'}", file=sys.stderr)
+        done = subprocess.run([program], cwd=source, stdout=subprocess.PIPE, text=True)
+        if done.returncode:
+            sys.exit(f"report_benchmarks: {name} ended with status {done.returncode}; its tables stay as they were")
+        results += [json.loads(line) for line in done.stdout.splitlines()]
+        all_quiet = all_quiet and quiet
+    how = f"Commit {commit}, {datetime.date.today()}, {cpu()}, {'nothing else ran' if all_quiet else 'beside other work'}"
+    for table in reversed(wanted):  # from the end of a page: places before it stay
+        text = table.page.read_text()
+        lines = [line for line in results if line["bench"] in table.names]
+        table.page.write_text(text[:table.begin] + table.filled(lines, how) + text[table.end:])
+        print(table, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()
