@@ -95,8 +95,8 @@ public:
 
   ///@{
   /**
-   * Gel between the middle of the probe's face (z = 0) and the skin in mm; below 0 the probe is pressed in. In [-10, 20].
-   * Default 1.
+   * Gel between the middle of the probe's face (z = 0) and the skin in mm; below 0 the face lies inside the body, which is not
+   * deformed. In [-10, 20]. Default 1.
    */
   vtkSetMacro(StandoffMm, double);
   vtkGetMacro(StandoffMm, double);
