@@ -44,8 +44,8 @@ void MoveVolume(LoadedVolume&, const Pose&);
 /// none, or knows the volume with another geometry.
 const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string& path, const LoadedVolume&);
 
-/// Puts each volume where the pose file \a path says, painted and carved where that is a project with strokes; throws as PoseIn. An
-/// empty path leaves the volumes as their files are.
+/// Puts each volume where the pose file \a path says, painted and carved where that is a project with strokes; throws as PoseIn.
+/// An empty path leaves the volumes as their files are.
 void ApplyPoses(Session&, std::vector<LoadedVolume>&, const std::string& path);
 
 /// The volumes as the blocks of one data set, named by their files, so that filters name them in what they report.

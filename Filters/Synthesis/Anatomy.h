@@ -23,7 +23,8 @@ struct AnatomyParameters {
   double trunkWidthMm = 290.0;  ///< along x, in [150, 600]
   double trunkLengthMm = 240.0; ///< along y, in [120, 600]
   double trunkDepthMm = 190.0;  ///< along z, in [60, 400]
-  double standoffMm = 1.0;      ///< gel between the middle of the probe's face and the skin, in [-10, 20]; below 0: the face lies inside the body, undeformed
+  double standoffMm = 1.0;      ///< gel between the middle of the probe's face and the skin, in [-10, 20]; below 0: the face lies
+                                ///< inside the body, undeformed
   double undulationMm = 1.5;    ///< how far a layer's thickness deviates from its mean, in [0, 4]; never by more than half of it
   double skinMm = 2.0;          ///< in [0.5, 5]
   double fatMm = 12.0;          ///< in [2, 60]
