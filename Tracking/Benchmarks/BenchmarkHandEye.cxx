@@ -192,6 +192,7 @@ void Simulate(const std::string& name, HandEyeScenario scenario, int trials, boo
                               {"median", ours.MedianError()},
                               {"inside_95", static_cast<double>(inside) / ours.trials},
                               {"radius_95", radius / ours.trials},
+                              {"asked", trials},
                               {"trials", ours.trials},
                               {"refused", refused},
                               {"wrongly_left_out", wronglyLeft},

@@ -136,7 +136,7 @@ void RunAll(const std::string& name, const Pairs& pairs, const std::vector<std::
     for (const Start& start : starts)
       Run(name + ", " + std::to_string(static_cast<int>(start.degrees)) + " degrees, " +
               std::to_string(static_cast<int>(start.voxels)) + " voxels",
-          "dissertation's search", pairs, start, std::max(trials / 4, 1), voxelMm, 0.0, [&](std::size_t pair, const Pose& pose) {
+          "dissertation's search", pairs, start, trials, voxelMm, 0.0, [&](std::size_t pair, const Pose& pose) {
             return AlignSearch({{&pairs[pair].first->pyramid, Pose::Identity(), "fixed"}},
                                {&pairs[pair].second->pyramid, pose, "moving"})
                 .volumeToWorld;
