@@ -275,6 +275,9 @@ class BadInput(unittest.TestCase):
         write_mha(far, blobs(seed=2), origin=(500, 0, 0))
         self.refuses("", ["align", self.good, far, "-o", self.path / "poses.json", "--method", "search"], ["overlap"])
         self.refuses("", ["stitch", self.good, far, "-o", self.path / "out.mha"], ["overlap"])
+        done = run("stitch", self.good, far, "-o", self.path / "both.mha", "--allow-disjoint")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(int(read_mha(self.path / "both.ValidRegion.mha")[1].sum()), 2 * 20**3)
 
     def test_constant_volumes(self):
         flat = self.path / "flat.mha"

@@ -122,6 +122,15 @@ class Phantom(unittest.TestCase):
             centre = numbers["Offset"] + numbers["TransformMatrix"].reshape(3, 3).T @ (numbers["ElementSpacing"] * index)
             self.assertAlmostEqual(numpy.linalg.norm(pose[:3, :3] @ centre + pose[:3, 3] - centre), 8, places=3)
 
+    def test_the_knock_is_what_was_asked_for(self):
+        run_json("phantom", "-o", work / "far", "--count", 2, "--spacing", 3, "--knock-mm", 21, "--knock-degrees", 17, "--format", "nrrd")
+        pose = affine_of(json.loads((work / "far" / "truth.json").read_text())["volumes"][1])
+        self.assertAlmostEqual(numpy.degrees(numpy.arccos((numpy.trace(pose[:3, :3]) - 1) / 2)), 17, places=6)
+        files = [work / "far" / f"volume_{i}.nrrd" for i in (1, 2)]
+        write_poses(work / "far_still.json", files, [numpy.eye(4)] * 2)
+        off = run_json("score", work / "far_still.json", "--truth", work / "far" / "truth.json")["volumes"][1]["mean_mm"]
+        self.assertTrue(20 < off < 32, off)
+
     def test_seed(self):
         for name, seed, count in (("same", 5, 3), ("other", 6, 2)):
             run_json("phantom", "-o", work / name, "--spacing", 2.5, "--seed", seed, "--count", count)

@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """echorama calibrate, track, motion, and align with a tracker: from scans of the rig and a log to volumes that a tracker places."""
+import csv
 import json
 import math
 import pathlib
+import re
 import signal
 import subprocess
 import tempfile
@@ -143,8 +145,9 @@ class HandEye(unittest.TestCase):
                    work / "no.json")
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr.lower(), "metre|1000")
-        run_json("calibrate", "hand-eye", "--volumes", *self.volumes, "--tracker", metres, "--unit", 1000, "--poses",
+        told = run_json("calibrate", "hand-eye", "--volumes", *self.volumes, "--tracker", metres, "--unit", 1000, "--poses",
                  work / "rig" / "truth.json", "-o", work / "metres.json")
+        self.assertLess(self.error_of(told["VolumeToSensor"]), 3.0)
 
     def test_a_bad_fifth_scan_is_left_out(self):
         sensor = [*self.sensor[:4], self.sensor[4] @ pose([30, 0, 0], [0.4, 0, 0])]
@@ -181,6 +184,13 @@ class HandEye(unittest.TestCase):
         self.assertIn("--calibration", done.stderr)
 
 
+    def test_at_says_when_each_was_made(self):
+        common = ["--tracker", self.log, "--poses", work / "rig" / "truth.json", "-o", work / "at.json"]
+        told = run_json("calibrate", "hand-eye", "--volumes", *self.volumes, *common)
+        back = run_json("calibrate", "hand-eye", "--volumes", *self.volumes[::-1], "--at", *range(50, -10, -10), *common)
+        numpy.testing.assert_allclose(back["VolumeToSensor"], told["VolumeToSensor"], atol=1e-3)
+
+
 class Pivot(unittest.TestCase):
     def test_the_tip(self):
         random = numpy.random.default_rng(1)
@@ -196,6 +206,7 @@ class Pivot(unittest.TestCase):
         self.assertLess(told["report"]["tipRadius95Mm"], 0.5)
         content = json.loads((work / "pivot.json").read_text())["transforms"][0]
         self.assertEqual((content["from"], content["to"]), ("StylusTip", "Stylus"))
+        numpy.testing.assert_allclose(content["matrix"], pose(told["report"]["tip"], [0, 0, 0]), atol=1e-9)
         done = run("calibrate", "pivot", "--tracker", write_log(work / "still.csv", "StylusToTracker", range(20), poses[:1] * 20), "-o",
                    work / "still.json")
         self.assertEqual(done.returncode, 1)
@@ -237,6 +248,12 @@ class Rig(unittest.TestCase):
         count = int.from_bytes((work / "prints" / "clip.stl").read_bytes()[80:84], "little")
         self.assertEqual((work / "prints" / "clip.stl").stat().st_size, 84 + 50 * count)
         self.assertEqual(told["rigs"][0]["scale"], 0.6)
+        rows = list(csv.DictReader((work / "prints" / "rig_0.6.csv").read_text().splitlines()))
+        self.assertAlmostEqual(float(rows[0]["radius"]), 4 * 0.6)
+        data = (work / "prints" / "rig_0.6.stl").read_bytes()[84:]
+        corners = numpy.frombuffer(data, [("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("more", "<u2")])["corner"].reshape(-1, 3)
+        span = numpy.ptp([[float(row["x"]), float(row["y"])] for row in rows], axis=0)
+        numpy.testing.assert_allclose(numpy.ptp(corners, axis=0)[:2], span + 12, atol=1.5)  # the base reaches 6 mm beyond the balls' centres
         done = run("synthesize", work / "prints" / "rig_0.6.json", "-o", work / "small", "--spacing", 3)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("scale", run("calibrate", "rig", "-o", work / "huge", "--scale", 7).stderr)
@@ -250,7 +267,14 @@ class Motion(unittest.TestCase):
         self.assertAlmostEqual(told["poses"], 40 * (times[-1] - times[0]), delta=2)
         self.assertEqual(told["missing"], 0)
         self.assertAlmostEqual(told["path_mm"], 10 * told["lasts_seconds"], delta=1)
-        self.assertIn("ProbeToTracker", run("info", work / "path.igs.mha").stdout)
+        info = run_json("info", work / "path.igs.mha")["files"][0]["transforms"]["ProbeToTracker"]
+        lasts = times[-1] - times[0]
+        self.assertEqual(info["statuses"], {"OK": told["poses"]})
+        self.assertAlmostEqual(info["moves_mm"], 10 * lasts, delta=1)
+        self.assertAlmostEqual(info["turns_degrees"], math.degrees(0.1 * lasts), delta=1)
+        header = (work / "path.igs.mha").read_bytes().split(b"ElementDataFile")[0].decode()
+        first = numpy.array(re.search("Seq_Frame0000_ProbeToTrackerTransform = (.*)", header)[1].split(), float).reshape(4, 4)
+        numpy.testing.assert_allclose(first, pose([10 * times[0], 0, 0], [0, 0, 0.1 * times[0]]), atol=0.3)
         self.assertEqual(run("motion", log, "-o", work / "path.txt").returncode, 2)
 
     @unittest.skipUnless((DATA / "aurora").is_dir(), f"{DATA / 'aurora'} is not there")

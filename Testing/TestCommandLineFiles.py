@@ -141,6 +141,7 @@ class Sequences(unittest.TestCase):
         numpy.testing.assert_array_equal(pixels, self.pixels)
         for frame, (given, image) in enumerate(zip(self.transforms, ["OK"] * 4 + ["INVALID"])):
             self.assertEqual(frames[frame]["ImageStatus"], image)
+            self.assertAlmostEqual(float(frames[frame]["Timestamp"]), 10 + 0.1 * frame, places=9)
             for name, (matrix, status) in given.items():
                 self.assertEqual(frames[frame][name + "TransformStatus"], status)
                 numpy.testing.assert_array_equal(numpy.array(frames[frame][name + "Transform"].split(), float).reshape(4, 4), matrix)
@@ -156,7 +157,15 @@ class Sequences(unittest.TestCase):
     def test_some_frames(self):
         for text, expected in (("1", [1]), ("1:3", [1, 2, 3]), ("::2", [0, 2, 4]), ("3:", [3, 4]), (":1,4", [0, 1, 4]), ("4,0:1", [4, 0, 1])):
             run_json("convert", self.path, work / "some.igs.mha", "--frames", text)
-            numpy.testing.assert_array_equal(read_sequence(work / "some.igs.mha")[0], self.pixels[expected], text)
+            pixels, frames = read_sequence(work / "some.igs.mha")
+            numpy.testing.assert_array_equal(pixels, self.pixels[expected], text)
+            self.assertEqual(len(frames), len(expected))
+            for frame, i in zip(frames, expected):
+                self.assertAlmostEqual(float(frame["Timestamp"]), 10 + 0.1 * i, places=9)
+                self.assertEqual(frame["ImageStatus"], "INVALID" if i == 4 else "OK")
+                for name, (matrix, status) in self.transforms[i].items():
+                    self.assertEqual(frame[name + "TransformStatus"], status, text)
+                    numpy.testing.assert_array_equal(numpy.array(frame[name + "Transform"].split(), float).reshape(4, 4), matrix, text)
 
     def test_real_ones(self):
         if not PLUS.exists():

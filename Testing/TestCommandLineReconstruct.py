@@ -104,23 +104,35 @@ class Reconstruct(unittest.TestCase):
         self.assertEqual(read_mha(work / "tracker.mha")[1].shape, (9, 15, 12))
 
     def test_a_given_grid(self):
-        path, _ = slices()
+        path, pixels = slices()
         write_mha(work / "grid.mha", blobs((4, 5, 6)), (1, 1, 1), (2, 3, 1))
-        told = run_json("reconstruct", path, "-o", work / "onto.mha", "--grid", work / "grid.mha", "--clip", "none")
+        told = run_json("reconstruct", path, "-o", work / "onto.mha", "--grid", work / "grid.mha", "--clip", "none", "--between", "nothing",
+                        "--fill", "none")
         self.assertEqual((told["dimensions"], told["origin"]), ([6, 5, 4], [2, 3, 1]))
-        numpy.testing.assert_array_equal(read_mha(work / "onto.mha")[1].shape, (4, 5, 6))
+        numpy.testing.assert_array_equal(read_mha(work / "onto.mha")[1], pixels[1:5, 3:8, 2:8])
+
+    def test_between_frames(self):
+        pixels = blobs((2, 12, 15))
+        write_sequence(work / "gap.igs.mha", pixels, [{"ImageToWorld": (shifted(z), "OK")} for z in (0, 2)])
+        for way in ("forward", "backward"):
+            common = ["reconstruct", work / "gap.igs.mha", "-o", work / "gap.mha", "--spacing", 1, "--grid", "axis", "--clip", "none",
+                      "--between", way]
+            self.assertGreater(run_json(*common, "--fill", "none")["frames_between"], 0)
+            numpy.testing.assert_allclose(read_mha(work / "gap.mha")[1][1], pixels.astype(float).mean(0), atol=1.5, err_msg=way)
+            self.assertEqual(run_json(*common, "--fill", "none", "--maximum-gap", 1.5)["frames_between"], 0, way)
+            self.assertEqual(read_mha(work / "gap.mha")[1][1].max(), 0, way)
+        run_json(*common[:-1], "nothing", "--fill", "mean", "--reach", 1)
+        self.assertGreater(read_mha(work / "gap.mha")[1][1].min(), 0)
 
     def test_modes(self):
         """Two frames in one place."""
         pixels = blobs((2, 12, 15))
         transforms = [{"ImageToWorld": (shifted(0), "OK")}] * 2
         write_sequence(work / "two.igs.mha", pixels, transforms)
-        low, high = pixels.min(0).astype(int), pixels.max(0).astype(int)
-        for mode, expected in (("mean", pixels.astype(int).mean(0)), ("maximum", high), ("latest", pixels[1]),
+        for mode, expected in (("mean", pixels.astype(int).mean(0)), ("maximum", pixels.max(0)), ("latest", pixels[1]),
                                ("alpha", 0.25 * pixels[1] + 0.75 * pixels[0])):
             run_json("reconstruct", work / "two.igs.mha", "-o", work / "mode.mha", *EXACT, "--mode", mode, "--alpha", 0.25)
             numpy.testing.assert_allclose(read_mha(work / "mode.mha")[1][0], expected, atol=0.51, err_msg=mode)
-        self.assertTrue((low <= high).all())
 
     def test_clip(self):
         path, pixels = slices()

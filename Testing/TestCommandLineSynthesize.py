@@ -7,7 +7,9 @@ import pathlib
 import tempfile
 import unittest
 
+import echorama
 import numpy
+from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
 from program_under_test import read_mha, run, run_json, write_sequence
@@ -114,8 +116,18 @@ class Sets(unittest.TestCase):
         self.assertEqual([names.GetValue(i) for i in range(names.GetNumberOfValues())], ["ball", "plate", "vessel"])
 
     def test_beams_scan_convert_to_the_volume(self):
-        info = run_json("info", work / "set/beams_1.mha")
-        self.assertIn("120", json.dumps(info))
+        for number in (1, 2):
+            reader, converter = echorama.vtkUltrasoundReader(), echorama.vtkUltrasoundScanConverter()
+            reader.SetFileName(str(work / f"set/beams_{number}.mha"))
+            converter.SetInputConnection(reader.GetOutputPort())
+            converter.SetSpacingMm(1.5)
+            converter.Update()
+            made, (header, voxels) = converter.GetOutput(), read_mha(work / f"set/volume_{number}.mha")
+            self.assertEqual(made.GetDimensions(), voxels.shape[::-1])
+            numpy.testing.assert_allclose(made.GetOrigin(), affine(header)[:3, 3], atol=1e-4)
+            grey = vtk_to_numpy(made.GetPointData().GetArray("Intensity")).reshape(voxels.shape).astype(int)
+            # Not exactly: the reader may take zeros at the rim of the beams for what lies outside.
+            self.assertLess((abs(grey - voxels) > 1).mean(), 0.01, number)
 
 
 class OtherScenes(unittest.TestCase):

@@ -8,6 +8,7 @@ volume and puts out one on the same grid needs nothing in here. Anything else is
 to feed it and what to expect.
 """
 import os
+import pathlib
 import sys
 import tempfile
 
@@ -636,6 +637,20 @@ def check_carries_fields(image, source):
     for name, array in arrays_of(source.GetFieldData()).items():
         if check(name in there, f"the field {name} got lost") and name != acquisition.ProbeToWorldName():
             check(same(there[name], array), f"the field {name} was changed")
+    name = acquisition.ProbeToWorldName()
+    if name in there and name in arrays_of(source.GetFieldData()):
+        now, then = (values(each.GetFieldData().GetArray(name)).reshape(4, 4) for each in (image, source))
+        went = np.eye(4) if current == "vtkUltrasoundScanConverter" else motion(image, source)  # beams lie in no world of their own
+        check(np.allclose(now, went @ then, atol=1e-9), "ProbeToWorld did not go where the volume went")
+
+
+def motion(image, source):
+    """From where the source lies to where the image lies, by their directions and origins."""
+    to, start = (np.array(geometry(each)["direction"]).reshape(3, 3) for each in (image, source))
+    matrix = np.eye(4)
+    matrix[:3, :3] = to @ start.T
+    matrix[:3, 3] = np.array(image.GetPoint(0)) - matrix[:3, :3] @ source.GetPoint(0)
+    return matrix
 
 
 def world_of_voxels(image):
@@ -826,6 +841,12 @@ def algorithms():
                 continue
             yield name, kind
 
+
+source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
+furnished = {path.stem for room in ("Core", "Readers", "Tracking", "Filters") for path in (source / room).rglob("vtk*.xml")}
+check(furnished, "there is nothing to test")
+for current in sorted((furnished | set(Special)) - {name for name, _ in algorithms()}):
+    check(False, "the package has no such algorithm, or it cannot be made")
 
 for name, kind in algorithms():
     current = name

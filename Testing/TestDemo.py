@@ -51,9 +51,10 @@ with tempfile.TemporaryDirectory() as folder:
 
     made = demo(folder / "synthetic", "--synthetic")
     check(made.returncode == 0, f"the demo of a synthesised scene failed:\n{made.stderr}")
-    check_report(folder / "synthetic")
+    report = check_report(folder / "synthetic")
+    check("did not succeed" not in report, "the report itself calls the alignment a failure")
     off = re.search(r"off +([\d.]+) mm before, ([\d.]+) mm after", made.stdout)
-    check(off and float(off[1]) > 5.0 and float(off[2]) < 0.6 * float(off[1]), f"synthetic volumes: {made.stdout!r}")
+    check(off and float(off[1]) > 5.0 and float(off[2]) < 4.0, f"synthetic volumes: {made.stdout!r}")
 
     volumes = [folder / "phantom volumes" / "phantom" / f"volume_{number}.mha" for number in (1, 2)]
     own = demo(folder / "own", "--", *volumes)

@@ -36,7 +36,10 @@ for path in [*ours("*.h"), *ours("*.cxx")]:
     if re.search(r"\b(mt19937|std::rand|srand|random_device)\b", text):
         complaints.append(f"{name}: randomness that is not Core/Base/Random.h")
 
-for library in sorted((build / "lib").glob("libEchorama*Kernels.so")):
+libraries = sorted((build / "lib").glob("libEchorama*Kernels.so"))
+if not libraries:
+    complaints.append("there are no kernel libraries to look at")
+for library in libraries:
     needed = subprocess.run(["readelf", "-d", library], capture_output=True, text=True, check=True).stdout
     if "libvtk" in needed:
         complaints.append(f"{library.name}: kernels link VTK")

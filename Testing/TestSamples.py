@@ -7,7 +7,9 @@ import subprocess
 import tempfile
 import unittest
 
-from program_under_test import PROGRAM, SOURCE, run_json
+import numpy
+
+from program_under_test import PROGRAM, SOURCE, run_json, write_poses
 
 SCENE = {
     "schema": "echorama-scene-1",
@@ -38,8 +40,12 @@ class Samples(unittest.TestCase):
             made = work / "out" / "ball"
             volumes = sorted(path for path in made.glob("*.mha") if "ValidRegion" not in path.name and "beams" not in path.name)
             self.assertGreaterEqual(len(volumes), 2)
-            score = run_json("score", made / "truth.json", "--truth", made / "truth.json")
-            self.assertAlmostEqual(score["score_mm"], 0, places=9)
+            files = [made / f"volume_{i}.mha" for i in (1, 2)]
+            self.assertEqual([path.name for path in volumes], [path.name for path in files])
+            write_poses(work / "still.json", files, [numpy.eye(4)] * 2)
+            off = [each["mean_mm"] for each in run_json("score", work / "still.json", "--truth", made / "truth.json")["volumes"]]
+            self.assertAlmostEqual(off[0], 0, places=9)
+            self.assertTrue(3.5 < off[1] < 6.5, off)  # 4 mm and 3 degrees
 
     def test_nothing_made_is_an_error(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -100,6 +100,14 @@ for client in (early, late):
     kind, name, time, body = client.message()
     assert (kind, name) == ("TRANSFORM", "VolumeToReference")
     assert np.allclose(np.array(struct.unpack(">12f", body)).reshape(4, 3).T, [[0, -1, 0, -5], [1, 0, 0, -6], [0, 0, 1, 7]])
+c, s = np.cos(0.4), np.sin(0.4)
+about_x = np.array([[1, 0, 0, 5], [0, c, -s, 6], [0, s, c, 7]])
+for i, value in enumerate(about_x.ravel()):
+    matrix.SetElement(i // 4, i % 4, float(value))
+assert sender.SendTransform("VolumeToReference", matrix)
+for client in (early, late):
+    sent = np.array(struct.unpack(">12f", client.message()[3])).reshape(4, 3).T
+    assert np.allclose(sent, turn @ about_x @ np.diag([-1, -1, 1, 1]), atol=1e-6)
 assert sender.Flush(10)
 
 # 3. As they are.
@@ -111,7 +119,7 @@ _, _, _, body = client.message()
 _, _, steps, centre, _ = image_of(body)
 assert np.allclose(steps, np.array([[0, -0.75, 0], [0.5, 0, 0], [0, 0, 2.0]])) and np.allclose(centre, middle)
 assert sender.SendTransform("VolumeToReference", matrix)
-assert np.allclose(struct.unpack(">12f", client.message()[3])[9:], [5, 6, 7])
+assert np.allclose(np.array(struct.unpack(">12f", client.message()[3])).reshape(4, 3).T, about_x, atol=1e-6)
 
 # 4. All types of voxels.
 for dtype, kind in ((np.uint8, 3), (np.uint16, 5), (np.float32, 10), (np.float64, 11)):

@@ -69,6 +69,8 @@ def tools_of(source):
         result[tool] = (np.array(output.GetPoint(point)), int(arrays.GetArray("Status").GetValue(point)),
                         arrays.GetArray("TimeStamp").GetValue(point), np.array(arrays.GetArray("ToolToWorld").GetTuple(point)))
         assert (output.GetPointData().GetArray("ToolToWorld").GetNumberOfComponents()) == 16
+        for axis, name in enumerate(("XAxis", "YAxis", "ZAxis")):
+            assert np.allclose(arrays.GetArray(name).GetTuple(point), result[tool][3].reshape(4, 4)[:3, axis]), name
     axes, valid = source.GetOutputDataObject(2), [tool for tool in result if result[tool][1] == 0]
     assert axes.GetNumberOfLines() == 3 * len(valid)
     for line in range(axes.GetNumberOfLines()):

@@ -78,6 +78,13 @@ found = vtk_to_numpy(fit.GetOutput().GetPoints().GetData())
 truth = centres + (0, 0, 105)
 error = np.linalg.norm(matrix_of(fit)[:3] @ np.c_[centres, np.ones(7)].T - truth.T, axis=0)
 assert error.max() < 1.2, error
+assert np.linalg.norm(found - truth, axis=1).max() < 1.5, found - truth  # in image depth it would be 2 to 4 mm off
+is_found = vtk_to_numpy(fit.GetOutput().GetPointData().GetArray("Found"))
+residual = vtk_to_numpy(fit.GetOutput().GetPointData().GetArray("Residual"))
+placed = (matrix_of(fit)[:3] @ np.c_[centres, np.ones(7)].T).T
+assert is_found.sum() == fit.GetNumberOfFoundBalls()
+assert np.allclose(residual[is_found == 1], np.linalg.norm(found - placed, axis=1)[is_found == 1], atol=1e-3)
+assert (residual[is_found == 0] == 0).all()
 fit.SetDepthScale(1540 / 1482.36)  # known, it need not be told from the balls
 assert not errors_of(fit)
 error = np.linalg.norm(matrix_of(fit)[:3] @ np.c_[centres, np.ones(7)].T - truth.T, axis=0)
