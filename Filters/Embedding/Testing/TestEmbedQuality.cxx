@@ -186,6 +186,29 @@ TEST(EmbedQuality, SpacingAndPoseDoNotMatter)
   EXPECT_EQ(scene.Measure().border.patches, plain.border.patches);
 }
 
+TEST(EmbedQuality, ShellsAreMillimetresThick)
+{
+  // 2 grey levels per mm along voxels of 2 mm.
+  Scene scene(
+      {24, 50, 50}, [](int i, int, int) { return i < 12 ? data : invented; }, [](int i, int, int) { return 4.0 * i; });
+  scene.grid.spacing = {2.0, 1.0, 1.0};
+  const EmbedQualityReport report = scene.Measure();
+  EXPECT_GT(report.borderMeasured, 0.9);
+  EXPECT_NEAR(report.border.mean, 10.0, 3.0); // 20 if shells were counted in voxels
+}
+
+TEST(EmbedQuality, AFlatBorderIsMeasuredWhereverItLies)
+{
+  for (int border = 20; border < 31; ++border) {
+    const Scene scene(
+        {48, 50, 50}, [border](int i, int, int) { return i < border ? data : invented; },
+        [border](int i, int, int) { return i < border ? 30.0 : 20.0; });
+    const EmbedQualityReport report = scene.Measure();
+    EXPECT_GT(report.borderMeasured, 0.9) << border;
+    EXPECT_NEAR(report.border.median, 10.0, 1e-9) << border;
+  }
+}
+
 TEST(EmbedQuality, HolesIslandsAndThinShells)
 {
   // A hole and an island of four voxels, and a sheet of one: each is a border.
