@@ -63,27 +63,29 @@ struct Input {
   }
 };
 
+// Blocks without a name have that of the nearest one above, as in GLTF.
+void AddBlocks(vtkDataObject* data, const std::string& name, Input& input)
+{
+  vtkPolyData* block = vtkPolyData::SafeDownCast(data);
+  if (block && (block->GetNumberOfPolys() + block->GetNumberOfStrips() > 0 || vtkUltrasoundTissue::IsTissue(block))) {
+    input.Blocks.push_back(block);
+    input.Names.push_back(name);
+  }
+  if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data)) {
+    const auto node = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
+    node->VisitOnlyLeavesOff();
+    node->TraverseSubTreeOff();
+    for (node->InitTraversal(); !node->IsDoneWithTraversal(); node->GoToNextItem()) {
+      const char* own = node->HasCurrentMetaData() ? node->GetCurrentMetaData()->Get(vtkCompositeDataSet::NAME()) : nullptr;
+      AddBlocks(node->GetCurrentDataObject(), own && *own ? own : name, input);
+    }
+  }
+}
+
 Input BlocksOf(vtkDataObject* data)
 {
   Input input;
-  const auto add = [&input](vtkPolyData* block, const std::string& name) {
-    if (block && (block->GetNumberOfPolys() + block->GetNumberOfStrips() > 0 || vtkUltrasoundTissue::IsTissue(block))) {
-      input.Blocks.push_back(block);
-      input.Names.push_back(name);
-    }
-  };
-  add(vtkPolyData::SafeDownCast(data), "");
-  if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data)) {
-    // Blocks without a name have that of the nearest one above, as in GLTF.
-    std::string name;
-    const auto node = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
-    node->VisitOnlyLeavesOff();
-    for (node->InitTraversal(); !node->IsDoneWithTraversal(); node->GoToNextItem()) {
-      const char* own = node->HasCurrentMetaData() ? node->GetCurrentMetaData()->Get(vtkCompositeDataSet::NAME()) : nullptr;
-      name = own && *own ? own : name;
-      add(vtkPolyData::SafeDownCast(node->GetCurrentDataObject()), name);
-    }
-  }
+  AddBlocks(data, "", input);
   return input;
 }
 
