@@ -300,7 +300,7 @@ void AlignSearchParameters::Check() const
   check(firstStepMm > 0.0 && firstStepMm <= 1000.0, "the first step must be in (0, 1000] mm");
   check(firstStepDegrees > 0.0 && firstStepDegrees <= 60.0, "the first step must be in (0, 60] degrees");
   check(repeats >= 0 && repeats <= 100, "the number of repeats must be in [0, 100]");
-  check(points >= 100 && points <= 10000000, "the number of points must be in [100, 10000000]");
+  check(points >= 1000 && points <= 10000000, "the number of points must be in [1000, 10000000]");
 }
 
 AlignSearchResult AlignSearch(const std::vector<PlacedVolume>& fixed, const PlacedVolume& moving, const AlignSearchParameters& p,

@@ -16,7 +16,7 @@ struct AlignSearchParameters {
   double firstStepMm = 8.0;      ///< between poses on the first level, mm, (0, 1000]
   double firstStepDegrees = 6.0; ///< between poses on the first level, degrees, (0, 60]
   int repeats = 3;               ///< how often a level starts again from a better pose, [0, 100]; the dissertation's search: 0
-  int points = 20000;            ///< random points of the moving volume that are compared, [100, 10 million]
+  int points = 20000;            ///< random points of the moving volume that are compared, [1000, 10 million]
   std::uint64_t seed = 1;        ///< of these points
   bool pyramid = true;           ///< compare averaged volumes while steps are larger than voxels; else always the finest
 

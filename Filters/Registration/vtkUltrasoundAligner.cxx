@@ -220,7 +220,7 @@ bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
     }
     if (!(value >= p.From && value <= p.To) || (!p.SetReal && value != std::floor(value))) {
       vtkErrorMacro(<< p.Name << " must be " << (p.SetReal ? "a number" : "a whole number") << " in [" << p.From << ", " << p.To
-                    << "]; it is not " << value);
+                    << "]; it is " << value);
       return false;
     }
     if (p.SetReal) {
@@ -484,6 +484,16 @@ double vtkUltrasoundAligner::GetOverlap(int volume) const
 {
   const auto* result = this->ResultOf(volume);
   return result ? result->Overlap : 0.0;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::SetPoints(int points)
+{
+  points = points < 1 ? 0 : std::clamp(points, 1000, 10000000);
+  if (points != this->Points) {
+    this->Points = points;
+    this->Modified();
+  }
 }
 
 //----------------------------------------------------------------------------

@@ -179,10 +179,10 @@ public:
 
   ///@{
   /**
-   * Random points of each volume that are compared, in [1000, 10000000]. 0 (default) is the method's own: 200000 on each level
-   * (global), 20000 (search).
+   * Random points of each volume that are compared, in [1000, 10000000]; fewer become 1000. 0 (default) is the method's own:
+   * 200000 on each level (global), 20000 (search).
    */
-  vtkSetClampMacro(Points, int, 0, 10000000);
+  void SetPoints(int points);
   vtkGetMacro(Points, int);
   ///@}
 
