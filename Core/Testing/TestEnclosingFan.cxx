@@ -81,7 +81,7 @@ PlacedProbe Enclosed(const Region& region, const EnclosingFanParameters& paramet
   return EncloseRegion(region.mask.View(), region.grid, parameters);
 }
 
-// How many real voxels the fan leaves outside, or has closer than \a margin to an end in depth.
+// How many real voxels the fan leaves outside, or has closer than \a margin to an end in depth or to a side.
 int Outside(const PlacedProbe& fan, const Region& region, double margin = 0.0)
 {
   EXPECT_NO_THROW(fan.geometry.Check());
@@ -93,8 +93,11 @@ int Outside(const PlacedProbe& fan, const Region& region, double margin = 0.0)
       for (int i = 0; i < region.grid.dimensions[0]; ++i)
         if (region.mask.View()(i, j, k)) {
           const auto beam = BeamPointAt(fan.geometry, toProbe * Eigen::Vector3d(i, j, k));
-          count += !beam || beam->depth < fan.geometry.depthMin + margin || beam->depth > fan.geometry.depthMax - margin ||
-                   (0.5 - std::abs(beam->fan)) * fan.geometry.Fan().Span(beam->depth) < margin;
+          const ProbeGeometry& g = fan.geometry;
+          const double rho = beam ? g.Fan().PointOf({beam->fan + g.fanOffset, beam->depth}).y() : 0.0;
+          count += !beam || beam->depth < g.depthMin + margin || beam->depth > g.depthMax - margin ||
+                   (0.5 - std::abs(beam->fan)) * g.Fan().Span(beam->depth) < margin ||
+                   (!g.IsPlane() && (0.5 - std::abs(beam->sweep)) * std::abs(g.Sweep().Span(rho)) < margin);
         }
   return count;
 }

@@ -61,6 +61,19 @@ TEST(Pyramid, KeepsARampWhereItLies)
   }
 }
 
+TEST(Pyramid, HalvesAxesWithinTheRootOfTwo)
+{
+  const std::array<int, 3> n{32, 32, 32};
+  const Volume<unsigned char> volume(n, 7);
+  PyramidParameters p = Deep();
+  p.levels = 2;
+  for (const double ratio : {1.0, 1.41, 1.42, 1.9}) {
+    const auto levels = BuildPyramid<unsigned char>({volume.View(), {}, Oblique(n, {1.0, 1.0, ratio})}, p);
+    ASSERT_EQ(levels.size(), 2u);
+    EXPECT_EQ(levels[1].geometry.dimensions, (std::array<int, 3>{16, 16, ratio < 1.415 ? 16 : 32})) << ratio;
+  }
+}
+
 TEST(Pyramid, HalvesTheFinestAxesUntilVoxelsAreCubes)
 {
   const std::array<int, 3> n{64, 32, 16};

@@ -100,6 +100,34 @@ TEST(Sampling, VoxelsThatAreNotFiniteAreHidden)
   EXPECT_EQ(Linear(sampler, 0.6, 0.2, 0.2), 7.0);
 }
 
+TEST(Sampling, HiddenCornersLeaveTheMeanOfTheOthers)
+{
+  Volume<float> volume({2, 2, 2});
+  Volume<unsigned char> valid({2, 2, 2}, 1);
+  Random random(8);
+  for (float& v : volume.View())
+    v = static_cast<float>(random.Uniform(0.0, 100.0));
+  for (int hidden = 0; hidden < 256; ++hidden) {
+    for (int c = 0; c < 8; ++c)
+      valid.View()[c] = hidden >> c & 1 ? 0 : 1;
+    const Sampler<float> sampler(volume.View(), valid.View());
+    const double x = random.Uniform(), y = random.Uniform(), z = random.Uniform();
+    double sum = 0.0, weights = 0.0;
+    for (int c = 0; c < 8; ++c) {
+      const double w = (c & 1 ? x : 1 - x) * (c & 2 ? y : 1 - y) * (c & 4 ? z : 1 - z);
+      if (valid.View()[c]) {
+        sum += w * static_cast<double>(volume.View()[c]);
+        weights += w;
+      }
+    }
+    const int nearest = (x >= 0.5 ? 1 : 0) + (y >= 0.5 ? 2 : 0) + (z >= 0.5 ? 4 : 0);
+    if (hidden >> nearest & 1)
+      EXPECT_EQ(Linear(sampler, x, y, z), none);
+    else
+      EXPECT_NEAR(Linear(sampler, x, y, z), sum / weights, 1e-9) << hidden;
+  }
+}
+
 TEST(Sampling, AConstantStaysThatConstant)
 {
   Volume<unsigned char> valid({6, 6, 6}, 1);

@@ -272,6 +272,9 @@ TEST(TransformGraph, OpenCyclesAreMeasuredInMillimetres)
   ASSERT_EQ(open.size(), 1u) << "the two directions of one pair are a cycle too";
   EXPECT_NEAR(open[0].degrees, 1.0, 1e-6);
   EXPECT_GT(open[0].mm, 1.74);
+  EXPECT_LT(open[0].mm, 2.65); // 1.75 by the lever, at most 0.88 by where it turns
+  EXPECT_EQ(graph.CheckCycles({1.2, 10.0, 100.0}).size(), 1u);
+  EXPECT_TRUE(graph.CheckCycles({1.2, 10.0, 10.0}).empty()) << "a shorter lever moves less";
   EXPECT_EQ(graph.CheckCycles({10.0, 1.1, 100.0}).size(), 0u);
   EXPECT_EQ(graph.CheckCycles({10.0, 0.9, 100.0}).size(), 1u);
   graph.Set(Link("BToA", SomeAffine(5), TransformStatus::OutOfRange));

@@ -262,7 +262,7 @@ def check_enclosing():
     image = image_of(np.ones(two.shape, np.uint8), two.astype(np.uint8))
     filter, errors = fit(image, EncloseRegion=True)
     assert not errors and outside(filter.GetOutput(), two) == 0, errors
-    assert 0.6 < filter.GetOverlap() < 0.95 and "holds the whole region" in filter.GetNotes(), filter.GetOverlap()
+    assert 0.6 < filter.GetOverlap() < 0.95 and "encloses the whole region" in filter.GetNotes(), filter.GetOverlap()
     wider, errors = fit(image, EncloseRegion=True, MarginMm=5)
     assert not errors and wider.GetOverlap() < filter.GetOverlap() - 0.1
     again, errors = fit(filter.GetOutput(), EncloseRegion=True)

@@ -43,7 +43,11 @@ editor.Rotation = [0.0, 0.0, 180.0]
 editor.UpdatePipeline()
 blocks = servermanager.Fetch(editor)
 assert numpy.allclose(blocks.GetBlock(1).GetOrigin(), before)
-assert not numpy.allclose(blocks.GetBlock(0).GetOrigin(), servermanager.Fetch(a).GetOrigin())
+middle = lambda image: numpy.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
+axes = lambda image: numpy.array([[image.GetDirectionMatrix().GetElement(i, j) for j in range(3)] for i in range(3)])
+turned, was = blocks.GetBlock(0), servermanager.Fetch(a)
+assert numpy.allclose(middle(turned), middle(was), atol=1e-6), (middle(turned), middle(was))
+assert numpy.allclose(axes(turned), numpy.diag([-1, -1, 1]) @ axes(was), atol=1e-9)
 
 # The handle: a group with a box, its position and rotation.
 groups = [editor.SMProxy.GetPropertyGroup(i) for i in range(editor.SMProxy.GetNumberOfPropertyGroups())]

@@ -80,6 +80,22 @@ SequenceContent Images(int width, int height)
 
 } // namespace
 
+TEST_F(SequenceRecorderTest, AFrameWithoutPixelsIsZeros)
+{
+  SequenceRecorder recorder(Path("a.igs.mhd"), Images(5, 3));
+  for (int i = 0; i < 3; ++i)
+    recorder.Append(FrameOf(i, i), i == 1 ? nullptr : PixelsOf(i, 15).data());
+  recorder.Finish();
+  SequenceFile file(Path("a.igs.mhd"));
+  ASSERT_EQ(file.Content().frames, 3);
+  std::string pixels(15, 'x');
+  for (int i = 0; i < 3; ++i) {
+    file.ReadFrame(i, pixels.data());
+    EXPECT_EQ(pixels, i == 1 ? std::string(15, '\0') : PixelsOf(i, 15));
+    EXPECT_EQ(file.Frame(i).imageValid, i != 1);
+  }
+}
+
 TEST_F(SequenceRecorderTest, ComesBack)
 {
   for (const bool images : {false, true}) {

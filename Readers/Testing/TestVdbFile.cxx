@@ -156,6 +156,19 @@ TEST_F(VdbFile, EveryTypeComesBackWithGeometryAndValidRegion)
       });
 }
 
+TEST_F(VdbFile, ATurnedGridIsTurnedForOthersToo)
+{
+  const ImageHeader header = Oblique(VoxelType::UInt8);
+  const std::vector<unsigned char> voxels(header.geometry.VoxelCount(), 1);
+  openvdb::io::File file(Write("a.vdb", header, voxels.data(), nullptr));
+  file.open();
+  const openvdb::GridBase::Ptr grid = file.readGrid("Intensity");
+  for (const Eigen::Vector3d& index : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(20, 0, 0), Eigen::Vector3d(3, 5, 16)}) {
+    const openvdb::Vec3d at = grid->indexToWorld(openvdb::Vec3d(index.x(), index.y(), index.z()));
+    EXPECT_LT((header.geometry.IndexToWorld() * index - Eigen::Vector3d(at.x(), at.y(), at.z())).norm(), 1e-9);
+  }
+}
+
 TEST_F(VdbFile, ASparseVolumeIsASmallFileThatOthersRead)
 {
   ImageHeader header;

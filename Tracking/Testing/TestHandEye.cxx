@@ -87,6 +87,29 @@ std::vector<HandEyePair> PairsOf(const std::vector<Eigen::Vector3d>& turns, cons
 
 const std::vector<Eigen::Vector3d> NoShift{Eigen::Vector3d::Zero()};
 
+TEST(HandEye, ResidualsAreWhatTheySay)
+{
+  HandEyeScenario scenario;
+  scenario.poses = 10;
+  scenario.outliers = 1;
+  scenario.target << 0.0, 15.0, 40.0;
+  const HandEyeSimulation simulation = SimulateHandEye(scenario);
+  const HandEyeResult result = CalibrateHandEye(simulation.pairs, ParametersOf(scenario));
+  double mm = 0.0, degrees = 0.0;
+  for (std::size_t i = 0; i < 10; ++i) {
+    const HandEyePair& pair = simulation.pairs[i];
+    const Pose tracked = result.solution.worldToTracker.inverse() * pair.sensorToTracker * result.solution.volumeToSensor;
+    const double off = (tracked * scenario.target - pair.volumeToWorld * scenario.target).norm();
+    const double turn = RotationAngle(pair.volumeToWorld.inverse() * tracked) / RadiansPerDegree;
+    EXPECT_NEAR(result.residuals[i].mm, off, 1e-6);
+    EXPECT_NEAR(result.residuals[i].degrees, turn, 1e-6);
+    mm += result.residuals[i].inlier ? off * off : 0.0;
+    degrees += result.residuals[i].inlier ? turn * turn : 0.0;
+  }
+  EXPECT_NEAR(result.rmsMm, std::sqrt(mm / result.inliers), 1e-6);
+  EXPECT_NEAR(result.rmsDegrees, std::sqrt(degrees / result.inliers), 1e-6);
+}
+
 TEST(HandEye, IsExactOnExactData)
 {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Readers/PoseLog.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Testing/Sanitized.h"
@@ -101,7 +102,7 @@ TEST(PivotCalibration, RegionHoldsAndBoundIsReached)
                         Case{{200, 6.0, 6.0, {0.5, 0.2}}, true, 41000}, Case{{60, 20.0, 20.0, {0.75, 2.1}}, true, 51000}}) {
     constexpr int Trials = 500;
     int held = 0;
-    double squares = 0.0, stated = 0.0, algebraic = 0.0;
+    double squares = 0.0, stated = 0.0, algebraic = 0.0, mahalanobis = 0.0;
     PivotParameters parameters;
     parameters.noise = c.estimate ? PoseNoise{c.motion.noise.degrees / 2, c.motion.noise.mm / 2} : c.motion.noise;
     parameters.estimateNoise = c.estimate;
@@ -113,11 +114,15 @@ TEST(PivotCalibration, RegionHoldsAndBoundIsReached)
       squares += error * error;
       algebraic += (result.algebraicTip - Tip).squaredNorm();
       stated += result.tipRmsMm * result.tipRmsMm;
+      Eigen::Matrix<double, 6, 1> off;
+      off << result.tip - Tip, result.pivot - Pivot;
+      mahalanobis += off.dot(SolveSymmetric(result.covariance, off).col(0)) / Trials;
     }
     const double rms = std::sqrt(squares / Trials), bound = std::sqrt(stated / Trials), plain = std::sqrt(algebraic / Trials);
     SCOPED_TRACE("case " + std::to_string(c.seed) + ": held " + std::to_string(held) + ", rms " + std::to_string(rms) +
                  ", stated " + std::to_string(bound) + ", plain " + std::to_string(plain));
     EXPECT_GE(held, 465);
+    EXPECT_NEAR(mahalanobis, 6.0, c.motion.poses < 20 ? 1.6 : 1.0); // six numbers; of 8 poses the scale has 18 degrees of freedom
     EXPECT_LE(held, 485);
     EXPECT_NEAR(rms / bound, 1.0, 0.08);
     EXPECT_LT(rms, 1.02 * plain);

@@ -212,7 +212,7 @@ TEST(PolhemusTracker, SaysWhatIsTheMatter)
   character.deaf = true;
   message(character, "", "answers like a Polhemus", DeviceState::Connecting);
   character.talksAlready = true;
-  message(character, "", "stop talking", DeviceState::Connecting);
+  message(character, "", "stop sending", DeviceState::Connecting);
   character = {};
   message(character, "?model=liberty", "it is a Patriot, not a Liberty", DeviceState::Failed);
   character.sensors = 0;

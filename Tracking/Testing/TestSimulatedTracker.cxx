@@ -173,6 +173,12 @@ TEST(SimulatedTracker, DistortionIsThatOfOneField)
   const Eigen::Vector3d curl(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1));
   EXPECT_LT((LogRotation(seen(x).linear()) - 0.5 * curl).norm(), 1e-8);
   EXPECT_GT(curl.norm(), 1e-3);
+  // And it is in what is measured.
+  const auto bent = Parameters("motion=still&distortionMm=3");
+  const ToolPose measured = SimulatedMeasurement(bent, 0, 5);
+  const Pose truth = SimulatedTruth(bent, 0, measured.time);
+  EXPECT_TRUE(measured.pose.isApprox(SimulatedDistortion(bent, truth), 1e-12));
+  EXPECT_GT((measured.pose.translation() - truth.translation()).norm(), 0.01);
 }
 
 TEST(SimulatedTracker, BeyondItsRange)

@@ -308,8 +308,8 @@ void TestFiles::laterWorkOnAProjectIsOffered()
   } // it ends without being asked, as in a crash
   WindowUnderTest window;
   window.Window().Start(project, {});
-  QTRY_VERIFY(window.HasMessage("later work on this project"));
-  QVERIFY(window.Answer("Go on with it"));
+  QTRY_VERIFY(window.HasMessage("unsaved changes"));
+  QVERIFY(window.Answer("Restore them"));
   QTRY_COMPARE(window.Pose(window.Session()->GetVolumeId(1)), moved);
 }
 

@@ -19,10 +19,12 @@
 #include <QApplication>
 #include <QCheckBox>
 #include <QDockWidget>
+#include <QDoubleSpinBox>
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
 #include <QSettings>
+#include <QSpinBox>
 #include <QSurfaceFormat>
 #include <QTableWidget>
 #include <QTemporaryDir>
@@ -55,6 +57,7 @@ class TestPanels : public QObject {
 private slots:
   void init();
   void refineBringsAVolumeBack();
+  void aSureAnswerIsTakenUnasked();
   void aCancelledJobChangesNothing();
   void whatMovedMeanwhileStays();
   void aWindowMayCloseWhileAJobRuns();
@@ -126,6 +129,30 @@ void TestPanels::refineBringsAVolumeBack()
   QVERIFY(window.Pose(2) == moved);
 }
 
+void TestPanels::aSureAnswerIsTakenUnasked()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()})); // one anatomy, in which nothing repeats
+  const auto first = window.Pose(1), belongs = window.Pose(2);
+  Raise(window, "registrationPanel");
+  for (const char* button : {"refine", "alignAll"}) {
+    window.Session()->Select(2, true, true);
+    window.Session()->TranslateSelection(3.0, -2.0, 1.0);
+    window.Session()->RotateSelection(0.0, 0.0, 4.0);
+    const int entries = window.Session()->GetUndoCount();
+    QVERIFY(!window.Part<QCheckBox>("alignDoubtful")->isChecked());
+    QTest::mouseClick(window.Part<QPushButton>(button), Qt::LeftButton);
+    QVERIFY(Wait(window));
+    auto* table = window.Part<QTableWidget>("alignResults");
+    QCOMPARE(table->rowCount(), 2);
+    QCOMPARE(table->item(0, 1)->text(), QString("stays"));
+    QCOMPARE(table->item(1, 1)->text(), QString("aligned"));
+    QCOMPARE(window.Pose(1), first);
+    QVERIFY2(Distance(window.Pose(2), belongs) < 0.5, button);
+    QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
+  }
+}
+
 void TestPanels::aCancelledJobChangesNothing()
 {
   WindowUnderTest window;
@@ -155,7 +182,7 @@ void TestPanels::whatMovedMeanwhileStays()
   auto put = window.Pose(2);
   QVERIFY(Wait(window));
   QVERIFY(window.Pose(2) == put);
-  QVERIFY(window.HasMessage("moved meanwhile"));
+  QVERIFY(window.HasMessage("moved during the alignment"));
   // And when the volume that stays is moved, nothing is taken.
   window.Part<RegistrationPanel>("registrationPanel")->Refine();
   window.Session()->Select(1, true, true);
@@ -255,13 +282,26 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QVERIFY(panel->SetHistory(folder_->filePath("attempts.csv")));
   QVERIFY(panel->LoadTruth(truth));
   QCOMPARE(window.Part<QLabel>("score")->text(), QString("0.00 mm"));
-  // Twice the same exercise.
+  // As far as was asked for, the fixed volume not at all; twice the same exercise, and another one for another seed.
+  window.Part<QDoubleSpinBox>("scatterMm")->setValue(9.0);
+  window.Part<QDoubleSpinBox>("scatterDegrees")->setValue(4.0);
+  window.Part<QLineEdit>("trainee")->setText("Ada");
+  const auto fixed = window.Pose(1);
+  double at[3], put[3], angles[3];
+  window.Session()->GetPlacement(2, at, angles);
   QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
   const auto scattered = window.Pose(2);
   QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
   QVERIFY(Distance(window.Pose(2), scattered) < 1e-9);
-  const double start = window.Session()->GetScore();
-  QVERIFY(start > 5.0);
+  window.Session()->GetPlacement(2, put, angles);
+  QVERIFY(std::abs(std::hypot(put[0] - at[0], put[1] - at[1], put[2] - at[2]) - 9.0) < 1e-6);
+  QVERIFY(std::abs(window.Session()->GetRotationError(2) - 4.0) < 1e-4);
+  QCOMPARE(window.Pose(1), fixed);
+  window.Part<QSpinBox>("scatterSeed")->setValue(2);
+  QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
+  QVERIFY(Distance(window.Pose(2), scattered) > 0.1);
+  const double start = window.Session()->GetScore(); // the mean over both volumes
+  QVERIFY(start > 3.0);
   window.Settle();
   QCOMPARE(window.Part<QLabel>("score")->text(), QString::number(start, 'f', 2) + " mm");
 
@@ -273,6 +313,7 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   window.Session()->Select(2, true, true);
   window.Session()->TranslateSelection(1.0, 0.0, 0.0);
   QCOMPARE(window.Part<QLabel>("score")->text(), QString("hidden until you submit"));
+  QTest::qWait(300);
   QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
   QVERIFY(!panel->IsTraining());
   const std::vector<Attempt> attempts = ReadAttempts(folder_->filePath("attempts.csv").toStdString());
@@ -280,6 +321,9 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QCOMPARE(attempts[0].scoreMm, window.Session()->GetScore());
   QCOMPARE(attempts[0].startMm, start);
   QCOMPARE(attempts[0].edits, 1);
+  QVERIFY(attempts[0].seconds >= 0.3);
+  QCOMPARE(attempts[0].trainee, std::string("Ada"));
+  QCOMPARE(attempts[0].worstMm, window.Session()->GetVolumeScore(2));
   QCOMPARE(window.Part<QTableWidget>("attempts")->rowCount(), 1);
   QCOMPARE(window.Part<QLabel>("score")->text(), QString::number(window.Session()->GetScore(), 'f', 2) + " mm");
   // A file that is something else is refused, and stays.

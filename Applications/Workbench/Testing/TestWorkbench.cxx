@@ -344,6 +344,14 @@ void TestWorkbench::wheelAndMiddleButtonMoveTheSlice()
   window.Drag(window.Slice(0), centre, centre + QPoint(50, 0), Qt::RightButton);
   window.Session()->GetGreyWindow(changed);
   QVERIFY(changed[1] - changed[0] > 1.1 * (grey[1] - grey[0]));
+  window.Session()->GetGreyWindow(grey);
+  window.Drag(window.Slice(0), centre, centre - QPoint(0, 50), Qt::RightButton); // up: brighter
+  window.Session()->GetGreyWindow(changed);
+  QVERIFY(changed[0] + changed[1] < grey[0] + grey[1]);
+  QVERIFY(std::abs((changed[1] - changed[0]) - (grey[1] - grey[0])) < 1e-6);
+  const double before = view->GetPosition();
+  window.Wheel(window.Slice(0), 1, Qt::ShiftModifier);
+  QVERIFY(std::abs(view->GetPosition() - before - 10.0) < 1e-6);
   // Look: a click takes the other slices there.
   window.Key(Qt::Key_1);
   window.Click(window.Slice(0), centre + QPoint(30, 10));
@@ -364,6 +372,11 @@ void TestWorkbench::aViewBecomesLargeAndSmallAgain()
   window.Screenshot("large-slice");
   window.Key(Qt::Key_M);
   QVERIFY(window.Slice(0)->isVisible() && window.Slice(2)->isVisible());
+  for (const bool large : {true, false}) {
+    QTest::mouseDClick(window.Slice(1), Qt::LeftButton, {}, {40, 40});
+    window.Settle();
+    QCOMPARE(window.Slice(0)->isVisible(), !large);
+  }
 }
 
 void TestWorkbench::paintingIsOneEdit()

@@ -170,4 +170,14 @@ TEST(FrameSector, FanAndRectangleByNumbers)
   EXPECT_EQ(part.View()(1, 0, 0), 0);
   EXPECT_THROW(RectangleMask(10, 20, 0, 4, 10, 10), Error);
   EXPECT_THROW(RectangleMask(5, 2, 0, 4, 10, 10), Error);
+
+  // Leaning, and with pixels that are not square.
+  const ImageFan leaning{120.0, -40.0, -10.0, 40.0, 41.3, 133.7};
+  const auto oblique = FanMask(leaning, width, height, 0.5, 0.8);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double across = 0.5 * (x - 120.0), down = 0.8 * (y + 40.0), mm = std::hypot(across, down);
+      const double angle = std::atan2(across, down) * 57.29577951308232;
+      ASSERT_EQ(oblique.View()(x, y, 0), mm >= 41.3 && mm <= 133.7 && angle >= -10.0 && angle <= 40.0) << x << " " << y;
+    }
 }

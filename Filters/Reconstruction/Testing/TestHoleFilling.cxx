@@ -49,6 +49,25 @@ TEST(HoleFilling, ASingleVoxelGetsTheMeanOfItsNeighbours)
   EXPECT_EQ(scene.coverage.View()(2, 2, 2), 0);
 }
 
+TEST(HoleFilling, TheCubeOfTheMeanIsThatOfTheGap)
+{
+  Scene one({12, 3, 3});
+  one.See(3, 1, 1, 200);
+  one.See(5, 1, 1, 60);
+  one.See(7, 1, 1, 80);
+  one.Fill(HoleFilling::Mean, 5);
+  EXPECT_EQ(one.intensity.View()(6, 1, 1), 70);
+  EXPECT_EQ(one.intensity.View()(4, 1, 1), 130);
+  Scene three({12, 3, 3});
+  three.See(4, 1, 1, 255);
+  three.See(5, 1, 1, 60);
+  three.See(9, 1, 1, 80);
+  EXPECT_EQ(three.Fill(HoleFilling::Mean, 5), 3u);
+  EXPECT_EQ(three.intensity.View()(6, 1, 1), 158); // half edge 2: 255 and 60
+  EXPECT_EQ(three.intensity.View()(7, 1, 1), 70);
+  EXPECT_EQ(three.intensity.View()(8, 1, 1), 80);
+}
+
 TEST(HoleFilling, GapsUpToTheReachAreBridged)
 {
   for (const HoleFilling method : {HoleFilling::Mean, HoleFilling::Stick})

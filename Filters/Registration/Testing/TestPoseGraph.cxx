@@ -160,6 +160,12 @@ TEST(PoseGraph, TheCovarianceTurnsWithTheWorld)
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = world.starts[0].linear();
   const Information expected = turn * edge.information * turn.transpose();
   EXPECT_LT((result.information[1] - expected).cwiseAbs().maxCoeff(), 0.02);
+
+  // Walked against its direction the edge says as much of the other volume.
+  const PoseGraphResult other = SolvePoseGraph(world.starts, {edge}, 1, p);
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = other.volumeToWorld[0].linear();
+  const Information back = turn * edge.information * turn.transpose();
+  EXPECT_LT((other.information[0] - back).cwiseAbs().maxCoeff(), 0.02);
 }
 
 TEST(PoseGraph, ParallelEdgesAreAveragedByTheirWeights)

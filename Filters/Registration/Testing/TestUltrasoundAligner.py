@@ -238,7 +238,11 @@ assert fields.GetAbstractArray("AlignmentVerdict").GetValue(0) == "aligned" and 
 assert fields.GetArray("AlignmentSimilarity").GetValue(0) == sure.GetSimilarity(1) > 0.5
 covariance = np.array(fields.GetArray("AlignmentCovariance").GetTuple(0)).reshape(6, 6)
 assert np.allclose(covariance, covariance.T) and np.linalg.eigvalsh(covariance).min() > 0
+sd = np.sqrt(np.diag(covariance))
+assert sd[:3].max() < 1.0 and sd[3:].max() < 0.05, sd  # its inverse would be far above
 assert fields.GetArray("AlignmentCentre").GetNumberOfComponents() == 3
+middles = [(geometry(sure.GetOutput().GetBlock(i)) @ [43, 39, 35, 1])[:3] for i in (0, 1)]
+assert np.linalg.norm(fields.GetArray("AlignmentCentre").GetTuple3(0) - np.mean(middles, axis=0)) < 10
 report = json.loads(sure.GetReport())
 assert report["method"] == "global" and len(report["volumes"]) == 2 and len(report["pairs"]) == 1
 assert report["pairs"][0]["verdict"] == "aligned" and not report["pairs"][0]["voted_down"]

@@ -34,6 +34,18 @@ std::vector<ResampledVolume> Pair(const std::array<int, 3>& n, const Value& firs
           Make({{third, 0, 0}, {n[0] - third, n[1], n[2]}}, second, [=](int i, int, int) { return i < middle ? 0.0f : 1.0f; })};
 }
 
+TEST(Multiband, FineDetailChangesOverAtOnce)
+{
+  const std::array<int, 3> n{128, 20, 1};
+  const Value checks = [](int i, int j, int) { return (i + j) % 2 ? 120.0f : 80.0f; };
+  const Volume<float> blended = BlendMultiband(Pair(n, checks, [](int, int, int) { return 100.0f; }), n, 5);
+  for (int j = 2; j < 18; ++j)
+    for (int d = 4; d < 12; ++d) {
+      EXPECT_NEAR(blended.View()(64 - d, j, 0), checks(64 - d, j, 0), 2.0);
+      EXPECT_NEAR(blended.View()(64 + d, j, 0), 100.0, 2.0);
+    }
+}
+
 TEST(Multiband, ConstantsStay)
 {
   for (const std::array<int, 3>& n :

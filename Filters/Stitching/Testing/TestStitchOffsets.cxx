@@ -63,6 +63,43 @@ TEST(StitchOffsets, MeetHalfWayAndEndWhereAVolumeIsAlone)
   }
 }
 
+TEST(StitchOffsets, AlongEveryAxis)
+{
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<int, 3> n{5, 5, 5}, size, first{0, 0, 0};
+    n[axis] = 40;
+    size = n;
+    size[axis] = 30;
+    first[axis] = 10;
+    Labels labels(n);
+    for (int k = 0; k < n[2]; ++k)
+      for (int j = 0; j < n[1]; ++j)
+        for (int i = 0; i < n[0]; ++i)
+          labels.View()(i, j, k) = std::array<int, 3>{i, j, k}[axis] >= 20;
+    const auto fields = OffsetFields({Make({{0, 0, 0}, size}, [](int, int, int) { return 100.0f; }),
+                                      Make({first, size}, [](int, int, int) { return 140.0f; })},
+                                     labels, Eigen::Vector3d(1.0, 1.0, 1.0));
+    for (int x = 0; x < 30; ++x) {
+      std::array<int, 3> at{2, 2, 2};
+      at[axis] = x;
+      EXPECT_NEAR(At(fields[0], at[0], at[1], at[2]), x <= 9 ? 0.0 : x < 19 ? 2.0 * (x - 9) : 20.0, 0.1) << axis << " " << x;
+    }
+  }
+}
+
+TEST(StitchOffsets, RowsFarApartGoTheirOwnWay)
+{
+  const std::array<int, 3> n{40, 24, 1};
+  const auto half = [&](double spacingY) {
+    const auto fields = OffsetFields({Make({{0, 0, 0}, {30, 24, 1}}, [](int, int, int) { return 100.0f; }),
+                                      Make({{10, 0, 0}, {30, 24, 1}}, [](int, int j, int) { return j < 12 ? 80.0f : 120.0f; })},
+                                     Halves(n, 17), Eigen::Vector3d(1.0, spacingY, 1.0));
+    return At(fields[0], 13, 2, 0);
+  };
+  EXPECT_NEAR(half(50.0), -10.0 * 4.0 / 7.0, 0.3);
+  EXPECT_NEAR(half(0.02), 0.0, 1.0); // close together: their mean
+}
+
 TEST(StitchOffsets, FollowTheDifferenceAlongTheSeam)
 {
   const std::array<int, 3> n{40, 24, 1};

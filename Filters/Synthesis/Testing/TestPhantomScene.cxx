@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Filters/Synthesis/Phantom.h"
 #include "Filters/Synthesis/PhantomScene.h"
+#include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
 
@@ -32,6 +33,13 @@ TEST(PhantomScene, DistancesOfSimpleShapes)
   const Ellipsoid turned{{0, 0, 0}, {8, 2, 2}, {0, 0, 1.5707963267948966}};
   EXPECT_NEAR(SignedDistance(turned, {0, 8, 0}), 0.0, 1e-12);
   EXPECT_NEAR(SignedDistance(turned, {2, 0, 0}), 0.0, 1e-12);
+  const Ellipsoid leaning{{0, 0, 0}, {8, 2, 2}, {0, 0, 0.5}};
+  EXPECT_NEAR(SignedDistance(leaning, {8 * std::cos(0.5), 8 * std::sin(0.5), 0}), 0.0, 1e-9);
+  EXPECT_GT(SignedDistance(leaning, {8 * std::cos(0.5), -8 * std::sin(0.5), 0}), 1.0);
+  PhantomScene scene;
+  scene.inclusions.push_back({"leaning", leaning, 5.0, 0.0, 0.0, 0.0});
+  EXPECT_EQ(SceneLookup(scene).EchogenicityAt({7 * std::cos(0.5), 7 * std::sin(0.5), 0}), 5.0);
+  EXPECT_EQ(SceneLookup(scene).EchogenicityAt({7 * std::cos(0.5), -7 * std::sin(0.5), 0}), 0.0);
   const Tube tube{{{0, 0, 0}, {10, 0, 0}, {10, 10, 0}}, 2.0};
   EXPECT_NEAR(SignedDistance(tube, {5, -3, 0}), 1.0, 1e-12);
   EXPECT_NEAR(SignedDistance(tube, {10, 5, 1}), -1.0, 1e-12);

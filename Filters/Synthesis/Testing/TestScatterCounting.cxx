@@ -67,6 +67,17 @@ TEST(ScatterCounting, DistancesFollowTheLaw)
   EXPECT_NEAR(mean / within, meanOfText, 0.1);
 }
 
+TEST(ScatterCounting, LooksWhereTheProbeLooks)
+{
+  const Pose pose(Eigen::Translation3d(10, -20, 30) * Eigen::AngleAxisd(0.7, Vector3d(1, 2, 0.5).normalized()));
+  TissueSurface surface = Background(Scattering(0.0));
+  AddBox(surface, Scattering(1.0), {-50, -50, 40}, {50, 50, 60});
+  for (auto& point : surface.points)
+    point = (pose * point.cast<double>()).cast<float>();
+  const Volume<float> row = CountScatters(AcousticScene(surface), {}, ProbeGeometry::Linear(20, 0, 0, 100), pose, {101, 1, 1});
+  EXPECT_NEAR(row.View()[40], 1.0f, 1e-3f);
+}
+
 TEST(ScatterCounting, ReceiverHearsWhatLiesAhead)
 {
   const Vector3d element(1, 2, 3), ahead(0, 0, 1);
