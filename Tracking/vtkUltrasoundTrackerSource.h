@@ -188,11 +188,11 @@ public:
 
   ///@{
   /**
-   * Records every pose from now on to a sequence (.igs.mha) that a crash leaves whole up to the last second; opens the device if
-   * it is not open. A file that is there already is refused. No name, or an empty one, ends the recording, as StopRecording()
-   * does. Ends with the device when another one is set, and with the next StartRecording(): the new one begins first, so that
-   * nothing is lost between the two, and what is wrong with the earlier one is an error, but does not stop it. Returns false,
-   * with an error that names the reason, when it cannot be; StopRecording also when nothing was recorded. See
+   * Records every pose from now on to a sequence (.igs.mha) that a crash leaves whole up to the last half second; opens the
+   * device if it is not open. A file that is there already is refused. No name, or an empty one, ends the recording, as
+   * StopRecording() does. Ends with the device when another one is set, and with the next StartRecording(): the new one begins
+   * first, so that nothing is lost between the two, and what is wrong with the earlier one is an error, but does not stop it.
+   * Returns false, with an error that names the reason, when it cannot be; StopRecording also when nothing was recorded. See
    * echorama::StreamRecorder.
    */
   bool StartRecording(VTK_FILEPATH const char* fileName);

@@ -252,10 +252,10 @@ void FileActions::OfferLaterBackup()
   const QString backup = QString::fromStdString(bench_->Session()->GetLaterBackup());
   if (backup.isEmpty())
     return;
-  bench_->Ask(tr("There is later work on this project, of %1, that was not saved.")
+  bench_->Ask(tr("This project has unsaved changes, last backed up at %1.")
                   .arg(QFileInfo(backup).lastModified().toString("yyyy-MM-dd hh:mm:ss")),
-              {{tr("Go on with it"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},
-               {tr("Leave it"), {}}});
+              {{tr("Restore them"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},
+               {tr("Ignore them"), {}}});
 }
 
 bool FileActions::Save()

@@ -25,7 +25,7 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
   setObjectName("historyPanel");
   undo_ = Button(this, "undo", tr("Undo"), tr("Takes the last edit back (Ctrl+Z)"), [this] { bench_->Session()->Undo(); });
   redo_ = Button(this, "redo", tr("Redo"), tr("Makes it again (Ctrl+Shift+Z)"), [this] { bench_->Session()->Redo(); });
-  auto* title = new QLabel(tr("Backups (click: back to it; can be undone)"), this);
+  auto* title = new QLabel(tr("Backups (click one to return to it; this can be undone)"), this);
   title->setWordWrap(true);
   for (QPushButton* button : {undo_, redo_}) // labels of edits can be long
     button->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Fixed);

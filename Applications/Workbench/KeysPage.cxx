@@ -20,11 +20,11 @@ constexpr const char* Mouse[][2] = {
     {"Double click", "make a view large, and back"},
 };
 constexpr const char* Aligning[][2] = {
-    {"x, y, z", "keep to an axis; again: to the plane across it; again: free"},
+    {"x, y, z", "restrict motion to this axis; press again for the plane perpendicular to it, and again for free motion"},
     {"Arrows", "move by one step in the view"},
     {"Page up, Page down", "move by one step towards you, and away"},
     {"Ctrl + arrows, Ctrl + Page up, Page down", "turn by one step"},
-    {"+, -", "steps twice and half as large"},
+    {"+, -", "double or halve the step size"},
     {"c", "put the centre of rotation where the mouse is"},
     {"Shift + c", "put it back in the middle of what is selected"},
     {"Escape", "take a drag back"},

@@ -72,9 +72,9 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : QW
          "degrees and a third of a volume; unknown, anywhere; automatic, one after the other while it is not clear"),
       this);
   metric_ = ChoiceOfNames(MetricNames(), "alignMetric", tr("The likeness by which places are compared"), this);
-  doubtful_ = new QCheckBox(tr("Take doubtful answers too"), this);
+  doubtful_ = new QCheckBox(tr("Accept ambiguous results"), this);
   doubtful_->setObjectName("alignDoubtful");
-  doubtful_->setToolTip(tr("Also move volumes whose answer is ambiguous. Failed ones never move."));
+  doubtful_->setToolTip(tr("Also moves volumes whose result is ambiguous. Failed volumes never move."));
   table_ = new QTableWidget(0, 4, this);
   table_->setObjectName("alignResults");
   table_->setHorizontalHeaderLabels({tr("Volume"), tr("Answer"), tr("Moved"), tr("Overlap")});
@@ -220,8 +220,9 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
   for (const Result::Volume& volume : result.volumes) {
     vtkNew<vtkMatrix4x4> now;
     if (volume.held && (!session->GetVolumeToWorld(volume.id, now) || ElementsOf(now) != volume.before)) {
-      workspace_.say(tr("%1: not taken, for a volume that the others were aligned with has been moved meanwhile").arg(label),
-                     true);
+      workspace_.say(
+          tr("%1: result discarded, because a volume that the others were aligned with was moved in the meantime").arg(label),
+          true);
       return;
     }
   }
@@ -244,7 +245,7 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
       taken = volume.verdict == NameOf(Verdict::Aligned) || (takesDoubtful && volume.verdict == NameOf(Verdict::Ambiguous));
       if (taken && ElementsOf(now) != volume.before) {
         taken = false;
-        reason = tr("it was moved meanwhile, and stays where it was put");
+        reason = tr("it was moved during the alignment and was left where it is");
         answer = tr("not taken");
       }
       if (taken)
@@ -271,8 +272,7 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
     workspace_.say(tr("%1: done, %2 moved").arg(label).arg(moved), false);
   else
     workspace_.say(
-        tr("%1: %2 of %3 aligned; what is not taken stays where it was. %4").arg(label).arg(moved).arg(moved + left).arg(why),
-        true);
+        tr("%1: %2 of %3 volumes aligned; the others were not moved. %4").arg(label).arg(moved).arg(moved + left).arg(why), true);
 }
 
 } // namespace echorama

@@ -37,7 +37,7 @@ bool GreyLevelAt(vtkImageData* image, const double world[3], double& level)
 StatusReadout::StatusReadout(Workbench* bench, QWidget* parent) : QLabel(parent), bench_(bench)
 {
   setObjectName("readout");
-  setToolTip(tr("The point under the mouse: to the left, to the back, to the head; grey level and volume"));
+  setToolTip(tr("Position under the mouse in mm (left, posterior, superior), and the grey level of each volume there"));
 }
 
 void StatusReadout::ShowAt(double x, double y, double z)

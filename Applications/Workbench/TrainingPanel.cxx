@@ -83,7 +83,7 @@ TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(pa
   live_->setChecked(true);
   vectors_ = new QCheckBox(tr("Show the errors as arrows"), evaluation);
   vectors_->setObjectName("showErrors");
-  vectors_->setToolTip(tr("In the 3D view: from where points belong to where they are"));
+  vectors_->setToolTip(tr("In the 3D view: arrows from where points are to where they belong"));
   form->addRow(tr("Truth"), truth_);
   form->addRow(choose);
   form->addRow(tr("Score"), score_);
@@ -112,8 +112,9 @@ TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(pa
   seed_->setToolTip(tr("The same number scatters the same volumes in the same way"));
   auto* scatter = new QPushButton(tr("Scatter volumes"), training);
   scatter->setObjectName("scatter");
-  scatter->setToolTip(tr("Moves every volume but the first, in a random direction, by so much from where it belongs (or, without "
-                         "truth, from where it is). Can be undone."));
+  scatter->setToolTip(
+      tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, without "
+         "truth, from where it is). Can be undone."));
   start_ = new QPushButton(training);
   start_->setObjectName("trainingStart");
   submit_ = new QPushButton(tr("Submit"), training);

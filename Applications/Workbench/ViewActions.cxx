@@ -47,7 +47,8 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
     addTo(modes_, name, label, key, help, word, [this, word] { SetMode(word); });
   };
   addMode("modeBlend", tr("&Blend"), "B", tr("Volumes are mixed; tints add up to grey where they agree"), "blend");
-  addMode("modeDifference", tr("&Difference"), "D", tr("Where selected volumes and the others agree it is dark"), "difference");
+  addMode("modeDifference", tr("&Difference"), "D",
+          tr("Difference between the selected volumes and the others: dark where they agree"), "difference");
   addMode("modeCheckerboard", tr("&Checkerboard"), "K", tr("Squares of the selected volumes and of the others in turn"),
           "checkerboard");
 

@@ -114,8 +114,8 @@ QWidget* ViewPanel::VolumeControls()
       });
   particleSize_ = NumberField(box, {"particleSize", tr("Size of particles; at 1 they touch"), 0.1, 10.0, 2, 0.1, {}},
                               set(&VolumeLook::particleSize));
-  opacity_ =
-      NumberField(box, {"volumeOpacity", tr("Low: one sees into the volumes"), 0.0, 1.0, 2, 0.05, {}}, set(&VolumeLook::opacity));
+  opacity_ = NumberField(box, {"volumeOpacity", tr("Opacity; lower values let you see into the volumes"), 0.0, 1.0, 2, 0.05, {}},
+                         set(&VolumeLook::opacity));
   valueOpacity_ =
       Check("valueOpacity", tr("Dark is transparent"),
             tr("Opacity grows with the grey level, so that fluid and shadows are seen through"), &VolumeLook::valueOpacity);

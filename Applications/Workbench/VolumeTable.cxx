@@ -115,7 +115,7 @@ QVariant VolumeTable::headerData(int section, Qt::Orientation orientation, int r
   }
   if (role == Qt::ToolTipRole) {
     static const char* const help[Columns] = {
-        QT_TR_NOOP("Shown in the views, and used by what aligns and stitches what is shown"),
+        QT_TR_NOOP("Shown in the views. Only volumes that are shown are stitched and exported; aligning uses all of them"),
         QT_TR_NOOP("Tint of the volume; double click to change it"), QT_TR_NOOP("Double click to rename"),
         QT_TR_NOOP("Weight of the volume where several overlap; double click to change it"),
         QT_TR_NOOP("Volumes of one group are selected and moved together")};

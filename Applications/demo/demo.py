@@ -48,9 +48,15 @@ class Steps:
             result = json.loads(answer.stdout)
         except ValueError:
             result = {}
-        if answer.returncode != 0 or not result:
+        doubtful = answer.returncode == 3 and "error" not in result  # the result is there, and the report tells of it
+        if (answer.returncode != 0 and not doubtful) or not result:
             reason = result.get("error", f"echorama {arguments[0]} ended with status {answer.returncode}")
             raise StepFailed(f"{what}: {reason}")
+        if doubtful:
+            for volume in result.get("volumes", []):
+                if volume.get("reason"):
+                    print(f"  {volume['file']}: {volume['verdict']} ({volume['reason']})")
+            print("  not every volume is aligned: look at the report before you use the result")
         self.done.append((what, shlex.join(["echorama", *arguments]), float(result.get("seconds", 0))))
         return result
 

@@ -184,7 +184,7 @@ void Align(Session& session, AlignOptions options)
   session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
   if (!aligner->GetAllAligned()) {
     session.status = Session::Doubtful;
-    session.Note("not every volume is aligned: the poses should not be used unseen");
+    session.Note("not every volume is aligned: check the poses before using them");
   }
 
   for (std::size_t i = 0; i < places.size(); ++i)

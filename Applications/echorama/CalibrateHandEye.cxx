@@ -231,7 +231,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
     session.Say("what would help most: " + result.advice.front().text);
   if (2 * result.inliers < static_cast<int>(options.volumes.size())) {
     session.status = Session::Doubtful;
-    session.Note("more than half of the scans were of no use: the calibration should not be used unseen");
+    session.Note("more than half of the scans could not be used: check the calibration before using it");
   }
   WriteTransforms(options.output, {calibration, world}, report.dump());
   if (!options.savePoses.empty())

@@ -107,7 +107,7 @@ void Score(Session& session, const ScoreOptions& options)
 {
   const std::vector<VolumePose> poses = ReadPoses(options.poses);
   if (options.truth.empty() && options.landmarks.empty())
-    throw Error(Error::Kind::InvalidParameter, "--truth or --landmarks is needed: what shall the poses be held against?");
+    throw Error(Error::Kind::InvalidParameter, "give --truth or --landmarks to compare the poses with");
   if (!options.truth.empty())
     ScoreWithTruth(session, options, poses);
   if (!options.landmarks.empty())

@@ -29,7 +29,7 @@ public:
   /// The results for --json. Keys "command", "seconds", "stages" and "notes" belong to the session.
   nlohmann::ordered_json result = nlohmann::ordered_json::object();
 
-  /// The exit status when all is printed: 0, or Doubtful for a result that must not be used unseen.
+  /// The exit status when all is printed: 0, or Doubtful for a result that must be checked.
   static constexpr int Doubtful = 3;
   int status = 0;
 

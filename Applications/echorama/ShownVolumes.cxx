@@ -78,7 +78,7 @@ ShownVolumes::ShownVolumes(const std::vector<LoadedVolume>& volumes)
     volumes_.push_back(shown);
   }
   if (sorted_.empty())
-    throw Error(Error::Kind::BadInput, volumes.front().file + ": there is nothing to see, no voxel is real");
+    throw Error(Error::Kind::BadInput, volumes.front().file + ": nothing to show: no voxel is valid");
   std::sort(sorted_.begin(), sorted_.end());
   middle_ /= static_cast<double>(sorted_.size());
   // The voxels between those that were looked at, and half of the outermost.

@@ -495,7 +495,7 @@ Command ViewCommand(CLI::App& program)
 {
   auto values = std::make_shared<ViewOptions>();
   CLI::App* options = program.add_subcommand("view", "Show volumes: three planes and a volume rendering");
-  options->add_option("file", values->files, "Volumes (.mha .mhd .nrrd .nhdr .vti)")->required();
+  options->add_option("file", values->files, "Volumes of any format")->required();
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong");
   options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window");
   options->add_flag("--labels", values->labels,

@@ -40,8 +40,9 @@ int main(int argc, char** argv)
   CLI::App program("Reconstruct, align, stitch, embed and look at 3D ultrasound volumes.", "echorama");
   program.set_version_flag("--version", "echorama " ECHORAMA_VERSION);
   program.require_subcommand(1);
-  program.footer("Every subcommand explains itself: echorama align --help\n"
-                 "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done but not to be trusted (align).");
+  program.footer(
+      "Every subcommand explains itself: echorama align --help\n"
+      "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done, but the result must be checked (align, calibrate).");
 
   bool json = false;
   int threads = 0;

@@ -94,7 +94,7 @@ echorama::ProbeFit vtkUltrasoundProbeFit::Enclose(vtkImageData* image, const ech
   const auto count = std::count(voxels.begin(), voxels.end(), static_cast<unsigned char>(1));
   const double voxel = geometry.spacing.head(geometry.dimensions[2] == 1 ? 2 : 3).prod();
   fit.overlap = std::min(1.0, static_cast<double>(count) * voxel / echorama::FanVolume(fan.geometry));
-  fit.notes.push_back("The fan holds the whole region, which need not be one.");
+  fit.notes.push_back("The fan encloses the whole region; the region itself need not be fan-shaped.");
   return fit;
 }
 

@@ -160,9 +160,10 @@ public:
     double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
     found = Refine(poses, coarseMm_, middleMm, progress.Part(0.7, 0.8));
     if (found.empty()) {
-      result.reason = isKnown && !result.anywhere
-                          ? "every pose that fits at a coarse level loses its overlap, or leaves the start, at a finer one"
-                          : "every pose that fits at a coarse level loses its overlap at a finer one";
+      result.reason =
+          isKnown && !result.anywhere
+              ? "every pose found at low resolution lost its overlap, or moved too far from the start, when it was refined"
+              : "every pose found at low resolution lost its overlap when it was refined";
       return result;
     }
     // What this level cannot tell apart a finer one may.
@@ -289,15 +290,16 @@ private:
       result.reason = "they overlap by only " + Number(100.0 * best.overlap, 0) + "% of the smaller one";
     } else if (!(best.similarity >= p_.minimumSimilarity)) {
       result.verdict = Verdict::Failed;
-      result.reason =
-          "where they overlap best, they are hardly more alike than by chance (similarity " + Number(best.similarity, 3) + ")";
+      result.reason = "even at the best pose the volumes are hardly more similar than by chance (similarity " +
+                      Number(best.similarity, 3) + ")";
     } else if (result.errorMm > p_.maximumErrorVoxels * voxel) {
       result.verdict = Verdict::Ambiguous;
-      result.reason = "the contents do not determine the pose (predicted error " + Number(std::min(result.errorMm, 999.0), 1) +
-                      " mm); least " + LeastDetermined(covariance, shape_.radius);
+      result.reason = "the image contents do not determine the pose (predicted error " +
+                      Number(std::min(result.errorMm, 999.0), 1) + " mm); the least certain motion is " +
+                      LeastDetermined(covariance, shape_.radius);
     } else if (result.splitMm > p_.maximumSplitVoxels * voxel) {
       result.verdict = Verdict::Failed;
-      result.reason = "two halves of the voxels find poses that lie " + Number(result.splitMm, 1) + " mm apart";
+      result.reason = "aligning two halves of the voxels separately gives poses " + Number(result.splitMm, 1) + " mm apart";
     } else if (result.peakRatio < p_.minimumPeakRatio) {
       result.verdict = Verdict::Ambiguous;
       result.reason = "a different pose fits nearly as well (ratio " + Number(result.peakRatio, 2) + ")";

@@ -367,10 +367,10 @@ std::string Alignment::WhyDoubtful(int v) const
       unsure += (unsure.empty() ? "" : "; ") + NameOfPair(edges_[e]) + " (" + attempt.pair.alignment.reason + ")";
   }
   if (!unsure.empty())
-    return "only an ambiguous pair places it: " + unsure;
+    return "its pose depends on an ambiguous pair alone: " + unsure;
   if (count > 0)
     return std::string(count == 1 ? "the pair " : "the pairs ") + contested + (count == 1 ? " disagrees" : " disagree") +
-           " with the others by " + Millimetres(residual) + ", and as many pairs speak for that as against it";
+           " with the others by " + Millimetres(residual) + ", and as many pairs support it as contradict it";
   return "volumes between it and " + volumes_[Index(fixed_)].name + " are placed by ambiguous pairs only";
 }
 
@@ -390,7 +390,7 @@ std::string Alignment::WhyFailed(int v) const
   if (!others.empty())
     return "it is aligned with " + others + " only, which no pair joins to " + volumes_[Index(fixed_)].name;
   if (reasons.empty())
-    return "it overlaps no other volume where it starts, nor as far from there as the start may be off";
+    return "it overlaps no other volume at its start pose or within the allowed distance from it";
   return "no pair places it: " + reasons;
 }
 
@@ -417,7 +417,7 @@ AlignVolumesResult Alignment::Report() const
       volume.reason = WhyDoubtful(v);
     } else if (!graph_.isDetermined[Index(v)]) {
       volume.verdict = Verdict::Ambiguous;
-      volume.reason = "its pairs leave a part of its pose open";
+      volume.reason = "the pairs with other volumes do not fully determine its pose";
     } else {
       volume.verdict = Verdict::Aligned;
     }

@@ -171,7 +171,7 @@ public:
     std::vector<Eigen::Matrix3d> inverse(right_.size());
     for (std::ptrdiff_t node = 0; node < count_; ++node)
       inverse[static_cast<std::size_t>(node)] = Full(Block(node, 0, 0, 0)).inverse() / (1.0 + damping);
-    const auto dot = [this](const Vectors& a, const Vectors& b) {
+    const auto dot = [](const Vectors& a, const Vectors& b) {
       double sum = 0.0;
       for (std::size_t i = 0; i < a.size(); ++i)
         sum += a[i].dot(b[i]);

@@ -77,7 +77,7 @@ public:
   ///@}
 
   ///@{
-  /** Whole sweep in degrees, in [0, 178]; 0: the array moves along a line, or not at all. Default 65. */
+  /** Whole sweep in degrees, in [0, 178); 0: the array moves along a line, or not at all. Default 65. */
   vtkSetMacro(SweepAngle, double);
   vtkGetMacro(SweepAngle, double);
   ///@}

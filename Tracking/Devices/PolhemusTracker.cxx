@@ -171,7 +171,7 @@ PolhemusTracker::Step PolhemusTracker::Quiet(const Worker::Signal& signal)
         return Step::Done;
     }
   }
-  problem_ = options_.path + ": what is there does not stop talking; is it a Polhemus, and set to " +
+  problem_ = options_.path + ": the device does not stop sending; is it a Polhemus tracker, set to " +
              std::to_string(options_.baud) + " bits per second?";
   return Step::Again;
 }

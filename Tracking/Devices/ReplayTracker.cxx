@@ -31,7 +31,7 @@ void ReplayParameters::Check() const
   if (loop && !step && speed == 0.0)
     refuse("a replay that begins again and again needs a speed above 0");
   if (!(from >= 0.0 && std::isfinite(from)) || !(to >= from))
-    refuse("the part that is replayed must be from 0 or later to no earlier");
+    refuse("\"from\" must be at least 0, and \"to\" must not be less than \"from\"");
   log.Check();
 }
 
