@@ -86,6 +86,74 @@ TEST(HoleFilling, GapsUpToTheReachAreBridged)
       }
 }
 
+TEST(HoleFilling, SticksAreThoseOfBruteForce)
+{
+  const std::array<int, 3> n{14, 12, 10};
+  constexpr int reach = 3;
+  Scene scene(n);
+  Random random(5);
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i)
+        if (random.Uniform() < 0.15)
+          scene.See(i, j, k, static_cast<unsigned char>(random.Below(256)));
+  const Scene before = scene;
+  // As in Plus the end ahead counts more than the one behind, so that it matters which way a line runs.
+  const std::array<std::array<int, 3>, 13> lines{{{1, 0, 0},
+                                                  {0, 1, 0},
+                                                  {0, 0, 1},
+                                                  {1, 1, 0},
+                                                  {1, -1, 0},
+                                                  {1, 0, 1},
+                                                  {1, 0, -1},
+                                                  {0, 1, 1},
+                                                  {0, 1, -1},
+                                                  {1, 1, 1},
+                                                  {-1, 1, 1},
+                                                  {1, -1, 1},
+                                                  {1, 1, -1}}};
+  const auto seen = [&](int i, int j, int k) {
+    return i >= 0 && j >= 0 && k >= 0 && i < n[0] && j < n[1] && k < n[2] && before.coverage.View()(i, j, k) > 0;
+  };
+  scene.Fill(HoleFilling::Stick, reach);
+  int filled = 0, oblique = 0;
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) {
+        if (seen(i, j, k))
+          continue;
+        double shortest = 1e9, sum = 0.0;
+        int count = 0, steps = 0;
+        for (const auto& [x, y, z] : lines) {
+          int ahead = 1, back = 1;
+          while (ahead <= reach && !seen(i + ahead * x, j + ahead * y, k + ahead * z))
+            ++ahead;
+          while (back <= reach && !seen(i - back * x, j - back * y, k - back * z))
+            ++back;
+          if (ahead + back - 1 > reach)
+            continue;
+          const double length = (ahead + back + 1) * std::sqrt(static_cast<double>(x * x + y * y + z * z));
+          if (length < shortest) {
+            shortest = length;
+            sum = count = 0;
+            steps = x * x + y * y + z * z;
+          }
+          if (length == shortest) {
+            const double share = (back + 1.0) / (ahead + back + 1.0);
+            sum += share * before.intensity.View()(i + ahead * x, j + ahead * y, k + ahead * z) +
+                   (1.0 - share) * before.intensity.View()(i - back * x, j - back * y, k - back * z);
+            ++count;
+          }
+        }
+        ASSERT_EQ(scene.valid.View()(i, j, k), count > 0) << i << " " << j << " " << k;
+        ASSERT_EQ(scene.intensity.View()(i, j, k), count > 0 ? std::floor(sum / count + 0.5) : 0.0) << i << " " << j << " " << k;
+        filled += count > 0;
+        oblique += steps > 1;
+      }
+  EXPECT_GT(filled, 500);
+  EXPECT_GT(oblique, 100);
+}
+
 TEST(HoleFilling, NothingBeyondTheRim)
 {
   // A slab of data: what lies outside has data on one side only.
