@@ -39,7 +39,7 @@ enum class VtkXmlEncoding { Raw, Base64 };
 class VtkXmlCheck {
 public:
   explicit VtkXmlCheck(const std::string& path)
-    : lines_(path), path_(path), stream_(path, std::ios::binary), bytes_(std::filesystem::file_size(path))
+    : lines_(path), stream_(path, std::ios::binary), bytes_(std::filesystem::file_size(path))
   {
   }
 
@@ -121,7 +121,7 @@ private:
   {
     constexpr const char* blanks = " \t\r\n";
     XmlElement element;
-    std::size_t at = std::min(text.find_first_of(" \t\r\n", 1), text.size());
+    std::size_t at = std::min(text.find_first_of(blanks, 1), text.size());
     element.name = text.substr(0, at);
     if (element.name.back() == '/' && element.name.size() > 1) // <name/>
       element.name.pop_back();
@@ -344,7 +344,6 @@ private:
   }
 
   HeaderLines lines_; // says what is wrong
-  std::string path_;
   std::ifstream stream_;
   std::uint64_t bytes_;
   bool swap_ = false, compressed_ = false, appended_ = false;

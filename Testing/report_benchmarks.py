@@ -109,7 +109,8 @@ def busy_share(seconds=2.0):
     def ticks():
         numbers = [int(number) for number in pathlib.Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
         return sum(numbers), numbers[3] + numbers[4]
-    before, time_slept = ticks(), time.sleep(seconds)
+    before = ticks()
+    time.sleep(seconds)
     after = ticks()
     return 1 - (after[1] - before[1]) / max(1, after[0] - before[0])
 

@@ -90,11 +90,15 @@ std::string TextOf(const nlohmann::ordered_json& object)
   std::string safe;
   safe.reserve(text.size());
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool pair = text[i] == '\xc2' && static_cast<unsigned char>(text[i + 1]) < 0xa0; // U+0080 to U+009F
+    if (text[i] == '\xc2' && static_cast<unsigned char>(text[i + 1]) < 0xa0) // U+0080 to U+009F, of two bytes
+      ++i;
+    else if (text[i] != '\x7f') {
+      safe += text[i];
+      continue;
+    }
     char escaped[8];
-    if (pair || text[i] == '\x7f')
-      std::snprintf(escaped, sizeof escaped, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(text[pair ? ++i : i])));
-    safe += pair || text[i] == '\x7f' ? std::string(escaped) : std::string(1, text[i]);
+    std::snprintf(escaped, sizeof escaped, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(text[i])));
+    safe += escaped;
   }
   return safe;
 }

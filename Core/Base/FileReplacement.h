@@ -27,10 +27,9 @@ public:
   /// \a path shall not be there afterwards (it may be missing already): a companion of an earlier version.
   void Remove(const std::string& path);
 
-  /// \throws Error(FileSystem) when a temporary file is still empty or cannot be put in place; then nothing has changed.
   /// One file is renamed over its predecessor. With several, all predecessors are put aside first and the last staged
   /// file appears last: others see the old set, none, or the new set, and never a mixed one.
-  /// \throws Error(FileSystem), after which everything is as it was.
+  /// \throws Error(FileSystem) when a temporary file is still empty or cannot be put in place; everything is then as it was.
   void Commit();
 
 private:

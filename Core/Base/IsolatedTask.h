@@ -20,8 +20,11 @@ enum class TaskOutcome {
 
 /// Runs \a task in a process of its own, a fork of this one, silently: for code that is not ours, prints, and may crash or hang
 /// on damaged data. What it changes is seen here in shared memory alone. It may not rely on other threads: they are not in the
-/// fork. \param progress asked about every 20 ms, with \a fraction, whether to go on \throws Error(NotPossible) when no process
-/// can be started; Error(Cancelled), with the process ended.
+/// fork.
+///
+/// \param progress asked about every 20 ms, with \a fraction, whether to go on
+///
+/// \throws Error(NotPossible) when no process can be started; Error(Cancelled), with the process ended.
 TaskOutcome RunIsolated(const std::function<bool()>& task, const TaskLimits& limits, const Progress& progress = {},
                         double fraction = 0.0);
 
