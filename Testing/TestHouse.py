@@ -65,6 +65,10 @@ for path in ours("vtk*.xml"):
         name, label = re.search(r'\bname="(\w+)"', tag), re.search(r'\blabel="([^"]*)"', tag)
         if label and re.sub(r"\W", "", label[1]) != name[1]:
             complaints.append(f"{path.name}: scripts would not find {name[1]} under the label {label[1]}")
+        # ParaView 5.13 opens a window of errors otherwise, also for what is only shown.
+        count, default = re.search(r'number_of_elements="(\d+)"', tag), re.search(r'default_values="([^"]*)"', tag)
+        if re.match(r"<(Int|Double|IdType)", tag) and count and len(default[1].split() if default else ()) != int(count[1]):
+            complaints.append(f"{path.name}: {name[1]} has no default_values, or not {count[1]}")
 
 print("\n".join(complaints) or "the house is in order")
 sys.exit(1 if complaints else 0)

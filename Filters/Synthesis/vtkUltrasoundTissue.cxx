@@ -203,6 +203,7 @@ TissueSurface vtkUltrasoundTissue::Of(vtkPolyData* data)
   surface.triangles.reserve(static_cast<std::size_t>(polygons));
   surface.bodyOfTriangle.reserve(static_cast<std::size_t>(polygons));
   vtkNew<vtkIdList> cut;
+  vtkNew<vtkPoints> places;
   vtkIdType count;
   const vtkIdType* ids;
   for (auto cells = vtk::TakeSmartPointer(data->GetPolys()->NewIterator()); !cells->IsDoneWithTraversal();
@@ -213,9 +214,9 @@ TissueSurface vtkUltrasoundTissue::Of(vtkPolyData* data)
     } else if (count > 3) {
       vtkNew<vtkPolygon> polygon;
       polygon->Initialize(static_cast<int>(count), ids, data->GetPoints());
-      polygon->Triangulate(cut);
+      polygon->Triangulate(0, cut, places);
       for (vtkIdType i = 0; i + 2 < cut->GetNumberOfIds(); i += 3) {
-        add(ids[cut->GetId(i)], ids[cut->GetId(i + 1)], ids[cut->GetId(i + 2)]);
+        add(cut->GetId(i), cut->GetId(i + 1), cut->GetId(i + 2));
       }
     }
   }
