@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import shutil
 import signal
 import struct
@@ -63,7 +64,9 @@ class Usage(unittest.TestCase):
     def test_help(self):
         self.assertEqual(run("--help").returncode, 0)
         self.assertRegex(run("--version").stdout, r"^echorama \d+\.\d+\.\d+\n$")
-        for command in ("info", "convert", "reconstruct", "align", "score", "stitch", "probe-fit", "phantom", "view"):
+        commands = re.findall(r"^  ([a-z][a-z-]*) ", run("--help").stdout, re.MULTILINE)
+        self.assertGreater(len(commands), 10)
+        for command in commands:
             done = run(command, "--help")
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             self.assertIn("--threads", done.stdout)
@@ -123,13 +126,18 @@ class Phantom(unittest.TestCase):
             self.assertAlmostEqual(numpy.linalg.norm(pose[:3, :3] @ centre + pose[:3, 3] - centre), 8, places=3)
 
     def test_the_knock_is_what_was_asked_for(self):
-        run_json("phantom", "-o", work / "far", "--count", 2, "--spacing", 3, "--knock-mm", 21, "--knock-degrees", 17, "--format", "nrrd")
+        run_json("phantom", "-o", work / "far", "--count", 2, "--spacing", 3, "--knock-mm", 21, "--knock-degrees", 17, "--format", "nrrd",
+                 "--overlap", 0.8)
         pose = affine_of(json.loads((work / "far" / "truth.json").read_text())["volumes"][1])
         self.assertAlmostEqual(numpy.degrees(numpy.arccos((numpy.trace(pose[:3, :3]) - 1) / 2)), 17, places=6)
         files = [work / "far" / f"volume_{i}.nrrd" for i in (1, 2)]
         write_poses(work / "far_still.json", files, [numpy.eye(4)] * 2)
         off = run_json("score", work / "far_still.json", "--truth", work / "far" / "truth.json")["volumes"][1]["mean_mm"]
         self.assertTrue(20 < off < 32, off)
+        # So is what the neighbours share.
+        told = run_json("stitch", *files, "-o", work / "far.mha", "--poses", work / "far" / "truth.json", "--method", "average", "--spacing", 4)
+        shared = told["overlap_fraction"]
+        self.assertAlmostEqual(2 * shared / (1 + shared), 0.8, delta=0.03)  # shared voxels over those of one volume
 
     def test_seed(self):
         for name, seed, count in (("same", 5, 3), ("other", 6, 2)):
@@ -191,6 +199,12 @@ class MainJob(unittest.TestCase):
         score = run_json("score", work / "shifted.json", "--truth", phantom / "truth.json")
         self.assertAlmostEqual(score["volumes"][2]["mean_mm"], 3, places=6)
         self.assertAlmostEqual(score["score_mm"], 1.5, places=6)
+        # Points of a volume that is turned are not all as far off; a single one has no spread.
+        still = work / "turned.json"
+        write_poses(still, volumes(), [numpy.eye(4)] * 3)
+        many, one = (run_json("score", still, "--truth", phantom / "truth.json", *points)["volumes"][1] for points in ((), ("--points", 1)))
+        self.assertGreater(many["max_mm"], many["mean_mm"] + 1)
+        self.assertEqual([one[key] for key in ("median_mm", "percentile95_mm", "max_mm")], [one["mean_mm"]] * 3)
 
     def test_align_tells_how_sure_it_is(self):
         told = self.aligned
@@ -291,11 +305,15 @@ class MainJob(unittest.TestCase):
 
     def test_start_poses_and_fixed_volume(self):
         """From the truth the aligner stays there, and the fixed volume is where the start says, to the last bit."""
-        again = run_json("align", *volumes(), "-o", work / "again.json", "--poses", phantom / "truth.json", "--fixed", 2, "--start", "tracked",
-                         *FEWER_POINTS)
+        common = ["--poses", phantom / "truth.json", "--fixed", 2, "--start", "tracked", *FEWER_POINTS]
+        again = run_json("align", *volumes(), "-o", work / "again.json", *common)
         numpy.testing.assert_allclose(again["volumes"][1]["VolumeToWorld"], affine_of(truth()["volumes"][1]), atol=1e-12)
         self.assertEqual(again["fixed"], 2)
         self.assertLess(run_json("score", work / "again.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1.25)
+        # Another likeness finds the same place, and other digits of it.
+        other = run_json("align", *volumes(), "-o", work / "other.json", "--metric", "ncc", *common)
+        self.assertLess(run_json("score", work / "other.json", "--truth", phantom / "truth.json", "--fixed", 2)["score_mm"], 1.25)
+        self.assertNotEqual(other["volumes"][0]["VolumeToWorld"], again["volumes"][0]["VolumeToWorld"])
 
     def test_held_volumes(self):
         """With one volume held beside the fixed one, only the third moves."""
@@ -314,7 +332,7 @@ class MainJob(unittest.TestCase):
         numpy.testing.assert_array_equal(voxels, read_mha(work / "stitched_moved.mha")[1])
         self.assertEqual(list(voxels.shape[::-1]), told["dimensions"])
         numpy.testing.assert_array_equal([float(x) for x in header["ElementSpacing"].split()], [3, 3, 3])
-        self.assertGreater(told["overlap_fraction"], 0.2)
+        self.assertGreater(told["overlap_fraction"], 0.4)
         for method in ("feather", "average", "maximum"):
             run_json("stitch", *volumes(), "-o", work / f"{method}.mha", "--poses", self.poses, "--spacing", 3, "--method", method,
                      "--texture", "mix")
@@ -364,6 +382,26 @@ class MainJob(unittest.TestCase):
         self.assertEqual((len(voxels), len(regions)), (10, 1))
         default = run_json("stitch", *arguments, "-o", folder / "default.nrrd")
         self.assertEqual((folder / "default.nrrd").read_bytes(), (folder / f"{default['method']}_{default['texture']}.nrrd").read_bytes())
+
+    def test_stitch_parts_detail_from_the_rest(self):
+        """A wave of each volume, across that of the other. Where the smooth part is the plain average and details are those of one
+        volume, as much of a wave of wavelength L is averaged as a Gaussian of standard deviation s leaves: exp(-(2 pi s / L)^2 / 2)."""
+        wave = 100 + 40 * numpy.cos(2 * numpy.pi * numpy.arange(48) / 12)
+        write_mha(work / "along_x.mha", numpy.broadcast_to(wave, (48, 24, 48)).astype("u1"))
+        write_mha(work / "along_z.mha", numpy.broadcast_to(wave[:, None, None], (48, 24, 48)).astype("u1"), origin=(0, 12, 0))
+
+        def kept(*options):
+            """The share of the first volume's wave where its own details are shown, and where those of the other are."""
+            run_json("stitch", work / "along_x.mha", work / "along_z.mha", "-o", work / "waves.mha", "--sharpness", 0, *options)
+            middle = read_mha(work / "waves.mha")[1][6:42, :, 6:42].astype(float)  # whole periods
+            return [2 * (middle[:, rows] * (wave[6:42] - 100) / 40).mean() / 40 for rows in (slice(13, 16), slice(20, 23))]
+
+        for scale in (2, 4):
+            smooth = numpy.exp(-(2 * numpy.pi * scale / 12) ** 2 / 2)
+            numpy.testing.assert_allclose(kept("--detail-scale", scale), [1 - smooth / 2, smooth / 2], atol=0.05)
+        # The plain average of details too, but as strong as one of them.
+        smooth = numpy.exp(-(2 * numpy.pi * 2 / 12) ** 2 / 2)
+        numpy.testing.assert_allclose(kept("--detail-sharpness", 0), [smooth / 2 + (1 - smooth) / 2**0.5] * 2, atol=0.05)
 
     def test_stitch_tells_first_what_it_needs(self):
         before = snapshot(work)
@@ -424,7 +462,7 @@ class MainJob(unittest.TestCase):
         first = [affine_of(pose) for pose in truth()["volumes"]]
         write_poses(poses, [phantom / FILES[0], quiet], first[:2])
         told = run_json("stitch", phantom / FILES[0], quiet, "-o", work / "loud.mha", "--poses", poses, "--spacing", 3, "--gain")
-        self.assertAlmostEqual(told["gains"][1]["gain"] / told["gains"][0]["gain"], 1 / 0.75, delta=0.2)
+        self.assertAlmostEqual(told["gains"][1]["gain"] / told["gains"][0]["gain"], 1 / 0.75, delta=0.05)
         self.assertNotIn("gains", run_json("stitch", phantom / FILES[0], quiet, "-o", work / "loud.mha", "--poses", poses, "--spacing", 3))
 
     def test_stitch_tells_how_good_it_is(self):
@@ -484,6 +522,22 @@ class MainJob(unittest.TestCase):
             self.assertGreater((quarter.max(axis=2) > 60).mean(), 0.02)
             self.assertGreater(len(numpy.unique(quarter.reshape(-1, 3), axis=0)), 100)
         self.assertGreater(numpy.ptp(pixels.astype(int), axis=2).max(), 40)
+
+    def test_view_labels(self):
+        """What is invented is blue, what is mixed yellow, and data stay grey."""
+        write_mha(work / "cube.mha", blobs((20, 20, 20)))
+        run_json("embed", work / "cube.mha", "-o", work / "in_noise.mha", "--margin", 8)
+        tints = {}
+        for labels in ([], ["--labels"]):
+            run_json("view", work / "in_noise.mha", "--screenshot", work / "labels.png", "--size", 240, 180, *labels)
+            pixels = read_png(work / "labels.png").astype(int)[:90, :120]  # one of the slices
+            bright = pixels.min(axis=2) > 40
+            tints[bool(labels)] = [(bright & (change > 20)).mean() for change in (pixels[..., 2] - pixels[..., 0], pixels[..., 0] - pixels[..., 2])]
+            grey = (bright & (numpy.ptp(pixels, axis=2) < 4)).mean()
+            self.assertGreater(grey, 0.05)
+        self.assertLess(max(tints[False]), 0.02)  # the lines through the middle
+        self.assertGreater(tints[True][0], 0.25)
+        self.assertGreater(tints[True][1], 0.05)
 
     def test_view_without_a_display(self):
         environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}

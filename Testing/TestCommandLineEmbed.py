@@ -7,7 +7,7 @@ import tempfile
 import unittest
 
 import numpy as np
-from program_under_test import run, snapshot, write_mha
+from program_under_test import read_mha, run, run_json, snapshot, write_mha
 
 
 class Embed(unittest.TestCase):
@@ -53,6 +53,67 @@ class Embed(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("invented background", done.stdout)
         self.assertNotIn("grain of the data", done.stdout)
+        # A form that holds all data is the outline.
+        told = run_json("embed", self.views[0], "-o", out, "--form", self.views[0], "--margin", "0", "--preview", "3")
+        known = run_json("info", self.views[0])["files"][0]["acquisition"]["ProbeGeometry"]
+        for key, value in known.items():
+            np.testing.assert_allclose(told["ProbeGeometry"][key], value, rtol=1e-6, err_msg=key)
+
+    def test_numbers_of_a_cube(self):
+        """A cube of 14 mm, 100 inside; its surface is 60 on the left half and 140 on the right, and has no grain."""
+        valid, shell = np.zeros((2, 24, 26, 28), np.uint8)
+        valid[4:18, 5:19, 6:20] = shell[4:18, 5:19, 6:20] = 1
+        shell[5:17, 6:18, 7:19] = 0
+        voxels = 100 * valid
+        voxels[shell == 1] = np.broadcast_to(np.where(np.arange(28) < 13, 60, 140), valid.shape)[shell == 1]
+        write_mha(self.folder / "cube.mha", voxels)
+        write_mha(self.folder / "cube.ValidRegion.mha", valid)
+        where = np.argwhere(shell)
+
+        def spread(place, exponent):
+            """The mean of the surface, weighted by distance to a power."""
+            weights = np.linalg.norm(where - place, axis=1) ** -exponent
+            return (weights * voxels[shell == 1]).sum() / weights.sum()
+
+        def embedded(*options):
+            told = run_json("embed", self.folder / "cube.mha", "-o", self.folder / "cubed.mha", *options)
+            first = -np.array(told["origin"][::-1])  # where the first voxel of the cube's file went
+            first = (first / told["spacing"][0]).round().astype(int)
+            return told, first, *(read_mha(self.folder / f"cubed{name}.mha")[1] for name in ("", ".Embedding"))
+
+        for margin, feather, outside, inside, options in (
+                (5, 3, 4, 6, ()), (9, 5, 1, 2, ("--margin", 9, "--feather", 5, "--outside-exponent", 1, "--inside-exponent", 2))):
+            told, first, grey, labels = embedded("--smooth", 0.001, *options)
+            probe = told["ProbeGeometry"]
+            side = 14 + 2 * margin
+            np.testing.assert_allclose([probe["fan_mm"], probe["sweep_mm"], *probe["depth_mm"]], [side, side, 0, side], atol=1e-3)
+            # What is nearer to the background than the feather is mixed with it.
+            data, cube = (14 - 2 * (feather - 1))**3, 14**3
+            self.assertEqual((told["voxels_data"], told["voxels_blend"]), (data, cube - data))
+            self.assertEqual([(labels == kind).sum() for kind in (1, 2)], [data, cube - data])
+            for x in range(6 - margin, 6):
+                place = np.array([11, 12, x])
+                self.assertEqual(labels[tuple(place + first)], 3)
+                self.assertAlmostEqual(grey[tuple(place + first)], spread(place, outside), delta=0.8, msg=f"{x}")  # half a level by rounding
+            for x in range(7, 6 + feather - 1):  # behind the surface
+                place, weight = np.array([11, 12, x]), (x - 5) / feather
+                self.assertAlmostEqual(grey[tuple(place + first)], weight * 100 + (1 - weight) * spread(place, inside), delta=0.8, msg=f"{x}")
+
+        # Every third voxel, from the second: the middle of three.
+        told, first, grey, labels = embedded("--preview", 3)
+        self.assertEqual(told["spacing"], [3, 3, 3])
+        known = labels == 1
+        third = (slice(1, None, 3),) * 3
+        self.assertEqual(told["voxels_data"] + told["voxels_blend"], valid[third].sum())
+        np.testing.assert_array_equal(np.sort(grey[known]), np.sort(voxels[third][valid[third] == 1]))  # the feather is no thicker than a voxel
+
+        # Where all of it is grain, the background has the mean and the deviation of the whole cube; with --no-contrast that of the noise.
+        told, _, grey, labels = embedded("--smooth", 1000)
+        real, invented = voxels[valid == 1].astype(float), grey[labels == 3].astype(float)
+        self.assertAlmostEqual(invented.mean(), real.mean(), delta=2)
+        self.assertAlmostEqual(invented.std(), real.std(), delta=2)
+        told, _, grey, labels = embedded("--smooth", 1000, "--no-contrast")
+        self.assertGreater(grey[labels == 3].std(), 1.5 * real.std())
 
     def test_what_is_refused(self):
         nothing = self.folder / "nothing.mha"

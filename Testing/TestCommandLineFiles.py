@@ -170,7 +170,9 @@ class Sequences(unittest.TestCase):
     def test_real_ones(self):
         if not PLUS.exists():
             self.skipTest(f"{PLUS} is not there")
-        for path in sorted(PLUS.glob("*.igs.mha")):
+        paths = sorted(PLUS.glob("*.igs.mha"))
+        self.assertTrue(paths)
+        for path in paths:
             told = run_json("info", path)["files"][0]
             self.assertEqual(told["kind"], "sequence")
             self.assertGreater(told["frames"], 4)

@@ -34,6 +34,8 @@ class Noise(unittest.TestCase):
         self.assertEqual(told["correlation"], {"depth_mm": 1, "fan": 0.035, "sweep": 0.05})
         self.assertAlmostEqual(voxels[valid == 1].mean(), 40, delta=1.5)
         self.assertTrue((voxels[valid == 0] == 0).all())
+        for key, value in {"fan_degrees": 40, "fan_mm": 25, "sweep_degrees": 30, "sweep_mm": 18, "depth_mm": [0, 50]}.items():
+            numpy.testing.assert_allclose(told["ProbeGeometry"][key], value, rtol=1e-9, err_msg=key)
         text = run("noise", "-o", out, *FAN).stdout
         for words in ("151 samples, 87 elements, 61 steps", "1.000 mm along the depth, 3.50% of the fan, 5.00% of the sweep", f"wrote {out}"):
             self.assertIn(words, text)
@@ -55,22 +57,46 @@ class Noise(unittest.TestCase):
         self.assertEqual(first.shape, like.shape)
         self.assertAlmostEqual(first[valid == 1].mean(), like[valid == 1].mean(), delta=2)
         self.assertAlmostEqual(first[valid == 1].std(), like[valid == 1].std(), delta=2.5)
+        # In a window no wider than the grain, part of the grain is taken for something else.
+        narrow = run_json("noise", "-o", work / "narrow.mha", "--match", work / "first.mha", "--on-grid", "--window", 0.7)
+        self.assertLess(narrow["correlation"]["depth_mm"], 0.85 * told["correlation"]["depth_mm"])
 
     def test_form_gives_the_fan_alone(self):
         run_json("noise", "-o", work / "form.mha", *FAN)
         told = run_json("noise", "-o", work / "in_form.mha", "--form", work / "form.mha", "--spacing", 1, "--intensity", "rayleigh",
-                        "--mean", 300, "--float", "--samples", 80)
+                        "--mean", 300, "--float", "--samples", 80, "--elements", 61, "--steps", 37)
         header, voxels = read_mha(work / "in_form.mha")
         self.assertEqual(header["ElementType"], "MET_FLOAT")
-        self.assertGreater(voxels.max(), 400)
-        self.assertEqual(told["counts"]["samples"], 80)
+        self.assertEqual(told["counts"], {"samples": 80, "elements": 61, "steps": 37})
         self.assertAlmostEqual(told["ProbeGeometry"]["depth_mm"][1], 50, delta=1e-6)
+        # The mean that was asked for, and the longer tail of Rayleigh's distribution to the right; logarithms have theirs to the left.
+        run_json("noise", "-o", work / "logs.mha", "--form", work / "form.mha", "--spacing", 1, "--mean", 90, "--float")
+        skews = []
+        for name, mean in (("in_form", 300), ("logs", 90)):
+            real = read_mha(work / f"{name}.mha")[1][read_mha(work / f"{name}.ValidRegion.mha")[1] == 1].astype(float)
+            self.assertAlmostEqual(real.mean(), mean, delta=0.05 * mean)
+            skews.append(((real - real.mean()) ** 3).mean() / real.std() ** 3)
+        self.assertAlmostEqual(skews[0], 0.63, delta=0.2)
+        self.assertLess(skews[1], -0.1)
 
     def test_the_kinds_to_compare_with(self):
+        """White noise has no grain, Perlin's is as smooth as if it had one of its own; both begin at the first depth."""
+        alike = {}
         for kind in ("white", "perlin"):
-            told = run_json("noise", "-o", work / "kind.mha", *FAN, "--kind", kind)
+            told = run_json("noise", "-o", work / "kind.mha", *FAN, "--kind", kind, "--depth-min", 10)
             self.assertNotIn("counts", told)
-            self.assertAlmostEqual(read_mha(work / "kind.mha")[1][read_mha(work / "kind.ValidRegion.mha")[1] == 1].mean(), 40, delta=5)
+            (header, voxels), (_, valid) = (read_mha(work / f"kind{name}.mha") for name in ("", ".ValidRegion"))
+            self.assertAlmostEqual(voxels[valid == 1].mean(), 40, delta=1)
+            both = (valid[:, :, 1:] & valid[:, :, :-1]) == 1
+            alike[kind] = numpy.corrcoef(voxels[:, :, 1:][both], voxels[:, :, :-1][both])[0, 1]
+            # Along the beam in the middle.
+            origin = numpy.array(header["Offset"].split(), float)
+            x, y = (-origin[:2] / 0.8).round().astype(int)
+            depths = origin[2] + 0.8 * numpy.flatnonzero(valid[:, y, x])
+            self.assertAlmostEqual(depths[0], 10, delta=0.8)
+            self.assertAlmostEqual(depths[-1], 50, delta=0.8)
+        self.assertLess(abs(alike["white"]), 0.05)
+        self.assertGreater(alike["perlin"], 0.6)
 
     def test_what_it_refuses(self):
         before = snapshot(work)

@@ -133,11 +133,57 @@ class Reconstruct(unittest.TestCase):
                                ("alpha", 0.25 * pixels[1] + 0.75 * pixels[0])):
             run_json("reconstruct", work / "two.igs.mha", "-o", work / "mode.mha", *EXACT, "--mode", mode, "--alpha", 0.25)
             numpy.testing.assert_allclose(read_mha(work / "mode.mha")[1][0], expected, atol=0.51, err_msg=mode)
+        # Plus rounds after each pixel.
+        pixels = numpy.random.default_rng(7).integers(1, 255, (3, 12, 15))
+        write_sequence(work / "three.igs.mha", pixels.astype("u1"), [{"ImageToWorld": (shifted(0), "OK")}] * 3)
+        run_json("reconstruct", work / "three.igs.mha", "-o", work / "mode.mha", *EXACT, "--mode", "running-mean")
+        expected = numpy.floor((2 * numpy.floor((pixels[0] + pixels[1]) / 2 + 0.5) + pixels[2]) / 3 + 0.5)
+        numpy.testing.assert_array_equal(read_mha(work / "mode.mha")[1][0], expected)
+        self.assertTrue((expected != numpy.floor(pixels.mean(0) + 0.5)).any())
 
+    def test_interpolation(self):
+        """Pixels that lie a quarter of a voxel to the right: into the nearest voxel, or by weights into two."""
+        matrices = [shifted(z) for z in range(SHAPE[0])]
+        for matrix in matrices:
+            matrix[0, 3] = 0.25
+        path, pixels = slices("quarter.igs.mha", transforms=[{"ImageToWorld": (matrix, "OK")} for matrix in matrices])
+        write_mha(work / "grid.mha", blobs(SHAPE))
+        for way, expected in (("nearest", pixels[:, :, 1:]), ("linear", 0.75 * pixels[:, :, 1:] + 0.25 * pixels[:, :, :-1])):
+            run_json("reconstruct", path, "-o", work / "quarter.mha", "--grid", work / "grid.mha", "--clip", "none", "--between", "nothing",
+                     "--fill", "none", "--interpolation", way)
+            numpy.testing.assert_allclose(read_mha(work / "quarter.mha")[1][:, :, 1:], expected, atol=0.51, err_msg=way)
+
+    def test_the_grid_lies_as_the_sweep_does(self):
+        """Unless the world's axes are asked for."""
+        turn = numpy.eye(4)
+        turn[:3, :3] = turned(30) @ turned(20, 0)
+        path, pixels = slices("oblique.igs.mha", transforms=[{"ImageToWorld": (turn @ shifted(z), "OK")} for z in range(SHAPE[0])])
+        common = ["reconstruct", path, "-o", work / "oblique.mha", "--between", "nothing", "--spacing", 1, "--clip", "none", "--fill", "none"]
+        run_json(*common)
+        header, voxels = read_mha(work / "oblique.mha")
+        numpy.testing.assert_array_equal(voxels, pixels)
+        numpy.testing.assert_allclose(numpy.array(header["TransformMatrix"].split(), float).reshape(3, 3).T, turn[:3, :3], atol=1e-9)
+        told = run_json(*common, "--grid", "axis")
+        corners = turn[:3, :3] @ numpy.array([[x, y, z] for x in (0, 14) for y in (0, 11) for z in (0, 8)]).T
+        numpy.testing.assert_allclose(told["dimensions"], numpy.ptp(corners, axis=1) + 1, atol=1)
+        numpy.testing.assert_allclose(told["origin"], corners.min(axis=1), atol=1e-6)
     def test_clip(self):
         path, pixels = slices()
         run_json("reconstruct", path, "-o", work / "clip.mha", *PLAIN, "--fill", "none", "--clip", "3,2,8,7")
         numpy.testing.assert_array_equal(read_mha(work / "clip.mha")[1], pixels[:, 2:9, 3:11])
+        # Found: echoes change from frame to frame, what is printed beside them does not.
+        y, x = numpy.mgrid[:60, :80]
+        depth, beam = numpy.hypot(x - 40, y + 10), numpy.arctan2(x - 40, y + 10)
+        sector = (depth > 15) & (depth < 65) & (abs(beam) < 0.5)
+        frames = numpy.random.default_rng(1).integers(40, 200, (6, 60, 80), "u1") * sector.astype("u1")
+        frames[:, 2:6, 2:10] = 255
+        write_sequence(work / "sector.igs.mha", frames, [{"ImageToWorld": (shifted(z), "OK")} for z in range(6)])
+        write_mha(work / "grid.mha", blobs(frames.shape))
+        run_json("reconstruct", work / "sector.igs.mha", "-o", work / "sector.mha", "--grid", work / "grid.mha", "--between", "nothing",
+                 "--fill", "none")
+        found, voxels = read_mha(work / "sector.ValidRegion.mha")[1][3] == 1, read_mha(work / "sector.mha")[1][3]
+        self.assertGreater((found & sector).sum() / (found | sector).sum(), 0.93)
+        numpy.testing.assert_array_equal(voxels, frames[3] * found)
 
     def test_threads_change_nothing(self):
         path, _ = slices()
@@ -237,18 +283,37 @@ class ProbeFit(unittest.TestCase):
     def test_finds_the_probe_of_a_phantom(self):
         known = run_json("info", self.volume)["files"][0]["acquisition"]
         told = run_json("probe-fit", self.volume, "-o", work / "fitted.mha")
-        self.assertGreater(told["overlap"], 0.95)
-        self.assertLess(told["residual_mm"], 1.5)
+        self.assertGreater(told["overlap"], 0.98)
+        self.assertLess(told["residual_mm"], 0.75)  # half a voxel
         for key in ("fan_degrees", "sweep_degrees"):
-            self.assertAlmostEqual(told["ProbeGeometry"][key], known["ProbeGeometry"][key], delta=2)
+            self.assertAlmostEqual(told["ProbeGeometry"][key], known["ProbeGeometry"][key], delta=0.5)
         look = [numpy.array(matrix)[:3, 2] for matrix in (told["ProbeToWorld"], known["ProbeToWorld"])]
-        self.assertGreater(look[0] @ look[1], 0.999)
+        self.assertGreater(look[0] @ look[1], 0.99999)  # a quarter of a degree
         fitted = run_json("info", work / "fitted.mha")["files"][0]["acquisition"]
         self.assertEqual(fitted["ProbeGeometry"], told["ProbeGeometry"])
         numpy.testing.assert_array_equal(read_mha(work / "fitted.mha")[1], read_mha(self.volume)[1])
         text = run("probe-fit", self.volume).stdout
         for words in ("probe ", "file says", "residual", "overlap"):
             self.assertIn(words, text)
+
+    def test_enclose(self):
+        """The least fan that holds the region is the file's own, or that of a box its size; with a margin, that to all sides."""
+        known = run_json("info", self.volume)["files"][0]["acquisition"]
+        told = run_json("probe-fit", self.volume, "--enclose")
+        self.assertEqual(told["ProbeGeometry"], known["ProbeGeometry"])
+        numpy.testing.assert_allclose(told["ProbeToWorld"], known["ProbeToWorld"], atol=1e-9)
+        self.assertAlmostEqual(told["filled"], 1, delta=0.02)
+        valid = numpy.zeros((30, 30, 30), "u1")
+        valid[8:22, 8:22, 8:22] = 1
+        write_mha(work / "box.mha", 100 * valid)
+        write_mha(work / "box.ValidRegion.mha", valid)
+        for margin in (0, 5):
+            told = run_json("probe-fit", work / "box.mha", "--enclose", "--margin", margin, "-o", work / "boxed.mha")
+            probe, side = told["ProbeGeometry"], 14 + 2 * margin
+            numpy.testing.assert_allclose([probe["fan_mm"], probe["sweep_mm"], *probe["depth_mm"]], [side, side, 0, side], atol=1e-3)
+            self.assertAlmostEqual(told["filled"], (14 / side)**3, places=4)
+            self.assertEqual(run_json("info", work / "boxed.mha")["files"][0]["acquisition"]["ProbeGeometry"], probe)
+        self.assertEqual(run("probe-fit", work / "box.mha", "--margin", 5).returncode, 2)  # only of a fan that encloses
 
     def test_refused(self):
         refuses = Refused().refuses
@@ -258,6 +323,11 @@ class ProbeFit(unittest.TestCase):
         voxels[2:4, 2:18, 2:18] = voxels[16:18, 2:18, 2:18] = voxels[2:18, 2:4, 2:4] = 9
         write_mha(work / "pi.mha", voxels)
         refuses(["pi.mha"], "probe-fit", work / "pi.mha", "-o", work / "no.mha")
+        # Unless one is content with so bad a fit: each limit is what it is compared with.
+        fit = run_json("probe-fit", work / "pi.mha", "--minimum-overlap", 0, "--maximum-distance", 1)
+        self.assertLess(fit["overlap"], 0.75)
+        for limits in ((1.01 * fit["overlap"], 1), (0, 0.99 * fit["mean_distance"])):
+            refuses(["pi.mha"], "probe-fit", work / "pi.mha", "--minimum-overlap", limits[0], "--maximum-distance", limits[1])
         refuses(["missing.mha"], "probe-fit", work / "missing.mha")
         refuses(["input"], "probe-fit", self.volume, "-o", self.volume)
         refuses(["--minimum-overlap"], "probe-fit", self.volume, "--minimum-overlap", 2, status=2)

@@ -75,7 +75,7 @@ class Sets(unittest.TestCase):
                 self.assertTrue(valid[tuple(index[::-1])], row)
                 places.setdefault(row["label"], []).append((to_world @ point)[:3])
         shared = [each for each in places.values() if len(each) > 1]
-        self.assertGreater(len(shared), 10)
+        self.assertEqual(len(shared), 20)
         for each in shared:
             numpy.testing.assert_allclose(each[0], each[1], atol=1e-6)
 
@@ -127,7 +127,7 @@ class Sets(unittest.TestCase):
             numpy.testing.assert_allclose(made.GetOrigin(), affine(header)[:3, 3], atol=1e-4)
             grey = vtk_to_numpy(made.GetPointData().GetArray("Intensity")).reshape(voxels.shape).astype(int)
             # Not exactly: the reader may take zeros at the rim of the beams for what lies outside.
-            self.assertLess((abs(grey - voxels) > 1).mean(), 0.01, number)
+            self.assertLess((abs(grey - voxels) > 1).mean(), 0.001, number)
 
 
 class OtherScenes(unittest.TestCase):
@@ -153,7 +153,7 @@ class OtherScenes(unittest.TestCase):
                      probe={**SCENE["probe"], "depthMaxMm": 120}, views={"count": 2, "overlap": 0.8})
         told = run_json("synthesize", path, "-o", work / "rig")
         rows = list(csv.DictReader((work / "rig/landmarks_1.csv").read_text().splitlines()))
-        self.assertGreaterEqual(len(rows), 3)
+        self.assertEqual(len(rows), 7)  # its balls
         self.assertEqual(len(told["volumes"]), 2)
 
     def test_a_mesh_from_a_folder_of_data(self):
@@ -161,7 +161,9 @@ class OtherScenes(unittest.TestCase):
         (work / "meshes/tetrahedron.obj").write_text(
             "v 0 0 20\nv 10 0 20\nv 0 10 20\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
         path = scene("mesh.json", tissue=[{"mesh": {"file": "../elsewhere/tetrahedron.obj", "unit": "mm", "material": "bone"}}])
-        run_json("synthesize", path, "-o", work / "mesh", "--data", work / "meshes")
+        run_json("synthesize", path, "-o", work / "mesh", "--data", work / "meshes", "--format", "nrrd")
+        self.assertEqual(run_json("info", work / "mesh/volume_2.nrrd")["files"][0]["format"], "NRRD")
+        self.assertFalse(list((work / "mesh").glob("*.mha")))
         done = run("synthesize", path, "-o", work / "mesh2")
         self.assertEqual(done.returncode, 1)
         self.assertIn("tetrahedron.obj", done.stderr)
@@ -177,7 +179,9 @@ class OtherScenes(unittest.TestCase):
         path = scene("plane.json", probe={"preset": "curvilinear", "elements": 32, "samples": 128},
                      views={"poses": [{"face": [0, 0, 0], "target": [0, 0, 50]}]})
         run_json("synthesize", path, "-o", work / "plane", "--spacing", 0.8)
-        self.assertEqual(read_mha(work / "plane/volume_1.mha")[1].shape[0], 1)
+        header, voxels = read_mha(work / "plane/volume_1.mha")
+        self.assertEqual(voxels.shape[0], 1)
+        self.assertEqual([float(number) for number in header["ElementSpacing"].split()[:2]], [0.8, 0.8])
 
 
 def pose(x, degrees):
@@ -225,7 +229,7 @@ class Recordings(unittest.TestCase):
         a, b = (read_mha(work / name / "beams_1.mha")[1].astype(float) for name in ("still", "moving"))
         first, middle = abs(a[0] - b[0]).mean(), abs(a[5:7] - b[5:7]).mean()
         self.assertGreater(first, 5)  # 5 mm away
-        self.assertLess(middle, first)
+        self.assertLess(middle, 0.8 * first)
         # Where it moves a place is not seen where it lies.
         two = scene("two.json", sweep={"seconds": 1, "velocityMmPerSecond": [3, 0, 0]})
         told = run_json("synthesize", two, "-o", work / "two", "--landmarks", 5)

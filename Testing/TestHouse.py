@@ -22,6 +22,9 @@ def text_of(paths):
     return "\n".join(path.read_text(errors="replace") for path in paths)
 
 
+for pattern in ("*.h", "*.cxx", "vtk*.cxx", "vtk*.xml", "Testing/*.py", "Testing/*.cxx"):
+    if len(list(ours(pattern))) < 10:
+        complaints.append(f"there is hardly any {pattern} to look at in {source}")
 for path in [*ours("*.h"), *ours("*.cxx")]:
     name = path.relative_to(source)
     text = path.read_text()

@@ -43,7 +43,7 @@ with tempfile.TemporaryDirectory() as folder:
 
     stitched = run(example / "stitch_volumes", cwd=example)
     check("wrote stitched.vti" in stitched, f"stitch_volumes said {stitched!r}")
-    check((example / "stitched.vti").stat().st_size > 10_000, "stitched.mha is too small")
+    check((example / "stitched.vti").stat().st_size > 10_000, "stitched.vti is too small")
     again = run(example / "stitch_volumes", "stitched.vti", "stitched.vti", cwd=example)
     check("wrote stitched.vti" in again, f"stitch_volumes with files said {again!r}")
 

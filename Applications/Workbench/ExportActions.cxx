@@ -6,6 +6,7 @@
 #include "Core/Geometry/PoseFile.h"
 #include "Job.h"
 #include "JobBar.h"
+#include "Readers/VolumeFile.h"
 #include <filesystem>
 #include <QAction>
 #include <QFileDialog>
@@ -21,7 +22,8 @@ namespace echorama {
 
 namespace {
 
-// A file for each volume that is shown, by its name. Throws Error(FileSystem) when one is there.
+// A file for each volume that is shown, by its name. Throws Error(FileSystem) when one is there, or would be written beside it,
+// or belongs to two volumes.
 std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession* session, const QString& folder,
                                                   const std::string& extension)
 {
@@ -34,10 +36,17 @@ std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession*
     for (char& character : name)
       if (character == '/' || character == '\\' || character == '\0')
         character = '_';
-    const auto path = std::filesystem::path(folder.toStdString()) / (name + "." + extension);
-    if (std::filesystem::exists(path))
-      throw Error(Error::Kind::FileSystem, path.string() + ": it is there already; choose another folder");
-    files.emplace_back(id, path.string());
+    const std::string path = (std::filesystem::path(folder.toStdString()) / (name + "." + extension)).string();
+    std::vector<std::string> written{path, CompanionPath(path, "ValidRegion")};
+    for (const char* array : CompanionArrays)
+      written.push_back(CompanionPath(path, array));
+    for (const std::string& each : written)
+      if (std::filesystem::exists(each))
+        throw Error(Error::Kind::FileSystem, each + ": it is there already; choose another folder");
+    for (const auto& file : files)
+      if (file.second == path)
+        throw Error(Error::Kind::FileSystem, path + ": two volumes would be this file; rename one of them");
+    files.emplace_back(id, path);
   }
   if (files.empty())
     throw Error(Error::Kind::NotPossible, "no volume is shown");

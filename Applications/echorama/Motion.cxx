@@ -5,6 +5,7 @@
 #include "Outputs.h"
 #include "Readers/SequenceWriter.h"
 #include "TrackedVolumes.h"
+#include <algorithm>
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <memory>
@@ -41,7 +42,8 @@ void ResampleMotion(Session& session, const MotionOptions& options)
   if (!(last >= first))
     throw Error(Error::Kind::InvalidParameter, options.log + ": there is nothing between --from and --to; it lasts from " +
                                                    Fixed(path->FirstTime(), 3) + " to " + Fixed(path->LastTime(), 3) + " s");
-  const double steps = std::floor((last - first) * options.rate);
+  constexpr double rounding = 1e-6; // of a step: 1.2 - 1 is less than 0.2, and the end belongs to it
+  const double steps = std::floor((last - first) * options.rate + rounding);
   if (steps > 1e7)
     throw Error(Error::Kind::TooLarge, options.log + ": at this rate it would have more than ten million poses");
   SequenceContent content;
@@ -53,7 +55,7 @@ void ResampleMotion(Session& session, const MotionOptions& options)
   std::optional<Pose> before;
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
     SequenceFrame frame;
-    frame.time = first + i / options.rate;
+    frame.time = std::min(first + i / options.rate, last);
     SequenceTransform transform;
     transform.name = tool.name;
     if (path->Covers(frame.time)) {

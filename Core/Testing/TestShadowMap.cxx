@@ -6,6 +6,7 @@
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Imaging/ShadowMap.h"
 #include "Testing/Sanitized.h"
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -299,6 +300,110 @@ TEST(ShadowMap, SpecksAreNoEchoesAndALoneDarkBeamIsNoShadow)
   const Volume<float> map = ReliabilityMap(image.Posed(), image.probe);
   EXPECT_LT(MeanOver(image, map, InShadowsCore), 0.05);
   EXPECT_GT(MeanOver(image, map, FarFromShadow), 0.995);
+}
+
+// Beams along z without speckle, a cell a voxel: tissue of grey 100, the first samples black. The beams of one half show
+// something else from a depth on.
+class FlatBeams {
+public:
+  explicit FlatBeams(const std::function<float(int depth)>& tail)
+  {
+    geometry_.dimensions = {24, 20, samples};
+    intensity_ = Volume<float>(geometry_.dimensions, 100.0f);
+    for (int j = 0; j < 20; ++j)
+      for (int i = 0; i < 24; ++i) {
+        intensity_.View()(i, j, 0) = 0.0f;
+        for (int d = 1; i < 12 && d < samples; ++d)
+          if (const float grey = tail(d); grey >= 0.0f)
+            intensity_.View()(i, j, d) = grey;
+      }
+    intensity_.View()(20, 10, 40) = 150.0f; // the top value, that nothing else is saturated
+  }
+  /// Of the middle of the half, at a depth.
+  double At(int depth, const ReliabilityParameters& p) const
+  {
+    const Volume<float> map = ReliabilityMap(PosedVolume<float>{intensity_.View(), {}, geometry_}, {}, p);
+    EXPECT_EQ(map.View()(18, 10, depth), 1.0f) << "of the other half";
+    return static_cast<double>(map.View()(5, 10, depth));
+  }
+  static constexpr int samples = 60;
+
+private:
+  ImageGeometry geometry_;
+  Volume<float> intensity_;
+};
+
+double SmoothStep(double from, double to, double x)
+{
+  const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+TEST(ShadowMap, LevelsOfShadowAndTissue)
+{
+  for (const double level : {0.05, 0.2, 0.35, 0.45, 0.65, 0.8, 1.0}) {
+    const FlatBeams beams([level](int d) { return d >= 30 ? static_cast<float>(100.0 * level) : -1.0f; });
+    for (const auto& [shadow, tissue] : {std::pair(0.3, 0.7), {0.1, 0.7}, {0.3, 0.9}, {0.0, 1.0}, {0.6, 0.62}}) {
+      ReliabilityParameters p;
+      p.shadowLevel = shadow;
+      p.tissueLevel = tissue;
+      const double reliability = SmoothStep(shadow, tissue, level);
+      EXPECT_NEAR(beams.At(45, p), reliability < 0.5 ? reliability : 1.0, 1e-4) // from one half on it is no tail
+          << level << " " << shadow << " " << tissue;
+      EXPECT_EQ(beams.At(15, p), 1.0) << "above the tail";
+    }
+  }
+}
+
+TEST(ShadowMap, HowLongAShadowIsAtLeast)
+{
+  for (const int length : {3, 6, 9, 12, 15}) { // of 60 samples
+    const FlatBeams beams([length](int d) { return d >= FlatBeams::samples - length ? 0.0f : -1.0f; });
+    for (const double least : {0.0, 0.1, 0.2, 0.4}) {
+      ReliabilityParameters p;
+      p.leastEcho = 0.0;
+      p.leastShadow = least;
+      const double counts = least > 0.0 ? SmoothStep(0.5 * least, least, length / 60.0) : 1.0;
+      EXPECT_NEAR(beams.At(59, p), 1.0 - counts, 1e-4) << length << " " << least;
+      EXPECT_EQ(beams.At(59 - length, p), 1.0) << length << " " << least;
+    }
+  }
+}
+
+// A stretch as long as the least echo proves sound, all the way down to it; one sample less proves nothing.
+TEST(ShadowMap, HowLongAnEchoIsAtLeast)
+{
+  for (const int length : {2, 5, 6, 9}) {
+    const FlatBeams beams([length](int d) { return d < 20 || (d >= 40 && d < 40 + length) ? -1.0f : 0.0f; });
+    for (const double least : {0.0, 0.05, 0.1, 0.15}) { // 1, 3, 6 and 9 samples
+      ReliabilityParameters p;
+      p.leastEcho = least;
+      p.leastShadow = 0.1;
+      const bool proves = length >= std::max(1, static_cast<int>(std::lround(60.0 * least)));
+      EXPECT_EQ(beams.At(30, p), proves ? 1.0 : 0.0) << length << " " << least;
+      EXPECT_EQ(beams.At(55, p), 0.0) << length << " " << least;
+    }
+  }
+}
+
+// Of three columns of voxels two at the top value: two thirds of every neighbourhood of a saturated voxel.
+TEST(ShadowMap, HowMuchIsSaturated)
+{
+  ImageGeometry geometry;
+  geometry.dimensions = {24, 20, 30};
+  Volume<float> intensity(geometry.dimensions, 100.0f);
+  for (int k = 0; k < 30; ++k)
+    for (int j = 0; j < 20; ++j)
+      for (int i = 0; i < 24; ++i)
+        if (k == 0 || i % 3)
+          intensity.View()(i, j, k) = k == 0 ? 0.0f : 110.0f;
+  for (const double share : {0.0, 0.3, 0.5, 0.66, 0.7}) {
+    ReliabilityParameters p;
+    p.saturatedShare = share;
+    const Volume<float> map = ReliabilityMap(PosedVolume<float>{intensity.View(), {}, geometry}, {}, p);
+    EXPECT_NEAR(map.View()(10, 10, 15), 1.0 - SmoothStep(share, 1.0, 2.0 / 3.0), 1e-4) << share;
+    EXPECT_EQ(map.View()(12, 10, 15), 1.0f) << share;
+  }
 }
 
 TEST(ShadowMap, FluidThatRunsOutOfTheImageForAShortWayIsExcused)

@@ -14,8 +14,8 @@ struct CellBox {
 };
 
 /// The box of the greatest weight whose cells all have \a weights > 0 (0 and NaN: not allowed in it). Exact: every box that
-/// cannot grow is looked at. Cost: n_x n_y n_z^2 / 2 steps; layers of z are parallel. Boxes that weigh the same: the first in (z,
-/// y, x). \throws Error(Cancelled)
+/// cannot grow is looked at. Cost: n_x n_y n_z^2 / 2 steps; layers of z are parallel. Of boxes that weigh the same, the one whose
+/// last layer comes first, then whose last row does. \throws Error(Cancelled)
 CellBox LargestBox(VolumeView<const float> weights, const Progress& progress = {});
 
 /// What cropping would have left of a region.

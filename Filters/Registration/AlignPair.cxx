@@ -208,7 +208,7 @@ public:
                                                      progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
                                                    .volumeToWorld;
     result.splitMm = shape_.Distance(halves[0], halves[1]);
-    Judge(best, covariance, result);
+    Judge(p_, covariance, shape_.radius, result);
     result.confidenceSeconds = SecondsSince(start);
     return result;
   }
@@ -280,32 +280,6 @@ private:
     if (found.size() < 2 || Evidence(found[1]) * HighestRatio <= Evidence(found[0]))
       return HighestRatio;
     return Evidence(found[0]) / Evidence(found[1]);
-  }
-
-  void Judge(const LocalAlignResult& best, const Information& covariance, PairAlignment& result) const
-  {
-    const double voxel = result.voxelMm;
-    if (best.overlap < p_.minimumOverlap) {
-      result.verdict = Verdict::Failed;
-      result.reason = "they overlap by only " + Number(100.0 * best.overlap, 0) + "% of the smaller one";
-    } else if (!(best.similarity >= p_.minimumSimilarity)) {
-      result.verdict = Verdict::Failed;
-      result.reason = "even at the best pose the volumes are hardly more similar than by chance (similarity " +
-                      Number(best.similarity, 3) + ")";
-    } else if (result.errorMm > p_.maximumErrorVoxels * voxel) {
-      result.verdict = Verdict::Ambiguous;
-      result.reason = "the image contents do not determine the pose (predicted error " +
-                      Number(std::min(result.errorMm, 999.0), 1) + " mm); the least certain motion is " +
-                      LeastDetermined(covariance, shape_.radius);
-    } else if (result.splitMm > p_.maximumSplitVoxels * voxel) {
-      result.verdict = Verdict::Failed;
-      result.reason = "aligning two halves of the voxels separately gives poses " + Number(result.splitMm, 1) + " mm apart";
-    } else if (result.peakRatio < p_.minimumPeakRatio) {
-      result.verdict = Verdict::Ambiguous;
-      result.reason = "a different pose fits nearly as well (ratio " + Number(result.peakRatio, 2) + ")";
-    } else {
-      result.verdict = Verdict::Aligned;
-    }
   }
 
   const PlacedVolume &fixed_, &moving_;
@@ -385,6 +359,33 @@ Information CovarianceOf(const Information& information, double radiusMm)
   const Eigen::Matrix<double, 6, 1> variances = eigen.values.cwiseMax(1.0 / (FarMm * FarMm)).cwiseInverse();
   return unit.cwiseInverse().asDiagonal() * eigen.vectors * variances.asDiagonal() * eigen.vectors.transpose() *
          unit.cwiseInverse().asDiagonal();
+}
+
+void Judge(const AlignPairParameters& p, const Information& covariance, double radiusMm, PairAlignment& result)
+{
+  const double voxel = result.voxelMm;
+  result.reason.clear();
+  if (result.overlap < p.minimumOverlap) {
+    result.verdict = Verdict::Failed;
+    result.reason = "they overlap by only " + Number(100.0 * result.overlap, 0) + "% of the smaller one";
+  } else if (!(result.similarity >= p.minimumSimilarity)) {
+    result.verdict = Verdict::Failed;
+    result.reason = "even at the best pose the volumes are hardly more similar than by chance (similarity " +
+                    Number(result.similarity, 3) + ")";
+  } else if (result.errorMm > p.maximumErrorVoxels * voxel) {
+    result.verdict = Verdict::Ambiguous;
+    result.reason = "the image contents do not determine the pose (predicted error " +
+                    Number(std::min(result.errorMm, 999.0), 1) + " mm); the least certain motion is " +
+                    LeastDetermined(covariance, radiusMm);
+  } else if (result.splitMm > p.maximumSplitVoxels * voxel) {
+    result.verdict = Verdict::Failed;
+    result.reason = "aligning two halves of the voxels separately gives poses " + Number(result.splitMm, 1) + " mm apart";
+  } else if (result.peakRatio < p.minimumPeakRatio) {
+    result.verdict = Verdict::Ambiguous;
+    result.reason = "a different pose fits nearly as well (ratio " + Number(result.peakRatio, 2) + ")";
+  } else {
+    result.verdict = Verdict::Aligned;
+  }
 }
 
 PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures,

@@ -74,6 +74,10 @@ struct PairAlignment {
 /// The 6 x 6 covariance; in directions that are not determined the standard deviation is 1 km at \a radiusMm mm from the centre.
 Information CovarianceOf(const Information& information, double radiusMm);
 
+/// Sets the verdict and the reason by what is known of an alignment: its overlap, similarity, errorMm, splitMm, peakRatio and
+/// voxelMm. \param covariance of its twist \param radiusMm where a rotation is felt, both for the words of the reason
+void Judge(const AlignPairParameters& parameters, const Information& covariance, double radiusMm, PairAlignment& alignment);
+
 /// Aligns two volumes: global search, local refinement of its candidates, and a verdict on the best.
 ///
 /// The start is always one of the candidates. All are refined at a coarse level, the best down to the finest. Four checks

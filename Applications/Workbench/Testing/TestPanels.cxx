@@ -31,7 +31,9 @@
 #include <QToolButton>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
+#include <vtkDataArray.h>
 #include <vtkImageData.h>
+#include <vtkPointData.h>
 #include <vtkUltrasoundAlignmentSession.h>
 
 using namespace echorama;
@@ -63,6 +65,8 @@ private slots:
   void aWindowMayCloseWhileAJobRuns();
   void stitchingMakesAndSavesOneVolume();
   void exportWritesAndNeverReplaces();
+  void exportHoldsWhatWasPaintedOfWhatIsShown();
+  void exportedFilesHaveNamesOfTheirOwn();
   void trainingHidesScoreAndKeepsAttempts();
   void aToolThatIsLetGoLeavesVolumes();
   void thePicturesOfTheManual();
@@ -269,6 +273,92 @@ void TestPanels::exportWritesAndNeverReplaces()
   QVERIFY(Wait(window));
   QVERIFY(window.HasMessage("it is there already"));
   QCOMPARE(QFileInfo(out.filePath("b.mha")).lastModified(), before);
+}
+
+void TestPanels::exportHoldsWhatWasPaintedOfWhatIsShown()
+{
+  const QString third = WriteVolume(QDir(folder_->path()), "c.mha", 1, {0.0, 0.0, 0.0}, 64);
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B(), third}));
+  auto* session = window.Session();
+  const vtkNew<vtkImageData> before;
+  QVERIFY(session->GetSnapshot(1, before));
+  const auto stroke = [session](const char* mode, double x) { // a ball of 4 mm beside the middle
+    return session->BeginStroke(1, mode, 4.0, 250.0, 1.0, 1.0, true) && session->ExtendStroke(x, 0.0, 0.0) &&
+           session->EndStroke();
+  };
+  QVERIFY(stroke("paint", 12.0) && stroke("carve", -12.0));
+  session->Select(1, true, true);
+  session->TranslateSelection(20.0, 0.0, 0.0);
+  session->Select(2, true, true);
+  session->TranslateSelection(400.0, 0.0, 0.0);
+  QVERIFY(session->SetVisible(2, false));
+  ExportActions& actions = *window.Window().findChild<ExportActions*>();
+  const QDir out(folder_->filePath("out"));
+  QVERIFY(QDir().mkpath(out.path()));
+  actions.ExportVolumes(out.path());
+  actions.ExportTransforms(out.path());
+  QVERIFY(Wait(window));
+  QVERIFY2(window.HasMessage("Exported 2 volumes"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(out.exists("a.mha") && out.exists("a.tfm") && out.exists("c.mha"));
+  QVERIFY(!out.exists("b.mha") && !out.exists("b.tfm"));
+  // Grey levels and valid region are those of the file but for the two balls, which moved along.
+  WindowUnderTest other;
+  QVERIFY(other.Open({out.filePath("a.mha")}));
+  const vtkNew<vtkImageData> after;
+  QVERIFY(other.Session()->GetSnapshot(1, after));
+  QCOMPARE(after->GetNumberOfPoints(), before->GetNumberOfPoints());
+  const auto value = [](vtkImageData* image, const char* name, vtkIdType i) {
+    return image->GetPointData()->GetArray(name)->GetTuple1(i);
+  };
+  int wrong = 0, painted = 0, carved = 0;
+  for (vtkIdType i = 0; i < before->GetNumberOfPoints(); ++i) {
+    double was[3], is[3];
+    before->GetPoint(i, was);
+    after->GetPoint(i, is);
+    const bool inPaint = std::hypot(was[0] - 12.0, was[1], was[2]) <= 4.0;
+    const bool inCarve = std::hypot(was[0] + 12.0, was[1], was[2]) <= 4.0;
+    painted += inPaint;
+    carved += inCarve;
+    wrong += std::abs(is[0] - was[0] - 20.0) > 1e-6;
+    wrong += value(after, "ValidRegion", i) != (inCarve ? 0.0 : value(before, "ValidRegion", i));
+    wrong += !inCarve && value(after, "Intensity", i) != (inPaint ? 250.0 : value(before, "Intensity", i));
+  }
+  QCOMPARE(wrong, 0);
+  QVERIFY(painted > 200 && carved > 200);
+  // Nor is what is hidden stitched: it would make the result 400 mm longer.
+  Raise(window, "resultPanel");
+  QTest::mouseClick(window.Part<QPushButton>("stitchPreview"), Qt::LeftButton);
+  QVERIFY(Wait(window));
+  auto* result = window.Part<ResultPanel>("resultPanel")->Result().session.Get();
+  QCOMPARE(result->GetNumberOfVolumes(), 1);
+  double bounds[6];
+  result->GetImage(result->GetVolumeId(0))->GetBounds(bounds);
+  QVERIFY2(std::abs(bounds[1] - bounds[0] - (60.0 + 20.0)) < 6.0, qPrintable(QString::number(bounds[1] - bounds[0])));
+}
+
+void TestPanels::exportedFilesHaveNamesOfTheirOwn()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  ExportActions& actions = *window.Window().findChild<ExportActions*>();
+  const QDir out(folder_->filePath("out"));
+  QVERIFY(QDir().mkpath(out.path()));
+  // What lies beside a volume is part of it.
+  QFile mask(out.filePath("a.ValidRegion.mha"));
+  QVERIFY(mask.open(QIODevice::WriteOnly) && mask.write("somebody's") > 0);
+  mask.close();
+  actions.ExportVolumes(out.path());
+  QVERIFY(Wait(window));
+  QVERIFY2(window.HasMessage("a.ValidRegion.mha: it is there already"), qPrintable(window.Messages().join('\n')));
+  QCOMPARE(out.entryList(QDir::Files), QStringList("a.ValidRegion.mha"));
+  QCOMPARE(QFileInfo(mask).size(), 10);
+  // Two names that would be one file.
+  QVERIFY(window.Session()->SetName(1, "left/right") && window.Session()->SetName(2, "left_right"));
+  actions.ExportVolumes(out.path());
+  QVERIFY(Wait(window));
+  QVERIFY2(window.HasMessage("left_right.mha: two volumes"), qPrintable(window.Messages().join('\n')));
+  QCOMPARE(out.entryList(QDir::Files), QStringList("a.ValidRegion.mha"));
 }
 
 void TestPanels::trainingHidesScoreAndKeepsAttempts()

@@ -93,6 +93,25 @@ TEST(LargestBox, NothingIsNothing)
   EXPECT_EQ(LargestBox(weights.View()).weight, 2.0);
 }
 
+// Boxes that weigh the same: one of them is chosen, and by the weights alone.
+TEST(LargestBox, TiesDoNotDependOnThreads)
+{
+  Volume<float> weights({9, 7, 6}, 1.0f);
+  for (int k = 0; k < 6; ++k)
+    for (int j = 0; j < 7; ++j)
+      for (int i = 0; i < 9; ++i)
+        if (i % 3 == 2 || j % 4 == 3 || k % 3 == 2)
+          weights.View()(i, j, k) = 0.0f;
+  const CellBox many = LargestBox(weights.View());
+  const ThreadLimit limit(1);
+  const CellBox one = LargestBox(weights.View());
+  EXPECT_EQ(many.weight, 12.0);
+  EXPECT_EQ(many.first, one.first);
+  EXPECT_EQ(many.size, one.size);
+  EXPECT_EQ(one.first, (std::array<int, 3>{0, 0, 0}));
+  EXPECT_EQ(one.size, (std::array<int, 3>{2, 3, 2}));
+}
+
 TEST(LargestCrop, AFullFanLosesItsRimAtMost)
 {
   const FanScene scene;
@@ -108,8 +127,39 @@ TEST(LargestCrop, ABoxInBeamSpaceIsFound)
   EXPECT_NEAR(crop.first.depth, 15.0, 1.6);
   EXPECT_NEAR(crop.last.depth, 45.0, 1.6);
   EXPECT_NEAR(crop.first.fan, -0.5, 0.03);
+  EXPECT_NEAR(crop.last.fan, 0.5, 0.03);
+  EXPECT_NEAR(crop.first.sweep, -0.5, 0.03);
   EXPECT_NEAR(crop.last.sweep, 0.1, 0.03);
   EXPECT_GT(crop.share, 0.85);
+  // The share is that of the region's voxels within the corners.
+  const Eigen::Affine3d toProbe = Eigen::Affine3d(scene.fan.probeToWorld.inverse()) * scene.grid.IndexToWorld();
+  int all = 0, inside = 0;
+  for (int k = 0; k < 72; ++k)
+    for (int j = 0; j < 72; ++j)
+      for (int i = 0; i < 100; ++i)
+        if (scene.region.View()(i, j, k)) {
+          const auto beam = BeamPointAt(scene.fan.geometry, toProbe * Eigen::Vector3d(i, j, k));
+          ++all;
+          inside += beam && beam->depth >= crop.first.depth && beam->depth <= crop.last.depth && beam->fan >= crop.first.fan &&
+                    beam->fan <= crop.last.fan && beam->sweep >= crop.first.sweep && beam->sweep <= crop.last.sweep;
+        }
+  EXPECT_DOUBLE_EQ(crop.share, static_cast<double>(inside) / all);
+}
+
+// Above 55% of the depth lie more cells, below it more mm^3: a fan grows wide.
+TEST(LargestCrop, LargestIsByVolume)
+{
+  FanScene scene;
+  const Eigen::Affine3d toProbe = Eigen::Affine3d(scene.fan.probeToWorld.inverse()) * scene.grid.IndexToWorld();
+  for (int k = 0; k < 72; ++k)
+    for (int j = 0; j < 72; ++j)
+      for (int i = 0; i < 100; ++i)
+        if (const auto beam = BeamPointAt(scene.fan.geometry, toProbe * Eigen::Vector3d(i, j, k));
+            beam && beam->depth > 33.0 && beam->depth < 37.0)
+          scene.region.View()(i, j, k) = 0;
+  const Crop crop = LargestCrop(scene.region.View(), scene.grid, scene.fan, 40);
+  EXPECT_GT(crop.first.depth, 33.0);
+  EXPECT_GT(crop.last.depth, 57.0);
 }
 
 TEST(LargestCrop, AHoleCostsThePartBehindIt)

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
+#include <utility>
+#include <vector>
 
 namespace echorama {
 
@@ -77,11 +79,71 @@ TEST(LocalStatistics, IsTheNormalisedGaussianWindow)
   }
 }
 
+// The response to a single bright voxel is the window itself: along each axis, whatever blocks are used, its second moment is the
+// square of the standard deviation that was asked for.
+TEST(LocalStatistics, TheWindowIsAsWideAsAskedFor)
+{
+  const Eigen::Vector3d spacing(0.5, 1.0, 2.0);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const double voxels : {1.5, 3.0, 4.5, 6.0, 9.0}) {
+      std::array<int, 3> size{1, 1, 1};
+      size[axis] = 180;
+      double sum = 0.0, first = 0.0, second = 0.0;
+      for (int at = 84; at < 96; ++at) { // at all places within a block of 1, 2, 3, 4 or 6 voxels
+        Volume<float> volume(size);
+        volume.View()[at] = 1000.0f;
+        const LocalStatistics statistics(VolumeView<const float>(volume.View()), {}, spacing,
+                                         voxels * spacing[static_cast<Eigen::Index>(axis)]);
+        const Values got = All(statistics, volume);
+        for (int i = 30; i < 150; ++i) {
+          const double mean = static_cast<double>(got.mean.View()[i]);
+          sum += mean;
+          first += mean * (i - at);
+          second += mean * (i - at) * (i - at);
+        }
+      }
+      EXPECT_NEAR(first / sum, 0.0, 0.01) << axis << " " << voxels;
+      EXPECT_NEAR(second / sum / (voxels * voxels), 1.0, 0.012) << axis << " " << voxels;
+    }
+}
+
+TEST(LocalStatistics, BelowAVoxelTheWindowIsTheVoxel)
+{
+  Volume<short> volume({7, 5, 3});
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
+    volume.View()[at] = static_cast<short>(17 * at % 101);
+  const Values got = All(LocalStatistics(VolumeView<const short>(volume.View()), {}, unit, 0.0), volume);
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at) {
+    EXPECT_NEAR(got.mean.View()[at], volume.View()[at], 1e-4);
+    EXPECT_NEAR(got.deviation.View()[at], 0.0, 1e-3);
+  }
+}
+
+TEST(LocalStatistics, APartOfARowIsThatPart)
+{
+  Volume<float> volume({50, 6, 5});
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
+    volume.View()[at] = static_cast<float>(Random(8, static_cast<std::uint64_t>(at)).Uniform());
+  const LocalStatistics statistics(VolumeView<const float>(volume.View()), {}, unit, 3.0);
+  const Values whole = All(statistics, volume);
+  for (const auto& [first, end] : {std::pair(0, 1), {7, 31}, {49, 50}}) {
+    std::vector<float> mean(static_cast<std::size_t>(end - first) + 1, -1.0f), deviation(mean);
+    statistics.Row(3, 2, first, end, mean.data(), deviation.data());
+    for (int i = first; i < end; ++i) {
+      EXPECT_EQ(mean[static_cast<std::size_t>(i - first)], whole.mean.View()(i, 3, 2));
+      EXPECT_EQ(deviation[static_cast<std::size_t>(i - first)], whole.deviation.View()(i, 3, 2));
+    }
+    EXPECT_EQ(mean.back(), -1.0f) << "nothing behind the end is written";
+    EXPECT_EQ(deviation.back(), -1.0f);
+  }
+}
+
 TEST(LocalStatistics, WhatIsOutsideOrNoNumberDoesNotCount)
 {
   Volume<float> volume({20, 20, 20}, 7.0f);
   Volume<unsigned char> region(volume.Dimensions(), 1);
   volume.View()(10, 10, 10) = std::numeric_limits<float>::quiet_NaN();
+  volume.View()(3, 9, 15) = std::numeric_limits<float>::infinity();
   volume.View()(4, 4, 4) = 1e9f;
   region.View()(4, 4, 4) = 0;
   const Values got = All(LocalStatistics(VolumeView<const float>(volume.View()), region.View(), unit, 2.0), volume);

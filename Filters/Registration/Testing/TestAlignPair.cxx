@@ -2,6 +2,7 @@
 #include "Filters/Registration/AlignPair.h"
 #include "RandomScene.h"
 #include "Testing/Sanitized.h"
+#include <algorithm>
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
@@ -51,7 +52,118 @@ TEST(AlignPair, FindsTheWayHomeAndSaysSo)
   EXPECT_LT(found.overlap, 0.9);
   EXPECT_TRUE(found.reason.empty());
   EXPECT_LT(found.errorMm, 1.0);
+  EXPECT_GT(found.splitMm, 0.0) << "two halves of the voxels, and not the same ones twice";
   EXPECT_LT(found.splitMm, 1.0);
+
+  // The error is what the twist's covariance does to the voxels, in the mean.
+  const Information covariance = found.information.inverse();
+  double square = 0.0;
+  int count = 0;
+  for (int k = 0; k < windows.b.dimensions[2]; ++k)
+    for (int j = 0; j < windows.b.dimensions[1]; ++j)
+      for (int i = 0; i < windows.b.dimensions[0]; ++i, ++count) {
+        const Eigen::Vector3d r = found.volumeToWorld * (windows.b.IndexToWorld() * Eigen::Vector3d(i, j, k)) - found.centre;
+        Eigen::Matrix<double, 3, 6> moves;
+        for (int axis = 0; axis < 3; ++axis) {
+          moves.col(axis) = Eigen::Vector3d::Unit(axis);
+          moves.col(3 + axis) = Eigen::Vector3d::Unit(axis).cross(r);
+        }
+        square += (moves * covariance * moves.transpose()).trace();
+      }
+  EXPECT_NEAR(found.errorMm / std::sqrt(square / count), 1.0, 0.05);
+}
+
+// What passes every check, just.
+PairAlignment JustGoodEnough(const AlignPairParameters& p)
+{
+  PairAlignment alignment;
+  alignment.voxelMm = 0.5;
+  alignment.overlap = p.minimumOverlap;
+  alignment.similarity = p.minimumSimilarity;
+  alignment.errorMm = p.maximumErrorVoxels * alignment.voxelMm;
+  alignment.splitMm = p.maximumSplitVoxels * alignment.voxelMm;
+  alignment.peakRatio = p.minimumPeakRatio;
+  return alignment;
+}
+
+TEST(AlignPair, EachCheckOfTheVerdictByItself)
+{
+  AlignPairParameters p;
+  p.minimumOverlap = 0.25;
+  p.minimumSimilarity = 0.125;
+  p.maximumErrorVoxels = 1.5;
+  p.maximumSplitVoxels = 2.5;
+  p.minimumPeakRatio = 1.25;
+  PairAlignment alignment = JustGoodEnough(p);
+  alignment.reason = "of an earlier attempt";
+  Judge(p, Information::Identity(), 40.0, alignment);
+  EXPECT_EQ(alignment.verdict, Verdict::Aligned);
+  EXPECT_EQ(alignment.reason, "");
+
+  const auto judged = [&p](const auto& change, Verdict verdict, const char* reason) {
+    PairAlignment spoilt = JustGoodEnough(p);
+    change(spoilt);
+    Judge(p, Information::Identity(), 40.0, spoilt);
+    EXPECT_EQ(spoilt.verdict, verdict) << reason;
+    EXPECT_NE(spoilt.reason.find(reason), std::string::npos) << spoilt.reason << " instead of " << reason;
+  };
+  judged([](PairAlignment& a) { a.overlap = 0.2449; }, Verdict::Failed, "overlap by only 24%");
+  judged([](PairAlignment& a) { a.similarity = 0.1241; }, Verdict::Failed, "by chance (similarity 0.124)");
+  judged([](PairAlignment& a) { a.similarity = std::nan(""); }, Verdict::Failed, "by chance");
+  judged([](PairAlignment& a) { a.errorMm = 0.76; }, Verdict::Ambiguous, "do not determine the pose (predicted error 0.8 mm)");
+  judged([](PairAlignment& a) { a.errorMm = 1e6; }, Verdict::Ambiguous, "predicted error 999.0 mm");
+  judged([](PairAlignment& a) { a.splitMm = 1.26; }, Verdict::Failed, "two halves of the voxels separately gives poses 1.3 mm");
+  judged([](PairAlignment& a) { a.peakRatio = 1.2449; }, Verdict::Ambiguous, "a different pose fits nearly as well (ratio 1.24)");
+
+  // What is wrong with most of it is said first.
+  judged([](PairAlignment& a) { a.overlap = a.similarity = 0.0; }, Verdict::Failed, "overlap");
+  judged([](PairAlignment& a) { a.similarity = 0.0, a.errorMm = 9.0; }, Verdict::Failed, "by chance");
+  judged([](PairAlignment& a) { a.errorMm = a.splitMm = 9.0; }, Verdict::Ambiguous, "do not determine");
+  judged([](PairAlignment& a) { a.splitMm = 9.0, a.peakRatio = 1.0; }, Verdict::Failed, "two halves");
+}
+
+TEST(AlignPair, TheLeastCertainMotionIsNamed)
+{
+  const AlignPairParameters p;
+  const auto reason = [&p](const Information& covariance, double radius) {
+    PairAlignment alignment = JustGoodEnough(p);
+    alignment.errorMm = 100.0;
+    Judge(p, covariance, radius, alignment);
+    std::string text = alignment.reason;
+    text.erase(std::remove(text.begin(), text.end(), '-'), text.end()); // an axis has no sign
+    return text;
+  };
+  Information covariance = Information::Zero();
+  covariance.diagonal() << 1.0, 2.0, 9.0, 1e-4, 4e-4, 2e-4; // the turns at 100 mm: 1, 4 and 2 mm^2; at 200 mm: 4, 16 and 8
+  EXPECT_NE(reason(covariance, 100.0).find("a move along the direction (0.00, 0.00, 1.00)"), std::string::npos);
+  EXPECT_NE(reason(covariance, 200.0).find("a turn about the direction (0.00, 1.00, 0.00)"), std::string::npos);
+}
+
+// The checks work on what the alignment itself finds: a pair that passes them all fails each one that asks for more.
+TEST(AlignPair, EveryCheckIsMade)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  const Windows windows(Scene(5), Scene(5));
+  const Pose start = Knock(windows, 3.0, 3.0, 4);
+  const auto run = [&](const auto& ask) {
+    AlignPairParameters p = With(AlignStart::Tracked);
+    p.points = 20000;
+    ask(p);
+    return windows.Align(start, p);
+  };
+  const PairAlignment good = run([](AlignPairParameters&) {});
+  ASSERT_EQ(good.verdict, Verdict::Aligned) << good.reason;
+  const auto fails = [&](const auto& ask, const char* reason) {
+    const PairAlignment found = run(ask);
+    EXPECT_NE(found.verdict, Verdict::Aligned) << reason;
+    EXPECT_NE(found.reason.find(reason), std::string::npos) << found.reason << " instead of " << reason;
+  };
+  fails([&](AlignPairParameters& p) { p.minimumOverlap = 1.0; }, "overlap");
+  fails([&](AlignPairParameters& p) { p.minimumSimilarity = 1.0; }, "by chance");
+  fails([&](AlignPairParameters& p) { p.maximumErrorVoxels = std::max(1e-3, 0.9 * good.errorMm / good.voxelMm); }, "determine");
+  fails([&](AlignPairParameters& p) { p.maximumSplitVoxels = std::max(1e-3, 0.9 * good.splitMm / good.voxelMm); }, "halves");
+  if (good.peakRatio < 99.0)
+    fails([&](AlignPairParameters& p) { p.minimumPeakRatio = 99.0; }, "a different pose");
 }
 
 TEST(AlignPair, OtherTissueIsNotAligned)

@@ -4,6 +4,7 @@
 #include "Filters/Registration/GlobalSearch.h"
 #include "Filters/Registration/MaskedCorrelation.h"
 #include "Testing/Sanitized.h"
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -407,17 +408,28 @@ TEST_F(GlobalSearchTest, WorksAcrossSpacingsAndSizes)
   EXPECT_GT(inside.candidates.front().overlap, 0.9);
 }
 
+// Each limit cuts candidates off that the search without it has, and leaves some.
 TEST_F(GlobalSearchTest, KeepsToReachOverlapAndCount)
 {
-  GlobalSearchParameters p = Quick(25.0, 15.0);
-  p.candidates = 3;
-  p.minimumOverlap = 0.4;
   const PlacedVolume knocked = Knocked(0, 20.0, 30.0);
-  const GlobalSearchResult result = GlobalSearch(fixed, knocked, p);
-  EXPECT_LE(result.candidates.size(), 3u);
   const Eigen::Vector3d centre = movingSeen.geometry.Centre();
+  const auto way = [&](const GlobalCandidate& c) { return (c.volumeToWorld * centre - knocked.volumeToWorld * centre).norm(); };
+  GlobalSearchParameters p = Quick(25.0, 45.0);
+  p.candidates = 12;
+  const std::vector<GlobalCandidate> all = GlobalSearch(fixed, knocked, p).candidates;
+  ASSERT_GT(all.size(), 3u);
+  ASSERT_TRUE(std::any_of(all.begin(), all.end(), [&](const GlobalCandidate& c) { return way(c) > 20.0; }));
+  ASSERT_TRUE(std::any_of(all.begin(), all.end(), [](const GlobalCandidate& c) { return c.overlap < 0.4; }));
+
+  p.candidates = 3;
+  EXPECT_EQ(GlobalSearch(fixed, knocked, p).candidates.size(), 3u);
+  p.candidates = 12;
+  p.reachMm = 15.0;
+  p.minimumOverlap = 0.4;
+  const GlobalSearchResult result = GlobalSearch(fixed, knocked, p);
+  ASSERT_GE(result.candidates.size(), 2u);
   for (const GlobalCandidate& c : result.candidates) {
-    EXPECT_LE((c.volumeToWorld * centre - knocked.volumeToWorld * centre).norm(), 15.5);
+    EXPECT_LE(way(c), 15.5);
     EXPECT_GE(c.overlap, 0.399);
     EXPECT_TRUE(std::isfinite(c.sharpness));
   }

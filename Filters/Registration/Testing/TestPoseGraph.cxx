@@ -359,6 +359,53 @@ TEST(PoseGraph, CovarianceOfALoop)
   }
 }
 
+// Volumes that are turned alike, with edges about one place of the world: each component of the twist is a network of its own,
+// in which variances are resistances. Along a chain they add up; around a loop two ways are parallel.
+TEST(PoseGraph, CovariancesFollowTheRulesOfResistances)
+{
+  constexpr int count = 7;
+  World world(count, 21);
+  const Eigen::Matrix3d turn = ExpRotation({0.5, -0.3, 0.8});
+  const Eigen::Vector3d common(30.0, -20.0, 10.0);
+  for (std::size_t v = 0; v < count; ++v) {
+    world.truth[v].linear() = turn;
+    world.starts[v] = world.truth[v];
+  }
+  Twist variances; // of an edge of weight one, in the frame of the volumes
+  variances << 0.04, 0.09, 0.16, 1e-6, 4e-6, 9e-6;
+  std::vector<PoseEdge> loop;
+  std::vector<double> resistance;
+  for (int v = 0; v < count; ++v) {
+    resistance.push_back(1.0 + 0.5 * v);
+    PoseEdge edge = world.Exact(v, (v + 1) % count);
+    edge.centre = world.truth[Index(v)].inverse() * common;
+    edge.information.setZero();
+    edge.information.diagonal() = (resistance.back() * variances).cwiseInverse();
+    loop.push_back(edge);
+  }
+  const std::vector<PoseEdge> chain(loop.begin(), loop.end() - 1);
+  Information toWorld = Information::Zero();
+  toWorld.topLeftCorner<3, 3>() = toWorld.bottomRightCorner<3, 3>() = turn;
+  PoseGraphParameters p;
+  p.floorMm = 0.0;
+  const PoseGraphResult open = SolvePoseGraph(world.starts, chain, 0, p), closed = SolvePoseGraph(world.starts, loop, 0, p);
+  const double around = std::accumulate(resistance.begin(), resistance.end(), 0.0);
+  double sum = 0.0;
+  for (int v = 1; v < count; ++v) {
+    sum += resistance[Index(v) - 1];
+    EXPECT_LT((open.centre[Index(v)] - common).norm(), 1e-9);
+    const auto expectCovariance = [&](const PoseGraphResult& result, double factor) {
+      const Information covariance = toWorld.transpose() * result.information[Index(v)].inverse() * toWorld;
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j)
+          EXPECT_NEAR(covariance(i, j) / std::sqrt(variances[i] * variances[j]), i == j ? factor : 0.0, 1e-4 * factor)
+              << v << " " << i << " " << j;
+    };
+    expectCovariance(open, sum);
+    expectCovariance(closed, sum * (around - sum) / around);
+  }
+}
+
 TEST(PoseGraph, SaysWhatIsNotDetermined)
 {
   World world(3, 10);

@@ -5,6 +5,9 @@
 #include "Filters/Synthesis/Icosphere.h"
 #include "Filters/Synthesis/Synthesize.h"
 #include "Testing/Sanitized.h"
+#include <algorithm>
+#include <cmath>
+#include <complex>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -276,6 +279,81 @@ TEST(Synthesize, ShadowsAreAsSoftAsTheApertureIsWide)
   EXPECT_LT(soft[16] / lit[16], 0.05);
   for (std::size_t beam = 1; beam < soft.size(); ++beam)
     EXPECT_LT(soft[beam] / lit[beam], soft[beam - 1] / lit[beam - 1] + 0.25);
+}
+
+// Behind the edge of an absorber the amplitude is the share of the aperture, by its apodisation, that looks past it. Along the
+// fan and along the sweep that is another aperture.
+TEST(Synthesize, EachDirectionHasItsOwnAperture)
+{
+  Material absorber = Clear();
+  absorber.attenuation = 200.0;
+  const double edge = 0.5, depth = 9.0, thickness = 0.4, focus = 25.0;
+  for (const double lateral : {14.0, 4.0}) {
+    SynthesisParameters p = Small();
+    p.probe = ProbeGeometry::Linear(16.0, 16.0, 0.0, 40.0);
+    p.elements = p.steps = 9; // 2 mm apart
+    p.subRays = 256;
+    p.sampling = echorama::Sampling::Sobol;
+    p.transport.maxBounces = 0;
+    p.transport.refraction = false;
+    p.transducer.lateralApertureMm = lateral;
+    p.transducer.elevationApertureMm = 18.0 - lateral;
+    const BeamEchoes open = SynthesizeEchoes(AcousticScene(Background(Speckled())), p);
+    for (const int axis : {0, 1}) {
+      TissueSurface surface = Background(Speckled());
+      Vector3d from(-50.0, -50.0, depth - 0.5 * thickness);
+      from[axis] = edge;
+      AddBox(surface, from, Vector3d(50.0, 50.0, depth + 0.5 * thickness), absorber);
+      const BeamEchoes shaded = SynthesizeEchoes(AcousticScene(surface), p);
+      const double sigma =
+          (axis == 0 ? lateral : 18.0 - lateral) / echorama::Transducer::sigmasPerAperture * (1.0 - depth / focus);
+      const auto below = [](double sigmas) { return 0.5 * std::erfc(-std::clamp(sigmas, -2.5, 2.5) / std::sqrt(2.0)); };
+      for (int place = 0; place < 9; ++place) {
+        double with = 0.0, without = 0.0;
+        for (int other = 0; other < 9; ++other)
+          for (int i = open.baseband.Dimensions()[0] / 2; i < open.baseband.Dimensions()[0] * 9 / 10; ++i) {
+            const int beam = axis == 0 ? place : other, step = axis == 0 ? other : place;
+            with += std::norm(shaded.baseband.View().Row(beam, step)[i]);
+            without += std::norm(open.baseband.View().Row(beam, step)[i]);
+          }
+        const double share = (below((edge - (2.0 * place - 8.0)) / sigma) - below(-2.5)) / (below(2.5) - below(-2.5));
+        EXPECT_NEAR(std::sqrt(with / without), share, 0.03) << lateral << " " << axis << " " << place;
+      }
+    }
+  }
+}
+
+// At the focus neighbouring beams share speckle as far as their profiles, of two Gaussian widths and curved fronts, overlap.
+TEST(Synthesize, SpeckleIsAsWideAsTheBeamInEachDirection)
+{
+  const AcousticScene scene(Background(Speckled(8.0)));
+  for (const double lateral : {14.0, 6.0}) {
+    SynthesisParameters p = Small();
+    p.probe = ProbeGeometry::Linear(12.0, 12.0, 23.0, 27.0);
+    p.elements = p.steps = 13; // 1 mm apart
+    p.samples = 33;
+    p.subRays = 1;
+    p.transducer.lateralApertureMm = lateral;
+    p.transducer.elevationApertureMm = 20.0 - lateral;
+    const BeamEchoes echoes = SynthesizeEchoes(scene, p);
+    const auto rows = echoes.baseband.View();
+    const echorama::BeamWidth width = WidthAt(p.transducer, 25.0);
+    for (const int axis : {0, 1}) {
+      std::complex<double> both = 0.0;
+      double power = 0.0;
+      for (int step = 0; step + axis < p.steps; ++step)
+        for (int beam = 0; beam + 1 - axis < p.elements; ++beam)
+          for (int i = 0; i < rows.Dimensions()[0]; ++i) {
+            const std::complex<double> a = rows.Row(beam, step)[i], b = rows.Row(beam + 1 - axis, step + axis)[i];
+            both += a * std::conj(b);
+            power += 0.5 * (std::norm(a) + std::norm(b));
+          }
+      const double sigma = axis == 0 ? width.lateralSigma : width.elevationSigma;
+      const double phase = p.transducer.PhasePerMm() * (axis == 0 ? width.lateralCurvature : width.elevationCurvature) * sigma;
+      EXPECT_NEAR(std::abs(both) / power, std::exp(-0.25 / (sigma * sigma) - 0.25 * phase * phase), 0.1)
+          << lateral << " " << axis;
+    }
+  }
 }
 
 TEST(Synthesize, WhatStaysBlackIsNotSummed)
