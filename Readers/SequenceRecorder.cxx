@@ -42,7 +42,7 @@ public:
     file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL), 0666);
     if (file_ >= 0)
       return {};
-    return errno == EEXIST ? "it is there already; choose another name, or allow that it is replaced"
+    return errno == EEXIST ? "it is there already; choose another name"
                            : std::string("it cannot be written: ") + std::strerror(errno);
   }
   bool Write(std::uint64_t at, const char* bytes, std::uint64_t count)

@@ -31,9 +31,14 @@ void ShowNow(const TrackOptions& options, const PoseStream& poses, const LiveTra
 {
   if (options.shown.empty()) {
     const StreamStatistics statistics = poses.Statistics();
-    if (statistics.tools.empty())
+    if (statistics.tools.empty() || statistics.state != DeviceState::Running)
       std::cerr << DeviceStateText(statistics.state) << (statistics.message.empty() ? "" : ": " + statistics.message) << '\n';
     for (const ToolStatistics& tool : statistics.tools) {
+      if (statistics.live && tool.secondsSinceLast > LiveTransforms::defaultFreshSeconds) {
+        std::cerr << tool.name << ": " << TransformStatusText(TransformStatus::Missing) << "  came last "
+                  << Fixed(tool.secondsSinceLast, 1) << " s ago\n";
+        continue;
+      }
       const ToolPose latest = poses.Latest(tool.name);
       std::cerr << tool.name << ": " << TransformStatusText(latest.status) << "  "
                 << (latest.status == TransformStatus::Missing ? "-" : Triple(latest.pose.translation(), " ", 2) + " mm") << "  "

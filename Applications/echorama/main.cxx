@@ -68,9 +68,13 @@ int main(int argc, char** argv)
       json = json || std::strcmp(argv[i], "--json") == 0;
     const auto chosen = program.get_subcommands();
     const std::string name = chosen.empty() ? "" : chosen.front()->get_name();
+    std::string path = "echorama "; // to the help that lists the options, of "calibrate rig", not of "calibrate"
+    for (const CLI::App* app = chosen.empty() ? nullptr : chosen.front(); app;
+         app = app->get_subcommands().empty() ? nullptr : app->get_subcommands().front())
+      path += app->get_name() + " ";
     const bool unknown = chosen.empty() && argc > 1 && argv[1][0] != '-';
     const std::string reason = unknown ? argv[1] + std::string(": there is no such command") : error.what();
-    return Session(name, json).Fail(reason + " (see echorama " + (name.empty() ? "" : name + " ") + "--help)", ExitMisused);
+    return Session(name, json).Fail(reason + " (see " + path + "--help)", ExitMisused);
   }
   for (const Command& command : commands)
     if (command.options->parsed())

@@ -28,11 +28,14 @@ struct LiveTransform {
 /// why. Safe for use by several threads. Cost: some microseconds per tool.
 class LiveTransforms {
 public:
+  static constexpr double defaultFreshSeconds = 1.0;
+
   /// \param stream must outlive this
   /// \param freshSeconds of a live stream, a newest pose that came longer ago counts as Missing: a frozen picture is not shown as
   /// if it were live. In (0, 3600].
   /// \throws Error(BadInput) when a fixed transform is none (NamedTransform::Complaint), Error(InvalidParameter)
-  explicit LiveTransforms(const PoseStream& stream, const std::vector<NamedTransform>& fixed = {}, double freshSeconds = 1.0);
+  explicit LiveTransforms(const PoseStream& stream, const std::vector<NamedTransform>& fixed = {},
+                          double freshSeconds = defaultFreshSeconds);
 
   /// From a frame to another. When \a time is NaN, at the newest moment that all the tools on the way have reached; else at that
   /// time on the sender's clock, as PoseStream::At. Tools that have no moment in common at all, as those of senders whose clocks
