@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // elastix (a Debian package, https://elastix.lumc.nl) as the peer of benchmarks: volumes and masks are handed over as files
-// in a temporary folder, which is removed again.
+// in a temporary folder, which is removed again. Who includes this has ECHORAMA_SOURCE_DIR: the rigid parameters are in
+// Testing/elastix-rigid.txt.
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Core/Imaging/VolumeView.h"
+#include "Testing/Benchmark.h"
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -12,19 +14,37 @@
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <unistd.h>
 #include <vector>
 
 namespace echorama::benchmark {
 
+/// Of this process, and of the programs that it started and that have ended.
+inline double CpuSeconds()
+{
+  double seconds = 0.0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    for (const timeval& time : {usage.ru_utime, usage.ru_stime})
+      seconds += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  }
+  return seconds;
+}
+
 class Elastix {
 public:
-  Elastix()
+  Elastix(const PosedVolume<unsigned char>& fixed, const PosedVolume<unsigned char>& moving)
   {
     char name[] = "/tmp/elastix-XXXXXX";
     if (mkdtemp(name))
       folder_ = name;
+    Write("fixed.mha", Filled(fixed).View(), fixed.geometry);
+    Write("fixed-mask.mha", fixed.valid, fixed.geometry);
+    Write("moving.mha", Filled(moving).View(), moving.geometry);
+    Write("moving-mask.mha", moving.valid, moving.geometry);
   }
   ~Elastix()
   {
@@ -37,50 +57,35 @@ public:
 
   static bool IsInstalled() { return std::system("elastix --version >/dev/null 2>&1") == 0; }
 
-  /// A rigid registration on four levels; \a metric is one of elastix, as "AdvancedMattesMutualInformation".
-  static std::string RigidParameters(const std::string& metric)
+  /// Runs it with the text of a parameter file. \returns the text of what was found, or nothing when it failed.
+  std::optional<std::string> Run(const std::string& parameters)
   {
-    return "(FixedInternalImagePixelType \"float\")\n(MovingInternalImagePixelType \"float\")\n(UseDirectionCosines \"true\")\n"
-           "(Registration \"MultiResolutionRegistration\")\n(Interpolator \"LinearInterpolator\")\n"
-           "(ResampleInterpolator \"FinalBSplineInterpolator\")\n(Resampler \"DefaultResampler\")\n"
-           "(FixedImagePyramid \"FixedSmoothingImagePyramid\")\n(MovingImagePyramid \"MovingSmoothingImagePyramid\")\n"
-           "(Optimizer \"AdaptiveStochasticGradientDescent\")\n(Transform \"EulerTransform\")\n(Metric \"" +
-           metric +
-           "\")\n(AutomaticScalesEstimation \"true\")\n(AutomaticTransformInitialization \"false\")\n"
-           "(NumberOfResolutions 4)\n(MaximumNumberOfIterations 500)\n(NumberOfSpatialSamples 5000)\n(NewSamplesEveryIteration "
-           "\"true\")\n"
-           "(ImageSampler \"RandomCoordinate\")\n(NumberOfHistogramBins 32)\n(ErodeMask \"false\")\n(RequiredRatioOfValidSamples "
-           "0.05)\n"
-           "(HowToCombineTransforms \"Compose\")\n(WriteResultImage \"false\")\n(DefaultPixelValue 0)\n(RandomSeed 1)\n";
-  }
-
-  /// Runs it. \returns the text of the parameters that were found, or nothing when it failed.
-  std::optional<std::string> Run(const PosedVolume<unsigned char>& fixed, const PosedVolume<unsigned char>& moving,
-                                 const std::string& parameters) const
-  {
-    Write("fixed.mha", Filled(fixed).View(), fixed.geometry);
-    Write("fixed-mask.mha", fixed.valid, fixed.geometry);
-    Write("moving.mha", Filled(moving).View(), moving.geometry);
-    Write("moving-mask.mha", moving.valid, moving.geometry);
     std::ofstream(Path("parameters.txt")) << parameters;
     const std::string command = "cd " + folder_ +
                                 " && rm -f TransformParameters.0.txt && elastix -f fixed.mha -m moving.mha -fMask fixed-mask.mha"
                                 " -mMask moving-mask.mha -p parameters.txt -out . >/dev/null 2>&1";
-    if (std::system(command.c_str()) != 0)
+    int status = 0;
+    const double before = benchmark::CpuSeconds();
+    seconds_ = benchmark::Seconds([&] { status = std::system(command.c_str()); });
+    cpuSeconds_ = benchmark::CpuSeconds() - before;
+    if (status != 0)
       return std::nullopt;
-    std::ifstream file(Path("TransformParameters.0.txt"));
-    if (!file)
-      return std::nullopt;
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
+    return TextOf(Path("TransformParameters.0.txt"));
   }
 
-  /// How the moving volume has to be moved from where its geometry has it, by a rigid run.
-  std::optional<Pose> RunRigid(const PosedVolume<unsigned char>& fixed, const PosedVolume<unsigned char>& moving,
-                               const std::string& metric) const
+  /// Of the last run: of its program alone, reading the volumes included.
+  double Seconds() const { return seconds_; }
+  double CpuSeconds() const { return cpuSeconds_; }
+
+  /// How the moving volume has to be moved from where its geometry has it. \a metric is one of elastix, as
+  /// "AdvancedMattesMutualInformation"; \a iterations are made on each level.
+  std::optional<Pose> RunRigid(const std::string& metric, int iterations)
   {
-    const auto text = Run(fixed, moving, RigidParameters(metric));
+    const auto parameters = TextOf(ECHORAMA_SOURCE_DIR "/Testing/elastix-rigid.txt");
+    if (!parameters)
+      throw std::runtime_error("there is no " ECHORAMA_SOURCE_DIR "/Testing/elastix-rigid.txt");
+    const auto text =
+        Run(*parameters + "(Metric \"" + metric + "\")\n(MaximumNumberOfIterations " + std::to_string(iterations) + ")\n");
     if (!text)
       return std::nullopt;
     const std::vector<double> p = Numbers(*text, "TransformParameters"), c = Numbers(*text, "CenterOfRotationPoint");
@@ -108,9 +113,19 @@ public:
     return numbers;
   }
 
+private:
   std::string Path(const std::string& name) const { return folder_ + "/" + name; }
 
-private:
+  static std::optional<std::string> TextOf(const std::string& path)
+  {
+    std::ifstream file(path);
+    if (!file)
+      return std::nullopt;
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+
   // Its pyramids know no masks: black outside would be smoothed into the fan, so what is not real gets the mean of what is.
   static Volume<unsigned char> Filled(const PosedVolume<unsigned char>& volume)
   {
@@ -143,6 +158,7 @@ private:
   }
 
   std::string folder_;
+  double seconds_ = 0.0, cpuSeconds_ = 0.0;
 };
 
 } // namespace echorama::benchmark

@@ -82,36 +82,7 @@ def stage_seconds(stages, name, otherwise):
     return float(sum(stage.get("seconds", 0) for stage in stages if name in stage.values()) or otherwise)
 
 
-PARAMETERS = """(FixedInternalImagePixelType "float")
-(MovingInternalImagePixelType "float")
-(FixedImageDimension 3)
-(MovingImageDimension 3)
-(UseDirectionCosines "true")
-(Registration "MultiResolutionRegistration")
-(Interpolator "LinearInterpolator")
-(ResampleInterpolator "FinalBSplineInterpolator")
-(FinalBSplineInterpolationOrder 1)
-(Resampler "DefaultResampler")
-(FixedImagePyramid "FixedSmoothingImagePyramid")
-(MovingImagePyramid "MovingSmoothingImagePyramid")
-(NumberOfResolutions 4)
-(Transform "EulerTransform")
-(AutomaticScalesEstimation "true")
-(AutomaticTransformInitialization "false")
-(HowToCombineTransforms "Compose")
-(Optimizer "AdaptiveStochasticGradientDescent")
-(AutomaticParameterEstimation "true")
-(MaximumNumberOfIterations 250)
-(Metric "{metric}")
-(NumberOfHistogramBins 32)
-(ImageSampler "RandomCoordinate")
-(NumberOfSpatialSamples 5000)
-(NewSamplesEveryIteration "true")
-(RequiredRatioOfValidSamples 0.05)
-(RandomSeed 1)
-(ErodeMask "false")
-(WriteResultImage "false")
-"""
+PARAMETERS = pathlib.Path(__file__).resolve().parents[2] / "Testing" / "elastix-rigid.txt"  # those of the benchmark as well
 
 
 def fill_outside(image):
@@ -124,18 +95,20 @@ def fill_outside(image):
 
 
 class Elastix:
-    """elastix: rigid, four resolutions, 250 iterations each, both masks. The start is put into the geometry of the second volume,
-    so that its own transform begins at the identity. The time is that of the whole program, which reads its files too."""
+    """elastix by the parameters of that file, with both masks. The start is put into the geometry of the second volume, so that its
+    own transform begins at the identity. The time is that of the whole program, which reads its files too."""
 
-    METRICS = {"elastix-mi": "AdvancedMattesMutualInformation", "elastix-ncc": "AdvancedNormalizedCorrelation"}
+    # Metric, and iterations on each level: its only stopping rule. The same as in the benchmark.
+    SETTINGS = {"elastix-mi-250": ("AdvancedMattesMutualInformation", 250), "elastix-mi-1000": ("AdvancedMattesMutualInformation", 1000),
+                "elastix-ncc-250": ("AdvancedNormalizedCorrelation", 250)}
 
-    def __init__(self, metric):
-        self.metric = metric
+    def __init__(self, metric, iterations):
+        self.added = f'(Metric "{metric}")\n(MaximumNumberOfIterations {iterations})\n'
 
     def align(self, case, start, limit):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
-            (folder / "parameters.txt").write_text(PARAMETERS.format(metric=self.metric))
+            (folder / "parameters.txt").write_text(PARAMETERS.read_text() + self.added)
             for number, motion in ((0, np.eye(4)), (1, start.motion)):
                 image = case.image(number)
                 echorama.vtkUltrasoundVolume.Move(image, matrix_of(motion))
@@ -147,7 +120,7 @@ class Elastix:
                 writer.Write()
             masks = [[flag, folder / f"{number}.ValidRegion.mha"] for number, flag in ((0, "-fMask"), (1, "-mMask"))]
             begin, before = time.monotonic(), cpu_seconds()
-            done = run_program(["elastix", "-f", folder / "0.mha", "-m", folder / "1.mha", "-out", folder, "-threads", 2, "-p",
+            done = run_program(["elastix", "-f", folder / "0.mha", "-m", folder / "1.mha", "-out", folder, "-p",
                                 folder / "parameters.txt", *[word for mask in masks if mask[1].exists() for word in mask]], limit)
             seconds = time.monotonic() - begin
             result = folder / "TransformParameters.0.txt"
@@ -179,7 +152,7 @@ def contestants(program, own=()):
     """By name. `own`: "NAME=OPTIONS of echorama align" of the user."""
     found = {"echorama": Echorama(program), "search": Echorama(program, ["--method", "search", "--set", "MinimumOverlap=0.15"])}
     if shutil.which("elastix"):
-        found.update({name: Elastix(metric) for name, metric in Elastix.METRICS.items()})
+        found.update({name: Elastix(*settings) for name, settings in Elastix.SETTINGS.items()})
     for text in own:
         name, _, options = text.partition("=")
         found[name] = Echorama(program, options.split())

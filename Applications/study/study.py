@@ -126,7 +126,7 @@ def main(arguments=None):
     command.add_argument("folder", type=pathlib.Path)
     command.add_argument("--pairs", nargs="+", choices=[*PAIRS, *ANATOMY_PAIRS], metavar="NAME",
                          help=f"some of: {' '.join([*PAIRS, *ANATOMY_PAIRS])}")
-    command.add_argument("--anatomy", action="store_true", help="pairs of a synthesised abdomen, half a minute each, instead of the phantom's")
+    command.add_argument("--anatomy", action="store_true", help="pairs of a synthesised abdomen, half a minute for each volume, instead of the phantom's")
     command.add_argument("--repeats", type=int, default=1, help="pairs of each kind (default 1)")
     command.add_argument("--seed", type=int, default=1)
     command.add_argument("--spacing", type=float, default=1.0, help="edge of the voxels, mm (default 1)")

@@ -2,11 +2,12 @@
 // Hand-eye calibration: how far C places the centre of the volume from its true place, root mean square over trials, beside the
 // Cramer-Rao bound of the same trials, and how often the stated 95% sphere holds the truth. Poses are drawn anew for each trial
 // (HandEyeSimulation.h): turns about directions at random by up to 60 or 15 degrees, lever 150 mm, noise of 0.25 degrees and 0.7
-// mm per axis on both sides or on the sensor's alone. Trials that ours refuses, because the poses drawn turn too little, are left
-// out for all and counted.
+// mm per axis on both sides or on the sensor's alone.
 //
-// Peers: the closed forms, and OpenCV's calibrateHandEye where it is installed, on the same data. Trials in which a peer throws,
-// or gives no number, are counted as its failures and are not in its errors.
+// Peers: the closed forms, and OpenCV's calibrateHandEye where it is installed. All get the data of all trials. A trial has no
+// answer from one that refuses it (ours does where poses turn too little, or another calibration fits nearly as well), throws, or
+// gives no number; the error and the bound of a line are over the trials that its method answers. So that the peers can be
+// compared with ours where it refuses some, error_where_ours_answers is theirs over the others alone.
 //
 // The case ethz: two recordings of one rig with a motion-capture system and a camera. Error: how far apart the two calibrations
 // put the camera's centre; and, beside it, the target, the board's mean place.
@@ -99,17 +100,18 @@ bool Solved(const Solver& solver, const std::vector<HandEyePair>& pairs, Pose& p
 }
 
 struct Tally {
-  double squares = 0.0;
-  int trials = 0, failures = 0;
+  double squares = 0.0, bounds = 0.0;
   std::vector<double> errors, seconds;
-  void Add(double error, double time)
+  void Add(double error, double time, double bound = NaN)
   {
     squares += error * error;
-    ++trials;
+    bounds += bound;
     errors.push_back(error);
     seconds.push_back(time);
   }
-  double Rms() const { return trials > 0 ? std::sqrt(squares / trials) : NaN; }
+  int Answers() const { return static_cast<int>(errors.size()); }
+  double Rms() const { return errors.empty() ? NaN : std::sqrt(squares / Answers()); }
+  double Bound() const { return errors.empty() ? NaN : std::sqrt(bounds / Answers()); }
   static double Median(std::vector<double> values)
   {
     if (values.empty())
@@ -136,80 +138,74 @@ void Simulate(const std::string& name, HandEyeScenario scenario, int trials, boo
   parameters.estimateNoise = estimateNoise;
   const auto peers = withPeers ? Contestants() : std::vector<std::pair<std::string, Solver>>();
   Tally ours, clean, oursBesideClean;
-  std::map<std::string, Tally> theirs;
-  double bound = 0.0, radius = 0.0;
-  int refused = 0, inside = 0, wronglyKept = 0, wronglyLeft = 0;
+  std::map<std::string, Tally> theirs, beside; // beside: over what ours answers
+  double radius = 0.0;
+  int inside = 0, wronglyKept = 0, wronglyLeft = 0, cleanRefused = 0;
   for (int trial = 0; trial < trials; ++trial) {
     scenario.seed = 1000 + static_cast<std::uint64_t>(trial);
     const HandEyeSimulation simulation = SimulateHandEye(scenario);
     const Eigen::Vector3d truth = simulation.truth.volumeToSensor * scenario.target;
+    const double bound = HandEyeBound(scenario, simulation).trace();
+    const auto errorOf = [&scenario, &truth](const Pose& C) { return (C * scenario.target - truth).norm(); };
     HandEyeResult result;
-    double seconds = 0.0;
-    try {
-      seconds = benchmark::Seconds([&] { result = CalibrateHandEye(simulation.pairs, parameters); });
-    } catch (const Error& error) {
-      if (error.GetKind() != Error::Kind::NotPossible)
-        throw;
-      ++refused;
-      continue;
-    }
-    const double error = (result.solution.volumeToSensor * scenario.target - truth).norm();
-    ours.Add(error, seconds);
-    inside += error <= result.targetRadius95Mm ? 1 : 0;
-    radius += result.targetRadius95Mm;
-    bound += HandEyeBound(scenario, simulation).trace();
-    for (std::size_t i = 0; i < result.residuals.size(); ++i) {
-      wronglyKept += result.residuals[i].inlier && simulation.isOutlier[i] ? 1 : 0;
-      wronglyLeft += !result.residuals[i].inlier && !simulation.isOutlier[i] ? 1 : 0;
-    }
-    if (scenario.outliers > 0) { // the scans that are right, alone
-      const std::vector<HandEyePair> pairs(simulation.pairs.begin() + scenario.outliers, simulation.pairs.end());
-      Pose C = Pose::Identity();
-      const auto calibrate = [&parameters](const std::vector<HandEyePair>& scans) {
-        return CalibrateHandEye(scans, parameters).solution.volumeToSensor;
-      };
-      if (Solved(calibrate, pairs, C)) {
-        clean.Add((C * scenario.target - truth).norm(), 0.0);
-        oursBesideClean.Add(error, 0.0);
-      } else
-        ++clean.failures;
+    const auto calibrate = [&parameters, &result](const std::vector<HandEyePair>& pairs) {
+      result = CalibrateHandEye(pairs, parameters);
+      return result.solution.volumeToSensor;
+    };
+    Pose C = Pose::Identity();
+    bool answered = false;
+    const double seconds = benchmark::Seconds([&] { answered = Solved(calibrate, simulation.pairs, C); });
+    if (answered) {
+      const double error = errorOf(C);
+      ours.Add(error, seconds, bound);
+      inside += error <= result.targetRadius95Mm ? 1 : 0;
+      radius += result.targetRadius95Mm;
+      for (std::size_t i = 0; i < result.residuals.size(); ++i) {
+        wronglyKept += result.residuals[i].inlier && simulation.isOutlier[i] ? 1 : 0;
+        wronglyLeft += !result.residuals[i].inlier && !simulation.isOutlier[i] ? 1 : 0;
+      }
+      if (scenario.outliers > 0) { // the scans that are right, alone
+        if (Solved(calibrate, {simulation.pairs.begin() + scenario.outliers, simulation.pairs.end()}, C)) {
+          clean.Add(errorOf(C), 0.0);
+          oursBesideClean.Add(error, 0.0);
+        } else
+          ++cleanRefused;
+      }
     }
     for (const auto& peer : peers) {
-      Pose C = Pose::Identity();
       bool solved = false;
       const double time = benchmark::Seconds([&] { solved = Solved(peer.second, simulation.pairs, C); });
-      if (solved)
-        theirs[peer.first].Add((C * scenario.target - truth).norm(), time);
-      else
-        ++theirs[peer.first].failures;
+      if (!solved)
+        continue;
+      theirs[peer.first].Add(errorOf(C), time, bound);
+      if (answered)
+        beside[peer.first].Add(errorOf(C), time);
     }
   }
-  const double best = std::sqrt(bound / ours.trials);
   const std::string testCase =
       name + ", " + std::to_string(scenario.poses) + " poses, " + std::to_string(static_cast<int>(scenario.degrees)) + " degrees";
-  nlohmann::ordered_json more{{"bound", best},
-                              {"error_over_bound", ours.Rms() / best},
-                              {"median", ours.MedianError()},
-                              {"inside_95", static_cast<double>(inside) / ours.trials},
-                              {"radius_95", radius / ours.trials},
-                              {"asked", trials},
-                              {"trials", ours.trials},
-                              {"refused", refused},
-                              {"wrongly_left_out", wronglyLeft},
-                              {"wrongly_kept", wronglyKept}};
-  if (clean.trials > 0) {
-    more["without_outliers"] = clean.Rms();
-    more["without_outliers_refused"] = clean.failures;
-    more["ratio_to_clean"] = oursBesideClean.Rms() / clean.Rms();
-  }
+  const auto of = [trials](const Tally& tally) {
+    return nlohmann::ordered_json{{"bound", tally.Bound()},
+                                  {"error_over_bound", tally.Rms() / tally.Bound()},
+                                  {"median", tally.MedianError()},
+                                  {"trials", trials},
+                                  {"no_answer", trials - tally.Answers()}};
+  };
+  nlohmann::ordered_json more = of(ours);
+  more.update({{"inside_95", static_cast<double>(inside) / ours.Answers()},
+               {"radius_95", radius / ours.Answers()},
+               {"wrongly_left_out", wronglyLeft},
+               {"wrongly_kept", wronglyKept}});
+  if (scenario.outliers > 0)
+    more.update({{"without_outliers", clean.Rms()},
+                 {"without_outliers_no_answer", cleanRefused},
+                 {"ratio_to_clean", oursBesideClean.Rms() / clean.Rms()}});
   benchmark::Report("handeye", testCase, "maximum-likelihood", ours.MedianSeconds(), ours.Rms(), "mm", more);
   for (const auto& peer : peers) {
     const Tally& tally = theirs[peer.first];
-    benchmark::Report("handeye", testCase, peer.first, tally.MedianSeconds(), tally.Rms(), "mm",
-                      {{"error_over_bound", tally.Rms() / best},
-                       {"median", tally.MedianError()},
-                       {"trials", tally.trials},
-                       {"failures", tally.failures}});
+    nlohmann::ordered_json told = of(tally);
+    told["error_where_ours_answers"] = beside[peer.first].Rms();
+    benchmark::Report("handeye", testCase, peer.first, tally.MedianSeconds(), tally.Rms(), "mm", told);
   }
 }
 
