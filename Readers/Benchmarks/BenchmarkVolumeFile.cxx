@@ -104,14 +104,14 @@ void OtherFormats(const fs::path& folder, int n, const Voxels& voxels)
       double vtkSeconds = 0.0;
       std::tie(writeSeconds, vtkSeconds) = Duel(write, [&] { writer->Write(); });
       read(theirs);
-      Report("volume_file", name + " write", "vtkNIFTIImageWriter", vtkSeconds, Different(voxels, back.data()), "voxels",
+      Report("volume_file", name + " write", "VTK", vtkSeconds, Different(voxels, back.data()), "voxels",
              {{"file_mb", Megabytes(theirs)}});
       std::tie(readSeconds, vtkSeconds) = Duel([&] { read(theirs); },
                                                [&] {
                                                  reader->Modified();
                                                  reader->Update();
                                                });
-      Report("volume_file", name + " read", "vtkNIFTIImageReader", vtkSeconds,
+      Report("volume_file", name + " read", "VTK", vtkSeconds,
              Different(voxels, static_cast<unsigned char*>(reader->GetOutput()->GetScalarPointer())), "voxels");
     }
 #endif
@@ -166,9 +166,9 @@ int main()
       reader->Update();
     };
     const auto [readSeconds, vtkReadSeconds] = Duel([&] { back = Read(theirs); }, vtkRead);
-    Report("volume_file", name + " write", "vtkMetaImageWriter", vtkWriteSeconds, Different(voxels, Read(theirs).data()),
-           "voxels", megabytes(theirs));
-    Report("volume_file", name + " read", "vtkMetaImageReader", vtkReadSeconds,
+    Report("volume_file", name + " write", "VTK", vtkWriteSeconds, Different(voxels, Read(theirs).data()), "voxels",
+           megabytes(theirs));
+    Report("volume_file", name + " read", "VTK", vtkReadSeconds,
            Different(voxels, static_cast<unsigned char*>(reader->GetOutput()->GetScalarPointer())), "voxels");
 #else
     const double writeSeconds = MedianSeconds(write), readSeconds = MedianSeconds(read);

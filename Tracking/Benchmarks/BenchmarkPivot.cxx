@@ -81,8 +81,10 @@ int main()
     const std::vector<TimedPose> poses = Recorded(c, 1);
     const auto [oursSeconds, plainSeconds] =
         benchmark::Duel([&] { CalibratePivot(poses, parameters); }, [&] { StackedLeastSquares(poses); }, 21);
-    benchmark::Report("pivot", c.name, "ours", oursSeconds, std::sqrt(ours / Trials), "mm",
-                      {{"stated", std::sqrt(stated / Trials)}, {"region_held", held / static_cast<double>(Trials)}});
-    benchmark::Report("pivot", c.name, "least squares (SVD)", plainSeconds, std::sqrt(plain / Trials), "mm");
+    benchmark::Report(
+        "pivot", c.name, "ours", oursSeconds, std::sqrt(ours / Trials), "mm",
+        {{"trials", Trials}, {"stated", std::sqrt(stated / Trials)}, {"region_held", held / static_cast<double>(Trials)}});
+    benchmark::Report("pivot", c.name, "least squares (SVD)", plainSeconds, std::sqrt(plain / Trials), "mm",
+                      {{"trials", Trials}});
   }
 }

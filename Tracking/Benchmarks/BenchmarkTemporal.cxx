@@ -127,8 +127,10 @@ int main()
         benchmark::Duel([&] { CalibrateTime(streams[0], streams[1]); },
                         [&] { PlainOffset(streams[0], streams[1], std::max(c.firstHz, c.secondHz)); }, 5);
     const double count = std::max(1, answered);
-    benchmark::Report("temporal", c.name, "ours", oursSeconds, 1e3 * std::sqrt(ours / count), "ms",
-                      {{"stated", 1e3 * std::sqrt(stated / count)}, {"held", held / count}, {"answered", answered}});
-    benchmark::Report("temporal", c.name, "differences and correlation", plainSeconds, 1e3 * std::sqrt(plain / Trials), "ms");
+    benchmark::Report(
+        "temporal", c.name, "ours", oursSeconds, 1e3 * std::sqrt(ours / count), "ms",
+        {{"trials", Trials}, {"stated", 1e3 * std::sqrt(stated / count)}, {"held", held / count}, {"answered", answered}});
+    benchmark::Report("temporal", c.name, "differences and correlation", plainSeconds, 1e3 * std::sqrt(plain / Trials), "ms",
+                      {{"trials", Trials}});
   }
 }

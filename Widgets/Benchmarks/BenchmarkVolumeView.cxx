@@ -75,7 +75,7 @@ void BenchScore(const std::vector<Scene>& scenes)
   aligned[2] = aligned[2].Moved(slip);
   LiveScoreResult score;
   const double seconds = benchmark::MedianSeconds([&] { score = live.Update(aligned, 1); }, 101);
-  benchmark::Report("workbench", "score update, three volumes", "LiveScore", seconds, std::abs(score.mean - 1.5), "mm");
+  benchmark::Report("volume_view", "score update, three volumes", "LiveScore", seconds, std::abs(score.mean - 1.5), "mm");
 }
 
 void BenchParticles(const std::vector<Scene>& scenes)
@@ -87,7 +87,7 @@ void BenchParticles(const std::vector<Scene>& scenes)
     Particles particles;
     const double seconds = benchmark::MedianSeconds([&] { particles = MakeParticles(scenes[0].Posed(), parameters); });
     const double sort = benchmark::MedianSeconds([&] { BackToFront({{&particles.positions, {0.5, 0.7, 0.1}, 0.0}}); });
-    benchmark::ReportTime("workbench", "particles of one volume, downsampling " + std::to_string(downsampling), "MakeParticles",
+    benchmark::ReportTime("volume_view", "particles of one volume, downsampling " + std::to_string(downsampling), "MakeParticles",
                           seconds, {{"particles", particles.Count()}, {"sort_seconds", sort}});
   }
 }
@@ -161,19 +161,16 @@ void BenchFrames(const std::vector<Scene>& scenes)
     place(1, 0.0);
     const auto picture = PictureOf(window);
     const int particles = view->GetNumberOfParticles();
-    const auto report = [&, style = std::string(style)](const std::string& how, std::vector<double> seconds, double rms,
-                                                        int count) {
+    const auto report = [&](const std::string& how, std::vector<double> seconds, nlohmann::ordered_json more) {
       std::sort(seconds.begin(), seconds.end());
       std::sort(processor.begin(), processor.end());
-      benchmark::Report("workbench", "3D " + style + ", three volumes, 800 x 600", how, seconds[seconds.size() / 2], rms,
-                        "grey levels RMS",
-                        {{"percentile95_seconds", seconds[seconds.size() * 95 / 100]},
-                         {"slowest_seconds", seconds.back()},
-                         {"processor_seconds", processor[processor.size() / 2]},
-                         {"level", view->GetDetailLevel()},
-                         {"particles", count}});
+      more.update({{"percentile95_seconds", seconds[seconds.size() * 95 / 100]},
+                   {"slowest_seconds", seconds.back()},
+                   {"processor_seconds", processor[processor.size() / 2]},
+                   {"level", view->GetDetailLevel()}});
+      benchmark::ReportTime("volume_view", style, how, seconds[seconds.size() / 2], more);
     };
-    report("full", full, 0.0, particles);
+    report("full", full, {{"particles", particles}});
     processor.clear();
     view->SetInteractive(true);
     for (int frame = 0; frame < 60; ++frame) {
@@ -184,7 +181,8 @@ void BenchFrames(const std::vector<Scene>& scenes)
     }
     place(1, 0.0);
     const auto coarse = PictureOf(window);
-    report("dragging", drag, Rms(coarse, picture), view->GetNumberOfParticles());
+    report("dragging", drag,
+           {{"particles", view->GetNumberOfParticles()}, {"error", Rms(coarse, picture)}, {"error_unit", "grey levels RMS"}});
     view->SetInteractive(false);
   }
 }

@@ -118,7 +118,7 @@ int main()
   for (const double t : {0.1, 0.2, 0.3, 0.4, 0.5}) {
     AlignSearchParameters p;
     p.minimumOverlap = t;
-    trials.Run("search", p, 20, true);
+    trials.Run("search", p, 10, true);
   }
   for (const int points : {1000, 3000, 10000, 40000}) {
     AlignSearchParameters p;
@@ -127,6 +127,6 @@ int main()
   }
   AlignSearchParameters once;
   once.repeats = 0;
-  trials.Run("search without repeats", once, 20);
+  trials.Run("search without repeats", once, 10);
   return 0;
 }

@@ -2,8 +2,10 @@
 // Stitching, all methods in one table: time, also over that of a plain average in turn, processor time, the largest memory per
 // voxel of the output, and what became of the image (MeasureStitch): seams, texture, and the error against the truth inside and
 // outside overlaps. The truth of a synthetic case is the anatomy without speckle, so that its error favours averages; that of the
-// liver is its full reconstruction, which is itself an average. The peer does the plain average with filters of VTK: reslice
-// each volume and its mask onto the grid, multiply, sum, divide.
+// liver is its full reconstruction, which is itself an average. The peer does the plain average with filters of VTK: each volume
+// and its mask, as the two components of one image, are resliced onto the part of the grid that the volume covers, and summed up
+// over that part by vtkSMPTools. Ours and the peer are timed in turn, equally often.
+//
 // Arguments: [word of a case's name]... [--methods word...] [--runs N]; without words all cases, all methods, three runs.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -17,18 +19,18 @@
 #include <fstream>
 #include <functional>
 #include <malloc.h>
+#include <tbb/info.h>
 
 #ifdef ECHORAMA_WITH_VTK
 #include <vtkImageData.h>
-#include <vtkImageMathematics.h>
 #include <vtkImageReslice.h>
 #include <vtkMatrix4x4.h>
 #include <vtkMatrixToLinearTransform.h>
 #include <vtkMetaImageReader.h>
+#include <vtkMultiThreader.h>
 #include <vtkNew.h>
-#include <vtkPointData.h>
 #include <vtkSmartPointer.h>
-#include <vtkUnsignedCharArray.h>
+#include <vtkSMPTools.h>
 #endif
 
 using namespace echorama;
@@ -250,7 +252,7 @@ Result Stitched(const Case& scene, const StitchParameters& parameters)
 
 // One line: a stitching, timed in turn with the plain average.
 void Contest(const Case& scene, const std::string& method, const std::function<Result()>& stitch,
-             const std::function<Result()>& average, int runs)
+             const std::function<Result()>& average, int runs, int threads)
 {
   Result result;
   double peak = 0.0;
@@ -291,75 +293,85 @@ void Contest(const Case& scene, const std::string& method, const std::function<R
                      {"error_overlap", quality.errorOverlap},
                      {"error_outside", quality.errorOutside},
                      {"overlap_voxels", quality.overlapVoxels},
-                     {"voxels", result.valid.View().Size()}});
+                     {"voxels", result.valid.View().Size()},
+                     {"runs", runs},
+                     {"threads", threads}});
 }
 
 #ifdef ECHORAMA_WITH_VTK
 
-vtkSmartPointer<vtkImageData> VtkImageOf(const Volume<Byte>& voxels, const ImageGeometry& geometry)
+// Values, and 255 where they are real. Those that are not real are 0, so that the quotient of the two interpolated components is
+// that of the real ones alone.
+vtkSmartPointer<vtkImageData> VtkImageOf(const Volume<Byte>& values, const Volume<Byte>& mask, const ImageGeometry& geometry)
 {
   auto image = vtkSmartPointer<vtkImageData>::New();
   image->SetDimensions(geometry.dimensions.data());
   image->SetSpacing(geometry.spacing.data());
-  vtkNew<vtkUnsignedCharArray> array;
-  array->SetArray(const_cast<Byte*>(voxels.View().Data()), voxels.View().Size(), 1);
-  image->GetPointData()->SetScalars(array);
+  image->AllocateScalars(VTK_UNSIGNED_CHAR, 2);
+  auto* pairs = static_cast<Byte*>(image->GetScalarPointer());
+  for (std::ptrdiff_t at = 0; at < values.View().Size(); ++at) {
+    pairs[2 * at] = mask.View()[at] ? values.View()[at] : Byte(0);
+    pairs[2 * at + 1] = mask.View()[at] ? Byte(255) : Byte(0);
+  }
   return image;
 }
 
-// The chain: voxels outside of a mask are 0 already, so that they add nothing to the sum.
-Result VtkAverage(const Case& scene, const std::vector<vtkSmartPointer<vtkImageData>>& values,
-                  const std::vector<vtkSmartPointer<vtkImageData>>& masks)
+Result VtkAverage(const Case& scene, const std::vector<vtkSmartPointer<vtkImageData>>& images)
 {
   const auto& n = scene.grid.dimensions;
-  vtkSmartPointer<vtkImageData> sum, count;
-  for (std::size_t v = 0; v < values.size(); ++v) {
+  Result result{Volume<Byte>(n), Volume<Byte>(n), Volume<Byte>(n)};
+  Volume<float> sum(n);
+  for (std::size_t v = 0; v < images.size(); ++v) {
     // From the grid to the volume's own axes and origin: the reslicer knows of no directions.
     const ImageGeometry& geometry = scene.geometries[v];
-    Eigen::Affine3d map = geometry.WorldToIndex() * scene.grid.IndexToWorld() * scene.grid.spacing.cwiseInverse().asDiagonal();
-    map = geometry.spacing.asDiagonal() * map;
+    const Eigen::Affine3d toIndex = geometry.WorldToIndex() * scene.grid.IndexToWorld();
+    const Eigen::Affine3d map(geometry.spacing.asDiagonal() * toIndex * scene.grid.spacing.cwiseInverse().asDiagonal());
     const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = map.matrix();
     vtkNew<vtkMatrix4x4> matrix;
     matrix->DeepCopy(rows.data());
     vtkNew<vtkMatrixToLinearTransform> transform;
     transform->SetInput(matrix);
-    const auto reslice = [&](vtkImageData* image, bool linear, int type) {
-      vtkNew<vtkImageReslice> filter;
-      filter->SetInputData(image);
-      filter->SetResliceTransform(transform);
-      filter->SetOutputOrigin(0.0, 0.0, 0.0);
-      filter->SetOutputSpacing(scene.grid.spacing.data());
-      filter->SetOutputExtent(0, n[0] - 1, 0, n[1] - 1, 0, n[2] - 1);
-      filter->SetInterpolationMode(linear ? VTK_RESLICE_LINEAR : VTK_RESLICE_NEAREST);
-      filter->SetOutputScalarType(type);
-      filter->Update();
-      return vtkSmartPointer<vtkImageData>(filter->GetOutput());
-    };
-    const auto combine = [](vtkImageData* a, vtkImageData* b, int operation) {
-      vtkNew<vtkImageMathematics> filter;
-      filter->SetOperation(operation);
-      filter->SetInput1Data(a);
-      filter->SetInput2Data(b);
-      filter->DivideByZeroToCOn();
-      filter->SetConstantC(0.0);
-      filter->Update();
-      return vtkSmartPointer<vtkImageData>(filter->GetOutput());
-    };
-    const auto mask = reslice(masks[v], false, VTK_FLOAT);
-    const auto part = combine(reslice(values[v], true, VTK_FLOAT), mask, VTK_MULTIPLY);
-    sum = sum ? combine(sum, part, VTK_ADD) : part;
-    count = count ? combine(count, mask, VTK_ADD) : mask;
-    if (v + 1 == values.size())
-      sum = combine(sum, count, VTK_DIVIDE);
+    const Eigen::Vector3d size(geometry.dimensions[0], geometry.dimensions[1], geometry.dimensions[2]);
+    Eigen::AlignedBox3d box; // voxels reach half a step beyond their centres
+    for (int corner = 0; corner < 8; ++corner)
+      box.extend(toIndex.inverse() *
+                 (Eigen::Vector3d(corner & 1, corner >> 1 & 1, corner >> 2).cwiseProduct(size).array() - 0.5).matrix());
+    int extent[6];
+    for (int axis = 0; axis < 3; ++axis) {
+      extent[2 * axis] = std::clamp(static_cast<int>(std::floor(box.min()[axis])), 0, n[axis] - 1);
+      extent[2 * axis + 1] = std::clamp(static_cast<int>(std::ceil(box.max()[axis])), 0, n[axis] - 1);
+    }
+    vtkNew<vtkImageReslice> filter;
+    filter->SetInputData(images[v]);
+    filter->SetResliceTransform(transform);
+    filter->SetOutputOrigin(0.0, 0.0, 0.0);
+    filter->SetOutputSpacing(scene.grid.spacing.data());
+    filter->SetOutputExtent(extent);
+    filter->SetInterpolationModeToLinear();
+    filter->SetOutputScalarType(VTK_FLOAT);
+    filter->Update();
+    vtkImageData* part = filter->GetOutput();
+    vtkSMPTools::For(extent[4], extent[5] + 1, [&](int begin, int end) {
+      for (int k = begin; k < end; ++k)
+        for (int j = extent[2]; j <= extent[3]; ++j) {
+          const auto* pair = static_cast<const float*>(part->GetScalarPointer(extent[0], j, k));
+          float* row = sum.View().Row(j, k);
+          Byte* coverage = result.coverage.View().Row(j, k);
+          for (int i = extent[0]; i <= extent[1]; ++i, pair += 2)
+            if (pair[1] > 127.5f) {
+              row[i] += 255.0f * pair[0] / pair[1];
+              ++coverage[i];
+            }
+        }
+    });
   }
-  Result result{Volume<Byte>(n), Volume<Byte>(n), Volume<Byte>(n)};
-  const float* mean = static_cast<const float*>(sum->GetScalarPointer());
-  const float* covered = static_cast<const float*>(count->GetScalarPointer());
-  for (std::ptrdiff_t at = 0; at < result.valid.View().Size(); ++at) {
-    result.intensity.View()[at] = static_cast<Byte>(mean[at] + 0.5f);
-    result.coverage.View()[at] = static_cast<Byte>(covered[at]);
-    result.valid.View()[at] = covered[at] > 0.0f;
-  }
+  vtkSMPTools::For(0, result.valid.View().Size(), [&](vtkIdType begin, vtkIdType end) {
+    for (vtkIdType at = begin; at < end; ++at)
+      if (const Byte count = result.coverage.View()[at]; count > 0) {
+        result.intensity.View()[at] = static_cast<Byte>(sum.View()[at] / static_cast<float>(count) + 0.5f);
+        result.valid.View()[at] = 1;
+      }
+  });
   return result;
 }
 
@@ -435,7 +447,7 @@ bool Liver(Case& scene)
 
 struct Wanted {
   std::vector<std::string> cases, methods; // words, one of which a name must contain; none: all
-  int runs = 3;
+  int runs = benchmark::Trials(3);
 
   static bool Has(const std::vector<std::string>& words, const std::string& name)
   {
@@ -475,18 +487,18 @@ void Measure(const Case& scene, const Wanted& wanted)
   const std::function<Result()> average = with(StitchMethod::Average, StitchTexture::Mix);
   for (const Contender& contender : contenders)
     if (Wanted::Has(wanted.methods, contender.name))
-      Contest(scene, contender.name, with(contender.method, contender.texture), average, wanted.runs);
+      Contest(scene, contender.name, with(contender.method, contender.texture), average, wanted.runs,
+              tbb::info::default_concurrency());
 #ifdef ECHORAMA_WITH_VTK
   const char* peer = "vtk reslice and average";
   if (!Wanted::Has(wanted.methods, peer))
     return;
-  std::vector<vtkSmartPointer<vtkImageData>> values, masks;
-  for (std::size_t v = 0; v < scene.values.size(); ++v) {
-    values.push_back(VtkImageOf(scene.values[v], scene.geometries[v]));
-    masks.push_back(VtkImageOf(scene.masks[v], scene.geometries[v]));
-  }
+  std::vector<vtkSmartPointer<vtkImageData>> images;
+  for (std::size_t v = 0; v < scene.values.size(); ++v)
+    images.push_back(VtkImageOf(scene.values[v], scene.masks[v], scene.geometries[v]));
   Contest(
-      scene, peer, [&] { return VtkAverage(scene, values, masks); }, average, 1);
+      scene, peer, [&] { return VtkAverage(scene, images); }, average, wanted.runs,
+      vtkMultiThreader::GetGlobalDefaultNumberOfThreads());
 #endif
 }
 
@@ -506,8 +518,8 @@ int main(int argc, char** argv)
       words->push_back(argument);
   }
   const std::pair<const char*, std::function<Case()>> synthetic[] = {
-      {"chain of 3, 96^3", [] { return Chain(96); }},      {"chain of 3, 128^3", [] { return Chain(128); }},
-      {"2 fans, 160^3", [] { return Fans(2, 160, 0.5); }}, {"5 fans, 96^3", [] { return Fans(5, 96, 0.3); }},
+      {"chain of 3, 96^3", [] { return Chain(96); }},
+      {"5 fans, 96^3", [] { return Fans(5, 96, 0.3); }},
       {"chain of 3, 256^3", [] { return Chain(256); }},
   };
   for (const auto& [name, make] : synthetic)

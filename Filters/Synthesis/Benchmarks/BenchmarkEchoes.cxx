@@ -196,7 +196,7 @@ int main()
                {"per_second", static_cast<double>(scatterers.Count()) / makeSeconds},
                {"memory_mb", static_cast<double>(scatterers.MemoryBytes()) / 1e6},
                {"per_mm3", tissue.scattererDensity}});
-  benchmark::Report("echoes", "scatterers of a volume", "hashed lattice in bricks", makeSeconds, 0.0, "none", made);
+  benchmark::ReportTime("echoes", "scatterers of a volume", "hashed lattice in bricks", makeSeconds, made);
 
   // Beams all over the volume for the comparison.
   std::vector<const SoundSegment*> some;
@@ -223,8 +223,12 @@ int main()
       rows.emplace_back(row.begin(), row.end());
     pairsOf[reach] = static_cast<double>(pairs) / count;
     const double cpu = line["cpu_seconds"].get<double>() / count;
-    line.update(
-        {{"cpu_seconds", cpu}, {"reach", reach}, {"pairs", pairsOf[reach]}, {"pairs_per_cpu_second", pairsOf[reach] / cpu}});
+    line.update({{"cpu_seconds", cpu},
+                 {"reach", reach},
+                 {"pairs", pairsOf[reach]},
+                 {"pairs_per_cpu_second", pairsOf[reach] / cpu},
+                 {"runs", 1},
+                 {"threads", 1}});
     benchmark::Report("echoes", "one beam", "peer: plain loop in double precision", seconds / count, RelativeError(rows, exact),
                       "relative rms", line);
   }
@@ -234,11 +238,15 @@ int main()
       for (std::size_t b = 0; b < some.size(); ++b)
         rows[b] = RowOf(*some[b], scatterers, transducer, axis, wide);
     };
-    sum();
     double seconds = 0.0;
     nlohmann::ordered_json line = Timed(sum, seconds);
     const double cpu = line["cpu_seconds"].get<double>() / count;
-    line.update({{"cpu_seconds", cpu}, {"reach", reach}, {"pairs", pairs}, {"pairs_per_cpu_second", pairs / cpu}});
+    line.update({{"cpu_seconds", cpu},
+                 {"reach", reach},
+                 {"pairs", pairs},
+                 {"pairs_per_cpu_second", pairs / cpu},
+                 {"runs", 1},
+                 {"threads", 1}});
     benchmark::Report("echoes", "one beam", "ours", seconds / count, RelativeError(rows, exact), "relative rms", line);
   }
 
@@ -255,6 +263,6 @@ int main()
   std::vector<Row> compared;
   for (std::size_t i = firstCompared; i < segments.size(); i += comparedApart)
     compared.push_back(rows[i]);
-  line.update({{"threads", 2}});
+  line.update({{"runs", 1}, {"threads", 2}});
   benchmark::Report("echoes", "volume of 128 x 128 beams", "ours", seconds, RelativeError(compared, exact), "relative rms", line);
 }

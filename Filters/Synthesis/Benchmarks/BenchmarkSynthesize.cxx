@@ -46,20 +46,23 @@ SynthesisParameters Volume128()
 }
 
 void ReportRun(const std::string& name, const std::string& method, double seconds, double sceneSeconds, const SynthesisCost& cost,
-               const TissueSurface& surface, double error, const char* unit)
+               const TissueSurface& surface, std::optional<double> error, const char* unit)
 {
   const double mb = 1e-6;
-  benchmark::Report("synthesize", name, method, seconds, error, unit,
-                    {{"triangles", surface.triangles.size()},
-                     {"scene_seconds", sceneSeconds},
-                     {"rays_seconds", cost.raysSeconds},
-                     {"scatterers_seconds", cost.scatterersSeconds},
-                     {"echoes_seconds", cost.echoesSeconds},
-                     {"detection_seconds", cost.detectionSeconds},
-                     {"rays", cost.rays},
-                     {"segments", cost.segments},
-                     {"scatterers", cost.scatterers},
-                     {"held_mb", mb * static_cast<double>(cost.bytes)}});
+  const nlohmann::ordered_json more{{"triangles", surface.triangles.size()},
+                                    {"scene_seconds", sceneSeconds},
+                                    {"rays_seconds", cost.raysSeconds},
+                                    {"scatterers_seconds", cost.scatterersSeconds},
+                                    {"echoes_seconds", cost.echoesSeconds},
+                                    {"detection_seconds", cost.detectionSeconds},
+                                    {"rays", cost.rays},
+                                    {"segments", cost.segments},
+                                    {"scatterers", cost.scatterers},
+                                    {"held_mb", mb * static_cast<double>(cost.bytes)}};
+  if (error)
+    benchmark::Report("synthesize", name, method, seconds, *error, unit, more);
+  else
+    benchmark::ReportTime("synthesize", name, method, seconds, more);
 }
 
 // Root of the mean squared difference of two volumes of grey.
@@ -83,13 +86,12 @@ void WholeVolume(std::int64_t triangles, const std::string& name)
     SynthesisCost cost;
     Volume<unsigned char> beams;
     const double seconds = benchmark::Seconds([&] { beams = SynthesizeBeams(*scene, p, {}, &cost); });
-    double error = 0.0;
+    std::optional<double> error;
     if (rays == 1) { // the same on one thread: the difference must be nothing
       const ThreadLimit limit(1);
       error = Rms(beams, SynthesizeBeams(*scene, p));
     }
-    ReportRun(name, rays == 1 ? "1 ray an element" : "8 rays an element", seconds + sceneSeconds, sceneSeconds, cost, surface,
-              error, rays == 1 ? "grey, RMS to one thread" : "");
+    ReportRun(name, std::to_string(rays), seconds + sceneSeconds, sceneSeconds, cost, surface, error, "grey, RMS to one thread");
   }
 }
 
