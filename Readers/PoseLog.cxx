@@ -188,7 +188,7 @@ public:
     if (log_.poses.empty())
       lines_.Fail("it holds no poses");
     if (columns_.pairs && options_.unitMm == 0.0)
-      log_.notes.push_back("lengths were taken as metres, which those who write pairs of poses use; the file does not say");
+      log_.notes.push_back("the file states no unit of length; metres are assumed, as is usual for pairs of poses");
     if (!columns_.pairs && options_.unitMm == 0.0)
       NoteSmallness();
     faults_.Note(log_.notes);
@@ -232,7 +232,7 @@ private:
       }
       before = line_;
     }
-    lines_.Fail("it is no log of poses: no line names columns x, y, z, qw, qx, qy and qz, and none holds the 33 numbers of a "
+    lines_.Fail("not a log of poses: no line names columns x, y, z, qw, qx, qy and qz, and none holds the 33 numbers of a "
                 "time and two matrices");
   }
 
@@ -320,7 +320,7 @@ private:
     ToolPose pose;
     pose.time = Time();
     if (!std::isfinite(pose.time)) {
-      faults_.Add("there is no time; the row was left out", number_);
+      faults_.Add("the row has no time and was skipped", number_);
       return;
     }
     if (columns_.pairs)
@@ -345,9 +345,9 @@ private:
       pose.name = log_.tools[static_cast<std::size_t>(side)];
       pose.status = TransformStatus::Valid;
       if (!NearestPose(matrix, pose.pose))
-        Miss(pose, "the matrix is no pose (a rotation and a translation); it was taken as missing");
+        Miss(pose, "the matrix is not a rigid transform; the pose is treated as missing");
       else if (pose.pose.translation().cwiseAbs().maxCoeff() > LargestMm)
-        Miss(pose, "the position is beyond 1e7 mm; it was taken as missing");
+        Miss(pose, "the position is beyond 1e7 mm; the pose is treated as missing");
       log_.poses.push_back(pose);
     }
   }
@@ -355,7 +355,7 @@ private:
   void TakeSensors(const ToolPose& moment)
   {
     if (cells_.size() <= LastColumn())
-      faults_.Add("the row ends early; what is whole of it was taken", number_);
+      faults_.Add("the row ends early; its complete values were read", number_);
     for (const Sensor& sensor : columns_.sensors) {
       ToolPose pose = moment;
       std::array<double, 7> numbers{};
@@ -401,11 +401,11 @@ private:
     const Eigen::Vector3d place = unit * Eigen::Vector3d(numbers[0], numbers[1], numbers[2]);
     const Eigen::Quaterniond turn(numbers[3], numbers[4], numbers[5], numbers[6]);
     if (!place.allFinite() || !turn.coeffs().allFinite())
-      Miss(pose, "a number is not finite; the pose was taken as missing");
+      Miss(pose, "a number is not finite; the pose is treated as missing");
     else if (place.cwiseAbs().maxCoeff() > LargestMm)
-      Miss(pose, "the position is beyond 1e7 mm; the pose was taken as missing");
+      Miss(pose, "the position is beyond 1e7 mm; the pose is treated as missing");
     else if (!(std::fabs(turn.norm() - 1.0) <= QuaternionTolerance))
-      Miss(pose, "the length of the quaternion is not 1; the pose was taken as missing");
+      Miss(pose, "the length of the quaternion is not 1; the pose is treated as missing");
     else {
       pose.pose.linear() = turn.normalized().toRotationMatrix();
       pose.pose.translation() = place;
@@ -448,7 +448,7 @@ PoseLog ReadSequencePoses(const std::string& path, const PoseLogOptions& options
     const SequenceFrame frame = file.Frame(index);
     const double time = options.rowsPerSecond > 0.0 ? index / options.rowsPerSecond : frame.time;
     if (timed && !std::isfinite(time)) {
-      faults.Add("there is no time; its poses were left out", index);
+      faults.Add("the frame has no time; its poses were skipped", index);
       continue;
     }
     for (const SequenceTransform& transform : frame.transforms) {
@@ -468,7 +468,7 @@ PoseLog ReadSequencePoses(const std::string& path, const PoseLogOptions& options
         } else {
           pose.pose = Pose::Identity();
           pose.status = TransformStatus::Missing;
-          faults.Add(pose.name + " is no pose (a rotation and a translation); it was taken as missing", index);
+          faults.Add(pose.name + " is not a rigid transform; it is treated as missing", index);
         }
       }
       log.poses.push_back(pose);
@@ -504,10 +504,9 @@ void SortByTime(PoseLog& log)
     before->second = pose.time;
   }
   if (wrong > 0)
-    log.notes.push_back("the times do not rise " + std::to_string(wrong) + " times, at " + NumberText(first) +
-                        " s for the first time" +
+    log.notes.push_back("the times do not increase at " + std::to_string(wrong) + " rows, first at " + NumberText(first) + " s" +
                         (2 * wrong > static_cast<std::int64_t>(log.poses.size())
-                             ? ": they have too few digits; say how many rows there are a second"
+                             ? ": they have too few digits; give the number of rows per second"
                              : ""));
   std::stable_sort(log.poses.begin(), log.poses.end(), [](const ToolPose& a, const ToolPose& b) { return a.time < b.time; });
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama noise: what an ultrasound machine shows of nothing, in the fan of a probe.
 #include "Commands.h"
+#include "Core/Base/NumberText.h"
 #include "Outputs.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
@@ -115,7 +116,7 @@ Command NoiseCommand(CLI::App& program)
 
   const auto number = [options](const std::string& name, const std::string& text, double low, double high, double preset,
                                 const std::function<void(double)>& set) {
-    options->add_option_function<double>(name, set, text + " [" + Fixed(preset, preset == 0.0 || preset >= 1.0 ? 0 : 4) + "]")
+    options->add_option_function<double>(name, set, text + " [" + NumberText(preset) + "]")
         ->check(CLI::Range(low, high));
   };
   vtkUltrasoundNoiseSource* s = source;

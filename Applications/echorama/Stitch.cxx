@@ -262,7 +262,7 @@ Command StitchCommand(CLI::App& program)
       ->check(CLI::IsMember(NamesFrom(vtkUltrasoundStitcher::GetMethodName)))
       ->capture_default_str();
   options
-      ->add_option("--texture", values->texture, "What becomes of speckle and edges there (not for maximum, multiband, offset)")
+      ->add_option("--texture", values->texture, "What becomes of speckle and edges there (distance, feather and membrane only)")
       ->check(CLI::IsMember(NamesFrom(vtkUltrasoundStitcher::GetTextureName)))
       ->capture_default_str();
   options

@@ -23,7 +23,8 @@ print(reconstructor.GetReport())
 fit = vtkUltrasoundProbeFit() # passes the volume on, with ProbeGeometry and ProbeToWorld
 fit.SetInputConnection(reconstructor.GetOutputPort())
 fit.Update()
-print(f"probe: {100 * fit.GetOverlap():.0f}% overlap, {fit.GetResidualMm():.1f} mm off")
+if fit.GetOverlap() > 0:
+    print(f"probe: {100 * fit.GetOverlap():.0f}% overlap, {fit.GetResidualMm():.1f} mm off")
 
 writer = vtkUltrasoundWriter()
 writer.SetInputData(fit.GetOutput() if fit.GetOverlap() > 0 else reconstructor.GetOutput())

@@ -104,7 +104,7 @@ public:
   ///@}
 
   ///@{
-  /** The angle by which real noise volumes overlap their neighbours, in degrees, from 0. Default 10. */
+  /** The angle by which real noise volumes overlap their neighbours, in degrees, [0, 90]. Default 10. */
   vtkSetClampMacro(OverlapDegrees, double, 0.0, 90.0);
   vtkGetMacro(OverlapDegrees, double);
   ///@}

@@ -20,7 +20,7 @@ void Check(const ScoredVolume& volume)
   if ((volume.aligned.spacing - volume.truth.spacing).cwiseAbs().maxCoeff() > 1e-6 * volume.truth.spacing.maxCoeff())
     throw Error(Error::Kind::BadInput, volume.name + ": its spacing differs from that of its truth");
   if (volume.indexPoints.empty())
-    throw Error(Error::Kind::BadInput, volume.name + ": none of its voxels is real");
+    throw Error(Error::Kind::BadInput, volume.name + ": no voxel is valid and finite");
 }
 
 } // namespace

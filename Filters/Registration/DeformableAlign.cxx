@@ -577,7 +577,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
 {
   parameters.Check();
   if (fixed.empty())
-    throw Error(Error::Kind::BadInput, "there is no volume to deform towards");
+    throw Error(Error::Kind::BadInput, "deformable alignment needs at least one fixed volume");
   CheckVolume(moving);
   for (const DeformableVolume& f : fixed) {
     CheckVolume(f);
@@ -590,9 +590,10 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
   DeformableAlignResult result;
   const Eigen::AlignedBox3d overlap = OverlapBox(fixed, moving, std::max(first, CoarseOctave), result.overlap);
   if (result.overlap < parameters.minimumOverlap)
-    throw Error(Error::Kind::NotPossible,
-                moving.features->name + " lies in the volumes it should agree with by " + std::to_string(100.0 * result.overlap) +
-                    "% of itself; " + std::to_string(100.0 * parameters.minimumOverlap) + "% are asked for (MinimumOverlap)");
+    throw Error(Error::Kind::NotPossible, std::to_string(100.0 * result.overlap) + "% of " + moving.features->name +
+                                              " overlaps the fixed volumes; at least " +
+                                              std::to_string(100.0 * parameters.minimumOverlap) +
+                                              "% is required (MinimumOverlap)");
 
   DisplacementField field;
   Seen warped, tried;
@@ -608,7 +609,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
     level.Warp(DisplacementField(), warped, {});
     const Commons rigid = level.Compare(warped);
     if (std::all_of(rigid.begin(), rigid.end(), [](const Common& c) { return !(c.weight > 0.0); }))
-      throw Error(Error::Kind::NotPossible, moving.features->name + " has nothing to compare in the overlap");
+      throw Error(Error::Kind::NotPossible, moving.features->name + " has no features in the overlap");
     field = field.IsZero() ? DisplacementField(level.Lattice()) : field.SeenOn(level.Lattice());
     Vectors c = field.Coefficients();
     level.Warp(field, warped, {});
@@ -669,7 +670,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
   result.bendingEnergy = field.BendingEnergy();
   result.smallestDeterminant = field.SmallestDeterminant();
   if (!(result.smallestDeterminant > 0.0))
-    result.reason = "the displacement folds space over; more BendingWeight or a wider ControlSpacingMm would keep it smooth";
+    result.reason = "the displacement folds space; increase BendingWeight or ControlSpacingMm";
   else if (!(result.similarityAfter > result.similarityBefore))
     result.reason = "no displacement makes the volumes more alike";
   else {
@@ -686,7 +687,7 @@ std::vector<DeformableAlignResult> DeformInTurn(const std::vector<DeformableVolu
   parameters.Check();
   const int count = static_cast<int>(volumes.size());
   if (count < 2)
-    throw Error(Error::Kind::BadInput, "two volumes are needed at least; " + std::to_string(count) + " came in");
+    throw Error(Error::Kind::BadInput, "deformable alignment needs at least two volumes, got " + std::to_string(count));
   if (fixed < 0 || fixed >= count)
     throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(count) +
                                                    ", counted from 0; it is " + std::to_string(fixed));

@@ -41,10 +41,10 @@ struct DeformableAlignResult {
 /// What a rigid motion leaves over: finds the smooth displacement that makes a moving volume agree with others.
 ///
 /// Free-form deformation (Rueckert et al. 1999): cubic B-splines on a lattice along the axes of the moving volume over the
-/// overlap, whose coefficients minimise the differences of what the metric sees (pseudo-Huber loss, weighted by both volumes,
-/// over the overlap alone) plus bendingWeight times the bending energy, by Levenberg-Marquardt, coarse to fine. Beyond the
-/// overlap nothing but the bending counts, and the field goes smoothly to zero within three spacings of the lattice.
-/// What is left of a rigid motion becomes part of the field.
+/// overlap, whose coefficients minimise W / 2 log(1 - r^2), r the correlation of what the metric sees (weighted by both volumes,
+/// W in all, over the overlap alone) plus bendingWeight times the bending energy, by Levenberg-Marquardt, coarse to fine. Beyond
+/// the overlap nothing but the bending counts, and the field goes smoothly to zero within three spacings of the lattice. What is
+/// left of a rigid motion becomes part of the field.
 ///
 /// A field that folds anywhere, or does not raise the similarity, is not applied: the result says why and holds a zero field.
 /// The result does not depend on the number of threads.

@@ -485,8 +485,8 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
     if (!(ball.radius > 0.0 && ball.radius < 1000.0 && ball.centre.allFinite()))
       throw Error(Error::Kind::BadInput, "rig fit: the ball " + ball.name + " needs a centre and a radius above 0");
   if (static_cast<int>(balls.size()) < p.fewestBalls)
-    throw Error(Error::Kind::BadInput, "rig fit: the rig has " + std::to_string(balls.size()) + " balls; " +
-                                           std::to_string(p.fewestBalls) + " at least are needed");
+    throw Error(Error::Kind::BadInput, "rig fit: the rig has " + std::to_string(balls.size()) + " balls; at least " +
+                                           std::to_string(p.fewestBalls) + " are needed");
   const Scene scene(intensity, valid, geometry, probe);
   const auto candidates = FindCandidates(scene, intensity, static_cast<std::size_t>(p.candidates), progress.Part(0.0, 0.3));
   // The scale matters little for recognition: 2% of distances of some 50 mm.
@@ -495,8 +495,8 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
   const int most = matches.empty() ? 0 : matches.front().balls;
   if (most < p.fewestBalls)
     throw Error(Error::Kind::NotPossible, "rig fit: the rig was not found: of " + std::to_string(candidates.size()) +
-                                              " echoes that may be balls, " + std::to_string(most) +
-                                              " at most lie as the rig's balls do");
+                                              " candidate echoes at most " + std::to_string(most) +
+                                              " match the layout of the rig");
 
   // The few best are refined; what counts is how well they fit then.
   std::vector<Refined> fits;
@@ -509,7 +509,7 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
   const auto check = [&] {
     if (best.found < p.fewestBalls)
       throw Error(Error::Kind::NotPossible,
-                  "rig fit: the rig was not found: " + std::to_string(best.found) + " balls at most fit");
+                  "rig fit: the rig was not found: at most " + std::to_string(best.found) + " balls match");
     const double rms = std::sqrt(best.squared / best.found);
     if (!(rms <= p.largestRmsMm))
       throw Error(Error::Kind::NotPossible, "rig fit: the rig was not found: where it would fit best, " +
@@ -523,8 +523,8 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
     for (const RigBall& ball : balls)
       apart = std::max(apart, (other.pose * ball.centre - best.pose * ball.centre).norm());
     if (other.found == best.found && apart > 2.0 * p.toleranceMm && other.squared < 2.0 * best.squared)
-      throw Error(Error::Kind::NotPossible, "rig fit: two places of the rig explain " + std::to_string(best.found) +
-                                                " balls equally well; more balls must be seen");
+      throw Error(Error::Kind::NotPossible, "rig fit: two poses of the rig explain " + std::to_string(best.found) +
+                                                " balls equally well; a scan that shows more balls is needed");
   }
   progress(0.75);
 

@@ -13,11 +13,9 @@
  * Input 1 (optional, repeatable): the same volumes, in the same order, where they belong. Then the output tells how far they are
  * from there, as vtkUltrasoundAlignmentScore does.
  *
- * | field data      | of        | values                                                                                       |
- * | --------------- | --------- | -------------------------------------------------------------------------------------------- |
- * | VolumeToWorld   | each block | 16 doubles, row by row: the motion here after the one that the input tells (an aligner's), if
- * any | | Score           | the whole | 1 double, mm: with a truth, the mean of the volumes' scores, the fixed one not counted |
- * | VolumeScore     | the whole | mm, one per volume                                                                            |
+ * Field data of each block: VolumeToWorld, 16 doubles row by row, the motion here after the one that the input tells (an
+ * aligner's), if any. With a truth, field data of the whole: Score, the mean of the volumes' scores in mm, the fixed one not
+ * counted, and VolumeScore, mm, one per volume.
  *
  * Fails with a message when a chosen volume is not there, or the truth has not as many volumes, of the same dimensions and
  * spacing, and two or more.

@@ -54,8 +54,7 @@ void CheckRegions(const StitchParameters& parameters, const std::vector<StitchIn
 {
   for (int v = 0; v < regions.Count(); ++v)
     if (regions.InsideCount(v) == 0)
-      throw Error(Error::Kind::BadInput,
-                  inputs[v].name + ": none of its voxels is real (inside its valid region and finite) at a voxel of the output");
+      throw Error(Error::Kind::BadInput, inputs[v].name + ": no voxel is valid and finite at a voxel of the output grid");
   for (int v = 0; v < regions.Count() && !parameters.allowDisjoint; ++v)
     if (regions.OverlapCount(v) == 0)
       throw Error(Error::Kind::NotPossible,
@@ -353,7 +352,7 @@ StitchPlan::StitchPlan(const StitchParameters& parameters, const std::vector<Sti
   : parts_(std::make_unique<Parts>())
 {
   if (inputs.size() < 2)
-    throw Error(Error::Kind::BadInput, "stitching needs at least two volumes; " + std::to_string(inputs.size()) + " came in");
+    throw Error(Error::Kind::BadInput, "stitching needs at least two volumes, got " + std::to_string(inputs.size()));
   for (const StitchInput& input : inputs)
     GeometryOf(input).Check(input.name);
   std::vector<ImageGeometry> reaches;
@@ -677,7 +676,7 @@ void StitchPlan::Render(const GridBox& box, const StitchOutput<T>& output, const
   if (box.Empty())
     return;
   if (within.first != box.first || within.size != box.size)
-    throw Error(Error::Kind::InvalidParameter, "the box to make reaches beyond the output");
+    throw Error(Error::Kind::InvalidParameter, "the requested extent is not within the output grid");
   ParallelRanges(static_cast<std::ptrdiff_t>(box.size[1]) * box.size[2], rowsOfOneTask, progress,
                  [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
                    typename Parts::RowBlender<T> blender(*parts_, box, output);

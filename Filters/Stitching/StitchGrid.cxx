@@ -52,7 +52,7 @@ Eigen::Vector3d SmallestSpacing(const std::vector<ImageGeometry>& volumes, bool 
 ImageGeometry StitchGrid(const std::vector<ImageGeometry>& volumes, double spacingMm)
 {
   if (volumes.size() < 2)
-    throw Error(Error::Kind::BadInput, "stitching needs at least two volumes; " + std::to_string(volumes.size()) + " came in");
+    throw Error(Error::Kind::BadInput, "stitching needs at least two volumes, got " + std::to_string(volumes.size()));
   if (!(spacingMm >= 0.0) || !std::isfinite(spacingMm))
     throw Error(Error::Kind::InvalidParameter, "SpacingMm is " + std::to_string(spacingMm) +
                                                    "; it must be positive, or 0 for the smallest spacing of the volumes");

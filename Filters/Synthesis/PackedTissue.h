@@ -31,7 +31,7 @@ struct PackedTissueParameters {
   ResolutionCell cell;
   double deviation = 0.25; ///< a mesh leaves its sphere by at most this part of the resolution cell there, in [0.001, 10]
   /// Corners lie on their spheres, so that bodies never overlap; or a bit outside, so that each mesh has its sphere's
-  /// volume, and spheres that touch overlap by up to a tenth of the deviation allowed.
+  /// volume, and spheres that touch overlap by up to twice two thirds of the deviation allowed.
   bool trueVolume = false;
   bool turned = true;                   ///< each mesh is turned at random, so that triangles do not face the probe all at once
   std::int64_t maxTriangles = 10000000; ///< more are refused, in [20, 100 million]

@@ -9,11 +9,10 @@
  *
  * Output 0: tissue (see vtkUltrasoundTissue), in mm and LPS, with more field data per body:
  *
- * | field          | values                                                                                                |
- * | -------------- | ----------------------------------------------------------------------------------------------------- |
- * | SurfaceFaults  | 6 ints: open edges, edges of more than two triangles, edges whose triangles face different sides, components
- * inside out, self-intersections, triangles without area | | SurfaceVolume  | double: mm^3 within | | SurfaceReport  | text: what
- * was found and mended, empty when nothing                                                   |
+ * - SurfaceFaults, 6 ints: open edges, edges of more than two triangles, edges whose triangles face different sides, components
+ *   inside out, self-intersections, triangles without area
+ * - SurfaceVolume, double: mm^3 within
+ * - SurfaceReport, text: what was found and mended, empty when nothing
  *
  * Output 1: where the faults are: a point each (the first hundred of a kind and body), with the point arrays `Fault` (0 to 5, in
  * the order above) and `Body`.

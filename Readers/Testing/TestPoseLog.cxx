@@ -172,7 +172,7 @@ TEST_F(PoseLogFile, RowsThatEndEarlyAndTimesThatDoNotRise)
   for (const ToolPose& pose : back.poses)
     order.push_back(pose.pose.translation().x());
   EXPECT_EQ(order, (std::vector<double>{2, 3, 1, 5}));
-  EXPECT_TRUE(HasNote(back, "the times do not rise 2 times, at 1 s"));
+  EXPECT_TRUE(HasNote(back, "the times do not increase at 2 rows, first at 1 s"));
   EXPECT_TRUE(HasNote(back, "line 5: there is no time"));
 }
 
@@ -188,8 +188,8 @@ TEST_F(PoseLogFile, RowsPerSecond)
 TEST_F(PoseLogFile, Refused)
 {
   Refused("", "the file is empty");
-  Refused("1,2,3\n", "it is no log of poses");
-  Refused("t,x,y,z,qx,qy,qz\n1,2,3,4,5,6,7\n", "it is no log of poses");
+  Refused("1,2,3\n", "not a log of poses");
+  Refused("t,x,y,z,qx,qy,qz\n1,2,3,4,5,6,7\n", "not a log of poses");
   Refused("x,y,z,qw,qx,qy,qz\n1,2,3,4,5,6,7\n", ", line 1: no column holds the time");
   Refused(Head, "it holds no poses");
   Refused(Head + "1,Probe,one,2,3,1,0,0,0,OK\n", ", line 2: \"one\" is not a number");
@@ -256,7 +256,7 @@ TEST_F(PoseLogFile, Aurora)
   EXPECT_EQ(a[2].pose.translation(), Vector3d(102.84, -60.0, -158.25));
   EXPECT_NEAR(a[0].time, 4 * 3600 + 15 * 60 + 52.821, 1e-9);
   EXPECT_TRUE(HasNote(log, "the row ends early")); // the last one: the program was ended while it wrote
-  EXPECT_FALSE(HasNote(log, "do not rise"));
+  EXPECT_FALSE(HasNote(log, "do not increase"));
 }
 
 TEST_F(PoseLogFile, HandEyePairs)
@@ -268,7 +268,7 @@ TEST_F(PoseLogFile, HandEyePairs)
   ASSERT_EQ(log.poses.size(), 2u * 524u);
   EXPECT_EQ(log.poses[0].time, 87.095);
   EXPECT_NEAR(log.poses[0].pose.translation().x(), 692.35007, 1e-9);
-  EXPECT_FALSE(HasNote(log, "do not rise"));
+  EXPECT_FALSE(HasNote(log, "do not increase"));
   for (const ToolPose& pose : log.poses)
     EXPECT_EQ(pose.status, TransformStatus::Valid);
   const PoseLog coarse = ReadPoseLog(vicon);

@@ -18,7 +18,7 @@ void LiveScore::Set(int id, const std::string& name, const ImageGeometry& truth,
 {
   truth.Check(name + " (truth)");
   if (points.empty())
-    throw Error(Error::Kind::BadInput, name + ": none of its voxels is real");
+    throw Error(Error::Kind::BadInput, name + ": no voxel is valid and finite");
   volumes_[id] = {truth, truth, std::move(points), name};
 }
 

@@ -242,7 +242,8 @@ TEST_F(DeformableAlignTest, AFieldThatFoldsIsNotApplied)
 TEST_F(DeformableAlignTest, RefusesAndStops)
 {
   const auto p = Quick();
-  EXPECT_NE(MessageOf([&] { DeformableAlign({}, Volume(bent), p); }, Error::Kind::BadInput).find("no volume"), std::string::npos);
+  EXPECT_NE(MessageOf([&] { DeformableAlign({}, Volume(bent), p); }, Error::Kind::BadInput).find("at least one fixed volume"),
+            std::string::npos);
   MessageOf([&] { DeformableAlign({Volume(fixed)}, {}, p); }, Error::Kind::BadInput);
   const Pose away = MotionAbout({0, 0, 0}, {0, 0, 0}, {900.0, 0.0, 0.0});
   EXPECT_NE(MessageOf(

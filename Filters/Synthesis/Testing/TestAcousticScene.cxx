@@ -400,7 +400,7 @@ TEST(AcousticScene, BodiesMaySharePoints)
 
 TEST(AcousticScene, FarFromTheOrigin)
 {
-  // At 1000 km single precision has steps of 0.06 mm: so much the surface may be off, and no more.
+  // At 1 km single precision has steps of 0.06 mm: so much the surface may be off, and no more.
   const Vector3d far(1e6, -2e5, 5e5);
   TissueSurface surface = Background(water);
   AddSphere(surface, red, far, 30, 3);
