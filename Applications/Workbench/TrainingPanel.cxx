@@ -77,7 +77,8 @@ TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(pa
   choose->setToolTip(tr("A pose file that says where the volumes belong, such as truth.json of a synthetic set"));
   score_ = new QLabel(evaluation);
   score_->setObjectName("score");
-  score_->setToolTip(tr("Mean distance of points of the volumes from where they belong, seen from the first volume that has a truth"));
+  score_->setToolTip(
+      tr("Mean distance of points of the volumes from where they belong, seen from the first volume that has a truth"));
   live_ = new QCheckBox(tr("Show the score"), evaluation);
   live_->setObjectName("showScore");
   live_->setChecked(true);

@@ -116,8 +116,7 @@ Command NoiseCommand(CLI::App& program)
 
   const auto number = [options](const std::string& name, const std::string& text, double low, double high, double preset,
                                 const std::function<void(double)>& set) {
-    options->add_option_function<double>(name, set, text + " [" + NumberText(preset) + "]")
-        ->check(CLI::Range(low, high));
+    options->add_option_function<double>(name, set, text + " [" + NumberText(preset) + "]")->check(CLI::Range(low, high));
   };
   vtkUltrasoundNoiseSource* s = source;
   const std::string automatic = "; 0: three to each length of the grain";
