@@ -6,6 +6,7 @@ import pathlib
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 SOURCE = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
 sys.path.insert(0, str(SOURCE / "Testing"))
@@ -54,6 +55,36 @@ class Reports(unittest.TestCase):
         self.assertTrue(text.startswith("Before.") and text.endswith("After.\n"))
         again = self.table(text)
         self.assertEqual(again.stamp, again.digest())
+
+    def test_what_makes_a_table_old(self):
+        with tempfile.TemporaryDirectory() as name, unittest.mock.patch.object(report_benchmarks, "source", pathlib.Path(name)):
+            kernel, header = (pathlib.Path(name) / "Core/Imaging" / f"DistanceMap{end}" for end in (".cxx", ".h"))
+            kernel.parent.mkdir(parents=True)
+            kernel.write_text("int a = 1; // one\n")
+            table = self.table(PAGE)
+            digests = [table.digest()]
+            for file, text in ((kernel, "int a = 2; // one\n"), (header, "constexpr int b = 1;\n"), (header, "constexpr int b = 2;\n")):
+                file.write_text(text)
+                digests.append(table.digest())
+            self.assertEqual(len(set(digests)), len(digests))
+            kernel.write_text("// two\nint a =\n  2;")  # the same to a compiler
+            self.assertEqual(table.digest(), digests[-1])
+
+    def test_a_program_is_run_again_when_it_has_changed(self):
+        with tempfile.TemporaryDirectory() as name, unittest.mock.patch.object(report_benchmarks, "wait_until_quiet", lambda limit: True), \
+                unittest.mock.patch.object(report_benchmarks, "identity", lambda program: program.read_text()):
+            program = pathlib.Path(name) / "BenchmarkSome"
+
+            def write(case):
+                program.write_text(f"#!/bin/sh\necho '{{\"case\": \"{case}\"}}'; date +%N >> {name}/runs\n")
+                program.chmod(0o755)
+
+            def case(again=False):
+                return report_benchmarks.measured(program, 0, again)["lines"][0]["case"], len((pathlib.Path(name) / "runs").read_text().split())
+            write("a")
+            self.assertEqual([case(), case(), case(again=True)], [("a", 1), ("a", 1), ("a", 2)])
+            write("b")
+            self.assertEqual(case(), ("b", 3))
 
     def test_what_cannot_be_filled_is_said(self):
         for page, lines in ((PAGE, LINES[:2]), (PAGE.replace("{ours.", "{nobody."), LINES)):

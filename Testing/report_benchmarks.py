@@ -15,8 +15,12 @@ become rows; the text in between begins with the head of the table and ends with
     <!-- end bench 0123456789ab -->
 
 Lines with the same values of "by" make one row. In it the keys of the first of them are names, and so is each method, up to the first
-character that is no letter or digit: echorama.seconds. "only: EXPRESSION" leaves lines out. There may be several "row"s, each with what
-was said before it. The number at the end is that of the kernels' contents: when it is not theirs any more, a test fails.
+character that is no letter or digit: echorama.seconds. "lines" holds them all, in order. "only: EXPRESSION" leaves lines out. There may be several "row"s, each with what
+was said before it. The number at the end is that of the kernels' contents, comments and spaces left out, and their own headers': when it
+is not theirs any more, a test fails.
+
+What a program printed is kept beside it, and printed again as long as the program and our libraries are the same: a report that was
+stopped goes on where it was.
 """
 import argparse
 import datetime
@@ -65,7 +69,9 @@ class Table:
         for kernel in self.kernels:
             if not (source / kernel).is_file():
                 sys.exit(f"{self}: there is no kernel {kernel}")
-            told.update((source / kernel).read_bytes())
+            for file in dict.fromkeys((source / kernel, (source / kernel).with_suffix(".h"))):
+                if file.is_file():
+                    told.update(re.sub(r"//[^\n]*|\s+", "", file.read_text()).encode())
         return told.hexdigest()[:12]
 
     def filled(self, lines, how):
@@ -79,7 +85,7 @@ class Table:
             if not groups:
                 sys.exit(f"{self}: the benchmark printed no line for \"{row}\"")
             for group in groups.values():
-                names = dict(group[0])
+                names = {**group[0], "lines": [types.SimpleNamespace(**line) for line in group]}
                 for line in group:
                     names[re.match(r"\w*", str(line.get("method", "")))[0]] = types.SimpleNamespace(**line)
                 try:
@@ -126,12 +132,46 @@ def wait_until_quiet(limit):
             return False
 
 
+def identity(program):
+    """Of the program and the libraries of ours that it loads."""
+    loaded = subprocess.run(["ldd", program], stdout=subprocess.PIPE, text=True, check=True).stdout
+    told = hashlib.sha256()
+    for file in [program, *sorted(set(re.findall(r"=> (\S*/libEchorama\S+)", loaded)))]:
+        told.update(pathlib.Path(file).read_bytes())
+    return told.hexdigest()
+
+
+def measured(program, wait, again):
+    """What it prints, and when, where and how that was measured."""
+    kept = program.with_suffix(".measured.json")
+    if not program.is_file():
+        sys.exit(f"report_benchmarks: there is no program {program}")
+    if kept.is_file() and not again:
+        told = json.loads(kept.read_text())
+        if told["program"] == identity(program):
+            print(f"{program.name}: measured before, the program has not changed", file=sys.stderr)
+            return told
+    quiet = wait_until_quiet(wait)
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=source, stdout=subprocess.PIPE, text=True).stdout.strip()
+    print(f"{program.name}{'' if quiet else ': the machine is not quiet'}", file=sys.stderr)
+    begin = time.monotonic()
+    done = subprocess.run([program], cwd=source, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        sys.exit(f"report_benchmarks: {program.name} ended with status {done.returncode}; its tables stay as they were")
+    print(f"{program.name}: {time.monotonic() - begin:.0f} s", file=sys.stderr)
+    told = {"program": identity(program), "lines": [json.loads(line) for line in done.stdout.splitlines()],
+            "how": f"Commit {commit}, {datetime.date.today()}, {cpu()}, {'nothing else ran' if quiet else 'beside other work'}"}
+    kept.write_text(json.dumps(told, indent=1))
+    return told
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name", nargs="*", help="benchmarks (default: all that fill a table)")
     parser.add_argument("--programs", type=pathlib.Path, default=source / "build" / "release" / "benchmarks")
     parser.add_argument("--list", action="store_true", help="print the names of the benchmarks that fill tables")
     parser.add_argument("--check", action="store_true", help="name the tables that are older than what they measure")
+    parser.add_argument("--again", action="store_true", help="measure again what has not changed")
     parser.add_argument("--wait", type=float, default=600, help="how long to wait for a quiet machine, seconds")
     options = parser.parse_args()
     wanted = [table for table in tables() if not options.name or set(table.names) & set(options.name)]
@@ -148,21 +188,14 @@ def main():
             sys.exit("older than the kernels that they measure; ./run bench --report fills them:\n  " + "\n  ".join(old))
         print(f"{len(wanted)} tables are those of the kernels as they are")
         return
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=source, stdout=subprocess.PIPE, text=True).stdout.strip()
-    results, all_quiet = [], True
+    results = {}
     for name in names:
         program = options.programs / ("Benchmark" + "".join(part.capitalize() for part in name.split("_")))
-        quiet = wait_until_quiet(options.wait)
-        print(f"{name}{'' if quiet else ': the machine is not quiet'}", file=sys.stderr)
-        done = subprocess.run([program], cwd=source, stdout=subprocess.PIPE, text=True)
-        if done.returncode:
-            sys.exit(f"report_benchmarks: {name} ended with status {done.returncode}; its tables stay as they were")
-        results += [json.loads(line) for line in done.stdout.splitlines()]
-        all_quiet = all_quiet and quiet
-    how = f"Commit {commit}, {datetime.date.today()}, {cpu()}, {'nothing else ran' if all_quiet else 'beside other work'}"
+        results[name] = measured(program, options.wait, options.again)
     for table in reversed(wanted):  # from the end of a page: places before it stay
         text = table.page.read_text()
-        lines = [line for line in results if line["bench"] in table.names]
+        lines = [line for name in table.names for line in results[name]["lines"]]
+        how = "; ".join(dict.fromkeys(results[name]["how"] for name in table.names))
         table.page.write_text(text[:table.begin] + table.filled(lines, how) + text[table.end:])
         print(table, file=sys.stderr)
 
