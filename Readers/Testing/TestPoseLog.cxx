@@ -156,7 +156,7 @@ TEST_F(PoseLogFile, WhatIsNoMeasurementIsMissing)
   const PoseLog bent = Read("0," + Identity("1") + ",2,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1\n");
   EXPECT_EQ(bent.poses[0].status, TransformStatus::Valid);
   EXPECT_EQ(bent.poses[1].status, TransformStatus::Missing);
-  EXPECT_TRUE(HasNote(bent, "the matrix is no pose"));
+  EXPECT_TRUE(HasNote(bent, "the matrix is not a rigid transform"));
 }
 
 TEST_F(PoseLogFile, RowsThatEndEarlyAndTimesThatDoNotRise)
@@ -173,7 +173,7 @@ TEST_F(PoseLogFile, RowsThatEndEarlyAndTimesThatDoNotRise)
     order.push_back(pose.pose.translation().x());
   EXPECT_EQ(order, (std::vector<double>{2, 3, 1, 5}));
   EXPECT_TRUE(HasNote(back, "the times do not increase at 2 rows, first at 1 s"));
-  EXPECT_TRUE(HasNote(back, "line 5: there is no time"));
+  EXPECT_TRUE(HasNote(back, "line 5: the row has no time"));
 }
 
 TEST_F(PoseLogFile, RowsPerSecond)
@@ -224,7 +224,7 @@ TEST_F(PoseLogFile, Sequence)
   files.Commit();
   const PoseLog log = ReadPoseLog(path);
   EXPECT_EQ(log.tools, (std::vector<std::string>{"ProbeToTracker", "StylusToTracker"}));
-  EXPECT_TRUE(HasNote(log, "ImageToProbe is no pose"));
+  EXPECT_TRUE(HasNote(log, "ImageToProbe is not a rigid transform"));
   const std::vector<ToolPose> probe = log.Of("Probe");
   ASSERT_EQ(probe.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i)

@@ -134,7 +134,7 @@ assert field(alone.GetOutput().GetBlock(1), "DeformationApplied")[0].ToDouble() 
 assert "volume 2" in field(alone.GetOutput().GetBlock(1), "DeformationReason")[0].ToString()
 
 # 5. errors: a sentence, empty outputs
-assert "two volumes are needed" in errors_of(aligner(a))
+assert "at least two volumes, got 1" in errors_of(aligner(a))
 constant = vtkImageData()
 constant.DeepCopy(b)
 constant.GetPointData().GetArray("Intensity").Fill(9)
