@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "PolhemusEmulator.h"
 #include "Tracking/Devices/PolhemusTracker.h"
+#include <cstdlib>
 #include <functional>
 #include <gtest/gtest.h>
 
