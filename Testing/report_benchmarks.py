@@ -77,7 +77,7 @@ class Table:
     def filled(self, lines, how):
         """The rows, the line that says how they were measured, and the end."""
         text = ""
-        lines = [line for line in lines if "bench" in line]  # others are points of curves
+        lines = [line for line in lines if "case" in line]  # others are points of curves
         for by, only, row in self.rows:
             groups = {}
             for line in lines:
