@@ -85,6 +85,9 @@ class Reports(unittest.TestCase):
             self.assertEqual([case(), case(), case(again=True)], [("a", 1), ("a", 1), ("a", 2)])
             write("b")
             self.assertEqual(case(), ("b", 3))
+            with unittest.mock.patch.object(report_benchmarks, "wait_until_quiet", lambda limit: False):
+                case(again=True)
+            self.assertEqual(case(), ("b", 5))  # what was measured beside other work is measured again
 
     def test_what_cannot_be_filled_is_said(self):
         for page, lines in ((PAGE, LINES[:2]), (PAGE.replace("{ours.", "{nobody."), LINES)):

@@ -15,12 +15,12 @@ become rows; the text in between begins with the head of the table and ends with
     <!-- end bench 0123456789ab -->
 
 Lines with the same values of "by" make one row. In it the keys of the first of them are names, and so is each method, up to the first
-character that is no letter or digit: echorama.seconds. "lines" holds them all, in order. "only: EXPRESSION" leaves lines out. There may be several "row"s, each with what
-was said before it. The number at the end is that of the kernels' contents, comments and spaces left out, and their own headers': when it
-is not theirs any more, a test fails.
+character that is no letter or digit: echorama.seconds. "lines" holds them all, in order. "only: EXPRESSION" leaves lines out. There may
+be several "row"s, each with what was said before it. The number at the end is that of the kernels' contents, comments and spaces left
+out, and their own headers': when it is not theirs any more, a test fails.
 
-What a program printed is kept beside it, and printed again as long as the program and our libraries are the same: a report that was
-stopped goes on where it was.
+What a program printed on a quiet machine is kept beside it, and used again as long as the program and our libraries are the same: a
+report that was stopped goes on where it was.
 """
 import argparse
 import datetime
@@ -133,6 +133,9 @@ def wait_until_quiet(limit):
             return False
 
 
+Quiet = "nothing else ran"
+
+
 def identity(program):
     """Of the program and the libraries of ours that it loads."""
     loaded = subprocess.run(["ldd", program], stdout=subprocess.PIPE, text=True, check=True).stdout
@@ -149,7 +152,7 @@ def measured(program, wait, again):
         sys.exit(f"report_benchmarks: there is no program {program}")
     if kept.is_file() and not again:
         told = json.loads(kept.read_text())
-        if told["program"] == identity(program):
+        if told["program"] == identity(program) and told["how"].endswith(Quiet):
             print(f"{program.name}: measured before, the program has not changed", file=sys.stderr)
             return told
     quiet = wait_until_quiet(wait)
@@ -161,7 +164,7 @@ def measured(program, wait, again):
         sys.exit(f"report_benchmarks: {program.name} ended with status {done.returncode}; its tables stay as they were")
     print(f"{program.name}: {time.monotonic() - begin:.0f} s", file=sys.stderr)
     told = {"program": identity(program), "lines": [json.loads(line) for line in done.stdout.splitlines()],
-            "how": f"Commit {commit}, {datetime.date.today()}, {cpu()}, {'nothing else ran' if quiet else 'beside other work'}"}
+            "how": f"Commit {commit}, {datetime.date.today()}, {cpu()}, {Quiet if quiet else 'beside other work'}"}
     kept.write_text(json.dumps(told, indent=1))
     return told
 
