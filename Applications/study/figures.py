@@ -14,8 +14,8 @@ from cases import PLAIN, Case
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "demo"))
 from volumes import Volume  # noqa: E402 (volumes in the world: the demo's)
 
-COLOURS = {"start": "#9e9e9e", "search": "#ff6f00", "elastix-mi-250": "#7b1fa2", "elastix-mi-1000": "#4a148c", "elastix-ncc-250": "#c2185b", "echorama": "#00796b",
-           "truth": "#424242"}
+COLOURS = {"start": "#9e9e9e", "search": "#ff6f00", "elastix-mi-250": "#7b1fa2", "elastix-mi-1000": "#4a148c",
+           "elastix-ncc-250": "#c2185b", "echorama": "#00796b", "truth": "#424242"}
 SPARE = ["#1976d2", "#689f38", "#5d4037", "#0097a7"]
 # What is plotted against, with the value that means "none" of it and how it is written.
 AGAINST = {"overlap": "overlap", "noise_db": "noise beside background, dB", "rib": "share of the fan in shadow",
