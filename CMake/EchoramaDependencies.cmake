@@ -37,7 +37,7 @@ find_path(ECHORAMA_POCKETFFT_INCLUDE_DIR pocketfft.hpp
 add_library(Echorama_PocketFFT INTERFACE IMPORTED)
 target_include_directories(Echorama_PocketFFT SYSTEM INTERFACE ${ECHORAMA_POCKETFFT_INCLUDE_DIR})
 # Embree's own configuration looks for a TBB of another name. Its headers and library bear the major version in their names;
-# what differs between versions 3 and 4 is in Filters/Synthesis/EmbreeQuery.h.
+# what differs between versions 3 and 4 is in Filters/Acoustics/EmbreeQuery.h.
 find_path(ECHORAMA_EMBREE_HEADERS rtcore.h PATH_SUFFIXES embree4 embree3 REQUIRED)
 get_filename_component(embree ${ECHORAMA_EMBREE_HEADERS} NAME)
 find_library(ECHORAMA_EMBREE ${embree} REQUIRED)

@@ -3,6 +3,7 @@
 #   [KERNEL_LIBRARIES target...]  further libraries, private to the kernels
 #   [KERNEL_SUBDIRECTORIES dir...] where the kernels lie, default: the room's own folder
 #   [CLASSES class...]            vtk classes, by path without extension
+#   [UNWRAPPED class...]          the same, for C++ alone
 #   [VTK_LIBRARIES target...]     further libraries, private to the vtk classes
 #   [FUZZED file...]              kernels whose branches the fuzzers follow, default: all of a room with fuzzers
 #   [BENCHMARK_DEPENDS room...])  other rooms whose kernels the benchmarks use; without them they are left out
@@ -10,9 +11,10 @@
 # A room is two layers. Kernels (every .cxx whose name does not begin with vtk) become lib<Echorama><NAME>Kernels,
 # which links no VTK; the vtk classes become the VTK module Echorama::NAME over it. Tests and benchmarks are found by
 # their place and name: Testing/Test*.cxx (GoogleTest), Testing/Test*.py (wrapped classes),
-# Benchmarks/Benchmark*.cxx, Fuzzing/Fuzz*.cxx (libFuzzer).
+# Benchmarks/Benchmark*.cxx, Fuzzing/Fuzz*.cxx (libFuzzer). Other sources in Benchmarks are contestants: methods that are no part of the
+# product, for its benchmarks and tests.
 function(echorama_add_room name)
-  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;VTK_LIBRARIES;FUZZED;BENCHMARK_DEPENDS")
+  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;UNWRAPPED;VTK_LIBRARIES;FUZZED;BENCHMARK_DEPENDS")
   if(NOT ECHORAMA_STACK STREQUAL "paraview")
     _echorama_add_kernels(${name})
   endif()
@@ -72,7 +74,7 @@ macro(_echorama_add_kernels name)
 endmacro()
 
 macro(_echorama_add_classes name)
-  vtk_module_add_module(Echorama::${name} CLASSES ${room_CLASSES})
+  vtk_module_add_module(Echorama::${name} CLASSES ${room_CLASSES} NOWRAP_CLASSES ${room_UNWRAPPED})
   vtk_module_link(Echorama::${name} PUBLIC Echorama::${name}Kernels PRIVATE ${room_VTK_LIBRARIES})
   # Classes may lie in subfolders (Core/Pipeline); they are included by their bare names all the same. Installed, they lie in
   # one folder.
@@ -95,12 +97,22 @@ macro(_echorama_add_classes name)
 endmacro()
 
 macro(_echorama_add_tests name)
+  file(GLOB contestants CONFIGURE_DEPENDS Benchmarks/*.cxx)
+  list(FILTER contestants EXCLUDE REGEX "/Benchmark[^/]*$")
+  if(contestants)
+    add_library(${name}Contestants STATIC EXCLUDE_FROM_ALL ${contestants})
+    target_link_libraries(${name}Contestants PUBLIC Echorama::${name}Kernels)
+    echorama_compile_options(${name}Contestants)
+  endif()
   if(ECHORAMA_TESTING)
     file(GLOB tests CONFIGURE_DEPENDS Testing/Test*.cxx)
     if(tests)
       add_executable(${name}Tests EXCLUDE_FROM_ALL ${tests})
       add_dependencies(tests ${name}Tests)
       target_link_libraries(${name}Tests PRIVATE Echorama::${name}Kernels ${room_KERNEL_LIBRARIES} GTest::gtest_main)
+      if(TARGET ${name}Contestants)
+        target_link_libraries(${name}Tests PRIVATE ${name}Contestants)
+      endif()
       target_compile_definitions(${name}Tests PRIVATE ECHORAMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
       echorama_compile_options(${name}Tests)
       target_compile_options(${name}Tests PRIVATE -O1) # tests are compiled longer than they run
@@ -172,6 +184,9 @@ function(echorama_add_benchmark file name)
   add_executable(${target} EXCLUDE_FROM_ALL ${file})
   add_dependencies(benchmarks ${target})
   target_link_libraries(${target} PRIVATE Echorama::${name}Kernels TBB::tbb nlohmann_json::nlohmann_json)
+  if(TARGET ${name}Contestants)
+    target_link_libraries(${target} PRIVATE ${name}Contestants)
+  endif()
   foreach(other IN LISTS ARGN)
     target_link_libraries(${target} PRIVATE Echorama::${other}Kernels)
   endforeach()

@@ -2,8 +2,10 @@
 // The pose in an affine map: the polar decomposition gives the nearest rotation, and the corners of the grid say how far that
 // moves a voxel from where the map has it. (The difference of two affine maps is largest at a corner.)
 #include "Readers/AffinePose.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
 #include <cmath>
@@ -15,7 +17,7 @@ constexpr double SilentShear = 1e-3, LargestShear = 0.1; // voxels
 
 void FindPose(ImageHeader& header, const Eigen::Matrix<double, 3, 4>& affine)
 {
-  const auto fail = [&header](const std::string& reason) { throw Error(Error::Kind::BadFile, header.path + ": " + reason); };
+  const auto fail = [&header](const std::string& reason) { FailFile(header.path, reason); };
   ImageGeometry& g = header.geometry;
   Eigen::Matrix3d axes = affine.leftCols<3>();
   if (g.dimensions[2] == 1 && axes.col(2).isZero(0.0)) // an image that says nothing of its thickness
@@ -41,7 +43,7 @@ void FindPose(ImageHeader& header, const Eigen::Matrix<double, 3, 4>& affine)
   if (residual <= SilentShear)
     return;
   const Eigen::Matrix3d cosines = g.direction.transpose() * g.direction;
-  const double angle = std::asin(std::min(1.0, (cosines - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff())) * 180.0 / M_PI;
+  const double angle = std::asin(std::min(1.0, (cosines - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff())) * 180.0 / Pi;
   const std::string shear = "its affine is sheared: axes are " + NumberText(std::round(angle * 1e4) / 1e4) +
                             " degrees off a right angle, which no rigid pose can express";
   if (residual > LargestShear)
@@ -60,11 +62,7 @@ void PlaceAffine(ImageHeader& header, const Eigen::Matrix<double, 3, 4>& affine)
 {
   FindPose(header, affine);
   PlaceAxes(header, 3);
-  try {
-    header.geometry.Check(header.path);
-  } catch (const Error& error) {
-    throw Error(Error::Kind::BadFile, error.what());
-  }
+  CheckGeometry(header.path, header.geometry);
 }
 
 } // namespace echorama

@@ -6,9 +6,10 @@
 #include "Readers/DicomFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Readers/DataFile.h"
 #include "Readers/DicomHeader.h"
+#include "Readers/DicomPixels.h"
 #include "Readers/KretzFile.h"
-#include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -67,12 +68,7 @@ struct Slice {
 
 class DicomSource : public VolumeSource {
 public:
-  explicit DicomSource(const std::string& path)
-  {
-    content_.path = path;
-    content_.format = FileFormat::Dicom;
-    FindFiles();
-  }
+  explicit DicomSource(const std::string& path) : VolumeSource(path, FileFormat::Dicom) { FindFiles(); }
 
   // A Kretz file in the only file is for its own reader.
   const DicomHeader* Kretz() const { return files_.size() == 1 && files_[0].kretzBytes > 0 ? &files_[0] : nullptr; }
@@ -88,13 +84,9 @@ public:
     else if (files_.size() == 1)
       PlaceUnplaced();
     else
-      FailFile(content_.path, "its " + std::to_string(files_.size()) + " pictures do not say where they lie");
+      Fail("its " + std::to_string(files_.size()) + " pictures do not say where they lie");
     ChooseType();
-    try {
-      content_.geometry.Check(content_.path);
-    } catch (const Error& error) {
-      throw Error(Error::Kind::BadFile, error.what());
-    }
+    CheckGeometry(content_.path, content_.geometry);
     const double decoded = first.storage != DicomStorage::Plain
                                ? static_cast<double>(first.PictureBytes()) * static_cast<double>(first.pictures.size())
                                : 0.0;
@@ -102,11 +94,11 @@ public:
                 static_cast<double>(content_.geometry.VoxelCount()) * static_cast<double>(SizeOf(content_.type)) + decoded);
     content_.fields = first.fields;
     if (first.burnedIn)
-      content_.notes.push_back("The file says that annotations are burned into its pictures; they may name people.");
+      Note("The file says that annotations are burned into its pictures; they may name people.");
     if (first.samples == 3)
-      content_.notes.push_back("Its colours have become luminance.");
+      Note("Its colours have become luminance.");
     if (first.photometric == "MONOCHROME1")
-      content_.notes.push_back("Its grey levels were stored inverted (MONOCHROME1) and are turned back.");
+      Note("Its grey levels were stored inverted (MONOCHROME1) and are turned back.");
   }
 
   void Read(std::size_t index, void* voxels, unsigned char*, const Progress& progress) override
@@ -204,7 +196,7 @@ private:
       }
     }
     if (broken > 0)
-      content_.notes.push_back(std::to_string(broken) + " files of its folder could not be read as DICOM.");
+      Note(std::to_string(broken) + " files of its folder could not be read as DICOM.");
   }
 
   static std::string MovieGroup()
@@ -262,9 +254,9 @@ private:
         all.push_back({f, p});
       }
     if (all.empty())
-      FailFile(content_.path, "none of its pictures holds tissue intensities");
+      Fail("none of its pictures holds tissue intensities");
     if (others > 0)
-      content_.notes.push_back(std::to_string(others) + " pictures that hold no tissue intensities are left out.");
+      Note(std::to_string(others) + " pictures that hold no tissue intensities are left out.");
     std::map<double, std::vector<Slice>> volumes;
     for (const Slice& slice : all) {
       const DicomPicture& picture = PictureOf(slice);
@@ -275,18 +267,17 @@ private:
       if (slices_.empty())
         content_.geometry = geometry;
       else if (!content_.geometry.AgreesWith(geometry, 1e-2))
-        FailFile(content_.path, "its volumes at different times do not lie on one grid (the first has " +
-                                    std::to_string(content_.geometry.dimensions[2]) + " slices, that at time " +
-                                    NumberText(time) + " has " + std::to_string(geometry.dimensions[2]) + ")");
+        Fail("its volumes at different times do not lie on one grid (the first has " +
+             std::to_string(content_.geometry.dimensions[2]) + " slices, that at time " + NumberText(time) + " has " +
+             std::to_string(geometry.dimensions[2]) + ")");
       slices_.insert(slices_.end(), slices.begin(), slices.end());
       if (volumes.size() > 1)
         content_.times.push_back(time);
     }
     if (volumes.size() > 1 && !seconds)
-      content_.notes.push_back("Its times are numbers of volumes, not seconds; the file does not say those.");
+      Note("Its times are numbers of volumes, not seconds; the file does not say those.");
     if (plane == &DicomPicture::volume)
-      content_.notes.push_back(
-          "The world is the scanner's volume frame of reference; the file does not say where the patient lies.");
+      Note("The world is the scanner's volume frame of reference; the file does not say where the patient lies.");
     PlaceProbe(plane);
   }
 
@@ -303,9 +294,9 @@ private:
     for (Slice& slice : slices) {
       const DicomPicture& picture = PictureOf(slice);
       if (!(picture.*plane).directions->isApprox(axes, sameDirection))
-        FailFile(content_.path, WhereIs(slice) + " is turned against " + WhereIs(slices[0]) + ": the pictures are not parallel");
+        Fail(WhereIs(slice) + " is turned against " + WhereIs(slices[0]) + ": the pictures are not parallel");
       if (!picture.spacing.isApprox(one.spacing, 1e-6))
-        FailFile(content_.path, WhereIs(slice) + " has another pixel spacing than " + WhereIs(slices[0]));
+        Fail(WhereIs(slice) + " has another pixel spacing than " + WhereIs(slices[0]));
       slice.along = normal.dot(*(picture.*plane).position);
     }
     std::stable_sort(slices.begin(), slices.end(), [](const Slice& a, const Slice& b) { return a.along < b.along; });
@@ -335,8 +326,8 @@ private:
         FailFile(content_.path,
                  "two pictures lie at the same place (" + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]) + ")");
       if (std::abs(steps[i] - median) > tolerance)
-        FailFile(content_.path, "its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + NumberText(median) +
-                                    " mm elsewhere; are slices missing?");
+        Fail("its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + NumberText(median) +
+             " mm elsewhere; are slices missing?");
       const Eigen::Vector3d there = geometry.origin + normal * (slices[i + 1].along - slices[0].along);
       const double aside = (*(PictureOf(slices[i + 1]).*plane).position - there).norm();
       if (aside > std::max(evenness, 1e-2 * one.spacing.minCoeff()))
@@ -355,7 +346,7 @@ private:
       return;
     const DicomPicture& one = PictureOf(slices_[0]);
     if (!IsRotation(matrix->topLeftCorner<3, 3>()) || !matrix->row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1))) {
-      content_.notes.push_back("Its Volume to Transducer Mapping Matrix is not a rigid transform and is left out.");
+      Note("Its Volume to Transducer Mapping Matrix is not a rigid transform and is left out.");
       return;
     }
     Pose volumeToTransducer;
@@ -394,8 +385,8 @@ private:
         content_.times.push_back(static_cast<double>(i) * (file.frameTime > 0.0 ? file.frameTime : 1.0));
     }
     if (file.pictures.size() > 1 && !(file.frameTime > 0.0))
-      content_.notes.push_back("The file does not say how fast its volumes follow each other; they are one second apart.");
-    content_.notes.push_back("Its sizes come from private elements of Philips; its place in the patient is not known.");
+      Note("The file does not say how fast its volumes follow each other; they are one second apart.");
+    Note("Its sizes come from private elements of Philips; its place in the patient is not known.");
   }
 
   // Pictures in one file that say nothing, or the same, of their place.
@@ -418,7 +409,7 @@ private:
       if (count > 1)
         FailFile(file.path, "its pixel spacing is missing");
       spacing.setOnes();
-      content_.notes.push_back("The file does not say how large its pixels are; 1 mm is taken.");
+      Note("The file does not say how large its pixels are; 1 mm is taken.");
     }
     content_.geometry.spacing << spacing, one.sliceSpacing > 0.0 ? one.sliceSpacing : 1.0;
     if (one.patient.IsKnown()) {
@@ -426,7 +417,7 @@ private:
       content_.geometry.origin = pose.translation();
       content_.geometry.direction = pose.linear();
     } else
-      content_.notes.push_back("The file does not say where its pictures lie.");
+      Note("The file does not say where its pictures lie.");
     for (std::size_t i = 0; i < file.pictures.size(); ++i)
       slices_.push_back({0, i});
   }
@@ -450,7 +441,7 @@ private:
       if (const DicomPicture& picture = PictureOf(slice); picture.slope != 1.0 || picture.intercept != 0.0)
         content_.type = VoxelType::Float32;
     if (content_.type == VoxelType::Float32)
-      content_.notes.push_back("Its stored numbers are rescaled to values by slope and intercept, and have become floats.");
+      Note("Its stored numbers are rescaled to values by slope and intercept, and have become floats.");
   }
 
   // One slice of stored numbers to voxels.

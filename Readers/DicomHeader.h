@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Core/Base/Progress.h"
 #include "Readers/ImageHeader.h"
 #include <cstdint>
 #include <Eigen/Core>
@@ -74,16 +73,5 @@ bool LooksLikeDicom(std::string_view start);
 /// Reads all but the pixels. Every length is compared with the bytes that are there before anything is allocated for it.
 /// \throws Error(FileSystem), Error(BadFile) that names the file and what is wrong.
 DicomHeader ReadDicomHeader(const std::string& path);
-
-/// The compressed pixels of an encapsulated file, as gdcm's codecs take them: one fragment per picture, or all of one picture.
-/// What does not begin as its transfer syntax says is kept from the codecs.
-/// \throws Error(BadFile) when the fragments are damaged, or of a syntax that is not known.
-std::vector<std::string> ReadDicomFragments(const DicomHeader& header);
-
-/// The pixels of all pictures of a file that are not plain, as they were before compression, one after the other.
-/// Colours stay in the file's space, but YBR_RCT and YBR_ICT, which become RGB.
-/// \param progress asked, with \a fraction, whether to go on while they are decoded
-/// \throws Error(BadFile) when they cannot be decoded or are not as many as the header says; Error(Cancelled).
-std::vector<char> DecodeDicomPixels(const DicomHeader& header, const Progress& progress = {}, double fraction = 0.0);
 
 } // namespace echorama

@@ -5,6 +5,7 @@
 // interface sets one, and "0,5" would end a number at its zero.
 #include "Readers/ImageHeader.h"
 #include "Core/Base/Error.h"
+#include "Readers/DataFile.h"
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Readers/HeaderLines.h"
@@ -55,7 +56,7 @@ ImageHeader ReadHeader(const std::string& path, FrameAxis* axis)
   else if (header.format == FileFormat::Nrrd)
     ParseNrrd(header, axis);
   else
-    throw Error(Error::Kind::BadFile, path + ": the content is neither MetaImage nor NRRD");
+    FailFile(path, "the content is neither MetaImage nor NRRD");
   return header;
 }
 
@@ -76,10 +77,8 @@ FileFormat FormatOfContent(const std::string& path)
       return FileFormat::ImageStack;
     fail(Error::Kind::FileSystem, "it is a folder, not a file, and holds no images");
   }
-  std::ifstream stream(path, std::ios::binary);
+  std::ifstream stream = OpenToRead(path);
   std::string start(4096, '\0');
-  if (!stream)
-    fail(Error::Kind::FileSystem, "it cannot be opened (is reading permitted?)");
   stream.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(stream.gcount()));
   if (start.empty())
@@ -156,11 +155,7 @@ bool TakeFrameField(const HeaderLines& lines, FrameAxis& axis, std::string_view 
   return true;
 }
 
-HeaderLines::HeaderLines(const std::string& path) : path_(path), stream_(path, std::ios::binary)
-{
-  if (!stream_)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be opened");
-}
+HeaderLines::HeaderLines(const std::string& path) : path_(path), stream_(OpenToRead(path)) {}
 
 bool HeaderLines::Next(std::string& line)
 {
@@ -181,7 +176,7 @@ bool HeaderLines::Next(std::string& line)
 
 void HeaderLines::Fail(const std::string& reason) const
 {
-  throw Error(Error::Kind::BadFile, path_ + ": " + reason);
+  FailFile(path_, reason);
 }
 
 void HeaderLines::FailHere(const std::string& reason) const

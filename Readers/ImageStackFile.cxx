@@ -1,330 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Opening looks at the header of every image (they must agree); reading decodes slices in parallel, each straight into memory
-// of its own size and from there, as grey, into the volume. The three libraries report errors through callbacks: libpng and
-// libjpeg want a longjmp, so their code stands in functions that hold nothing which needs a destructor; libtiff has handlers
-// per file. Nobody prints.
+// of its own size and from there, as grey, into the volume.
 #include "Readers/ImageStackFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
-#include "Readers/VolumeFile.h"
+#include "Core/Base/SizeText.h"
+#include "Readers/DataFile.h"
+#include "Readers/PictureFile.h"
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <csetjmp>
-#include <cstdarg>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <optional>
-
-#include <jpeglib.h>
-#include <png.h>
-#include <tiffio.h>
 
 namespace fs = std::filesystem;
 
 namespace echorama {
 namespace {
 
-enum class Kind { None, Png, Jpeg, Tiff };
-
 // No image holds more than this many bytes per byte of its file (progressive JPEG of one colour comes near).
 constexpr double LargestRatio = 2e4;
-constexpr const char* Changed = "it has changed since it was opened";
 
-Kind KindOf(std::string_view start)
-{
-  if (start.substr(0, 8) == "\x89PNG\r\n\x1a\n")
-    return Kind::Png;
-  if (start.substr(0, 3) == "\xff\xd8\xff")
-    return Kind::Jpeg;
-  const std::string_view four = start.substr(0, 4);
-  for (const std::string_view magic :
-       {std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4), std::string_view("MM\0+", 4)})
-    if (four == magic)
-      return Kind::Tiff;
-  return Kind::None;
-}
-
-Kind KindOfFile(const fs::path& path)
+PictureKind KindOfFile(const fs::path& path)
 {
   std::error_code error;
   if (!fs::is_regular_file(path, error))
-    return Kind::None;
+    return PictureKind::None;
   char start[8] = {};
   std::ifstream(path, std::ios::binary).read(start, sizeof start);
-  return KindOf({start, sizeof start});
-}
-
-// What the header of an image says. Plain data: it is filled in between setjmp and longjmp.
-struct Info {
-  std::uint32_t width, height;
-  int channels; // 1 grey, 2 grey with alpha, 3 colour, 4 colour with alpha
-  int bytes;    // of a sample
-  bool isFloat, isSigned, inverted;
-  double dotsPerMm[2];   // 0: not said
-  unsigned char* pixels; // where they go; nullptr: the header alone
-  std::size_t room;      // bytes there
-  char message[200];
-
-  std::size_t Size() const
-  {
-    return static_cast<std::size_t>(width) * height * static_cast<std::size_t>(channels) * static_cast<std::size_t>(bytes);
-  }
-  bool SameShape(const Info& other) const
-  {
-    return width == other.width && height == other.height && channels == other.channels && bytes == other.bytes &&
-           isFloat == other.isFloat && isSigned == other.isSigned;
-  }
-};
-
-//------------------------------------------------------------------------------------------------ PNG
-void PngError(png_structp png, png_const_charp message)
-{
-  Info* info = static_cast<Info*>(png_get_error_ptr(png));
-  std::snprintf(info->message, sizeof info->message, "%s", message);
-  png_longjmp(png, 1);
-}
-
-void PngWarning(png_structp, png_const_charp) {}
-
-bool ReadPng(FILE* file, Info* info)
-{
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, info, PngError, PngWarning);
-  png_infop header = png ? png_create_info_struct(png) : nullptr;
-  if (!header || setjmp(png_jmpbuf(png))) {
-    png_destroy_read_struct(&png, &header, nullptr);
-    return false;
-  }
-  png_init_io(png, file);
-  png_read_info(png, header);
-  const int color = png_get_color_type(png, header);
-  png_uint_32 x = 0, y = 0;
-  int unit = 0;
-  if (png_get_pHYs(png, header, &x, &y, &unit) && unit == PNG_RESOLUTION_METER) {
-    info->dotsPerMm[0] = x / 1000.0;
-    info->dotsPerMm[1] = y / 1000.0;
-  }
-  if (color == PNG_COLOR_TYPE_PALETTE)
-    png_set_palette_to_rgb(png);
-  else if (png_get_bit_depth(png, header) < 8)
-    png_set_expand_gray_1_2_4_to_8(png);
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-  png_set_swap(png);
-#endif
-  const int passes = png_set_interlace_handling(png);
-  png_read_update_info(png, header);
-  info->width = png_get_image_width(png, header);
-  info->height = png_get_image_height(png, header);
-  info->channels = png_get_channels(png, header);
-  info->bytes = png_get_bit_depth(png, header) / 8;
-  if (info->pixels) {
-    if (info->Size() > info->room)
-      png_error(png, Changed);
-    const std::size_t stride = info->Size() / info->height;
-    for (int pass = 0; pass < passes; ++pass)
-      for (std::uint32_t row = 0; row < info->height; ++row)
-        png_read_row(png, info->pixels + row * stride, nullptr);
-    png_read_end(png, nullptr);
-  }
-  png_destroy_read_struct(&png, &header, nullptr);
-  return true;
-}
-
-//------------------------------------------------------------------------------------------------ JPEG
-struct JpegErrors {
-  jpeg_error_mgr manager; // first: libjpeg knows this part
-  jmp_buf jump;
-};
-
-void JpegError(j_common_ptr jpeg)
-{
-  std::longjmp(reinterpret_cast<JpegErrors*>(jpeg->err)->jump, 1);
-}
-
-void JpegMessage(j_common_ptr) {}
-
-bool ReadJpeg(FILE* file, Info* info)
-{
-  jpeg_decompress_struct jpeg;
-  JpegErrors errors;
-  jpeg.err = jpeg_std_error(&errors.manager);
-  errors.manager.error_exit = JpegError;
-  errors.manager.output_message = JpegMessage;
-  if (setjmp(errors.jump)) {
-    char text[JMSG_LENGTH_MAX];
-    errors.manager.format_message(reinterpret_cast<j_common_ptr>(&jpeg), text);
-    std::snprintf(info->message, sizeof info->message, "%.190s", text);
-    jpeg_destroy_decompress(&jpeg);
-    return false;
-  }
-  jpeg_create_decompress(&jpeg);
-  jpeg_stdio_src(&jpeg, file);
-  jpeg_read_header(&jpeg, TRUE);
-  const bool grey = jpeg.num_components == 1;
-  bool good = grey || jpeg.num_components == 3;
-  if (!good)
-    std::snprintf(info->message, sizeof info->message, "it has %d colour components; 1 or 3 are read", jpeg.num_components);
-  else {
-    jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
-    info->width = jpeg.image_width;
-    info->height = jpeg.image_height;
-    info->channels = grey ? 1 : 3;
-    info->bytes = 1;
-    const double perMm = jpeg.density_unit == 1 ? 1.0 / 25.4 : jpeg.density_unit == 2 ? 0.1 : 0.0;
-    info->dotsPerMm[0] = jpeg.X_density * perMm;
-    info->dotsPerMm[1] = jpeg.Y_density * perMm;
-    if (info->pixels && info->Size() > info->room) {
-      std::snprintf(info->message, sizeof info->message, "%s", Changed);
-      good = false;
-    } else if (info->pixels) {
-      jpeg_start_decompress(&jpeg);
-      const std::size_t stride = info->Size() / info->height;
-      while (jpeg.output_scanline < jpeg.output_height) {
-        JSAMPROW row = info->pixels + jpeg.output_scanline * stride;
-        jpeg_read_scanlines(&jpeg, &row, 1);
-      }
-      jpeg_finish_decompress(&jpeg);
-      // Damage and a missing end are warnings to libjpeg, which makes up the rest.
-      if (errors.manager.num_warnings > 0) {
-        errors.manager.format_message(reinterpret_cast<j_common_ptr>(&jpeg), info->message);
-        good = false;
-      }
-    }
-  }
-  jpeg_destroy_decompress(&jpeg);
-  return good;
-}
-
-//------------------------------------------------------------------------------------------------ TIFF
-int TiffError(TIFF*, void* user, const char*, const char* format, va_list arguments)
-{
-  Info* info = static_cast<Info*>(user);
-  if (info && info->message[0] == '\0') // the first says what went wrong
-    std::vsnprintf(info->message, sizeof info->message, format, arguments);
-  return 1; // told; nobody prints
-}
-
-int TiffWarning(TIFF*, void*, const char*, const char*, va_list)
-{
-  return 1;
-}
-
-using TiffPointer = std::unique_ptr<TIFF, void (*)(TIFF*)>;
-
-TiffPointer OpenTiff(const std::string& path, Info* info)
-{
-  TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
-  TIFFOpenOptionsSetErrorHandlerExtR(options, TiffError, info);
-  TIFFOpenOptionsSetWarningHandlerExtR(options, TiffWarning, nullptr);
-  TiffPointer tiff(TIFFOpenExt(path.c_str(), "rm", options), TIFFClose); // m: not mapped, so that a shrinking file is no crash
-  TIFFOpenOptionsFree(options);
-  return tiff;
-}
-
-template <class T>
-T TiffTag(TIFF* tiff, std::uint32_t tag)
-{
-  T value{};
-  TIFFGetFieldDefaulted(tiff, tag, &value);
-  return value;
-}
-
-// The current page. \returns false with a message.
-bool ReadTiffPage(TIFF* tiff, Info* info)
-{
-  const auto refuse = [info](const char* format, int number) {
-    std::snprintf(info->message, sizeof info->message, format, number);
-    return false;
-  };
-  info->width = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH);
-  info->height = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH);
-  const int bits = TiffTag<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE),
-            format = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT),
-            photometric = TiffTag<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC),
-            compression = TiffTag<std::uint16_t>(tiff, TIFFTAG_COMPRESSION);
-  info->channels = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
-  if (info->channels < 1 || info->channels > 4)
-    return refuse("it has %d numbers per pixel; 1 to 4 are read", info->channels);
-  if (info->channels > 1 && TiffTag<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG)
-    return refuse("its %d colours are stored apart, which is not supported", info->channels);
-  if (bits != 8 && bits != 16 && bits != 32)
-    return refuse("it has %d bits per number; 8, 16 and 32 are read", bits);
-  info->isFloat = format == SAMPLEFORMAT_IEEEFP;
-  info->isSigned = format == SAMPLEFORMAT_INT;
-  if ((info->isFloat && bits != 32) || format > SAMPLEFORMAT_VOID)
-    return refuse("its sample format %d is not supported", format);
-  if (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG)
-    TIFFSetField(tiff, TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
-  else if (photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE && photometric != PHOTOMETRIC_RGB)
-    return refuse("its colours are stored in a way that is not supported (photometric interpretation %d)", photometric);
-  info->inverted = photometric == PHOTOMETRIC_MINISWHITE;
-  info->bytes = bits / 8;
-  const int unit = TiffTag<std::uint16_t>(tiff, TIFFTAG_RESOLUTIONUNIT);
-  const double perMm = unit == RESUNIT_INCH ? 1.0 / 25.4 : unit == RESUNIT_CENTIMETER ? 0.1 : 0.0;
-  info->dotsPerMm[0] = static_cast<double>(TiffTag<float>(tiff, TIFFTAG_XRESOLUTION)) * perMm;
-  info->dotsPerMm[1] = static_cast<double>(TiffTag<float>(tiff, TIFFTAG_YRESOLUTION)) * perMm;
-  if (!info->pixels)
-    return true;
-  if (info->Size() > info->room)
-    return refuse(Changed, 0);
-
-  const std::size_t sample = static_cast<std::size_t>(info->channels) * static_cast<std::size_t>(info->bytes),
-                    stride = info->width * sample;
-  const auto damaged = [&] { return info->message[0] != '\0' ? false : refuse("its data end early or are damaged", 0); };
-  if (!TIFFIsTiled(tiff)) {
-    if (TIFFScanlineSize64(tiff) != stride)
-      return refuse("its rows have not the length of its %d numbers per pixel", info->channels);
-    for (std::uint32_t row = 0; row < info->height; ++row)
-      if (TIFFReadScanline(tiff, info->pixels + row * stride, row) != 1)
-        return damaged();
-    return true;
-  }
-  const std::uint32_t across = TiffTag<std::uint32_t>(tiff, TIFFTAG_TILEWIDTH),
-                      down = TiffTag<std::uint32_t>(tiff, TIFFTAG_TILELENGTH);
-  const std::uint64_t size = TIFFTileSize64(tiff);
-  if (across == 0 || down == 0 || size != across * sample * down || size > (std::uint64_t{1} << 28))
-    return refuse("its tiles have not the size of their %d numbers per pixel", info->channels);
-  std::vector<unsigned char> tile(size);
-  for (std::uint32_t y = 0; y < info->height; y += down)
-    for (std::uint32_t x = 0; x < info->width; x += across) {
-      if (TIFFReadTile(tiff, tile.data(), x, y, 0, 0) < 0)
-        return damaged();
-      const std::size_t length = std::min(across, info->width - x) * sample;
-      for (std::uint32_t row = 0; row < std::min(down, info->height - y); ++row)
-        std::memcpy(info->pixels + (y + row) * stride + x * sample, tile.data() + row * across * sample, length);
-    }
-  return true;
-}
-
-//------------------------------------------------------------------------------------------------ the stack
-struct Picture {
-  std::string path;
-  Kind kind = Kind::None;
-  std::uint64_t page = 0; // TIFF: where its directory is, 0 for the first
-  Info info{};
-};
-
-// Reads the header of a slice into its info, and the pixels where they are wanted.
-void ReadSlice(Picture& slice)
-{
-  bool good = false;
-  slice.info.message[0] = '\0';
-  if (slice.kind == Kind::Tiff) {
-    const TiffPointer tiff = OpenTiff(slice.path, &slice.info);
-    good = tiff && (slice.page == 0 || TIFFSetSubDirectory(tiff.get(), slice.page)) && ReadTiffPage(tiff.get(), &slice.info);
-  } else {
-    const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(slice.path.c_str(), "rb"), std::fclose);
-    if (!file)
-      throw Error(Error::Kind::FileSystem, slice.path + ": it cannot be opened (is reading permitted?)");
-    good = slice.kind == Kind::Png ? ReadPng(file.get(), &slice.info) : ReadJpeg(file.get(), &slice.info);
-  }
-  if (!good)
-    FailFile(slice.path,
-             "the image cannot be read (" + std::string(slice.info.message[0] ? slice.info.message : "damaged") + ")");
+  return PictureKindOf({start, sizeof start});
 }
 
 // img2 before img10: digits are compared as numbers. Equal numbers: the shorter text, then the order of characters.
@@ -404,10 +111,8 @@ std::optional<double> MmOfUnit(const std::string& unit)
 
 class ImageStack : public VolumeSource {
 public:
-  ImageStack(const std::string& path, const VolumeReadParameters& parameters)
+  ImageStack(const std::string& path, const VolumeReadParameters& parameters) : VolumeSource(path, FileFormat::ImageStack)
   {
-    content_.path = path;
-    content_.format = FileFormat::ImageStack;
     Collect();
     CheckSlices();
     FindSpacing(parameters);
@@ -415,7 +120,6 @@ public:
   void Read(std::size_t, void* voxels, unsigned char*, const Progress& progress) override;
 
 private:
-  void Note(const std::string& note) { content_.notes.push_back(note); }
   void Collect();
   void CollectPages(std::string path);
   void NoteGaps();
@@ -425,7 +129,7 @@ private:
 
   std::vector<Picture> slices_;
   std::string description_; // of a TIFF
-  float resolution_[2] = {0.f, 0.f};
+  std::array<float, 2> resolution_{};
 };
 
 void ImageStack::Collect()
@@ -442,7 +146,7 @@ void ImageStack::Collect()
       const std::string name = entry.path().filename().string();
       if (name[0] == '.' || entry.is_directory(error))
         continue;
-      if (const Kind kind = KindOfFile(entry.path()); kind != Kind::None)
+      if (const PictureKind kind = KindOfFile(entry.path()); kind != PictureKind::None)
         slices_.push_back({entry.path().string(), kind});
       else if (++ignoredCount == 1 || name < ignored)
         ignored = name;
@@ -455,8 +159,8 @@ void ImageStack::Collect()
       Note(std::to_string(ignoredCount) + (ignoredCount > 1 ? " files of the folder are" : " file of the folder is") +
            " no image and was left out: " + ignored + (ignoredCount > 1 ? ", ..." : ""));
   } else {
-    const Kind kind = KindOfFile(path);
-    if (kind == Kind::None)
+    const PictureKind kind = KindOfFile(path);
+    if (kind == PictureKind::None)
       FailFile(path, "the content is none of PNG, JPEG and TIFF");
     slices_.push_back({path, kind});
     const auto [pattern, number] = SplitNumber(fs::path(path).filename().string());
@@ -465,14 +169,14 @@ void ImageStack::Collect()
          number < 0 ? fs::directory_iterator() : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
       const auto [otherPattern, otherNumber] = SplitNumber(entry.path().filename().string());
       if (otherPattern == pattern && otherNumber >= 0 && entry.path().filename() != fs::path(path).filename())
-        if (const Kind otherKind = KindOfFile(entry.path()); otherKind != Kind::None)
+        if (const PictureKind otherKind = KindOfFile(entry.path()); otherKind != PictureKind::None)
           slices_.push_back({(folder / entry.path().filename()).string(), otherKind});
     }
   }
   std::sort(slices_.begin(), slices_.end(), [](const Picture& a, const Picture& b) {
     return NaturallyBefore(fs::path(a.path).filename().string(), fs::path(b.path).filename().string());
   });
-  if (slices_.size() == 1 && slices_[0].kind == Kind::Tiff)
+  if (slices_.size() == 1 && slices_[0].kind == PictureKind::Tiff)
     CollectPages(slices_[0].path);
   else if (!fs::is_directory(path, error) && slices_.size() > 1)
     Note("the " + std::to_string(slices_.size()) + " images beside it that differ by their number were taken as the slices");
@@ -481,24 +185,12 @@ void ImageStack::Collect()
 
 void ImageStack::CollectPages(std::string path) // a copy: the slices are made anew
 {
-  Picture first{path, Kind::Tiff};
-  const TiffPointer tiff = OpenTiff(path, &first.info);
-  if (!tiff)
-    FailFile(path, "the image cannot be read (" + std::string(first.info.message) + ")");
-  if (const char* text = nullptr; TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) == 1 && text)
-    description_ = text;
-  resolution_[0] = TiffTag<float>(tiff.get(), TIFFTAG_XRESOLUTION);
-  resolution_[1] = TiffTag<float>(tiff.get(), TIFFTAG_YRESOLUTION);
+  const TiffPages tiff = ReadTiffPages(path);
+  description_ = tiff.description;
+  resolution_ = tiff.resolution;
   slices_.clear();
-  bool more = true;
-  for (; more; more = TIFFReadDirectory(tiff.get()) == 1) {
-    if ((TiffTag<std::uint32_t>(tiff.get(), TIFFTAG_SUBFILETYPE) & FILETYPE_REDUCEDIMAGE) != 0)
-      continue; // a thumbnail
-    first.page = TIFFCurrentDirOffset(tiff.get());
-    slices_.push_back(first);
-  }
-  if (first.info.message[0] != '\0')
-    FailFile(path, "its pages are damaged (" + std::string(first.info.message) + ")");
+  for (const std::uint64_t page : tiff.pages)
+    slices_.push_back({path, PictureKind::Tiff, page});
   if (slices_.empty())
     FailFile(path, "it holds thumbnails alone");
   if (description_.compare(0, 7, "ImageJ=") != 0)
@@ -539,10 +231,10 @@ void ImageStack::CheckSlices()
   double fileBytes = 0.0, needed = 0.0;
   std::string last;
   for (Picture& slice : slices_) {
-    ReadSlice(slice);
-    const Info &info = slice.info, &first = slices_[0].info;
-    const auto size = [](const Info& i) { return std::to_string(i.width) + " x " + std::to_string(i.height); };
-    const auto type = [](const Info& i) {
+    ReadPicture(slice);
+    const PictureInfo &info = slice.info, &first = slices_[0].info;
+    const auto size = [](const PictureInfo& i) { return SizeText(i.width, i.height); };
+    const auto type = [](const PictureInfo& i) {
       return std::to_string(8 * i.bytes) + "-bit " + (i.isFloat ? "float" : i.isSigned ? "signed" : "unsigned");
     };
     if (info.width < 1 || info.height < 1 || info.width > 0x7fffffffu || info.height > 0x7fffffffu)
@@ -566,7 +258,7 @@ void ImageStack::CheckSlices()
     if (needed > LargestRatio * fileBytes)
       FailFile(slice.path, "its " + size(info) + " pixels are more than a file of its size can hold");
   }
-  const Info& first = slices_[0].info;
+  const PictureInfo& first = slices_[0].info;
   content_.geometry.dimensions = {static_cast<int>(first.width), static_cast<int>(first.height),
                                   static_cast<int>(slices_.size())};
   content_.type = first.isFloat      ? VoxelType::Float32
@@ -627,16 +319,12 @@ void ImageStack::FindSpacing(const VolumeReadParameters& parameters)
     Note("the images do not say their spacing along " + assumed + ": 1 mm was assumed");
   content_.geometry.spacing = spacing;
   Note("images hold no pose: the first pixel is the origin, and the axes are those of the world");
-  try {
-    content_.geometry.Check(content_.path);
-  } catch (const Error& error) {
-    throw Error(Error::Kind::BadFile, error.what());
-  }
+  CheckGeometry(content_.path, content_.geometry);
 }
 
 // One number per pixel of several.
 template <class T>
-void ToGrey(const T* pixels, std::size_t count, const Info& info, T* grey)
+void ToGrey(const T* pixels, std::size_t count, const PictureInfo& info, T* grey)
 {
   const std::size_t channels = static_cast<std::size_t>(info.channels);
   for (std::size_t i = 0; i < count; ++i, pixels += channels) {
@@ -644,11 +332,8 @@ void ToGrey(const T* pixels, std::size_t count, const Info& info, T* grey)
       grey[i] = pixels[0];
     else if (pixels[0] == pixels[1] && pixels[1] == pixels[2])
       grey[i] = pixels[0];
-    else {
-      const double luminance = 0.299 * static_cast<double>(pixels[0]) + 0.587 * static_cast<double>(pixels[1]) +
-                               0.114 * static_cast<double>(pixels[2]);
-      grey[i] = static_cast<T>(std::is_integral_v<T> ? std::floor(luminance + 0.5) : luminance);
-    }
+    else
+      grey[i] = Luminance(pixels);
     if constexpr (std::is_integral_v<T>)
       if (info.inverted)
         grey[i] = static_cast<T>(std::numeric_limits<T>::max() - grey[i]);
@@ -660,13 +345,13 @@ void ImageStack::Read(std::size_t, void* voxels, unsigned char*, const Progress&
   const std::size_t count = static_cast<std::size_t>(slices_[0].info.width) * slices_[0].info.height;
   ParallelFor(static_cast<std::ptrdiff_t>(slices_.size()), progress, [&](std::ptrdiff_t k) {
     Picture slice = slices_[static_cast<std::size_t>(k)];
-    const Info expected = slice.info;
+    const PictureInfo expected = slice.info;
     std::vector<std::uint32_t> memory((expected.Size() + 3) / 4); // aligned for every type
     slice.info.pixels = reinterpret_cast<unsigned char*>(memory.data());
     slice.info.room = 4 * memory.size();
-    ReadSlice(slice);
+    ReadPicture(slice);
     if (!slice.info.SameShape(expected))
-      FailFile(slice.path, Changed);
+      FailFile(slice.path, PictureChanged);
     DispatchVoxelType(content_.type, [&](auto zero) {
       using T = decltype(zero);
       if constexpr (sizeof(T) <= 4)
@@ -680,14 +365,14 @@ void ImageStack::Read(std::size_t, void* voxels, unsigned char*, const Progress&
 
 bool LooksLikeImage(std::string_view start)
 {
-  return KindOf(start) != Kind::None;
+  return PictureKindOf(start) != PictureKind::None;
 }
 
 bool HoldsImages(const std::string& folder)
 {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().filename().string()[0] != '.' && KindOfFile(entry.path()) != Kind::None)
+    if (entry.path().filename().string()[0] != '.' && KindOfFile(entry.path()) != PictureKind::None)
       return true;
   return false;
 }

@@ -15,10 +15,12 @@
 //
 // What is known of the format is what open readers of it (SlicerHeart, kretz by P. Looney) found out.
 #include "Readers/KretzFile.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Base/SizeText.h"
 #include "Core/Imaging/ScanConversion.h"
-#include "Readers/VolumeFile.h"
+#include "Readers/DataFile.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -33,7 +35,6 @@ namespace echorama {
 namespace {
 
 constexpr std::string_view Signature = "KRETZFILE 1.0   ";
-constexpr double degreesPerRadian = 57.29577951308232, quarterTurn = 1.5707963267948966;
 constexpr double mmPerMetre = 1000.0;
 
 // Angles this near to even spacing (in steps) are even.
@@ -94,12 +95,8 @@ struct Angles {
 class KretzSource : public VolumeSource {
 public:
   KretzSource(const std::string& path, std::uint64_t offset, std::uint64_t bytes, const VolumeReadParameters& parameters)
-    : stream_(path, std::ios::binary), begin_(offset), end_(offset + bytes)
+    : VolumeSource(path, FileFormat::Kretz), stream_(OpenToRead(path)), begin_(offset), end_(offset + bytes)
   {
-    content_.path = path;
-    content_.format = FileFormat::Kretz;
-    if (!stream_)
-      throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");
     if (!(parameters.spacingMm >= 0.0) || !std::isfinite(parameters.spacingMm))
       throw Error(Error::Kind::InvalidParameter, path + ": the spacing to convert to is " + NumberText(parameters.spacingMm) +
                                                      " mm; it must be positive, or 0 for that of the samples");
@@ -141,8 +138,6 @@ public:
   }
 
 private:
-  [[noreturn]] void Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, content_.path + ": " + reason); }
-
   void FindItems()
   {
     std::string start(Signature.size(), '\0');
@@ -245,7 +240,7 @@ private:
   {
     const double count = static_cast<double>(dimensions_[0]) * dimensions_[1] * dimensions_[2];
     if (count > std::numeric_limits<int>::max())
-      Fail("its dimensions (" + Dimensions() + ") need more than 2^31 - 1 samples");
+      Fail("its dimensions (" + SizeText(dimensions_) + ") need more than 2^31 - 1 samples");
     const std::uint64_t bytes = static_cast<std::uint64_t>(count);
     const auto single = items_.find(Samples), movie = items_.find(MovieSamples);
     if (movie != items_.end() && movie->second.bytes > 0) {
@@ -257,14 +252,14 @@ private:
       }
       if (single == items_.end())
         Fail("its movie " + TextOf(MovieSamples) + " is compressed; save it uncompressed on the scanner");
-      content_.notes.push_back("Its movie " + TextOf(MovieSamples) +
-                               " is compressed and is left out; the single volume beside it is read.");
+      Note("Its movie " + TextOf(MovieSamples) + " is compressed and is left out; the single volume beside it is read.");
     }
     if (single == items_.end())
       Fail("it holds no samples " + TextOf(Samples) + "; compressed files must be saved uncompressed on the scanner");
     if (single->second.bytes != bytes)
-      Fail("its dimensions (" + Dimensions() + ") need " + std::to_string(bytes) + " bytes, and the samples " + TextOf(Samples) +
-           " are " + std::to_string(single->second.bytes) + ": they are compressed or the dimensions are wrong");
+      Fail("its dimensions (" + SizeText(dimensions_) + ") need " + std::to_string(bytes) + " bytes, and the samples " +
+           TextOf(Samples) + " are " + std::to_string(single->second.bytes) +
+           ": they are compressed or the dimensions are wrong");
     first_ = single->second.offset;
   }
 
@@ -291,7 +286,7 @@ private:
     content_.times.resize(volumes);
     for (std::size_t i = 0; i < volumes; ++i)
       content_.times[i] = static_cast<double>(i);
-    content_.notes.push_back("The times of its movie cannot be told; the volumes are one second apart.");
+    Note("The times of its movie cannot be told; the volumes are one second apart.");
   }
 
   // Of all that is said in words, what names neither a person nor a place nor a day.
@@ -301,11 +296,6 @@ private:
                                    std::pair("TransducerType", ProbeName)})
       if (const std::string text = Text(tag); !text.empty())
         content_.fields.emplace_back(key, text);
-  }
-
-  std::string Dimensions() const
-  {
-    return std::to_string(dimensions_[0]) + " x " + std::to_string(dimensions_[1]) + " x " + std::to_string(dimensions_[2]);
   }
 
   Angles ReadAngles(KretzTag tag, const char* what, int count)
@@ -326,8 +316,8 @@ private:
       const double place = static_cast<double>(above - angles.begin()) - 1.0 + (wanted - above[-1]) / (above[0] - above[-1]);
       axis.places.push_back(std::min(std::max(place, 0.0), count - 1.0));
     }
-    content_.notes.push_back("The beams are resampled to even angles: " + std::string(what) + " deviate from them by up to " +
-                             NumberText(deviation * degreesPerRadian) + " degrees, " + NumberText(deviation / step) + " steps.");
+    Note("The beams are resampled to even angles: " + std::string(what) + " deviate from them by up to " +
+         NumberText(deviation * DegreesPerRadian) + " degrees, " + NumberText(deviation / step) + " steps.");
     return axis;
   }
 
@@ -348,14 +338,14 @@ private:
     double face = Has(FaceRadius) ? step * Number(FaceRadius, "the radius of the face") : 0.0;
     if (!(face > 0.0 && face <= first)) {
       face = first;
-      content_.notes.push_back("The radius of the array's face is not known; depths count from the first sample.");
+      Note("The radius of the array's face is not known; depths count from the first sample.");
     }
     face = std::max(face, axis); // the sweep turns about a line behind the face
 
     ProbeGeometry probe;
     probe.fanAngle = fan_.last - fan_.first;
     probe.fanWidth = probe.fanAngle * face;
-    probe.fanOffset = (0.5 * (fan_.first + fan_.last) - quarterTurn) / probe.fanAngle;
+    probe.fanOffset = (0.5 * (fan_.first + fan_.last) - (0.5 * Pi)) / probe.fanAngle;
     if (std::abs(probe.fanOffset) < 1e-12)
       probe.fanOffset = 0.0;
     probe.sweepAngle = sweep_.last - sweep_.first;
@@ -365,7 +355,7 @@ private:
 
     Pose probeToWorld = Pose::Identity();
     probeToWorld.translation().z() = face;
-    const double turned = 0.5 * (sweep_.first + sweep_.last) - quarterTurn;
+    const double turned = 0.5 * (sweep_.first + sweep_.last) - (0.5 * Pi);
     if (std::abs(turned) > 1e-12)
       probeToWorld = MotionAbout({0, 0, axis}, {turned, 0, 0}, {0, 0, 0}) * probeToWorld;
 
@@ -398,13 +388,9 @@ private:
     const double spacing = Number(CartesianSpacing, "the spacing of the voxels");
     content_.geometry.dimensions = dimensions_;
     content_.geometry.spacing.setConstant(spacing);
-    try {
-      content_.geometry.Check(content_.path);
-    } catch (const Error& error) {
-      throw Error(Error::Kind::BadFile, error.what());
-    }
-    content_.notes.push_back("It holds voxels, not beams; that their spacing is " + NumberText(spacing) +
-                             " mm is inferred, not confirmed: measure something of known size.");
+    CheckGeometry(content_.path, content_.geometry);
+    Note("It holds voxels, not beams; that their spacing is " + NumberText(spacing) +
+         " mm is inferred, not confirmed: measure something of known size.");
     CheckMemory(content_.path, static_cast<double>(content_.geometry.VoxelCount()));
   }
 
@@ -412,16 +398,10 @@ private:
   void ReadSamples(std::size_t index, unsigned char* out, const Progress& progress)
   {
     const std::uint64_t total = static_cast<std::uint64_t>(VolumeView<unsigned char>(out, dimensions_).Size());
-    constexpr std::uint64_t chunkBytes = 1 << 24;
     stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(first_ + index * total));
-    for (std::uint64_t done = 0; done < total;) {
-      const std::uint64_t chunk = std::min(chunkBytes, total - done);
-      if (!stream_.read(reinterpret_cast<char*>(out + done), static_cast<std::streamsize>(chunk)))
-        Fail("the data end early, after " + std::to_string(done) + " of " + std::to_string(total) + " samples");
-      done += chunk;
-      progress(static_cast<double>(done) / static_cast<double>(total));
-    }
+    if (const std::uint64_t there = ReadPieces(stream_, out, total, progress); there < total)
+      Fail("the data end early, after " + std::to_string(there) + " of " + std::to_string(total) + " samples");
   }
 
   // From the file's angles to even ones, linearly between neighbours.

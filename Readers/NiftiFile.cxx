@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A NIfTI header is a fixed block of 348 (version 1) or 540 bytes (version 2), in the byte order of whoever wrote it, then
-// extensions, then the voxels. We take it apart ourselves rather than with libnifti, which prints to stderr, believes every
-// length and ends where a file does without saying so: here each number is checked against the file's size before anything
-// is allocated, and voxels go through the same code as those of the other formats.
-//
-// The header's affine maps indices to RAS; two signs make it LPS.
+// A NIfTI file is a header (NiftiHeader.h), then extensions, then the voxels. We take it apart ourselves rather than with
+// libnifti, which prints to stderr, believes every length and ends where a file does without saying so: here each number is
+// checked against the file's size before anything is allocated, and voxels go through the same code as those of the other
+// formats.
 //
 // Compressed time series are inflated in order; going back to an earlier volume starts over.
 #include "Readers/NiftiFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Base/SizeText.h"
 #include "Readers/AffinePose.h"
 #include "Readers/Compression.h"
+#include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"
+#include "Readers/NiftiHeader.h"
 #include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cctype>
@@ -29,157 +30,14 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr int SizeOfHeader[] = {0, 348, 540}; // by version
-constexpr int CommentCode = 6;
-const std::string CommentStart = "Echorama volume", OwnDescription = "Echorama";
-
-template <class T>
-T Swapped(T value)
-{
-  char bytes[sizeof(T)];
-  std::memcpy(bytes, &value, sizeof(T));
-  std::reverse(bytes, bytes + sizeof(T));
-  std::memcpy(&value, bytes, sizeof(T));
-  return value;
-}
-
-// What we use of a header of either version, as numbers of this machine.
-struct Fields {
-  int version = 1;
-  bool bigEndian = false;
-  bool pair = false; // .hdr and .img
-  std::array<std::int64_t, 8> dim{};
-  std::array<double, 8> pixdim{};
-  int datatype = 0, qformCode = 0, sformCode = 0, units = 0;
-  double offset = 0.0, slope = 0.0, intercept = 0.0, timeOffset = 0.0;
-  std::array<double, 6> quaternion{}; // b c d, then the offset
-  std::array<double, 12> srow{};
-  std::string description, intentName;
-};
-
-// Where each version has what. The types differ, too: see Parse.
-struct Layout {
-  std::size_t dim, pixdim, datatype, offset, slope, intercept, timeOffset, units, description, qformCode, sformCode, quaternion,
-      srow, intentName, magic;
-};
-constexpr Layout Layouts[] = {{},
-                              {40, 76, 70, 108, 112, 116, 136, 123, 148, 252, 254, 256, 280, 328, 344},
-                              {16, 104, 12, 168, 176, 184, 216, 500, 240, 344, 348, 352, 400, 508, 4}};
-
-class Bytes {
-public:
-  Bytes(std::string_view bytes, bool swap) : bytes_(bytes), swap_(swap) {}
-  template <class T>
-  T At(std::size_t offset) const
-  {
-    T value;
-    std::memcpy(&value, bytes_.data() + offset, sizeof(T));
-    return swap_ ? Swapped(value) : value;
-  }
-  std::string Text(std::size_t offset, std::size_t length) const
-  {
-    std::string text(bytes_.substr(offset, length));
-    text.erase(std::min(text.find('\0'), text.size()));
-    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())))
-      text.pop_back();
-    return text;
-  }
-
-private:
-  std::string_view bytes_;
-  bool swap_;
-};
-
-// The version that the first four bytes name, 0 for none.
-int VersionOf(std::string_view start, bool& swap)
-{
-  if (start.size() < 4)
-    return 0;
-  for (const bool swapped : {false, true})
-    for (const int version : {1, 2})
-      if (Bytes(start, swapped).At<std::int32_t>(0) == SizeOfHeader[version]) {
-        swap = swapped;
-        return version;
-      }
-  return 0;
-}
-
-template <int Version>
-Fields Parse(const Bytes& bytes)
-{
-  constexpr bool one = Version == 1;
-  using Real = std::conditional_t<one, float, double>;
-  using Size = std::conditional_t<one, std::int16_t, std::int64_t>;
-  using Code = std::conditional_t<one, std::int16_t, std::int32_t>;
-  using Offset = std::conditional_t<one, float, std::int64_t>;
-  const Layout& at = Layouts[Version];
-  const auto reals = [&](std::size_t offset, auto& target) {
-    for (std::size_t i = 0; i < target.size(); ++i)
-      target[i] = static_cast<double>(bytes.At<Real>(offset + i * sizeof(Real)));
-  };
-  Fields f;
-  f.version = Version;
-  for (std::size_t i = 0; i < 8; ++i)
-    f.dim[i] = bytes.At<Size>(at.dim + i * sizeof(Size));
-  reals(at.pixdim, f.pixdim);
-  reals(at.quaternion, f.quaternion);
-  reals(at.srow, f.srow);
-  f.datatype = bytes.At<std::int16_t>(at.datatype);
-  f.offset = static_cast<double>(bytes.At<Offset>(at.offset));
-  f.slope = static_cast<double>(bytes.At<Real>(at.slope));
-  f.intercept = static_cast<double>(bytes.At<Real>(at.intercept));
-  f.timeOffset = static_cast<double>(bytes.At<Real>(at.timeOffset));
-  f.units = one ? bytes.At<unsigned char>(at.units) : bytes.At<std::int32_t>(at.units);
-  f.qformCode = bytes.At<Code>(at.qformCode);
-  f.sformCode = bytes.At<Code>(at.sformCode);
-  f.description = bytes.Text(at.description, 80);
-  f.intentName = bytes.Text(at.intentName, 16);
-  return f;
-}
-
-// The voxel type of a NIfTI code; Fails, with what it is, for the others.
-struct TypeCode {
-  int code;
-  VoxelType type;
-};
-constexpr TypeCode TypeCodes[] = {{256, VoxelType::Int8},   {2, VoxelType::UInt8},     {4, VoxelType::Int16},
-                                  {512, VoxelType::UInt16}, {8, VoxelType::Int32},     {768, VoxelType::UInt32},
-                                  {1024, VoxelType::Int64}, {1280, VoxelType::UInt64}, {16, VoxelType::Float32},
-                                  {64, VoxelType::Float64}};
-
-const char* NameOfOther(int code)
-{
-  switch (code) {
-  case 1:
-    return "single bits";
-  case 32:
-  case 1792:
-  case 2048:
-    return "complex numbers";
-  case 128:
-  case 2304:
-    return "colours";
-  case 1536:
-    return "128-bit numbers";
-  default:
-    return "an unknown type";
-  }
-}
-
 // Reads a file, plain or gzip, from its beginning on; going back starts over.
 class PlainOrGzip {
 public:
-  explicit PlainOrGzip(const std::string& path) : path_(path), stream_(path, std::ios::binary)
+  explicit PlainOrGzip(const std::string& path) : path_(path), stream_(OpenToRead(path)), fileBytes_(FileSize(path))
   {
-    if (!stream_)
-      throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");
     unsigned char magic[2] = {0, 0};
     stream_.read(reinterpret_cast<char*>(magic), 2);
     compressed_ = stream_.gcount() == 2 && magic[0] == 0x1f && magic[1] == 0x8b;
-    std::error_code error;
-    fileBytes_ = fs::file_size(path, error);
-    if (error)
-      throw Error(Error::Kind::FileSystem, path + ": " + error.message());
   }
   bool Compressed() const { return compressed_; }
   double FileBytes() const { return static_cast<double>(fileBytes_); }
@@ -198,15 +56,9 @@ public:
     }
     stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(offset));
-    for (std::uint64_t done = 0; done < bytes;) {
-      const std::uint64_t piece = std::min<std::uint64_t>(bytes - done, 1 << 24);
-      stream_.read(static_cast<char*>(out) + done, static_cast<std::streamsize>(piece));
-      done += static_cast<std::uint64_t>(stream_.gcount());
-      if (!stream_)
-        throw Error(Error::Kind::BadFile, path_ + ": the data end early, after " + std::to_string(offset + done) + " of " +
-                                              std::to_string(std::max(total_, offset + bytes)) + " bytes: the file is truncated");
-      progress(static_cast<double>(done) / static_cast<double>(bytes));
-    }
+    if (const std::uint64_t there = ReadPieces(stream_, out, bytes, progress); there < bytes)
+      FailFile(path_, "the data end early, after " + std::to_string(offset + there) + " of " +
+                          std::to_string(std::max(total_, offset + bytes)) + " bytes: the file is truncated");
   }
   // After the last byte of the file's content was read.
   void Finish()
@@ -218,8 +70,8 @@ public:
 private:
   std::string path_;
   std::ifstream stream_;
+  std::uint64_t fileBytes_, total_ = 0;
   bool compressed_ = false;
-  std::uint64_t fileBytes_ = 0, total_ = 0;
   std::unique_ptr<Inflater> inflater_;
 };
 
@@ -240,23 +92,20 @@ void ScaleInPlace(Scaled* values, std::size_t count, double slope, double interc
 
 class NiftiSource : public VolumeSource {
 public:
-  explicit NiftiSource(const std::string& path)
+  explicit NiftiSource(const std::string& path) : VolumeSource(path, FileFormat::Nifti)
   {
-    content_.path = stored_.path = path;
-    content_.format = FileFormat::Nifti;
+    stored_.path = path;
     ReadHeader();
   }
   void Read(std::size_t index, void* voxels, unsigned char* valid, const Progress& progress) override;
 
 private:
-  [[noreturn]] void Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, content_.path + ": " + reason); }
-  void Note(const std::string& note) { content_.notes.push_back(note); }
   void ReadHeader();
-  void ReadDimensions(const Fields& fields);
-  void ReadTimes(const Fields& fields);
-  void ReadType(const Fields& fields);
-  void ReadGeometry(const Fields& fields);
-  Eigen::Matrix<double, 3, 4> AffineOf(const Fields& fields);
+  void ReadDimensions(const NiftiHeader& fields);
+  void ReadTimes(const NiftiHeader& fields);
+  void ReadType(const NiftiHeader& fields);
+  void ReadGeometry(const NiftiHeader& fields);
+  Eigen::Matrix<double, 3, 4> AffineOf(const NiftiHeader& fields);
   void ReadExtensions(PlainOrGzip& file, std::uint64_t at, bool swap);
   void ReadComment(const std::string& text);
   void CheckSizes();
@@ -274,29 +123,25 @@ void NiftiSource::ReadHeader()
   std::string bytes(4, '\0');
   file.Read(0, bytes.data(), bytes.size());
   bool swap = false;
-  const int version = VersionOf(bytes, swap);
+  const int version = NiftiVersion(bytes, swap);
   if (version == 0)
     Fail("the content is not NIfTI");
-  const std::size_t size = static_cast<std::size_t>(SizeOfHeader[version]);
+  const std::size_t size = NiftiHeaderSize(version);
   bytes.resize(size);
   file.SetTotal(size);
   file.Read(4, bytes.data() + 4, size - 4);
-  const std::string magic = bytes.substr(Layouts[version].magic, 4);
-  const std::string number = std::to_string(version);
-  if (magic != "n+" + number + std::string(1, '\0') && magic != "ni" + number + std::string(1, '\0'))
+  const NiftiHeader fields = ParseNiftiHeader(version, {bytes, swap});
+  const bool pair = fields.magic[1] == 'i';
+  if (fields.magic != (pair ? "ni" : "n+") + std::to_string(version) + std::string(1, '\0'))
     Fail(version == 1 ? "it is an ANALYZE 7.5 header (or the magic of NIfTI is damaged), which says nothing of the orientation"
                       : "the magic of NIfTI-2 is damaged");
-  const Bytes view(bytes, swap);
-  Fields fields = version == 1 ? Parse<1>(view) : Parse<2>(view);
-  fields.bigEndian = (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__) != swap;
-  fields.pair = magic[1] == 'i';
 
-  stored_.bigEndian = fields.bigEndian;
+  stored_.bigEndian = HostIsBigEndian != swap;
   ReadDimensions(fields);
   ReadType(fields);
   offset_ = fields.offset;
   stored_.dataPath = content_.path;
-  if (fields.pair) {
+  if (pair) {
     std::string stem = content_.path;
     const std::string end = fs::path(stem).extension() == ".gz" ? ".hdr.gz" : ".hdr";
     if (stem.size() <= end.size() || stem.compare(stem.size() - end.size(), end.size(), end) != 0)
@@ -321,14 +166,14 @@ void NiftiSource::ReadHeader()
   CheckSizes(); // before loops whose length the header tells
   ReadTimes(fields);
   ReadGeometry(fields);
-  if (!fields.description.empty() && fields.description != OwnDescription)
+  if (!fields.description.empty() && fields.description != NiftiDescription)
     content_.fields.emplace_back("descrip", fields.description);
   if (!fields.intentName.empty())
     content_.fields.emplace_back("intent_name", fields.intentName);
   ReadExtensions(file, size, swap);
 }
 
-void NiftiSource::ReadDimensions(const Fields& fields)
+void NiftiSource::ReadDimensions(const NiftiHeader& fields)
 {
   const std::int64_t count = fields.dim[0];
   if (count < 1 || count > 7)
@@ -347,14 +192,13 @@ void NiftiSource::ReadDimensions(const Fields& fields)
   volumes_ = dim[4];
 }
 
-void NiftiSource::ReadType(const Fields& fields)
+void NiftiSource::ReadType(const NiftiHeader& fields)
 {
-  const auto* found = std::find_if(std::begin(TypeCodes), std::end(TypeCodes),
-                                   [&](const TypeCode& known) { return known.code == fields.datatype; });
-  if (found == std::end(TypeCodes))
-    Fail("its voxels are " + std::string(NameOfOther(fields.datatype)) + " (datatype " + std::to_string(fields.datatype) +
+  const std::optional<VoxelType> type = NiftiVoxelType(fields.datatype);
+  if (!type)
+    Fail("its voxels are " + std::string(NiftiTypeName(fields.datatype)) + " (datatype " + std::to_string(fields.datatype) +
          "), which are not supported");
-  stored_.type = content_.type = found->type;
+  stored_.type = content_.type = *type;
   if (fields.slope == 0.0 || std::isnan(fields.slope) || (fields.slope == 1.0 && fields.intercept == 0.0))
     return;
   if (!std::isfinite(fields.slope) || !std::isfinite(fields.intercept))
@@ -366,7 +210,7 @@ void NiftiSource::ReadType(const Fields& fields)
   Note("the stored numbers were scaled as the file says: times " + NumberText(slope_) + " plus " + NumberText(intercept_));
 }
 
-void NiftiSource::ReadTimes(const Fields& fields)
+void NiftiSource::ReadTimes(const NiftiHeader& fields)
 {
   if (volumes_ == 1)
     return;
@@ -400,7 +244,7 @@ void NiftiSource::ReadTimes(const Fields& fields)
 }
 
 // Index to RAS in the file's unit.
-Eigen::Matrix<double, 3, 4> NiftiSource::AffineOf(const Fields& fields)
+Eigen::Matrix<double, 3, 4> NiftiSource::AffineOf(const NiftiHeader& fields)
 {
   Eigen::Matrix<double, 3, 4> affine;
   if (fields.sformCode > 0) {
@@ -438,7 +282,7 @@ Eigen::Matrix<double, 3, 4> NiftiSource::AffineOf(const Fields& fields)
   return affine;
 }
 
-void NiftiSource::ReadGeometry(const Fields& fields)
+void NiftiSource::ReadGeometry(const NiftiHeader& fields)
 {
   Eigen::Matrix<double, 3, 4> affine = AffineOf(fields);
   affine.topRows<2>() = -affine.topRows<2>().eval(); // RAS to LPS
@@ -480,16 +324,17 @@ void NiftiSource::ReadExtensions(PlainOrGzip& file, std::uint64_t at, bool swap)
   for (at += 4; at + 16 <= end;) {
     char head[8];
     file.Read(at, head, 8);
-    const std::int32_t size = Bytes({head, 8}, swap).At<std::int32_t>(0), code = Bytes({head, 8}, swap).At<std::int32_t>(4);
+    const NiftiBytes numbers({head, 8}, swap);
+    const std::int32_t size = numbers.At<std::int32_t>(0), code = numbers.At<std::int32_t>(4);
     if (size == 0 && code == 0)
       break; // padding
     if (size < 16 || at + static_cast<std::uint64_t>(size) > end)
       Fail("an extension of the header has " + std::to_string(size) + " bytes, which do not fit before the voxels");
     // Ours begins with a known line; another program's comment is not worth reading, however long.
     const std::uint64_t length = static_cast<std::uint64_t>(size) - 8;
-    std::string text(std::min<std::uint64_t>(length, CommentStart.size()), '\0');
+    std::string text(std::min<std::uint64_t>(length, NiftiCommentStart.size()), '\0');
     file.Read(at + 8, text.data(), text.size());
-    if (code == CommentCode && text == CommentStart) {
+    if (code == NiftiCommentCode && text == NiftiCommentStart) {
       while (text.size() < length) { // piece by piece: only what is there is allocated
         const std::size_t done = text.size();
         text.resize(std::min<std::uint64_t>(length, done + 65536));
@@ -512,7 +357,7 @@ void NiftiSource::ReadComment(const std::string& text)
   std::istringstream lines(text);
   std::string line;
   std::getline(lines, line);
-  const std::vector<std::string_view> words = HeaderLines::Words(std::string_view(line).substr(CommentStart.size()));
+  const std::vector<std::string_view> words = HeaderLines::Words(std::string_view(line).substr(NiftiCommentStart.size()));
   std::array<double, 15> numbers;
   bool good = words.size() == numbers.size();
   for (std::size_t i = 0; good && i < numbers.size(); ++i)
@@ -550,20 +395,11 @@ void NiftiSource::CheckSizes()
   const auto& d = stored_.geometry.dimensions;
   const double voxels = static_cast<double>(d[0]) * d[1] * d[2],
                bytes = offset_ + voxels * static_cast<double>(SizeOf(stored_.type)) * static_cast<double>(volumes_);
-  const double there = Data().FileBytes();
-  std::string says = "its dimensions (" + std::to_string(d[0]) + " x " + std::to_string(d[1]) + " x " + std::to_string(d[2]);
-  says += (volumes_ > 1 ? ", " + std::to_string(volumes_) + " volumes" : "") + ") need " + NumberText(bytes) + " bytes";
-  const auto fail = [&](const std::string& reason) {
-    throw Error(Error::Kind::BadFile, stored_.dataPath + ": " + says + reason);
-  };
-  if (data_->Compressed()) {
-    if (bytes > there * static_cast<double>(LargestCompressionRatio))
-      fail(", more than " + NumberText(there) + " compressed bytes can hold");
-  } else if (bytes > there)
-    fail(", and it holds " + NumberText(there) + ": it is truncated or the dimensions are wrong");
-  else if (bytes < there)
-    fail(", and it holds " + NumberText(there) + ": the dimensions or the type are wrong");
-  data_->SetTotal(static_cast<std::uint64_t>(bytes));
+  const std::string says =
+      "its dimensions (" + SizeText(d) + (volumes_ > 1 ? ", " + std::to_string(volumes_) + " volumes" : "") + ")";
+  PlainOrGzip& data = Data();
+  CheckBytes(stored_.dataPath, says, bytes, data.FileBytes(), data.Compressed(), true);
+  data.SetTotal(static_cast<std::uint64_t>(bytes));
   CheckMemory(content_.path, voxels * static_cast<double>(SizeOf(content_.type)));
 }
 
@@ -592,89 +428,6 @@ void NiftiSource::Read(std::size_t index, void* voxels, unsigned char*, const Pr
     });
 }
 
-// Puts numbers into a header of zeros.
-class HeaderBytes {
-public:
-  explicit HeaderBytes(int version) : bytes_(static_cast<std::size_t>(SizeOfHeader[version]), '\0')
-  {
-    Put<std::int32_t>(0, SizeOfHeader[version]);
-  }
-  template <class T>
-  void Put(std::size_t offset, T value)
-  {
-    std::memcpy(bytes_.data() + offset, &value, sizeof value);
-  }
-  void PutText(std::size_t offset, const std::string& text) { bytes_.replace(offset, text.size(), text); }
-  const std::string& Content() const { return bytes_; }
-
-private:
-  std::string bytes_;
-};
-
-template <int Version>
-std::string HeaderText(const ImageHeader& header, const std::string& description, std::size_t offset, double& loss)
-{
-  constexpr bool one = Version == 1;
-  using Real = std::conditional_t<one, float, double>;
-  using Size = std::conditional_t<one, std::int16_t, std::int64_t>;
-  using Code = std::conditional_t<one, std::int16_t, std::int32_t>;
-  using Offset = std::conditional_t<one, float, std::int64_t>;
-  const Layout& at = Layouts[Version];
-  const ImageGeometry& g = header.geometry;
-  HeaderBytes bytes(Version);
-  const auto size = [&](std::size_t i, int value) { bytes.Put(at.dim + i * sizeof(Size), static_cast<Size>(value)); };
-  const auto real = [&](std::size_t offset0, std::size_t i, double value) {
-    bytes.Put(offset0 + i * sizeof(Real), static_cast<Real>(value));
-  };
-  size(0, 3);
-  real(at.pixdim, 0, 1.0); // right-handed
-  for (std::size_t i = 1; i < 8; ++i) {
-    size(i, i <= 3 ? g.dimensions[i - 1] : 1);
-    real(at.pixdim, i, i <= 3 ? g.spacing[static_cast<Eigen::Index>(i) - 1] : 0.0);
-  }
-  const auto* code =
-      std::find_if(std::begin(TypeCodes), std::end(TypeCodes), [&](const TypeCode& known) { return known.type == header.type; });
-  bytes.Put(at.datatype, static_cast<std::int16_t>(code->code));
-  bytes.Put(at.datatype + 2, static_cast<std::int16_t>(8 * SizeOf(header.type)));
-  bytes.Put(at.offset, static_cast<Offset>(offset));
-  real(at.slope, 0, 1.0);
-  if (one)
-    bytes.Put(at.units, static_cast<unsigned char>(2)); // mm
-  else
-    bytes.Put(at.units, std::int32_t{2});
-  bytes.PutText(at.description, description);
-  bytes.Put(at.qformCode, static_cast<Code>(1)); // coordinates of the scanner
-  bytes.Put(at.sformCode, static_cast<Code>(1));
-
-  Eigen::Affine3d ras = g.IndexToWorld();
-  ras.matrix().topRows<2>() = -ras.matrix().topRows<2>().eval();
-  Eigen::Matrix3d rotation = g.direction;
-  rotation.topRows<2>() = -rotation.topRows<2>().eval();
-  Eigen::Quaterniond q(rotation);
-  q.normalize();
-  if (q.w() < 0.0)
-    q.coeffs() = -q.coeffs();
-  for (int row = 0; row < 3; ++row) {
-    const std::size_t r = static_cast<std::size_t>(row);
-    real(at.quaternion, r, q.vec()[row]);
-    real(at.quaternion, 3 + r, ras.translation()[row]);
-    for (int column = 0; column < 4; ++column)
-      real(at.srow, 4 * r + static_cast<std::size_t>(column), ras(row, column));
-  }
-  // The loss, from the header as others will read it.
-  const std::array<double, 12> srow = Parse<Version>(Bytes(bytes.Content(), false)).srow;
-  Eigen::Matrix<double, 3, 4> rounding = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(srow.data());
-  rounding -= ras.matrix().topRows<3>();
-  loss = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector4d index(corner & 1 ? g.dimensions[0] - 1 : 0, corner & 2 ? g.dimensions[1] - 1 : 0,
-                                corner & 4 ? g.dimensions[2] - 1 : 0, 1.0);
-    loss = std::max(loss, (rounding * index).norm());
-  }
-  bytes.PutText(at.magic, one ? std::string("n+1\0", 4) : std::string("n+2\0\r\n\032\n", 8));
-  return bytes.Content();
-}
-
 } // namespace
 
 bool LooksLikeNifti(std::string_view start)
@@ -690,48 +443,12 @@ bool LooksLikeNifti(std::string_view start)
     start = inflated;
   }
   bool swap = false;
-  return VersionOf(start, swap) != 0;
+  return NiftiVersion(start, swap) != 0;
 }
 
 std::unique_ptr<VolumeSource> OpenNifti(const std::string& path)
 {
   return std::make_unique<NiftiSource>(path);
-}
-
-std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, double& roundingMm)
-{
-  const ImageGeometry& g = header.geometry;
-  if (!(std::max(g.origin.norm(), g.spacing.norm()) < static_cast<double>(std::numeric_limits<float>::max())))
-    throw Error(Error::Kind::BadInput,
-                path + ": its geometry is beyond the range of 32-bit floats, which is all that NIfTI-1 has");
-  std::string description = OwnDescription;
-  std::string comment = CommentStart;
-  const auto add = [&](const auto& numbers) {
-    for (Eigen::Index i = 0; i < numbers.size(); ++i)
-      comment += " " + NumberText(numbers.data()[i]);
-  };
-  add(g.origin);
-  add(g.spacing);
-  add(Eigen::Matrix3d(g.direction.transpose())); // row by row
-  comment += "\n";
-  for (const HeaderField& field : header.fields) {
-    if (field.first == "descrip" && field.second.size() < 80)
-      description = field.second;
-    else
-      comment += field.first + "=" + field.second + "\n";
-  }
-  comment.resize((comment.size() + 8 + 15) / 16 * 16 - 8, '\0');
-  if (comment.size() > (1u << 27)) // vox_offset is a float
-    throw Error(Error::Kind::BadInput, path + ": its fields are too long for a header");
-
-  const int version = *std::max_element(g.dimensions.begin(), g.dimensions.end()) > 32767 ? 2 : 1;
-  const std::size_t offset = static_cast<std::size_t>(SizeOfHeader[version]) + 4 + 8 + comment.size();
-  std::string start = version == 1 ? HeaderText<1>(header, description, offset, roundingMm)
-                                   : HeaderText<2>(header, description, offset, roundingMm);
-  start += std::string("\1\0\0\0", 4);
-  for (const std::int32_t number : {static_cast<std::int32_t>(comment.size() + 8), std::int32_t{CommentCode}})
-    start.append(reinterpret_cast<const char*>(&number), sizeof number);
-  return start + comment;
 }
 
 } // namespace echorama

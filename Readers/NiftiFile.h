@@ -21,12 +21,4 @@ bool LooksLikeNifti(std::string_view start);
 /// complex numbers, several numbers per voxel and spectra are refused.
 std::unique_ptr<VolumeSource> OpenNifti(const std::string& path);
 
-/// All that comes before the voxels of a NIfTI-1 file (NIfTI-2 when a dimension is beyond 32767). sform and qform hold the pose
-/// as 32-bit floats, which is all that NIfTI-1 has; an extension of the header (a comment, which other programs skip) holds
-/// it exactly, and the fields.
-/// \param path the file, for messages
-/// \param roundingMm by how many millimetres other programs see a voxel displaced, at most: the rounding to floats
-/// \throws Error(BadInput) for fields that are too long, or a geometry beyond the range of floats.
-std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, double& roundingMm);
-
 } // namespace echorama

@@ -4,6 +4,7 @@
 // the number of rows. Time and memory grow with the length of the file alone.
 #include "Readers/PoseLog.h"
 #include "Core/Base/Error.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Readers/CsvLine.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceFile.h"
@@ -332,7 +333,7 @@ private:
   void TakePair(ToolPose pose)
   {
     for (int side = 0; side < 2; ++side) {
-      Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix;
+      MatrixRows matrix;
       for (int i = 0; i < 16; ++i) {
         const auto number = Number(1 + 16 * side + i);
         if (!number) {

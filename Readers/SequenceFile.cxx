@@ -9,17 +9,15 @@
 // state is kept at multiples of a number of frames, which is doubled (and every second state dropped) when there are more
 // than 256 of them. A jump then costs the decompression of one such stretch, 1/256 of the file at most, and the memory
 // stays the same. Interleaved frames cost a pass over the file each, so that as many as 64 MB hold are taken in one pass.
-//
-// An orientation code names, axis by axis of the file, the direction in which it runs: M towards the marked side of the
-// probe, U away from it, F away from the probe, N towards it, A and D along the sweep. Every code is a permutation with
-// signs, so there is one loop that turns them all. A code of two letters leaves the third axis to be right-handed.
 #include "Readers/SequenceFile.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/SizeText.h"
 #include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
+#include "Readers/DataFile.h"
+#include "Readers/FrameOrientation.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceText.h"
-#include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -169,99 +167,9 @@ Matrix ParseMatrix(std::string_view text)
   return matrix;
 }
 
-// How the axes of a file lie in MF orientation.
-struct Turn {
-  std::array<int, 3> axis{0, 1, 2}; // of the file, for each axis in memory
-  std::array<bool, 3> flip{};       // for each axis in memory
-
-  bool IsIdentity() const { return axis == std::array<int, 3>{0, 1, 2} && flip == std::array<bool, 3>{}; }
-  // As far as 2D frames are concerned.
-  bool KeepsPlane() const { return axis[0] == 0 && axis[1] == 1 && !flip[0] && !flip[1]; }
-};
-
-// \returns false for a code that is none.
-bool ParseOrientation(const std::string& code, Turn& turn)
+std::string FrameSizeText(const std::array<int, 3>& size)
 {
-  if (code.empty() || code == "XX")
-    return true;
-  if (code.size() != 2 && code.size() != 3)
-    return false;
-  const std::string letters = "MUFNAD"; // + and - along x, y, z
-  std::array<int, 3> along{-1, -1, -1};
-  std::array<bool, 3> back{};
-  for (std::size_t i = 0; i < code.size(); ++i) {
-    const std::size_t letter = letters.find(code[i]);
-    if (letter == std::string::npos)
-      return false;
-    along[i] = static_cast<int>(letter / 2);
-    back[i] = letter % 2 == 1;
-  }
-  if (code.size() == 2) {
-    along[2] = 3 - along[0] - along[1];
-    const bool cyclic = (along[0] + 1) % 3 == along[1];
-    back[2] = (back[0] != back[1]) == cyclic;
-  }
-  for (int i = 0; i < 3; ++i) {
-    const auto found = std::find(along.begin(), along.end(), i);
-    if (found == along.end())
-      return false; // two letters along one axis
-    turn.axis[static_cast<std::size_t>(i)] = static_cast<int>(found - along.begin());
-    turn.flip[static_cast<std::size_t>(i)] = back[static_cast<std::size_t>(found - along.begin())];
-  }
-  return true;
-}
-
-template <std::size_t Size>
-struct Pixel {
-  char bytes[Size];
-};
-
-template <class P>
-void TurnPixels(const Turn& turn, const std::array<int, 3>& size, const char* in, char* out)
-{
-  // Sizes are those in memory; the strides are those of the file along the axes in memory.
-  std::array<std::ptrdiff_t, 3> ofFile{}, stride{};
-  std::array<std::size_t, 3> memoryAxis{};
-  for (std::size_t i = 0; i < 3; ++i)
-    memoryAxis[static_cast<std::size_t>(turn.axis[i])] = i;
-  ofFile[0] = 1;
-  ofFile[1] = size[memoryAxis[0]];
-  ofFile[2] = ofFile[1] * size[memoryAxis[1]];
-  const P* from = reinterpret_cast<const P*>(in);
-  for (std::size_t i = 0; i < 3; ++i) {
-    stride[i] = ofFile[static_cast<std::size_t>(turn.axis[i])];
-    if (turn.flip[i]) {
-      from += stride[i] * (size[i] - 1);
-      stride[i] = -stride[i];
-    }
-  }
-  P* to = reinterpret_cast<P*>(out);
-  for (int z = 0; z < size[2]; ++z)
-    for (int y = 0; y < size[1]; ++y) {
-      const P* row = from + z * stride[2] + y * stride[1];
-      for (int x = 0; x < size[0]; ++x)
-        *to++ = row[x * stride[0]];
-    }
-}
-
-bool TurnPixels(std::size_t pixelBytes, const Turn& turn, const std::array<int, 3>& size, const char* in, char* out)
-{
-  switch (pixelBytes) {
-#define EchoramaTurnCase(n)                                                                                                      \
-  case n:                                                                                                                        \
-    TurnPixels<Pixel<n>>(turn, size, in, out);                                                                                   \
-    return true;
-    EchoramaTurnCase(1) EchoramaTurnCase(2) EchoramaTurnCase(3) EchoramaTurnCase(4) EchoramaTurnCase(6) EchoramaTurnCase(8)
-        EchoramaTurnCase(12) EchoramaTurnCase(16) EchoramaTurnCase(24) EchoramaTurnCase(32)
-#undef EchoramaTurnCase
-  }
-  return false;
-}
-
-// Swaps the bytes of numbers.
-std::string SizeText(const std::array<int, 3>& size)
-{
-  return std::to_string(size[0]) + " x " + std::to_string(size[1]) + (size[2] == 1 ? "" : " x " + std::to_string(size[2]));
+  return size[2] == 1 ? SizeText(size[0], size[1]) : SizeText(size);
 }
 
 std::string FramesText(std::int64_t frames)
@@ -275,7 +183,7 @@ struct SequenceFile::Parts {
   SequenceContent content;
   ImageHeader header;
   bool interleaved = false;
-  Turn turn;
+  FrameOrientation turn;
   std::int64_t dataOffset = 0;
 
   Names names;
@@ -378,7 +286,7 @@ void SequenceFile::Parts::FindOrientation()
   if (!content.HasImages())
     return;
   const std::string code = Upper(content.orientation);
-  if (!ParseOrientation(code, turn))
+  if (!turn.Parse(code))
     FailFile(content.path, "its image orientation is \"" + content.orientation +
                                "\"; two or three letters are needed, one of M and U, one of F and N, one of A and D");
   const std::array<int, 3> inFile = content.dimensions;
@@ -417,18 +325,10 @@ void SequenceFile::Parts::FindOrientation()
 void SequenceFile::Parts::CheckSizes(const FrameAxis& axis)
 {
   const std::string& path = content.path;
-  const auto sizeOf = [](const std::string& file) {
-    std::error_code error;
-    const bool plain = fs::is_regular_file(file, error);
-    const std::uintmax_t size = plain ? fs::file_size(file, error) : 0;
-    if (!plain || error)
-      throw Error(Error::Kind::FileSystem, file + ": there is no such file, or it is not a plain one");
-    return static_cast<std::uint64_t>(size);
-  };
   if (axis.frames < 1)
     FailFile(path, "it has no frames");
   const bool images = content.HasImages();
-  const std::uint64_t bytesThere = images ? sizeOf(header.dataPath) : 0;
+  const std::uint64_t bytesThere = images ? FileSize(header.dataPath) : 0;
   // A list of frames costs memory per frame, so that there must be a byte for each at the least.
   if (static_cast<std::uint64_t>(axis.frames) > static_cast<std::uint64_t>(axis.headerBytes) + bytesThere)
     FailFile(path, "it says that it has " + FramesText(axis.frames) + ", more than the bytes of the file");
@@ -438,7 +338,7 @@ void SequenceFile::Parts::CheckSizes(const FrameAxis& axis)
     return;
   }
   if (content.dimensions[2] < 1)
-    FailFile(path, "its frames are of " + SizeText(content.dimensions) + " pixels");
+    FailFile(path, "its frames are of " + FrameSizeText(content.dimensions) + " pixels");
   if (!header.typeIsKnown)
     FailFile(path, "its pixels are of a type that is not supported");
   if (header.encoding == ImageHeader::Encoding::Text)
@@ -452,19 +352,13 @@ void SequenceFile::Parts::CheckSizes(const FrameAxis& axis)
                all = frame * static_cast<double>(content.frames);
   const std::uint64_t offset = static_cast<std::uint64_t>(std::max<std::int64_t>(0, header.dataOffset));
   const double there = bytesThere > offset ? static_cast<double>(bytesThere - offset) : 0.0;
-  const std::string says =
-      FramesText(content.frames) + " of " + SizeText(content.dimensions) + " pixels need " + NumberText(all) + " bytes";
+  const std::string says = FramesText(content.frames) + " of " + FrameSizeText(content.dimensions) + " pixels";
   const bool raw = header.encoding == ImageHeader::Encoding::Raw;
-  if (raw && there < all)
-    FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": it is truncated or the dimensions are wrong");
-  const bool recorded = header.dataPath != header.path &&
-                        std::find(content.fields.begin(), content.fields.end(), RecorderField) != content.fields.end();
-  if (raw && there > all && recorded)
+  const bool cutOff = raw && there > all && header.dataPath != header.path &&
+                      std::find(content.fields.begin(), content.fields.end(), RecorderField) != content.fields.end();
+  if (cutOff)
     content.notes.push_back("the recording was cut off: the pixels of a last frame were left out");
-  else if (raw && there > all && header.dataOffset >= 0)
-    FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": the dimensions or the type are wrong");
-  if (!raw && (there * static_cast<double>(LargestCompressionRatio) < all || header.dataOffset < 0))
-    FailFile(header.dataPath, says + ", more than " + NumberText(there) + " compressed bytes can hold");
+  CheckBytes(header.dataPath, says, all, raw || header.dataOffset >= 0 ? there : 0.0, !raw, !cutOff && header.dataOffset >= 0);
   CheckMemory(path, 2.0 * frame);
   dataOffset =
       header.dataOffset >= 0 ? header.dataOffset : static_cast<std::int64_t>(bytesThere - static_cast<std::uint64_t>(all));
@@ -601,9 +495,7 @@ void SequenceFile::Parts::OpenData()
 {
   if (stream.is_open())
     return;
-  stream.open(header.dataPath, std::ios::binary);
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, header.dataPath + ": it cannot be opened (is reading permitted?)");
+  stream = OpenToRead(header.dataPath);
   if (header.encoding == ImageHeader::Encoding::Zlib) {
     const std::uint64_t frame = content.FrameBytes(), all = frame * static_cast<std::uint64_t>(content.frames);
     inflater = std::make_unique<Inflater>(stream, dataOffset, header.dataPath, all);
@@ -711,7 +603,7 @@ void SequenceFile::ReadFrame(int index, void* pixels, const Progress& progress)
   if (p.header.bigEndian != HostIsBigEndian)
     SwapBytes(raw, size, bytes / size);
   if (turned)
-    TurnPixels(size * p.content.components, p.turn, p.content.dimensions, raw, out);
+    p.turn.Turn(size * p.content.components, p.content.dimensions, raw, out);
 }
 
 bool LooksLikeSequence(const std::string& path)

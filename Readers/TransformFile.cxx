@@ -2,12 +2,11 @@
 // Both formats come down to a list of edges; what they have in common (names, doubles, cycles) is checked on that list. The
 // XML parser neither follows external entities nor expands own ones, and keeps no stack per level, so nesting is harmless.
 #include "Readers/TransformFile.h"
-#include "Core/Base/FileReplacement.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Readers/HeaderLines.h"
-#include <fstream>
 #include <pugixml.hpp>
 
 namespace echorama {
@@ -58,7 +57,7 @@ NamedTransform PlusTransform(const pugi::xml_node& element, const JsonPlace& pla
   const std::vector<std::string_view> words = HeaderLines::Words(matrixText);
   if (words.size() != 16)
     named.Fail("Matrix holds " + std::to_string(words.size()) + " values; 16 are needed");
-  Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix;
+  MatrixRows matrix;
   for (std::size_t i = 0; i < words.size(); ++i)
     if (!ParseNumber(words[i], matrix.data()[i]))
       named.Fail("Matrix holds \"" + std::string(words[i].substr(0, 60)) + "\", which is not a number");
@@ -99,8 +98,9 @@ NamedTransform JsonTransform(const Json& value, const JsonPlace& place)
   transform.to = place.In("to").Text(place.Member(value, "to"));
   const JsonPlace named = place.In(transform.Name());
   SetMatrix(transform, named.In("matrix").Rows<4>(named.Member(value, "matrix")), named);
-  if (value.contains("errorMm"))
-    transform.errorMm = named.In("errorMm").Number(value["errorMm"]);
+  for (const char* key : {"errorMm", "error_mm"}) // as files before it were spelled, and as they are
+    if (value.contains(key))
+      transform.errorMm = named.In(key).Number(value[key]);
   if (value.contains("status"))
     transform.status = TransformStatusOf(named.In("status").Text(value["status"]));
   if (value.contains("date"))
@@ -187,7 +187,7 @@ void WriteTransforms(const std::string& path, const std::vector<NamedTransform>&
                     {"matrix", JsonPlace::RowsOf(transform.matrix.matrix())},
                     {"status", TransformStatusText(transform.status)}});
     if (transform.errorMm)
-      list.back()["errorMm"] = *transform.errorMm;
+      list.back()["error_mm"] = *transform.errorMm;
     if (!transform.date.empty())
       list.back()["date"] = transform.date;
   }
@@ -198,17 +198,13 @@ void WriteTransforms(const std::string& path, const std::vector<NamedTransform>&
       throw Error(Error::Kind::InvalidParameter, path + ": the report is no JSON object");
   }
 
-  FileReplacement replacement;
-  std::ofstream stream(replacement.Stage(path));
+  std::string text;
   try {
-    stream << root.dump(2) << '\n';
+    text = root.dump(2) + '\n';
   } catch (const nlohmann::json::exception&) {
     throw Error(Error::Kind::InvalidParameter, path + ": a name or date is not UTF-8");
   }
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
-  replacement.Commit();
+  WriteTextFile(path, text);
 }
 
 } // namespace echorama

@@ -12,7 +12,8 @@ namespace echorama {
 /// * Configurations of the Plus toolkit (XML): each element Transform in CoordinateDefinitions, with From, To, Matrix (16
 ///   numbers, row by row) and, optionally, Error (negative: not known), Date and Status. Frames are made to begin with a capital.
 /// * {"schema": "echorama-transforms-1", "unit": "mm", "transforms": [{"from": .., "to": .., "matrix": [[4 numbers] x 4],
-///   "status": "OK", "errorMm": .., "date": ..}, ...]}; the last three may be missing. Other keys are ignored.
+///   "status": "OK", "error_mm": .., "date": ..}, ...]}; the last three may be missing; older files say errorMm. Other keys are
+///   ignored.
 ///
 /// An edge that is given twice counts once when its matrix is the same. Status is that of TransformStatusOf. A matrix may be
 /// singular (it leads one way only), its last row must be 0 0 0 1.

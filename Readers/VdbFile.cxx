@@ -3,31 +3,20 @@
 // both directions go by blocks of 8^3: one look-up per block, then a copy of 512 voxels in another order. Blocks of a layer are
 // made in parallel and hung into the tree one after the other, in their order, so the file does not depend on the threads.
 //
-// OpenVDB trusts its files: it allocates what a length says, does not ask whether reading succeeded, and reads as many bytes
-// into a node as a damaged length says. Therefore the file is taken into memory and walked through here first: every length in
-// its header, metadata and tree must be the one that its place allows. Then the library reads from a stream that throws at
-// the end, through io::Archive, the base class of its own readers. What remains: damage within voxels that were compressed
-// with Blosc (behind the header of their chunk), or not at all, is not noticed, as in every format without checksums. The walk
-// costs one pass over the file.
+// OpenVDB trusts its files, so the file is taken into memory and walked through first (VdbWalk.h). Then the library reads from a
+// stream that throws at the end, through io::Archive, the base class of its own readers.
 #include "Readers/VdbFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Readers/AffinePose.h"
-#include "Readers/VolumeFile.h"
+#include "Readers/DataFile.h"
+#include "Readers/VdbWalk.h"
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <filesystem>
 #include <fstream>
-#include <istream>
 #include <limits>
 #include <openvdb/io/Archive.h>
 #include <openvdb/openvdb.h>
-#include <streambuf>
-
-namespace fs = std::filesystem;
 
 namespace echorama {
 namespace {
@@ -67,244 +56,6 @@ void Initialize()
   static const bool done = (openvdb::initialize(), true);
   static_cast<void>(done);
 }
-
-class MemoryBuffer : public std::streambuf {
-public:
-  explicit MemoryBuffer(std::string& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
-
-private:
-  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override
-  {
-    const off_type at = offset + (from == std::ios_base::beg ? 0 : (from == std::ios_base::cur ? gptr() : egptr()) - eback());
-    if (at < 0 || at > egptr() - eback())
-      return pos_type(off_type(-1));
-    setg(eback(), eback() + at, egptr());
-    return pos_type(at);
-  }
-  pos_type seekpos(pos_type position, std::ios_base::openmode mode) override
-  {
-    return seekoff(position, std::ios_base::beg, mode);
-  }
-};
-
-// A stream over bytes in memory that throws at their end.
-class MemoryStream : private MemoryBuffer, public std::istream {
-public:
-  explicit MemoryStream(std::string& bytes) : MemoryBuffer(bytes), std::istream(static_cast<MemoryBuffer*>(this))
-  {
-    exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-  }
-};
-
-// The lengths in a file's header and in the metadata of each grid, which OpenVDB would allocate.
-class Walk {
-public:
-  Walk(std::string& bytes, std::string path) : bytes_(bytes), stream_(bytes), path_(std::move(path)) {}
-
-  void File()
-  {
-    if (Number<std::int64_t>() != 0x56444220)
-      FailFile(path_, "the content is not OpenVDB");
-    const std::uint32_t version = Number<std::uint32_t>();
-    if (version < 222 || version > openvdb::OPENVDB_FILE_VERSION)
-      FailFile(path_, "it is OpenVDB of file version " + std::to_string(version) + "; versions 222 to " +
-                          std::to_string(static_cast<unsigned>(openvdb::OPENVDB_FILE_VERSION)) + " are read");
-    Skip(8); // the library that wrote it
-    if (Number<char>() == 0)
-      FailFile(path_, "it was written as a stream, without the places of its grids; write it as a file");
-    for (int i = 0; i < 36; ++i) { // a unique name
-      const char c = Number<char>();
-      const bool dash = i == 8 || i == 13 || i == 18 || i == 23;
-      if (dash ? c != '-' : std::isxdigit(static_cast<unsigned char>(c)) == 0)
-        FailFile(path_, "its header is damaged");
-    }
-    Metadata();
-    const std::int32_t grids = Number<std::int32_t>();
-    if (grids < 1)
-      FailFile(path_, "it holds no grids");
-    for (std::int32_t i = 0; i < grids; ++i) {
-      for (int name = 0; name < 3; ++name) // name, type, the grid that it shares voxels with
-        Skip(Length());
-      const std::int64_t begin = Number<std::int64_t>(), blocks = Number<std::int64_t>(), end = Number<std::int64_t>();
-      if (!(begin >= static_cast<std::int64_t>(Position()) && begin <= blocks && blocks <= end))
-        FailFile(path_, "the places of its grids are damaged");
-      if (static_cast<std::uint64_t>(end) > bytes_.size())
-        FailFile(path_, "grid " + std::to_string(i + 1) + " ends at byte " + std::to_string(end) + ", and the file at " +
-                            std::to_string(bytes_.size()) + ": it is truncated");
-      stream_.seekg(begin);
-      Number<std::uint32_t>(); // compression
-      Metadata();
-      Skip(Length()); // the name of the transform's kind
-      stream_.seekg(end);
-    }
-  }
-
-private:
-  template <class T>
-  T Number()
-  {
-    T value;
-    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
-    return value;
-  }
-  std::uint64_t Position() { return static_cast<std::uint64_t>(stream_.tellg()); }
-  std::uint32_t Length()
-  {
-    const std::uint32_t length = Number<std::uint32_t>();
-    if (length > bytes_.size() - Position())
-      FailFile(path_, "a text in its header is " + std::to_string(length) + " bytes long, more than the file: it is damaged");
-    return length;
-  }
-  void Skip(std::uint64_t bytes) { stream_.seekg(static_cast<std::streamoff>(bytes), std::ios::cur); }
-
-  // A type of metadata that OpenVDB knows is read by its own size, whatever the length beside it says; one that it does not
-  // know, by that length. Types that are not in this list (among them the index for loading voxels later, which holds lengths of
-  // its own) are made unknown.
-  void Metadata()
-  {
-    const std::uint32_t count = Number<std::uint32_t>();
-    for (std::uint32_t i = 0; i < count; ++i) {
-      Skip(Length()); // name
-      const std::uint32_t length = Length();
-      const std::uint64_t at = Position();
-      const std::string type = bytes_.substr(at, length);
-      Skip(length);
-      const std::uint32_t size = Length();
-      constexpr std::pair<const char*, std::uint32_t> sizes[] = {{"bool", 1},   {"float", 4},  {"double", 8}, {"int32", 4},
-                                                                 {"int64", 8},  {"vec2i", 8},  {"vec2s", 8},  {"vec2d", 16},
-                                                                 {"vec3i", 12}, {"vec3s", 12}, {"vec3d", 24}, {"vec4i", 16},
-                                                                 {"vec4s", 16}, {"vec4d", 32}, {"mat4s", 64}, {"mat4d", 128}};
-      const auto* known =
-          std::find_if(std::begin(sizes), std::end(sizes), [&](const auto& entry) { return type == entry.first; });
-      if (known != std::end(sizes) && known->second != size)
-        FailFile(path_, "its metadata are damaged");
-      if (known == std::end(sizes) && type != "string" && length > 0)
-        bytes_[at] = '?';
-      Skip(size);
-    }
-  }
-
-  std::string& bytes_;
-  MemoryStream stream_;
-  std::string path_;
-};
-
-// The lengths in a tree of Tree_..._5_4_3, from its topology on: whether OpenVDB can read it without leaving its buffers.
-class TreeWalk {
-public:
-  // \param valueBytes of a value in the nodes' tables, \param dataBytes of one among the voxels (halves are shorter)
-  TreeWalk(std::istream& stream, std::string path, std::size_t valueBytes, std::size_t dataBytes, std::uint32_t compression)
-    : stream_(stream), path_(std::move(path)), valueBytes_(valueBytes), dataBytes_(dataBytes), compression_(compression)
-  {
-  }
-  void Tree()
-  {
-    if (Number<std::int32_t>() != 1)
-      Fail();
-    Skip(valueBytes_); // background
-    const std::uint32_t tiles = Number<std::uint32_t>(), children = Number<std::uint32_t>();
-    for (std::uint32_t i = 0; i < tiles; ++i) {
-      Corner();
-      Skip(valueBytes_);
-      if (Number<unsigned char>() > 1)
-        Fail();
-    }
-    for (std::uint32_t i = 0; i < children; ++i) {
-      Corner();
-      Node<5>();
-    }
-    for (std::uint64_t i = 0; i < leaves_; ++i)
-      Values<3>(Mask<3>());
-  }
-
-private:
-  template <int Log2>
-  static constexpr std::size_t Count = std::size_t{1} << (3 * Log2);
-
-  template <class T>
-  T Number()
-  {
-    T value;
-    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
-    return value;
-  }
-  void Skip(std::uint64_t bytes) { stream_.ignore(static_cast<std::streamsize>(bytes)); }
-  [[noreturn]] void Fail() const { FailFile(path_, "its tree of voxels is damaged"); }
-  void Corner()
-  {
-    for (int axis = 0; axis < 3; ++axis)
-      if (Number<std::int32_t>() % 4096 != 0)
-        Fail();
-  }
-  // Reads a mask. \returns how many of its bits are set.
-  template <int Log2>
-  std::size_t Mask()
-  {
-    std::array<std::uint64_t, Count<Log2> / 64> words;
-    stream_.read(reinterpret_cast<char*>(words.data()), sizeof words);
-    std::size_t on = 0;
-    for (const std::uint64_t word : words)
-      on += static_cast<std::size_t>(__builtin_popcountll(word));
-    return on;
-  }
-  template <int Log2>
-  void Node()
-  {
-    const std::size_t children = Mask<Log2>();
-    Values<Log2>(Mask<Log2>());
-    for (std::size_t i = 0; i < children; ++i)
-      if constexpr (Log2 == 5)
-        Node<4>();
-      else {
-        Mask<3>();
-        ++leaves_;
-      }
-  }
-  // The values of a node of which \a active are on, as io::readCompressedValues takes them.
-  template <int Log2>
-  void Values(std::size_t active)
-  {
-    namespace io = openvdb::io;
-    const int form = Number<std::int8_t>();
-    if (form < io::NO_MASK_OR_INACTIVE_VALS || form > io::NO_MASK_AND_ALL_VALS)
-      Fail();
-    const bool two = form == io::MASK_AND_TWO_INACTIVE_VALS;
-    if (two || form == io::NO_MASK_AND_ONE_INACTIVE_VAL || form == io::MASK_AND_ONE_INACTIVE_VAL)
-      Skip((two ? 2 : 1) * valueBytes_);
-    if (two || form == io::MASK_AND_NO_INACTIVE_VALS || form == io::MASK_AND_ONE_INACTIVE_VAL)
-      Skip(Count<Log2> / 8);
-    const bool activeAlone = (compression_ & io::COMPRESS_ACTIVE_MASK) && form != io::NO_MASK_AND_ALL_VALS;
-    const std::int64_t bytes = static_cast<std::int64_t>((activeAlone ? active : Count<Log2>)*dataBytes_);
-    if (!(compression_ & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)))
-      return Skip(static_cast<std::uint64_t>(bytes));
-    // Positive: bytes of compressed values. Else they are as they are, and it counts them.
-    const std::int64_t length = Number<std::int64_t>();
-    if (length > 2 * bytes + 1024 || (length <= 0 && length != -bytes))
-      Fail();
-    const std::istream::pos_type begin = stream_.tellg();
-    if (length > 0 && (compression_ & io::COMPRESS_BLOSC))
-      BloscHeader(length, bytes);
-    stream_.seekg(begin + static_cast<std::streamoff>(std::abs(length)));
-  }
-  // Blosc is not told how many bytes it is given: it believes the header in them.
-  // Format: https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst
-  void BloscHeader(std::int64_t compressedBytes, std::int64_t bytes)
-  {
-    if (compressedBytes < 16)
-      Fail();
-    Skip(4); // versions, flags, the size of a value
-    const std::int32_t nbytes = Number<std::int32_t>(), blocksize = Number<std::int32_t>(), cbytes = Number<std::int32_t>();
-    const bool blocks = nbytes == 0 || (blocksize > 0 && blocksize <= nbytes);
-    if (nbytes != bytes || cbytes != compressedBytes || !blocks)
-      Fail();
-  }
-
-  std::istream& stream_;
-  std::string path_;
-  std::size_t valueBytes_, dataBytes_;
-  std::uint32_t compression_;
-  std::uint64_t leaves_ = 0;
-};
 
 class Archive : public openvdb::io::Archive {
 public:
@@ -350,7 +101,7 @@ public:
     const bool real = grid->isType<openvdb::FloatGrid>() || grid->isType<openvdb::DoubleGrid>();
     if (chosen.saveFloatAsHalf() && !real)
       FailFile(path, "its grid " + chosen.gridName() + " holds halves of whole numbers");
-    TreeWalk(stream, path, valueBytes, chosen.saveFloatAsHalf() ? 2 : valueBytes, openvdb::io::getDataCompression(stream)).Tree();
+    CheckVdbTree(stream, path, valueBytes, chosen.saveFloatAsHalf() ? 2 : valueBytes, openvdb::io::getDataCompression(stream));
     chosen.seekToGrid(stream);
     readGrid(grid, chosen, stream);
     return grid;
@@ -447,10 +198,9 @@ void CopyLayer(const openvdb::GridBase& base, const Box& box, std::int64_t z0, s
 
 class VdbSource : public VolumeSource {
 public:
-  explicit VdbSource(const std::string& path)
+  explicit VdbSource(const std::string& path) : VolumeSource(path, FileFormat::Vdb)
   {
-    content_.path = stored_.path = path;
-    content_.format = FileFormat::Vdb;
+    stored_.path = path;
     content_.holdsValidRegion = true;
     Guarded(path, [this] { Open(); });
   }
@@ -460,7 +210,6 @@ public:
   }
 
 private:
-  [[noreturn]] void Fail(const std::string& reason) const { FailFile(content_.path, reason); }
   void Open();
   bool IsOurs(const openvdb::CoordBBox& box);
   bool ValuesFit() const;
@@ -478,17 +227,13 @@ void VdbSource::Open()
   const std::string& path = content_.path;
   std::string bytes;
   {
-    std::ifstream file(path, std::ios::binary);
-    std::error_code error;
-    const std::uint64_t size = fs::file_size(path, error);
-    if (!file || error)
-      throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");
+    std::ifstream file = OpenToRead(path);
+    const std::uint64_t size = FileSize(path);
     CheckMemory(path, static_cast<double>(size));
     bytes.resize(size);
-    file.read(bytes.data(), static_cast<std::streamsize>(size));
-    bytes.resize(static_cast<std::size_t>(file.gcount()));
+    bytes.resize(ReadPieces(file, bytes.data(), size));
   }
-  Walk(bytes, path).File();
+  CheckVdbHeader(bytes, path);
   MemoryStream stream(bytes);
   std::vector<std::string> others;
   grid_ = Archive().Read(stream, path, others);
@@ -496,7 +241,7 @@ void VdbSource::Open()
     std::string names;
     for (const std::string& name : others)
       names += (names.empty() ? "" : ", ") + name;
-    content_.notes.push_back("of several grids " + grid_->getName() + " was taken; left out: " + names);
+    Note("of several grids " + grid_->getName() + " was taken; left out: " + names);
   }
   if (grid_->getGridClass() == openvdb::GRID_LEVEL_SET)
     Fail("its grid " + grid_->getName() + " is a level set (distances from a surface), not a volume of intensities");
@@ -507,7 +252,7 @@ void VdbSource::Open()
     first_ = openvdb::Coord(0);
     if (!ValuesFit()) {
       content_.type = NativeType(*grid_);
-      content_.notes.push_back("another program has changed the voxels: they no longer fit the type that they had");
+      Note("another program has changed the voxels: they no longer fit the type that they had");
     }
   } else {
     if (box.empty())
@@ -521,7 +266,7 @@ void VdbSource::Open()
       stored_.geometry.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(length);
     }
     content_.type = NativeType(*grid_);
-    content_.notes.push_back("the file does not name its unit of length or its frame: mm and LPS were assumed");
+    Note("the file does not name its unit of length or its frame: mm and LPS were assumed");
   }
   const auto& d = stored_.geometry.dimensions;
   CheckMemory(path, static_cast<double>(d[0]) * d[1] * d[2] * static_cast<double>(SizeOf(content_.type) + 1));
@@ -556,8 +301,7 @@ bool VdbSource::IsOurs(const openvdb::CoordBBox& box)
     if (length < 1)
       Fail("its metadata hold the dimension " + std::to_string(length));
     if (!box.empty() && (box.min()[axis] < 0 || box.max()[axis] >= length)) {
-      content_.notes.push_back(
-          "another program has made the volume larger or moved its voxels: the box of the active ones was taken");
+      Note("another program has made the volume larger or moved its voxels: the box of the active ones was taken");
       return false;
     }
     stored_.geometry.dimensions[static_cast<std::size_t>(axis)] = length;

@@ -3,9 +3,10 @@
 // header promises is compared with what the disk holds first: a lying header must not make us ask for terabytes.
 #include "Readers/VolumeFile.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Memory.h"
+#include "Core/Base/SizeText.h"
 #include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
+#include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
 #include <cctype>
@@ -20,38 +21,13 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
-constexpr std::uint64_t ChunkBytes = 1 << 24;
-
 std::uint64_t SizeOfData(const ImageHeader& header)
 {
   const std::string& path = header.dataPath;
   std::error_code error;
   if (!fs::exists(path, error))
     throw Error(Error::Kind::FileSystem, path + ": there is no such file, though " + header.path + " names it");
-  if (!fs::is_regular_file(path, error))
-    throw Error(Error::Kind::FileSystem, path + ": it is not a plain file");
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error)
-    throw Error(Error::Kind::FileSystem, path + ": " + error.message());
-  return size;
-}
-
-std::string DimensionsText(const ImageGeometry& g)
-{
-  return std::to_string(g.dimensions[0]) + " x " + std::to_string(g.dimensions[1]) + " x " + std::to_string(g.dimensions[2]);
-}
-
-void ReadRaw(std::istream& stream, const ImageHeader& header, char* out, const Progress& progress)
-{
-  const std::uint64_t total = header.ByteCount();
-  for (std::uint64_t done = 0; done < total;) {
-    const std::uint64_t chunk = std::min(ChunkBytes, total - done);
-    stream.read(out + done, static_cast<std::streamsize>(chunk));
-    done += static_cast<std::uint64_t>(stream.gcount());
-    if (!stream)
-      FailFile(header.dataPath, "the data end early, after " + std::to_string(done) + " of " + std::to_string(total) + " bytes");
-    progress(static_cast<double>(done) / static_cast<double>(total));
-  }
+  return FileSize(path);
 }
 
 template <class T>
@@ -76,7 +52,7 @@ void ReadText(std::istream& stream, const ImageHeader& header, T* out, const Pro
       progress(static_cast<double>(i) / static_cast<double>(count));
   }
   if (stream >> word)
-    FailFile(header.dataPath, "it holds more numbers than its dimensions (" + DimensionsText(header.geometry) + ") say");
+    FailFile(header.dataPath, "it holds more numbers than its dimensions (" + SizeText(header.geometry.dimensions) + ") say");
 }
 
 void ReverseSlices(char* bytes, std::size_t slice, int slices)
@@ -87,10 +63,9 @@ void ReverseSlices(char* bytes, std::size_t slice, int slices)
 
 class HeaderVolume : public VolumeSource {
 public:
-  explicit HeaderVolume(const std::string& path) : header_(ReadImageHeader(path))
+  explicit HeaderVolume(const std::string& path) : VolumeSource(path, FileFormat::Unknown), header_(ReadImageHeader(path))
   {
     CheckVolume(header_);
-    content_.path = path;
     content_.format = header_.format;
     content_.geometry = header_.geometry;
     content_.type = header_.type;
@@ -109,14 +84,6 @@ private:
 
 } // namespace
 
-void CheckMemory(const std::string& path, double bytes)
-{
-  const double free = FreeMemory();
-  if (!(bytes <= free))
-    throw Error(Error::Kind::TooLarge, path + ": its voxels need " + NumberText(std::ceil(bytes / 1e6)) + " MB, and only " +
-                                           NumberText(std::floor(free / 1e6)) + " MB of memory are free");
-}
-
 void CheckVolume(const ImageHeader& header)
 {
   const std::string& path = header.path;
@@ -124,52 +91,33 @@ void CheckVolume(const ImageHeader& header)
     FailFile(path, "its voxels are of a type that is not supported");
   if (header.components != 1)
     FailFile(path, "it has " + std::to_string(header.components) + " numbers per voxel; one is needed");
-  try {
-    header.geometry.Check(path);
-  } catch (const Error& error) {
-    throw Error(Error::Kind::BadFile, error.what());
-  }
+  CheckGeometry(path, header.geometry);
   const double voxels = static_cast<double>(header.geometry.VoxelCount()),
                bytes = voxels * static_cast<double>(SizeOf(header.type));
   const std::uint64_t fileBytes = SizeOfData(header);
   const std::uint64_t offset = static_cast<std::uint64_t>(std::max<std::int64_t>(0, header.dataOffset));
   const double there = fileBytes > offset ? static_cast<double>(fileBytes - offset) : 0.0;
-  const std::string says = "its dimensions (" + DimensionsText(header.geometry) + ") need " + NumberText(bytes) + " bytes";
-  switch (header.encoding) {
-  case ImageHeader::Encoding::Raw:
-    if (there < bytes)
-      FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": it is truncated or the dimensions are wrong");
-    if (there > bytes && header.dataOffset >= 0)
-      FailFile(header.dataPath, says + ", and it holds " + NumberText(there) + ": the dimensions or the type are wrong");
-    break;
-  case ImageHeader::Encoding::Zlib:
-    if (there * static_cast<double>(LargestCompressionRatio) < bytes)
-      FailFile(header.dataPath, says + ", more than " + NumberText(there) + " compressed bytes can hold");
-    break;
-  case ImageHeader::Encoding::Text:
-    if ((there + 1.0) / 2.0 < voxels)
-      FailFile(header.dataPath, "its dimensions (" + DimensionsText(header.geometry) + ") need more numbers than " +
-                                    NumberText(there) + " characters can hold");
-    break;
-  }
+  const std::string says = "its dimensions (" + SizeText(header.geometry.dimensions) + ")";
+  if (header.encoding != ImageHeader::Encoding::Text)
+    CheckBytes(header.dataPath, says, bytes, there, header.encoding == ImageHeader::Encoding::Zlib, header.dataOffset >= 0);
+  else if ((there + 1.0) / 2.0 < voxels)
+    FailFile(header.dataPath, says + " need more numbers than " + NumberText(there) + " characters can hold");
   CheckMemory(path, bytes);
 }
 
 void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progress)
 {
   const std::uint64_t bytes = header.ByteCount();
-  char* const out = static_cast<char*>(voxels);
-  std::ifstream stream(header.dataPath, std::ios::binary);
+  std::ifstream stream = OpenToRead(header.dataPath);
   if (header.dataOffset < 0)
     stream.seekg(-static_cast<std::streamoff>(bytes), std::ios::end);
   else
     stream.seekg(header.dataOffset);
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, header.dataPath + ": it cannot be opened (is reading permitted?)");
 
   switch (header.encoding) {
   case ImageHeader::Encoding::Raw:
-    ReadRaw(stream, header, out, progress);
+    if (const std::uint64_t there = ReadPieces(stream, voxels, bytes, progress); there < bytes)
+      FailFile(header.dataPath, "the data end early, after " + std::to_string(there) + " of " + std::to_string(bytes) + " bytes");
     break;
   case ImageHeader::Encoding::Zlib:
     Decompress(stream, header.dataPath, header.skipDecoded, voxels, bytes, progress);

@@ -15,9 +15,6 @@ namespace echorama {
 /// \throws Error(BadFile) or Error(TooLarge) that names the file, Error(FileSystem) when a detached data file is missing.
 void CheckVolume(const ImageHeader& header);
 
-/// Throws Error(TooLarge) when \a bytes are more than the memory that this machine has free.
-void CheckMemory(const std::string& path, double bytes);
-
 /// Reads the voxels into ByteCount() bytes at \a voxels, in this machine's byte order and the header's geometry.
 /// CheckVolume must have passed.
 /// \throws Error(BadFile) that names the file when the data end early, go on too long or are damaged, Error(Cancelled).

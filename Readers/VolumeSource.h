@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Error.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Geometry/RigidTransform.h"
@@ -56,7 +57,15 @@ public:
   virtual void ReadBeams(std::size_t index, void* samples, const Progress& progress = {});
 
 protected:
-  VolumeSource() = default;
+  VolumeSource(const std::string& path, FileFormat format)
+  {
+    content_.path = path;
+    content_.format = format;
+  }
+  /// Error(BadFile): the file, and why it cannot be read.
+  [[noreturn]] void Fail(const std::string& reason) const { FailFile(content_.path, reason); }
+  void Note(const std::string& sentence) { content_.notes.push_back(sentence); }
+
   VolumeContent content_;
 };
 

@@ -7,7 +7,7 @@
 #include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
-#include "Readers/NiftiFile.h"
+#include "Readers/NiftiHeader.h"
 #include <algorithm>
 #include <cctype>
 #include <filesystem>

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 
 namespace echorama {
 
@@ -42,6 +44,15 @@ auto DispatchVoxelType(VoxelType type, Functor&& functor)
 inline std::size_t SizeOf(VoxelType type)
 {
   return DispatchVoxelType(type, [](auto zero) { return sizeof zero; });
+}
+
+/// Grey out of red, green and blue, by the weights of ITU-R BT.601.
+template <class T>
+T Luminance(const T* colours)
+{
+  const double value =
+      0.299 * static_cast<double>(colours[0]) + 0.587 * static_cast<double>(colours[1]) + 0.114 * static_cast<double>(colours[2]);
+  return static_cast<T>(std::is_integral_v<T> ? std::floor(value + 0.5) : value);
 }
 
 } // namespace echorama

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundReader.h"
 
 #include "Readers/BorderZeros.h"
+#include "Readers/DataFile.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeSource.h"
@@ -187,11 +188,7 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
   }
   geometry.direction = direction;
   geometry.origin += geometry.direction * geometry.spacing.cwiseProduct(first);
-  try {
-    geometry.Check(path);
-  } catch (const Error& error) {
-    throw Error(Error::Kind::BadFile, error.what());
-  }
+  echorama::CheckGeometry(path, geometry);
   echorama::CheckMemory(path, static_cast<double>(geometry.VoxelCount()));
   return geometry;
 }

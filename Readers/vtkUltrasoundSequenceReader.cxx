@@ -2,6 +2,7 @@
 #include "vtkUltrasoundSequenceReader.h"
 
 #include "Core/Base/NumberText.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/SequencePoses.h"
 #include "Readers/TransformFile.h"
@@ -57,8 +58,7 @@ void AddString(vtkDataObject* data, const std::string& name, const std::string& 
 
 void InsertMatrix(vtkDoubleArray* array, const Eigen::Affine3d& matrix)
 {
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix.matrix();
-  array->InsertNextTuple(rows.data());
+  array->InsertNextTuple(echorama::MatrixRows(matrix.matrix()).data());
 }
 
 vtkSmartPointer<vtkDoubleArray> NewMatrices(const std::string& name)

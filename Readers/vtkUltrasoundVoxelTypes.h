@@ -9,7 +9,6 @@
 #include "vtkDataArray.h"
 #include "vtkType.h"
 
-#include <cmath>
 #include <cstdint>
 #include <string>
 #include <type_traits>
@@ -45,14 +44,12 @@ inline VoxelType VoxelTypeOf(vtkDataArray* array)
   }
 }
 
-/** Grey out of colours (the first three of \a components), by the weights of ITU-R BT.601. */
+/** Grey out of colours (the first three of \a components). */
 template <class T>
 inline void MakeGrey(const T* colours, std::uint64_t components, T* grey, vtkIdType count)
 {
   for (vtkIdType i = 0; i < count; ++i, colours += components) {
-    const double value = 0.299 * static_cast<double>(colours[0]) + 0.587 * static_cast<double>(colours[1]) +
-                         0.114 * static_cast<double>(colours[2]);
-    grey[i] = static_cast<T>(std::is_integral_v<T> ? std::floor(value + 0.5) : value);
+    grey[i] = Luminance(colours);
   }
 }
 

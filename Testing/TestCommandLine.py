@@ -78,16 +78,14 @@ class Usage(unittest.TestCase):
                           ["stitch", *some, "-o", work / "no.mha", "--method", "banana"],
                           ["stitch", *some, "-o", work / "no.mha", "--sharpness", "-1"],
                           ["stitch", *some, "-o", work / "no.mha", "--spacing", "-1"], ["align", *some, "--start", "nowhere"],
-                          ["align", *some, "--metric", "banana"], ["align", *some, "--method", "search", "--set", "Candidates=3"],
-                          ["align", *some, "-o", work / "no.json", "--method", "banana"],
+                          ["align", *some, "--metric", "banana"], ["align", *some, "--method", "search"], ["align", *some, "--metric", "mad"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "0"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "4"],
                           ["align", *some, "-o", work / "no.json", "--hold", "4"],
-                          ["align", *some, "-o", work / "no.json", "--hold", "1", "--method", "search"],
                           ["align", *some, "-o", work / "no.json", "--set", "banana=1"],
-                          ["align", *some, "-o", work / "no.json", "--set", "Levels"],
-                          ["align", *some, "-o", work / "no.json", "--set", "Levels=many"],
-                          ["align", *some, "-o", work / "no.json", "--set", "Levels=999"], ["score", phantom / "truth.json"],
+                          ["align", *some, "-o", work / "no.json", "--set", "Points"],
+                          ["align", *some, "-o", work / "no.json", "--set", "Points=many"],
+                          ["align", *some, "-o", work / "no.json", "--set", "Points=999"], ["score", phantom / "truth.json"],
                           ["score", phantom / "truth.json", "--landmarks", work / "one.csv"],
                           ["phantom"], ["phantom", "-o", work / "no", "--count", "0"], ["view"],
                           ["view", some[0], "--screenshot", work / "no.png", "--size", "1", "1"]):
@@ -208,7 +206,7 @@ class MainJob(unittest.TestCase):
 
     def test_align_tells_how_sure_it_is(self):
         told = self.aligned
-        self.assertEqual((told["method"], told["verdict"]), ("global", "aligned"))
+        self.assertEqual(told["verdict"], "aligned")
         for volume in told["volumes"]:
             self.assertEqual((volume["verdict"], volume["reason"]), ("aligned", ""))
             covariance = numpy.array(volume["covariance"])
@@ -222,15 +220,6 @@ class MainJob(unittest.TestCase):
             self.assertEqual(set(pair["seconds"]), {"global", "local", "confidence"})
             self.assertFalse(pair["voted_down"])
         self.assertEqual(set(told["align_seconds"]), {"prepare", "pairs", "graph"})
-
-    def test_the_search_of_the_dissertation(self):
-        done = run("align", *volumes(), "-o", work / "search.json", "--method", "search", *FEWER_POINTS, "--json")
-        self.assertEqual(done.returncode, 3, done.stderr)  # it may be right, and does not know
-        told = json.loads(done.stdout)
-        self.assertEqual([volume["verdict"] for volume in told["volumes"]], ["aligned"] + ["unjudged"] * (len(told["volumes"]) - 1))
-        self.assertEqual(told["verdict"], "doubtful")
-        self.assertGreater(told["volumes"][1]["error_grey"], 0)
-        self.assertLess(run_json("score", work / "search.json", "--truth", phantom / "truth.json")["score_mm"], 1.25)
 
     def test_align_with_no_options(self):
         """The poses go to poses.json, and what is there already stays."""
@@ -371,15 +360,18 @@ class MainJob(unittest.TestCase):
         folder = work / "ways"
         folder.mkdir()
         arguments = [*volumes(), "--poses", phantom / "truth.json", "--spacing", 4]
-        ways = [(method, "split") for method in ("membrane", "distance", "feather", "average", "maximum", "multiband", "offset")]
+        ways = [(method, "split") for method in ("membrane", "distance", "feather", "average", "maximum")]
         voxels, regions = set(), set()
-        for method, texture in [*ways, ("membrane", "mix"), ("membrane", "restore"), ("membrane", "seam")]:
+        for method, texture in [*ways, ("membrane", "mix"), ("membrane", "seam")]:
             out = folder / f"{method}_{texture}.nrrd"
             told = run_json("stitch", *arguments, "-o", out, "--method", method, "--texture", texture)
             self.assertEqual((told["method"], told["texture"]), (method, texture))
             voxels.add(out.read_bytes())
             regions.add(out.with_name(f"{out.stem}.ValidRegion.nrrd").read_bytes())
-        self.assertEqual((len(voxels), len(regions)), (10, 1))
+        self.assertEqual((len(voxels), len(regions)), (7, 1))
+        refused = run("stitch", *arguments, "-o", folder / "none.nrrd", "--method", "multiband")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("feather", refused.stderr)
         default = run_json("stitch", *arguments, "-o", folder / "default.nrrd")
         self.assertEqual((folder / "default.nrrd").read_bytes(), (folder / f"{default['method']}_{default['texture']}.nrrd").read_bytes())
 
@@ -655,7 +647,7 @@ class Manners(unittest.TestCase):
         self.assertGreater(told["stages"]["read"], 0)
 
     def test_progress_on_a_terminal_alone(self):
-        command = [PROGRAM, "align", *volumes(), "-o", work / "bar.json", "--method", "search", "--set", "Levels=2", *FEWER_POINTS]
+        command = [PROGRAM, "align", *volumes(), "-o", work / "bar.json", "--start", "tracked", *FEWER_POINTS]
         terminal, child = pty.openpty()
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=child)
         os.close(child)
@@ -670,7 +662,7 @@ class Manners(unittest.TestCase):
             shown += piece
         os.close(terminal)
         output = process.communicate(timeout=300)[0]
-        self.assertEqual(process.returncode, 3)
+        self.assertIn(process.returncode, (0, 3))
         self.assertIn(b"align", shown)
         self.assertIn(b"%", shown)
         self.assertNotIn(b"%\r\n", shown)  # the bar is wiped, and leaves no line
@@ -693,9 +685,8 @@ class Manners(unittest.TestCase):
 
     def test_stopping(self):
         """Far more work than can be done in the time before the signal; afterwards there is no new file."""
-        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--method", "search", "--set", "Samples=7",
-                         "--set", "Levels=20", "--set", "Points=1000000")
-        self.interrupted(signal.SIGINT, "align", *volumes(), "--start", "unknown", "--set", "Candidates=1000")
+        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--start", "unknown", "--set",
+                         "Candidates=1000")
         self.interrupted(signal.SIGTERM, "phantom", "-o", "volumes", "--spacing", "0.5", "--count", "40")
         self.interrupted(signal.SIGINT, "stitch", *volumes(), "-o", "stitched.mha", "--spacing", "0.4")
 

@@ -59,6 +59,22 @@ class Embed(unittest.TestCase):
         for key, value in known.items():
             np.testing.assert_allclose(told["ProbeGeometry"][key], value, rtol=1e-6, err_msg=key)
 
+    def test_overlap_moves_noise_volumes_together(self):
+        """By 30 degrees or none: other noise, and the same data. All of a fan of 65 degrees cannot be overlap."""
+        def embedded(name, overlap):
+            done = run("embed", self.stitched, "-o", self.folder / f"{name}.mha", "--noise", *self.views, "--preview", 4,
+                       "--no-contrast", "--overlap", overlap)
+            return done, *(read_mha(self.folder / f"{name}{kind}.mha")[1] for kind in ("", ".Embedding") if done.returncode == 0)
+
+        (done, apart, labels), (_, together, same) = embedded("apart", 0), embedded("together", 30)
+        self.assertIn("noise is that of 2 volumes", done.stdout)
+        np.testing.assert_array_equal(labels, same)
+        np.testing.assert_array_equal(apart[labels == 1], together[labels == 1])
+        self.assertGreater((apart != together)[labels == 3].mean(), 0.2)  # where the tiles moved
+        done, = embedded("refused", 70)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("nothing would be left of it", done.stderr)
+
     def test_numbers_of_a_cube(self):
         """A cube of 14 mm, 100 inside; its surface is 60 on the left half and 140 on the right, and has no grain."""
         valid, shell = np.zeros((2, 24, 26, 28), np.uint8)

@@ -106,7 +106,7 @@ class Noise(unittest.TestCase):
             (["-o", work / "x.mha", "--on-grid"], 2, "--on-grid"),
             (["-o", work / "x.mha", "--match", work / "missing.mha"], 1, "missing.mha"),
             (["-o", work / "x.mha", "--depth-max", -5], 1, "depth"),
-            (["-o", work / "x.mha", *FAN, "--mean", 400], 1, "mean"),
+            (["-o", work / "x.mha", *FAN, "--mean", 400], 1, "Mean"),
             (["-o", work / "x.unknown"], 2, "x.unknown"),
         ):
             done = run("noise", *arguments)

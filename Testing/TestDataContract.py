@@ -424,6 +424,16 @@ class Temporal(TissueSource):
         return filter
 
 
+class TrackerPlacement(Several):
+    """With a track that covers the volumes' time stamps."""
+
+    output = "blocks"
+
+    def connect(self, filter, images):
+        super().connect(filter, images)
+        filter.SetInputDataObject(1, track(10.0))
+
+
 class Files(Feed):
     def __init__(self, make):
         super().__init__(make)
@@ -527,6 +537,7 @@ Special = {
     "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundSynthesizer": Synthesizer,
+    "vtkUltrasoundTrackerPlacement": TrackerPlacement,
     "vtkUltrasoundTrackerSource": TrackerSource,
     "vtkUltrasoundVolumeReconstructor": Reconstructor,
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rules of the house that a compiler does not keep: layers, one threading library, and that no filter is half furnished."""
+"""The rules of the house that a compiler does not keep: layers, who may use whom, sizes, one threading library, and that no filter
+is half furnished."""
 import os
 import pathlib
 import re
@@ -38,6 +39,68 @@ for path in [*ours("*.h"), *ours("*.cxx")]:
         complaints.append(f"{name}: names a threading library; use Core/Base/Parallel.h, or Worker.h to wait for a device")
     if re.search(r"\b(mt19937|std::rand|srand|random_device)\b", text):
         complaints.append(f"{name}: randomness that is not Core/Base/Random.h")
+
+# Who may use whom: the table of Documentation/house.md, of lines | `room` | `used` `used` | what it holds |.
+house = (source / "Documentation" / "house.md").read_text()
+uses = {room: re.findall(r"`([\w/]+)`", used) for room, used in re.findall(r"^\| `([\w/]+)` \| ((?:`[\w/]+` ?)*|all )\|", house, re.M)}
+built = re.search(r"set\(ECHORAMA_ROOMS (Core [^)]*)\)", (source / "CMakeLists.txt").read_text())[1].split()
+above = []
+for room, used in uses.items():
+    complaints += [f"house.md: {room} uses {other}, which is not above it in the table" for other in used if other not in above]
+    above.append(room)
+for room in built:
+    if room not in uses:
+        complaints.append(f"house.md: {room} is not in the table of who may use whom")
+for place in re.findall(r"`([\w/]+/[\w./]*)`", house):
+    if not (source / place).exists() and place not in ("Testing/", "Benchmarks/", "Fuzzing/"):
+        complaints.append(f"house.md: there is no {place}")
+
+
+def room_of(path):
+    return "/".join(path.parts[:2 if path.parts[0] == "Filters" else 1])
+
+
+def check_use(file, room, used):
+    if used != room and used not in uses[room]:
+        complaints.append(f"{file}: {room} may not use {used}; Documentation/house.md says who may")
+
+
+classes = {path.name: room_of(path.relative_to(source)) for path in ours("vtk*.h")}
+for room in [room for room in built if room in uses]:
+    for path in [*sorted((source / room).rglob("*.h")), *sorted((source / room).rglob("*.cxx"))]:
+        name = path.relative_to(source)
+        for include in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M) if path.parent.name != "Benchmarks" else ():
+            parts = pathlib.PurePath(include)
+            if include in classes or parts.parts[0] in (*rooms, "Applications", "Plugin"):
+                check_use(name, room, classes.get(include) or room_of(parts))
+    named = {other.replace("/", ""): other for other in built}
+    for file in ("vtk.module", "CMakeLists.txt"):
+        text = re.sub(r"BENCHMARK_DEPENDS[^)\n]*", "", (source / room / file).read_text())
+        for other in re.findall(rf"\b(?:Echorama::)?({'|'.join(named)})(?:Kernels)?\b", text):
+            check_use(f"{room}/{file}", room, named[other])
+
+# Sizes. What is too large as yet; whoever mends one takes it off the list.
+too_large = {
+    "Readers",
+    "Tracking",
+}
+lines, limits = dict.fromkeys(built, 0), dict.fromkeys(built, 12000)
+for path in [*ours("*.h"), *ours("*.cxx")]:
+    name = path.relative_to(source)
+    if path.parent.name in ("Testing", "Benchmarks", "Fuzzing") or room_of(name) not in built:
+        continue
+    lines[str(name)] = path.read_text().count("\n")
+    lines[room_of(name)] += lines[str(name)]
+    if not path.name.startswith("vtk"):
+        limits[str(name)] = 700
+    if name.parts[0] == "Widgets" and path.suffix == ".cxx":
+        limits[str(name)] = 600
+for name, limit in limits.items():
+    if lines[name] > limit and name not in too_large:
+        complaints.append(f"{name}: {lines[name]} lines; no more than {limit} of one idea")
+for name in sorted(too_large):
+    if lines.get(name, 0) <= limits.get(name, 0):
+        complaints.append(f"{name}: it is not too large any more; take it off the list in {pathlib.Path(__file__).name}")
 
 libraries = sorted((build / "lib").glob("libEchorama*Kernels.so"))
 if not libraries:

@@ -23,7 +23,7 @@ from geometry import Probe, about, apply, degrees_of, pose, random_motion, read_
 
 temporary = tempfile.TemporaryDirectory()
 work = pathlib.Path(temporary.name)
-QUICK = "--method search --set MinimumOverlap=0.2 --set Points=2000 --set Levels=5 --set Repeats=1"
+QUICK = "--start tracked --set Points=2000"
 
 
 def quiet(*_):
@@ -86,7 +86,7 @@ class Study(unittest.TestCase):
             shutil.copy(self.case.files[number - 1], own / f"{number}.mha")
             (own / f"landmarks_{number}.fcsv").write_text(f"# CoordinateSystem = 0\nid,{point},0,0,0,1,1,1,0,apex,,\n")
         said = []
-        methods = {name: value for name, value in contestants.contestants(PROGRAM, [f"quick={QUICK}", "wrong=--method banana"]).items()
+        methods = {name: value for name, value in contestants.contestants(PROGRAM, [f"quick={QUICK}", "wrong=--metric banana"]).items()
                    if name in ("quick", "wrong")}
         rows = study.run(folder, methods, PROGRAM, say=said.append)
         self.assertEqual(len(rows), 3 * 3, [(row["case"], row["start"], row["method"]) for row in rows])
@@ -113,6 +113,19 @@ class Study(unittest.TestCase):
         for name in ("results.png", "slices.png", "scores.png"):
             self.assertGreater((folder / "out" / name).stat().st_size, 5000)
         self.assertIn("| 4 deg, 4 mm | quick | 1 | 100% |", (folder / "out" / "table.md").read_text())
+
+    def test_the_search_of_the_dissertation(self):
+        peers = contestants.contestants(PROGRAM)
+        if "search" not in peers:
+            self.skipTest("the benchmarks are not built")
+        judge = study.Judge(self.case, PROGRAM)
+        start = next(start for start in self.case.starts() if "4deg" in start.name)
+        answer = peers["search"].align(self.case, start, 120)
+        self.assertLess(judge.figures(answer.motion)["tre_mm"], 2)
+        self.assertGreater(judge.figures(start.motion)["tre_mm"], 3)
+        self.assertEqual(answer.verdict, "")
+        with self.assertRaisesRegex(contestants.Failed, "minimum overlap"):
+            contestants.Search(peers["search"].program, 0.99).align(self.case, start, 120)
 
     @unittest.skipUnless(shutil.which("elastix"), "elastix is not installed")
     def test_elastix_finds_a_known_motion(self):

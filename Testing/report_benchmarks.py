@@ -16,8 +16,8 @@ become rows; the text in between begins with the head of the table and ends with
 
 Lines with the same values of "by" make one row. In it the keys of the first of them are names, and so is each method, up to the first
 character that is no letter or digit: echorama.seconds. "lines" holds them all, in order. "only: EXPRESSION" leaves lines out. There may
-be several "row"s, each with what was said before it. The number at the end is that of the kernels' contents, comments and spaces left
-out, and their own headers': when it is not theirs any more, a test fails.
+be several "row"s, each with what was said before it. The number at the end is that of the kernels' contents and their own headers',
+without comments, spaces and the paths of what they include: when it is not theirs any more, a test fails.
 
 What a program printed on a quiet machine is kept beside it, and used again as long as the program and our libraries are the same: a
 report that was stopped goes on where it was.
@@ -71,7 +71,7 @@ class Table:
                 sys.exit(f"{self}: there is no kernel {kernel}")
             for file in dict.fromkeys((source / kernel, (source / kernel).with_suffix(".h"))):
                 if file.is_file():
-                    told.update(re.sub(r"//[^\n]*|\s+", "", file.read_text()).encode())
+                    told.update(re.sub(r'#include "[^\n]*|//[^\n]*|\s+', "", file.read_text()).encode())
         return told.hexdigest()[:12]
 
     def filled(self, lines, how):

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundHandEyeCalibration.h"
 
-#include "Core/Base/JsonPlace.h"
+#include "Tracking/Calibration/CalibrationJson.h"
 #include "vtkCellArray.h"
 #include "vtkDataSet.h"
 #include "vtkDoubleArray.h"
@@ -173,30 +173,9 @@ int vtkUltrasoundHandEyeCalibration::GetNumberOfPairs() const
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundHandEyeCalibration::SetMethod(const char* name)
-{
-  try {
-    const echorama::HandEyeMethod method = echorama::HandEyeMethodOf(name ? name : "");
-    if (method != this->Method) {
-      this->Method = method;
-      this->Modified();
-    }
-  } catch (const Error& error) {
-    vtkErrorMacro(<< error.what());
-  }
-}
-
-//----------------------------------------------------------------------------
-const char* vtkUltrasoundHandEyeCalibration::GetMethod() const
-{
-  return echorama::HandEyeMethodName(this->Method);
-}
-
-//----------------------------------------------------------------------------
 echorama::HandEyeParameters vtkUltrasoundHandEyeCalibration::Parameters() const
 {
   echorama::HandEyeParameters parameters;
-  parameters.method = this->Method;
   parameters.sensorNoise = {this->SensorNoiseDegrees, this->SensorNoiseMm};
   parameters.volumeNoise = {this->VolumeNoiseDegrees, this->VolumeNoiseMm};
   parameters.target = Eigen::Vector3d(this->Target);
@@ -268,9 +247,9 @@ int vtkUltrasoundHandEyeCalibration::RequestData(vtkInformation*, vtkInformation
     std::vector<std::string> notes;
     const auto pairs = this->CollectPairs(vtkDataObject::GetData(inputs[0]), vtkDataObject::GetData(inputs[1]), notes);
     this->Result = echorama::CalibrateHandEye(pairs, this->Parameters(), progress);
-    notes.insert(notes.end(), this->Result.notes.begin(), this->Result.notes.end());
+    this->Result.notes.insert(this->Result.notes.begin(), notes.begin(), notes.end());
     this->PutOut(vtkPolyData::GetData(outputs), pairs);
-    this->Report = this->ReportOf(notes);
+    this->Report = echorama::Report(this->Result, this->Parameters());
     this->HasResult = true;
   });
 }
@@ -313,42 +292,6 @@ void vtkUltrasoundHandEyeCalibration::PutOut(vtkPolyData* output, const std::vec
   AddField(output, "Covariance", this->Result.covariance);
   AddField(output, "TargetCovariance", this->Result.targetCovariance);
   AddField(output, "TargetRadius95", Eigen::Matrix<double, 1, 1>::Constant(this->Result.targetRadius95Mm));
-}
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundHandEyeCalibration::ReportOf(const std::vector<std::string>& notes) const
-{
-  using Json = nlohmann::ordered_json;
-  const auto rows = [](const auto& matrix) { return echorama::JsonPlace::RowsOf(matrix); };
-  const auto numbers = [](const auto& v) { return Json{v[0], v[1], v[2]}; };
-  Json scans = Json::array(), advice = Json::array();
-  for (const echorama::HandEyeResidual& residual : this->Result.residuals) {
-    scans.push_back({{"name", residual.name},
-                     {"inlier", residual.inlier},
-                     {"mm", residual.mm},
-                     {"degrees", residual.degrees},
-                     {"reason", residual.reason}});
-  }
-  for (const echorama::HandEyeAdvice& one : this->Result.advice) {
-    advice.push_back({{"text", one.text}, {"axis", numbers(one.axis)}, {"degrees", one.degrees}, {"radius95_mm", one.radiusMm}});
-  }
-  const Json report{{"method", this->GetMethod()},
-                    {"volume_to_sensor", rows(this->Result.solution.volumeToSensor.matrix())},
-                    {"world_to_tracker", rows(this->Result.solution.worldToTracker.matrix())},
-                    {"target", numbers(this->Target)},
-                    {"target_radius95_mm", this->Result.targetRadius95Mm},
-                    {"target_rms_mm", this->Result.targetRmsMm},
-                    {"target_covariance", rows(this->Result.targetCovariance)},
-                    {"covariance", rows(this->Result.covariance)},
-                    {"inliers", this->Result.inliers},
-                    {"rms_mm", this->Result.rmsMm},
-                    {"rms_degrees", this->Result.rmsDegrees},
-                    {"noise_estimated", this->Result.noiseEstimated},
-                    {"noise_scale", this->Result.noiseScale},
-                    {"scans", scans},
-                    {"advice", advice},
-                    {"notes", notes}};
-  return report.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 //----------------------------------------------------------------------------
@@ -397,7 +340,6 @@ void vtkUltrasoundHandEyeCalibration::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "SensorArray: " << this->SensorArray << "\n";
   os << indent << "VolumeArray: " << this->VolumeArray << "\n";
   os << indent << "NameArray: " << this->NameArray << "\n";
-  os << indent << "Method: " << this->GetMethod() << "\n";
   os << indent << "Target: " << this->Target[0] << " " << this->Target[1] << " " << this->Target[2] << "\n";
   os << indent << "SensorNoiseDegrees: " << this->SensorNoiseDegrees << "\n";
   os << indent << "SensorNoiseMm: " << this->SensorNoiseMm << "\n";

@@ -79,15 +79,6 @@ public:
   ///@}
 
   ///@{
-  /**
-   * "maximum-likelihood" (default), or a closed form: "shiu-ahmad", "tsai-lenz", "park-martin", "horaud", "daniilidis",
-   * "andreff". Another name is an error and changes nothing.
-   */
-  void SetMethod(const char* name);
-  const char* GetMethod() const;
-  ///@}
-
-  ///@{
   /** Where in the volume the error counts, mm in the volume's frame: usually its centre. Default 0 0 0. */
   vtkSetVector3Macro(Target, double);
   vtkGetVector3Macro(Target, double);
@@ -116,7 +107,7 @@ public:
   ///@}
 
   ///@{
-  /** Whether scans that do not agree with the others are left out, and named. Maximum likelihood only. Default on. */
+  /** Whether scans that do not agree with the others are left out, and named. Default on. */
   vtkSetMacro(RejectOutliers, bool);
   vtkGetMacro(RejectOutliers, bool);
   vtkBooleanMacro(RejectOutliers, bool);
@@ -151,12 +142,7 @@ public:
   int GetNumberOfInliers() const;
   ///@}
 
-  /**
-   * What the last update did, as JSON: {"method", "volume_to_sensor", "world_to_tracker" (rows), "target", "target_radius95_mm",
-   * "target_rms_mm", "target_covariance", "covariance", "inliers", "rms_mm", "rms_degrees", "noise_scale", "scans": [{"name",
-   * "inlier", "mm", "degrees", "reason"}, ...], "advice": [{"text", "axis", "degrees", "radius95_mm"}, ...], "notes": [...]}.
-   * Empty when it failed.
-   */
+  /** What the last update did, as JSON (Calibration/CalibrationJson.h). Empty when it failed. */
   std::string GetReport() const { return this->Report; }
 
 protected:
@@ -175,10 +161,8 @@ private:
                                                   std::vector<std::string>& notes) const;
   echorama::HandEyeParameters Parameters() const;
   void PutOut(vtkPolyData* output, const std::vector<echorama::HandEyePair>& pairs) const;
-  std::string ReportOf(const std::vector<std::string>& notes) const;
 
   std::vector<echorama::HandEyePair> Pairs;
-  echorama::HandEyeMethod Method = echorama::HandEyeMethod::MaximumLikelihood;
   echorama::HandEyeResult Result;
   std::string SensorArray = "SensorToTracker";
   std::string VolumeArray = "VolumeToWorld";

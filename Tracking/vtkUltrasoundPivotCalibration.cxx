@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundPivotCalibration.h"
 
-#include "Core/Base/JsonPlace.h"
-#include "Tracking/Calibration/PivotCalibration.h"
+#include "Tracking/Calibration/CalibrationJson.h"
 #include "vtkUltrasoundTrackPoses.h"
 #include "vtkUltrasoundVolume.h"
 
@@ -61,42 +60,6 @@ void Fill(vtkPolyData* output, const echorama::TrackPoses& track, const echorama
   AddField(output, "TipCovariance", covariance.data(), 9);
   AddField(output, "Pivot", result.pivot.data(), 3);
 }
-
-std::string ReportOf(const std::string& tool, const echorama::PivotResult& result)
-{
-  using Json = nlohmann::ordered_json;
-  const auto numbers = [](const Eigen::Vector3d& v) { return Json{v[0], v[1], v[2]}; };
-  const Eigen::Matrix3d covariance = result.covariance.topLeftCorner<3, 3>();
-  Json outliers = Json::array();
-  for (std::size_t i = 0; i < result.residuals.size(); ++i) {
-    if (!result.residuals[i].inlier) {
-      outliers.push_back(i);
-    }
-  }
-  Json sphere;
-  if (result.sphere.known) {
-    sphere = {{"centre", numbers(result.sphere.centre)},
-              {"radius_mm", result.sphere.radiusMm},
-              {"radius_error_mm", result.sphere.radiusErrorMm},
-              {"rms_mm", result.sphere.rmsMm}};
-  }
-  const Json report{{"tool", tool},
-                    {"tip", numbers(result.tip)},
-                    {"tip_radius95_mm", result.tipRadius95Mm},
-                    {"tip_rms_mm", result.tipRmsMm},
-                    {"tip_covariance", echorama::JsonPlace::RowsOf(covariance)},
-                    {"pivot", numbers(result.pivot)},
-                    {"poses", result.residuals.size()},
-                    {"inliers", result.inliers},
-                    {"outliers", outliers},
-                    {"rms_mm", result.rmsMm},
-                    {"noise_scale", result.noiseScale},
-                    {"swing_degrees", numbers(result.swingDegrees)},
-                    {"least_squares_tip", numbers(result.algebraicTip)},
-                    {"sphere", sphere},
-                    {"notes", result.notes}};
-  return report.dump(2, ' ', false, Json::error_handler_t::replace);
-}
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -146,7 +109,7 @@ int vtkUltrasoundPivotCalibration::RequestData(vtkInformation*, vtkInformationVe
     std::copy_n(result.tip.data(), 3, this->Tip);
     std::copy_n(result.pivot.data(), 3, this->Pivot);
     this->Radius95 = result.tipRadius95Mm;
-    this->Report = ReportOf(track.tool, result);
+    this->Report = echorama::Report(result, track.tool);
   });
 }
 

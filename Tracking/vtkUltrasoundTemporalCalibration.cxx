@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundTemporalCalibration.h"
 
-#include "Core/Base/Json.h"
-#include "Tracking/Calibration/TemporalCalibration.h"
+#include "Tracking/Calibration/CalibrationJson.h"
 #include "vtkUltrasoundTrackPoses.h"
 #include "vtkUltrasoundVolume.h"
 
@@ -45,33 +44,6 @@ void MoveTimes(vtkPolyData* output, const echorama::TemporalResult& result, bool
     moved->SetValue(i, time + growth / (1.0 - growth) * (time - result.middleSeconds));
   }
   output->GetPointData()->AddArray(moved);
-}
-
-std::string ReportOf(const std::string& first, const std::string& second, const echorama::TemporalResult& result)
-{
-  using Json = nlohmann::ordered_json;
-  Json curve = Json::array();
-  for (std::size_t i = 0; i < result.offsets.size(); ++i) {
-    curve.push_back({result.offsets[i], result.correlations[i]}); // NaN becomes null
-  }
-  const Json report{{"first_tool", first},
-                    {"second_tool", second},
-                    {"offset_s", result.offsetSeconds},
-                    {"standard_error_s", result.standardErrorSeconds},
-                    {"signal", result.signal == echorama::SpeedSignal::Rotation ? "rotation" : "translation"},
-                    {"correlation", result.correlation},
-                    {"confidence", result.confidence},
-                    {"next_correlation", result.nextCorrelation},
-                    {"next_offset_s", result.nextOffsetSeconds},
-                    {"speed_ratio", result.speedRatio},
-                    {"overlap_s", result.overlapSeconds},
-                    {"middle_s", result.middleSeconds},
-                    {"drift_ppm", result.driftPpm},
-                    {"drift_error_ppm", result.driftErrorPpm},
-                    {"drifts", result.drifts},
-                    {"notes", result.notes},
-                    {"correlation_by_offset", curve}};
-  return report.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 } // namespace
 
@@ -128,7 +100,7 @@ int vtkUltrasoundTemporalCalibration::RequestData(vtkInformation*, vtkInformatio
     AddField(output, "TimeOffsetError", result.standardErrorSeconds);
     this->Offset = result.offsetSeconds;
     this->StandardError = result.standardErrorSeconds;
-    this->Report = ReportOf(a.tool, b.tool, result);
+    this->Report = echorama::Report(result, a.tool, b.tool);
   });
 }
 

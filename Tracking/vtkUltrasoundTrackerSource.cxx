@@ -2,12 +2,12 @@
 #include "vtkUltrasoundTrackerSource.h"
 
 #include "Core/Base/Error.h"
-#include "Readers/SequencePoses.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Readers/TransformFile.h"
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/TrackerDevice.h"
 #include "Tracking/Stream/Clock.h"
-#include "Tracking/Stream/LiveTransforms.h"
+#include "Tracking/Stream/ShownImage.h"
 #include "Tracking/Stream/StreamRecorder.h"
 #include "Tracking/Stream/StreamReport.h"
 
@@ -37,7 +37,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -45,8 +44,6 @@
 using echorama::Error;
 using echorama::LiveTransform;
 using echorama::LiveTransforms;
-using echorama::StreamedImage;
-using echorama::ToolPose;
 using echorama::ToolStatistics;
 using echorama::TransformStatus;
 
@@ -83,51 +80,6 @@ vtkSmartPointer<Array> NewArray(const char* name, int components = 1)
   return array;
 }
 
-// The frame of coordinates that most tools are seen in; of equals the first in the order of bytes.
-std::string UsualWorld(const std::vector<std::string>& tools)
-{
-  std::map<std::string, int> counts;
-  for (const std::string& tool : tools) {
-    if (const auto frames = echorama::FramesOf(tool)) {
-      ++counts[frames->second];
-    }
-  }
-  std::string world;
-  int most = 0;
-  for (const auto& [frame, count] : counts) {
-    if (count > most) {
-      world = frame;
-      most = count;
-    }
-  }
-  return world;
-}
-
-struct PlacedImage {
-  StreamedImage Image;
-  std::optional<Eigen::Affine3d> ToWorld;
-  echorama::ImageGeometry Geometry;
-};
-
-// An image without a time is further away than any other.
-double DistanceInTime(const StreamedImage& image, double time)
-{
-  return std::isnan(image.time) ? std::numeric_limits<double>::infinity() : std::abs(image.time - time);
-}
-
-// Whether its numbers agree with its bytes, and we can show it.
-bool IsShowable(const StreamedImage& image)
-{
-  if (!image.voxels || (image.components != 1 && image.components != 3 && image.components != 4)) {
-    return false;
-  }
-  try {
-    image.geometry.Check(image.name);
-  } catch (const Error&) {
-    return false;
-  }
-  return image.voxels->size() == image.geometry.VoxelCount() * static_cast<std::size_t>(image.components) * SizeOf(image.type);
-}
 } // namespace
 
 // A device that was opened, and all that came from it.
@@ -139,7 +91,7 @@ struct vtkUltrasoundTrackerSource::Session {
   std::unique_ptr<echorama::TrackerDevice> Device; // which writes to what is above, so it goes first
   std::vector<double> Times;                       // of a recording that is shown as a whole
   double TimeShown = NaN;                          // of that recording
-  std::optional<PlacedImage> Image;                // that output 1 shows
+  std::optional<echorama::ShownImage> Image;       // that output 1 shows
   std::uint64_t PosesShown = 0, ImagesShown = 0;   // versions
   double FreshUntil = 0.0;                         // our clock: when a tool that is shown becomes too old
 
@@ -406,61 +358,55 @@ std::string vtkUltrasoundTrackerSource::GetToolName(int index) const
   return index >= 0 && static_cast<std::size_t>(index) < tools.size() ? tools[static_cast<std::size_t>(index)] : "";
 }
 
-namespace {
-// By its name, or that of its frame.
-std::optional<ToolStatistics> Find(const std::vector<ToolStatistics>& tools, const char* name)
+// By the name of the tool, or that of its frame.
+template <class T, class Value>
+T vtkUltrasoundTrackerSource::StatisticOf(const char* name, T otherwise, const Value& value) const
 {
   const std::string wanted = TextOf(name);
+  const auto tools = this->Opened ? this->Opened->Poses.Statistics().tools : std::vector<ToolStatistics>();
   for (const ToolStatistics& tool : tools) {
     const auto frames = echorama::FramesOf(tool.name);
     if (tool.name == wanted || (frames && frames->first == wanted)) {
-      return tool;
+      return static_cast<T>(value(tool));
     }
   }
-  return {};
+  return otherwise;
 }
-} // namespace
 
 //----------------------------------------------------------------------------
 vtkIdType vtkUltrasoundTrackerSource::GetNumberOfPoses(const char* tool) const
 {
-  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
-  return found ? static_cast<vtkIdType>(found->valid + found->missing + found->outOfRange) : 0;
+  return this->StatisticOf<vtkIdType>(tool, 0, [](const auto& s) { return s.valid + s.missing + s.outOfRange; });
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundTrackerSource::GetRate(const char* tool) const
 {
-  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
-  return found ? found->rateHz : NaN;
+  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.rateHz; });
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundTrackerSource::GetJitter(const char* tool) const
 {
-  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
-  return found ? found->jitterSeconds : NaN;
+  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.jitterSeconds; });
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundTrackerSource::GetLatency(const char* tool) const
 {
-  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
-  return found ? found->medianLatencySeconds : NaN;
+  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.medianLatencySeconds; });
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundTrackerSource::GetDropoutShare(const char* tool) const
 {
-  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
-  return found ? found->DropoutShare() : NaN;
+  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.DropoutShare(); });
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundTrackerSource::GetSecondsSinceLast(const char* tool) const
 {
-  const auto found = this->Opened ? Find(this->Opened->Poses.Statistics().tools, tool) : std::nullopt;
-  return found ? found->secondsSinceLast : NaN;
+  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.secondsSinceLast; });
 }
 
 //----------------------------------------------------------------------------
@@ -474,25 +420,17 @@ bool vtkUltrasoundTrackerSource::StartRecording(const char* fileName)
     return false;
   }
   // The new one first: when it cannot be started, the earlier one goes on.
-  auto& recorder = this->Opened->Recorder;
   std::unique_ptr<echorama::StreamRecorder> earlier;
   const auto start = [&](const echorama::Progress&) {
     auto next = std::make_unique<echorama::StreamRecorder>(path, this->Opened->Poses.Subscribe());
-    earlier = std::exchange(recorder, std::move(next));
+    earlier = std::exchange(this->Opened->Recorder, std::move(next));
   };
   if (!vtkUltrasoundVolume::Run(this, nullptr, start)) {
     return false;
   }
   vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
-    try {
-      if (earlier) {
-        earlier->Stop();
-      }
-    } catch (const Error& error) {
-      const bool isEmpty = error.GetKind() == Error::Kind::BadInput && earlier->State().frames == 0;
-      if (!isEmpty) { // that nothing was recorded is no fault
-        throw;
-      }
+    if (earlier) {
+      earlier->StopIfAnything();
     }
   });
   return true;
@@ -509,21 +447,27 @@ bool vtkUltrasoundTrackerSource::StopRecording()
 }
 
 //----------------------------------------------------------------------------
+echorama::RecordingState vtkUltrasoundTrackerSource::Recording() const
+{
+  return this->Opened && this->Opened->Recorder ? this->Opened->Recorder->State() : echorama::RecordingState();
+}
+
+//----------------------------------------------------------------------------
 vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRecordedPoses() const
 {
-  return this->Opened && this->Opened->Recorder ? static_cast<vtkIdType>(this->Opened->Recorder->State().poses) : 0;
+  return static_cast<vtkIdType>(this->Recording().poses);
 }
 
 //----------------------------------------------------------------------------
 vtkIdType vtkUltrasoundTrackerSource::GetNumberOfUnrecordedPoses() const
 {
-  return this->Opened && this->Opened->Recorder ? static_cast<vtkIdType>(this->Opened->Recorder->State().lost) : 0;
+  return static_cast<vtkIdType>(this->Recording().lost);
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::GetRecordingProblem() const
 {
-  return this->Opened && this->Opened->Recorder ? this->Opened->Recorder->State().problem : "";
+  return this->Recording().problem;
 }
 
 //----------------------------------------------------------------------------
@@ -533,25 +477,27 @@ vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRejected() const
 }
 
 //----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::ShownTime() const
+// A transform at the time that is shown.
+LiveTransform vtkUltrasoundTrackerSource::Found(const char* name)
 {
-  return this->Opened && this->Opened->IsWhole() ? this->Opened->TimeShown : this->Time;
+  LiveTransform found;
+  found.transform.status = TransformStatus::Missing;
+  found.message = "the device is not open";
+  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+    if (const Session* session = this->Updated()) {
+      found = session->Transforms->Find(TextOf(name), session->IsWhole() ? session->TimeShown : this->Time);
+    }
+  });
+  return found;
 }
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundTrackerSource::GetTransform(const char* name, vtkMatrix4x4* matrix)
 {
-  LiveTransform found;
-  found.transform.status = TransformStatus::Missing;
-  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
-    if (const Session* session = this->Updated()) {
-      found = session->Transforms->Find(TextOf(name), this->ShownTime());
-    }
-  });
+  const LiveTransform found = this->Found(name);
   if (matrix) {
     const bool known = found.Status() != TransformStatus::Missing;
-    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows =
-        known ? found.transform.matrix.matrix() : Eigen::Matrix4d(Eigen::Matrix4d::Identity());
+    const echorama::MatrixRows rows = known ? found.transform.matrix.matrix() : Eigen::Matrix4d(Eigen::Matrix4d::Identity());
     matrix->DeepCopy(rows.data());
   }
   return static_cast<int>(found.Status());
@@ -560,25 +506,13 @@ int vtkUltrasoundTrackerSource::GetTransform(const char* name, vtkMatrix4x4* mat
 //----------------------------------------------------------------------------
 double vtkUltrasoundTrackerSource::GetTransformError(const char* name)
 {
-  double error = -1.0;
-  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
-    if (const Session* session = this->Updated()) {
-      error = session->Transforms->Find(TextOf(name), this->ShownTime()).transform.errorMm.value_or(-1.0);
-    }
-  });
-  return error;
+  return this->Found(name).transform.errorMm.value_or(-1.0);
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::GetTransformMessage(const char* name)
 {
-  std::string message = "the device is not open";
-  vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
-    if (const Session* session = this->Updated()) {
-      message = session->Transforms->Find(TextOf(name), this->ShownTime()).message;
-    }
-  });
-  return message;
+  return this->Found(name).message;
 }
 
 //----------------------------------------------------------------------------
@@ -619,8 +553,8 @@ int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformati
     }
     this->ChooseImage(session->IsWhole() ? session->Times.front() : this->Time);
     if (session->Image) {
-      vtkUltrasoundVolume::SetGeometry(image, session->Image->Geometry);
-      vtkDataObject::SetPointDataActiveScalarInfo(image, echorama::VtkTypeOf(session->Image->Image.type), 1);
+      vtkUltrasoundVolume::SetGeometry(image, session->Image->geometry);
+      vtkDataObject::SetPointDataActiveScalarInfo(image, echorama::VtkTypeOf(session->Image->image.type), 1);
     }
   });
 }
@@ -674,38 +608,19 @@ void vtkUltrasoundTrackerSource::ReadImage(double time)
 }
 
 //----------------------------------------------------------------------------
-// The newest image that can be placed in the world, else the newest; with a time, the nearest to it.
 void vtkUltrasoundTrackerSource::ChooseImage(double time)
 {
   Session& session = *this->Opened;
-  session.Image.reset();
   session.ImagesShown = session.Images.Version();
-  std::vector<StreamedImage> images = session.Images.Images();
-  images.erase(std::remove_if(images.begin(), images.end(), [](const StreamedImage& image) { return !IsShowable(image); }),
-               images.end());
-  std::reverse(images.begin(), images.end());
-  if (!std::isnan(time)) {
-    std::stable_sort(images.begin(), images.end(), [time](const StreamedImage& a, const StreamedImage& b) {
-      return DistanceInTime(a, time) < DistanceInTime(b, time);
-    });
-  }
-  const std::string world = TextOf(this->WorldFrame).empty() ? UsualWorld(session.Poses.Tools()) : std::string(this->WorldFrame);
-  for (const StreamedImage& image : images) {
-    const LiveTransform found = session.Transforms->Find(TextOf(this->ImageFrame), world, image.time);
-    const bool placed = !std::isnan(image.time) && found.Status() == TransformStatus::Valid &&
-                        std::abs(found.transform.matrix.linear().determinant()) > 1e-12;
-    if (placed) {
-      session.Image =
-          PlacedImage{image, found.transform.matrix, echorama::FrameGeometry(found.transform.matrix, image.geometry.dimensions)};
-      return;
-    }
-    if (!session.Image) {
-      session.Image = PlacedImage{image, {}, image.geometry};
-    }
-    if (!std::isnan(time)) {
-      return; // the one of that moment
-    }
-  }
+  session.Image =
+      echorama::ChooseImage(session.Images.Images(), *session.Transforms, TextOf(this->ImageFrame), this->World(), time);
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundTrackerSource::World() const
+{
+  const std::string world = TextOf(this->WorldFrame);
+  return world.empty() ? echorama::UsualWorld(this->Opened->Poses.Tools()) : world;
 }
 
 //----------------------------------------------------------------------------
@@ -713,7 +628,7 @@ void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, vtkPolyData* axe
 {
   Session& session = *this->Opened;
   const std::vector<std::string> names = session.Poses.Tools();
-  const std::string world = TextOf(this->WorldFrame).empty() ? UsualWorld(names) : std::string(this->WorldFrame);
+  const std::string world = this->World();
 
   const vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
@@ -754,8 +669,7 @@ void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, vtkPolyData* axe
     tool->InsertNextValue(number);
     times->InsertNextValue(known ? found.time : NaN);
     statuses->InsertNextValue(static_cast<unsigned char>(found.Status()));
-    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix.matrix();
-    toWorld->InsertNextTuple(rows.data());
+    toWorld->InsertNextTuple(echorama::MatrixRows(matrix.matrix()).data());
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3d direction = matrix.linear().col(axis).normalized();
       axes[axis]->InsertNextTuple(direction.data());
@@ -792,9 +706,9 @@ void vtkUltrasoundTrackerSource::ShowImage(vtkImageData* output)
   if (!this->Opened->Image) {
     return;
   }
-  const PlacedImage& placed = *this->Opened->Image;
-  const StreamedImage& image = placed.Image;
-  vtkUltrasoundVolume::SetGeometry(output, placed.Geometry);
+  const echorama::ShownImage& shown = *this->Opened->Image;
+  const echorama::StreamedImage& image = shown.image;
+  vtkUltrasoundVolume::SetGeometry(output, shown.geometry);
   const auto intensity = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(echorama::VtkTypeOf(image.type)));
   intensity->SetName(vtkUltrasoundVolume::IntensityName());
   intensity->SetNumberOfTuples(output->GetNumberOfPoints());
@@ -812,8 +726,8 @@ void vtkUltrasoundTrackerSource::ShowImage(vtkImageData* output)
   valid->SetNumberOfTuples(output->GetNumberOfPoints());
   valid->Fill(1.0);
   output->GetPointData()->AddArray(valid);
-  if (placed.ToWorld) {
-    vtkUltrasoundAcquisition::SetImageToWorld(output, *placed.ToWorld);
+  if (shown.imageToWorld) {
+    vtkUltrasoundAcquisition::SetImageToWorld(output, *shown.imageToWorld);
   }
   if (std::isfinite(image.time)) {
     vtkUltrasoundAcquisition::SetTimeStamp(output, image.time);

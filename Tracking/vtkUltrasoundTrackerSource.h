@@ -44,6 +44,13 @@
 #include <memory> // for what is open
 #include <string> // for texts
 
+#ifndef __VTK_WRAP__
+namespace echorama {
+struct LiveTransform;
+struct RecordingState;
+} // namespace echorama
+#endif
+
 class vtkImageData;
 class vtkMatrix4x4;
 
@@ -249,7 +256,11 @@ private:
   void Open();
   void Close();
   Session* Updated();
-  double ShownTime() const;
+  std::string World() const;
+  template <class T, class Value>
+  T StatisticOf(const char* name, T otherwise, const Value& value) const;
+  echorama::RecordingState Recording() const;
+  echorama::LiveTransform Found(const char* name);
   void ReadImage(double time);
   void ChooseImage(double time);
   void ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time);

@@ -20,6 +20,7 @@
 #include "vtkWidgetRepresentation.h"
 #ifndef __VTK_WRAP__
 #include <memory>
+#include <vector>
 #endif
 #include <string>
 
@@ -61,7 +62,7 @@ public:
   /** Whether the view is a slice: "automatic" (default: when the camera's projection is parallel), "slice" or "3d". Another name
    * is an error and changes nothing. */
   void SetViewKind(const char* name);
-  const char* GetViewKind() const;
+  const char* GetViewKind() const { return this->ViewKind.c_str(); }
   bool IsSlice() const;
   ///@}
 
@@ -80,7 +81,7 @@ public:
    * error and changes nothing.
    */
   void SetConstraint(const char* name);
-  const char* GetConstraint() const;
+  const char* GetConstraint() const { return this->Constraint.c_str(); }
   ///@}
 
   ///@{
@@ -106,8 +107,8 @@ public:
    * With \a turn a drag of volumes turns them: in a slice about the line of sight, in 3D like a ball whose front follows the
    * mouse.
    */
-  void StartWidgetInteraction(double position[2]) override;
-  void StartTurning(double position[2]);
+  void StartWidgetInteraction(double position[2]) override { this->Start(position, false); }
+  void StartTurning(double position[2]) { this->Start(position, true); }
   void WidgetInteraction(double position[2]) override;
   void EndWidgetInteraction(double position[2]) override;
   void CancelInteraction();
@@ -121,14 +122,14 @@ public:
   /** One edit each: moves the selection along the axes of the view (right, up, towards the viewer), mm, and turns it about the
    * centre of rotation by a rotation vector along them, degrees. Sensitivity and constraint do not count. False: nothing is
    * selected. */
-  bool TranslateInView(double right, double up, double towards);
-  bool RotateInView(double right, double up, double towards);
+  bool TranslateInView(double right, double up, double towards) { return this->MoveInView(false, right, up, towards); }
+  bool RotateInView(double right, double up, double towards) { return this->MoveInView(true, right, up, towards); }
   ///@}
 
   ///@{
   /** Volumes (ids) that are seen at a position of a slice, the last of the session first: visible, and real there. Returns how
    * many. */
-  int GetNumberOfVolumesAt(double x, double y) const;
+  int GetNumberOfVolumesAt(double x, double y) const { return static_cast<int>(this->VolumesAt(x, y).size()); }
   int GetVolumeAt(double x, double y, int which = 0) const; ///< -1: none
   ///@}
   /**
@@ -168,7 +169,10 @@ private:
   void operator=(const vtkUltrasoundAlignmentRepresentation&) = delete;
 
 #ifndef __VTK_WRAP__
+  void MakeHandles();
   void Start(double position[2], bool turn);
+  bool MoveInView(bool turn, double right, double up, double towards);
+  std::vector<int> VolumesAt(double x, double y) const;
 
   double TranslationSensitivity = 1.0;
   double RotationSensitivity = 1.0;

@@ -30,8 +30,12 @@
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
 #include "Widgets/Session/AlignmentSession.h"
+#include "Widgets/Session/SessionStorage.h"
+#include "Widgets/Session/SessionTruth.h"
+#include <algorithm>
 #include <functional>
 #include <memory>
+#include <type_traits>
 #endif
 #include <string>
 
@@ -41,6 +45,11 @@ class vtkMatrix4x4;
 class vtkMultiBlockDataSet;
 class vtkPolyData;
 class vtkStringArray;
+#ifndef __VTK_WRAP__
+namespace echorama {
+class SessionImages;
+}
+#endif
 
 class ECHORAMAWIDGETS_EXPORT vtkUltrasoundAlignmentSession : public vtkObject {
 public:
@@ -61,12 +70,14 @@ public:
    * the id. OpenVolume reads the file first. */
   int AddVolume(vtkImageData* image, const char* file, const char* name = nullptr);
   int OpenVolume(const char* file);
-  bool RemoveVolume(int id);
-  int GetNumberOfVolumes() const;
-  int GetVolumeId(int index) const; ///< -1: none
-  bool HasVolume(int id) const;
+  bool RemoveVolume(int id) { return this->Do(&Kernel::Remove, id); }
+  int GetNumberOfVolumes() const { return static_cast<int>(this->GetKernel().State().volumes.size()); }
+  int GetVolumeId(int index) const { return this->GetKernel().State().IdAt(index); } ///< -1: none
+  bool HasVolume(int id) const { return this->Find(id) != nullptr; }
   /** Where it lies now, with what was painted: not to be changed. nullptr: no such volume. */
   vtkImageData* GetImage(int id) const;
+  /** The voxel (its point id) that is nearest to a point of the world; -1: none, or none that is real. */
+  vtkIdType GetVoxelAt(int id, const double world[3]) const;
   /** All (or the visible) volumes as blocks with NAME(): for filters. Voxels are shared. */
   void GetVolumes(vtkMultiBlockDataSet* blocks, bool onlyVisible = false) const;
   /** The same for one volume: as it is now, whatever is painted later. For jobs beside the work. */
@@ -75,16 +86,20 @@ public:
 
   ///@{
   /** Of a volume. Colours are RGB in [0, 1]. File is empty when there is none. */
-  std::string GetName(int id) const;
-  bool SetName(int id, const char* name);
-  std::string GetFile(int id) const;
-  bool GetColour(int id, double rgb[3]) const;
-  bool SetColour(int id, double r, double g, double b);
-  double GetOpacity(int id) const;
-  bool SetOpacity(int id, double opacity);
-  bool GetVisible(int id) const;
-  bool SetVisible(int id, bool visible);
-  int GetGroup(int id) const;
+  std::string GetName(int id) const { return this->Of(id, &echorama::SessionVolume::name); }
+  bool SetName(int id, const char* name) { return this->Do(&Kernel::SetName, id, name ? name : ""); }
+  std::string GetFile(int id) const { return this->Of(id, &echorama::SessionVolume::file); }
+  bool GetColour(int id, double rgb[3]) const
+  {
+    const echorama::SessionVolume* volume = this->Find(id);
+    return volume && std::copy(volume->colour.begin(), volume->colour.end(), rgb) != rgb;
+  }
+  bool SetColour(int id, double r, double g, double b) { return this->Do(&Kernel::SetColour, id, {r, g, b}); }
+  double GetOpacity(int id) const { return this->Of(id, &echorama::SessionVolume::opacity); }
+  bool SetOpacity(int id, double opacity) { return this->Do(&Kernel::SetOpacity, id, opacity); }
+  bool GetVisible(int id) const { return this->Of(id, &echorama::SessionVolume::visible); }
+  bool SetVisible(int id, bool visible) { return this->Do(&Kernel::SetVisible, id, visible); }
+  int GetGroup(int id) const { return this->Of(id, &echorama::SessionVolume::group); }
   /** Grey levels drawn black and white: by default the 0.1 and 99.9 percentile of all volumes. Not an edit. */
   void GetGreyWindow(double window[2]) const;
   void SetGreyWindow(double black, double white);
@@ -96,45 +111,52 @@ public:
   bool SetVolumeToWorld(int id, vtkMatrix4x4* pose);
   /** The same in numbers: the middle of the volume, mm, and rotations about the world's z, then y, then x, degrees. */
   bool GetPlacement(int id, double middle[3], double degrees[3]) const;
-  bool SetPlacement(int id, double x, double y, double z, double degreesX, double degreesY, double degreesZ);
+  bool SetPlacement(int id, double x, double y, double z, double degreesX, double degreesY, double degreesZ)
+  {
+    return this->Do(&Kernel::SetPlacement, id, {{x, y, z}, {degreesX, degreesY, degreesZ}});
+  }
   ///@}
 
   ///@{
   /** Selection: with all of the volume's group. Not an edit. */
-  bool Select(int id, bool on = true, bool alone = false);
-  void SelectAll();
-  void SelectNone();
-  void InvertSelection();
-  bool IsSelected(int id) const;
-  int GetNumberOfSelected() const;
-  bool GroupSelection();
-  bool UngroupSelection();
+  bool Select(int id, bool on = true, bool alone = false) { return this->Do(&Kernel::Select, id, on, alone); }
+  void SelectAll() { this->Do(&Kernel::SelectAll); }
+  void SelectNone() { this->Do(&Kernel::SelectNone); }
+  void InvertSelection() { this->Do(&Kernel::InvertSelection); }
+  bool IsSelected(int id) const { return this->GetKernel().Selection().count(id) > 0; }
+  int GetNumberOfSelected() const { return static_cast<int>(this->GetKernel().Selection().size()); }
+  bool GroupSelection() { return this->Do(&Kernel::GroupSelection); }
+  bool UngroupSelection() { return this->Do(&Kernel::UngroupSelection); }
   ///@}
 
   ///@{
   /** Moves all that is selected by a motion of the world; translates, mm; turns about the centre of rotation by a rotation
    * vector, degrees. */
   bool MoveSelection(vtkMatrix4x4* motion);
-  bool TranslateSelection(double x, double y, double z);
-  bool RotateSelection(double x, double y, double z);
-  void GetCentreOfRotation(double centre[3]) const;
-  void SetCentreOfRotation(double x, double y, double z);
-  void ResetCentreOfRotation(); ///< the middle of what is selected
+  bool TranslateSelection(double x, double y, double z)
+  {
+    return this->Do(&Kernel::MoveSelection, echorama::Pose(Eigen::Translation3d(x, y, z)));
+  }
+  bool RotateSelection(double x, double y, double z) { return this->Do(&Kernel::RotateSelection, {x, y, z}); }
+  void GetCentreOfRotation(double centre[3]) const { Eigen::Map<Eigen::Vector3d>{centre} = this->Session.CentreOfRotation(); }
+  void SetCentreOfRotation(double x, double y, double z) { this->Do(&Kernel::SetCentreOfRotation, Eigen::Vector3d(x, y, z)); }
+  /** The middle of what is selected. */
+  void ResetCentreOfRotation() { this->Do(&Kernel::SetCentreOfRotation, std::nullopt); }
   ///@}
 
   ///@{
   /** Edits: what happens between Begin and End is one entry of undo, or none when nothing changed. Cancel goes back. */
-  void BeginEdit(const char* label);
-  bool EndEdit();
-  void CancelEdit();
-  bool Undo();
-  bool Redo();
-  int GetUndoCount() const;
-  int GetRedoCount() const;
-  std::string GetUndoLabel() const;
-  std::string GetRedoLabel() const;
+  void BeginEdit(const char* label) { this->Session.Begin(label ? label : ""); }
+  bool EndEdit() { return this->Ask(&Kernel::End, {}); }
+  void CancelEdit() { this->Do(&Kernel::Cancel); }
+  bool Undo() { return this->Ask(&Kernel::Undo, "Undo: " + this->GetUndoLabel()); }
+  bool Redo() { return this->Ask(&Kernel::Redo, "Redo: " + this->GetRedoLabel()); }
+  int GetUndoCount() const { return this->GetKernel().UndoCount(); }
+  int GetRedoCount() const { return this->GetKernel().RedoCount(); }
+  std::string GetUndoLabel() const { return this->GetKernel().UndoLabel(); }
+  std::string GetRedoLabel() const { return this->GetKernel().RedoLabel(); }
   /** What was done stays done: nothing before can be undone, and volumes that were removed are let go. */
-  bool ForgetHistory();
+  bool ForgetHistory() { return this->Do(&Kernel::ForgetHistory); }
   ///@}
 
   ///@{
@@ -161,11 +183,14 @@ public:
   bool GetProjectFiles(const char* path, vtkStringArray* files);
   /** Where else volumes of projects are looked for. */
   void AddSearchFolder(const char* folder);
-  std::string GetProjectPath() const; ///< empty: never saved
+  std::string GetProjectPath() const { return this->Storage.ProjectPath(); } ///< empty: never saved
   bool GetModifiedSinceSave() const;
   /** For people: who, what. Saved with the project. */
-  std::string GetComment() const;
-  void SetComment(const char* comment);
+  std::string GetComment() const { return this->Comment; }
+  void SetComment(const char* comment)
+  {
+    this->Change([&] { this->Comment = comment ? comment : ""; });
+  }
   /** Poses alone: the file that echorama align and stitch read and write. ReadPoses is an edit, of the volumes that the file
    * names. */
   bool ReadPoses(const char* path);
@@ -176,10 +201,10 @@ public:
   /** Backups after each edit, and at least once a second while one goes on; a thread of its own waits for the disk. Default off:
    * scripts do not write by surprise; the workbench turns it on. */
   void SetAutomaticBackups(bool on);
-  bool GetAutomaticBackups() const;
+  bool GetAutomaticBackups() const { return this->AutomaticBackups; }
   /** NAME.backups beside the project NAME.json; of a session that was never saved a folder under the user's data folder. Empty:
    * of a session without project and without backups. */
-  std::string GetBackupFolder() const;
+  std::string GetBackupFolder() const { return this->Storage.BackupFolder(); }
   /** Now; returns when it is on the disk. */
   bool BackUp();
   /** Paths, newest first; labels and times (seconds since 1970) in the same order; unreadable ones have the label "damaged".
@@ -189,34 +214,46 @@ public:
                           vtkDoubleArray* times = nullptr);
   /** Of the project that is open: its newest readable backup, when that is later than the project file and differs from what is
    * open. Empty: there is none. For a window that has opened a project: work that was not saved. */
-  std::string GetLaterBackup();
+  std::string GetLaterBackup() { return this->Storage.LaterBackup(this->Session.State(), this->Folders()); }
   /** A person decided not to keep what was not saved: its backups go at the end of the session, or when it opens another project.
    * A further edit takes this back. Without edits (volumes were opened, no more) an unsaved session leaves no backups anyway. */
-  void ForgetUnsavedWork();
+  void ForgetUnsavedWork() { this->Storage.SetForgotten(true); }
   /** Restoring is an edit: it can be undone. Volumes that are here keep their ids, others are read. */
   bool RestoreBackup(const char* path);
   /** Folders of sessions that ended without being saved, and whose process is gone: the newest first. OpenProject opens the
    * newest backup in one, DiscardBackups removes them. */
   static int GetAbandonedSessions(vtkStringArray* folders);
-  bool DiscardBackups(const char* folder);
+  bool DiscardBackups(const char* folder)
+  {
+    return this->Change([&] { echorama::Backups::Discard(folder ? folder : ""); });
+  }
   ///@}
 
   ///@{
   /** The truth: a pose file that names the volumes. The score (mm, dissertation 4.4.2) follows poses at once: NaN without truth
    * or with fewer than two volumes that have one. FixedVolume: on which both agree, default the first that has a truth. */
-  bool ReadTruth(const char* path);
+  bool ReadTruth(const char* path)
+  {
+    return this->DoTruth([&] { this->Truth.Read(path ? path : "", this->Session.State(), this->PointsOf); });
+  }
   bool SetTruth(int id, vtkMatrix4x4* volumeToWorld);
-  void ClearTruth();
-  bool HasTruth() const;
+  void ClearTruth()
+  {
+    this->DoTruth([this] { this->Truth.Clear(); });
+  }
+  bool HasTruth() const { return !this->Truth.Empty(); }
   /** Where a volume belongs: its VolumeToWorld by the truth. Returns false, and leaves the pose alone, when nothing is known. */
   bool GetTruth(int id, vtkMatrix4x4* volumeToWorld) const;
-  double GetScore() const;
-  double GetVolumeScore(int id) const;
-  double GetRotationError(int id) const; ///< degrees
+  double GetScore() const { return this->Truth.Mean(this->Session.State()); }
+  double GetVolumeScore(int id) const { return this->Truth.MeanOf(id, this->Session.State()); }
+  double GetRotationError(int id) const { return this->Truth.DegreesOf(id, this->Session.State()); } ///< degrees
   /** Points of the volumes where they are, with the array Error (3 doubles, mm) from where they belong, and Volume (ids). */
   void GetErrorVectors(vtkPolyData* vectors, int pointsPerVolume = 200) const;
-  void SetFixedVolume(int id);
-  int GetFixedVolume() const; ///< -1: none has a truth
+  void SetFixedVolume(int id)
+  {
+    this->DoTruth([&] { this->Truth.SetFixed(id); });
+  }
+  int GetFixedVolume() const { return this->Truth.Fixed(this->Session.State()); } ///< -1: none has a truth
   ///@}
 
 protected:
@@ -230,18 +267,78 @@ private:
 #ifndef __VTK_WRAP__
 public:
   /** The kernel session: to read. */
-  const echorama::AlignmentSession& GetKernel() const;
+  const echorama::AlignmentSession& GetKernel() const
+  {
+    return this->Session;
+  }
+  /** The same as with a matrix. */
+  bool SetVolumeToWorld(int id, const echorama::Pose& pose)
+  {
+    return this->Do(&Kernel::SetPose, id, pose);
+  }
+  /** As GetTruth; none: nothing is known. */
+  std::optional<echorama::Pose> GetTruthOf(int id) const
+  {
+    const echorama::Pose* truth = this->Truth.Find(id);
+    return truth ? std::optional<echorama::Pose>(*truth) : std::nullopt;
+  }
+  /** For tools that drag: see AlignmentSession::MoveHeld. */
+  bool MoveHeld(const echorama::AlignmentSession::Grip& grip, const echorama::Pose& motion)
+  {
+    return this->Do(&Kernel::MoveHeld, grip, motion);
+  }
 
 private:
-  struct Internals;
+  using Kernel = echorama::AlignmentSession;
+  const echorama::SessionVolume* Find(int id) const
+  {
+    return this->GetKernel().State().Find(id);
+  }
+  template <class T>
+  T Of(int id, T echorama::SessionVolume::*what) const
+  {
+    const echorama::SessionVolume* volume = this->Find(id);
+    return volume ? volume->*what : T();
+  }
   /** Does it, reports an error that it throws, and tells what has changed. \a label: of the backup, when it is not the edit's.
    * Returns whether it went well. */
   bool Change(const std::function<void()>& change, const std::string& label = {});
-  void BackUpInTheBackground(const std::string& label, bool finished);
-  /** Takes volumes out, with a warning that names them. Throws when nothing is left. */
-  void LeaveOut(const std::string& path, std::vector<echorama::SessionVolume>& volumes,
-                const std::function<bool(const echorama::SessionVolume&)>& out);
-  std::unique_ptr<Internals> Parts;
+  template <class Result, class... Parameters>
+  bool Do(Result (Kernel::*edit)(Parameters...), const std::decay_t<Parameters>&... arguments)
+  {
+    return this->Change([&] { (this->Session.*edit)(arguments...); });
+  }
+  /** The same, and returns what the kernel says. */
+  bool Ask(bool (Kernel::*edit)(), const std::string& label)
+  {
+    bool answer = false;
+    this->Change([&] { answer = (this->Session.*edit)(); }, label);
+    return answer;
+  }
+  /** The same for the truth, which the kernel knows nothing of: whoever shows poses shows how far they are from it. */
+  bool DoTruth(const std::function<void()>& change)
+  {
+    const bool done = this->Change(change);
+    this->Modified();
+    this->InvokeEvent(PosesChangedEvent, nullptr);
+    return done;
+  }
+  void BackUpInTheBackground(const std::string& label);
+  void TellTrouble(const std::string& trouble);
+  void Warn(const std::string& text); ///< unless it is empty
+  echorama::Project Now() const;
+  std::vector<std::string> Folders() const;
+
+  echorama::AlignmentSession Session;
+  std::unique_ptr<echorama::SessionImages> Images;
+  echorama::SessionTruth Truth;
+  echorama::SessionTruth::PointsOf PointsOf;
+  echorama::SessionStorage Storage;
+  std::string Comment;
+  std::vector<std::string> SearchFolders;
+  bool AutomaticBackups = false;
+  mutable std::optional<std::array<double, 2>> GreyWindow; ///< found when somebody asks
+  bool GreyWindowChosen = false;
 #endif
 };
 

@@ -74,48 +74,6 @@ void vtkUltrasoundAlignmentWidget::SetSession(vtkUltrasoundAlignmentSession* ses
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundAlignmentSession* vtkUltrasoundAlignmentWidget::GetSession()
-{
-  return this->GetAlignmentRepresentation()->GetSession();
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentWidget::SetTranslationSensitivity(double factor)
-{
-  this->GetAlignmentRepresentation()->SetTranslationSensitivity(factor);
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundAlignmentWidget::GetTranslationSensitivity()
-{
-  return this->GetAlignmentRepresentation()->GetTranslationSensitivity();
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentWidget::SetRotationSensitivity(double factor)
-{
-  this->GetAlignmentRepresentation()->SetRotationSensitivity(factor);
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundAlignmentWidget::GetRotationSensitivity()
-{
-  return this->GetAlignmentRepresentation()->GetRotationSensitivity();
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentWidget::SetConstraint(const char* name)
-{
-  this->GetAlignmentRepresentation()->SetConstraint(name);
-}
-
-//----------------------------------------------------------------------------
-const char* vtkUltrasoundAlignmentWidget::GetConstraint()
-{
-  return this->GetAlignmentRepresentation()->GetConstraint();
-}
-
-//----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentWidget::StepTool(vtkMatrix4x4* toolToWorld, bool grasping)
 {
   const bool begins = grasping && !this->ToolHolds, ends = !grasping && this->ToolHolds;
@@ -134,12 +92,6 @@ bool vtkUltrasoundAlignmentWidget::StepTool(vtkMatrix4x4* toolToWorld, bool gras
     this->Render();
   }
   return good;
-}
-
-//----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentWidget::IsDragging()
-{
-  return this->Now == Gesture::Drag;
 }
 
 //----------------------------------------------------------------------------
@@ -247,8 +199,8 @@ void vtkUltrasoundAlignmentWidget::MoveAction(vtkAbstractWidget* widget)
     self->Hover(true, true);
     return;
   }
-  double position[2] = {static_cast<double>(self->Interactor->GetEventPosition()[0]),
-                        static_cast<double>(self->Interactor->GetEventPosition()[1])};
+  const int* event = self->Interactor->GetEventPosition();
+  double position[2] = {static_cast<double>(event[0]), static_cast<double>(event[1])};
   self->Moved =
       self->Moved || std::max(std::abs(position[0] - self->Pressed[0]), std::abs(position[1] - self->Pressed[1])) > ClickReach;
   // Until the mouse has gone farther than a hand trembles it is a click, which moves nothing; from then on, all of its way
@@ -278,8 +230,8 @@ void vtkUltrasoundAlignmentWidget::EndSelectAction(vtkAbstractWidget* widget)
     return;
   }
   Representation* representation = self->GetAlignmentRepresentation();
-  double position[2] = {static_cast<double>(self->Interactor->GetEventPosition()[0]),
-                        static_cast<double>(self->Interactor->GetEventPosition()[1])};
+  const int* event = self->Interactor->GetEventPosition();
+  double position[2] = {static_cast<double>(event[0]), static_cast<double>(event[1])};
   const bool onVolume = representation->GetInteractionState() == Representation::OnSelected;
   const Gesture gesture = self->Now;
   self->Release();

@@ -34,12 +34,12 @@
 
 #include "EchoramaWidgetsModule.h"
 #include "vtkAbstractWidget.h"
+#include "vtkUltrasoundAlignmentRepresentation.h"
 #ifndef __VTK_WRAP__
 #include <string>
 #endif
 
 class vtkMatrix4x4;
-class vtkUltrasoundAlignmentRepresentation;
 class vtkUltrasoundAlignmentSession;
 
 class ECHORAMAWIDGETS_EXPORT vtkUltrasoundAlignmentWidget : public vtkAbstractWidget {
@@ -58,13 +58,13 @@ public:
   ///@{
   /** Of the representation. A session that is taken away cancels the drag. */
   void SetSession(vtkUltrasoundAlignmentSession* session);
-  vtkUltrasoundAlignmentSession* GetSession();
-  void SetTranslationSensitivity(double factor);
-  double GetTranslationSensitivity();
-  void SetRotationSensitivity(double factor);
-  double GetRotationSensitivity();
-  void SetConstraint(const char* name);
-  const char* GetConstraint();
+  vtkUltrasoundAlignmentSession* GetSession() { return this->GetAlignmentRepresentation()->GetSession(); }
+  void SetTranslationSensitivity(double factor) { this->GetAlignmentRepresentation()->SetTranslationSensitivity(factor); }
+  double GetTranslationSensitivity() { return this->GetAlignmentRepresentation()->GetTranslationSensitivity(); }
+  void SetRotationSensitivity(double factor) { this->GetAlignmentRepresentation()->SetRotationSensitivity(factor); }
+  double GetRotationSensitivity() { return this->GetAlignmentRepresentation()->GetRotationSensitivity(); }
+  void SetConstraint(const char* name) { this->GetAlignmentRepresentation()->SetConstraint(name); }
+  const char* GetConstraint() { return this->GetAlignmentRepresentation()->GetConstraint(); }
   ///@}
 
   ///@{
@@ -83,7 +83,7 @@ public:
   bool StepTool(vtkMatrix4x4* toolToWorld, bool grasping);
 
   /** Whether something is dragged now; and brings it back. */
-  bool IsDragging();
+  bool IsDragging() { return this->Now == Gesture::Drag; }
   void CancelDrag();
 
   /** Turning it off cancels a drag. */

@@ -4,6 +4,7 @@
 #ifndef vtkUltrasoundSessionVoxels_h
 #define vtkUltrasoundSessionVoxels_h
 
+#include "Core/Imaging/ValidPoints.h"
 #include "Widgets/Painting/VoxelEdits.h"
 #include "Widgets/Session/SessionState.h"
 
@@ -16,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 namespace echorama {
 
@@ -49,7 +51,7 @@ public:
       return false;
     }
     this->Prepare();
-    const bool changed = this->Edits->GoTo(chain);
+    const auto changed = this->Edits->GoTo(chain);
     this->At = chain;
     return this->Touched(changed);
   }
@@ -66,11 +68,56 @@ public:
   bool Extend(const Eigen::Vector3d& point) { return this->Touched(this->Edits->Extend(point)); }
   bool End(const StrokeChain& chain)
   {
-    const bool changed = this->Edits->End(chain);
+    const auto changed = this->Edits->End(chain);
     this->At = chain;
     return this->Touched(changed);
   }
   ///@}
+
+  /** Some of the grey levels that are real, at most about so many, are added to \a levels. */
+  void SampleGreyLevels(std::ptrdiff_t samples, std::vector<double>& levels) const
+  {
+    const auto valid = this->ValidView();
+    vtkUltrasoundVolume::Dispatch(vtkUltrasoundVolume::GetIntensity(this->Base), [&](auto type) {
+      const auto view = this->IntensityView(type);
+      const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, view.Size() / samples) | 1; // odd: not along columns alone
+      for (std::ptrdiff_t i = 0; i < view.Size(); i += step) {
+        if ((valid.Empty() || valid[i]) && std::isfinite(static_cast<double>(view[i]))) {
+          levels.push_back(static_cast<double>(view[i]));
+        }
+      }
+    });
+  }
+
+  /** The voxel that is nearest to a point of the world; -1: none that is real. */
+  vtkIdType VoxelAt(const Eigen::Vector3d& world) const
+  {
+    const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(this->Image);
+    const Eigen::Vector3d index = geometry.WorldToIndex() * world;
+    vtkIdType voxel = 0, stride = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double nearest = std::round(index[axis]);
+      const int size = geometry.dimensions[static_cast<std::size_t>(axis)];
+      if (!(nearest >= 0.0 && nearest < size)) {
+        return -1;
+      }
+      voxel += stride * static_cast<vtkIdType>(nearest);
+      stride *= size;
+    }
+    const auto valid =
+        vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(this->Image), this->Image);
+    return valid.Empty() || valid[voxel] ? voxel : -1;
+  }
+
+  /** ValidPoints of it. */
+  std::vector<Eigen::Vector3d> Points(int count, std::uint64_t seed) const
+  {
+    std::vector<Eigen::Vector3d> points;
+    vtkUltrasoundVolume::Dispatch(vtkUltrasoundVolume::GetIntensity(this->Base), [&](auto type) {
+      points = ValidPoints(this->IntensityView(type), this->ValidView(), count, seed);
+    });
+    return points;
+  }
 
   /** Copies the voxels ahead of the first stroke. */
   void Prepare()
@@ -96,26 +143,15 @@ public:
   }
 
 private:
-  /** VoxelEdits of any voxel type. */
-  struct AnyEdits {
-    virtual ~AnyEdits() = default;
-    virtual bool GoTo(const StrokeChain& chain) = 0;
-    virtual void Begin(const Brush& brush) = 0;
-    virtual bool Extend(const Eigen::Vector3d& point) = 0;
-    virtual bool End(const StrokeChain& chain) = 0;
-  };
   template <class T>
-  struct EditsOf : AnyEdits {
-    VoxelEdits<T> Edits;
-    EditsOf(VolumeView<T> intensity, VolumeView<unsigned char> valid, const ImageGeometry& geometry)
-      : Edits(intensity, valid, geometry)
-    {
-    }
-    bool GoTo(const StrokeChain& chain) override { return !this->Edits.GoTo(chain).Empty(); }
-    void Begin(const Brush& brush) override { this->Edits.Begin(brush); }
-    bool Extend(const Eigen::Vector3d& point) override { return !this->Edits.Extend(point).Empty(); }
-    bool End(const StrokeChain& chain) override { return !this->Edits.End(chain).Empty(); }
-  };
+  VolumeView<const T> IntensityView(T) const
+  {
+    return vtkUltrasoundVolume::ViewOf<const T>(vtkUltrasoundVolume::GetIntensity(this->Base), this->Base);
+  }
+  VolumeView<const unsigned char> ValidView() const
+  {
+    return vtkUltrasoundVolume::ViewOf<const unsigned char>(vtkUltrasoundVolume::GetValidRegion(this->Base), this->Base);
+  }
 
   static vtkSmartPointer<vtkDataArray> CopyOf(vtkDataArray* array)
   {
@@ -156,8 +192,8 @@ private:
         std::transform(voxels.begin(), voxels.end(), static_cast<unsigned char*>(this->Valid->GetVoidPointer(0)),
                        [](T value) -> unsigned char { return std::isfinite(static_cast<double>(value)) ? 1 : 0; });
       }
-      this->Edits = std::make_unique<EditsOf<T>>(voxels, vtkUltrasoundVolume::ViewOf<unsigned char>(this->Valid, this->Base),
-                                                 this->Known.geometry);
+      this->Edits = std::make_unique<VoxelEdits<T>>(voxels, vtkUltrasoundVolume::ViewOf<unsigned char>(this->Valid, this->Base),
+                                                    this->Known.geometry);
     });
     if (named && valid) // what was given serves as a snapshot until something is painted
     {
@@ -168,22 +204,22 @@ private:
     SetArrays(this->Image, this->Intensity, this->Valid);
   }
 
-  bool Touched(bool changed)
+  bool Touched(const AnyVoxelEdits::Box& changed)
   {
-    if (changed) {
+    if (!changed.Empty()) {
       this->Intensity->Modified();
       this->Valid->Modified();
       this->Image->Modified();
       this->KeptIntensity = nullptr;
       this->KeptValid = nullptr;
     }
-    return changed;
+    return !changed.Empty();
   }
 
   vtkSmartPointer<vtkImageData> Base = vtkSmartPointer<vtkImageData>::New();
   vtkSmartPointer<vtkDataArray> Intensity, Valid;         ///< our own, once painted
   vtkSmartPointer<vtkDataArray> KeptIntensity, KeptValid; ///< what was handed out last
-  std::unique_ptr<AnyEdits> Edits;
+  std::unique_ptr<AnyVoxelEdits> Edits;
   StrokeChain At; ///< the strokes that the voxels have
 };
 

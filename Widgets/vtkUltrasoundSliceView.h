@@ -30,6 +30,7 @@
 #include "EchoramaWidgetsModule.h"
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
+#include "Widgets/Slices/SliceFrame.h"
 #include <memory>
 #endif
 #include <string>
@@ -56,14 +57,22 @@ public:
   ///@{
   /** Size of the viewport, pixels. Default 400 x 400. */
   void SetPixelSize(int width, int height);
-  void GetPixelSize(int size[2]) const;
+  void GetPixelSize(int size[2]) const
+  {
+    size[0] = this->Frame.width;
+    size[1] = this->Frame.height;
+  }
   ///@}
 
   ///@{
   /** "x", "y", "z" or "oblique" (as it is turned now). Default "z". */
   void SetAxis(const char* name);
-  std::string GetAxis() const;
+  std::string GetAxis() const { return echorama::SliceAxes()[this->Frame.axis].name; }
   ///@}
+
+  /** The colour of the line that shows this view's plane in the views linked with it, RGB in [0, 1]. Default: that of the axis.
+   */
+  void SetColour(double r, double g, double b);
 
   ///@{
   /** An oblique plane: its normal towards the viewer, and what is up (made perpendicular to the normal). */
@@ -74,29 +83,29 @@ public:
 
   ///@{
   /** Unit vectors of the world: right and up in the picture, and towards the viewer. */
-  void GetRight(double right[3]) const;
-  void GetUp(double up[3]) const;
-  void GetNormal(double normal[3]) const;
+  void GetRight(double right[3]) const { Copy(this->Frame.right, right); }
+  void GetUp(double up[3]) const { Copy(this->Frame.up, up); }
+  void GetNormal(double normal[3]) const { Copy(this->Frame.Towards(), normal); }
   ///@}
 
   ///@{
   /** Where the plane is, mm: the world's coordinate along its axis; of an oblique plane along its normal. The range is that of
    * the visible volumes; [0, 0] when there are none. */
   void SetPosition(double mm);
-  double GetPosition() const;
+  double GetPosition() const { return this->Frame.Position(); }
   void GetPositionRange(double range[2]) const;
   ///@}
 
   ///@{
   /** The middle of the view. The plane goes through it, so that the cursor follows. */
   void SetFocus(double x, double y, double z);
-  void GetFocus(double focus[3]) const;
+  void GetFocus(double focus[3]) const { Copy(this->Frame.focus, focus); }
   ///@}
 
   ///@{
   /** The point that linked views have in common: all of them go through it, none pans. */
   void SetCursor(double x, double y, double z);
-  void GetCursor(double cursor[3]) const;
+  void GetCursor(double cursor[3]) const { Copy(this->Frame.cursor, cursor); }
   ///@}
 
   ///@{
@@ -104,7 +113,7 @@ public:
    * pixels. Fit: all visible volumes are seen, and the plane goes through their middle if it missed them; done by itself when
    * the first volumes come. */
   void SetMillimetresPerPixel(double mm);
-  double GetMillimetresPerPixel() const;
+  double GetMillimetresPerPixel() const { return this->Frame.mmPerPixel; }
   void Zoom(double factor, double pixelX, double pixelY);
   void Pan(double pixelsX, double pixelsY);
   void Fit();
@@ -114,13 +123,13 @@ public:
   /** Takes part in what \a other and its linked views have in common. */
   void LinkTo(vtkUltrasoundSliceView* other);
   void Unlink();
-  bool IsLinked() const;
+  bool IsLinked() const { return this->Linked->size() > 1; }
   ///@}
 
   ///@{
   /** Between pixels and the world, mm; a point off the plane goes to where it is seen. */
-  void PixelToWorld(double pixelX, double pixelY, double world[3]) const;
-  void WorldToPixel(double x, double y, double z, double pixel[2]) const;
+  void PixelToWorld(double pixelX, double pixelY, double world[3]) const { Copy(this->Frame.WorldOf(pixelX, pixelY), world); }
+  void WorldToPixel(double x, double y, double z, double pixel[2]) const { Copy(this->Frame.PixelOf({x, y, z}), pixel); }
   ///@}
 
   ///@{
@@ -138,14 +147,14 @@ public:
 
   ///@{
   /** Trilinear (default), or the nearest voxel. */
-  void SetLinear(bool on);
-  bool GetLinear() const;
+  void SetLinear(bool on) { this->Change(this->Parameters.linear, on); }
+  bool GetLinear() const { return this->Parameters.linear; }
   ///@}
 
   ///@{
   /** Side of the squares of the checkerboard, pixels in [2, 10000]. Default 40. */
   void SetSquarePixels(int pixels);
-  int GetSquarePixels() const;
+  int GetSquarePixels() const { return this->Parameters.squarePixels; }
   ///@}
 
   ///@{
@@ -153,9 +162,9 @@ public:
    * drawn from fewer samples. Turning it off makes the picture whole again. Default off. InteractiveStep: every so many pixels
    * both ways, in [1, 16]; 0 (default): as needed, at most 4. */
   void SetInteractive(bool on);
-  bool GetInteractive() const;
+  bool GetInteractive() const { return this->Interactive; }
   void SetInteractiveStep(int step);
-  int GetInteractiveStep() const;
+  int GetInteractiveStep() const { return this->InteractiveStep; }
   ///@}
 
   ///@{
@@ -167,7 +176,7 @@ public:
   ///@{
   /** Scale bar, letters of the body's sides (not in oblique planes), and the linked views' planes. Default on. */
   void SetAnnotated(bool on);
-  bool GetAnnotated() const;
+  bool GetAnnotated() const { return this->Annotated; }
   ///@}
 
   /** Brings picture, camera and lines up to date. Returns whether anything was out of date: time to render. */
@@ -178,8 +187,8 @@ public:
   /** Its outer corners: lower left, lower right, upper right, upper left; mm. */
   void GetPlaneCorners(double corners[12]) const;
   /** How many pixels apart the picture was sampled (1: in full), and how long drawing it took, s. */
-  int GetPictureStep() const;
-  double GetPictureSeconds() const;
+  int GetPictureStep() const { return this->Parameters.step; }
+  double GetPictureSeconds() const { return this->PictureSeconds; }
 
 protected:
   vtkUltrasoundSliceView();
@@ -189,10 +198,35 @@ private:
   vtkUltrasoundSliceView(const vtkUltrasoundSliceView&) = delete;
   void operator=(const vtkUltrasoundSliceView&) = delete;
 #ifndef __VTK_WRAP__
-  struct Internals;
-  void SessionChanged(vtkObject*, unsigned long event, void*);
+  template <class Vector>
+  static void Copy(const Vector& from, double* to)
+  {
+    std::copy_n(from.data(), from.size(), to);
+  }
+  template <class T>
+  void Change(T& member, const T& value)
+  {
+    if (value != member) {
+      member = value;
+      this->Outdate();
+    }
+  }
+  bool InRange(const char* what, double value, double low, double high);
+  void OnSession(vtkObject*, unsigned long event, void*);
   void Outdate();
   void OutdateLines();
+  void OutdatePlane();
+
+  echorama::SliceFrame Frame;
+  std::optional<std::array<double, 3>> Colour; ///< of its line in linked views; nothing: the axis's
+  bool NeverFitted = true;
+  std::shared_ptr<std::vector<vtkUltrasoundSliceView*>> Linked; ///< with this view; one alone when it is not linked
+  echorama::SliceShown Shown = echorama::SliceShown::All;
+  echorama::SliceParameters Parameters;
+  bool Interactive = false, Annotated = true;
+  int InteractiveStep = 0;
+  double PictureSeconds = 0.0;
+  struct Internals;
   std::unique_ptr<Internals> Parts;
 #endif
 };

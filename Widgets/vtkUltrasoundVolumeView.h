@@ -27,6 +27,8 @@
 #include "EchoramaWidgetsModule.h"
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
+#include "Widgets/Particles/DetailLevel.h"
+#include "Widgets/Particles/Particles.h"
 #include <memory>
 #endif
 #include <string>
@@ -60,46 +62,46 @@ public:
   ///@{
   /** "points", "volume" or "outline". Default "points". */
   bool SetStyle(const char* style);
-  std::string GetStyle() const;
+  std::string GetStyle() const { return this->Style; }
   ///@}
 
   ///@{
   /** Voxels along each axis of the block that becomes one particle, in [1, 64]. Default 2. Volumes together have at most
    * Budget particles; blocks grow when there would be more. Default 2000000, at least 1000. */
   void SetDownsampling(int voxels);
-  int GetDownsampling() const;
+  int GetDownsampling() const { return this->Parameters.downsampling; }
   void SetBudget(int particles);
-  int GetBudget() const;
+  int GetBudget() const { return this->Parameters.budget; }
   ///@}
 
   ///@{
   /** Width of a particle, in sides of its block: at 1 they touch when seen along the axes. In [0.1, 10]. Default 1.25: closed
    * also when seen obliquely. */
   void SetParticleSize(double factor);
-  double GetParticleSize() const;
+  double GetParticleSize() const { return this->ParticleSize; }
   ///@}
 
   ///@{
   /** Opacity of each particle, and of as much of a rendered volume, in [0, 1]; times that of the volume. Default 0.3. With
    * ValueOpacity (default on) also times the grey level, so that dark regions are seen through. */
   void SetOpacity(double opacity);
-  double GetOpacity() const;
+  double GetOpacity() const { return this->Parameters.opacity; }
   void SetValueOpacity(bool on);
-  bool GetValueOpacity() const;
+  bool GetValueOpacity() const { return this->Parameters.valueOpacity; }
   ///@}
 
   ///@{
   /** Grey levels below Minimum and above Maximum are hidden. Defaults 1 and 1e300. */
   void SetMinimum(double grey);
-  double GetMinimum() const;
+  double GetMinimum() const { return this->Parameters.minimum; }
   void SetMaximum(double grey);
-  double GetMaximum() const;
+  double GetMaximum() const { return this->Parameters.maximum; }
   ///@}
 
   ///@{
   /** Level of detail while something is dragged; off shows the full picture. Default off. */
   void SetInteractive(bool on);
-  bool GetInteractive() const;
+  bool GetInteractive() const { return this->Detail.Interactive(); }
   ///@}
 
   /** After a drag: makes the next frame one level finer, or takes what waited. False: there is nothing to add, or it would take
@@ -109,19 +111,19 @@ public:
   ///@{
   /** The time that a frame of Refine() may take to draw, ms, in [5, 1000000]. Default 1000. */
   void SetRestBudget(double milliseconds);
-  double GetRestBudget() const;
+  double GetRestBudget() const { return this->Detail.restSeconds * 1000.0; }
   ///@}
 
   ///@{
   /** The time that a frame may take while dragging, ms, in [5, 10000]. Default 100. */
   void SetFrameBudget(double milliseconds);
-  double GetFrameBudget() const;
+  double GetFrameBudget() const { return this->Detail.Budget() * 1000.0; }
   ///@}
 
   ///@{
   /** Of the last frame: its time from begin to end, s; its level of detail (0: full); how many particles it showed. */
-  double GetLastFrameSeconds() const;
-  int GetDetailLevel() const;
+  double GetLastFrameSeconds() const { return this->LastSeconds; }
+  int GetDetailLevel() const { return this->Detail.Level(); }
   int GetNumberOfParticles() const;
   ///@}
 
@@ -134,20 +136,20 @@ public:
   void RemovePlane(int plane);
   int GetNumberOfPlanes() const;
   void SetShowPlanes(bool on);
-  bool GetShowPlanes() const;
+  bool GetShowPlanes() const { return this->ShowPlanes; }
   ///@}
 
   ///@{
   /** Arrows from where points of the volumes are to where they belong, coloured by their length, with a scale in mm. They are
    * there when the session has a truth. Default off. */
   void SetErrorVectors(bool on);
-  bool GetErrorVectors() const;
+  bool GetErrorVectors() const { return this->ShowErrors; }
   ///@}
 
   ///@{
   /** The axes L, P and S in the corner at the lower left. Default on. */
   void SetOrientationMarker(bool on);
-  bool GetOrientationMarker() const;
+  bool GetOrientationMarker() const { return this->ShowMarker; }
   ///@}
 
 protected:
@@ -162,6 +164,13 @@ private:
   void OnSession(vtkObject* caller, unsigned long event, void* data);
   void OnStart();
   void OnEnd();
+
+  std::string Style = "points";
+  echorama::ParticleParameters Parameters;
+  double ParticleSize = 1.25;
+  bool ShowPlanes = true, ShowErrors = false, ShowMarker = true;
+  echorama::FrameDetail Detail;
+  double LastSeconds = 0.0;
   struct Internals;
   std::unique_ptr<Internals> Parts;
 #endif

@@ -87,7 +87,7 @@ void AlignmentHandles::OnKey(vtkObject*, unsigned long, void*)
   hand.constraint = constraint;
   hand.translationStepMm = mm;
   hand.rotationStepDegrees = degrees;
-  bench_->SetHand(hand);
+  bench_->Set(hand);
 }
 
 void AlignmentHandles::OnWidgetEvent(vtkObject*, unsigned long event, void*)

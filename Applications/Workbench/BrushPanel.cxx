@@ -34,39 +34,26 @@ double RadiusOf(int step)
 BrushPanel::BrushPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
 {
   setObjectName("brushPanel");
-  const auto change = [this](double BrushSettings::*field) {
-    return [this, field](double value) {
-      BrushSettings brush = bench_->Brush();
-      brush.*field = value;
-      bench_->SetBrush(brush);
-    };
-  };
-  help_ = new QLabel(this);
-  help_->setWordWrap(true);
-  help_->setObjectName("brushHelp");
+  const auto radius = bench->Setter(&BrushSettings::radiusMm);
+  const QString radiusHelp = tr("Radius of the brush ([ smaller, ] larger)");
+  help_ = TextField(this, "brushHelp");
   size_ = new QSlider(Qt::Horizontal, this);
   size_->setObjectName("brushSize");
   size_->setRange(0, Steps);
-  size_->setToolTip(tr("Radius of the brush ([ smaller, ] larger)"));
-  connect(size_, &QSlider::valueChanged, this, [change](int step) { change (&BrushSettings::radiusMm)(RadiusOf(step)); });
-  radius_ = NumberField(this, {"brushRadius", tr("Radius of the brush ([ smaller, ] larger)"), 0.1, 100.0, 2, 0.5, " mm"},
-                        change(&BrushSettings::radiusMm));
+  size_->setToolTip(radiusHelp);
+  connect(size_, &QSlider::valueChanged, this, [radius](int step) { radius(RadiusOf(step)); });
+  radius_ = NumberField(this, {"brushRadius", radiusHelp, 0.1, 100.0, 2, 0.5, " mm"}, radius);
   intensity_ = NumberField(this, {"brushIntensity", tr("Grey level that is painted"), -1e6, 1e6, 0, 10.0, {}},
-                           change(&BrushSettings::intensity));
+                           bench->Setter(&BrushSettings::intensity));
   opacity_ =
       NumberField(this, {"brushOpacity", tr("How much of the grey level covers what is there, 0 to 1"), 0.0, 1.0, 2, 0.1, {}},
-                  change(&BrushSettings::opacity));
+                  bench->Setter(&BrushSettings::opacity));
   hardness_ = NumberField(
       this, {"brushHardness", tr("Share of the radius that is painted in full; outside it fades, 0 to 1"), 0.0, 1.0, 2, 0.1, {}},
-      change(&BrushSettings::hardness));
-  insideValid_ = new QCheckBox(tr("Only where there are data"), this);
-  insideValid_->setObjectName("brushInsideValid");
-  insideValid_->setToolTip(tr("The brush does not reach beyond the borders of the volume's data"));
-  connect(insideValid_, &QCheckBox::toggled, this, [this](bool on) {
-    BrushSettings brush = bench_->Brush();
-    brush.insideValid = on;
-    bench_->SetBrush(brush);
-  });
+      bench->Setter(&BrushSettings::hardness));
+  insideValid_ = CheckField(this, "brushInsideValid", tr("Only where there are data"),
+                            tr("The brush does not reach beyond the borders of the volume's data"),
+                            bench->Setter(&BrushSettings::insideValid));
   auto* layout = new QFormLayout(this);
   layout->setContentsMargins(6, 4, 6, 4);
   layout->addRow(help_);
@@ -88,9 +75,9 @@ void BrushPanel::ShowBrush()
   Show(intensity_, brush.intensity);
   Show(opacity_, brush.opacity);
   Show(hardness_, brush.hardness);
-  const QSignalBlocker quietSize(size_), quietCheck(insideValid_);
+  Show(insideValid_, brush.insideValid);
+  const QSignalBlocker quiet(size_);
   size_->setValue(StepOf(brush.radiusMm));
-  insideValid_->setChecked(brush.insideValid);
 
   const Tool tool = bench_->CurrentTool();
   for (QWidget* field : {static_cast<QWidget*>(intensity_), static_cast<QWidget*>(opacity_), static_cast<QWidget*>(hardness_),

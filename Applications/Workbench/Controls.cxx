@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Controls.h"
 #include <QAction>
+#include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
+#include <QHeaderView>
+#include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
 #include <QSignalBlocker>
+#include <QTableWidget>
+#include <QToolButton>
 
 namespace echorama {
 
@@ -35,7 +40,8 @@ QDoubleSpinBox* NumberField(QWidget* parent, const Number& number, const std::fu
   field->setLocale(QLocale::c()); // a point, as in every file and report
   field->setFocusPolicy(Qt::StrongFocus);
   field->setMinimumWidth(52);
-  QObject::connect(field, qOverload<double>(&QDoubleSpinBox::valueChanged), field, edited);
+  if (edited)
+    QObject::connect(field, qOverload<double>(&QDoubleSpinBox::valueChanged), field, edited);
   return field;
 }
 
@@ -48,16 +54,24 @@ void Show(QDoubleSpinBox* field, double value)
   field->setValue(value);
 }
 
-QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, const QVector<Choice>& choices,
+QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, const QVector<WordChoice>& choices,
                        const std::function<void(const QString&)>& chosen)
 {
   auto* field = new QComboBox(parent);
   Describe(field, name, help);
-  for (const Choice& choice : choices)
+  for (const WordChoice& choice : choices)
     field->addItem(choice.label, choice.word);
   QObject::connect(field, qOverload<int>(&QComboBox::activated), field,
                    [field, chosen](int i) { chosen(field->itemData(i).toString()); });
   return field;
+}
+
+QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, const std::vector<std::string>& words)
+{
+  QVector<WordChoice> choices;
+  for (const std::string& word : words)
+    choices.append({QString::fromStdString(word), QString::fromStdString(word)});
+  return ChoiceField(parent, name, help, choices, [](const QString&) {});
 }
 
 void Show(QComboBox* field, const QString& word)
@@ -66,13 +80,70 @@ void Show(QComboBox* field, const QString& word)
   field->setCurrentIndex(field->findData(word));
 }
 
+QCheckBox* CheckField(QWidget* parent, const char* name, const QString& label, const QString& help,
+                      const std::function<void(bool)>& toggled)
+{
+  auto* field = new QCheckBox(label, parent);
+  Describe(field, name, help);
+  field->setAccessibleName(label);
+  if (toggled)
+    QObject::connect(field, &QCheckBox::toggled, field, toggled);
+  return field;
+}
+
+void Show(QCheckBox* field, bool on)
+{
+  const QSignalBlocker quiet(field);
+  field->setChecked(on);
+}
+
+QLabel* TextField(QWidget* parent, const char* name, const QString& help)
+{
+  auto* field = new QLabel(parent);
+  field->setObjectName(name);
+  field->setToolTip(help);
+  field->setWordWrap(true);
+  return field;
+}
+
+QTableWidget* TableField(QWidget* parent, const char* name, const QString& help, const QStringList& headers)
+{
+  auto* table = new QTableWidget(0, headers.size(), parent);
+  Describe(table, name, help);
+  table->setHorizontalHeaderLabels(headers);
+  table->setEditTriggers(QAbstractItemView::NoEditTriggers);
+  table->verticalHeader()->hide();
+  return table;
+}
+
+void InsertRow(QTableWidget* table, int row, const QStringList& texts, const QString& help)
+{
+  table->insertRow(row);
+  for (int column = 0; column < texts.size(); ++column) {
+    auto* item = new QTableWidgetItem(texts[column]);
+    item->setToolTip(help);
+    table->setItem(row, column, item);
+  }
+}
+
+QToolButton* SmallButton(QWidget* parent, const QString& name, const QString& label, const QString& help)
+{
+  auto* button = new QToolButton(parent);
+  button->setObjectName(name);
+  button->setText(label);
+  button->setToolTip(help);
+  button->setAutoRaise(true);
+  return button;
+}
+
 QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help,
                     const std::function<void()>& pressed)
 {
   auto* button = new QPushButton(label, parent);
   Describe(button, name, help);
   button->setAccessibleName(label);
-  QObject::connect(button, &QPushButton::clicked, button, pressed);
+  if (pressed)
+    QObject::connect(button, &QPushButton::clicked, button, pressed);
   return button;
 }
 

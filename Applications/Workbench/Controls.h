@@ -2,13 +2,20 @@
 #pragma once
 #include <functional>
 #include <QString>
+#include <QStringList>
 #include <QVector>
+#include <string>
+#include <vector>
 
 class QAction;
+class QCheckBox;
 class QComboBox;
 class QDoubleSpinBox;
+class QLabel;
 class QObject;
 class QPushButton;
+class QTableWidget;
+class QToolButton;
 class QWidget;
 
 namespace echorama {
@@ -23,20 +30,37 @@ struct Number {
   QString unit; ///< " mm"
 };
 
-/// A field for it. `edited` is called with the new value when a person changed it: on Return, when the field is left, and at
-/// each step of its arrows; never for what Show() writes. Typing in between does nothing, so that "12" is not first 1.
-QDoubleSpinBox* NumberField(QWidget* parent, const Number& number, const std::function<void(double)>& edited);
+/// A field for it. `edited`, if any, is called with the new value when a person changed it: on Return, when the field is left,
+/// and at each step of its arrows; never for what Show() writes. Typing in between does nothing, so that "12" is not first 1.
+QDoubleSpinBox* NumberField(QWidget* parent, const Number& number, const std::function<void(double)>& edited = {});
 
 /// Writes a value into a field without calling anybody, and not while a person types in it.
 void Show(QDoubleSpinBox* field, double value);
 
 /// One of several words: the word, and what people read.
-struct Choice {
+struct WordChoice {
   QString word, label;
 };
-QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, const QVector<Choice>& choices,
+QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, const QVector<WordChoice>& choices,
                        const std::function<void(const QString&)>& chosen);
 void Show(QComboBox* field, const QString& word);
+/// The same for words that people read as they are.
+QComboBox* ChoiceField(QWidget* parent, const char* name, const QString& help, const std::vector<std::string>& words);
+
+QCheckBox* CheckField(QWidget* parent, const char* name, const QString& label, const QString& help,
+                      const std::function<void(bool)>& toggled = {});
+void Show(QCheckBox* field, bool on);
+
+/// Text that is shown; long lines are broken.
+QLabel* TextField(QWidget* parent, const char* name, const QString& help = {});
+
+/// Rows to read, which grow with what they hold.
+QTableWidget* TableField(QWidget* parent, const char* name, const QString& help, const QStringList& headers);
+/// \a help: of all cells of the row.
+void InsertRow(QTableWidget* table, int row, const QStringList& texts, const QString& help = {});
+
+/// A small one for the row of controls of a view.
+QToolButton* SmallButton(QWidget* parent, const QString& name, const QString& label, const QString& help);
 
 QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help,
                     const std::function<void()>& pressed);

@@ -4,8 +4,6 @@
 #include "Controls.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Geometry/PoseFile.h"
-#include "Job.h"
-#include "JobBar.h"
 #include "Readers/VolumeFile.h"
 #include <filesystem>
 #include <QAction>
@@ -13,8 +11,6 @@
 #include <QMenu>
 #include <vector>
 #include <vtkImageData.h>
-#include <vtkMatrix4x4.h>
-#include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundWriter.h>
 
@@ -83,53 +79,36 @@ void ExportActions::AddTo(QMenu* menu, QWidget* window)
 
 void ExportActions::ExportVolumes(const QString& folder, const QString& extension)
 {
-  struct Item {
-    vtkSmartPointer<vtkImageData> image;
-    std::string path;
-  };
-  std::vector<Item> items;
-  vtkNew<vtkMultiBlockDataSet> all; // what stays as it is, whatever the session does
-  workspace_.session->GetVolumes(all);
+  std::vector<std::pair<vtkSmartPointer<vtkImageData>, std::string>> items;
   try {
     for (const auto& [id, path] : FilesFor(workspace_.session, folder, extension.toStdString())) {
-      items.push_back({nullptr, path});
-      int index = 0;
-      while (workspace_.session->GetVolumeId(index) != id)
-        ++index;
-      items.back().image = vtkImageData::SafeDownCast(all->GetBlock(static_cast<unsigned int>(index)));
+      items.emplace_back(vtkSmartPointer<vtkImageData>::New(), path);
+      workspace_.session->GetSnapshot(id, items.back().first); // it stays as it is, whatever the session does
     }
   } catch (const Error& error) {
     workspace_.say(tr("Export volumes: %1").arg(error.what()), true);
     return;
   }
   const int count = static_cast<int>(items.size());
-  Job* job = Job::Start(
-      this, tr("Export volumes"),
-      [items = std::move(items)](const Progress& progress) {
-        for (std::size_t i = 0; i < items.size(); ++i) {
-          const vtkNew<vtkUltrasoundWriter> writer;
-          writer->SetInputDataObject(items[i].image);
-          writer->SetFileName(items[i].path.c_str());
-          const double of = static_cast<double>(items.size());
-          Run(writer, progress.Part(static_cast<double>(i) / of, static_cast<double>(i + 1) / of), [&] { writer->Write(); });
-        }
-      },
-      [this, folder, count] { workspace_.say(tr("Exported %1 volumes to %2").arg(count).arg(folder), false); },
-      [this](const QString& error) { workspace_.say(tr("Export volumes: %1").arg(error), true); });
-  workspace_.jobs->Watch(job);
+  const auto write = [items = std::move(items)](const Progress& progress) {
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      const vtkNew<vtkUltrasoundWriter> writer;
+      writer->SetInputDataObject(items[i].first);
+      writer->SetFileName(items[i].second.c_str());
+      const double of = static_cast<double>(items.size());
+      Run(writer, progress.Part(static_cast<double>(i) / of, static_cast<double>(i + 1) / of), [&] { writer->Write(); });
+    }
+  };
+  workspace_.Run(this, tr("Export volumes"), write,
+                 [this, folder, count] { workspace_.say(tr("Exported %1 volumes to %2").arg(count).arg(folder), false); });
 }
 
 void ExportActions::ExportTransforms(const QString& folder)
 {
   try {
     const auto files = FilesFor(workspace_.session, folder, "tfm");
-    for (const auto& [id, path] : files) {
-      const vtkNew<vtkMatrix4x4> matrix;
-      workspace_.session->GetVolumeToWorld(id, matrix);
-      Pose pose;
-      pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-      WriteItkTransform(path, pose);
-    }
+    for (const auto& [id, path] : files)
+      WriteItkTransform(path, workspace_.session->GetKernel().State().Find(id)->volumeToWorld);
     workspace_.say(tr("Exported %1 transforms to %2").arg(files.size()).arg(folder), false);
   } catch (const Error& error) {
     workspace_.say(tr("Export transforms: %1").arg(error.what()), true);

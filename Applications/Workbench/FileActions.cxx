@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "FileActions.h"
 #include "Controls.h"
-#include "Job.h"
-#include "JobBar.h"
 #include "Workbench.h"
 #include <memory>
 #include <QAction>
@@ -37,8 +35,7 @@ void RememberFolder(const QString& path)
 
 } // namespace
 
-FileActions::FileActions(Workbench* bench, JobBar* jobs, QWidget* window)
-  : QObject(window), bench_(bench), jobs_(jobs), window_(window)
+FileActions::FileActions(Workbench* bench, QWidget* window) : QObject(window), bench_(bench), window_(window)
 {
   const QString volumes = tr("Volumes (%1);;All files (*)").arg(VolumeFilter), projects = tr("Projects (*.json);;All files (*)");
   open_ = MakeAction(this, "open", tr("&Open volumes..."), "Ctrl+O", tr("Open volumes; files can be dropped on the window, too"),
@@ -51,7 +48,7 @@ FileActions::FileActions(Workbench* bench, JobBar* jobs, QWidget* window)
   saveAs_ =
       MakeAction(this, "saveAs", tr("Save project &as..."), "Ctrl+Shift+S", tr("Save the project under another name"), [this] {
         afterSave_ = nullptr;
-        AskSave(tr("Save the project"), tr("Projects (*.json)"), "alignment.json", [this](const QString& path) { SaveTo(path); });
+        AskSave();
       });
   readPoses_ =
       MakeAction(this, "readPoses", tr("&Read poses..."), "", tr("Put the volumes where a pose file says; can be undone"),
@@ -120,7 +117,7 @@ void FileActions::OpenVolumes(const QStringList& files, const std::function<void
   const QString label = volumes.size() == 1 ? tr("Reading %1").arg(QFileInfo(volumes.first()).fileName())
                                             : tr("Reading %1 volumes").arg(volumes.size());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
-  Job* job = Job::Start(
+  bench_->Shared().Run(
       this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
       [this, read, then] {
         auto* session = bench_->Session();
@@ -138,9 +135,7 @@ void FileActions::OpenVolumes(const QStringList& files, const std::function<void
         ShowHistory();
         if (then)
           then();
-      },
-      [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
-  jobs_->Watch(job);
+      });
 }
 
 // All in one message, so that none pushes another away.
@@ -207,7 +202,7 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs, const 
   }
   const QString label = tr("Opening %1").arg(QFileInfo(path).fileName());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
-  Job* job = Job::Start(
+  bench_->Shared().Run(
       this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress); },
       [this, path, saveAs, then, read, before = edits_] {
         WarnOfUnread(*read);
@@ -219,9 +214,7 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs, const 
           take();
         else // work went on while files were read
           WhenSaved(QuestionBefore(path), take);
-      },
-      [this, label](const QString& error) { bench_->Warn(label + ": " + error); });
-  jobs_->Watch(job);
+      });
 }
 
 void FileActions::TakeProject(const QString& path, const QString& saveAs, const std::vector<ReadVolume>& volumes,
@@ -263,7 +256,7 @@ bool FileActions::Save()
   const std::string path = bench_->Session()->GetProjectPath();
   if (!path.empty())
     return SaveTo(QString::fromStdString(path));
-  AskSave(tr("Save the project"), tr("Projects (*.json)"), "alignment.json", [this](const QString& chosen) { SaveTo(chosen); });
+  AskSave();
   return false;
 }
 
@@ -318,18 +311,17 @@ void FileActions::AskOpen(const QString& title, const QString& filter, bool seve
   dialog->open();
 }
 
-void FileActions::AskSave(const QString& title, const QString& filter, const QString& name,
-                          const std::function<void(const QString&)>& save)
+void FileActions::AskSave()
 {
-  auto* dialog = new QFileDialog(window_, title, LastFolder(), filter);
+  auto* dialog = new QFileDialog(window_, tr("Save the project"), LastFolder(), tr("Projects (*.json)"));
   dialog->setObjectName("saveDialog");
   dialog->setAttribute(Qt::WA_DeleteOnClose);
   dialog->setAcceptMode(QFileDialog::AcceptSave);
-  dialog->setDefaultSuffix(QFileInfo(name).suffix());
-  dialog->selectFile(name);
-  connect(dialog, &QFileDialog::fileSelected, this, [save](const QString& file) {
+  dialog->setDefaultSuffix("json");
+  dialog->selectFile("alignment.json");
+  connect(dialog, &QFileDialog::fileSelected, this, [this](const QString& file) {
     RememberFolder(file);
-    save(file);
+    SaveTo(file);
   });
   connect(dialog, &QFileDialog::rejected, this, [this] { afterSave_ = nullptr; });
   dialog->open();

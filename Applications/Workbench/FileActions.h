@@ -13,7 +13,6 @@ class QWidget;
 
 namespace echorama {
 
-class JobBar;
 class Workbench;
 
 /// Opening and saving: volumes, projects, poses. Volumes are read in the background; what cannot be read is named in the message
@@ -23,7 +22,7 @@ class FileActions : public QObject {
 
 public:
   /// \a window: where dialogs belong.
-  FileActions(Workbench* bench, JobBar* jobs, QWidget* window);
+  FileActions(Workbench* bench, QWidget* window);
   void AddTo(QMenu* menu);
   QAction* OpenAction() const { return open_; }
   QAction* SaveAction() const { return save_; }
@@ -60,11 +59,10 @@ private:
                    const std::function<void()>& then);
   void OfferLaterBackup();
   void AskOpen(const QString& title, const QString& filter, bool several);
-  void AskSave(const QString& title, const QString& filter, const QString& name, const std::function<void(const QString&)>& save);
+  void AskSave();
   void ShowHistory();
 
   Workbench* bench_;
-  JobBar* jobs_;
   QWidget* window_;
   QAction *open_, *openProject_, *save_, *saveAs_, *readPoses_;
   SessionState opened_; ///< as files had it, of a session that was never saved: what is different is work

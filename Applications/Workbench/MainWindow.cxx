@@ -51,7 +51,7 @@ constexpr int LayoutVersion = 1; ///< of the panels: a layout of other panels is
 
 MainWindow::MainWindow(Workspace& workspace, QWidget* parent)
   : QMainWindow(parent), bench_(new Workbench(workspace, this)), jobs_(new JobBar(this)), messages_(new MessageBar(this)),
-    views_(new ViewGrid(bench_, this)), readout_(new StatusReadout(bench_, this)), files_(new FileActions(bench_, jobs_, this)),
+    views_(new ViewGrid(bench_, this)), readout_(new StatusReadout(bench_, this)), files_(new FileActions(bench_, this)),
     edits_(new EditActions(bench_, this)), looks_(new ViewActions(bench_, views_, this))
 {
   setObjectName("workbench");
@@ -157,49 +157,46 @@ void MainWindow::MakePanels()
                                dock->show();
                                dock->raise();
                              }));
-  auto* training = new TrainingPanel(workspace, this);
+  auto* training = new TrainingPanel(bench_, this);
   AddPanel(training, tr("Train"));
   auto* score = new QLabel(this);
   score->setObjectName("scoreReadout");
   connect(training, &TrainingPanel::ScoreShown, score, &QLabel::setText);
-  AddStatus(score);
+  statusBar()->addPermanentWidget(score);
   AddPanel(new TrackerPanel(workspace, this), tr("Tracker"));
+}
+
+QDockWidget* MainWindow::AddDock(Qt::DockWidgetArea area, QWidget* panel, const QString& title, QWidget* content)
+{
+  auto* dock = new QDockWidget(title, this);
+  dock->setObjectName(panel->objectName() + "Dock");
+  dock->setWidget(content);
+  addDockWidget(area, dock);
+  Menu(Place::View)->addAction(dock->toggleViewAction());
+  return dock;
 }
 
 void MainWindow::AddLeft(QWidget* panel, const QString& title)
 {
-  auto* dock = new QDockWidget(title, this);
-  dock->setObjectName(panel->objectName() + "Dock");
-  dock->setWidget(panel);
-  addDockWidget(Qt::LeftDockWidgetArea, dock);
-  Menu(Place::View)->addAction(dock->toggleViewAction());
+  AddDock(Qt::LeftDockWidgetArea, panel, title, panel);
 }
 
 void MainWindow::AddPanel(QWidget* panel, const QString& title)
 {
-  auto* dock = new QDockWidget(title, this);
-  dock->setObjectName(panel->objectName() + "Dock");
-  auto* scroll = new QScrollArea(dock); // at 800 lines of screen some panels are longer than the window
+  auto* scroll = new QScrollArea(this); // at 800 lines of screen some panels are longer than the window
   scroll->setWidgetResizable(true);
   scroll->setFocusPolicy(Qt::NoFocus); // keys are for the views
   scroll->setFrameShape(QFrame::NoFrame);
   scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
   scroll->setWidget(panel);
   scroll->setMinimumWidth(210);
-  dock->setWidget(scroll);
-  addDockWidget(Qt::RightDockWidgetArea, dock);
-  if (lastPanel_) {
-    tabifyDockWidget(lastPanel_, dock);
-    lastPanel_->raise();
-  }
-  Menu(Place::View)->addAction(dock->toggleViewAction());
-  if (!lastPanel_)
+  QDockWidget* dock = AddDock(Qt::RightDockWidgetArea, panel, title, scroll);
+  if (!lastPanel_) {
     lastPanel_ = dock;
-}
-
-void MainWindow::AddStatus(QWidget* widget)
-{
-  statusBar()->addPermanentWidget(widget);
+    return;
+  }
+  tabifyDockWidget(lastPanel_, dock);
+  lastPanel_->raise();
 }
 
 void MainWindow::RestoreLayout()
@@ -210,18 +207,7 @@ void MainWindow::RestoreLayout()
   QSettings settings;
   restoreGeometry(settings.value("window/geometry").toByteArray());
   restoreState(settings.value("window/state").toByteArray(), LayoutVersion);
-  BrushSettings brush;
-  SliceLook slices;
-  VolumeLook volume;
-  Handling hand;
-  Load(settings, brush);
-  Load(settings, slices);
-  Load(settings, volume);
-  Load(settings, hand);
-  bench_->SetBrush(brush);
-  bench_->SetSlices(slices);
-  bench_->SetVolume(volume);
-  bench_->SetHand(hand);
+  bench_->SetShown(Remembered());
 }
 
 void MainWindow::Start(const QString& project, const QStringList& volumes)
@@ -290,10 +276,7 @@ void MainWindow::closeEvent(QCloseEvent* event)
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState(LayoutVersion));
-  Save(settings, bench_->Brush());
-  Save(settings, bench_->Slices());
-  Save(settings, bench_->Volume());
-  Save(settings, bench_->Hand());
+  Remember(bench_->Shown());
   event->accept();
 }
 

@@ -38,7 +38,6 @@ public:
   ///@{ Where parts add themselves: a menu, and a panel among the tabs at the right.
   QMenu* Menu(Place place) const { return menus_[static_cast<std::size_t>(place)]; }
   void AddPanel(QWidget* panel, const QString& title);
-  void AddStatus(QWidget* widget);
   ///@}
 
   /// Looks for sessions that ended without being saved, opens what is named, and keeps backups from now on.
@@ -52,6 +51,7 @@ protected:
 private:
   void MakeMenus();
   void MakePanels();
+  QDockWidget* AddDock(Qt::DockWidgetArea area, QWidget* panel, const QString& title, QWidget* content);
   void AddLeft(QWidget* panel, const QString& title);
   void ShowTitle();
   bool AsksBeforeClosing();

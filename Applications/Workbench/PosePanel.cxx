@@ -10,8 +10,6 @@
 #include <QLabel>
 #include <QPushButton>
 #include <QVBoxLayout>
-#include <vtkMatrix4x4.h>
-#include <vtkNew.h>
 
 namespace echorama {
 
@@ -26,32 +24,24 @@ void PlaceSelection(Workbench* bench, int id, const double middle[3], const doub
   auto* session = bench->Session();
   const QVector<int> selected = bench->SelectedVolumes();
   session->BeginEdit(QObject::tr("Place %1").arg(bench->NameOf(id)).toUtf8().constData());
-  vtkNew<vtkMatrix4x4> motion, before;
-  session->GetVolumeToWorld(id, before);
+  const auto& volumes = session->GetKernel().State();
+  const Pose before = volumes.Find(id)->volumeToWorld;
   if (!session->SetPlacement(id, middle[0], middle[1], middle[2], degrees[0], degrees[1], degrees[2])) {
     session->CancelEdit();
     return;
   }
-  session->GetVolumeToWorld(id, motion);
-  before->Invert();
-  vtkMatrix4x4::Multiply4x4(motion, before, motion);
+  const Pose motion = volumes.Find(id)->volumeToWorld * before.inverse(Eigen::Isometry);
   for (int other : selected)
-    if (other != id) {
-      vtkNew<vtkMatrix4x4> pose;
-      session->GetVolumeToWorld(other, pose);
-      vtkMatrix4x4::Multiply4x4(motion, pose, pose);
-      session->SetVolumeToWorld(other, pose);
-    }
+    if (other != id)
+      session->SetVolumeToWorld(other, motion * volumes.Find(other)->volumeToWorld);
   session->EndEdit();
 }
 
 } // namespace
 
-PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench), of_(new QLabel(this))
+PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench), of_(TextField(this, "poseOf"))
 {
   setObjectName("posePanel");
-  of_->setObjectName("poseOf");
-  of_->setWordWrap(true);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(6, 4, 6, 4);
   layout->setSpacing(4);
@@ -108,29 +98,22 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
   addSteps(4, tr("Turn by"), "turn", tr("One step %1 about %2, about the centre of rotation"),
            [this](int axis, double steps) { Turn(axis, steps); });
 
-  const auto setHand = [this](double Handling::*field) {
-    return [this, field](double value) {
-      Handling hand = bench_->Hand();
-      hand.*field = value;
-      bench_->SetHand(hand);
-    };
-  };
   grid->addWidget(new QLabel(tr("Step, mm, \u00b0"), this), 5, 0);
   mmStep_ =
       NumberField(this, {"translationStep", tr("One step of the keys and of the buttons above, mm"), 0.01, 100.0, 2, 0.5, ""},
-                  setHand(&Handling::translationStepMm));
+                  bench->Setter(&Handling::translationStepMm));
   degreeStep_ =
       NumberField(this, {"rotationStep", tr("One turn of the keys and of the buttons above"), 0.01, 90.0, 2, 0.5, "\u00b0"},
-                  setHand(&Handling::rotationStepDegrees));
+                  bench->Setter(&Handling::rotationStepDegrees));
   grid->addWidget(mmStep_, 5, 1);
   grid->addWidget(degreeStep_, 5, 2);
   grid->addWidget(new QLabel(tr("Mouse speed"), this), 6, 0);
   mmSensitivity_ = NumberField(
       this, {"translationSensitivity", tr("How far volumes move: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
-      setHand(&Handling::translationSensitivity));
+      bench->Setter(&Handling::translationSensitivity));
   degreeSensitivity_ = NumberField(
       this, {"rotationSensitivity", tr("How far volumes turn: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
-      setHand(&Handling::rotationSensitivity));
+      bench->Setter(&Handling::rotationSensitivity));
   grid->addWidget(mmSensitivity_, 6, 1);
   grid->addWidget(degreeSensitivity_, 6, 2);
   grid->addWidget(new QLabel(tr("<small>moving</small>"), this), 7, 1, Qt::AlignHCenter | Qt::AlignTop);

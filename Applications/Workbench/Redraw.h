@@ -23,7 +23,6 @@ public:
   /// Once nothing has asked anew for \a milliseconds.
   void AskAnew(int milliseconds) { timer_.start(milliseconds); }
   void Stop() { timer_.stop(); }
-  bool Waiting() const { return timer_.isActive(); }
 
 private:
   std::function<void()> draw_;

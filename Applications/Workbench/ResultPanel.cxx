@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ResultPanel.h"
 #include "AlgorithmRun.h"
-#include "Job.h"
-#include "JobBar.h"
+#include "Controls.h"
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
@@ -25,61 +24,50 @@ namespace echorama {
 
 namespace {
 
-// A combination box of names by number, as the stitcher tells them.
-QComboBox* ChoiceOfMethods(const char* (*nameOf)(int), const char* objectName, int chosen, const QString& tip, QWidget* parent)
+// By number, as the stitcher tells them.
+std::vector<std::string> NamesOf(const char* (*nameOf)(int))
 {
-  auto* box = new QComboBox(parent);
-  box->setObjectName(objectName);
-  box->setToolTip(tip);
+  std::vector<std::string> names;
   for (int i = 0; nameOf(i); ++i)
-    box->addItem(QString::fromLatin1(nameOf(i)));
-  box->setCurrentIndex(chosen);
-  return box;
+    names.emplace_back(nameOf(i));
+  return names;
 }
 
 } // namespace
 
-ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
+ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : JobPanel(workspace, parent)
 {
   setObjectName("resultPanel");
   const vtkNew<vtkUltrasoundStitcher> defaults;
-  method_ = ChoiceOfMethods(&vtkUltrasoundStitcher::GetMethodName, "stitchMethod", defaults->GetMethod(),
-                            tr("How one volume goes over into the next"), this);
-  texture_ = ChoiceOfMethods(&vtkUltrasoundStitcher::GetTextureName, "stitchTexture", defaults->GetTexture(),
-                             tr("What happens to speckle where volumes overlap: mixing blurs it, the others keep it"), this);
   const vtkNew<vtkUltrasoundEmbedder> embedding;
-  spacing_ = new QDoubleSpinBox(this);
-  spacing_->setObjectName("stitchSpacing");
-  spacing_->setRange(0.0, 20.0);
-  spacing_->setDecimals(3);
-  spacing_->setSingleStep(0.1);
-  spacing_->setSuffix(tr(" mm"));
+  method_ = ChoiceField(this, "stitchMethod", tr("How one volume goes over into the next"),
+                        NamesOf(&vtkUltrasoundStitcher::GetMethodName));
+  method_->setCurrentIndex(defaults->GetMethod());
+  texture_ =
+      ChoiceField(this, "stitchTexture", tr("What happens to speckle where volumes overlap: mixing blurs it, the others keep it"),
+                  NamesOf(&vtkUltrasoundStitcher::GetTextureName));
+  texture_->setCurrentIndex(defaults->GetTexture());
+  spacing_ = NumberField(this, {"stitchSpacing", tr("Side of the result's voxels"), 0.0, 20.0, 3, 0.1, tr(" mm")});
   spacing_->setSpecialValueText(tr("as the volumes"));
-  spacing_->setToolTip(tr("Side of the result's voxels"));
-  gain_ = new QCheckBox(tr("Equalise gain"), this);
-  gain_->setObjectName("stitchGain");
-  gain_->setToolTip(tr("First gives the volumes the same brightness and contrast where they overlap"));
+  gain_ = CheckField(this, "stitchGain", tr("Equalise gain"),
+                     tr("First gives the volumes the same brightness and contrast where they overlap"));
   gain_->setChecked(defaults->GetEqualizeGain());
-  embed_ = new QCheckBox(tr("Embed in a background"), this);
-  embed_->setObjectName("embed");
-  embed_->setToolTip(tr("Puts the result into the fan that holds it, in noise of its own brightness and grain"));
-  margin_ = new QDoubleSpinBox(this);
-  margin_->setObjectName("embedMargin");
-  margin_->setRange(0.0, 200.0);
+  embed_ = CheckField(this, "embed", tr("Embed in a background"),
+                      tr("Puts the result into the fan that holds it, in noise of its own brightness and grain"),
+                      [this](bool) { ShowState(); });
+  margin_ =
+      NumberField(this, {"embedMargin", tr("How much larger than the data the background is"), 0.0, 200.0, 2, 1.0, tr(" mm")});
   margin_->setValue(embedding->GetMarginMm());
-  margin_->setSuffix(tr(" mm"));
-  margin_->setToolTip(tr("How much larger than the data the background is"));
-  preview_ = new QPushButton(tr("Pre&view"), this);
-  preview_->setObjectName("stitchPreview");
-  preview_->setToolTip(tr("Quickly, with voxels twice as large"));
-  make_ = new QPushButton(tr("&Make"), this);
-  make_->setObjectName("stitchMake");
-  make_->setToolTip(tr("With full resolution"));
-  save_ = new QPushButton(tr("Save result…"), this);
-  save_->setObjectName("stitchSave");
-  text_ = new QLabel(tr("Stitches the volumes that are shown."), this);
-  text_->setObjectName("stitchText");
-  text_->setWordWrap(true);
+  preview_ = Button(this, "stitchPreview", tr("Pre&view"), tr("Quickly, with voxels twice as large"), [this] { Make(true); });
+  make_ = Button(this, "stitchMake", tr("&Make"), tr("With full resolution"), [this] { Make(false); });
+  save_ = Button(this, "stitchSave", tr("Save result…"), tr("As a file; its extension names the format"), [this] {
+    const QString path = QFileDialog::getSaveFileName(this, tr("Save result"), "stitched.mha",
+                                                      tr("Volumes (*.mha *.mhd *.nrrd *.nhdr *.nii *.nii.gz *.vti *.vdb)"));
+    if (!path.isEmpty())
+      Save(path);
+  });
+  text_ = TextField(this, "stitchText");
+  text_->setText(tr("Stitches the volumes that are shown."));
 
   auto* layout = new QVBoxLayout(this);
   auto* form = new QFormLayout;
@@ -96,21 +84,7 @@ ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : QWidget(parent
   layout->addLayout(buttons);
   layout->addWidget(text_);
   layout->addWidget(save_);
-  connect(preview_, &QPushButton::clicked, this, [this] { Make(true); });
-  connect(make_, &QPushButton::clicked, this, [this] { Make(false); });
-  connect(embed_, &QCheckBox::toggled, this, &ResultPanel::ShowState);
-  connect(save_, &QPushButton::clicked, this, [this] {
-    const QString path = QFileDialog::getSaveFileName(this, tr("Save result"), "stitched.mha",
-                                                      tr("Volumes (*.mha *.mhd *.nrrd *.nhdr *.nii *.nii.gz *.vti *.vdb)"));
-    if (!path.isEmpty())
-      Save(path);
-  });
   ShowState();
-}
-
-ResultPanel::~ResultPanel()
-{
-  delete job_; // before the buttons
 }
 
 void ResultPanel::SetView(QWidget* view)
@@ -121,15 +95,15 @@ void ResultPanel::SetView(QWidget* view)
 
 void ResultPanel::ShowState()
 {
-  preview_->setEnabled(!job_);
-  make_->setEnabled(!job_);
-  save_->setEnabled(!job_ && volume_);
+  preview_->setEnabled(!IsRunning());
+  make_->setEnabled(!IsRunning());
+  save_->setEnabled(!IsRunning() && volume_);
   margin_->setEnabled(embed_->isChecked());
 }
 
 void ResultPanel::Make(bool preview)
 {
-  if (job_)
+  if (IsRunning())
     return;
   vtkNew<vtkMultiBlockDataSet> shown; // it stays as it is, whatever the session does
   workspace_.session->GetVolumes(shown, true);
@@ -151,8 +125,8 @@ void ResultPanel::Make(bool preview)
   }
   const auto made = std::make_shared<vtkSmartPointer<vtkImageData>>();
   const QString label = embedder ? tr("Stitch and embed") : tr("Stitch");
-  job_ = Job::Start(
-      this, preview ? tr("%1 (preview)").arg(label) : label,
+  Start(
+      preview ? tr("%1 (preview)").arg(label) : label,
       [stitcher, embedder, made, preview](const Progress& progress) {
         if (preview) {
           stitcher->UpdateInformation();
@@ -178,14 +152,7 @@ void ResultPanel::Make(bool preview)
                         .arg(size[1])
                         .arg(size[2])
                         .arg(spacing[0], 0, 'g', 3));
-      },
-      [this, label](const QString& error) { workspace_.say(tr("%1: %2").arg(label, error), true); });
-  connect(job_, &Job::Ended, this, [this] {
-    job_ = nullptr;
-    ShowState();
-  });
-  workspace_.jobs->Watch(job_);
-  ShowState();
+      });
 }
 
 void ResultPanel::Show(vtkImageData* volume, const QString& text)
@@ -203,24 +170,17 @@ void ResultPanel::Show(vtkImageData* volume, const QString& text)
 
 void ResultPanel::Save(const QString& path)
 {
-  if (job_ || !volume_)
+  if (IsRunning() || !volume_)
     return;
   const auto writer = vtkSmartPointer<vtkUltrasoundWriter>::New();
   writer->SetInputDataObject(volume_);
   writer->SetFileName(path.toUtf8());
-  job_ = Job::Start(
-      this, tr("Save result"), [writer](const Progress& progress) { Run(writer, progress, [&] { writer->Write(); }); },
+  Start(
+      tr("Save result"), [writer](const Progress& progress) { Run(writer, progress, [&] { writer->Write(); }); },
       [this, path, writer] {
         const QString notes = QString::fromStdString(writer->GetNotes());
         workspace_.say(notes.isEmpty() ? tr("Saved %1").arg(path) : tr("Saved %1. %2").arg(path, notes), false);
-      },
-      [this, path](const QString& error) { workspace_.say(tr("Saving %1: %2").arg(path, error), true); });
-  connect(job_, &Job::Ended, this, [this] {
-    job_ = nullptr;
-    ShowState();
-  });
-  workspace_.jobs->Watch(job_);
-  ShowState();
+      });
 }
 
 } // namespace echorama

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "JobBar.h"
 #include "Workspace.h"
-#include <QPointer>
-#include <QWidget>
 #include <vtkSmartPointer.h>
 
 class QCheckBox;
@@ -14,16 +13,13 @@ class vtkImageData;
 
 namespace echorama {
 
-class Job;
-
 /// Makes one volume of those that are shown: stitched, and on request embedded in a background. A preview is made of voxels twice
 /// as large. The result is shown in a session of its own, beside the volumes, and can be saved; the volumes stay as they are.
-class ResultPanel : public QWidget {
+class ResultPanel : public JobPanel {
   Q_OBJECT
 
 public:
   explicit ResultPanel(Workspace& workspace, QWidget* parent = nullptr);
-  ~ResultPanel() override;
 
   /// A workspace of its own, whose session holds the result and nothing else.
   Workspace& Result() { return result_; }
@@ -40,9 +36,8 @@ public slots:
 
 private:
   void Show(vtkImageData* volume, const QString& text);
-  void ShowState();
+  void ShowState() override;
 
-  Workspace& workspace_;
   Workspace result_;
   vtkSmartPointer<vtkImageData> volume_;
   QComboBox *method_, *texture_;
@@ -50,7 +45,6 @@ private:
   QCheckBox *gain_, *embed_;
   QPushButton *preview_, *make_, *save_;
   QLabel* text_;
-  QPointer<Job> job_;
 };
 
 } // namespace echorama

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <QString>
-
-class QSettings;
+#include <tuple>
 
 namespace echorama {
 
@@ -45,15 +44,11 @@ struct Handling {
   QString constraint = "free"; ///< the word of vtkUltrasoundAlignmentRepresentation; not remembered
 };
 
-///@{ Remembered from one start to the next; values out of range are left as they are by default.
-void Load(QSettings&, BrushSettings&);
-void Save(QSettings&, const BrushSettings&);
-void Load(QSettings&, SliceLook&);
-void Save(QSettings&, const SliceLook&);
-void Load(QSettings&, VolumeLook&);
-void Save(QSettings&, const VolumeLook&);
-void Load(QSettings&, Handling&);
-void Save(QSettings&, const Handling&);
-///@}
+/// All that one window shares between its parts, and remembers from one start to the next.
+using Settings = std::tuple<BrushSettings, SliceLook, VolumeLook, Handling>;
+
+/// Values out of range are left as they are by default.
+Settings Remembered();
+void Remember(Settings settings);
 
 } // namespace echorama

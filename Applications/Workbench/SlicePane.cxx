@@ -20,16 +20,6 @@ namespace {
 
 constexpr int SliderSteps = 1000;
 
-QToolButton* SmallButton(QWidget* parent, const QString& name, const QString& text, const QString& help)
-{
-  auto* button = new QToolButton(parent);
-  button->setObjectName(name);
-  button->setText(text);
-  button->setToolTip(help);
-  button->setAutoRaise(true);
-  return button;
-}
-
 } // namespace
 
 SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis, QWidget* parent)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrackerPanel.h"
+#include "Controls.h"
 #include <QComboBox>
 #include <QFormLayout>
 #include <QLabel>
@@ -16,19 +17,12 @@ TrackerPanel::TrackerPanel(Workspace& workspace, QWidget* parent) : QWidget(pare
   tracker_->SetActive(false); // until Connect
   address_ = new QLineEdit(QSettings().value("tracker/address", "igtl://localhost:18944").toString(), this);
   address_->setObjectName("trackerAddress");
-  address_->setToolTip(
-      tr("The tracker in one line: igtl://HOST:PORT, polhemus:/dev/ttyUSB0, udp://:PORT, replay:FILE or simulated:"));
-  tool_ = new QComboBox(this);
-  tool_->setObjectName("trackerTool");
-  tool_->setToolTip(tr("The tool that moves volumes"));
-  connect_ = new QPushButton(this);
-  connect_->setObjectName("trackerConnect");
-  grasp_ = new QPushButton(tr("&Grasp (hold)"), this);
-  grasp_->setObjectName("trackerGrasp");
-  grasp_->setToolTip(tr("While it is held down, the selected volumes follow the tool"));
-  state_ = new QLabel(this);
-  state_->setObjectName("trackerState");
-  state_->setWordWrap(true);
+  address_->setToolTip(tr("The tracker in one line: igtl://HOST:PORT, polhemus:/dev/ttyUSB0, replay:FILE or simulated:"));
+  tool_ = ChoiceField(this, "trackerTool", tr("The tool that moves volumes"), std::vector<std::string>());
+  connect_ = Button(this, "trackerConnect", {}, tr("Begins to read the tracker, and ends it"), [this] { ConnectOrNot(); });
+  grasp_ =
+      Button(this, "trackerGrasp", tr("&Grasp (hold)"), tr("While it is held down, the selected volumes follow the tool"), {});
+  state_ = TextField(this, "trackerState");
   auto* form = new QFormLayout(this);
   form->addRow(tr("Tracker"), address_);
   form->addRow(connect_);
@@ -39,7 +33,6 @@ TrackerPanel::TrackerPanel(Workspace& workspace, QWidget* parent) : QWidget(pare
   timer_ = new QTimer(this);
   timer_->setInterval(16);
   connect(timer_, &QTimer::timeout, this, &TrackerPanel::Step);
-  connect(connect_, &QPushButton::clicked, this, &TrackerPanel::ConnectOrNot);
   connect(grasp_, &QPushButton::pressed, this, [this] { SetGrasping(true); });
   connect(grasp_, &QPushButton::released, this, [this] { SetGrasping(false); });
   Step();

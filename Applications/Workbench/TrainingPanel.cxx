@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrainingPanel.h"
+#include "Controls.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Widgets/Session/LiveScore.h"
+#include "Workbench.h"
 #include <cmath>
 #include <QCheckBox>
 #include <QDateTime>
@@ -23,10 +25,6 @@
 #include <QTableWidget>
 #include <QTimer>
 #include <QVBoxLayout>
-#include <vtkCallbackCommand.h>
-#include <vtkImageData.h>
-#include <vtkMatrix4x4.h>
-#include <vtkNew.h>
 
 namespace echorama {
 
@@ -44,27 +42,9 @@ QString TimeText(double seconds)
   return QStringLiteral("%1:%2").arg(whole / 60).arg(whole % 60, 2, 10, QLatin1Char('0'));
 }
 
-Pose PoseOf(vtkMatrix4x4* matrix)
-{
-  Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-  return pose;
-}
-
-Eigen::Vector3d MiddleOf(vtkImageData* image)
-{
-  double index[3];
-  Eigen::Vector3d middle;
-  const int* extent = image->GetExtent();
-  for (int axis = 0; axis < 3; ++axis)
-    index[axis] = 0.5 * (extent[2 * axis] + extent[2 * axis + 1]);
-  image->TransformContinuousIndexToPhysicalPoint(index, middle.data());
-  return middle;
-}
-
 } // namespace
 
-TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace)
+TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
 {
   setObjectName("trainingPanel");
   auto* layout = new QVBoxLayout(this);
@@ -72,19 +52,16 @@ TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(pa
   auto* evaluation = new QGroupBox(tr("Evaluation"), this);
   auto* form = new QFormLayout(evaluation);
   truth_ = new QLabel(tr("none"), evaluation);
-  auto* choose = new QPushButton(tr("Load truth…"), evaluation);
-  choose->setObjectName("loadTruth");
-  choose->setToolTip(tr("A pose file that says where the volumes belong, such as truth.json of a synthetic set"));
+  auto* choose = Button(evaluation, "loadTruth", tr("Load truth…"),
+                        tr("A pose file that says where the volumes belong, such as truth.json of a synthetic set"),
+                        [this] { ChooseTruth(); });
   score_ = new QLabel(evaluation);
   score_->setObjectName("score");
   score_->setToolTip(
       tr("Mean distance of points of the volumes from where they belong, seen from the first volume that has a truth"));
-  live_ = new QCheckBox(tr("Show the score"), evaluation);
-  live_->setObjectName("showScore");
-  live_->setChecked(true);
-  vectors_ = new QCheckBox(tr("Show the errors as arrows"), evaluation);
-  vectors_->setObjectName("showErrors");
-  vectors_->setToolTip(tr("In the 3D view: arrows from where points are to where they belong"));
+  live_ = CheckField(evaluation, "showScore", tr("Show the score"), {}, [this](bool) { ShowScore(); });
+  vectors_ = CheckField(evaluation, "showErrors", tr("Show the errors as arrows"),
+                        tr("In the 3D view: arrows from where points are to where they belong"), [this](bool) { ShowState(); });
   form->addRow(tr("Truth"), truth_);
   form->addRow(choose);
   form->addRow(tr("Score"), score_);
@@ -97,37 +74,29 @@ TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(pa
   trainee_ = new QLineEdit(QSettings().value("training/trainee").toString(), training);
   trainee_->setObjectName("trainee");
   trainee_->setPlaceholderText(tr("name, may be empty"));
-  scatterMm_ = new QDoubleSpinBox(training);
-  scatterMm_->setObjectName("scatterMm");
-  scatterMm_->setRange(0.0, 500.0);
+  scatterMm_ = NumberField(training, {"scatterMm", tr("How far volumes are moved"), 0.0, 500.0, 2, 1.0, tr(" mm")});
   scatterMm_->setValue(15.0);
-  scatterMm_->setSuffix(tr(" mm"));
-  scatterDegrees_ = new QDoubleSpinBox(training);
-  scatterDegrees_->setObjectName("scatterDegrees");
-  scatterDegrees_->setRange(0.0, 180.0);
+  scatterDegrees_ = NumberField(training, {"scatterDegrees", tr("How far volumes are turned"), 0.0, 180.0, 2, 1.0, tr("°")});
   scatterDegrees_->setValue(15.0);
-  scatterDegrees_->setSuffix(tr("°"));
   seed_ = new QSpinBox(training);
   seed_->setObjectName("scatterSeed");
   seed_->setRange(1, 1000000);
   seed_->setToolTip(tr("The same number scatters the same volumes in the same way"));
-  auto* scatter = new QPushButton(tr("Scatter volumes"), training);
-  scatter->setObjectName("scatter");
-  scatter->setToolTip(
-      tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, without "
-         "truth, from where it is). Can be undone."));
-  start_ = new QPushButton(training);
-  start_->setObjectName("trainingStart");
-  submit_ = new QPushButton(tr("Submit"), training);
-  submit_->setObjectName("trainingSubmit");
+  auto* scatter = Button(training, "scatter", tr("Scatter volumes"),
+                         tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "
+                            "without truth, from where it is). Can be undone."),
+                         [this] { Scatter(); });
+  start_ = Button(training, "trainingStart", {}, {}, [this] { StartOrGiveUp(); });
+  submit_ = Button(training, "trainingSubmit", tr("Submit"), tr("Shows score and errors, and adds the attempt to the history"),
+                   [this] { Submit(); });
   time_ = new QLabel(training);
   time_->setObjectName("trainingTime");
   history_ = new QLineEdit(training);
   history_->setObjectName("trainingHistory");
   history_->setReadOnly(true);
   history_->setToolTip(tr("The file of all attempts, CSV"));
-  auto* chooseHistory = new QPushButton(tr("Keep attempts in…"), training);
-  chooseHistory->setObjectName("chooseHistory");
+  auto* chooseHistory = Button(training, "chooseHistory", tr("Keep attempts in…"),
+                               tr("Adds attempts to another table from now on"), [this] { ChooseHistory(); });
   form->addRow(tr("Trainee"), trainee_);
   form->addRow(tr("Scatter by"), scatterMm_);
   form->addRow(tr("and"), scatterDegrees_);
@@ -139,46 +108,21 @@ TrainingPanel::TrainingPanel(Workspace& workspace, QWidget* parent) : QWidget(pa
   form->addRow(chooseHistory);
   layout->addWidget(training);
 
-  table_ = new QTableWidget(0, 5, this);
-  table_->setObjectName("attempts");
-  table_->setHorizontalHeaderLabels({tr("When"), tr("Trainee"), tr("Score, mm"), tr("From, mm"), tr("Time")});
-  table_->setEditTriggers(QAbstractItemView::NoEditTriggers);
-  table_->verticalHeader()->hide();
-  table_->setToolTip(tr("All attempts, the last one first"));
+  table_ = TableField(this, "attempts", tr("All attempts, the last one first"),
+                      {tr("When"), tr("Trainee"), tr("Score, mm"), tr("From, mm"), tr("Time")});
   layout->addWidget(table_, 1);
 
   clock_ = new QTimer(this);
   clock_->setInterval(500);
   connect(clock_, &QTimer::timeout, this, [this] { time_->setText(TimeText(taken_.elapsed() * 1e-3)); });
-  connect(choose, &QPushButton::clicked, this, &TrainingPanel::ChooseTruth);
-  connect(chooseHistory, &QPushButton::clicked, this, &TrainingPanel::ChooseHistory);
-  connect(live_, &QCheckBox::toggled, this, &TrainingPanel::ShowScore);
-  connect(vectors_, &QCheckBox::toggled, this, &TrainingPanel::ShowState);
-  connect(scatter, &QPushButton::clicked, this, &TrainingPanel::Scatter);
-  connect(start_, &QPushButton::clicked, this, &TrainingPanel::StartOrGiveUp);
-  connect(submit_, &QPushButton::clicked, this, &TrainingPanel::Submit);
 
-  observer_ = vtkSmartPointer<vtkCallbackCommand>::New();
-  observer_->SetClientData(this);
-  observer_->SetCallback([](vtkObject*, unsigned long event, void* self, void*) {
-    auto* panel = static_cast<TrainingPanel*>(self);
-    if (event == vtkUltrasoundAlignmentSession::PosesChangedEvent)
-      panel->ShowScore();
-    else
-      panel->ShowState(); // a project brings its own truth
-  });
-  for (const unsigned long event :
-       {vtkUltrasoundAlignmentSession::PosesChangedEvent, vtkUltrasoundAlignmentSession::VolumesChangedEvent})
-    workspace_.session->AddObserver(event, observer_);
+  connect(bench, &Workbench::PosesChanged, this, &TrainingPanel::ShowScore);
+  connect(bench, &Workbench::VolumesChanged, this, &TrainingPanel::ShowState); // a project brings its own truth
 
   historyPath_ = DefaultHistory();
   ShowHistory();
+  live_->setChecked(true);
   ShowState();
-}
-
-TrainingPanel::~TrainingPanel()
-{
-  workspace_.session->RemoveObserver(observer_);
 }
 
 void TrainingPanel::ChooseTruth()
@@ -191,7 +135,7 @@ void TrainingPanel::ChooseTruth()
 bool TrainingPanel::LoadTruth(const QString& path)
 {
   // The session reports what is wrong, and that goes to the message bar.
-  if (!workspace_.session->ReadTruth(path.toUtf8()))
+  if (!bench_->Session()->ReadTruth(path.toUtf8()))
     return false;
   truth_->setText(QFileInfo(path).fileName());
   truth_->setToolTip(path);
@@ -216,7 +160,7 @@ bool TrainingPanel::SetHistory(const QString& path)
       ReadAttempts(path.toStdString());
   } catch (const Error& error) {
     historyPath_ = before;
-    workspace_.say(QString::fromUtf8(error.what()), true);
+    bench_->Warn(error.what());
     return false;
   }
   QSettings().setValue("training/history", path);
@@ -232,23 +176,20 @@ void TrainingPanel::ShowHistory()
     return;
   try {
     for (const Attempt& attempt : ReadAttempts(historyPath_.toStdString())) {
-      table_->insertRow(0);
-      const QStringList texts{QString::fromStdString(attempt.time), QString::fromStdString(attempt.trainee),
-                              QString::number(attempt.scoreMm, 'f', 2), QString::number(attempt.startMm, 'f', 2),
-                              TimeText(attempt.seconds)};
-      for (int column = 0; column < texts.size(); ++column)
-        table_->setItem(0, column, new QTableWidgetItem(texts[column]));
+      InsertRow(table_, 0,
+                {QString::fromStdString(attempt.time), QString::fromStdString(attempt.trainee),
+                 QString::number(attempt.scoreMm, 'f', 2), QString::number(attempt.startMm, 'f', 2), TimeText(attempt.seconds)});
     }
   } catch (const Error& error) {
-    workspace_.say(QString::fromUtf8(error.what()), true);
+    bench_->Warn(error.what());
   }
 }
 
 void TrainingPanel::Scatter()
 {
-  vtkUltrasoundAlignmentSession* session = workspace_.session;
+  auto* session = bench_->Session();
   if (session->GetNumberOfVolumes() < 2) {
-    workspace_.say(tr("Scatter: two volumes are needed"), true);
+    bench_->Warn(tr("Scatter: two volumes are needed"));
     return;
   }
   session->BeginEdit("Scatter volumes");
@@ -257,17 +198,11 @@ void TrainingPanel::Scatter()
     if (id == (session->GetFixedVolume() > 0 ? session->GetFixedVolume() : session->GetVolumeId(0)))
       continue;
     Random random(static_cast<std::uint64_t>(seed_->value()), static_cast<std::uint64_t>(i));
-    vtkNew<vtkMatrix4x4> pose;
-    session->GetVolumeToWorld(id, pose);
-    const Pose now = PoseOf(pose);
-    session->GetTruth(id, pose); // else from where it is
-    const Pose before = PoseOf(pose);
-    const Eigen::Vector3d middle = before * now.inverse(Eigen::Isometry) * MiddleOf(session->GetImage(id));
+    const SessionVolume& volume = *session->GetKernel().State().Find(id);
+    const Pose before = session->GetTruthOf(id).value_or(volume.volumeToWorld);
     const Eigen::Vector3d turn = random.Direction() * (scatterDegrees_->value() / DegreesPerRadian);
     const Eigen::Vector3d shift = random.Direction() * scatterMm_->value();
-    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> after = (MotionAbout(middle, turn, shift) * before).matrix();
-    pose->DeepCopy(after.data());
-    session->SetVolumeToWorld(id, pose);
+    session->SetVolumeToWorld(id, MotionAbout(before * volume.geometry.Centre(), turn, shift) * before);
   }
   session->EndEdit();
 }
@@ -275,8 +210,8 @@ void TrainingPanel::Scatter()
 void TrainingPanel::StartOrGiveUp()
 {
   if (!isTraining_) {
-    workspace_.session->ForgetHistory(); // undo would lead to the solution
-    startScore_ = workspace_.session->GetScore();
+    bench_->Session()->ForgetHistory(); // undo would lead to the solution
+    startScore_ = bench_->Session()->GetScore();
     taken_.start();
     clock_->start();
   } else {
@@ -289,7 +224,7 @@ void TrainingPanel::StartOrGiveUp()
 
 void TrainingPanel::Submit()
 {
-  vtkUltrasoundAlignmentSession* session = workspace_.session;
+  auto* session = bench_->Session();
   clock_->stop();
   Attempt attempt;
   attempt.seconds = taken_.elapsed() * 1e-3;
@@ -319,20 +254,19 @@ void TrainingPanel::Submit()
   try {
     QDir().mkpath(QFileInfo(historyPath_).path());
     AppendAttempt(historyPath_.toStdString(), attempt);
-    workspace_.say(tr("Submitted: %1 mm after %2, from %3 mm at the start")
-                       .arg(attempt.scoreMm, 0, 'f', 2)
-                       .arg(TimeText(attempt.seconds))
-                       .arg(attempt.startMm, 0, 'f', 2),
-                   false);
+    bench_->Note(tr("Submitted: %1 mm after %2, from %3 mm at the start")
+                     .arg(attempt.scoreMm, 0, 'f', 2)
+                     .arg(TimeText(attempt.seconds))
+                     .arg(attempt.startMm, 0, 'f', 2));
   } catch (const Error& error) {
-    workspace_.say(tr("The attempt (%1 mm) was not kept: %2").arg(attempt.scoreMm, 0, 'f', 2).arg(error.what()), true);
+    bench_->Warn(tr("The attempt (%1 mm) was not kept: %2").arg(attempt.scoreMm, 0, 'f', 2).arg(error.what()));
   }
   ShowHistory();
 }
 
 void TrainingPanel::ShowScore()
 {
-  vtkUltrasoundAlignmentSession* session = workspace_.session;
+  auto* session = bench_->Session();
   const double score = session->HasTruth() ? session->GetScore() : std::nan("");
   const bool shown = !isTraining_ && live_->isChecked() && std::isfinite(score);
   const QString text = shown ? tr("%1 mm").arg(score, 0, 'f', 2) : QString();
@@ -342,7 +276,7 @@ void TrainingPanel::ShowScore()
 
 void TrainingPanel::ShowState()
 {
-  const bool hasTruth = workspace_.session->HasTruth();
+  const bool hasTruth = bench_->Session()->HasTruth();
   if (isTraining_ && !hasTruth) { // another project was opened
     isTraining_ = false;
     clock_->stop();
@@ -359,8 +293,7 @@ void TrainingPanel::ShowState()
                          : tr("Hides score and errors, and starts the clock; what was done before can no longer be undone"));
   start_->setEnabled(hasTruth);
   submit_->setEnabled(isTraining_);
-  submit_->setToolTip(tr("Shows score and errors, and adds the attempt to the history"));
-  workspace_.showErrorVectors(hasTruth && !isTraining_ && vectors_->isChecked());
+  bench_->Set(&VolumeLook::errorVectors, hasTruth && !isTraining_ && vectors_->isChecked());
   ShowScore();
 }
 

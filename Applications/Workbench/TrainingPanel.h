@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Workspace.h"
 #include <QElapsedTimer>
 #include <QWidget>
-#include <vtkSmartPointer.h>
 
 class QCheckBox;
 class QDoubleSpinBox;
@@ -13,9 +11,10 @@ class QPushButton;
 class QSpinBox;
 class QTableWidget;
 class QTimer;
-class vtkCallbackCommand;
 
 namespace echorama {
+
+class Workbench;
 
 /// Evaluation and training (dissertation 4.4). With a truth loaded the score is shown while volumes move, with the errors as
 /// arrows in the 3D view. In training both are hidden from the start of an attempt until it is submitted; then score, errors and
@@ -24,8 +23,7 @@ class TrainingPanel : public QWidget {
   Q_OBJECT
 
 public:
-  explicit TrainingPanel(Workspace& workspace, QWidget* parent = nullptr);
-  ~TrainingPanel() override;
+  explicit TrainingPanel(Workbench* bench, QWidget* parent = nullptr);
 
   /// The pose file of the truth; a failure goes to the message bar.
   bool LoadTruth(const QString& path);
@@ -46,8 +44,7 @@ private:
   void ShowState();
   void ShowHistory();
 
-  Workspace& workspace_;
-  vtkSmartPointer<vtkCallbackCommand> observer_;
+  Workbench* bench_;
   QLabel *truth_, *score_, *time_;
   QCheckBox *live_, *vectors_;
   QLineEdit *trainee_, *history_;

@@ -34,17 +34,17 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   addTool("toolRestore", tr("&Restore"), "5", tr("Bring back what was painted over or carved away"), Tool::Restore);
 
   const auto addShown = [&](const char* name, const QString& label, const char* key, const QString& help, const QString& word) {
-    addTo(shown_, name, label, key, help, word, [this, word] { SetShown(word); });
+    addTo(shown_, name, label, key, help, word, [this, word] { bench_->Set(&SliceLook::shown, word); });
   };
   addShown("showAll", tr("&All"), "A", tr("Slices show all volumes"), "all");
   addShown("showSelected", tr("&Selected"), "S", tr("Slices show the selected volumes alone"), "selected");
   addShown("showOthers", tr("&Others"), "O", tr("Slices show the volumes that are not selected"), "others");
   switch_ = MakeAction(this, "showSwitch", tr("S&witch selected and others"), "Space",
                        tr("Flicker: back and forth between the selected volumes and the others"),
-                       [this] { SetShown(bench_->Slices().shown == "selected" ? "others" : "selected"); });
+                       [this] { bench_->Set(&SliceLook::shown, bench_->Slices().shown == "selected" ? "others" : "selected"); });
 
   const auto addMode = [&](const char* name, const QString& label, const char* key, const QString& help, const QString& word) {
-    addTo(modes_, name, label, key, help, word, [this, word] { SetMode(word); });
+    addTo(modes_, name, label, key, help, word, [this, word] { bench_->Set(&SliceLook::mode, word); });
   };
   addMode("modeBlend", tr("&Blend"), "B", tr("Volumes are mixed; tints add up to grey where they agree"), "blend");
   addMode("modeDifference", tr("&Difference"), "D",
@@ -52,12 +52,8 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   addMode("modeCheckerboard", tr("&Checkerboard"), "K", tr("Squares of the selected volumes and of the others in turn"),
           "checkerboard");
 
-  linear_ =
-      MakeAction(this, "linear", tr("&Trilinear interpolation"), "N", tr("Smooth between voxels, or the nearest voxel"), [this] {
-        SliceLook look = bench_->Slices();
-        look.linear = !look.linear;
-        bench_->SetSlices(look);
-      });
+  linear_ = MakeAction(this, "linear", tr("&Trilinear interpolation"), "N", tr("Smooth between voxels, or the nearest voxel"),
+                       [this] { bench_->Set(&SliceLook::linear, !bench_->Slices().linear); });
   linear_->setCheckable(true);
   linked_ = MakeAction(this, "linked", tr("&Link slices"), "L", tr("Slices share the point in focus and the zoom"),
                        [this] { views_->SetLinked(!views_->Linked()); });
@@ -111,25 +107,9 @@ void ViewActions::ShowLook()
   linear_->setChecked(bench_->Slices().linear);
 }
 
-void ViewActions::SetShown(const QString& word)
-{
-  SliceLook look = bench_->Slices();
-  look.shown = word;
-  bench_->SetSlices(look);
-}
-
-void ViewActions::SetMode(const QString& word)
-{
-  SliceLook look = bench_->Slices();
-  look.mode = word;
-  bench_->SetSlices(look);
-}
-
 void ViewActions::ChangeBrush(double factor)
 {
-  BrushSettings brush = bench_->Brush();
-  brush.radiusMm = std::clamp(brush.radiusMm * factor, 0.1, 100.0);
-  bench_->SetBrush(brush);
+  bench_->Set(&BrushSettings::radiusMm, std::clamp(bench_->Brush().radiusMm * factor, 0.1, 100.0));
 }
 
 } // namespace echorama

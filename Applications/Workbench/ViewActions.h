@@ -25,8 +25,6 @@ public:
 
 private:
   void ShowLook();
-  void SetShown(const QString& word);
-  void SetMode(const QString& word);
   void ChangeBrush(double factor);
 
   Workbench* bench_;

@@ -8,7 +8,6 @@
 #include <QDoubleSpinBox>
 #include <QFormLayout>
 #include <QGroupBox>
-#include <QSignalBlocker>
 #include <QVBoxLayout>
 
 namespace echorama {
@@ -32,30 +31,17 @@ QWidget* ViewPanel::SliceControls()
   auto* box = new QGroupBox(tr("Slices"), this);
   auto* form = new QFormLayout(box);
   form->setContentsMargins(2, 2, 2, 2);
-  const auto setWord = [this](QString SliceLook::*field) {
-    return [this, field](const QString& word) {
-      SliceLook look = bench_->Slices();
-      look.*field = word;
-      bench_->SetSlices(look);
-    };
-  };
   shown_ = ChoiceField(box, "shown", tr("Which volumes slices show (A all, S selected, O others, Space switches)"),
-                       {{"all", tr("All")}, {"selected", tr("Selected")}, {"others", tr("Others")}}, setWord(&SliceLook::shown));
+                       {{"all", tr("All")}, {"selected", tr("Selected")}, {"others", tr("Others")}},
+                       bench_->Setter(&SliceLook::shown));
   mode_ = ChoiceField(box, "mode", tr("How volumes that overlap are shown (B blend, D difference, K checkerboard)"),
                       {{"blend", tr("Blend")}, {"difference", tr("Difference")}, {"checkerboard", tr("Checkerboard")}},
-                      setWord(&SliceLook::mode));
+                      bench_->Setter(&SliceLook::mode));
   interpolation_ = ChoiceField(box, "interpolation", tr("Between voxels (N switches)"),
-                               {{"linear", tr("Trilinear")}, {"nearest", tr("Nearest voxel")}}, [this](const QString& word) {
-                                 SliceLook look = bench_->Slices();
-                                 look.linear = word == "linear";
-                                 bench_->SetSlices(look);
-                               });
+                               {{"linear", tr("Trilinear")}, {"nearest", tr("Nearest voxel")}},
+                               [this](const QString& word) { bench_->Set(&SliceLook::linear, word == "linear"); });
   squares_ = NumberField(box, {"squares", tr("Side of the squares of the checkerboard, pixels"), 4.0, 400.0, 0, 10.0, " px"},
-                         [this](double value) {
-                           SliceLook look = bench_->Slices();
-                           look.squarePixels = static_cast<int>(value);
-                           bench_->SetSlices(look);
-                         });
+                         bench_->Setter(&SliceLook::squarePixels));
   const auto setWindow = [this](double) { bench_->Session()->SetGreyWindow(black_->value(), white_->value()); };
   black_ = NumberField(
       box, {"black", tr("Grey level that is drawn black (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
@@ -72,59 +58,31 @@ QWidget* ViewPanel::SliceControls()
   return box;
 }
 
-QCheckBox* ViewPanel::Check(const char* name, const QString& label, const QString& help, bool VolumeLook::*field)
-{
-  auto* box = new QCheckBox(label, this);
-  box->setObjectName(name);
-  box->setToolTip(help);
-  connect(box, &QCheckBox::toggled, this, [this, field](bool on) {
-    VolumeLook look = bench_->Volume();
-    look.*field = on;
-    bench_->SetVolume(look);
-  });
-  return box;
-}
-
 QWidget* ViewPanel::VolumeControls()
 {
   auto* box = new QGroupBox(tr("3D view"), this);
   auto* form = new QFormLayout(box);
   form->setContentsMargins(2, 2, 2, 2);
-  const auto set = [this](double VolumeLook::*field) {
-    return [this, field](double value) {
-      VolumeLook look = bench_->Volume();
-      look.*field = value;
-      bench_->SetVolume(look);
-    };
-  };
   style_ = ChoiceField(box, "style", tr("How volumes are drawn in 3D"),
                        {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}},
-                       [this](const QString& word) {
-                         VolumeLook look = bench_->Volume();
-                         look.style = word;
-                         bench_->SetVolume(look);
-                       });
+                       bench_->Setter(&VolumeLook::style));
   downsampling_ = NumberField(
       box,
       {"downsampling", tr("One particle for so many voxels along each axis; more is faster and coarser"), 1.0, 64.0, 0, 1.0, {}},
-      [this](double value) {
-        VolumeLook look = bench_->Volume();
-        look.downsampling = static_cast<int>(value);
-        bench_->SetVolume(look);
-      });
+      bench_->Setter(&VolumeLook::downsampling));
   particleSize_ = NumberField(box, {"particleSize", tr("Size of particles; at 1 they touch"), 0.1, 10.0, 2, 0.1, {}},
-                              set(&VolumeLook::particleSize));
+                              bench_->Setter(&VolumeLook::particleSize));
   opacity_ = NumberField(box, {"volumeOpacity", tr("Opacity; lower values let you see into the volumes"), 0.0, 1.0, 2, 0.05, {}},
-                         set(&VolumeLook::opacity));
-  valueOpacity_ =
-      Check("valueOpacity", tr("Dark is transparent"),
-            tr("Opacity grows with the grey level, so that fluid and shadows are seen through"), &VolumeLook::valueOpacity);
-  minimum_ =
-      NumberField(box, {"minimum", tr("Darker voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}}, set(&VolumeLook::minimum));
-  maximum_ =
-      NumberField(box, {"maximum", tr("Brighter voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}}, set(&VolumeLook::maximum));
-  slices_ =
-      Check("slicesIn3D", tr("Slices in 3D"), tr("Draws the slices with their pictures in the 3D view"), &VolumeLook::slices);
+                         bench_->Setter(&VolumeLook::opacity));
+  valueOpacity_ = CheckField(this, "valueOpacity", tr("Dark is transparent"),
+                             tr("Opacity grows with the grey level, so that fluid and shadows are seen through"),
+                             bench_->Setter(&VolumeLook::valueOpacity));
+  minimum_ = NumberField(box, {"minimum", tr("Darker voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}},
+                         bench_->Setter(&VolumeLook::minimum));
+  maximum_ = NumberField(box, {"maximum", tr("Brighter voxels are hidden in 3D"), -1e6, 1e6, 0, 5.0, {}},
+                         bench_->Setter(&VolumeLook::maximum));
+  slices_ = CheckField(this, "slicesIn3D", tr("Slices in 3D"), tr("Draws the slices with their pictures in the 3D view"),
+                       bench_->Setter(&VolumeLook::slices));
   form->addRow(tr("Drawn as"), style_);
   form->addRow(tr("Downsampling"), downsampling_);
   form->addRow(tr("Particle size"), particleSize_);
@@ -151,11 +109,8 @@ void ViewPanel::ShowLook()
   Show(opacity_, volume.opacity);
   Show(minimum_, volume.minimum);
   Show(maximum_, volume.maximum);
-  const std::pair<QCheckBox*, bool> checks[] = {{valueOpacity_, volume.valueOpacity}, {slices_, volume.slices}};
-  for (const auto& [box, on] : checks) {
-    const QSignalBlocker quiet(box);
-    box->setChecked(on);
-  }
+  Show(valueOpacity_, volume.valueOpacity);
+  Show(slices_, volume.slices);
   for (QWidget* field : {static_cast<QWidget*>(downsampling_), static_cast<QWidget*>(particleSize_)})
     field->setEnabled(volume.style == "points");
   for (QWidget* field : {static_cast<QWidget*>(opacity_), static_cast<QWidget*>(valueOpacity_), static_cast<QWidget*>(minimum_),

@@ -23,7 +23,6 @@ private:
   QWidget* VolumeControls();
   void ShowLook();
   void ShowWindow();
-  QCheckBox* Check(const char* name, const QString& label, const QString& help, bool VolumeLook::*field);
 
   Workbench* bench_;
   QComboBox *shown_, *mode_, *interpolation_, *style_;

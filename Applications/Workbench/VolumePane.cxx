@@ -68,28 +68,17 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
 
   style_ = ChoiceField(this, "volumeStyle", tr("How volumes are drawn in 3D"),
                        {{"points", tr("Particles")}, {"volume", tr("Volume")}, {"outline", tr("Outline")}},
-                       [this](const QString& word) {
-                         VolumeLook look = bench_->Volume();
-                         look.style = word;
-                         bench_->SetVolume(look);
-                       });
-  auto* fit = new QToolButton(this);
-  fit->setObjectName("volumeFit");
-  fit->setText(tr("Fit"));
-  fit->setToolTip(tr("Show everything (F)"));
-  auto* large = new QToolButton(this);
-  large->setObjectName("volumeLarge");
-  large->setText(QString(QChar(0x2922)));
-  large->setToolTip(tr("Make this view large, and back (M, or a double click)"));
+                       bench->Setter(&VolumeLook::style));
+  auto* fit = SmallButton(this, "volumeFit", tr("Fit"), tr("Show everything (F)"));
+  auto* large =
+      SmallButton(this, "volumeLarge", QString(QChar(0x2922)), tr("Make this view large, and back (M, or a double click)"));
   auto* row = new QHBoxLayout;
   row->setContentsMargins(2, 0, 2, 0);
   row->setSpacing(3);
   row->addWidget(style_);
   row->addStretch(1);
-  for (QToolButton* button : {fit, large}) {
-    button->setAutoRaise(true);
-    row->addWidget(button);
-  }
+  row->addWidget(fit);
+  row->addWidget(large);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->setSpacing(1);

@@ -2,13 +2,12 @@
 #include "VolumeReading.h"
 #include "AlgorithmRun.h"
 #include "Core/Base/Error.h"
-#include "Readers/VolumeFile.h"
+#include "Readers/OutputFiles.h"
 #include <new>
 #include <QFileInfo>
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundReader.h>
-#include <vtkUltrasoundVolume.h>
 
 namespace echorama {
 
@@ -41,18 +40,13 @@ std::vector<ReadVolume> ReadVolumes(const QStringList& files, const Progress& pr
 
 QStringList WithoutCompanions(const QStringList& files)
 {
+  std::vector<std::string> paths;
+  for (const QString& file : files)
+    paths.push_back(file.toStdString());
   QStringList volumes;
-  for (const QString& file : files) {
-    bool isCompanion = false;
-    for (const QString& other : files) {
-      const std::string path = other.toStdString();
-      isCompanion |= file.toStdString() == CompanionPath(path, vtkUltrasoundVolume::ValidRegionName());
-      for (const char* array : CompanionArrays)
-        isCompanion |= file.toStdString() == CompanionPath(path, array);
-    }
-    if (!isCompanion)
+  for (const QString& file : files)
+    if (!IsCompanion(file.toStdString(), paths))
       volumes.append(file);
-  }
   return volumes;
 }
 

@@ -8,25 +8,26 @@
 
 namespace echorama {
 
+namespace {
+
+constexpr std::pair<unsigned long, void (Workbench::*)()> Signals[] = {
+    {vtkUltrasoundAlignmentSession::VolumesChangedEvent, &Workbench::VolumesChanged},
+    {vtkUltrasoundAlignmentSession::PosesChangedEvent, &Workbench::PosesChanged},
+    {vtkUltrasoundAlignmentSession::SelectionChangedEvent, &Workbench::SelectionChanged},
+    {vtkUltrasoundAlignmentSession::VoxelsChangedEvent, &Workbench::VoxelsChanged},
+    {vtkUltrasoundAlignmentSession::HistoryChangedEvent, &Workbench::HistoryChanged}};
+
+} // namespace
+
 Workbench::Workbench(Workspace& workspace, QObject* parent) : QObject(parent), workspace_(workspace)
 {
   // Errors are not observed here: what VTK classes report comes through Messages.
-  for (unsigned long event :
-       {vtkUltrasoundAlignmentSession::VolumesChangedEvent, vtkUltrasoundAlignmentSession::PosesChangedEvent,
-        vtkUltrasoundAlignmentSession::SelectionChangedEvent, vtkUltrasoundAlignmentSession::VoxelsChangedEvent,
-        vtkUltrasoundAlignmentSession::HistoryChangedEvent})
+  for (const auto& [event, changed] : Signals)
     observers_.append(Session()->AddObserver(event, this, &Workbench::OnSessionEvent));
   // Either may go before the other.
   workspace_.say = [bench = QPointer<Workbench>(this)](const QString& text, bool isError) {
     if (bench)
       isError ? bench->Warn(text) : bench->Note(text);
-  };
-  workspace_.showErrorVectors = [bench = QPointer<Workbench>(this)](bool shown) {
-    if (!bench)
-      return;
-    VolumeLook look = bench->Volume();
-    look.errorVectors = shown;
-    bench->SetVolume(look);
   };
 }
 
@@ -38,25 +39,9 @@ Workbench::~Workbench()
 
 void Workbench::OnSessionEvent(vtkObject*, unsigned long event, void*)
 {
-  switch (event) {
-  case vtkUltrasoundAlignmentSession::VolumesChangedEvent:
-    emit VolumesChanged();
-    break;
-  case vtkUltrasoundAlignmentSession::PosesChangedEvent:
-    emit PosesChanged();
-    break;
-  case vtkUltrasoundAlignmentSession::SelectionChangedEvent:
-    emit SelectionChanged();
-    break;
-  case vtkUltrasoundAlignmentSession::VoxelsChangedEvent:
-    emit VoxelsChanged();
-    break;
-  case vtkUltrasoundAlignmentSession::HistoryChangedEvent:
-    emit HistoryChanged();
-    break;
-  default:
-    break;
-  }
+  for (const auto& [of, changed] : Signals)
+    if (of == event)
+      emit(this->*changed)();
 }
 
 QVector<int> Workbench::Volumes() const
@@ -105,28 +90,9 @@ void Workbench::SetTool(Tool tool)
   emit ToolChanged();
 }
 
-void Workbench::SetBrush(const BrushSettings& brush)
+void Workbench::SetShown(const Settings& settings)
 {
-  brush_ = brush;
-  emit BrushChanged();
-}
-
-void Workbench::SetSlices(const SliceLook& look)
-{
-  slices_ = look;
-  emit LookChanged();
-}
-
-void Workbench::SetVolume(const VolumeLook& look)
-{
-  volume_ = look;
-  emit LookChanged();
-}
-
-void Workbench::SetHand(const Handling& hand)
-{
-  hand_ = hand;
-  emit HandChanged();
+  std::apply([this](const auto&... parts) { (Set(parts), ...); }, settings);
 }
 
 void Workbench::SetInteracting(bool on)

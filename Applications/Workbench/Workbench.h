@@ -27,7 +27,7 @@ class Workbench : public QObject {
   Q_OBJECT
 
 public:
-  /// What is said in \a workspace goes to the message bar, and its error vectors to the 3D view.
+  /// What is said in \a workspace goes to the message bar.
   explicit Workbench(Workspace& workspace, QObject* parent = nullptr);
   ~Workbench() override;
 
@@ -44,14 +44,33 @@ public:
 
   Tool CurrentTool() const { return tool_; }
   void SetTool(Tool tool);
-  const BrushSettings& Brush() const { return brush_; }
-  void SetBrush(const BrushSettings& brush);
-  const SliceLook& Slices() const { return slices_; }
-  void SetSlices(const SliceLook& look);
-  const VolumeLook& Volume() const { return volume_; }
-  void SetVolume(const VolumeLook& look);
-  const Handling& Hand() const { return hand_; }
-  void SetHand(const Handling& hand);
+  ///@{ How things are shown and handled; whoever changes a part tells the others.
+  const Settings& Shown() const { return settings_; }
+  void SetShown(const Settings& settings);
+  const BrushSettings& Brush() const { return std::get<BrushSettings>(settings_); }
+  const SliceLook& Slices() const { return std::get<SliceLook>(settings_); }
+  const VolumeLook& Volume() const { return std::get<VolumeLook>(settings_); }
+  const Handling& Hand() const { return std::get<Handling>(settings_); }
+  template <class Part>
+  void Set(const Part& part)
+  {
+    std::get<Part>(settings_) = part;
+    Tell(part);
+  }
+  /// One field of one of them.
+  template <class Part, class Value, class Given>
+  void Set(Value Part::*field, const Given& value)
+  {
+    std::get<Part>(settings_).*field = static_cast<Value>(value);
+    Tell(std::get<Part>(settings_));
+  }
+  /// What a control calls with the new value of a field.
+  template <class Part, class Value>
+  auto Setter(Value Part::*field)
+  {
+    return [this, field](const auto& value) { Set(field, value); };
+  }
+  ///@}
 
   /// While something is dragged or painted: views draw coarsely where they must to keep up, and those that are only watching
   /// redraw less often.
@@ -80,16 +99,17 @@ signals:
   void Said(const Message& message);
 
 private:
+  void Tell(const BrushSettings&) { emit BrushChanged(); }
+  void Tell(const SliceLook&) { emit LookChanged(); }
+  void Tell(const VolumeLook&) { emit LookChanged(); }
+  void Tell(const Handling&) { emit HandChanged(); }
   void OnSessionEvent(vtkObject* session, unsigned long event, void* data);
 
   Workspace& workspace_;
   vtkSmartPointer<vtkUltrasoundAlignmentSession> session_ = workspace_.session;
   QVector<unsigned long> observers_;
   Tool tool_ = Tool::Align;
-  BrushSettings brush_;
-  SliceLook slices_;
-  VolumeLook volume_;
-  Handling hand_;
+  Settings settings_;
   bool interacting_ = false;
 };
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama align: where do overlapping volumes belong?
 #include "Commands.h"
-#include "Outputs.h"
-#include "Readers/TransformFile.h"
+#include "Core/Base/Angles.h"
+#include "Core/Geometry/MatrixRows.h"
+#include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
@@ -21,7 +22,7 @@ constexpr const char* DefaultOutput = "poses.json";
 
 struct AlignOptions {
   std::vector<std::string> files, settings;
-  std::string output, poses, apply, start, metric, method;
+  std::string output, poses, apply, start, metric;
   int fixed = 1;
   std::vector<int> held; // from 1
   TrackerOptions tracker;
@@ -46,40 +47,26 @@ Pose PoseOf(vtkUltrasoundAligner* aligner, int volume)
 {
   vtkNew<vtkMatrix4x4> matrix;
   aligner->GetPose(volume, matrix);
-  Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-  return pose;
+  return FromRows<Pose>(matrix->GetData());
 }
 
-// Puts each volume where the tracker says, as seen from the fixed one: with S the sensor's poses and C the calibration, a
-// volume's probe lies at C^-1 S_fixed^-1 S C of the fixed one's (dissertation eq. 4.4).
-void PlaceByTracker(Session& session, const AlignOptions& options, std::vector<LoadedVolume>& volumes)
+// Puts each volume where the tracker says, as seen from the fixed one.
+void PlaceVolumes(Session& session, AlignOptions& options, std::vector<LoadedVolume>& volumes)
 {
-  const TrackedTool tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
-  const TransformGraph graph(ReadTransforms(options.calibration));
-  const NamedTransform* edge = graph.Edge("Volume", tool.from);
-  if (!edge)
-    throw Error(Error::Kind::BadInput, options.calibration + ": it has no VolumeTo" + tool.from + ", which " + tool.name +
-                                           " of " + options.tracker.log + " needs; choose another tool with --tool");
-  if (!IsRotation(edge->matrix.linear()) || edge->status != TransformStatus::Valid)
-    throw Error(Error::Kind::BadInput, options.calibration + ": " + edge->Name() + " is not a rigid, valid pose");
-  Pose volumeToSensor = Pose::Identity();
-  volumeToSensor.matrix() = edge->matrix.matrix();
-  const std::string text = ReadTransformReport(options.calibration);
-  const auto report = nlohmann::ordered_json::parse(text.empty() ? "{}" : text);
-  std::string frame;
-  if (report.is_object() && report.contains("volumeFrame") && report["volumeFrame"].is_string())
-    frame = report["volumeFrame"];
-  const VolumeFrames frames = VolumeFrames::Of(session, volumes, frame);
-  const std::vector<Pose> sensor = SensorPoses(session, options.tracker, tool, volumes);
-  const auto fixed = static_cast<std::size_t>(options.fixed - 1);
+  const ToolTrack tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
+  const VolumeCalibration calibration = ReadVolumeCalibration(options.calibration, tool.from);
+  options.tracker.matching.fixed = static_cast<std::size_t>(options.fixed - 1);
+  const TrackerPlacement placement =
+      PlaceByTracker(tool, TrackedVolumesOf(options.tracker, volumes), calibration, options.tracker.matching);
+  for (const std::string& note : placement.notes)
+    session.Note(note);
+  session.Say("tracker: " + placement.how);
   for (std::size_t i = 0; i < volumes.size(); ++i)
-    if (i != fixed)
-      MoveVolume(volumes[i], frames.toFile[fixed] * volumeToSensor.inverse() * sensor[fixed].inverse() * sensor[i] *
-                                 volumeToSensor * frames.toFile[i].inverse());
+    if (i != options.tracker.matching.fixed)
+      MoveVolume(volumes[i], placement.volumeToWorld[i]);
   session.result["tracker"] = {{"recording", options.tracker.log}, {"tool", tool.name}, {"calibration", options.calibration}};
-  if (edge->errorMm)
-    session.Say("tracker: the calibration states an error of " + Fixed(*edge->errorMm, 2) + " mm");
+  if (calibration.errorMm)
+    session.Say("tracker: the calibration states an error of " + Fixed(*calibration.errorMm, 2) + " mm");
 }
 
 void Align(Session& session, AlignOptions options)
@@ -106,9 +93,6 @@ void Align(Session& session, AlignOptions options)
       throw Error(Error::Kind::InvalidParameter, "--hold: there are only " + std::to_string(options.files.size()) + " volumes");
     aligner->AddHeldVolume(number - 1);
   }
-  if (!options.held.empty() && options.method != "global")
-    throw Error(Error::Kind::InvalidParameter, "--hold: only the method global holds volumes");
-  aligner->SetMethod(options.method.c_str());
   aligner->SetStart(options.start.c_str());
   aligner->SetMetric(options.metric.c_str());
   for (const std::string& setting : options.settings)
@@ -117,7 +101,8 @@ void Align(Session& session, AlignOptions options)
   std::unique_ptr<OutputFolder> folder;
   std::vector<std::string> places;
   if (!options.apply.empty()) {
-    folder = std::make_unique<OutputFolder>(session, options.apply, inputs);
+    folder = std::make_unique<OutputFolder>(options.apply, inputs);
+    session.ShowAs(folder->StageFolder(), options.apply);
     for (const std::string& file : options.files)
       places.push_back(folder->Stage(std::filesystem::path(file).filename().string()));
   }
@@ -125,7 +110,7 @@ void Align(Session& session, AlignOptions options)
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
   ApplyPoses(session, volumes, options.poses);
   if (!options.tracker.log.empty())
-    PlaceByTracker(session, options, volumes);
+    PlaceVolumes(session, options, volumes);
   if (options.trackerOnly) {
     std::vector<VolumePose> poses;
     session.result["output"] = options.output;
@@ -149,14 +134,13 @@ void Align(Session& session, AlignOptions options)
   const auto report = nlohmann::ordered_json::parse(aligner->GetReport());
   session.result["output"] = options.output;
   session.result["fixed"] = options.fixed;
-  session.result["method"] = options.method;
   session.result["volumes"] = nlohmann::ordered_json::array();
   std::vector<VolumePose> poses;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     LoadedVolume& volume = volumes[i];
     const Pose pose = PoseOf(aligner, static_cast<int>(i));
     const ImageGeometry start = volume.geometry.Moved(volume.volumeToWorld);
-    const double degrees = RotationAngle(pose) * 57.29577951308232, mm = (pose * start.Centre() - start.Centre()).norm();
+    const double degrees = RotationAngle(pose) * DegreesPerRadian, mm = (pose * start.Centre() - start.Centre()).norm();
     MoveVolume(volume, pose);
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
     nlohmann::ordered_json entry{{"file", volume.file}, {"turned_degrees", degrees}, {"moved_mm", mm}};
@@ -173,14 +157,12 @@ void Align(Session& session, AlignOptions options)
                                                    Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
                                                    " mm, overlap " + Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
   }
-  if (report.contains("pairs")) {
-    session.result["pairs"] = report["pairs"];
-    for (auto& pair : session.result["pairs"]) { // from 1, as --fixed counts
-      pair["fixed"] = pair["fixed"].get<int>() + 1;
-      pair["moving"] = pair["moving"].get<int>() + 1;
-    }
-    session.result["align_seconds"] = report["seconds"];
+  session.result["pairs"] = report["pairs"];
+  for (auto& pair : session.result["pairs"]) { // from 1, as --fixed counts
+    pair["fixed"] = pair["fixed"].get<int>() + 1;
+    pair["moving"] = pair["moving"].get<int>() + 1;
   }
+  session.result["align_seconds"] = report["seconds"];
   session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
   if (!aligner->GetAllAligned()) {
     session.status = Session::Doubtful;
@@ -207,9 +189,8 @@ Command AlignCommand(CLI::App& program)
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output,
                       std::string("Pose file to write (default: ") + DefaultOutput + ", unless it is there)");
-  options
-      ->add_option("--hold", values->held,
-                   "A volume (from 1) that stays where it is beside the fixed one, for global; again for each")
+  options->add_option("--hold", values->held,
+                      "A volume (from 1) that stays where it is beside the fixed one; again for each")
       ->allow_extra_args(false) // volumes may follow
       ->check(CLI::Range(1, 1000000));
   options->add_option("--poses", values->poses, "Pose file to start from (default: where the volumes say)");
@@ -217,44 +198,28 @@ Command AlignCommand(CLI::App& program)
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   const vtkNew<vtkUltrasoundAligner> defaults;
-  values->method = defaults->GetMethod();
   values->start = defaults->GetStart();
   values->metric = defaults->GetMetric();
   options
-      ->add_option(
-          "--method", values->method,
-          "How poses are found: global correlates over all poses, refines, and tells how sure it is; search goes through six "
-          "dimensions from coarse to fine about the start (the dissertation's)")
-      ->check(CLI::IsMember({"global", "search"}))
-      ->capture_default_str();
-  options
       ->add_option("--start", values->start,
-                   "What is known about where volumes belong, for global: tracked (within 12 degrees and 20 mm), hand-made (35 "
+                   "What is known about where volumes belong: tracked (within 12 degrees and 20 mm), hand-made (35 "
                    "degrees and a third of a volume), unknown (nothing), automatic (one after the other, while unclear)")
       ->check(CLI::IsMember(AlignStartNames()))
       ->capture_default_str();
-  options->add_option("--metric", values->metric, "The likeness that refines poses, for global")
+  options->add_option("--metric", values->metric, "The likeness that refines poses")
       ->check(CLI::IsMember(MetricNames()))
       ->capture_default_str();
-  const AlignSearchParameters search;
   const AlignPairParameters pair;
   options->add_option(
       "--set", values->settings,
-      "A parameter of the method, as NAME=VALUE; again for each. Of global: MinimumOverlap=" + Fixed(pair.minimumOverlap, 1) +
+      "A parameter, as NAME=VALUE; again for each: MinimumOverlap=" + Fixed(pair.minimumOverlap, 1) +
           " (share of the smaller volume, 0.01 to 1), Candidates=" + std::to_string(pair.candidates) +
           " (refined poses, 1 to 1000), FinestMm=0 (the voxels at which it ends; 0: the volumes' own), UseReliability=1 (0 or 1: "
           "shadowed and saturated voxels count less), Points=" +
           std::to_string(pair.points) +
           " (compared on a level, 1000 to 10000000), MinimumSimilarity=" + Fixed(pair.minimumSimilarity, 2) +
           ", MinimumPeakRatio=" + Fixed(pair.minimumPeakRatio, 2) + ", MaximumErrorVoxels=" + Fixed(pair.maximumErrorVoxels, 1) +
-          ", MaximumSplitVoxels=" + Fixed(pair.maximumSplitVoxels, 1) +
-          " (what is trusted), Seed=1. Of search: MinimumOverlap=" + Fixed(search.minimumOverlap, 1) +
-          " (share of a volume that must lie in others, 0.01 to 1), Samples=" + std::to_string(search.samples) +
-          " (along each dimension: 3, 5 or 7), Levels=" + std::to_string(search.levels) + " (1 to 20), FirstStepMm=" +
-          Fixed(search.firstStepMm, 0) + " (up to 1000), FirstStepDegrees=" + Fixed(search.firstStepDegrees, 0) +
-          " (up to 60), Repeats=" + std::to_string(search.repeats) + " (of a level, 0 to 100), Points=" +
-          std::to_string(search.points) + " (compared, 1000 to 10000000), Seed=" + std::to_string(search.seed) +
-          ", Pyramid=" + std::to_string(search.pyramid) + " (0 or 1)");
+          ", MaximumSplitVoxels=" + Fixed(pair.maximumSplitVoxels, 1) + " (what is trusted), Seed=1");
   values->tracker.AddTo(*options, false);
   options->add_option("--calibration", values->calibration,
                       "Calibration of the tracked probe, as echorama calibrate hand-eye writes it");

@@ -3,10 +3,13 @@
 // sensor's frame (dissertation 4.1.2).
 #include "Calibrate.h"
 #include "CalibrationRigFile.h"
-#include "Outputs.h"
+#include "Core/Base/Angles.h"
+#include "Core/Base/JsonPlace.h"
+#include "Core/Geometry/MatrixRows.h"
+#include "Readers/OutputFiles.h"
 #include "Readers/TransformFile.h"
 #include "TrackedVolumes.h"
-#include "Tracking/Calibration/HandEye.h"
+#include "Tracking/Calibration/CalibrationJson.h"
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <filesystem>
@@ -22,7 +25,7 @@ namespace {
 struct HandEyeOptions {
   std::vector<std::string> volumes;
   TrackerOptions tracker;
-  std::string poses, savePoses, output, method = HandEyeMethodName(HandEyeMethod::MaximumLikelihood), start;
+  std::string poses, savePoses, output, start;
   std::vector<double> target;
   PoseNoise sensorNoise, volumeNoise;
   std::string rig = "1", align = "rig";
@@ -69,9 +72,7 @@ std::vector<bool> FindRig(Session& session, const HandEyeOptions& options, std::
       if (last) {
         vtkNew<vtkMatrix4x4> matrix;
         fit->GetRigToWorld(matrix);
-        Pose rigToFile;
-        rigToFile.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-        MoveVolume(volumes[i], rigToFile.inverse());
+        MoveVolume(volumes[i], FromRows<Pose>(matrix->GetData()).inverse());
         report.found.push_back(fit->GetNumberOfFoundBalls());
         report.rmsMm.push_back(fit->GetRmsMm());
         session.Say("  " + volumes[i].file + ": " + std::to_string(fit->GetNumberOfFoundBalls()) + " of " +
@@ -106,47 +107,13 @@ std::vector<bool> AlignContents(Session& session, const HandEyeOptions& options,
     const int number = static_cast<int>(i);
     vtkNew<vtkMatrix4x4> matrix;
     aligner->GetPose(number, matrix);
-    Pose pose;
-    pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-    MoveVolume(volumes[i], pose);
+    MoveVolume(volumes[i], FromRows<Pose>(matrix->GetData()));
     trusted.push_back(aligner->GetVerdict(number) == "aligned");
     if (!trusted.back())
       session.Note(volumes[i].file + ": it is left out: " + aligner->GetVerdict(number) + " (" + aligner->GetReason(number) +
                    ")");
   }
   return trusted;
-}
-
-nlohmann::ordered_json ReportOf(const HandEyeResult& result, const HandEyeOptions& options, const HandEyeParameters& parameters,
-                                const VolumeFrames& frames)
-{
-  nlohmann::ordered_json report;
-  report["kind"] = "hand-eye";
-  report["method"] = options.method;
-  report["volumeFrame"] = frames.Name();
-  report["target"] = JsonOf(parameters.target);
-  report["targetRmsMm"] = result.targetRmsMm;
-  report["targetRadius95Mm"] = result.targetRadius95Mm;
-  report["rmsMm"] = result.rmsMm;
-  report["rmsDegrees"] = result.rmsDegrees;
-  report["inliers"] = result.inliers;
-  report["noise"] = {{"sensorDegrees", parameters.sensorNoise.degrees * result.noiseScale},
-                     {"sensorMm", parameters.sensorNoise.mm * result.noiseScale},
-                     {"volumeDegrees", parameters.volumeNoise.degrees * result.noiseScale},
-                     {"volumeMm", parameters.volumeNoise.mm * result.noiseScale},
-                     {"estimated", result.noiseEstimated}};
-  report["scans"] = nlohmann::ordered_json::array();
-  for (const HandEyeResidual& residual : result.residuals) {
-    nlohmann::ordered_json scan{
-        {"name", residual.name}, {"inlier", residual.inlier}, {"mm", residual.mm}, {"degrees", residual.degrees}};
-    if (!residual.reason.empty())
-      scan["reason"] = residual.reason;
-    report["scans"].push_back(scan);
-  }
-  report["advice"] = nlohmann::ordered_json::array();
-  for (const HandEyeAdvice& advice : result.advice)
-    report["advice"].push_back(advice.text);
-  return report;
 }
 
 void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
@@ -164,18 +131,22 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   }
 
   HandEyeParameters parameters;
-  parameters.method = HandEyeMethodOf(options.method);
   parameters.sensorNoise = options.sensorNoise;
   parameters.volumeNoise = options.volumeNoise;
   parameters.rejectOutliers = !options.keepAll;
 
-  const TrackedTool tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
+  const ToolTrack tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.volumes);
-  const std::vector<Pose> sensor = SensorPoses(session, options.tracker, tool, volumes);
-  const VolumeFrames frames = VolumeFrames::Of(session, volumes);
+  const std::vector<TrackedVolume> tracked = TrackedVolumesOf(options.tracker, volumes);
+  const SensorPoses sensor = MatchSensor(tool, tracked, options.tracker.matching);
+  const VolumeFrames frames = FindVolumeFrames(tracked);
+  for (const auto& notes : {sensor.notes, frames.notes})
+    for (const std::string& note : notes)
+      session.Note(note);
+  session.Say("tracker: " + sensor.how);
   // Where the error counts: the middle of what is seen.
   for (std::size_t i = 0; i < volumes.size(); ++i)
-    parameters.target += frames.toFile[i].inverse() * volumes[i].geometry.Centre() / static_cast<double>(volumes.size());
+    parameters.target += frames.toWorld[i].inverse() * volumes[i].geometry.Centre() / static_cast<double>(volumes.size());
   if (!options.target.empty())
     parameters.target = Eigen::Vector3d(options.target.data());
 
@@ -189,7 +160,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     poses.push_back({volumes[i].file, volumes[i].geometry, volumes[i].volumeToWorld});
     if (trusted[i])
-      pairs.push_back({sensor[i], volumes[i].volumeToWorld * frames.toFile[i], volumes[i].file});
+      pairs.push_back({sensor.poses[i], volumes[i].volumeToWorld * frames.toWorld[i], volumes[i].file});
   }
   constexpr int fewest = 5; // below, residuals say too little about the noise
   parameters.estimateNoise = !options.noiseGiven && pairs.size() >= fewest;
@@ -207,20 +178,21 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   world.from = "World";
   world.to = tool.to;
   world.matrix = result.solution.worldToTracker;
-  nlohmann::ordered_json report = ReportOf(result, options, parameters, frames);
+  nlohmann::ordered_json report = ToJson(result, parameters);
+  report["volume_frame"] = frames.Name();
   if (rig.depthScale > 0.0)
     report["rig"] = {{"rig", options.rig},
-                     {"depthScale", rig.depthScale},
-                     {"depthScaleError", rig.depthScaleError},
+                     {"depth_scale", rig.depthScale},
+                     {"depth_scale_error", rig.depthScaleError},
                      {"balls", rig.found},
-                     {"rmsMm", rig.rmsMm}};
+                     {"rms_mm", rig.rmsMm}};
   session.result["output"] = options.output;
   session.result[calibration.Name()] = JsonOf(result.solution.volumeToSensor);
   session.result[world.Name()] = JsonOf(result.solution.worldToTracker);
   session.result["report"] = report;
   const Eigen::Vector3d offset = result.solution.volumeToSensor.translation();
   session.Say(calibration.Name() + ": " + Triple(offset, ", ", 2) + " mm, turned by " +
-              Fixed(RotationAngle(result.solution.volumeToSensor) * 57.29577951308232, 2) + " degrees, from " +
+              Fixed(RotationAngle(result.solution.volumeToSensor) * DegreesPerRadian, 2) + " degrees, from " +
               std::to_string(result.inliers) + " of " + std::to_string(options.volumes.size()) + " scans");
   session.Say("error at the middle of the volume: " + Fixed(result.targetRmsMm, 2) + " mm RMS, within " +
               Fixed(result.targetRadius95Mm, 2) + " mm with 95%" + (result.noiseEstimated ? " (noise from the residuals)" : ""));
@@ -233,7 +205,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
     session.status = Session::Doubtful;
     session.Note("more than half of the scans could not be used: check the calibration before using it");
   }
-  WriteTransforms(options.output, {calibration, world}, report.dump());
+  WriteTransforms(options.output, {calibration, world}, JsonPlace::Print(report));
   if (!options.savePoses.empty())
     WritePoses(options.savePoses, poses);
   session.Say("wrote " + options.output);
@@ -273,9 +245,6 @@ Command CalibrateHandEyeCommand(CLI::App& calibrate)
       ->add_option("--start", values->start,
                    "What is known about where the volumes belong, for --align contents; as for echorama align")
       ->check(CLI::IsMember(AlignStartNames()))
-      ->capture_default_str();
-  options->add_option("--method", values->method, "How the calibration is solved")
-      ->check(CLI::IsMember(HandEyeMethodNames()))
       ->capture_default_str();
   options
       ->add_option("--target", values->target,

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama calibrate pivot: where the tip of a tracked tool is, from turning it about the tip.
 #include "Calibrate.h"
-#include "Outputs.h"
+#include "Core/Base/JsonPlace.h"
+#include "Readers/OutputFiles.h"
 #include "Readers/TransformFile.h"
 #include "TrackedVolumes.h"
-#include "Tracking/Calibration/PivotCalibration.h"
+#include "Tracking/Calibration/CalibrationJson.h"
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <memory>
@@ -22,11 +23,11 @@ struct PivotOptions {
 void CalibrateTip(Session& session, const PivotOptions& options)
 {
   CheckOutput(options.output, {options.log});
-  const TrackedTool tool = ReadTool(session, options.log, options.tool, options.unitMm);
+  const ToolTrack tool = ReadTool(session, options.log, options.tool, options.unitMm);
   std::vector<TimedPose> poses;
-  for (const ToolPose& pose : tool.poses)
+  for (const TimedPose& pose : tool.poses)
     if (!(pose.time < options.from) && !(pose.time > options.to))
-      poses.push_back({pose.time, pose.pose});
+      poses.push_back(pose);
   PivotParameters parameters;
   parameters.rejectOutliers = !options.keepAll;
   if (!options.noise.empty()) {
@@ -43,27 +44,14 @@ void CalibrateTip(Session& session, const PivotOptions& options)
   tip.to = tool.from;
   tip.matrix = Eigen::Translation3d(result.tip);
   tip.errorMm = result.tipRmsMm;
-  nlohmann::ordered_json report;
-  report["kind"] = "pivot";
-  report["tip"] = JsonOf(result.tip);
-  report["pivot"] = JsonOf(result.pivot);
-  report["tipRmsMm"] = result.tipRmsMm;
-  report["tipRadius95Mm"] = result.tipRadius95Mm;
-  report["rmsMm"] = result.rmsMm;
-  report["poses"] = poses.size();
-  report["inliers"] = result.inliers;
-  report["swingDegrees"] = JsonOf(result.swingDegrees);
-  report["leastSquaresTip"] = JsonOf(result.algebraicTip);
-  if (result.sphere.known)
-    report["sphere"] = {
-        {"radiusMm", result.sphere.radiusMm}, {"radiusErrorMm", result.sphere.radiusErrorMm}, {"rmsMm", result.sphere.rmsMm}};
+  const nlohmann::ordered_json report = ToJson(result, tool.name);
   session.result["output"] = options.output;
   session.result["report"] = report;
   session.Say(tip.Name() + ": " + Triple(result.tip, ", ", 2) + " mm, from " + std::to_string(result.inliers) + " of " +
               std::to_string(poses.size()) + " poses");
   session.Say("error of the tip: " + Fixed(result.tipRmsMm, 3) + " mm RMS, within " + Fixed(result.tipRadius95Mm, 3) +
               " mm with 95%; poses place it " + Fixed(result.rmsMm, 2) + " mm (RMS) from the fixed point");
-  WriteTransforms(options.output, {tip}, report.dump());
+  WriteTransforms(options.output, {tip}, JsonPlace::Print(report));
   session.Say("wrote " + options.output);
 }
 

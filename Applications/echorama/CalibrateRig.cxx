@@ -2,10 +2,10 @@
 // echorama calibrate rig: the rig of balls and the clip for the sensor, for a 3D printer, and scenes of the same rigs.
 #include "Calibrate.h"
 #include "Core/Base/NumberText.h"
-#include "Outputs.h"
+#include "Core/Base/TextFile.h"
+#include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
-#include <fstream>
 #include <memory>
 #include <vtkNew.h>
 #include <vtkPolyData.h>
@@ -60,7 +60,8 @@ nlohmann::ordered_json SceneOf(const CalibrationRigParameters& rig, const std::s
 
 void MakeRig(Session& session, const RigOptions& options)
 {
-  OutputFolder folder(session, options.folder, {});
+  OutputFolder folder(options.folder, {});
+  session.ShowAs(folder.StageFolder(), options.folder);
   session.result["output"] = options.folder;
   session.result["rigs"] = nlohmann::ordered_json::array();
   for (const double scale : options.scales) {
@@ -74,7 +75,7 @@ void MakeRig(Session& session, const RigOptions& options)
     rig.scale = scale;
     rig.waterCelsius = options.waterCelsius;
     rig.plateDepthMm = std::min(rig.plateDepthMm * std::max(scale, 0.5), 490.0); // so that a small rig is near the probe
-    WriteText(folder.Stage(name + ".json"), SceneOf(rig, name).dump(2) + "\n");
+    WriteTextFile(folder.Stage(name + ".json"), SceneOf(rig, name).dump(2) + "\n");
     std::string table = "label,x,y,z,radius\n"; // in the world of the scene
     const std::vector<Landmark> centres = CalibrationLandmarks(rig);
     for (std::size_t i = 0; i < centres.size(); ++i) {
@@ -82,7 +83,7 @@ void MakeRig(Session& session, const RigOptions& options)
       table += centres[i].label + "," + NumberText(p.x()) + "," + NumberText(p.y()) + "," + NumberText(p.z()) + "," +
                NumberText(scale * rig.balls[i].radius) + "\n";
     }
-    WriteText(folder.Stage(name + ".csv"), table);
+    WriteTextFile(folder.Stage(name + ".csv"), table);
     session.result["rigs"].push_back(
         {{"scale", scale}, {"stl", name + ".stl"}, {"scene", name + ".json"}, {"balls", name + ".csv"}});
   }

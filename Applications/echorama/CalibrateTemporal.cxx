@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama calibrate temporal: the offset between the clocks of two recordings of one motion.
 #include "Calibrate.h"
-#include "Core/Base/FileReplacement.h"
-#include "Outputs.h"
+#include "Core/Base/JsonPlace.h"
+#include "Core/Base/TextFile.h"
+#include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
-#include "Tracking/Calibration/TemporalCalibration.h"
+#include "Tracking/Calibration/CalibrationJson.h"
 #include <CLI/Validators.hpp>
-#include <fstream>
 #include <memory>
 
 namespace echorama {
@@ -18,14 +18,6 @@ struct TemporalOptions {
   TemporalParameters parameters;
 };
 
-std::vector<TimedPose> PosesOf(const TrackedTool& tool)
-{
-  std::vector<TimedPose> poses;
-  for (const ToolPose& pose : tool.poses)
-    poses.push_back({pose.time, pose.pose});
-  return poses;
-}
-
 void CalibrateClocks(Session& session, TemporalOptions options)
 {
   if (!options.output.empty())
@@ -33,36 +25,24 @@ void CalibrateClocks(Session& session, TemporalOptions options)
   options.parameters.signal = options.signal == "rotation"      ? SpeedSignal::Rotation
                               : options.signal == "translation" ? SpeedSignal::Translation
                                                                 : SpeedSignal::Automatic;
-  const TrackedTool first = ReadTool(session, options.first, options.firstTool, options.unitMm);
-  const TrackedTool second = ReadTool(session, options.second, options.secondTool, options.unitMm);
+  const ToolTrack first = ReadTool(session, options.first, options.firstTool, options.unitMm);
+  const ToolTrack second = ReadTool(session, options.second, options.secondTool, options.unitMm);
   TemporalResult result;
   session.Work("calibrate", "", [&](const Progress& progress) {
-    result = CalibrateTime(PosesOf(first), PosesOf(second), options.parameters, progress);
+    result = CalibrateTime(first.poses, second.poses, options.parameters, progress);
   });
   for (const std::string& note : result.notes)
     session.Note(note);
-  session.result["kind"] = "temporal";
-  session.result["offset_seconds"] = result.offsetSeconds;
-  session.result["standard_error_seconds"] = result.standardErrorSeconds;
-  session.result["signal"] = result.signal == SpeedSignal::Rotation ? "rotation" : "translation";
-  session.result["correlation"] = result.correlation;
-  session.result["confidence"] = result.confidence;
-  session.result["overlap_seconds"] = result.overlapSeconds;
-  session.result["drift_ppm"] = result.driftPpm;
-  session.result["drift_error_ppm"] = result.driftErrorPpm;
+  const nlohmann::ordered_json report = ToJson(result, first.name, second.name);
+  session.result = report;
+  session.result.erase("correlation_by_offset"); // thousands of lines, for a plot; in the file
   session.Say("offset: " + Fixed(1e3 * result.offsetSeconds, 2) + " ms (standard error " +
               Fixed(1e3 * result.standardErrorSeconds, 2) + " ms) to be added to the times of " + options.second + " " +
               second.name);
   session.Say("from speeds of " + session.result["signal"].get<std::string>() + ", correlation " + Fixed(result.correlation, 3) +
               ", over " + Fixed(result.overlapSeconds, 1) + " s");
   if (!options.output.empty()) {
-    FileReplacement files;
-    std::ofstream stream(files.Stage(options.output));
-    stream << session.result.dump(2) << '\n';
-    stream.close();
-    if (!stream)
-      throw Error(Error::Kind::FileSystem, options.output + ": it cannot be written (is the disk full?)");
-    files.Commit();
+    WriteTextFile(options.output, JsonPlace::Print(report) + "\n");
     session.Say("wrote " + options.output);
   }
 }

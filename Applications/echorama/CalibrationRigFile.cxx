@@ -3,7 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
-#include "Filters/Synthesis/CalibrationRig.h"
+#include "Filters/Phantoms/CalibrationRig.h"
 #include "Readers/CsvLine.h"
 #include <algorithm>
 #include <sstream>

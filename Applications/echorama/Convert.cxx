@@ -2,9 +2,10 @@
 // echorama convert: from one file format to another. Volumes go through VTK's reader and writer; sequences go frame by frame from
 // kernel to kernel, so that they need no memory; transforms become our JSON.
 #include "Commands.h"
-#include "Files.h"
-#include "Outputs.h"
+#include "FrameList.h"
+#include "Readers/FileKind.h"
 #include "Readers/ImageHeader.h"
+#include "Readers/OutputFiles.h"
 #include "Readers/SequenceWriter.h"
 #include "Readers/TransformFile.h"
 #include "Volumes.h"

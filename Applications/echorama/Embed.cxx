@@ -2,7 +2,7 @@
 // echorama embed: a stitched volume in a background of noise, as one scan of a real machine.
 #include "Commands.h"
 #include "Filters/Embedding/Feather.h"
-#include "Outputs.h"
+#include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <algorithm>
 #include <array>

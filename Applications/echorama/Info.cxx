@@ -2,8 +2,9 @@
 // echorama info: what a file holds.
 #include "Info.h"
 #include "Commands.h"
+#include "Core/Base/Angles.h"
 #include "Core/Geometry/PoseFile.h"
-#include "Files.h"
+#include "Readers/FileKind.h"
 #include "Readers/TransformFile.h"
 #include "Volumes.h"
 #include <memory>
@@ -56,7 +57,7 @@ Json DescribePoses(Session& session, const std::string& file)
 {
   Json json{{"file", file}, {"poses", Json::array()}};
   for (const VolumePose& pose : ReadPoses(file)) {
-    const double degrees = RotationAngle(pose.volumeToWorld) * 57.29577951308232;
+    const double degrees = RotationAngle(pose.volumeToWorld) * DegreesPerRadian;
     json["poses"].push_back({{"file", pose.file}, {"rotation_degrees", degrees}, {"VolumeToWorld", JsonOf(pose.volumeToWorld)}});
     session.Say("  " + pose.file + ": turned by " + Fixed(degrees, 3) + " degrees, translation " +
                 Triple(pose.volumeToWorld.translation(), ", ", 3) + " mm");

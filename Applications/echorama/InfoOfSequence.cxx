@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama info of a tracked sequence: its header alone is read.
-#include "Files.h"
+#include "Core/Base/Angles.h"
 #include "Info.h"
+#include "Readers/FileKind.h"
 #include "Readers/SequenceFile.h"
 #include "Volumes.h"
 #include <algorithm>
@@ -119,7 +120,7 @@ Json DescribeSequence(Session& session, const std::string& file)
     }
     if (track.valid > 0) {
       const double mm = track.places.diagonal().norm();
-      const double degrees = track.radians * 57.29577951308232;
+      const double degrees = track.radians * DegreesPerRadian;
       one["moves_mm"] = mm;
       one["turns_degrees"] = degrees;
       line += "; moves within " + Fixed(mm, 1) + " mm, turns by up to " + Fixed(degrees, 1) + " degrees";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama info of a volume, of any format.
-#include "Files.h"
 #include "Info.h"
+#include "Readers/FileKind.h"
 #include "Readers/VolumeSource.h"
 #include "Volumes.h"
 #include <limits>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Filters/Synthesis/SurfaceCheck.h"
+#include "Filters/Tissue/SurfaceCheck.h"
 #include <string>
 
 namespace echorama {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama motion: a recorded motion, smoothed and resampled, as a path for a probe (dissertation 3.2).
 #include "Commands.h"
-#include "Core/Geometry/MotionPath.h"
-#include "Outputs.h"
+#include "Readers/OutputFiles.h"
 #include "Readers/SequenceWriter.h"
 #include "TrackedVolumes.h"
 #include <algorithm>
@@ -24,19 +23,10 @@ void ResampleMotion(Session& session, const MotionOptions& options)
   CheckOutput(options.output, {options.log});
   if (!NamesSequence(options.output))
     throw Error(Error::Kind::InvalidParameter, options.output + ": a sequence ends in .igs.mha or .seq.mha");
-  const TrackedTool tool = ReadTool(session, options.log, options.tool, options.unitMm);
-  std::vector<TimedPose> recorded;
-  for (const ToolPose& pose : tool.poses)
-    if (recorded.empty() || pose.time > recorded.back().time)
-      recorded.push_back({pose.time, pose.pose});
+  const ToolTrack tool = ReadTool(session, options.log, options.tool, options.unitMm);
   std::unique_ptr<MotionPath> path;
-  session.Work("smooth", "", [&](const Progress& progress) {
-    try {
-      path = std::make_unique<MotionPath>(recorded, options.smoothing, progress);
-    } catch (const Error& error) {
-      throw Error(error.GetKind(), options.log + ": " + error.what());
-    }
-  });
+  session.Work("smooth", "",
+               [&](const Progress& progress) { path = std::make_unique<MotionPath>(tool.Path(options.smoothing, progress)); });
   const double first = std::isnan(options.from) ? path->FirstTime() : std::max(options.from, path->FirstTime());
   const double last = std::isnan(options.to) ? path->LastTime() : std::min(options.to, path->LastTime());
   if (!(last >= first))

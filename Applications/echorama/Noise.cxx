@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama noise: what an ultrasound machine shows of nothing, in the fan of a probe.
 #include "Commands.h"
-#include "Core/Base/NumberText.h"
-#include "Outputs.h"
+#include "ParameterOptions.h"
+#include "Readers/OutputFiles.h"
 #include "Volumes.h"
-#include <CLI/Validators.hpp>
 #include <memory>
 #include <optional>
 #include <vtkImageData.h>
@@ -16,9 +15,7 @@ namespace echorama {
 namespace {
 
 struct NoiseOptions {
-  std::string output, match, form, kind = "beams", intensity = "log";
-  std::uint64_t seed = 1;
-  bool onGrid = false, floats = false;
+  std::string output, match, form;
 };
 
 // Options whose defaults are those of the filter, by which they are set.
@@ -31,16 +28,8 @@ void MakeNoise(Session& session, const NoiseOptions& options, vtkUltrasoundNoise
     if (!file->empty())
       inputs.push_back(*file);
   CheckVolumeOutput(options.output, inputs);
-  if (options.onGrid && inputs.empty())
+  if (source->GetOnInputGrid() && inputs.empty())
     throw Error(Error::Kind::InvalidParameter, "--on-grid takes the grid of --form or --match, and neither is given");
-  source->SetKind(options.kind == "white"    ? vtkUltrasoundNoiseSource::WHITE
-                  : options.kind == "perlin" ? vtkUltrasoundNoiseSource::PERLIN
-                                             : vtkUltrasoundNoiseSource::BEAMS);
-  source->SetIntensityModel(options.intensity == "rayleigh" ? vtkUltrasoundNoiseSource::RAYLEIGH
-                                                            : vtkUltrasoundNoiseSource::LOG_COMPRESSED);
-  source->SetSeed(static_cast<vtkTypeInt64>(options.seed));
-  source->SetOnInputGrid(options.onGrid);
-  source->SetFloatOutput(options.floats);
   std::optional<LoadedVolume> form, match;
   if (!options.form.empty()) {
     form = LoadVolume(session, options.form);
@@ -65,9 +54,9 @@ void MakeNoise(Session& session, const NoiseOptions& options, vtkUltrasoundNoise
   session.Say("probe    " + ProbeText(probe));
   session.result["ProbeGeometry"] = JsonOf(probe);
   session.result["ProbeToWorld"] = JsonOf(vtkUltrasoundAcquisition::ProbeToWorldOf(noise).value());
-  session.result["seed"] = options.seed;
-  session.result["kind"] = options.kind;
-  if (options.kind == "beams") {
+  session.result["seed"] = source->GetSeed();
+  session.result["kind"] = source->GetKindAsString();
+  if (source->GetKind() == vtkUltrasoundNoiseSource::BEAMS) {
     const int* counts = source->GetMadeCounts();
     const double* lengths = source->GetMadeCorrelation();
     session.Say("beams    " + std::to_string(counts[0]) + " samples, " + std::to_string(counts[1]) + " elements, " +
@@ -102,48 +91,15 @@ Command NoiseCommand(CLI::App& program)
   options->add_option("--match", values->match, "Volume whose grain and intensities the noise shall have");
   options->add_option("--form", values->form,
                       "Volume whose fan the noise shall fill (else that of --match, else the options below)");
-  options->add_flag("--on-grid", values->onGrid, "On the grid of the volume that gives the fan");
-  options->add_option("--seed", values->seed, "Seed")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62))
-      ->capture_default_str();
-  options->add_option("--kind", values->kind, "Noise along beams; the others are there to compare with")
-      ->check(CLI::IsMember({"beams", "white", "perlin"}))
-      ->capture_default_str();
-  options->add_option("--intensity", values->intensity, "Distribution of the intensities, without --match")
-      ->check(CLI::IsMember({"log", "rayleigh"}))
-      ->capture_default_str();
-  options->add_flag("--float", values->floats, "Write float, neither rounded nor cut");
-
-  const auto number = [options](const std::string& name, const std::string& text, double low, double high, double preset,
-                                const std::function<void(double)>& set) {
-    options->add_option_function<double>(name, set, text + " [" + NumberText(preset) + "]")->check(CLI::Range(low, high));
-  };
-  vtkUltrasoundNoiseSource* s = source;
-  const std::string automatic = "; 0: three to each length of the grain";
-  number("--samples", "Samples along a beam" + automatic, 0, 100000, 0,
-         [source](double n) { source->SetSamples(static_cast<int>(n)); });
-  number("--elements", "Beams across the fan" + automatic, 0, 100000, 0,
-         [source](double n) { source->SetElements(static_cast<int>(n)); });
-  number("--steps", "Planes of the sweep" + automatic, 0, 100000, 0,
-         [source](double n) { source->SetSteps(static_cast<int>(n)); });
-  number("--depth-correlation", "Size of the grain along the depth, mm", 0, 1000, s->GetDepthCorrelationMm(),
-         [source](double n) { source->SetDepthCorrelationMm(n); });
-  number("--fan-correlation", "Size of the grain across the fan, whole fans", 0, 0.25, s->GetFanCorrelation(),
-         [source](double n) { source->SetFanCorrelation(n); });
-  number("--sweep-correlation", "Size of the grain along the sweep, whole sweeps", 0, 0.25, s->GetSweepCorrelation(),
-         [source](double n) { source->SetSweepCorrelation(n); });
-  number("--mean", "Mean intensity", 1e-6, 1e6, s->GetMean(), [source](double n) { source->SetMean(n); });
-  number("--window", "What is smooth over so many mm of --match is no grain", 0.01, 1000, s->GetWindowMm(),
-         [source](double n) { source->SetWindowMm(n); });
-  number("--spacing", "Edge of the voxels, mm", 0.01, 100, s->GetSpacingMm(), [source](double n) { source->SetSpacingMm(n); });
-  number("--fan-angle", "Fan, degrees", 0, 359.9, s->GetFanAngle(), [source](double n) { source->SetFanAngle(n); });
-  number("--fan-width", "Length of the array's arc, mm", 0, 10000, s->GetFanWidth(),
-         [source](double n) { source->SetFanWidth(n); });
-  number("--sweep-angle", "Sweep, degrees", 0, 359.9, s->GetSweepAngle(), [source](double n) { source->SetSweepAngle(n); });
-  number("--sweep-width", "Length of the arc that the array travels, mm", 0, 10000, s->GetSweepWidth(),
-         [source](double n) { source->SetSweepWidth(n); });
-  number("--depth-min", "First depth, mm", -1000, 10000, s->GetDepthMin(), [source](double n) { source->SetDepthMin(n); });
-  number("--depth-max", "Last depth, mm", -1000, 10000, s->GetDepthMax(), [source](double n) { source->SetDepthMax(n); });
+  AddParameter(options, source, "OnInputGrid", "--on-grid");
+  AddParameters(options, source, {"Seed", "Kind"});
+  AddParameter(options, source, "IntensityModel", "--intensity");
+  AddParameter(options, source, "FloatOutput", "--float");
+  AddParameters(options, source, {"Mean", "Samples", "Elements", "Steps", "FanCorrelation", "SweepCorrelation"});
+  AddParameter(options, source, "DepthCorrelationMm", "--depth-correlation");
+  AddParameter(options, source, "WindowMm", "--window");
+  AddParameter(options, source, "SpacingMm", "--spacing");
+  AddParameters(options, source, {"FanAngle", "FanWidth", "SweepAngle", "SweepWidth", "DepthMin", "DepthMax"});
   return {options, [values, source](Session& session) { MakeNoise(session, *values, source); }};
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama phantom: volumes of an invented body, knocked out of place by a known amount.
 #include "Commands.h"
-#include "Filters/Synthesis/PhantomViews.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "SyntheticSet.h"
 #include <CLI/Validators.hpp>
 #include <memory>
@@ -35,7 +35,8 @@ void Phantom(Session& session, const PhantomOptions& options)
   source->SetDecorrelation(options.decorrelation);
   source->SetNoiseDb(options.noiseDb);
 
-  OutputFolder folder(session, options.folder, {});
+  OutputFolder folder(options.folder, {});
+  session.ShowAs(folder.StageFolder(), options.folder);
   session.result["folder"] = options.folder;
   SyntheticSet set(session, folder, options.format, {options.knockMm, options.knockDegrees, options.seed});
   for (std::size_t i = 0; i < views.size(); ++i) {

@@ -4,7 +4,7 @@
 #include "Commands.h"
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
-#include "Outputs.h"
+#include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <algorithm>
 #include <CLI/Validators.hpp>

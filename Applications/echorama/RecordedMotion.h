@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Geometry/MotionPath.h"
-#include "Filters/Synthesis/SynthesisScene.h"
+#include "Filters/Acoustics/SynthesisScene.h"
 #include <string>
 #include <vector>
 

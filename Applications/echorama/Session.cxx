@@ -3,6 +3,7 @@
 // takes its place, so that a user sees one sentence: the first error with a reason that was reported while a stage ran. Errors
 // after it are complaints about it.
 #include "Session.h"
+#include "Core/Base/JsonPlace.h"
 #include "Core/Base/Utf8.h"
 #include "Core/Base/VtkMessage.h"
 
@@ -83,10 +84,22 @@ void InstallSignalHandlers()
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-// Bytes of files that are not UTF-8 are replaced. Control characters are escaped, also those that JSON would allow.
-std::string TextOf(const nlohmann::ordered_json& object)
+// Whole numbers as such: a number of bytes that was computed is 10167620, not 10167620.0.
+void MakeWhole(nlohmann::ordered_json& value)
 {
-  const std::string text = object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  if (value.is_structured())
+    for (nlohmann::ordered_json& each : value)
+      MakeWhole(each);
+  else if (value.is_number_float() && std::fabs(value.get<double>()) < 9e15 &&
+           value.get<double>() == std::floor(value.get<double>()))
+    value = static_cast<std::int64_t>(value.get<double>());
+}
+
+// Bytes of files that are not UTF-8 are replaced. Control characters are escaped, also those that JSON would allow.
+std::string TextOf(nlohmann::ordered_json object)
+{
+  MakeWhole(object);
+  const std::string text = echorama::JsonPlace::Print(object);
   std::string safe;
   safe.reserve(text.size());
   for (std::size_t i = 0; i < text.size(); ++i) {

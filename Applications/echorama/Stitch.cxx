@@ -2,8 +2,8 @@
 // echorama stitch: many volumes become one. What fits into the allowed memory is made whole; larger results are made and written
 // slab by slab.
 #include "Commands.h"
-#include "Outputs.h"
 #include "Readers/ImageHeader.h"
+#include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
 #include <memory>

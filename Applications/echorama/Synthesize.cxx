@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama synthesize: overlapping volumes of a scene, from several poses of a probe, with everything that is known of them.
 #include "Commands.h"
-#include "Filters/Synthesis/PhantomViews.h"
-#include "Filters/Synthesis/SceneTissue.h"
+#include "Core/Base/TextFile.h"
+#include "Filters/Acoustics/SceneTissue.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "Meshes.h"
 #include "RecordedMotion.h"
 #include "SyntheticSet.h"
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <CLI/Validators.hpp>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <vtkImageData.h>
 #include <vtkNew.h>
@@ -129,7 +129,8 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
   if (auto* recording = std::get_if<SceneRecording>(&scene.views))
     resolve(recording->file);
   scene.dataFolder.clear();
-  OutputFolder folder(session, options.folder, inputs);
+  OutputFolder folder(options.folder, inputs);
+  session.ShowAs(folder.StageFolder(), options.folder);
   session.result["folder"] = options.folder;
   vtkNew<vtkPolyData> tissue;
   std::vector<std::string> notes;
@@ -139,7 +140,7 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
     session.Note(note);
   session.result["triangles"] = tissue->GetNumberOfPolys();
   session.result["seed"] = scene.seed;
-  WriteText(folder.Stage("scene.json"), SceneToJson(scene) + "\n");
+  WriteTextFile(folder.Stage("scene.json"), SceneToJson(scene) + "\n");
   WriteTissue(session, tissue, folder.Stage("geometry.vtp"));
 
   vtkNew<vtkUltrasoundSynthesizer> synthesizer;

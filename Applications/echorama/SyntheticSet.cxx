@@ -2,12 +2,12 @@
 #include "SyntheticSet.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Random.h"
-#include "Filters/Registration/ValidPoints.h"
-#include "Filters/Synthesis/Phantom.h"
-#include "Filters/Synthesis/PhantomViews.h"
+#include "Core/Base/TextFile.h"
+#include "Core/Imaging/ValidPoints.h"
+#include "Filters/Phantoms/Phantom.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "Volumes.h"
 #include <algorithm>
-#include <fstream>
 #include <vtkImageData.h>
 #include <vtkUltrasoundVolume.h>
 
@@ -53,18 +53,14 @@ Pose SyntheticSet::Add(vtkImageData* image, const nlohmann::ordered_json& more, 
   told["VolumeToWorld"] = JsonOf(knock.inverse());
   session_.Say("wrote " + folder_.Final(name));
   if (!places.empty()) {
-    const std::string list = "landmarks_" + number + ".csv", path = folder_.Stage(list);
-    std::ofstream stream(path);
-    stream << "label,x,y,z\n";
+    const std::string list = "landmarks_" + number + ".csv";
+    std::string text = "label,x,y,z\n";
     for (const Landmark& place : places)
       if (const auto seen = seenAt(place.position)) {
         const Eigen::Vector3d point = knock * *seen;
-        stream << place.label << ',' << NumberText(point.x()) << ',' << NumberText(point.y()) << ',' << NumberText(point.z())
-               << '\n';
+        text += place.label + ',' + NumberText(point.x()) + ',' + NumberText(point.y()) + ',' + NumberText(point.z()) + '\n';
       }
-    stream.close();
-    if (!stream)
-      throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+    WriteTextFile(folder_.Stage(list), text);
     told["landmarks"] = folder_.Final(list);
   }
   session_.result["volumes"].push_back(told);

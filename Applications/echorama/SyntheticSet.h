@@ -3,7 +3,8 @@
 #include "Core/Geometry/Landmark.h"
 #include "Core/Geometry/PoseFile.h"
 #include "Core/Geometry/ProbeGeometry.h"
-#include "Outputs.h"
+#include "Readers/OutputFiles.h"
+#include "Session.h"
 #include <cstdint>
 #include <functional>
 #include <optional>

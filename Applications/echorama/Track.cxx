@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama track: a tracker, live, replayed or simulated: what it sees, recorded, and passed on over OpenIGTLink.
 #include "Commands.h"
-#include "Outputs.h"
+#include "Readers/OutputFiles.h"
 #include "Readers/TransformFile.h"
 #include "Tracking/Devices/OpenIgtLinkServer.h"
 #include "Tracking/Devices/TrackerAddress.h"
@@ -58,9 +58,7 @@ void ShowNow(const TrackOptions& options, const PoseStream& poses, const LiveTra
 
 void Report(Session& session, const StreamStatistics& statistics)
 {
-  const auto report = nlohmann::ordered_json::parse(StreamReport(statistics));
-  for (const auto& [key, value] : report.items())
-    session.result[key] = value;
+  session.result.update(ToJson(statistics));
   for (const ToolStatistics& tool : statistics.tools)
     session.Say(tool.name + ": " + std::to_string(tool.valid) + " poses, " + Fixed(tool.rateHz, 1) + " Hz, jitter " +
                 Fixed(1e3 * tool.jitterSeconds, 2) + " ms, " + Fixed(100.0 * tool.DropoutShare(), 1) +

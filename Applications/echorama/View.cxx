@@ -1,39 +1,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// echorama view: three planes through the volumes, and a volume rendering.
+// echorama view: three slice views and a 3D view of the volumes.
 //
-// The planes are parallel to the axes of the first volume, so a volume that lies obliquely is seen along its own axes, and
+// The slices are parallel to the axes of the first volume, so a volume that lies obliquely is seen along its own axes, and
 // all volumes are cut by the same planes of the world, which is what shows whether they fit.
 #include "Commands.h"
 #include "Core/Base/FileReplacement.h"
+#include "Core/Base/Percentile.h"
+#include "Core/Imaging/Sampling.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "Display.h"
-#include "Outputs.h"
-#include "ShownVolumes.h"
+#include "Filters/Embedding/Feather.h"
+#include "Readers/OutputFiles.h"
+#include "Volumes.h"
+#include <array>
 #include <CLI/Validators.hpp>
 #include <filesystem>
 #include <memory>
-#include <vtkActor.h>
-#include <vtkCallbackCommand.h>
 #include <vtkCamera.h>
-#include <vtkCellArray.h>
-#include <vtkColorTransferFunction.h>
-#include <vtkImageSlice.h>
-#include <vtkImageSliceMapper.h>
+#include <vtkCoordinate.h>
 #include <vtkInteractorStyleTrackballCamera.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
-#include <vtkPiecewiseFunction.h>
 #include <vtkPNGWriter.h>
-#include <vtkPolyData.h>
-#include <vtkPolyDataMapper.h>
-#include <vtkProperty.h>
+#include <vtkPointData.h>
 #include <vtkRenderer.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderWindowInteractor.h>
-#include <vtkSmartVolumeMapper.h>
 #include <vtkTextActor.h>
 #include <vtkTextProperty.h>
-#include <vtkVolume.h>
-#include <vtkVolumeProperty.h>
+#include <vtkUltrasoundAlignmentSession.h>
+#include <vtkUltrasoundSliceView.h>
+#include <vtkUltrasoundVolume.h>
+#include <vtkUltrasoundVolumeView.h>
+#include <vtkUnsignedCharArray.h>
 #include <vtkWindowToImageFilter.h>
 
 namespace echorama {
@@ -46,84 +45,105 @@ struct ViewOptions {
   bool labels = false;
 };
 
-// How a plane lies on the screen, as axes of the frame: to the right, down, and into the screen. Depth (the last axis of
-// most ultrasound volumes) points down where it can.
+// How a plane lies on the screen, as axes of the first volume: down, and into the screen. Depth (the last axis of most
+// ultrasound volumes) points down where it can.
 struct PlaneAxes {
-  int right, down, inward;
+  int down, inward;
   double inwardSign; ///< so that right, down, inward are right-handed
+  std::array<double, 3> colour;
 };
-constexpr PlaneAxes Planes[3] = {{1, 2, 0, 1.0}, {0, 2, 1, -1.0}, {0, 1, 2, 1.0}};
-constexpr double PlaneColours[3][3] = {{0.95, 0.45, 0.4}, {0.45, 0.85, 0.45}, {0.45, 0.65, 1.0}};
+constexpr PlaneAxes Planes[3] = {
+    {2, 0, 1.0, {0.95, 0.45, 0.4}}, {2, 1, -1.0, {0.45, 0.85, 0.45}}, {1, 2, 1.0, {0.45, 0.65, 1.0}}};
 
-vtkSmartPointer<vtkActor> LineActor(vtkPolyData* lines, const double* colour, double width)
+// The colours of data, mixed and invented voxels of an embedded volume.
+constexpr std::pair<EmbeddedVoxel, std::array<double, 3>> LabelTints[3] = {{EmbeddedVoxel::Data, {1.0, 1.0, 1.0}},
+                                                                           {EmbeddedVoxel::Blend, {1.0, 0.85, 0.4}},
+                                                                           {EmbeddedVoxel::Invented, {0.45, 0.65, 1.0}}};
+
+// Fully bright colours whose hues are evenly spread: their mean is grey.
+std::array<double, 3> TintOf(std::size_t i, std::size_t count)
 {
-  vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputData(lines);
-  auto actor = vtkSmartPointer<vtkActor>::New();
-  actor->SetMapper(mapper);
-  actor->GetProperty()->SetColor(colour[0], colour[1], colour[2]);
-  actor->GetProperty()->SetLineWidth(static_cast<float>(width));
-  actor->GetProperty()->LightingOff();
-  actor->PickableOff();
-  return actor;
+  if (count == 1)
+    return {1.0, 1.0, 1.0};
+  const double hue = 6.0 * (static_cast<double>(i) / static_cast<double>(count) + 30.0 / 360.0);
+  std::array<double, 3> tint;
+  for (std::size_t c = 0; c < 3; ++c)
+    tint[c] = 0.25 + 0.75 * std::clamp(2.0 - std::fabs(std::remainder(hue - 2.0 * static_cast<double>(c), 6.0)), 0.0, 1.0);
+  return tint;
 }
 
-vtkSmartPointer<vtkPolyData> Lines(const std::vector<Eigen::Vector3d>& points, const std::vector<std::pair<int, int>>& pairs)
+// An embedded volume whose valid region are the voxels of one label, or with Outside all that is there.
+vtkSmartPointer<vtkImageData> PartOf(vtkImageData* volume, vtkDataArray* labels, EmbeddedVoxel part)
 {
-  auto lines = vtkSmartPointer<vtkPolyData>::New();
-  vtkNew<vtkPoints> coordinates;
-  coordinates->SetDataTypeToDouble();
-  for (const Eigen::Vector3d& point : points)
-    coordinates->InsertNextPoint(point.data());
-  vtkNew<vtkCellArray> cells;
-  for (const auto& [a, b] : pairs) {
-    const vtkIdType ids[2] = {a, b};
-    cells->InsertNextCell(2, ids);
-  }
-  lines->SetPoints(coordinates);
-  lines->SetLines(cells);
-  return lines;
+  vtkNew<vtkUnsignedCharArray> valid;
+  valid->SetName(vtkUltrasoundVolume::ValidRegionName());
+  valid->SetNumberOfValues(labels->GetNumberOfTuples());
+  const auto voxels = vtkUltrasoundVolume::ViewOf<const EmbeddedVoxel>(labels, volume);
+  std::transform(voxels.begin(), voxels.end(), valid->GetPointer(0), [part](EmbeddedVoxel voxel) -> unsigned char {
+    return voxel != EmbeddedVoxel::Outside && (part == EmbeddedVoxel::Outside || part == voxel);
+  });
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->ShallowCopy(volume);
+  image->GetPointData()->AddArray(valid);
+  return image;
+}
+
+vtkSmartPointer<vtkTextActor> AddText(vtkRenderer* view, int size, const std::array<double, 3>& colour, double top)
+{
+  auto text = vtkSmartPointer<vtkTextActor>::New();
+  text->GetTextProperty()->SetFontSize(size);
+  text->GetTextProperty()->SetColor(colour[0], colour[1], colour[2]);
+  text->GetTextProperty()->SetVerticalJustificationToTop();
+  text->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
+  text->SetPosition(0.012, top);
+  view->AddActor2D(text);
+  return text;
 }
 
 class ViewWindow {
 public:
-  ViewWindow(const std::vector<LoadedVolume>& volumes, const ViewOptions& options, bool offScreen);
+  ViewWindow(const std::vector<LoadedVolume>& volumes, const ViewOptions& options);
 
   vtkRenderWindow* RenderWindow() { return window_; }
   void Start();
 
-  // What the user does. Plane 3 is the rendering.
-  int PlaneAt(int x, int y);
+  // What the user does. View 3 is the rendering.
+  int ViewAt(int x, int y);
   void Scroll(int plane, int steps);
   void LookAt(int plane, int x, int y);
+  void Pan(int plane, int dx, int dy);
+  void Zoom(int plane, int dy);
   void ChangeWindow(int dx, int dy);
   void Toggle(std::size_t volume);
   void ToggleLabels();
-  void ResetCameras();
-  void Render() { window_->Render(); }
+  void Fit();
+  void Reset();
+  void Render(); ///< coarsely: Refine follows
 
 private:
-  void AddRendering();
-  void Refresh();
-  ImageGeometry GridOf(int plane) const;
-  std::string NameOf(int plane) const;
+  struct Shown {
+    int whole = 0;
+    std::vector<int> parts; ///< of an embedded volume, by label
+    bool visible = true;
+  };
+  void Add(const LoadedVolume& volume, const std::array<double, 3>& tint);
+  void ShowVolumes();
+  void Prepare();
+  void Refine();
 
-  ShownVolumes volumes_;
-  std::vector<std::string> names_;
-  GreyWindow grey_;
-  std::vector<bool> shown_;
+  vtkNew<vtkUltrasoundAlignmentSession> session_;
+  std::vector<Shown> volumes_;
+  double firstWindow_[2] = {0.0, 255.0}; ///< the grey window at first
   bool labels_;
-  Eigen::Matrix3d frame_;   ///< columns: the axes of the planes
-  Eigen::AlignedBox3d box_; ///< of all volumes, in coordinates of the frame
-  Eigen::Vector3d focus_;   ///< where the planes meet, in coordinates of the frame
-  double pixel_ = 1.0, step_ = 1.0;
+  Eigen::Matrix3d frame_; ///< columns: the axes of the planes
+  double step_ = 0.0;
 
   vtkNew<vtkRenderWindow> window_;
-  vtkSmartPointer<vtkRenderer> views_[4];
-  vtkSmartPointer<vtkImageSlice> slices_[3];
-  vtkSmartPointer<vtkActor> crosses_[3][2], frames_[3];
+  vtkNew<vtkUltrasoundSliceView> slices_[3];
+  vtkNew<vtkUltrasoundVolumeView> volume_;
+  vtkRenderer* views_[4];
   vtkSmartPointer<vtkTextActor> titles_[3];
-  std::vector<vtkSmartPointer<vtkVolume>> renderings_;
+  vtkNew<vtkRenderWindowInteractor> interactor_;
 };
 
 class ViewStyle : public vtkInteractorStyleTrackballCamera {
@@ -131,35 +151,57 @@ public:
   static ViewStyle* New();
   vtkTypeMacro(ViewStyle, vtkInteractorStyleTrackballCamera);
   ViewWindow* View = nullptr;
+  bool IsBusy() const { return drag_ != Drag::None || this->State != VTKIS_NONE; }
 
   void OnLeftButtonDown() override
   {
-    plane_ = this->View->PlaneAt(X(), Y());
-    windowing_ = this->Interactor->GetControlKey() != 0;
-    dragging_ = plane_ < 3;
-    lastX_ = X();
-    lastY_ = Y();
-    if (!dragging_)
+    if (!Begin(this->Interactor->GetControlKey() ? Drag::Window : Drag::Look))
       this->Superclass::OnLeftButtonDown();
-    else if (!windowing_)
+    else if (drag_ == Drag::Look)
       this->View->LookAt(plane_, X(), Y());
+  }
+  void OnMiddleButtonDown() override
+  {
+    if (!Begin(Drag::Pan))
+      this->Superclass::OnMiddleButtonDown();
+  }
+  void OnRightButtonDown() override
+  {
+    if (!Begin(Drag::Zoom))
+      this->Superclass::OnRightButtonDown();
   }
   void OnMouseMove() override
   {
-    if (!dragging_)
-      this->Superclass::OnMouseMove();
-    else if (windowing_)
-      this->View->ChangeWindow(X() - lastX_, Y() - lastY_);
-    else
-      this->View->LookAt(plane_, X(), Y());
+    const int dx = X() - lastX_, dy = Y() - lastY_;
     lastX_ = X();
     lastY_ = Y();
+    switch (drag_) {
+    case Drag::None:
+      return this->Superclass::OnMouseMove();
+    case Drag::Look:
+      return this->View->LookAt(plane_, X(), Y());
+    case Drag::Window:
+      return this->View->ChangeWindow(dx, dy);
+    case Drag::Pan:
+      return this->View->Pan(plane_, dx, dy);
+    case Drag::Zoom:
+      return this->View->Zoom(plane_, dy);
+    }
   }
   void OnLeftButtonUp() override
   {
-    if (!dragging_)
-      this->Superclass::OnLeftButtonUp();
-    dragging_ = false;
+    drag_ = Drag::None;
+    this->Superclass::OnLeftButtonUp();
+  }
+  void OnMiddleButtonUp() override
+  {
+    drag_ = Drag::None;
+    this->Superclass::OnMiddleButtonUp();
+  }
+  void OnRightButtonUp() override
+  {
+    drag_ = Drag::None;
+    this->Superclass::OnRightButtonUp();
   }
   void OnMouseWheelForward() override { Wheel(1); }
   void OnMouseWheelBackward() override { Wheel(-1); }
@@ -172,7 +214,7 @@ public:
     else if (key == 'l')
       this->View->ToggleLabels();
     else if (key == 'r')
-      this->View->ResetCameras();
+      this->View->Reset();
     else if (name == "Up" || name == "Down")
       Wheel(name == "Up" ? 1 : -1);
     else if (key == 'q' || key == 'e')
@@ -180,278 +222,279 @@ public:
   }
 
 private:
+  enum class Drag { None, Look, Window, Pan, Zoom };
+
   int X() const { return this->Interactor->GetEventPosition()[0]; }
   int Y() const { return this->Interactor->GetEventPosition()[1]; }
+  bool Begin(Drag drag)
+  {
+    plane_ = this->View->ViewAt(X(), Y());
+    drag_ = plane_ < 3 ? drag : Drag::None;
+    lastX_ = X();
+    lastY_ = Y();
+    return plane_ < 3;
+  }
   void Wheel(int steps)
   {
-    const int plane = this->View->PlaneAt(X(), Y());
-    if (plane < 3)
-      this->View->Scroll(plane, steps);
+    const int view = this->View->ViewAt(X(), Y());
+    if (view < 3)
+      this->View->Scroll(view, steps);
     else if (steps > 0)
       this->Superclass::OnMouseWheelForward();
     else
       this->Superclass::OnMouseWheelBackward();
   }
 
+  Drag drag_ = Drag::None;
   int plane_ = 3, lastX_ = 0, lastY_ = 0;
-  bool dragging_ = false, windowing_ = false;
 };
 vtkStandardNewMacro(ViewStyle);
 
-ViewWindow::ViewWindow(const std::vector<LoadedVolume>& volumes, const ViewOptions& options, bool offScreen)
-  : volumes_(volumes), grey_(volumes_.Window()), shown_(volumes.size(), true), labels_(options.labels),
-    frame_(volumes_.Geometry(0).direction), box_(volumes_.Box()), focus_(volumes_.Middle())
+ViewWindow::ViewWindow(const std::vector<LoadedVolume>& volumes, const ViewOptions& options)
+  : labels_(options.labels), frame_(vtkUltrasoundVolume::GeometryOf(volumes.front().image).direction)
 {
-  for (const LoadedVolume& volume : volumes)
-    names_.push_back(std::filesystem::path(volume.file).filename().string());
-  step_ = volumes_.SmallestSpacing();
-  pixel_ = std::max(step_, box_.sizes().maxCoeff() / 700.0);
-
   window_->SetWindowName("Echorama");
-  window_->SetOffScreenRendering(offScreen);
+  window_->SetOffScreenRendering(!options.screenshot.empty());
   window_->SetSize(options.size[0], options.size[1]);
   window_->SetMultiSamples(0);
   constexpr double places[4][2] = {{0.0, 0.0}, {0.0, 0.5}, {0.5, 0.5}, {0.5, 0.0}};
   for (int view = 0; view < 4; ++view) {
-    views_[view] = vtkSmartPointer<vtkRenderer>::New();
+    views_[view] = view < 3 ? slices_[view]->GetRenderer() : volume_->GetRenderer();
     views_[view]->SetViewport(places[view][0] + 0.001, places[view][1] + 0.001, places[view][0] + 0.499, places[view][1] + 0.499);
     window_->AddRenderer(views_[view]);
   }
-  for (int plane = 0; plane < 3; ++plane) {
-    views_[plane]->SetBackground(0.0, 0.0, 0.0);
-    slices_[plane] = vtkSmartPointer<vtkImageSlice>::New();
-    vtkNew<vtkImageSliceMapper> mapper;
-    slices_[plane]->SetMapper(mapper);
-    views_[plane]->AddViewProp(slices_[plane]);
-    for (int line = 0; line < 2; ++line) {
-      const int other = line == 0 ? Planes[plane].right : Planes[plane].down; // the plane that this line is the trace of
-      crosses_[plane][line] = LineActor(nullptr, PlaneColours[other], 1.0);
-      crosses_[plane][line]->GetProperty()->SetOpacity(0.6);
-      views_[plane]->AddActor(crosses_[plane][line]);
-    }
-    frames_[plane] = LineActor(nullptr, PlaneColours[plane], 1.5);
-    views_[3]->AddActor(frames_[plane]);
-    titles_[plane] = vtkSmartPointer<vtkTextActor>::New();
-    titles_[plane]->GetTextProperty()->SetFontSize(15);
-    titles_[plane]->GetTextProperty()->SetColor(PlaneColours[plane][0], PlaneColours[plane][1], PlaneColours[plane][2]);
-    titles_[plane]->SetPosition(8, 8);
-    views_[plane]->AddActor2D(titles_[plane]);
-  }
-  AddRendering();
-  Refresh();
-  ResetCameras();
-}
-
-void ViewWindow::AddRendering()
-{
-  vtkRenderer* view = views_[3];
-  view->SetBackground(0.06, 0.07, 0.09);
-  const auto byteOf = [this](double share) { return 2.0 + 251.0 * grey_(volumes_.Percentile(share)); };
-  for (std::size_t i = 0; i < volumes_.Count(); ++i) {
-    const auto bytes = volumes_.Bytes(i, grey_, 256);
-    vtkNew<vtkSmartVolumeMapper> mapper;
-    mapper->SetInputData(bytes);
-    mapper->SetRequestedRenderModeToGPU(); // the other mappers ignore the direction of a volume
-    mapper->SetAutoAdjustSampleDistances(!window_->GetOffScreenRendering());
-    vtkNew<vtkColorTransferFunction> colour;
-    const auto& tint = volumes_.Tint(i);
-    colour->AddRGBPoint(0.0, 0.0, 0.0, 0.0);
-    colour->AddRGBPoint(byteOf(0.95), 0.6 * tint[0], 0.6 * tint[1], 0.6 * tint[2]);
-    colour->AddRGBPoint(255.0, tint[0], tint[1], tint[2]);
-    // Zero is what is not real. Fluid and weak speckle stay clear, so that one sees into the volume.
-    vtkNew<vtkPiecewiseFunction> opacity;
-    opacity->AddPoint(0.0, 0.0);
-    opacity->AddPoint(byteOf(0.6), 0.0);
-    opacity->AddPoint(byteOf(0.95), 0.08);
-    opacity->AddPoint(255.0, 0.5);
-    vtkNew<vtkVolumeProperty> property;
-    property->SetColor(colour);
-    property->SetScalarOpacity(opacity);
-    property->SetInterpolationTypeToLinear();
-    property->SetScalarOpacityUnitDistance(box_.diagonal().norm() / 150.0);
-    auto rendering = vtkSmartPointer<vtkVolume>::New();
-    rendering->SetMapper(mapper);
-    rendering->SetProperty(property);
-    view->AddVolume(rendering);
-    renderings_.push_back(rendering);
-
-    vtkNew<vtkTextActor> name;
-    name->SetInput(names_[i].c_str());
-    name->GetTextProperty()->SetFontSize(14);
-    name->GetTextProperty()->SetColor(tint[0], tint[1], tint[2]);
-    name->SetPosition(8, 8 + 18 * static_cast<double>(volumes_.Count() - 1 - i));
-    view->AddActor2D(name);
-  }
-}
-
-ImageGeometry ViewWindow::GridOf(int plane) const
-{
-  const PlaneAxes& axes = Planes[plane];
-  ImageGeometry grid;
-  grid.spacing.setConstant(pixel_);
-  grid.direction.col(0) = frame_.col(axes.right);
-  grid.direction.col(1) = frame_.col(axes.down);
-  grid.direction.col(2) = axes.inwardSign * frame_.col(axes.inward);
-  grid.dimensions = {static_cast<int>(box_.sizes()[axes.right] / pixel_ + 1.5),
-                     static_cast<int>(box_.sizes()[axes.down] / pixel_ + 1.5), 1};
-  Eigen::Vector3d first = box_.min();
-  first[axes.inward] = focus_[axes.inward];
-  grid.origin = frame_ * first;
-  return grid;
-}
-
-std::string ViewWindow::NameOf(int plane) const
-{
-  const int axis = Planes[plane].inward;
-  const std::string at = " " + Fixed(focus_[axis], 1) + " mm";
-  for (int world = 0; world < 3; ++world)
-    if (frame_(world, axis) > 1.0 - 1e-9)
-      return std::string(1, "xyz"[world]) + at;
-  return "along axis " + std::string(1, "ijk"[axis]) + at;
-}
-
-void ViewWindow::Refresh()
-{
-  for (int plane = 0; plane < 3; ++plane) {
-    const ImageGeometry grid = GridOf(plane);
-    auto* mapper = static_cast<vtkImageSliceMapper*>(slices_[plane]->GetMapper());
-    mapper->SetInputData(volumes_.Picture(grid, grey_, shown_, labels_));
-    titles_[plane]->SetInput(NameOf(plane).c_str());
-
-    const PlaneAxes& axes = Planes[plane];
-    const auto point = [&](double right, double down) {
-      Eigen::Vector3d p = focus_;
-      p[axes.right] = right;
-      p[axes.down] = down;
-      return Eigen::Vector3d(frame_ * p);
-    };
-    const double left = box_.min()[axes.right], right = box_.max()[axes.right];
-    const double top = box_.min()[axes.down], bottom = box_.max()[axes.down];
-    const double x = focus_[axes.right], y = focus_[axes.down];
-    // Lines lie a little before the picture, as seen from the camera.
-    const Eigen::Vector3d before = -0.5 * pixel_ * grid.direction.col(2);
-    const auto show = [](vtkActor* actor, vtkPolyData* lines) {
-      static_cast<vtkPolyDataMapper*>(actor->GetMapper())->SetInputData(lines);
-    };
-    show(crosses_[plane][0], Lines({point(x, top) + before, point(x, bottom) + before}, {{0, 1}}));
-    show(crosses_[plane][1], Lines({point(left, y) + before, point(right, y) + before}, {{0, 1}}));
-    show(frames_[plane], Lines({point(left, top), point(right, top), point(right, bottom), point(left, bottom)},
-                               {{0, 1}, {1, 2}, {2, 3}, {3, 0}}));
-  }
-}
-
-void ViewWindow::ResetCameras()
-{
-  const Eigen::Vector3d centre = frame_ * box_.center();
-  const double diagonal = box_.diagonal().norm();
+  window_->AddObserver(vtkCommand::StartEvent, this, &ViewWindow::Prepare);
   for (int plane = 0; plane < 3; ++plane) {
     const PlaneAxes& axes = Planes[plane];
-    const Eigen::Vector3d position = centre - 2.0 * diagonal * axes.inwardSign * frame_.col(axes.inward);
-    const Eigen::Vector3d up = -frame_.col(axes.down);
-    vtkCamera* camera = views_[plane]->GetActiveCamera();
-    camera->ParallelProjectionOn();
-    camera->SetFocalPoint(centre.data());
-    camera->SetPosition(position.data());
-    camera->SetViewUp(up.data());
-    const double* viewport = views_[plane]->GetViewport();
-    const double aspect =
-        (viewport[2] - viewport[0]) * window_->GetSize()[0] / ((viewport[3] - viewport[1]) * window_->GetSize()[1]);
-    camera->SetParallelScale(0.53 * std::max(box_.sizes()[axes.down], box_.sizes()[axes.right] / aspect));
-    views_[plane]->ResetCameraClippingRange();
+    const Eigen::Vector3d normal = -axes.inwardSign * frame_.col(axes.inward), up = -frame_.col(axes.down);
+    slices_[plane]->SetSession(session_);
+    slices_[plane]->SetNormalAndUp(normal.x(), normal.y(), normal.z(), up.x(), up.y(), up.z());
+    slices_[plane]->SetColour(axes.colour[0], axes.colour[1], axes.colour[2]);
+    if (plane > 0)
+      slices_[plane]->LinkTo(slices_[0]);
+    titles_[plane] = AddText(views_[plane], 15, axes.colour, 0.98);
   }
-  // From the side and a little from above, the second axis away from the viewer, depth down; the box fills the view.
+  views_[3]->SetBackground(0.06, 0.07, 0.09);
+  volume_->SetOrientationMarker(false); // the volumes need not know the patient's axes
+  volume_->SetSession(session_);
+
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  std::ptrdiff_t real = 0;
+  std::vector<double> levels; // some hundred thousand per volume
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    Add(volumes[i], TintOf(i, volumes.size()));
+    vtkImageData* image = session_->GetImage(volumes_.back().whole);
+    const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(image);
+    step_ = i == 0 ? geometry.spacing.minCoeff() : std::min(step_, geometry.spacing.minCoeff());
+    const auto input = vtkUltrasoundVolume::CheckInput(nullptr, image, volumes[i].file);
+    vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+      const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input);
+      std::ptrdiff_t count = 0;
+      const Eigen::Vector3d index = ValidCentroid<decltype(type)>(posed.intensity, posed.valid, count);
+      middle += static_cast<double>(count) * (geometry.IndexToWorld() * index);
+      real += count;
+      const Sampler<decltype(type)> sampler(posed.intensity, posed.valid);
+      for (std::ptrdiff_t v = 0, step = posed.intensity.Size() / 300000 | 1; v < posed.intensity.Size(); v += step)
+        if (sampler.IsReal(v))
+          levels.push_back(static_cast<double>(posed.intensity[v]));
+    });
+  }
+  if (levels.empty())
+    throw Error(Error::Kind::BadInput, volumes.front().file + ": nothing to show: no voxel is valid");
+  middle /= static_cast<double>(real);
+  session_->GetGreyWindow(firstWindow_);
+  session_->SelectNone();
+  volume_->SetMinimum(Percentile(levels, 0.9)); // fluid and weak speckle stay clear, so that one sees into the volume
+  ShowVolumes();
+  Prepare();
+  slices_[0]->SetCursor(middle.x(), middle.y(), middle.z());
+  Fit();
+}
+
+void ViewWindow::Add(const LoadedVolume& volume, const std::array<double, 3>& tint)
+{
+  const std::string name = std::filesystem::path(volume.file).filename().string();
+  const auto add = [&](vtkImageData* image, const std::array<double, 3>& colour) {
+    const int id = session_->AddVolume(image, nullptr, name.c_str());
+    if (id <= 0)
+      throw Error(Error::Kind::BadInput, Session::TakeReportedError());
+    session_->SetColour(id, tint[0] * colour[0], tint[1] * colour[1], tint[2] * colour[2]);
+    return id;
+  };
+  Shown shown;
+  vtkDataArray* labels = volume.image->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName());
+  if (!labels || labels->GetDataType() != VTK_UNSIGNED_CHAR || labels->GetNumberOfComponents() != 1) {
+    shown.whole = add(volume.image, {1.0, 1.0, 1.0});
+  } else {
+    shown.whole = add(PartOf(volume.image, labels, EmbeddedVoxel::Outside), {1.0, 1.0, 1.0});
+    for (const auto& [label, colour] : LabelTints)
+      shown.parts.push_back(add(PartOf(volume.image, labels, label), colour));
+  }
+  volumes_.push_back(shown);
+  AddText(views_[3], 14, tint, 0.98)->SetInput((std::string(volumes_.size() - 1, '\n') + name).c_str());
+}
+
+void ViewWindow::ShowVolumes()
+{
+  for (const Shown& shown : volumes_) {
+    const bool labelled = labels_ && !shown.parts.empty();
+    session_->SetVisible(shown.whole, shown.visible && !labelled);
+    for (const int part : shown.parts)
+      session_->SetVisible(part, shown.visible && labelled);
+  }
+}
+
+// Whatever the window's size is now, and whoever asked for a picture.
+void ViewWindow::Prepare()
+{
+  // In coordinates along the axes of the planes: where they meet, and the box of the volumes.
+  Eigen::Vector3d cursor, low, high;
+  slices_[0]->GetCursor(cursor.data());
+  cursor = (frame_.transpose() * cursor).eval();
+  for (int plane = 0; plane < 3; ++plane) {
+    const int* size = views_[plane]->GetSize();
+    slices_[plane]->SetPixelSize(size[0], size[1]);
+    slices_[plane]->Update();
+    const int inward = Planes[plane].inward;
+    const double sign = Planes[plane].inwardSign;
+    double range[2];
+    slices_[plane]->GetPositionRange(range);
+    low[inward] = std::min(-sign * range[0], -sign * range[1]);
+    high[inward] = std::max(-sign * range[0], -sign * range[1]);
+
+    std::string name = "along axis " + std::string(1, "ijk"[inward]);
+    for (int world = 0; world < 3; ++world)
+      if (frame_(world, inward) > 1.0 - 1e-9)
+        name = "xyz"[world];
+    titles_[plane]->SetInput((name + " " + Fixed(cursor[inward], 1) + " mm").c_str());
+  }
+  for (int plane = 0; plane < 3; ++plane) {
+    const auto& [down, inward, sign, colour] = Planes[plane];
+    const int right = 3 - down - inward;
+    Eigen::Matrix<double, 3, 4> corners = cursor.replicate<1, 4>();
+    corners.row(right) << low[right], high[right], high[right], low[right];
+    corners.row(down) << high[down], high[down], low[down], low[down];
+    corners = (frame_ * corners).eval();
+    volume_->SetPlane(plane, corners.data());
+    volume_->SetPlaneColour(plane, colour[0], colour[1], colour[2]);
+  }
+}
+
+void ViewWindow::Fit()
+{
+  slices_[0]->Fit();
+  // From the side and a little from above, the second axis away from the viewer, depth down; the volumes fill the view.
+  volume_->Fit();
   vtkCamera* camera = views_[3]->GetActiveCamera();
-  const Eigen::Vector3d position = centre + 1.6 * diagonal * (frame_ * Eigen::Vector3d(0.4, -0.8, -0.45).normalized());
+  const Eigen::Vector3d position = Eigen::Vector3d(camera->GetFocalPoint()) + frame_ * Eigen::Vector3d(0.4, -0.8, -0.45);
   const Eigen::Vector3d up = -frame_.col(2);
-  camera->SetFocalPoint(centre.data());
   camera->SetPosition(position.data());
   camera->SetViewUp(up.data());
-  camera->SetViewAngle(30.0);
-  views_[3]->ResetCameraClippingRange();
+  volume_->Fit();
 }
 
-int ViewWindow::PlaneAt(int x, int y)
+void ViewWindow::Render()
 {
-  for (int view = 0; view < 4; ++view)
-    if (views_[view]->IsInViewport(x, y))
-      return view;
-  return 3;
+  volume_->SetInteractive(true);
+  window_->Render();
+}
+
+int ViewWindow::ViewAt(int x, int y)
+{
+  return static_cast<int>(std::find_if(views_, views_ + 3, [&](vtkRenderer* view) { return view->IsInViewport(x, y); }) - views_);
 }
 
 void ViewWindow::Scroll(int plane, int steps)
 {
-  const int axis = Planes[plane].inward;
-  focus_[axis] = std::clamp(focus_[axis] + steps * step_, box_.min()[axis], box_.max()[axis]);
-  Refresh();
+  double range[2];
+  slices_[plane]->GetPositionRange(range);
+  const double position = slices_[plane]->GetPosition() - Planes[plane].inwardSign * steps * step_;
+  slices_[plane]->SetPosition(std::clamp(position, range[0], range[1]));
   Render();
 }
 
 void ViewWindow::LookAt(int plane, int x, int y)
 {
-  views_[plane]->SetDisplayPoint(x, y, 0.0);
-  views_[plane]->DisplayToWorld();
-  const double* world = views_[plane]->GetWorldPoint();
-  const Eigen::Vector3d at = frame_.transpose() * Eigen::Vector3d(world[0], world[1], world[2]) / world[3];
-  for (const int axis : {Planes[plane].right, Planes[plane].down})
-    focus_[axis] = std::clamp(at[axis], box_.min()[axis], box_.max()[axis]);
-  Refresh();
+  const int* corner = views_[plane]->GetOrigin();
+  double at[3], range[2];
+  slices_[plane]->PixelToWorld(x - corner[0], y - corner[1], at);
+  slices_[plane]->SetCursor(at[0], at[1], at[2]);
+  for (auto& slice : slices_) {
+    slice->GetPositionRange(range);
+    slice->SetPosition(std::clamp(slice->GetPosition(), range[0], range[1]));
+  }
+  Render();
+}
+
+void ViewWindow::Pan(int plane, int dx, int dy)
+{
+  slices_[plane]->Pan(dx, dy);
+  Render();
+}
+
+void ViewWindow::Zoom(int plane, int dy)
+{
+  const int* size = views_[plane]->GetSize();
+  slices_[plane]->Zoom(std::pow(1.01, dy), 0.5 * size[0], 0.5 * size[1]);
   Render();
 }
 
 void ViewWindow::ChangeWindow(int dx, int dy)
 {
-  const double range = volumes_.Window().white - volumes_.Window().black;
-  const double middle = 0.5 * (grey_.black + grey_.white) - 0.003 * range * dy;
-  const double half = std::max(0.5 * (grey_.white - grey_.black) + 0.002 * range * dx, 0.005 * range);
-  grey_ = {middle - half, middle + half};
-  Refresh();
+  double grey[2];
+  session_->GetGreyWindow(grey);
+  const double range = firstWindow_[1] - firstWindow_[0];
+  const double middle = 0.5 * (grey[0] + grey[1]) - 0.003 * range * dy;
+  const double half = std::max(0.5 * (grey[1] - grey[0]) + 0.002 * range * dx, 0.005 * range);
+  session_->SetGreyWindow(middle - half, middle + half);
   Render();
 }
 
 void ViewWindow::Toggle(std::size_t volume)
 {
-  if (volume >= shown_.size())
+  if (volume >= volumes_.size())
     return;
-  shown_[volume] = !shown_[volume];
-  renderings_[volume]->SetVisibility(shown_[volume]);
-  Refresh();
+  volumes_[volume].visible = !volumes_[volume].visible;
+  ShowVolumes();
+  Render();
+}
+
+void ViewWindow::Reset()
+{
+  Fit();
   Render();
 }
 
 void ViewWindow::ToggleLabels()
 {
   labels_ = !labels_;
-  Refresh();
+  ShowVolumes();
   Render();
+}
+
+void ViewWindow::Refine()
+{
+  if (Session::Interrupted())
+    interactor_->TerminateApp();
+  else if (!static_cast<ViewStyle*>(interactor_->GetInteractorStyle())->IsBusy() && volume_->Refine())
+    window_->Render();
 }
 
 void ViewWindow::Start()
 {
-  vtkNew<vtkTextActor> help;
-  help->SetInput("drag: look there   wheel: scroll   ctrl+drag: grey levels   middle: move   right: zoom\n"
+  AddText(views_[3], 12, {0.6, 0.6, 0.6}, 0.09)
+      ->SetInput("drag: look there   wheel: scroll   ctrl+drag: grey levels   middle: move   right: zoom\n"
                  "1-9: show or hide a volume   l: colour what is invented   r: reset the views   q: quit");
-  help->GetTextProperty()->SetFontSize(12);
-  help->GetTextProperty()->SetColor(0.6, 0.6, 0.6);
-  help->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
-  help->SetPosition(0.02, 0.92);
-  views_[3]->AddActor2D(help);
-
-  vtkNew<vtkRenderWindowInteractor> interactor;
   vtkNew<ViewStyle> style;
   style->View = this;
-  interactor->SetRenderWindow(window_);
-  interactor->SetInteractorStyle(style);
-  interactor->Initialize();
-  vtkNew<vtkCallbackCommand> stopped;
-  stopped->SetClientData(interactor);
-  stopped->SetCallback([](vtkObject*, unsigned long, void* client, void*) {
-    if (Session::Interrupted())
-      static_cast<vtkRenderWindowInteractor*>(client)->TerminateApp();
-  });
-  interactor->AddObserver(vtkCommand::TimerEvent, stopped);
-  interactor->CreateRepeatingTimer(200);
+  style->AddObserver(vtkCommand::StartInteractionEvent, this, &ViewWindow::Render);
+  interactor_->SetRenderWindow(window_);
+  interactor_->SetInteractorStyle(style);
+  interactor_->Initialize();
+  interactor_->AddObserver(vtkCommand::TimerEvent, this, &ViewWindow::Refine);
+  interactor_->CreateRepeatingTimer(200);
   Render();
-  interactor->Start();
+  interactor_->Start();
 }
 
 void View(Session& session, ViewOptions options)
@@ -467,14 +510,14 @@ void View(Session& session, ViewOptions options)
   ApplyPoses(session, volumes, options.poses);
   session.result["files"] = options.files;
 
-  ViewWindow view(volumes, options, !options.screenshot.empty());
+  ViewWindow view(volumes, options);
   if (options.screenshot.empty()) {
     view.Start();
     return;
   }
   vtkNew<vtkPNGWriter> writer;
   session.Time("render", [&] {
-    view.Render();
+    view.RenderWindow()->Render();
     vtkNew<vtkWindowToImageFilter> picture;
     picture->SetInput(view.RenderWindow());
     picture->ReadFrontBufferOff();
@@ -494,7 +537,7 @@ void View(Session& session, ViewOptions options)
 Command ViewCommand(CLI::App& program)
 {
   auto values = std::make_shared<ViewOptions>();
-  CLI::App* options = program.add_subcommand("view", "Show volumes: three planes and a volume rendering");
+  CLI::App* options = program.add_subcommand("view", "Show volumes: three slices and the volumes in 3D");
   options->add_option("file", values->files, "Volumes of any format")->required();
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong");
   options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window");

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Volumes.h"
+#include "Core/Base/Angles.h"
+#include "Core/Base/JsonPlace.h"
 
-#include "Readers/VolumeFile.h"
+#include "Readers/OutputFiles.h"
 #include "Widgets/Session/ProjectFile.h"
 #include "Widgets/vtkUltrasoundSessionVoxels.h"
-#include <algorithm>
-#include <filesystem>
 #include <sstream>
 #include <vtkCompositeDataSet.h>
 #include <vtkInformation.h>
@@ -16,11 +16,6 @@
 #include <vtkUltrasoundWriter.h>
 
 namespace echorama {
-namespace {
-
-constexpr double Degrees = 57.29577951308232;
-
-} // namespace
 
 std::vector<std::string> LinesOf(const std::string& text)
 {
@@ -76,17 +71,9 @@ std::vector<LoadedVolume> LoadVolumes(Session& session, const std::vector<std::s
 
 std::vector<std::string> WithoutCompanions(Session& session, const std::vector<std::string>& files)
 {
-  const auto same = [](const std::string& a, const std::string& b) {
-    return std::filesystem::path(a).lexically_normal() == std::filesystem::path(b).lexically_normal();
-  };
   std::vector<std::string> volumes;
   for (const std::string& file : files) {
-    const bool companion = std::any_of(files.begin(), files.end(), [&](const std::string& other) {
-      return same(file, CompanionPath(other, vtkUltrasoundVolume::ValidRegionName())) ||
-             std::any_of(CompanionArrays.begin(), CompanionArrays.end(),
-                         [&](const char* array) { return same(file, CompanionPath(other, array)); });
-    });
-    if (companion)
+    if (IsCompanion(file, files))
       session.Note(file + ": not a volume of its own, but a part of one that is named too; left out");
     else
       volumes.push_back(file);
@@ -155,7 +142,7 @@ std::vector<std::string> SaveVolume(Session& session, vtkImageData* image, const
 
 nlohmann::ordered_json JsonOf(const Eigen::Vector3d& v)
 {
-  return {v[0], v[1], v[2]};
+  return JsonPlace::ListOf(v);
 }
 
 nlohmann::ordered_json JsonOf(const Pose& pose)
@@ -165,30 +152,27 @@ nlohmann::ordered_json JsonOf(const Pose& pose)
 
 nlohmann::ordered_json JsonOf(const Eigen::Affine3d& matrix)
 {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (int i = 0; i < 4; ++i)
-    rows.push_back({matrix(i, 0), matrix(i, 1), matrix(i, 2), matrix(i, 3)});
-  return rows;
+  return JsonPlace::RowsOf(matrix.matrix());
 }
 
 nlohmann::ordered_json JsonOf(const ProbeGeometry& g)
 {
-  nlohmann::ordered_json json{{"fan_degrees", g.fanAngle * Degrees},
+  nlohmann::ordered_json json{{"fan_degrees", g.fanAngle * DegreesPerRadian},
                               {"fan_mm", g.fanWidth},
-                              {"sweep_degrees", g.sweepAngle * Degrees},
+                              {"sweep_degrees", g.sweepAngle * DegreesPerRadian},
                               {"sweep_mm", g.sweepWidth},
                               {"depth_mm", {g.depthMin, g.depthMax}}};
   if (g.fanOffset != 0.0)
-    json["fan_offset_degrees"] = g.fanOffset * Degrees;
+    json["fan_offset_degrees"] = g.fanOffset * DegreesPerRadian;
   return json;
 }
 
 std::string ProbeText(const ProbeGeometry& g)
 {
-  return "fan " + Fixed(g.fanAngle * Degrees, 1) + " degrees, " + Fixed(g.fanWidth, 1) + " mm" +
-         (g.fanOffset != 0.0 ? ", off centre by " + Fixed(g.fanOffset * Degrees, 1) + " degrees" : "") + "; sweep " +
-         Fixed(g.sweepAngle * Degrees, 1) + " degrees, " + Fixed(g.sweepWidth, 1) + " mm; depth " + Fixed(g.depthMin, 1) +
-         " to " + Fixed(g.depthMax, 1) + " mm";
+  return "fan " + Fixed(g.fanAngle * DegreesPerRadian, 1) + " degrees, " + Fixed(g.fanWidth, 1) + " mm" +
+         (g.fanOffset != 0.0 ? ", off centre by " + Fixed(g.fanOffset * DegreesPerRadian, 1) + " degrees" : "") + "; sweep " +
+         Fixed(g.sweepAngle * DegreesPerRadian, 1) + " degrees, " + Fixed(g.sweepWidth, 1) + " mm; depth " +
+         Fixed(g.depthMin, 1) + " to " + Fixed(g.depthMax, 1) + " mm";
 }
 
 const char* TypeText(VoxelType type)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who aligns: the program echorama with one set of options or another, and elastix when it is installed.
+"""Who aligns: the program echorama with one set of options or another, the search of the dissertation, and elastix where it is installed.
 
 Each gets a case and a start and answers with the second volume's motion as seen from the first, from where their files stand.
 """
@@ -71,8 +71,7 @@ class Echorama:
             second = said["volumes"][1]
             (_, first), (_, moved) = read_poses(out)
             seconds = stage_seconds(said.get("stages", {}), "align", said["seconds"])
-            verdict = second["verdict"] if second["verdict"] != "unjudged" else ""
-            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, verdict, second["reason"])
+            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, second["verdict"], second["reason"])
 
 
 def stage_seconds(stages, name, otherwise):
@@ -94,6 +93,37 @@ def fill_outside(image):
         intensity[~real] = intensity[real].mean()
 
 
+def write_moved(folder, case, start, prepare=lambda image: None):
+    """Both volumes as files 0.mha and 1.mha, the second where the start puts it."""
+    for number, motion in ((0, np.eye(4)), (1, start.motion)):
+        image = case.image(number)
+        echorama.vtkUltrasoundVolume.Move(image, matrix_of(motion))
+        prepare(image)
+        writer = echorama.vtkUltrasoundWriter()
+        writer.SetInputDataObject(image)
+        writer.SetFileName(str(folder / f"{number}.mha"))
+        writer.SetUseCompression(False)
+        writer.Write()
+
+
+class Search:
+    """The search of the dissertation, by a program of the benchmarks (Filters/Registration/Benchmarks). It judges nothing."""
+
+    def __init__(self, program, minimum_overlap=0.15):
+        self.program, self.minimum_overlap = program, minimum_overlap
+
+    def align(self, case, start, limit):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            write_moved(folder, case, start)
+            before = cpu_seconds()
+            done = run_program([self.program, folder / "0.mha", folder / "1.mha", self.minimum_overlap], limit)
+            if done.returncode != 0:
+                raise Failed(done.stderr.strip()[-300:] or f"it ended with status {done.returncode}")
+            said = json.loads(done.stdout)
+            return Answer(np.array(said["VolumeToWorld"]) @ start.motion, said["seconds"], cpu_seconds() - before)
+
+
 class Elastix:
     """elastix by the parameters of that file, with both masks. The start is put into the geometry of the second volume, so that its
     own transform begins at the identity. The time is that of the whole program, which reads its files too."""
@@ -109,15 +139,7 @@ class Elastix:
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             (folder / "parameters.txt").write_text(PARAMETERS.read_text() + self.added)
-            for number, motion in ((0, np.eye(4)), (1, start.motion)):
-                image = case.image(number)
-                echorama.vtkUltrasoundVolume.Move(image, matrix_of(motion))
-                fill_outside(image)
-                writer = echorama.vtkUltrasoundWriter()
-                writer.SetInputDataObject(image)
-                writer.SetFileName(str(folder / f"{number}.mha"))
-                writer.SetUseCompression(False)
-                writer.Write()
+            write_moved(folder, case, start, fill_outside)
             masks = [[flag, folder / f"{number}.ValidRegion.mha"] for number, flag in ((0, "-fMask"), (1, "-mMask"))]
             begin, before = time.monotonic(), cpu_seconds()
             done = run_program(["elastix", "-f", folder / "0.mha", "-m", folder / "1.mha", "-out", folder, "-p",
@@ -150,7 +172,10 @@ def euler_motion(text):
 
 def contestants(program, own=()):
     """By name. `own`: "NAME=OPTIONS of echorama align" of the user."""
-    found = {"echorama": Echorama(program), "search": Echorama(program, ["--method", "search", "--set", "MinimumOverlap=0.15"])}
+    found = {"echorama": Echorama(program)}
+    search = pathlib.Path(shutil.which(program) or program).resolve().parents[1] / "benchmarks" / "BenchmarkAlignSearch"
+    if search.exists():
+        found["search"] = Search(search)
     if shutil.which("elastix"):
         found.update({name: Elastix(*settings) for name, settings in Elastix.SETTINGS.items()})
     for text in own:

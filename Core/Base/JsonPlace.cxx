@@ -55,4 +55,9 @@ void JsonPlace::Need(const Json& object, const char* key, const std::string& wan
     Fail(std::string("\"") + key + "\" is " + Shown(value) + "; \"" + wanted + "\" is needed");
 }
 
+std::string JsonPlace::Print(const Json& value)
+{
+  return value.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
 } // namespace echorama

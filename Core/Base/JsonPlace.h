@@ -49,17 +49,26 @@ public:
   /// Checks that the member \a key is the text \a wanted.
   void Need(const Json& object, const char* key, const std::string& wanted) const;
 
+  /// As indented text. Texts in it that are not UTF-8 are mended.
+  static std::string Print(const Json& value);
+
+  /// A vector as a list.
+  template <class Derived>
+  static Json ListOf(const Eigen::MatrixBase<Derived>& vector)
+  {
+    Json list = Json::array();
+    for (Eigen::Index i = 0; i < vector.size(); ++i)
+      list.push_back(vector[i]);
+    return list;
+  }
+
   /// A matrix as a list of rows.
   template <class Derived>
   static Json RowsOf(const Eigen::MatrixBase<Derived>& matrix)
   {
     Json rows = Json::array();
-    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-      Json row = Json::array();
-      for (Eigen::Index j = 0; j < matrix.cols(); ++j)
-        row.push_back(matrix(i, j));
-      rows.push_back(row);
-    }
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+      rows.push_back(ListOf(matrix.row(i)));
     return rows;
   }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/TextFile.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
 #include <filesystem>
 #include <fstream>
 
@@ -24,6 +25,17 @@ std::string ReadTextFile(const std::string& path, std::size_t limit)
   if (stream.bad())
     throw Error(Error::Kind::FileSystem, path + ": reading it failed");
   return text;
+}
+
+void WriteTextFile(const std::string& path, const std::string& text)
+{
+  FileReplacement replacement;
+  std::ofstream stream(replacement.Stage(path), std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
+  replacement.Commit();
 }
 
 } // namespace echorama

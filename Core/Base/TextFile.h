@@ -9,4 +9,7 @@ namespace echorama {
 /// more than \a limit bytes: then it is something else.
 std::string ReadTextFile(const std::string& path, std::size_t limit = 16 << 20);
 
+/// Writes \a text under a temporary name and renames, so that a failure leaves what was there. \throws Error(FileSystem)
+void WriteTextFile(const std::string& path, const std::string& text);
+
 } // namespace echorama

@@ -2,6 +2,7 @@
 // Fits to masks of known fans: time and error against the number of points of the outline, the size of the mask, the shape of
 // the probe and what is wrong with the mask. The error is the greatest distance (mm) between the same places of the true fan and
 // the fitted one: corners, edges and middles. "voxel_mm" is the scale to judge it by.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/ProbeFit.h"
@@ -15,7 +16,7 @@ namespace {
 
 using namespace echorama;
 
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 
 struct Case {
   ProbeGeometry probe;

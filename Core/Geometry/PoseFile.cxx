@@ -2,7 +2,6 @@
 // JSON prints the shortest digits that give a double back, so poses survive any number of rounds unchanged. All checks
 // are made on reading, with the place in the file in the message: a pose file is written by people and scripts too.
 #include "Core/Geometry/PoseFile.h"
-#include "Core/Base/FileReplacement.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
 #include "Core/Geometry/PoseJson.h"
@@ -18,17 +17,6 @@ namespace {
 
 constexpr const char* Schema = "echorama-poses-1";
 constexpr const char* ProjectSchema = "echorama-project-1"; // of an alignment session: a pose file with more in it
-
-void WriteText(const std::string& path, const std::string& text)
-{
-  FileReplacement replacement;
-  std::ofstream stream(replacement.Stage(path));
-  stream << text;
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
-  replacement.Commit();
-}
 
 fs::path Resolved(const fs::path& path)
 {
@@ -102,7 +90,7 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
   } catch (const nlohmann::json::exception&) {
     throw Error(Error::Kind::InvalidParameter, path + ": a file name is not UTF-8");
   }
-  WriteText(path, text + '\n');
+  WriteTextFile(path, text + '\n');
 }
 
 void WriteItkTransform(const std::string& path, const Pose& volumeToWorld)
@@ -116,7 +104,7 @@ void WriteItkTransform(const std::string& path, const Pose& volumeToWorld)
       text += " " + NumberText(inverse(row, column));
   for (int row = 0; row < 3; ++row)
     text += " " + NumberText(inverse(row, 3));
-  WriteText(path, text + "\nFixedParameters: 0 0 0\n");
+  WriteTextFile(path, text + "\nFixedParameters: 0 0 0\n");
 }
 
 const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry)

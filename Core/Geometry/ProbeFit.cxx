@@ -1,8 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The surface of a fan has six faces: first and last beam, first and last step of the sweep, first and last sample. In the
-// coordinates of the beams (the exact inverse of the geometry) each is a plane, so the signed distance of a point from the
-// fan is the greatest of six numbers in mm, and cheap.
-//
 // 1. Outline: a few ten thousand points between blocks of voxels (OutlineRegion), thinned evenly.
 // 2. Starts: a fan is symmetric about two planes, so the axes of inertia of the region are those of the probe, unless two
 //    moments agree or a part is missing. They, and they turned by 45 degrees about each, with depth along any of them, times
@@ -22,11 +18,12 @@
 #include "Core/Geometry/ProbeFit.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Geometry/FanRefinement.h"
 #include "Core/Imaging/RegionOutline.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <Eigen/Eigenvalues>
 #include <limits>
 #include <utility>
@@ -40,143 +37,6 @@ constexpr double asGood = 0.004, nearlyAsGood = 0.02;
 constexpr double worthAnUnknown = 0.01;                    // gain of a rating by an offset of the fan
 constexpr double mostHoles = 1.0 / 3.0;                    // of the region but for its rim
 constexpr double leastSeenSide = 0.15, leastSeenEnd = 0.4; // of each side, and of the near or the far end
-constexpr double leastWeight = 0.01;                       // of a point at the end of the grid that is inside the model
-
-// The unknowns: a twist of the probe frame, then the shape.
-enum Unknown { FanAngle = 6, FanWidth, SweepAngle, SweepWidth, Length, FanOffset, unknowns };
-using Vector = Eigen::Matrix<double, unknowns, 1>;
-using Matrix = Eigen::Matrix<double, unknowns, unknowns>;
-
-// Solves a symmetric positive definite system: Cholesky, in this order on every machine.
-Vector Solved(Matrix a, Vector b)
-{
-  for (int j = 0; j < unknowns; ++j)
-    for (int i = j; i < unknowns; ++i) {
-      double sum = a(i, j);
-      for (int k = 0; k < j; ++k)
-        sum -= a(i, k) * a(j, k);
-      a(i, j) = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / a(j, j);
-    }
-  for (int i = 0; i < unknowns; ++i) {
-    for (int k = 0; k < i; ++k)
-      b[i] -= a(i, k) * b[k];
-    b[i] /= a(i, i);
-  }
-  for (int i = unknowns; i-- > 0;) {
-    for (int k = i + 1; k < unknowns; ++k)
-      b[i] -= a(k, i) * b[k];
-    b[i] /= a(i, i);
-  }
-  return b;
-}
-
-struct Model {
-  Pose probeToWorld = Pose::Identity();
-  ProbeGeometry shape; // depthMin = 0
-
-  double& operator[](int unknown) { return shape.*NumberOf(unknown); }
-  double operator[](int unknown) const { return shape.*NumberOf(unknown); }
-
-private:
-  static double ProbeGeometry::*NumberOf(int unknown)
-  {
-    static constexpr double ProbeGeometry::*numbers[] = {&ProbeGeometry::fanAngle,   &ProbeGeometry::fanWidth,
-                                                         &ProbeGeometry::sweepAngle, &ProbeGeometry::sweepWidth,
-                                                         &ProbeGeometry::depthMax,   &ProbeGeometry::fanOffset};
-    return numbers[unknown - FanAngle];
-  }
-};
-
-enum Face { FanSide, SweepSide, Near, Far, faces };
-
-// A point in the coordinates of the beams, with the face that is nearest when it is inside, or that it is furthest beyond.
-struct Located {
-  ProbeArc::Place sweep, fan; // sweep.depth is the distance from the face in the fan's plane; fan.along from the fan's middle
-  double distance = 0.0;      // mm, negative inside
-  Face face = FanSide;
-};
-
-Located Locate(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe)
-{
-  Located at;
-  const bool plane = shape.IsPlane();
-  at.sweep = plane ? ProbeArc::Place{0.0, inProbe.z()} : shape.Sweep().PlaceOf(inProbe.y(), inProbe.z());
-  at.fan = shape.Fan().PlaceOf(inProbe.x(), at.sweep.depth);
-  at.fan.along -= shape.fanOffset;
-  const auto beyond = [&at](Face face, double distance) {
-    if (distance > at.distance) {
-      at.distance = distance;
-      at.face = face;
-    }
-  };
-  at.distance = (std::abs(at.fan.along) - 0.5) * std::abs(shape.Fan().Span(at.fan.depth));
-  if (!plane)
-    beyond(SweepSide, (std::abs(at.sweep.along) - 0.5) * std::abs(shape.Sweep().Span(at.sweep.depth)));
-  beyond(Near, shape.depthMin - at.fan.depth);
-  beyond(Far, at.fan.depth - shape.depthMax);
-  return at;
-}
-
-double Sinc(double a)
-{
-  return std::abs(a) < 1e-4 ? 1.0 - a * a / 6.0 : std::sin(a) / a;
-}
-double SincDerivative(double a)
-{
-  return std::abs(a) < 1e-2 ? a * (-1.0 / 3.0 + a * a / 30.0) : (std::cos(a) - std::sin(a) / a) / a;
-}
-
-// How ProbeArc::PointOf moves with the angle and with the width, at a fixed place.
-struct ArcDerivatives {
-  Eigen::Vector2d angle, width;
-};
-ArcDerivatives DerivativesOf(const ProbeArc& arc, const ProbeArc::Place& at)
-{
-  const double s = at.along, turn = arc.angle * s, half = 0.5 * turn;
-  const double sine = std::sin(half), cosine = std::cos(half);
-  ArcDerivatives d;
-  d.width = Eigen::Vector2d(s * Sinc(turn), -s * sine * Sinc(half));
-  d.angle.x() = arc.width * s * s * SincDerivative(turn) + at.depth * s * std::cos(turn);
-  d.angle.y() = -0.5 * arc.width * s * s * (cosine * Sinc(half) + sine * SincDerivative(half)) - at.depth * s * std::sin(turn);
-  return d;
-}
-
-// How the signed distance of a point changes with the unknowns.
-Vector GradientOf(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe, Located at)
-{
-  const double fanSign = at.fan.along < 0.0 ? -1.0 : 1.0, sweepSign = at.sweep.along < 0.0 ? -1.0 : 1.0;
-  // The foot of the point on the face.
-  if (at.face == FanSide)
-    at.fan.along = 0.5 * fanSign;
-  else if (at.face == SweepSide)
-    at.sweep.along = 0.5 * sweepSign;
-  else
-    at.fan.depth = at.face == Near ? shape.depthMin : shape.depthMax;
-  at.fan.along += shape.fanOffset;
-  const double phi = shape.fanAngle * at.fan.along, psi = shape.sweepAngle * at.sweep.along;
-  const Eigen::Vector3d outward(0.0, std::sin(psi), std::cos(psi)); // along the middle beam of the plane
-  const Eigen::Vector3d beam = std::sin(phi) * Eigen::Vector3d::UnitX() + std::cos(phi) * outward;
-  Eigen::Vector3d normal = at.face == Far ? beam : Eigen::Vector3d(-beam);
-  if (at.face == FanSide)
-    normal = fanSign * (std::cos(phi) * Eigen::Vector3d::UnitX() - std::sin(phi) * outward);
-  else if (at.face == SweepSide)
-    normal = sweepSign * Eigen::Vector3d(0.0, std::cos(psi), -std::sin(psi));
-
-  Vector gradient;
-  gradient.head<3>() = -normal;
-  gradient.segment<3>(3) = normal.cross(inProbe);
-  const ArcDerivatives fan = DerivativesOf(shape.Fan(), at.fan), sweep = DerivativesOf(shape.Sweep(), at.sweep);
-  const double outwardPart = normal.dot(outward);
-  gradient[FanAngle] = -(normal.x() * fan.angle.x() + outwardPart * fan.angle.y());
-  gradient[FanWidth] = -(normal.x() * fan.width.x() + outwardPart * fan.width.y());
-  gradient[SweepAngle] = -normal.tail<2>().dot(sweep.angle);
-  gradient[SweepWidth] = -normal.tail<2>().dot(sweep.width);
-  gradient[Length] = at.face == Far ? -1.0 : 0.0;
-  gradient[FanOffset] = at.face == FanSide ? -fanSign * shape.Fan().Span(at.fan.depth) : 0.0;
-  return gradient;
-}
-
-using Points = std::vector<RegionOutline::Point>;
 
 // Every n-th of a list, n chosen for at most \a count.
 template <class T>
@@ -199,12 +59,12 @@ struct Cell {
 };
 
 // Intersection over union of region and model. Voxels that the surface cuts agree with the region.
-double OverlapOf(const Model& model, const std::vector<Cell>& cells, double voxelMm)
+double OverlapOf(const FanModel& model, const std::vector<Cell>& cells, double voxelMm)
 {
   const Pose worldToProbe = model.probeToWorld.inverse();
   std::ptrdiff_t both = 0, either = 0;
   for (const Cell& cell : cells) {
-    const double distance = Locate(model.shape, worldToProbe * cell.position).distance;
+    const double distance = LocateInFan(model.shape, worldToProbe * cell.position).distance;
     const bool inside = std::abs(distance) <= 0.5 * voxelMm ? cell.inside : distance < 0.0;
     both += inside && cell.inside;
     either += inside || cell.inside;
@@ -213,150 +73,17 @@ double OverlapOf(const Model& model, const std::vector<Cell>& cells, double voxe
 }
 
 // Mean distance of the outline, each at most \a cap, as a part of it: 0 ... 1. Ends of the grid count when they are outside.
-double MisfitOf(const Model& model, const Points& points, double cap)
+double MisfitOf(const FanModel& model, const OutlinePoints& points, double cap)
 {
   const Pose worldToProbe = model.probeToWorld.inverse();
   double sum = 0.0, weights = 0.0;
   for (const RegionOutline::Point& point : points) {
-    const double distance = Locate(model.shape, worldToProbe * point.position).distance;
-    const double weight = point.atGrid && distance < 0.0 ? leastWeight : 1.0;
+    const double distance = LocateInFan(model.shape, worldToProbe * point.position).distance;
+    const double weight = point.atGrid && distance < 0.0 ? leastFanWeight : 1.0;
     sum += weight * std::min(std::abs(distance), cap);
     weights += weight;
   }
   return sum / (weights * cap);
-}
-
-// Which of the unknowns a fit may change.
-enum class Freedom { Plane, Centred, Offset };
-
-// The robust least squares of a model to points, at one reach of Tukey's weight.
-class Problem {
-public:
-  Problem(const Points& points, double reach, Freedom freedom) : points_(points), reach_(reach), freedom_(freedom) {}
-
-  // The sum that is minimised. With a matrix, also the normal equations.
-  double Evaluate(const Model& model, Matrix* hessian = nullptr, Vector* slope = nullptr) const
-  {
-    const Pose worldToProbe = model.probeToWorld.inverse();
-    double cost = 0.0;
-    if (hessian) {
-      hessian->setZero();
-      slope->setZero();
-    }
-    for (const RegionOutline::Point& point : points_) {
-      const Eigen::Vector3d inProbe = worldToProbe * point.position;
-      const Located at = Locate(model.shape, inProbe);
-      const double kind = point.atGrid && at.distance < 0.0 ? leastWeight : 1.0;
-      const double ratio = at.distance / reach_, remains = std::max(0.0, 1.0 - ratio * ratio);
-      cost += kind * (1.0 - remains * remains * remains);
-      if (!hessian || remains == 0.0)
-        continue;
-      const double weight = kind * remains * remains;
-      const Vector gradient = GradientOf(model.shape, inProbe, at);
-      hessian->selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
-      *slope += (weight * at.distance) * gradient;
-    }
-    return cost;
-  }
-
-  // At most \a steps steps downhill.
-  void Improve(Model& model, int steps) const
-  {
-    double damping = 1e-3;
-    Matrix hessian;
-    Vector slope;
-    double cost = Evaluate(model, &hessian, &slope);
-    for (int step = 0; step < steps; ++step) {
-      bool better = false;
-      double gain = 0.0;
-      for (int trial = 0; trial < 6 && !better; ++trial) {
-        const Model moved = Moved(model, hessian, slope, damping);
-        const double movedCost = Evaluate(moved);
-        better = movedCost < cost;
-        if (better) {
-          gain = cost - movedCost;
-          model = moved;
-          damping = std::max(1e-9, damping * 0.2);
-        } else {
-          damping *= 8.0;
-        }
-      }
-      if (!better || gain < 1e-5 * cost)
-        return;
-      cost = Evaluate(model, &hessian, &slope);
-    }
-  }
-
-private:
-  bool IsFree(int unknown) const
-  {
-    if (unknown == FanOffset)
-      return freedom_ == Freedom::Offset;
-    return freedom_ != Freedom::Plane || unknown == 0 || unknown == 2 || unknown == 4 || unknown == FanAngle ||
-           unknown == FanWidth || unknown == Length;
-  }
-
-  // One damped step. Shape numbers do not fall below 0: one that would is held there and the others are solved for again.
-  Model Moved(const Model& model, const Matrix& hessian, const Vector& slope, double damping) const
-  {
-    std::array<bool, unknowns> held;
-    Vector change = Vector::Zero();
-    for (int unknown = 0; unknown < unknowns; ++unknown)
-      held[unknown] = !IsFree(unknown);
-    for (bool again = true; again;) {
-      again = false;
-      Matrix system = hessian.selfadjointView<Eigen::Lower>();
-      Vector right = -slope;
-      const double least = 1e-12 * (hessian.diagonal().maxCoeff() + 1e-30);
-      for (int unknown = 0; unknown < unknowns; ++unknown) {
-        system(unknown, unknown) += damping * hessian(unknown, unknown) + least;
-        if (held[unknown]) {
-          // What the others see of a number that is clamped: it goes to 0, or stays.
-          right -= system.col(unknown) * change[unknown];
-        }
-      }
-      for (int unknown = 0; unknown < unknowns; ++unknown)
-        if (held[unknown]) {
-          system.row(unknown).setZero();
-          system.col(unknown).setZero();
-          system(unknown, unknown) = 1.0;
-          right[unknown] = change[unknown];
-        }
-      change = Solved(system, right);
-      for (int unknown = FanAngle; unknown < unknowns; ++unknown)
-        if (unknown != FanOffset && !held[unknown] && model[unknown] + change[unknown] < 0.0) {
-          held[unknown] = true;
-          change[unknown] = -model[unknown];
-          again = true;
-        }
-      if (again)
-        for (int unknown = 0; unknown < unknowns; ++unknown)
-          if (!held[unknown])
-            change[unknown] = 0.0;
-    }
-    Model moved = model;
-    moved.probeToWorld = model.probeToWorld * Exp(change.head<6>());
-    for (int unknown = FanAngle; unknown < unknowns; ++unknown)
-      if (IsFree(unknown))
-        moved[unknown] =
-            unknown == FanOffset ? model[unknown] + change[unknown] : std::max(0.0, model[unknown] + change[unknown]);
-    moved.shape.fanAngle = std::min(moved.shape.fanAngle, 1.999 * Pi);
-    moved.shape.sweepAngle = std::min(moved.shape.sweepAngle, 1.999 * Pi);
-    moved.shape.depthMax = std::max(moved.shape.depthMax, 0.5 * model.shape.depthMax);
-    return moved;
-  }
-
-  const Points& points_;
-  double reach_;
-  Freedom freedom_;
-};
-
-// Fits with a reach that shrinks from \a from to \a to, mm.
-void Refine(Model& model, const Points& points, Freedom freedom, double from, double to, int steps)
-{
-  for (double reach = from; reach > 1.5 * to; reach *= 0.5)
-    Problem(points, reach, freedom).Improve(model, 4);
-  Problem(points, to, freedom).Improve(model, steps);
 }
 
 // All that the search needs to know of a region.
@@ -367,7 +94,7 @@ struct Region {
   Eigen::Vector3d centroid;        // mm
   Eigen::Matrix3d axes;            // of inertia; of a slice the last is its normal
   std::vector<Cell> cells, sample; // many; some of them
-  Points few, some, many;
+  OutlinePoints few, some, many;
 
   double Reach() const { return 1.75 * outline.cellMm; }
 };
@@ -460,7 +187,7 @@ double WidthFor(double angle, double extent, double length)
 }
 
 struct Rated {
-  Model model;
+  FanModel model;
   double rating = -std::numeric_limits<double>::infinity(); // overlap less misfit
 };
 
@@ -520,7 +247,7 @@ void SortByRating(std::vector<Rated>& list)
 }
 
 // Whether two models are one, to within what a fit leaves.
-bool IsAlike(const Model& a, const Model& b, double size)
+bool IsAlike(const FanModel& a, const FanModel& b, double size)
 {
   const Eigen::Matrix3d turn = a.probeToWorld.linear().transpose() * b.probeToWorld.linear();
   // Turned by half about the middle beam a fan is the same.
@@ -541,15 +268,15 @@ std::vector<Rated> Distinct(const std::vector<Rated>& sorted, std::size_t most, 
 }
 
 // Overlap less misfit, of all cells or of some.
-double RatingOf(const Model& model, const Region& region, const std::vector<Cell>& cells, const Points& points)
+double RatingOf(const FanModel& model, const Region& region, const std::vector<Cell>& cells, const OutlinePoints& points)
 {
   const double cellMm = region.outline.cellMm;
   return OverlapOf(model, cells, region.voxelMm) - 0.5 * MisfitOf(model, points, std::max(0.05 * region.size, 2.0 * cellMm));
 }
 
 // The best model, and those that explain the region as well, or nearly so.
-struct Choice {
-  Model best;
+struct FitChoice {
+  FanModel best;
   std::vector<Rated> others; // distinct from it, with their ratings less its own
 };
 
@@ -560,7 +287,7 @@ bool IsThin(double extent, const Region& region)
 }
 
 // How well a model follows the axes of the grid, where the region leaves the choice.
-double ConventionOf(const Model& model, const Region& region)
+double ConventionOf(const FanModel& model, const Region& region)
 {
   const Eigen::Matrix3d& axes = region.outline.geometry.direction;
   const Eigen::Matrix3d turn = model.probeToWorld.linear();
@@ -571,9 +298,9 @@ double ConventionOf(const Model& model, const Region& region)
   return (isThin ? -10.0 : 0.0) + turn.col(2).dot(axes.col(region.plane ? 1 : 2)) + 0.3 * std::abs(turn.col(0).dot(axes.col(0)));
 }
 
-Choice Choose(const Region& region, const Progress& progress)
+FitChoice Choose(const Region& region, const Progress& progress)
 {
-  const Freedom freedom = region.plane ? Freedom::Plane : Freedom::Centred;
+  const FanFreedom freedom = region.plane ? FanFreedom::Plane : FanFreedom::Centred;
   // 2. starts
   const Frames frames = StartFrames(region);
   std::vector<std::vector<Rated>> perFrame(frames.size());
@@ -588,7 +315,7 @@ Choice Choose(const Region& region, const Progress& progress)
   // 3. each to its optimum
   const auto refineAll = [&](const Progress& part) {
     ParallelFor(static_cast<std::ptrdiff_t>(candidates.size()), part, [&](std::ptrdiff_t i) {
-      Refine(candidates[i].model, region.some, freedom, 0.2 * region.size, region.Reach(), 10);
+      RefineFan(candidates[i].model, region.some, freedom, 0.2 * region.size, region.Reach(), 10);
       candidates[i].rating = RatingOf(candidates[i].model, region, region.sample, region.some);
     });
     SortByRating(candidates);
@@ -622,14 +349,14 @@ Choice Choose(const Region& region, const Progress& progress)
 
   // 4. the best with all points
   ParallelFor(static_cast<std::ptrdiff_t>(candidates.size()), progress.Part(0.8, 1.0), [&](std::ptrdiff_t i) {
-    Refine(candidates[i].model, region.many, freedom, 4.0 * region.Reach(), region.Reach(), 30);
+    RefineFan(candidates[i].model, region.many, freedom, 4.0 * region.Reach(), region.Reach(), 30);
     candidates[i].rating = RatingOf(candidates[i].model, region, region.cells, region.many);
     // A fan that is not centred on its array is a solid of its own only when the array bends and turns.
     if (region.plane ||
         std::min(candidates[i].model.shape.fanAngle, candidates[i].model.shape.sweepAngle) < 5.0 * RadiansPerDegree)
       return;
     Rated offset = candidates[i];
-    Refine(offset.model, region.many, Freedom::Offset, 0.1 * region.size, region.Reach(), 40);
+    RefineFan(offset.model, region.many, FanFreedom::Offset, 0.1 * region.size, region.Reach(), 40);
     offset.rating = RatingOf(offset.model, region, region.cells, region.many);
     if (offset.rating > candidates[i].rating + worthAnUnknown)
       candidates[i] = offset;
@@ -640,7 +367,7 @@ Choice Choose(const Region& region, const Progress& progress)
     if (other->rating > candidates.front().rating - asGood &&
         ConventionOf(other->model, region) > ConventionOf(chosen->model, region) + 0.05)
       chosen = other;
-  Choice choice{chosen->model, {}};
+  FitChoice choice{chosen->model, {}};
   for (auto other = candidates.begin(); other != candidates.end(); ++other)
     if (other != chosen && other->rating > chosen->rating - nearlyAsGood)
       choice.others.push_back({other->model, other->rating - chosen->rating});
@@ -653,16 +380,16 @@ struct Residual {
   double beyond = 0.0;          // the part of the outline that is further off than what voxels and rounding explain
 };
 
-Residual ResidualOf(const Model& model, const Region& region)
+Residual ResidualOf(const FanModel& model, const Region& region)
 {
-  const Points& points = region.outline.points;
+  const OutlinePoints& points = region.outline.points;
   const Pose worldToProbe = model.probeToWorld.inverse();
   const bool onlyGrid = std::all_of(points.begin(), points.end(), [](const auto& point) { return point.atGrid; });
   const double near = std::max(0.015 * region.size, region.outline.cellMm);
   Residual residual;
   double count = 0.0;
   for (const RegionOutline::Point& point : points) {
-    const double distance = Locate(model.shape, worldToProbe * point.position).distance;
+    const double distance = LocateInFan(model.shape, worldToProbe * point.position).distance;
     if (point.atGrid && !onlyGrid && distance < 0.0)
       continue;
     residual.rms += distance * distance;
@@ -676,7 +403,7 @@ Residual ResidualOf(const Model& model, const Region& region)
 
 // The near end of a fan that begins in a tip, from the voxels themselves: blocks of voxels blunt it. The face moves along the
 // beams to where it puts the fewest voxels on the wrong side; not beyond the point where beams or planes of the sweep meet.
-void SharpenTip(Model& model, VolumeView<const unsigned char> valid, const Region& region)
+void SharpenTip(FanModel& model, VolumeView<const unsigned char> valid, const Region& region)
 {
   ProbeGeometry& shape = model.shape;
   const double cell = region.outline.cellMm, inside = 4.0 * cell;
@@ -706,7 +433,7 @@ void SharpenTip(Model& model, VolumeView<const unsigned char> valid, const Regio
   for (int k = first[2]; k <= last[2]; ++k)
     for (int j = first[1]; j <= last[1]; ++j)
       for (int i = first[0]; i <= last[0]; ++i) {
-        const Located at = Locate(longer, indexToProbe * Eigen::Vector3d(i, j, k));
+        const FanPlace at = LocateInFan(longer, indexToProbe * Eigen::Vector3d(i, j, k));
         if (at.distance <= 0.0 && at.fan.depth < inside)
           voxels.emplace_back(at.fan.depth, valid(i, j, k) ? 1 : -1);
       }
@@ -730,7 +457,7 @@ void SharpenTip(Model& model, VolumeView<const unsigned char> valid, const Regio
 }
 
 // Turned by half about the middle beam a fan is the same: +x is the side towards which the indices grow.
-void FaceTheGrid(Model& model, const Region& region)
+void FaceTheGrid(FanModel& model, const Region& region)
 {
   const Eigen::Vector3d along = region.outline.geometry.direction.transpose() * model.probeToWorld.linear().col(0);
   Eigen::Index most = 0;
@@ -742,35 +469,28 @@ void FaceTheGrid(Model& model, const Region& region)
   }
 }
 
-std::string Text(const char* format, double value)
-{
-  char text[200];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
 // How much of each face of the model the outline touches, of FanSide and SweepSide the lesser of both sides, [0, 1].
-std::array<double, faces> SeenParts(const Model& model, const Region& region)
+std::array<double, FanPlace::faces> SeenParts(const FanModel& model, const Region& region)
 {
   const ProbeGeometry& shape = model.shape;
   // A face is looked at in up to 6 x 6 parts, none smaller than two cells.
   constexpr int most = 6;
   const auto partsOf = [&](double extent) { return std::clamp(static_cast<int>(0.5 * extent / region.outline.cellMm), 1, most); };
   const auto partsOfFace = [&](int face) -> std::array<int, 2> {
-    const double depth = face == Near ? 0.0 : face == Far ? shape.depthMax : 0.5 * shape.depthMax;
+    const double depth = face == FanPlace::Near ? 0.0 : face == FanPlace::Far ? shape.depthMax : 0.5 * shape.depthMax;
     const int fan = partsOf(shape.Fan().Span(depth)), sweep = region.plane ? 1 : partsOf(shape.Sweep().Span(depth));
     const int deep = partsOf(shape.depthMax);
-    return {face == FanSide ? deep : fan, face == SweepSide ? deep : sweep};
+    return {face == FanPlace::FanSide ? deep : fan, face == FanPlace::SweepSide ? deep : sweep};
   };
-  bool touched[faces][2][most][most] = {};
+  bool touched[FanPlace::faces][2][most][most] = {};
   const Pose worldToProbe = model.probeToWorld.inverse();
   for (const RegionOutline::Point& point : region.outline.points) {
-    const Located at = Locate(shape, worldToProbe * point.position);
+    const FanPlace at = LocateInFan(shape, worldToProbe * point.position);
     if (std::abs(at.distance) > region.Reach())
       continue;
     const double fan = at.fan.along + 0.5, sweep = at.sweep.along + 0.5, deep = at.fan.depth / shape.depthMax;
-    const double place[2] = {at.face == FanSide ? deep : fan, at.face == SweepSide ? deep : sweep};
-    const bool positive = at.face == FanSide ? fan > 0.5 : at.face == SweepSide && sweep > 0.5;
+    const double place[2] = {at.face == FanPlace::FanSide ? deep : fan, at.face == FanPlace::SweepSide ? deep : sweep};
+    const bool positive = at.face == FanPlace::FanSide ? fan > 0.5 : at.face == FanPlace::SweepSide && sweep > 0.5;
     int part[2];
     for (int a = 0; a < 2; ++a) {
       const int parts = partsOfFace(at.face)[a];
@@ -778,22 +498,23 @@ std::array<double, faces> SeenParts(const Model& model, const Region& region)
     }
     touched[at.face][positive][part[0]][part[1]] = true;
   }
-  std::array<double, faces> seen{};
-  for (int face = 0; face < faces; ++face) {
+  std::array<double, FanPlace::faces> seen{};
+  for (int face = 0; face < FanPlace::faces; ++face) {
     int count[2] = {0, 0};
     for (int side = 0; side < 2; ++side)
       for (const auto& row : touched[face][side])
         count[side] += static_cast<int>(std::count(std::begin(row), std::end(row), true));
     const auto [first, second] = partsOfFace(face);
-    seen[face] = static_cast<double>(face < Near ? std::min(count[0], count[1]) : count[0]) / (first * second);
+    seen[face] = static_cast<double>(face < FanPlace::Near ? std::min(count[0], count[1]) : count[0]) / (first * second);
   }
   if (region.plane)
-    seen[SweepSide] = 1.0;
+    seen[FanPlace::SweepSide] = 1.0;
   return seen;
 }
 
 // What the region leaves open, in sentences.
-std::vector<std::string> NotesOn(const Choice& choice, const Region& region, const std::array<double, faces>& seen, double beyond)
+std::vector<std::string> NotesOn(const FitChoice& choice, const Region& region, const std::array<double, FanPlace::faces>& seen,
+                                 double beyond)
 {
   const ProbeGeometry& shape = choice.best.shape;
   const double cell = region.outline.cellMm;
@@ -801,24 +522,24 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
   if (region.outline.coversGrid)
     notes.push_back("Every voxel is valid: the fan is the grid, which need not be what the probe saw.");
   if (region.outline.holesPart > 0.01)
-    notes.push_back(Text("Holes (%.0f%% of the region) were taken as part of it.", 100.0 * region.outline.holesPart));
+    notes.push_back(Format("Holes (%.0f%% of the region) were taken as part of it.", 100.0 * region.outline.holesPart));
   if (beyond > 0.1)
     notes.push_back(
-        Text("%.0f%% of the outline do not lie on the model: corners are missing, edges are ragged, or the region is not "
-             "quite a fan.",
-             100.0 * beyond));
+        Format("%.0f%% of the outline do not lie on the model: corners are missing, edges are ragged, or the region is not "
+               "quite a fan.",
+               100.0 * beyond));
   if (region.outline.largestPart < 0.99)
-    notes.push_back(Text("%.0f%% of the region does not hang together with the rest and was left out of the fit.",
-                         100.0 * (1.0 - region.outline.largestPart)));
+    notes.push_back(Format("%.0f%% of the region does not hang together with the rest and was left out of the fit.",
+                           100.0 * (1.0 - region.outline.largestPart)));
 
-  const auto unseen = [&](Face face, const char* sentence) {
+  const auto unseen = [&](FanPlace::Face face, const char* sentence) {
     if (seen[face] < 0.5)
-      notes.push_back(Text(sentence, 100.0 * seen[face]));
+      notes.push_back(Format(sentence, 100.0 * seen[face]));
   };
-  unseen(Far, "Only %.0f%% of the far end is seen in the outline: the depth may be greater.");
-  unseen(Near, "Only %.0f%% of the near end is seen in the outline: the first depth and the widths are uncertain.");
-  unseen(FanSide, "Only %.0f%% of one side of the fan is seen in the outline: the fan may be wider.");
-  unseen(SweepSide, "Only %.0f%% of one side of the sweep is seen in the outline: the sweep may be wider.");
+  unseen(FanPlace::Far, "Only %.0f%% of the far end is seen in the outline: the depth may be greater.");
+  unseen(FanPlace::Near, "Only %.0f%% of the near end is seen in the outline: the first depth and the widths are uncertain.");
+  unseen(FanPlace::FanSide, "Only %.0f%% of one side of the fan is seen in the outline: the fan may be wider.");
+  unseen(FanPlace::SweepSide, "Only %.0f%% of one side of the sweep is seen in the outline: the sweep may be wider.");
 
   bool otherAxis = false, exchanged = false;
   double exchangedRating = 0.0;
@@ -839,11 +560,11 @@ std::vector<std::string> NotesOn(const Choice& choice, const Region& region, con
 
   if (shape.fanOffset != 0.0)
     notes.push_back(
-        Text("The fan is not centred (fanOffset): its middle beam is turned by %.1f degrees from where the sweep looks.",
-             shape.fanAngle * shape.fanOffset / RadiansPerDegree));
+        Format("The fan is not centred (fanOffset): its middle beam is turned by %.1f degrees from where the sweep looks.",
+               shape.fanAngle * shape.fanOffset / RadiansPerDegree));
   if (!region.plane && IsThin(shape.Sweep().Span(0.5 * shape.depthMax), region))
-    notes.push_back(Text("The region is only %.3g mm thick along the sweep, too little to tell its angle from its width.",
-                         shape.Sweep().Span(0.5 * shape.depthMax)));
+    notes.push_back(Format("The region is only %.3g mm thick along the sweep, too little to tell its angle from its width.",
+                           shape.Sweep().Span(0.5 * shape.depthMax)));
   if (shape.fanAngle * shape.depthMax < cell)
     notes.push_back("The beams are parallel, as far as the voxels tell: nothing is known of a radius of the array.");
   else if (shape.fanWidth < cell)
@@ -877,10 +598,10 @@ ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& ge
   if (region.outline.points.size() < (region.plane ? 40 : 150))
     throw Error(Error::Kind::NotPossible, "the valid region is too small for a fit: its outline is " +
                                               std::to_string(region.outline.points.size()) + " voxels long");
-  Choice choice = Choose(region, progress.Part(0.3, 1.0));
+  FitChoice choice = Choose(region, progress.Part(0.3, 1.0));
   SharpenTip(choice.best, valid, region);
   FaceTheGrid(choice.best, region);
-  const Model& best = choice.best;
+  const FanModel& best = choice.best;
 
   ProbeFit fit;
   fit.geometry = best.shape;
@@ -891,14 +612,16 @@ ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& ge
   fit.meanDistance = residual.mean / region.size;
   const std::string refusal = "no fan explains the valid region: ";
   if (region.outline.holesPart > mostHoles)
-    throw Error(Error::Kind::NotPossible, refusal + Text("%.0f%% of it are holes", 100.0 * region.outline.holesPart));
+    throw Error(Error::Kind::NotPossible, refusal + Format("%.0f%% of it are holes", 100.0 * region.outline.holesPart));
   if (fit.overlap < parameters.minimumOverlap || fit.meanDistance > parameters.maximumDistance)
-    throw Error(Error::Kind::NotPossible, refusal + Text("the best one overlaps it by %.3f", fit.overlap) +
-                                              Text(" (at least %.3g is asked for), and", parameters.minimumOverlap) +
-                                              Text(" its surface lies %.3g mm off the outline", residual.mean) +
-                                              Text(" in the mean (at most %.3g mm)", parameters.maximumDistance * region.size));
-  const std::array<double, faces> seen = SeenParts(best, region);
-  if (std::max(seen[Near], seen[Far]) < leastSeenEnd || std::min(seen[FanSide], seen[SweepSide]) < leastSeenSide)
+    throw Error(Error::Kind::NotPossible,
+                refusal +
+                    Format("the best one overlaps it by %.3f (at least %.3g is asked for), and its surface lies %.3g mm off the "
+                           "outline in the mean (at most %.3g mm)",
+                           fit.overlap, parameters.minimumOverlap, residual.mean, parameters.maximumDistance * region.size));
+  const std::array<double, FanPlace::faces> seen = SeenParts(best, region);
+  if (std::max(seen[FanPlace::Near], seen[FanPlace::Far]) < leastSeenEnd ||
+      std::min(seen[FanPlace::FanSide], seen[FanPlace::SweepSide]) < leastSeenSide)
     throw Error(Error::Kind::NotPossible, refusal + "the grid cuts off so much of it that its sides are not seen");
   try {
     fit.geometry.Check();

@@ -3,6 +3,7 @@
 // names, so that among equally short ways the first in that order wins. The same search gives the spanning trees whose missing
 // edges close the fundamental cycles: when all of these close, every cycle does. Graphs have a dozen edges; nothing is kept.
 #include "Core/Geometry/TransformGraph.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <charconv>
@@ -13,8 +14,6 @@
 
 namespace echorama {
 namespace {
-
-constexpr double Degrees = 57.29577951308232;
 
 bool IsBlank(char c)
 {
@@ -297,7 +296,7 @@ std::vector<OpenCycle> TransformGraph::CheckCycles(const CycleTolerance& toleran
     }
     const Eigen::JacobiSVD<Eigen::Matrix3d> change(product.linear() - Eigen::Matrix3d::Identity());
     result.mm = product.translation().norm() + tolerance.leverMm * change.singularValues()[0];
-    result.degrees = Degrees * std::abs(Eigen::AngleAxisd(product.rotation()).angle());
+    result.degrees = DegreesPerRadian * std::abs(Eigen::AngleAxisd(product.rotation()).angle());
     if (!(result.mm <= tolerance.mm && result.degrees <= tolerance.degrees)) // NaN does not close either
       open.push_back(result);
   }

@@ -3,6 +3,7 @@
 
 #include "Core/Base/Angles.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Geometry/MatrixRows.h"
 
 #include "vtkDataObject.h"
 #include "vtkDoubleArray.h"
@@ -59,14 +60,12 @@ std::optional<Transform> MatrixOf(vtkDataObject* data, const char* name)
   if (!n) {
     return {};
   }
-  Transform transform;
-  transform.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n->data());
-  return transform;
+  return echorama::FromRows<Transform>(n->data());
 }
 
 void SetMatrix(vtkDataObject* data, const char* name, const Eigen::Matrix4d& matrix)
 {
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix;
+  const echorama::MatrixRows rows = matrix;
   SetNumbers(data, name, std::vector<double>(rows.data(), rows.data() + 16));
 }
 
@@ -155,8 +154,7 @@ bool vtkUltrasoundAcquisition::GetProbeToWorld(vtkDataObject* data, vtkMatrix4x4
   if (!pose) {
     return false;
   }
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = pose->matrix();
-  matrix->DeepCopy(rows.data());
+  matrix->DeepCopy(echorama::MatrixRows(pose->matrix()).data());
   return true;
 }
 

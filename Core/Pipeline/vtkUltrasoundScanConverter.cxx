@@ -53,9 +53,7 @@ vtkUltrasoundScanConverter::Job vtkUltrasoundScanConverter::Prepare(vtkInformati
 //----------------------------------------------------------------------------
 int vtkUltrasoundScanConverter::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  // Field data does not travel with the information of the pipeline.
-  int port = 0;
-  this->GetInputAlgorithm(0, 0, port)->Update(port);
+  vtkUltrasoundVolume::MakeInput(this, 0); // field data does not travel with the information of the pipeline
   return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress&) {
     vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs).Grid);
   });

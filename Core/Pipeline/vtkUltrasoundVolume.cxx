@@ -5,15 +5,20 @@
 #include "vtkCompositeDataSet.h"
 #include "vtkDataObjectTree.h"
 #include "vtkDataObjectTreeIterator.h"
+#include "vtkDoubleArray.h"
+#include "vtkExecutive.h"
+#include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix3x3.h"
 #include "vtkMatrix4x4.h"
+#include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 #include "vtkSmartPointer.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
 
 #include <cstring>
@@ -183,6 +188,49 @@ std::vector<vtkUltrasoundVolume::Input> vtkUltrasoundVolume::CollectInputs(vtkAl
     }
   }
   return inputs;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::AcceptVolumes(vtkInformation* port)
+{
+  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
+  port->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
+  port->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  port->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundVolume::MakeInput(vtkAlgorithm* filter, int port, int connection)
+{
+  RequestWhole(filter->GetExecutive()->GetInputInformation(port));
+  bool made = true;
+  for (int number = 0; number < filter->GetNumberOfInputConnections(port); ++number) {
+    if (connection < 0 || number == connection) {
+      int output = 0;
+      vtkAlgorithm* producer = filter->GetInputAlgorithm(port, number, output);
+      made = producer->GetExecutive()->Update(output) && made;
+    }
+  }
+  return made;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::AddField(vtkDataObject* data, const char* name, const double* values, int components)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(components);
+  array->InsertNextTuple(values);
+  data->GetFieldData()->AddArray(array);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::AddField(vtkDataObject* data, const char* name, const std::string& text)
+{
+  vtkNew<vtkStringArray> array;
+  array->SetName(name);
+  array->InsertNextValue(text);
+  data->GetFieldData()->AddArray(array);
 }
 
 //----------------------------------------------------------------------------

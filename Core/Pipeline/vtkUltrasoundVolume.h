@@ -26,6 +26,7 @@
 
 class vtkAlgorithm;
 class vtkDataArray;
+class vtkDataObject;
 class vtkImageData;
 class vtkInformation;
 class vtkInformationVector;
@@ -136,6 +137,21 @@ public:
       RefuseType(intensity);
     }
   }
+
+  /** For FillInputPortInformation: the port takes any number of images, or of data object trees of such. */
+  static void AcceptVolumes(vtkInformation* port);
+
+  /**
+   * For RequestInformation, where only the data tells what comes out: makes what comes in on a port, whole, on all connections or
+   * one. It is not made again later, as nothing has changed then. Returns whether it could be made.
+   */
+  static bool MakeInput(vtkAlgorithm* filter, int port, int connection = -1);
+
+  ///@{
+  /** Adds an array of one tuple, or one text, to the field data. */
+  static void AddField(vtkDataObject* data, const char* name, const double* values, int components);
+  static void AddField(vtkDataObject* data, const char* name, const std::string& text);
+  ///@}
 
   /**
    * For RequestUpdateExtent: asks for the whole of every connection of an input port, whether it is cut into extents or

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Regions of known fans, one and many together, and regions that are none: every voxel is inside, and the fan is not much larger.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -14,7 +15,7 @@ using namespace echorama;
 
 namespace {
 
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 
 struct Region {
   ImageGeometry grid;

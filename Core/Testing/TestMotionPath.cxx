@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/MotionPath.h"
@@ -11,7 +12,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double pi = 3.141592653589793;
+constexpr double pi = Pi;
 
 Pose PoseOf(const Vector3d& position, const Vector3d& turn)
 {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Masks of known fans, whole and damaged, on grids that follow them or not; and regions that no fan explains.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -15,7 +16,7 @@ using namespace echorama;
 
 namespace {
 
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 
 struct Case {
   ProbeGeometry probe;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/ProbeGeometry.h"
@@ -10,7 +11,7 @@
 namespace {
 
 using namespace echorama;
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 
 // The textbook form with radii, written from the picture of the probe alone.
 Eigen::Vector3d ByRadii(double phi, double fanRadius, double psi, double sweepRadius, double depth)

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <cmath>
@@ -7,7 +8,7 @@
 namespace {
 
 using namespace echorama;
-constexpr double pi = 3.141592653589793;
+constexpr double pi = Pi;
 
 // Angles at which the formulas change or lose digits.
 const double angles[] = {0.0, 1e-300, 1e-12,  1e-9, 1e-8, 3e-8,   1e-5,      1e-3,      0.00999, 0.01,    0.01001,

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -11,7 +12,7 @@
 namespace {
 
 using namespace echorama;
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 
 struct Case {
   const char* name;

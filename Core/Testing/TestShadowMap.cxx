@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Synthetic beams with known shadows, through scan conversion: what is found, what is spared, and what must not matter.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -166,7 +167,7 @@ TEST(ShadowMap, FindsTheShadowAndSparesFluid)
 
 TEST(ShadowMap, EveryShapeOfProbe)
 {
-  const double degree = 0.017453292519943295;
+  const double degree = RadiansPerDegree;
   for (const ProbeGeometry& probe :
        {ProbeGeometry::Linear(60, 50, 0, 80), ProbeGeometry::Phased(70 * degree, 60 * degree, 5, 85),
         ProbeGeometry{35 * degree, 30.0, 40 * degree, 25.0, 5.0, 85.0, 0.4}, ProbeGeometry::Convex(1.1, 40, 0, 0, 5, 85)}) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Core/Geometry/TransformGraph.h"
+#include <algorithm>
+#include <array>
 #include <gtest/gtest.h>
 #include <limits>
 
@@ -73,6 +76,10 @@ TEST(TransformGraph, NamesAreCutWherePlusCutsThem)
   EXPECT_EQ(FramesOf("StepperEncoderValuesToStepperHomeTransform"), Frames("StepperEncoderValues", "StepperHome"));
   EXPECT_EQ(FramesOf("imageToProbe"), Frames("Image", "Probe"));
   EXPECT_EQ(FramesOf("Marker_1To2ndTracker"), Frames("Marker_1", "2ndTracker"));
+  EXPECT_EQ(FramesOf("axleToBed"), Frames("Axle", "Bed"));
+  EXPECT_EQ(FramesOf("zoomToBed"), Frames("Zoom", "Bed"));
+  EXPECT_FALSE(FramesOf("BedToaxle"));
+  EXPECT_FALSE(FramesOf("BedTozoom"));
   for (const char* name : {"", "To", "Image", "ImageTo", "ToProbe", "ImageToTransform", "AToBToC", "ImagetoProbe", "Imagetoprobe",
                            "TotoTotoro", "Torso", "Image ToProbe", "ImageToProbe ", "Image\nToProbe", "Transform",
                            "ImageToProbeTransformStatus", "Timestamp", "FrameNumber"})
@@ -191,6 +198,13 @@ TEST(TransformGraph, SingularMatricesLeadOneWay)
   thin.linear() *= 1e-9;
   graph.Set(Link("ImageToProbe", thin));
   EXPECT_DOUBLE_EQ(graph.Find("Probe", "Image").matrix(2, 2), 1e9);
+
+  // Flat is what is thinner than the rounding of doubles leaves it, 1e-12.
+  for (const double thickness : {2e-12, 5e-13}) {
+    Eigen::Affine3d plate = Eigen::Affine3d::Identity();
+    plate.linear()(2, 2) = thickness;
+    EXPECT_EQ(TransformGraph({Link("ImageToProbe", plate)}).ReachableFrom("Probe").size(), thickness > 1e-12 ? 1u : 0u);
+  }
 }
 
 TEST(TransformGraph, SaysWhatIsMissing)
@@ -239,11 +253,12 @@ TEST(TransformGraph, RefusesBadEdges)
 TEST(TransformGraph, CyclesThatClose)
 {
   TransformGraph graph = TrackedProbe();
-  EXPECT_TRUE(graph.CheckCycles().empty()) << "a tree";
+  EXPECT_TRUE(graph.CheckCycles({0.0, 0.0, 100.0}).empty()) << "a tree has no cycle, however strict the tolerance is";
   graph.Set({"Image", "Phantom", graph.Find("Image", "Phantom").matrix, {}, {}, ""});
   graph.Set({"Tracker", "Image", graph.Find("Tracker", "Image").matrix, {}, {}, ""});
   graph.Set({"Tracker", "Probe", graph.Find("Tracker", "Probe").matrix, {}, {}, ""});
   EXPECT_TRUE(graph.CheckCycles({1e-9, 1e-6, 100.0}).empty());
+  EXPECT_TRUE(TransformGraph({Link("AToB"), Link("BToA")}).CheckCycles({0.0, 0.0, 100.0}).empty()) << "exactly";
 }
 
 TEST(TransformGraph, OpenCyclesAreMeasuredInMillimetres)
@@ -267,7 +282,7 @@ TEST(TransformGraph, OpenCyclesAreMeasuredInMillimetres)
   // A turn by one degree moves what is 100 mm away by 1.745 mm.
   graph = TransformGraph(
       {Link("AToB", SomeAffine(5)),
-       Link("BToA", SomeAffine(5).inverse() * Eigen::AngleAxisd(0.017453292519943295, Eigen::Vector3d(1, 2, 2) / 3.0))});
+       Link("BToA", SomeAffine(5).inverse() * Eigen::AngleAxisd(RadiansPerDegree, Eigen::Vector3d(1, 2, 2) / 3.0))});
   open = graph.CheckCycles();
   ASSERT_EQ(open.size(), 1u) << "the two directions of one pair are a cycle too";
   EXPECT_NEAR(open[0].degrees, 1.0, 1e-6);
@@ -279,6 +294,48 @@ TEST(TransformGraph, OpenCyclesAreMeasuredInMillimetres)
   EXPECT_EQ(graph.CheckCycles({10.0, 0.9, 100.0}).size(), 1u);
   graph.Set(Link("BToA", SomeAffine(5), TransformStatus::OutOfRange));
   EXPECT_TRUE(graph.CheckCycles().empty()) << "what is not valid is not compared";
+}
+
+// A ring of four units that does not close by 2 mm: in all orders, and with each edge the wrong one.
+TEST(TransformGraph, OpenCyclesAreMeasuredWhereTheUnitIsLargest)
+{
+  std::array<double, 4> units{0.08, 0.3, 0.5, 1.0};
+  do
+    for (std::size_t wrong = 0; wrong < 4; ++wrong)
+      for (const bool turned : {false, true}) {
+        TransformGraph graph;
+        for (std::size_t i = 0; i < 4; ++i) {
+          std::size_t from = i, to = (i + 1) % 4;
+          if (turned && i % 2 == 0)
+            std::swap(from, to);
+          const Eigen::Vector3d off(0.0, i == wrong ? 2.0 : 0.0, 0.0); // mm
+          const auto toWorld = [&](std::size_t frame) { return SomeAffine(20 + frame, units[frame]); };
+          const std::string names = "ABCD";
+          const Eigen::Affine3d matrix = toWorld(to).inverse() * Eigen::Translation3d(off) * toWorld(from);
+          graph.Set({names.substr(from, 1), names.substr(to, 1), matrix, {}, {}, ""});
+        }
+        const auto open = graph.CheckCycles();
+        ASSERT_EQ(open.size(), 1u);
+        const auto largest = std::max_element(units.begin(), units.end()) - units.begin();
+        EXPECT_EQ(open[0].frame, std::string(1, static_cast<char>('A' + largest)));
+        EXPECT_NEAR(open[0].mm, 2.0, 1e-9);
+        EXPECT_EQ(open[0].edges.size(), 4u);
+      }
+  while (std::next_permutation(units.begin(), units.end()));
+}
+
+// C, D and E make a cycle that hangs on A by B: it is told without the way there.
+TEST(TransformGraph, ACycleIsToldWithoutTheWayToIt)
+{
+  Eigen::Affine3d wrong = Eigen::Affine3d::Identity();
+  wrong.linear()(0, 0) = 1.02; // stretched by 2% along one axis: 2 mm at 100 mm
+  TransformGraph graph(
+      {Link("AToB", SomeAffine(1)), Link("BToC", SomeAffine(2)), Link("CToD"), Link("CToE"), Link("DToE", wrong)});
+  const auto open = graph.CheckCycles({1.0, 1.0, 100.0});
+  ASSERT_EQ(open.size(), 1u);
+  EXPECT_EQ(open[0].edges, (Names{"DToE", "inverse of CToE", "CToD"}));
+  EXPECT_NEAR(open[0].mm, 2.0, 1e-9);
+  EXPECT_TRUE(graph.CheckCycles({2.1, 1.0, 100.0}).empty());
 }
 
 TEST(TransformGraph, EveryWrongEdgeOpensACycle)

@@ -75,7 +75,7 @@ def mha(name):
 def check_phantoms():
     """The phantoms know their probe."""
     if not hasattr(echorama, "vtkUltrasoundPhantomSource"):
-        skipped.append("phantoms (the room Filters/Synthesis is not built)")
+        skipped.append("phantoms (the room Filters/Phantoms is not built)")
         return
     for place in (dict(), dict(Position=(20, -30, 40), Orientation=(30, -50, 70)), dict(FanAngle=80, FanRadius=12, SweepRadius=50)):
         source = echorama.vtkUltrasoundPhantomSource()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The kernels without VTK: makes a coarse phantom and prints how much of its box the fan fills, and its mean grey.
 #include "Core/Base/Error.h"
-#include "Filters/Synthesis/Phantom.h"
+#include "Filters/Phantoms/Phantom.h"
 #include <iostream>
 #include <vector>
 

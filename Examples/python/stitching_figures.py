@@ -24,8 +24,7 @@ NAMES = ("square", "triangle", "circle")
 WAYS = (("plain average", "average", "mix"), ("feather (Szeliski)", "feather", "mix"), ("distance", "distance", "mix"),
         ("membrane", "membrane", "mix"))
 TEXTURES = (("plain average", "average", "mix"), ("membrane, mix", "membrane", "mix"),
-            ("membrane, restore", "membrane", "restore"), ("membrane, split", "membrane", "split"),
-            ("membrane, seam", "membrane", "seam"), ("multiband (Burt)", "multiband", "mix"), ("offset (Peleg)", "offset", "mix"))
+            ("membrane, split", "membrane", "split"), ("membrane, seam", "membrane", "seam"))
 
 
 def shapes(size):
@@ -176,8 +175,7 @@ def textures(folder, masks):
     rows, columns = np.nonzero(np.sum(masks, axis=0) > 1)
     panels = [panel[max(rows.min() - 8, 0):rows.max() + 9, max(columns.min() - 8, 0):columns.max() + 9] for panel in panels]
     titles = [title for title, _, _ in TEXTURES]
-    save(folder, "stitching_textures.png", [panels[:4]], titles[:4], width=2.6)
-    save(folder, "stitching_textures_more.png", [panels[4:]], titles[4:], width=2.6)
+    save(folder, "stitching_textures.png", [panels], titles, width=2.6)
 
 
 def volumes_in_slices(folder, paths):

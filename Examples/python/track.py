@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """track.py DEVICE [SECONDS]: where the tools of a tracker are, as lines of text, and at the end how well they came.
 
-DEVICE is a line such as "polhemus:/dev/ttyUSB0?names=Probe,Stylus", "udp://:18950", "igtl://localhost:18944",
+DEVICE is a line such as "polhemus:/dev/ttyUSB0?names=Probe,Stylus", "igtl://localhost:18944",
 "replay:FILE?speed=2" or "simulated:?rate=100"; SECONDS defaults to 10.
 """
 import sys

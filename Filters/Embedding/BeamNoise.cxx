@@ -10,6 +10,7 @@
 // same seed with other lengths is the same noise, smoother. Every distribution is one increasing curve over the Rayleigh
 // distributed envelope, tabulated at 16384 nodes.
 #include "BeamNoise.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
@@ -22,6 +23,31 @@
 #include <string>
 
 namespace echorama {
+
+ParameterList Describe(BeamNoiseParameters& p)
+{
+  return {
+      Parameter(
+          "IntensityModel", Choice(p.intensity, {"rayleigh", "log-compressed"}),
+          "How intensities are distributed: as the envelope of speckle, or as the greys of a machine. A volume to match brings "
+          "its own distribution."),
+      Parameter("Mean", p.mean, {0, Unlimited, true}, "", "Mean of the intensities; below 255 when they are log-compressed."),
+      Parameter("DynamicRangeDb", p.dynamicRangeDb, {10, 200}, "dB",
+                "How much 255 greys span. With 60 dB the deviation is 24 greys where nothing is cut.")
+          .When("IntensityModel", "log-compressed"),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same noise."),
+      Parameter("Samples", p.samples, {2, 100000}, "", "Samples along each beam."),
+      Parameter("Elements", p.elements, {2, 100000}, "", "Beams across the fan."),
+      Parameter("Steps", p.steps, {2, 100000}, "", "Planes of the sweep."),
+      Parameter(
+          "DepthCorrelationMm", p.depthCorrelationMm, {0, 10000}, "mm",
+          "Size of the grain along the depth, at most a quarter of the depth range: the lag at which the autocorrelation of the "
+          "speckle's power is one half. 0: neighbouring samples are independent. A volume to match brings its own."),
+      Parameter("FanCorrelation", p.fanCorrelation, {0, 0.25}, "whole fans", "The same across the fan."),
+      Parameter("SweepCorrelation", p.sweepCorrelation, {0, 0.25}, "whole sweeps", "The same along the sweep."),
+  };
+}
+
 namespace {
 
 // From the length at which the power's correlation exp(-lag^2 / (2 sigma^2)) is one half to the deviation of the filter.
@@ -227,29 +253,15 @@ void Check(const BeamNoiseParameters& p, const ProbeGeometry& geometry)
 {
   geometry.Check();
   const auto fail = [](const std::string& reason) { throw Error(Error::Kind::InvalidParameter, "noise: " + reason); };
-  const auto needTwo = [&fail](const char* name, int count) {
-    if (count < 2)
-      fail(std::string(name) + " is " + std::to_string(count) + "; at least 2 are needed");
-  };
-  needTwo("samples", p.samples);
-  needTwo("elements", p.elements);
-  if (!geometry.IsPlane())
-    needTwo("steps", p.steps);
-  const auto needLength = [&fail](const char* name, double length, double most) {
-    if (!(length >= 0.0 && length <= most))
-      fail(std::string(name) + " is " + NumberText(length) + "; it lies between 0 and " + NumberText(most));
-  };
-  needLength("depthCorrelationMm", p.depthCorrelationMm, 0.25 * (geometry.depthMax - geometry.depthMin));
-  needLength("fanCorrelation", p.fanCorrelation, 0.25);
-  needLength("sweepCorrelation", p.sweepCorrelation, 0.25);
-  if (p.intensity == NoiseIntensity::Rayleigh && !(p.mean > 0.0 && std::isfinite(p.mean)))
-    fail("mean is " + NumberText(p.mean) + "; Rayleigh distributed intensities need a positive one");
-  if (p.intensity == NoiseIntensity::LogCompressed) {
-    if (!(p.mean > 0.0 && p.mean < 255.0))
-      fail("mean is " + NumberText(p.mean) + "; that of greys lies between 0 and 255");
-    if (!(p.dynamicRangeDb >= 10.0 && p.dynamicRangeDb <= 200.0))
-      fail("dynamicRangeDb is " + NumberText(p.dynamicRangeDb) + "; it lies between 10 and 200");
-  }
+  BeamNoiseParameters described = p;
+  if (geometry.IsPlane())
+    described.steps = 2; // it has one, whatever is said
+  if (p.intensity == NoiseIntensity::Histogram)
+    described.mean = described.dynamicRangeDb = 100.0; // the quantiles say it
+  CheckRanges(described);
+  CheckRange("DepthCorrelationMm", p.depthCorrelationMm, 0.0, 0.25 * (geometry.depthMax - geometry.depthMin));
+  if (p.intensity == NoiseIntensity::LogCompressed && !(p.mean < 255.0))
+    fail("Mean is " + NumberText(p.mean) + "; that of greys must be below 255");
   if (p.intensity == NoiseIntensity::Histogram) {
     if (p.quantiles.size() < 2)
       fail("quantiles has " + std::to_string(p.quantiles.size()) + " values; at least 2 are needed");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
@@ -24,14 +25,16 @@ struct BeamNoiseParameters {
   int elements = 240; ///< beams across the fan, >= 2
   int steps = 120;    ///< planes of the sweep, >= 2; not used where the probe does not sweep (one plane)
   NoiseIntensity intensity = NoiseIntensity::LogCompressed;
-  double mean = 40.0;              ///< of the intensities: > 0 for Rayleigh, (0, 255) for LogCompressed; not used for Histogram
-  double dynamicRangeDb = 60.0;    ///< dB that 255 greys span (LogCompressed), [10, 200]
-  std::vector<float> quantiles;    ///< for Histogram: at least 2 ascending values at evenly spaced probabilities 0 ... 1
-  double depthCorrelationMm = 0.6; ///< along the depth, mm, 0 to a quarter of the depth range
-  double fanCorrelation = 0.0125;  ///< across the fan, in whole fans, [0, 0.25]
-  double sweepCorrelation = 0.025; ///< along the sweep, in whole sweeps, [0, 0.25]
+  double mean = 40.0; ///< for LogCompressed below 255; not used for Histogram
+  double dynamicRangeDb = 60.0;
+  std::vector<float> quantiles; ///< for Histogram: at least 2 ascending values at evenly spaced probabilities 0 ... 1
+  double depthCorrelationMm = 0.6;
+  double fanCorrelation = 0.0125;
+  double sweepCorrelation = 0.025;
   std::uint64_t seed = 1;
 };
+
+ParameterList Describe(BeamNoiseParameters& p);
 
 /// Noise as a machine makes it: random intensities evenly spaced along beams, a beam volume for ScanConvert. Scan conversion
 /// curves its grain about the probe and widens it with depth, as that of speckle. It is the envelope of a complex Gaussian

@@ -5,6 +5,7 @@
 // surface bulges by far less than the hundredth of a voxel that is added.
 #include "EmbedGrid.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>
@@ -54,6 +55,47 @@ EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first
   lattice.origin = lattice.IndexToWorld() * Eigen::Vector3d(-grid.offset[0], -grid.offset[1], -grid.offset[2]);
   grid.geometry = lattice;
   return grid;
+}
+
+EmbedGrid EmbedGridOf(const ImageGeometry& data, VolumeView<const unsigned char> region, const PlacedProbe& form, int factor)
+{
+  std::array<int, 3> first = data.dimensions, last{-1, -1, -1};
+  for (int k = 0; k < data.dimensions[2]; ++k)
+    for (int j = 0; j < data.dimensions[1]; ++j) {
+      const unsigned char *begin = region.Row(j, k), *end = begin + data.dimensions[0];
+      const unsigned char* found = std::find_if(begin, end, [](unsigned char real) { return real != 0; });
+      if (found == end)
+        continue;
+      const unsigned char* lastFound = end - 1;
+      while (!*lastFound)
+        --lastFound;
+      first = {std::min(first[0], static_cast<int>(found - begin)), std::min(first[1], j), std::min(first[2], k)};
+      last = {std::max(last[0], static_cast<int>(lastFound - begin)), std::max(last[1], j), std::max(last[2], k)};
+    }
+  return EmbedGridOf(data, first, last, form, factor);
+}
+
+void CopyToGrid(const EmbedGrid& grid, const std::array<int, 3>& size, std::size_t bytes, const void* data, void* onGrid)
+{
+  const auto& n = grid.geometry.dimensions;
+  const std::size_t rowBytes = bytes * static_cast<std::size_t>(n[0]);
+  ParallelFor(n[2], [&](std::ptrdiff_t slice) {
+    const int k = grid.DataIndex(static_cast<int>(slice), 2);
+    for (int J = 0; J < n[1]; ++J) {
+      char* row = static_cast<char*>(onGrid) + rowBytes * static_cast<std::size_t>(slice * n[1] + J);
+      const int j = grid.DataIndex(J, 1);
+      std::fill(row, row + rowBytes, char(0));
+      if (k < 0 || k >= size[2] || j < 0 || j >= size[1])
+        continue;
+      const char* source = static_cast<const char*>(data) +
+                           bytes * static_cast<std::size_t>((static_cast<std::ptrdiff_t>(k) * size[1] + j) * size[0]);
+      for (int I = 0; I < n[0]; ++I) {
+        const int i = grid.DataIndex(I, 0);
+        if (i >= 0 && i < size[0])
+          std::copy_n(source + bytes * static_cast<std::size_t>(i), bytes, row + bytes * static_cast<std::size_t>(I));
+      }
+    }
+  });
 }
 
 } // namespace echorama

@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/ProbeGeometry.h"
+#include "Core/Imaging/VolumeView.h"
 
 namespace echorama {
 
@@ -21,5 +22,11 @@ struct EmbedGrid {
 /// \throws Error(InvalidParameter) for a factor below 1, Error(TooLarge) when an axis has more than 100,000 voxels
 EmbedGrid EmbedGridOf(const ImageGeometry& data, const std::array<int, 3>& first, const std::array<int, 3>& last,
                       const PlacedProbe& form, int factor = 1);
+
+/// The same to hold the voxels of a region (not 0) of the data. Of an empty region there are none to hold.
+EmbedGrid EmbedGridOf(const ImageGeometry& data, VolumeView<const unsigned char> region, const PlacedProbe& form, int factor = 1);
+
+/// Copies voxels of \a bytes bytes each from the data, of \a size voxels, to their places on the grid; all others become 0.
+void CopyToGrid(const EmbedGrid& grid, const std::array<int, 3>& size, std::size_t bytes, const void* data, void* onGrid);
 
 } // namespace echorama

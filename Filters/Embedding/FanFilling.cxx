@@ -110,6 +110,18 @@ void FillFan(const PosedVolume<T>& noise, const PlacedProbe& noiseFan, const Pla
                    valid, progress.Part(0.4, 1.0));
 }
 
+std::ptrdiff_t PutRealNoise(VolumeView<const float> real, VolumeView<const unsigned char> there,
+                            VolumeView<const unsigned char> form, VolumeView<float> noise)
+{
+  std::ptrdiff_t missing = 0;
+  for (std::ptrdiff_t at = 0; at < noise.Size(); ++at)
+    if (there[at])
+      noise[at] = real[at];
+    else if (form[at])
+      ++missing;
+  return missing;
+}
+
 #define EchoramaInstantiate(T)                                                                                                   \
   template void FillFan<T>(const PosedVolume<T>&, const PlacedProbe&, const PlacedProbe&, const ImageGeometry&,                  \
                            VolumeView<float>, VolumeView<unsigned char>, const Progress&);

@@ -30,4 +30,8 @@ void FillFanFromBeams(VolumeView<const float> beams, const ProbeGeometry& noiseF
                       const PlacedProbe& target, const ImageGeometry& grid, VolumeView<float> intensity,
                       VolumeView<unsigned char> valid, const Progress& progress = {});
 
+/// Puts \a real noise in the place of \a noise where it is \a there. \returns how many voxels of \a form have none.
+std::ptrdiff_t PutRealNoise(VolumeView<const float> real, VolumeView<const unsigned char> there,
+                            VolumeView<const unsigned char> form, VolumeView<float> noise);
+
 } // namespace echorama

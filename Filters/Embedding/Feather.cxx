@@ -6,6 +6,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/DistanceMap.h"
+#include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "LocalStatistics.h"
 #include <algorithm>
@@ -17,16 +18,6 @@
 namespace echorama {
 
 namespace {
-
-template <class T>
-T ToVoxel(double value)
-{
-  if constexpr (std::is_floating_point_v<T>)
-    return static_cast<T>(value);
-  else
-    return static_cast<T>(std::clamp(std::floor(value + 0.5), static_cast<double>(std::numeric_limits<T>::min()),
-                                     static_cast<double>(std::numeric_limits<T>::max())));
-}
 
 void CheckShape(const std::array<int, 3>& wanted, const std::array<int, 3>& given, const char* name)
 {
@@ -103,7 +94,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
           first = std::min(first, i);
           end = i + 1;
         } else if (label != EmbeddedVoxel::Data)
-          intensity[at] = label == EmbeddedVoxel::Invented ? ToVoxel<T>(static_cast<double>(background[at])) : T(0);
+          intensity[at] = label == EmbeddedVoxel::Invented ? RoundedVoxel<T>(static_cast<double>(background[at])) : T(0);
         labels[at] = static_cast<unsigned char>(label);
       }
       // 2. the blend
@@ -123,7 +114,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
               static_cast<double>(otherMean[i]) + w * (static_cast<double>(mean[i]) - static_cast<double>(otherMean[i]));
           value = base + (value - base) / std::sqrt(w * w + (1.0 - w) * (1.0 - w));
         }
-        intensity[at] = ToVoxel<T>(value);
+        intensity[at] = RoundedVoxel<T>(value);
       }
     }
   });

@@ -12,6 +12,22 @@
 #include <vector>
 
 namespace echorama {
+
+ParameterList Describe(LatticeNoiseParameters& p)
+{
+  return {
+      Parameter("Deviation", p.deviation, {0, Unlimited}, "", "Standard deviation of the intensities of white and Perlin noise.")
+          .When("Kind", "white")
+          .When("Kind", "perlin"),
+      Parameter("CellMm", p.cellMm, {0, Unlimited, true}, "mm",
+                "Distance of the gradients of Perlin noise, at least that of the voxels.")
+          .When("Kind", "perlin"),
+      Parameter("Octaves", p.octaves, {1, 10}, "",
+                "Octaves of Perlin noise, each with half the cell and half the amplitude of the one before.")
+          .When("Kind", "perlin"),
+  };
+}
+
 namespace {
 
 [[noreturn]] void Fail(const std::string& reason)
@@ -22,11 +38,8 @@ namespace {
 void Check(const LatticeNoiseParameters& p)
 {
   if (!std::isfinite(p.mean))
-    Fail("mean is not finite");
-  if (!(p.deviation >= 0.0 && std::isfinite(p.deviation)))
-    Fail("deviation is " + NumberText(p.deviation) + "; it is not negative");
-  if (p.octaves < 1 || p.octaves > 10)
-    Fail("octaves is " + std::to_string(p.octaves) + "; it lies between 1 and 10");
+    Fail("Mean is not finite");
+  CheckRanges(p);
 }
 
 // From 0 to 1, with no slope and no curvature at both ends.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 #include <cstdint>
@@ -9,12 +10,15 @@ namespace echorama {
 /// Noise that is made on the voxels of a grid: to compare with. It looks the same in all places and directions, which
 /// ultrasound never does (dissertation 6.2); MakeBeamNoise is the one to use.
 struct LatticeNoiseParameters {
-  double mean = 40.0;      ///< of the intensities
-  double deviation = 20.0; ///< of the intensities, >= 0
-  double cellMm = 4.0;     ///< distance of the gradients (Perlin), mm, at least the greatest spacing of the grid
-  int octaves = 3;         ///< (Perlin) each has half the cell and half the amplitude of the one before, [1, 10]
+  double mean = 40.0;
+  double deviation = 20.0;
+  double cellMm = 4.0; ///< (Perlin) at least the greatest spacing of the grid
+  int octaves = 3;     ///< (Perlin)
   std::uint64_t seed = 1;
 };
+
+/// All but mean and seed, which are those of BeamNoiseParameters.
+ParameterList Describe(LatticeNoiseParameters& p);
 
 /// Independent normal deviates. \throws Error(InvalidParameter), Error(BadInput) for dimensions that are not positive,
 /// Error(Cancelled).

@@ -10,6 +10,7 @@
 // Passes 2 and 3 are done three times: the window follows the lengths that were found, up to the widest. A window of three
 // lengths takes 3% of the variance with it, which shortens the lengths by 2%; one of two lengths shortens them by 10%.
 #include "NoiseMatch.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
@@ -23,6 +24,20 @@
 #include <string>
 
 namespace echorama {
+
+ParameterList Describe(NoiseMatchParameters& p)
+{
+  return {
+      Parameter(
+          "WindowMm", p.windowMm, {0, Unlimited, true}, "mm",
+          "Of the volume to match, what is smooth over so much along the depth, and twice as much across, is the scene and no "
+          "grain.")
+          .Advanced(),
+      Parameter("DepthBands", p.depthBands, {1, 100}, "", "The depth is cut into so many equal parts for the lengths by depth."),
+      Parameter("Quantiles", p.quantiles, {2, 65536}, "", "How many quantiles are given."),
+  };
+}
+
 namespace {
 
 constexpr std::ptrdiff_t leastSamples = 1000;
@@ -41,7 +56,7 @@ double EnvelopeCorrelation(double power)
     term *= factor * factor * power;
     sum += term;
   }
-  return sum / (4.0 / 3.14159265358979323846 - 1.0);
+  return sum / (4.0 / Pi - 1.0);
 }
 
 // And back.
@@ -422,20 +437,6 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
   return match;
 }
 
-void Check(const NoiseMatchParameters& p)
-{
-  const auto need = [](const char* name, int value, int least, int greatest) {
-    if (value < least || value > greatest)
-      throw Error(Error::Kind::InvalidParameter, std::string("noise match: ") + name + " is " + std::to_string(value) +
-                                                     "; it lies between " + std::to_string(least) + " and " +
-                                                     std::to_string(greatest));
-  };
-  if (!(p.windowMm > 0.0 && std::isfinite(p.windowMm)))
-    throw Error(Error::Kind::InvalidParameter, "noise match: windowMm must be positive");
-  need("depthBands", p.depthBands, 1, 100);
-  need("quantiles", p.quantiles, 2, 65536);
-}
-
 // mm per whole fan and per whole sweep halfway down the middle beam.
 Eigen::Vector2d SpansHalfway(const ProbeGeometry& geometry)
 {
@@ -488,7 +489,7 @@ void ReadBeams(const PosedVolume<T>& volume, const ProbeGeometry& geometry, cons
 NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned char> valid, const ProbeGeometry& geometry,
                       const NoiseMatchParameters& parameters, const Progress& progress)
 {
-  Check(parameters);
+  CheckRanges(parameters);
   CheckBeamVolume(beams.Dimensions(), geometry);
   if (!valid.Empty() && valid.Dimensions() != beams.Dimensions())
     throw Error(Error::Kind::BadInput, "noise match: the valid region does not have the dimensions of the beams");
@@ -501,7 +502,7 @@ template <class T>
 NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometry, const Pose& probeToWorld,
                       const NoiseMatchParameters& parameters, const Progress& progress)
 {
-  Check(parameters);
+  CheckRanges(parameters);
   geometry.Check();
   volume.geometry.Check("the volume whose noise is to be matched");
   if (!IsRotation(probeToWorld.linear()) || !probeToWorld.translation().allFinite())

@@ -12,9 +12,11 @@ struct NoiseMatchParameters {
   /// What is smooth over so many mm along the depth and twice as many across, halfway down (standard deviations of a Gaussian),
   /// is the scene; what is finer is grain, > 0. Longer lengths than half of it come out too short (1.8 mm as 1.55 by default).
   double windowMm = 1.5;
-  int depthBands = 4;  ///< the depth is cut into so many equal parts for the lengths by depth, [1, 100]
-  int quantiles = 257; ///< how many quantiles are given, [2, 65536]
+  int depthBands = 4;
+  int quantiles = 257;
 };
+
+ParameterList Describe(NoiseMatchParameters& p);
 
 /// The grain of a volume, in beam space. Lengths are those of BeamNoiseParameters, in its units.
 struct NoiseMatch {

@@ -7,11 +7,11 @@
 #include "BeamSampling.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -30,13 +30,6 @@ bool Turns(const ProbeArc& arc)
 double ExtentOf(const ProbeArc& arc)
 {
   return Turns(arc) ? arc.angle : arc.width;
-}
-
-std::string Text(const char* format, double a, double b = 0.0)
-{
-  char text[160];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
 }
 
 // What all tiles share: the distances between samples, of the first volume.
@@ -115,9 +108,9 @@ void RefuseOverlap(const NoiseInput& input, const ProbeArc& arc, const char* wha
   const bool turns = Turns(arc);
   throw Error(Error::Kind::InvalidParameter,
               std::string("noise tiling: ") + (turns ? "overlapDegrees" : "overlapMm") +
-                  Text(" is %.4g, but the ", turns ? parameters.overlapDegrees : parameters.overlapMm) + what + " of " +
-                  input.name + Text(" is %.4g", turns ? arc.angle / RadiansPerDegree : arc.width) + (turns ? " degrees" : " mm") +
-                  ": nothing would be left of it beside its neighbour");
+                  Format(" is %.4g, but the ", turns ? parameters.overlapDegrees : parameters.overlapMm) + what + " of " +
+                  input.name + Format(" is %.4g", turns ? arc.angle / RadiansPerDegree : arc.width) +
+                  (turns ? " degrees" : " mm") + ": nothing would be left of it beside its neighbour");
 }
 
 // Which volume lies where on the common lattice, for the how many-th time.
@@ -227,8 +220,8 @@ Plan PlanOf(const NoiseTilingParameters& parameters, const std::vector<NoiseInpu
       throw;
     throw Error(Error::Kind::NotPossible, "noise tiling: " + std::to_string(columns) + " columns and " + std::to_string(rows) +
                                               " rows make a fan of " +
-                                              Text("%.1f degrees that sweeps over %.1f degrees", fan.fanAngle / RadiansPerDegree,
-                                                   fan.sweepAngle / RadiansPerDegree) +
+                                              Format("%.1f degrees that sweeps over %.1f degrees",
+                                                     fan.fanAngle / RadiansPerDegree, fan.sweepAngle / RadiansPerDegree) +
                                               ", and no probe has that (" + error.what() + ")");
   }
   const double halfway = 0.5 * (head.depthMin + head.depthMax);

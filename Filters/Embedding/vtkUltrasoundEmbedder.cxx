@@ -3,7 +3,7 @@
 
 #include "BeamNoise.h"
 #include "Core/Base/Memory.h"
-#include "Core/Base/Parallel.h"
+#include "Core/Base/SizeText.h"
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"
@@ -24,7 +24,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 using echorama::Error;
 using echorama::PlacedProbe;
@@ -50,29 +49,8 @@ vtkSmartPointer<vtkDataArray> OnGrid(vtkDataArray* array, vtkImageData* data, co
   result->SetNumberOfTuples(static_cast<vtkIdType>(grid.geometry.VoxelCount()));
   const std::size_t bytes =
       static_cast<std::size_t>(array->GetDataTypeSize()) * static_cast<std::size_t>(array->GetNumberOfComponents());
-  int size[3];
-  data->GetDimensions(size);
-  const auto& n = grid.geometry.dimensions;
-  char* to = static_cast<char*>(result->GetVoidPointer(0));
-  const char* from = static_cast<const char*>(array->GetVoidPointer(0));
-  echorama::ParallelFor(n[2], [&](std::ptrdiff_t slice) {
-    const int k = grid.DataIndex(static_cast<int>(slice), 2);
-    for (int J = 0; J < n[1]; ++J) {
-      char* row = to + bytes * static_cast<std::size_t>((slice * n[1] + J) * n[0]);
-      const int j = grid.DataIndex(J, 1);
-      std::fill(row, row + bytes * static_cast<std::size_t>(n[0]), char(0));
-      if (k < 0 || k >= size[2] || j < 0 || j >= size[1]) {
-        continue;
-      }
-      const char* source = from + bytes * static_cast<std::size_t>((static_cast<vtkIdType>(k) * size[1] + j) * size[0]);
-      for (int I = 0; I < n[0]; ++I) {
-        const int i = grid.DataIndex(I, 0);
-        if (i >= 0 && i < size[0]) {
-          std::copy_n(source + bytes * static_cast<std::size_t>(i), bytes, row + bytes * static_cast<std::size_t>(I));
-        }
-      }
-    }
-  });
+  echorama::CopyToGrid(grid, vtkUltrasoundVolume::GeometryOf(data).dimensions, bytes, array->GetVoidPointer(0),
+                       result->GetVoidPointer(0));
   return result;
 }
 
@@ -111,12 +89,8 @@ int vtkUltrasoundEmbedder::FillInputPortInformation(int port, vtkInformation* in
 int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   // The fan, and with it the grid, depends on the data.
-  for (int port : {0, 2}) {
-    int output = 0;
-    if (vtkAlgorithm* source = this->GetNumberOfInputConnections(port) ? this->GetInputAlgorithm(port, 0, output) : nullptr) {
-      source->UpdateWholeExtent();
-    }
-  }
+  vtkUltrasoundVolume::MakeInput(this, 0);
+  vtkUltrasoundVolume::MakeInput(this, 2);
   if (!vtkImageData::GetData(inputs[0])) {
     return 1; // a composite data set, whose blocks come one by one later
   }
@@ -160,23 +134,7 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
               : IsSame(plan.Form, *enclosing.shape) ? "The outline is the fan of the form."
                                                     : "The fan of the form does not hold all data: the outline is a larger one.";
 
-  std::array<int, 3> first = geometry.dimensions, last{-1, -1, -1};
-  for (int k = 0; k < geometry.dimensions[2]; ++k) {
-    for (int j = 0; j < geometry.dimensions[1]; ++j) {
-      const unsigned char *begin = region.View().Row(j, k), *end = begin + geometry.dimensions[0];
-      const unsigned char* found = std::find_if(begin, end, [](unsigned char real) { return real != 0; });
-      if (found == end) {
-        continue;
-      }
-      const unsigned char* lastFound = end - 1;
-      while (!*lastFound) {
-        --lastFound;
-      }
-      first = {std::min(first[0], static_cast<int>(found - begin)), std::min(first[1], j), std::min(first[2], k)};
-      last = {std::max(last[0], static_cast<int>(lastFound - begin)), std::max(last[1], j), std::max(last[2], k)};
-    }
-  }
-  plan.Grid = echorama::EmbedGridOf(geometry, first, last, plan.Form, this->PreviewFactor);
+  plan.Grid = echorama::EmbedGridOf(geometry, region.View(), plan.Form, this->PreviewFactor);
   this->Planned = plan;
   this->PlannedFor = key;
   return *this->Planned;
@@ -236,14 +194,7 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
     Volume<unsigned char> there(grid.dimensions);
     echorama::FillFanFromBeams(tiled.samples.View(), tiled.fan.geometry, {0, 0, 0}, plan.Form, grid, real.View(), there.View(),
                                progress.Part(0.9, 1.0));
-    std::ptrdiff_t missing = 0;
-    for (std::ptrdiff_t at = 0; at < noise.Size(); ++at) {
-      if (there.View()[at]) {
-        noise[at] = real.View()[at];
-      } else if (form[at]) {
-        ++missing;
-      }
-    }
+    const std::ptrdiff_t missing = echorama::PutRealNoise(real.View(), there.View(), form, noise);
     note = "The noise is that of " + std::to_string(volumes.size()) + (volumes.size() == 1 ? " volume" : " volumes") +
            (missing ? ", and made where they have none." : ".");
   }
@@ -274,9 +225,8 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
     }
   }
   if (bytes > echorama::FreeMemory()) {
-    throw Error(Error::Kind::TooLarge, "embedding on a grid of " + std::to_string(grid.dimensions[0]) + " x " +
-                                           std::to_string(grid.dimensions[1]) + " x " + std::to_string(grid.dimensions[2]) +
-                                           " voxels needs " + std::to_string(bytes / 1e9).substr(0, 5) +
+    throw Error(Error::Kind::TooLarge, "embedding on a grid of " + echorama::SizeText(grid.dimensions) + " voxels needs " +
+                                           std::to_string(bytes / 1e9).substr(0, 5) +
                                            " GB, more than there is free; a PreviewFactor of 2 needs an eighth of it");
   }
 
@@ -300,21 +250,8 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   vtkDataArray* labels = AddArray(output, vtkUltrasoundVolume::EmbeddingName(), VTK_UNSIGNED_CHAR);
   const auto region = vtkUltrasoundVolume::ViewOf<unsigned char>(seen, output);
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
-    const auto volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input);
-    const echorama::Sampler<decltype(type)> sampler(volume.intensity, volume.valid);
-    const auto& n = image->GetDimensions();
-    echorama::ParallelFor(grid.dimensions[2], [&](std::ptrdiff_t slice) {
-      const int k = plan.Grid.DataIndex(static_cast<int>(slice), 2);
-      for (int J = 0; J < grid.dimensions[1]; ++J) {
-        const int j = plan.Grid.DataIndex(J, 1);
-        for (int I = 0; I < grid.dimensions[0]; ++I) {
-          const int i = plan.Grid.DataIndex(I, 0);
-          const bool there = i >= 0 && j >= 0 && k >= 0 && i < n[0] && j < n[1] && k < n[2];
-          region(I, J, static_cast<int>(slice)) =
-              there && sampler.IsReal((static_cast<std::ptrdiff_t>(k) * n[1] + j) * n[0] + i) ? 1 : 0;
-        }
-      }
-    });
+    const Volume<unsigned char> real = echorama::RealRegionOf(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input));
+    echorama::CopyToGrid(plan.Grid, real.Dimensions(), 1, real.View().Data(), region.Data());
   });
 
   // 2. the background, and the data over it

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundNoiseSource.h"
 
-#include "Core/Base/Angles.h"
+#include "BeamNoise.h"
+#include "Core/Geometry/ProbeSettings.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "LatticeNoise.h"
 #include "NoiseMatch.h"
@@ -21,23 +22,53 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundNoiseSource);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundNoiseSource);
+
+struct vtkUltrasoundNoiseSource::Settings {
+  enum class NoiseKind { Beams, White, Perlin } kind = NoiseKind::Beams;
+  int samples = 0, elements = 0, steps = 0;
+  echorama::BeamNoiseParameters beams;
+  echorama::NoiseMatchParameters match;
+  echorama::LatticeNoiseParameters lattice;
+  double spacingMm = 0.5;
+  bool onInputGrid = false, floatOutput = false;
+  std::int64_t maximumVoxels = std::int64_t{1} << 30;
+  echorama::ProbeSettings fan;
+};
+
 //----------------------------------------------------------------------------
-vtkUltrasoundNoiseSource::vtkUltrasoundNoiseSource()
+echorama::ParameterList vtkUltrasoundNoiseSource::Parameters()
+{
+  using echorama::Parameter;
+  Settings& v = *this->Values;
+  const std::string automatic =
+      " 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0.";
+  return echorama::Join(
+      {{Parameter("Kind", echorama::Choice(v.kind, {"beams", "white", "perlin"}),
+                  "Noise along beams looks like ultrasound; white and Perlin noise are there to compare with.")},
+       echorama::Without(Describe(v.beams), {"Samples", "Elements", "Steps"}),
+       {Parameter("Samples", v.samples, {0, 100000}, "", "Samples along a beam." + automatic),
+        Parameter("Elements", v.elements, {0, 100000}, "", "Beams across the fan." + automatic),
+        Parameter("Steps", v.steps, {0, 100000}, "", "Planes of the sweep." + automatic)},
+       echorama::Without(Describe(v.match), {"DepthBands", "Quantiles"}),
+       Describe(v.lattice),
+       {Parameter("SpacingMm", v.spacingMm, {0, 1000, true}, "mm", "Edge of the cubic voxels.").When("OnInputGrid", "off"),
+        Parameter("OnInputGrid", v.onInputGrid, "Whether the output lies on the grid of the volume that gives the fan."),
+        Parameter("FloatOutput", v.floatOutput, "Whether intensities are float, neither rounded nor cut; else unsigned char."),
+        Parameter("MaximumVoxels", v.maximumVoxels, {1, echorama::Unlimited}, "",
+                  "The output is refused when it would have more voxels.")
+            .Advanced()},
+       Describe(v.fan)});
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundNoiseSource::vtkUltrasoundNoiseSource() : Values(new Settings)
 {
   this->SetNumberOfInputPorts(2);
-  const echorama::BeamNoiseParameters beams;
-  this->Mean = beams.mean;
-  this->DynamicRangeDb = beams.dynamicRangeDb;
-  this->Seed = static_cast<vtkTypeInt64>(beams.seed);
-  this->DepthCorrelationMm = beams.depthCorrelationMm;
-  this->FanCorrelation = beams.fanCorrelation;
-  this->SweepCorrelation = beams.sweepCorrelation;
-  this->WindowMm = echorama::NoiseMatchParameters().windowMm;
-  const echorama::LatticeNoiseParameters lattice;
-  this->Deviation = lattice.deviation;
-  this->CellMm = lattice.cellMm;
-  this->Octaves = lattice.octaves;
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundNoiseSource::~vtkUltrasoundNoiseSource() = default;
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundNoiseSource::FillInputPortInformation(int port, vtkInformation* info)
@@ -64,23 +95,13 @@ echorama::PlacedProbe vtkUltrasoundNoiseSource::FanFor(vtkInformationVector** in
       return vtkUltrasoundProbeFit::ProbeOf(*input);
     }
   }
-  echorama::PlacedProbe fan;
-  fan.geometry.fanAngle = this->FanAngle / echorama::DegreesPerRadian;
-  fan.geometry.fanWidth = this->FanWidth;
-  fan.geometry.sweepAngle = this->SweepAngle / echorama::DegreesPerRadian;
-  fan.geometry.sweepWidth = this->SweepWidth;
-  fan.geometry.depthMin = this->DepthMin;
-  fan.geometry.depthMax = this->DepthMax;
-  fan.probeToWorld.linear() =
-      echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
-  fan.probeToWorld.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
-  return fan;
+  return this->Values->fan.Place();
 }
 
 //----------------------------------------------------------------------------
 echorama::ImageGeometry vtkUltrasoundNoiseSource::GridFor(vtkInformationVector** inputs, const echorama::PlacedProbe& fan)
 {
-  if (this->OnInputGrid) {
+  if (this->Values->onInputGrid) {
     for (const int port : {0, 1}) {
       if (const auto input = this->InputAt(inputs, port)) {
         return vtkUltrasoundVolume::GeometryOf(input->Image);
@@ -88,22 +109,8 @@ echorama::ImageGeometry vtkUltrasoundNoiseSource::GridFor(vtkInformationVector**
     }
     throw Error(Error::Kind::InvalidParameter, "OnInputGrid is on, but there is no input whose grid could be taken");
   }
-  return echorama::ScanConversionGrid(fan.geometry, fan.probeToWorld, this->SpacingMm,
-                                      static_cast<std::size_t>(this->MaximumVoxels));
-}
-
-//----------------------------------------------------------------------------
-echorama::BeamNoiseParameters vtkUltrasoundNoiseSource::BeamParameters(const echorama::ProbeGeometry& geometry) const
-{
-  echorama::BeamNoiseParameters parameters;
-  parameters.intensity =
-      this->IntensityModel == RAYLEIGH ? echorama::NoiseIntensity::Rayleigh : echorama::NoiseIntensity::LogCompressed;
-  parameters.mean = this->Mean;
-  parameters.dynamicRangeDb = this->DynamicRangeDb;
-  parameters.depthCorrelationMm = this->DepthCorrelationMm;
-  parameters.fanCorrelation = this->FanCorrelation;
-  parameters.sweepCorrelation = this->SweepCorrelation;
-  return echorama::ResolvingCounts(parameters, geometry);
+  return echorama::ScanConversionGrid(fan.geometry, fan.probeToWorld, this->Values->spacingMm,
+                                      static_cast<std::size_t>(this->Values->maximumVoxels));
 }
 
 //----------------------------------------------------------------------------
@@ -111,15 +118,13 @@ int vtkUltrasoundNoiseSource::RequestInformation(vtkInformation*, vtkInformation
 {
   // Field data and valid regions do not travel with the information of the pipeline.
   for (int port = 0; port < this->GetNumberOfInputPorts(); ++port) {
-    int producerPort = 0;
-    if (vtkAlgorithm* producer = this->GetInputAlgorithm(port, 0, producerPort)) {
-      producer->Update(producerPort);
-    }
+    vtkUltrasoundVolume::MakeInput(this, port);
   }
   return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
     vtkInformation* out = outputs->GetInformationObject(0);
     vtkUltrasoundVolume::SetGeometry(out, this->GridFor(inputs, this->FanFor(inputs)));
-    vtkDataObject::SetPointDataActiveScalarInfo(out, this->FloatOutput ? VTK_FLOAT : VTK_UNSIGNED_CHAR, 1);
+    vtkDataObject::SetPointDataActiveScalarInfo(out, this->Values->floatOutput ? VTK_FLOAT : VTK_UNSIGNED_CHAR, 1);
   });
 }
 
@@ -128,47 +133,42 @@ void vtkUltrasoundNoiseSource::Execute(vtkInformationVector** inputs, vtkImageDa
 {
   const echorama::PlacedProbe fan = this->FanFor(inputs);
   const echorama::ImageGeometry grid = this->GridFor(inputs, fan);
-  const auto seed = static_cast<std::uint64_t>(this->Seed);
+  const Settings& v = *this->Values;
 
   // What it shall be like.
-  echorama::BeamNoiseParameters beams = this->BeamParameters(fan.geometry);
-  echorama::LatticeNoiseParameters lattice;
-  lattice.mean = this->Mean;
-  lattice.deviation = this->Deviation;
+  echorama::BeamNoiseParameters beams = echorama::ResolvingCounts(v.beams, fan.geometry);
+  echorama::LatticeNoiseParameters lattice = v.lattice;
+  lattice.mean = v.beams.mean;
   std::fill_n(this->MatchResolved, 3, 0);
   const auto matched = this->InputAt(inputs, 1);
   if (matched) {
     const echorama::PlacedProbe probe = vtkUltrasoundProbeFit::ProbeOf(*matched);
-    echorama::NoiseMatchParameters how;
-    how.windowMm = this->WindowMm;
     vtkUltrasoundVolume::Dispatch(matched->Intensity, [&](auto type) {
       using T = decltype(type);
       const auto match = echorama::MatchNoise<T>(vtkUltrasoundVolume::PosedVolumeOf<T>(*matched), probe.geometry,
-                                                 probe.probeToWorld, how, progress.Part(0.0, 0.5));
+                                                 probe.probeToWorld, v.match, progress.Part(0.0, 0.5));
       beams = echorama::NoiseLike(match, probe.geometry, fan.geometry);
       lattice.mean = match.mean;
       lattice.deviation = match.deviation;
       std::copy(match.lengths.resolved.begin(), match.lengths.resolved.end(), this->MatchResolved);
     });
   }
-  beams.seed = lattice.seed = seed;
-  for (const auto& [wanted, count] : {std::pair{this->Samples, &beams.samples}, std::pair{this->Elements, &beams.elements},
-                                      std::pair{this->Steps, &beams.steps}}) {
+  beams.seed = lattice.seed = v.beams.seed;
+  for (const auto& [wanted, count] :
+       {std::pair{v.samples, &beams.samples}, std::pair{v.elements, &beams.elements}, std::pair{v.steps, &beams.steps}}) {
     *count = wanted > 0 ? wanted : *count;
   }
-  lattice.cellMm = this->CellMm;
-  lattice.octaves = this->Octaves;
 
   vtkUltrasoundVolume::SetGeometry(output, grid);
   vtkDataArray* intensity =
-      AddArray(output, vtkUltrasoundVolume::IntensityName(), this->FloatOutput ? VTK_FLOAT : VTK_UNSIGNED_CHAR);
+      AddArray(output, vtkUltrasoundVolume::IntensityName(), this->Values->floatOutput ? VTK_FLOAT : VTK_UNSIGNED_CHAR);
   vtkDataArray* validRegion = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
   output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
   const auto valid = vtkUltrasoundVolume::ViewOf<unsigned char>(validRegion, output);
 
   const echorama::Progress make = progress.Part(matched ? 0.5 : 0.0, 0.8), convert = progress.Part(0.8, 1.0);
   echorama::Volume<float> noise;
-  if (this->Kind == BEAMS) {
+  if (v.kind == Settings::NoiseKind::Beams) {
     const auto samples = echorama::MakeBeamNoise(beams, fan.geometry, make);
     noise = echorama::Volume<float>(grid.dimensions);
     echorama::ScanConvert<float>(samples.View(), fan.geometry, fan.probeToWorld, grid, noise.View(), valid, convert);
@@ -177,8 +177,8 @@ void vtkUltrasoundNoiseSource::Execute(vtkInformationVector** inputs, vtkImageDa
     this->MadeCorrelation[1] = beams.fanCorrelation;
     this->MadeCorrelation[2] = fan.geometry.IsPlane() ? 0.0 : beams.sweepCorrelation;
   } else {
-    noise = this->Kind == WHITE ? echorama::MakeWhiteNoise(lattice, grid.dimensions, make)
-                                : echorama::MakePerlinNoise(lattice, grid, make);
+    noise = v.kind == Settings::NoiseKind::White ? echorama::MakeWhiteNoise(lattice, grid.dimensions, make)
+                                                 : echorama::MakePerlinNoise(lattice, grid, make);
     // For the shape of the fan alone, which reaches a thousandth of a sample beyond the last.
     const echorama::Volume<unsigned char> samples({beams.samples, beams.elements, fan.geometry.IsPlane() ? 1 : beams.steps});
     echorama::Volume<unsigned char> nothing(grid.dimensions);
@@ -189,7 +189,7 @@ void vtkUltrasoundNoiseSource::Execute(vtkInformationVector** inputs, vtkImageDa
     std::fill_n(this->MadeCounts, 3, 0);
     std::fill_n(this->MadeCorrelation, 3, 0.0);
   }
-  if (this->FloatOutput) {
+  if (this->Values->floatOutput) {
     std::copy(noise.View().begin(), noise.View().end(), vtkUltrasoundVolume::ViewOf<float>(intensity, output).begin());
   } else {
     std::transform(noise.View().begin(), noise.View().end(),
@@ -198,32 +198,12 @@ void vtkUltrasoundNoiseSource::Execute(vtkInformationVector** inputs, vtkImageDa
   }
   vtkUltrasoundAcquisition::SetProbeGeometry(output, fan.geometry);
   vtkUltrasoundAcquisition::SetProbeToWorld(output, fan.probeToWorld);
-  vtkUltrasoundAcquisition::SetSeed(output, seed);
+  vtkUltrasoundAcquisition::SetSeed(output, v.beams.seed);
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundNoiseSource::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Kind: " << (this->Kind == BEAMS ? "beams" : this->Kind == WHITE ? "white" : "Perlin") << "\n";
-  os << indent << "IntensityModel: " << (this->IntensityModel == RAYLEIGH ? "Rayleigh" : "log-compressed") << "\n";
-  os << indent << "Mean: " << this->Mean << "\n";
-  os << indent << "DynamicRangeDb: " << this->DynamicRangeDb << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
-  os << indent << "Counts: " << this->Samples << " x " << this->Elements << " x " << this->Steps << "\n";
-  os << indent << "Correlation: " << this->DepthCorrelationMm << " mm, " << this->FanCorrelation << " fans, "
-     << this->SweepCorrelation << " sweeps\n";
-  os << indent << "WindowMm: " << this->WindowMm << "\n";
-  os << indent << "Deviation: " << this->Deviation << "\n";
-  os << indent << "CellMm: " << this->CellMm << "\n";
-  os << indent << "Octaves: " << this->Octaves << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
-  os << indent << "OnInputGrid: " << (this->OnInputGrid ? "on" : "off") << "\n";
-  os << indent << "FloatOutput: " << (this->FloatOutput ? "on" : "off") << "\n";
-  os << indent << "MaximumVoxels: " << this->MaximumVoxels << "\n";
-  os << indent << "Fan: " << this->FanAngle << " degrees, " << this->FanWidth << " mm\n";
-  os << indent << "Sweep: " << this->SweepAngle << " degrees, " << this->SweepWidth << " mm\n";
-  os << indent << "Depth: " << this->DepthMin << " to " << this->DepthMax << "\n";
-  os << indent << "Position: " << this->Position[0] << " " << this->Position[1] << " " << this->Position[2] << "\n";
-  os << indent << "Orientation: " << this->Orientation[0] << " " << this->Orientation[1] << " " << this->Orientation[2] << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -27,8 +27,10 @@
 #include "vtkUltrasoundImageAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "BeamNoise.h"
-#include <optional>
+#include "Core/Geometry/ProbeGeometry.h"
+#include "vtkUltrasoundParameters.h"
+#include <memory>   // for what is set
+#include <optional> // for inputs
 #endif
 
 class vtkAlgorithmOutput;
@@ -39,168 +41,254 @@ public:
   vtkTypeMacro(vtkUltrasoundNoiseSource, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  /** What kinds of noise there are. */
-  enum KindType { BEAMS = 0, WHITE = 1, PERLIN = 2 };
-
-  /** How intensities of noise along beams are distributed. */
-  enum IntensityModelType { RAYLEIGH = 0, LOG_COMPRESSED = 1 };
-
   ///@{
   /** The volume to match. */
   void SetMatchConnection(vtkAlgorithmOutput* port) { this->SetInputConnection(1, port); }
   void SetMatchData(vtkDataObject* volume) { this->SetInputDataObject(1, volume); }
   ///@}
 
+  // BEGIN parameters
+  enum Kinds { BEAMS = 0, WHITE = 1, PERLIN = 2 };
+
   ///@{
-  /** BEAMS (default), WHITE or PERLIN. */
-  vtkSetClampMacro(Kind, int, BEAMS, PERLIN);
-  vtkGetMacro(Kind, int);
+  /**
+   * Noise along beams looks like ultrasound; white and Perlin noise are there to compare with. Default beams. There are BEAMS,
+   * WHITE, PERLIN.
+   */
+  void SetKind(int value) { this->SetParameter("Kind", value); }
+  int GetKind() { return static_cast<int>(this->GetParameter("Kind")); }
   void SetKindToBeams() { this->SetKind(BEAMS); }
   void SetKindToWhite() { this->SetKind(WHITE); }
   void SetKindToPerlin() { this->SetKind(PERLIN); }
+  std::string GetKindAsString() { return this->GetParameterAsText("Kind"); }
+  ///@}
+
+  enum IntensityModels { RAYLEIGH = 0, LOG_COMPRESSED = 1 };
+
+  ///@{
+  /**
+   * How intensities are distributed: as the envelope of speckle, or as the greys of a machine. A volume to match brings its own
+   * distribution. Default log-compressed. There are RAYLEIGH, LOG_COMPRESSED.
+   */
+  void SetIntensityModel(int value) { this->SetParameter("IntensityModel", value); }
+  int GetIntensityModel() { return static_cast<int>(this->GetParameter("IntensityModel")); }
+  void SetIntensityModelToRayleigh() { this->SetIntensityModel(RAYLEIGH); }
+  void SetIntensityModelToLogCompressed() { this->SetIntensityModel(LOG_COMPRESSED); }
+  std::string GetIntensityModelAsString() { return this->GetParameterAsText("IntensityModel"); }
+  ///@}
+
+  ///@{
+  /** Mean of the intensities; below 255 when they are log-compressed. Above 0; default 40. */
+  void SetMean(double value) { this->SetParameter("Mean", value); }
+  double GetMean() { return this->GetParameter("Mean"); }
   ///@}
 
   ///@{
   /**
-   * RAYLEIGH (the envelope of speckle) or LOG_COMPRESSED (default: the greys of a machine). A volume to match brings its own
-   * distribution. WHITE and PERLIN are normally distributed, or nearly.
+   * How much 255 greys span. With 60 dB the deviation is 24 greys where nothing is cut. Used when IntensityModel is
+   * log-compressed. In [10, 200] dB; default 60.
    */
-  vtkSetClampMacro(IntensityModel, int, RAYLEIGH, LOG_COMPRESSED);
-  vtkGetMacro(IntensityModel, int);
+  void SetDynamicRangeDb(double value) { this->SetParameter("DynamicRangeDb", value); }
+  double GetDynamicRangeDb() { return this->GetParameter("DynamicRangeDb"); }
   ///@}
 
   ///@{
-  /** Mean of the intensities, above 0, and below 255 when log-compressed. Default 40. */
-  vtkSetMacro(Mean, double);
-  vtkGetMacro(Mean, double);
-  ///@}
-
-  ///@{
-  /** How many dB 255 greys span (log-compressed), in [10, 200]. Default 60: a deviation of 24 greys where nothing is cut. */
-  vtkSetClampMacro(DynamicRangeDb, double, 10.0, 200.0);
-  vtkGetMacro(DynamicRangeDb, double);
-  ///@}
-
-  ///@{
-  /** Seed, at least 0. Default 1. */
-  vtkSetClampMacro(Seed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
-  vtkGetMacro(Seed, vtkTypeInt64);
+  /** The same seed makes the same noise. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
   ///@}
 
   ///@{
   /**
-   * How many samples along a beam, beams (elements) across the fan and planes (steps) of the sweep. 0 (default): three to each
-   * length below. With a length of 0 they set the grain (dissertation 6.2); 0 is then 400, 240 and 120.
+   * Size of the grain along the depth, at most a quarter of the depth range: the lag at which the autocorrelation of the
+   * speckle's power is one half. 0: neighbouring samples are independent. A volume to match brings its own. In [0, 10000] mm;
+   * default 0.6.
    */
-  vtkSetClampMacro(Samples, int, 0, 100000);
-  vtkGetMacro(Samples, int);
-  vtkSetClampMacro(Elements, int, 0, 100000);
-  vtkGetMacro(Elements, int);
-  vtkSetClampMacro(Steps, int, 0, 100000);
-  vtkGetMacro(Steps, int);
+  void SetDepthCorrelationMm(double value) { this->SetParameter("DepthCorrelationMm", value); }
+  double GetDepthCorrelationMm() { return this->GetParameter("DepthCorrelationMm"); }
+  ///@}
+
+  ///@{
+  /** The same across the fan. In [0, 0.25] whole fans; default 0.0125. */
+  void SetFanCorrelation(double value) { this->SetParameter("FanCorrelation", value); }
+  double GetFanCorrelation() { return this->GetParameter("FanCorrelation"); }
+  ///@}
+
+  ///@{
+  /** The same along the sweep. In [0, 0.25] whole sweeps; default 0.025. */
+  void SetSweepCorrelation(double value) { this->SetParameter("SweepCorrelation", value); }
+  double GetSweepCorrelation() { return this->GetParameter("SweepCorrelation"); }
   ///@}
 
   ///@{
   /**
-   * Size of the grain: the lag at which the autocorrelation of the speckle's power is one half. Along the depth in mm (0 to a
-   * quarter of the depth range; default 0.6), across the fan in whole fans (0 to 0.25; default 0.0125), along the sweep in whole
-   * sweeps (0 to 0.25; default 0.025). 0: neighbouring samples are independent. A volume to match brings its own.
+   * Samples along a beam. 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0. In
+   * [0, 100000]; default 0.
    */
-  vtkSetMacro(DepthCorrelationMm, double);
-  vtkGetMacro(DepthCorrelationMm, double);
-  vtkSetClampMacro(FanCorrelation, double, 0.0, 0.25);
-  vtkGetMacro(FanCorrelation, double);
-  vtkSetClampMacro(SweepCorrelation, double, 0.0, 0.25);
-  vtkGetMacro(SweepCorrelation, double);
+  void SetSamples(int value) { this->SetParameter("Samples", value); }
+  int GetSamples() { return static_cast<int>(this->GetParameter("Samples")); }
   ///@}
 
   ///@{
   /**
-   * Of the volume to match, what is smooth over so many mm along the depth, and twice as many across, is the scene and no grain;
-   * > 0. Default 1.5.
+   * Beams across the fan. 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0. In
+   * [0, 100000]; default 0.
    */
-  vtkSetMacro(WindowMm, double);
-  vtkGetMacro(WindowMm, double);
-  ///@}
-
-  ///@{
-  /** Standard deviation of the intensities of WHITE and PERLIN, at least 0. Default 20. */
-  vtkSetClampMacro(Deviation, double, 0.0, 1e9);
-  vtkGetMacro(Deviation, double);
-  ///@}
-
-  ///@{
-  /** Distance of the gradients of PERLIN, mm, at least SpacingMm. Default 4. */
-  vtkSetMacro(CellMm, double);
-  vtkGetMacro(CellMm, double);
-  ///@}
-
-  ///@{
-  /** Octaves of PERLIN, in [1, 10]. Default 3. */
-  vtkSetClampMacro(Octaves, int, 1, 10);
-  vtkGetMacro(Octaves, int);
-  ///@}
-
-  ///@{
-  /** Edge of the cubic voxels in mm, > 0. Default 0.5. Not used with OnInputGrid. */
-  vtkSetMacro(SpacingMm, double);
-  vtkGetMacro(SpacingMm, double);
-  ///@}
-
-  ///@{
-  /** Whether the output lies on the grid of input 0. Default off. */
-  vtkSetMacro(OnInputGrid, bool);
-  vtkGetMacro(OnInputGrid, bool);
-  vtkBooleanMacro(OnInputGrid, bool);
-  ///@}
-
-  ///@{
-  /** Whether intensities are float, neither rounded nor cut. Default off: unsigned char. */
-  vtkSetMacro(FloatOutput, bool);
-  vtkGetMacro(FloatOutput, bool);
-  vtkBooleanMacro(FloatOutput, bool);
-  ///@}
-
-  ///@{
-  /** The output is refused when it would have more voxels, at least 1. Default 2^30. */
-  vtkSetClampMacro(MaximumVoxels, vtkIdType, 1, VTK_ID_MAX);
-  vtkGetMacro(MaximumVoxels, vtkIdType);
+  void SetElements(int value) { this->SetParameter("Elements", value); }
+  int GetElements() { return static_cast<int>(this->GetParameter("Elements")); }
   ///@}
 
   ///@{
   /**
-   * The fan where no volume gives one: angles (degrees, [0, 360)) and lengths of arcs (mm, >= 0) of the fan and of the sweep.
-   * Default 65 degrees, 45 mm; 55 degrees, 29 mm. A sweep of 0 degrees and 0 mm is a single plane.
+   * Planes of the sweep. 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0. In [0,
+   * 100000]; default 0.
    */
-  vtkSetMacro(FanAngle, double);
-  vtkGetMacro(FanAngle, double);
-  vtkSetMacro(FanWidth, double);
-  vtkGetMacro(FanWidth, double);
-  vtkSetMacro(SweepAngle, double);
-  vtkGetMacro(SweepAngle, double);
-  vtkSetMacro(SweepWidth, double);
-  vtkGetMacro(SweepWidth, double);
+  void SetSteps(int value) { this->SetParameter("Steps", value); }
+  int GetSteps() { return static_cast<int>(this->GetParameter("Steps")); }
   ///@}
 
   ///@{
-  /** Its first and last depth along the beams, mm from the face. Default 0 and 100. */
-  vtkSetMacro(DepthMin, double);
-  vtkGetMacro(DepthMin, double);
-  vtkSetMacro(DepthMax, double);
-  vtkGetMacro(DepthMax, double);
+  /**
+   * Of the volume to match, what is smooth over so much along the depth, and twice as much across, is the scene and no grain.
+   * Above 0 mm; default 1.5.
+   */
+  void SetWindowMm(double value) { this->SetParameter("WindowMm", value); }
+  double GetWindowMm() { return this->GetParameter("WindowMm"); }
   ///@}
 
   ///@{
-  /** Where the middle of its face lies in the world, mm. Default (0, 0, 0). */
-  vtkSetVector3Macro(Position, double);
-  vtkGetVector3Macro(Position, double);
+  /**
+   * Standard deviation of the intensities of white and Perlin noise. Used when Kind is white or perlin. At least 0; default 20.
+   */
+  void SetDeviation(double value) { this->SetParameter("Deviation", value); }
+  double GetDeviation() { return this->GetParameter("Deviation"); }
   ///@}
 
   ///@{
-  /** How it is turned: axis times angle, in degrees. Default (0, 0, 0): it looks along +z, the fan along x. */
-  vtkSetVector3Macro(Orientation, double);
-  vtkGetVector3Macro(Orientation, double);
+  /** Distance of the gradients of Perlin noise, at least that of the voxels. Used when Kind is perlin. Above 0 mm; default 4. */
+  void SetCellMm(double value) { this->SetParameter("CellMm", value); }
+  double GetCellMm() { return this->GetParameter("CellMm"); }
   ///@}
+
+  ///@{
+  /**
+   * Octaves of Perlin noise, each with half the cell and half the amplitude of the one before. Used when Kind is perlin. In [1,
+   * 10]; default 3.
+   */
+  void SetOctaves(int value) { this->SetParameter("Octaves", value); }
+  int GetOctaves() { return static_cast<int>(this->GetParameter("Octaves")); }
+  ///@}
+
+  ///@{
+  /** Edge of the cubic voxels. Used when OnInputGrid is off. In (0, 1000] mm; default 0.5. */
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
+  ///@}
+
+  ///@{
+  /** Whether the output lies on the grid of the volume that gives the fan. Default off. */
+  void SetOnInputGrid(bool value) { this->SetParameter("OnInputGrid", value); }
+  bool GetOnInputGrid() { return this->GetParameter("OnInputGrid") != 0.0; }
+  void OnInputGridOn() { this->SetOnInputGrid(true); }
+  void OnInputGridOff() { this->SetOnInputGrid(false); }
+  ///@}
+
+  ///@{
+  /** Whether intensities are float, neither rounded nor cut; else unsigned char. Default off. */
+  void SetFloatOutput(bool value) { this->SetParameter("FloatOutput", value); }
+  bool GetFloatOutput() { return this->GetParameter("FloatOutput") != 0.0; }
+  void FloatOutputOn() { this->SetFloatOutput(true); }
+  void FloatOutputOff() { this->SetFloatOutput(false); }
+  ///@}
+
+  ///@{
+  /** The output is refused when it would have more voxels. At least 1; default 1073741824. */
+  void SetMaximumVoxels(vtkTypeInt64 value) { this->SetParameterAsInteger("MaximumVoxels", value); }
+  vtkTypeInt64 GetMaximumVoxels() { return this->GetParameterAsInteger("MaximumVoxels"); }
+  ///@}
+
+  ///@{
+  /** Angle between the first and the last beam of a fan. In [0, 359.999] degrees; default 65. */
+  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
+  double GetFanAngle() { return this->GetParameter("FanAngle"); }
+  ///@}
+
+  ///@{
+  /** Length of the array along its arc. In [0, 10000] mm; default 45. */
+  void SetFanWidth(double value) { this->SetParameter("FanWidth", value); }
+  double GetFanWidth() { return this->GetParameter("FanWidth"); }
+  ///@}
+
+  ///@{
+  /**
+   * Angle that the array sweeps. With an angle and a width of 0 the sweep is a single plane. In [0, 359.999] degrees; default 55.
+   */
+  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
+  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
+  ///@}
+
+  ///@{
+  /** Length of the arc that the middle of the array travels. In [0, 10000] mm; default 29. */
+  void SetSweepWidth(double value) { this->SetParameter("SweepWidth", value); }
+  double GetSweepWidth() { return this->GetParameter("SweepWidth"); }
+  ///@}
+
+  ///@{
+  /** First depth along the beams, from the face. In [-10000, 10000] mm; default 0. */
+  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
+  double GetDepthMin() { return this->GetParameter("DepthMin"); }
+  ///@}
+
+  ///@{
+  /** Last depth along the beams, from the face. In [-10000, 10000] mm; default 100. */
+  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
+  double GetDepthMax() { return this->GetParameter("DepthMax"); }
+  ///@}
+
+  ///@{
+  /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
+  void SetPosition(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetPosition(value);
+  }
+  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
+  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
+  ///@}
+
+  ///@{
+  /** How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. In degrees; default (0, 0, 0). */
+  void SetOrientation(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetOrientation(value);
+  }
+  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
+  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   ///@{
   /** After an update: samples, elements and steps that were made, and their lengths (mm, whole fans, whole sweeps). */
@@ -218,7 +306,7 @@ public:
 
 protected:
   vtkUltrasoundNoiseSource();
-  ~vtkUltrasoundNoiseSource() override = default;
+  ~vtkUltrasoundNoiseSource() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
@@ -227,40 +315,14 @@ protected:
 #endif
 
 private:
+  struct Settings;
 #ifndef __VTK_WRAP__
   std::optional<vtkUltrasoundVolume::Input> InputAt(vtkInformationVector** inputs, int port);
   echorama::PlacedProbe FanFor(vtkInformationVector** inputs);
   echorama::ImageGeometry GridFor(vtkInformationVector** inputs, const echorama::PlacedProbe& fan);
-  echorama::BeamNoiseParameters BeamParameters(const echorama::ProbeGeometry& geometry) const;
+  std::unique_ptr<Settings> Values;
 #endif
 
-  int Kind = BEAMS;
-  int IntensityModel = LOG_COMPRESSED;
-  double Mean;
-  double DynamicRangeDb;
-  vtkTypeInt64 Seed;
-  int Samples = 0;
-  int Elements = 0;
-  int Steps = 0;
-  double DepthCorrelationMm;
-  double FanCorrelation;
-  double SweepCorrelation;
-  double WindowMm;
-  double Deviation;
-  double CellMm;
-  int Octaves;
-  double SpacingMm = 0.5;
-  bool OnInputGrid = false;
-  bool FloatOutput = false;
-  vtkIdType MaximumVoxels = vtkIdType(1) << 30;
-  double FanAngle = 65.0;
-  double FanWidth = 45.0;
-  double SweepAngle = 55.0;
-  double SweepWidth = 29.0;
-  double DepthMin = 0.0;
-  double DepthMax = 100.0;
-  double Position[3] = {0.0, 0.0, 0.0};
-  double Orientation[3] = {0.0, 0.0, 0.0};
   int MadeCounts[3] = {0, 0, 0};
   double MadeCorrelation[3] = {0.0, 0.0, 0.0};
   int MatchResolved[3] = {0, 0, 0};

@@ -43,10 +43,7 @@ vtkUltrasoundNoiseTiler::~vtkUltrasoundNoiseTiler() = default;
 //----------------------------------------------------------------------------
 int vtkUltrasoundNoiseTiler::FillInputPortInformation(int, vtkInformation* information)
 {
-  information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
-  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-  information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  vtkUltrasoundVolume::AcceptVolumes(information);
   return 1;
 }
 
@@ -94,10 +91,7 @@ const std::vector<echorama::NoiseInput>& vtkUltrasoundNoiseTiler::Prepare(vtkInf
 int vtkUltrasoundNoiseTiler::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   // How large the whole is depends on the fans, and field data does not travel with the information of the pipeline.
-  for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection) {
-    int port = 0;
-    this->GetInputAlgorithm(0, connection, port)->Update(port);
-  }
+  vtkUltrasoundVolume::MakeInput(this, 0);
   return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress& progress) {
     const auto tiling = echorama::PlanNoiseTiling(this->Parameters(), this->Prepare(inputs[0], progress));
     vtkInformation* out = outputs->GetInformationObject(0);

@@ -2,13 +2,15 @@
 // Passes over bytes: threshold, erosion and dilation by a square (separable running counts), one flood fill for the largest
 // piece, and the closing of gaps that rows and columns enclose. Some 10 ns a pixel, once per sweep; Add() is one pass.
 #include "FrameSector.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/SizeText.h"
 #include "Core/Geometry/ProbeFit.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <utility>
 
@@ -119,9 +121,9 @@ void FrameSector::Add(VolumeView<const T> pixels)
     bright_.assign(last_.size(), 0);
   }
   if (pixels.Dimensions() != size_)
-    throw Error(Error::Kind::BadInput, "frames are of different sizes, " + std::to_string(size_[0]) + " x " +
-                                           std::to_string(size_[1]) + " and " + std::to_string(pixels.Dimensions()[0]) + " x " +
-                                           std::to_string(pixels.Dimensions()[1]) + "; no one sector is theirs");
+    throw Error(Error::Kind::BadInput, "frames are of different sizes, " + SizeText(size_[0], size_[1]) + " and " +
+                                           SizeText(pixels.Dimensions()[0], pixels.Dimensions()[1]) +
+                                           "; no one sector is theirs");
   for (std::size_t i = 0; i < last_.size(); ++i) {
     const float value = static_cast<float>(pixels[static_cast<std::ptrdiff_t>(i)]);
     changes_[i] += frames_ > 0 && value != last_[i] && !(std::isnan(value) && std::isnan(last_[i]));
@@ -199,11 +201,7 @@ DetectedSector DetectSector(const FrameSector& frames, double spacingX, double s
     return static_cast<double>(mask.View().Size() - std::count(mask.View().begin(), mask.View().end(), 0)) /
            static_cast<double>(mask.View().Size());
   };
-  const auto percent = [](double part) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1f%%", 100.0 * part);
-    return std::string(text);
-  };
+  const auto percent = [](double part) { return Format("%.1f%%", 100.0 * part); };
   FittedSector fitted = FitSector(found, spacingX, spacingY, progress);
   const double part = std::min(share(found), share(fitted.mask));
   if (part < (fitted.overlap > 0.0 ? leastShare : leastPiece))
@@ -229,7 +227,6 @@ std::array<int, 4> BoxOf(VolumeView<const unsigned char> mask)
 
 Volume<unsigned char> FanMask(const ImageFan& fan, int width, int height, double spacingX, double spacingY)
 {
-  constexpr double degreesPerRadian = 57.29577951308232;
   if (!(fan.from >= -180.0 && fan.from < fan.to && fan.to <= 180.0))
     throw Error(Error::Kind::InvalidParameter, "FanAngles are " + std::to_string(fan.from) + " and " + std::to_string(fan.to) +
                                                    "; they must be in [-180, 180] degrees and in order");
@@ -242,7 +239,7 @@ Volume<unsigned char> FanMask(const ImageFan& fan, int width, int height, double
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const double across = (x - fan.apexX) * spacingX, down = (y - fan.apexY) * spacingY;
-      const double depth = std::hypot(across, down), angle = std::atan2(across, down) * degreesPerRadian;
+      const double depth = std::hypot(across, down), angle = std::atan2(across, down) * DegreesPerRadian;
       mask.View()(x, y, 0) = depth >= fan.nearMm && depth <= fan.farMm && angle >= fan.from && angle <= fan.to;
     }
   return mask;
@@ -255,8 +252,7 @@ Volume<unsigned char> RectangleMask(int left, int right, int top, int bottom, in
   top = std::max(top, 0);
   bottom = std::min(bottom, height - 1);
   if (left > right || top > bottom)
-    throw Error(Error::Kind::InvalidParameter,
-                "Rectangle holds no pixel of an image of " + std::to_string(width) + " x " + std::to_string(height));
+    throw Error(Error::Kind::InvalidParameter, "Rectangle holds no pixel of an image of " + SizeText(width, height));
   Volume<unsigned char> mask({width, height, 1});
   for (int y = top; y <= bottom; ++y)
     std::fill(mask.View().Row(y, 0) + left, mask.View().Row(y, 0) + right + 1, static_cast<unsigned char>(1));

@@ -6,6 +6,7 @@
 #include "HoleFilling.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
 #include <cmath>
@@ -107,15 +108,6 @@ private:
   int reach_;
 };
 
-template <class T>
-T Rounded(double value)
-{
-  if constexpr (std::is_floating_point_v<T>)
-    return static_cast<T>(value);
-  else
-    return static_cast<T>(std::floor(value + 0.5)); // a mean of values of T is in the range of T
-}
-
 } // namespace
 
 template <class T>
@@ -179,8 +171,8 @@ std::size_t FillHoles(const HoleFillingParameters& parameters, VolumeView<T> int
         const Bridge bridge = holes.At(i, j, k);
         if (!bridge.gap)
           continue;
-        values[i] = Rounded<T>(parameters.method == HoleFilling::Stick ? bridge.sum / bridge.count
-                                                                       : holes.MeanAround(i, j, k, (bridge.gap + 2) / 2));
+        values[i] = RoundedVoxel<T>(parameters.method == HoleFilling::Stick ? bridge.sum / bridge.count
+                                                                            : holes.MeanAround(i, j, k, (bridge.gap + 2) / 2));
         real[i] = 1;
         ++filled[static_cast<std::size_t>(k)];
       }

@@ -5,12 +5,13 @@
 // no mean image, the principal directions are all there is.
 #include "ReconstructionGrid.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Memory.h"
+#include "Core/Base/SizeText.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <Eigen/Eigenvalues>
 #include <limits>
 #include <optional>
@@ -119,8 +120,7 @@ ImageGeometry GridAround(const Eigen::AlignedBox3d& box, const Eigen::Matrix3d& 
   grid.origin = directions * box.min();
   const Eigen::Array3d size = (box.sizes().array() / spacing - slack).ceil().max(0.0) + 1.0;
   if (!(size.maxCoeff() <= std::numeric_limits<int>::max()) || !(size.prod() <= 1e15))
-    throw Error(Error::Kind::TooLarge, "the output grid would have " + std::to_string(size[0]) + " x " + std::to_string(size[1]) +
-                                           " x " + std::to_string(size[2]) +
+    throw Error(Error::Kind::TooLarge, "the output grid would have " + SizeText(size[0], size[1], size[2]) +
                                            " voxels; choose a larger SpacingMm, or leave frames out that lie far away");
   for (int axis = 0; axis < 3; ++axis)
     grid.dimensions[static_cast<std::size_t>(axis)] = static_cast<int>(size[axis]);
@@ -129,9 +129,7 @@ ImageGeometry GridAround(const Eigen::AlignedBox3d& box, const Eigen::Matrix3d& 
 
 std::string Megabytes(double bytes)
 {
-  char text[64];
-  std::snprintf(text, sizeof text, bytes < 10.0 * megabyte ? "%.2g MB" : "%.0f MB", bytes / megabyte);
-  return text;
+  return Format(bytes < 10.0 * megabyte ? "%.2g MB" : "%.0f MB", bytes / megabyte);
 }
 
 } // namespace
@@ -192,13 +190,10 @@ void CheckMemory(const ImageGeometry& grid, double bytesPerVoxel, double limitMb
     spacing = std::ceil(spacing / digit) * digit; // two digits, rounded up
     bytes = static_cast<double>(WithSpacing(grid, spacing).VoxelCount()) * bytesPerVoxel;
   }
-  char suggestion[32];
-  std::snprintf(suggestion, sizeof suggestion, "%.2g", spacing);
-  const auto& n = grid.dimensions;
-  throw Error(Error::Kind::TooLarge,
-              "a volume of " + std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]) +
-                  " voxels takes " + Megabytes(needed) + " to make, more than the " + Megabytes(allowed) +
-                  (limitMb > 0.0 ? " allowed (MemoryLimitMb)" : " that are free") + "; SpacingMm = " + suggestion + " would fit");
+  throw Error(Error::Kind::TooLarge, "a volume of " + SizeText(grid.dimensions) + " voxels takes " + Megabytes(needed) +
+                                         " to make, more than the " + Megabytes(allowed) +
+                                         (limitMb > 0.0 ? " allowed (MemoryLimitMb)" : " that are free") +
+                                         Format("; SpacingMm = %.2g would fit", spacing));
 }
 
 } // namespace echorama

@@ -16,7 +16,10 @@
 #include "VolumeReconstruction.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/SizeText.h"
+#include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
+#include "ReconstructionFrame.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -34,18 +37,12 @@ constexpr double farthest = 268435456.0; // voxels from the grid, beyond which f
 constexpr int longestAxis = 1 << 26;     // voxels, for the same reason
 constexpr float mostPixels = 65535.0f;   // of a voxel, before its mean moves on
 constexpr float leastWeight = 0.125f;    // of a pixel in the middle of eight voxels
-constexpr double singular = 1e-9;        // sine of the angle between the axes of an image
 constexpr int mostParts = 1000;          // from one frame to the next
 constexpr int slabs = 24;                // enough to keep threads busy, few enough to keep the rows' overhead low
 
 struct Cell {
   float value = 0.0f;
   float weight = 0.0f;
-};
-
-// Columns [begin, end) of a row that are real.
-struct Span {
-  int row, begin, end;
 };
 
 // The columns of a row whose fixed-point coordinate first + i * step is in [lower, upper), cut to [begin, end).
@@ -75,50 +72,6 @@ void Narrow(Fixed first, Fixed step, Fixed lower, Fixed upper, int& begin, int& 
   end = static_cast<int>(std::min<Fixed>(to, end));
 }
 
-template <class T>
-T Rounded(float value)
-{
-  if constexpr (std::is_floating_point_v<T>)
-    return static_cast<T>(value);
-  else {
-    const float whole = std::floor(value + 0.5f);
-    const float least = static_cast<float>(std::numeric_limits<T>::lowest()),
-                most = static_cast<float>(std::numeric_limits<T>::max());
-    return static_cast<T>(std::min(std::max(whole, least), most));
-  }
-}
-
-// A frame as it is kept until the next one comes.
-template <class T>
-struct Frame {
-  std::vector<T> pixels;
-  std::vector<unsigned char> mask; // empty: all real
-  std::array<int, 3> size{0, 0, 0};
-  std::vector<Span> spans;
-  Eigen::Affine3d imageToWorld;
-  int left = 0, right = 0, top = 0, bottom = 0; // of the real pixels, inclusive
-
-  bool Real(std::ptrdiff_t at) const { return mask.empty() || mask[static_cast<std::size_t>(at)]; }
-};
-
-template <class Real>
-std::vector<Span> SpansOf(const std::array<int, 3>& size, const Real& real)
-{
-  std::vector<Span> spans;
-  for (int row = 0; row < size[1]; ++row) {
-    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(row) * size[0];
-    for (int i = 0; i < size[0]; ++i) {
-      if (!real(first + i))
-        continue;
-      const int begin = i;
-      while (i < size[0] && real(first + i))
-        ++i;
-      spans.push_back({row, begin, i});
-    }
-  }
-  return spans;
-}
-
 // Index coordinates of pixel (0, 0), and the steps along columns and rows.
 struct PixelMap {
   Eigen::Vector3d first, column, row;
@@ -132,9 +85,9 @@ PixelMap MapOf(const Eigen::Affine3d& imageToIndex)
 // One plane of pixels to splat: a frame (next alone), or one in between.
 template <class T>
 struct Plane {
-  const Frame<T>* previous = nullptr;
-  const Frame<T>* next = nullptr;
-  const std::vector<Span>* spans = nullptr;
+  const ReconstructionFrame<T>* previous = nullptr;
+  const ReconstructionFrame<T>* next = nullptr;
+  const std::vector<PixelSpan>* spans = nullptr;
   float share = 1.0f; // of next
   PixelMap map;
 };
@@ -164,30 +117,6 @@ Fixed ToFixed(double coordinate)
 
 } // namespace
 
-const char* FrameUseText(FrameUse use)
-{
-  switch (use) {
-  case FrameUse::Used:
-    return "it was used";
-  case FrameUse::PoseNotFinite:
-    return "its pose holds a number that is not finite";
-  case FrameUse::PoseSingular:
-    return "its pose is singular";
-  case FrameUse::NoPixels:
-    return "none of its pixels is real";
-  default:
-    return "it lies outside the grid";
-  }
-}
-
-FrameUse CheckPose(const Eigen::Affine3d& imageToWorld)
-{
-  if (!imageToWorld.matrix().allFinite())
-    return FrameUse::PoseNotFinite;
-  const Eigen::Vector3d u = imageToWorld.linear().col(0), v = imageToWorld.linear().col(1);
-  return u.cross(v).norm() > singular * u.norm() * v.norm() ? FrameUse::Used : FrameUse::PoseSingular;
-}
-
 double ReconstructionMemory(const ReconstructionParameters& parameters, const ImageGeometry& grid, std::size_t voxelBytes)
 {
   const bool twoCells = parameters.compounding == Compounding::Latest || parameters.compounding == Compounding::Alpha;
@@ -204,7 +133,7 @@ struct VolumeReconstruction<T>::Body {
   Eigen::Affine3d worldToIndex;
   std::vector<Cell> cells, latest;         // latest: of the frame at hand (Latest, Alpha)
   std::vector<int> touchedFrom, touchedTo; // per row of voxels
-  Frame<T> previous, current;
+  ReconstructionFrame<T> previous, current;
   bool hasPrevious = false;
   int used = 0, between = 0;
 
@@ -226,7 +155,7 @@ struct VolumeReconstruction<T>::Body {
       cell.weight = std::min(cell.weight + weight, mostPixels);
     } else if constexpr (how == Compounding::RunningMean) {
       const float total = cell.weight + weight;
-      cell.value = static_cast<float>(Rounded<T>((sum + cell.weight * cell.value) / total));
+      cell.value = static_cast<float>(RoundedVoxel<T>((sum + cell.weight * cell.value) / total));
       cell.weight = std::min(std::floor(total * 256.0f + 0.5f), mostPixels) / 256.0f;
     } else if (cell.weight + weight <= mostPixels) {
       cell.value += sum;
@@ -237,71 +166,19 @@ struct VolumeReconstruction<T>::Body {
     }
   }
 
-  void Load(const TrackedFrame<T>& frame);
-  double StepBetween(const Frame<T>& a, const Frame<T>& b) const;
   bool Splat(const std::vector<Plane<T>>& planes);
   template <Compounding how, SplatMethod splat>
   bool SplatSlab(const std::vector<Plane<T>>& planes, int axis, int lower, int upper);
   template <bool flush, Compounding how>
-  bool NearestRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper, float* values,
+  bool NearestRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper, float* values,
                   std::vector<Cell>& target);
   template <bool flush, Compounding how>
-  bool LinearRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper, float* values,
+  bool LinearRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper, float* values,
                  std::vector<Cell>& target);
   void LayOver(Cell& cell, Cell& fresh) const;
-  bool Blend(const Frame<T>& a, const Frame<T>& b);
+  bool Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b);
   void Write(int axis, int lower, int upper);
 };
-
-template <class T>
-void VolumeReconstruction<T>::Body::Load(const TrackedFrame<T>& frame)
-{
-  current.size = frame.pixels.Dimensions();
-  current.pixels.assign(frame.pixels.begin(), frame.pixels.end());
-  current.imageToWorld = frame.imageToWorld;
-  if (frame.mask.Empty())
-    current.mask.clear();
-  else
-    current.mask.assign(frame.mask.begin(), frame.mask.end());
-  if constexpr (std::is_floating_point_v<T>) {
-    const auto finite = [](T value) { return std::isfinite(static_cast<float>(value)); };
-    if (!std::all_of(current.pixels.begin(), current.pixels.end(), finite)) {
-      current.mask.resize(current.pixels.size(), 1);
-      for (std::size_t i = 0; i < current.pixels.size(); ++i)
-        current.mask[i] = static_cast<unsigned char>(current.mask[i] && finite(current.pixels[i]));
-    }
-  }
-  if (current.mask.empty()) {
-    current.spans.clear();
-    for (int row = 0; row < current.size[1]; ++row)
-      current.spans.push_back({row, 0, current.size[0]});
-  } else {
-    current.spans = SpansOf(current.size, [this](std::ptrdiff_t at) { return current.mask[static_cast<std::size_t>(at)] != 0; });
-  }
-  if (current.spans.empty())
-    return;
-  current.top = current.spans.front().row;
-  current.bottom = current.spans.back().row;
-  current.left = current.size[0];
-  current.right = 0;
-  for (const Span& span : current.spans) {
-    current.left = std::min(current.left, span.begin);
-    current.right = std::max(current.right, span.end - 1);
-  }
-}
-
-// How far a pixel moves at most. The difference of two affine maps is affine, so it is largest at a corner.
-template <class T>
-double VolumeReconstruction<T>::Body::StepBetween(const Frame<T>& a, const Frame<T>& b) const
-{
-  double step = 0.0;
-  for (int corner = 0; corner < 4; ++corner) {
-    const Eigen::Vector3d pixel(corner & 1 ? std::max(a.right, b.right) : std::min(a.left, b.left),
-                                corner & 2 ? std::max(a.bottom, b.bottom) : std::min(a.top, b.top), 0.0);
-    step = std::max(step, (b.imageToWorld * pixel - a.imageToWorld * pixel).norm());
-  }
-  return step;
-}
 
 // What a frame brought to a voxel is laid over what was there.
 template <class T>
@@ -318,7 +195,7 @@ void VolumeReconstruction<T>::Body::LayOver(Cell& cell, Cell& fresh) const
 // With "flush", visits the same voxels again to lay the frame over them.
 template <class T>
 template <bool flush, Compounding how>
-bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper,
+bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper,
                                                float* values, std::vector<Cell>& target)
 {
   Fixed first[3], step[3];
@@ -372,7 +249,7 @@ bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Span
 
 template <class T>
 template <bool flush, Compounding how>
-bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const Span& span, int axis, int lower, int upper,
+bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper,
                                               float* values, std::vector<Cell>& target)
 {
   Fixed first[3], step[3];
@@ -469,7 +346,7 @@ bool VolumeReconstruction<T>::Body::SplatSlab(const std::vector<Plane<T>>& plane
   std::vector<float> values(static_cast<std::size_t>(planes.front().next->size[0]));
   bool any = false;
   for (const Plane<T>& plane : planes) {
-    for (const Span& span : *plane.spans) {
+    for (const PixelSpan& span : *plane.spans) {
       // Most rows of most slabs end here.
       const double edge = plane.map.first[axis] + plane.map.row[axis] * span.row;
       const double begin = edge + plane.map.column[axis] * span.begin, end = edge + plane.map.column[axis] * (span.end - 1);
@@ -482,7 +359,7 @@ bool VolumeReconstruction<T>::Body::SplatSlab(const std::vector<Plane<T>>& plane
         any |= LinearRow<false, put>(plane, span, axis, lower, upper, values.data(), target);
     }
     if constexpr (byFrame) {
-      for (const Span& span : *plane.spans) {
+      for (const PixelSpan& span : *plane.spans) {
         if constexpr (splat == SplatMethod::Nearest)
           NearestRow<true, put>(plane, span, axis, lower, upper, nullptr, latest);
         else
@@ -506,7 +383,7 @@ void VolumeReconstruction<T>::Body::Write(int axis, int lower, int upper)
         const Cell& cell = cells[at];
         if (!(cell.weight > 0.0f))
           continue;
-        output.intensity.Data()[at] = Rounded<T>(mean ? cell.value / cell.weight : cell.value);
+        output.intensity.Data()[at] = RoundedVoxel<T>(mean ? cell.value / cell.weight : cell.value);
         output.valid.Data()[at] = 1;
         output.coverage.Data()[at] = static_cast<unsigned short>(std::max(1.0f, std::floor(cell.weight + 0.5f)));
       }
@@ -570,43 +447,13 @@ Eigen::Affine3d IndexToFoot(const Eigen::Affine3d& imageToWorld, const Eigen::Af
   return frame.inverse() * indexToWorld;
 }
 
-// The value of a frame at (x, y): its nearest pixel, or bilinear over the pixels that are real. The nearest must be.
-template <class T>
-bool Sample(const Frame<T>& frame, double x, double y, bool linear, float& value)
-{
-  if (!(x >= -0.5 && y >= -0.5 && x < frame.size[0] - 0.5 && y < frame.size[1] - 0.5))
-    return false;
-  const int nearX = std::min(static_cast<int>(x + 0.5), frame.size[0] - 1),
-            nearY = std::min(static_cast<int>(y + 0.5), frame.size[1] - 1);
-  const std::ptrdiff_t width = frame.size[0], nearest = nearY * width + nearX;
-  if (!frame.Real(nearest))
-    return false;
-  value = static_cast<float>(frame.pixels[static_cast<std::size_t>(nearest)]);
-  if (!linear)
-    return true;
-  const double left = std::clamp(x, 0.0, frame.size[0] - 1.0), top = std::clamp(y, 0.0, frame.size[1] - 1.0);
-  const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
-  const float s = static_cast<float>(left - x0), t = static_cast<float>(top - y0);
-  float sum = 0.0f, weights = 0.0f;
-  for (int corner = 0; corner < 4; ++corner) {
-    const float w = (corner & 1 ? s : 1.0f - s) * (corner & 2 ? t : 1.0f - t);
-    const std::ptrdiff_t at = (y0 + (corner >> 1)) * width + x0 + (corner & 1);
-    if (w > 0.0f && frame.Real(at)) {
-      sum += w * (static_cast<float>(frame.pixels[static_cast<std::size_t>(at)]) - value);
-      weights += w;
-    }
-  }
-  value += sum / weights; // the nearest pixel has a weight of at least 1/4
-  return true;
-}
-
 } // namespace
 
 template <class T>
-bool VolumeReconstruction<T>::Body::Blend(const Frame<T>& a, const Frame<T>& b)
+bool VolumeReconstruction<T>::Body::Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b)
 {
   Eigen::AlignedBox3d box;
-  for (const Frame<T>* frame : {&a, &b})
+  for (const ReconstructionFrame<T>* frame : {&a, &b})
     for (int corner = 0; corner < 4; ++corner)
       box.extend(worldToIndex * (frame->imageToWorld * Eigen::Vector3d(corner & 1 ? frame->right : frame->left,
                                                                        corner & 2 ? frame->bottom : frame->top, 0.0)));
@@ -651,8 +498,8 @@ bool VolumeReconstruction<T>::Body::Blend(const Frame<T>& a, const Frame<T>& b)
           if ((distanceA >= 0.0) == (distanceB >= 0.0)) // a voxel on a plane belongs to one of its two neighbours alone
             continue;
           float valueA, valueB;
-          if (!Sample(a, startA[0] + x * stepA[0], startA[1] + x * stepA[1], linear, valueA) ||
-              !Sample(b, startB[0] + x * stepB[0], startB[1] + x * stepB[1], linear, valueB))
+          if (!a.Sample(startA[0] + x * stepA[0], startA[1] + x * stepA[1], linear, valueA) ||
+              !b.Sample(startB[0] + x * stepB[0], startB[1] + x * stepB[1], linear, valueB))
             continue;
           const double share = std::abs(distanceA) / (std::abs(distanceA) + std::abs(distanceB));
           const float value = valueA + static_cast<float>(share) * (valueB - valueA);
@@ -735,20 +582,19 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
   Body& body = *body_;
   const auto& size = frame.pixels.Dimensions();
   if (frame.pixels.Empty() || size[0] < 1 || size[1] < 1 || size[2] != 1)
-    throw Error(Error::Kind::BadInput, "a frame is " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
-                                           std::to_string(size[2]) + " pixels; it must be one slice");
+    throw Error(Error::Kind::BadInput, "a frame is " + SizeText(size) + " pixels; it must be one slice");
   if (!frame.mask.Empty() && frame.mask.Dimensions() != size)
     throw Error(Error::Kind::BadInput, "the mask of a frame has another size than its pixels");
   const FrameUse placed = CheckPose(frame.imageToWorld);
   if (placed != FrameUse::Used)
     return placed;
-  body.Load(frame);
+  body.current.Load(frame);
   if (body.current.spans.empty())
     return FrameUse::NoPixels;
 
   const BetweenFrames between = body.parameters.between;
   const bool neighbours = body.hasPrevious && body.previous.size == body.current.size;
-  const double step = neighbours ? body.StepBetween(body.previous, body.current) : 0.0;
+  const double step = neighbours ? LargestStep(body.previous, body.current) : 0.0;
   const bool joined = neighbours && between != BetweenFrames::Nothing && std::isfinite(step) &&
                       step <= body.parameters.maximumGapMm &&
                       (between == BetweenFrames::Backward || step <= mostParts * body.parameters.stepMm);
@@ -759,13 +605,14 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
   } else {
     // Those in between first, then the frame itself.
     const Eigen::Affine3d& toIndex = body.worldToIndex;
-    std::vector<Span> common;
+    std::vector<PixelSpan> common;
     std::vector<Plane<T>> planes;
     const int parts = joined ? std::max(1, static_cast<int>(std::ceil(step / body.parameters.stepMm))) : 1;
     if (parts > 1) {
       const bool everywhere = body.previous.mask.empty() && body.current.mask.empty();
-      common = everywhere ? body.current.spans
-                          : SpansOf(size, [&body](std::ptrdiff_t at) { return body.previous.Real(at) && body.current.Real(at); });
+      common = everywhere
+                   ? body.current.spans
+                   : PixelSpansOf(size, [&body](std::ptrdiff_t at) { return body.previous.Real(at) && body.current.Real(at); });
     }
     for (int part = 1; part <= parts; ++part) {
       Plane<T> plane;

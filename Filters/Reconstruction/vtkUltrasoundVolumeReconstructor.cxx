@@ -2,8 +2,7 @@
 #include "vtkUltrasoundVolumeReconstructor.h"
 
 #include "Core/Base/Error.h"
-#include "Filters/Reconstruction/FrameSector.h"
-#include "Filters/Reconstruction/ReconstructionGrid.h"
+#include "Core/Base/SizeText.h"
 
 #include "vtkAlgorithmOutput.h"
 #include "vtkFieldData.h"
@@ -32,33 +31,13 @@ namespace {
 const char* const NoPose = "it has no valid pose (ImageToWorld)";
 const char* const OtherType = "its pixels are of another type than those of the first frame";
 
-// The size of a pixel, mm.
-Eigen::Vector2d PixelSize(const Eigen::Affine3d& imageToWorld)
-{
-  return {imageToWorld.linear().col(0).norm(), imageToWorld.linear().col(1).norm()};
-}
-
-std::string Dimensions(const std::array<int, 3>& n)
-{
-  return std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]);
-}
-
 // What a frame may show: the sector, and of that what its own valid region allows. The store keeps what is combined.
 echorama::VolumeView<const unsigned char> MaskOf(const vtkUltrasoundVolume::Input& frame,
                                                  const std::optional<echorama::Volume<unsigned char>>& sector,
                                                  echorama::Volume<unsigned char>& store)
 {
-  const auto own = vtkUltrasoundVolume::ViewOf<const unsigned char>(frame.ValidRegion, frame.Image);
-  if (!sector) {
-    return own;
-  }
-  if (own.Empty()) {
-    return sector->View();
-  }
-  store = *sector;
-  std::transform(own.begin(), own.end(), store.View().begin(), store.View().begin(),
-                 [](unsigned char a, unsigned char b) { return static_cast<unsigned char>(a && b); });
-  return store.View();
+  return echorama::BothMasks(vtkUltrasoundVolume::ViewOf<const unsigned char>(frame.ValidRegion, frame.Image),
+                             sector ? sector->View() : echorama::VolumeView<const unsigned char>(), store);
 }
 
 vtkDataArray* MakeArray(vtkImageData* image, const char* name, int type)
@@ -190,12 +169,9 @@ private:
 };
 
 //----------------------------------------------------------------------------
-// What is known before the volume is made.
-struct vtkUltrasoundVolumeReconstructor::Plan {
-  vtkMTimeType InputTime = 0, ReferenceTime = 0, OwnTime = 0;
-  echorama::ImageGeometry Grid;
-  std::optional<echorama::Volume<unsigned char>> Sector; // of all frames, when there is one
-  std::string SectorText;
+// What is known before the volume is made, and of which state of the inputs.
+struct vtkUltrasoundVolumeReconstructor::Plan : echorama::ReconstructionPlan {
+  std::array<vtkMTimeType, 3> Times{}; // of the frames, the reference, and of this filter
   int Type = VTK_UNSIGNED_CHAR;
 };
 
@@ -256,17 +232,25 @@ echorama::ReconstructionParameters vtkUltrasoundVolumeReconstructor::Parameters(
 }
 
 //----------------------------------------------------------------------------
-echorama::Volume<unsigned char> vtkUltrasoundVolumeReconstructor::SectorMask(const std::array<int, 3>& size,
-                                                                             const Eigen::Affine3d& imageToWorld) const
+echorama::SectorParameters vtkUltrasoundVolumeReconstructor::GivenSector() const
 {
-  if (this->Sector == RECTANGLE) {
-    return echorama::RectangleMask(this->Rectangle[0], this->Rectangle[1], this->Rectangle[2], this->Rectangle[3], size[0],
-                                   size[1]);
-  }
-  const Eigen::Vector2d pixel = PixelSize(imageToWorld);
-  return echorama::FanMask(
-      {this->FanApex[0], this->FanApex[1], this->FanAngles[0], this->FanAngles[1], this->FanDepths[0], this->FanDepths[1]},
-      size[0], size[1], pixel[0], pixel[1]);
+  echorama::SectorParameters sector;
+  sector.choice = static_cast<echorama::SectorChoice>(this->Sector);
+  std::copy_n(this->Rectangle, 4, sector.rectangle.begin());
+  sector.fan = {this->FanApex[0],   this->FanApex[1],   this->FanAngles[0],
+                this->FanAngles[1], this->FanDepths[0], this->FanDepths[1]};
+  return sector;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolumeReconstructor::Begin(const echorama::ImageGeometry& grid, int type)
+{
+  const double bytes =
+      echorama::ReconstructionMemory(this->Parameters(), grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)));
+  echorama::CheckMemory(grid, bytes / static_cast<double>(grid.VoxelCount()), this->MemoryLimitMb);
+  this->Statistics = Counts();
+  this->Statistics.MemoryMb = bytes / 1e6;
+  this->Statistics.Grid = echorama::SizeText(grid.dimensions);
 }
 
 //----------------------------------------------------------------------------
@@ -293,84 +277,35 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
     auto* executive = producer ? Pipeline::SafeDownCast(producer->GetExecutive()) : nullptr;
     return executive ? std::max(executive->GetPipelineMTime(), producer->GetMTime()) : 0;
   };
-  const vtkMTimeType inputTime = timeOf(0), referenceTime = timeOf(1), ownTime = this->GetMTime();
-  if (this->Prepared && this->Prepared->InputTime == inputTime && this->Prepared->ReferenceTime == referenceTime &&
-      this->Prepared->OwnTime == ownTime) {
+  const std::array<vtkMTimeType, 3> times{timeOf(0), timeOf(1), this->GetMTime()};
+  if (this->Prepared && this->Prepared->Times == times) {
     return *this->Prepared;
   }
   this->Prepared.reset();
   auto plan = std::make_unique<Plan>();
-  plan->InputTime = inputTime;
-  plan->ReferenceTime = referenceTime;
-  plan->OwnTime = ownTime;
+  plan->Times = times;
 
   vtkInformation* in = inputs[0]->GetInformationObject(0);
   Frames frames(this, inputs);
   frames.Remember(in);
-  const bool given = this->GetNumberOfInputConnections(1) > 0, detect = this->Sector == DETECTED;
-  echorama::FrameSector found;
-  std::vector<echorama::FramePlace> places;
-  std::array<int, 3> size{0, 0, 0};
-  std::optional<Eigen::Affine3d> first; // pose
+  const bool given = this->GetNumberOfInputConnections(1) > 0;
+  echorama::ReconstructionSurvey survey(this->GivenSector());
   for (int index = 0; index < frames.Count(); ++index) {
     progress(0.9 * index / frames.Count());
     const vtkUltrasoundVolume::Input frame = frames.Make(index);
-    const auto pose = vtkUltrasoundAcquisition::ImageToWorldOf(frame.Image);
-    if (!pose || echorama::CheckPose(*pose) != echorama::FrameUse::Used) {
-      continue;
-    }
-    const std::array<int, 3> dimensions = vtkUltrasoundVolume::GeometryOf(frame.Image).dimensions;
-    if (!first) {
-      first = pose;
-      size = dimensions;
-      plan->Type = frame.Intensity->GetDataType();
-    }
-    const auto own = vtkUltrasoundVolume::ViewOf<const unsigned char>(frame.ValidRegion, frame.Image);
-    if (frame.Intensity->GetDataType() != plan->Type || (!own.Empty() && std::find(own.begin(), own.end(), 1) == own.end())) {
-      continue;
-    }
-    if (detect) {
-      vtkUltrasoundVolume::Dispatch(frame.Intensity, [&](auto type) {
-        found.Add<decltype(type)>(vtkUltrasoundVolume::ViewOf<const decltype(type)>(frame.Intensity, frame.Image));
-      });
-    }
-    places.push_back({*pose, {0, dimensions[0] - 1, 0, dimensions[1] - 1}});
-    if (given && !detect) {
+    vtkUltrasoundVolume::Dispatch(frame.Intensity, [&](auto type) {
+      if (survey.Add(vtkUltrasoundVolume::ViewOf<const decltype(type)>(frame.Intensity, frame.Image),
+                     vtkUltrasoundVolume::ViewOf<const unsigned char>(frame.ValidRegion, frame.Image),
+                     vtkUltrasoundAcquisition::ImageToWorldOf(frame.Image))) {
+        plan->Type = frame.Intensity->GetDataType();
+      }
+    });
+    if (given && this->Sector != DETECTED && !survey.Empty()) {
       break; // the type is all that was to be learned
     }
   }
   frames.Restore(in);
-  if (first && places.empty()) {
-    throw Error(Error::Kind::BadInput,
-                "none of the " + std::to_string(frames.Count()) + " frames has a real pixel (ValidRegion)");
-  }
-  if (!first) {
-    throw Error(Error::Kind::BadInput,
-                "none of the " + std::to_string(frames.Count()) + " frames has a valid pose (ImageToWorld)");
-  }
-  plan->SectorText = "all pixels";
-  if (detect) {
-    const Eigen::Vector2d pixel = PixelSize(*first);
-    echorama::DetectedSector sector = echorama::DetectSector(found, pixel[0], pixel[1], progress.Part(0.9, 1.0));
-    plan->Sector = std::move(sector.mask);
-    plan->SectorText = sector.text;
-    if (!sector.found) {
-      vtkWarningMacro(<< sector.text);
-    }
-  } else if (this->Sector != ALL) {
-    plan->Sector = this->SectorMask(size, *first);
-    plan->SectorText = this->Sector == RECTANGLE ? "the given rectangle" : "the given fan";
-  }
-  if (plan->Sector) {
-    // The grid is that of the pixels that count.
-    const auto mask = plan->Sector->View();
-    const std::array<int, 4> box = echorama::BoxOf(mask);
-    const std::ptrdiff_t inside = mask.Size() - std::count(mask.begin(), mask.end(), 0);
-    plan->SectorText += ", " + std::to_string(inside) + " of " + std::to_string(mask.Size()) + " pixels";
-    for (echorama::FramePlace& place : places) {
-      place.pixels = inside > 0 ? box : place.pixels;
-    }
-  }
+  std::optional<echorama::ImageGeometry> grid;
   if (given) {
     int port = 0;
     vtkAlgorithm* producer = this->GetInputAlgorithm(1, 0, port);
@@ -379,10 +314,13 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
     if (!made || !reference || reference->GetNumberOfPoints() < 1) {
       throw Error(Error::Kind::BadInput, "the reference volume is empty");
     }
-    plan->Grid = vtkUltrasoundVolume::GeometryOf(reference);
-    plan->Grid.Check("the reference volume");
-  } else {
-    plan->Grid = echorama::ReconstructionGrid(places, static_cast<echorama::GridDirections>(this->Grid), this->SpacingMm);
+    grid = vtkUltrasoundVolume::GeometryOf(reference);
+    grid->Check("the reference volume");
+  }
+  static_cast<echorama::ReconstructionPlan&>(*plan) =
+      survey.Finish(grid, static_cast<echorama::GridDirections>(this->Grid), this->SpacingMm, progress.Part(0.9, 1.0));
+  if (!plan->sectorFound) {
+    vtkWarningMacro(<< plan->sectorText);
   }
   this->Prepared = std::move(plan);
   return *this->Prepared;
@@ -396,7 +334,7 @@ int vtkUltrasoundVolumeReconstructor::RequestInformation(vtkInformation*, vtkInf
   const int done = vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
     vtkInformation* out = outputs->GetInformationObject(0);
     const Plan& plan = this->Prepare(inputs, progress);
-    vtkUltrasoundVolume::SetGeometry(out, plan.Grid);
+    vtkUltrasoundVolume::SetGeometry(out, plan.grid);
     vtkDataObject::SetPointDataActiveScalarInfo(out, plan.Type, 1);
     // One volume of all times.
     out->Remove(Pipeline::TIME_STEPS());
@@ -423,16 +361,10 @@ void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vt
 {
   this->Statistics = Counts();
   const Plan& plan = this->Prepare(inputs, progress);
-  const echorama::ReconstructionParameters parameters = this->Parameters();
-  const std::size_t voxelBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(plan.Type));
-  const double bytes = echorama::ReconstructionMemory(parameters, plan.Grid, voxelBytes);
-  this->Statistics.MemoryMb = bytes / 1e6;
-  this->Statistics.Grid = Dimensions(plan.Grid.dimensions);
-  this->Statistics.SectorText = plan.SectorText;
-  echorama::CheckMemory(plan.Grid, bytes / static_cast<double>(plan.Grid.VoxelCount()), this->MemoryLimitMb);
-
+  this->Begin(plan.grid, plan.Type);
+  this->Statistics.SectorText = plan.sectorText;
   output->Initialize();
-  vtkUltrasoundVolume::SetGeometry(output, plan.Grid);
+  vtkUltrasoundVolume::SetGeometry(output, plan.grid);
   const Arrays arrays(output, plan.Type);
   vtkInformation* in = inputs[0]->GetInformationObject(0);
   Frames frames(this, inputs);
@@ -440,7 +372,7 @@ void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vt
   vtkUltrasoundVolume::Dispatch(arrays.Intensity, [&](auto type) {
     using T = decltype(type);
     const echorama::ReconstructionOutput<T> views = arrays.Views<T>(output);
-    echorama::VolumeReconstruction<T> reconstruction(parameters, plan.Grid, views);
+    echorama::VolumeReconstruction<T> reconstruction(this->Parameters(), plan.grid, views);
     echorama::Volume<unsigned char> store;
     for (int index = 0; index < frames.Count(); ++index) {
       progress(0.9 * index / frames.Count());
@@ -455,11 +387,11 @@ void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vt
         continue;
       }
       const auto pixels = vtkUltrasoundVolume::ViewOf<const T>(frame.Intensity, frame.Image);
-      if (plan.Sector && plan.Sector->Dimensions() != pixels.Dimensions()) {
-        this->Refuse("it is not of the size of the first frame, " + Dimensions(plan.Sector->Dimensions()));
+      if (plan.sector && plan.sector->Dimensions() != pixels.Dimensions()) {
+        this->Refuse("it is not of the size of the first frame, " + echorama::SizeText(plan.sector->Dimensions()));
         continue;
       }
-      const echorama::FrameUse use = reconstruction.Add({pixels, MaskOf(frame, plan.Sector, store), *pose});
+      const echorama::FrameUse use = reconstruction.Add({pixels, MaskOf(frame, plan.sector, store), *pose});
       if (use != echorama::FrameUse::Used) {
         this->Refuse(echorama::FrameUseText(use));
       }
@@ -515,10 +447,7 @@ bool vtkUltrasoundVolumeReconstructor::BeginLive(vtkImageData* grid, int vtkType
            }
            const echorama::ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(grid);
            geometry.Check("the grid");
-           const echorama::ReconstructionParameters parameters = this->Parameters();
-           const auto voxelBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(vtkType));
-           const double bytes = echorama::ReconstructionMemory(parameters, geometry, voxelBytes);
-           echorama::CheckMemory(geometry, bytes / static_cast<double>(geometry.VoxelCount()), this->MemoryLimitMb);
+           this->Begin(geometry, vtkType);
            auto live = std::make_unique<Live>();
            live->Type = vtkType;
            live->Image = vtkSmartPointer<vtkImageData>::New();
@@ -527,16 +456,13 @@ bool vtkUltrasoundVolumeReconstructor::BeginLive(vtkImageData* grid, int vtkType
            vtkUltrasoundVolume::Dispatch(live->Data->Intensity, [&](auto type) {
              using T = decltype(type);
              auto reconstruction = std::make_shared<echorama::VolumeReconstruction<T>>(
-                 parameters, geometry, live->Data->template Views<T>(live->Image));
+                 this->Parameters(), geometry, live->Data->template Views<T>(live->Image));
              live->Between = [reconstruction] { return reconstruction->FramesBetween(); };
              live->Add = [reconstruction](const vtkUltrasoundVolume::Input& frame, echorama::VolumeView<const unsigned char> mask,
                                           const Eigen::Affine3d& pose) {
                return reconstruction->Add({vtkUltrasoundVolume::ViewOf<const T>(frame.Intensity, frame.Image), mask, pose});
              };
            });
-           this->Statistics = Counts();
-           this->Statistics.MemoryMb = bytes / 1e6;
-           this->Statistics.Grid = Dimensions(geometry.dimensions);
            this->LiveVolume = std::move(live);
          }) == 1;
 }
@@ -564,9 +490,8 @@ bool vtkUltrasoundVolumeReconstructor::AddFrame(vtkImageData* image)
       return;
     }
     const std::array<int, 3> size = vtkUltrasoundVolume::GeometryOf(image).dimensions;
-    if ((this->Sector == RECTANGLE || this->Sector == FAN) && (!live.Sector || live.Sector->Dimensions() != size) &&
-        echorama::CheckPose(*pose) == echorama::FrameUse::Used) {
-      live.Sector = this->SectorMask(size, *pose);
+    if ((!live.Sector || live.Sector->Dimensions() != size) && echorama::CheckPose(*pose) == echorama::FrameUse::Used) {
+      live.Sector = echorama::GivenSector(this->GivenSector(), size, *pose);
     }
     echorama::Volume<unsigned char> store;
     const echorama::FrameUse use = live.Add(frame, MaskOf(frame, live.Sector, store), *pose);

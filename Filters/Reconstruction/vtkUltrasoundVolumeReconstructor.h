@@ -40,6 +40,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Reconstruction/HoleFilling.h"
+#include "Filters/Reconstruction/ReconstructionPlan.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
 #endif
 
@@ -239,7 +240,8 @@ private:
   struct Live;
   const Plan& Prepare(vtkInformationVector** inputs, const echorama::Progress& progress);
   echorama::ReconstructionParameters Parameters() const;
-  echorama::Volume<unsigned char> SectorMask(const std::array<int, 3>& size, const Eigen::Affine3d& imageToWorld) const;
+  echorama::SectorParameters GivenSector() const;
+  void Begin(const echorama::ImageGeometry& grid, int type);
   void Refuse(const std::string& reason);
 
   struct Counts {

@@ -8,11 +8,12 @@
 //
 // Cost: pairs times AlignPair. Which pairs may overlap costs a millisecond each, at the coarsest resolution.
 #include "AlignVolumes.h"
-#include "AlignSearch.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
+#include "Core/Imaging/ValidPoints.h"
+#include "Index.h"
 #include "PoseGraph.h"
-#include "ValidPoints.h"
+#include "VolumeOverlap.h"
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -36,11 +37,6 @@ std::string Millimetres(double mm)
   char text[64];
   std::snprintf(text, sizeof text, "%.1f mm", mm);
   return text;
-}
-
-std::size_t Index(int number)
-{
-  return static_cast<std::size_t>(number);
 }
 
 // Round about how large a volume is, from its coarsest resolution.
@@ -160,9 +156,8 @@ double Alignment::Overlap(int a, int b, const std::vector<Pose>& poses, const Ei
   PlacedVolume first = volumes_[Index(a)], second = volumes_[Index(b)];
   first.volumeToWorld = poses[Index(a)];
   second.volumeToWorld = Eigen::Translation3d(shift) * poses[Index(b)];
-  AlignSearchParameters sparse;
-  sparse.points = 1000;
-  return std::max(OverlapOf({first}, second, sparse), OverlapOf({second}, first, sparse));
+  constexpr int points = 1000;
+  return std::max(OverlapOf({first}, second, points), OverlapOf({second}, first, points));
 }
 
 // For each volume those it overlaps most; where these are few, those too that it would overlap if it were closer.
@@ -549,9 +544,7 @@ AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fi
   if (count < 2)
     throw Error(Error::Kind::BadInput,
                 "two volumes are needed to align; there " + std::string(count == 1 ? "is one" : "are none"));
-  if (fixed < 0 || Index(fixed) >= count)
-    throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(count) +
-                                                   ", numbered from 0; it is " + std::to_string(fixed));
+  CheckFixedVolume(fixed, count);
   std::set<int> staying{fixed};
   for (const int v : p.held) {
     if (v < 0 || Index(v) >= count)

@@ -4,7 +4,8 @@
 // T_f, so that an alignment that equals the truth scores 0 to rounding.
 #include "AlignmentScore.h"
 #include "Core/Base/Error.h"
-#include "Percentile.h"
+#include "Core/Base/Percentile.h"
+#include "PlacedVolume.h"
 #include <algorithm>
 #include <cmath>
 
@@ -30,9 +31,7 @@ AlignmentScore ScoreAlignment(const std::vector<ScoredVolume>& volumes, int fixe
   if (volumes.size() < 2)
     throw Error(Error::Kind::BadInput,
                 "two volumes are needed to score an alignment; there " + std::string(volumes.empty() ? "are none" : "is one"));
-  if (fixed < 0 || static_cast<std::size_t>(fixed) >= volumes.size())
-    throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(volumes.size()) +
-                                                   ", numbered from 0; it is " + std::to_string(fixed));
+  CheckFixedVolume(fixed, volumes.size());
   for (const ScoredVolume& volume : volumes)
     Check(volume);
 

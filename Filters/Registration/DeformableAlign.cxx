@@ -6,13 +6,16 @@
 // only whole cells get all thousand. The cost is then mostly that of reading the moving volume.
 //
 // The matrix couples control points at most three apart: it is kept as a stencil of 7^3 blocks of 3 x 3 per control point, the
-// penalty is added to it, and conjugate gradients solve it.
+// penalty is added to it, and conjugate gradients solve it (LatticeEquations).
 #include "DeformableAlign.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
+#include "Index.h"
+#include "LatticeEquations.h"
 #include "Metric.h"
+#include "PlacedVolume.h"
 #include <algorithm>
 #include <cmath>
 
@@ -22,7 +25,7 @@ namespace {
 
 constexpr int CoarseOctave = 2; // voxels of about 4 mm tell where volumes overlap
 
-using Vectors = std::vector<Eigen::Vector3d>;
+using Vectors = LatticeEquations::Vectors;
 
 // A value and a weight of every voxel of a grid, as MetricLevel keeps them.
 using Seen = std::vector<float>;
@@ -67,14 +70,14 @@ void SeeThrough(const MetricLevel& level, const Pose& volumeToWorld, const Displ
   const auto& n = grid.dimensions;
   seen.resize(2 * grid.VoxelCount());
   ParallelFor(n[2], progress, [&](std::ptrdiff_t k) {
-    Vectors positions(static_cast<std::size_t>(n[0]), Eigen::Vector3d::Zero());
+    Vectors positions(Index(n[0]), Eigen::Vector3d::Zero());
     const Eigen::Vector3d step = toWorld.linear().col(0), indexStep = toIndex.linear() * step;
     for (int j = 0; j < n[1]; ++j) {
       const Eigen::Vector3d start = toWorld * Eigen::Vector3d(0.0, j, static_cast<double>(k)), indexStart = toIndex * start;
       if (field)
         field->Row(start, step, n[0], positions.data());
       for (int i = 0; i < n[0]; ++i) {
-        Eigen::Vector3d& p = positions[static_cast<std::size_t>(i)];
+        Eigen::Vector3d& p = positions[Index(i)];
         p = field ? Eigen::Vector3d(indexStart + i * indexStep + toIndex.linear() * p)
                   : Eigen::Vector3d(indexStart + i * indexStep);
       }
@@ -90,8 +93,8 @@ struct Axis {
   {
     const Eigen::Vector3d from = lattice.WorldToIndex() * grid.origin;
     const double by = grid.spacing[axis] / lattice.spacing[axis];
-    cells = lattice.dimensions[static_cast<std::size_t>(axis)] - 3;
-    for (int i = 0; i < grid.dimensions[static_cast<std::size_t>(axis)]; ++i) {
+    cells = lattice.dimensions[Index(axis)] - 3;
+    for (int i = 0; i < grid.dimensions[Index(axis)]; ++i) {
       const double x = from[axis] + i * by;
       // The lattice is laid so that only rounding can put a voxel beyond its inner cells.
       const int c = std::clamp(static_cast<int>(std::floor(x)) - 1, 0, cells - 1);
@@ -113,120 +116,14 @@ struct Axis {
 
 constexpr int pairOf[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
 
-// Normal equations over the control points: a symmetric block matrix as a stencil, and a right side.
-class Normal {
-public:
-  explicit Normal(const std::array<int, 3>& n)
-    : n_(n), count_(static_cast<std::ptrdiff_t>(n[0]) * n[1] * n[2]),
-      blocks_(static_cast<std::size_t>(count_) * Stencil * 6, 0.0),
-      right_(static_cast<std::size_t>(count_), Eigen::Vector3d::Zero())
-  {
-  }
-
-  static constexpr int Stencil = 343;
-  const std::array<int, 3>& Dimensions() const { return n_; }
-  std::ptrdiff_t Node(int i, int j, int k) const { return (static_cast<std::ptrdiff_t>(k) * n_[1] + j) * n_[0] + i; }
-  /// xx, xy, xz, yy, yz, zz of the block that couples a node with the one \a offset away.
-  double* Block(std::ptrdiff_t node, int di, int dj, int dk)
-  {
-    return blocks_.data() + 6 * (node * Stencil + ((dk + 3) * 7 + dj + 3) * 7 + di + 3);
-  }
-  const double* Block(std::ptrdiff_t node, int di, int dj, int dk) const
-  {
-    return const_cast<Normal*>(this)->Block(node, di, dj, dk);
-  }
-  Vectors& Right() { return right_; }
-
-  // Calls body(other node, di, dj, dk) for all nodes that a node is coupled with.
-  template <class Body>
-  void Neighbours(std::ptrdiff_t node, const Body& body) const
-  {
-    const int i = static_cast<int>(node % n_[0]), j = static_cast<int>(node / n_[0] % n_[1]),
-              k = static_cast<int>(node / n_[0] / n_[1]);
-    for (int dk = std::max(-3, -k); dk <= std::min(3, n_[2] - 1 - k); ++dk)
-      for (int dj = std::max(-3, -j); dj <= std::min(3, n_[1] - 1 - j); ++dj)
-        for (int di = std::max(-3, -i); di <= std::min(3, n_[0] - 1 - i); ++di)
-          body(Node(i + di, j + dj, k + dk), di, dj, dk);
-  }
-
-  // Adds the quadratic penalty whose entries depend on the offset alone, and its pull on the coefficients.
-  void AddPenalty(const std::array<double, Stencil>& entries, const Vectors& coefficients)
-  {
-    ParallelRanges(count_, 32, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t node = begin; node < end; ++node)
-        Neighbours(node, [&](std::ptrdiff_t other, int di, int dj, int dk) {
-          const double entry = entries[static_cast<std::size_t>(((dk + 3) * 7 + dj + 3) * 7 + di + 3)];
-          double* block = Block(node, di, dj, dk);
-          block[0] += entry;
-          block[3] += entry;
-          block[5] += entry;
-          right_[static_cast<std::size_t>(node)] -= entry * coefficients[static_cast<std::size_t>(other)];
-        });
-    });
-  }
-
-  // Conjugate gradients, preconditioned by the blocks of the diagonal, which are raised by \a damping of themselves.
-  Vectors Solve(double damping) const
-  {
-    std::vector<Eigen::Matrix3d> inverse(right_.size());
-    for (std::ptrdiff_t node = 0; node < count_; ++node)
-      inverse[static_cast<std::size_t>(node)] = Full(Block(node, 0, 0, 0)).inverse() / (1.0 + damping);
-    const auto dot = [](const Vectors& a, const Vectors& b) {
-      double sum = 0.0;
-      for (std::size_t i = 0; i < a.size(); ++i)
-        sum += a[i].dot(b[i]);
-      return sum;
-    };
-    Vectors x(right_.size(), Eigen::Vector3d::Zero()), r = right_, z(x), p(x), q(x);
-    const auto precondition = [&] {
-      for (std::size_t i = 0; i < r.size(); ++i)
-        z[i] = inverse[i] * r[i];
-    };
-    precondition();
-    p = z;
-    double rz = dot(r, z);
-    const double enough = 1e-8 * rz;
-    for (int step = 0; step < 400 && rz > enough; ++step) {
-      ParallelRanges(count_, 32, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-        for (std::ptrdiff_t node = begin; node < end; ++node) {
-          Eigen::Vector3d sum = damping * (Full(Block(node, 0, 0, 0)) * p[static_cast<std::size_t>(node)]);
-          Neighbours(node, [&](std::ptrdiff_t other, int di, int dj, int dk) {
-            const double* b = Block(node, di, dj, dk);
-            const Eigen::Vector3d& v = p[static_cast<std::size_t>(other)];
-            sum[0] += b[0] * v[0] + b[1] * v[1] + b[2] * v[2];
-            sum[1] += b[1] * v[0] + b[3] * v[1] + b[4] * v[2];
-            sum[2] += b[2] * v[0] + b[4] * v[1] + b[5] * v[2];
-          });
-          q[static_cast<std::size_t>(node)] = sum;
-        }
-      });
-      const double alpha = rz / dot(p, q);
-      for (std::size_t i = 0; i < x.size(); ++i) {
-        x[i] += alpha * p[i];
-        r[i] -= alpha * q[i];
-      }
-      precondition();
-      const double next = dot(r, z), beta = next / rz;
-      rz = next;
-      for (std::size_t i = 0; i < p.size(); ++i)
-        p[i] = z[i] + beta * p[i];
-    }
-    return x;
-  }
-
-private:
-  static Eigen::Matrix3d Full(const double* b)
-  {
-    Eigen::Matrix3d full;
-    full << b[0], b[1], b[2], b[1], b[3], b[4], b[2], b[4], b[5];
-    return full;
-  }
-
-  std::array<int, 3> n_;
-  std::ptrdiff_t count_;
-  std::vector<double> blocks_;
-  Vectors right_;
-};
+// Sums of the products of some weights with some sums, those of the first weight first.
+template <std::ptrdiff_t Sums, std::size_t Weights>
+void AddProducts(const std::array<double, Weights>& weights, const double* sums, double* to)
+{
+  for (const double weight : weights)
+    for (std::ptrdiff_t i = 0; i < Sums; ++i)
+      *to++ += weight * sums[i];
+}
 
 // What two volumes have in common: weighted sums over the voxels of the grid.
 struct Common {
@@ -269,16 +166,15 @@ public:
     Eigen::Vector3d first;
     for (int axis = 0; axis < 3; ++axis) {
       // The overlap is told along the axes of the moving volume, in mm from its first voxel's centre.
-      const int n = whole.dimensions[static_cast<std::size_t>(axis)];
+      const int n = whole.dimensions[Index(axis)];
       const Eigen::Vector3d shift = whole.direction.transpose() * (whole.origin - MillimetreFrame(moving).origin);
       const double low = std::floor((overlap.min()[axis] - shift[axis]) / whole.spacing[axis]),
                    high = std::ceil((overlap.max()[axis] - shift[axis]) / whole.spacing[axis]);
       first[axis] = std::clamp(low, 0.0, n - 1.0);
-      grid_.dimensions[static_cast<std::size_t>(axis)] =
-          static_cast<int>(std::clamp(high, first[axis], n - 1.0) - first[axis]) + 1;
+      grid_.dimensions[Index(axis)] = static_cast<int>(std::clamp(high, first[axis], n - 1.0) - first[axis]) + 1;
       const double length = overlap.sizes()[axis];
       const int cells = std::max(1, static_cast<int>(std::ceil(length / controlSpacing - 0.01)));
-      lattice_.dimensions[static_cast<std::size_t>(axis)] = cells + 3;
+      lattice_.dimensions[Index(axis)] = cells + 3;
       lattice_.spacing[axis] = controlSpacing;
     }
     grid_.origin = whole.IndexToWorld() * first;
@@ -334,57 +230,45 @@ public:
   };
 
   // The data's share of the normal equations at what was warped.
-  Normal Equations(const Seen& warped, const std::vector<Weighing>& weighing) const
+  LatticeEquations Equations(const Seen& warped, const std::vector<Weighing>& weighing) const
   {
     const Axis x(grid_, lattice_, 0), y(grid_, lattice_, 1), z(grid_, lattice_, 2);
-    Normal normal(lattice_.dimensions);
+    LatticeEquations normal(lattice_.dimensions);
     const std::ptrdiff_t cells = static_cast<std::ptrdiff_t>(x.cells) * y.cells;
-    constexpr std::ptrdiff_t squareSize = 600, lineSize = 60, rightSquare = 48, rightLine = 12;
+    constexpr std::ptrdiff_t squareSize = 600, rightSquare = 48;
     constexpr int atOnce = 16;
     std::vector<std::vector<double>> squares(atOnce), rights(atOnce);
-    std::vector<double> cubes(static_cast<std::size_t>(cells * 10 * squareSize)),
-        rightCubes(static_cast<std::size_t>(cells * 4 * rightSquare));
+    std::vector<double> cubes(Index(cells * 10 * squareSize)), rightCubes(Index(cells * 4 * rightSquare));
     for (int from = 0; from < grid_.dimensions[2];) {
       int to = from;
-      while (to < grid_.dimensions[2] && to < from + atOnce &&
-             z.cell[static_cast<std::size_t>(to)] == z.cell[static_cast<std::size_t>(from)])
+      while (to < grid_.dimensions[2] && to < from + atOnce && z.cell[Index(to)] == z.cell[Index(from)])
         ++to;
-      if (from == 0 || z.cell[static_cast<std::size_t>(from)] != z.cell[static_cast<std::size_t>(from) - 1]) {
+      if (from == 0 || z.cell[Index(from)] != z.cell[Index(from) - 1]) {
         std::fill(cubes.begin(), cubes.end(), 0.0);
         std::fill(rightCubes.begin(), rightCubes.end(), 0.0);
       }
       ParallelFor(to - from, [&](std::ptrdiff_t s) {
-        auto &square = squares[static_cast<std::size_t>(s)], &right = rights[static_cast<std::size_t>(s)];
-        square.assign(static_cast<std::size_t>(cells * squareSize), 0.0);
-        right.assign(static_cast<std::size_t>(cells * rightSquare), 0.0);
+        auto &square = squares[Index(s)], &right = rights[Index(s)];
+        square.assign(Index(cells * squareSize), 0.0);
+        right.assign(Index(cells * rightSquare), 0.0);
         SumSlice(warped, from + static_cast<int>(s), weighing, x, y, square.data(), right.data());
       });
       ParallelFor(cells, [&](std::ptrdiff_t cell) {
         for (int k = from; k < to; ++k) {
-          const auto& pz = z.pairs[static_cast<std::size_t>(k)];
-          const auto& wz = z.weights[static_cast<std::size_t>(k)];
-          const double* square = squares[static_cast<std::size_t>(k - from)].data() + cell * squareSize;
-          const double* right = rights[static_cast<std::size_t>(k - from)].data() + cell * rightSquare;
-          for (int p = 0; p < 10; ++p) {
-            double* cube = cubes.data() + (cell * 10 + p) * squareSize;
-            for (std::ptrdiff_t i = 0; i < squareSize; ++i)
-              cube[i] += pz[static_cast<std::size_t>(p)] * square[i];
-          }
-          for (int p = 0; p < 4; ++p) {
-            double* cube = rightCubes.data() + (cell * 4 + p) * rightSquare;
-            for (std::ptrdiff_t i = 0; i < rightSquare; ++i)
-              cube[i] += wz[static_cast<std::size_t>(p)] * right[i];
-          }
+          const std::size_t slice = Index(k - from);
+          AddProducts<squareSize>(z.pairs[Index(k)], squares[slice].data() + cell * squareSize,
+                                  cubes.data() + cell * 10 * squareSize);
+          AddProducts<rightSquare>(z.weights[Index(k)], rights[slice].data() + cell * rightSquare,
+                                   rightCubes.data() + cell * 4 * rightSquare);
         }
       });
-      const int zCell = z.cell[static_cast<std::size_t>(from)];
-      if (to == grid_.dimensions[2] || z.cell[static_cast<std::size_t>(to)] != zCell)
+      const int zCell = z.cell[Index(from)];
+      if (to == grid_.dimensions[2] || z.cell[Index(to)] != zCell)
         for (std::ptrdiff_t cell = 0; cell < cells; ++cell)
           Scatter(normal, static_cast<int>(cell % x.cells), static_cast<int>(cell / x.cells), zCell,
                   cubes.data() + cell * 10 * squareSize, rightCubes.data() + cell * 4 * rightSquare);
       from = to;
     }
-    static_assert(squareSize == 10 * lineSize && rightSquare == 4 * rightLine);
     return normal;
   }
 
@@ -395,7 +279,7 @@ private:
     const auto& n = grid_.dimensions;
     const Eigen::Matrix3d toWorld = grid_.direction * grid_.spacing.cwiseInverse().asDiagonal() * 0.5; // central
     const std::ptrdiff_t steps[3] = {2, 2 * static_cast<std::ptrdiff_t>(n[0]), 2 * static_cast<std::ptrdiff_t>(n[0]) * n[1]};
-    std::vector<double> line(static_cast<std::size_t>(x.cells) * 60), right(static_cast<std::size_t>(x.cells) * 12);
+    std::vector<double> line(Index(x.cells) * 60), right(Index(x.cells) * 12);
     for (int j = 0; j < n[1]; ++j) {
       std::fill(line.begin(), line.end(), 0.0);
       std::fill(right.begin(), right.end(), 0.0);
@@ -425,40 +309,29 @@ private:
         const double outer[6] = {square * g[0] * g[0], square * g[0] * g[1], square * g[0] * g[2],
                                  square * g[1] * g[1], square * g[1] * g[2], square * g[2] * g[2]};
         const double pull[3] = {residual * g[0], residual * g[1], residual * g[2]};
-        const std::size_t column = static_cast<std::size_t>(i);
-        double* l = line.data() + 60 * static_cast<std::ptrdiff_t>(x.cell[column]);
-        for (std::size_t p = 0; p < 10; ++p)
-          for (int c = 0; c < 6; ++c)
-            *l++ += x.pairs[column][p] * outer[c];
-        double* q = right.data() + 12 * static_cast<std::ptrdiff_t>(x.cell[column]);
-        for (std::size_t p = 0; p < 4; ++p)
-          for (int c = 0; c < 3; ++c)
-            *q++ += x.weights[column][p] * pull[c];
+        const std::size_t column = Index(i);
+        AddProducts<6>(x.pairs[column], outer, line.data() + 60 * static_cast<std::ptrdiff_t>(x.cell[column]));
+        AddProducts<3>(x.weights[column], pull, right.data() + 12 * static_cast<std::ptrdiff_t>(x.cell[column]));
       }
       if (!any)
         continue;
-      const std::size_t row = static_cast<std::size_t>(j);
+      const std::size_t row = Index(j);
       for (int cell = 0; cell < x.cells; ++cell) {
         const std::ptrdiff_t place = static_cast<std::ptrdiff_t>(y.cell[row]) * x.cells + cell;
-        const double *l = line.data() + 60 * cell, *q = right.data() + 12 * cell;
-        for (std::size_t p = 0; p < 10; ++p)
-          for (std::ptrdiff_t c = 0; c < 60; ++c)
-            squares[place * 600 + static_cast<std::ptrdiff_t>(p) * 60 + c] += y.pairs[row][p] * l[c];
-        for (std::size_t p = 0; p < 4; ++p)
-          for (std::ptrdiff_t c = 0; c < 12; ++c)
-            rights[place * 48 + static_cast<std::ptrdiff_t>(p) * 12 + c] += y.weights[row][p] * q[c];
+        AddProducts<60>(y.pairs[row], line.data() + 60 * cell, squares + place * 600);
+        AddProducts<12>(y.weights[row], right.data() + 12 * cell, rights + place * 48);
       }
     }
   }
 
   // The sums of one cell go to its 64 control points.
-  static void Scatter(Normal& normal, int ci, int cj, int ck, const double* cube, const double* right)
+  static void Scatter(LatticeEquations& normal, int ci, int cj, int ck, const double* cube, const double* right)
   {
     for (int k = 0; k < 4; ++k)
       for (int j = 0; j < 4; ++j)
         for (int i = 0; i < 4; ++i) {
           const std::ptrdiff_t node = normal.Node(ci + i, cj + j, ck + k);
-          normal.Right()[static_cast<std::size_t>(node)] += Eigen::Map<const Eigen::Vector3d>(right + ((k * 4 + j) * 4 + i) * 3);
+          normal.Right()[Index(node)] += Eigen::Map<const Eigen::Vector3d>(right + ((k * 4 + j) * 4 + i) * 3);
           for (int c = 0; c < 4; ++c)
             for (int b = 0; b < 4; ++b)
               for (int a = 0; a < 4; ++a) {
@@ -508,9 +381,9 @@ Eigen::AlignedBox3d OverlapBox(const std::vector<DeformableVolume>& fixed, const
   return box;
 }
 
-std::array<double, Normal::Stencil> PenaltyEntries(double bending, double reachMm, const Eigen::Vector3d& spacing)
+LatticeEquations::Penalty PenaltyEntries(double bending, double reachMm, const Eigen::Vector3d& spacing)
 {
-  std::array<double, Normal::Stencil> entries{};
+  LatticeEquations::Penalty entries{};
   const double mass = bending / (reachMm * reachMm * reachMm * reachMm);
   std::size_t at = 0;
   for (int c = -3; c <= 3; ++c)
@@ -518,19 +391,6 @@ std::array<double, Normal::Stencil> PenaltyEntries(double bending, double reachM
       for (int a = -3; a <= 3; ++a)
         entries[at++] = bending * BendingEntry({a, b, c}, spacing) + mass * MassEntry({a, b, c}, spacing);
   return entries;
-}
-
-double PenaltyOf(const Normal& shape, const std::array<double, Normal::Stencil>& entries, const Vectors& c)
-{
-  return ParallelSum<double>(static_cast<std::ptrdiff_t>(c.size()), 32, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    double sum = 0.0;
-    for (std::ptrdiff_t node = begin; node < end; ++node)
-      shape.Neighbours(node, [&](std::ptrdiff_t other, int di, int dj, int dk) {
-        sum += entries[static_cast<std::size_t>(((dk + 3) * 7 + dj + 3) * 7 + di + 3)] *
-               c[static_cast<std::size_t>(node)].dot(c[static_cast<std::size_t>(other)]);
-      });
-    return 0.5 * sum;
-  });
 }
 
 // The cost of a fixed volume is W/2 log(1 - r^2), W being its weight before anything moved: the likelihood of two signals of
@@ -614,9 +474,9 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
     Vectors c = field.Coefficients();
     level.Warp(field, warped, {});
     Commons now = level.Compare(warped);
-    const Normal shape(level.Lattice().dimensions);
+    const LatticeEquations shape(level.Lattice().dimensions);
     const auto costOf = [&](const Commons& commons, const Vectors& coefficients) {
-      double cost = PenaltyOf(shape, penalty, coefficients);
+      double cost = shape.PenaltyOf(penalty, coefficients);
       for (std::size_t v = 0; v < commons.size(); ++v)
         cost += 0.5 * rigid[v].weight * std::log(commons[v].Unexplained());
       return cost;
@@ -624,7 +484,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
     double cost = costOf(now, c), damping = 0.0;
     for (int iteration = 0; iteration < parameters.iterations; ++iteration, ++result.iterations) {
       part(static_cast<double>(iteration) / parameters.iterations);
-      Normal normal = level.Equations(warped, WeighingOf(now, rigid));
+      LatticeEquations normal = level.Equations(warped, WeighingOf(now, rigid));
       normal.AddPenalty(penalty, c);
       double step = 0.0;
       bool isBetter = false;
@@ -688,16 +548,14 @@ std::vector<DeformableAlignResult> DeformInTurn(const std::vector<DeformableVolu
   const int count = static_cast<int>(volumes.size());
   if (count < 2)
     throw Error(Error::Kind::BadInput, "deformable alignment needs at least two volumes, got " + std::to_string(count));
-  if (fixed < 0 || fixed >= count)
-    throw Error(Error::Kind::InvalidParameter, "the fixed volume must be one of the " + std::to_string(count) +
-                                                   ", counted from 0; it is " + std::to_string(fixed));
+  CheckFixedVolume(fixed, volumes.size());
   for (const DeformableVolume& volume : volumes)
     CheckVolume(volume);
   std::vector<DeformableAlignResult> results(volumes.size());
   std::vector<bool> isPlaced(volumes.size(), false);
-  std::vector<DeformableVolume> placed{volumes[static_cast<std::size_t>(fixed)]};
+  std::vector<DeformableVolume> placed{volumes[Index(fixed)]};
   placed.front().field = nullptr;
-  isPlaced[static_cast<std::size_t>(fixed)] = true;
+  isPlaced[Index(fixed)] = true;
   for (int turn = 1; turn < count; ++turn) {
     std::size_t next = 0;
     double most = -1.0;

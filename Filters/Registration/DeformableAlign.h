@@ -7,7 +7,7 @@ namespace echorama {
 
 /// A volume that lies where it belongs as well as a rigid motion can tell.
 struct DeformableVolume {
-  const MetricPyramid* features = nullptr; ///< of "local-ncc", "ncc" or "mad": metrics that compare values
+  const MetricPyramid* features = nullptr; ///< of "local-ncc" or "ncc": metrics that compare values
   Pose volumeToWorld = Pose::Identity();
   const DisplacementField* field = nullptr; ///< its own displacement, when that is known already; none: rigid
 };

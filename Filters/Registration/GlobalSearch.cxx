@@ -14,8 +14,8 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "MaskedCorrelation.h"
-#include "ValidPoints.h"
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -24,8 +24,6 @@ namespace echorama {
 namespace {
 
 using Complex = MaskedCorrelator::Complex;
-
-constexpr int FewestGlobalVoxels = 100;
 
 // All measured (BenchmarkGlobalSearch).
 constexpr double DefaultStepDegrees = 20.0;
@@ -42,24 +40,6 @@ constexpr std::ptrdiff_t RefinedPoints = 3000; // compared while climbing, at mo
 constexpr std::size_t FinishedPeaks = 30;      // that climb to the end
 constexpr int FirstLevels = 2, LastLevels = 2, Sweeps = 3;
 constexpr float NoScore = -1e9f;
-
-void CheckGlobalVolume(const PlacedVolume& volume)
-{
-  if (!volume.pyramid || volume.pyramid->empty())
-    throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");
-  const PyramidLevel& finest = volume.pyramid->front();
-  const auto& n = finest.geometry.dimensions;
-  if (*std::min_element(n.begin(), n.end()) < 2)
-    throw Error(Error::Kind::BadInput, volume.name + ": it is not a volume (one voxel thick); the search needs three dimensions");
-  if (finest.realVoxels < FewestGlobalVoxels)
-    throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) +
-                                           " of its voxels are real; at least " + std::to_string(FewestGlobalVoxels) +
-                                           " are needed");
-  const VolumeView<const float> view = finest.intensity.View();
-  const float* first = std::find_if(view.begin(), view.end(), [](float v) { return v == v; });
-  if (std::all_of(first, view.end(), [first](float v) { return !(v == v) || v == *first; }))
-    throw Error(Error::Kind::BadInput, volume.name + ": it is constant; there is nothing to align on");
-}
 
 // The valid region of a volume, in a frame with the axes of the grid and the origin in the centroid.
 struct Region {
@@ -633,8 +613,8 @@ GlobalSearchResult GlobalSearch(const PlacedVolume& fixed, const PlacedVolume& m
                                 const Progress& progress)
 {
   p.Check();
-  CheckGlobalVolume(fixed);
-  CheckGlobalVolume(moving);
+  CheckPlacedVolume(fixed);
+  CheckPlacedVolume(moving);
   progress(0.0);
 
   // 1. The volumes at low resolution, and the frames they are compared in.

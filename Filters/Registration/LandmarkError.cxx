@@ -2,7 +2,7 @@
 // Labels are looked up in one ordered map per list: n log n for lists of n landmarks, for each pair of lists.
 #include "LandmarkError.h"
 #include "Core/Base/Error.h"
-#include "Percentile.h"
+#include "Core/Base/Percentile.h"
 #include <map>
 
 namespace echorama {

@@ -9,7 +9,7 @@
 
 namespace echorama {
 
-/// The metrics by name, the default first: "local-ncc", "ncc", "mad", "mind-ssc", "lc2".
+/// The metrics by name, the default first: "local-ncc", "ncc", "mind-ssc", "lc2".
 std::vector<std::string> MetricNames();
 
 /// What a metric sees of one volume at each of its resolutions. It owns all it needs: the pyramid that it was built from

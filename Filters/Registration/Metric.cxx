@@ -7,11 +7,11 @@
 namespace echorama {
 namespace {
 
-constexpr std::ptrdiff_t FewestVoxels = 100, FewestOfLevel = 200;
+constexpr std::ptrdiff_t FewestOfLevel = 200;
 
 const std::vector<const Metric*>& Metrics()
 {
-  static const std::vector<const Metric*> metrics{&LocalNccMetric, &NccMetric, &MadMetric, &MindSscMetric, &Lc2Metric};
+  static const std::vector<const Metric*> metrics{&LocalNccMetric, &NccMetric, &MindSscMetric, &Lc2Metric};
   return metrics;
 }
 
@@ -48,21 +48,9 @@ void ExtendByOne(MetricLevel& level)
 
 void Check(const PlacedVolume& volume)
 {
-  if (!volume.pyramid || volume.pyramid->empty())
-    throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");
-  const PyramidLevel& finest = volume.pyramid->front();
-  const auto& n = finest.geometry.dimensions;
-  if (*std::min_element(n.begin(), n.end()) < 2)
-    throw Error(Error::Kind::BadInput, volume.name + ": it is not a volume (one voxel thick); aligning needs three dimensions");
-  if (finest.geometry.VoxelCount() > (std::size_t{1} << 29))
+  CheckPlacedVolume(volume);
+  if (volume.pyramid->front().geometry.VoxelCount() > (std::size_t{1} << 29))
     throw Error(Error::Kind::TooLarge, volume.name + ": volumes of at most 2^29 voxels can be aligned");
-  if (finest.realVoxels < FewestVoxels)
-    throw Error(Error::Kind::BadInput, volume.name + ": only " + std::to_string(finest.realVoxels) +
-                                           " of its voxels are real; at least " + std::to_string(FewestVoxels) + " are needed");
-  const VolumeView<const float> view = finest.intensity.View();
-  const float* first = std::find_if(view.begin(), view.end(), [](float v) { return v == v; });
-  if (std::all_of(first, view.end(), [first](float v) { return !(v == v) || v == *first; }))
-    throw Error(Error::Kind::BadInput, volume.name + ": it is constant; there is nothing to align on");
   if (!volume.reliability)
     return;
   for (std::size_t l = 0; l < std::min(volume.reliability->size(), volume.pyramid->size()); ++l)

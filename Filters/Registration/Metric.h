@@ -54,7 +54,7 @@ struct Metric {
   void (*see)(const MetricSource& source, MetricLevel& level);
 };
 
-extern const Metric LocalNccMetric, NccMetric, MadMetric, MindSscMetric, Lc2Metric;
+extern const Metric LocalNccMetric, NccMetric, MindSscMetric, Lc2Metric;
 
 /// \throws Error(InvalidParameter) for a name that is not one of MetricNames().
 const Metric& MetricNamed(const std::string& name);

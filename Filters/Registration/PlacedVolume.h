@@ -12,9 +12,14 @@ struct PlacedVolume {
   const std::vector<PyramidLevel>* pyramid = nullptr; ///< the finest first (BuildPyramid)
   Pose volumeToWorld = Pose::Identity();
   std::string name; ///< for messages
-  /// How much each voxel of each level counts, in [0, 1] (the pyramid of its ReliabilityMap); none: all alike. The search of
-  /// the dissertation does not look at it.
+  /// How much each voxel of each level counts, in [0, 1] (the pyramid of its ReliabilityMap); none: all alike
   const std::vector<PyramidLevel>* reliability = nullptr;
 };
+
+/// \throws Error(BadInput) that names a volume without voxels, one voxel thick, constant, or with fewer than 100 real voxels.
+void CheckPlacedVolume(const PlacedVolume& volume);
+
+/// \throws Error(InvalidParameter) when \a fixed is not the number of one of \a count volumes, counted from 0.
+void CheckFixedVolume(int fixed, std::size_t count);
 
 } // namespace echorama

@@ -16,12 +16,14 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Base/SymmetricMatrix.h"
+#include "Index.h"
+#include "JoinedSets.h"
+#include "PlacedVolume.h"
 #include "PoseGraphSolver.h"
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
 #include <queue>
 #include <string>
 
@@ -35,33 +37,6 @@ constexpr double TreeEdgesAtMost = 200000; // trees times edges
 constexpr int Rounds = 50;                 // of putting edges aside and taking them back
 constexpr int MostFalls = 3;               // an edge that was put aside so often stays there
 constexpr int Regroupings = 5;             // of parts that a majority of edges wants elsewhere
-
-std::size_t At(int number)
-{
-  return static_cast<std::size_t>(number);
-}
-
-// Sets of volumes that are joined; the smallest member names a set.
-class Sets {
-public:
-  explicit Sets(std::size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0); }
-  int Of(int v)
-  {
-    while (parents_[At(v)] != v)
-      v = parents_[At(v)] = parents_[At(parents_[At(v)])];
-    return v;
-  }
-  bool Join(int a, int b) // whether they were apart
-  {
-    a = Of(a);
-    b = Of(b);
-    parents_[At(std::max(a, b))] = std::min(a, b);
-    return a != b;
-  }
-
-private:
-  std::vector<int> parents_;
-};
 
 double DistanceMm(const Twist& disagreement, double radiusMm)
 {
@@ -82,8 +57,8 @@ public:
       neighbours_(poses.size())
   {
     for (std::size_t e = 0; e < edges_.size(); ++e) {
-      neighbours_[At(edges_[e].from)].push_back({edges_[e].to, e});
-      neighbours_[At(edges_[e].to)].push_back({edges_[e].from, e});
+      neighbours_[Index(edges_[e].from)].push_back({edges_[e].to, e});
+      neighbours_[Index(edges_[e].to)].push_back({edges_[e].from, e});
     }
   }
 
@@ -116,8 +91,12 @@ private:
     double mm, sigmas;
   };
 
+  JoinedSets Joined(const Flags& used) const;
   Judgement Judge(std::size_t e, const MarginalCovariances& covariances) const;
-  Twist ResidualOf(std::size_t e) const { return Disagreement(edges_[e], poses[At(edges_[e].from)], poses[At(edges_[e].to)]); }
+  Twist ResidualOf(std::size_t e) const
+  {
+    return Disagreement(edges_[e], poses[Index(edges_[e].from)], poses[Index(edges_[e].to)]);
+  }
   const Pose& Step(std::size_t e, int from) const { return edges_[e].from == from ? edges_[e].toInFrom : edges_[e].fromInTo; }
   double GateMm(double variance) const { return std::max(p_.outlierMm, p_.outlierSigmas * std::sqrt(variance / 3.0)); }
 
@@ -140,12 +119,18 @@ private:
   std::vector<std::vector<Neighbour>> neighbours_;
 };
 
-std::vector<int> Graph::Roots(const Flags& used) const
+JoinedSets Graph::Joined(const Flags& used) const
 {
-  Sets sets(poses.size());
+  JoinedSets sets(poses.size());
   for (std::size_t e = 0; e < edges_.size(); ++e)
     if (used[e])
       sets.Join(edges_[e].from, edges_[e].to);
+  return sets;
+}
+
+std::vector<int> Graph::Roots(const Flags& used) const
+{
+  JoinedSets sets = Joined(used);
   std::vector<int> roots(poses.size());
   const int ofFixed = sets.Of(fixed_);
   for (std::size_t v = 0; v < roots.size(); ++v) {
@@ -182,16 +167,16 @@ Flags Graph::Bridges(const Flags& used) const
     order[root] = low[root] = count++;
     while (!stack.empty()) {
       Visit& visit = stack.back();
-      const std::size_t v = At(visit.volume);
+      const std::size_t v = Index(visit.volume);
       if (visit.next < neighbours_[v].size()) {
         const Neighbour& n = neighbours_[v][visit.next++];
         if (!used[n.edge] || n.edge == visit.arrived)
           continue;
-        if (order[At(n.volume)] >= 0) {
-          low[v] = std::min(low[v], order[At(n.volume)]);
+        if (order[Index(n.volume)] >= 0) {
+          low[v] = std::min(low[v], order[Index(n.volume)]);
           continue;
         }
-        order[At(n.volume)] = low[At(n.volume)] = count++;
+        order[Index(n.volume)] = low[Index(n.volume)] = count++;
         stack.push_back({n.volume, n.edge, 0});
         continue;
       }
@@ -199,7 +184,7 @@ Flags Graph::Bridges(const Flags& used) const
       stack.pop_back();
       if (stack.empty())
         continue;
-      const std::size_t above = At(stack.back().volume);
+      const std::size_t above = Index(stack.back().volume);
       low[above] = std::min(low[above], low[v]);
       bridges[done.arrived] = low[v] > order[above];
     }
@@ -217,7 +202,7 @@ std::vector<double> Graph::CycleWeights(const Flags& take) const
     const WeighedEdge& edge = edges_[e];
     int closed = 0, tried = 0;
     const auto walk = [&](const auto& self, int at, const Pose& pose, double variance, int steps) -> void {
-      for (const Neighbour& n : neighbours_[At(at)]) {
+      for (const Neighbour& n : neighbours_[Index(at)]) {
         if (tried >= CyclesPerEdge)
           return;
         if (!take[n.edge] || n.edge == e || n.volume == edge.from)
@@ -251,7 +236,7 @@ Graph::Tree Graph::GrowTree(const Flags& take, const Flags& isRoot, const std::v
       if (take[e])
         order.push_back(e);
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lengths[a] < lengths[b]; });
-    Sets sets(volumes);
+    JoinedSets sets(volumes);
     for (const std::size_t e : order)
       allowed[e] = sets.Join(edges_[e].from, edges_[e].to);
   }
@@ -278,13 +263,13 @@ Graph::Tree Graph::GrowTree(const Flags& take, const Flags& isRoot, const std::v
     isDone[v] = true;
     tree.order.push_back(v);
     if (tree.parents[v] >= 0) {
-      const std::size_t parent = At(tree.parents[v]), e = tree.edges[v];
+      const std::size_t parent = Index(tree.parents[v]), e = tree.edges[v];
       tree.poses[v] = tree.poses[parent] * Step(e, tree.parents[v]);
       tree.depths[v] = tree.depths[parent] + 1;
       tree.variances[v] = tree.variances[parent] + edges_[e].variance;
     }
     for (const Neighbour& n : neighbours_[v]) {
-      const std::size_t to = At(n.volume);
+      const std::size_t to = Index(n.volume);
       if (!allowed[n.edge] || isDone[to] || ways[v] + lengths[n.edge] >= ways[to])
         continue;
       ways[to] = ways[v] + lengths[n.edge];
@@ -321,22 +306,22 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       if (!take[e])
         continue;
-      const std::size_t from = At(edges_[e].from), to = At(edges_[e].to);
+      const std::size_t from = Index(edges_[e].from), to = Index(edges_[e].to);
       if (tree.edges[from] == e || tree.edges[to] == e) {
-        votes[At(roots[from])] += 1.0;
+        votes[Index(roots[from])] += 1.0;
         continue;
       }
       std::size_t a = from, b = to; // up to where their ways meet
       while (a != b)
-        (tree.depths[a] >= tree.depths[b] ? a : b) = At(tree.parents[tree.depths[a] >= tree.depths[b] ? a : b]);
+        (tree.depths[a] >= tree.depths[b] ? a : b) = Index(tree.parents[tree.depths[a] >= tree.depths[b] ? a : b]);
       const double variance = edges_[e].variance + tree.variances[from] + tree.variances[to] - 2.0 * tree.variances[a];
       const double distance = DistanceMm(Disagreement(edges_[e], tree.poses[from], tree.poses[to]), p_.radiusMm);
       const double gate = GateMm(variance);
-      votes[At(roots[from])] += 1.0 / (1.0 + distance * distance / (gate * gate));
+      votes[Index(roots[from])] += 1.0 / (1.0 + distance * distance / (gate * gate));
       isUnanimous = isUnanimous && distance <= gate;
     }
     for (std::size_t v = 0; v < volumes; ++v)
-      if (votes[At(roots[v])] > best[At(roots[v])])
+      if (votes[Index(roots[v])] > best[Index(roots[v])])
         bestPoses[v] = tree.poses[v];
     for (std::size_t v = 0; v < volumes; ++v)
       best[v] = std::max(best[v], votes[v]);
@@ -400,7 +385,7 @@ void Graph::Settle(const Flags& take, const Flags& keep)
       std::sort(bad.begin(), bad.end());
       Flags isTouched(poses.size(), false);
       for (const auto& [minusSigmas, e] : bad) {
-        const std::size_t from = At(edges_[e].from), to = At(edges_[e].to);
+        const std::size_t from = Index(edges_[e].from), to = Index(edges_[e].to);
         if (minusSigmas > 0.7 * bad.front().first || isTouched[from] || isTouched[to] || Bridges(stands)[e])
           continue;
         stands[e] = false;
@@ -433,10 +418,7 @@ void Graph::Solve(const Flags& take, const Flags& keep, const Progress& progress
       aside.push_back({ResidualSigmas(e), e});
     }
   std::sort(aside.begin(), aside.end());
-  Sets sets(poses.size());
-  for (std::size_t e = 0; e < edges_.size(); ++e)
-    if (stands[e])
-      sets.Join(edges_[e].from, edges_[e].to);
+  JoinedSets sets = Joined(stands);
   for (const auto& [sigmas, e] : aside)
     stands[e] = sets.Join(edges_[e].from, edges_[e].to); // nothing else joins its volumes
   Settle(take, keep);
@@ -450,7 +432,7 @@ std::vector<Party> Graph::Parties(const Flags& asked) const
   std::vector<Party> parties;
   Flags isDone(edges_.size(), false);
   const auto motionOf = [&](std::size_t e) {
-    return poses[At(edges_[e].from)] * edges_[e].toInFrom * poses[At(edges_[e].to)].inverse(Eigen::Isometry);
+    return poses[Index(edges_[e].from)] * edges_[e].toInFrom * poses[Index(edges_[e].to)].inverse(Eigen::Isometry);
   };
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     if (!asked[e] || stands[e] || isDone[e])
@@ -459,13 +441,13 @@ std::vector<Party> Graph::Parties(const Flags& asked) const
     isDone[e] = true;
     for (std::size_t other = e + 1; other < edges_.size(); ++other) {
       const WeighedEdge& edge = edges_[other];
-      if (!asked[other] || stands[other] || isDone[other] || roots[At(edge.from)] != roots[At(edges_[e].from)])
+      if (!asked[other] || stands[other] || isDone[other] || roots[Index(edge.from)] != roots[Index(edges_[e].from)])
         continue;
       const double gate = 2.0 * GateMm(edges_[e].variance + edge.variance);
       const Pose motion = motionOf(other);
       const auto differs = [&](const Pose& wanted) {
         const Pose gap = wanted.inverse(Eigen::Isometry) * party.motion;
-        const Eigen::Vector3d centre = poses[At(edge.to)] * (edge.fromInTo * edge.centre);
+        const Eigen::Vector3d centre = poses[Index(edge.to)] * (edge.fromInTo * edge.centre);
         Twist twist;
         twist.head<3>() = gap * centre - centre;
         twist.tail<3>() = LogRotation(gap.linear());
@@ -492,13 +474,13 @@ int Graph::Cut(const Party& party, Flags& isMoved) const
   const std::size_t volumes = poses.size();
   const int enough = static_cast<int>(party.edges.size()) + 1;
   const std::vector<int> roots = Roots(stands);
-  const int root = roots[At(party.still.front())];
+  const int root = roots[Index(party.still.front())];
   Flags isSource(volumes, false), isSink(volumes, false);
-  isSource[At(root)] = true;
+  isSource[Index(root)] = true;
   for (const int v : party.still)
-    isSource[At(v)] = true;
+    isSource[Index(v)] = true;
   for (const int v : party.moved)
-    isSink[At(v)] = true;
+    isSink[Index(v)] = true;
   for (std::size_t v = 0; v < volumes; ++v)
     if (isSource[v] && isSink[v])
       return enough;
@@ -515,14 +497,14 @@ int Graph::Cut(const Party& party, Flags& isMoved) const
     while (!queue.empty() && at < 0) {
       const int v = queue.front();
       queue.pop();
-      for (const Neighbour& n : neighbours_[At(v)]) {
+      for (const Neighbour& n : neighbours_[Index(v)]) {
         const bool isOpen = edges_[n.edge].from == v ? flow[n.edge] < 1 : flow[n.edge] > -1;
-        if (!stands[n.edge] || isReached[At(n.volume)] || !isOpen)
+        if (!stands[n.edge] || isReached[Index(n.volume)] || !isOpen)
           continue;
-        isReached[At(n.volume)] = true;
-        arrivals[At(n.volume)] = n.edge;
+        isReached[Index(n.volume)] = true;
+        arrivals[Index(n.volume)] = n.edge;
         queue.push(n.volume);
-        if (isSink[At(n.volume)])
+        if (isSink[Index(n.volume)])
           at = n.volume;
       }
     }
@@ -532,8 +514,8 @@ int Graph::Cut(const Party& party, Flags& isMoved) const
         isMoved[v] = roots[v] == root && !isReached[v];
       return units;
     }
-    while (!isSource[At(at)]) {
-      const std::size_t e = arrivals[At(at)];
+    while (!isSource[Index(at)]) {
+      const std::size_t e = arrivals[Index(at)];
       flow[e] += edges_[e].to == at ? 1 : -1;
       at = edges_[e].to == at ? edges_[e].from : edges_[e].to;
     }
@@ -546,24 +528,20 @@ void Graph::Regroup(const Flags& take, const Progress& progress)
 {
   for (int turn = 0; turn < Regroupings; ++turn) {
     progress(static_cast<double>(turn) / Regroupings);
-    bool isChanged = false;
-    for (const Party& party : Parties(take)) {
-      Flags isMoved;
-      if (Cut(party, isMoved) >= static_cast<int>(party.edges.size()))
-        continue;
-      for (std::size_t v = 0; v < poses.size(); ++v)
-        if (isMoved[v])
-          poses[v] = party.motion * poses[v];
-      for (std::size_t e = 0; e < edges_.size(); ++e)
-        stands[e] = stands[e] && isMoved[At(edges_[e].from)] == isMoved[At(edges_[e].to)];
-      for (const std::size_t e : party.edges)
-        stands[e] = true;
-      Settle(take, Flags(edges_.size(), false));
-      isChanged = true;
-      break; // the others are not what they were
-    }
-    if (!isChanged)
+    Flags isMoved;
+    const std::vector<Party> parties = Parties(take);
+    const auto party = std::find_if(parties.begin(), parties.end(),
+                                    [&](const Party& one) { return Cut(one, isMoved) < static_cast<int>(one.edges.size()); });
+    if (party == parties.end())
       return;
+    for (std::size_t v = 0; v < poses.size(); ++v)
+      if (isMoved[v])
+        poses[v] = party->motion * poses[v];
+    for (std::size_t e = 0; e < edges_.size(); ++e)
+      stands[e] = stands[e] && isMoved[Index(edges_[e].from)] == isMoved[Index(edges_[e].to)];
+    for (const std::size_t e : party->edges)
+      stands[e] = true;
+    Settle(take, Flags(edges_.size(), false)); // the others are not what they were
   }
 }
 
@@ -588,10 +566,9 @@ void CheckGraph(const std::vector<Pose>& start, const std::vector<PoseEdge>& edg
       throw Error(Error::Kind::InvalidParameter, message);
   };
   const int volumes = static_cast<int>(start.size());
-  check(fixed >= 0 && fixed < volumes,
-        "the fixed volume must be one of the " + std::to_string(volumes) + ", numbered from 0; it is " + std::to_string(fixed));
+  CheckFixedVolume(fixed, start.size());
   for (int v = 0; v < volumes; ++v)
-    check(start[At(v)].matrix().allFinite() && IsRotation(start[At(v)].linear()),
+    check(start[Index(v)].matrix().allFinite() && IsRotation(start[Index(v)].linear()),
           "the start pose of volume " + std::to_string(v) + " is not a rotation and a translation");
   for (const PoseEdge& edge : edges) {
     const std::string name = "the edge " + std::to_string(edge.from) + "-" + std::to_string(edge.to);
@@ -633,11 +610,11 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
     weighed.emplace_back(edges[e], p);
     isVerified[e] = edges[e].verified;
   }
-  const Pose toFixed = start[At(fixed)].inverse(Eigen::Isometry);
+  const Pose toFixed = start[Index(fixed)].inverse(Eigen::Isometry);
   std::vector<Pose> local;
   for (const Pose& pose : start)
     local.push_back(toFixed * pose);
-  local[At(fixed)] = Pose::Identity();
+  local[Index(fixed)] = Pose::Identity();
 
   Graph graph(weighed, local, fixed, p);
   graph.Solve(isVerified, none, progress.Part(0.0, 0.5));
@@ -669,12 +646,12 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
     result.isPlaced[v] = roots[v] == fixed;
     result.isDoubtful[v] = result.isPlaced[v] && (result.isDoubtful[v] || sureRoots[v] != fixed);
     if (result.isPlaced[v] && static_cast<int>(v) != fixed)
-      result.volumeToWorld[v] = start[At(fixed)] * graph.poses[v];
+      result.volumeToWorld[v] = start[Index(fixed)] * graph.poses[v];
   }
   double chiSquare = 0.0;
   int freedom = 0;
   for (std::size_t e = 0; e < count; ++e) {
-    if (roots[At(edges[e].from)] != fixed || roots[At(edges[e].to)] != fixed)
+    if (roots[Index(edges[e].from)] != fixed || roots[Index(edges[e].to)] != fixed)
       continue;
     result.residualMm[e] = graph.ResidualMm(e);
     result.residualSigmas[e] = graph.ResidualSigmas(e);
@@ -691,10 +668,10 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
   Twist scale;
   scale << 1.0, 1.0, 1.0, p.radiusMm, p.radiusMm, p.radiusMm;
   Information turn = Information::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = start[At(fixed)].linear();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = start[Index(fixed)].linear();
   for (std::size_t v = 0; v < volumes; ++v) {
     const int number = static_cast<int>(v);
-    result.centre.push_back(start[At(fixed)] * covariances.Centre(number));
+    result.centre.push_back(start[Index(fixed)] * covariances.Centre(number));
     if (number == fixed || !result.isPlaced[v]) {
       result.isDetermined[v] = number == fixed;
       continue;

@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundAligner.h"
 
-#include "AlignInTurn.h"
 #include "Core/Base/Json.h"
 #include "Core/Imaging/ShadowMap.h"
-#include "vtkDataObjectTree.h"
-#include "vtkDoubleArray.h"
-#include "vtkFieldData.h"
 #include "vtkImageData.h"
-#include "vtkInformation.h"
-#include "vtkInformationVector.h"
 #include "vtkMatrix4x4.h"
-#include "vtkMultiBlockDataSet.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
-#include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
-#include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
 #include <chrono>
@@ -27,23 +18,6 @@ vtkStandardNewMacro(vtkUltrasoundAligner);
 
 namespace {
 using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-
-void AddField(vtkDataObject* data, const char* name, const double* values, int components)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(components);
-  array->InsertNextTuple(values);
-  data->GetFieldData()->AddArray(array);
-}
-
-void AddField(vtkDataObject* data, const char* name, const std::string& text)
-{
-  vtkNew<vtkStringArray> array;
-  array->SetName(name);
-  array->InsertNextValue(text);
-  data->GetFieldData()->AddArray(array);
-}
 
 // A volume at falling resolution, and how much its voxels count.
 struct Prepared {
@@ -90,14 +64,7 @@ vtkUltrasoundAligner::vtkUltrasoundAligner()
   this->MinimumPeakRatio = pair.minimumPeakRatio;
   this->MaximumErrorVoxels = pair.maximumErrorVoxels;
   this->MaximumSplitVoxels = pair.maximumSplitVoxels;
-  const echorama::AlignSearchParameters search;
-  this->Samples = search.samples;
-  this->Levels = search.levels;
-  this->FirstStepMm = search.firstStepMm;
-  this->FirstStepDegrees = search.firstStepDegrees;
-  this->Repeats = search.repeats;
-  this->Seed = static_cast<int>(search.seed);
-  this->Pyramid = search.pyramid;
+  this->Seed = static_cast<int>(pair.seed);
 }
 
 //----------------------------------------------------------------------------
@@ -144,12 +111,6 @@ int vtkUltrasoundAligner::GetNumberOfHeldVolumes() const
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundAligner::SetMethod(const char* name)
-{
-  this->Choose(this->Method, name, "alignment method", {"global", "search"});
-}
-
-//----------------------------------------------------------------------------
 void vtkUltrasoundAligner::SetStart(const char* name)
 {
   this->Choose(this->Start, name, "start", echorama::AlignStartNames());
@@ -159,12 +120,6 @@ void vtkUltrasoundAligner::SetStart(const char* name)
 void vtkUltrasoundAligner::SetMetric(const char* name)
 {
   this->Choose(this->Metric, name, "metric", echorama::MetricNames());
-}
-
-//----------------------------------------------------------------------------
-const char* vtkUltrasoundAligner::GetMethod() const
-{
-  return this->Method.c_str();
 }
 
 //----------------------------------------------------------------------------
@@ -185,35 +140,25 @@ bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
   using Self = vtkUltrasoundAligner;
   struct Parameter {
     const char* Name;
-    const char* Methods; // g: global, s: search
     double From, To;
     void (Self::*SetReal)(double);
     void (Self::*SetWhole)(int);
     void (Self::*SetSwitch)(bool);
   };
   static const Parameter parameters[] = {
-      {"MinimumOverlap", "gs", 0.01, 1.0, &Self::SetMinimumOverlap, nullptr, nullptr},
-      {"Candidates", "g", 1, 1000, nullptr, &Self::SetCandidates, nullptr},
-      {"FinestMm", "g", 0.0, 1000.0, &Self::SetFinestMm, nullptr, nullptr},
-      {"UseReliability", "g", 0, 1, nullptr, nullptr, &Self::SetUseReliability},
-      {"MinimumSimilarity", "g", 0.0, 1.0, &Self::SetMinimumSimilarity, nullptr, nullptr},
-      {"MinimumPeakRatio", "g", 1.0, 99.0, &Self::SetMinimumPeakRatio, nullptr, nullptr},
-      {"MaximumErrorVoxels", "g", 1e-3, 1000.0, &Self::SetMaximumErrorVoxels, nullptr, nullptr},
-      {"MaximumSplitVoxels", "g", 1e-3, 1000.0, &Self::SetMaximumSplitVoxels, nullptr, nullptr},
-      {"Samples", "s", 3, 7, nullptr, &Self::SetSamples, nullptr},
-      {"Levels", "s", 1, 20, nullptr, &Self::SetLevels, nullptr},
-      {"FirstStepMm", "s", 1e-6, 1000.0, &Self::SetFirstStepMm, nullptr, nullptr},
-      {"FirstStepDegrees", "s", 1e-6, 60.0, &Self::SetFirstStepDegrees, nullptr, nullptr},
-      {"Repeats", "s", 0, 100, nullptr, &Self::SetRepeats, nullptr},
-      {"Points", "gs", 1000, 1e7, nullptr, &Self::SetPoints, nullptr},
-      {"Seed", "gs", 0, VTK_INT_MAX, nullptr, &Self::SetSeed, nullptr},
-      {"Pyramid", "s", 0, 1, nullptr, nullptr, &Self::SetPyramid},
+      {"MinimumOverlap", 0.01, 1.0, &Self::SetMinimumOverlap, nullptr, nullptr},
+      {"Candidates", 1, 1000, nullptr, &Self::SetCandidates, nullptr},
+      {"FinestMm", 0.0, 1000.0, &Self::SetFinestMm, nullptr, nullptr},
+      {"UseReliability", 0, 1, nullptr, nullptr, &Self::SetUseReliability},
+      {"MinimumSimilarity", 0.0, 1.0, &Self::SetMinimumSimilarity, nullptr, nullptr},
+      {"MinimumPeakRatio", 1.0, 99.0, &Self::SetMinimumPeakRatio, nullptr, nullptr},
+      {"MaximumErrorVoxels", 1e-3, 1000.0, &Self::SetMaximumErrorVoxels, nullptr, nullptr},
+      {"MaximumSplitVoxels", 1e-3, 1000.0, &Self::SetMaximumSplitVoxels, nullptr, nullptr},
+      {"Points", 1000, 1e7, nullptr, &Self::SetPoints, nullptr},
+      {"Seed", 0, VTK_INT_MAX, nullptr, &Self::SetSeed, nullptr},
   };
   std::string names;
   for (const Parameter& p : parameters) {
-    if (!std::strchr(p.Methods, this->IsGlobal() ? 'g' : 's')) {
-      continue;
-    }
     names += (names.empty() ? "" : ", ") + std::string(p.Name);
     if (!name || std::strcmp(name, p.Name) != 0) {
       continue;
@@ -232,28 +177,12 @@ bool vtkUltrasoundAligner::SetParameter(const char* name, double value)
     }
     return true;
   }
-  vtkErrorMacro("the method " << this->Method << " has no parameter named \"" << (name ? name : "") << "\"; it has: " << names);
+  vtkErrorMacro("there is no parameter named \"" << (name ? name : "") << "\"; there are: " << names);
   return false;
 }
 
 //----------------------------------------------------------------------------
-echorama::AlignSearchParameters vtkUltrasoundAligner::SearchParameters() const
-{
-  echorama::AlignSearchParameters p;
-  p.minimumOverlap = this->MinimumOverlap > 0.0 ? this->MinimumOverlap : p.minimumOverlap;
-  p.samples = this->Samples;
-  p.levels = this->Levels;
-  p.firstStepMm = this->FirstStepMm;
-  p.firstStepDegrees = this->FirstStepDegrees;
-  p.repeats = this->Repeats;
-  p.points = this->Points > 0 ? this->Points : p.points;
-  p.seed = static_cast<std::uint64_t>(this->Seed);
-  p.pyramid = this->Pyramid;
-  return p;
-}
-
-//----------------------------------------------------------------------------
-echorama::AlignVolumesParameters vtkUltrasoundAligner::GlobalParameters() const
+echorama::AlignVolumesParameters vtkUltrasoundAligner::Parameters() const
 {
   echorama::AlignVolumesParameters p;
   p.held = this->HeldVolumes;
@@ -272,39 +201,11 @@ echorama::AlignVolumesParameters vtkUltrasoundAligner::GlobalParameters() const
 }
 
 //----------------------------------------------------------------------------
-std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignBySearch(const std::vector<echorama::PlacedVolume>& volumes,
-                                                                              const echorama::Progress& progress)
+std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignAll(const std::vector<echorama::PlacedVolume>& volumes,
+                                                                         double prepareSeconds,
+                                                                         const echorama::Progress& progress)
 {
-  std::vector<Result> results;
-  auto report = nlohmann::ordered_json::array();
-  for (const auto& found : echorama::AlignInTurn(volumes, this->FixedVolume, this->SearchParameters(), progress)) {
-    Result result;
-    result.VolumeToWorld = found.volumeToWorld;
-    result.Error = found.error;
-    result.Overlap = found.overlap;
-    if (static_cast<int>(results.size()) == this->FixedVolume) {
-      result.Verdict = echorama::NameOf(echorama::Verdict::Aligned);
-    } else {
-      result.Verdict = "unjudged";
-      result.Reason = "the method search does not tell whether its answer is right";
-    }
-    report.push_back({{"name", volumes[results.size()].name},
-                      {"verdict", result.Verdict},
-                      {"reason", result.Reason},
-                      {"error_grey", found.error},
-                      {"overlap", found.overlap}});
-    results.push_back(result);
-  }
-  this->Report = nlohmann::ordered_json{{"method", this->Method}, {"volumes", report}}.dump();
-  return results;
-}
-
-//----------------------------------------------------------------------------
-std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignGlobally(const std::vector<echorama::PlacedVolume>& volumes,
-                                                                              double prepareSeconds,
-                                                                              const echorama::Progress& progress)
-{
-  const auto found = echorama::AlignVolumes(volumes, this->FixedVolume, this->GlobalParameters(), progress);
+  const auto found = echorama::AlignVolumes(volumes, this->FixedVolume, this->Parameters(), progress);
   std::vector<Result> results;
   auto ofVolumes = nlohmann::ordered_json::array(), ofPairs = nlohmann::ordered_json::array();
   for (const auto& volume : found.volumes) {
@@ -351,7 +252,6 @@ std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignGlobally(co
   }
   this->Report =
       nlohmann::ordered_json{
-          {"method", this->Method},
           {"volumes", ofVolumes},
           {"pairs", ofPairs},
           {"seconds",
@@ -361,92 +261,52 @@ std::vector<vtkUltrasoundAligner::Result> vtkUltrasoundAligner::AlignGlobally(co
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundAligner::FillInputPortInformation(int, vtkInformation* info)
-{
-  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-  info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
-  info->Set(INPUT_IS_REPEATABLE(), 1);
-  return 1;
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundAligner::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
-{
-  // Without this, ranks other than the first would be handed empty data.
-  outputs->GetInformationObject(0)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
-  return 1;
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundAligner::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
-{
-  vtkUltrasoundVolume::RequestWhole(inputs[0]);
-  return 1;
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundAligner::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformationVector* outputs,
+                                   const echorama::Progress& progress)
 {
   this->Results.clear();
   this->Report.clear();
-  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
-    const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-    if (this->IsGlobal()) {
-      this->GlobalParameters().pair.Check();
-    } else {
-      this->SearchParameters().Check();
-    }
+  const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+  this->Parameters().pair.Check();
 
-    // 1. the resolutions of each volume
-    const auto begin = std::chrono::steady_clock::now();
-    std::vector<Prepared> prepared;
-    std::vector<echorama::PlacedVolume> placed(volumes.size());
-    for (std::size_t i = 0; i < volumes.size(); ++i) {
-      const double count = static_cast<double>(volumes.size());
-      prepared.push_back(Prepare(volumes[i], this->IsGlobal() && this->UseReliability,
-                                 progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count)));
-    }
-    for (std::size_t i = 0; i < volumes.size(); ++i) {
-      placed[i].pyramid = &prepared[i].Pyramid;
-      placed[i].reliability = prepared[i].Reliability.empty() ? nullptr : &prepared[i].Reliability;
-      placed[i].name = volumes[i].Name;
-    }
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+  // 1. the resolutions of each volume
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<Prepared> prepared;
+  std::vector<echorama::PlacedVolume> placed(volumes.size());
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const double count = static_cast<double>(volumes.size());
+    prepared.push_back(Prepare(volumes[i], this->UseReliability,
+                               progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count)));
+  }
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    placed[i].pyramid = &prepared[i].Pyramid;
+    placed[i].reliability = prepared[i].Reliability.empty() ? nullptr : &prepared[i].Reliability;
+    placed[i].name = volumes[i].Name;
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
 
-    // 2. where they belong
-    const auto results = this->IsGlobal() ? this->AlignGlobally(placed, seconds.count(), progress.Part(0.1, 1.0))
-                                          : this->AlignBySearch(placed, progress.Part(0.1, 1.0));
+  // 2. where they belong
+  const auto results = this->AlignAll(placed, seconds.count(), progress.Part(0.1, 1.0));
 
-    // 3. the same voxels there
-    auto* output = vtkMultiBlockDataSet::GetData(outputs);
-    output->SetNumberOfBlocks(static_cast<unsigned int>(volumes.size()));
-    for (std::size_t i = 0; i < volumes.size(); ++i) {
-      const Result& result = results[i];
-      vtkNew<vtkImageData> moved;
-      moved->ShallowCopy(volumes[i].Image);
-      const bool isFixed = static_cast<int>(i) == this->FixedVolume;
-      if (!isFixed) {
-        vtkUltrasoundVolume::Move(moved, result.VolumeToWorld);
-        AddField(moved, AlignmentOverlapName(), &result.Overlap, 1);
-      }
-      const RowMajor rows = result.VolumeToWorld.matrix();
-      AddField(moved, VolumeToWorldName(), rows.data(), 16);
-      AddField(moved, AlignmentVerdictName(), result.Verdict);
-      AddField(moved, AlignmentReasonName(), result.Reason);
-      if (this->IsGlobal()) {
-        AddField(moved, AlignmentSimilarityName(), &result.Similarity, 1);
-        AddField(moved, AlignmentCovarianceName(), result.Covariance.data(), 36); // symmetric: rows are columns
-        AddField(moved, AlignmentCentreName(), result.Centre.data(), 3);
-      } else if (!isFixed) {
-        AddField(moved, AlignmentErrorName(), &result.Error, 1);
-      }
-      const auto block = static_cast<unsigned int>(i);
-      output->SetBlock(block, moved);
-      output->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volumes[i].Name.c_str());
+  // 3. the same voxels there
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const Result& result = results[i];
+    vtkNew<vtkImageData> moved;
+    moved->ShallowCopy(volumes[i].Image);
+    if (static_cast<int>(i) != this->FixedVolume) {
+      vtkUltrasoundVolume::Move(moved, result.VolumeToWorld);
+      vtkUltrasoundVolume::AddField(moved, AlignmentOverlapName(), &result.Overlap, 1);
     }
-    this->Results = results;
-  });
+    const RowMajor rows = result.VolumeToWorld.matrix();
+    vtkUltrasoundVolume::AddField(moved, VolumeToWorldName(), rows.data(), 16);
+    vtkUltrasoundVolume::AddField(moved, AlignmentVerdictName(), result.Verdict);
+    vtkUltrasoundVolume::AddField(moved, AlignmentReasonName(), result.Reason);
+    vtkUltrasoundVolume::AddField(moved, AlignmentSimilarityName(), &result.Similarity, 1);
+    vtkUltrasoundVolume::AddField(moved, AlignmentCovarianceName(), result.Covariance.data(), 36); // symmetric: rows are columns
+    vtkUltrasoundVolume::AddField(moved, AlignmentCentreName(), result.Centre.data(), 3);
+    PutBlock(outputs, 0, i, moved, volumes[i].Name);
+  }
+  this->Results = results;
 }
 
 //----------------------------------------------------------------------------
@@ -470,13 +330,6 @@ bool vtkUltrasoundAligner::GetPose(int volume, vtkMatrix4x4* pose) const
     pose->DeepCopy(rows.data());
   }
   return result != nullptr;
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundAligner::GetError(int volume) const
-{
-  const auto* result = this->ResultOf(volume);
-  return result ? result->Error : 0.0;
 }
 
 //----------------------------------------------------------------------------
@@ -531,7 +384,6 @@ void vtkUltrasoundAligner::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FixedVolume: " << this->FixedVolume << "\n";
   os << indent << "HeldVolumes: " << this->HeldVolumes.size() << "\n";
-  os << indent << "Method: " << this->GetMethod() << "\n";
   os << indent << "Start: " << this->Start << "\n";
   os << indent << "Metric: " << this->Metric << "\n";
   os << indent << "UseReliability: " << (this->UseReliability ? "on" : "off") << "\n";
@@ -542,13 +394,7 @@ void vtkUltrasoundAligner::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MaximumErrorVoxels: " << this->MaximumErrorVoxels << "\n";
   os << indent << "MaximumSplitVoxels: " << this->MaximumSplitVoxels << "\n";
   os << indent << "MinimumOverlap: " << this->MinimumOverlap << "\n";
-  os << indent << "Samples: " << this->Samples << "\n";
-  os << indent << "Levels: " << this->Levels << "\n";
-  os << indent << "FirstStepMm: " << this->FirstStepMm << "\n";
-  os << indent << "FirstStepDegrees: " << this->FirstStepDegrees << "\n";
-  os << indent << "Repeats: " << this->Repeats << "\n";
   os << indent << "Points: " << this->Points << "\n";
   os << indent << "Seed: " << this->Seed << "\n";
-  os << indent << "Pyramid: " << (this->Pyramid ? "on" : "off") << "\n";
   os << indent << "Volumes: " << this->Results.size() << "\n";
 }

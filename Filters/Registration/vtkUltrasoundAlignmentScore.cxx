@@ -2,7 +2,7 @@
 #include "vtkUltrasoundAlignmentScore.h"
 
 #include "AlignmentScore.h"
-#include "ValidPoints.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "vtkCellArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -49,10 +49,7 @@ vtkUltrasoundAlignmentScore::~vtkUltrasoundAlignmentScore() = default;
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentScore::FillInputPortInformation(int, vtkInformation* info)
 {
-  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-  info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
-  info->Set(INPUT_IS_REPEATABLE(), 1);
+  vtkUltrasoundVolume::AcceptVolumes(info);
   return 1;
 }
 

@@ -2,19 +2,11 @@
 #include "vtkUltrasoundDeformableAligner.h"
 
 #include "Core/Base/Error.h"
-#include "vtkDataObjectTree.h"
-#include "vtkDoubleArray.h"
-#include "vtkFieldData.h"
 #include "vtkImageData.h"
-#include "vtkInformation.h"
-#include "vtkInformationVector.h"
-#include "vtkMultiBlockDataSet.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkStringArray.h"
 #include "vtkUltrasoundDisplacement.h"
-#include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
 
@@ -23,15 +15,6 @@ using echorama::Error;
 vtkStandardNewMacro(vtkUltrasoundDeformableAligner);
 
 namespace {
-void AddField(vtkDataObject* data, const char* name, std::initializer_list<double> values)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(static_cast<int>(values.size()));
-  array->InsertNextTuple(values.begin());
-  data->GetFieldData()->AddArray(array);
-}
-
 // What the metric sees of a volume, by its Reliability where it has one.
 std::shared_ptr<const echorama::MetricPyramid> FeaturesOf(const vtkUltrasoundVolume::Input& volume,
                                                           const echorama::Progress& progress)
@@ -76,85 +59,52 @@ vtkUltrasoundDeformableAligner::vtkUltrasoundDeformableAligner()
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundDeformableAligner::FillInputPortInformation(int, vtkInformation* info)
+void vtkUltrasoundDeformableAligner::Execute(vtkInformationVector** inputs, vtkInformationVector* outputs,
+                                             const echorama::Progress& progress)
 {
-  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-  info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
-  info->Set(INPUT_IS_REPEATABLE(), 1);
-  return 1;
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundDeformableAligner::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
-{
-  // Without this, ranks other than the first would be handed empty data.
-  for (int port = 0; port < 2; ++port) {
-    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  // 1. what came in
+  const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+  echorama::DeformableAlignParameters parameters;
+  parameters.controlSpacingMm = this->ControlSpacingMm;
+  parameters.bendingWeight = this->BendingWeight;
+  parameters.levels = this->Levels;
+  parameters.iterations = this->Iterations;
+  parameters.finestMm = this->FinestMm;
+  parameters.minimumOverlap = this->MinimumOverlap;
+  parameters.Check();
+  std::vector<std::shared_ptr<const echorama::MetricPyramid>> features;
+  std::vector<echorama::DeformableVolume> seen;
+  const double count = static_cast<double>(volumes.size());
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const double done = static_cast<double>(i);
+    features.push_back(FeaturesOf(volumes[i], progress.Part(0.2 * done / count, 0.2 * (done + 1.0) / count)));
+    seen.push_back({features.back().get(), echorama::Pose::Identity(), nullptr});
   }
-  return 1;
-}
 
-//----------------------------------------------------------------------------
-int vtkUltrasoundDeformableAligner::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
-{
-  vtkUltrasoundVolume::RequestWhole(inputs[0]);
-  return 1;
-}
+  // 2. the kernel
+  const auto results = echorama::DeformInTurn(seen, this->FixedVolume, parameters, progress.Part(0.2, 1.0));
 
-//----------------------------------------------------------------------------
-int vtkUltrasoundDeformableAligner::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
-{
-  return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
-    // 1. what came in
-    const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-    echorama::DeformableAlignParameters parameters;
-    parameters.controlSpacingMm = this->ControlSpacingMm;
-    parameters.bendingWeight = this->BendingWeight;
-    parameters.levels = this->Levels;
-    parameters.iterations = this->Iterations;
-    parameters.finestMm = this->FinestMm;
-    parameters.minimumOverlap = this->MinimumOverlap;
-    parameters.Check();
-    std::vector<std::shared_ptr<const echorama::MetricPyramid>> features;
-    std::vector<echorama::DeformableVolume> seen;
-    const double count = static_cast<double>(volumes.size());
-    for (std::size_t i = 0; i < volumes.size(); ++i) {
-      const double done = static_cast<double>(i);
-      features.push_back(FeaturesOf(volumes[i], progress.Part(0.2 * done / count, 0.2 * (done + 1.0) / count)));
-      seen.push_back({features.back().get(), echorama::Pose::Identity(), nullptr});
-    }
-
-    // 2. the kernel
-    const auto results = echorama::DeformInTurn(seen, this->FixedVolume, parameters, progress.Part(0.2, 1.0));
-
-    // 3. the same volumes, and their displacements
-    auto* output = vtkMultiBlockDataSet::GetData(outputs, 0);
-    auto* displacements = vtkMultiBlockDataSet::GetData(outputs, 1);
-    for (std::size_t i = 0; i < volumes.size(); ++i) {
-      const echorama::DeformableAlignResult& result = results[i];
-      vtkNew<vtkImageData> volume;
-      volume->ShallowCopy(volumes[i].Image);
-      AddField(volume, DeformationAppliedName(), {result.isApplied ? 1.0 : 0.0});
-      AddField(volume, DeformationSimilarityName(), {result.similarityBefore, result.similarityAfter});
-      AddField(volume, DeformationBendingName(), {result.bendingEnergy});
-      AddField(volume, DeformationLargestName(), {result.largestMm});
-      AddField(volume, DeformationJacobianName(), {result.smallestDeterminant});
-      vtkNew<vtkStringArray> reason;
-      reason->SetName(DeformationReasonName());
-      reason->InsertNextValue(static_cast<int>(i) == this->FixedVolume ? "it is the fixed volume" : result.reason);
-      volume->GetFieldData()->AddArray(reason);
-      vtkNew<vtkImageData> displacement;
-      vtkUltrasoundDisplacement::ImageOf(
-          result.isApplied ? result.field : ZeroField(vtkUltrasoundVolume::GeometryOf(volumes[i].Image)), displacement);
-      const auto block = static_cast<unsigned int>(i);
-      output->SetBlock(block, volume);
-      displacements->SetBlock(block, displacement);
-      for (vtkMultiBlockDataSet* blocks : {output, displacements}) {
-        blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volumes[i].Name.c_str());
-      }
-    }
-  });
+  // 3. the same volumes, and their displacements
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const echorama::DeformableAlignResult& result = results[i];
+    vtkNew<vtkImageData> volume;
+    volume->ShallowCopy(volumes[i].Image);
+    const auto add = [&volume](const char* name, std::initializer_list<double> values) {
+      vtkUltrasoundVolume::AddField(volume, name, values.begin(), static_cast<int>(values.size()));
+    };
+    add(DeformationAppliedName(), {result.isApplied ? 1.0 : 0.0});
+    add(DeformationSimilarityName(), {result.similarityBefore, result.similarityAfter});
+    add(DeformationBendingName(), {result.bendingEnergy});
+    add(DeformationLargestName(), {result.largestMm});
+    add(DeformationJacobianName(), {result.smallestDeterminant});
+    vtkUltrasoundVolume::AddField(volume, DeformationReasonName(),
+                                  static_cast<int>(i) == this->FixedVolume ? "it is the fixed volume" : result.reason);
+    vtkNew<vtkImageData> displacement;
+    vtkUltrasoundDisplacement::ImageOf(
+        result.isApplied ? result.field : ZeroField(vtkUltrasoundVolume::GeometryOf(volumes[i].Image)), displacement);
+    PutBlock(outputs, 0, i, volume, volumes[i].Name);
+    PutBlock(outputs, 1, i, displacement, volumes[i].Name);
+  }
 }
 
 //----------------------------------------------------------------------------

@@ -35,17 +35,17 @@
 #define vtkUltrasoundDeformableAligner_h
 
 #include "EchoramaFiltersRegistrationModule.h"
-#include "vtkMultiBlockDataSetAlgorithm.h"
+#include "vtkUltrasoundMultiBlockAlgorithm.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/DeformableAlign.h" // for the defaults
 #include <vector>
 #endif
 
-class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundDeformableAligner : public vtkMultiBlockDataSetAlgorithm {
+class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundDeformableAligner : public vtkUltrasoundMultiBlockAlgorithm {
 public:
   static vtkUltrasoundDeformableAligner* New();
-  vtkTypeMacro(vtkUltrasoundDeformableAligner, vtkMultiBlockDataSetAlgorithm);
+  vtkTypeMacro(vtkUltrasoundDeformableAligner, vtkUltrasoundMultiBlockAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   ///@{
@@ -107,10 +107,9 @@ protected:
   vtkUltrasoundDeformableAligner();
   ~vtkUltrasoundDeformableAligner() override = default;
 
-  int FillInputPortInformation(int port, vtkInformation* info) override;
-  int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
-  int RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
-  int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+#ifndef __VTK_WRAP__
+  void Execute(vtkInformationVector** inputs, vtkInformationVector* outputs, const echorama::Progress& progress) override;
+#endif
 
 private:
   vtkUltrasoundDeformableAligner(const vtkUltrasoundDeformableAligner&) = delete;

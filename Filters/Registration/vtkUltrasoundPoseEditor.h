@@ -26,7 +26,7 @@
 #define vtkUltrasoundPoseEditor_h
 
 #include "EchoramaFiltersRegistrationModule.h"
-#include "vtkMultiBlockDataSetAlgorithm.h"
+#include "vtkUltrasoundMultiBlockAlgorithm.h"
 
 #ifndef __VTK_WRAP__
 #include "Core/Geometry/RigidTransform.h"
@@ -37,10 +37,10 @@
 
 class vtkMatrix4x4;
 
-class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundPoseEditor : public vtkMultiBlockDataSetAlgorithm {
+class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundPoseEditor : public vtkUltrasoundMultiBlockAlgorithm {
 public:
   static vtkUltrasoundPoseEditor* New();
-  vtkTypeMacro(vtkUltrasoundPoseEditor, vtkMultiBlockDataSetAlgorithm);
+  vtkTypeMacro(vtkUltrasoundPoseEditor, vtkUltrasoundMultiBlockAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   ///@{
@@ -111,9 +111,9 @@ protected:
   ~vtkUltrasoundPoseEditor() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
-  int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
-  int RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
-  int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+#ifndef __VTK_WRAP__
+  void Execute(vtkInformationVector** inputs, vtkInformationVector* outputs, const echorama::Progress& progress) override;
+#endif
 
 private:
   vtkUltrasoundPoseEditor(const vtkUltrasoundPoseEditor&) = delete;

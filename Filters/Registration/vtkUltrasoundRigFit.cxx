@@ -4,7 +4,6 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "vtkDoubleArray.h"
-#include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -26,20 +25,6 @@ vtkStandardNewMacro(vtkUltrasoundRigFit);
 namespace {
 using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
-void AddField(vtkPolyData* output, const char* name, const double* values, int count)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(count);
-  array->InsertNextTuple(values);
-  output->GetFieldData()->AddArray(array);
-}
-
-void AddMatrix(vtkPolyData* output, const char* name, const echorama::Pose& pose)
-{
-  const RowMajor rows = pose.matrix();
-  AddField(output, name, rows.data(), 16);
-}
 } // namespace
 
 vtkUltrasoundRigFit::vtkUltrasoundRigFit()
@@ -175,9 +160,9 @@ int vtkUltrasoundRigFit::RequestData(vtkInformation*, vtkInformationVector** inp
     output->GetPointData()->AddArray(names);
     output->GetPointData()->AddArray(found);
     output->GetPointData()->AddArray(residuals);
-    AddMatrix(output, "RigToWorld", this->RigToWorld);
-    AddMatrix(output, "RigToProbe", this->Last.rigToProbe);
-    AddField(output, "DepthScale", &this->Last.depthScale, 1);
+    vtkUltrasoundVolume::AddField(output, "RigToWorld", RowMajor(this->RigToWorld.matrix()).data(), 16);
+    vtkUltrasoundVolume::AddField(output, "RigToProbe", RowMajor(this->Last.rigToProbe.matrix()).data(), 16);
+    vtkUltrasoundVolume::AddField(output, "DepthScale", &this->Last.depthScale, 1);
   });
 }
 

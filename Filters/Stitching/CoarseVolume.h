@@ -5,7 +5,7 @@
 namespace echorama {
 
 /// One volume on a coarse copy of the output grid (a voxel of it is some voxels of the output wide): what is decided for all
-/// volumes together and needs no single voxels - gains, seams, offsets - is decided there. All boxes are the same.
+/// volumes together and needs no single voxels - gains, seams - is decided there. All boxes are the same.
 struct CoarseVolume {
   Boxed<unsigned char> inside; ///< bit 0: the volume is there
   Boxed<float> value;          ///< its voxel there (one sample, not a mean); only where inside

@@ -12,7 +12,6 @@
 #include "Membrane.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Multiversion.h"
-#include "MembraneDescent.h"
 #include "MembraneLanes.h"
 #include "MembraneLevels.h"
 #include <algorithm>
@@ -509,68 +508,6 @@ void Multigrid::Write(const Frame& frame, const Components& components, RowField
   });
 }
 
-// The descent works on the box of what is unknown, as it always did.
-void Descend(const Frame& frame, const RowField<unsigned char>& kinds, const Components& components,
-             const Eigen::Vector3d& spacing, const MembraneParameters& parameters, const Progress& progress,
-             RowField<float>& values, MembraneReport& report)
-{
-  std::array<int, 3> low{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(), std::numeric_limits<int>::max()};
-  std::array<int, 3> high{std::numeric_limits<int>::min(), std::numeric_limits<int>::min(), std::numeric_limits<int>::min()};
-  double least = std::numeric_limits<double>::infinity(), most = -least;
-  const auto forRuns = [&](const auto& body) {
-    for (std::size_t line = 0; line + 1 < components.rowStart.size(); ++line)
-      for (auto n = static_cast<std::size_t>(components.rowStart[line]);
-           n < static_cast<std::size_t>(components.rowStart[line + 1]); ++n)
-        if (IsSolved(components.Root(n)))
-          body(components.y0 + static_cast<int>(line % static_cast<std::size_t>(components.ny)),
-               components.z0 + static_cast<int>(line / static_cast<std::size_t>(components.ny)), components.runs[n],
-               components.Root(n));
-  };
-  forRuns([&](int y, int z, const Run& run, const Run& root) {
-    low = {std::min(low[0], run.begin - 1), std::min(low[1], y - 1), std::min(low[2], z - 1)};
-    high = {std::max(high[0], run.end + 1), std::max(high[1], y + 2), std::max(high[2], z + 2)};
-    least = std::min(least, static_cast<double>(root.least));
-    most = std::max(most, static_cast<double>(root.most));
-  });
-  const std::array<int, 2> lowest{components.y0, components.z0}, rows{components.ny, components.nz};
-  for (std::size_t axis = 0; axis < 2; ++axis) { // not beyond the grid: flat ones stay flat
-    low[axis + 1] = std::max(low[axis + 1], lowest[axis]);
-    high[axis + 1] = std::min(high[axis + 1], lowest[axis] + rows[axis]);
-  }
-  DescentGrid grid({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-  for (int z = low[2]; z < high[2]; ++z)
-    for (int y = low[1]; y < high[1]; ++y) {
-      const int first = std::max(low[0], frame.First(y, z)), end = std::min(high[0], frame.End(y, z));
-      for (int i = first; i < end; ++i)
-        if (frame.Row(kinds, y, z)[i - frame.First(y, z)] == static_cast<unsigned char>(MembraneVoxel::Known)) {
-          const std::size_t at = grid.At(i - low[0], y - low[1], z - low[2]);
-          grid.kinds[at] = static_cast<unsigned char>(MembraneVoxel::Known);
-          const double scaled = (static_cast<double>(frame.Row(values, y, z)[i - frame.First(y, z)]) - least) / (most - least);
-          grid.values[at] = scaled > 0.0 ? static_cast<float>(std::min(scaled, 1.0)) : 0.0f; // NaN where no unknown looks
-        }
-    }
-  forRuns([&](int y, int z, const Run& run, const Run&) {
-    const std::size_t at = grid.At(run.begin - low[0], y - low[1], z - low[2]);
-    std::fill_n(grid.kinds.begin() + static_cast<std::ptrdiff_t>(at), run.end - run.begin,
-                static_cast<unsigned char>(MembraneVoxel::Unknown));
-  });
-  const Eigen::Array3d weights = (spacing.minCoeff() / spacing.array()).square();
-  DescendMembrane(grid,
-                  {static_cast<float>(weights[0]), static_cast<float>(weights[frame.swapped ? 2 : 1]),
-                   static_cast<float>(weights[frame.swapped ? 1 : 2])},
-                  parameters, progress, report);
-  forRuns([&](int y, int z, const Run& run, const Run& root) {
-    const std::size_t at = grid.At(run.begin - low[0], y - low[1], z - low[2]);
-    float* to = frame.Row(values, y, z) + (run.begin - frame.First(y, z));
-    for (int i = 0; i < run.end - run.begin; ++i)
-      to[i] = std::clamp(
-          static_cast<float>(least + (most - least) * static_cast<double>(grid.values[at + static_cast<std::size_t>(i)])),
-          root.least, root.most);
-  });
-  report.bound = std::numeric_limits<double>::infinity();
-  report.certified = false;
-}
-
 void Check(const RowField<unsigned char>& kinds, const Eigen::Vector3d& spacing, const RowField<float>& values,
            const MembraneParameters& parameters)
 {
@@ -586,12 +523,6 @@ void Check(const RowField<unsigned char>& kinds, const Eigen::Vector3d& spacing,
     refuse("the tolerance of a membrane must be positive");
   if (parameters.maximumCycles < 0)
     refuse("the number of cycles of a membrane must not be negative");
-  if (parameters.levels < 1 || parameters.levels > 8)
-    refuse("the levels of a membrane's descent must be 1 to 8");
-  if (!(parameters.descentStop > 0.0 && parameters.descentStop < 1.0))
-    refuse("the fall of energy that ends a membrane's descent must lie between 0 and 1");
-  if (!(parameters.maximumSeconds >= 0.0))
-    refuse("the seconds of a membrane's descent must not be negative");
 }
 
 } // namespace
@@ -624,11 +555,6 @@ MembraneReport SolveMembrane(const RowField<unsigned char>& kinds, const Eigen::
     }
   if (!any)
     return report;
-  if (parameters.solver == MembraneSolver::SteepestDescent) {
-    Descend(frame, kinds, components, spacing, parameters, progress, values, report);
-    report.solveSeconds = SecondsSince(start);
-    return report;
-  }
   Multigrid multigrid(frame, kinds, values, components, spacing, progress.Part(0.0, 0.5));
   report.setupSeconds = SecondsSince(start);
   multigrid.Solve(parameters, progress.Part(0.5, 1.0), report);

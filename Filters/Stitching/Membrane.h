@@ -3,7 +3,6 @@
 #include "Core/Base/Progress.h"
 #include "Filters/Stitching/RowField.h"
 #include <Eigen/Core>
-#include <limits>
 #include <vector>
 
 namespace echorama {
@@ -15,41 +14,18 @@ enum class MembraneVoxel : unsigned char {
   Known = 2,   ///< a boundary value
 };
 
-enum class MembraneSolver {
-  Multigrid,       ///< full multigrid / multigrid-preconditioned, stopped on the certificate
-  SteepestDescent, ///< the dissertation's coarse-to-fine descent (5.3.2), stopped as it is there; kept to compare with
-};
-
 struct MembraneParameters {
-  MembraneSolver solver = MembraneSolver::Multigrid;
-  /// Largest error of any value, relative to the span of the known values that unknowns lie between; > 0. Multigrid only.
+  /// Largest error of any value, relative to the span of the known values that unknowns lie between; > 0
   double tolerance = 1.0 / 512;
   int maximumCycles = 50; ///< >= 0; then the best so far is returned, with the bound it has (report.certified = false)
-  ///@{
-  /// SteepestDescent only: levels, 1 (the finest alone) to 8; the share of the energy below which the fall of one step ends a
-  /// level, in (0, 1); seconds after which all levels end; whether report.trace is filled.
-  int levels = 6;
-  double descentStop = 1e-4;
-  double maximumSeconds = std::numeric_limits<double>::infinity();
-  bool trace = false;
-  ///@}
-};
-
-/// One step of a descent.
-struct MembraneStep {
-  double seconds = 0.0; ///< since the beginning
-  double energy =
-      0.0;       ///< sum over faces, times r^(d - 2) where voxels are r times larger (dissertation 5.9), of values in [0, 1]
-  int level = 0; ///< 0 is the finest
 };
 
 struct MembraneReport {
   std::ptrdiff_t unknowns = 0;
-  int cycles = 0;     ///< of multigrid; steps of the descent
-  double bound = 0.0; ///< no value is further than this from the exact solution, in the unit of the values (infinity: not known)
+  int cycles = 0;
+  double bound = 0.0;     ///< no value is further than this from the exact solution, in the unit of the values
   bool certified = false; ///< bound <= tolerance times the span
   double setupSeconds = 0.0, solveSeconds = 0.0;
-  std::vector<MembraneStep> trace;
 };
 
 /// Minimises the sum over faces of w_axis (u_p - u_q)^2 (dissertation 5.6, 5.7; w_axis = (least spacing / spacing)^2) over the

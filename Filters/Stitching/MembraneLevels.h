@@ -65,7 +65,20 @@ public:
     };
     Fill voids;  ///< cells that are not there: the mean of their neighbours
     Fill knowns; ///< known cells: the boundary value, from the right sides of their neighbours
+
+    /// The ties of a row of a coarse level, each by x.
+    struct Ties {
+      const float *x, *y, *yNext, *z, *zNext, *inverse;
+    };
+    Ties TiesOf(int y, int z) const
+    {
+      const std::ptrdiff_t own = rows.At(y, z).at, above = rows.At(y + 1, z).at, behind = rows.At(y, z + 1).at;
+      return {tie[0].data() + own, tie[1].data() + own,    tie[1].data() + above,
+              tie[2].data() + own, tie[2].data() + behind, inverse.data() + own};
+    }
   };
+  static int CellOf(int fine, bool halved) { return halved ? fine >> 1 : fine; }
+  static constexpr float KnownTie = 0.75f; ///< see BuildCoarse
 
   /// \param rows, codes of the finest level; there is at least one unknown, each is connected to a known voxel
   MembraneLevels(MembraneRows rows, std::vector<unsigned char> codes, const Eigen::Vector3d& spacing, const Progress& progress);

@@ -197,7 +197,7 @@ using Voxel = std::array<int, 3>;
 constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
 // A voxel, or a block of voxels, that may take what a move offers or keep what it shows.
-struct Choice {
+struct SeamChoice {
   Voxel at;
   std::array<std::uint32_t, 3> next{none, none, none}; // the choice at the next voxel along each axis
   std::array<std::int32_t, 3> ifNextTakes{0, 0, 0};    // what it costs if that one takes it and this one does not
@@ -212,7 +212,7 @@ std::int32_t Capacity(std::int64_t sum)
 }
 
 // Cuts among the choices that are free, while the others stay with what they take. \return whether any changed
-bool CutFree(const std::vector<Choice>& choices, const std::vector<unsigned char>& free, std::vector<unsigned char>& takes)
+bool CutFree(const std::vector<SeamChoice>& choices, const std::vector<unsigned char>& free, std::vector<unsigned char>& takes)
 {
   std::vector<std::uint32_t> number(choices.size(), none);
   std::uint32_t count = 0;
@@ -225,7 +225,7 @@ bool CutFree(const std::vector<Choice>& choices, const std::vector<unsigned char
   std::vector<CutGraph::Face> faces;
   faces.reserve(std::size_t(3) * count);
   for (std::size_t n = 0; n < choices.size(); ++n) {
-    const Choice& choice = choices[n];
+    const SeamChoice& choice = choices[n];
     if (free[n])
       terminals[number[n]] += choice.taking;
     for (int axis = 0; axis < 3; ++axis) {
@@ -252,16 +252,16 @@ bool CutFree(const std::vector<Choice>& choices, const std::vector<unsigned char
 }
 
 // Choices of blocks of two voxels along each axis; parents receives the block of each choice.
-std::vector<Choice> Blocks(const std::vector<Choice>& choices, std::vector<std::uint32_t>& parents)
+std::vector<SeamChoice> Blocks(const std::vector<SeamChoice>& choices, std::vector<std::uint32_t>& parents)
 {
   Voxel lower = choices.front().at, upper = lower;
-  for (const Choice& choice : choices)
+  for (const SeamChoice& choice : choices)
     for (int axis = 0; axis < 3; ++axis) {
       lower[axis] = std::min(lower[axis], choice.at[axis] / 2);
       upper[axis] = std::max(upper[axis], choice.at[axis] / 2);
     }
   Volume<std::uint32_t> numbers({upper[0] - lower[0] + 1, upper[1] - lower[1] + 1, upper[2] - lower[2] + 1}, none);
-  std::vector<Choice> blocks;
+  std::vector<SeamChoice> blocks;
   parents.resize(choices.size());
   for (std::size_t n = 0; n < choices.size(); ++n) {
     const Voxel at{choices[n].at[0] / 2, choices[n].at[1] / 2, choices[n].at[2] / 2};
@@ -274,7 +274,7 @@ std::vector<Choice> Blocks(const std::vector<Choice>& choices, std::vector<std::
     parents[n] = number;
   }
   for (std::size_t n = 0; n < choices.size(); ++n) {
-    Choice& block = blocks[parents[n]];
+    SeamChoice& block = blocks[parents[n]];
     block.taking += choices[n].taking;
     for (int axis = 0; axis < 3; ++axis) {
       const std::uint32_t m = choices[n].next[axis];
@@ -289,7 +289,7 @@ std::vector<Choice> Blocks(const std::vector<Choice>& choices, std::vector<std::
 }
 
 // The choices within some steps of where takers meet keepers, or of one that would rather be on the other side.
-std::vector<unsigned char> Band(const std::vector<Choice>& choices, const std::vector<unsigned char>& takes, int width)
+std::vector<unsigned char> Band(const std::vector<SeamChoice>& choices, const std::vector<unsigned char>& takes, int width)
 {
   std::vector<unsigned char> band(choices.size(), 0), wider;
   for (std::size_t n = 0; n < choices.size(); ++n) {
@@ -310,13 +310,13 @@ std::vector<unsigned char> Band(const std::vector<Choice>& choices, const std::v
 }
 
 // Which choices take what is offered.
-std::vector<unsigned char> Cut(const std::vector<Choice>& choices, std::size_t exact, const Progress& progress)
+std::vector<unsigned char> Cut(const std::vector<SeamChoice>& choices, std::size_t exact, const Progress& progress)
 {
   constexpr int bandWidth = 3, rounds = 4;
   std::vector<unsigned char> takes(choices.size(), 0);
   progress(0.0);
   std::vector<std::uint32_t> parents;
-  std::vector<Choice> blocks;
+  std::vector<SeamChoice> blocks;
   if (choices.size() > exact)
     blocks = Blocks(choices, parents);
   // Dust does not become less in blocks, and need not: its flows are short.
@@ -521,7 +521,7 @@ bool Seams::Move(int volume, const Progress& progress)
         number[i] = next++;
   });
   // 2. Faces, each once, from the choice at its lower end; and what faces to voxels without a choice cost either way.
-  std::vector<Choice> choices(nodes);
+  std::vector<SeamChoice> choices(nodes);
   const auto labels = labels_.View();
   const auto numberOf = [&](const Voxel& at) {
     return box.HasRow(at[1], at[2]) && at[0] >= box.first[0] && at[0] < box.first[0] + box.size[0]
@@ -536,7 +536,7 @@ bool Seams::Move(int volume, const Progress& progress)
         const std::uint32_t node = numberOf(p);
         if (node == none)
           continue;
-        Choice& choice = choices[node];
+        SeamChoice& choice = choices[node];
         choice.at = p;
         const int a = labels(i, j, k);
         for (int axis = 0; axis < 3; ++axis)
@@ -626,31 +626,6 @@ Volume<unsigned short> CutSeams(const std::vector<CoarseVolume>& volumes, const 
     }
   progress(1.0);
   return seams.Take();
-}
-
-Volume<unsigned short> LargestScale(const std::vector<CoarseVolume>& volumes, const std::array<int, 3>& dimensions)
-{
-  CheckVolumes(volumes, dimensions);
-  Labels labels(dimensions, noVolume);
-  ForRows({{0, 0, 0}, dimensions}, Progress(), [&](int j, int k) {
-    std::vector<float> best(dimensions[0], -1.0f);
-    unsigned short* label = labels.View().Row(j, k);
-    for (std::size_t v = 0; v < volumes.size(); ++v) {
-      const Boxed<unsigned char>& inside = volumes[v].inside;
-      if (!inside.box.HasRow(j, k))
-        continue;
-      const unsigned char* row = inside.Row(j, k);
-      for (int n = 0; n < inside.box.size[0]; ++n) {
-        const int i = inside.box.first[0] + n;
-        const float share = row[n] & 1 ? At(volumes[v].scale, i, j, k) * At(volumes[v].trust, i, j, k) : -1.0f;
-        if (share > best[i]) {
-          best[i] = share;
-          label[i] = static_cast<unsigned short>(v);
-        }
-      }
-    }
-  });
-  return labels;
 }
 
 } // namespace echorama

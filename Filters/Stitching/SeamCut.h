@@ -34,8 +34,4 @@ struct SeamParameters {
 Volume<unsigned short> CutSeams(const std::vector<CoarseVolume>& volumes, const std::array<int, 3>& dimensions,
                                 const SeamParameters& parameters = {}, const Progress& progress = {});
 
-/// The volume with the largest scale * trust, the first of equals: the seam without regard to what is there.
-/// \return label per voxel of the grid, noVolume where nothing is
-Volume<unsigned short> LargestScale(const std::vector<CoarseVolume>& volumes, const std::array<int, 3>& dimensions);
-
 } // namespace echorama

@@ -3,26 +3,26 @@
 //   1. masks of the volumes on the plan's grid, from which RegionMap knows pure, overlap and empty regions; cores;
 //   2. a scale per volume at the voxels of its overlap (StitchScales), kept in spans of rows;
 //   3. where gains, seams or textures are wanted: smooth parts of the volumes (LowPass, on their own lattices), and all volumes
-//      on a coarse copy of the grid, on which gains, correlations, seams and offsets are found.
+//      on a coarse copy of the grid, on which gains, correlations and seams are found.
 // Masks and maps are gone when the plan stands. Rendering goes row by row: every volume that covers the row is sampled, and
 // what belongs to a voxel is gathered and blended there. Nothing is kept per voxel but the output, and no voxel needs its
 // neighbours, so boxes and threads do not change the result.
 #include "Stitch.h"
 #include "BlendWeights.h"
 #include "Core/Base/Error.h"
+#include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "LowPass.h"
-#include "Multiband.h"
 #include "RegionMap.h"
 #include "SeamCut.h"
 #include "StitchGain.h"
 #include "StitchMemory.h"
-#include "StitchOffsets.h"
 #include "StitchSampler.h"
 #include "StitchScales.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace echorama {
 
@@ -39,16 +39,6 @@ constexpr float noValue = std::numeric_limits<float>::quiet_NaN();
 // Sums are kept in float, those of doubles in double.
 template <class T>
 using Accumulator = std::conditional_t<std::is_same_v<T, double>, double, float>;
-
-template <class T, class A>
-T Rounded(A value)
-{
-  if constexpr (std::is_integral_v<T>)
-    return static_cast<T>(std::clamp(std::floor(value + A(0.5)), static_cast<A>(std::numeric_limits<T>::min()),
-                                     static_cast<A>(std::numeric_limits<T>::max())));
-  else
-    return static_cast<T>(value);
-}
 
 void CheckRegions(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const RegionMap& regions)
 {
@@ -106,12 +96,10 @@ struct StitchPlan::Parts {
   BlockLattice blocks;                   // of the smooth parts
   std::vector<SmoothPart> lows;
   StitchGains gains;
-  std::vector<CoarseField> shares;  // of the details (Seam) or of all (Offset)
-  std::vector<CoarseField> offsets; // Peleg's
-  std::vector<CoarseSampler> scaleSamplers, lowSamplers, deviationSamplers, shareSamplers, offsetSamplers;
-  Volume<float> whole; // the result of Multiband
+  std::vector<CoarseField> shares; // of the details (Seam)
+  std::vector<CoarseSampler> scaleSamplers, lowSamplers, deviationSamplers, shareSamplers;
 
-  bool NeedsLows() const { return textured || parameters.equalizeGain || parameters.method == StitchMethod::Offset; }
+  bool NeedsLows() const { return textured || parameters.equalizeGain; }
   CoarseSampler BlockSampler(const Boxed<float>& field, const ImageGeometry& where) const
   {
     const PosedVolume<float> blockwise{field.values.View(), {}, Cropped(blocks.geometry, field.box)};
@@ -120,7 +108,6 @@ struct StitchPlan::Parts {
   void FindScales(const Progress& progress);
   std::vector<CoarseVolume> CoarseVolumes(const ImageGeometry& coarse, int step) const;
   void FindWhatIsCoarse(const Progress& progress);
-  void BlendWhole(const Progress& progress);
   void ScaleRow(int volume, int j, int k, int first, int end, const unsigned char* wanted, float* scale) const;
   template <class T>
   class RowBlender;
@@ -157,8 +144,7 @@ void StitchPlan::Parts::FindScales(const Progress& progress)
   if (factor == 1)
     CheckRegions(parameters, inputs, regions);
   const StitchMethod method = parameters.method;
-  const bool cored = method != StitchMethod::Feather && method != StitchMethod::Average && method != StitchMethod::Maximum;
-  if (cored)
+  if (method == StitchMethod::Distance || method == StitchMethod::Membrane)
     regions.GiveCores(progress.Part(0.2, 0.3));
   const VolumeView<const unsigned char> covered = coverage.View();
   scales = StitchScales(parameters, regions, covered, planGrid.spacing, bound, progress.Part(0.3, 0.85));
@@ -263,7 +249,6 @@ void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
 {
   gains.gain.assign(inputs.size(), 1.0);
   gains.offset.assign(inputs.size(), 0.0);
-  const bool offset = parameters.method == StitchMethod::Offset;
   if (!NeedsLows())
     return;
   int step = factor;
@@ -277,17 +262,13 @@ void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
     lowSamplers.push_back(BlockSampler(lows[v].low, grid));
     deviationSamplers.push_back(BlockSampler(lows[v].deviation, grid));
   }
-  if (!offset && !(textured && parameters.texture == StitchTexture::Seam))
+  if (!textured || parameters.texture != StitchTexture::Seam)
     return;
   for (std::size_t v = 0; v < inputs.size(); ++v)
     for (Boxed<float>* field : {&volumes[v].value, &volumes[v].low})
       for (float& value : field->values.View())
         value = static_cast<float>(gains.gain[v] * value + gains.offset[v]);
-  const Volume<unsigned short> labels =
-      offset ? LargestScale(volumes, coarse.dimensions) : CutSeams(volumes, coarse.dimensions, {}, progress.Part(0.5, 0.9));
-  std::vector<Boxed<float>> moved;
-  if (offset)
-    moved = OffsetFields(volumes, labels, coarse.spacing, progress.Part(0.5, 0.9));
+  const Volume<unsigned short> labels = CutSeams(volumes, coarse.dimensions, {}, progress.Part(0.5, 0.9));
   for (std::size_t v = 0; v < inputs.size(); ++v) {
     const GridBox box = volumes[v].inside.box;
     CoarseField share{{box, Volume<float>(box.size)}, {box, Volume<unsigned char>(box.size)}};
@@ -299,52 +280,9 @@ void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
       }
     });
     shares.push_back(std::move(share));
-    if (offset)
-      offsets.push_back({std::move(moved[v]), std::move(volumes[v].inside)});
   }
   for (const CoarseField& share : shares)
     shareSamplers.emplace_back(share.values, share.known, coarse, grid);
-  for (const CoarseField& field : offsets)
-    offsetSamplers.emplace_back(field.values, field.known, coarse, grid);
-}
-
-// Multiband needs neighbourhoods, and so all volumes at once.
-void StitchPlan::Parts::BlendWhole(const Progress& progress)
-{
-  std::vector<ResampledVolume> volumes;
-  Volume<float> largest(grid.dimensions, -1.0f);
-  Volume<unsigned short> shown(grid.dimensions, noVolume);
-  for (std::size_t v = 0; v < inputs.size(); ++v) {
-    const GridBox box = samplers[v].Box();
-    ResampledVolume volume{
-        {box, Volume<float>(box.size)}, {box, Volume<unsigned char>(box.size)}, {box, Volume<float>(box.size)}};
-    ForRows(box, Progress(), [&](int j, int k) {
-      unsigned char* inside = volume.inside.Row(j, k);
-      float *values = volume.values.Row(j, k), *scale = volume.share.Row(j, k);
-      samplers[v].Inside(j, k, inside);
-      samplers[v].Values(j, k, inside, values);
-      std::fill(scale, scale + box.size[0], 1.0f);
-      ScaleRow(static_cast<int>(v), j, k, box.first[0], box.first[0] + box.size[0], inside, scale);
-      float* most = largest.View().Row(j, k) + box.first[0];
-      unsigned short* label = shown.View().Row(j, k) + box.first[0];
-      for (int i = 0; i < box.size[0]; ++i) {
-        values[i] = inside[i] & 1 ? static_cast<float>(gains.gain[v] * values[i] + gains.offset[v]) : 0.0f;
-        if ((inside[i] & 1) && scale[i] > most[i]) {
-          most[i] = scale[i];
-          label[i] = static_cast<unsigned short>(v);
-        }
-      }
-    });
-    volumes.push_back(std::move(volume));
-  }
-  for (std::size_t v = 0; v < inputs.size(); ++v)
-    ForRows(volumes[v].share.box, Progress(), [&](int j, int k) {
-      const unsigned short* label = shown.View().Row(j, k) + volumes[v].share.box.first[0];
-      float* share = volumes[v].share.Row(j, k);
-      for (int i = 0; i < volumes[v].share.box.size[0]; ++i)
-        share[i] = label[i] == v;
-    });
-  whole = BlendMultiband(volumes, grid.dimensions, 5, progress);
 }
 
 StitchPlan::StitchPlan(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const ImageGeometry& grid,
@@ -367,9 +305,7 @@ StitchPlan::StitchPlan(const StitchParameters& parameters, const std::vector<Sti
   for (const StitchInput& input : inputs)
     parts_->samplers.emplace_back(input, grid, parameters.reliabilityFloor);
   parts_->FindScales(progress.Part(0.0, 0.6));
-  parts_->FindWhatIsCoarse(progress.Part(0.6, parameters.method == StitchMethod::Multiband ? 0.7 : 1.0));
-  if (parameters.method == StitchMethod::Multiband)
-    parts_->BlendWhole(progress.Part(0.7, 1.0));
+  parts_->FindWhatIsCoarse(progress.Part(0.6, 1.0));
 }
 
 StitchPlan::~StitchPlan() = default;
@@ -444,7 +380,7 @@ public:
       const A gain = static_cast<A>(parts_.gains.gain[v]), offset = static_cast<A>(parts_.gains.offset[v]);
       for (int i = layer.first; i < layer.end; ++i)
         if (count_[i] == 1 && (layer.Inside(i) & 1)) {
-          result[i] = Rounded<T>(gain * layer.values[i - layer.start] + offset);
+          result[i] = RoundedVoxel<T>(gain * layer.values[i - layer.start] + offset);
           if (weight)
             weight[i] = 1.0f;
         }
@@ -453,13 +389,7 @@ public:
       SampleOverlap(j, k);
       for (int i = 0; i < box_.size[0]; ++i)
         if (count_[i] > 1)
-          result[i] = Rounded<T>(Blend(i, y, z, spread));
-    }
-    if (parts_.parameters.method == StitchMethod::Multiband) {
-      const float* row = parts_.whole.View().Row(j, k) + box_.first[0];
-      for (int i = 0; i < box_.size[0]; ++i)
-        if (valid[i])
-          result[i] = Rounded<T>(row[i]);
+          result[i] = RoundedVoxel<T>(Blend(i, y, z, spread));
     }
   }
 
@@ -512,7 +442,6 @@ private:
   void SampleOverlap(int j, int k)
   {
     const int n = box_.size[0], first = box_.first[0];
-    const bool offset = parts_.parameters.method == StitchMethod::Offset;
     for (const int v : rows_) {
       Layer& layer = layers_[v];
       layer.shared.assign(static_cast<std::size_t>(n), 0);
@@ -534,12 +463,6 @@ private:
       if (!parts_.shareSamplers.empty()) {
         layer.share.resize(static_cast<std::size_t>(n));
         parts_.shareSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.share.data());
-      }
-      if (offset) {
-        layer.low.resize(static_cast<std::size_t>(n));
-        parts_.offsetSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.low.data());
-        for (int i = layer.first; i < layer.end; ++i)
-          layer.values[i - layer.start] += layer.low[i] / static_cast<A>(parts_.gains.gain[v]);
       }
     }
   }
@@ -592,37 +515,25 @@ private:
   void Weigh(std::size_t n, bool trusted)
   {
     const float* trust = trusted ? voxel_.trust.data() : nullptr;
-    switch (parts_.parameters.method) {
-    case StitchMethod::Maximum: {
-      std::size_t largest = 0;
-      for (std::size_t a = 1; a < n; ++a)
-        if (here_[a].value > here_[largest].value)
-          largest = a;
-      for (std::size_t a = 0; a < n; ++a)
-        voxel_.weight[a] = a == largest;
-      return;
-    }
-    case StitchMethod::Offset:
-    case StitchMethod::Multiband:
-      if (!Normalize(voxel_.detail.data(), n, voxel_.weight.data())) {
-        const BlendPower hard(1000.0);
-        BlendWeights(voxel_.scale.data(), nullptr, n, hard, voxel_.weight.data());
-      }
-      return;
-    default:
+    if (parts_.parameters.method != StitchMethod::Maximum) {
       BlendWeights(voxel_.scale.data(), trust, n, power_, voxel_.weight.data());
+      return;
     }
+    std::size_t largest = 0;
+    for (std::size_t a = 1; a < n; ++a)
+      if (here_[a].value > here_[largest].value)
+        largest = a;
+    for (std::size_t a = 0; a < n; ++a)
+      voxel_.weight[a] = a == largest;
   }
 
-  static bool Normalize(const float* shares, std::size_t n, float* weights)
+  static bool Normalize(float* shares, std::size_t n)
   {
-    float total = 0.0f;
-    for (std::size_t a = 0; a < n; ++a)
-      total += shares[a];
+    const float total = std::accumulate(shares, shares + n, 0.0f);
     if (!(total > 0.0f))
       return false;
     for (std::size_t a = 0; a < n; ++a)
-      weights[a] = shares[a] / total;
+      shares[a] /= total;
     return true;
   }
 
@@ -630,10 +541,7 @@ private:
   A Detail(std::size_t n)
   {
     float* h = voxel_.detail.data();
-    const bool seam = parts_.parameters.texture == StitchTexture::Seam && Normalize(h, n, h);
-    if (parts_.parameters.texture == StitchTexture::Restore) {
-      std::copy_n(voxel_.weight.data(), n, h);
-    } else if (!seam) {
+    if (parts_.parameters.texture != StitchTexture::Seam || !Normalize(h, n)) {
       for (std::size_t a = 0; a < n; ++a)
         voxel_.scale[a] *= voxel_.trust[a];
       BlendWeights(voxel_.scale.data(), nullptr, n, detailPower_, h);

@@ -14,22 +14,19 @@ namespace echorama {
 
 /// What decides how much each of the overlapping volumes counts at a voxel.
 enum class StitchMethod {
-  Distance,  ///< the distances to pure and empty regions (dissertation 5.2, 5.4)
-  Feather,   ///< the distance to the own border (Szeliski 1996)
-  Average,   ///< plain mean
-  Maximum,   ///< the largest value is shown
-  Membrane,  ///< the smoothest surface from pure to empty regions (dissertation 5.3, 5.4)
-  Multiband, ///< each octave over a transition as wide as its features (Burt and Adelson 1983); to compare with
-  Offset,    ///< one volume per voxel, with smooth offsets that make them meet at the seam (Peleg 1981); to compare with
+  Distance, ///< the distances to pure and empty regions (dissertation 5.2, 5.4)
+  Feather,  ///< the distance to the own border (Szeliski 1996)
+  Average,  ///< plain mean
+  Maximum,  ///< the largest value is shown
+  Membrane, ///< the smoothest surface from pure to empty regions (dissertation 5.3, 5.4)
 };
 
 /// What becomes of speckle and edges where volumes overlap. A weighted mean of two speckle patterns has less texture than either,
 /// so all but Mix blend the smooth part of the volumes by the weights and the rest, the detail, in another way.
 enum class StitchTexture {
-  Mix,     ///< the weighted mean of all
-  Restore, ///< the weighted mean of the details, amplified by as much as their mixture has lost
-  Split,   ///< details change over in a narrow transition
-  Seam,    ///< details come from one volume per voxel, along a seam where the volumes differ least (graph cut)
+  Mix,   ///< the weighted mean of all
+  Split, ///< details change over in a narrow transition, amplified by as much as their mixture has lost
+  Seam,  ///< details come from one volume per voxel, along a seam where the volumes differ least (graph cut)
 };
 
 struct StitchParameters {
@@ -46,7 +43,6 @@ struct StitchParameters {
   double reliabilityFloor = 0.01;
   bool allowDisjoint = false;   ///< whether a volume may overlap no other; it is then just put in its place
   double maximumMemoryGb = 0.0; ///< 10^9 bytes; 0: three quarters of this machine's memory
-  MembraneSolver membraneSolver = MembraneSolver::Multigrid;
   /// Largest error of the weights of two volumes that comes from their membrane, certified for exponents from 1 to 32, (0, 1].
   double membraneTolerance = 1.0 / 512;
 };

@@ -4,6 +4,7 @@
 // is what keeps volumes of one lattice free of interpolation.
 #include "StitchGrid.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/SizeText.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -86,8 +87,7 @@ ImageGeometry StitchGrid(const std::vector<ImageGeometry>& volumes, double spaci
   if (flat)
     size[2] = 1.0;
   if (!(size.maxCoeff() <= std::numeric_limits<int>::max()) || !(size.prod() <= 1e15))
-    throw Error(Error::Kind::TooLarge, "the output grid would have " + std::to_string(size[0]) + " x " + std::to_string(size[1]) +
-                                           " x " + std::to_string(size[2]) +
+    throw Error(Error::Kind::TooLarge, "the output grid would have " + SizeText(size[0], size[1], size[2]) +
                                            " voxels; choose a larger SpacingMm, or poses that lie nearer to each other");
   for (int axis = 0; axis < 3; ++axis)
     grid.dimensions[axis] = static_cast<int>(size[axis]);

@@ -3,11 +3,12 @@
 // no larger than the boxes that meet in it.
 #include "StitchMemory.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
+#include "Core/Base/SizeText.h"
 #include "RowSampler.h"
 #include "StitchGrid.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <unistd.h>
 
 namespace echorama {
@@ -20,9 +21,7 @@ constexpr double membraneBytes = 32.0;
 
 std::string Gigabytes(double bytes)
 {
-  char text[32];
-  std::snprintf(text, sizeof text, bytes < 1e8 ? "%.3g GB" : "%.1f GB", bytes * 1e-9);
-  return text;
+  return Format(bytes < 1e8 ? "%.3g GB" : "%.1f GB", bytes * 1e-9);
 }
 
 double AllowedMemory(const StitchParameters& parameters)
@@ -53,12 +52,9 @@ double PlanBytes(const StitchParameters& parameters, const std::vector<GridBox>&
   case StitchMethod::Membrane:
     return regions + 4.0 * overlaps + membraneBytes * largestOverlap;
   case StitchMethod::Distance:
-  case StitchMethod::Offset:
     return regions + 4.0 * overlaps + 4.0 * largest + 5.0 * voxels;
   case StitchMethod::Feather:
     return regions + 4.0 * overlaps + 5.0 * largest;
-  case StitchMethod::Multiband:
-    return regions + 4.0 * overlaps + std::max(4.0 * largest + 5.0 * voxels, 24.0 * sum) + 12.0 * voxels;
   case StitchMethod::Average:
   case StitchMethod::Maximum:
     break;
@@ -82,10 +78,9 @@ StitchCost CostOfStitch(const StitchParameters& parameters, const std::vector<Im
   cost.allowedBytes = AllowedMemory(parameters);
   const double full = PlanBytes(parameters, boxes, voxels);
   cost.planBytes = full;
-  const bool mayBeCoarse = parameters.method != StitchMethod::Multiband;
   const auto fits = [&] { return cost.planBytes <= 0.5 * cost.allowedBytes; };
   if (cost.WholeBytes() > cost.allowedBytes)
-    while (!fits() && mayBeCoarse && cost.planFactor < 64) {
+    while (!fits() && cost.planFactor < 64) {
       ++cost.planFactor;
       cost.planBytes = full;
       for (int axis = 0; axis < 3; ++axis)
@@ -125,15 +120,11 @@ void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeom
     spacing = std::ceil(spacing / digit) * digit; // two digits, rounded up
     coarser = CostOfStitch(parameters, volumes, StitchGrid(volumes, spacing), outputs);
   }
-  char suggestion[32];
-  std::snprintf(suggestion, sizeof suggestion, "%.2g", spacing);
-  const auto& n = grid.dimensions;
   throw Error(Error::Kind::TooLarge,
-              "stitching " + std::to_string(volumes.size()) + " volumes onto " + std::to_string(n[0]) + " x " +
-                  std::to_string(n[1]) + " x " + std::to_string(n[2]) + " voxels needs " + Gigabytes(needed) +
-                  ", more than the " + Gigabytes(cost.allowedBytes) + " allowed (MaximumMemoryGb); " +
+              "stitching " + std::to_string(volumes.size()) + " volumes onto " + SizeText(grid.dimensions) + " voxels needs " +
+                  Gigabytes(needed) + ", more than the " + Gigabytes(cost.allowedBytes) + " allowed (MaximumMemoryGb); " +
                   (cost.slabs > 1 ? "written in " + std::to_string(cost.slabs) + " slabs it fits, or " : "") +
-                  "SpacingMm = " + suggestion + " would fit");
+                  Format("SpacingMm = %.2g would fit", spacing));
 }
 
 } // namespace echorama

@@ -158,7 +158,6 @@ RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMa
                    [](unsigned char kind) { return kind == static_cast<unsigned char>(MembraneVoxel::Unknown); }))
     return scale;
   MembraneParameters membrane;
-  membrane.solver = parameters.membraneSolver;
   // An exponent multiplies the error of a scale: the weights are certified for exponents up to 32.
   membrane.tolerance = parameters.membraneTolerance / std::clamp(parameters.sharpness, 1.0, 32.0);
   const MembraneReport report = SolveMembrane(kinds, spacing, scale, 0.5f, membrane, progress);

@@ -51,10 +51,7 @@ vtkUltrasoundStitchQuality::vtkUltrasoundStitchQuality()
 int vtkUltrasoundStitchQuality::FillInputPortInformation(int port, vtkInformation* information)
 {
   if (port == 1) {
-    // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-    information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-    information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
-    information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
+    vtkUltrasoundVolume::AcceptVolumes(information);
     return 1;
   }
   information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");

@@ -29,8 +29,8 @@ using echorama::Error;
 vtkStandardNewMacro(vtkUltrasoundStitcher);
 
 namespace {
-const char* const METHOD_NAMES[] = {"distance", "feather", "average", "maximum", "membrane", "multiband", "offset"};
-const char* const TEXTURE_NAMES[] = {"mix", "restore", "split", "seam"};
+const char* const METHOD_NAMES[] = {"distance", "feather", "average", "maximum", "membrane"};
+const char* const TEXTURE_NAMES[] = {"mix", "split", "seam"};
 
 template <std::size_t count>
 const char* NameOf(const char* const (&names)[count], int number)
@@ -145,10 +145,7 @@ vtkUltrasoundStitcher::~vtkUltrasoundStitcher() = default;
 //----------------------------------------------------------------------------
 int vtkUltrasoundStitcher::FillInputPortInformation(int port, vtkInformation* information)
 {
-  information->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
-  // The tree comes first: the pipeline looks there to see that composite data is wanted whole, not leaf by leaf.
-  information->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObjectTree");
-  information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  vtkUltrasoundVolume::AcceptVolumes(information);
   if (port == 1) {
     information->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
   }
@@ -173,19 +170,8 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
         type = typeKnown ? CommonType(type, scalars->Get(vtkDataObject::FIELD_ARRAY_TYPE())) : type;
         continue;
       }
-      // Only the data knows. It is made now, and not again later: nothing has changed when it is asked for.
-      int port = 0;
-      vtkAlgorithm* producer = this->GetInputAlgorithm(0, connection, port);
-      auto* pipeline = vtkStreamingDemandDrivenPipeline::SafeDownCast(producer->GetExecutive());
-      if (in->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT())) {
-        int whole[6];
-        in->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
-        in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), whole, 6);
-      }
-      in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER(), 0);
-      in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_PIECES(), 1);
-      in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-      if (!pipeline || !pipeline->Update(port)) {
+      // Only the data knows.
+      if (!vtkUltrasoundVolume::MakeInput(this, 0, connection)) {
         throw Error(Error::Kind::BadInput, "input " + std::to_string(connection + 1) + " could not be made");
       }
       vtkNew<vtkInformationVector> one;
@@ -256,7 +242,6 @@ echorama::StitchParameters vtkUltrasoundStitcher::Parameters() const
   echorama::StitchParameters parameters;
   parameters.method = static_cast<echorama::StitchMethod>(this->Method);
   parameters.texture = static_cast<echorama::StitchTexture>(this->Texture);
-  parameters.membraneSolver = static_cast<echorama::MembraneSolver>(this->MembraneSolver);
   parameters.sharpness = this->Sharpness;
   parameters.detailSharpness = this->DetailSharpness;
   parameters.detailScale = this->DetailScale;
@@ -382,13 +367,8 @@ std::string vtkUltrasoundStitcher::EstimateCost()
   std::string report;
   this->UpdateInformation();
   vtkInformationVector* inputs[2] = {this->GetExecutive()->GetInputInformation(0), this->GetExecutive()->GetInputInformation(1)};
-  for (int port = 0; port < 2; ++port) {
-    for (int connection = 0; connection < this->GetNumberOfInputConnections(port); ++connection) {
-      int number = 0;
-      vtkAlgorithm* producer = this->GetInputAlgorithm(port, connection, number);
-      producer->Update(number);
-    }
-  }
+  vtkUltrasoundVolume::MakeInput(this, 0);
+  vtkUltrasoundVolume::MakeInput(this, 1);
   vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
     const std::unique_ptr<Scene> scene = this->Collect(inputs);
     const echorama::StitchOutputs outputs{static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(scene->Type)),
@@ -414,7 +394,6 @@ void vtkUltrasoundStitcher::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Method: " << this->GetMethodAsString() << "\n";
   os << indent << "Texture: " << this->GetTextureAsString() << "\n";
-  os << indent << "MembraneSolver: " << this->MembraneSolver << "\n";
   os << indent << "Sharpness: " << this->Sharpness << "\n";
   os << indent << "DetailSharpness: " << this->DetailSharpness << "\n";
   os << indent << "DetailScale: " << this->DetailScale << "\n";

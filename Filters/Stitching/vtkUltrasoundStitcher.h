@@ -55,25 +55,22 @@ public:
   vtkTypeMacro(vtkUltrasoundStitcher, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3, MEMBRANE = 4, MULTIBAND = 5, OFFSET = 6 };
-  enum MembraneSolvers { MULTIGRID = 0, STEEPEST_DESCENT = 1 };
-  enum Textures { MIX = 0, RESTORE = 1, SPLIT = 2, SEAM = 3 };
+  enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3, MEMBRANE = 4 };
+  enum Textures { MIX = 0, SPLIT = 1, SEAM = 2 };
 
   ///@{
   /**
    * What decides how much each volume counts: the smoothest surface from pure to empty regions (MEMBRANE, default), the distances
    * to them (DISTANCE), the distance to the own border (FEATHER, Szeliski 1996), nothing (AVERAGE), or the largest value is shown
-   * (MAXIMUM). MULTIBAND (Burt and Adelson 1983) and OFFSET (Peleg 1981) are there to compare with.
+   * (MAXIMUM).
    */
-  vtkSetClampMacro(Method, int, DISTANCE, OFFSET);
+  vtkSetClampMacro(Method, int, DISTANCE, MEMBRANE);
   vtkGetMacro(Method, int);
   void SetMethodToDistance() { this->SetMethod(DISTANCE); }
   void SetMethodToFeather() { this->SetMethod(FEATHER); }
   void SetMethodToAverage() { this->SetMethod(AVERAGE); }
   void SetMethodToMaximum() { this->SetMethod(MAXIMUM); }
   void SetMethodToMembrane() { this->SetMethod(MEMBRANE); }
-  void SetMethodToMultiband() { this->SetMethod(MULTIBAND); }
-  void SetMethodToOffset() { this->SetMethod(OFFSET); }
   const char* GetMethodAsString() { return GetMethodName(this->Method); }
   ///@}
 
@@ -86,14 +83,12 @@ public:
   ///@{
   /**
    * What becomes of speckle and edges where volumes overlap (for DISTANCE, FEATHER, MEMBRANE): the weighted mean of all
-   * (MIX), the mean of the details amplified by what their mixture has lost (RESTORE), details that change over in a narrow
-   * transition (SPLIT, default), or details of one volume per voxel along a seam where the volumes differ least (SEAM, graph
-   * cut).
+   * (MIX), details that change over in a narrow transition, amplified by what their mixture has lost (SPLIT, default), or details
+   * of one volume per voxel along a seam where the volumes differ least (SEAM, graph cut).
    */
   vtkSetClampMacro(Texture, int, MIX, SEAM);
   vtkGetMacro(Texture, int);
   void SetTextureToMix() { this->SetTexture(MIX); }
-  void SetTextureToRestore() { this->SetTexture(RESTORE); }
   void SetTextureToSplit() { this->SetTexture(SPLIT); }
   void SetTextureToSeam() { this->SetTexture(SEAM); }
   const char* GetTextureAsString() { return GetTextureName(this->Texture); }
@@ -118,17 +113,6 @@ public:
   /** The same exponent for the details of SPLIT, in [0, 1000]. Default 32: about a sixteenth of the overlap is transition. */
   vtkSetClampMacro(DetailSharpness, double, 0.0, 1000.0);
   vtkGetMacro(DetailSharpness, double);
-  ///@}
-
-  ///@{
-  /**
-   * How membranes are found: MULTIGRID (default), whose largest error is certified (GetMembraneBound()), or the coarse-to-fine
-   * STEEPEST_DESCENT of the dissertation (5.3.2), slower and of unknown error, to compare with.
-   */
-  vtkSetClampMacro(MembraneSolver, int, MULTIGRID, STEEPEST_DESCENT);
-  vtkGetMacro(MembraneSolver, int);
-  void SetMembraneSolverToMultigrid() { this->SetMembraneSolver(MULTIGRID); }
-  void SetMembraneSolverToSteepestDescent() { this->SetMembraneSolver(STEEPEST_DESCENT); }
   ///@}
 
   ///@{
@@ -255,7 +239,6 @@ private:
 
   int Method = MEMBRANE;
   int Texture = SPLIT;
-  int MembraneSolver = MULTIGRID;
   bool OutputWeights = false;
   bool OutputSpread = false;
   bool UseReliability = true;

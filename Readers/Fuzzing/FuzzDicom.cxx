@@ -3,6 +3,7 @@
 // their own.
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
+#include "Readers/DicomPixels.h"
 #include "Testing/Fuzzing.h"
 #include <vector>
 

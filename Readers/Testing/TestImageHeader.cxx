@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Headers as other programs write them, and headers that lie.
 #include "Readers/ImageHeader.h"
+#include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
 #include <clocale>
@@ -34,14 +35,7 @@ std::string Meta(const Fields& changes = {}, const std::string& data = std::stri
                                           {"Offset", "10 20 -30.5"},        {"CenterOfRotation", "0 0 0"},
                                           {"ElementSpacing", "0.25 0.5 2"}, {"DimSize", "2 3 4"},
                                           {"ElementType", "MET_UCHAR"},     {"ElementDataFile", "LOCAL"}};
-  std::string text;
-  for (const auto& [key, value] : lines) {
-    const auto change = changes.find(key);
-    const std::string& now = change == changes.end() ? value : change->second;
-    if (!now.empty())
-      text += key + " = " + now + "\n";
-  }
-  return text + data;
+  return MetaImageLines(lines, changes) + data;
 }
 
 /// The same volume as NRRD.

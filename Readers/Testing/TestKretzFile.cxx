@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Readers/KretzFile.h"
@@ -14,7 +15,7 @@ using namespace echorama::testing;
 
 namespace {
 
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 
 template <class T>
 std::string Bytes(const T& value)

@@ -2,6 +2,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/Compression.h"
 #include "Readers/NiftiFile.h"
+#include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeWriter.h"
@@ -102,35 +103,7 @@ bool HasNote(const VolumeContent& content, const std::string& words)
                      [&](const std::string& note) { return note.find(words) != std::string::npos; });
 }
 
-const VoxelType AllTypes[] = {VoxelType::Int8,   VoxelType::UInt8, VoxelType::Int16,  VoxelType::UInt16,  VoxelType::Int32,
-                              VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64, VoxelType::Float32, VoxelType::Float64};
 const short CodeOfType[] = {256, 2, 4, 512, 8, 768, 1024, 1280, 16, 64};
-
-ImageHeader Oblique(VoxelType type)
-{
-  ImageHeader header;
-  header.type = type;
-  header.geometry.dimensions = {5, 4, 3};
-  header.geometry.origin = {1.0 / 3.0, -1e5 / 7.0, 1e-3};
-  header.geometry.spacing = {0.1, 1.0 / 3.0, 0.7};
-  header.geometry.direction = ExpRotation({0.3, -1.2, 2.0});
-  header.fields = {{"Echorama_TimeStamp", "0.1"}, {"Modality", "MET_MOD_US"}};
-  return header;
-}
-
-template <class T>
-std::vector<T> Values(std::size_t count)
-{
-  Random random(5, sizeof(T));
-  std::vector<T> values(count);
-  for (T& value : values)
-    value = std::is_floating_point_v<T> ? static_cast<T>(random.Normal() * 1e3) : static_cast<T>(random.Bits());
-  values[0] = std::numeric_limits<T>::lowest();
-  values[1] = std::numeric_limits<T>::max();
-  if (std::is_floating_point_v<T>)
-    values[2] = std::numeric_limits<T>::quiet_NaN();
-  return values;
-}
 
 } // namespace
 

@@ -4,6 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/Compression.h"
 #include "Readers/SequenceFile.h"
+#include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
 #include <cmath>
@@ -45,14 +46,7 @@ std::string Meta(const Fields& changes = {}, const std::string& frameLines = "",
                                           {"TransformMatrix", "1 0 0 0 1 0 0 0 1"},
                                           {"UltrasoundImageOrientation", "MF"},
                                           {"UltrasoundImageType", "BRIGHTNESS"}};
-  std::string text;
-  for (const auto& [key, value] : lines) {
-    const auto change = changes.find(key);
-    const std::string& now = change == changes.end() ? value : change->second;
-    if (!now.empty())
-      text += key + " = " + now + "\n";
-  }
-  return text + frameLines + "ElementDataFile = LOCAL\n" + data;
+  return MetaImageLines(lines, changes) + frameLines + "ElementDataFile = LOCAL\n" + data;
 }
 
 /// As NRRD, with the axes and kinds given.

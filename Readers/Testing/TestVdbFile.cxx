@@ -2,6 +2,7 @@
 // Files of other programs are made here with OpenVDB itself.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VdbFile.h"
 #include <cstring>
@@ -25,34 +26,7 @@ using namespace echorama::testing;
 
 namespace {
 
-const VoxelType AllTypes[] = {VoxelType::Int8,   VoxelType::UInt8, VoxelType::Int16,  VoxelType::UInt16,  VoxelType::Int32,
-                              VoxelType::UInt32, VoxelType::Int64, VoxelType::UInt64, VoxelType::Float32, VoxelType::Float64};
-
-ImageHeader Oblique(VoxelType type)
-{
-  ImageHeader header;
-  header.type = type;
-  header.geometry.dimensions = {21, 9, 17}; // no multiples of the leaves' 8
-  header.geometry.origin = {1.0 / 3.0, -1e5 / 7.0, 1e-3};
-  header.geometry.spacing = {0.1, 1.0 / 3.0, 0.7};
-  header.geometry.direction = ExpRotation({0.3, -1.2, 2.0});
-  header.fields = {{"Echorama_TimeStamp", "0.1"}, {"Modality", "MET_MOD_US"}};
-  return header;
-}
-
-template <class T>
-std::vector<T> Values(std::size_t count)
-{
-  Random random(5, sizeof(T));
-  std::vector<T> values(count);
-  for (T& value : values)
-    value = std::is_floating_point_v<T> ? static_cast<T>(random.Normal() * 1e3) : static_cast<T>(random.Bits());
-  values[0] = std::numeric_limits<T>::lowest();
-  values[1] = std::numeric_limits<T>::max();
-  if (std::is_floating_point_v<T>)
-    values[2] = std::numeric_limits<T>::quiet_NaN();
-  return values;
-}
+constexpr std::array<int, 3> NoMultiples{21, 9, 17}; // of the leaves' 8
 
 class VdbFile : public TemporaryFolder {
 protected:
@@ -132,7 +106,7 @@ TEST_F(VdbFile, EveryTypeComesBackWithGeometryAndValidRegion)
       DispatchVoxelType(type, [&](auto zero) {
         using T = decltype(zero);
         SCOPED_TRACE(static_cast<int>(type));
-        const ImageHeader wanted = Oblique(type);
+        const ImageHeader wanted = Oblique(type, NoMultiples);
         const std::size_t count = wanted.geometry.VoxelCount();
         const std::vector<T> voxels = Values<T>(count); // also where they are not valid
         std::vector<unsigned char> valid(count);
@@ -158,7 +132,7 @@ TEST_F(VdbFile, EveryTypeComesBackWithGeometryAndValidRegion)
 
 TEST_F(VdbFile, ATurnedGridIsTurnedForOthersToo)
 {
-  const ImageHeader header = Oblique(VoxelType::UInt8);
+  const ImageHeader header = Oblique(VoxelType::UInt8, NoMultiples);
   const std::vector<unsigned char> voxels(header.geometry.VoxelCount(), 1);
   openvdb::io::File file(Write("a.vdb", header, voxels.data(), nullptr));
   file.open();
@@ -325,7 +299,7 @@ TEST_F(VdbFile, WhatIsNoVolumeIsRefused)
 
 TEST_F(VdbFile, TruncatedFilesAreRefused)
 {
-  const ImageHeader header = Oblique(VoxelType::UInt8);
+  const ImageHeader header = Oblique(VoxelType::UInt8, NoMultiples);
   const std::vector<unsigned char> voxels = Values<unsigned char>(header.geometry.VoxelCount());
   const std::string file = Bytes(Write("a.vdb", header, voxels.data(), nullptr));
   for (std::size_t length = 8; length < file.size(); length += 1 + length / 10)
@@ -394,7 +368,7 @@ TEST_F(VdbFile, SizesInBloscChunksAreChecked)
 
 TEST_F(VdbFile, RandomDamageNeverCrashes)
 {
-  ImageHeader header = Oblique(VoxelType::UInt8);
+  ImageHeader header = Oblique(VoxelType::UInt8, NoMultiples);
   const std::vector<unsigned char> voxels = Values<unsigned char>(header.geometry.VoxelCount());
   for (const bool compress : {true, false}) {
     const std::string good = Bytes(Write("a.vdb", header, voxels.data(), nullptr, compress));
@@ -424,7 +398,7 @@ TEST_F(VdbFile, WhatCannotBeWritten)
     ExpectRefused([&] { Write(name, header, voxels.data(), nullptr); }, kind, Path(name), words);
     EXPECT_EQ(FileCount(), 0);
   };
-  const ImageHeader good = Oblique(VoxelType::UInt8);
+  const ImageHeader good = Oblique(VoxelType::UInt8, NoMultiples);
   refused("a.vd", good, Error::Kind::InvalidParameter, ".vdb");
   refused("missing/a.vdb", good, Error::Kind::FileSystem, "folder");
   ImageHeader bad = good;

@@ -16,7 +16,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
 #include "Testing/Benchmark.h"
-#include "Tracking/Calibration/HandEyeClosedForms.h"
+#include "Tracking/Benchmarks/HandEyeContestants.h"
 #include "Tracking/Calibration/HandEyeSimulation.h"
 #include <algorithm>
 #include <cmath>
@@ -70,11 +70,9 @@ Pose SolveByOpenCV(cv::HandEyeCalibrationMethod method, const std::vector<HandEy
 std::vector<std::pair<std::string, Solver>> Contestants()
 {
   std::vector<std::pair<std::string, Solver>> contestants;
-  for (const std::string& name : HandEyeMethodNames())
-    if (name != "maximum-likelihood")
-      contestants.emplace_back(name, [name](const std::vector<HandEyePair>& pairs) {
-        return SolveHandEyeClosedForm(HandEyeMethodOf(name), pairs).volumeToSensor;
-      });
+  for (const HandEyeClosedForm& form : HandEyeClosedForms())
+    contestants.emplace_back(form.name,
+                             [&form](const std::vector<HandEyePair>& pairs) { return form.solve(pairs).volumeToSensor; });
 #ifdef ECHORAMA_WITH_OPENCV
   const std::pair<const char*, cv::HandEyeCalibrationMethod> methods[] = {{"opencv tsai", cv::CALIB_HAND_EYE_TSAI},
                                                                           {"opencv park", cv::CALIB_HAND_EYE_PARK},

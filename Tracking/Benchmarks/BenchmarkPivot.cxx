@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pivot calibration: time, error of the tip and how often the stated 95% region holds, beside the plain least squares that most
 // programs solve: all poses stacked into [R -I] [tip; pivot] = -t, by the singular value decomposition.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Testing/Benchmark.h"
 #include "Tracking/Calibration/PivotCalibration.h"
@@ -12,7 +13,6 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double DegreesPerRadian = 57.29577951308232;
 const int Trials = benchmark::Trials(500);
 const Vector3d Tip(12.0, -8.0, 150.0), Pivot(210.0, -35.0, 320.0);
 

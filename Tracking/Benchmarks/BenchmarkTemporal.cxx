@@ -2,6 +2,7 @@
 // Temporal calibration: time, error of the offset and how often 1.96 standard errors hold it, beside what is usually written by
 // hand: speeds by differences of neighbouring poses, put onto the faster stream's rate, and the highest sample of their
 // correlation.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Testing/Benchmark.h"
 #include "Tracking/Calibration/TemporalCalibration.h"
@@ -13,7 +14,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double DegreesPerRadian = 57.29577951308232, Offset = -0.4137;
+constexpr double Offset = -0.4137;
 const int Trials = benchmark::Trials(100);
 
 struct Case {

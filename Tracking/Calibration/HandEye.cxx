@@ -12,7 +12,6 @@
 #include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/HandEyeAdvice.h"
-#include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Tracking/Calibration/HandEyeDiagnosis.h"
 #include "Tracking/Calibration/HandEyeSearch.h"
 #include <algorithm>
@@ -27,20 +26,6 @@ constexpr std::size_t LeastForNoise = 5; // scans
 constexpr double SuspectScale = 1.3, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
 // Three scans agree by chance too easily to outvote another.
 constexpr std::size_t LeastMajority = 4, ManyScans = 8;
-
-struct MethodName {
-  HandEyeMethod method;
-  const char* name;
-};
-constexpr MethodName Methods[] = {
-    {HandEyeMethod::MaximumLikelihood, "maximum-likelihood"},
-    {HandEyeMethod::ShiuAhmad, "shiu-ahmad"},
-    {HandEyeMethod::TsaiLenz, "tsai-lenz"},
-    {HandEyeMethod::ParkMartin, "park-martin"},
-    {HandEyeMethod::Horaud, "horaud"},
-    {HandEyeMethod::Daniilidis, "daniilidis"},
-    {HandEyeMethod::Andreff, "andreff"},
-};
 
 void CheckNoise(const PoseNoise& noise, const char* side)
 {
@@ -89,34 +74,6 @@ std::string TypicalResidual(const HandEyeModel& model, const HandEyeSolution& so
 
 } // namespace
 
-const char* HandEyeMethodName(HandEyeMethod method)
-{
-  for (const MethodName& one : Methods)
-    if (one.method == method)
-      return one.name;
-  return "";
-}
-
-std::vector<std::string> HandEyeMethodNames()
-{
-  std::vector<std::string> names;
-  for (const MethodName& one : Methods)
-    names.emplace_back(one.name);
-  return names;
-}
-
-HandEyeMethod HandEyeMethodOf(const std::string& name)
-{
-  std::string list;
-  for (const MethodName& one : Methods) {
-    if (name == one.name)
-      return one.method;
-    list += (list.empty() ? "" : ", ") + std::string(one.name);
-  }
-  throw Error(Error::Kind::InvalidParameter,
-              "there is no hand-eye calibration method named \"" + name + "\"; there are: " + list);
-}
-
 void HandEyeParameters::Check() const
 {
   CheckNoise(sensorNoise, "sensor");
@@ -158,18 +115,16 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
 
   // The solution.
   const std::size_t count = pairs.size();
-  const bool likelihood = parameters.method == HandEyeMethod::MaximumLikelihood;
   const HandEyeModel model(pairs, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
   const auto search = [&](bool estimate, const Progress& part) {
-    return FindHandEyeConsensus(pairs, model, parameters.rejectOutliers || !likelihood, parameters.target, estimate,
-                                parameters.seed, part);
+    return FindHandEyeConsensus(pairs, model, parameters.rejectOutliers, parameters.target, estimate, parameters.seed, part);
   };
   const auto inliersOf = [](const HandEyeConsensus& found) {
     return static_cast<std::size_t>(std::count(found.inlier.begin(), found.inlier.end(), 1));
   };
   result.noiseEstimated = parameters.estimateNoise && count >= LeastForNoise;
   HandEyeConsensus consensus = search(result.noiseEstimated, progress.Part(0.0, 0.5));
-  if (result.noiseEstimated && likelihood && inliersOf(consensus) < LeastForNoise) {
+  if (result.noiseEstimated && inliersOf(consensus) < LeastForNoise) {
     result.noiseEstimated = false;
     consensus = search(false, progress.Part(0.5, 0.8));
   }
@@ -193,13 +148,6 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
       RefuseHandEye(
           "the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
           Format(" are left, %.3g times the noise stated. Check that every sensor pose belongs to its volume", consensus.scale));
-  }
-  if (!likelihood) {
-    consensus.inlier.assign(count, 1);
-    consensus.fit.solution = SolveHandEyeClosedForm(parameters.method, pairs);
-    consensus.square.clear();
-    result.notes.push_back(std::string("The covariance is that of the maximum likelihood, which ") +
-                           HandEyeMethodName(parameters.method) + " does not reach.");
   }
   result.solution = consensus.fit.solution;
   progress(0.9);

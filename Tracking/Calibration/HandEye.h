@@ -20,27 +20,12 @@ struct HandEyeSolution {
   Pose worldToTracker = Pose::Identity(); ///< O
 };
 
-/// The closed forms, as published; all weigh every pair the same and know of no outliers.
-enum class HandEyeMethod {
-  ShiuAhmad,  ///< dissertation 4.1.2; Shiu and Ahmad 1989: rotation, then translation, linear
-  TsaiLenz,   ///< 1989: modified Rodrigues vectors
-  ParkMartin, ///< 1994: logarithms of rotations
-  Horaud,     ///< Horaud and Dornaika 1995: unit quaternions
-  Daniilidis, ///< 1999: dual quaternions, rotation and translation together
-  Andreff,    ///< 1999: linear in the nine numbers of the rotation, made rigid, then translation
-  MaximumLikelihood
-};
-const char* HandEyeMethodName(HandEyeMethod method); ///< "shiu-ahmad", "tsai-lenz" ... "maximum-likelihood"
-std::vector<std::string> HandEyeMethodNames();
-HandEyeMethod HandEyeMethodOf(const std::string& name); ///< Throws Error(InvalidParameter) that lists the names.
-
 /// The standard deviation of a pose's noise, per axis.
 struct PoseNoise {
   double degrees = 0.25, mm = 0.7;
 };
 
 struct HandEyeParameters {
-  HandEyeMethod method = HandEyeMethod::MaximumLikelihood;
   PoseNoise sensorNoise; ///< of S, in the sensor's own axes; degrees in [0, 45], mm in [0, 100]
   PoseNoise volumeNoise; ///< of M, in the volume's axes about \a target; not both sides without noise
   /// Where in the volume the error counts: mm, in the volume's frame. Usually its centre.

@@ -4,8 +4,7 @@
 //
 // The turns of a motion have one axis on either side, k_A = R_C k_B. Its sign is lost at 180 degrees, where noise turns a into
 // -a. So beyond 150 degrees the sign is taken from the rotation of the equation that knows no axes, R_A R_C - R_C R_B = 0 in all
-// nine numbers (Andreff's). Unit axes of small turns are mostly noise; where a method speaks of unit axes (Shiu-Ahmad, Horaud) a
-// motion counts by the sine of half its angle, squared.
+// nine numbers (Andreff's).
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/SymmetricMatrix.h"
@@ -35,122 +34,6 @@ void AddKronecker(const Eigen::Matrix3d& B, const Eigen::Matrix3d& A, Matrix9& s
       sum.block<3, 3>(3 * row, 3 * column) += B(row, column) * A;
 }
 
-// A motion with its turns as vectors, whose signs belong together.
-struct Turn {
-  Eigen::Vector3d a, b; // rotation vectors of A and B
-  // sin(angle / 2) axis, and cos(angle / 2): the unit quaternions
-  Eigen::Vector4d QuaternionA() const { return Quaternion(a); }
-  Eigen::Vector4d QuaternionB() const { return Quaternion(b); }
-
-private:
-  static Eigen::Vector4d Quaternion(const Eigen::Vector3d& v) // x y z w
-  {
-    const double angle = v.norm();
-    const double s = angle < 1e-6 ? 0.5 : std::sin(0.5 * angle) / angle;
-    return {s * v.x(), s * v.y(), s * v.z(), std::cos(0.5 * angle)};
-  }
-};
-
-// R_A R_C = R_C R_B in all nine numbers: the eigenvector of the least eigenvalue (Andreff, Horaud, Espiau 1999).
-Eigen::Matrix3d AndreffRotation(const std::vector<HandEyeMotion>& motions)
-{
-  Matrix9 sum = Matrix9::Zero();
-  for (const HandEyeMotion& motion : motions)
-    AddKronecker(motion.volume.linear(), motion.sensor.linear(), sum); // R_A X R_B^T = X
-  Matrix9 normal = -sum - sum.transpose();
-  normal.diagonal().array() += 2.0 * static_cast<double>(motions.size());
-  return RotationOf(EigenOfSymmetric(normal).vectors.col(0));
-}
-
-std::vector<Turn> TurnsOf(const std::vector<HandEyeMotion>& motions)
-{
-  std::vector<Turn> turns;
-  turns.reserve(motions.size());
-  bool large = false;
-  for (const HandEyeMotion& motion : motions) {
-    turns.push_back({LogRotation(motion.sensor.linear()), LogRotation(motion.volume.linear())});
-    large = large || turns.back().a.norm() > LargeTurn || turns.back().b.norm() > LargeTurn;
-  }
-  if (large) {
-    const Eigen::Matrix3d rotation = AndreffRotation(motions);
-    for (Turn& turn : turns)
-      if (turn.b.norm() > LargeTurn && turn.a.dot(rotation * turn.b) < 0.0)
-        turn.b *= (turn.b.norm() - 2.0 * EIGEN_PI) / turn.b.norm(); // the same turn, the other way round
-  }
-  return turns;
-}
-
-// Shiu and Ahmad 1989: each motion leaves the turn of C about its axis open, C = k_A k_B^T + cos(b) Y + sin(b) Z; all these are
-// linear in the nine numbers of C and each motion's cosine and sine, which are eliminated.
-Eigen::Matrix3d ShiuAhmadRotation(const std::vector<Turn>& turns)
-{
-  Matrix9 normal = Matrix9::Zero();
-  Vector9 right = Vector9::Zero();
-  for (const Turn& turn : turns) {
-    if (turn.a.norm() < 1e-9 || turn.b.norm() < 1e-9)
-      continue;
-    const Eigen::Vector3d a = turn.a.normalized(), b = turn.b.normalized();
-    const double weight = std::pow(std::sin(0.5 * turn.b.norm()), 2);
-    const Eigen::Matrix3d some = Eigen::Quaterniond::FromTwoVectors(b, a).toRotationMatrix(); // takes k_B to k_A
-    const Eigen::Matrix3d x = a * b.transpose(), y = some - x, z = Hat(a) * some;
-    // |Y|^2 = |Z|^2 = 2, and Y, Z are orthogonal to each other and to X.
-    normal.diagonal().array() += weight;
-    for (const Eigen::Matrix3d* m : {&y, &z}) {
-      const Eigen::Map<const Vector9> vec(m->data());
-      normal -= 0.5 * weight * vec * vec.transpose();
-    }
-    right += weight * Eigen::Map<const Vector9>(x.data());
-  }
-  return RotationOf(SolveSymmetric(normal, right));
-}
-
-// Tsai and Lenz 1989: (P_A + P_B) x p = P_B - P_A with P the axis times 2 sin(angle / 2) and p that of C times tan(angle / 2).
-// p is infinite where C turns by 180 degrees. So C is sought as C' Q, with Q the identity or half a turn about an axis of the
-// volume: of the four, one C' turns by 120 degrees at most. The one that takes the axes of B closest to those of A counts.
-Eigen::Matrix3d TsaiLenzRotation(const std::vector<Turn>& turns)
-{
-  Eigen::Matrix3d best = Eigen::Matrix3d::Identity();
-  double bestError = -1.0;
-  for (int half = 0; half < 4; ++half) {
-    Eigen::Vector3d q = -Eigen::Vector3d::Ones(); // the diagonal of Q
-    if (half == 3)
-      q.setOnes();
-    else
-      q[half] = 1.0;
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (const Turn& turn : turns) {
-      const Eigen::Vector3d a = 2.0 * turn.QuaternionA().head<3>();
-      const Eigen::Vector3d b = q.cwiseProduct(2.0 * turn.QuaternionB().head<3>());
-      const Eigen::Matrix3d cross = Hat(a + b);
-      normal += cross.transpose() * cross;
-      right += cross.transpose() * (b - a);
-    }
-    const Eigen::Vector3d p = SolveSymmetric(normal, right);
-    if (!p.allFinite())
-      continue;
-    const Eigen::Matrix3d rotation =
-        Eigen::Quaterniond(1.0, p.x(), p.y(), p.z()).normalized().toRotationMatrix() * q.asDiagonal();
-    double error = 0.0;
-    for (const Turn& turn : turns)
-      error += (turn.a - rotation * turn.b).squaredNorm();
-    if (bestError < 0.0 || error < bestError) {
-      bestError = error;
-      best = rotation;
-    }
-  }
-  return best;
-}
-
-// Park and Martin 1994: the rotation that takes the rotation vectors of B closest to those of A.
-Eigen::Matrix3d ParkMartinRotation(const std::vector<Turn>& turns)
-{
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const Turn& turn : turns)
-    sum += turn.a * turn.b.transpose();
-  return NearestRotation(sum);
-}
-
 // The matrices of quaternion multiplication, x y z w: p q = Left(p) q = Right(q) p.
 Eigen::Matrix4d Left(const Eigen::Vector4d& p)
 {
@@ -173,17 +56,6 @@ Eigen::Matrix3d RotationOfQuaternion(const Eigen::Vector4d& q)
   return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
 }
 
-// Horaud and Dornaika 1995: q_A q = q q_B for unit quaternions, with |q| = 1.
-Eigen::Matrix3d HoraudRotation(const std::vector<Turn>& turns)
-{
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  for (const Turn& turn : turns) {
-    const Eigen::Matrix4d open = Left(turn.QuaternionA()) - Right(turn.QuaternionB());
-    normal += open.transpose() * open;
-  }
-  return RotationOfQuaternion(EigenOfSymmetric(normal).vectors.col(0));
-}
-
 Eigen::Vector3d TranslationOf(const Eigen::Matrix3d& rotation, const std::vector<HandEyeMotion>& motions)
 {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
@@ -199,7 +71,7 @@ Eigen::Vector3d TranslationOf(const Eigen::Matrix3d& rotation, const std::vector
 // Daniilidis 1999: with dual quaternions, vector parts only, a motion gives six rows in the eight numbers (q, q') of C. Its
 // null space has two dimensions; |q| = 1 and q q' = 0 pick the answer. Rotations and translations are weighed against each other
 // by the unit of length, here the root mean square translation of the motions.
-Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector<Turn>& turns)
+Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector<HandEyeTurn>& turns)
 {
   double unit = 0.0;
   for (const HandEyeMotion& motion : motions)
@@ -209,7 +81,7 @@ Pose DaniilidisPose(const std::vector<HandEyeMotion>& motions, const std::vector
 
   Matrix8 normal = Matrix8::Zero();
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    const Eigen::Vector4d a = turns[i].QuaternionA(), b = turns[i].QuaternionB();
+    const Eigen::Vector4d a = HandEyeTurn::Quaternion(turns[i].a), b = HandEyeTurn::Quaternion(turns[i].b);
     const auto dual = [unit](const Eigen::Vector3d& t, const Eigen::Vector4d& q) {
       return Eigen::Vector4d(0.5 / unit * (Left(Eigen::Vector4d(t.x(), t.y(), t.z(), 0.0)) * q));
     };
@@ -278,8 +150,16 @@ void NeedTwo(const std::vector<HandEyePair>& pairs)
 
 } // namespace
 
+Eigen::Vector4d HandEyeTurn::Quaternion(const Eigen::Vector3d& v)
+{
+  const double angle = v.norm();
+  const double s = angle < 1e-6 ? 0.5 : std::sin(0.5 * angle) / angle;
+  return {s * v.x(), s * v.y(), s * v.z(), std::cos(0.5 * angle)};
+}
+
 std::vector<HandEyeMotion> HandEyeMotions(const std::vector<HandEyePair>& pairs)
 {
+  NeedTwo(pairs);
   std::vector<HandEyeMotion> motions;
   motions.reserve(pairs.size() * (pairs.size() - 1) / 2);
   for (std::size_t i = 0; i < pairs.size(); ++i)
@@ -289,37 +169,59 @@ std::vector<HandEyeMotion> HandEyeMotions(const std::vector<HandEyePair>& pairs)
   return motions;
 }
 
-HandEyeSolution SolveHandEyeClosedForm(HandEyeMethod method, const std::vector<HandEyePair>& pairs)
+Eigen::Matrix3d AndreffRotation(const std::vector<HandEyeMotion>& motions)
 {
-  NeedTwo(pairs);
+  Matrix9 sum = Matrix9::Zero();
+  for (const HandEyeMotion& motion : motions)
+    AddKronecker(motion.volume.linear(), motion.sensor.linear(), sum); // R_A X R_B^T = X
+  Matrix9 normal = -sum - sum.transpose();
+  normal.diagonal().array() += 2.0 * static_cast<double>(motions.size());
+  return RotationOf(EigenOfSymmetric(normal).vectors.col(0));
+}
+
+std::vector<HandEyeTurn> HandEyeTurns(const std::vector<HandEyeMotion>& motions)
+{
+  std::vector<HandEyeTurn> turns;
+  turns.reserve(motions.size());
+  bool large = false;
+  for (const HandEyeMotion& motion : motions) {
+    turns.push_back({LogRotation(motion.sensor.linear()), LogRotation(motion.volume.linear())});
+    large = large || turns.back().a.norm() > LargeTurn || turns.back().b.norm() > LargeTurn;
+  }
+  if (large) {
+    const Eigen::Matrix3d rotation = AndreffRotation(motions);
+    for (HandEyeTurn& turn : turns)
+      if (turn.b.norm() > LargeTurn && turn.a.dot(rotation * turn.b) < 0.0)
+        turn.b *= (turn.b.norm() - 2.0 * EIGEN_PI) / turn.b.norm(); // the same turn, the other way round
+  }
+  return turns;
+}
+
+HandEyeSolution HandEyeSolutionOf(const Eigen::Matrix3d& rotation, const std::vector<HandEyeMotion>& motions,
+                                  const std::vector<HandEyePair>& pairs)
+{
+  HandEyeSolution solution;
+  solution.volumeToSensor.linear() = rotation;
+  solution.volumeToSensor.translation() = TranslationOf(rotation, motions);
+  solution.worldToTracker = WorldToTrackerOf(solution.volumeToSensor, pairs);
+  return solution;
+}
+
+HandEyeSolution SolveHandEyeParkMartin(const std::vector<HandEyePair>& pairs)
+{
+  const std::vector<HandEyeMotion> motions = HandEyeMotions(pairs);
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const HandEyeTurn& turn : HandEyeTurns(motions))
+    sum += turn.a * turn.b.transpose();
+  return HandEyeSolutionOf(NearestRotation(sum), motions, pairs);
+}
+
+HandEyeSolution SolveHandEyeDaniilidis(const std::vector<HandEyePair>& pairs)
+{
   const std::vector<HandEyeMotion> motions = HandEyeMotions(pairs);
   HandEyeSolution solution;
-  Pose& C = solution.volumeToSensor;
-  switch (method) {
-  case HandEyeMethod::ShiuAhmad:
-    C.linear() = ShiuAhmadRotation(TurnsOf(motions));
-    break;
-  case HandEyeMethod::TsaiLenz:
-    C.linear() = TsaiLenzRotation(TurnsOf(motions));
-    break;
-  case HandEyeMethod::ParkMartin:
-    C.linear() = ParkMartinRotation(TurnsOf(motions));
-    break;
-  case HandEyeMethod::Horaud:
-    C.linear() = HoraudRotation(TurnsOf(motions));
-    break;
-  case HandEyeMethod::Andreff:
-    C.linear() = AndreffRotation(motions);
-    break;
-  case HandEyeMethod::Daniilidis:
-    C = DaniilidisPose(motions, TurnsOf(motions));
-    break;
-  case HandEyeMethod::MaximumLikelihood:
-    throw Error(Error::Kind::InvalidParameter, "hand-eye calibration: maximum-likelihood is no closed form");
-  }
-  if (method != HandEyeMethod::Daniilidis)
-    C.translation() = TranslationOf(C.linear(), motions);
-  solution.worldToTracker = WorldToTrackerOf(C, pairs);
+  solution.volumeToSensor = DaniilidisPose(motions, HandEyeTurns(motions));
+  solution.worldToTracker = WorldToTrackerOf(solution.volumeToSensor, pairs);
   return solution;
 }
 

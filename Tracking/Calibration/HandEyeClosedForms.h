@@ -13,15 +13,32 @@ struct HandEyeMotion {
 };
 
 /// The motions between all pairs of scans, n (n - 1) / 2, not only between neighbours: a short way round is not better than a
-/// long one, and each says something.
+/// long one, and each says something. \throws Error(NotPossible) for fewer than two pairs, as all that need them.
 std::vector<HandEyeMotion> HandEyeMotions(const std::vector<HandEyePair>& pairs);
 
-/// C and O by one of the closed forms. O is the mean of what each scan says of it, given C.
+/// The turns of a motion as rotation vectors, whose signs belong together.
+struct HandEyeTurn {
+  Eigen::Vector3d a, b;                                      ///< of A and B
+  static Eigen::Vector4d Quaternion(const Eigen::Vector3d&); ///< sin(angle / 2) axis, cos(angle / 2)
+};
+std::vector<HandEyeTurn> HandEyeTurns(const std::vector<HandEyeMotion>& motions);
+
+/// The rotation of C from R_A R_C = R_C R_B in all nine numbers, linear, made a rotation (Andreff, Horaud, Espiau 1999).
+Eigen::Matrix3d AndreffRotation(const std::vector<HandEyeMotion>& motions);
+
+/// C of this rotation, with its translation by linear least squares, and O, the mean of what each scan says of it, given C.
+HandEyeSolution HandEyeSolutionOf(const Eigen::Matrix3d& rotation, const std::vector<HandEyeMotion>& motions,
+                                  const std::vector<HandEyePair>& pairs);
+
+///@{
+/// The closed forms that the search for the maximum likelihood starts from: the rotation that takes the rotation vectors of B
+/// closest to those of A (Park and Martin 1994), and dual quaternions, rotation and translation together (Daniilidis 1999).
 ///
 /// Nothing is refused: too little motion gives a rigid answer without meaning, which CalibrateHandEye finds out.
-/// \throws Error(InvalidParameter) for MaximumLikelihood, which is none; Error(NotPossible) for fewer than two pairs.
 /// Cost: quadratic in the number of scans; 20 scans take some 0.05 ms.
-HandEyeSolution SolveHandEyeClosedForm(HandEyeMethod method, const std::vector<HandEyePair>& pairs);
+HandEyeSolution SolveHandEyeParkMartin(const std::vector<HandEyePair>& pairs);
+HandEyeSolution SolveHandEyeDaniilidis(const std::vector<HandEyePair>& pairs);
+///@}
 
 /// C and O from all scans at once, without motions (Shah 2013): the rotations are the leading singular vectors of the sum of the
 /// Kronecker products of M_i and S_i, made rotations. Linear in the number of scans and blind to the sign of a turn by 180

@@ -85,8 +85,8 @@ std::vector<HandEyeSolution> Starts(const std::vector<HandEyePair>& pairs, bool 
     for (std::size_t i = 0; i < ClosedFormScans; ++i)
       some.push_back(pairs[i * count / ClosedFormScans]);
   }
-  for (const HandEyeMethod method : {HandEyeMethod::ParkMartin, HandEyeMethod::Daniilidis})
-    starts.push_back(SolveHandEyeClosedForm(method, some));
+  starts.push_back(SolveHandEyeParkMartin(some));
+  starts.push_back(SolveHandEyeDaniilidis(some));
   if (!withTriples)
     return starts;
 

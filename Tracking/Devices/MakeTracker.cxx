@@ -7,7 +7,6 @@
 #include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
-#include "Tracking/Devices/UdpTracker.h"
 
 namespace echorama {
 namespace {
@@ -32,7 +31,6 @@ const std::vector<Kind>& Kinds()
       {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>},
       {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
       {PolhemusTracker::Scheme, Make<PolhemusTracker>},
-      {UdpTracker::Scheme, Make<UdpTracker>},
   };
   return kinds;
 }

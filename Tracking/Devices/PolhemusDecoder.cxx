@@ -7,6 +7,7 @@
 //
 // Where something does not fit, one byte is skipped, not the record: when bytes were lost, the next record begins within it.
 #include "Tracking/Devices/PolhemusDecoder.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -18,8 +19,7 @@ namespace echorama {
 namespace {
 
 constexpr std::size_t HeaderBytes = 8;
-constexpr std::size_t LongestLine = 400; // the longest record of text has some 190
-constexpr double Degree = 0.017453292519943295;
+constexpr std::size_t LongestLine = 400;      // the longest record of text has some 190
 constexpr double UnitTolerance = 1e-3;        // length of a quaternion
 constexpr double OrientationTolerance = 2e-3; // radians between the two copies: 0.1 degrees; text rounds to 5 decimals
 constexpr double BinaryCopyTolerance = 1e-3;  // of the device's units between the two copies of a position
@@ -455,9 +455,9 @@ std::string PolhemusDecoder::Understand(const Fields& f, PolhemusRecord& record)
   }
   if (f.euler) {
     using Axis = Eigen::AngleAxisd;
-    const Eigen::Quaterniond copy = Axis((*f.euler)[0] * Degree, Eigen::Vector3d::UnitZ()) *
-                                    Axis((*f.euler)[1] * Degree, Eigen::Vector3d::UnitY()) *
-                                    Axis((*f.euler)[2] * Degree, Eigen::Vector3d::UnitX());
+    const Eigen::Quaterniond copy = Axis((*f.euler)[0] * RadiansPerDegree, Eigen::Vector3d::UnitZ()) *
+                                    Axis((*f.euler)[1] * RadiansPerDegree, Eigen::Vector3d::UnitY()) *
+                                    Axis((*f.euler)[2] * RadiansPerDegree, Eigen::Vector3d::UnitX());
     if (!(f.euler->cwiseAbs().maxCoeff() <= 360.0) || !(copy.angularDistance(turn) <= OrientationTolerance))
       return "an orientation that differs from its copy";
   }

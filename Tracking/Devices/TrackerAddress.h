@@ -13,7 +13,6 @@ namespace echorama {
 /// | igtl        | //HOST:PORT               | OpenIGTLink, we are the client (of Plus, of Slicer)    |
 /// | igtl-listen | //HOST:PORT               | OpenIGTLink, we are the server; loopback by default    |
 /// | polhemus    | /dev/ttyUSB0              | Polhemus Patriot or Liberty on a serial line           |
-/// | udp         | //HOST:PORT               | our own pose packets                                   |
 /// | replay      | FILE                      | a recording                                            |
 /// | simulated   | (none)                    | a tracker that does not exist, with its faults         |
 struct TrackerAddress {

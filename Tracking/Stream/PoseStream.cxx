@@ -75,8 +75,8 @@ const char* DeviceStateText(DeviceState state)
 
 const char* RejectionText(Rejection reason)
 {
-  static const char* const texts[RejectionCount] = {"malformed", "too large", "replayed",     "foreign",
-                                                    "not rigid", "duplicate", "out of order", "too many tools"};
+  static const char* const texts[RejectionCount] = {"malformed", "too large",    "foreign",       "not rigid",
+                                                    "duplicate", "out of order", "too many tools"};
   return texts[static_cast<int>(reason)];
 }
 

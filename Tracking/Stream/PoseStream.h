@@ -38,14 +38,13 @@ const char* DeviceStateText(DeviceState state); ///< "idle", "connecting" ...
 enum class Rejection {
   Malformed,    ///< not what the format says: lengths, checks, words
   TooLarge,     ///< a length beyond what a tracker sends
-  Replayed,     ///< older than what has come already
-  Foreign,      ///< from another sender, or for another receiver
+  Foreign,      ///< from a sender beyond those that are listened to
   NotRigid,     ///< a matrix that is no pose; the tool counts as Missing at that moment
   Duplicate,    ///< the same tool and time again
   OutOfOrder,   ///< older than the newest of its tool, but by less than a jump of the clock
   TooManyTools, ///< beyond StreamLimits::tools
 };
-inline constexpr int RejectionCount = 8;
+inline constexpr int RejectionCount = 7;
 const char* RejectionText(Rejection reason); ///< "malformed", "too large" ...
 
 /// How one tool has come so far. Counts are of all time; the rest is of the poses that are remembered (StreamLimits), and 0 when

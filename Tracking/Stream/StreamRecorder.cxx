@@ -145,4 +145,14 @@ void StreamRecorder::Stop()
     throw Error(*p.error);
 }
 
+void StreamRecorder::StopIfAnything()
+{
+  try {
+    Stop();
+  } catch (const Error& error) {
+    if (error.GetKind() != Error::Kind::BadInput || State().frames > 0)
+      throw;
+  }
+}
+
 } // namespace echorama

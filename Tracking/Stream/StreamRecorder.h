@@ -41,6 +41,8 @@ public:
   /// \throws Error(FileSystem) when the disk is full, Error(BadInput) when no pose came; there is no file then.
   /// Error(NotPossible) when something else ended it, such as a lack of memory; what is safe stays.
   void Stop();
+  /// The same, but that nothing came is no fault.
+  void StopIfAnything();
 
 private:
   struct Parts;

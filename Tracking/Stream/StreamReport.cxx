@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Stream/StreamReport.h"
+#include "Core/Base/JsonPlace.h"
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace echorama {
 namespace {
@@ -13,7 +13,7 @@ nlohmann::ordered_json Known(double value)
 
 } // namespace
 
-std::string StreamReport(const StreamStatistics& statistics)
+nlohmann::ordered_json ToJson(const StreamStatistics& statistics)
 {
   nlohmann::ordered_json report;
   report["state"] = DeviceStateText(statistics.state);
@@ -24,23 +24,28 @@ std::string StreamReport(const StreamStatistics& statistics)
     report["tools"].push_back({{"name", tool.name},
                                {"valid", tool.valid},
                                {"missing", tool.missing},
-                               {"outOfRange", tool.outOfRange},
-                               {"dropoutShare", Known(tool.DropoutShare())},
-                               {"clockJumps", tool.clockJumps},
+                               {"out_of_range", tool.outOfRange},
+                               {"dropout_share", Known(tool.DropoutShare())},
+                               {"clock_jumps", tool.clockJumps},
                                {"remembered", tool.remembered},
                                {"gaps", tool.gaps},
-                               {"longestGapSeconds", Known(tool.longestGapSeconds)},
-                               {"rateHz", Known(tool.rateHz)},
-                               {"jitterSeconds", Known(tool.jitterSeconds)},
-                               {"medianLatencySeconds", Known(tool.medianLatencySeconds)},
-                               {"latencySpreadSeconds", Known(tool.latencySpreadSeconds)},
-                               {"secondsSinceLast", Known(tool.secondsSinceLast)}});
+                               {"longest_gap_seconds", Known(tool.longestGapSeconds)},
+                               {"rate_hz", Known(tool.rateHz)},
+                               {"jitter_seconds", Known(tool.jitterSeconds)},
+                               {"median_latency_seconds", Known(tool.medianLatencySeconds)},
+                               {"latency_spread_seconds", Known(tool.latencySpreadSeconds)},
+                               {"seconds_since_last", Known(tool.secondsSinceLast)}});
   report["rejected"] = nlohmann::ordered_json::object();
   for (int i = 0; i < RejectionCount; ++i)
     if (const std::uint64_t count = statistics.Rejected(static_cast<Rejection>(i)); count > 0)
       report["rejected"][RejectionText(static_cast<Rejection>(i))] = count;
-  report["lastRejection"] = statistics.lastRejection;
-  return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  report["last_rejection"] = statistics.lastRejection;
+  return report;
+}
+
+std::string StreamReport(const StreamStatistics& statistics)
+{
+  return JsonPlace::Print(ToJson(statistics));
 }
 
 } // namespace echorama

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Core/Base/Worker.h"
 #include "PseudoTerminal.h"
@@ -71,7 +72,7 @@ inline std::string EncodePolhemus(const PolhemusSpeech& speech, int station, con
   const Eigen::Matrix3d& R = pose.linear();
   const double elevation = std::asin(std::clamp(-R(2, 0), -1.0, 1.0));
   const Eigen::Vector3d euler =
-      Eigen::Vector3d(std::atan2(R(1, 0), R(0, 0)), elevation, std::atan2(R(2, 1), R(2, 2))) * 57.29577951308232;
+      Eigen::Vector3d(std::atan2(R(1, 0), R(0, 0)), elevation, std::atan2(R(2, 1), R(2, 2))) * DegreesPerRadian;
   for (const PolhemusItem item : speech.layout) {
     switch (item) {
     case PolhemusItem::LineEnd:

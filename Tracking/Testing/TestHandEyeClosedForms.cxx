@@ -2,17 +2,16 @@
 // Each closed form against exact data, where it must be exact, and against noise, where it must be near the Cramer-Rao bound.
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Tracking/Benchmarks/HandEyeContestants.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Tracking/Calibration/HandEyeSimulation.h"
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 
 using namespace echorama;
 
 namespace {
-
-const HandEyeMethod ClosedForms[] = {HandEyeMethod::ShiuAhmad, HandEyeMethod::TsaiLenz,   HandEyeMethod::ParkMartin,
-                                     HandEyeMethod::Horaud,    HandEyeMethod::Daniilidis, HandEyeMethod::Andreff};
 
 // How far two poses carry points of a ball of 100 mm from each other, at most.
 double Distance(const Pose& a, const Pose& b)
@@ -46,17 +45,9 @@ Pose SomeC()
   return C;
 }
 
-std::string NameOf(HandEyeMethod method)
-{
-  std::string name = HandEyeMethodName(method);
-  for (char& c : name)
-    c = c == '-' ? '_' : c;
-  return name;
-}
+class ClosedForm : public testing::TestWithParam<HandEyeClosedForm> {};
 
-class HandEyeClosedForm : public testing::TestWithParam<HandEyeMethod> {};
-
-TEST_P(HandEyeClosedForm, IsExactOnExactData)
+TEST_P(ClosedForm, IsExactOnExactData)
 {
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
     for (const double degrees : {10.0, 60.0, 170.0}) {
@@ -65,43 +56,43 @@ TEST_P(HandEyeClosedForm, IsExactOnExactData)
       scenario.degrees = degrees;
       scenario.seed = seed;
       const HandEyeSimulation simulation = SimulateHandEye(scenario);
-      const HandEyeSolution solution = SolveHandEyeClosedForm(GetParam(), simulation.exactPairs);
+      const HandEyeSolution solution = GetParam().solve(simulation.exactPairs);
       EXPECT_LT(Distance(solution.volumeToSensor, simulation.truth.volumeToSensor), 1e-5) << seed << " " << degrees;
       EXPECT_LT(Distance(solution.worldToTracker, simulation.truth.worldToTracker), 1e-4) << seed << " " << degrees;
     }
 }
 
-TEST_P(HandEyeClosedForm, IsExactForHalfTurns)
+TEST_P(ClosedForm, IsExactForHalfTurns)
 {
   // Half turns from the first to others, and one that is none: half turns about x, y and z alone commute and leave four answers.
   const double pi = EIGEN_PI;
   for (const Pose& C : {SomeC(), Pose(Pose::Identity())}) {
     const HandEyeSimulation simulation = Exact({{0.0, 0.0, 0.0}, {pi, 0.0, 0.0}, {0.0, pi, 0.0}, {0.4, 0.5, -0.3}}, C);
-    EXPECT_LT(Distance(SolveHandEyeClosedForm(GetParam(), simulation.pairs).volumeToSensor, C), 1e-5);
+    EXPECT_LT(Distance(GetParam().solve(simulation.pairs).volumeToSensor, C), 1e-5);
   }
   const HandEyeSimulation near =
       Exact({{0.0, 0.0, 0.0}, {3.13, 0.1, 0.0}, {0.0, 3.14, -0.1}, {0.1, 0.0, 3.12}, {1.0, 0.3, 0.2}}, SomeC());
-  EXPECT_LT(Distance(SolveHandEyeClosedForm(GetParam(), near.pairs).volumeToSensor, SomeC()), 1e-5);
+  EXPECT_LT(Distance(GetParam().solve(near.pairs).volumeToSensor, SomeC()), 1e-5);
 }
 
-TEST_P(HandEyeClosedForm, FindsCalibrationsThatAreHalfTurns)
+TEST_P(ClosedForm, FindsCalibrationsThatAreHalfTurns)
 {
   for (const Eigen::Vector3d& axis :
        {Eigen::Vector3d(1.0, 0.0, 0.0), Eigen::Vector3d(0.0, 0.6, 0.8), Eigen::Vector3d(0.0, 0.0, 1.0)}) {
     Pose C = SomeC();
     C.linear() = ExpRotation(EIGEN_PI * axis);
     const HandEyeSimulation simulation = Exact({{0.0, 0.0, 0.0}, {0.5, 0.1, 0.0}, {0.0, -0.7, 0.3}, {0.2, 0.2, 0.9}}, C);
-    EXPECT_LT(Distance(SolveHandEyeClosedForm(GetParam(), simulation.pairs).volumeToSensor, C), 1e-5);
+    EXPECT_LT(Distance(GetParam().solve(simulation.pairs).volumeToSensor, C), 1e-5);
   }
 }
 
-TEST_P(HandEyeClosedForm, IsNearTheBoundWithNoise)
+TEST_P(ClosedForm, IsNearTheBoundWithNoise)
 {
   double error = 0.0, bound = 0.0;
   HandEyeScenario scenario;
   for (scenario.seed = 1; scenario.seed <= 100; ++scenario.seed) {
     const HandEyeSimulation simulation = SimulateHandEye(scenario);
-    const HandEyeSolution solution = SolveHandEyeClosedForm(GetParam(), simulation.pairs);
+    const HandEyeSolution solution = GetParam().solve(simulation.pairs);
     error += (solution.volumeToSensor * scenario.target - simulation.truth.volumeToSensor * scenario.target).squaredNorm();
     bound += HandEyeBound(scenario, simulation).trace();
   }
@@ -109,7 +100,7 @@ TEST_P(HandEyeClosedForm, IsNearTheBoundWithNoise)
   EXPECT_GT(std::sqrt(error / bound), 0.85);
 }
 
-TEST_P(HandEyeClosedForm, IsNotFooledByNoiseNearHalfTurns)
+TEST_P(ClosedForm, IsNotFooledByNoiseNearHalfTurns)
 {
   // Half of the poses are turned by about 180 degrees from the other half, so that noise flips axes.
   double error = 0.0, bound = 0.0;
@@ -127,15 +118,18 @@ TEST_P(HandEyeClosedForm, IsNotFooledByNoiseNearHalfTurns)
         pair.sensorToTracker = pair.sensorToTracker * C * half * C.inverse();
       }
     }
-    const HandEyeSolution solution = SolveHandEyeClosedForm(GetParam(), simulation.pairs);
+    const HandEyeSolution solution = GetParam().solve(simulation.pairs);
     error += (solution.volumeToSensor * scenario.target - simulation.truth.volumeToSensor * scenario.target).squaredNorm();
     bound += HandEyeBound(scenario, simulation).trace();
   }
   EXPECT_LT(std::sqrt(error / bound), 1.6);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, HandEyeClosedForm, testing::ValuesIn(ClosedForms),
-                         [](const auto& one) { return NameOf(one.param); });
+INSTANTIATE_TEST_SUITE_P(All, ClosedForm, testing::ValuesIn(HandEyeClosedForms()), [](const auto& one) {
+  std::string name = one.param.name;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
 
 TEST(HandEyeClosedForms, KroneckerIsExactAlsoForHalfTurns)
 {
@@ -159,9 +153,9 @@ TEST(HandEyeClosedForms, AllPairsOfScansAreMotions)
 
 TEST(HandEyeClosedForms, Refuse)
 {
-  EXPECT_THROW(SolveHandEyeClosedForm(HandEyeMethod::ParkMartin, {HandEyePair()}), Error);
+  for (const HandEyeClosedForm& form : HandEyeClosedForms())
+    EXPECT_THROW(form.solve({HandEyePair()}), Error) << form.name;
   EXPECT_THROW(SolveHandEyeByKronecker({}), Error);
-  EXPECT_THROW(SolveHandEyeClosedForm(HandEyeMethod::MaximumLikelihood, {HandEyePair(), HandEyePair()}), Error);
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 #include "Readers/PoseLog.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Testing/Sanitized.h"
+#include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/PivotCalibration.h"
 #include <cmath>
 #include <functional>
@@ -161,6 +162,77 @@ TEST(PivotCalibration, OutliersAreNamed)
   const PivotResult result = CalibratePivot(poses, all);
   EXPECT_EQ(result.inliers, 100);
   EXPECT_TRUE(HasNote(result, "times what the noise explains"));
+}
+
+// The same in other units, with outliers and the noise as it is stated: only poses close to the tip may decide where to begin.
+TEST(PivotCalibration, OutliersAreFoundInAnyUnit)
+{
+  PivotParameters parameters;
+  parameters.estimateNoise = false;
+  std::vector<TimedPose> poses = Turned({}, 300);
+  Random random(7);
+  for (std::size_t i = 0; i < 40; ++i)
+    poses[i].pose.translation() += random.Uniform(15.0, 100.0) * random.Direction();
+  const PivotResult expected = CalibratePivot(poses, parameters);
+  EXPECT_EQ(expected.inliers, 60);
+  EXPECT_LT((expected.tip - Tip).norm(), 1.5 * expected.tipRadius95Mm);
+  const double mm = parameters.noise.mm;
+  for (const double unit : {0.01, 100.0}) {
+    SCOPED_TRACE(unit);
+    std::vector<TimedPose> scaled = poses;
+    for (TimedPose& pose : scaled)
+      pose.pose.translation() *= unit;
+    parameters.noise.mm = unit * mm;
+    const PivotResult result = CalibratePivot(scaled, parameters);
+    EXPECT_EQ(result.inliers, expected.inliers);
+    EXPECT_LT((result.tip / unit - expected.tip).norm(), 1e-5);
+    EXPECT_NEAR(result.tipRadius95Mm / unit, expected.tipRadius95Mm, 1e-6);
+  }
+}
+
+// Three numbers per pose, less the six that are fitted.
+TEST(PivotCalibration, TheRegionOfFewPosesKnowsThatTheyAreFew)
+{
+  PivotParameters parameters;
+  parameters.rejectOutliers = false;
+  for (const int count : {4, 5, 9})
+    for (const bool estimate : {false, true}) {
+      parameters.estimateNoise = estimate;
+      const PivotResult result = CalibratePivot(Turned({count, 30.0, 60.0, {0.25, 0.7}}, 3), parameters);
+      const Eigen::Matrix3d covariance = result.covariance.topLeftCorner<3, 3>();
+      EXPECT_DOUBLE_EQ(result.tipRadius95Mm, ConfidenceRadius(covariance, estimate ? 3 * count - 6 : 0)) << count;
+    }
+}
+
+// Positions on a circle lie on many spheres. Those of a cap of b degrees (RMS) tell theirs by how far they leave the plane, which
+// goes with the square of b.
+TEST(PivotCalibration, ASphereIsKnownWhenThePositionsMakeOne)
+{
+  const auto sphereOf = [](double tiltDegrees, bool circle) {
+    std::vector<TimedPose> poses;
+    for (int i = 0; i < 200; ++i) {
+      // About the lever it spins freely; the lever leans by as much everywhere, or by anything up to twice that.
+      const double azimuth = 2.4 * i, lean = circle ? 1.0 : 2.0 * std::sqrt((i + 0.5) / 200.0) / std::sqrt(2.0);
+      const Vector3d lever = Tip.normalized(), side = lever.unitOrthogonal(), other = lever.cross(side);
+      const double radians = tiltDegrees * std::sqrt(2.0) / DegreesPerRadian * lean;
+      Pose pose = Pose::Identity();
+      pose.linear() = ExpRotation(radians * (std::cos(azimuth) * side + std::sin(azimuth) * other)) *
+                      ExpRotation(0.7 * std::sin(1.3 * i) * lever);
+      pose.translation() = Pivot - pose.linear() * Tip;
+      poses.push_back({i / 60.0, pose});
+    }
+    PivotParameters parameters;
+    parameters.leastSwingDegrees = 0.5;
+    return CalibratePivot(poses, parameters).sphere;
+  };
+  EXPECT_FALSE(sphereOf(20.0, true).known);
+  EXPECT_FALSE(sphereOf(1.2, false).known);
+  for (const double degrees : {2.5, 20.0}) {
+    const PivotSphere sphere = sphereOf(degrees, false);
+    ASSERT_TRUE(sphere.known) << degrees;
+    EXPECT_NEAR(sphere.radiusMm, Tip.norm(), 1e-4) << degrees;
+    EXPECT_LT((sphere.centre - Pivot).norm(), 1e-4) << degrees;
+  }
 }
 
 TEST(PivotCalibration, StatedNoiseIsComparedWithTheResiduals)

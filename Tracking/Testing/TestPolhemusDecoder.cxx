@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "PolhemusEmulator.h"
 #include "Tracking/Devices/DeviceClock.h"
@@ -18,7 +19,7 @@ std::vector<PolhemusRecord> Decode(PolhemusDecoder& decoder, const std::string& 
 
 double DegreesBetween(const Pose& a, const Pose& b)
 {
-  return RotationAngle(a.inverse() * b) * 57.29577951308232;
+  return RotationAngle(a.inverse() * b) * DegreesPerRadian;
 }
 
 PolhemusSpeech Speech(PolhemusFormat format, const PolhemusLayout& layout, PolhemusModel model = PolhemusModel::Patriot)

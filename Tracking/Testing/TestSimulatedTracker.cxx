@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Stream/Clock.h"
@@ -9,7 +10,7 @@ using namespace echorama;
 
 namespace {
 
-constexpr double Degrees = 57.29577951308232;
+constexpr double Degrees = DegreesPerRadian;
 
 double Distance(const Pose& a, const Pose& b)
 {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Stream/StreamReport.h"
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 using namespace echorama;
 
@@ -19,8 +18,8 @@ TEST(StreamReport, SaysWhatTheStatisticsSay)
   ASSERT_EQ(report["tools"].size(), 1u);
   EXPECT_EQ(report["tools"][0]["name"], "ProbeToTracker");
   EXPECT_EQ(report["tools"][0]["valid"], 5);
-  EXPECT_NEAR(report["tools"][0]["rateHz"].get<double>(), 10.0, 1e-9);
-  EXPECT_NEAR(report["tools"][0]["medianLatencySeconds"].get<double>(), 0.02, 1e-9);
+  EXPECT_NEAR(report["tools"][0]["rate_hz"].get<double>(), 10.0, 1e-9);
+  EXPECT_NEAR(report["tools"][0]["median_latency_seconds"].get<double>(), 0.02, 1e-9);
   EXPECT_EQ(report["rejected"], nlohmann::json({{"duplicate", 1}}));
 }
 
@@ -31,7 +30,7 @@ TEST(StreamReport, UnknownIsNullAndForeignTextsAreMended)
   stream.Add({"Probe\xff", 0.0, 0.0, Pose::Identity(), TransformStatus::Valid});
   stream.Reject(Rejection::Malformed, "\xc3\x28");
   const auto report = nlohmann::json::parse(StreamReport(stream.Statistics()));
-  EXPECT_TRUE(report["tools"][0]["medianLatencySeconds"].is_null());
+  EXPECT_TRUE(report["tools"][0]["median_latency_seconds"].is_null());
   EXPECT_EQ(report["live"], false);
   EXPECT_EQ(report["rejected"]["malformed"], 1);
 }

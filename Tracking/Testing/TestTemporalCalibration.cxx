@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
@@ -15,8 +16,6 @@ using namespace echorama::testing;
 using Eigen::Vector3d;
 
 namespace {
-
-constexpr double Pi = 3.14159265358979323846, DegreesPerRadian = 57.29577951308232;
 
 // A hand's motion without a rhythm: sums of waves of random frequencies.
 class Motion {

@@ -82,6 +82,7 @@ filter = make(first, second)
 assert not filter.messages, filter.messages
 report = json.loads(filter.GetReport())
 assert abs(filter.GetOffset() + 0.34) < 0.003 and 0 < filter.GetStandardError() < 0.003, report
+assert report["kind"] == "temporal" and report["offset_seconds"] == filter.GetOffset() and len(report["correlation_by_offset"]) > 10
 assert report["signal"] == "rotation" and report["correlation"] > 0.99 and report["confidence"] > 0.99 and not report["drifts"]
 output = filter.GetOutput()
 assert np.allclose(vtk_to_numpy(output.GetPointData().GetArray("TimeStamp")), second_times + 0.34 + filter.GetOffset())

@@ -2,7 +2,7 @@
 // The 3D view with three volumes of 256^3: what an update of the score costs, what particles cost, and frames at rest and while
 // dragging with the error of the level of detail against the full picture (RMS, grey levels). Frames need a screen (xvfb-run).
 #include "Core/Base/Random.h"
-#include "Filters/Registration/ValidPoints.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "Testing/Benchmark.h"
 #include "Widgets/Particles/Particles.h"
 #include "Widgets/Session/LiveScore.h"

@@ -7,7 +7,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/Sampling.h"
-#include "Filters/Registration/ValidPoints.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "Testing/Benchmark.h"
 #include "Widgets/Painting/VoxelEdits.h"
 #include "Widgets/Session/LiveScore.h"

@@ -6,10 +6,12 @@
 #include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 namespace echorama {
 namespace {
+
+constexpr std::pair<const char*, BrushMode> Modes[] = {
+    {"paint", BrushMode::Paint}, {"carve", BrushMode::Carve}, {"restore", BrushMode::Restore}};
 
 void CheckRange(const char* name, double value, double from, double to, bool openBelow = false)
 {
@@ -21,9 +23,21 @@ void CheckRange(const char* name, double value, double from, double to, bool ope
 
 } // namespace
 
+std::string NameOf(BrushMode mode)
+{
+  const auto found = std::find_if(std::begin(Modes), std::end(Modes), [&](const auto& each) { return each.second == mode; });
+  return found == std::end(Modes) ? "" : found->first;
+}
+
+std::optional<BrushMode> BrushModeNamed(const std::string& name)
+{
+  const auto found = std::find_if(std::begin(Modes), std::end(Modes), [&](const auto& each) { return name == each.first; });
+  return found == std::end(Modes) ? std::nullopt : std::optional(found->second);
+}
+
 void Brush::Check() const
 {
-  if (mode != BrushMode::Paint && mode != BrushMode::Carve && mode != BrushMode::Restore)
+  if (NameOf(mode).empty())
     throw Error(Error::Kind::InvalidParameter, "the brush's mode is none of paint, carve and restore");
   CheckRange("radius (mm)", radiusMm, 0.0, 1000.0, true);
   if (!std::isfinite(intensity))

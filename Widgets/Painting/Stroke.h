@@ -2,6 +2,8 @@
 #pragma once
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,11 @@ enum class BrushMode {
   Carve,   ///< voxels leave the valid region
   Restore, ///< intensities and valid region become the file's again
 };
+
+///@{ Their names: "paint", "carve", "restore". None: there is no mode of this name.
+std::string NameOf(BrushMode mode);
+std::optional<BrushMode> BrushModeNamed(const std::string& name);
+///@}
 
 /// A spherical brush.
 struct Brush {

@@ -58,4 +58,72 @@ private:
   int level_ = 0, tooFine_ = -1, fast_ = 0, slow_ = 0;
 };
 
+/// The level of each frame of a view: full at rest; while something is dragged as DetailLevel has it; after that one finer with
+/// each Refine, as far as the time of a frame at rest allows.
+class FrameDetail {
+public:
+  double restSeconds = 1.0; ///< what a frame of Refine may take to draw
+
+  double Budget() const { return drag_.Budget(); }
+  void SetBudget(double seconds) { drag_ = DetailLevel(seconds); }
+
+  bool Interactive() const { return interactive_; }
+  bool Dragging() const { return interactive_ && refined_ < 0; }
+  bool Full() const { return !interactive_ || refined_ == 0; }
+  int Level() const { return !interactive_ ? 0 : refined_ >= 0 ? refined_ : drag_.Level(); }
+  /// The level that a drag would begin with.
+  int LevelFor(double fullSeconds) const { return drag_.LevelFor(fullSeconds); }
+
+  /// \param fullSeconds: what the full picture takes; 0: not known. \returns false when all is as it was.
+  bool SetInteractive(bool on, double fullSeconds)
+  {
+    if (interactive_ == on && refined_ < 0)
+      return false;
+    interactive_ = on;
+    refined_ = -1;
+    if (on)
+      Begin(fullSeconds);
+    return true;
+  }
+
+  /// A drag begins, or goes on with another picture.
+  void Begin(double fullSeconds)
+  {
+    refined_ = -1;
+    coarser_ = 0.0;
+    drag_.Begin(fullSeconds);
+  }
+
+  /// A frame took \a seconds, \a drawSeconds of these to draw. \a typical: the next one will cost as much. \returns whether the
+  /// next one has another level.
+  bool Measure(double seconds, double drawSeconds, bool typical)
+  {
+    drawn_ = drawSeconds;
+    return Dragging() && typical && drag_.Measure(seconds);
+  }
+
+  /// The drag is over, and its level stays.
+  void Stay() { refined_ = Level(); }
+
+  /// As Stay, one level finer. \param fullSeconds: what the full picture took last; 0: not known.
+  /// \returns false, and does nothing, at level 0 or when the frame would take too long: as much more as the last step took; of
+  /// the first step what is known of levels.
+  bool Refine(double fullSeconds)
+  {
+    const int level = Level();
+    const double growth = coarser_ > 0.0 ? std::clamp(drawn_ / coarser_, 1.2, DetailLevel::Step) : DetailLevel::Step;
+    if (level == 0 || (level == 1 && fullSeconds > 0.0 ? fullSeconds : growth * drawn_) > restSeconds)
+      return false;
+    coarser_ = drawn_;
+    refined_ = level - 1;
+    return true;
+  }
+
+private:
+  DetailLevel drag_;
+  bool interactive_ = false;
+  int refined_ = -1;                   ///< the level of Refine; -1: that of the drag
+  double drawn_ = 0.0, coarser_ = 0.0; ///< what the last frame took to draw, and that of the level before
+};
+
 } // namespace echorama

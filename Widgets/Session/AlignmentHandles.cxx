@@ -3,6 +3,7 @@
 // drawing and taking hold of them then use the same few numbers, and both are exact at any zoom and in any projection.
 #include "AlignmentHandles.h"
 #include "Core/Base/Angles.h"
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -163,6 +164,33 @@ Eigen::Matrix3d SliceFrame(const MouseView& view, bool& alongWorld)
   frame.col(1) = view.up;
   frame.col(2) = view.towards;
   return frame;
+}
+
+int AxisOf(const Handle& handle, bool alongWorld)
+{
+  int axis = handle.axis;
+  if (alongWorld && axis < 3)
+    handle.direction.cwiseAbs().maxCoeff(&axis);
+  return axis;
+}
+
+std::optional<Eigen::Vector2d> GripOf(const std::vector<Handle>& handles, std::size_t index, const HandleSizes& sizes)
+{
+  const std::vector<Eigen::Vector2d>& line = handles[index].line;
+  switch (handles[index].kind) {
+  case Handle::Kind::Arrow:
+    return line[1];
+  case Handle::Kind::Square:
+    return 0.25 * (line[0] + line[1] + line[2] + line[3]);
+  case Handle::Kind::Ring: {
+    const auto seen = std::find_if(line.begin(), line.end(), [&](const Eigen::Vector2d& point) {
+      return HandleAt(handles, point, sizes) == static_cast<int>(index);
+    });
+    return seen == line.end() ? std::nullopt : std::optional<Eigen::Vector2d>(*seen);
+  }
+  default:
+    return line.front();
+  }
 }
 
 } // namespace echorama

@@ -36,6 +36,13 @@ struct HandleSizes {
 std::vector<Handle> MakeHandles(const MouseView& view, const Eigen::Vector3d& centre, const Eigen::Matrix3d& frame, bool slice,
                                 const HandleSizes& sizes);
 
+/// The world's axis that a handle stands for; of handles that do not lie along the world's axes: the view's.
+int AxisOf(const Handle& handle, bool alongWorld);
+
+/// Where a handle can be taken hold of: the tip of an arrow, the middle of a square, a point of a ring in front of the others.
+/// None: it lies behind others.
+std::optional<Eigen::Vector2d> GripOf(const std::vector<Handle>& handles, std::size_t index, const HandleSizes& sizes);
+
 /// Index of the handle under a pixel; -1: none. The centre wins, then squares, then what is nearest.
 int HandleAt(const std::vector<Handle>& handles, const Eigen::Vector2d& pixel, const HandleSizes& sizes);
 

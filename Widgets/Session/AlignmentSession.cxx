@@ -6,6 +6,7 @@
 // What is selected is not part of the state. It is tidied after each change of the state: volumes that went leave it, and a
 // group is in it as a whole.
 #include "Widgets/Session/AlignmentSession.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <cmath>
@@ -30,12 +31,6 @@ constexpr std::array<std::array<double, 3>, 7> Tints{{{1.0, 1.0, 1.0},
   throw Error(Error::Kind::InvalidParameter, reason);
 }
 
-void CheckPose(const Pose& pose, const char* what)
-{
-  if (!IsRotation(pose.linear()) || !pose.translation().allFinite() || pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    Refuse(std::string("the ") + what + " is not rigid (a rotation, a translation, and 0 0 0 1 below)");
-}
-
 void CheckUnit(double value, const char* what)
 {
   if (!(value >= 0.0 && value <= 1.0))
@@ -46,6 +41,14 @@ void CheckColour(const std::array<double, 3>& rgb)
 {
   for (const double part : rgb)
     CheckUnit(part, "colour");
+}
+
+void CheckNew(const SessionVolume& volume)
+{
+  volume.geometry.Check(volume.name.empty() ? "the volume" : volume.name);
+  CheckRigid(volume.volumeToWorld, "pose");
+  CheckColour(volume.colour);
+  CheckUnit(volume.opacity, "opacity");
 }
 
 bool Named(const SessionState& state, const std::string& name, int except = 0)
@@ -66,34 +69,56 @@ Pose Composed(const Pose& motion, const Pose& pose)
 
 } // namespace
 
-/// One setter: an edit by itself, or a part of the one that is open. Taken back when the setter throws.
-class AlignmentSession::Edit {
-public:
-  Edit(AlignmentSession& session, const std::string& label) : session_(session), before_(session.state_)
-  {
-    session_.Begin(label);
-  }
-  ~Edit()
-  {
-    if (!finished_) {
-      session_.state_ = std::move(before_);
-      session_.End();
-    }
-  }
-  Edit(const Edit&) = delete;
-  Edit& operator=(const Edit&) = delete;
-  void Finish()
-  {
-    finished_ = true;
-    session_.TidySelection();
-    session_.End();
-  }
+void CheckRigid(const Pose& pose, const char* what)
+{
+  if (!IsRotation(pose.linear()) || !pose.translation().allFinite() || pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    Refuse(std::string("the ") + what + " is not rigid (a rotation, a translation, and 0 0 0 1 below)");
+}
 
-private:
-  AlignmentSession& session_;
-  SessionState before_;
-  bool finished_ = false;
-};
+std::string VerbOf(BrushMode mode)
+{
+  std::string verb = NameOf(mode);
+  if (!verb.empty())
+    verb.front() = static_cast<char>(verb.front() - 'a' + 'A');
+  return verb;
+}
+
+Placement PlacementOf(const SessionVolume& volume)
+{
+  const Eigen::Matrix3d R = volume.volumeToWorld.linear();
+  Eigen::Vector3d angle;
+  const double across = std::hypot(R(0, 0), R(0, 1));
+  angle.y() = std::atan2(R(0, 2), across);
+  if (across > 1e-9) {
+    angle.x() = std::atan2(-R(1, 2), R(2, 2));
+    angle.z() = std::atan2(-R(0, 1), R(0, 0));
+  } else { // x and z turn about the same line: all of it is told as x
+    angle.x() = std::atan2(R(2, 1), R(1, 1));
+    angle.z() = 0.0;
+  }
+  return {volume.volumeToWorld * volume.geometry.Centre(), angle / RadiansPerDegree};
+}
+
+// One setter: an edit by itself, or a part of the one that is open. Taken back when it throws.
+void AlignmentSession::Edit(const std::string& label, const std::function<void()>& change)
+{
+  SessionState before = state_;
+  Begin(label);
+  try {
+    change();
+  } catch (...) {
+    state_ = std::move(before);
+    End();
+    throw;
+  }
+  TidySelection();
+  End();
+}
+
+void AlignmentSession::EditOne(const std::string& verb, int id, const std::function<void(SessionVolume&)>& change)
+{
+  Edit(verb + " " + Volume(id).name, [&] { change(Volume(id)); });
+}
 
 void AlignmentSession::Begin(const std::string& label)
 {
@@ -126,34 +151,30 @@ void AlignmentSession::Cancel()
   TidySelection();
 }
 
-bool AlignmentSession::Undo()
+bool AlignmentSession::Step(std::vector<Entry>& from, std::vector<Entry>& to)
 {
   if (Editing())
-    throw Error(Error::Kind::NotPossible, "nothing can be undone during an edit");
-  if (done_.empty())
+    throw Error(Error::Kind::NotPossible,
+                std::string("nothing can be ") + (&from == &done_ ? "un" : "re") + "done during an edit");
+  if (from.empty())
     return false;
-  Entry entry = std::move(done_.back());
-  done_.pop_back();
+  Entry entry = std::move(from.back());
+  from.pop_back();
   std::swap(state_, entry.state);
-  undone_.push_back(std::move(entry));
+  to.push_back(std::move(entry));
   ++version_;
   TidySelection();
   return true;
 }
 
+bool AlignmentSession::Undo()
+{
+  return Step(done_, undone_);
+}
+
 bool AlignmentSession::Redo()
 {
-  if (Editing())
-    throw Error(Error::Kind::NotPossible, "nothing can be redone during an edit");
-  if (undone_.empty())
-    return false;
-  Entry entry = std::move(undone_.back());
-  undone_.pop_back();
-  std::swap(state_, entry.state);
-  done_.push_back(std::move(entry));
-  ++version_;
-  TidySelection();
-  return true;
+  return Step(undone_, done_);
 }
 
 std::string AlignmentSession::UndoLabel() const
@@ -174,14 +195,6 @@ SessionVolume& AlignmentSession::Volume(int id)
   return *volume;
 }
 
-void AlignmentSession::CheckNew(const SessionVolume& volume) const
-{
-  volume.geometry.Check(volume.name.empty() ? "the volume" : volume.name);
-  CheckPose(volume.volumeToWorld, "pose");
-  CheckColour(volume.colour);
-  CheckUnit(volume.opacity, "opacity");
-}
-
 int AlignmentSession::Add(SessionVolume volume)
 {
   CheckNew(volume);
@@ -189,46 +202,58 @@ int AlignmentSession::Add(SessionVolume volume)
     if (!volume.file.empty() && other.file == volume.file)
       Refuse(volume.file + ": it is open already, as " + other.name);
 
-  Edit edit(*this, "");
-  if (volume.name.empty())
-    volume.name = "volume";
-  const std::string wanted = volume.name;
-  for (int copy = 2; Named(state_, volume.name); ++copy)
-    volume.name = wanted + " (" + std::to_string(copy) + ")";
-  if (volume.colour == White) {
-    // The first tint that is the rarest among the others: white for the first volume.
-    const auto uses = [this](const std::array<double, 3>& tint) {
-      return std::count_if(state_.volumes.begin(), state_.volumes.end(),
-                           [&](const SessionVolume& other) { return other.colour == tint; });
-    };
-    volume.colour =
-        *std::min_element(Tints.begin(), Tints.end(), [&](const auto& a, const auto& b) { return uses(a) < uses(b); });
-  }
-  volume.id = nextId_++;
-  volume.group = 0;
-  if (depth_ == 1)
-    label_ = "Add " + volume.name;
-  state_.volumes.push_back(std::move(volume));
-  edit.Finish();
+  Edit("", [&] {
+    if (volume.name.empty())
+      volume.name = "volume";
+    const std::string wanted = volume.name;
+    for (int copy = 2; Named(state_, volume.name); ++copy)
+      volume.name = wanted + " (" + std::to_string(copy) + ")";
+    if (volume.colour == White) {
+      // The first tint that is the rarest among the others: white for the first volume.
+      const auto uses = [this](const std::array<double, 3>& tint) {
+        return std::count_if(state_.volumes.begin(), state_.volumes.end(),
+                             [&](const SessionVolume& other) { return other.colour == tint; });
+      };
+      volume.colour =
+          *std::min_element(Tints.begin(), Tints.end(), [&](const auto& a, const auto& b) { return uses(a) < uses(b); });
+    }
+    volume.id = nextId_++;
+    volume.group = 0;
+    if (depth_ == 1)
+      label_ = "Add " + volume.name;
+    state_.volumes.push_back(std::move(volume));
+  });
   return nextId_ - 1;
 }
 
 void AlignmentSession::Remove(int id)
 {
-  const std::string name = Volume(id).name;
-  Edit edit(*this, "Remove " + name);
-  auto& volumes = state_.volumes;
-  volumes.erase(std::find_if(volumes.begin(), volumes.end(), [id](const SessionVolume& volume) { return volume.id == id; }));
-  edit.Finish();
+  EditOne("Remove", id,
+          [this](SessionVolume& volume) { state_.volumes.erase(state_.volumes.begin() + (&volume - state_.volumes.data())); });
 }
 
 void AlignmentSession::SetPose(int id, const Pose& volumeToWorld)
 {
-  CheckPose(volumeToWorld, "pose");
-  const std::string name = Volume(id).name;
-  Edit edit(*this, "Move " + name);
-  Volume(id).volumeToWorld = volumeToWorld;
-  edit.Finish();
+  CheckRigid(volumeToWorld, "pose");
+  EditOne("Move", id, [&](SessionVolume& volume) { volume.volumeToWorld = volumeToWorld; });
+}
+
+void AlignmentSession::SetPlacement(int id, const Placement& placement)
+{
+  const SessionVolume& volume = Volume(id);
+  const Placement now = PlacementOf(volume);
+  if (now.middle == placement.middle && now.degrees == placement.degrees)
+    return;
+  Pose pose = volume.volumeToWorld;
+  if (now.degrees != placement.degrees) {
+    const Eigen::Vector3d angle = placement.degrees * RadiansPerDegree;
+    pose.linear() =
+        (Eigen::AngleAxisd(angle.x(), Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(angle.y(), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(angle.z(), Eigen::Vector3d::UnitZ()))
+            .toRotationMatrix();
+  }
+  pose.translation() = placement.middle - pose.linear() * volume.geometry.Centre();
+  SetPose(id, pose);
 }
 
 void AlignmentSession::SetName(int id, const std::string& name)
@@ -238,47 +263,31 @@ void AlignmentSession::SetName(int id, const std::string& name)
     Refuse("a volume needs a name");
   if (Named(state_, name, id))
     Refuse("another volume has the name " + name);
-  Edit edit(*this, "Rename " + Volume(id).name);
-  Volume(id).name = name;
-  edit.Finish();
+  EditOne("Rename", id, [&](SessionVolume& volume) { volume.name = name; });
 }
 
 void AlignmentSession::SetColour(int id, const std::array<double, 3>& rgb)
 {
   CheckColour(rgb);
-  const std::string name = Volume(id).name;
-  Edit edit(*this, "Colour of " + name);
-  Volume(id).colour = rgb;
-  edit.Finish();
+  EditOne("Colour of", id, [&](SessionVolume& volume) { volume.colour = rgb; });
 }
 
 void AlignmentSession::SetOpacity(int id, double opacity)
 {
   CheckUnit(opacity, "opacity");
-  const std::string name = Volume(id).name;
-  Edit edit(*this, "Opacity of " + name);
-  Volume(id).opacity = opacity;
-  edit.Finish();
+  EditOne("Opacity of", id, [&](SessionVolume& volume) { volume.opacity = opacity; });
 }
 
 void AlignmentSession::SetVisible(int id, bool visible)
 {
-  const std::string name = Volume(id).name;
-  Edit edit(*this, (visible ? "Show " : "Hide ") + name);
-  Volume(id).visible = visible;
-  edit.Finish();
+  EditOne(visible ? "Show" : "Hide", id, [&](SessionVolume& volume) { volume.visible = visible; });
 }
 
 void AlignmentSession::AddStroke(int id, Stroke stroke)
 {
-  const SessionVolume& volume = Volume(id);
-  const char* verb = stroke.brush.mode == BrushMode::Paint   ? "Paint "
-                     : stroke.brush.mode == BrushMode::Carve ? "Carve "
-                                                             : "Restore ";
-  StrokeChain longer = Append(volume.strokes, std::move(stroke));
-  Edit edit(*this, verb + volume.name);
-  Volume(id).strokes = std::move(longer);
-  edit.Finish();
+  const std::string verb = VerbOf(stroke.brush.mode);
+  const StrokeChain longer = Append(Volume(id).strokes, std::move(stroke));
+  EditOne(verb, id, [&](SessionVolume& volume) { volume.strokes = longer; });
 }
 
 void AlignmentSession::Select(int id, bool on, bool alone)
@@ -317,18 +326,50 @@ void AlignmentSession::InvertSelection()
 
 void AlignmentSession::MoveSelection(const Pose& motion)
 {
-  CheckPose(motion, "motion");
+  CheckRigid(motion, "motion");
   if (selection_.empty() || motion.matrix() == Eigen::Matrix4d::Identity())
     return;
-  const std::string label = selection_.size() == 1 ? "Move " + Volume(*selection_.begin()).name
-                                                   : "Move " + std::to_string(selection_.size()) + " volumes";
-  Edit edit(*this, label);
-  for (const int id : selection_) {
-    Pose moved = Composed(motion, Volume(id).volumeToWorld);
-    CheckPose(moved, "pose"); // too far away to be a number
-    Volume(id).volumeToWorld = moved;
-  }
-  edit.Finish();
+  Edit(LabelOf("Move"), [&] {
+    for (const int id : selection_) {
+      const Pose moved = Composed(motion, Volume(id).volumeToWorld);
+      CheckRigid(moved, "pose"); // too far away to be a number
+      Volume(id).volumeToWorld = moved;
+    }
+  });
+}
+
+std::string AlignmentSession::LabelOf(const char* verb) const
+{
+  return std::string(verb) + " " +
+         (selection_.size() == 1 ? state_.Find(*selection_.begin())->name : std::to_string(selection_.size()) + " volumes");
+}
+
+AlignmentSession::Grip AlignmentSession::TakeHold() const
+{
+  Grip grip{{}, CentreOfRotation(), centre_.has_value()};
+  for (const SessionVolume& volume : state_.volumes)
+    if (selection_.count(volume.id) != 0)
+      grip.volumes.emplace_back(volume.id, volume.volumeToWorld);
+  return grip;
+}
+
+void AlignmentSession::MoveHeld(const Grip& grip, const Pose& motion)
+{
+  Edit(LabelOf("Move"), [&] {
+    for (const auto& [id, start] : grip.volumes)
+      if (SessionVolume* volume = state_.Find(id)) {
+        volume->volumeToWorld = Composed(motion, start);
+        CheckRigid(volume->volumeToWorld, "pose");
+      }
+  });
+  if (grip.isCentreChosen)
+    SetCentreOfRotation(motion * grip.centre);
+}
+
+void AlignmentSession::RotateSelection(const Eigen::Vector3d& degrees)
+{
+  if (!degrees.isZero(0.0))
+    MoveSelection(MotionAbout(CentreOfRotation(), degrees * RadiansPerDegree, Eigen::Vector3d::Zero()));
 }
 
 int AlignmentSession::GroupSelection()
@@ -347,19 +388,19 @@ int AlignmentSession::GroupSelection()
   int highest = 0;
   for (const SessionVolume& volume : state_.volumes)
     highest = std::max(highest, volume.group);
-  Edit edit(*this, "Group " + std::to_string(selection_.size()) + " volumes");
-  for (const int id : selection_)
-    Volume(id).group = highest + 1;
-  edit.Finish();
+  Edit("Group " + std::to_string(selection_.size()) + " volumes", [&] {
+    for (const int id : selection_)
+      Volume(id).group = highest + 1;
+  });
   return highest + 1;
 }
 
 void AlignmentSession::UngroupSelection()
 {
-  Edit edit(*this, "Ungroup");
-  for (const int id : selection_)
-    Volume(id).group = 0;
-  edit.Finish();
+  Edit("Ungroup", [this] {
+    for (const int id : selection_)
+      Volume(id).group = 0;
+  });
 }
 
 Eigen::Vector3d AlignmentSession::CentreOfRotation() const
@@ -419,9 +460,7 @@ void AlignmentSession::Replace(SessionState state, const std::string& label)
       volume.id = nextId_++;
     nextId_ = std::max(nextId_, volume.id + 1);
   }
-  Edit edit(*this, label);
-  state_ = std::move(state);
-  edit.Finish();
+  Edit(label, [&] { state_ = std::move(state); });
 }
 
 bool AlignmentSession::Remembers(int id) const

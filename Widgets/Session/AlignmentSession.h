@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Widgets/Session/SessionState.h"
+#include <functional>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 namespace echorama {
+
+/// A pose in numbers: the middle of the volume, world, mm, and rotations about the world's z, then y, then x, degrees.
+struct Placement {
+  Eigen::Vector3d middle, degrees;
+};
+Placement PlacementOf(const SessionVolume& volume);
+
+/// \throws Error(InvalidParameter) that calls the pose \a what.
+void CheckRigid(const Pose& pose, const char* what);
+
+/// How edits that draw are called: "Paint".
+std::string VerbOf(BrushMode mode);
 
 /// What a person does to a set of volumes by hand: poses, looks, groups and strokes, with undo and redo of every edit.
 ///
@@ -45,7 +58,9 @@ public:
   int Add(SessionVolume volume);
   void Remove(int id);
   void SetPose(int id, const Pose& volumeToWorld); ///< Error(InvalidParameter) when not rigid
-  void SetName(int id, const std::string& name);   ///< Error(InvalidParameter) when empty or another volume's
+  /// Numbers that are as PlacementOf tells leave the last bits alone.
+  void SetPlacement(int id, const Placement& placement);
+  void SetName(int id, const std::string& name); ///< Error(InvalidParameter) when empty or another volume's
   void SetColour(int id, const std::array<double, 3>& rgb);
   void SetOpacity(int id, double opacity);
   void SetVisible(int id, bool visible);
@@ -60,7 +75,19 @@ public:
   ///@}
   ///@{ Of what is selected.
   void MoveSelection(const Pose& motion); ///< world: pose becomes motion * pose
-  int GroupSelection();                   ///< returns the group's number; of fewer than two volumes: Error(NotPossible)
+  /// What is selected, as it lies when somebody takes hold of it.
+  struct Grip {
+    std::vector<std::pair<int, Pose>> volumes; ///< ids and poses; none: nothing is selected
+    Eigen::Vector3d centre;                    ///< of rotation
+    bool isCentreChosen = false;               ///< then it goes with the volumes
+  };
+  Grip TakeHold() const;
+  /// Everything that is held and still there goes from where it was taken hold of by a motion of the world.
+  void MoveHeld(const Grip& grip, const Pose& motion);
+  /// "Turn liver_A", "Turn 2 volumes".
+  std::string LabelOf(const char* verb) const;
+  void RotateSelection(const Eigen::Vector3d& degrees); ///< a rotation vector, about the centre of rotation
+  int GroupSelection(); ///< returns the group's number; of fewer than two volumes: Error(NotPossible)
   void UngroupSelection();
   ///@}
   /// Where rotations turn about, world: what the user chose, else the middle of what is selected, else of all. The middle is the
@@ -81,9 +108,10 @@ private:
     std::string label;
     SessionState state; ///< before the edit; of what was undone: after it
   };
-  class Edit;
   SessionVolume& Volume(int id);
-  void CheckNew(const SessionVolume& volume) const;
+  void Edit(const std::string& label, const std::function<void()>& change);
+  void EditOne(const std::string& verb, int id, const std::function<void(SessionVolume&)>& change);
+  bool Step(std::vector<Entry>& from, std::vector<Entry>& to);
   void TidySelection();
   SessionState state_, start_;
   std::vector<Entry> done_, undone_;

@@ -165,6 +165,13 @@ void Read(Backup& backup)
   }
 }
 
+std::vector<Backup> Opened(std::vector<Backup> backups)
+{
+  for (Backup& backup : backups)
+    Read(backup);
+  return backups;
+}
+
 std::string Time(std::int64_t time, const char* format)
 {
   const auto seconds = static_cast<std::time_t>(time);
@@ -197,7 +204,7 @@ Backups::~Backups()
 
 bool Backups::Write(const Project& project, const std::string& label, bool inPlaceOfLast)
 {
-  if (last_ && last_->state == project.state && last_->truth == project.truth && last_->comment == project.comment)
+  if (last_ && *last_ == project)
     return false;
   const std::vector<Backup> earlier = Named(folder_);
   BackupStamp stamp;
@@ -228,18 +235,12 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
 
 std::vector<Backup> Backups::List(const std::string& folder)
 {
-  std::vector<Backup> backups = Named(folder);
-  for (Backup& backup : backups)
-    echorama::Read(backup);
-  return backups;
+  return Opened(Named(folder));
 }
 
 std::vector<Backup> Backups::ListFor(const std::string& path)
 {
-  std::vector<Backup> backups = NamedFor(path);
-  for (Backup& backup : backups)
-    echorama::Read(backup);
-  return backups;
+  return Opened(NamedFor(path));
 }
 
 std::optional<Backup> Backups::NewestFor(const std::string& path, std::int64_t time)

@@ -44,8 +44,6 @@ public:
   /// The newest first; damaged ones are marked. A folder that is not there has none.
   static std::vector<Backup> List(const std::string& folder);
   std::vector<Backup> List() const { return List(folder_); }
-  /// \throws as ReadProject.
-  static Project Read(const Backup& backup) { return ReadProject(backup.path); }
   /// Under which name a backup lies in its folder.
   static std::string FileName(int number, std::int64_t time);
 

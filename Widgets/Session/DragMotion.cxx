@@ -86,6 +86,19 @@ Eigen::Vector3d MotionConstraint::Rotation(const Eigen::Vector3d& v) const
   return kind == Kind::Free ? v : Eigen::Vector3d(v.dot(axis) * axis);
 }
 
+std::optional<MotionConstraint> ConstraintNamed(const std::string& name)
+{
+  const char* const axes[] = {"x", "y", "z"};
+  const char* const planes[] = {"yz", "xz", "xy"};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (name == axes[axis])
+      return MotionConstraint{MotionConstraint::Kind::Axis, Eigen::Vector3d::Unit(axis)};
+    if (name == planes[axis])
+      return MotionConstraint{MotionConstraint::Kind::Plane, Eigen::Vector3d::Unit(axis)};
+  }
+  return name == "free" ? std::optional<MotionConstraint>(MotionConstraint()) : std::nullopt;
+}
+
 Drag::Drag(const MouseView& view, const DragParameters& parameters, const Eigen::Vector2d& pressed)
   : view_(view), parameters_(parameters), pressed_(pressed), last_(pressed)
 {

@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/RigidTransform.h"
 #include <optional>
+#include <string>
 
 namespace echorama {
 
@@ -45,6 +46,9 @@ struct MotionConstraint {
   Eigen::Vector3d Translation(const Eigen::Vector3d& v) const; ///< the part that is allowed
   Eigen::Vector3d Rotation(const Eigen::Vector3d& v) const;    ///< the part of a rotation vector that is allowed
 };
+
+/// "free", an axis of the world ("x", "y", "z") or a plane across one ("yz", "xz", "xy"). None: there is none of this name.
+std::optional<MotionConstraint> ConstraintNamed(const std::string& name);
 
 /// How the mouse moves what it drags.
 enum class DragKind {

@@ -22,11 +22,6 @@ void LiveScore::Set(int id, const std::string& name, const ImageGeometry& truth,
   volumes_[id] = {truth, truth, std::move(points), name};
 }
 
-void LiveScore::Remove(int id)
-{
-  volumes_.erase(id);
-}
-
 LiveScoreResult LiveScore::Update(const std::map<int, ImageGeometry>& aligned, int fixed) const
 {
   std::vector<ScoredVolume> volumes;

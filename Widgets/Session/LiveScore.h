@@ -21,7 +21,6 @@ public:
   /// A volume with its truth; one that is known already gets another. \a points: ValidPoints of it.
   /// \throws Error(BadInput) when the truth is not a geometry or there are no points; what was known then stays.
   void Set(int id, const std::string& name, const ImageGeometry& truth, std::vector<Eigen::Vector3d> points);
-  void Remove(int id);
   void Clear() { volumes_.clear(); }
   bool Empty() const { return volumes_.empty(); }
   bool Has(int id) const { return volumes_.count(id) != 0; }

@@ -26,15 +26,10 @@ using Json = JsonPlace::Json;
 constexpr const char* Schema = "echorama-project-1";
 constexpr const char* PoseSchema = "echorama-poses-1";
 constexpr std::size_t Limit = std::size_t{512} << 20; // bytes of a file
-constexpr std::pair<const char*, BrushMode> Modes[] = {
-    {"paint", BrushMode::Paint}, {"carve", BrushMode::Carve}, {"restore", BrushMode::Restore}};
 
 fs::path Resolved(const fs::path& path)
 {
-  std::error_code error;
-  const fs::path whole = fs::absolute(path, error);
-  const fs::path resolved = fs::weakly_canonical(whole, error);
-  return error ? whole.lexically_normal() : resolved;
+  return ResolvedPath(path.string());
 }
 
 std::string Relative(const std::string& path, const fs::path& folder)
@@ -65,19 +60,11 @@ std::string Checksum(const std::string& text)
 Json JsonOf(const Stroke& stroke)
 {
   const Brush& brush = stroke.brush;
-  const char* mode = "";
-  for (const auto& [name, value] : Modes)
-    if (value == brush.mode)
-      mode = name;
   Json path = Json::array();
   for (const Eigen::Vector3d& point : stroke.pathMm)
     path.push_back(Json::array({point.x(), point.y(), point.z()}));
-  return {{"mode", mode},
-          {"radiusMm", brush.radiusMm},
-          {"intensity", brush.intensity},
-          {"opacity", brush.opacity},
-          {"hardness", brush.hardness},
-          {"insideValid", brush.insideValid},
+  return {{"mode", NameOf(brush.mode)}, {"radiusMm", brush.radiusMm}, {"intensity", brush.intensity},
+          {"opacity", brush.opacity},   {"hardness", brush.hardness}, {"insideValid", brush.insideValid},
           {"pathMm", std::move(path)}};
 }
 
@@ -107,15 +94,10 @@ Stroke ToStroke(const Json& value, const JsonPlace& place)
 {
   Stroke stroke;
   Brush& brush = stroke.brush;
-  const std::string mode = place.In("mode").Text(place.Member(value, "mode"));
-  bool known = false;
-  for (const auto& [name, each] : Modes)
-    if (mode == name) {
-      brush.mode = each;
-      known = true;
-    }
-  if (!known)
+  const std::optional<BrushMode> mode = BrushModeNamed(place.In("mode").Text(place.Member(value, "mode")));
+  if (!mode)
     place.In("mode").Fail("paint, carve or restore is needed");
+  brush.mode = *mode;
   brush.radiusMm = place.In("radiusMm").Number(place.Member(value, "radiusMm"));
   brush.intensity = place.In("intensity").Number(place.Member(value, "intensity"));
   brush.opacity = place.In("opacity").Number(place.Member(value, "opacity"));
@@ -241,6 +223,21 @@ void SyncFolder(const fs::path& folder)
 }
 
 } // namespace
+
+std::string ResolvedPath(const std::string& path)
+{
+  if (path.empty())
+    return path;
+  std::error_code error;
+  const fs::path whole = fs::absolute(path, error);
+  const fs::path resolved = fs::weakly_canonical(whole, error);
+  return (error ? whole.lexically_normal() : resolved).string();
+}
+
+bool operator==(const Project& a, const Project& b)
+{
+  return a.state == b.state && a.truth == b.truth && a.comment == b.comment;
+}
 
 Project ReadProject(const std::string& path, BackupStamp* stamp)
 {

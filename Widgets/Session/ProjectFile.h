@@ -7,12 +7,17 @@
 
 namespace echorama {
 
+/// The absolute path of a file, with symbolic links followed: two names of one file are one path. Empty stays empty.
+std::string ResolvedPath(const std::string& path);
+
 /// What a project file holds.
 struct Project {
   SessionState state;  ///< after reading: ids from 1, in order
   std::string truth;   ///< pose file of the ground truth, absolute, or empty
   std::string comment; ///< for people: who, what
 };
+
+bool operator==(const Project&, const Project&); ///< exact: to the last bit
 
 /// What a backup knows beside its project.
 struct BackupStamp {

@@ -7,20 +7,13 @@
 namespace echorama {
 namespace {
 
-bool SameStroke(const Stroke& a, const Stroke& b)
-{
-  return a.brush.mode == b.brush.mode && a.brush.radiusMm == b.brush.radiusMm && a.brush.intensity == b.brush.intensity &&
-         a.brush.opacity == b.brush.opacity && a.brush.hardness == b.brush.hardness &&
-         a.brush.insideValid == b.brush.insideValid && a.pathMm == b.pathMm;
-}
-
 bool SameStrokes(const StrokeChain& a, const StrokeChain& b)
 {
   const StrokeNode *left = a.get(), *right = b.get();
   if ((left ? left->count : 0) != (right ? right->count : 0))
     return false;
   for (; left != right; left = left->before.get(), right = right->before.get()) // what they share is the same from there on
-    if (!SameStroke(left->stroke, right->stroke))
+    if (!(left->stroke == right->stroke))
       return false;
   return true;
 }

@@ -27,6 +27,11 @@ struct SessionState {
   std::vector<SessionVolume> volumes; ///< in the user's order; the first is the gauge of pose files
   const SessionVolume* Find(int id) const;
   SessionVolume* Find(int id);
+  /// -1: there are not so many.
+  int IdAt(int index) const
+  {
+    return index >= 0 && index < static_cast<int>(volumes.size()) ? volumes[static_cast<std::size_t>(index)].id : -1;
+  }
 };
 
 bool operator==(const SessionVolume&, const SessionVolume&); ///< exact: to the last bit

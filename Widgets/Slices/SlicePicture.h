@@ -17,6 +17,9 @@ struct SlicePlane {
   int width = 0, height = 0;                        ///< pixels
 };
 
+/// Which of the volumes are drawn.
+enum class SliceShown { All, Selected, Others };
+
 /// How the volumes on a plane become one picture. Grey levels go through each volume's window first.
 enum class SliceMode {
   Blend,        ///< mean of the tinted grey levels, by opacity; as opaque as the most opaque volume there

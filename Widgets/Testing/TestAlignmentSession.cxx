@@ -349,3 +349,51 @@ TEST(AlignmentSession, LongHistoriesEndWithoutOverflow)
   chain.reset();
   EXPECT_EQ(StrokesOf(branch).size(), 100000u) << "what two chains share stays";
 }
+
+TEST(AlignmentSession, NumbersPlaceAVolumeAndLeaveItAloneWhenTheyAreItsOwn)
+{
+  AlignmentSession session = Three();
+  Random random(4);
+  for (int i = 0; i < 20; ++i) {
+    session.SetPose(1, SomePose(random));
+    const Pose before = session.State().Find(1)->volumeToWorld;
+    Placement placement = PlacementOf(*session.State().Find(1));
+    const int entries = session.UndoCount();
+    session.SetPlacement(1, placement);
+    EXPECT_EQ(session.State().Find(1)->volumeToWorld.matrix(), before.matrix()) << "to the last bit";
+    EXPECT_EQ(session.UndoCount(), entries);
+    placement.middle.x() += 1.0;
+    placement.degrees = {10.0, -20.0, 170.0};
+    session.SetPlacement(1, placement);
+    const Placement now = PlacementOf(*session.State().Find(1));
+    EXPECT_LT((now.middle - placement.middle).norm(), 1e-9);
+    EXPECT_LT((now.degrees - placement.degrees).norm(), 1e-9);
+  }
+  ExpectRefused(
+      session,
+      [&session] {
+        session.SetPlacement(1, {{NaN, 0, 0}, {0, 0, 0}});
+      },
+      "rigid");
+}
+
+TEST(AlignmentSession, WhatIsHeldGoesFromWhereItWasTaken)
+{
+  AlignmentSession session = Three();
+  session.Select(1, true);
+  session.Select(2, true);
+  session.SetCentreOfRotation(Eigen::Vector3d(1, 2, 3));
+  const AlignmentSession::Grip grip = session.TakeHold();
+  session.Begin(session.LabelOf("Turn"));
+  session.MoveHeld(grip, Shift(50.0));
+  session.MoveHeld(grip, Shift(2.0)); // not on top of the first
+  session.Remove(2);
+  session.MoveHeld(grip, Shift(3.0)); // what is gone is left out
+  EXPECT_TRUE(session.End());
+  EXPECT_EQ(session.UndoLabel(), "Turn 2 volumes");
+  EXPECT_EQ(session.State().Find(1)->volumeToWorld.translation(), Eigen::Vector3d(3.0, 0.0, 0.0));
+  EXPECT_EQ(session.State().Find(3)->volumeToWorld.translation(), Eigen::Vector3d(0.0, 0.0, 0.0));
+  EXPECT_EQ(session.CentreOfRotation(), Eigen::Vector3d(4, 2, 3)) << "the one that was chosen goes along";
+  ExpectRefused(
+      session, [&] { session.MoveHeld(grip, Shift(NaN)); }, "rigid");
+}

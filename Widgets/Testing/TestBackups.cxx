@@ -81,8 +81,8 @@ TEST_F(BackupFolder, NumberedTheNewestFirst)
   EXPECT_EQ(list[0].label, "three, going on");
   EXPECT_EQ(list[0].number, 4);
   EXPECT_EQ(list[2].label, "one");
-  EXPECT_EQ(StepOf(Backups::Read(list[0])), 4);
-  EXPECT_EQ(StepOf(Backups::Read(list[1])), 2);
+  EXPECT_EQ(StepOf(ReadProject(list[0].path)), 4);
+  EXPECT_EQ(StepOf(ReadProject(list[1].path)), 2);
   EXPECT_LE(std::abs(static_cast<double>(list[0].time - std::time(nullptr))), 30.0);
   Backups later(Path());
   later.Write(Step(5), "of another session");
@@ -111,7 +111,7 @@ TEST_F(BackupFolder, TwoSessionsNeverReplaceEachOthers)
     EXPECT_TRUE(backup.readable) << backup.path;
   const BackupStamp stamp{all.front().number, all.front().time, "taken"};
   EXPECT_FALSE(WriteProject(all.front().path, Step(5), &stamp, false));
-  EXPECT_NE(StepOf(Backups::Read(all.front())), 5);
+  EXPECT_NE(StepOf(ReadProject(all.front().path)), 5);
 }
 
 TEST_F(BackupFolder, OldOnesAreThinnedOut)
@@ -160,10 +160,10 @@ TEST_F(BackupFolder, DamagedOnesAreListedAndNotOpened)
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(after[i].readable, i == 3) << i;
     if (i < 3) {
-      EXPECT_THROW(Backups::Read(after[i]), Error);
+      EXPECT_THROW(ReadProject(after[i].path), Error);
     }
   }
-  EXPECT_EQ(StepOf(Backups::Read(after[3])), 1);
+  EXPECT_EQ(StepOf(ReadProject(after[3].path)), 1);
 }
 
 TEST_F(BackupFolder, AFullDiskCostsTheNewOneAlone)
@@ -190,7 +190,7 @@ TEST_F(BackupFolder, AFullDiskCostsTheNewOneAlone)
   }
   writer.Post(Step(5), "five", true);
   EXPECT_NO_THROW(writer.Flush());
-  EXPECT_EQ(StepOf(Backups::Read(Backups::List(Path()).front())), 5);
+  EXPECT_EQ(StepOf(ReadProject(Backups::List(Path()).front().path)), 5);
 }
 
 TEST_F(BackupFolder, EditsAreWrittenBesideTheWork)
@@ -213,7 +213,7 @@ TEST_F(BackupFolder, EditsAreWrittenBesideTheWork)
     EXPECT_EQ(Numbers().size(), 7u) << "a drag is one";
     writer.Post(Step(62), "last", true);
   } // nothing that waits is lost
-  EXPECT_EQ(StepOf(Backups::Read(Backups::List(Path()).front())), 62);
+  EXPECT_EQ(StepOf(ReadProject(Backups::List(Path()).front().path)), 62);
 }
 
 TEST_F(BackupFolder, ADragIsOnTheDiskWithinASecondOfEachStep)
@@ -226,7 +226,7 @@ TEST_F(BackupFolder, ADragIsOnTheDiskWithinASecondOfEachStep)
   for (int i = 0; i < 1000 && !written; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     const std::vector<Backup> list = Backups::List(Path());
-    written = !list.empty() && list.front().readable && StepOf(Backups::Read(list.front())) == 4;
+    written = !list.empty() && list.front().readable && StepOf(ReadProject(list.front().path)) == 4;
   }
   EXPECT_TRUE(written) << "without anybody asking";
 }
@@ -246,7 +246,7 @@ TEST_F(BackupFolder, AKillLeavesEveryBackupWhole)
     waitpid(child, nullptr, 0);
     for (const Backup& backup : Backups::List(Path())) {
       ASSERT_TRUE(backup.readable) << backup.path;
-      EXPECT_EQ(backup.label, "step " + std::to_string(StepOf(Backups::Read(backup))));
+      EXPECT_EQ(backup.label, "step " + std::to_string(StepOf(ReadProject(backup.path))));
       ++made;
     }
   }
@@ -288,7 +288,7 @@ TEST_F(BackupFolder, SessionsWhoseProcessIsGoneAreFound)
   ASSERT_EQ(abandoned.size(), 1u);
   const std::vector<Backup> list = Backups::List(abandoned[0]);
   ASSERT_EQ(list.size(), 1u);
-  EXPECT_EQ(StepOf(Backups::Read(list[0])), 8);
+  EXPECT_EQ(StepOf(ReadProject(list[0].path)), 8);
 
   // It is taken over by a project, behind what that has.
   Backups(beside).Write(Step(1), "earlier");
@@ -297,7 +297,7 @@ TEST_F(BackupFolder, SessionsWhoseProcessIsGoneAreFound)
   EXPECT_FALSE(fs::exists(abandoned[0]));
   const std::vector<Backup> moved = Backups::List(beside);
   ASSERT_EQ(moved.size(), 2u);
-  EXPECT_EQ(StepOf(Backups::Read(moved[0])), 8);
+  EXPECT_EQ(StepOf(ReadProject(moved[0].path)), 8);
   Put(Path("liver.backups/notes.txt"), "of somebody else");
   Backups::Discard(beside);
   EXPECT_TRUE(Backups::List(beside).empty());

@@ -67,5 +67,71 @@ TEST(DetailLevel, DoesNotFlicker)
   EXPECT_LE(changes, 3);
 }
 
+// After a drag each step draws the next finer level, down to the full picture.
+TEST(FrameDetail, RefinesStepByStep)
+{
+  const Machine machine{1.0, 3.0};
+  FrameDetail detail;
+  EXPECT_TRUE(detail.Full());
+  EXPECT_FALSE(detail.SetInteractive(false, 1.0));
+  EXPECT_TRUE(detail.SetInteractive(true, machine.full));
+  EXPECT_TRUE(detail.Dragging() && detail.Level() > 1);
+  detail.restSeconds = 1.5;
+  for (int level = detail.Level(); level > 0; --level) {
+    detail.Measure(0.01, machine.Frame(level), true);
+    ASSERT_TRUE(detail.Refine(0.0));
+    EXPECT_EQ(detail.Level(), level - 1);
+    EXPECT_FALSE(detail.Dragging());
+    EXPECT_EQ(detail.Full(), level == 1);
+  }
+  EXPECT_FALSE(detail.Refine(0.0));
+  EXPECT_TRUE(detail.SetInteractive(true, machine.full)); // anew
+  EXPECT_GT(detail.Level(), 1);
+}
+
+// A step is taken when going by the last one, or by what the full picture took, it will not take too long.
+TEST(FrameDetail, RefinesNoFurtherThanTheTimeAllows)
+{
+  FrameDetail detail;
+  detail.SetInteractive(true, 10.0);
+  const int first = detail.Level();
+  detail.Measure(0.1, 0.1, true);
+  detail.restSeconds = 0.29; // of the first step three times as much is expected
+  EXPECT_FALSE(detail.Refine(0.0));
+  EXPECT_EQ(detail.Level(), first);
+  detail.restSeconds = 0.31;
+  ASSERT_TRUE(detail.Refine(0.0));
+  detail.Measure(0.2, 0.2, true);
+  detail.restSeconds = 0.39; // it took twice as much: the next one will, too
+  EXPECT_FALSE(detail.Refine(0.0));
+  detail.restSeconds = 0.41;
+  ASSERT_TRUE(detail.Refine(0.0));
+  while (detail.Level() > 1) {
+    detail.Measure(0.01, 0.01, true);
+    ASSERT_TRUE(detail.Refine(0.0));
+  }
+  detail.Measure(0.01, 0.01, true);
+  EXPECT_FALSE(detail.Refine(0.5)); // what the full picture took is known
+  EXPECT_TRUE(detail.Refine(0.4));
+}
+
+// Only typical frames of the drag decide on its level.
+TEST(FrameDetail, MeasuresTheDragAlone)
+{
+  FrameDetail detail;
+  EXPECT_FALSE(detail.Measure(9.0, 9.0, true));
+  detail.SetInteractive(true, 0.0);
+  EXPECT_EQ(detail.Level(), 0);
+  EXPECT_FALSE(detail.Measure(9.0, 9.0, false));
+  EXPECT_EQ(detail.Level(), 0);
+  EXPECT_TRUE(detail.Measure(9.0, 9.0, true));
+  const int coarse = detail.Level();
+  EXPECT_GT(coarse, 0);
+  detail.Stay();
+  EXPECT_FALSE(detail.Dragging());
+  EXPECT_FALSE(detail.Measure(9.0, 9.0, true));
+  EXPECT_EQ(detail.Level(), coarse);
+}
+
 } // namespace
 } // namespace echorama

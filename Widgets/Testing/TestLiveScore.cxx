@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/TextFile.h"
-#include "Filters/Registration/ValidPoints.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "Readers/Testing/TemporaryFolder.h"
 #include "Widgets/Session/LiveScore.h"
 #include <cmath>
@@ -119,8 +119,6 @@ TEST(LiveScore, Limits)
   EXPECT_THROW(live.Set(5, "B", ImageGeometry(), Points(3)), Error);
   EXPECT_TRUE(live.Has(5)); // as it was
   EXPECT_NEAR(live.Update({{2, A}, {5, B}}, 5).mean, 0.0, 1e-12);
-  live.Remove(5);
-  EXPECT_FALSE(live.Has(5));
   live.Clear();
   EXPECT_TRUE(live.Empty());
 }

@@ -279,6 +279,20 @@ class SliceView(unittest.TestCase):
         self.view.SetCursor(0, 0, 0)
         self.assertFalse(self.view.IsLinked())
 
+    def test_the_colour_of_a_linked_plane(self):
+        other = vtkUltrasoundSliceView()
+        other.SetAxis("x")
+        other.LinkTo(self.view)
+        self.view.SetSession(None)
+        window, lines = window_of(self.view), {}
+        for colour in ((1, 0, 1), (0, 1, 0)):
+            other.SetColour(*colour)
+            self.assertTrue(self.view.Update(), "its line is out of date")
+            window.Render()
+            seen = pixels(rendered(window)).astype(int)
+            lines[colour] = (np.abs(seen - np.multiply(colour, 110)).max(axis=2) < 3).sum()
+        self.assertGreater(min(lines.values()), 150, "a line from below to above, but for a gap at the cursor")
+
     def test_level_of_detail(self):
         full = self.picture()
         self.view.SetInteractiveStep(4)
@@ -304,6 +318,7 @@ class SliceView(unittest.TestCase):
                            (lambda: view.SetCursor(0, nan, 0), "cursor"), (lambda: view.Zoom(-1, 0, 0), "factor"),
                            (lambda: view.SetNormalAndUp(1, 0, 0, 2, 0, 0), "parallel"),
                            (lambda: view.SetBrush(0, 0, 0, -1), "brush"),
+                           (lambda: view.SetColour(0, 2, 0), "colour"), (lambda: view.SetColour(0, nan, 0), "colour"),
                            (lambda: view.SetInteractiveStep(17), "step"), (lambda: view.Turn(nan, 0), "angles")):
             with Errors(view) as messages:
                 call()

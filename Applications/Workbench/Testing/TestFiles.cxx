@@ -5,7 +5,6 @@
 #include "Job.h"
 #include "JobBar.h"
 #include "SliceCanvas.h"
-#include "Theme.h"
 #include "VolumePane.h"
 #include "vtkUltrasoundSliceView.h"
 #include "WindowUnderTest.h"
@@ -18,20 +17,17 @@
 #include <QLineEdit>
 #include <QListWidget>
 #include <QPushButton>
-#include <QSurfaceFormat>
 #include <QTableView>
-#include <QTemporaryDir>
 #include <QThread>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
 
 using namespace echorama;
 
-class TestFiles : public QObject {
+class TestFiles : public WindowTest {
   Q_OBJECT
 
 private slots:
-  void init();
   void keysMoveVolumesAfterAClickInTheTable();
   void keysAreShortcutsAfterANumber();
   void keysMoveVolumesAfterAButton();
@@ -49,11 +45,6 @@ private slots:
   void severalSessionsAreOffered();
 
 private:
-  QDir Folder() const { return QDir(folder_->path()); }
-  QString A() { return WriteVolume(Folder(), "left.mha", 1, {0, 0, 0}); }
-  QString B() { return WriteVolume(Folder(), "right.mha", 2, {12, 4, 0}); }
-
-  std::unique_ptr<QTemporaryDir> folder_;
 };
 
 namespace {
@@ -76,13 +67,6 @@ double ArrowMoves(WindowUnderTest& window, int id)
 }
 
 } // namespace
-
-void TestFiles::init()
-{
-  folder_ = std::make_unique<QTemporaryDir>();
-  qputenv("XDG_DATA_HOME", folder_->filePath("data").toLocal8Bit());
-  QSettings::setPath(QSettings::NativeFormat, QSettings::UserScope, folder_->filePath("settings"));
-}
 
 void TestFiles::keysMoveVolumesAfterAClickInTheTable()
 {
@@ -234,7 +218,7 @@ void TestFiles::volumesComeAfterTheirProject()
     QVERIFY(window.Open({A(), B()}));
     QVERIFY(window.Window().Files()->SaveTo(project));
   }
-  const QString third = WriteVolume(Folder(), "third.mha", 3, {0, 9, 4});
+  const QString third = WriteVolume("third.mha", 3, {0, 9, 4});
   WindowUnderTest window;
   window.Drop({third, project});
   QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 3);
@@ -360,15 +344,10 @@ void TestFiles::severalSessionsAreOffered()
 
 int main(int argc, char** argv)
 {
-  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
-  format.setSamples(0);
-  QSurfaceFormat::setDefaultFormat(format);
-  QApplication application(argc, argv);
-  QApplication::setOrganizationName("Echorama");
-  QApplication::setApplicationName("WorkbenchTest");
-  ApplyTheme(application);
-  TestFiles test;
-  return QTest::qExec(&test, argc, argv);
+  return WindowTest::Run(argc, argv, [argc, argv] {
+    TestFiles test;
+    return QTest::qExec(&test, argc, argv);
+  });
 }
 
 #include "TestFiles.moc"

@@ -7,7 +7,6 @@
 #include "RegistrationPanel.h"
 #include "ResultPanel.h"
 #include "SliceCanvas.h"
-#include "Theme.h"
 #include "TrainingPanel.h"
 #include "ViewGrid.h"
 #include "VolumePane.h"
@@ -23,11 +22,8 @@
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
-#include <QSettings>
 #include <QSpinBox>
-#include <QSurfaceFormat>
 #include <QTableWidget>
-#include <QTemporaryDir>
 #include <QToolButton>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
@@ -53,11 +49,10 @@ double Distance(const std::array<double, 16>& a, const std::array<double, 16>& b
 
 } // namespace
 
-class TestPanels : public QObject {
+class TestPanels : public WindowTest {
   Q_OBJECT
 
 private slots:
-  void init();
   void refineBringsAVolumeBack();
   void aSureAnswerIsTakenUnasked();
   void aCancelledJobChangesNothing();
@@ -72,14 +67,9 @@ private slots:
   void thePicturesOfTheManual();
 
 private:
-  QString A() const { return folder_->filePath("a.mha"); }
-  QString B() const { return folder_->filePath("b.mha"); }
-  bool Wait(WindowUnderTest& window)
-  {
-    const bool done = QTest::qWaitFor([&] { return window.Window().Jobs()->Count() == 0; }, 120000);
-    window.Settle();
-    return done;
-  }
+  // One anatomy, in which nothing repeats, twice.
+  QString A() override { return WriteVolume("a.mha", 1, {0.0, 0.0, 0.0}, 64); }
+  QString B() override { return WriteVolume("b.mha", 1, {0.0, 0.0, 0.0}, 64); }
   void Raise(WindowUnderTest& window, const char* panel)
   {
     auto* dock = window.Part<QDockWidget>((QByteArray(panel) + "Dock").constData());
@@ -88,25 +78,15 @@ private:
     window.Settle();
   }
   void Picture(WindowUnderTest& window, const QString& name);
-
-  std::unique_ptr<QTemporaryDir> folder_;
 };
-
-void TestPanels::init()
-{
-  folder_ = std::make_unique<QTemporaryDir>();
-  qputenv("XDG_DATA_HOME", folder_->filePath("data").toUtf8());
-  QSettings().clear();
-  WriteVolume(QDir(folder_->path()), "a.mha", 1, {0.0, 0.0, 0.0}, 64);
-  WriteVolume(QDir(folder_->path()), "b.mha", 1, {0.0, 0.0, 0.0}, 64);
-}
 
 void TestPanels::refineBringsAVolumeBack()
 {
+  QStringList files;
   for (const char* name : {"a.mha", "b.mha"})
-    WriteVolume(QDir(folder_->path()), name, 1, {0.0, 0.0, 0.0}, 64, true);
+    files.append(WriteVolume(name, 1, {0.0, 0.0, 0.0}, 64, true));
   WindowUnderTest window;
-  QVERIFY(window.Open({A(), B()}));
+  QVERIFY(window.Open(files));
   const auto belongs = window.Pose(2);
   window.Session()->Select(2, true, true);
   window.Session()->TranslateSelection(3.0, -2.0, 1.0);
@@ -115,7 +95,7 @@ void TestPanels::refineBringsAVolumeBack()
   Raise(window, "registrationPanel");
   QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
   QVERIFY(!window.Part<QPushButton>("refine")->isEnabled());
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(window.Part<QPushButton>("refine")->isEnabled());
   auto* table = window.Part<QTableWidget>("alignResults");
   QCOMPARE(table->rowCount(), 2);
@@ -126,7 +106,7 @@ void TestPanels::refineBringsAVolumeBack()
   QCOMPARE(window.Session()->GetUndoCount(), entries);
   window.Part<QCheckBox>("alignDoubtful")->setChecked(true);
   QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY2(Distance(window.Pose(2), belongs) < 0.3, qPrintable(QString::number(Distance(window.Pose(2), belongs))));
   QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
   window.Session()->Undo();
@@ -146,7 +126,7 @@ void TestPanels::aSureAnswerIsTakenUnasked()
     const int entries = window.Session()->GetUndoCount();
     QVERIFY(!window.Part<QCheckBox>("alignDoubtful")->isChecked());
     QTest::mouseClick(window.Part<QPushButton>(button), Qt::LeftButton);
-    QVERIFY(Wait(window));
+    QVERIFY(window.Wait());
     auto* table = window.Part<QTableWidget>("alignResults");
     QCOMPARE(table->rowCount(), 2);
     QCOMPARE(table->item(0, 1)->text(), QString("stays"));
@@ -168,7 +148,7 @@ void TestPanels::aCancelledJobChangesNothing()
   window.Part<RegistrationPanel>("registrationPanel")->AlignAll();
   QCOMPARE(window.Window().Jobs()->Count(), 1);
   QTest::mouseClick(window.Part<QToolButton>("jobCancel"), Qt::LeftButton);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(window.Pose(2) == before);
   QCOMPARE(window.Session()->GetUndoCount(), entries);
   QCOMPARE(window.Part<QTableWidget>("alignResults")->rowCount(), 0);
@@ -184,7 +164,7 @@ void TestPanels::whatMovedMeanwhileStays()
   window.Part<RegistrationPanel>("registrationPanel")->Refine();
   window.Session()->TranslateSelection(0.0, 1.0, 0.0);
   auto put = window.Pose(2);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(window.Pose(2) == put);
   QVERIFY(window.HasMessage("moved during the alignment"));
   // And when the volume that stays is moved, nothing is taken.
@@ -192,7 +172,7 @@ void TestPanels::whatMovedMeanwhileStays()
   window.Session()->Select(1, true, true);
   window.Session()->TranslateSelection(0.0, 0.0, 2.0);
   put = window.Pose(2);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(window.Pose(2) == put);
 }
 
@@ -218,26 +198,26 @@ void TestPanels::stitchingMakesAndSavesOneVolume()
   Raise(window, "resultPanel");
   auto* panel = window.Part<ResultPanel>("resultPanel");
   QTest::mouseClick(window.Part<QPushButton>("stitchPreview"), Qt::LeftButton);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   auto* result = panel->Result().session.Get();
   QCOMPARE(result->GetNumberOfVolumes(), 1);
   double coarse[3], fine[3];
   result->GetImage(result->GetVolumeId(0))->GetSpacing(coarse);
   QTest::mouseClick(window.Part<QPushButton>("stitchMake"), Qt::LeftButton);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QCOMPARE(result->GetNumberOfVolumes(), 1);
   QCOMPARE(result->GetUndoCount(), 0); // else results would pile up in memory
   result->GetImage(result->GetVolumeId(0))->GetSpacing(fine);
   QCOMPARE(coarse[0], 2.0 * fine[0]);
   QVERIFY(result->GetImage(result->GetVolumeId(0))->GetDimensions()[0] > 64);
   QCOMPARE(window.Session()->GetNumberOfVolumes(), 2);
-  const QString path = folder_->filePath("stitched.mha");
+  const QString path = Folder().filePath("stitched.mha");
   panel->Save(path);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(QFileInfo(path).size() > 1000);
   QVERIFY(window.HasMessage("Saved"));
   panel->Save("/nowhere/stitched.mha");
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(window.HasMessage("/nowhere"));
 }
 
@@ -249,12 +229,12 @@ void TestPanels::exportWritesAndNeverReplaces()
   window.Session()->TranslateSelection(20.0, 0.0, 0.0);
   QVERIFY(window.Part<QAction>("exportVolumes")->isEnabled());
   ExportActions& actions = *window.Window().findChild<ExportActions*>();
-  const QDir out(folder_->filePath("out"));
+  const QDir out(Folder().filePath("out"));
   QVERIFY(QDir().mkpath(out.path()));
   actions.ExportVolumes(out.path());
   actions.ExportTransforms(out.path());
   actions.ExportPoses(out.filePath("poses.json"));
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   for (const char* name : {"a.mha", "b.mha", "a.tfm", "b.tfm", "poses.json"})
     QVERIFY2(out.exists(name), name);
   QFile transform(out.filePath("b.tfm"));
@@ -270,14 +250,14 @@ void TestPanels::exportWritesAndNeverReplaces()
   // A second time nothing is replaced.
   const QDateTime before = QFileInfo(out.filePath("b.mha")).lastModified();
   actions.ExportVolumes(out.path());
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY(window.HasMessage("it is there already"));
   QCOMPARE(QFileInfo(out.filePath("b.mha")).lastModified(), before);
 }
 
 void TestPanels::exportHoldsWhatWasPaintedOfWhatIsShown()
 {
-  const QString third = WriteVolume(QDir(folder_->path()), "c.mha", 1, {0.0, 0.0, 0.0}, 64);
+  const QString third = WriteVolume("c.mha", 1, {0.0, 0.0, 0.0}, 64);
   WindowUnderTest window;
   QVERIFY(window.Open({A(), B(), third}));
   auto* session = window.Session();
@@ -294,11 +274,11 @@ void TestPanels::exportHoldsWhatWasPaintedOfWhatIsShown()
   session->TranslateSelection(400.0, 0.0, 0.0);
   QVERIFY(session->SetVisible(2, false));
   ExportActions& actions = *window.Window().findChild<ExportActions*>();
-  const QDir out(folder_->filePath("out"));
+  const QDir out(Folder().filePath("out"));
   QVERIFY(QDir().mkpath(out.path()));
   actions.ExportVolumes(out.path());
   actions.ExportTransforms(out.path());
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY2(window.HasMessage("Exported 2 volumes"), qPrintable(window.Messages().join('\n')));
   QVERIFY(out.exists("a.mha") && out.exists("a.tfm") && out.exists("c.mha"));
   QVERIFY(!out.exists("b.mha") && !out.exists("b.tfm"));
@@ -329,7 +309,7 @@ void TestPanels::exportHoldsWhatWasPaintedOfWhatIsShown()
   // Nor is what is hidden stitched: it would make the result 400 mm longer.
   Raise(window, "resultPanel");
   QTest::mouseClick(window.Part<QPushButton>("stitchPreview"), Qt::LeftButton);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   auto* result = window.Part<ResultPanel>("resultPanel")->Result().session.Get();
   QCOMPARE(result->GetNumberOfVolumes(), 1);
   double bounds[6];
@@ -342,21 +322,21 @@ void TestPanels::exportedFilesHaveNamesOfTheirOwn()
   WindowUnderTest window;
   QVERIFY(window.Open({A(), B()}));
   ExportActions& actions = *window.Window().findChild<ExportActions*>();
-  const QDir out(folder_->filePath("out"));
+  const QDir out(Folder().filePath("out"));
   QVERIFY(QDir().mkpath(out.path()));
   // What lies beside a volume is part of it.
   QFile mask(out.filePath("a.ValidRegion.mha"));
   QVERIFY(mask.open(QIODevice::WriteOnly) && mask.write("somebody's") > 0);
   mask.close();
   actions.ExportVolumes(out.path());
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY2(window.HasMessage("a.ValidRegion.mha: it is there already"), qPrintable(window.Messages().join('\n')));
   QCOMPARE(out.entryList(QDir::Files), QStringList("a.ValidRegion.mha"));
   QCOMPARE(QFileInfo(mask).size(), 10);
   // Two names that would be one file.
   QVERIFY(window.Session()->SetName(1, "left/right") && window.Session()->SetName(2, "left_right"));
   actions.ExportVolumes(out.path());
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   QVERIFY2(window.HasMessage("left_right.mha: two volumes"), qPrintable(window.Messages().join('\n')));
   QCOMPARE(out.entryList(QDir::Files), QStringList("a.ValidRegion.mha"));
 }
@@ -365,11 +345,11 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
 {
   WindowUnderTest window;
   QVERIFY(window.Open({A(), B()}));
-  const QString truth = folder_->filePath("truth.json");
+  const QString truth = Folder().filePath("truth.json");
   QVERIFY(window.Session()->WritePoses(truth.toUtf8()));
   auto* panel = window.Part<TrainingPanel>("trainingPanel");
   Raise(window, "trainingPanel");
-  QVERIFY(panel->SetHistory(folder_->filePath("attempts.csv")));
+  QVERIFY(panel->SetHistory(Folder().filePath("attempts.csv")));
   QVERIFY(panel->LoadTruth(truth));
   QCOMPARE(window.Part<QLabel>("score")->text(), QString("0.00 mm"));
   // As far as was asked for, the fixed volume not at all; twice the same exercise, and another one for another seed.
@@ -406,7 +386,7 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QTest::qWait(300);
   QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
   QVERIFY(!panel->IsTraining());
-  const std::vector<Attempt> attempts = ReadAttempts(folder_->filePath("attempts.csv").toStdString());
+  const std::vector<Attempt> attempts = ReadAttempts(Folder().filePath("attempts.csv").toStdString());
   QCOMPARE(attempts.size(), std::size_t(1));
   QCOMPARE(attempts[0].scoreMm, window.Session()->GetScore());
   QCOMPARE(attempts[0].startMm, start);
@@ -506,7 +486,7 @@ void TestPanels::thePicturesOfTheManual()
     QSKIP("the liver pair is not there");
   WindowUnderTest window;
   QVERIFY(window.Open({Liver.filePath("liver_volume_A.mha"), Liver.filePath("liver_volume_B.mha")}));
-  const QString truth = folder_->filePath("truth.json");
+  const QString truth = Folder().filePath("truth.json");
   QVERIFY(window.Session()->WritePoses(truth.toUtf8())); // both are from one sweep: they lie where they belong
   window.Session()->Select(2, true, true);
   Raise(window, "registrationPanel");
@@ -529,23 +509,23 @@ void TestPanels::thePicturesOfTheManual()
   VolumeLook look = window.Window().Bench()->Volume();
   look.minimum = 75.0;
   look.slices = false;
-  window.Window().Bench()->SetVolume(look);
+  window.Window().Bench()->Set(look);
   window.Window().Views()->ToggleLarge(window.Window().Views()->Volume());
   Picture(window, "workbench-3d");
   window.Window().Views()->ToggleLarge(window.Window().Views()->Volume());
   look.minimum = 1.0;
   look.slices = true;
-  window.Window().Bench()->SetVolume(look);
+  window.Window().Bench()->Set(look);
 
   Raise(window, "resultPanel");
   window.Part<QCheckBox>("embed")->setChecked(true);
   window.Part<ResultPanel>("resultPanel")->Make(true);
-  QVERIFY(Wait(window));
+  QVERIFY(window.Wait());
   Picture(window, "workbench-stitch");
 
   Raise(window, "trainingPanel");
   auto* training = window.Part<TrainingPanel>("trainingPanel");
-  QVERIFY(training->SetHistory(folder_->filePath("attempts.csv")));
+  QVERIFY(training->SetHistory(Folder().filePath("attempts.csv")));
   QVERIFY(training->LoadTruth(truth));
   QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
   window.Part<QCheckBox>("showErrors")->setChecked(true);
@@ -554,16 +534,10 @@ void TestPanels::thePicturesOfTheManual()
 
 int main(int argc, char** argv)
 {
-  qputenv("QT_FONT_DPI", "96"); // whatever the screen claims, of which Qt's versions think differently: texts have one size
-  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
-  format.setSamples(0);
-  QSurfaceFormat::setDefaultFormat(format);
-  QApplication application(argc, argv);
-  QApplication::setOrganizationName("Echorama");
-  QApplication::setApplicationName("WorkbenchPanelsTest");
-  ApplyTheme(application);
-  TestPanels test;
-  return QTest::qExec(&test, argc, argv);
+  return WindowTest::Run(argc, argv, [argc, argv] {
+    TestPanels test;
+    return QTest::qExec(&test, argc, argv);
+  });
 }
 
 #include "TestPanels.moc"

@@ -5,7 +5,6 @@
 #include "FileActions.h"
 #include "SliceCanvas.h"
 #include "SlicePane.h"
-#include "Theme.h"
 #include "ViewGrid.h"
 #include "VolumePane.h"
 #include "vtkUltrasoundAlignmentWidget.h"
@@ -20,9 +19,7 @@
 #include <QLabel>
 #include <QListWidget>
 #include <QProcess>
-#include <QSurfaceFormat>
 #include <QTableView>
-#include <QTemporaryDir>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkDataArray.h>
@@ -63,11 +60,10 @@ double LitPercent(const QImage& picture, const QWidget* widget, const QWidget* w
 
 } // namespace
 
-class TestWorkbench : public QObject {
+class TestWorkbench : public WindowTest {
   Q_OBJECT
 
 private slots:
-  void init();
   void opensWhatIsDropped();
   void anUnreadableVolumeIsNamedAndTheOthersOpen();
   void theTableIsTheSelection();
@@ -98,20 +94,7 @@ private slots:
 private:
   void ExpectDragged(SliceCanvas* slice, const std::array<double, 16>& before, const std::array<double, 16>& after,
                      const QPoint& by);
-  QDir Folder() const { return QDir(folder_->path()); }
-  QString A() { return WriteVolume(Folder(), "left.mha", 1, {0, 0, 0}); }
-  QString B() { return WriteVolume(Folder(), "right.mha", 2, {12, 4, 0}); }
-
-  std::unique_ptr<QTemporaryDir> folder_;
 };
-
-void TestWorkbench::init()
-{
-  folder_ = std::make_unique<QTemporaryDir>();
-  // No remembered layout, and no session that another test left.
-  qputenv("XDG_DATA_HOME", folder_->filePath("data").toLocal8Bit());
-  QSettings::setPath(QSettings::NativeFormat, QSettings::UserScope, folder_->filePath("settings"));
-}
 
 void TestWorkbench::opensWhatIsDropped()
 {
@@ -169,7 +152,7 @@ void TestWorkbench::theTableIsTheSelection()
 void TestWorkbench::aGroupIsSelectedTogether()
 {
   WindowUnderTest window;
-  QVERIFY(window.Open({A(), B(), WriteVolume(Folder(), "third.mha", 3, {0, 9, 4})}));
+  QVERIFY(window.Open({A(), B(), WriteVolume("third.mha", 3, {0, 9, 4})}));
   window.Session()->Select(1, true, true);
   window.Session()->Select(2);
   window.Key(Qt::Key_G, Qt::ControlModifier);
@@ -734,7 +717,7 @@ void TestWorkbench::aBatchIsSeenAsAWhole()
 {
   WindowUnderTest window;
   const double far = 90.0;
-  QVERIFY(window.Open({A(), WriteVolume(Folder(), "far.mha", 3, {far, 0, 0})}));
+  QVERIFY(window.Open({A(), WriteVolume("far.mha", 3, {far, 0, 0})}));
   QTest::qWait(100);
   double pixel[2];
   SliceCanvas* slice = window.Slice(0);
@@ -775,18 +758,13 @@ static int DragUntilKilled(const QStringList& files)
 
 int main(int argc, char** argv)
 {
-  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
-  format.setSamples(0);
-  QSurfaceFormat::setDefaultFormat(format);
-  QApplication application(argc, argv);
-  QApplication::setOrganizationName("Echorama");
-  QApplication::setApplicationName("WorkbenchTest");
-  ApplyTheme(application);
-  const QStringList arguments = QApplication::arguments();
-  if (arguments.value(1) == "--drag-until-killed")
-    return DragUntilKilled(arguments.mid(2));
-  TestWorkbench test;
-  return QTest::qExec(&test, argc, argv);
+  return WindowTest::Run(argc, argv, [argc, argv] {
+    const QStringList arguments = QApplication::arguments();
+    if (arguments.value(1) == "--drag-until-killed")
+      return DragUntilKilled(arguments.mid(2));
+    TestWorkbench test;
+    return QTest::qExec(&test, argc, argv);
+  });
 }
 
 #include "TestWorkbench.moc"

@@ -5,6 +5,7 @@
 #include "MessageBar.h"
 #include "SliceCanvas.h"
 #include "SlicePane.h"
+#include "Theme.h"
 #include "ViewGrid.h"
 #include "VolumePane.h"
 #include <cmath>
@@ -13,8 +14,11 @@
 #include <QFile>
 #include <QMimeData>
 #include <QPushButton>
+#include <QSettings>
+#include <QSurfaceFormat>
 #include <QtTest>
 #include <QUrl>
+#include <QVTKOpenGLNativeWidget.h>
 #include <QWheelEvent>
 #include <QWindow>
 #include <vtkMatrix4x4.h>
@@ -125,7 +129,12 @@ bool WindowUnderTest::Answer(const QString& label)
 bool WindowUnderTest::Open(const QStringList& paths)
 {
   window_->Files()->Open(paths);
-  const bool done = QTest::qWaitFor([this] { return window_->Jobs()->Count() == 0; }, 30000);
+  return Wait(30000);
+}
+
+bool WindowUnderTest::Wait(int milliseconds)
+{
+  const bool done = QTest::qWaitFor([this] { return window_->Jobs()->Count() == 0; }, milliseconds);
   Settle();
   return done;
 }
@@ -170,6 +179,31 @@ QImage WindowUnderTest::Screenshot(const QString& name)
   const QImage picture = window_->grab().toImage();
   picture.save(folder.filePath(name + ".png"));
   return picture;
+}
+
+int WindowTest::Run(int argc, char** argv, const std::function<int()>& test)
+{
+  qputenv("QT_FONT_DPI", "96"); // whatever the screen claims, of which Qt's versions think differently: texts have one size
+  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
+  format.setSamples(0);
+  QSurfaceFormat::setDefaultFormat(format);
+  QApplication application(argc, argv);
+  QApplication::setOrganizationName("Echorama");
+  QApplication::setApplicationName("WorkbenchTest");
+  ApplyTheme(application);
+  return test();
+}
+
+void WindowTest::init()
+{
+  folder_ = std::make_unique<QTemporaryDir>();
+  qputenv("XDG_DATA_HOME", folder_->filePath("data").toLocal8Bit());
+  QSettings::setPath(QSettings::NativeFormat, QSettings::UserScope, folder_->filePath("settings"));
+}
+
+QString WindowTest::WriteVolume(const QString& name, int seed, std::array<double, 3> middle, int side, bool repeats)
+{
+  return ::WriteVolume(Folder(), name, seed, middle, side, repeats);
 }
 
 QString WriteVolume(const QDir& folder, const QString& name, int seed, std::array<double, 3> middle, int side, bool repeats)

@@ -9,6 +9,7 @@
 #include <QPoint>
 #include <QString>
 #include <QStringList>
+#include <QTemporaryDir>
 #include <vtkNew.h>
 
 class vtkMatrix4x4;
@@ -53,6 +54,8 @@ public:
 
   /// Opens files and waits until they are there.
   bool Open(const QStringList& paths);
+  /// Until nothing runs in the background.
+  bool Wait(int milliseconds = 120000);
   /// Draws what waits to be drawn.
   void Settle();
   QStringList Messages();
@@ -64,6 +67,28 @@ public:
 private:
   echorama::Workspace workspace_;
   std::unique_ptr<echorama::MainWindow> window_;
+};
+
+/// What tests of windows begin with: a folder of their own, with no remembered layout and no session that another test left, and
+/// two volumes in it that overlap.
+class WindowTest : public QObject {
+  Q_OBJECT
+
+public:
+  /// The main() of a test program. \a test is made when the application is there.
+  static int Run(int argc, char** argv, const std::function<int()>& test);
+
+protected slots:
+  virtual void init();
+
+protected:
+  QDir Folder() const { return QDir(folder_->path()); }
+  virtual QString A() { return WriteVolume("left.mha", 1, {0, 0, 0}); }
+  virtual QString B() { return WriteVolume("right.mha", 2, {12, 4, 0}); }
+  QString WriteVolume(const QString& name, int seed, std::array<double, 3> middle, int side = 48, bool repeats = false);
+
+private:
+  std::unique_ptr<QTemporaryDir> folder_;
 };
 
 /// Writes a MetaImage of bytes: a bright shell and some blobs in speckle, with a border that is not real. \a seed makes

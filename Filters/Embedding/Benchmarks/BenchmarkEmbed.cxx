@@ -16,10 +16,10 @@
 #include "Filters/Embedding/EmbedGrid.h"
 #include "Filters/Embedding/EmbedQuality.h"
 #include "Filters/Embedding/NoiseMatch.h"
+#include "Filters/Phantoms/Phantom.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Stitching/Stitch.h"
 #include "Filters/Stitching/StitchGrid.h"
-#include "Filters/Synthesis/Phantom.h"
-#include "Filters/Synthesis/PhantomViews.h"
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
@@ -94,33 +94,12 @@ public:
       form_ = EncloseRegion(data_.valid.View(), data_.geometry, parameters);
     });
     Time("grid", [&] {
-      std::array<int, 3> first = data_.geometry.dimensions, last{-1, -1, -1};
-      for (int k = 0; k < data_.geometry.dimensions[2]; ++k)
-        for (int j = 0; j < data_.geometry.dimensions[1]; ++j)
-          for (int i = 0; i < data_.geometry.dimensions[0]; ++i)
-            if (data_.valid.View()(i, j, k)) {
-              const std::array<int, 3> at{i, j, k};
-              for (std::size_t axis = 0; axis < 3; ++axis) {
-                first[axis] = std::min(first[axis], at[axis]);
-                last[axis] = std::max(last[axis], at[axis]);
-              }
-            }
-      grid_ = EmbedGridOf(data_.geometry, first, last, form_);
+      grid_ = EmbedGridOf(data_.geometry, data_.valid.View(), form_);
       values_ = Volume<Byte>(grid_.geometry.dimensions);
       region_ = Volume<Byte>(grid_.geometry.dimensions);
       labels_ = Volume<Byte>(grid_.geometry.dimensions);
-      const auto& n = data_.geometry.dimensions;
-      ParallelFor(grid_.geometry.dimensions[2], [&](std::ptrdiff_t slice) {
-        const int k = grid_.DataIndex(static_cast<int>(slice), 2);
-        for (int J = 0; J < grid_.geometry.dimensions[1]; ++J)
-          for (int I = 0; I < grid_.geometry.dimensions[0]; ++I) {
-            const int i = grid_.DataIndex(I, 0), j = grid_.DataIndex(J, 1);
-            if (i < 0 || j < 0 || k < 0 || i >= n[0] || j >= n[1] || k >= n[2] || !data_.valid.View()(i, j, k))
-              continue;
-            region_.View()(I, J, static_cast<int>(slice)) = 1;
-            values_.View()(I, J, static_cast<int>(slice)) = data_.voxels.View()(i, j, k);
-          }
-      });
+      CopyToGrid(grid_, data_.geometry.dimensions, 1, data_.voxels.View().Data(), values_.View().Data());
+      CopyToGrid(grid_, data_.geometry.dimensions, 1, data_.valid.View().Data(), region_.View().Data());
     });
   }
 

@@ -277,19 +277,19 @@ TEST(BeamNoise, RefusesWhatIsOutOfRangeByName)
     return p;
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  ExpectRefused(with([](auto& p) { p.samples = 1; }), convex, "samples");
-  ExpectRefused(with([](auto& p) { p.elements = 0; }), convex, "elements");
-  ExpectRefused(with([](auto& p) { p.steps = 1; }), convex, "steps");
-  ExpectRefused(with([](auto& p) { p.depthCorrelationMm = 26.0; }), convex, "depthCorrelationMm");
-  ExpectRefused(with([](auto& p) { p.fanCorrelation = -0.1; }), convex, "fanCorrelation");
-  ExpectRefused(with([nan](auto& p) { p.sweepCorrelation = nan; }), convex, "sweepCorrelation");
-  ExpectRefused(with([](auto& p) { p.mean = 255.0; }), convex, "mean");
-  ExpectRefused(with([](auto& p) { p.dynamicRangeDb = 5.0; }), convex, "dynamicRangeDb");
+  ExpectRefused(with([](auto& p) { p.samples = 1; }), convex, "Samples");
+  ExpectRefused(with([](auto& p) { p.elements = 0; }), convex, "Elements");
+  ExpectRefused(with([](auto& p) { p.steps = 1; }), convex, "Steps");
+  ExpectRefused(with([](auto& p) { p.depthCorrelationMm = 26.0; }), convex, "DepthCorrelationMm");
+  ExpectRefused(with([](auto& p) { p.fanCorrelation = -0.1; }), convex, "FanCorrelation");
+  ExpectRefused(with([nan](auto& p) { p.sweepCorrelation = nan; }), convex, "SweepCorrelation");
+  ExpectRefused(with([](auto& p) { p.mean = 255.0; }), convex, "Mean");
+  ExpectRefused(with([](auto& p) { p.dynamicRangeDb = 5.0; }), convex, "DynamicRangeDb");
   ExpectRefused(with([](auto& p) {
                   p.intensity = NoiseIntensity::Rayleigh;
                   p.mean = 0.0;
                 }),
-                convex, "mean");
+                convex, "Mean");
   ExpectRefused(with([](auto& p) { p.intensity = NoiseIntensity::Histogram; }), convex, "quantiles");
   ExpectRefused(with([](auto& p) {
                   p.intensity = NoiseIntensity::Histogram;

@@ -71,6 +71,59 @@ TEST(EmbedGrid, HoldsTheFanAndTheDataAndLittleElse)
   }
 }
 
+TEST(EmbedGrid, TakesTheEndsOfARegionFromItsVoxels)
+{
+  const ImageGeometry data = Oblique();
+  Volume<unsigned char> region(data.dimensions);
+  region.View()(10, 30, 12) = 1; // each end along another axis lies at another voxel
+  region.View()(20, 10, 29) = 255;
+  region.View()(15, 12, 10) = 1;
+  for (const int factor : {1, 2}) {
+    const EmbedGrid wanted = EmbedGridOf(data, {10, 10, 10}, {20, 30, 29}, Fan(), factor);
+    const EmbedGrid found = EmbedGridOf(data, region.View(), Fan(), factor);
+    EXPECT_EQ(found.offset, wanted.offset);
+    EXPECT_EQ(found.geometry.dimensions, wanted.geometry.dimensions);
+  }
+  // Voxels beyond the fan make the grid larger: an end that is missed shows.
+  PlacedProbe small = Fan();
+  small.geometry = ProbeGeometry::Convex(0.2, 5.0, 0.1, 3.0, 0.0, 5.0);
+  small.probeToWorld = Pose(Eigen::Translation3d(data.IndexToWorld() * Eigen::Vector3d(15.0, 20.0, 20.0)));
+  const EmbedGrid found = EmbedGridOf(data, region.View(), small);
+  EXPECT_EQ(found.offset, (std::array<int, 3>{-10, -10, -10}));
+  EXPECT_EQ(found.geometry.dimensions, (std::array<int, 3>{11, 21, 20}));
+}
+
+TEST(EmbedGrid, CopiesEveryVoxelToItsPlaceAndZerosElsewhere)
+{
+  const std::array<int, 3> size{7, 5, 4};
+  Volume<std::array<short, 2>> data(size);
+  short value = 0;
+  for (auto& voxel : data.View()) {
+    ++value;
+    voxel = {value, static_cast<short>(-value)};
+  }
+  for (const int factor : {1, 2, 3}) {
+    EmbedGrid grid;
+    grid.factor = factor;
+    grid.offset = {2, 0, -1}; // empty before, flush, and cut
+    grid.start = {factor / 2, 1, 0};
+    grid.geometry.dimensions = {12, 6, 5};
+    Volume<std::array<short, 2>> out(grid.geometry.dimensions, {9, 9});
+    CopyToGrid(grid, size, sizeof(std::array<short, 2>), data.View().Data(), out.View().Data());
+    int copied = 0;
+    for (int k = 0; k < 5; ++k)
+      for (int j = 0; j < 6; ++j)
+        for (int i = 0; i < 12; ++i) {
+          const int x = factor * (i - 2) + factor / 2, y = factor * j + 1, z = factor * (k + 1);
+          const bool there = x >= 0 && x < 7 && y < 5 && z < 4;
+          copied += there;
+          EXPECT_EQ(out.View()(i, j, k), there ? data.View()(x, y, z) : (std::array<short, 2>{0, 0}))
+              << i << " " << j << " " << k;
+        }
+    EXPECT_GT(copied, 0);
+  }
+}
+
 TEST(EmbedGrid, ASliceStaysOne)
 {
   ImageGeometry data = Oblique();

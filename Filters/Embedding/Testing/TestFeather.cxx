@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Filters/Embedding/Feather.h"
+#include "Filters/Embedding/LocalStatistics.h"
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
@@ -123,6 +124,48 @@ TEST(Feather, ConstantsMeetInARampAndStayConstant)
   EXPECT_EQ(result.View()(19, 3, 3), 40);
   EXPECT_EQ(result.View()(29, 3, 3), 60);
   EXPECT_EQ(result.View()(39, 3, 3), 80);
+}
+
+// The closed form, voxel by voxel, with local means that are measured over whole rows. Labels of an earlier run say nothing.
+TEST(Feather, BlendsAreMeansAboutWhichTextureIsRestored)
+{
+  for (const bool keep : {false, true})
+    // All of a row, a part, its end (beyond as many voxels as there are rows), and a border of a single voxel.
+    for (const auto& [from, radius] : {std::pair(0, 12.0), std::pair(20, 12.0), std::pair(50, 12.0), std::pair(20, 0.8)}) {
+      Scene scene;
+      const FeatherParameters parameters{radius, keep, 3.0};
+      for (std::ptrdiff_t at = 0; at < scene.region.View().Size(); ++at) {
+        scene.region.View()[at] = at % size[0] >= from && at / size[0] % size[1] >= 2; // two rows of each slice are background
+        scene.background.View()[at] += 0.4f * static_cast<float>(at % size[0]);        // and neither is flat
+        scene.data.View()[at] = static_cast<unsigned char>(scene.data.View()[at] - at % size[0] / 2);
+      }
+      const LocalStatistics own(VolumeView<const unsigned char>(scene.data.View()), scene.region.View(), spacing, 3.0),
+          others(VolumeView<const float>(scene.background.View()), scene.form.View(), spacing, 3.0);
+      for (const char* run : {"first", "second"}) {
+        const Volume<unsigned char> result = scene.Run(parameters);
+        std::vector<float> mean(size[0]), otherMean(size[0]), unused(size[0]);
+        int wrong = 0, blended = 0;
+        for (int k = 0; k < size[2]; ++k)
+          for (int j = 2; j < size[1]; ++j) {
+            own.Row(j, k, 0, size[0], mean.data(), unused.data());
+            others.Row(j, k, 0, size[0], otherMean.data(), unused.data());
+            for (int i = from; i < size[0]; ++i) {
+              const double w = scene.weights.View()(i, j, k), b = scene.background.View()(i, j, k);
+              if (w >= 1.0)
+                continue;
+              double value = w * scene.data.View()(i, j, k) + (1.0 - w) * b;
+              if (keep) {
+                const double base = w * mean[i] + (1.0 - w) * otherMean[i];
+                value = base + (value - base) / std::hypot(w, 1.0 - w);
+              }
+              wrong += std::abs(result.View()(i, j, k) - std::min(value, 255.0)) > 0.501;
+              ++blended;
+            }
+          }
+        EXPECT_EQ(wrong, 0) << run << " run, keep " << keep << ", from " << from << ", radius " << radius;
+        EXPECT_GT(blended, 900);
+      }
+    }
 }
 
 TEST(Feather, WhereTheBackgroundEndsDataDoNotFade)

@@ -110,10 +110,10 @@ TEST(LatticeNoise, RefusesWhatIsOutOfRange)
   refused(p, "cellMm");
   p = {};
   p.octaves = 0;
-  refused(p, "octaves");
+  refused(p, "Octaves");
   p = {};
   p.deviation = -1.0;
-  refused(p, "deviation");
+  refused(p, "Deviation");
   EXPECT_THROW(MakeWhiteNoise({}, {0, 1, 1}), Error);
   EXPECT_THROW(MakePerlinNoise({}, Grid(), Progress([](double) { return false; })), Error);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Noise that is known sample by sample, in fans of other sizes and side by side.
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -17,7 +18,7 @@ using namespace echorama;
 
 namespace {
 
-constexpr double degree = 0.017453292519943295;
+constexpr double degree = RadiansPerDegree;
 const ProbeGeometry convex = ProbeGeometry::Convex(60 * degree, 30.0, 40 * degree, 20.0, 2.0, 42.0);
 
 PlacedProbe Placed(const ProbeGeometry& geometry)
@@ -195,6 +196,17 @@ TEST(FillFan, AFunctionOfTheBeamsSurvivesMirroring)
       // Counts of samples are whole numbers: half a sample at the ends, and half of one where the parities differ.
       EXPECT_LT(worst, axis == 0 ? 0.52 : 1.02);
     }
+}
+
+TEST(FillFan, RealNoiseTakesThePlaceOfMadeNoiseWhereItIs)
+{
+  Volume<float> real({4, 1, 1}, 7.0f), noise({4, 1, 1}, 1.0f);
+  Volume<unsigned char> there({4, 1, 1}), form({4, 1, 1});
+  there.View()[0] = form.View()[0] = 1; // real in the form
+  there.View()[1] = 1;                  // real outside of it
+  form.View()[2] = 1;                   // missing
+  EXPECT_EQ(PutRealNoise(real.View(), there.View(), form.View(), noise.View()), 1);
+  EXPECT_EQ(std::vector<float>(noise.View().begin(), noise.View().end()), (std::vector<float>{7.0f, 7.0f, 1.0f, 1.0f}));
 }
 
 TEST(FillFan, OfItsOwnFanIsTheNoise)

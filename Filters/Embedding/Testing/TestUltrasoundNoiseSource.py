@@ -123,9 +123,10 @@ assert made(plane).GetDimensions()[2] == 1 and plane.GetMadeCounts()[2] == 1
 # What cannot be done is said, and nothing comes out.
 for change, words in (
     (lambda s: s.SetDepthMax(-1), "depth"),
-    (lambda s: s.SetDepthCorrelationMm(30), "depthCorrelationMm"),
-    (lambda s: s.SetMean(0), "mean"),
-    (lambda s: s.SetSpacingMm(0), "spacing"),
+    (lambda s: s.SetDepthCorrelationMm(30), "DepthCorrelationMm"),
+    (lambda s: s.SetMean(0), "Mean"),
+    (lambda s: s.SetSpacingMm(0), "SpacingMm"),
+    (lambda s: s.SetOctaves(11), "Octaves"),
     (lambda s: s.SetMaximumVoxels(1000), "voxels"),
     (lambda s: s.OnInputGridOn(), "OnInputGrid"),
 ):
@@ -141,4 +142,4 @@ bad = small()
 bad.SetMatchData(constant)
 text = errors_of(bad)
 assert "too little texture" in text, text
-assert "Correlation: 1 mm" in str(source)
+assert "DepthCorrelationMm: 1\n" in str(source)

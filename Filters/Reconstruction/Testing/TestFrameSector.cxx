@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Filters/Reconstruction/FrameSector.h"
@@ -158,7 +159,7 @@ TEST(FrameSector, WhatNoFanExplainsStaysAsItIs)
 
 TEST(FrameSector, FanAndRectangleByNumbers)
 {
-  const ImageFan fan{120.0, -40.0, -0.5 * 57.29577951308232, 0.5 * 57.29577951308232, 55.0, 220.0};
+  const ImageFan fan{120.0, -40.0, -0.5 * DegreesPerRadian, 0.5 * DegreesPerRadian, 55.0, 220.0};
   const auto mask = FanMask(fan, width, height, 1.0, 1.0);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
@@ -183,7 +184,7 @@ TEST(FrameSector, FanAndRectangleByNumbers)
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const double across = 0.5 * (x - 120.0), down = 0.8 * (y + 40.0), mm = std::hypot(across, down);
-      const double angle = std::atan2(across, down) * 57.29577951308232;
+      const double angle = std::atan2(across, down) * DegreesPerRadian;
       ASSERT_EQ(oblique.View()(x, y, 0), mm >= 41.3 && mm <= 133.7 && angle >= -10.0 && angle <= 40.0) << x << " " << y;
     }
 }
@@ -373,6 +374,27 @@ TEST(FrameSector, AFanIsFittedInMillimetres)
     either += mask.View()[at] || fitted.mask.View()[at];
   }
   EXPECT_GT(both, 0.98 * either);
+}
+
+// Nothing of what was found is lost, and the mask grows by half of the smaller edge of a pixel all around the fan.
+TEST(FrameSector, AFittedFanReachesHalfAPixelBeyondTheCentres)
+{
+  struct Case {
+    double across, down, from, to, nearMm, farMm;
+  };
+  for (const Case& c : {Case{1.0, 1.0, -28.6, 28.6, 55.0, 220.0}, Case{1.0, 1.0, -25.0, 40.0, 60.0, 165.0},
+                        Case{0.9, 0.75, -25.0, 40.0, 60.0, 165.0}, Case{0.4, 0.5, -28.6, 28.6, 25.0, 85.0}}) {
+    const auto mask = FanMask({120.0, -40.0, c.from, c.to, c.nearMm, c.farMm}, width, height, c.across, c.down);
+    const auto fitted = FitSector(mask, c.across, c.down).mask;
+    int added = 0, lost = 0;
+    for (std::ptrdiff_t at = 0; at < mask.View().Size(); ++at) {
+      added += fitted.View()[at] && !mask.View()[at];
+      lost += mask.View()[at] && !fitted.View()[at];
+    }
+    EXPECT_EQ(lost, 0);
+    const double perimeter = (c.nearMm + c.farMm) * (c.to - c.from) / DegreesPerRadian + 2.0 * (c.farMm - c.nearMm);
+    EXPECT_NEAR(added * c.across * c.down / perimeter, 0.5 * std::min(c.across, c.down), 0.1 * std::min(c.across, c.down));
+  }
 }
 
 TEST(FrameSector, TheBoxOfAMask)

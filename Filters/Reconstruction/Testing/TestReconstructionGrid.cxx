@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Reconstruction/ReconstructionGrid.h"
@@ -99,7 +100,7 @@ TEST(ReconstructionGrid, ImagesThatTurnAllTheWayHaveAGrid)
     std::vector<FramePlace> places;
     for (int k = 0; k < 36; ++k) {
       FramePlace place;
-      const double angle = k * 3.14159265358979323846 / 18.0;
+      const double angle = k * Pi / 18.0;
       place.imageToWorld.linear() = ExpRotation(turn == 3 ? Eigen::Vector3d(Eigen::Vector3d::Zero())
                                                           : Eigen::Vector3d(angle * Eigen::Vector3d::Unit(turn)));
       if (turn == 3 && k % 2) { // columns and rows exchanged in every other image

@@ -10,13 +10,13 @@
 //   BenchmarkAlignGraph [graph|volumes|both [START]]     default: both, tracked
 // ECHORAMA_TRACE=1 tells of each pair.
 #include "Core/Base/Random.h"
-#include "Filters/Registration/AlignInTurn.h"
+#include "Core/Imaging/ValidPoints.h"
+#include "Filters/Phantoms/Phantom.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/AlignmentScore.h"
 #include "Filters/Registration/AlignVolumes.h"
+#include "Filters/Registration/Benchmarks/AlignInTurn.h"
 #include "Filters/Registration/PoseGraph.h"
-#include "Filters/Registration/ValidPoints.h"
-#include "Filters/Synthesis/Phantom.h"
-#include "Filters/Synthesis/PhantomViews.h"
 #include "Testing/Benchmark.h"
 #include <algorithm>
 #include <cmath>

@@ -4,13 +4,16 @@
 // score (mean distance of points of the valid region from where they belong).
 // Success against the minimum overlap t; error against seconds for different numbers of points; without repeats.
 // VTK has no registration by intensities, so there is no peer in this run.
+//
+//   BenchmarkAlignSearch FIXED.mha MOVING.mha [t]    aligns two volumes of files, as the study asks: one line of JSON
 #include "Core/Base/Random.h"
+#include "Core/Imaging/ValidPoints.h"
 #include "Filters/Registration/AlignmentScore.h"
-#include "Filters/Registration/AlignSearch.h"
-#include "Filters/Registration/ValidPoints.h"
+#include "Filters/Registration/Benchmarks/AlignSearch.h"
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VoxelType.h"
 #include "Testing/Benchmark.h"
 #include <algorithm>
 #include <ctime>
@@ -39,6 +42,48 @@ struct LiverVolume {
   ImageGeometry geometry;
   Volume<unsigned char> voxels, valid;
 };
+
+// A volume of a file; what is real of it, its companion says.
+std::vector<PyramidLevel> PyramidOf(const std::string& path)
+{
+  const ImageHeader header = ReadImageHeader(path);
+  CheckVolume(header);
+  Volume<float> voxels(header.geometry.dimensions);
+  Volume<unsigned char> valid(header.geometry.dimensions, 1);
+  DispatchVoxelType(header.type, [&](auto type) {
+    Volume<decltype(type)> read(header.geometry.dimensions);
+    ReadVoxels(header, read.View().Data());
+    std::transform(read.View().begin(), read.View().end(), voxels.View().begin(), [](auto v) { return static_cast<float>(v); });
+  });
+  const std::string mask = CompanionPath(path, "ValidRegion");
+  if (std::filesystem::exists(mask))
+    ReadVoxels(ReadImageHeader(mask), valid.View().Data());
+  return BuildPyramid(PosedVolume<float>{voxels.View(), valid.View(), header.geometry});
+}
+
+int AlignFiles(int count, char** words)
+{
+  try {
+    AlignSearchParameters p;
+    if (count > 3)
+      p.minimumOverlap = std::stod(words[3]);
+    AlignSearchResult found;
+    const double seconds = benchmark::Seconds([&] {
+      const auto fixed = PyramidOf(words[1]), moving = PyramidOf(words[2]);
+      found = AlignSearch({{&fixed, Pose::Identity(), words[1]}}, {&moving, Pose::Identity(), words[2]}, p);
+    });
+    auto rows = nlohmann::ordered_json::array();
+    for (int r = 0; r < 4; ++r) {
+      const Eigen::RowVector4d row = found.volumeToWorld.matrix().row(r);
+      rows.push_back(std::vector<double>(row.data(), row.data() + 4));
+    }
+    std::cout << nlohmann::ordered_json{{"VolumeToWorld", rows}, {"overlap", found.overlap}, {"seconds", seconds}}.dump() << "\n";
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
 
 double Median(std::vector<double> numbers)
 {
@@ -104,8 +149,10 @@ private:
 
 } // namespace
 
-int main()
+int main(int argc, char** argv)
 {
+  if (argc > 2)
+    return AlignFiles(argc, argv);
   const std::filesystem::path folder = std::filesystem::path(ECHORAMA_SOURCE_DIR) / ".." / "shared" / "data" / "liver";
   if (!std::filesystem::exists(folder / "liver_volume_A.mha")) {
     std::cerr << "skipped: there are no liver volumes in " << folder << "\n";

@@ -5,9 +5,9 @@
 // The peer is the B-spline transform of elastix with the same spacing of its grid, masks and normalised correlation; its
 // control points are those of our own field, so both are measured alike.
 #include "Core/Imaging/Sampling.h"
+#include "Filters/Phantoms/Phantom.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/DeformableAlign.h"
-#include "Filters/Synthesis/Phantom.h"
-#include "Filters/Synthesis/PhantomViews.h"
 #include "Testing/Benchmark.h"
 #include "Testing/ElastixPeer.h"
 #include <optional>

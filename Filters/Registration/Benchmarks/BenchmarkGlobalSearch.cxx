@@ -9,11 +9,11 @@
 //
 // Arguments: trials of each pair (3), pairs of phantoms (4), 1 to leave out full covers of rotations.
 #include "Core/Base/Random.h"
+#include "Core/Imaging/ValidPoints.h"
+#include "Filters/Phantoms/Phantom.h"
+#include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/GlobalSearch.h"
 #include "Filters/Registration/MaskedCorrelation.h"
-#include "Filters/Registration/ValidPoints.h"
-#include "Filters/Synthesis/Phantom.h"
-#include "Filters/Synthesis/PhantomViews.h"
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"

@@ -5,11 +5,11 @@
 // of points of its valid region from where they belong, the median over trials. Peer: the search of the dissertation.
 // Arguments: metrics to run (default: all); --trials N.
 #include "Core/Base/Random.h"
-#include "Filters/Registration/AlignSearch.h"
+#include "Core/Imaging/ValidPoints.h"
+#include "Filters/Phantoms/Phantom.h"
+#include "Filters/Phantoms/PhantomViews.h"
+#include "Filters/Registration/Benchmarks/AlignSearch.h"
 #include "Filters/Registration/LocalAlign.h"
-#include "Filters/Registration/ValidPoints.h"
-#include "Filters/Synthesis/Phantom.h"
-#include "Filters/Synthesis/PhantomViews.h"
 #include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"

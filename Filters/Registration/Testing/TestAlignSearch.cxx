@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Filters/Registration/AlignInTurn.h"
-#include "Filters/Registration/AlignSearch.h"
+#include "Filters/Registration/Benchmarks/AlignInTurn.h"
+#include "Filters/Registration/Benchmarks/AlignSearch.h"
 #include "RandomScene.h"
 #include "Testing/Sanitized.h"
 #include <cmath>

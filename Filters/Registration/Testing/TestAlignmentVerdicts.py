@@ -16,7 +16,7 @@ from echorama.EchoramaCore import vtkUltrasoundVolume
 from echorama.EchoramaFiltersRegistration import vtkUltrasoundAligner
 
 try:
-    from echorama.EchoramaFiltersSynthesis import vtkUltrasoundPhantomSource
+    from echorama.EchoramaFiltersPhantoms import vtkUltrasoundPhantomSource
 except ImportError:
     print("skipped: this build has no phantom")
     sys.exit(77)

@@ -148,7 +148,7 @@ TEST_P(MetricTest, HalvesAreDisjoint)
 
 TEST(MetricNames, TheDefaultComesFirstAndOthersAreRefused)
 {
-  EXPECT_EQ(MetricNames(), (std::vector<std::string>{"local-ncc", "ncc", "mad", "mind-ssc", "lc2"}));
+  EXPECT_EQ(MetricNames(), (std::vector<std::string>{"local-ncc", "ncc", "mind-ssc", "lc2"}));
   const std::string message = MessageOf([] { MetricNamed("ssd"); }, Error::Kind::InvalidParameter);
   EXPECT_NE(message.find("\"ssd\""), std::string::npos) << message;
   EXPECT_NE(message.find("mind-ssc"), std::string::npos) << message;
@@ -170,7 +170,7 @@ TEST(MetricPyramid, BadVolumesAreNamed)
   }
   const Seen other(Box({10, 20, 20}, {1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}), [](const Eigen::Vector3d&) { return 1.0f; });
   const Seen good(geometry, [](const Eigen::Vector3d& p) { return static_cast<float>(p.x()); });
-  MessageOf([&] { BuildMetricPyramid({&good.pyramid, Pose::Identity(), "A", &other.pyramid}, "mad"); }, Error::Kind::BadInput);
+  MessageOf([&] { BuildMetricPyramid({&good.pyramid, Pose::Identity(), "A", &other.pyramid}, "ncc"); }, Error::Kind::BadInput);
 }
 
 // Against the sum over all voxels of the kernel's weights.

@@ -85,10 +85,9 @@ def errors_of(algorithm):
 
 def aligner(*images):
     filter = vtkUltrasoundAligner()
-    filter.SetMethod("search")
-    filter.SetPoints(3000)
-    filter.SetFirstStepMm(5)
-    filter.SetFirstStepDegrees(4)
+    filter.SetStart("tracked")
+    filter.SetPoints(20000)
+    filter.SetMetric("ncc")  # one scene seen twice, without speckle or drift: the most exact one
     for image in images:
         filter.AddInputDataObject(0, image)
     return filter
@@ -124,8 +123,7 @@ for i, image in enumerate((a, wrong)):
 assert np.array_equal(geometry(wrong), before), "the input must not change"
 assert np.array_equal(geometry(output.GetBlock(0)), geometry(a)), "the fixed volume stays"
 assert np.abs(geometry(output.GetBlock(1)) - geometry(b)).max() < 0.5
-assert 0 < align.GetError(1) < 4 and 0.4 < align.GetOverlap(1) < 1 and align.GetError(0) == 0
-assert output.GetBlock(1).GetFieldData().GetArray("AlignmentError").GetValue(0) == align.GetError(1)
+assert 0.4 < align.GetOverlap(1) < 1 and align.GetOverlap(0) == align.GetOverlap(1), "two volumes, one pair"
 assert output.GetBlock(1).GetFieldData().GetArray("AlignmentOverlap").GetValue(0) == align.GetOverlap(1)
 assert not align.GetPose(2, vtkMatrix4x4()) and align.GetNumberOfVolumes() == 2
 
@@ -164,32 +162,25 @@ constant.GetPointData().GetArray("Intensity").Fill(9)
 failed = aligner(a, constant)
 assert "volume 2: it is constant" in errors_of(failed)
 assert failed.GetOutput().GetNumberOfBlocks() == 0 and failed.GetNumberOfVolumes() == 0
-far = knocked(b, [[1, 0, 0, 900], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-assert "does not overlap" in errors_of(aligner(a, far))
 greedy = aligner(a, wrong)
 greedy.SetMinimumOverlap(0.98)
-assert "98.0%" in errors_of(greedy)
+assert errors_of(greedy) == "" and greedy.GetVerdict(1) == "failed" and greedy.GetReason(1)
+assert np.array_equal(geometry(greedy.GetOutput().GetBlock(1)), geometry(wrong)), "a volume that fails stays where it was"
 none = aligner(a, wrong)
 none.SetFixedVolume(2)
 assert "fixed volume must be one of the 2" in errors_of(none)
-even = aligner(a, wrong)
-even.SetSamples(4)
-assert "3, 5 or 7" in errors_of(even)
-even.SetSamples(3)
-even.Update()
-assert even.GetNumberOfVolumes() == 2
+none.SetFixedVolume(0)
+none.Update()
+assert none.GetNumberOfVolumes() == 2
 
 # 5. parameters by name
 named = vtkUltrasoundAligner()
-assert (named.GetMethod(), named.GetStart(), named.GetMetric()) == ("global", "automatic", "local-ncc")
+assert (named.GetStart(), named.GetMetric()) == ("automatic", "local-ncc")
 assert named.SetParameter("Candidates", 5) and named.GetCandidates() == 5
 assert named.SetParameter("UseReliability", 0) and not named.GetUseReliability()
-named.SetMethod("search")
 assert named.SetParameter("MinimumOverlap", 0.25) and named.GetMinimumOverlap() == 0.25
-assert named.SetParameter("Levels", 5) and named.GetLevels() == 5
-assert named.SetParameter("Pyramid", 0) and not named.GetPyramid()
-for name, value, expected in (("MinimumOverlap", 2.0, "[0.01, 1]"), ("Levels", 2.5, "whole number"), ("Levels", 0, "[1, 20]"),
-                              ("FirstStepMm", float("nan"), "FirstStepMm"), ("Colour", 1.0, "Repeats")):
+for name, value, expected in (("MinimumOverlap", 2.0, "[0.01, 1]"), ("Candidates", 2.5, "whole number"), ("Candidates", 0, "[1, 1000]"),
+                              ("FinestMm", float("nan"), "FinestMm"), ("Colour", 1.0, "MinimumPeakRatio")):
     messages = []
     note = lambda caller, event, text: messages.append(text)
     note.CallDataType = "string0"
@@ -197,20 +188,14 @@ for name, value, expected in (("MinimumOverlap", 2.0, "[0.01, 1]"), ("Levels", 2
     assert not named.SetParameter(name, value)
     named.RemoveObserver(tag)
     assert expected in messages[0], messages
-assert named.GetMinimumOverlap() == 0.25 and named.GetLevels() == 5
-assert named.GetMethod() == "search"
+assert named.GetMinimumOverlap() == 0.25 and named.GetCandidates() == 5
 messages = []
 named.AddObserver(vtkCommand.ErrorEvent, note)
-named.SetMethod("mutual-information")
-assert "mutual-information" in messages[0] and "search" in messages[0]
 named.SetStart("nowhere")
-assert "nowhere" in messages[1] and "hand-made" in messages[1]
-named.SetMetric("banana")
-assert "banana" in messages[2] and "mind-ssc" in messages[2]
-assert not named.SetParameter("Candidates", 5) and "search has no parameter" in messages[3]  # another method's
-assert (named.GetMethod(), named.GetStart(), named.GetMetric()) == ("search", "automatic", "local-ncc")
-named.SetMethod("search")
-assert len(messages) == 4
+assert "nowhere" in messages[0] and "hand-made" in messages[0]
+named.SetMetric("mad")
+assert "mad" in messages[1] and "mind-ssc" in messages[1]
+assert (named.GetStart(), named.GetMetric()) == ("automatic", "local-ncc") and len(messages) == 2
 
 # 6. abort: no output, and the filter itself reports no error
 stopped = aligner(a, wrong)
@@ -244,7 +229,7 @@ assert fields.GetArray("AlignmentCentre").GetNumberOfComponents() == 3
 middles = [(geometry(sure.GetOutput().GetBlock(i)) @ [43, 39, 35, 1])[:3] for i in (0, 1)]
 assert np.linalg.norm(fields.GetArray("AlignmentCentre").GetTuple3(0) - np.mean(middles, axis=0)) < 10
 report = json.loads(sure.GetReport())
-assert report["method"] == "global" and len(report["volumes"]) == 2 and len(report["pairs"]) == 1
+assert len(report["volumes"]) == 2 and len(report["pairs"]) == 1
 assert report["pairs"][0]["verdict"] == "aligned" and not report["pairs"][0]["voted_down"]
 forward = np.linalg.inv(geometry(sure.GetOutput().GetBlock(0))) @ geometry(sure.GetOutput().GetBlock(1))
 sure.SetFixedVolume(1)  # the other way round is the inverse motion, within a tenth of a voxel
@@ -284,7 +269,7 @@ both.RemoveAllInputConnections(1)
 both.AddTruthData(a)
 both.AddTruthData(b)
 both.Update()
-assert both.GetScore() < 0.3, both.GetScore()
+assert both.GetScore() < 0.05, both.GetScore()
 
 assert "1 aligned volumes and 2 true ones" in errors_of(score([a], [a, b]))
 small = volume((0, 0, 0), dims=(43, 40, 36))

@@ -10,7 +10,8 @@ from vtkmodules.vtkCommonTransforms import vtkTransform
 
 from echorama.EchoramaCore import vtkUltrasoundVolume
 from echorama.EchoramaFiltersRegistration import vtkUltrasoundRigFit
-from echorama.EchoramaFiltersSynthesis import vtkUltrasoundAnatomySource, vtkUltrasoundSynthesizer
+from echorama.EchoramaFiltersAcoustics import vtkUltrasoundSynthesizer
+from echorama.EchoramaFiltersPhantoms import vtkUltrasoundAnatomySource
 
 BALLS = (("A", (-27, -22, -19), 4), ("B", (-30, 23, -45), 5), ("C", (-5, -20, -49), 3), ("D", (-2, 18, -28), 6), ("E", (27, 21, -20), 7),
          ("F", (12, -14, -58), 3.5), ("G", (30, -1, -47), 4.5))

@@ -13,6 +13,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/DistanceMap.h"
+#include "Filters/Stitching/Benchmarks/MembraneDescent.h"
 #include "Filters/Stitching/BlendWeights.h"
 #include "Filters/Stitching/Membrane.h"
 #include "Testing/Benchmark.h"
@@ -527,26 +528,27 @@ void CompareSolvers(int size)
   }
 
   // The descent in twenty times our time, with the stop that serves it best.
-  MembraneParameters descent;
-  descent.solver = MembraneSolver::SteepestDescent;
+  DescentParameters descent;
   descent.maximumSeconds = 20.0 * ours;
   error = 1.0;
   double time = 0.0;
   nlohmann::ordered_json more;
   for (const double stop : {1e-4, 1e-5, 1e-6, 1e-7}) {
-    descent.descentStop = stop;
-    const double triedError = exact.LargestError(scene, solve(descent, report));
+    descent.stop = stop;
+    RowField<float> tried = scene.values;
+    const DescentReport descended = DescendMembrane(scene.kinds, Eigen::Vector3d::Ones(), tried, descent);
+    const double triedError = exact.LargestError(scene, tried.values);
     if (triedError < error) {
       error = triedError;
-      time = report.setupSeconds + report.solveSeconds;
+      time = descended.seconds;
       more = {{"allowed_seconds", descent.maximumSeconds},
               {"stop", stop},
-              {"steps", report.cycles},
+              {"steps", descended.steps},
               {"reached", error <= good},
               {"runs", 1},
               {"threads", tbb::info::default_concurrency()}};
     }
-    if (report.solveSeconds > descent.maximumSeconds)
+    if (descended.seconds > descent.maximumSeconds)
       break;
   }
   tell("steepest_descent", time, error, more);
@@ -559,19 +561,18 @@ void CompareLevels()
   RowField<float> guess = scene.values;
   SolveMembrane(scene.kinds, Eigen::Vector3d::Ones(), guess, 0.5f);
   const Reference exact(scene, guess.values);
-  MembraneParameters parameters;
-  parameters.solver = MembraneSolver::SteepestDescent;
+  DescentParameters parameters;
   parameters.trace = true;
   for (int levels = 1; levels <= 8; ++levels) {
     parameters.levels = levels;
     RowField<float> values = scene.values;
-    const MembraneReport report = SolveMembrane(scene.kinds, Eigen::Vector3d::Ones(), values, 0.5f, parameters);
+    const DescentReport report = DescendMembrane(scene.kinds, Eigen::Vector3d::Ones(), values, parameters);
     const std::string method = std::to_string(levels) + (levels == 1 ? " level" : " levels");
-    benchmark::Report("membrane", "descent by levels", method, report.solveSeconds, exact.LargestError(scene, values.values),
+    benchmark::Report("membrane", "descent by levels", method, report.seconds, exact.LargestError(scene, values.values),
                       "of the span",
                       {{"unknowns", scene.unknowns},
                        {"levels", levels},
-                       {"steps", report.cycles},
+                       {"steps", report.steps},
                        {"reference", "Eigen's conjugate gradients, double precision"},
                        {"reference_bound", exact.bound}});
     const std::size_t every = report.trace.size() / 120 + 1;
@@ -642,7 +643,7 @@ void CompareBlends()
       });
     }
   };
-  const auto membranes = [&](const MembraneParameters& parameters) {
+  const auto membranes = [&](const auto& solve) {
     const auto spans = std::make_shared<const RowSpans>(GridBox{{0, 0, 0}, n}, std::vector<int>(Size * Size, 0),
                                                         std::vector<int>(Size * Size, Size));
     for (std::size_t v = 0; v < 3; ++v) {
@@ -653,13 +654,20 @@ void CompareBlends()
         kinds.values[static_cast<std::size_t>(at)] = static_cast<unsigned char>(count == 0 ? 0 : own && count > 1 ? 1 : 2);
         values.values[static_cast<std::size_t>(at)] = own ? 1.0f : 0.0f;
       }
-      SolveMembrane(kinds, Eigen::Vector3d::Ones(), values, 0.5f, parameters);
+      solve(kinds, values);
       std::copy(values.values.begin(), values.values.end(), scale[v].View().Data());
     }
   };
-  MembraneParameters six, one;
-  six.solver = one.solver = MembraneSolver::SteepestDescent;
-  one.levels = 1;
+  const auto descent = [](int levels) {
+    return [levels](const RowField<unsigned char>& kinds, RowField<float>& values) {
+      DescentParameters parameters;
+      parameters.levels = levels;
+      DescendMembrane(kinds, Eigen::Vector3d::Ones(), values, parameters);
+    };
+  };
+  const auto multigrid = [](const RowField<unsigned char>& kinds, RowField<float>& values) {
+    SolveMembrane(kinds, Eigen::Vector3d::Ones(), values, 0.5f);
+  };
   const auto report = [&](const std::string& method, const auto& prepare, bool maximum) {
     const double seconds = benchmark::Seconds([&] {
       prepare();
@@ -673,11 +681,11 @@ void CompareBlends()
       "maximum", [] {}, true);
   report("distance", distances, false);
   report(
-      "membrane, 1 level of descent", [&] { membranes(one); }, false);
+      "membrane, 1 level of descent", [&] { membranes(descent(1)); }, false);
   report(
-      "membrane, 6 levels of descent", [&] { membranes(six); }, false);
+      "membrane, 6 levels of descent", [&] { membranes(descent(6)); }, false);
   report(
-      "membrane, multigrid", [&] { membranes({}); }, false);
+      "membrane, multigrid", [&] { membranes(multigrid); }, false);
 }
 
 } // namespace

@@ -10,6 +10,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/Sampling.h"
+#include "Filters/Stitching/Benchmarks/StitchContestants.h"
 #include "Filters/Stitching/StitchGrid.h"
 #include "Filters/Stitching/StitchQuality.h"
 #include "Testing/Benchmark.h"
@@ -250,6 +251,17 @@ Result Stitched(const Case& scene, const StitchParameters& parameters)
   return result;
 }
 
+Result Bytes(ContestantStitch stitch)
+{
+  const auto& n = stitch.values.Dimensions();
+  Result result{Volume<Byte>(n), Volume<Byte>(n), std::move(stitch.coverage)};
+  for (std::ptrdiff_t at = 0; at < result.valid.View().Size(); ++at) {
+    result.intensity.View()[at] = static_cast<Byte>(std::clamp(stitch.values.View()[at] + 0.5f, 0.0f, 255.0f));
+    result.valid.View()[at] = result.coverage.View()[at] > 0;
+  }
+  return result;
+}
+
 // One line: a stitching, timed in turn with the plain average.
 void Contest(const Case& scene, const std::string& method, const std::function<Result()>& stitch,
              const std::function<Result()>& average, int runs, int threads)
@@ -462,33 +474,40 @@ void Measure(const Case& scene, const Wanted& wanted)
     const char* name;
     StitchMethod method;
     StitchTexture texture;
+    double detailSharpness;
   };
+  // Details that change over as widely as the smooth part are the mean of all, amplified: "restore".
+  const double narrow = StitchParameters().detailSharpness, wide = StitchParameters().sharpness;
   const Contender contenders[] = {
-      {"average", StitchMethod::Average, StitchTexture::Mix},
-      {"feather", StitchMethod::Feather, StitchTexture::Mix},
-      {"maximum", StitchMethod::Maximum, StitchTexture::Mix},
-      {"distance", StitchMethod::Distance, StitchTexture::Mix},
-      {"membrane", StitchMethod::Membrane, StitchTexture::Mix},
-      {"distance restore", StitchMethod::Distance, StitchTexture::Restore},
-      {"distance split", StitchMethod::Distance, StitchTexture::Split},
-      {"distance seam", StitchMethod::Distance, StitchTexture::Seam},
-      {"membrane restore", StitchMethod::Membrane, StitchTexture::Restore},
-      {"membrane split", StitchMethod::Membrane, StitchTexture::Split},
-      {"membrane seam", StitchMethod::Membrane, StitchTexture::Seam},
-      {"multiband", StitchMethod::Multiband, StitchTexture::Mix},
-      {"offset", StitchMethod::Offset, StitchTexture::Mix},
+      {"average", StitchMethod::Average, StitchTexture::Mix, narrow},
+      {"feather", StitchMethod::Feather, StitchTexture::Mix, narrow},
+      {"maximum", StitchMethod::Maximum, StitchTexture::Mix, narrow},
+      {"distance", StitchMethod::Distance, StitchTexture::Mix, narrow},
+      {"membrane", StitchMethod::Membrane, StitchTexture::Mix, narrow},
+      {"distance restore", StitchMethod::Distance, StitchTexture::Split, wide},
+      {"distance split", StitchMethod::Distance, StitchTexture::Split, narrow},
+      {"distance seam", StitchMethod::Distance, StitchTexture::Seam, narrow},
+      {"membrane restore", StitchMethod::Membrane, StitchTexture::Split, wide},
+      {"membrane split", StitchMethod::Membrane, StitchTexture::Split, narrow},
+      {"membrane seam", StitchMethod::Membrane, StitchTexture::Seam, narrow},
   };
-  const auto with = [&scene](StitchMethod method, StitchTexture texture) {
+  const auto with = [&scene](StitchMethod method, StitchTexture texture, double detailSharpness) {
     StitchParameters parameters;
     parameters.method = method;
     parameters.texture = texture;
+    parameters.detailSharpness = detailSharpness;
     return [&scene, parameters] { return Stitched(scene, parameters); };
   };
-  const std::function<Result()> average = with(StitchMethod::Average, StitchTexture::Mix);
+  const std::function<Result()> average = with(StitchMethod::Average, StitchTexture::Mix, narrow);
   for (const Contender& contender : contenders)
     if (Wanted::Has(wanted.methods, contender.name))
-      Contest(scene, contender.name, with(contender.method, contender.texture), average, wanted.runs,
+      Contest(scene, contender.name, with(contender.method, contender.texture, contender.detailSharpness), average, wanted.runs,
               tbb::info::default_concurrency());
+  for (const auto& [name, stitch] : {std::pair("multiband", StitchByMultiband), std::pair("offset", StitchByOffsets)})
+    if (Wanted::Has(wanted.methods, name))
+      Contest(
+          scene, name, [&scene, stitch = stitch] { return Bytes(stitch(scene.Inputs(), scene.grid)); }, average, wanted.runs,
+          tbb::info::default_concurrency());
 #ifdef ECHORAMA_WITH_VTK
   const char* peer = "vtk reslice and average";
   if (!Wanted::Has(wanted.methods, peer))

@@ -376,48 +376,15 @@ TEST(Membrane, CyclesDoNotGrowWithSize)
   }
 }
 
-TEST(Membrane, DescentComesNear)
-{
-  Scene exact = Fans(64, true), descent = exact;
-  exact.Solve(Tolerance(1e-6));
-  for (const int levels : {1, 4, 6}) {
-    MembraneParameters parameters;
-    parameters.solver = MembraneSolver::SteepestDescent;
-    parameters.levels = levels;
-    parameters.descentStop = 1e-7;
-    parameters.trace = true;
-    Scene scene = descent;
-    const MembraneReport report = scene.Solve(parameters);
-    EXPECT_FALSE(report.certified);
-    EXPECT_TRUE(std::isinf(report.bound));
-    double error = 0.0;
-    for (std::size_t at = 0; at < scene.kind.size(); ++at)
-      if (scene.kind[at] == Unknown)
-        error = std::max(error, std::abs(static_cast<double>(scene.value[at]) - static_cast<double>(exact.value[at])));
-    EXPECT_LT(error, 0.03) << levels;
-    ASSERT_EQ(report.trace.size(), static_cast<std::size_t>(report.cycles));
-    EXPECT_GE(report.trace.front().level, std::min(levels - 1, 3)); // coarser ones may have nothing to do
-    EXPECT_EQ(report.trace.back().level, 0);
-    for (std::size_t n = 1; n < report.trace.size(); ++n) // within a level the energy falls
-      if (report.trace[n].level == report.trace[n - 1].level) {
-        EXPECT_LE(report.trace[n].energy, report.trace[n - 1].energy);
-      }
-  }
-}
-
 TEST(Membrane, StopsOnRequest)
 {
-  for (const MembraneSolver solver : {MembraneSolver::Multigrid, MembraneSolver::SteepestDescent}) {
-    Scene scene = Fans(32);
-    MembraneParameters parameters;
-    parameters.solver = solver;
-    int calls = 0;
-    try {
-      scene.Solve(parameters, 0.5f, Progress([&calls](double) { return ++calls < 4; }));
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.GetKind(), Error::Kind::Cancelled);
-    }
+  Scene scene = Fans(32);
+  int calls = 0;
+  try {
+    scene.Solve({}, 0.5f, Progress([&calls](double) { return ++calls < 4; }));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.GetKind(), Error::Kind::Cancelled);
   }
 }
 
@@ -439,9 +406,6 @@ TEST(Membrane, RefusesBadInput)
   EXPECT_EQ(kindOf([](Scene&, Parameters& p) { p.tolerance = 0.0; }), Error::Kind::InvalidParameter);
   EXPECT_EQ(kindOf([](Scene&, Parameters& p) { p.tolerance = NAN; }), Error::Kind::InvalidParameter);
   EXPECT_EQ(kindOf([](Scene&, Parameters& p) { p.maximumCycles = -1; }), Error::Kind::InvalidParameter);
-  EXPECT_EQ(kindOf([](Scene&, Parameters& p) { p.levels = 9; }), Error::Kind::InvalidParameter);
-  EXPECT_EQ(kindOf([](Scene&, Parameters& p) { p.descentStop = 0.0; }), Error::Kind::InvalidParameter);
-  EXPECT_EQ(kindOf([](Scene&, Parameters& p) { p.maximumSeconds = -1.0; }), Error::Kind::InvalidParameter);
   EXPECT_EQ(kindOf([](Scene& scene, Parameters&) {
               for (std::size_t at = 0; at < scene.kind.size(); ++at)
                 if (scene.kind[at] == Known)

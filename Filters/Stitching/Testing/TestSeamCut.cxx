@@ -346,20 +346,4 @@ TEST(SeamCut, ThreadsCancelAndBadInput)
   EXPECT_THROW(CutSeams(volumes, {36, 20, 19}), Error);
 }
 
-TEST(SeamCut, LargestScaleIsTheLargestShare)
-{
-  const std::array<int, 3> n{9, 2, 1};
-  std::vector<CoarseVolume> volumes{Noise({{0, 0, 0}, {7, 2, 1}}, 1), Noise({{2, 0, 0}, {7, 2, 1}}, 2)};
-  EXPECT_EQ(LargestScale(volumes, n).View()(6, 0, 0), 0); // equals: the first
-  EXPECT_EQ(LargestScale(volumes, n).View()(7, 0, 0), 1);
-  volumes[0].scale = Scale(volumes[0].inside.box, [](int i, int, int) { return 1.0f - 0.1f * static_cast<float>(i); });
-  volumes[1].scale = Scale(volumes[1].inside.box, [](int i, int, int) { return 0.1f * static_cast<float>(i); });
-  volumes[1].trust = Scale(volumes[1].inside.box, [](int, int j, int) { return j == 0 ? 1.0f : 0.1f; });
-  const Labels labels = LargestScale(volumes, n);
-  for (int i = 0; i < 9; ++i) {
-    EXPECT_EQ(labels.View()(i, 0, 0), i > 5 ? 1 : 0); // 5 is equal but for rounding: 0.5 and 0.5
-    EXPECT_EQ(labels.View()(i, 1, 0), i > 6 ? 1 : 0);
-  }
-}
-
 } // namespace

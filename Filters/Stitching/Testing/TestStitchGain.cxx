@@ -220,6 +220,91 @@ TEST(StitchGain, ConstantsMeetByOffsetAlone)
   }
 }
 
+// A standard deviation of 1e-5 of the mean parts contrast from rounding, in either volume.
+TEST(StitchGain, AContrastNearRoundingIsNone)
+{
+  const auto gainsOf = [](double first, double second) {
+    std::vector<CoarseVolume> volumes = Chain({{}, {}});
+    const double contrast[] = {first, second};
+    for (int v = 0; v < 2; ++v) {
+      const auto low = volumes[v].low.values.View();
+      for (int k = 0; k < 12; ++k)
+        for (int j = 0; j < 30; ++j)
+          for (int i = 0; i < 40; ++i) // four levels by turns, of standard deviation 1
+            low(i, j, k) = static_cast<float>(4096.0 * (1.0 + ((i + j + k) % 4 - 1.5) / std::sqrt(1.25) * contrast[v]));
+    }
+    const StitchGains found = EstimateStitchGains(volumes, true);
+    EXPECT_NEAR(found.gain[0] * found.gain[1], 1.0, 1e-12);
+    return found.gain[0] / found.gain[1];
+  };
+  EXPECT_NEAR(gainsOf(1.1e-5, 2.2e-5), 2.0, 0.05); // a step of floats is 6e-8 of the mean
+  EXPECT_EQ(gainsOf(0.9e-5, 1.8e-5), 1.0);
+  EXPECT_EQ(gainsOf(1.8e-5, 0.9e-5), 1.0);
+  EXPECT_EQ(gainsOf(6e-8, 6e-8), 1.0);
+}
+
+TEST(StitchGain, BlackVolumesAndVolumesWithoutDetailsGiveNumbers)
+{
+  std::vector<CoarseVolume> volumes;
+  for (const std::size_t without : {0, 1}) {
+    volumes = Chain({{}, {}});
+    volumes[without].value = volumes[without].low;
+    EXPECT_EQ(EstimateStitchGains(volumes, true).detailCorrelation, Eigen::MatrixXd::Identity(2, 2));
+  }
+  for (CoarseVolume& volume : volumes)
+    for (auto* field : {&volume.low, &volume.value})
+      std::fill(field->values.View().begin(), field->values.View().end(), 0.0f);
+  ExpectUntouched(EstimateStitchGains(volumes, true));
+}
+
+// 30 shared voxels that count a twentieth each, and of which 12 are left out: all weight is 0.9 of a voxel.
+TEST(StitchGain, LittleTrustIsEnoughWhereThereIsNoOther)
+{
+  std::vector<CoarseVolume> volumes{View({{0, 0, 0}, {4, 6, 5}}, {}, 1), View({{3, 0, 0}, {4, 6, 5}}, {}, 2)};
+  for (int v = 0; v < 2; ++v) {
+    std::fill(volumes[v].low.values.View().begin(), volumes[v].low.values.View().end(), v ? 30.0f : 50.0f);
+    volumes[v].trust = {volumes[v].inside.box, Volume<float>(volumes[v].inside.box.size, v ? 1.0f : 0.05f)};
+  }
+  for (int k = 0; k < 2; ++k)
+    for (int j = 0; j < 6; ++j)
+      volumes[0].low.values.View()(3, j, k) = 90.0f;
+  const StitchGains found = EstimateStitchGains(volumes, true);
+  EXPECT_EQ(found.gain[0], 1.0);
+  EXPECT_NEAR(found.offset[0], -10.0, 1e-9);
+  EXPECT_NEAR(found.offset[1], 10.0, 1e-9);
+}
+
+// Two pairs of 160 voxels agree, a third of 80 contradicts them by d. Least squares leaves it d / 2. Beyond a hundredth (of the
+// brightness for offsets, of the gain for gains) a contradiction counts by its size, which leaves it that hundredth.
+TEST(StitchGain, AContradictionCountsByItsSizeBeyondAHundredth)
+{
+  constexpr int slabs[] = {0, 10, 20, 25}; // along x: volumes 0 and 1, 1 and 2, 0 and 2
+  const auto solved = [&](double logGain, double offset) {
+    std::vector<CoarseVolume> volumes;
+    for (int v = 0; v < 3; ++v) {
+      volumes.push_back(View({{0, 0, 0}, {25, 4, 4}}, {}, static_cast<std::uint64_t>(v) + 1));
+      Random noise(8, static_cast<std::uint64_t>(v)); // without it, how far rounding goes would decide what an outlier is
+      for (int slab = 0; slab < 3; ++slab)
+        for (int k = 0; k < 4; ++k)
+          for (int j = 0; j < 4; ++j)
+            for (int i = slabs[slab]; i < slabs[slab + 1]; ++i) {
+              const bool other = v == 2 && slab == 2;
+              const double contrast = logGain == 0.0 ? 0.0 : 20.0 * std::sin(1.7 * i + 2.3 * j + 3.1 * k) + 0.1 * noise.Normal();
+              volumes[v].inside.values.View()(i, j, k) = slab == v || slab == (v + 2) % 3;
+              volumes[v].low.values.View()(i, j, k) =
+                  static_cast<float>(100.0 + (other ? offset : 0.0) + contrast * (other ? std::exp(logGain) : 1.0));
+            }
+    }
+    return EstimateStitchGains(volumes, true);
+  };
+  for (const double d : {0.5, 1.9, 2.5, 10.0}) { // in hundredths
+    const StitchGains offsets = solved(0.0, d), gains = solved(0.01 * d, 0.0);
+    EXPECT_EQ(offsets.gain[0], 1.0);
+    EXPECT_NEAR(offsets.offset[0] - offsets.offset[2], std::min(0.5 * d, 1.0), 1e-4) << d;
+    EXPECT_NEAR(100.0 * std::log(gains.gain[0] / gains.gain[2]), std::min(0.5 * d, 1.0), 0.2) << d; // standard error 0.1
+  }
+}
+
 TEST(StitchGain, UnlikeVolumesSayNothingOfTheGain)
 {
   // Of different contrast, but without a likeness: noise.

@@ -12,7 +12,7 @@ from echorama.EchoramaCore import vtkUltrasoundReliabilityMap
 from echorama.EchoramaFiltersStitching import vtkUltrasoundStitcher
 
 try:
-    from echorama.EchoramaFiltersSynthesis import vtkUltrasoundPhantomSource
+    from echorama.EchoramaFiltersPhantoms import vtkUltrasoundPhantomSource
 except ImportError:
     print("skipped: the phantom was not built")
     sys.exit(77)

@@ -86,7 +86,7 @@ def test_common_lattice_is_copied():
     a = volume(world[:, :, :26], origin, spacing, pose)
     b = volume(world[2:, 3:, 15:], origin + pose @ (spacing * [15, 3, 2]), spacing, pose)
     filter, messages = stitcher(a, b)
-    for texture in range(4):
+    for texture in range(3):
         filter.SetTexture(texture)
         filter.Update()
         assert not messages, messages
@@ -216,16 +216,16 @@ def test_methods_and_parameters():
     assert filter.GetMethodAsString() == "membrane" and filter.GetTextureAsString() == "split"
     assert filter.GetSharpness() == 1.5 and filter.GetSpacingMm() == 0
     assert not filter.GetAllowDisjoint() and not filter.GetOutputWeights()
-    for number, name in enumerate(("distance", "feather", "average", "maximum", "membrane", "multiband", "offset")):
+    for number, name in enumerate(("distance", "feather", "average", "maximum", "membrane")):
         assert filter.GetMethodFromName(name) == number
         getattr(filter, "SetMethodTo" + name.capitalize())()
         assert filter.GetMethod() == number and filter.GetMethodAsString() == name
-    for number, name in enumerate(("mix", "restore", "split", "seam")):
+    for number, name in enumerate(("mix", "split", "seam")):
         assert filter.GetTextureFromName(name) == number
         getattr(filter, "SetTextureTo" + name.capitalize())()
         assert filter.GetTexture() == number and filter.GetTextureAsString() == name
     assert filter.GetMethodFromName("nothing") == -1 and filter.GetTextureFromName("nothing") == -1
-    assert filter.GetTextureName(4) is None and filter.GetMethodName(7) is None
+    assert filter.GetTextureName(3) is None and filter.GetMethodName(5) is None
     filter.SetSharpness(-3)
     assert filter.GetSharpness() == 0
     filter.SetSharpness(1e9)
@@ -250,22 +250,15 @@ def test_methods_and_parameters():
     assert filter.GetOutput().GetSpacing() == (2.5, 2.5, 2.5)
 
 
-def test_membranes_and_their_solvers():
+def test_membranes_are_certified():
     a, b = volume(np.full((9, 20, 40), 100, np.uint8)), volume(np.full((9, 20, 40), 200, np.uint8), (20, 0, 0))
-    results = []
-    for name in ("Multigrid", "SteepestDescent"):
-        filter, messages = stitcher(a, b)
-        getattr(filter, "SetMembraneSolverTo" + name)()
-        filter.SetSharpness(1)
-        filter.Update()
-        assert not messages, messages
-        results.append(array(filter.GetOutput()).astype(int))
-        bound = filter.GetMembraneBound()
-        assert 0 < bound < 1 / 512 if name == "Multigrid" else bound == np.inf, bound
-        assert filter.GetPlanFactor() == 1
+    filter, messages = stitcher(a, b)
+    filter.SetSharpness(1)
+    filter.Update()
+    assert not messages, messages
+    assert 0 < filter.GetMembraneBound() < 1 / 512 and filter.GetPlanFactor() == 1
     ramp = 100 + 100 * (np.arange(20) + 1) / 21
-    assert np.abs(results[0][4, 10, 20:40] - ramp).max() < 1
-    assert np.abs(results[1] - results[0]).max() < 15
+    assert np.abs(array(filter.GetOutput()).astype(int)[4, 10, 20:40] - ramp).max() < 1
 
 
 def test_gains_spread_and_cost():

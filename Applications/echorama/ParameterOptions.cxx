@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ParameterOptions.h"
+#include <CLI/Error.hpp>
+
+namespace echorama {
+namespace {
+
+// "Edge of the cubic voxels (mm, above 0)". Help of the command line ends without a full stop.
+std::string HelpOf(const Parameter& parameter)
+{
+  std::string text = parameter.help, facts = parameter.unit;
+  if (const auto* choice = std::get_if<Choice>(&parameter.value))
+    for (const std::string& name : choice->names)
+      facts += (facts.empty() ? "" : ", ") + name;
+  if (!text.empty() && text.back() == '.')
+    text.pop_back();
+  const std::string range = parameter.range.high > 1e15 && parameter.range.low == 0.0 ? "" : parameter.range.Text();
+  if (!range.empty())
+    facts += (facts.empty() ? "" : ", ") + (range.find_first_of("[(") == 0 ? "in " + range : range);
+  return facts.empty() ? text : text + " (" + facts + ")";
+}
+
+} // namespace
+
+CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, vtkSmartPointer<vtkObjectBase> owner)
+{
+  if (flag.empty())
+    flag = parameter.Flag();
+  if (const auto* place = std::get_if<bool*>(&parameter.value)) {
+    const bool wanted = !**place;
+    if (!wanted && flag.rfind("--no-", 0) != 0)
+      flag.insert(2, "no-");
+    return options->add_flag_callback(
+        flag, [target = *place, wanted, owner] { *target = wanted; }, (wanted ? "" : "Turn off: ") + HelpOf(parameter));
+  }
+  const std::string help = HelpOf(parameter);
+  const bool isVector = std::holds_alternative<Eigen::Vector3d*>(parameter.value);
+  const auto set = [parameter, flag, owner](const std::vector<std::string>& words) mutable {
+    std::string text;
+    for (const std::string& word : words)
+      text += (text.empty() ? "" : " ") + word;
+    try {
+      parameter.Set(text);
+      parameter.Check();
+    } catch (const Error& problem) {
+      throw CLI::ValidationError(flag, problem.what());
+    }
+  };
+  CLI::Option* option = options->add_option_function<std::vector<std::string>>(flag, set, help)->expected(isVector ? 3 : 1);
+  const auto* choice = std::get_if<Choice>(&parameter.value);
+  option->type_name(choice ? "" : isVector ? "X Y Z" : std::holds_alternative<std::string*>(parameter.value) ? "TEXT" : "NUMBER");
+  return option->default_str(parameter.Text());
+}
+
+} // namespace echorama

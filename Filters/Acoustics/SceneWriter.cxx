@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Check() writes a scene and reads it again, and so says the same as the reader.
+#include "Core/Base/Error.h"
+#include "SceneKeys.h"
+#include <nlohmann/json.hpp>
+
+namespace echorama {
+namespace scene {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Eigen::Vector3d;
+
+class Writer {
+public:
+  static constexpr bool reads = false;
+  template <class T>
+  static Json Write(T& value)
+  {
+    if constexpr (mayBeRows<T>)
+      if (value.rows) {
+        Json rows = Json::array();
+        for (const auto& row : value.rows->rowwise())
+          rows.push_back({row[0], row[1], row[2], row[3]});
+        return rows;
+      }
+    Writer writer;
+    Describe(writer, value);
+    return std::move(writer.object_);
+  }
+
+  void Constant(const char* key, const char* text) { object_[key] = text; }
+  void Text(const char* key, const std::string& value, const char*, Presence presence = {})
+  {
+    if (presence == Presence::Needed || !value.empty())
+      object_[key] = value;
+  }
+  template <class T>
+  void Number(const char* key, const T& value, const Range&, const char*)
+  {
+    object_[key] = value;
+  }
+  template <class T>
+  void Number(const char* key, const std::optional<T>& value, const Range&, const char*)
+  {
+    if (value)
+      object_[key] = *value;
+  }
+  void Seed(const char* key, std::uint64_t value, const char*) { object_[key] = value; }
+  void Flag(const char* key, bool value, const char*) { object_[key] = value; }
+  template <class T>
+  void Choice(const char* key, const T& value, const Choices<T>& choices, const char*)
+  {
+    for (const auto& [name, choice] : choices)
+      if (choice == value)
+        object_[key] = name;
+    if (!object_.contains(key)) {
+      if constexpr (std::is_same_v<T, std::string>)
+        object_[key] = value; // for the reader to refuse
+    }
+  }
+  void Vector(const char* key, const Vector3d& value, const Range&, const char*)
+  {
+    object_[key] = Json::array({value.x(), value.y(), value.z()});
+  }
+  void MaterialName(const char* key, const std::string& value, Presence = {}) { object_[key] = value; }
+  template <class T>
+  void Object(const char* key, T& value, const char*, Presence = {})
+  {
+    object_[key] = Write(value);
+  }
+  template <class T>
+  void List(const char* key, std::vector<T>& values, const char*, Presence = {})
+  {
+    Json list = Json::array();
+    for (T& value : values)
+      list.push_back(Write(value));
+    object_[key] = std::move(list);
+  }
+  template <class Variant, class... T>
+  void OneOf(Variant& value, const Form<T>&... forms)
+  {
+    const auto write = [this](const auto& form, auto* held) {
+      if (held)
+        object_[form.key] = Write(*held);
+    };
+    (write(forms, std::get_if<T>(&value)), ...);
+  }
+  template <class Variant>
+  void Views(const char* key, Variant& value, const char*)
+  {
+    if (auto* recording = std::get_if<SceneRecording>(&value)) {
+      RecordingKey under{*recording};
+      object_[key] = Write(under);
+    } else if (auto* views = std::get_if<SceneViews>(&value))
+      object_[key] = Write(*views);
+    else
+      object_[key] = Write(std::get<SceneRow>(value));
+  }
+  void Shares(const char* key, const std::vector<ScenePacking::Share>& shares, const char*)
+  {
+    Json object = Json::object();
+    for (const ScenePacking::Share& share : shares)
+      object[share.material] = share.weight;
+    object_[key] = std::move(object);
+  }
+  void Materials(const char* key, std::vector<Material>& materials, const char*)
+  {
+    Json object = Json::object();
+    for (Material& material : materials)
+      object[material.name] = Write(material);
+    object_[key] = std::move(object);
+  }
+
+private:
+  Json object_ = Json::object();
+};
+
+} // namespace
+} // namespace scene
+
+void SynthesisScene::Check(const std::string& title) const
+{
+  for (std::size_t i = 0; i < materials.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (materials[i].name == materials[j].name)
+        throw Error(Error::Kind::BadFile, title + ": materials." + materials[i].name + ": it is there twice");
+  SynthesisScene copy = *this;
+  SceneFromJson(scene::Writer::Write(copy).dump(), title);
+}
+
+std::string SceneToJson(const SynthesisScene& scene)
+{
+  scene.Check();
+  SynthesisScene copy = scene;
+  return scene::Writer::Write(copy).dump(2) + "\n";
+}
+
+} // namespace echorama

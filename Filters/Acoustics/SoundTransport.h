@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "AcousticScene.h"
+#include "Interface.h"
+#include "RaySamples.h"
+#include "SoundPath.h"
+
+namespace echorama {
+
+/// How sound is followed through a scene.
+struct SoundTransport {
+  int maxBounces = 4; ///< reflections that are followed, in [0, 100]
+  /// A way ends where its echoes, there and back, would be this far below those of a perfect mirror at the face, in [10, 300].
+  double dynamicRangeDb = 120.0;
+  bool refraction = true; ///< false: rays go straight on, whatever the speeds of sound
+  /// Share of the pressure that the probe's own face turns back, in [0, 1]; 0: no reverberation between probe and tissue.
+  double faceReflection = 0.2;
+  /// How far from the middle of the face that happens, mm, in [0, 1000]: a disc in the plane of the element.
+  double faceRadius = 20.0;
+  /// How far from a surface's normal its mirror echo still finds the element: standard deviation of a Gaussian in the
+  /// angle, degrees, in [0.1, 90]. About that under which half of the aperture is seen from the depth of the focus.
+  double acceptanceDegrees = 5.0;
+  int maxSegments = 10000; ///< of one ray, in [1, 1e8]: a stop for scenes of many mirrors
+
+  /// Throws Error(InvalidParameter) that names the field that is out of range.
+  void Check() const;
+};
+
+/// What the scanner sends and assumes.
+struct SoundConditions {
+  double frequencyMHz = 3.5;         ///< in [0.1, 100]
+  double assumedSoundSpeed = 1540.0; ///< m/s, in [100, 10000]
+  double maxScanDepth = 150.0;       ///< mm, in (0, 1e5]: later echoes are not waited for
+
+  /// Throws Error(InvalidParameter) that names the field that is out of range.
+  void Check() const;
+};
+
+/// Where a ray begins.
+struct RayStart {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();     ///< mm, world
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ(); ///< unit vector
+  Eigen::Vector3d across = Eigen::Vector3d::UnitX();    ///< unit vector along the fan, perpendicular to the direction
+  BodySet inside;                                       ///< AcousticScene::BodiesAt(origin)
+  double scanDepth = 0.0;                               ///< mm that it has behind it: for sub-apertures
+  double amplitude = 1.0;                               ///< there and back
+};
+
+/// Follows rays through a scene: the direct way first, bent where the speed of sound changes, then what was reflected, and what
+/// is reflected from there.
+///
+/// Amplitudes count there and back, for echoes return the way they came: what passes an interface keeps its transmitted
+/// energy T, what is reflected by it and comes back to it once more keeps R, and R + T = 1. An echo of the surface itself has
+/// the signed reflected pressure, times how much of it turns back to the element: a Gaussian in the angle to the normal
+/// (mirror), and for rough surfaces a Lambert lobe of which the aperture catches a part.
+///
+/// The scene must outlive it. Thread safe.
+class SoundTracer {
+public:
+  /// \throws Error(InvalidParameter), see the two Check()s.
+  SoundTracer(const AcousticScene& scene, const SoundTransport& transport, const SoundConditions& conditions);
+
+  /// \a path is overwritten (its memory is used again). \a samples, if any, turn the reflections of rough surfaces: each is a
+  /// mirror, or with the probability of its roughness goes any way (Lambert). Without them all are mirrors.
+  void Trace(const RayStart& start, SoundPath& path, RaySamples* samples = nullptr) const;
+
+private:
+  struct Way;
+  struct Medium {
+    Fluid fluid;
+    double attenuation; ///< nepers per mm, there and back
+    double depthPerMm;
+    double roughness;
+  };
+  double Returned(double cosine, double roughness) const;
+  double WayToFace(const RayStart& start, const Eigen::Vector3d& place, const Eigen::Vector3d& direction) const;
+  void Follow(Way& way, const RayStart& start, SoundPath& path, RaySamples* samples, std::vector<Way>& reflections) const;
+
+  const AcousticScene& scene_;
+  SoundTransport transport_;
+  SoundConditions conditions_;
+  std::vector<Medium> media_;
+  double leastAmplitude_;
+  double mirrorFactor_; ///< 1 / (2 sigma^2)
+  double caught_;       ///< share of a Lambert lobe's energy that the aperture catches, seen head-on
+};
+
+/// The way of one ray: see SoundTracer, which is faster for many.
+SoundPath TracePath(const AcousticScene& scene, const SoundTransport& transport, const SoundConditions& conditions,
+                    const RayStart& start, RaySamples* samples = nullptr);
+
+} // namespace echorama

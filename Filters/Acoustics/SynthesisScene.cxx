@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "SynthesisScene.h"
+#include "Core/Base/Angles.h"
+#include "SceneKeys.h"
+#include <filesystem>
+
+namespace echorama {
+Eigen::Affine3d ScenePlace::Matrix() const
+{
+  if (rows)
+    return Eigen::Affine3d(*rows);
+  Eigen::Affine3d matrix = Eigen::Affine3d::Identity();
+  matrix.linear() = scale * ExpRotation(RadiansPerDegree * rotationDegrees);
+  matrix.translation() = translation;
+  return matrix;
+}
+
+Pose ScenePose::ProbeToWorld() const
+{
+  Pose pose = Pose::Identity();
+  if (rows) {
+    pose.matrix() = *rows;
+    // Rows that were rounded for a file are made a rotation again.
+    const Eigen::Matrix3d rotation = pose.linear();
+    if (!IsRotation(rotation, 1e-12))
+      pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+    return pose;
+  }
+  const Eigen::Vector3d z = (target - face).normalized(), x = (fan - fan.dot(z) * z).normalized();
+  pose.linear().col(0) = x;
+  pose.linear().col(1) = z.cross(x);
+  pose.linear().col(2) = z;
+  pose.translation() = face;
+  return pose;
+}
+
+ProbePreset SceneProbe::Resolve() const
+{
+  ProbePreset probe = ProbePresetOf(preset);
+  ProbeGeometry& head = probe.probe;
+  const auto bend = [](const char* what, const std::optional<double>& angleDegrees, const std::optional<double>& radius,
+                       const std::optional<double>& newWidth, double& angle, double& width) {
+    if (radius && newWidth)
+      scene::Refuse(std::string(what) + "RadiusMm and " + what + "WidthMm say the same; give one of them");
+    const double oldRadius = angle > 0.0 ? width / angle : 0.0;
+    const bool bent = angle > 0.0;
+    if (angleDegrees)
+      angle = RadiansPerDegree * *angleDegrees;
+    if (newWidth)
+      width = *newWidth;
+    else if (radius)
+      width = angle * *radius;
+    else if (angleDegrees && bent)
+      width = angle * oldRadius;
+  };
+  bend("fan", fanAngleDegrees, fanRadiusMm, fanWidthMm, head.fanAngle, head.fanWidth);
+  bend("sweep", sweepAngleDegrees, sweepRadiusMm, sweepWidthMm, head.sweepAngle, head.sweepWidth);
+  head.depthMin = depthMinMm.value_or(head.depthMin);
+  head.depthMax = depthMaxMm.value_or(head.depthMax);
+  probe.elements = elements.value_or(probe.elements);
+  probe.samples = samples.value_or(probe.samples);
+  probe.sweepSteps = sweepSteps.value_or(probe.sweepSteps);
+  if (!sweepSteps && probe.sweepSteps == 1 && !head.IsPlane())
+    scene::Refuse("the preset is of a single plane; say sweepSteps to sweep it");
+  if (probe.sweepSteps > 1 && head.IsPlane())
+    scene::Refuse("sweepSteps is " + std::to_string(probe.sweepSteps) + ", but the sweep has neither angle nor width");
+  head.Check();
+  if (probe.sweepSteps == 1)
+    head.sweepAngle = head.sweepWidth = 0.0;
+  return probe;
+}
+
+Eigen::Affine3d SceneMesh::ToWorld() const
+{
+  Eigen::Matrix3d linear = Eigen::Matrix3d::Identity();
+  if (axes == Axes::YUp)
+    linear << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return transform.Matrix() * Eigen::Affine3d((unit == Unit::Metres ? 1000.0 : 1.0) * linear);
+}
+
+Pose SceneSweep::ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) const
+{
+  Pose motion(ExpRotation(secondsFromMiddle * RadiansPerDegree * turnDegreesPerSecond));
+  motion.translation() = secondsFromMiddle * velocityMmPerSecond;
+  return middle * motion;
+}
+
+const Material& SynthesisScene::MaterialOf(const std::string& wanted) const
+{
+  std::string names;
+  for (const std::vector<Material>* list : {&materials, &StandardMaterials()})
+    for (const Material& material : *list) {
+      if (material.name == wanted)
+        return material;
+      names += (names.empty() ? "" : ", ") + material.name;
+    }
+  throw Error(Error::Kind::InvalidParameter, "there is no material " + scene::Quoted(wanted) + "; there are " + names);
+}
+
+SynthesisParameters SynthesisScene::Parameters() const
+{
+  const ProbePreset resolved = probe.Resolve();
+  SynthesisParameters parameters;
+  parameters.mode = transport.mode;
+  parameters.probe = resolved.probe;
+  parameters.elements = resolved.elements;
+  parameters.steps = resolved.sweepSteps;
+  parameters.samples = resolved.samples;
+  parameters.transducer = transducer;
+  parameters.transport = transport.sound;
+  parameters.subRays = transport.subRays;
+  parameters.sampling = transport.sampling;
+  parameters.mirrorDb = transport.mirrorDb;
+  parameters.counting = transport.counting;
+  parameters.counting.assumedSoundSpeed = transducer.assumedSoundSpeed;
+  parameters.counting.seed = seed;
+  parameters.receiver = receiver;
+  parameters.seed = seed;
+  return parameters;
+}
+
+PackedTissueParameters SynthesisScene::ParametersOf(const ScenePacking& packing) const
+{
+  PackedTissueParameters parameters;
+  parameters.packing = packing.spheres;
+  parameters.background = MaterialOf(background);
+  parameters.materials.clear();
+  for (const ScenePacking::Share& share : packing.materials)
+    parameters.materials.push_back({MaterialOf(share.material), share.weight});
+  parameters.cell.mm = packing.cellMm;
+  parameters.cell.growth = packing.cellGrowth;
+  parameters.deviation = packing.deviation;
+  parameters.trueVolume = packing.trueVolume;
+  parameters.turned = packing.turned;
+  return parameters;
+}
+
+std::string SynthesisScene::PathOf(const std::string& file) const
+{
+  const std::filesystem::path path(file);
+  if (!dataFolder.empty())
+    return (std::filesystem::path(dataFolder) / path.filename()).string();
+  return path.is_absolute() || folder.empty() ? file : (std::filesystem::path(folder) / path).lexically_normal().string();
+}
+
+} // namespace echorama

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "AcousticScene.h"
+#include "Core/Base/Progress.h"
+#include "Core/Geometry/Transducer.h"
+#include "Core/Imaging/BeamEchoes.h"
+#include "Core/Imaging/DisplacementField.h"
+#include "Receiver.h"
+#include "ScatterCounting.h"
+#include "SoundTransport.h"
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// What a synthesised volume is made with: probe, sound and receiver. Numbers that lie in other structs are documented there.
+struct SynthesisParameters {
+  /// How echoes are made.
+  enum class Mode {
+    Coherent, ///< rays for the ways of sound, and the coherent sum of the echoes of scatterers fixed to the tissue
+    Counting, ///< random scatter events of rays, counted (ScatterCounting): the algorithm of dissertation 3.4
+  };
+  Mode mode = Mode::Coherent;
+
+  ProbeGeometry probe = ProbeGeometry::Convex(1.1344640137963142, 40.0, 0.9599310885968813, 30.0, 5.0, 120.0);
+  Pose probeToWorld = Pose::Identity(); ///< rigid
+  /// Where the probe was at each step of the sweep, first to last, when it moved during the sweep; empty: at probeToWorld all
+  /// the time. The scanner does not know: it places every plane as if the probe had rested at probeToWorld. Coherent only.
+  std::vector<Pose> stepPoses;
+
+  int elements = 128; ///< beams of a plane, in [2, 4096]
+  int steps = 96;     ///< planes of the sweep, in [2, 4096]; 1 (whatever is given) of a probe that does not sweep
+  int samples = 512;  ///< depths on each beam, in [2, 16384]
+
+  Transducer transducer;
+  SoundTransport transport;
+  int subRays = 8; ///< rays per element, spread over its aperture, in [1, 4096]; 1: the axis alone, fast and hard-edged
+  Sampling sampling = Sampling::Stratified; ///< how they are spread, and how rough surfaces scatter them
+  /// Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue: dB, in [0, 120].
+  double mirrorDb = 45.0;
+  /// Ways of sound whose speckle would stay this far below black, after all gain, are not summed: dB, in [0, 300].
+  double invisibleDb = 12.0;
+  ScatterCounting counting; ///< of the mode Counting
+  Receiver receiver = DefaultReceiver();
+  std::uint64_t seed = 1; ///< of the tissue: volumes of one seed see the same scatterers
+  /// The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0: scatterersPerCell in every resolution cell at
+  /// the transmit focus. Volumes share their speckle when they have the same number.
+  double scatterersPerMm3 = 0.0;
+  static constexpr double scatterersPerCell = 10.0; ///< enough for speckle that is all but fully developed
+  /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. (So a simulator of tissue says
+  /// it; the fields of an aligner point the other way.) The surfaces of the scene are those that the tissue has now. The default
+  /// has not moved.
+  DisplacementField displacement;
+
+  /// A gain that makes up for 0.5 dB/cm/MHz at 3.5 MHz, there and back, and noise of electronics 65 dB below the reference
+  /// tissue.
+  static Receiver DefaultReceiver();
+
+  /// What scatterersPerMm3 comes to.
+  double ScatterersPerMm3() const;
+
+  /// Samples, elements and steps of the beam volume.
+  std::array<int, 3> BeamDimensions() const;
+
+  /// Throws Error(InvalidParameter) that names the number which is out of its range, and what the parts' own checks throw.
+  void Check() const;
+};
+
+/// What a run cost, stage by stage.
+struct SynthesisCost {
+  double raysSeconds = 0.0;       ///< following sound through the scene
+  double scatterersSeconds = 0.0; ///< making the scatterers near the beams
+  double echoesSeconds = 0.0;     ///< summing their echoes
+  double detectionSeconds = 0.0;  ///< from baseband to grey
+  std::int64_t rays = 0;          ///< how often the scene was asked
+  std::int64_t segments = 0;      ///< straight pieces of the ways of sound
+  std::int64_t surfaceEchoes = 0;
+  std::int64_t scatterers = 0;
+  std::size_t bytes = 0; ///< the largest of what was held at once: scene, ways, scatterers and samples
+};
+
+/// The echoes of a scene before detection, complex baseband: mode Coherent. The depth axis is finer than the volume's when its
+/// samples lie further apart than the pulse is long; DetectEchoes brings it to the number of samples.
+///
+/// 1. Sound is followed from every element through the scene: one ray along the axis of the beam, or several over the
+///    aperture (subRays). 2. Scatterers are made where those ways pass, nowhere else. 3. Each beam sums the
+/// echoes of the scatterers around its ways, and of the surfaces that it meets. With several rays the ways of the axis stand for
+/// the beam, the direct one with the mean amplitude of all rays at each depth: the edge of a shadow is as soft as the aperture is
+/// wide. Surfaces echo to every ray, by its share.
+/// The result does not depend on the number of threads.
+/// \throws as Check(); Error(TooLarge) when samples or scatterers would not fit; Error(Cancelled).
+BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& parameters, const Progress& progress = {},
+                            SynthesisCost* cost = nullptr);
+
+/// B-mode on the beams, of either mode: unsigned char, depth fastest, then fan, then sweep. Counted events are detected with the
+/// same receiver: their number per sample stands for the power.
+/// \throws as above.
+Volume<unsigned char> SynthesizeBeams(const AcousticScene& scene, const SynthesisParameters& parameters,
+                                      const Progress& progress = {}, SynthesisCost* cost = nullptr);
+
+/// One plane of a sweep: the same with a probe that does not sweep, held where the plane at \a sweep (-0.5 ... 0.5) lies.
+/// \throws Error(InvalidParameter) for a place outside of the sweep.
+SynthesisParameters SliceOf(const SynthesisParameters& parameters, double sweep);
+
+/// All parameters as one JSON text, to go with the volume; of a displacement only whether there is one.
+std::string DescribeSynthesis(const SynthesisParameters& parameters);
+
+} // namespace echorama

@@ -1,0 +1,249 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes what follows from the description of a class's parameters: setters in its header, properties in its ParaView XML, tables
+in pages. ./run generate builds, calls this, and builds again; with --check it writes nothing and fails when something is stale.
+
+A header has "// BEGIN parameters" and "// END parameters", XML the same as comments, a page
+"<!-- BEGIN parameters of vtkUltrasoundNoiseSource -->" (perhaps followed by ": Kind, Seed" for some of them) and
+"<!-- END parameters -->". What lies between is replaced.
+"""
+import json
+import os
+import pathlib
+import re
+import sys
+import textwrap
+from xml.sax.saxutils import escape, quoteattr
+
+WIDTH = 130
+TYPES = {"number": "double", "integer": "int", "integer64": "vtkTypeInt64", "choice": "int", "switch": "bool"}
+
+COMMON = """
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+"""
+
+
+def number(value):
+    return str(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
+
+
+def range_of(one):
+    low, high = one.get("low"), one.get("high")
+    if one["type"] in ("choice", "switch", "text") or one["type"] == "integer64" and low == 0:
+        return "at least 0" if one["type"] == "integer64" else ""
+    if low is not None and high is not None:
+        return f"{'(' if one.get('open') else '['}{number(low)}, {number(high)}]"
+    if low is not None:
+        return f"{'above' if one.get('open') else 'at least'} {number(low)}"
+    return f"at most {number(high)}" if high is not None else ""
+
+
+def default_of(one):
+    if one["type"] == "choice":
+        return one["choices"][one["value"]]
+    if one["type"] == "switch":
+        return "on" if one["value"] else "off"
+    if one["type"] == "vector":
+        return "(" + ", ".join(number(value) for value in one["value"]) + ")"
+    return one["value"] or "none" if one["type"] == "text" else number(one["value"])
+
+
+def when_of(one):
+    if "when" not in one:
+        return ""
+    other, values = one["when"]["name"], one["when"]["values"]
+    return f"Used when {other} is {' or '.join(values)}."
+
+
+def sentence(one):
+    """Range, unit and default: "In [0, 100] mm; default 3." """
+    said = measure(one)
+    return said + ("; default " if said else "Default ") + default_of(one) + "."
+
+
+def measure(one):
+    """Range and unit: "In [0, 100] mm", "Above 0 dB", "In degrees", or nothing."""
+    span, unit = range_of(one), one.get("unit", "")
+    if span[:1] in ("(", "[") or unit and not span:
+        span = " ".join(part for part in ("in", span) if part)
+    return " ".join(part for part in (span[:1].upper() + span[1:], unit) if part)
+
+
+def constant(choice):
+    return choice.upper().replace("-", "_")
+
+
+def camel(choice):
+    return "".join(word[:1].upper() + word[1:] for word in choice.split("-"))
+
+
+def comment(text):
+    one = f"  /** {text} */"
+    if len(one) <= WIDTH:
+        return one
+    return "\n".join(["  /**", *textwrap.wrap(text, WIDTH, initial_indent="   * ", subsequent_indent="   * ", break_on_hyphens=False), "   */"])
+
+
+def plural(name):
+    return name[:-1] + "ies" if name.endswith("y") else name + "s"
+
+
+def setters(one):
+    name, kind = one["name"], one["type"]
+    text = " ".join(part for part in (one["help"], when_of(one), sentence(one)) if part)
+    if kind == "choice":
+        text += " There are " + ", ".join(map(constant, one["choices"])) + "."
+    lines = []
+    if kind == "choice":
+        lines += [f"  enum {plural(name)} {{ " + ", ".join(f"{constant(choice)} = {i}" for i, choice in enumerate(one["choices"])) + " };", ""]
+    lines += ["  ///@{", comment(text)]
+    if kind == "vector":
+        lines += [f"  void Set{name}(double x, double y, double z)", "  {", "    const double value[3] = {x, y, z};",
+                  f"    this->Set{name}(value);", "  }",
+                  f"  void Set{name}(const double value[3]) {{ this->SetParameterAsVector(\"{name}\", value); }}",
+                  f"  double* Get{name}() VTK_SIZEHINT(3) {{ return this->GetParameterAsVector(\"{name}\"); }}"]
+    elif kind == "text":
+        lines += [f"  void Set{name}(const char* value) {{ this->SetParameterAsText(\"{name}\", value); }}",
+                  f"  std::string Get{name}() {{ return this->GetParameterAsText(\"{name}\"); }}"]
+    elif kind == "integer64":
+        lines += [f"  void Set{name}(vtkTypeInt64 value) {{ this->SetParameterAsInteger(\"{name}\", value); }}",
+                  f"  vtkTypeInt64 Get{name}() {{ return this->GetParameterAsInteger(\"{name}\"); }}"]
+    else:
+        got = f"this->GetParameter(\"{name}\")"
+        got = {"integer": f"static_cast<int>({got})", "choice": f"static_cast<int>({got})", "switch": f"{got} != 0.0"}.get(kind, got)
+        lines += [f"  void Set{name}({TYPES[kind]} value) {{ this->SetParameter(\"{name}\", value); }}",
+                  f"  {TYPES[kind]} Get{name}() {{ return {got}; }}"]
+        if kind == "switch":
+            lines += [f"  void {name}On() {{ this->Set{name}(true); }}", f"  void {name}Off() {{ this->Set{name}(false); }}"]
+        if kind == "choice":
+            lines += [f"  void Set{name}To{camel(choice)}() {{ this->Set{name}({constant(choice)}); }}" for choice in one["choices"]]
+            lines += [f"  std::string Get{name}AsString() {{ return this->GetParameterAsText(\"{name}\"); }}"]
+    return "\n".join([*lines, "  ///@}"])
+
+
+def header_of(parameters):
+    return "\n\n".join([setters(one) for one in parameters] + [COMMON.strip("\n")])
+
+
+def property_of(one, everything):
+    kind = one["type"]
+    element = {"number": "Double", "vector": "Double", "integer64": "IdType", "text": "String"}.get(kind, "Int") + "VectorProperty"
+    value = one["value"]
+    default = " ".join(map(number, value)) if kind == "vector" else value if kind == "text" else number(value)
+    lines = [f"      <{element} name=\"{one['name']}\" command=\"Set{one['name']}\" number_of_elements=\"{3 if kind == 'vector' else 1}\" "
+             f"default_values={quoteattr(default)}",
+             f"          label=\"{one['label']}\"" + (' panel_visibility="advanced"' if one.get("advanced") else "") + ">"]
+    if kind == "choice":
+        lines.append('        <EnumerationDomain name="enum">')
+        lines += [f"          <Entry value=\"{i}\" text=\"{choice.replace('-', ' ').capitalize()}\"/>" for i, choice in enumerate(one["choices"])]
+        lines.append("        </EnumerationDomain>")
+    elif kind == "switch":
+        lines.append('        <BooleanDomain name="bool"/>')
+    elif kind in ("number", "integer", "vector"):
+        bounds = "".join(f' {key}="{number(one[side])}"' for key, side in (("min", "low"), ("max", "high")) if side in one)
+        lines.append(f"        <{'Int' if kind == 'integer' else 'Double'}RangeDomain name=\"range\"{bounds}/>")
+    text = " ".join(part for part in (one["help"], measure(one) and measure(one) + ".") if part)
+    lines += textwrap.wrap(f"<Documentation>{escape(text)}</Documentation>", 140, initial_indent=" " * 8, subsequent_indent=" " * 10,
+                           break_on_hyphens=False)
+    if "when" in one:
+        other = next(two for two in everything if two["name"] == one["when"]["name"])
+        numbers = [other["choices"].index(text) if other["type"] == "choice" else int(text == "on") for text in one["when"]["values"]]
+        values = f'value="{numbers[0]}"' if len(numbers) == 1 else f'values="{" ".join(map(str, numbers))}"'
+        lines += ["        <Hints>", f"          <PropertyWidgetDecorator type=\"GenericDecorator\" mode=\"visibility\" property=\"{other['name']}\" {values}/>",
+                  "        </Hints>"]
+    return "\n".join([*lines, f"      </{element}>"])
+
+
+def table_of(parameters):
+    rows = ["| parameter | default | range | |", "| --- | --- | --- | --- |"]
+    for one in parameters:
+        span = ", ".join(one["choices"]) if one["type"] == "choice" else "" if one["type"] == "switch" else range_of(one)
+        unit = one.get("unit", "")
+        text = " ".join(part for part in (one["help"], when_of(one)) if part)
+        rows.append(f"| `{one['name']}` | {default_of(one)} | {span}{' ' if span and unit else ''}{unit} | {text.replace('|', chr(92) + '|')} |")
+    return "\n".join(rows) + "\n"
+
+
+def described(name):
+    """The parameters of a class, in the order in which it describes them, or None before it is built."""
+    import echorama
+    made = getattr(echorama, name, None)
+    return json.loads(made().GetParameterDescriptions()) if made and hasattr(made, "GetParameterDescriptions") else None
+
+
+def between(text, begin, end, inside, place):
+    """Replaces what lies between two lines."""
+    start = text.index(begin) + len(begin)
+    stop = text.find(end, start)
+    if stop < 0:
+        raise ValueError(f"{place}: {begin.strip()} has no {end.strip()}")
+    return text[:start].rstrip("\n") + "\n" + inside.strip("\n") + "\n" + text[text.rindex("\n", 0, stop) + 1:]
+
+
+def renewed(path, text):
+    name = path.stem
+    if path.suffix == ".h":
+        parameters = described(name)
+        # Before the class is built, what its .cxx needs declared.
+        inside = header_of(parameters) if parameters is not None else COMMON
+        return between(text, "  // BEGIN parameters\n", "  // END parameters", inside, path)
+    if path.suffix == ".xml":
+        parameters = described(name) or []
+        return between(text, "<!-- BEGIN parameters -->", "<!-- END parameters -->",
+                       "\n".join(property_of(one, parameters) for one in parameters), path)
+    for begin, name, chosen in re.findall(r"^(<!-- BEGIN parameters of (\w+)(?:: ([\w, ]+?))? -->)", text, re.M):
+        parameters = described(name)
+        if parameters is None:
+            raise ValueError(f"{path}: there is no class {name} with parameters")
+        wanted = chosen.replace(",", " ").split()
+        unknown = set(wanted) - {one["name"] for one in parameters}
+        if unknown:
+            raise ValueError(f"{path}: {name} has no parameter {', '.join(sorted(unknown))}")
+        text = between(text, begin, "<!-- END parameters -->", table_of([one for one in parameters if not wanted or one["name"] in wanted]), path)
+    return text
+
+
+def main():
+    root = pathlib.Path(os.environ.get("ECHORAMA_SOURCE_DIR") or pathlib.Path(__file__).resolve().parent.parent)
+    check, stale, complaints = "--check" in sys.argv, [], []
+    folders = ["Core", "Readers", "Tracking", "Filters", "Widgets"]
+    files = [path for folder in folders for pattern in ("vtk*.h", "vtk*.xml") for path in (root / folder).rglob(pattern)]
+    for path in sorted([*files, *(root / "Documentation").rglob("*.md"), root / "README.md"]):
+        text = path.read_text()
+        if not re.search({".h": r"^  // BEGIN parameters$", ".xml": r"^ *<!-- BEGIN parameters -->$"}.get(path.suffix, r"^<!-- BEGIN parameters of"), text, re.M):
+            continue
+        try:
+            new = renewed(path, text)
+        except ValueError as problem:
+            complaints.append(str(problem))
+            continue
+        if new != text:
+            stale.append(str(path.relative_to(root)))
+            if not check:
+                path.write_text(new)
+    for line in complaints:
+        print(line)
+    for name in stale:
+        print(f"{name}: {'stale: ./run generate' if check else 'written'}")
+    sys.exit(1 if complaints or check and stale else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Readers/OutputFiles.h"
+
+#include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
+#include "Readers/ImageHeader.h"
+#include "Readers/VolumeFile.h"
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+
+namespace echorama {
+namespace {
+
+[[noreturn]] void Fail(const fs::path& path, const std::string& reason)
+{
+  throw Error(Error::Kind::FileSystem, path.string() + ": " + reason);
+}
+
+// The files that reading a volume may touch.
+std::vector<fs::path> FilesOfInput(const std::string& input)
+{
+  std::error_code none;
+  std::vector<fs::path> files{input};
+  if (fs::is_directory(input, none)) { // a series of slices, one a file
+    for (fs::recursive_directory_iterator entry(input, none), end; !none && entry != end; entry.increment(none))
+      files.push_back(entry->path());
+    return files;
+  }
+  for (const std::string& companion : CompanionPaths(input))
+    files.emplace_back(companion);
+  for (std::size_t i = files.size(); i-- > 0;) {
+    for (const char* extension : {".hdr", ".img"}) // NIfTI in two files
+      if (files[i].extension() == ".hdr" || files[i].extension() == ".img")
+        files.push_back(fs::path(files[i]).replace_extension(extension));
+    try {
+      files.emplace_back(ReadImageHeader(files[i].string()).dataPath);
+    } catch (const Error&) {
+      // Not there, or without a header: then there are no detached voxels.
+    }
+  }
+  return files;
+}
+
+// The files that writing it may touch.
+std::vector<fs::path> FilesOfOutput(const std::string& output)
+{
+  std::vector<fs::path> files{output};
+  for (const std::string& companion : CompanionPaths(output))
+    files.emplace_back(companion);
+  for (std::size_t i = files.size(); i-- > 0;)
+    for (const char* extension : {".raw", ".zraw", ".raw.gz"})
+      if (files[i].extension() == ".mhd" || files[i].extension() == ".nhdr")
+        files.push_back(fs::path(files[i]).replace_extension(extension));
+  return files;
+}
+
+} // namespace
+
+std::vector<std::string> CompanionPaths(const std::string& path)
+{
+  std::vector<std::string> files{CompanionPath(path, "ValidRegion")};
+  for (const char* array : CompanionArrays)
+    files.push_back(CompanionPath(path, array));
+  return files;
+}
+
+bool IsCompanion(const std::string& file, const std::vector<std::string>& files)
+{
+  const auto normal = [](const std::string& path) { return fs::path(path).lexically_normal(); };
+  for (const std::string& other : files)
+    for (const std::string& companion : CompanionPaths(other))
+      if (normal(file) == normal(companion))
+        return true;
+  return false;
+}
+
+void CheckOutput(const std::string& name, const std::vector<std::string>& inputs)
+{
+  const fs::path path(name), folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code none;
+  if (!path.has_filename() || fs::is_directory(path, none))
+    Fail(path, "it is a folder; a file is needed");
+  if (!fs::is_directory(folder, none))
+    Fail(path, "its folder does not exist");
+  if (fs::exists(path, none) && !fs::is_regular_file(path, none))
+    Fail(path, "it is not a regular file");
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    Fail(path, std::string("its folder cannot be written in: ") + std::strerror(errno));
+  const std::vector<fs::path> writes = FilesOfOutput(name);
+  for (const std::string& input : inputs)
+    for (const fs::path& read : FilesOfInput(input))
+      for (const fs::path& write : writes)
+        if (fs::equivalent(write, read, none))
+          Fail(write, "it is, or belongs to, the input " + input + "; inputs are never overwritten");
+}
+
+void CheckVolumeOutput(const std::string& path, const std::vector<std::string>& inputs)
+{
+  CheckOutput(path, inputs);
+  if (FormatOfName(path) == FileFormat::Unknown)
+    throw Error(Error::Kind::InvalidParameter,
+                path +
+                    ": the extension names none of the formats that are written (.mha .mhd .nrrd .nhdr .nii .nii.gz .vdb .vti)");
+}
+
+OutputFolder::OutputFolder(const std::string& path, const std::vector<std::string>& inputs) : inputs_(inputs), folder_(path)
+{
+  fs::path folder;
+  for (const fs::path& part : folder_) {
+    folder /= part;
+    std::error_code error;
+    if (fs::create_directory(folder, error))
+      made_.push_back(folder);
+    else if (error)
+      Fail(folder_, "the folder cannot be made: " + error.message());
+  }
+  std::string pattern = (folder_ / ".echorama-XXXXXX").string();
+  if (!mkdtemp(pattern.data()))
+    Fail(folder_, std::string("the folder cannot be written in: ") + std::strerror(errno));
+  stage_ = pattern;
+}
+
+OutputFolder::~OutputFolder()
+{
+  std::error_code none;
+  fs::remove_all(stage_, none);
+  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder)
+    fs::remove(*folder, none); // only when it is empty
+}
+
+std::string OutputFolder::Stage(const std::string& name)
+{
+  CheckOutput(Final(name), inputs_);
+  if (std::find(names_.begin(), names_.end(), name) != names_.end())
+    Fail(Final(name), "it would be written twice, because two volumes have this name");
+  names_.push_back(name);
+  return (stage_ / name).string();
+}
+
+void OutputFolder::Commit()
+{
+  FileReplacement replacement;
+  for (const std::string& name : names_)
+    for (const std::string& companion : CompanionPaths(name)) // of an earlier file of this name
+      if (!fs::exists(stage_ / companion))
+        replacement.Remove((folder_ / companion).string());
+  for (const auto& entry : fs::directory_iterator(stage_))
+    fs::rename(entry.path(), replacement.Stage(Final(entry.path().filename().string())));
+  replacement.Commit();
+  made_.clear();
+}
+
+} // namespace echorama

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The three libraries report errors through callbacks: libpng and libjpeg want a longjmp, so their code stands in functions that
+// hold nothing which needs a destructor; libtiff has handlers per file. Nobody prints.
+#include "Readers/PictureFile.h"
+#include "Core/Base/Error.h"
+#include <algorithm>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include <jpeglib.h>
+#include <png.h>
+#include <tiffio.h>
+
+namespace echorama {
+namespace {
+
+//------------------------------------------------------------------------------------------------ PNG
+void PngError(png_structp png, png_const_charp message)
+{
+  PictureInfo* info = static_cast<PictureInfo*>(png_get_error_ptr(png));
+  std::snprintf(info->message, sizeof info->message, "%s", message);
+  png_longjmp(png, 1);
+}
+
+void PngWarning(png_structp, png_const_charp) {}
+
+bool ReadPng(FILE* file, PictureInfo* info)
+{
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, info, PngError, PngWarning);
+  png_infop header = png ? png_create_info_struct(png) : nullptr;
+  if (!header || setjmp(png_jmpbuf(png))) {
+    png_destroy_read_struct(&png, &header, nullptr);
+    return false;
+  }
+  png_init_io(png, file);
+  png_read_info(png, header);
+  const int color = png_get_color_type(png, header);
+  png_uint_32 x = 0, y = 0;
+  int unit = 0;
+  if (png_get_pHYs(png, header, &x, &y, &unit) && unit == PNG_RESOLUTION_METER) {
+    info->dotsPerMm[0] = x / 1000.0;
+    info->dotsPerMm[1] = y / 1000.0;
+  }
+  if (color == PNG_COLOR_TYPE_PALETTE)
+    png_set_palette_to_rgb(png);
+  else if (png_get_bit_depth(png, header) < 8)
+    png_set_expand_gray_1_2_4_to_8(png);
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+  png_set_swap(png);
+#endif
+  const int passes = png_set_interlace_handling(png);
+  png_read_update_info(png, header);
+  info->width = png_get_image_width(png, header);
+  info->height = png_get_image_height(png, header);
+  info->channels = png_get_channels(png, header);
+  info->bytes = png_get_bit_depth(png, header) / 8;
+  if (info->pixels) {
+    if (info->Size() > info->room)
+      png_error(png, PictureChanged);
+    const std::size_t stride = info->Size() / info->height;
+    for (int pass = 0; pass < passes; ++pass)
+      for (std::uint32_t row = 0; row < info->height; ++row)
+        png_read_row(png, info->pixels + row * stride, nullptr);
+    png_read_end(png, nullptr);
+  }
+  png_destroy_read_struct(&png, &header, nullptr);
+  return true;
+}
+
+//------------------------------------------------------------------------------------------------ JPEG
+struct JpegErrors {
+  jpeg_error_mgr manager; // first: libjpeg knows this part
+  jmp_buf jump;
+};
+
+void JpegError(j_common_ptr jpeg)
+{
+  std::longjmp(reinterpret_cast<JpegErrors*>(jpeg->err)->jump, 1);
+}
+
+void JpegMessage(j_common_ptr) {}
+
+bool ReadJpeg(FILE* file, PictureInfo* info)
+{
+  jpeg_decompress_struct jpeg;
+  JpegErrors errors;
+  jpeg.err = jpeg_std_error(&errors.manager);
+  errors.manager.error_exit = JpegError;
+  errors.manager.output_message = JpegMessage;
+  if (setjmp(errors.jump)) {
+    char text[JMSG_LENGTH_MAX];
+    errors.manager.format_message(reinterpret_cast<j_common_ptr>(&jpeg), text);
+    std::snprintf(info->message, sizeof info->message, "%.190s", text);
+    jpeg_destroy_decompress(&jpeg);
+    return false;
+  }
+  jpeg_create_decompress(&jpeg);
+  jpeg_stdio_src(&jpeg, file);
+  jpeg_read_header(&jpeg, TRUE);
+  const bool grey = jpeg.num_components == 1;
+  bool good = grey || jpeg.num_components == 3;
+  if (!good)
+    std::snprintf(info->message, sizeof info->message, "it has %d colour components; 1 or 3 are read", jpeg.num_components);
+  else {
+    jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
+    info->width = jpeg.image_width;
+    info->height = jpeg.image_height;
+    info->channels = grey ? 1 : 3;
+    info->bytes = 1;
+    const double perMm = jpeg.density_unit == 1 ? 1.0 / 25.4 : jpeg.density_unit == 2 ? 0.1 : 0.0;
+    info->dotsPerMm[0] = jpeg.X_density * perMm;
+    info->dotsPerMm[1] = jpeg.Y_density * perMm;
+    if (info->pixels && info->Size() > info->room) {
+      std::snprintf(info->message, sizeof info->message, "%s", PictureChanged);
+      good = false;
+    } else if (info->pixels) {
+      jpeg_start_decompress(&jpeg);
+      const std::size_t stride = info->Size() / info->height;
+      while (jpeg.output_scanline < jpeg.output_height) {
+        JSAMPROW row = info->pixels + jpeg.output_scanline * stride;
+        jpeg_read_scanlines(&jpeg, &row, 1);
+      }
+      jpeg_finish_decompress(&jpeg);
+      // Damage and a missing end are warnings to libjpeg, which makes up the rest.
+      if (errors.manager.num_warnings > 0) {
+        errors.manager.format_message(reinterpret_cast<j_common_ptr>(&jpeg), info->message);
+        good = false;
+      }
+    }
+  }
+  jpeg_destroy_decompress(&jpeg);
+  return good;
+}
+
+//------------------------------------------------------------------------------------------------ TIFF
+int TiffError(TIFF*, void* user, const char*, const char* format, va_list arguments)
+{
+  PictureInfo* info = static_cast<PictureInfo*>(user);
+  if (info && info->message[0] == '\0') // the first says what went wrong
+    std::vsnprintf(info->message, sizeof info->message, format, arguments);
+  return 1; // told; nobody prints
+}
+
+int TiffWarning(TIFF*, void*, const char*, const char*, va_list)
+{
+  return 1;
+}
+
+using TiffPointer = std::unique_ptr<TIFF, void (*)(TIFF*)>;
+
+TiffPointer OpenTiff(const std::string& path, PictureInfo* info)
+{
+  TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
+  TIFFOpenOptionsSetErrorHandlerExtR(options, TiffError, info);
+  TIFFOpenOptionsSetWarningHandlerExtR(options, TiffWarning, nullptr);
+  TiffPointer tiff(TIFFOpenExt(path.c_str(), "rm", options), TIFFClose); // m: not mapped, so that a shrinking file is no crash
+  TIFFOpenOptionsFree(options);
+  return tiff;
+}
+
+template <class T>
+T TiffTag(TIFF* tiff, std::uint32_t tag)
+{
+  T value{};
+  TIFFGetFieldDefaulted(tiff, tag, &value);
+  return value;
+}
+
+// The current page. \returns false with a message.
+bool ReadTiffPage(TIFF* tiff, PictureInfo* info)
+{
+  const auto refuse = [info](const char* format, int number) {
+    std::snprintf(info->message, sizeof info->message, format, number);
+    return false;
+  };
+  info->width = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH);
+  info->height = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH);
+  const int bits = TiffTag<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE),
+            format = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT),
+            photometric = TiffTag<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC),
+            compression = TiffTag<std::uint16_t>(tiff, TIFFTAG_COMPRESSION);
+  info->channels = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
+  if (info->channels < 1 || info->channels > 4)
+    return refuse("it has %d numbers per pixel; 1 to 4 are read", info->channels);
+  if (info->channels > 1 && TiffTag<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG)
+    return refuse("its %d colours are stored apart, which is not supported", info->channels);
+  if (bits != 8 && bits != 16 && bits != 32)
+    return refuse("it has %d bits per number; 8, 16 and 32 are read", bits);
+  info->isFloat = format == SAMPLEFORMAT_IEEEFP;
+  info->isSigned = format == SAMPLEFORMAT_INT;
+  if ((info->isFloat && bits != 32) || format > SAMPLEFORMAT_VOID)
+    return refuse("its sample format %d is not supported", format);
+  if (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG)
+    TIFFSetField(tiff, TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
+  else if (photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE && photometric != PHOTOMETRIC_RGB)
+    return refuse("its colours are stored in a way that is not supported (photometric interpretation %d)", photometric);
+  info->inverted = photometric == PHOTOMETRIC_MINISWHITE;
+  info->bytes = bits / 8;
+  const int unit = TiffTag<std::uint16_t>(tiff, TIFFTAG_RESOLUTIONUNIT);
+  const double perMm = unit == RESUNIT_INCH ? 1.0 / 25.4 : unit == RESUNIT_CENTIMETER ? 0.1 : 0.0;
+  info->dotsPerMm[0] = static_cast<double>(TiffTag<float>(tiff, TIFFTAG_XRESOLUTION)) * perMm;
+  info->dotsPerMm[1] = static_cast<double>(TiffTag<float>(tiff, TIFFTAG_YRESOLUTION)) * perMm;
+  if (!info->pixels)
+    return true;
+  if (info->Size() > info->room)
+    return refuse(PictureChanged, 0);
+
+  const std::size_t sample = static_cast<std::size_t>(info->channels) * static_cast<std::size_t>(info->bytes),
+                    stride = info->width * sample;
+  const auto damaged = [&] { return info->message[0] != '\0' ? false : refuse("its data end early or are damaged", 0); };
+  if (!TIFFIsTiled(tiff)) {
+    if (TIFFScanlineSize64(tiff) != stride)
+      return refuse("its rows have not the length of its %d numbers per pixel", info->channels);
+    for (std::uint32_t row = 0; row < info->height; ++row)
+      if (TIFFReadScanline(tiff, info->pixels + row * stride, row) != 1)
+        return damaged();
+    return true;
+  }
+  const std::uint32_t across = TiffTag<std::uint32_t>(tiff, TIFFTAG_TILEWIDTH),
+                      down = TiffTag<std::uint32_t>(tiff, TIFFTAG_TILELENGTH);
+  const std::uint64_t size = TIFFTileSize64(tiff);
+  if (across == 0 || down == 0 || size != across * sample * down || size > (std::uint64_t{1} << 28))
+    return refuse("its tiles have not the size of their %d numbers per pixel", info->channels);
+  std::vector<unsigned char> tile(size);
+  for (std::uint32_t y = 0; y < info->height; y += down)
+    for (std::uint32_t x = 0; x < info->width; x += across) {
+      if (TIFFReadTile(tiff, tile.data(), x, y, 0, 0) < 0)
+        return damaged();
+      const std::size_t length = std::min(across, info->width - x) * sample;
+      for (std::uint32_t row = 0; row < std::min(down, info->height - y); ++row)
+        std::memcpy(info->pixels + (y + row) * stride + x * sample, tile.data() + row * across * sample, length);
+    }
+  return true;
+}
+
+} // namespace
+
+PictureKind PictureKindOf(std::string_view start)
+{
+  if (start.substr(0, 8) == "\x89PNG\r\n\x1a\n")
+    return PictureKind::Png;
+  if (start.substr(0, 3) == "\xff\xd8\xff")
+    return PictureKind::Jpeg;
+  const std::string_view four = start.substr(0, 4);
+  for (const std::string_view magic :
+       {std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4), std::string_view("MM\0+", 4)})
+    if (four == magic)
+      return PictureKind::Tiff;
+  return PictureKind::None;
+}
+
+void ReadPicture(Picture& picture)
+{
+  bool good = false;
+  picture.info.message[0] = '\0';
+  if (picture.kind == PictureKind::Tiff) {
+    const TiffPointer tiff = OpenTiff(picture.path, &picture.info);
+    good =
+        tiff && (picture.page == 0 || TIFFSetSubDirectory(tiff.get(), picture.page)) && ReadTiffPage(tiff.get(), &picture.info);
+  } else {
+    const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(picture.path.c_str(), "rb"), std::fclose);
+    if (!file)
+      throw Error(Error::Kind::FileSystem, picture.path + ": it cannot be opened (is reading permitted?)");
+    good = picture.kind == PictureKind::Png ? ReadPng(file.get(), &picture.info) : ReadJpeg(file.get(), &picture.info);
+  }
+  if (!good)
+    FailFile(picture.path,
+             "the image cannot be read (" + std::string(picture.info.message[0] ? picture.info.message : "damaged") + ")");
+}
+
+TiffPages ReadTiffPages(const std::string& path)
+{
+  PictureInfo info{};
+  const TiffPointer tiff = OpenTiff(path, &info);
+  if (!tiff)
+    FailFile(path, "the image cannot be read (" + std::string(info.message) + ")");
+  TiffPages found;
+  if (const char* text = nullptr; TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) == 1 && text)
+    found.description = text;
+  found.resolution = {TiffTag<float>(tiff.get(), TIFFTAG_XRESOLUTION), TiffTag<float>(tiff.get(), TIFFTAG_YRESOLUTION)};
+  bool more = true;
+  for (; more; more = TIFFReadDirectory(tiff.get()) == 1)
+    if ((TiffTag<std::uint32_t>(tiff.get(), TIFFTAG_SUBFILETYPE) & FILETYPE_REDUCEDIMAGE) == 0) // else a thumbnail
+      found.pages.push_back(TIFFCurrentDirOffset(tiff.get()));
+  if (info.message[0] != '\0')
+    FailFile(path, "its pages are damaged (" + std::string(info.message) + ")");
+  return found;
+}
+
+} // namespace echorama

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class vtkUltrasoundTrackerPlacement
+ * @brief moves volumes to where a tracker says they belong
+ *
+ * With S the poses of the sensor on the probe when the volumes were made, and C the calibration (VolumeToSensor), the probe of a
+ * volume lies at C^-1 S_fixed^-1 S C of the fixed volume's (dissertation eq. 4.4); see echorama::PlaceByTracker.
+ *
+ * Input 0 (repeatable): volumes (vtkImageData, or the image leaves of vtkDataObjectTree). Input 1 (optional): the track, a
+ * vtkPolyData with one point per pose as output 1 of vtkUltrasoundSequenceReader: the point array PoseArray (16 numbers, row by
+ * row), TimeStamp, optionally Status (0: valid), and Tool with the field data ToolNames. Without it, Recording names a file.
+ *
+ * Output: a vtkMultiBlockDataSet with the same volumes in the same order, one block each, with the same NAME(). Voxels are shared
+ * with the input; only geometry, `ProbeToWorld` and `ImageToWorld` are new. Field data of each block: VolumeToWorld, 16 doubles,
+ * row by row: from where the input was to where the output is.
+ *
+ * Volumes and poses belong together by time: those of AddTime, else the volumes' `TimeStamp`; volumes without any are matched
+ * with the poses one by one, when there are as many. Poses are averaged over WindowSeconds.
+ *
+ * Refused, with a message that names volume and reason: some volumes without a time; a volume that was made before or after the
+ * recording, or in a gap of it; one without `ProbeToWorld` where the calibration is that of the probe; a calibration that does
+ * not hold the transform from the volume to this tool. Under MPI each rank computes and holds the whole result.
+ *
+ * @sa vtkUltrasoundHandEyeCalibration, vtkUltrasoundSequenceReader, vtkUltrasoundAligner
+ */
+#ifndef vtkUltrasoundTrackerPlacement_h
+#define vtkUltrasoundTrackerPlacement_h
+
+#include "EchoramaTrackingModule.h"
+#include "vtkUltrasoundMultiBlockAlgorithm.h"
+
+#ifndef __VTK_WRAP__
+#include "Tracking/Placement/TrackerPlacement.h"
+#endif
+#include <string>
+
+class vtkAlgorithmOutput;
+class vtkImageData;
+class vtkMatrix4x4;
+
+class ECHORAMATRACKING_EXPORT vtkUltrasoundTrackerPlacement : public vtkUltrasoundMultiBlockAlgorithm {
+public:
+  static vtkUltrasoundTrackerPlacement* New();
+  vtkTypeMacro(vtkUltrasoundTrackerPlacement, vtkUltrasoundMultiBlockAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  /** Connects the track, input 1. */
+  void SetTrackConnection(vtkAlgorithmOutput* track);
+
+  ///@{
+  /**
+   * A recording to take the poses from where no track is connected: a tracked sequence or a table; and what one unit of its
+   * lengths is in mm (1000: metres; 0, the default: as the file says). A tool that it does not hold is composed of those it
+   * holds.
+   */
+  vtkSetFilePathMacro(Recording);
+  vtkGetFilePathMacro(Recording);
+  vtkSetClampMacro(RecordingUnitMm, double, 0.0, 1e6);
+  vtkGetMacro(RecordingUnitMm, double);
+  ///@}
+
+  ///@{
+  /** The tool that is fixed to the probe: "ProbeToTracker", or by its name in ToolNames. Default: empty, the only one. */
+  vtkSetStringMacro(Tool);
+  vtkGetStringMacro(Tool);
+  ///@}
+
+  ///@{
+  /** The point array of 16 numbers that holds the poses of the track, from the tool to the world. Default: ToolToWorld. */
+  vtkSetStringMacro(PoseArray);
+  vtkGetStringMacro(PoseArray);
+  ///@}
+
+  ///@{
+  /**
+   * The calibration, a file as echorama calibrate hand-eye writes it; default none. Without one, VolumeToSensor is taken: 16
+   * numbers, row by row, mm; default the identity.
+   */
+  vtkSetFilePathMacro(CalibrationFile);
+  vtkGetFilePathMacro(CalibrationFile);
+  vtkSetVectorMacro(VolumeToSensor, double, 16);
+  vtkGetVectorMacro(VolumeToSensor, double, 16);
+  void SetVolumeToSensor(vtkMatrix4x4* matrix);
+  ///@}
+
+  enum FrameType { AUTOMATIC = 0, PROBE = 1, FILE_FRAME = 2 };
+  ///@{
+  /**
+   * What VolumeToSensor calls the volume: the frame of its probe (`ProbeToWorld`), or that of the file, for volumes that lie as
+   * they were acquired. Default AUTOMATIC: as CalibrationFile says, else the probe's where all volumes know it.
+   */
+  vtkSetClampMacro(VolumeFrame, int, AUTOMATIC, FILE_FRAME);
+  vtkGetMacro(VolumeFrame, int);
+  ///@}
+
+  ///@{
+  /** When each volume was made, seconds on the clock of the track, in their order. Default none: as the volumes say. */
+  void AddTime(double seconds);
+  void RemoveAllTimes();
+  int GetNumberOfTimes() const;
+  ///@}
+
+  ///@{
+  /** Standard deviation of the window over which poses are averaged, seconds, in [0, 60]. Default 0.2. */
+  void SetWindowSeconds(double seconds);
+  double GetWindowSeconds() const;
+  ///@}
+
+  ///@{
+  /** Poses that lie further apart leave a gap, in which none is known; seconds, in (0, 600]. Default 0.5. */
+  void SetLongestGapSeconds(double seconds);
+  double GetLongestGapSeconds() const;
+  ///@}
+
+  ///@{
+  /** The volume that stays where it is, counted from 0. Default 0. */
+  vtkSetClampMacro(FixedVolume, int, 0, VTK_INT_MAX);
+  vtkGetMacro(FixedVolume, int);
+  ///@}
+
+  /** How many volumes the last update placed; 0 when it failed. */
+  int GetNumberOfVolumes() const;
+
+  /** The motion of a volume, mm. Returns false, and leaves \a pose alone, when there is no such volume. */
+  bool GetPose(int volume, vtkMatrix4x4* pose) const;
+
+  /** The error of the calibration at the middle of the volumes, mm, as its file states it; NaN when it does not. */
+  vtkGetMacro(ErrorMm, double);
+
+  /** By what volumes and poses were matched, and what was noticed: one sentence per line. Empty when it failed. */
+  std::string GetNotes() const { return this->Notes; }
+
+  /** Name of the field data. */
+  static const char* VolumeToWorldName() { return "VolumeToWorld"; }
+
+#ifndef __VTK_WRAP__
+  /** What the kernel has to know of a volume. */
+  static echorama::TrackedVolume TrackedVolumeOf(vtkImageData* image, const std::string& name);
+#endif
+
+protected:
+  vtkUltrasoundTrackerPlacement();
+  ~vtkUltrasoundTrackerPlacement() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+#ifndef __VTK_WRAP__
+  void Execute(vtkInformationVector** inputs, vtkInformationVector* outputs, const echorama::Progress& progress) override;
+#endif
+
+  char* Recording = nullptr;
+  double RecordingUnitMm = 0.0;
+  char* Tool = nullptr;
+  char* PoseArray = nullptr;
+  char* CalibrationFile = nullptr;
+  double VolumeToSensor[16];
+  int VolumeFrame = AUTOMATIC;
+  int FixedVolume = 0;
+  double ErrorMm;
+
+private:
+  vtkUltrasoundTrackerPlacement(const vtkUltrasoundTrackerPlacement&) = delete;
+  void operator=(const vtkUltrasoundTrackerPlacement&) = delete;
+
+  void Forget();
+
+  std::string Notes;
+#ifndef __VTK_WRAP__
+  echorama::ToolTrack Track(vtkInformationVector* input) const;
+  echorama::VolumeCalibration Calibration(const std::string& sensor) const;
+
+  echorama::TrackerPlacementParameters Parameters;
+  std::vector<echorama::Pose> Poses;
+#endif
+};
+
+#endif
