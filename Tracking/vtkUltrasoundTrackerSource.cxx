@@ -219,8 +219,8 @@ void vtkUltrasoundTrackerSource::SetFollowTime(bool follow)
 }
 
 //----------------------------------------------------------------------------
-// Opens the device when there is one that is not open, and is to be.
-void vtkUltrasoundTrackerSource::Open()
+// Opens the device when there is one that is not open, and is to be. Whoever subscribes before it starts misses no pose.
+void vtkUltrasoundTrackerSource::Open(std::shared_ptr<echorama::PoseSubscription>* subscription)
 {
   if (!this->Active || (this->Opened && this->Opened->Device)) {
     return;
@@ -245,6 +245,9 @@ void vtkUltrasoundTrackerSource::Open()
       session->Times = recording->Times();
       session->TimeShown = session->Times.front();
     } else {
+      if (subscription) {
+        *subscription = session->Poses.Subscribe();
+      }
       session->Device->Start(session->Poses, &session->Images);
     }
     this->Opened = std::move(session);
@@ -416,13 +419,13 @@ bool vtkUltrasoundTrackerSource::StartRecording(const char* fileName)
   if (path.empty()) {
     return this->StopRecording();
   }
-  if (!this->Start()) {
-    return false;
-  }
+  this->SetActive(true);
   // The new one first: when it cannot be started, the earlier one goes on.
   std::unique_ptr<echorama::StreamRecorder> earlier;
   const auto start = [&](const echorama::Progress&) {
-    auto next = std::make_unique<echorama::StreamRecorder>(path, this->Opened->Poses.Subscribe());
+    std::shared_ptr<echorama::PoseSubscription> poses;
+    this->Open(&poses);
+    auto next = std::make_unique<echorama::StreamRecorder>(path, poses ? poses : this->Opened->Poses.Subscribe());
     earlier = std::exchange(this->Opened->Recorder, std::move(next));
   };
   if (!vtkUltrasoundVolume::Run(this, nullptr, start)) {

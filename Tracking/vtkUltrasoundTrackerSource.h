@@ -47,6 +47,7 @@
 #ifndef __VTK_WRAP__
 namespace echorama {
 struct LiveTransform;
+class PoseSubscription;
 struct RecordingState;
 } // namespace echorama
 #endif
@@ -253,7 +254,7 @@ private:
 
 #ifndef __VTK_WRAP__
   struct Session;
-  void Open();
+  void Open(std::shared_ptr<echorama::PoseSubscription>* subscription = nullptr);
   void Close();
   Session* Updated();
   std::string World() const;

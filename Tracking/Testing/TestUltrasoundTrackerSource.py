@@ -192,7 +192,7 @@ assert source.GetState() == "lost" and "unplugged" in source.GetMessage()
 assert list(tools_of(source)[0]) == ["Probe"]
 assert not source.errors
 
-# A recording of the device, replayed, is the same.
+# A recording of the device, replayed, is the same. It has the first pose too: it subscribes before the device starts.
 recording = folder / "recorded.igs.mha"
 source = make("simulated:?rate=100&tools=2&start=5&unplugAfter=0.5&noiseMm=1")
 assert source.StartRecording(str(recording)) and source.WaitForPoses(100, 60.0)
