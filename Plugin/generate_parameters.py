@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes what follows from the description of a class's parameters: setters in its header, properties in its ParaView XML, tables
-in pages. ./run generate builds, calls this, and builds again; with --check it writes nothing and fails when something is stale.
+in pages; and the JSON schema of scenes. ./run generate builds, calls this, and builds again; with --check it writes nothing and
+fails when something is stale.
 
 A header has "// BEGIN parameters" and "// END parameters", XML the same as comments, a page
 "<!-- BEGIN parameters of vtkUltrasoundNoiseSource -->" (perhaps followed by ": Kind, Seed" for some of them) and
@@ -16,6 +17,7 @@ import textwrap
 from xml.sax.saxutils import escape, quoteattr
 
 WIDTH = 130
+MULTI_LINE = {"Scene"}  # texts that are edited in a field of several lines
 TYPES = {"number": "double", "integer": "int", "integer64": "vtkTypeInt64", "choice": "int", "switch": "bool"}
 
 COMMON = """
@@ -46,8 +48,10 @@ def number(value):
 
 def range_of(one):
     low, high = one.get("low"), one.get("high")
-    if one["type"] in ("choice", "switch", "text") or one["type"] == "integer64" and low == 0:
-        return "at least 0" if one["type"] == "integer64" else ""
+    if one["type"] in ("choice", "name", "switch", "text"):
+        return ""
+    if one["type"] == "integer64" and high is not None and high >= 2**63:  # the type's own end
+        high = None
     if low is not None and high is not None:
         return f"{'(' if one.get('open') else '['}{number(low)}, {number(high)}]"
     if low is not None:
@@ -62,7 +66,7 @@ def default_of(one):
         return "on" if one["value"] else "off"
     if one["type"] == "vector":
         return "(" + ", ".join(number(value) for value in one["value"]) + ")"
-    return one["value"] or "none" if one["type"] == "text" else number(one["value"])
+    return one["value"] or "none" if one["type"] in ("name", "text") else number(one["value"])
 
 
 def when_of(one):
@@ -90,8 +94,13 @@ def constant(choice):
     return choice.upper().replace("-", "_")
 
 
+def capital(text):
+    """"3d probe" is "3D probe"."""
+    return re.sub(r"^[a-z]|(?<=\d)[a-z]\b", lambda letter: letter.group().upper(), text)
+
+
 def camel(choice):
-    return "".join(word[:1].upper() + word[1:] for word in choice.split("-"))
+    return "".join(capital(word) for word in choice.split("-"))
 
 
 def comment(text):
@@ -102,7 +111,7 @@ def comment(text):
 
 
 def plural(name):
-    return name[:-1] + "ies" if name.endswith("y") else name + "s"
+    return name[:-1] + "ies" if name.endswith("y") else name if name.endswith("s") else name + "s"
 
 
 def setters(one):
@@ -110,6 +119,8 @@ def setters(one):
     text = " ".join(part for part in (one["help"], when_of(one), sentence(one)) if part)
     if kind == "choice":
         text += " There are " + ", ".join(map(constant, one["choices"])) + "."
+    elif kind == "name":
+        text += " There are " + ", ".join(f'"{choice}"' for choice in one["choices"]) + "."
     lines = []
     if kind == "choice":
         lines += [f"  enum {plural(name)} {{ " + ", ".join(f"{constant(choice)} = {i}" for i, choice in enumerate(one["choices"])) + " };", ""]
@@ -119,7 +130,7 @@ def setters(one):
                   f"    this->Set{name}(value);", "  }",
                   f"  void Set{name}(const double value[3]) {{ this->SetParameterAsVector(\"{name}\", value); }}",
                   f"  double* Get{name}() VTK_SIZEHINT(3) {{ return this->GetParameterAsVector(\"{name}\"); }}"]
-    elif kind == "text":
+    elif kind in ("name", "text"):
         lines += [f"  void Set{name}(const char* value) {{ this->SetParameterAsText(\"{name}\", value); }}",
                   f"  std::string Get{name}() {{ return this->GetParameterAsText(\"{name}\"); }}"]
     elif kind == "integer64":
@@ -144,16 +155,19 @@ def header_of(parameters):
 
 def property_of(one, everything):
     kind = one["type"]
-    element = {"number": "Double", "vector": "Double", "integer64": "IdType", "text": "String"}.get(kind, "Int") + "VectorProperty"
+    element = {"number": "Double", "vector": "Double", "integer64": "IdType", "name": "String", "text": "String"}.get(kind, "Int") + "VectorProperty"
     value = one["value"]
-    default = " ".join(map(number, value)) if kind == "vector" else value if kind == "text" else number(value)
+    default = " ".join(map(number, value)) if kind == "vector" else value if kind in ("name", "text") else number(value)
     lines = [f"      <{element} name=\"{one['name']}\" command=\"Set{one['name']}\" number_of_elements=\"{3 if kind == 'vector' else 1}\" "
              f"default_values={quoteattr(default)}",
              f"          label=\"{one['label']}\"" + (' panel_visibility="advanced"' if one.get("advanced") else "") + ">"]
     if kind == "choice":
         lines.append('        <EnumerationDomain name="enum">')
-        lines += [f"          <Entry value=\"{i}\" text=\"{choice.replace('-', ' ').capitalize()}\"/>" for i, choice in enumerate(one["choices"])]
+        lines += [f"          <Entry value=\"{i}\" text=\"{capital(choice.replace('-', ' '))}\"/>" for i, choice in enumerate(one["choices"])]
         lines.append("        </EnumerationDomain>")
+    elif kind == "name":
+        lines += ['        <StringListDomain name="list">', *(f'          <String value="{choice}"/>' for choice in one["choices"]),
+                  "        </StringListDomain>"]
     elif kind == "switch":
         lines.append('        <BooleanDomain name="bool"/>')
     elif kind in ("number", "integer", "vector"):
@@ -162,19 +176,21 @@ def property_of(one, everything):
     text = " ".join(part for part in (one["help"], measure(one) and measure(one) + ".") if part)
     lines += textwrap.wrap(f"<Documentation>{escape(text)}</Documentation>", 140, initial_indent=" " * 8, subsequent_indent=" " * 10,
                            break_on_hyphens=False)
+    hints = ['          <Widget type="multi_line"/>'] if one["name"] in MULTI_LINE else []
     if "when" in one:
         other = next(two for two in everything if two["name"] == one["when"]["name"])
         numbers = [other["choices"].index(text) if other["type"] == "choice" else int(text == "on") for text in one["when"]["values"]]
         values = f'value="{numbers[0]}"' if len(numbers) == 1 else f'values="{" ".join(map(str, numbers))}"'
-        lines += ["        <Hints>", f"          <PropertyWidgetDecorator type=\"GenericDecorator\" mode=\"visibility\" property=\"{other['name']}\" {values}/>",
-                  "        </Hints>"]
+        hints.append(f"          <PropertyWidgetDecorator type=\"GenericDecorator\" mode=\"visibility\" property=\"{other['name']}\" {values}/>")
+    if hints:
+        lines += ["        <Hints>", *hints, "        </Hints>"]
     return "\n".join([*lines, f"      </{element}>"])
 
 
 def table_of(parameters):
     rows = ["| parameter | default | range | |", "| --- | --- | --- | --- |"]
     for one in parameters:
-        span = ", ".join(one["choices"]) if one["type"] == "choice" else "" if one["type"] == "switch" else range_of(one)
+        span = ", ".join(one["choices"]) if "choices" in one else "" if one["type"] == "switch" else range_of(one)
         unit = one.get("unit", "")
         text = " ".join(part for part in (one["help"], when_of(one)) if part)
         rows.append(f"| `{one['name']}` | {default_of(one)} | {span}{' ' if span and unit else ''}{unit} | {text.replace('|', chr(92) + '|')} |")
@@ -201,7 +217,9 @@ def renewed(path, text):
     name = path.stem
     if path.suffix == ".h":
         parameters = described(name)
-        # Before the class is built, what its .cxx needs declared.
+        # Before the class is built, what its .cxx needs declared, unless it is there.
+        if parameters is None and "GetParameterDescriptions" in text:
+            return text
         inside = header_of(parameters) if parameters is not None else COMMON
         return between(text, "  // BEGIN parameters\n", "  // END parameters", inside, path)
     if path.suffix == ".xml":
@@ -238,6 +256,12 @@ def main():
             stale.append(str(path.relative_to(root)))
             if not check:
                 path.write_text(new)
+    import echorama
+    schema = root / "Examples/scenes/echorama-scene-1.schema.json"
+    if schema.read_text() != echorama.vtkUltrasoundSynthesizer.GetSceneSchema():
+        stale.append(str(schema.relative_to(root)))
+        if not check:
+            schema.write_text(echorama.vtkUltrasoundSynthesizer.GetSceneSchema())
     for line in complaints:
         print(line)
     for name in stale:

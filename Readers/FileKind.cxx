@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Readers/FileKind.h"
 
+#include "Core/Geometry/TransformFile.h"
 #include "Readers/SequenceFile.h"
-#include "Readers/TransformFile.h"
 #include <filesystem>
 #include <fstream>
 
@@ -35,27 +35,9 @@ FileKind KindOf(const std::string& path)
 
 const char* FormatText(FileFormat format)
 {
-  switch (format) {
-  case FileFormat::MetaImage:
-    return "MetaImage";
-  case FileFormat::Nrrd:
-    return "NRRD";
-  case FileFormat::VtkXmlImage:
-    return "VTK XML image";
-  case FileFormat::Nifti:
-    return "NIfTI";
-  case FileFormat::Dicom:
-    return "DICOM";
-  case FileFormat::Kretz:
-    return "GE Kretz";
-  case FileFormat::Vdb:
-    return "OpenVDB";
-  case FileFormat::ImageStack:
-    return "stack of pictures";
-  case FileFormat::Unknown:
-    break;
-  }
-  return "unknown";
+  static const char* const texts[] = {"unknown", "MetaImage", "NRRD",    "VTK XML image",    "NIfTI",
+                                      "DICOM",   "GE Kretz",  "OpenVDB", "stack of pictures"};
+  return texts[static_cast<int>(format)];
 }
 
 } // namespace echorama

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/NumberText.h"
+#include "Core/Base/Words.h"
 #include "Readers/ImageHeader.h"
 #include <cstdint>
 #include <fstream>
@@ -32,7 +33,7 @@ public:
   template <class T>
   std::vector<T> Numbers(const std::string& key, std::string_view text, std::size_t count) const
   {
-    const std::vector<std::string_view> words = Words(text);
+    const std::vector<std::string_view> words = SplitWords(text);
     if (words.size() != count)
       Fail(key + " holds " + std::to_string(words.size()) + " values; " + std::to_string(count) + " are needed");
     std::vector<T> numbers(count);
@@ -45,9 +46,6 @@ public:
 
   /// As Numbers, for sizes: whole numbers from 0 to 2^31 - 1.
   std::vector<int> Sizes(const std::string& key, std::string_view text, std::size_t count) const;
-
-  static std::string_view Trimmed(std::string_view text);
-  static std::vector<std::string_view> Words(std::string_view text);
 
 private:
   std::string path_;

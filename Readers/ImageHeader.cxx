@@ -24,7 +24,6 @@ namespace echorama {
 namespace {
 
 constexpr std::size_t LongestLine = 1000000;
-constexpr const char* Blanks = " \t\r\v\f";
 
 std::string LowerExtension(const std::string& path)
 {
@@ -193,23 +192,6 @@ std::vector<int> HeaderLines::Sizes(const std::string& key, std::string_view tex
     sizes.push_back(static_cast<int>(size));
   }
   return sizes;
-}
-
-std::string_view HeaderLines::Trimmed(std::string_view text)
-{
-  const std::size_t first = text.find_first_not_of(Blanks);
-  return first == std::string_view::npos ? std::string_view() : text.substr(first, text.find_last_not_of(Blanks) - first + 1);
-}
-
-std::vector<std::string_view> HeaderLines::Words(std::string_view text)
-{
-  std::vector<std::string_view> words;
-  for (std::size_t at = text.find_first_not_of(Blanks); at != std::string_view::npos;) {
-    const std::size_t end = std::min(text.find_first_of(Blanks, at), text.size());
-    words.push_back(text.substr(at, end - at));
-    at = text.find_first_not_of(Blanks, end);
-  }
-  return words;
 }
 
 void PlaceAxes(ImageHeader& header, int axes)

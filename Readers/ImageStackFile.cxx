@@ -291,14 +291,10 @@ double ImageStack::ImageJSpacing(Eigen::Vector3d& spacing) const
 
 void ImageStack::FindSpacing(const VolumeReadParameters& parameters)
 {
-  const Eigen::Vector3d& asked = parameters.stackSpacingMm;
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(asked[axis] >= 0.0) || !std::isfinite(asked[axis]))
-      throw Error(Error::Kind::InvalidParameter,
-                  "stackSpacingMm is " + NumberText(asked[axis]) + "; it must be positive, or 0 for what the files say");
+  CheckRanges(parameters, content_.path);
   Eigen::Vector3d imageJ = Eigen::Vector3d::Zero();
   ImageJSpacing(imageJ);
-  Eigen::Vector3d spacing = asked;
+  Eigen::Vector3d spacing = parameters.stackSpacingMm;
   std::string said, assumed;
   for (int axis = 0; axis < 3; ++axis) {
     if (spacing[axis] > 0.0)

@@ -97,9 +97,7 @@ public:
   KretzSource(const std::string& path, std::uint64_t offset, std::uint64_t bytes, const VolumeReadParameters& parameters)
     : VolumeSource(path, FileFormat::Kretz), stream_(OpenToRead(path)), begin_(offset), end_(offset + bytes)
   {
-    if (!(parameters.spacingMm >= 0.0) || !std::isfinite(parameters.spacingMm))
-      throw Error(Error::Kind::InvalidParameter, path + ": the spacing to convert to is " + NumberText(parameters.spacingMm) +
-                                                     " mm; it must be positive, or 0 for that of the samples");
+    CheckRanges(parameters, path);
     FindItems();
     dimensions_ = {Dimension(DimensionI), Dimension(DimensionJ), Dimension(DimensionK)};
     FindSamples();

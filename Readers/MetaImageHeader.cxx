@@ -3,6 +3,7 @@
 // names (Position and Origin for Offset, and so on). CenterOfRotation and AnatomicalOrientation do not move voxels: ITK
 // ignores them too, and the axes are LPS. MET_LONG has four bytes, whatever a compiler's long has.
 #include "Core/Base/Error.h"
+#include "Core/Base/Words.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/ImageHeader.h"
 #include <algorithm>
@@ -98,7 +99,7 @@ int SpatialAxes(const HeaderLines& lines, const HeaderValues& values, int axes, 
   const std::string* kinds = values.Find("Kinds");
   if (!kinds)
     return axes == 2 ? 2 : axes - 1;
-  const std::vector<std::string_view> words = HeaderLines::Words(*kinds);
+  const std::vector<std::string_view> words = SplitWords(*kinds);
   const auto counts = [](std::string_view kind) { return kind == "list" || kind == "time"; };
   const auto frames = std::find_if(words.begin(), words.end(), counts);
   if (frames != words.end() && (words.size() != static_cast<std::size_t>(axes) || frames + 1 != words.end()))
@@ -191,13 +192,13 @@ void ParseMetaImage(ImageHeader& header, FrameAxis* axis)
   while (!known.count("ElementDataFile")) {
     if (!lines.Next(line))
       lines.FailHere("the header ends before ElementDataFile: the file is truncated");
-    if (HeaderLines::Trimmed(line).empty())
+    if (TrimBlanks(line).empty())
       continue;
     const std::size_t equals = line.find('=');
     if (equals == std::string::npos)
       lines.FailHere("\"Key = value\" is needed");
-    std::string key(HeaderLines::Trimmed(std::string_view(line).substr(0, equals)));
-    const std::string value(HeaderLines::Trimmed(std::string_view(line).substr(equals + 1)));
+    std::string key(TrimBlanks(std::string_view(line).substr(0, equals)));
+    const std::string value(TrimBlanks(std::string_view(line).substr(equals + 1)));
     if (const auto synonym = Synonyms.find(key); synonym != Synonyms.end())
       key = synonym->second;
     if (axis && TakeFrameField(lines, *axis, key, value))
@@ -260,7 +261,7 @@ bool CanHold(const HeaderField& field)
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.' || c == '-';
   });
   return plain && !OwnKeys.count(key) && !Synonyms.count(key) && key.size() + value.size() < 900000 &&
-         HeaderLines::Trimmed(value).size() == value.size() &&
+         TrimBlanks(value).size() == value.size() &&
          std::none_of(value.begin(), value.end(), [](unsigned char c) { return c < 32 && c != '\t'; });
 }
 

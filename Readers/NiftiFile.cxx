@@ -9,6 +9,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/SizeText.h"
+#include "Core/Base/Words.h"
 #include "Readers/AffinePose.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
@@ -357,7 +358,7 @@ void NiftiSource::ReadComment(const std::string& text)
   std::istringstream lines(text);
   std::string line;
   std::getline(lines, line);
-  const std::vector<std::string_view> words = HeaderLines::Words(std::string_view(line).substr(NiftiCommentStart.size()));
+  const std::vector<std::string_view> words = SplitWords(std::string_view(line).substr(NiftiCommentStart.size()));
   std::array<double, 15> numbers;
   bool good = words.size() == numbers.size();
   for (std::size_t i = 0; good && i < numbers.size(); ++i)

@@ -3,6 +3,7 @@
 // (direction times spacing) in a named space, or only a spacing. Axes without a vector ("none") do not lie in space: they
 // are channels or time. Field names may be written with or without blanks, so blanks are dropped before comparing.
 #include "Core/Base/Error.h"
+#include "Core/Base/Words.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/ImageHeader.h"
 #include <algorithm>
@@ -31,7 +32,7 @@ const std::vector<std::pair<VoxelType, std::string>> NrrdTypeNames = {
 std::optional<VoxelType> TypeNamed(const std::string& name)
 {
   for (const auto& [type, names] : NrrdTypeNames)
-    for (const std::string_view word : HeaderLines::Words(names))
+    for (const std::string_view word : SplitWords(names))
       if (word == name)
         return type;
   return {};
@@ -124,11 +125,10 @@ private:
         lines_.FailHere("\"field: value\" or \"key:=value\" is needed");
       const std::string_view before = std::string_view(line).substr(0, colon), after = std::string_view(line).substr(colon + 1);
       if (!after.empty() && after[0] == '=') {
-        if (sequence_ &&
-            TakeFrameField(lines_, *sequence_, HeaderLines::Trimmed(before), Unescaped(HeaderLines::Trimmed(after.substr(1)))))
+        if (sequence_ && TakeFrameField(lines_, *sequence_, TrimBlanks(before), Unescaped(TrimBlanks(after.substr(1)))))
           continue;
-        header_.fields.emplace_back(Unescaped(HeaderLines::Trimmed(before)), Unescaped(after.substr(1)));
-      } else if (const auto [place, fresh] = fields_.emplace(Plain(before), HeaderLines::Trimmed(after)); !fresh)
+        header_.fields.emplace_back(Unescaped(TrimBlanks(before)), Unescaped(after.substr(1)));
+      } else if (const auto [place, fresh] = fields_.emplace(Plain(before), TrimBlanks(after)); !fresh)
         lines_.FailHere("\"" + place->first + "\" is given twice");
     }
   }
@@ -184,7 +184,7 @@ private:
   std::size_t FindFrames(const std::vector<int>& sizes)
   {
     const std::string* kinds = Find("kinds");
-    const auto words = kinds ? HeaderLines::Words(*kinds) : std::vector<std::string_view>();
+    const auto words = kinds ? SplitWords(*kinds) : std::vector<std::string_view>();
     const auto found = std::find_if(words.begin(), words.end(), [](auto kind) { return kind == "list" || kind == "time"; });
     const std::size_t axis = static_cast<std::size_t>(found - words.begin());
     if (!sequence_) {
@@ -220,7 +220,7 @@ private:
       if (vectors.size() != all)
         lines_.Fail("space directions are not one per axis");
     } else if (const std::string* kinds = Find("kinds")) {
-      const auto words = HeaderLines::Words(*kinds);
+      const auto words = SplitWords(*kinds);
       for (std::size_t axis = 0; axis < all && axis < words.size(); ++axis)
         if (words[axis] != "domain" && words[axis] != "space" && words[axis] != "???" && words[axis] != "none")
           vectors[axis].reset();
@@ -295,7 +295,7 @@ private:
       const std::string* text = Find(field);
       if (!text)
         return false;
-      const auto words = HeaderLines::Words(*text);
+      const auto words = SplitWords(*text);
       if (words.size() != all)
         lines_.Fail(std::string(name) + " are not one per axis");
       for (std::size_t i = 0; i < axes.size(); ++i)

@@ -3,9 +3,11 @@
 // position and a quaternion with a common ending. What is wrong with single rows is gathered as one note per kind, whatever
 // the number of rows. Time and memory grow with the length of the file alone.
 #include "Readers/PoseLog.h"
+#include "Core/Base/CsvLine.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
+#include "Core/Base/Words.h"
 #include "Core/Geometry/MatrixRows.h"
-#include "Readers/CsvLine.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceFile.h"
 #include <algorithm>
@@ -77,13 +79,13 @@ std::vector<std::string> Cells(const std::string& line, char separator, bool& cl
   std::vector<std::string> cells;
   closed = true;
   if (separator == ' ') {
-    for (const std::string_view word : HeaderLines::Words(line))
+    for (const std::string_view word : SplitWords(line))
       cells.emplace_back(word);
     return cells;
   }
   closed = SplitCsvLine(line, separator, cells);
   for (std::string& cell : cells)
-    cell = std::string(HeaderLines::Trimmed(cell));
+    cell = std::string(TrimBlanks(cell));
   while (!cells.empty() && cells.back().empty()) // rows may end in a separator
     cells.pop_back();
   return cells;
@@ -203,7 +205,7 @@ private:
     while (lines_.Next(line_)) {
       if (++number_ == 1 && line_.compare(0, 3, "\xef\xbb\xbf") == 0) // a byte order mark
         line_.erase(0, 3);
-      const std::string_view text = HeaderLines::Trimmed(line_);
+      const std::string_view text = TrimBlanks(line_);
       if (!text.empty() && (comments || text[0] != '#'))
         return true;
     }
@@ -514,12 +516,13 @@ void SortByTime(PoseLog& log)
 
 } // namespace
 
-void PoseLogOptions::Check() const
+ParameterList Describe(PoseLogOptions& p)
 {
-  if (!(unitMm >= 0.0 && unitMm <= 1e6))
-    throw Error(Error::Kind::InvalidParameter, "the unit of lengths must be 0 to 1e6 mm");
-  if (!(rowsPerSecond >= 0.0 && rowsPerSecond <= 1e6))
-    throw Error(Error::Kind::InvalidParameter, "the rows per second must be 0 to 1e6");
+  return {
+      Parameter("UnitMm", p.unitMm, {0, 1e6}, "mm", "Unit of the recording's lengths; 1000: metres. 0: as the file says."),
+      Parameter("RowsPerSecond", p.rowsPerSecond, {0, 1e6}, "",
+                "When above 0, the times of the file are not taken: its rows (or frames) are this many a second, from 0 on. For "
+                "files whose times have too few digits.")};
 }
 
 std::vector<ToolPose> PoseLog::Of(const std::string& tool) const
@@ -527,12 +530,8 @@ std::vector<ToolPose> PoseLog::Of(const std::string& tool) const
   std::string name = tool;
   if (std::find(tools.begin(), tools.end(), name) == tools.end())
     name = ToolTransformName(tool);
-  if (std::find(tools.begin(), tools.end(), name) == tools.end()) {
-    std::string list;
-    for (const std::string& there : tools)
-      list += (list.empty() ? "" : ", ") + there;
-    throw Error(Error::Kind::BadInput, path + ": there is no tool " + tool + "; there are: " + list);
-  }
+  if (std::find(tools.begin(), tools.end(), name) == tools.end())
+    throw Error(Error::Kind::BadInput, path + ": there is no tool " + tool + "; there are: " + Joined(tools));
   std::vector<ToolPose> own;
   std::copy_if(poses.begin(), poses.end(), std::back_inserter(own), [&name](const ToolPose& pose) { return pose.name == name; });
   return own;
@@ -540,27 +539,13 @@ std::vector<ToolPose> PoseLog::Of(const std::string& tool) const
 
 PoseLog ReadPoseLog(const std::string& path, const PoseLogOptions& options)
 {
-  options.Check();
+  CheckRanges(options);
   const FileFormat format = FormatOfContent(path);
   if (format != FileFormat::MetaImage && format != FileFormat::Nrrd && format != FileFormat::Unknown)
     throw Error(Error::Kind::BadFile, path + ": it holds images, not a log of poses");
   PoseLog log = format == FileFormat::Unknown ? TableReader(path, options).Read() : ReadSequencePoses(path, options);
   SortByTime(log);
   return log;
-}
-
-bool LooksLikePoseLog(std::string_view bytes)
-{
-  if (bytes.substr(0, 3) == "\xef\xbb\xbf")
-    bytes.remove_prefix(3);
-  for (int number = 0; number < LongestPreamble && !bytes.empty(); ++number) {
-    const std::size_t end = std::min(bytes.find('\n'), bytes.size());
-    const std::string line(HeaderLines::Trimmed(bytes.substr(0, end)));
-    if (NamedColumns(line) || PairColumns(line))
-      return true;
-    bytes.remove_prefix(std::min(bytes.size(), end + 1));
-  }
-  return false;
 }
 
 } // namespace echorama

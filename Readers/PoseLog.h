@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ToolPose.h"
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace echorama {
@@ -26,13 +26,9 @@ inline constexpr const char* ArrivalField = "Arrival";
 
 /// What a file does not say.
 struct PoseLogOptions {
-  double unitMm = 0.0; ///< of lengths, in mm (1000: metres), in [0, 1e6]; 0: what the format says, see ReadPoseLog
-  /// When above 0, the times of the file are not taken: its rows (or frames) are this many a second, from 0 on. For files whose
-  /// times have too few digits. In [0, 1e6].
-  double rowsPerSecond = 0.0;
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  double unitMm = 0.0, rowsPerSecond = 0.0;
 };
+ParameterList Describe(PoseLogOptions& p);
 
 /// Reads a recording of a tracker:
 /// * sequences (.igs.mha ...): every rigid transform of every frame that has it, in mm; with its arrival, where the field
@@ -53,8 +49,5 @@ struct PoseLogOptions {
 /// Error(InvalidParameter) for the options, Error(FileSystem), Error(BadFile) that names file, line and reason: no such columns,
 /// text where a number is needed, an open quotation mark, binary data, no poses.
 PoseLog ReadPoseLog(const std::string& path, const PoseLogOptions& options = {});
-
-/// Whether a file that begins with \a bytes looks like one that ReadPoseLog reads, other than a sequence.
-bool LooksLikePoseLog(std::string_view bytes);
 
 } // namespace echorama

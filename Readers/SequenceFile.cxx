@@ -10,9 +10,10 @@
 // than 256 of them. A jump then costs the decompression of one such stretch, 1/256 of the file at most, and the memory
 // stays the same. Interleaved frames cost a pass over the file each, so that as many as 64 MB hold are taken in one pass.
 #include "Readers/SequenceFile.h"
+#include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/SizeText.h"
-#include "Readers/ByteOrder.h"
+#include "Core/Base/Words.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
 #include "Readers/FrameOrientation.h"
@@ -140,7 +141,7 @@ struct Matrix {
 Matrix ParseMatrix(std::string_view text)
 {
   Matrix matrix;
-  const std::vector<std::string_view> words = HeaderLines::Words(text);
+  const std::vector<std::string_view> words = SplitWords(text);
   std::array<double, 16> numbers{};
   bool parsed = words.size() == numbers.size();
   for (std::size_t i = 0; parsed && i < numbers.size(); ++i)
@@ -273,9 +274,9 @@ void SequenceFile::Parts::FindOrientation()
   // Plus names these differently in the two formats.
   for (auto field = content.fields.begin(); field != content.fields.end();) {
     if (field->first == "UltrasoundImageOrientation" || field->first == "ultrasound image orientation")
-      content.orientation = HeaderLines::Trimmed(field->second);
+      content.orientation = TrimBlanks(field->second);
     else if (field->first == "UltrasoundImageType" || field->first == "ultrasound image type")
-      content.imageType = HeaderLines::Trimmed(field->second);
+      content.imageType = TrimBlanks(field->second);
     else {
       ++field;
       continue;
@@ -615,7 +616,7 @@ bool LooksLikeSequence(const std::string& path)
     HeaderLines lines(path);
     std::string line;
     while (lines.Position() < 65536 && lines.Next(line)) {
-      const std::vector<std::string_view> words = HeaderLines::Words(line);
+      const std::vector<std::string_view> words = SplitWords(line);
       if (IsFrameField(line))
         return true;
       if (!words.empty() && (words[0] == "Kinds" || words[0] == "kinds:"))

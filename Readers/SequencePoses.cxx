@@ -4,6 +4,7 @@
 // whose tracker saw nothing has no pose instead of one by another way.
 #include "Readers/SequencePoses.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include <algorithm>
 #include <cctype>
 
@@ -20,10 +21,7 @@ std::string FrameName(std::string name)
 
 std::string Listed(const std::vector<std::string>& names)
 {
-  std::string text;
-  for (const std::string& name : names)
-    text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return names.empty() ? "none" : Joined(names);
 }
 
 NamedTransform EdgeOf(const std::string& name)

@@ -78,10 +78,14 @@ private:
 
 } // namespace
 
-void SequenceRecorderOptions::Check() const
+ParameterList Describe(SequenceRecorderOptions& p)
 {
-  if (!(flushSeconds >= 0.0 && flushSeconds <= 1.0))
-    throw Error(Error::Kind::InvalidParameter, "the seconds between two flushes must be 0 to 1");
+  return {
+      Parameter("Replace", p.replace, "Whether an existing recording may be overwritten; otherwise it is refused."),
+      Parameter("FlushSeconds", p.flushSeconds, {0, 1}, "s",
+                "Frames are made safe at least this often; 0: each at once. What is younger is lost when the program is killed."),
+      Parameter("SyncToDisk", p.syncToDisk,
+                "Whether safe also means: on the disk, so that a loss of power costs no more than a kill does.")};
 }
 
 struct SequenceRecorder::Parts {
@@ -174,7 +178,7 @@ SequenceRecorder::SequenceRecorder(const std::string& path, const SequenceConten
   p.path = path;
   p.content = content;
   p.options = options;
-  options.Check();
+  CheckRanges(options);
   if (FormatOfName(path) != FileFormat::MetaImage)
     p.Fail(Error::Kind::InvalidParameter, "the extension must be .mha for poses alone, or .mhd");
   CheckSequence(path, p.content);

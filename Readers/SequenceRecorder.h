@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Readers/SequenceFile.h"
 #include <cstdint>
 #include <memory>
@@ -9,13 +10,11 @@ namespace echorama {
 
 /// How a recording is kept.
 struct SequenceRecorderOptions {
-  bool replace = false; ///< an existing recording may be overwritten; otherwise it is refused
-  /// Frames are made safe at least this often, in [0, 1]; 0: each at once. What is younger is lost when the program is killed.
+  bool replace = false;
   double flushSeconds = 0.5;
-  bool syncToDisk = true; ///< safe also means: on the disk, so that a loss of power costs no more than a kill does
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  bool syncToDisk = true;
 };
+ParameterList Describe(SequenceRecorderOptions& p);
 
 /// Records a tracked sequence so that a crash, `kill -9` or a full disk leave a file that opens, with all frames that were
 /// made safe: in SequenceFile, and in every other reader of MetaImage sequences (Plus, Slicer).

@@ -7,6 +7,7 @@
 // stream that throws at the end, through io::Archive, the base class of its own readers.
 #include "Readers/VdbFile.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/Parallel.h"
 #include "Readers/AffinePose.h"
 #include "Readers/DataFile.h"
@@ -237,12 +238,8 @@ void VdbSource::Open()
   MemoryStream stream(bytes);
   std::vector<std::string> others;
   grid_ = Archive().Read(stream, path, others);
-  if (!others.empty()) {
-    std::string names;
-    for (const std::string& name : others)
-      names += (names.empty() ? "" : ", ") + name;
-    Note("of several grids " + grid_->getName() + " was taken; left out: " + names);
-  }
+  if (!others.empty())
+    Note("of several grids " + grid_->getName() + " was taken; left out: " + Joined(others));
   if (grid_->getGridClass() == openvdb::GRID_LEVEL_SET)
     Fail("its grid " + grid_->getName() + " is a level set (distances from a surface), not a volume of intensities");
 

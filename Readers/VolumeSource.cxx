@@ -16,6 +16,21 @@ void VolumeSource::ReadBeams(std::size_t, void*, const Progress&)
   throw Error(Error::Kind::BadInput, content_.path + ": it holds no beams");
 }
 
+ParameterList Describe(VolumeReadParameters& p)
+{
+  return {
+      Parameter(
+          "SpacingMm", p.spacingMm, {0, 1000}, "mm",
+          "Edge of the voxels that a file of beams (GE Kretz) is scan-converted to. 0 takes about as many voxels inside the fan "
+          "as there are samples."),
+      Parameter(
+          "StackSpacingMm", p.stackSpacingMm, {0, Unlimited}, "mm",
+          "Spacing of a stack of pictures: along x, along y and from picture to picture. Where it is 0, that of the files is "
+          "taken, else 1 mm, with a note. Other formats know theirs.")
+          .Advanced(),
+  };
+}
+
 std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
 {
   switch (FormatOfContent(path)) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Error.h"
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Geometry/RigidTransform.h"
@@ -71,11 +72,10 @@ protected:
 
 /// How files that leave it open are read.
 struct VolumeReadParameters {
-  /// Edge of the voxels that beams are scan-converted to, mm; 0: as SampleSpacing().
   double spacingMm = 0.0;
-  /// Spacing of image stacks, which hold none, mm along x, y and from slice to slice; 0: 1 mm, with a note.
   Eigen::Vector3d stackSpacingMm = Eigen::Vector3d::Zero();
 };
+ParameterList Describe(VolumeReadParameters& p);
 
 /// Opens a volume of any format but VTK's own (.vti, which the vtk layer reads); the content decides, not the name.
 /// \throws Error(FileSystem) when it is missing or cannot be read, Error(BadFile) that names file and reason,

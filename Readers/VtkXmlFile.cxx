@@ -5,8 +5,9 @@
 //
 // Only the elements and those lengths are read here. What lies between them is skipped: it is most of the file.
 #include "Readers/VtkXmlFile.h"
+#include "Core/Base/ByteOrder.h"
 #include "Core/Base/NumberText.h"
-#include "Readers/ByteOrder.h"
+#include "Core/Base/Words.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
 #include <array>
@@ -135,7 +136,7 @@ private:
                                     : text.find(text[open], open + 1);
       if (close == std::string_view::npos)
         lines_.Fail("it cannot be read as a VTK image file: the attributes of " + element.name + " are damaged");
-      const std::string key(HeaderLines::Trimmed(text.substr(at, equals - at)));
+      const std::string key(TrimBlanks(text.substr(at, equals - at)));
       if (!element.attributes.emplace(key, text.substr(open + 1, close - open - 1)).second)
         lines_.Fail(element.name + " says " + key + " twice");
       at = close + 1;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundReader.h"
 
-#include "Readers/BorderZeros.h"
+#include "Core/Base/JoinedText.h"
+#include "Core/Imaging/BorderZeros.h"
 #include "Readers/DataFile.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"
@@ -36,6 +37,8 @@ using echorama::VolumeContent;
 using echorama::VoxelType;
 
 vtkStandardNewMacro(vtkUltrasoundReader);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundReader);
 
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
@@ -212,9 +215,7 @@ void vtkUltrasoundReader::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
-  os << indent << "StackSpacingMm: " << this->StackSpacingMm[0] << " " << this->StackSpacingMm[1] << " "
-     << this->StackSpacingMm[2] << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->GetNotes() << "\n";
 }
 
@@ -230,22 +231,15 @@ int vtkUltrasoundReader::CanReadFile(const char* fileName)
 }
 
 //----------------------------------------------------------------------------
-echorama::VolumeReadParameters vtkUltrasoundReader::Parameters() const
+echorama::ParameterList vtkUltrasoundReader::Parameters()
 {
-  echorama::VolumeReadParameters parameters;
-  parameters.spacingMm = this->SpacingMm;
-  parameters.stackSpacingMm = Eigen::Vector3d(this->StackSpacingMm);
-  return parameters;
+  return Describe(this->Values);
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundReader::GetNotes() const
 {
-  std::string text;
-  for (const std::string& note : this->Notes) {
-    text += (text.empty() ? "" : "\n") + note;
-  }
-  return text;
+  return echorama::Joined(this->Notes, "\n");
 }
 
 //----------------------------------------------------------------------------
@@ -267,7 +261,7 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
       vtkUltrasoundVolume::SetGeometry(out, OpenXml(reader, path, unused));
       return;
     }
-    const auto source = echorama::OpenVolume(path, this->Parameters());
+    const auto source = echorama::OpenVolume(path, this->Values);
     const VolumeContent& content = source->Content();
     vtkUltrasoundVolume::SetGeometry(out, content.geometry);
     vtkDataObject::SetPointDataActiveScalarInfo(out, echorama::VtkTypeOf(content.type), 1);
@@ -343,7 +337,7 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
 //----------------------------------------------------------------------------
 void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progress& progress)
 {
-  const auto source = echorama::OpenVolume(this->FileName, this->Parameters());
+  const auto source = echorama::OpenVolume(this->FileName, this->Values);
   const VolumeContent& content = source->Content();
   this->Notes = content.notes;
   const std::size_t index = SetTime(content, this->GetOutputInformation(0), output);
@@ -368,7 +362,7 @@ void vtkUltrasoundReader::ReadBeams(vtkImageData* output, const echorama::Progre
   if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
     return; // voxels
   }
-  const auto source = echorama::OpenVolume(path, this->Parameters());
+  const auto source = echorama::OpenVolume(path, this->Values);
   const VolumeContent& content = source->Content();
   if (!content.beams) {
     return;

@@ -42,10 +42,8 @@
 #include <vector> // for the notes
 
 #ifndef __VTK_WRAP__
-namespace echorama {
-struct VolumeContent;
-struct VolumeReadParameters;
-} // namespace echorama
+#include "Readers/VolumeSource.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkXMLImageDataReader;
@@ -62,23 +60,52 @@ public:
   vtkGetFilePathMacro(FileName);
   ///@}
 
+  // BEGIN parameters
   ///@{
   /**
-   * Edge of the voxels, mm, that a file of beams (GE Kretz) is scan-converted to, in [0, 1000]. 0, the default, takes
-   * about as many voxels inside the fan as there are samples.
+   * Edge of the voxels that a file of beams (GE Kretz) is scan-converted to. 0 takes about as many voxels inside the fan as there
+   * are samples. In [0, 1000] mm; default 0.
    */
-  vtkSetClampMacro(SpacingMm, double, 0.0, 1000.0);
-  vtkGetMacro(SpacingMm, double);
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
   ///@}
 
   ///@{
   /**
-   * Spacing of a stack of pictures in mm: along x, along y and from picture to picture. Where it is 0, the default, that of
-   * the files is taken, else 1 mm, with a note. Other formats know theirs.
+   * Spacing of a stack of pictures: along x, along y and from picture to picture. Where it is 0, that of the files is taken, else
+   * 1 mm, with a note. Other formats know theirs. At least 0 mm; default (0, 0, 0).
    */
-  vtkSetVector3Macro(StackSpacingMm, double);
-  vtkGetVector3Macro(StackSpacingMm, double);
+  void SetStackSpacingMm(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetStackSpacingMm(value);
+  }
+  void SetStackSpacingMm(const double value[3]) { this->SetParameterAsVector("StackSpacingMm", value); }
+  double* GetStackSpacingMm() VTK_SIZEHINT(3) { return this->GetParameterAsVector("StackSpacingMm"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   /**
    * 1 when \a fileName is there and begins like a file that this class reads, else 0 (also for tracked sequences). The voxels
@@ -104,15 +131,12 @@ protected:
 #endif
 
   char* FileName = nullptr;
-  double SpacingMm = 0.0;
-  double StackSpacingMm[3] = {0.0, 0.0, 0.0};
 
 private:
   vtkUltrasoundReader(const vtkUltrasoundReader&) = delete;
   void operator=(const vtkUltrasoundReader&) = delete;
 
 #ifndef __VTK_WRAP__
-  echorama::VolumeReadParameters Parameters() const;
   void ReadSource(vtkImageData* output, const echorama::Progress& progress);
   void ReadBeams(vtkImageData* output, const echorama::Progress& progress);
   void SetFields(const echorama::VolumeContent& content, vtkImageData* output);
@@ -120,6 +144,7 @@ private:
   void FindValidRegion(vtkImageData* output, const echorama::Progress& progress);
   void FindCompanions(vtkImageData* output, const echorama::Progress& progress);
 
+  echorama::VolumeReadParameters Values;
   std::vector<std::string> Notes;
 #endif
 };

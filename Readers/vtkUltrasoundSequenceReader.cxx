@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundSequenceReader.h"
 
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Geometry/MatrixRows.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/SequencePoses.h"
-#include "Readers/TransformFile.h"
 
 #include "vtkCellArray.h"
 #include "vtkDoubleArray.h"
@@ -40,20 +41,14 @@ using echorama::TransformStatus;
 
 vtkStandardNewMacro(vtkUltrasoundSequenceReader);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundSequenceReader);
+
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
 
 std::string TextOf(const char* text)
 {
   return text ? text : "";
-}
-
-void AddString(vtkDataObject* data, const std::string& name, const std::string& text)
-{
-  const vtkNew<vtkStringArray> array;
-  array->SetName(name.c_str());
-  array->InsertNextValue(text);
-  data->GetFieldData()->AddArray(array);
 }
 
 void InsertMatrix(vtkDoubleArray* array, const Eigen::Affine3d& matrix)
@@ -145,7 +140,6 @@ vtkUltrasoundSequenceReader::vtkUltrasoundSequenceReader()
 {
   this->SetNumberOfInputPorts(0);
   this->SetNumberOfOutputPorts(2);
-  this->SetImageFrame("Image");
 }
 
 //----------------------------------------------------------------------------
@@ -153,9 +147,23 @@ vtkUltrasoundSequenceReader::~vtkUltrasoundSequenceReader()
 {
   this->SetFileName(nullptr);
   this->SetTransformFile(nullptr);
-  this->SetImageFrame(nullptr);
-  this->SetWorldFrame(nullptr);
-  this->SetToolFrame(nullptr);
+}
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundSequenceReader::Parameters()
+{
+  using echorama::Parameter;
+  return {
+      Parameter(
+          "WorldFrame", this->WorldFrame,
+          "The frame of coordinates that is the world. Empty takes the first of Reference, World and Tracker that transforms "
+          "lead to from the image (from anything, when none begins at the image), else the only frame that transforms lead "
+          "to and none leads from; where that leaves a choice, it has to be made here."),
+      Parameter("ImageFrame", this->ImageFrame, "The frame of coordinates that counts pixels.").Advanced(),
+      Parameter("ToolFrame", this->ToolFrame,
+                "Whose track output 1 is: a frame of coordinates. Empty takes the image where it can be placed, else every frame "
+                "that a transform of the file begins at and that can be placed.")
+          .Advanced()};
 }
 
 //----------------------------------------------------------------------------
@@ -164,9 +172,7 @@ void vtkUltrasoundSequenceReader::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
   os << indent << "TransformFile: " << (this->TransformFile ? this->TransformFile : "(none)") << "\n";
-  os << indent << "ImageFrame: " << TextOf(this->ImageFrame) << "\n";
-  os << indent << "WorldFrame: " << TextOf(this->WorldFrame) << "\n";
-  os << indent << "ToolFrame: " << TextOf(this->ToolFrame) << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "NumberOfFrames: " << this->GetNumberOfFrames() << "\n";
   os << indent << "Notes: " << this->GetNotes() << "\n";
 }
@@ -186,11 +192,7 @@ int vtkUltrasoundSequenceReader::GetNumberOfFrames() const
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundSequenceReader::GetCoordinateFrames() const
 {
-  std::string text;
-  for (const std::string& frame : this->Opened ? this->Opened->Poses.Frames() : std::vector<std::string>()) {
-    text += (text.empty() ? "" : ", ") + frame;
-  }
-  return text;
+  return this->Opened ? echorama::Joined(this->Opened->Poses.Frames()) : "";
 }
 
 //----------------------------------------------------------------------------
@@ -202,11 +204,7 @@ std::string vtkUltrasoundSequenceReader::GetWorldFrameInUse() const
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundSequenceReader::GetNotes() const
 {
-  std::string text;
-  for (const std::string& note : this->Opened ? this->Opened->Notes : std::vector<std::string>()) {
-    text += (text.empty() ? "" : "\n") + note;
-  }
-  return text;
+  return this->Opened ? echorama::Joined(this->Opened->Notes, "\n") : "";
 }
 
 //----------------------------------------------------------------------------
@@ -220,7 +218,7 @@ int vtkUltrasoundSequenceReader::FillOutputPortInformation(int port, vtkInformat
 vtkUltrasoundSequenceReader::Sequence& vtkUltrasoundSequenceReader::Open()
 {
   const std::string path = TextOf(this->FileName), transforms = TextOf(this->TransformFile);
-  const std::string image = TextOf(this->ImageFrame), world = TextOf(this->WorldFrame);
+  const std::string &image = this->ImageFrame, &world = this->WorldFrame;
   const std::string stamp = StampOf(path) + "|" + StampOf(transforms) + "|" + image + "|" + world;
   if (!this->Opened || this->Opened->Stamp != stamp) {
     this->Opened.reset();
@@ -315,7 +313,7 @@ void vtkUltrasoundSequenceReader::ReadFrame(int index, vtkImageData* output, con
   if (sequence.Poses.ImageIsPlaced()) {
     sequence.Poses.MoveTo(frame);
     pose = sequence.PoseOf(sequence.Poses.Image());
-    AddString(output, "WorldFrame", sequence.Poses.World());
+    vtkUltrasoundVolume::AddField(output, "WorldFrame", sequence.Poses.World());
   }
   if (content.HasImages()) {
     vtkUltrasoundVolume::SetGeometry(output, pose ? echorama::FrameGeometry(*pose, content.dimensions) : content.geometry);
@@ -349,20 +347,20 @@ void vtkUltrasoundSequenceReader::ReadFrame(int index, vtkImageData* output, con
     const auto matrix = NewMatrices(transform.name + "Transform");
     InsertMatrix(matrix, transform.matrix);
     output->GetFieldData()->AddArray(matrix);
-    AddString(output, transform.name + "TransformStatus", transform.statusText);
+    vtkUltrasoundVolume::AddField(output, (transform.name + "TransformStatus").c_str(), transform.statusText);
   }
   // Ours come back as what they were.
   const auto add = [output](const std::string& key, const std::string& value, const std::string& prefix) {
     if (key.compare(0, FieldPrefix.size(), FieldPrefix) != 0 ||
         !vtkUltrasoundAcquisition::SetFromText(output, key.substr(FieldPrefix.size()), value)) {
-      AddString(output, prefix + key, value);
+      vtkUltrasoundVolume::AddField(output, (prefix + key).c_str(), value);
     }
   };
   for (const auto& [key, value] : frame.fields) {
     add(key, value, "Frame_");
   }
   if (!content.imageType.empty()) {
-    AddString(output, "UltrasoundImageType", content.imageType);
+    vtkUltrasoundVolume::AddField(output, "UltrasoundImageType", content.imageType);
   }
   for (const auto& [key, value] : content.fields) {
     add(key, value, "");
@@ -376,7 +374,7 @@ void vtkUltrasoundSequenceReader::MakeTrack(vtkPolyData* output, const echorama:
   const SequenceContent& content = sequence.File.Content();
   SequencePoses& poses = sequence.Poses;
   std::vector<std::string> tools;
-  if (const std::string tool = TextOf(this->ToolFrame); !tool.empty()) {
+  if (const std::string& tool = this->ToolFrame; !tool.empty()) {
     if (!poses.Reaches(tool)) {
       throw Error(Error::Kind::NotPossible, content.path + ": no transforms lead from the ToolFrame " + tool + " to the world; " +
                                                 "there are " + this->GetCoordinateFrames());
@@ -450,5 +448,5 @@ void vtkUltrasoundSequenceReader::MakeTrack(vtkPolyData* output, const echorama:
     arrays->AddArray(statuses[i]);
   }
   output->GetFieldData()->AddArray(names);
-  AddString(output, "WorldFrame", poses.World());
+  vtkUltrasoundVolume::AddField(output, "WorldFrame", poses.World());
 }

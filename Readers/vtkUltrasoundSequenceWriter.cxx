@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundSequenceWriter.h"
 
+#include "Core/Base/JoinedText.h"
 #include "Readers/SequenceWriter.h"
 
 #include "vtkCommand.h"
@@ -30,6 +31,8 @@ using echorama::SequenceTransform;
 using echorama::TransformStatus;
 
 vtkStandardNewMacro(vtkUltrasoundSequenceWriter);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundSequenceWriter);
 
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
@@ -169,22 +172,25 @@ vtkUltrasoundSequenceWriter::~vtkUltrasoundSequenceWriter()
 }
 
 //----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundSequenceWriter::Parameters()
+{
+  using echorama::Parameter;
+  return {Parameter("UseCompression", this->UseCompression, "Whether pixels are compressed, without loss.")};
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundSequenceWriter::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
-  os << indent << "UseCompression: " << this->UseCompression << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->GetNotes() << "\n";
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundSequenceWriter::GetNotes() const
 {
-  std::string text;
-  for (const std::string& note : this->Notes) {
-    text += (text.empty() ? "" : "\n") + note;
-  }
-  return text;
+  return echorama::Joined(this->Notes, "\n");
 }
 
 //----------------------------------------------------------------------------
@@ -201,7 +207,7 @@ int vtkUltrasoundSequenceWriter::Write()
   this->Notes.clear();
   this->InvokeEvent(vtkCommand::StartEvent);
   const int written = vtkUltrasoundVolume::Run(this, nullptr, [this](const echorama::Progress& progress) {
-    this->Notes = WriteSteps(this, this->FileName ? this->FileName : "", this->UseCompression != 0, progress);
+    this->Notes = WriteSteps(this, this->FileName ? this->FileName : "", this->UseCompression, progress);
   });
   this->InvokeEvent(vtkCommand::EndEvent);
   if (!written) {

@@ -33,6 +33,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Core/Base/Progress.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAREADERS_EXPORT vtkUltrasoundSequenceWriter : public vtkWriter {
@@ -47,12 +48,37 @@ public:
   vtkGetFilePathMacro(FileName);
   ///@}
 
+  // BEGIN parameters
   ///@{
-  /** Whether pixels are compressed (zlib, without loss). Default: on. */
-  vtkSetMacro(UseCompression, vtkTypeBool);
-  vtkGetMacro(UseCompression, vtkTypeBool);
-  vtkBooleanMacro(UseCompression, vtkTypeBool);
+  /** Whether pixels are compressed, without loss. Default on. */
+  void SetUseCompression(bool value) { this->SetParameter("UseCompression", value); }
+  bool GetUseCompression() { return this->GetParameter("UseCompression") != 0.0; }
+  void UseCompressionOn() { this->SetUseCompression(true); }
+  void UseCompressionOff() { this->SetUseCompression(false); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   /**
    * Updates the input at each of its time steps and writes them. Returns 1 when the file is there, complete; 0 after any
@@ -80,13 +106,13 @@ protected:
   void WriteData() override;
 
   char* FileName = nullptr;
-  vtkTypeBool UseCompression = 1;
 
 private:
   vtkUltrasoundSequenceWriter(const vtkUltrasoundSequenceWriter&) = delete;
   void operator=(const vtkUltrasoundSequenceWriter&) = delete;
 
 #ifndef __VTK_WRAP__
+  bool UseCompression = true;
   std::vector<std::string> Notes;
 #endif
 };

@@ -2,8 +2,9 @@
 #include "vtkUltrasoundWriter.h"
 
 #include "Core/Base/FileReplacement.h"
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/NumberText.h"
-#include "Readers/BorderZeros.h"
+#include "Core/Imaging/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/NiftiFile.h"
 #include "Readers/SequenceFile.h"
@@ -43,6 +44,8 @@ using echorama::ImageHeader;
 using echorama::VolumeWriter;
 
 vtkStandardNewMacro(vtkUltrasoundWriter);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundWriter);
 
 namespace {
 const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
@@ -203,23 +206,32 @@ vtkUltrasoundWriter::~vtkUltrasoundWriter()
 }
 
 //----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundWriter::Parameters()
+{
+  using echorama::Parameter;
+  return {Parameter("UseCompression", this->UseCompression,
+                    "Whether voxels are compressed, without loss. NIfTI goes by its extension: .nii is not, .nii.gz is."),
+          Parameter(
+              "NumberOfSlabs", this->NumberOfSlabs, {1, echorama::Unlimited}, "",
+              "In how many slabs along z the input is asked for its voxels, one after the other; at most so many as there are "
+              "slices. With more than 1 the volume is never in memory as a whole, when the input makes no more than it is asked "
+              "for; the files are the same to the last byte. For .mha, .mhd, .nrrd, .nhdr, .nii and .nii.gz.")
+              .Advanced()};
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundWriter::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
-  os << indent << "UseCompression: " << this->UseCompression << "\n";
-  os << indent << "NumberOfSlabs: " << this->NumberOfSlabs << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->GetNotes() << "\n";
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundWriter::GetNotes() const
 {
-  std::string text;
-  for (const std::string& note : this->Notes) {
-    text += (text.empty() ? "" : "\n") + note;
-  }
-  return text;
+  return echorama::Joined(this->Notes, "\n");
 }
 
 //----------------------------------------------------------------------------
@@ -244,10 +256,11 @@ int vtkUltrasoundWriter::Write()
   }
   this->InvokeEvent(vtkCommand::StartEvent);
   this->Finish(vtkUltrasoundVolume::Run(this, nullptr, [this, &path, sequence](const echorama::Progress& progress) {
+    echorama::CheckRanges(this->Parameters());
     if (!sequence) {
       this->WriteBySlabs(path, progress);
     } else if (this->NumberOfSlabs == 1) {
-      this->Notes = vtkUltrasoundSequenceWriter::WriteSteps(this, path, this->UseCompression != 0, progress);
+      this->Notes = vtkUltrasoundSequenceWriter::WriteSteps(this, path, this->UseCompression, progress);
     } else {
       throw Error(Error::Kind::InvalidParameter, path + ": a sequence is written frame by frame, not by slabs");
     }
@@ -308,7 +321,7 @@ void vtkUltrasoundWriter::WriteData()
         const std::string companion = echorama::CompanionPath(path, echorama::CompanionArrays[i]);
         if (whole.Beside[i]) {
           header.type = echorama::VoxelTypeOf(whole.Beside[i]);
-          echorama::WriteVdb(companion, header, whole.Voxels(whole.Beside[i]), nullptr, this->UseCompression != 0, files);
+          echorama::WriteVdb(companion, header, whole.Voxels(whole.Beside[i]), nullptr, this->UseCompression, files);
         } else {
           files.Remove(companion);
         }
@@ -316,8 +329,7 @@ void vtkUltrasoundWriter::WriteData()
       header.type = echorama::VoxelTypeOf(whole.Intensity);
       header.fields = FieldsOf(whole, lost);
       echorama::WriteVdb(path, header, whole.Voxels(whole.Intensity),
-                         whole.Valid ? whole.Voxels<unsigned char>(whole.Valid) : nullptr, this->UseCompression != 0, files,
-                         progress);
+                         whole.Valid ? whole.Voxels<unsigned char>(whole.Valid) : nullptr, this->UseCompression, files, progress);
       files.Commit();
       this->NoteLost(lost);
       break;
@@ -413,7 +425,7 @@ void vtkUltrasoundWriter::WriteBySlabs(const std::string& path, const echorama::
 void vtkUltrasoundWriter::WriteSlabs(const std::string& path, const Extent& whole, int slabs, const SlabSource& slabOf,
                                      const echorama::Progress& progress)
 {
-  const bool compress = this->UseCompression != 0;
+  const bool compress = this->UseCompression;
   const int slices = whole[5] - whole[4] + 1;
   slabs = std::max(1, std::min(slabs, slices));
   FileReplacement files;

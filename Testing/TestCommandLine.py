@@ -22,7 +22,7 @@ from program_under_test import PROGRAM, blobs, read_mha, run, run_json, snapshot
 work = None     # a folder for all tests
 phantom = None  # the folder of phantom volumes in it
 FILES = ["volume_1.mha", "volume_2.mha", "volume_3.mha"]
-FEWER_POINTS = ["--set", "Points=4000"]  # enough for these volumes, and quick
+FEWER_POINTS = ["--points", "4000"]  # enough for these volumes, and quick
 
 
 def setUpModule():
@@ -78,14 +78,13 @@ class Usage(unittest.TestCase):
                           ["stitch", *some, "-o", work / "no.mha", "--method", "banana"],
                           ["stitch", *some, "-o", work / "no.mha", "--sharpness", "-1"],
                           ["stitch", *some, "-o", work / "no.mha", "--spacing", "-1"], ["align", *some, "--start", "nowhere"],
-                          ["align", *some, "--metric", "banana"], ["align", *some, "--method", "search"], ["align", *some, "--metric", "mad"],
+                          ["align", *some, "--metric", "banana"], ["align", *some, "--method", "search"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "0"],
                           ["align", *some, "-o", work / "no.json", "--fixed", "4"],
                           ["align", *some, "-o", work / "no.json", "--hold", "4"],
-                          ["align", *some, "-o", work / "no.json", "--set", "banana=1"],
-                          ["align", *some, "-o", work / "no.json", "--set", "Points"],
-                          ["align", *some, "-o", work / "no.json", "--set", "Points=many"],
-                          ["align", *some, "-o", work / "no.json", "--set", "Points=999"], ["score", phantom / "truth.json"],
+                          ["align", *some, "-o", work / "no.json", "--points"],
+                          ["align", *some, "-o", work / "no.json", "--points", "many"],
+                          ["align", *some, "-o", work / "no.json", "--points", "99"], ["score", phantom / "truth.json"],
                           ["score", phantom / "truth.json", "--landmarks", work / "one.csv"],
                           ["phantom"], ["phantom", "-o", work / "no", "--count", "0"], ["view"],
                           ["view", some[0], "--screenshot", work / "no.png", "--size", "1", "1"]):
@@ -362,13 +361,13 @@ class MainJob(unittest.TestCase):
         arguments = [*volumes(), "--poses", phantom / "truth.json", "--spacing", 4]
         ways = [(method, "split") for method in ("membrane", "distance", "feather", "average", "maximum")]
         voxels, regions = set(), set()
-        for method, texture in [*ways, ("membrane", "mix"), ("membrane", "seam")]:
+        for method, texture in [*ways, ("membrane", "mix")]:
             out = folder / f"{method}_{texture}.nrrd"
             told = run_json("stitch", *arguments, "-o", out, "--method", method, "--texture", texture)
             self.assertEqual((told["method"], told["texture"]), (method, texture))
             voxels.add(out.read_bytes())
             regions.add(out.with_name(f"{out.stem}.ValidRegion.nrrd").read_bytes())
-        self.assertEqual((len(voxels), len(regions)), (7, 1))
+        self.assertEqual((len(voxels), len(regions)), (6, 1))
         refused = run("stitch", *arguments, "-o", folder / "none.nrrd", "--method", "multiband")
         self.assertEqual(refused.returncode, 2)
         self.assertIn("feather", refused.stderr)
@@ -685,8 +684,8 @@ class Manners(unittest.TestCase):
 
     def test_stopping(self):
         """Far more work than can be done in the time before the signal; afterwards there is no new file."""
-        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--start", "unknown", "--set",
-                         "Candidates=1000")
+        self.interrupted(signal.SIGINT, "align", *volumes(), "-o", "poses.json", "--apply", "moved", "--start", "unknown",
+                         "--candidates", "1000")
         self.interrupted(signal.SIGTERM, "phantom", "-o", "volumes", "--spacing", "0.5", "--count", "40")
         self.interrupted(signal.SIGINT, "stitch", *volumes(), "-o", "stitched.mha", "--spacing", "0.4")
 

@@ -237,7 +237,7 @@ class HandEye(unittest.TestCase):
                 ((["--volumes", *volumes, "--tracker", log, "--at", "1", "2"]), "--at"),
                 ((["--volumes", *volumes, "--tracker", log, "--tool", "Nothing"]), "SensorToTracker"),
                 ((["--volumes", *volumes, "--tracker", work / "absent.csv"]), "absent.csv"),
-                ((["--volumes", *volumes, "--tracker", log, "--rig", "9"]), "scale"),
+                ((["--volumes", *volumes, "--tracker", log, "--rig", "9"]), "Scale is 9; it must be in [0.2, 5]"),
                 ((["--volumes", *volumes, "--tracker", log, "--rig", log]), "label")):
             aligned = [] if "--rig" in arguments else ["--poses", work / "rig" / "truth.json"]
             done = run("calibrate", "hand-eye", *arguments, *aligned, "-o", work / "refused.json")
@@ -293,7 +293,7 @@ class Contents(unittest.TestCase):
             "schema": "echorama-transforms-1", "unit": "mm",
             "transforms": [{"from": "Volume", "to": "Sensor", "matrix": self.calibration.tolist()}]}))
         scores = {}
-        for name, option in (("tracked", ["--tracker-only"]), ("refined", ["--start", "tracked", "--set", "Points=4000"])):
+        for name, option in (("tracked", ["--tracker-only"]), ("refined", ["--start", "tracked", "--points", "4000"])):
             run_json("align", *self.volumes, "--tracker", self.track("off.csv", off), "--calibration", work / "known.json", *option, "-o",
                      work / f"texture_{name}.json")
             scores[name] = run_json("score", work / f"texture_{name}.json", "--truth", work / "texture.json")["score_mm"]
@@ -320,9 +320,9 @@ class Contents(unittest.TestCase):
             self.assertIn(words, done.stderr)
 
     def test_what_parameters_of_the_alignment_do(self):
-        """Two volumes that overlap by 91%, quickly; and each of --set."""
-        def aligned(*settings, start="tracked"):
-            done = run("align", *self.volumes[:2], "--start", start, *(word for each in ("Points=2000", *settings) for word in ("--set", each)),
+        """Two volumes that overlap by 91%, quickly."""
+        def aligned(*settings, start="tracked", points="2000"):
+            done = run("align", *self.volumes[:2], "--start", start, "--points", points, *settings,
                        "-o", work / "set.json", "--json")
             told = json.loads(done.stdout)
             self.assertEqual(done.returncode, 0 if told["verdict"] == "aligned" else 3, done.stderr)
@@ -330,24 +330,23 @@ class Contents(unittest.TestCase):
 
         plain = aligned()
         self.assertEqual(plain[0]["verdict"], "aligned")
-        for setting, verdict, words in (("MinimumOverlap=0.97", "failed", "overlap by 97%"), ("MinimumSimilarity=1", "failed", "more similar"),
-                                        ("MaximumErrorVoxels=0.001", "ambiguous", "predicted error"),
-                                        ("MaximumSplitVoxels=0.001", "failed", "two halves")):
+        for setting, verdict, words in (("--minimum-overlap=0.97", "failed", "overlap by 97%"), ("--minimum-similarity=1", "failed", "more similar"),
+                                        ("--maximum-error-voxels=0.001", "ambiguous", "predicted error"),
+                                        ("--maximum-split-voxels=0.001", "failed", "two halves")):
             volume, _ = aligned(setting)
             self.assertEqual(volume["verdict"], verdict, setting)
             self.assertIn(words, volume["reason"], setting)
         # Other points, other weights and other voxels find the same place, and other digits of it.
         found = [plain[0]["VolumeToWorld"]]
-        for setting in ("Seed=7", "Points=4000", "UseReliability=0", "FinestMm=6"):
-            volume, _ = aligned(setting)
-            numpy.testing.assert_allclose(volume["VolumeToWorld"], plain[0]["VolumeToWorld"], atol=0.5, err_msg=setting)
+        for volume, _ in (aligned("--seed=7"), aligned(points="4000"), aligned("--no-use-reliability"), aligned("--finest-mm=6")):
+            numpy.testing.assert_allclose(volume["VolumeToWorld"], plain[0]["VolumeToWorld"], atol=0.5)
             found.append(volume["VolumeToWorld"])
         self.assertEqual(len(set(map(json.dumps, found))), 5)
         # Within 35 degrees there is a second place that fits, with a third of the evidence; a single candidate has no rival.
         ratio = aligned(start="hand-made")[1]["peak_ratio"]
         self.assertTrue(1.5 < ratio < 10, ratio)
-        self.assertEqual(aligned("Candidates=1", start="hand-made")[1]["peak_ratio"], 99)
-        volume, _ = aligned(f"MinimumPeakRatio={ratio + 5}", start="hand-made")
+        self.assertEqual(aligned("--candidates=1", start="hand-made")[1]["peak_ratio"], 99)
+        volume, _ = aligned(f"--minimum-peak-ratio={ratio + 5}", start="hand-made")
         self.assertEqual(volume["verdict"], "ambiguous")
         self.assertIn("a different pose fits nearly as well", volume["reason"])
 

@@ -28,8 +28,9 @@ for name in names:
         assert one["help"].endswith("."), f"{place}: its help is no sentence"
         get, change = getattr(made, "Get" + one["name"]), getattr(made, "Set" + one["name"])
         assert (list(get()) if one["type"] == "vector" else get()) == one["value"], f"{place}: a default that is not there"
-        if one["type"] in ("choice", "text", "switch"):
-            other = {"choice": len(one.get("choices", " ")) - 1, "text": "something", "switch": not one["value"]}[one["type"]]
+        if one["type"] in ("choice", "name", "text", "switch"):
+            choices = one.get("choices", [" "])
+            other = {"choice": len(choices) - 1, "name": choices[-1], "text": "something", "switch": not one["value"]}[one["type"]]
         elif one["type"] == "vector":
             other = (0.25, -1.5, 3.0)
         else:

@@ -23,7 +23,7 @@ from geometry import Probe, about, apply, degrees_of, pose, random_motion, read_
 
 temporary = tempfile.TemporaryDirectory()
 work = pathlib.Path(temporary.name)
-QUICK = "--start tracked --set Points=2000"
+QUICK = "--start tracked --points 2000"
 
 
 def quiet(*_):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundHandEyeCalibration.h"
 
+#include "Core/Geometry/MatrixRows.h"
 #include "Tracking/Calibration/CalibrationJson.h"
 #include "vtkCellArray.h"
 #include "vtkDataSet.h"
@@ -20,16 +21,15 @@
 #include "vtkUltrasoundVolume.h"
 #include "vtkUnsignedCharArray.h"
 
-#include <limits>
 #include <map>
 
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundHandEyeCalibration);
 
-namespace {
-using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+vtkUltrasoundParametersMacro(vtkUltrasoundHandEyeCalibration);
 
+namespace {
 // The poses of one input, as they stand: the kernel checks them.
 struct Side {
   std::vector<echorama::Pose> Poses;
@@ -71,7 +71,7 @@ Side SideOf(vtkDataObject* data, const std::string& arrayName, const std::string
   for (vtkIdType i = 0; i < numbers->GetNumberOfTuples(); ++i) {
     double values[16];
     numbers->GetTuple(i, values);
-    side.Poses.emplace_back(RowMajor(values));
+    side.Poses.emplace_back(echorama::MatrixRows(values));
   }
   if (vtkStringArray* names = vtkStringArray::SafeDownCast(arrays->GetAbstractArray(nameArray.c_str()))) {
     if (names->GetNumberOfValues() != numbers->GetNumberOfTuples()) {
@@ -85,53 +85,23 @@ Side SideOf(vtkDataObject* data, const std::string& arrayName, const std::string
   return side;
 }
 
+// Row by row.
 template <class Derived>
 void AddField(vtkDataObject* data, const char* name, const Eigen::MatrixBase<Derived>& matrix)
 {
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(static_cast<int>(matrix.size()));
-  array->SetNumberOfTuples(1);
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    for (Eigen::Index column = 0; column < matrix.cols(); ++column) {
-      array->SetComponent(0, static_cast<int>(row * matrix.cols() + column), matrix(row, column));
-    }
-  }
-  data->GetFieldData()->AddArray(array);
-}
-
-void Copy(const echorama::Pose& pose, vtkMatrix4x4* matrix)
-{
-  for (int row = 0; row < 4; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      matrix->SetElement(row, column, pose.matrix()(row, column));
-    }
-  }
+  const Eigen::Matrix<double, Derived::RowsAtCompileTime, Derived::ColsAtCompileTime, Eigen::RowMajor> rows = matrix;
+  vtkUltrasoundVolume::AddField(data, name, rows.data(), static_cast<int>(rows.size()));
 }
 } // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundHandEyeCalibration::vtkUltrasoundHandEyeCalibration()
 {
-  const echorama::HandEyeParameters defaults;
-  this->SensorNoiseDegrees = defaults.sensorNoise.degrees;
-  this->SensorNoiseMm = defaults.sensorNoise.mm;
-  this->VolumeNoiseDegrees = defaults.volumeNoise.degrees;
-  this->VolumeNoiseMm = defaults.volumeNoise.mm;
-  this->RejectOutliers = defaults.rejectOutliers;
-  this->EstimateNoise = defaults.estimateNoise;
-  this->Seed = static_cast<int>(defaults.seed);
   this->SetNumberOfInputPorts(2);
 }
 
 //----------------------------------------------------------------------------
 vtkUltrasoundHandEyeCalibration::~vtkUltrasoundHandEyeCalibration() = default;
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundHandEyeCalibration::SetAlignmentsConnection(vtkAlgorithmOutput* alignments)
-{
-  this->SetInputConnection(1, alignments);
-}
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundHandEyeCalibration::FillInputPortInformation(int, vtkInformation* info)
@@ -150,8 +120,8 @@ void vtkUltrasoundHandEyeCalibration::AddPair(vtkMatrix4x4* sensorToTracker, vtk
     return;
   }
   echorama::HandEyePair pair;
-  pair.sensorToTracker.matrix() = Eigen::Map<const RowMajor>(sensorToTracker->GetData());
-  pair.volumeToWorld.matrix() = Eigen::Map<const RowMajor>(volumeToWorld->GetData());
+  pair.sensorToTracker = echorama::FromRows<echorama::Pose>(sensorToTracker->GetData());
+  pair.volumeToWorld = echorama::FromRows<echorama::Pose>(volumeToWorld->GetData());
   pair.name = name;
   this->Pairs.push_back(pair);
   this->Modified();
@@ -167,22 +137,18 @@ void vtkUltrasoundHandEyeCalibration::RemoveAllPairs()
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundHandEyeCalibration::GetNumberOfPairs() const
+echorama::ParameterList vtkUltrasoundHandEyeCalibration::Parameters()
 {
-  return static_cast<int>(this->Pairs.size());
-}
-
-//----------------------------------------------------------------------------
-echorama::HandEyeParameters vtkUltrasoundHandEyeCalibration::Parameters() const
-{
-  echorama::HandEyeParameters parameters;
-  parameters.sensorNoise = {this->SensorNoiseDegrees, this->SensorNoiseMm};
-  parameters.volumeNoise = {this->VolumeNoiseDegrees, this->VolumeNoiseMm};
-  parameters.target = Eigen::Vector3d(this->Target);
-  parameters.rejectOutliers = this->RejectOutliers;
-  parameters.estimateNoise = this->EstimateNoise;
-  parameters.seed = static_cast<std::uint64_t>(this->Seed);
-  return parameters;
+  using echorama::Parameter;
+  const std::string other = " When it is not there, the only one of 16 components is taken.";
+  return echorama::Join(
+      {Describe(this->Values),
+       {Parameter("SensorArray", this->SensorArray, "Name of the array of the sensor's poses." + other).Advanced(),
+        Parameter("VolumeArray", this->VolumeArray, "Name of the array of the alignments." + other).Advanced(),
+        Parameter(
+            "NameArray", this->NameArray,
+            "Name of the array of the scans' names. When both inputs have it, scans belong together by name, else by order.")
+            .Advanced()}});
 }
 
 //----------------------------------------------------------------------------
@@ -244,12 +210,13 @@ int vtkUltrasoundHandEyeCalibration::RequestData(vtkInformation*, vtkInformation
   this->HasResult = false;
   this->Report.clear();
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+    echorama::CheckRanges(this->Values);
     std::vector<std::string> notes;
     const auto pairs = this->CollectPairs(vtkDataObject::GetData(inputs[0]), vtkDataObject::GetData(inputs[1]), notes);
-    this->Result = echorama::CalibrateHandEye(pairs, this->Parameters(), progress);
+    this->Result = echorama::CalibrateHandEye(pairs, this->Values, progress);
     this->Result.notes.insert(this->Result.notes.begin(), notes.begin(), notes.end());
     this->PutOut(vtkPolyData::GetData(outputs), pairs);
-    this->Report = echorama::Report(this->Result, this->Parameters());
+    this->Report = echorama::Report(this->Result, this->Values);
     this->HasResult = true;
   });
 }
@@ -268,7 +235,7 @@ void vtkUltrasoundHandEyeCalibration::PutOut(vtkPolyData* output, const std::vec
   inliers->SetName("Inlier");
   vtkNew<vtkStringArray> names;
   names->SetName("ScanName");
-  const Eigen::Vector3d target(this->Target);
+  const Eigen::Vector3d& target = this->Values.target;
   const echorama::HandEyeSolution& solution = this->Result.solution;
   const echorama::Pose trackerToWorld = solution.worldToTracker.inverse();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -291,45 +258,17 @@ void vtkUltrasoundHandEyeCalibration::PutOut(vtkPolyData* output, const std::vec
   AddField(output, "WorldToTracker", solution.worldToTracker.matrix());
   AddField(output, "Covariance", this->Result.covariance);
   AddField(output, "TargetCovariance", this->Result.targetCovariance);
-  AddField(output, "TargetRadius95", Eigen::Matrix<double, 1, 1>::Constant(this->Result.targetRadius95Mm));
+  vtkUltrasoundVolume::AddField(output, "TargetRadius95", &this->Result.targetRadius95Mm, 1);
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundHandEyeCalibration::GetVolumeToSensor(vtkMatrix4x4* pose) const
+bool vtkUltrasoundHandEyeCalibration::GetFound(const echorama::Pose& found, vtkMatrix4x4* pose) const
 {
   if (!this->HasResult || !pose) {
     return false;
   }
-  Copy(this->Result.solution.volumeToSensor, pose);
+  pose->DeepCopy(echorama::MatrixRows(found.matrix()).data());
   return true;
-}
-
-//----------------------------------------------------------------------------
-bool vtkUltrasoundHandEyeCalibration::GetWorldToTracker(vtkMatrix4x4* pose) const
-{
-  if (!this->HasResult || !pose) {
-    return false;
-  }
-  Copy(this->Result.solution.worldToTracker, pose);
-  return true;
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundHandEyeCalibration::GetTargetRadius95() const
-{
-  return this->HasResult ? this->Result.targetRadius95Mm : std::numeric_limits<double>::quiet_NaN();
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundHandEyeCalibration::GetTargetRms() const
-{
-  return this->HasResult ? this->Result.targetRmsMm : std::numeric_limits<double>::quiet_NaN();
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundHandEyeCalibration::GetNumberOfInliers() const
-{
-  return this->HasResult ? this->Result.inliers : 0;
 }
 
 //----------------------------------------------------------------------------
@@ -337,16 +276,6 @@ void vtkUltrasoundHandEyeCalibration::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Pairs: " << this->Pairs.size() << "\n";
-  os << indent << "SensorArray: " << this->SensorArray << "\n";
-  os << indent << "VolumeArray: " << this->VolumeArray << "\n";
-  os << indent << "NameArray: " << this->NameArray << "\n";
-  os << indent << "Target: " << this->Target[0] << " " << this->Target[1] << " " << this->Target[2] << "\n";
-  os << indent << "SensorNoiseDegrees: " << this->SensorNoiseDegrees << "\n";
-  os << indent << "SensorNoiseMm: " << this->SensorNoiseMm << "\n";
-  os << indent << "VolumeNoiseDegrees: " << this->VolumeNoiseDegrees << "\n";
-  os << indent << "VolumeNoiseMm: " << this->VolumeNoiseMm << "\n";
-  os << indent << "RejectOutliers: " << (this->RejectOutliers ? "on" : "off") << "\n";
-  os << indent << "EstimateNoise: " << (this->EstimateNoise ? "on" : "off") << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "TargetRadius95: " << this->GetTargetRadius95() << "\n";
 }

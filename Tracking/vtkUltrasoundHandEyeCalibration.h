@@ -38,10 +38,12 @@
 #define vtkUltrasoundHandEyeCalibration_h
 
 #include "EchoramaTrackingModule.h"
+#include "vtkMath.h"
 #include "vtkPolyDataAlgorithm.h"
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Calibration/HandEye.h"
+#include "vtkUltrasoundParameters.h"
 #include <vector>
 #endif
 #include <string>
@@ -56,7 +58,7 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   /** Connects the alignments, input 1. */
-  void SetAlignmentsConnection(vtkAlgorithmOutput* alignments);
+  void SetAlignmentsConnection(vtkAlgorithmOutput* alignments) { this->SetInputConnection(1, alignments); }
 
   ///@{
   /**
@@ -65,71 +67,13 @@ public:
    */
   void AddPair(vtkMatrix4x4* sensorToTracker, vtkMatrix4x4* volumeToWorld, const std::string& name = "");
   void RemoveAllPairs();
-  int GetNumberOfPairs() const;
-  ///@}
-
-  ///@{
-  /** Names of the arrays of the inputs. Defaults SensorToTracker, VolumeToWorld, and Name (strings). */
-  vtkSetMacro(SensorArray, std::string);
-  vtkGetMacro(SensorArray, std::string);
-  vtkSetMacro(VolumeArray, std::string);
-  vtkGetMacro(VolumeArray, std::string);
-  vtkSetMacro(NameArray, std::string);
-  vtkGetMacro(NameArray, std::string);
-  ///@}
-
-  ///@{
-  /** Where in the volume the error counts, mm in the volume's frame: usually its centre. Default 0 0 0. */
-  vtkSetVector3Macro(Target, double);
-  vtkGetVector3Macro(Target, double);
-  ///@}
-
-  ///@{
-  /**
-   * Standard deviation of the noise of the sensor's poses, in its own axes, per axis: degrees in [0, 45], mm in [0, 100].
-   * Defaults 0.25 and 0.7.
-   */
-  vtkSetClampMacro(SensorNoiseDegrees, double, 0.0, 45.0);
-  vtkGetMacro(SensorNoiseDegrees, double);
-  vtkSetClampMacro(SensorNoiseMm, double, 0.0, 100.0);
-  vtkGetMacro(SensorNoiseMm, double);
-  ///@}
-
-  ///@{
-  /**
-   * Standard deviation of the noise of the alignments, in the volume's axes about the target, per axis: degrees in [0, 45], mm in
-   * [0, 100]. Defaults 0.25 and 0.7.
-   */
-  vtkSetClampMacro(VolumeNoiseDegrees, double, 0.0, 45.0);
-  vtkGetMacro(VolumeNoiseDegrees, double);
-  vtkSetClampMacro(VolumeNoiseMm, double, 0.0, 100.0);
-  vtkGetMacro(VolumeNoiseMm, double);
-  ///@}
-
-  ///@{
-  /** Whether scans that do not agree with the others are left out, and named. Default on. */
-  vtkSetMacro(RejectOutliers, bool);
-  vtkGetMacro(RejectOutliers, bool);
-  vtkBooleanMacro(RejectOutliers, bool);
-  ///@}
-
-  ///@{
-  /** Whether both noises are scaled to what the residuals show; needs five scans that agree. Default off. */
-  vtkSetMacro(EstimateNoise, bool);
-  vtkGetMacro(EstimateNoise, bool);
-  vtkBooleanMacro(EstimateNoise, bool);
-  ///@}
-
-  ///@{
-  /** Seed of the search for scans that agree, >= 0. Default 1. */
-  vtkSetClampMacro(Seed, int, 0, VTK_INT_MAX);
-  vtkGetMacro(Seed, int);
+  int GetNumberOfPairs() const { return static_cast<int>(this->Pairs.size()); }
   ///@}
 
   ///@{
   /** What the last update found. Returns false, and leaves \a pose alone, when it failed or there was none. */
-  bool GetVolumeToSensor(vtkMatrix4x4* pose) const;
-  bool GetWorldToTracker(vtkMatrix4x4* pose) const;
+  bool GetVolumeToSensor(vtkMatrix4x4* pose) const { return this->GetFound(this->Result.solution.volumeToSensor, pose); }
+  bool GetWorldToTracker(vtkMatrix4x4* pose) const { return this->GetFound(this->Result.solution.worldToTracker, pose); }
   ///@}
 
   ///@{
@@ -137,13 +81,120 @@ public:
    * How well the calibration places the target: the radius that holds its true place with 95%, and the root mean square error
    * expected, mm; NaN when there is no result. How many scans agree; 0 without a result.
    */
-  double GetTargetRadius95() const;
-  double GetTargetRms() const;
-  int GetNumberOfInliers() const;
+  double GetTargetRadius95() const { return this->HasResult ? this->Result.targetRadius95Mm : vtkMath::Nan(); }
+  double GetTargetRms() const { return this->HasResult ? this->Result.targetRmsMm : vtkMath::Nan(); }
+  int GetNumberOfInliers() const { return this->HasResult ? this->Result.inliers : 0; }
   ///@}
 
   /** What the last update did, as JSON (Calibration/CalibrationJson.h). Empty when it failed. */
   std::string GetReport() const { return this->Report; }
+
+  // BEGIN parameters
+  ///@{
+  /** Where in the volume the error counts, in the volume's frame: usually its centre. In mm; default (0, 0, 0). */
+  void SetTarget(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetTarget(value);
+  }
+  void SetTarget(const double value[3]) { this->SetParameterAsVector("Target", value); }
+  double* GetTarget() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Target"); }
+  ///@}
+
+  ///@{
+  /** Standard deviation of the sensor's turns by the tracker, about each of its own axes. In [0, 45] degrees; default 0.25. */
+  void SetSensorNoiseDegrees(double value) { this->SetParameter("SensorNoiseDegrees", value); }
+  double GetSensorNoiseDegrees() { return this->GetParameter("SensorNoiseDegrees"); }
+  ///@}
+
+  ///@{
+  /** Standard deviation of the sensor's position by the tracker, along each of its own axes. In [0, 100] mm; default 0.7. */
+  void SetSensorNoiseMm(double value) { this->SetParameter("SensorNoiseMm", value); }
+  double GetSensorNoiseMm() { return this->GetParameter("SensorNoiseMm"); }
+  ///@}
+
+  ///@{
+  /** Standard deviation of the turns of the alignments, about each axis of the volume. In [0, 45] degrees; default 0.25. */
+  void SetVolumeNoiseDegrees(double value) { this->SetParameter("VolumeNoiseDegrees", value); }
+  double GetVolumeNoiseDegrees() { return this->GetParameter("VolumeNoiseDegrees"); }
+  ///@}
+
+  ///@{
+  /** Standard deviation of the target's place by the alignments, along each axis of the volume. In [0, 100] mm; default 0.7. */
+  void SetVolumeNoiseMm(double value) { this->SetParameter("VolumeNoiseMm", value); }
+  double GetVolumeNoiseMm() { return this->GetParameter("VolumeNoiseMm"); }
+  ///@}
+
+  ///@{
+  /**
+   * Whether both noises are scaled, in their ratio, to what the residuals show. With fewer than five scans that agree they stay
+   * as stated, and a note says so. Default off.
+   */
+  void SetEstimateNoise(bool value) { this->SetParameter("EstimateNoise", value); }
+  bool GetEstimateNoise() { return this->GetParameter("EstimateNoise") != 0.0; }
+  void EstimateNoiseOn() { this->SetEstimateNoise(true); }
+  void EstimateNoiseOff() { this->SetEstimateNoise(false); }
+  ///@}
+
+  ///@{
+  /** Whether scans that do not agree with the others are left out, and named. Default on. */
+  void SetRejectOutliers(bool value) { this->SetParameter("RejectOutliers", value); }
+  bool GetRejectOutliers() { return this->GetParameter("RejectOutliers") != 0.0; }
+  void RejectOutliersOn() { this->SetRejectOutliers(true); }
+  void RejectOutliersOff() { this->SetRejectOutliers(false); }
+  ///@}
+
+  ///@{
+  /** Seed of the search for scans that agree. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
+  ///@}
+
+  ///@{
+  /**
+   * Name of the array of the sensor's poses. When it is not there, the only one of 16 components is taken. Default
+   * SensorToTracker.
+   */
+  void SetSensorArray(const char* value) { this->SetParameterAsText("SensorArray", value); }
+  std::string GetSensorArray() { return this->GetParameterAsText("SensorArray"); }
+  ///@}
+
+  ///@{
+  /** Name of the array of the alignments. When it is not there, the only one of 16 components is taken. Default VolumeToWorld. */
+  void SetVolumeArray(const char* value) { this->SetParameterAsText("VolumeArray", value); }
+  std::string GetVolumeArray() { return this->GetParameterAsText("VolumeArray"); }
+  ///@}
+
+  ///@{
+  /**
+   * Name of the array of the scans' names. When both inputs have it, scans belong together by name, else by order. Default Name.
+   */
+  void SetNameArray(const char* value) { this->SetParameterAsText("NameArray", value); }
+  std::string GetNameArray() { return this->GetParameterAsText("NameArray"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundHandEyeCalibration();
@@ -159,7 +210,7 @@ private:
 #ifndef __VTK_WRAP__
   std::vector<echorama::HandEyePair> CollectPairs(vtkDataObject* sensors, vtkDataObject* volumes,
                                                   std::vector<std::string>& notes) const;
-  echorama::HandEyeParameters Parameters() const;
+  bool GetFound(const echorama::Pose& found, vtkMatrix4x4* pose) const;
   void PutOut(vtkPolyData* output, const std::vector<echorama::HandEyePair>& pairs) const;
 
   std::vector<echorama::HandEyePair> Pairs;
@@ -167,14 +218,7 @@ private:
   std::string SensorArray = "SensorToTracker";
   std::string VolumeArray = "VolumeToWorld";
   std::string NameArray = "Name";
-  double Target[3] = {0.0, 0.0, 0.0};
-  double SensorNoiseDegrees;
-  double SensorNoiseMm;
-  double VolumeNoiseDegrees;
-  double VolumeNoiseMm;
-  bool RejectOutliers;
-  bool EstimateNoise;
-  int Seed;
+  echorama::HandEyeParameters Values;
   bool HasResult = false;
   std::string Report;
 #endif

@@ -18,48 +18,56 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundOpenIGTLinkSender);
 
-struct vtkUltrasoundOpenIGTLinkSender::Internals {
-  std::unique_ptr<echorama::OpenIgtLinkServer> Server;
-  echorama::OpenIgtLinkServerParameters Parameters; // of the server that runs
+vtkUltrasoundParametersMacro(vtkUltrasoundOpenIGTLinkSender);
 
-  // A server as the parameters say. Throws what it throws.
-  echorama::OpenIgtLinkServer& Listen(const echorama::OpenIgtLinkServerParameters& wanted)
+struct vtkUltrasoundOpenIGTLinkSender::Internals {
+  echorama::OpenIgtLinkServerParameters Wanted, Running; // Running: of the server
+  std::string DeviceName = "Volume";
+  bool KeepCoordinates = false;
+  double WaitSeconds = 0.0;
+  std::unique_ptr<echorama::OpenIgtLinkServer> Server;
+
+  // A server as is wanted. Throws what it throws.
+  echorama::OpenIgtLinkServer& Listen()
   {
-    const bool same = this->Server && wanted.host == this->Parameters.host && wanted.port == this->Parameters.port &&
-                      wanted.turnImages == this->Parameters.turnImages;
-    if (!same) {
+    this->Wanted.turnImages = !this->KeepCoordinates;
+    if (!this->Server || this->Wanted.host != this->Running.host || this->Wanted.port != this->Running.port ||
+        this->Wanted.turnImages != this->Running.turnImages) {
       this->Server.reset(); // its port may be the same
-      auto server = std::make_unique<echorama::OpenIgtLinkServer>(wanted);
+      auto server = std::make_unique<echorama::OpenIgtLinkServer>(this->Wanted);
       server->Start();
       this->Server = std::move(server);
-      this->Parameters = wanted;
+      this->Running = this->Wanted;
     }
     return *this->Server;
-  }
-  echorama::OpenIgtLinkServer& Listen(vtkUltrasoundOpenIGTLinkSender* sender)
-  {
-    echorama::OpenIgtLinkServerParameters parameters;
-    parameters.host = sender->Host ? sender->Host : "";
-    parameters.port = sender->Port;
-    parameters.turnImages = !sender->KeepCoordinates;
-    return this->Listen(parameters);
   }
 };
 
 //----------------------------------------------------------------------------
-vtkUltrasoundOpenIGTLinkSender::vtkUltrasoundOpenIGTLinkSender() : Parts(std::make_unique<Internals>())
-{
-  const echorama::OpenIgtLinkServerParameters defaults;
-  this->SetHost(defaults.host.c_str());
-  this->Port = defaults.port;
-  this->SetDeviceName("Volume");
-}
+vtkUltrasoundOpenIGTLinkSender::vtkUltrasoundOpenIGTLinkSender() : Parts(std::make_unique<Internals>()) {}
 
 //----------------------------------------------------------------------------
-vtkUltrasoundOpenIGTLinkSender::~vtkUltrasoundOpenIGTLinkSender()
+vtkUltrasoundOpenIGTLinkSender::~vtkUltrasoundOpenIGTLinkSender() = default;
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundOpenIGTLinkSender::Parameters()
 {
-  this->SetHost(nullptr);
-  this->SetDeviceName(nullptr);
+  using echorama::Parameter;
+  Internals& v = *this->Parts;
+  return echorama::Join(
+      {echorama::Without(Describe(v.Wanted), {"Clients", "QueuedBytes", "RememberedImages"}),
+       {Parameter("DeviceName", v.DeviceName, "What the volume is called there: 1 to 20 bytes."),
+        Parameter(
+            "KeepCoordinates", v.KeepCoordinates,
+            "Whether volume and transforms are sent with their own numbers, so that they lie where the poses of a tracker lie "
+            "that 3D Slicer is given as they are. Off: both are turned from L, P, S to R, A, S, so that patients lie in 3D "
+            "Slicer as they should.")
+            .Advanced(),
+        Parameter(
+            "WaitSeconds", v.WaitSeconds, {0, 3600}, "s",
+            "How long an update waits for a first client when there is none, and then again until the volume has been handed "
+            "over. For scripts that end after their update.")
+            .Advanced()}});
 }
 
 //----------------------------------------------------------------------------
@@ -67,10 +75,11 @@ void vtkUltrasoundOpenIGTLinkSender::Execute(vtkInformationVector** inputs, vtkI
                                              const echorama::Progress& progress)
 {
   // 1. what came in
+  echorama::CheckRanges(this->Parameters());
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
   const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
   echorama::StreamedImage message;
-  message.name = this->DeviceName ? this->DeviceName : "";
+  message.name = this->Parts->DeviceName;
   if (message.name.empty()) {
     throw Error(Error::Kind::InvalidParameter, "the device name is empty");
   }
@@ -82,12 +91,12 @@ void vtkUltrasoundOpenIGTLinkSender::Execute(vtkInformationVector** inputs, vtkI
                                                                                            echorama::SizeOf(message.type));
 
   // 2. to whom it may concern
-  echorama::OpenIgtLinkServer& server = this->Parts->Listen(this);
-  const auto wait = [&](double from, const std::function<bool(double)>& done) {
+  echorama::OpenIgtLinkServer& server = this->Parts->Listen();
+  const auto wait = [&progress, longest = this->Parts->WaitSeconds](double from, const std::function<bool(double)>& done) {
     const double start = echorama::ClockNow();
-    double left = this->WaitSeconds;
-    while (!done(std::min(left, 0.1)) && (left = start + this->WaitSeconds - echorama::ClockNow()) > 0.0) {
-      progress(from + 0.5 * (1.0 - left / this->WaitSeconds));
+    double left = longest;
+    while (!done(std::min(left, 0.1)) && (left = start + longest - echorama::ClockNow()) > 0.0) {
+      progress(from + 0.5 * (1.0 - left / longest));
     }
   };
   progress(0.0);
@@ -104,7 +113,7 @@ void vtkUltrasoundOpenIGTLinkSender::Execute(vtkInformationVector** inputs, vtkI
 bool vtkUltrasoundOpenIGTLinkSender::Start()
 {
   try {
-    this->Parts->Listen(this);
+    this->Parts->Listen();
   } catch (const Error& error) {
     vtkErrorMacro(<< error.what());
     return false;
@@ -130,14 +139,14 @@ bool vtkUltrasoundOpenIGTLinkSender::SendTransform(const char* name, vtkMatrix4x
     const int row = i / 4, column = i % 4;
     const double value = matrix->GetElement(row, column);
     fine = std::isfinite(value) && (row < 3 || value == (column == 3 ? 1.0 : 0.0));
-    pose.pose.matrix()(row, column) = this->KeepCoordinates ? value : signs[row] * signs[column] * value;
+    pose.pose.matrix()(row, column) = this->Parts->KeepCoordinates ? value : signs[row] * signs[column] * value;
   }
   if (!fine) {
     vtkErrorMacro(<< pose.name << ": the matrix is not affine, or not finite");
     return false;
   }
   try {
-    this->Parts->Listen(this).Send(pose);
+    this->Parts->Listen().Send(pose);
   } catch (const Error& error) {
     vtkErrorMacro(<< error.what());
     return false;
@@ -179,10 +188,6 @@ vtkIdType vtkUltrasoundOpenIGTLinkSender::GetNumberOfDroppedMessages()
 void vtkUltrasoundOpenIGTLinkSender::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Host: " << (this->Host ? this->Host : "(none)") << "\n";
-  os << indent << "Port: " << this->Port << "\n";
-  os << indent << "DeviceName: " << (this->DeviceName ? this->DeviceName : "(none)") << "\n";
-  os << indent << "KeepCoordinates: " << this->KeepCoordinates << "\n";
-  os << indent << "WaitSeconds: " << this->WaitSeconds << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "ListeningPort: " << this->GetListeningPort() << "\n";
 }

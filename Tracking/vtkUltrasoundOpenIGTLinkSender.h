@@ -25,6 +25,10 @@
 
 #include <memory> // for the server
 
+#ifndef __VTK_WRAP__
+#include "vtkUltrasoundParameters.h"
+#endif
+
 class vtkMatrix4x4;
 
 class ECHORAMATRACKING_EXPORT vtkUltrasoundOpenIGTLinkSender : public vtkUltrasoundImageAlgorithm {
@@ -33,46 +37,71 @@ public:
   vtkTypeMacro(vtkUltrasoundOpenIGTLinkSender, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
   /**
    * Where it listens: 127.0.0.1 for this machine alone, 0.0.0.0 for all that can reach it (OpenIGTLink knows no passwords).
-   * Default: 127.0.0.1.
+   * Default 127.0.0.1.
    */
-  vtkSetStringMacro(Host);
-  vtkGetStringMacro(Host);
+  void SetHost(const char* value) { this->SetParameterAsText("Host", value); }
+  std::string GetHost() { return this->GetParameterAsText("Host"); }
   ///@}
 
   ///@{
-  /** The port, 0 to 65535; 0 takes one that is free, see GetListeningPort(). Default: 18944, OpenIGTLink's own. */
-  vtkSetClampMacro(Port, int, 0, 65535);
-  vtkGetMacro(Port, int);
+  /** The port that clients connect to; 0 takes one that is free. In [0, 65535]; default 18944. */
+  void SetPort(int value) { this->SetParameter("Port", value); }
+  int GetPort() { return static_cast<int>(this->GetParameter("Port")); }
   ///@}
 
   ///@{
-  /** What the volume is called there, 1 to 20 bytes. Default: Volume. */
-  vtkSetStringMacro(DeviceName);
-  vtkGetStringMacro(DeviceName);
+  /** What the volume is called there: 1 to 20 bytes. Default Volume. */
+  void SetDeviceName(const char* value) { this->SetParameterAsText("DeviceName", value); }
+  std::string GetDeviceName() { return this->GetParameterAsText("DeviceName"); }
   ///@}
 
   ///@{
   /**
-   * On: volume and transforms are sent with their own numbers, so that they lie where the poses of a tracker lie that 3D Slicer
-   * is given as they are. Off: both are turned from L, P, S to R, A, S, so that patients lie in 3D Slicer as they should.
-   * Default: off.
+   * Whether volume and transforms are sent with their own numbers, so that they lie where the poses of a tracker lie that 3D
+   * Slicer is given as they are. Off: both are turned from L, P, S to R, A, S, so that patients lie in 3D Slicer as they should.
+   * Default off.
    */
-  vtkSetMacro(KeepCoordinates, vtkTypeBool);
-  vtkGetMacro(KeepCoordinates, vtkTypeBool);
-  vtkBooleanMacro(KeepCoordinates, vtkTypeBool);
+  void SetKeepCoordinates(bool value) { this->SetParameter("KeepCoordinates", value); }
+  bool GetKeepCoordinates() { return this->GetParameter("KeepCoordinates") != 0.0; }
+  void KeepCoordinatesOn() { this->SetKeepCoordinates(true); }
+  void KeepCoordinatesOff() { this->SetKeepCoordinates(false); }
   ///@}
 
   ///@{
   /**
-   * How long, s, an update waits for a first client when there is none, and then again until the volume has been handed over;
-   * in [0, 3600]. For scripts that end after their update. Default: 0.
+   * How long an update waits for a first client when there is none, and then again until the volume has been handed over. For
+   * scripts that end after their update. In [0, 3600] s; default 0.
    */
-  vtkSetClampMacro(WaitSeconds, double, 0.0, 3600.0);
-  vtkGetMacro(WaitSeconds, double);
+  void SetWaitSeconds(double value) { this->SetParameter("WaitSeconds", value); }
+  double GetWaitSeconds() { return this->GetParameter("WaitSeconds"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   /** Listens from now on. Returns false, with an error event, when that is not possible. Does nothing when it does already. */
   bool Start();
@@ -105,12 +134,6 @@ protected:
 #ifndef __VTK_WRAP__
   void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
 #endif
-
-  char* Host = nullptr;
-  int Port = 18944;
-  char* DeviceName = nullptr;
-  vtkTypeBool KeepCoordinates = 0;
-  double WaitSeconds = 0.0;
 
 private:
   vtkUltrasoundOpenIGTLinkSender(const vtkUltrasoundOpenIGTLinkSender&) = delete;

@@ -19,16 +19,9 @@
 
 vtkStandardNewMacro(vtkUltrasoundPivotCalibration);
 
-namespace {
-void AddField(vtkPolyData* output, const char* name, const double* values, int count)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(count);
-  array->InsertNextTuple(values);
-  output->GetFieldData()->AddArray(array);
-}
+vtkUltrasoundParametersMacro(vtkUltrasoundPivotCalibration);
 
+namespace {
 // The tips by their poses, and what follows from them.
 void Fill(vtkPolyData* output, const echorama::TrackPoses& track, const echorama::PivotResult& result)
 {
@@ -55,31 +48,31 @@ void Fill(vtkPolyData* output, const echorama::TrackPoses& track, const echorama
   output->GetPointData()->AddArray(times);
   output->GetPointData()->SetScalars(inliers);
   const Eigen::Matrix3d covariance = result.covariance.topLeftCorner<3, 3>();
-  AddField(output, "Tip", result.tip.data(), 3);
-  AddField(output, "TipRadius95", &result.tipRadius95Mm, 1);
-  AddField(output, "TipCovariance", covariance.data(), 9);
-  AddField(output, "Pivot", result.pivot.data(), 3);
+  vtkUltrasoundVolume::AddField(output, "Tip", result.tip.data(), 3);
+  vtkUltrasoundVolume::AddField(output, "TipRadius95", &result.tipRadius95Mm, 1);
+  vtkUltrasoundVolume::AddField(output, "TipCovariance", covariance.data(), 9);
+  vtkUltrasoundVolume::AddField(output, "Pivot", result.pivot.data(), 3);
 }
 } // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundPivotCalibration::vtkUltrasoundPivotCalibration()
 {
-  const echorama::PivotParameters defaults;
-  this->NoiseDegrees = defaults.noise.degrees;
-  this->NoiseMm = defaults.noise.mm;
-  this->EstimateNoise = defaults.estimateNoise;
-  this->RejectOutliers = defaults.rejectOutliers;
-  this->LeastSwing = defaults.leastSwingDegrees;
-  this->SetPoseArray("ToolToWorld");
   this->Forget();
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundPivotCalibration::~vtkUltrasoundPivotCalibration()
+vtkUltrasoundPivotCalibration::~vtkUltrasoundPivotCalibration() = default;
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundPivotCalibration::Parameters()
 {
-  this->SetTool(nullptr);
-  this->SetPoseArray(nullptr);
+  using echorama::Parameter;
+  return echorama::Join(
+      {{Parameter("Tool", this->Tool, "The tool, by its name in ToolNames. Empty takes the only one."),
+        Parameter("PoseArray", this->PoseArray, "The point array of 16 numbers that holds the poses, from the tool to the world.")
+            .Advanced()},
+       Describe(this->Values)});
 }
 
 //----------------------------------------------------------------------------
@@ -96,15 +89,10 @@ int vtkUltrasoundPivotCalibration::RequestData(vtkInformation*, vtkInformationVe
 {
   this->Forget();
   return vtkUltrasoundVolume::Run(this, outputs, [&](const echorama::Progress& progress) {
-    const echorama::TrackPoses track = echorama::TrackPosesOf(
-        vtkPolyData::GetData(inputs[0]), this->PoseArray ? this->PoseArray : "", this->Tool ? this->Tool : "", "the track");
-    echorama::PivotParameters parameters;
-    parameters.noise = {this->NoiseDegrees, this->NoiseMm};
-    parameters.estimateNoise = this->EstimateNoise;
-    parameters.rejectOutliers = this->RejectOutliers;
-    parameters.leastSwingDegrees = this->LeastSwing;
-    parameters.seed = static_cast<std::uint64_t>(this->Seed);
-    const echorama::PivotResult result = echorama::CalibratePivot(track.poses, parameters, progress);
+    echorama::CheckRanges(this->Values);
+    const echorama::TrackPoses track =
+        echorama::TrackPosesOf(vtkPolyData::GetData(inputs[0]), this->PoseArray, this->Tool, "the track");
+    const echorama::PivotResult result = echorama::CalibratePivot(track.poses, this->Values, progress);
     Fill(vtkPolyData::GetData(outputs), track, result);
     std::copy_n(result.tip.data(), 3, this->Tip);
     std::copy_n(result.pivot.data(), 3, this->Pivot);
@@ -117,14 +105,7 @@ int vtkUltrasoundPivotCalibration::RequestData(vtkInformation*, vtkInformationVe
 void vtkUltrasoundPivotCalibration::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Tool: " << (this->Tool ? this->Tool : "") << "\n";
-  os << indent << "PoseArray: " << (this->PoseArray ? this->PoseArray : "") << "\n";
-  os << indent << "NoiseDegrees: " << this->NoiseDegrees << "\n";
-  os << indent << "NoiseMm: " << this->NoiseMm << "\n";
-  os << indent << "EstimateNoise: " << (this->EstimateNoise ? "on" : "off") << "\n";
-  os << indent << "RejectOutliers: " << (this->RejectOutliers ? "on" : "off") << "\n";
-  os << indent << "LeastSwing: " << this->LeastSwing << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Tip: " << this->Tip[0] << " " << this->Tip[1] << " " << this->Tip[2] << "\n";
   os << indent << "Pivot: " << this->Pivot[0] << " " << this->Pivot[1] << " " << this->Pivot[2] << "\n";
   os << indent << "Radius95: " << this->Radius95 << "\n";

@@ -32,57 +32,98 @@
 
 #include <string> // for the report
 
+#ifndef __VTK_WRAP__
+#include "Tracking/Calibration/PivotCalibration.h"
+#include "vtkUltrasoundParameters.h"
+#endif
+
 class ECHORAMATRACKING_EXPORT vtkUltrasoundPivotCalibration : public vtkPolyDataAlgorithm {
 public:
   static vtkUltrasoundPivotCalibration* New();
   vtkTypeMacro(vtkUltrasoundPivotCalibration, vtkPolyDataAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** The tool, by its name in ToolNames. Default: empty, the only one. */
-  vtkSetStringMacro(Tool);
-  vtkGetStringMacro(Tool);
+  /** The tool, by its name in ToolNames. Empty takes the only one. Default none. */
+  void SetTool(const char* value) { this->SetParameterAsText("Tool", value); }
+  std::string GetTool() { return this->GetParameterAsText("Tool"); }
   ///@}
 
   ///@{
-  /** The point array of 16 numbers that holds the poses, from the tool to the world. Default: ToolToWorld. */
-  vtkSetStringMacro(PoseArray);
-  vtkGetStringMacro(PoseArray);
+  /** The point array of 16 numbers that holds the poses, from the tool to the world. Default ToolToWorld. */
+  void SetPoseArray(const char* value) { this->SetParameterAsText("PoseArray", value); }
+  std::string GetPoseArray() { return this->GetParameterAsText("PoseArray"); }
   ///@}
 
   ///@{
-  /** Standard deviation of a pose's noise per axis, degrees in [0, 45] and mm in (0, 100]. Default 0.25 and 0.7. */
-  vtkSetMacro(NoiseDegrees, double);
-  vtkGetMacro(NoiseDegrees, double);
-  vtkSetMacro(NoiseMm, double);
-  vtkGetMacro(NoiseMm, double);
+  /** Standard deviation of the angle of a pose, about each axis of the tool. In [0, 45] degrees; default 0.25. */
+  void SetNoiseDegrees(double value) { this->SetParameter("NoiseDegrees", value); }
+  double GetNoiseDegrees() { return this->GetParameter("NoiseDegrees"); }
   ///@}
 
   ///@{
-  /** Whether the noise is scaled to what the residuals say. Off: it is taken as stated. Default: on. */
-  vtkSetMacro(EstimateNoise, bool);
-  vtkGetMacro(EstimateNoise, bool);
-  vtkBooleanMacro(EstimateNoise, bool);
+  /** Standard deviation of the position of a pose, along each axis of the tool. In (0, 100] mm; default 0.7. */
+  void SetNoiseMm(double value) { this->SetParameter("NoiseMm", value); }
+  double GetNoiseMm() { return this->GetParameter("NoiseMm"); }
   ///@}
 
   ///@{
-  /** Whether poses at which the tip was not in place are left out. Default: on. */
-  vtkSetMacro(RejectOutliers, bool);
-  vtkGetMacro(RejectOutliers, bool);
-  vtkBooleanMacro(RejectOutliers, bool);
+  /**
+   * Whether the noise is scaled to what the residuals say. Off: it is taken as stated, and decides what is an outlier. Default
+   * on.
+   */
+  void SetEstimateNoise(bool value) { this->SetParameter("EstimateNoise", value); }
+  bool GetEstimateNoise() { return this->GetParameter("EstimateNoise") != 0.0; }
+  void EstimateNoiseOn() { this->SetEstimateNoise(true); }
+  void EstimateNoiseOff() { this->SetEstimateNoise(false); }
   ///@}
 
   ///@{
-  /** What every direction of the tool must swing by (RMS); degrees, in [0.1, 45]. Default 2. */
-  vtkSetMacro(LeastSwing, double);
-  vtkGetMacro(LeastSwing, double);
+  /** Whether poses at which the tip was not in place are left out. Default on. */
+  void SetRejectOutliers(bool value) { this->SetParameter("RejectOutliers", value); }
+  bool GetRejectOutliers() { return this->GetParameter("RejectOutliers") != 0.0; }
+  void RejectOutliersOn() { this->SetRejectOutliers(true); }
+  void RejectOutliersOff() { this->SetRejectOutliers(false); }
   ///@}
 
   ///@{
-  /** Of the search among poses with outliers. Default 1. */
-  vtkSetMacro(Seed, int);
-  vtkGetMacro(Seed, int);
+  /**
+   * What every direction of the tool must swing by (RMS), less what the noise pretends; otherwise the tip is refused. In [0.1,
+   * 45] degrees; default 2.
+   */
+  void SetLeastSwing(double value) { this->SetParameter("LeastSwing", value); }
+  double GetLeastSwing() { return this->GetParameter("LeastSwing"); }
   ///@}
+
+  ///@{
+  /** Seed of the search among poses with outliers. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   ///@{
   /** Results of the last update: tip in the tool's frame and fixed point in the world, mm. NaN when there is none. */
@@ -94,20 +135,16 @@ public:
   vtkGetMacro(Radius95, double);
 
   /** All results, as JSON. Empty when there are none. */
-  std::string GetReport() const { return this->Report; }
+  std::string GetReport() const
+  {
+    return this->Report;
+  }
 
 protected:
   vtkUltrasoundPivotCalibration();
   ~vtkUltrasoundPivotCalibration() override;
 
   int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
-
-  char* Tool = nullptr;
-  char* PoseArray = nullptr;
-  double NoiseDegrees, NoiseMm;
-  bool EstimateNoise, RejectOutliers;
-  double LeastSwing;
-  int Seed = 1;
 
   double Tip[3], Pivot[3];
   double Radius95;
@@ -119,6 +156,10 @@ private:
   void Forget();
 
   std::string Report;
+#ifndef __VTK_WRAP__
+  std::string Tool, PoseArray = "ToolToWorld";
+  echorama::PivotParameters Values;
+#endif
 };
 
 #endif

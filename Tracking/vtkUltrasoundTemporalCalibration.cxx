@@ -15,21 +15,10 @@
 
 vtkStandardNewMacro(vtkUltrasoundTemporalCalibration);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundTemporalCalibration);
+
 namespace {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-
-std::string TextOf(const char* text)
-{
-  return text ? text : "";
-}
-
-void AddField(vtkPolyData* output, const char* name, double value)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->InsertNextValue(value);
-  output->GetFieldData()->AddArray(array);
-}
 
 // The track with other times: t + offset, and where \a drift is on with the drift taken out, which is zero in the middle.
 void MoveTimes(vtkPolyData* output, const echorama::TemporalResult& result, bool drift)
@@ -51,21 +40,25 @@ void MoveTimes(vtkPolyData* output, const echorama::TemporalResult& result, bool
 vtkUltrasoundTemporalCalibration::vtkUltrasoundTemporalCalibration()
 {
   this->SetNumberOfInputPorts(2);
-  const echorama::TemporalParameters defaults;
-  this->LargestOffset = defaults.largestOffsetSeconds;
-  this->Smoothing = defaults.smoothingSeconds;
-  this->LongestGap = defaults.longestGapSeconds;
-  this->LeastOverlap = defaults.leastOverlapSeconds;
-  this->SetPoseArray("ToolToWorld");
   this->Forget();
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundTemporalCalibration::~vtkUltrasoundTemporalCalibration()
+vtkUltrasoundTemporalCalibration::~vtkUltrasoundTemporalCalibration() = default;
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundTemporalCalibration::Parameters()
 {
-  this->SetFirstTool(nullptr);
-  this->SetSecondTool(nullptr);
-  this->SetPoseArray(nullptr);
+  using echorama::Parameter;
+  const std::string only = " by its name in ToolNames. Empty takes the only one.";
+  return echorama::Join(
+      {{Parameter("FirstTool", this->FirstTool, "The tool of the first track," + only),
+        Parameter("SecondTool", this->SecondTool, "The tool of the second track," + only),
+        Parameter("PoseArray", this->PoseArray, "The point array of 16 numbers that holds the poses, in both tracks.")
+            .Advanced()},
+       Describe(this->Values),
+       {Parameter("CorrectDrift", this->CorrectDrift,
+                  "Whether a drift between the clocks, where one was found, is taken out of the times too.")}});
 }
 
 //----------------------------------------------------------------------------
@@ -80,24 +73,16 @@ int vtkUltrasoundTemporalCalibration::RequestData(vtkInformation*, vtkInformatio
 {
   this->Forget();
   return vtkUltrasoundVolume::Run(this, outputs, [&](const echorama::Progress& progress) {
+    echorama::CheckRanges(this->Values);
     vtkPolyData* const second = vtkPolyData::GetData(inputs[1]);
-    const std::string array = TextOf(this->PoseArray);
-    const auto a = echorama::TrackPosesOf(vtkPolyData::GetData(inputs[0]), array, TextOf(this->FirstTool), "the first track");
-    const auto b = echorama::TrackPosesOf(second, array, TextOf(this->SecondTool), "the second track");
-    echorama::TemporalParameters parameters;
-    parameters.signal = this->Signal == ROTATION      ? echorama::SpeedSignal::Rotation
-                        : this->Signal == TRANSLATION ? echorama::SpeedSignal::Translation
-                                                      : echorama::SpeedSignal::Automatic;
-    parameters.largestOffsetSeconds = this->LargestOffset;
-    parameters.smoothingSeconds = this->Smoothing;
-    parameters.longestGapSeconds = this->LongestGap;
-    parameters.leastOverlapSeconds = this->LeastOverlap;
-    const echorama::TemporalResult result = echorama::CalibrateTime(a.poses, b.poses, parameters, progress);
+    const auto a = echorama::TrackPosesOf(vtkPolyData::GetData(inputs[0]), this->PoseArray, this->FirstTool, "the first track");
+    const auto b = echorama::TrackPosesOf(second, this->PoseArray, this->SecondTool, "the second track");
+    const echorama::TemporalResult result = echorama::CalibrateTime(a.poses, b.poses, this->Values, progress);
     vtkPolyData* const output = vtkPolyData::GetData(outputs);
     output->ShallowCopy(second);
     MoveTimes(output, result, this->CorrectDrift);
-    AddField(output, "TimeOffset", result.offsetSeconds);
-    AddField(output, "TimeOffsetError", result.standardErrorSeconds);
+    vtkUltrasoundVolume::AddField(output, "TimeOffset", &result.offsetSeconds, 1);
+    vtkUltrasoundVolume::AddField(output, "TimeOffsetError", &result.standardErrorSeconds, 1);
     this->Offset = result.offsetSeconds;
     this->StandardError = result.standardErrorSeconds;
     this->Report = echorama::Report(result, a.tool, b.tool);
@@ -108,15 +93,7 @@ int vtkUltrasoundTemporalCalibration::RequestData(vtkInformation*, vtkInformatio
 void vtkUltrasoundTemporalCalibration::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FirstTool: " << TextOf(this->FirstTool) << "\n";
-  os << indent << "SecondTool: " << TextOf(this->SecondTool) << "\n";
-  os << indent << "PoseArray: " << TextOf(this->PoseArray) << "\n";
-  os << indent << "Signal: " << this->Signal << "\n";
-  os << indent << "LargestOffset: " << this->LargestOffset << "\n";
-  os << indent << "Smoothing: " << this->Smoothing << "\n";
-  os << indent << "LongestGap: " << this->LongestGap << "\n";
-  os << indent << "LeastOverlap: " << this->LeastOverlap << "\n";
-  os << indent << "CorrectDrift: " << (this->CorrectDrift ? "on" : "off") << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Offset: " << this->Offset << "\n";
   os << indent << "StandardError: " << this->StandardError << "\n";
 }

@@ -19,6 +19,8 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundTrackerPlacement);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundTrackerPlacement);
+
 namespace {
 std::string TextOf(const char* text)
 {
@@ -30,7 +32,6 @@ std::string TextOf(const char* text)
 vtkUltrasoundTrackerPlacement::vtkUltrasoundTrackerPlacement()
 {
   this->SetNumberOfInputPorts(2);
-  this->SetPoseArray("ToolToWorld");
   Eigen::Map<echorama::MatrixRows>(this->VolumeToSensor).setIdentity();
   this->Forget();
 }
@@ -39,8 +40,6 @@ vtkUltrasoundTrackerPlacement::vtkUltrasoundTrackerPlacement()
 vtkUltrasoundTrackerPlacement::~vtkUltrasoundTrackerPlacement()
 {
   this->SetRecording(nullptr);
-  this->SetTool(nullptr);
-  this->SetPoseArray(nullptr);
   this->SetCalibrationFile(nullptr);
 }
 
@@ -50,12 +49,6 @@ void vtkUltrasoundTrackerPlacement::Forget()
   this->Poses.clear();
   this->Notes.clear();
   this->ErrorMm = std::numeric_limits<double>::quiet_NaN();
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundTrackerPlacement::SetTrackConnection(vtkAlgorithmOutput* track)
-{
-  this->SetInputConnection(1, track);
 }
 
 //----------------------------------------------------------------------------
@@ -69,53 +62,38 @@ void vtkUltrasoundTrackerPlacement::SetVolumeToSensor(vtkMatrix4x4* matrix)
 //----------------------------------------------------------------------------
 void vtkUltrasoundTrackerPlacement::AddTime(double seconds)
 {
-  this->Parameters.times.push_back(seconds);
+  this->Values.times.push_back(seconds);
   this->Modified();
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundTrackerPlacement::RemoveAllTimes()
 {
-  if (!this->Parameters.times.empty()) {
-    this->Parameters.times.clear();
+  if (!this->Values.times.empty()) {
+    this->Values.times.clear();
     this->Modified();
   }
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundTrackerPlacement::GetNumberOfTimes() const
+echorama::ParameterList vtkUltrasoundTrackerPlacement::Parameters()
 {
-  return static_cast<int>(this->Parameters.times.size());
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundTrackerPlacement::SetWindowSeconds(double seconds)
-{
-  if (seconds != this->Parameters.smoothing.sigmaSeconds) {
-    this->Parameters.smoothing.sigmaSeconds = seconds;
-    this->Modified();
-  }
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerPlacement::GetWindowSeconds() const
-{
-  return this->Parameters.smoothing.sigmaSeconds;
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundTrackerPlacement::SetLongestGapSeconds(double seconds)
-{
-  if (seconds != this->Parameters.smoothing.longestGapSeconds) {
-    this->Parameters.smoothing.longestGapSeconds = seconds;
-    this->Modified();
-  }
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerPlacement::GetLongestGapSeconds() const
-{
-  return this->Parameters.smoothing.longestGapSeconds;
+  using echorama::Parameter;
+  return echorama::Join(
+      {{Parameter("Tool", this->Tool,
+                  "The tool that is fixed to the probe: ProbeToTracker, or by its name in ToolNames. "
+                  "Of a recording also one that is composed, such as ProbeToReference. Empty takes the only one.")},
+       Describe(this->Values),
+       {Parameter(
+            "VolumeFrame", echorama::Choice(this->VolumeFrame, {"automatic", "probe", "file-frame"}),
+            "What the calibration calls the volume: the frame of its probe (ProbeToWorld), or that of the file, for volumes "
+            "that lie as they were acquired. Automatic: as the file of the calibration says, else the probe's where all "
+            "volumes know it.")
+            .Advanced(),
+        Parameter("PoseArray", this->PoseArray,
+                  "The point array of 16 numbers that holds the poses of the track, from the tool to the world.")
+            .Advanced()},
+       echorama::Renamed(echorama::Without(Describe(this->RecordingOptions), {"RowsPerSecond"}), "UnitMm", "RecordingUnitMm")});
 }
 
 //----------------------------------------------------------------------------
@@ -143,13 +121,11 @@ echorama::ToolTrack vtkUltrasoundTrackerPlacement::Track(vtkInformationVector* i
     if (TextOf(this->Recording).empty()) {
       throw Error(Error::Kind::BadInput, "there is neither a track (input 1) nor a recording");
     }
-    echorama::PoseLogOptions options;
-    options.unitMm = this->RecordingUnitMm;
-    return echorama::ToolTrackOf(echorama::ReadPoseLog(this->Recording, options), TextOf(this->Tool));
+    return echorama::ToolTrackOf(echorama::ReadPoseLog(this->Recording, this->RecordingOptions), this->Tool);
   }
   echorama::ToolTrack track;
   track.source = "the track";
-  auto poses = echorama::TrackPosesOf(vtkPolyData::GetData(input), TextOf(this->PoseArray), TextOf(this->Tool), track.source);
+  auto poses = echorama::TrackPosesOf(vtkPolyData::GetData(input), this->PoseArray, this->Tool, track.source);
   track.poses = std::move(poses.poses);
   track.name = poses.tool.empty() ? "the tool" : poses.tool;
   const auto frames = echorama::FramesOf(poses.tool);
@@ -166,8 +142,8 @@ echorama::VolumeCalibration vtkUltrasoundTrackerPlacement::Calibration(const std
   } else if (!echorama::NearestPose(Eigen::Map<const echorama::MatrixRows>(this->VolumeToSensor), calibration.volumeToSensor)) {
     throw Error(Error::Kind::InvalidParameter, "VolumeToSensor is not a rigid pose");
   }
-  if (this->VolumeFrame != AUTOMATIC) {
-    calibration.frame = this->VolumeFrame == PROBE ? "probe" : "file";
+  if (this->VolumeFrame != Frame::Automatic) {
+    calibration.frame = this->VolumeFrame == Frame::Probe ? "probe" : "file";
   }
   return calibration;
 }
@@ -177,6 +153,7 @@ void vtkUltrasoundTrackerPlacement::Execute(vtkInformationVector** inputs, vtkIn
                                             const echorama::Progress& progress)
 {
   this->Forget();
+  echorama::CheckRanges(this->Parameters());
   progress(0.0); // it may be stopped
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
   std::vector<echorama::TrackedVolume> tracked;
@@ -185,13 +162,11 @@ void vtkUltrasoundTrackerPlacement::Execute(vtkInformationVector** inputs, vtkIn
   }
   const echorama::ToolTrack track = this->Track(inputs[1]);
   const echorama::VolumeCalibration calibration = this->Calibration(track.from);
-  echorama::TrackerPlacementParameters parameters = this->Parameters;
-  parameters.fixed = static_cast<std::size_t>(this->FixedVolume);
-  const echorama::TrackerPlacement placement = echorama::PlaceByTracker(track, tracked, calibration, parameters);
+  const echorama::TrackerPlacement placement = echorama::PlaceByTracker(track, tracked, calibration, this->Values);
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     vtkNew<vtkImageData> moved;
     moved->ShallowCopy(volumes[i].Image);
-    if (i != parameters.fixed) {
+    if (i != static_cast<std::size_t>(this->Values.fixed)) {
       vtkUltrasoundVolume::Move(moved, placement.volumeToWorld[i]);
     }
     vtkUltrasoundVolume::AddField(moved, VolumeToWorldName(), echorama::MatrixRows(placement.volumeToWorld[i].matrix()).data(),
@@ -209,12 +184,6 @@ void vtkUltrasoundTrackerPlacement::Execute(vtkInformationVector** inputs, vtkIn
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundTrackerPlacement::GetNumberOfVolumes() const
-{
-  return static_cast<int>(this->Poses.size());
-}
-
-//----------------------------------------------------------------------------
 bool vtkUltrasoundTrackerPlacement::GetPose(int volume, vtkMatrix4x4* pose) const
 {
   if (!pose || volume < 0 || volume >= this->GetNumberOfVolumes()) {
@@ -229,18 +198,13 @@ void vtkUltrasoundTrackerPlacement::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Recording: " << TextOf(this->Recording) << "\n";
-  os << indent << "RecordingUnitMm: " << this->RecordingUnitMm << "\n";
-  os << indent << "Tool: " << TextOf(this->Tool) << "\n";
-  os << indent << "PoseArray: " << TextOf(this->PoseArray) << "\n";
   os << indent << "CalibrationFile: " << TextOf(this->CalibrationFile) << "\n";
   os << indent << "VolumeToSensor:";
   for (const double number : this->VolumeToSensor) {
     os << " " << number;
   }
-  os << "\n" << indent << "VolumeFrame: " << this->VolumeFrame << "\n";
+  os << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Times: " << this->GetNumberOfTimes() << "\n";
-  os << indent << "WindowSeconds: " << this->GetWindowSeconds() << "\n";
-  os << indent << "LongestGapSeconds: " << this->GetLongestGapSeconds() << "\n";
-  os << indent << "FixedVolume: " << this->FixedVolume << "\n";
   os << indent << "ErrorMm: " << this->ErrorMm << "\n";
 }

@@ -31,6 +31,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Placement/TrackerPlacement.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 #include <string>
 
@@ -45,30 +46,15 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   /** Connects the track, input 1. */
-  void SetTrackConnection(vtkAlgorithmOutput* track);
+  void SetTrackConnection(vtkAlgorithmOutput* track) { this->SetInputConnection(1, track); }
 
   ///@{
   /**
-   * A recording to take the poses from where no track is connected: a tracked sequence or a table; and what one unit of its
-   * lengths is in mm (1000: metres; 0, the default: as the file says). A tool that it does not hold is composed of those it
-   * holds.
+   * A recording to take the poses from where no track is connected: a tracked sequence or a table. A tool that it does not hold
+   * is composed of those it holds.
    */
   vtkSetFilePathMacro(Recording);
   vtkGetFilePathMacro(Recording);
-  vtkSetClampMacro(RecordingUnitMm, double, 0.0, 1e6);
-  vtkGetMacro(RecordingUnitMm, double);
-  ///@}
-
-  ///@{
-  /** The tool that is fixed to the probe: "ProbeToTracker", or by its name in ToolNames. Default: empty, the only one. */
-  vtkSetStringMacro(Tool);
-  vtkGetStringMacro(Tool);
-  ///@}
-
-  ///@{
-  /** The point array of 16 numbers that holds the poses of the track, from the tool to the world. Default: ToolToWorld. */
-  vtkSetStringMacro(PoseArray);
-  vtkGetStringMacro(PoseArray);
   ///@}
 
   ///@{
@@ -83,43 +69,15 @@ public:
   void SetVolumeToSensor(vtkMatrix4x4* matrix);
   ///@}
 
-  enum FrameType { AUTOMATIC = 0, PROBE = 1, FILE_FRAME = 2 };
-  ///@{
-  /**
-   * What VolumeToSensor calls the volume: the frame of its probe (`ProbeToWorld`), or that of the file, for volumes that lie as
-   * they were acquired. Default AUTOMATIC: as CalibrationFile says, else the probe's where all volumes know it.
-   */
-  vtkSetClampMacro(VolumeFrame, int, AUTOMATIC, FILE_FRAME);
-  vtkGetMacro(VolumeFrame, int);
-  ///@}
-
   ///@{
   /** When each volume was made, seconds on the clock of the track, in their order. Default none: as the volumes say. */
   void AddTime(double seconds);
   void RemoveAllTimes();
-  int GetNumberOfTimes() const;
-  ///@}
-
-  ///@{
-  /** Standard deviation of the window over which poses are averaged, seconds, in [0, 60]. Default 0.2. */
-  void SetWindowSeconds(double seconds);
-  double GetWindowSeconds() const;
-  ///@}
-
-  ///@{
-  /** Poses that lie further apart leave a gap, in which none is known; seconds, in (0, 600]. Default 0.5. */
-  void SetLongestGapSeconds(double seconds);
-  double GetLongestGapSeconds() const;
-  ///@}
-
-  ///@{
-  /** The volume that stays where it is, counted from 0. Default 0. */
-  vtkSetClampMacro(FixedVolume, int, 0, VTK_INT_MAX);
-  vtkGetMacro(FixedVolume, int);
+  int GetNumberOfTimes() const { return static_cast<int>(this->Values.times.size()); }
   ///@}
 
   /** How many volumes the last update placed; 0 when it failed. */
-  int GetNumberOfVolumes() const;
+  int GetNumberOfVolumes() const { return static_cast<int>(this->Poses.size()); }
 
   /** The motion of a volume, mm. Returns false, and leaves \a pose alone, when there is no such volume. */
   bool GetPose(int volume, vtkMatrix4x4* pose) const;
@@ -133,7 +91,83 @@ public:
   /** Name of the field data. */
   static const char* VolumeToWorldName() { return "VolumeToWorld"; }
 
+  // BEGIN parameters
+  ///@{
+  /**
+   * The tool that is fixed to the probe: ProbeToTracker, or by its name in ToolNames. Of a recording also one that is composed,
+   * such as ProbeToReference. Empty takes the only one. Default none.
+   */
+  void SetTool(const char* value) { this->SetParameterAsText("Tool", value); }
+  std::string GetTool() { return this->GetParameterAsText("Tool"); }
+  ///@}
+
+  ///@{
+  /** Standard deviation of the window over which poses are averaged. 0: they stay as they are. In [0, 60] s; default 0.2. */
+  void SetWindowSeconds(double value) { this->SetParameter("WindowSeconds", value); }
+  double GetWindowSeconds() { return this->GetParameter("WindowSeconds"); }
+  ///@}
+
+  ///@{
+  /** Poses that lie further apart are not connected: no pose is known between them. In (0, 600] s; default 0.5. */
+  void SetLongestGapSeconds(double value) { this->SetParameter("LongestGapSeconds", value); }
+  double GetLongestGapSeconds() { return this->GetParameter("LongestGapSeconds"); }
+  ///@}
+
+  ///@{
+  /** The volume that stays where it is, counted from 0. At least 0; default 0. */
+  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
+  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
+  ///@}
+
+  enum VolumeFrames { AUTOMATIC = 0, PROBE = 1, FILE_FRAME = 2 };
+
+  ///@{
+  /**
+   * What the calibration calls the volume: the frame of its probe (ProbeToWorld), or that of the file, for volumes that lie as
+   * they were acquired. Automatic: as the file of the calibration says, else the probe's where all volumes know it. Default
+   * automatic. There are AUTOMATIC, PROBE, FILE_FRAME.
+   */
+  void SetVolumeFrame(int value) { this->SetParameter("VolumeFrame", value); }
+  int GetVolumeFrame() { return static_cast<int>(this->GetParameter("VolumeFrame")); }
+  void SetVolumeFrameToAutomatic() { this->SetVolumeFrame(AUTOMATIC); }
+  void SetVolumeFrameToProbe() { this->SetVolumeFrame(PROBE); }
+  void SetVolumeFrameToFileFrame() { this->SetVolumeFrame(FILE_FRAME); }
+  std::string GetVolumeFrameAsString() { return this->GetParameterAsText("VolumeFrame"); }
+  ///@}
+
+  ///@{
+  /** The point array of 16 numbers that holds the poses of the track, from the tool to the world. Default ToolToWorld. */
+  void SetPoseArray(const char* value) { this->SetParameterAsText("PoseArray", value); }
+  std::string GetPoseArray() { return this->GetParameterAsText("PoseArray"); }
+  ///@}
+
+  ///@{
+  /** Unit of the recording's lengths; 1000: metres. 0: as the file says. In [0, 1000000] mm; default 0. */
+  void SetRecordingUnitMm(double value) { this->SetParameter("RecordingUnitMm", value); }
+  double GetRecordingUnitMm() { return this->GetParameter("RecordingUnitMm"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 #ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
   /** What the kernel has to know of a volume. */
   static echorama::TrackedVolume TrackedVolumeOf(vtkImageData* image, const std::string& name);
 #endif
@@ -148,13 +182,8 @@ protected:
 #endif
 
   char* Recording = nullptr;
-  double RecordingUnitMm = 0.0;
-  char* Tool = nullptr;
-  char* PoseArray = nullptr;
   char* CalibrationFile = nullptr;
   double VolumeToSensor[16];
-  int VolumeFrame = AUTOMATIC;
-  int FixedVolume = 0;
   double ErrorMm;
 
 private:
@@ -168,7 +197,11 @@ private:
   echorama::ToolTrack Track(vtkInformationVector* input) const;
   echorama::VolumeCalibration Calibration(const std::string& sensor) const;
 
-  echorama::TrackerPlacementParameters Parameters;
+  enum class Frame { Automatic, Probe, File };
+  Frame VolumeFrame = Frame::Automatic;
+  std::string Tool, PoseArray = "ToolToWorld";
+  echorama::PoseLogOptions RecordingOptions;
+  echorama::TrackerPlacementParameters Values;
   std::vector<echorama::Pose> Poses;
 #endif
 };

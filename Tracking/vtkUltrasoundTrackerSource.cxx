@@ -1,41 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundTrackerSource.h"
 
-#include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include "Core/Geometry/MatrixRows.h"
-#include "Readers/TransformFile.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/TrackerDevice.h"
 #include "Tracking/Stream/Clock.h"
-#include "Tracking/Stream/ShownImage.h"
 #include "Tracking/Stream/StreamRecorder.h"
 #include "Tracking/Stream/StreamReport.h"
 
-#include "vtkCellArray.h"
-#include "vtkCellData.h"
-#include "vtkDoubleArray.h"
-#include "vtkFieldData.h"
-#include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
-#include "vtkIntArray.h"
 #include "vtkMatrix4x4.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
-#include "vtkPointData.h"
-#include "vtkPoints.h"
-#include "vtkPolyData.h"
-#include "vtkSmartPointer.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
-#include "vtkStringArray.h"
-#include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundTrackerOutputs.h"
 #include "vtkUltrasoundVolume.h"
-#include "vtkUltrasoundVoxelTypes.h"
-#include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -44,10 +28,11 @@
 using echorama::Error;
 using echorama::LiveTransform;
 using echorama::LiveTransforms;
-using echorama::ToolStatistics;
 using echorama::TransformStatus;
 
 vtkStandardNewMacro(vtkUltrasoundTrackerSource);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundTrackerSource);
 
 namespace {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
@@ -56,30 +41,6 @@ std::string TextOf(const char* text)
 {
   return text ? text : "";
 }
-
-// Whether it was another one.
-bool Replace(char*& text, const char* by)
-{
-  if ((!text && !by) || (text && by && std::strcmp(text, by) == 0)) {
-    return false;
-  }
-  delete[] text;
-  text = by ? new char[std::strlen(by) + 1] : nullptr;
-  if (by) {
-    std::strcpy(text, by);
-  }
-  return true;
-}
-
-template <class Array>
-vtkSmartPointer<Array> NewArray(const char* name, int components = 1)
-{
-  auto array = vtkSmartPointer<Array>::New();
-  array->SetName(name);
-  array->SetNumberOfComponents(components);
-  return array;
-}
-
 } // namespace
 
 // A device that was opened, and all that came from it.
@@ -93,6 +54,7 @@ struct vtkUltrasoundTrackerSource::Session {
   double TimeShown = NaN;                          // of that recording
   std::optional<echorama::ShownImage> Image;       // that output 1 shows
   std::uint64_t PosesShown = 0, ImagesShown = 0;   // versions
+  double FreshSeconds = 0.0;                       // of the transforms
   double FreshUntil = 0.0;                         // our clock: when a tool that is shown becomes too old
 
   explicit Session(const echorama::StreamLimits& limits) : Poses(limits) {}
@@ -100,38 +62,42 @@ struct vtkUltrasoundTrackerSource::Session {
 };
 
 //----------------------------------------------------------------------------
-vtkUltrasoundTrackerSource::vtkUltrasoundTrackerSource()
-  : Time(NaN), LongestGapSeconds(echorama::StreamLimits().longestGapSeconds)
+echorama::ParameterList vtkUltrasoundTrackerSource::Parameters()
 {
-  this->SetNumberOfInputPorts(0);
-  this->SetNumberOfOutputPorts(3);
-  this->SetImageFrame("Image");
+  using echorama::Parameter;
+  return echorama::Join(
+      {{Parameter(
+            "WorldFrame", this->WorldFrame,
+            "The frame of coordinates that is the world. Tools that no transforms lead from to it are missing. Empty takes the "
+            "frame that most tools are seen in, usually Tracker."),
+        Parameter("ImageFrame", this->ImageFrame, "The frame of coordinates that counts pixels of the image.").Advanced()},
+       echorama::Without(Describe(this->Limits), {"PosesPerTool", "Tools", "JumpSeconds"}),
+       {Parameter("FreshSeconds", this->FreshSeconds, {0, 3600, true}, "s",
+                  "A tool whose newest pose, of a live device, came longer ago is missing.")
+            .Advanced(),
+        Parameter("AxisLengthMm", this->AxisLengthMm, {0, echorama::Unlimited}, "mm", "Length of the axes in output 2.")}});
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundTrackerSource::~vtkUltrasoundTrackerSource()
+vtkUltrasoundTrackerSource::vtkUltrasoundTrackerSource() : Time(NaN)
 {
-  this->Close();
-  Replace(this->Device, nullptr);
-  Replace(this->TransformFile, nullptr);
-  this->SetWorldFrame(nullptr);
-  this->SetImageFrame(nullptr);
+  this->SetNumberOfInputPorts(0);
+  this->SetNumberOfOutputPorts(3);
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTrackerSource::~vtkUltrasoundTrackerSource() = default;
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundTrackerSource::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Device: " << (this->Device ? this->Device : "(none)") << "\n";
+  os << indent << "Device: " << this->Device << "\n";
   os << indent << "Active: " << this->Active << "\n";
-  os << indent << "TransformFile: " << (this->TransformFile ? this->TransformFile : "(none)") << "\n";
-  os << indent << "WorldFrame: " << TextOf(this->WorldFrame) << "\n";
-  os << indent << "ImageFrame: " << TextOf(this->ImageFrame) << "\n";
+  os << indent << "TransformFile: " << this->TransformFile << "\n";
   os << indent << "Time: " << this->Time << "\n";
   os << indent << "FollowTime: " << this->FollowTime << "\n";
-  os << indent << "LongestGapSeconds: " << this->LongestGapSeconds << "\n";
-  os << indent << "FreshSeconds: " << this->FreshSeconds << "\n";
-  os << indent << "AxisLengthMm: " << this->AxisLengthMm << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "State: " << this->GetState() << "\n";
   os << indent << "Message: " << this->GetMessage() << "\n";
 }
@@ -139,7 +105,8 @@ void vtkUltrasoundTrackerSource::PrintSelf(ostream& os, vtkIndent indent)
 //----------------------------------------------------------------------------
 void vtkUltrasoundTrackerSource::SetDevice(const char* device)
 {
-  if (Replace(this->Device, device)) {
+  if (this->Device != TextOf(device)) {
+    this->Device = TextOf(device);
     this->Close();
     this->Modified();
   }
@@ -148,11 +115,7 @@ void vtkUltrasoundTrackerSource::SetDevice(const char* device)
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::GetDeviceKinds()
 {
-  std::string text;
-  for (const std::string& scheme : echorama::TrackerSchemes()) {
-    text += (text.empty() ? "" : ", ") + scheme;
-  }
-  return text;
+  return echorama::Joined(echorama::TrackerSchemes());
 }
 
 //----------------------------------------------------------------------------
@@ -179,19 +142,8 @@ bool vtkUltrasoundTrackerSource::Start()
 //----------------------------------------------------------------------------
 void vtkUltrasoundTrackerSource::SetTransformFile(const char* fileName)
 {
-  if (Replace(this->TransformFile, fileName)) {
-    if (this->Opened) {
-      this->Opened->Transforms.reset();
-    }
-    this->Modified();
-  }
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundTrackerSource::SetFreshSeconds(double seconds)
-{
-  if (this->FreshSeconds != seconds) {
-    this->FreshSeconds = seconds;
+  if (this->TransformFile != TextOf(fileName)) {
+    this->TransformFile = TextOf(fileName);
     if (this->Opened) {
       this->Opened->Transforms.reset();
     }
@@ -227,13 +179,12 @@ void vtkUltrasoundTrackerSource::Open(std::shared_ptr<echorama::PoseSubscription
   }
   this->Close();
   try {
-    const std::string address = TextOf(this->Device);
-    if (address.empty()) {
+    echorama::CheckRanges(this->Parameters());
+    if (this->Device.empty()) {
       throw Error(Error::Kind::InvalidParameter, "there is no Device; its kinds are " + GetDeviceKinds());
     }
-    echorama::StreamLimits limits;
-    limits.longestGapSeconds = this->LongestGapSeconds;
-    auto device = echorama::MakeTracker(address);
+    echorama::StreamLimits limits = this->Limits;
+    auto device = echorama::MakeTracker(this->Device);
     auto* recording = this->FollowTime ? dynamic_cast<echorama::ReplayTracker*>(device.get()) : nullptr;
     if (recording) {
       limits.posesPerTool = 1000000; // whatever it holds; memory is taken as it is needed
@@ -270,11 +221,12 @@ void vtkUltrasoundTrackerSource::Close()
 // What is open, with its transforms; nullptr when nothing is.
 vtkUltrasoundTrackerSource::Session* vtkUltrasoundTrackerSource::Updated()
 {
-  if (this->Opened && !this->Opened->Transforms) {
-    const std::string file = TextOf(this->TransformFile);
+  if (this->Opened && (!this->Opened->Transforms || this->Opened->FreshSeconds != this->FreshSeconds)) {
+    const std::string& file = this->TransformFile;
     this->Opened->Transforms = std::make_unique<LiveTransforms>(
         this->Opened->Poses, file.empty() ? std::vector<echorama::NamedTransform>() : echorama::ReadTransforms(file),
         this->FreshSeconds);
+    this->Opened->FreshSeconds = this->FreshSeconds;
   }
   return this->Opened.get();
 }
@@ -297,22 +249,7 @@ bool vtkUltrasoundTrackerSource::WaitForPoses(int count, double seconds)
   if (!this->Start()) {
     return false;
   }
-  const double until = echorama::ClockNow() + seconds;
-  for (std::uint64_t version = this->Opened->Poses.Version();;) {
-    const echorama::StreamStatistics statistics = this->Opened->Poses.Statistics();
-    std::uint64_t taken = 0;
-    for (const ToolStatistics& tool : statistics.tools) {
-      taken += tool.valid + tool.missing + tool.outOfRange;
-    }
-    if (count <= 0 || taken >= static_cast<std::uint64_t>(count)) {
-      return true;
-    }
-    const double left = until - echorama::ClockNow();
-    if (!(left > 0.0) || statistics.state == echorama::DeviceState::Ended || statistics.state == echorama::DeviceState::Failed) {
-      return false;
-    }
-    version = this->Opened->Poses.WaitBeyond(version, left);
-  }
+  return this->Opened->Poses.WaitForPoses(static_cast<std::uint64_t>(std::max(count, 0)), seconds);
 }
 
 //----------------------------------------------------------------------------
@@ -365,21 +302,15 @@ std::string vtkUltrasoundTrackerSource::GetToolName(int index) const
 template <class T, class Value>
 T vtkUltrasoundTrackerSource::StatisticOf(const char* name, T otherwise, const Value& value) const
 {
-  const std::string wanted = TextOf(name);
-  const auto tools = this->Opened ? this->Opened->Poses.Statistics().tools : std::vector<ToolStatistics>();
-  for (const ToolStatistics& tool : tools) {
-    const auto frames = echorama::FramesOf(tool.name);
-    if (tool.name == wanted || (frames && frames->first == wanted)) {
-      return static_cast<T>(value(tool));
-    }
-  }
-  return otherwise;
+  const echorama::StreamStatistics all = this->Opened ? this->Opened->Poses.Statistics() : echorama::StreamStatistics();
+  const echorama::ToolStatistics* tool = all.Find(TextOf(name));
+  return tool ? static_cast<T>(value(*tool)) : otherwise;
 }
 
 //----------------------------------------------------------------------------
 vtkIdType vtkUltrasoundTrackerSource::GetNumberOfPoses(const char* tool) const
 {
-  return this->StatisticOf<vtkIdType>(tool, 0, [](const auto& s) { return s.valid + s.missing + s.outOfRange; });
+  return this->StatisticOf<vtkIdType>(tool, 0, [](const auto& s) { return s.Taken(); });
 }
 
 //----------------------------------------------------------------------------
@@ -536,6 +467,7 @@ int vtkUltrasoundTrackerSource::RequestInformation(vtkInformation*, vtkInformati
     outputs->GetInformationObject(port)->Remove(vtkStreamingDemandDrivenPipeline::TIME_RANGE());
   }
   return vtkUltrasoundVolume::Run(this, outputs, [this, outputs, image](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
     this->Open();
     const Session* session = this->Updated();
     if (!session) {
@@ -597,7 +529,9 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
       }
     }
     this->ShowTools(tools, axes, time);
-    this->ShowImage(image);
+    if (session->Image) {
+      echorama::PutImage(*session->Image, image);
+    }
   });
 }
 
@@ -615,124 +549,28 @@ void vtkUltrasoundTrackerSource::ChooseImage(double time)
 {
   Session& session = *this->Opened;
   session.ImagesShown = session.Images.Version();
-  session.Image =
-      echorama::ChooseImage(session.Images.Images(), *session.Transforms, TextOf(this->ImageFrame), this->World(), time);
+  session.Image = echorama::ChooseImage(session.Images.Images(), *session.Transforms, this->ImageFrame, this->World(), time);
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::World() const
 {
-  const std::string world = TextOf(this->WorldFrame);
-  return world.empty() ? echorama::UsualWorld(this->Opened->Poses.Tools()) : world;
+  return this->WorldFrame.empty() ? echorama::UsualWorld(this->Opened->Poses.Tools()) : this->WorldFrame;
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* output, vtkPolyData* axesOutput, double time)
+void vtkUltrasoundTrackerSource::ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time)
 {
   Session& session = *this->Opened;
-  const std::vector<std::string> names = session.Poses.Tools();
   const std::string world = this->World();
-
-  const vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  const vtkNew<vtkCellArray> vertices;
-  const auto tool = NewArray<vtkIntArray>("Tool");
-  const auto times = NewArray<vtkDoubleArray>("TimeStamp");
-  const auto toWorld = NewArray<vtkDoubleArray>("ToolToWorld", 16);
-  const auto statuses = NewArray<vtkUnsignedCharArray>("Status");
-  const vtkSmartPointer<vtkDoubleArray> axes[3] = {NewArray<vtkDoubleArray>("XAxis", 3), NewArray<vtkDoubleArray>("YAxis", 3),
-                                                   NewArray<vtkDoubleArray>("ZAxis", 3)};
-  const vtkNew<vtkPoints> ends;
-  ends->SetDataTypeToDouble();
-  const vtkNew<vtkCellArray> lines;
-  const auto toolOfLine = NewArray<vtkIntArray>("Tool"), axisOfLine = NewArray<vtkIntArray>("Axis");
-  const auto toolNames = NewArray<vtkStringArray>("ToolNames"), worldFrame = NewArray<vtkStringArray>("WorldFrame");
-  worldFrame->InsertNextValue(world);
+  const auto shown = echorama::ShowTools(session.Poses.Tools(), *session.Transforms, world, time);
   session.FreshUntil = std::numeric_limits<double>::infinity();
-  for (const std::string& name : names) {
-    const auto frames = echorama::FramesOf(name);
-    if (!frames || toolNames->LookupValue(frames->first) >= 0) {
-      continue; // no transform, or a second one of the same frame
-    }
-    LiveTransform found = session.Transforms->Find(frames->first, world, time);
-    if (frames->first == world) { // its place is known, but not whether it is seen
-      found = session.Transforms->Find(frames->first, frames->second, time);
-      found.transform.matrix.setIdentity();
-    }
-    const bool known = found.Status() != TransformStatus::Missing;
-    const Eigen::Affine3d matrix = known ? found.transform.matrix : Eigen::Affine3d::Identity();
-    const vtkIdType point = points->InsertNextPoint(matrix.translation().data());
-    if (found.Status() == TransformStatus::Valid) {
-      vertices->InsertNextCell(1, &point);
-      if (std::isnan(time) && session.Poses.Live()) {
-        session.FreshUntil = std::min(session.FreshUntil, session.Poses.Latest(name).arrival + this->FreshSeconds);
-      }
-    }
-    const int number = static_cast<int>(toolNames->InsertNextValue(frames->first));
-    tool->InsertNextValue(number);
-    times->InsertNextValue(known ? found.time : NaN);
-    statuses->InsertNextValue(static_cast<unsigned char>(found.Status()));
-    toWorld->InsertNextTuple(echorama::MatrixRows(matrix.matrix()).data());
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d direction = matrix.linear().col(axis).normalized();
-      axes[axis]->InsertNextTuple(direction.data());
-      if (found.Status() == TransformStatus::Valid) {
-        const Eigen::Vector3d end = matrix.translation() + this->AxisLengthMm * direction;
-        const vtkIdType line[2] = {ends->InsertNextPoint(matrix.translation().data()), ends->InsertNextPoint(end.data())};
-        lines->InsertNextCell(2, line);
-        toolOfLine->InsertNextValue(number);
-        axisOfLine->InsertNextValue(axis);
+  if (std::isnan(time) && session.Poses.Live()) {
+    for (const echorama::ShownTool& tool : shown) {
+      if (tool.status == TransformStatus::Valid) {
+        session.FreshUntil = std::min(session.FreshUntil, session.Poses.Latest(tool.name).arrival + this->FreshSeconds);
       }
     }
   }
-  output->SetPoints(points);
-  output->SetVerts(vertices);
-  for (vtkDataArray* array :
-       {static_cast<vtkDataArray*>(tool), static_cast<vtkDataArray*>(times), static_cast<vtkDataArray*>(toWorld),
-        static_cast<vtkDataArray*>(statuses), static_cast<vtkDataArray*>(axes[0]), static_cast<vtkDataArray*>(axes[1]),
-        static_cast<vtkDataArray*>(axes[2])}) {
-    output->GetPointData()->AddArray(array);
-  }
-  axesOutput->SetPoints(ends);
-  axesOutput->SetLines(lines);
-  axesOutput->GetCellData()->AddArray(toolOfLine);
-  axesOutput->GetCellData()->AddArray(axisOfLine);
-  for (vtkPolyData* data : {output, axesOutput}) {
-    data->GetFieldData()->AddArray(toolNames);
-    data->GetFieldData()->AddArray(worldFrame);
-  }
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundTrackerSource::ShowImage(vtkImageData* output)
-{
-  if (!this->Opened->Image) {
-    return;
-  }
-  const echorama::ShownImage& shown = *this->Opened->Image;
-  const echorama::StreamedImage& image = shown.image;
-  vtkUltrasoundVolume::SetGeometry(output, shown.geometry);
-  const auto intensity = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(echorama::VtkTypeOf(image.type)));
-  intensity->SetName(vtkUltrasoundVolume::IntensityName());
-  intensity->SetNumberOfTuples(output->GetNumberOfPoints());
-  if (image.components == 1) {
-    std::memcpy(intensity->GetVoidPointer(0), image.voxels->data(), image.voxels->size());
-  } else {
-    echorama::DispatchVoxelType(image.type, [&](auto zero) {
-      using T = decltype(zero);
-      echorama::MakeGrey(reinterpret_cast<const T*>(image.voxels->data()), static_cast<std::uint64_t>(image.components),
-                         static_cast<T*>(intensity->GetVoidPointer(0)), intensity->GetNumberOfTuples());
-    });
-  }
-  output->GetPointData()->SetScalars(intensity);
-  const auto valid = NewArray<vtkUnsignedCharArray>(vtkUltrasoundVolume::ValidRegionName());
-  valid->SetNumberOfTuples(output->GetNumberOfPoints());
-  valid->Fill(1.0);
-  output->GetPointData()->AddArray(valid);
-  if (shown.imageToWorld) {
-    vtkUltrasoundAcquisition::SetImageToWorld(output, *shown.imageToWorld);
-  }
-  if (std::isfinite(image.time)) {
-    vtkUltrasoundAcquisition::SetTimeStamp(output, image.time);
-  }
+  echorama::PutTools(shown, world, this->AxisLengthMm, tools, axes);
 }

@@ -45,14 +45,14 @@
 #include <string> // for texts
 
 #ifndef __VTK_WRAP__
+#include "Tracking/Stream/LiveTransforms.h"
+#include "vtkUltrasoundParameters.h"
+
 namespace echorama {
-struct LiveTransform;
-class PoseSubscription;
 struct RecordingState;
 } // namespace echorama
 #endif
 
-class vtkImageData;
 class vtkMatrix4x4;
 
 class ECHORAMATRACKING_EXPORT vtkUltrasoundTrackerSource : public vtkPolyDataAlgorithm {
@@ -67,7 +67,7 @@ public:
    * GetDeviceKinds() lists what there is. Another one closes the present one. Default: none.
    */
   void SetDevice(const char* device);
-  vtkGetStringMacro(Device);
+  const char* GetDevice() const { return this->Device.c_str(); }
   static std::string GetDeviceKinds();
   ///@}
 
@@ -89,22 +89,7 @@ public:
    * too is that of the device. Default: none.
    */
   void SetTransformFile(VTK_FILEPATH const char* fileName);
-  vtkGetFilePathMacro(TransformFile);
-  ///@}
-
-  ///@{
-  /**
-   * The frame of coordinates that is the world. Tools that no transforms lead from to it are missing. Default: empty, the frame
-   * that most tools are seen in, usually Tracker.
-   */
-  vtkSetStringMacro(WorldFrame);
-  vtkGetStringMacro(WorldFrame);
-  ///@}
-
-  ///@{
-  /** The frame of coordinates that counts pixels of the image. Default: Image, as in Plus. */
-  vtkSetStringMacro(ImageFrame);
-  vtkGetStringMacro(ImageFrame);
+  VTK_FILEPATH const char* GetTransformFile() const { return this->TransformFile.c_str(); }
   ///@}
 
   ///@{
@@ -127,24 +112,62 @@ public:
   vtkBooleanMacro(FollowTime, bool);
   ///@}
 
+  // BEGIN parameters
   ///@{
-  /** Poses that lie further apart in time are not interpolated; seconds, in (0, 600]. Counts when the device is opened. Default
-   * 0.5. */
-  vtkSetMacro(LongestGapSeconds, double);
-  vtkGetMacro(LongestGapSeconds, double);
+  /**
+   * The frame of coordinates that is the world. Tools that no transforms lead from to it are missing. Empty takes the frame that
+   * most tools are seen in, usually Tracker. Default none.
+   */
+  void SetWorldFrame(const char* value) { this->SetParameterAsText("WorldFrame", value); }
+  std::string GetWorldFrame() { return this->GetParameterAsText("WorldFrame"); }
   ///@}
 
   ///@{
-  /** A newest pose of a live device that came longer ago is missing; seconds, in (0, 3600]. Default 1. */
-  void SetFreshSeconds(double seconds);
-  vtkGetMacro(FreshSeconds, double);
+  /** The frame of coordinates that counts pixels of the image. Default Image. */
+  void SetImageFrame(const char* value) { this->SetParameterAsText("ImageFrame", value); }
+  std::string GetImageFrame() { return this->GetParameterAsText("ImageFrame"); }
   ///@}
 
   ///@{
-  /** Length of the axes in output 2, mm, at least 0. Default 50. */
-  vtkSetMacro(AxisLengthMm, double);
-  vtkGetMacro(AxisLengthMm, double);
+  /** Poses that lie further apart in time are not interpolated. Counts when the device is opened. In (0, 600] s; default 0.5. */
+  void SetLongestGapSeconds(double value) { this->SetParameter("LongestGapSeconds", value); }
+  double GetLongestGapSeconds() { return this->GetParameter("LongestGapSeconds"); }
   ///@}
+
+  ///@{
+  /** A tool whose newest pose, of a live device, came longer ago is missing. In (0, 3600] s; default 1. */
+  void SetFreshSeconds(double value) { this->SetParameter("FreshSeconds", value); }
+  double GetFreshSeconds() { return this->GetParameter("FreshSeconds"); }
+  ///@}
+
+  ///@{
+  /** Length of the axes in output 2. At least 0 mm; default 50. */
+  void SetAxisLengthMm(double value) { this->SetParameter("AxisLengthMm", value); }
+  double GetAxisLengthMm() { return this->GetParameter("AxisLengthMm"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   /**
    * Whether something has come (or has become too old) since the last update; then this is Modified() too. What ParaView calls.
@@ -237,16 +260,9 @@ protected:
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
-  char* Device = nullptr;
   bool Active = true;
-  char* TransformFile = nullptr;
-  char* WorldFrame = nullptr;
-  char* ImageFrame = nullptr;
   double Time;
   bool FollowTime = false;
-  double LongestGapSeconds;
-  double FreshSeconds = 1.0;
-  double AxisLengthMm = 50.0;
 
 private:
   vtkUltrasoundTrackerSource(const vtkUltrasoundTrackerSource&) = delete;
@@ -265,8 +281,10 @@ private:
   void ReadImage(double time);
   void ChooseImage(double time);
   void ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time);
-  void ShowImage(vtkImageData* output);
 
+  std::string Device, TransformFile, WorldFrame, ImageFrame = "Image";
+  echorama::StreamLimits Limits;
+  double FreshSeconds = echorama::LiveTransforms::defaultFreshSeconds, AxisLengthMm = 50.0;
   std::unique_ptr<Session> Opened;
   std::string Failure; // why it could not be opened
 #endif

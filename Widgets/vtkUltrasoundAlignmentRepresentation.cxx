@@ -5,6 +5,7 @@
 
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "vtkActor2D.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
@@ -358,8 +359,7 @@ bool vtkUltrasoundAlignmentRepresentation::StepTool(vtkMatrix4x4* toolToWorld, b
   bool good = true;
   if (toolToWorld && (grasping || parts.Tool)) {
     try {
-      Pose tool;
-      tool.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(toolToWorld->GetData());
+      const auto tool = echorama::FromRows<Pose>(toolToWorld->GetData());
       if (!parts.Tool) {
         parts.ToolHand = parts.TakeHold();
         if (parts.ToolHand) {

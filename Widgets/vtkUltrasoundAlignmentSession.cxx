@@ -8,6 +8,7 @@
 // images.
 #include "vtkUltrasoundAlignmentSession.h"
 
+#include "Core/Geometry/MatrixRows.h"
 #include "vtkDoubleArray.h"
 #include "vtkImageData.h"
 #include "vtkIntArray.h"
@@ -32,7 +33,6 @@ using namespace echorama;
 namespace fs = std::filesystem;
 
 namespace {
-using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
 constexpr std::ptrdiff_t GreySamples = 50000; // per volume
 constexpr int ScorePoints = 2000;             // per volume
@@ -43,15 +43,13 @@ Pose PoseOf(vtkMatrix4x4* matrix, const char* what)
   if (!matrix) {
     throw Error(Error::Kind::InvalidParameter, std::string("there is no ") + what);
   }
-  Pose pose;
-  pose.matrix() = Eigen::Map<const RowMajor>(matrix->GetData());
-  return pose;
+  return FromRows<Pose>(matrix->GetData());
 }
 
 bool Take(const Pose* pose, vtkMatrix4x4* matrix)
 {
   if (pose && matrix) {
-    Eigen::Map<RowMajor>(matrix->GetData()) = pose->matrix();
+    Eigen::Map<MatrixRows>(matrix->GetData()) = pose->matrix();
     matrix->Modified();
   }
   return pose && matrix;

@@ -60,7 +60,7 @@ public:
   /** A stroke in the making, in the physical space of the file. */
   void Begin(const Brush& brush)
   {
-    brush.Check();
+    CheckRanges(brush);
     this->Prepare();
     this->Edits->Begin(brush);
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundShownVolume.h"
 
+#include "Core/Geometry/MatrixRows.h"
 #include "vtkColorTransferFunction.h"
 #include "vtkCubeSource.h"
 #include "vtkFixedPointVolumeRayCastMapper.h"
@@ -166,7 +167,7 @@ void ShownVolume::Place(const SessionVolume& volume)
   grid.linear() = volume.geometry.direction;
   grid.translation() = volume.geometry.origin;
   vtkNew<vtkMatrix4x4> matrix;
-  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData()) = (volume.volumeToWorld * grid).matrix();
+  Eigen::Map<MatrixRows>(matrix->GetData()) = (volume.volumeToWorld * grid).matrix();
   this->Volume->SetUserMatrix(matrix);
   this->Box->SetUserMatrix(matrix);
 }

@@ -4,7 +4,7 @@
 #include "Controls.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Geometry/PoseFile.h"
-#include "Readers/VolumeFile.h"
+#include "Readers/OutputFiles.h"
 #include <filesystem>
 #include <QAction>
 #include <QFileDialog>
@@ -33,9 +33,8 @@ std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession*
       if (character == '/' || character == '\\' || character == '\0')
         character = '_';
     const std::string path = (std::filesystem::path(folder.toStdString()) / (name + "." + extension)).string();
-    std::vector<std::string> written{path, CompanionPath(path, "ValidRegion")};
-    for (const char* array : CompanionArrays)
-      written.push_back(CompanionPath(path, array));
+    std::vector<std::string> written = CompanionPaths(path);
+    written.push_back(path);
     for (const std::string& each : written)
       if (std::filesystem::exists(each))
         throw Error(Error::Kind::FileSystem, each + ": it is there already; choose another folder");

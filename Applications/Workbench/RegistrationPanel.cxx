@@ -3,15 +3,21 @@
 #include "AlgorithmRun.h"
 #include "Controls.h"
 #include "Core/Base/Angles.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Registration/AlignPair.h"
 #include "Workspace.h"
 #include <QCheckBox>
 #include <QComboBox>
+#include <QFileDialog>
 #include <QFormLayout>
+#include <QGroupBox>
+#include <QHBoxLayout>
 #include <QHeaderView>
+#include <QLineEdit>
 #include <QPushButton>
 #include <QTableWidget>
+#include <QToolButton>
 #include <QVBoxLayout>
 #include <vtkCompositeDataSet.h>
 #include <vtkImageData.h>
@@ -20,16 +26,44 @@
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundAligner.h>
+#include <vtkUltrasoundTrackerPlacement.h>
+#include <vtkUltrasoundVolume.h>
 
 namespace echorama {
 
 namespace {
 
-Pose PoseOf(vtkMatrix4x4* matrix)
+constexpr const char* Placed = "placed"; // by a tracker, which gives no verdict
+
+QLineEdit* LineField(QFormLayout* form, const char* name, const QString& label, const QString& help)
 {
-  Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-  return pose;
+  auto* field = new QLineEdit(form->parentWidget());
+  field->setObjectName(name);
+  field->setToolTip(help);
+  form->addRow(label, field);
+  return field;
+}
+
+// A path that is typed or chosen.
+QLineEdit* FileField(QFormLayout* form, const char* name, const QString& label, const QString& help, const QString& filter)
+{
+  QWidget* parent = form->parentWidget();
+  auto* field = new QLineEdit(parent);
+  field->setObjectName(name);
+  field->setToolTip(help);
+  QToolButton* browse = SmallButton(parent, QString(name) + "Browse", "...", RegistrationPanel::tr("Chooses the file"));
+  QObject::connect(browse, &QToolButton::clicked, field, [field, label, filter] {
+    auto* dialog = new QFileDialog(field, label, field->text(), filter);
+    dialog->setAttribute(Qt::WA_DeleteOnClose);
+    dialog->setFileMode(QFileDialog::ExistingFile);
+    QObject::connect(dialog, &QFileDialog::fileSelected, field, &QLineEdit::setText);
+    dialog->open();
+  });
+  auto* row = new QHBoxLayout;
+  row->addWidget(field);
+  row->addWidget(browse);
+  form->addRow(label, row);
+  return field;
 }
 
 } // namespace
@@ -42,8 +76,31 @@ struct RegistrationPanel::Result {
     bool held = false;
     std::string verdict, reason;
     double overlap = 0.0, degrees = 0.0, mm = 0.0;
+
+    void SetMotion(const Pose& motion)
+    {
+      degrees = RotationAngle(motion) * DegreesPerRadian;
+      mm = (motion * middle - middle).norm();
+    }
   };
   std::vector<Volume> volumes;
+
+  // The volumes as they are now, as blocks with their names; the first one is held.
+  vtkSmartPointer<vtkMultiBlockDataSet> Take(vtkUltrasoundAlignmentSession* session, const std::vector<int>& ids)
+  {
+    auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+    for (const int id : ids) {
+      const SessionVolume& volume = *session->GetKernel().State().Find(id);
+      const Pose& pose = volume.volumeToWorld;
+      const vtkNew<vtkImageData> image; // it stays as it is, whatever the session does
+      session->GetSnapshot(id, image);
+      const auto block = static_cast<unsigned int>(volumes.size());
+      blocks->SetBlock(block, image);
+      blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.name.c_str());
+      volumes.push_back({id, pose, pose, pose * volume.geometry.Centre(), block == 0, {}, {}});
+    }
+    return blocks;
+  }
 };
 
 RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : JobPanel(workspace, parent)
@@ -62,6 +119,19 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : Jo
   metric_ = ChoiceField(this, "alignMetric", tr("The likeness by which places are compared"), MetricNames());
   doubtful_ = CheckField(this, "alignDoubtful", tr("Accept ambiguous results"),
                          tr("Also moves volumes whose result is ambiguous. Failed volumes never move."));
+  auto* byTracker = new QGroupBox(tr("Tracker"), this);
+  auto* trackerForm = new QFormLayout(byTracker);
+  recording_ =
+      FileField(trackerForm, "placeRecording", tr("Recording"), tr("The poses of the probe: a tracked sequence or a table"),
+                tr("Recordings (*.mha *.mhd *.nrrd *.csv *.txt);;All files (*)"));
+  tool_ = LineField(trackerForm, "placeTool", tr("Tool"),
+                    tr("The tool that is fixed to the probe, as the recording names it; empty: the only one"));
+  calibration_ = FileField(trackerForm, "placeCalibration", tr("Calibration"),
+                           tr("From the volume to the tool, as echorama calibrate hand-eye writes it"),
+                           tr("Calibrations (*.json);;All files (*)"));
+  place_ = Button(this, "placeByTracker", tr("&Place by tracker"),
+                  tr("Puts all volumes beside the first as the tracker saw them"), [this] { PlaceByTracker(); });
+  trackerForm->addRow(place_);
   table_ = TableField(this, "alignResults", tr("What came out last; rest the mouse on an answer for its reason"),
                       {tr("Volume"), tr("Answer"), tr("Moved"), tr("Overlap")});
   table_->setSelectionMode(QAbstractItemView::NoSelection);
@@ -75,13 +145,22 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : Jo
   form->addRow(tr("Metric"), metric_);
   layout->addLayout(form);
   layout->addWidget(doubtful_);
+  layout->addWidget(byTracker);
   layout->addWidget(table_, 1);
 }
 
 void RegistrationPanel::ShowState()
 {
-  refine_->setEnabled(!IsRunning());
-  alignAll_->setEnabled(!IsRunning());
+  for (QPushButton* button : {refine_, alignAll_, place_})
+    button->setEnabled(!IsRunning());
+}
+
+std::vector<int> RegistrationPanel::AllIds() const
+{
+  std::vector<int> ids;
+  for (int i = 0; i < workspace_.session->GetNumberOfVolumes(); ++i)
+    ids.push_back(workspace_.session->GetVolumeId(i));
+  return ids;
 }
 
 void RegistrationPanel::Refine()
@@ -100,40 +179,31 @@ void RegistrationPanel::Refine()
         ids.push_back(id);
       }
     }
-  Run(tr("Refine"), ids, held, NameOf(AlignStart::Tracked));
+  Run(tr("Refine"), ids, held, "tracked");
 }
 
 void RegistrationPanel::AlignAll()
 {
-  std::vector<int> ids;
-  for (int i = 0; i < workspace_.session->GetNumberOfVolumes(); ++i)
-    ids.push_back(workspace_.session->GetVolumeId(i));
-  Run(tr("Align all"), ids, {}, start_->currentText().toStdString().c_str());
+  Run(tr("Align all"), AllIds(), {}, start_->currentText().toStdString());
 }
 
-void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, const std::vector<int>& held, const char* start)
+bool RegistrationPanel::MayRun(const QString& label, const std::vector<int>& ids) const
 {
-  if (IsRunning())
-    return;
-  if (ids.size() < 2) {
+  if (!IsRunning() && ids.size() < 2)
     workspace_.say(tr("%1: two volumes are needed; open another one").arg(label), true);
+  return !IsRunning() && ids.size() >= 2;
+}
+
+void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, const std::vector<int>& held,
+                            const std::string& start)
+{
+  if (!MayRun(label, ids))
     return;
-  }
   const auto result = std::make_shared<Result>();
-  const vtkNew<vtkMultiBlockDataSet> blocks;
-  for (const int id : ids) {
-    const SessionVolume& volume = *workspace_.session->GetKernel().State().Find(id);
-    const Pose& pose = volume.volumeToWorld;
-    const vtkNew<vtkImageData> image; // it stays as it is, whatever the session does
-    workspace_.session->GetSnapshot(id, image);
-    const auto block = static_cast<unsigned int>(result->volumes.size());
-    blocks->SetBlock(block, image);
-    blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.name.c_str());
-    result->volumes.push_back({id, pose, pose, pose * volume.geometry.Centre(), block == 0, {}, {}});
-  }
+  const auto blocks = result->Take(workspace_.session, ids);
   const auto aligner = vtkSmartPointer<vtkUltrasoundAligner>::New();
   aligner->SetInputDataObject(blocks);
-  aligner->SetStart(start);
+  aligner->SetStart(start.c_str());
   aligner->SetMetric(metric_->currentText().toStdString().c_str());
   for (const int number : held) {
     aligner->AddHeldVolume(number);
@@ -146,14 +216,43 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
       const int number = static_cast<int>(i);
       const vtkNew<vtkMatrix4x4> matrix;
       aligner->GetPose(number, matrix);
-      const Pose motion = PoseOf(matrix);
+      const Pose motion = FromRows<Pose>(matrix->GetData());
       if (!volume.held)
         volume.after = motion * volume.before;
       volume.verdict = aligner->GetVerdict(number);
       volume.reason = aligner->GetReason(number);
       volume.overlap = aligner->GetOverlap(number);
-      volume.degrees = RotationAngle(motion) * DegreesPerRadian;
-      volume.mm = (motion * volume.middle - volume.middle).norm();
+      volume.SetMotion(motion);
+    }
+  };
+  Start(label, work, [this, label, result] { Take(label, *result); });
+}
+
+void RegistrationPanel::PlaceByTracker()
+{
+  const QString label = tr("Place by tracker");
+  const std::vector<int> ids = AllIds();
+  if (!MayRun(label, ids))
+    return;
+  const auto result = std::make_shared<Result>();
+  const auto blocks = result->Take(workspace_.session, ids);
+  // Calibrations may be of volumes as they were acquired, so each goes back to where its file has it.
+  for (unsigned int i = 0; i < blocks->GetNumberOfBlocks(); ++i)
+    vtkUltrasoundVolume::Move(vtkImageData::SafeDownCast(blocks->GetBlock(i)), result->volumes[i].before.inverse());
+  const auto placement = vtkSmartPointer<vtkUltrasoundTrackerPlacement>::New();
+  placement->SetInputDataObject(blocks);
+  placement->SetRecording(recording_->text().trimmed().toUtf8());
+  placement->SetTool(tool_->text().trimmed().toUtf8());
+  placement->SetCalibrationFile(calibration_->text().trimmed().toUtf8());
+  const auto work = [placement, result](const Progress& progress) {
+    Update(placement, progress);
+    for (std::size_t i = 1; i < result->volumes.size(); ++i) {
+      Result::Volume& volume = result->volumes[i];
+      const vtkNew<vtkMatrix4x4> matrix;
+      placement->GetPose(static_cast<int>(i), matrix);
+      volume.after = result->volumes.front().before * FromRows<Pose>(matrix->GetData()); // beside the first one, wherever that is
+      volume.verdict = Placed;
+      volume.SetMotion(volume.after * volume.before.inverse());
     }
   };
   Start(label, work, [this, label, result] { Take(label, *result); });
@@ -187,7 +286,8 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
       reason.clear();
     } else {
       const Pose now = session->GetKernel().State().Find(volume.id)->volumeToWorld;
-      taken = volume.verdict == NameOf(Verdict::Aligned) || (takesDoubtful && volume.verdict == NameOf(Verdict::Ambiguous));
+      taken = volume.verdict == Placed || volume.verdict == NameOf(Verdict::Aligned) ||
+              (takesDoubtful && volume.verdict == NameOf(Verdict::Ambiguous));
       if (taken && now.matrix() != volume.before.matrix()) {
         taken = false;
         reason = tr("it was moved during the alignment and was left where it is");
@@ -201,9 +301,10 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
                tr("%1: %2, %3").arg(QString::fromStdString(session->GetName(volume.id)), answer, reason);
     }
     const QString way = volume.held ? QString() : tr("%1 mm, %2°").arg(volume.mm, 0, 'f', 2).arg(volume.degrees, 0, 'f', 2);
-    const QStringList texts{
-        QString::fromStdString(session->GetName(volume.id)), answer, way,
-        volume.held || volume.verdict == NameOf(Verdict::Failed) ? QString() : tr("%1%").arg(100.0 * volume.overlap, 0, 'f', 0)};
+    const QStringList texts{QString::fromStdString(session->GetName(volume.id)), answer, way,
+                            volume.held || volume.verdict == Placed || volume.verdict == NameOf(Verdict::Failed)
+                                ? QString()
+                                : tr("%1%").arg(100.0 * volume.overlap, 0, 'f', 0)};
     InsertRow(table_, table_->rowCount(), texts, reason);
   }
   session->EndEdit();

@@ -5,14 +5,15 @@
 
 class QCheckBox;
 class QComboBox;
+class QLineEdit;
 class QPushButton;
 class QTableWidget;
 
 namespace echorama {
 
-/// Automatic alignment of what is in the session: refining what is selected from where it is, or all volumes from scratch. It
-/// runs in the background, tells what each answer is worth, and its result is one edit. What was moved meanwhile stays where it
-/// was put, and doubtful answers are not taken unless the user says so.
+/// Automatic alignment of what is in the session: refining what is selected from where it is, aligning all volumes from scratch,
+/// or placing them as a tracker saw them. It runs in the background, tells what each answer is worth, and its result is one edit.
+/// Volumes that were moved meanwhile are left where they are, and doubtful answers are not taken unless the user says so.
 class RegistrationPanel : public JobPanel {
   Q_OBJECT
 
@@ -20,18 +21,23 @@ public:
   explicit RegistrationPanel(Workspace& workspace, QWidget* parent = nullptr);
 
 public slots:
-  void Refine();   ///< selected volumes onto the others, which stay; with all or none selected: all onto the first
-  void AlignAll(); ///< all onto the first, with the start that is chosen
+  void Refine();         ///< selected volumes onto the others, which stay; with all or none selected: all onto the first
+  void AlignAll();       ///< all onto the first, with the start that is chosen
+  void PlaceByTracker(); ///< all beside the first, by the recording and the calibration that are named
 
 private:
   struct Result;
-  void Run(const QString& label, const std::vector<int>& ids, const std::vector<int>& held, const char* start);
+  std::vector<int> AllIds() const;
+  /// What may begin: nothing runs, and there are two volumes; else says why not.
+  bool MayRun(const QString& label, const std::vector<int>& ids) const;
+  void Run(const QString& label, const std::vector<int>& ids, const std::vector<int>& held, const std::string& start);
   void Take(const QString& label, const Result& result);
   void ShowState() override;
 
   QComboBox *start_, *metric_;
   QCheckBox* doubtful_;
-  QPushButton *refine_, *alignAll_;
+  QLineEdit *recording_, *tool_, *calibration_;
+  QPushButton *refine_, *alignAll_, *place_;
   QTableWidget* table_;
 };
 

@@ -25,12 +25,9 @@ namespace echorama {
 namespace {
 
 // By number, as the stitcher tells them.
-std::vector<std::string> NamesOf(const char* (*nameOf)(int))
+std::vector<std::string> NamesOf(ParameterList parameters, const char* choice)
 {
-  std::vector<std::string> names;
-  for (int i = 0; nameOf(i); ++i)
-    names.emplace_back(nameOf(i));
-  return names;
+  return std::get<Choice>(Named(parameters, choice).value).names;
 }
 
 } // namespace
@@ -40,12 +37,12 @@ ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : JobPanel(works
   setObjectName("resultPanel");
   const vtkNew<vtkUltrasoundStitcher> defaults;
   const vtkNew<vtkUltrasoundEmbedder> embedding;
-  method_ = ChoiceField(this, "stitchMethod", tr("How one volume goes over into the next"),
-                        NamesOf(&vtkUltrasoundStitcher::GetMethodName));
+  method_ =
+      ChoiceField(this, "stitchMethod", tr("How one volume goes over into the next"), NamesOf(defaults->Parameters(), "Method"));
   method_->setCurrentIndex(defaults->GetMethod());
   texture_ =
       ChoiceField(this, "stitchTexture", tr("What happens to speckle where volumes overlap: mixing blurs it, the others keep it"),
-                  NamesOf(&vtkUltrasoundStitcher::GetTextureName));
+                  NamesOf(defaults->Parameters(), "Texture"));
   texture_->setCurrentIndex(defaults->GetTexture());
   spacing_ = NumberField(this, {"stitchSpacing", tr("Side of the result's voxels"), 0.0, 20.0, 3, 0.1, tr(" mm")});
   spacing_->setSpecialValueText(tr("as the volumes"));

@@ -2,17 +2,15 @@
 // echorama align: where do overlapping volumes belong?
 #include "Commands.h"
 #include "Core/Base/Angles.h"
-#include "Core/Geometry/MatrixRows.h"
+#include "Filters/Registration/AlignmentJson.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
-#include <vtkMatrix4x4.h>
-#include <vtkNew.h>
+#include <vtkSmartPointer.h>
 #include <vtkUltrasoundAligner.h>
 
 namespace echorama {
@@ -21,8 +19,8 @@ namespace {
 constexpr const char* DefaultOutput = "poses.json";
 
 struct AlignOptions {
-  std::vector<std::string> files, settings;
-  std::string output, poses, apply, start, metric;
+  std::vector<std::string> files;
+  std::string output, poses, apply;
   int fixed = 1;
   std::vector<int> held; // from 1
   TrackerOptions tracker;
@@ -30,46 +28,26 @@ struct AlignOptions {
   bool trackerOnly = false;
 };
 
-// "name=value"
-void Set(vtkUltrasoundAligner* aligner, const std::string& setting)
-{
-  const std::size_t equals = setting.find('=');
-  const std::string name = setting.substr(0, equals), text = equals == std::string::npos ? "" : setting.substr(equals + 1);
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0')
-    throw Error(Error::Kind::InvalidParameter, "--set " + setting + ": name=number is needed");
-  if (!aligner->SetParameter(name.c_str(), value))
-    throw Error(Error::Kind::InvalidParameter, "--set " + setting + ": " + Session::TakeReportedError());
-}
-
-Pose PoseOf(vtkUltrasoundAligner* aligner, int volume)
-{
-  vtkNew<vtkMatrix4x4> matrix;
-  aligner->GetPose(volume, matrix);
-  return FromRows<Pose>(matrix->GetData());
-}
-
 // Puts each volume where the tracker says, as seen from the fixed one.
 void PlaceVolumes(Session& session, AlignOptions& options, std::vector<LoadedVolume>& volumes)
 {
-  const ToolTrack tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
+  const ToolTrack tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.reading);
   const VolumeCalibration calibration = ReadVolumeCalibration(options.calibration, tool.from);
-  options.tracker.matching.fixed = static_cast<std::size_t>(options.fixed - 1);
+  options.tracker.matching.fixed = options.fixed - 1;
   const TrackerPlacement placement =
       PlaceByTracker(tool, TrackedVolumesOf(options.tracker, volumes), calibration, options.tracker.matching);
   for (const std::string& note : placement.notes)
     session.Note(note);
   session.Say("tracker: " + placement.how);
   for (std::size_t i = 0; i < volumes.size(); ++i)
-    if (i != options.tracker.matching.fixed)
+    if (i != static_cast<std::size_t>(options.tracker.matching.fixed))
       MoveVolume(volumes[i], placement.volumeToWorld[i]);
   session.result["tracker"] = {{"recording", options.tracker.log}, {"tool", tool.name}, {"calibration", options.calibration}};
   if (calibration.errorMm)
     session.Say("tracker: the calibration states an error of " + Fixed(*calibration.errorMm, 2) + " mm");
 }
 
-void Align(Session& session, AlignOptions options)
+void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner)
 {
   options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
@@ -86,17 +64,12 @@ void Align(Session& session, AlignOptions options)
   CheckOutput(options.output, inputs);
   if (options.fixed > static_cast<int>(options.files.size()))
     throw Error(Error::Kind::InvalidParameter, "--fixed: there are only " + std::to_string(options.files.size()) + " volumes");
-  vtkNew<vtkUltrasoundAligner> aligner;
   aligner->SetFixedVolume(options.fixed - 1);
   for (const int number : options.held) {
     if (number > static_cast<int>(options.files.size()))
       throw Error(Error::Kind::InvalidParameter, "--hold: there are only " + std::to_string(options.files.size()) + " volumes");
     aligner->AddHeldVolume(number - 1);
   }
-  aligner->SetStart(options.start.c_str());
-  aligner->SetMetric(options.metric.c_str());
-  for (const std::string& setting : options.settings)
-    Set(aligner, setting);
   // Places for the moved volumes are looked for first, so that nothing is refused after all the work.
   std::unique_ptr<OutputFolder> folder;
   std::vector<std::string> places;
@@ -131,37 +104,32 @@ void Align(Session& session, AlignOptions options)
   aligner->SetInputDataObject(BlocksOf(volumes));
   session.Update(aligner, "align");
 
-  const auto report = nlohmann::ordered_json::parse(aligner->GetReport());
+  nlohmann::ordered_json report = ToJson(aligner->Result(), 1); // from 1, as --fixed counts
   session.result["output"] = options.output;
   session.result["fixed"] = options.fixed;
   session.result["volumes"] = nlohmann::ordered_json::array();
   std::vector<VolumePose> poses;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     LoadedVolume& volume = volumes[i];
-    const Pose pose = PoseOf(aligner, static_cast<int>(i));
+    const VolumeAlignment& found = aligner->Result().volumes[i];
+    const Pose& pose = found.volumeToWorld;
     const ImageGeometry start = volume.geometry.Moved(volume.volumeToWorld);
     const double degrees = RotationAngle(pose) * DegreesPerRadian, mm = (pose * start.Centre() - start.Centre()).norm();
     MoveVolume(volume, pose);
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
     nlohmann::ordered_json entry{{"file", volume.file}, {"turned_degrees", degrees}, {"moved_mm", mm}};
-    for (const auto& [key, value] : report["volumes"][i].items())
-      if (key != "name")
-        entry[key] = value;
+    report["volumes"][i].erase("name");
+    entry.update(report["volumes"][i]);
     entry["VolumeToWorld"] = JsonOf(volume.volumeToWorld);
     session.result["volumes"].push_back(entry);
-    const int number = static_cast<int>(i);
-    const std::string verdict = aligner->GetVerdict(number), reason = aligner->GetReason(number);
     session.Say(volume.file + ": " +
-                (number + 1 == options.fixed ? "fixed"
-                                             : verdict + (reason.empty() ? "" : " (" + reason + ")") + "; turned by " +
-                                                   Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
-                                                   " mm, overlap " + Fixed(100.0 * aligner->GetOverlap(number), 0) + "%"));
+                (static_cast<int>(i) + 1 == options.fixed
+                     ? "fixed"
+                     : std::string(NameOf(found.verdict)) + (found.reason.empty() ? "" : " (" + found.reason + ")") +
+                           "; turned by " + Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
+                           " mm, overlap " + Fixed(100.0 * found.overlap, 0) + "%"));
   }
   session.result["pairs"] = report["pairs"];
-  for (auto& pair : session.result["pairs"]) { // from 1, as --fixed counts
-    pair["fixed"] = pair["fixed"].get<int>() + 1;
-    pair["moving"] = pair["moving"].get<int>() + 1;
-  }
   session.result["align_seconds"] = report["seconds"];
   session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
   if (!aligner->GetAllAligned()) {
@@ -185,6 +153,7 @@ void Align(Session& session, AlignOptions options)
 Command AlignCommand(CLI::App& program)
 {
   auto values = std::make_shared<AlignOptions>();
+  const auto aligner = vtkSmartPointer<vtkUltrasoundAligner>::New();
   CLI::App* options = program.add_subcommand("align", "Find where overlapping volumes belong");
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output,
@@ -197,29 +166,9 @@ Command AlignCommand(CLI::App& program)
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  const vtkNew<vtkUltrasoundAligner> defaults;
-  values->start = defaults->GetStart();
-  values->metric = defaults->GetMetric();
-  options
-      ->add_option("--start", values->start,
-                   "What is known about where volumes belong: tracked (within 12 degrees and 20 mm), hand-made (35 "
-                   "degrees and a third of a volume), unknown (nothing), automatic (one after the other, while unclear)")
-      ->check(CLI::IsMember(AlignStartNames()))
-      ->capture_default_str();
-  options->add_option("--metric", values->metric, "The likeness that refines poses")
-      ->check(CLI::IsMember(MetricNames()))
-      ->capture_default_str();
-  const AlignPairParameters pair;
-  options->add_option(
-      "--set", values->settings,
-      "A parameter, as NAME=VALUE; again for each: MinimumOverlap=" + Fixed(pair.minimumOverlap, 1) +
-          " (share of the smaller volume, 0.01 to 1), Candidates=" + std::to_string(pair.candidates) +
-          " (refined poses, 1 to 1000), FinestMm=0 (the voxels at which it ends; 0: the volumes' own), UseReliability=1 (0 or 1: "
-          "shadowed and saturated voxels count less), Points=" +
-          std::to_string(pair.points) +
-          " (compared on a level, 1000 to 10000000), MinimumSimilarity=" + Fixed(pair.minimumSimilarity, 2) +
-          ", MinimumPeakRatio=" + Fixed(pair.minimumPeakRatio, 2) + ", MaximumErrorVoxels=" + Fixed(pair.maximumErrorVoxels, 1) +
-          ", MaximumSplitVoxels=" + Fixed(pair.maximumSplitVoxels, 1) + " (what is trusted), Seed=1");
+  AddParameters(options, aligner,
+                {"Start", "Metric", "UseReliability", "MinimumOverlap", "FinestMm", "Candidates", "MinimumSimilarity",
+                 "MinimumPeakRatio", "MaximumErrorVoxels", "MaximumSplitVoxels", "Points", "Seed"});
   values->tracker.AddTo(*options, false);
   options->add_option("--calibration", values->calibration,
                       "Calibration of the tracked probe, as echorama calibrate hand-eye writes it");
@@ -228,7 +177,7 @@ Command AlignCommand(CLI::App& program)
   options->get_option("--calibration")->needs("--tracker");
   options->get_option("--tracker-only")->needs("--tracker");
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry");
-  return {options, [values](Session& session) { Align(session, *values); }};
+  return {options, [values, aligner](Session& session) { Align(session, *values, aligner); }};
 }
 
 } // namespace echorama

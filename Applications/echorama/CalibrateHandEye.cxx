@@ -6,8 +6,8 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Geometry/MatrixRows.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Readers/OutputFiles.h"
-#include "Readers/TransformFile.h"
 #include "TrackedVolumes.h"
 #include "Tracking/Calibration/CalibrationJson.h"
 #include <CLI/Validators.hpp>
@@ -27,10 +27,10 @@ struct HandEyeOptions {
   TrackerOptions tracker;
   std::string poses, savePoses, output, start;
   std::vector<double> target;
-  PoseNoise sensorNoise, volumeNoise;
+  HandEyeParameters parameters;
   std::string rig = "1", align = "rig";
   double depthScale = 0.0;
-  bool noiseGiven = false, keepAll = false;
+  bool noiseGiven = false;
 };
 
 // What was found of the rig in the volumes.
@@ -130,12 +130,8 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
       throw Error(Error::Kind::InvalidParameter, options.savePoses + ": --save-poses and --output name the same file");
   }
 
-  HandEyeParameters parameters;
-  parameters.sensorNoise = options.sensorNoise;
-  parameters.volumeNoise = options.volumeNoise;
-  parameters.rejectOutliers = !options.keepAll;
-
-  const ToolTrack tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.unitMm);
+  HandEyeParameters& parameters = options.parameters;
+  const ToolTrack tool = ReadTool(session, options.tracker.log, options.tracker.tool, options.tracker.reading);
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.volumes);
   const std::vector<TrackedVolume> tracked = TrackedVolumesOf(options.tracker, volumes);
   const SensorPoses sensor = MatchSensor(tool, tracked, options.tracker.matching);
@@ -259,14 +255,16 @@ Command CalibrateHandEyeCommand(CLI::App& calibrate)
     };
   };
   options
-      ->add_option_function<std::vector<double>>("--sensor-noise", noise(values->sensorNoise),
+      ->add_option_function<std::vector<double>>("--sensor-noise", noise(values->parameters.sensorNoise),
                                                  "Noise of the tracker: degrees and mm per axis (default: from the residuals, "
                                                  "with five scans or more)")
       ->expected(2);
   options
-      ->add_option_function<std::vector<double>>("--volume-noise", noise(values->volumeNoise), "Noise of the alignment, likewise")
+      ->add_option_function<std::vector<double>>("--volume-noise", noise(values->parameters.volumeNoise),
+                                                 "Noise of the alignment, likewise")
       ->expected(2);
-  options->add_flag("--keep-all", values->keepAll, "Use every aligned scan, however badly it fits");
+  options->add_flag_callback(
+      "--keep-all", [values] { values->parameters.rejectOutliers = false; }, "Use every aligned scan, however badly it fits");
   return {options, [values](Session& session) { CalibrateHandEyeFromVolumes(session, *values); }};
 }
 

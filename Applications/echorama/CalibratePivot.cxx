@@ -2,11 +2,11 @@
 // echorama calibrate pivot: where the tip of a tracked tool is, from turning it about the tip.
 #include "Calibrate.h"
 #include "Core/Base/JsonPlace.h"
+#include "Core/Geometry/TransformFile.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
-#include "Readers/TransformFile.h"
 #include "TrackedVolumes.h"
 #include "Tracking/Calibration/CalibrationJson.h"
-#include <CLI/Validators.hpp>
 #include <cmath>
 #include <memory>
 
@@ -15,27 +15,22 @@ namespace {
 
 struct PivotOptions {
   std::string log, tool, output;
-  double unitMm = 0.0, from = -INFINITY, to = INFINITY;
-  std::vector<double> noise;
-  bool keepAll = false;
+  PoseLogOptions reading;
+  double from = -INFINITY, to = INFINITY;
+  PivotParameters parameters;
 };
 
 void CalibrateTip(Session& session, const PivotOptions& options)
 {
   CheckOutput(options.output, {options.log});
-  const ToolTrack tool = ReadTool(session, options.log, options.tool, options.unitMm);
+  const ToolTrack tool = ReadTool(session, options.log, options.tool, options.reading);
   std::vector<TimedPose> poses;
   for (const TimedPose& pose : tool.poses)
     if (!(pose.time < options.from) && !(pose.time > options.to))
       poses.push_back(pose);
-  PivotParameters parameters;
-  parameters.rejectOutliers = !options.keepAll;
-  if (!options.noise.empty()) {
-    parameters.noise = {options.noise[0], options.noise[1]};
-    parameters.estimateNoise = false;
-  }
   PivotResult result;
-  session.Work("calibrate", options.log, [&](const Progress& progress) { result = CalibratePivot(poses, parameters, progress); });
+  session.Work("calibrate", options.log,
+               [&](const Progress& progress) { result = CalibratePivot(poses, options.parameters, progress); });
   for (const std::string& note : result.notes)
     session.Note(note);
 
@@ -65,13 +60,20 @@ Command CalibratePivotCommand(CLI::App& calibrate)
       ->required();
   options->add_option("--tool", values->tool, "The tool, as the recording calls it (default: its only one)");
   options->add_option("-o,--output", values->output, "Calibration to write (JSON)")->required();
-  options->add_option("--unit", values->unitMm, "Unit of the recording's lengths in mm; 1000: metres (default: as the file says)")
-      ->check(CLI::Range(1e-3, 1e6));
+  AddParameter(options, Describe(values->reading), "UnitMm", "--unit");
   options->add_option("--from", values->from, "Leave out what came before, in seconds of the recording");
   options->add_option("--to", values->to, "Leave out what came after");
-  options->add_option("--noise", values->noise, "Noise of the tracker: degrees and mm per axis (default: from the residuals)")
+  options
+      ->add_option_function<std::vector<double>>(
+          "--noise",
+          [values](const std::vector<double>& noise) {
+            values->parameters.noise = {noise[0], noise[1]};
+            values->parameters.estimateNoise = false;
+          },
+          "Noise of the tracker: degrees and mm per axis (default: from the residuals)")
       ->expected(2);
-  options->add_flag("--keep-all", values->keepAll, "Use every pose, however badly it fits");
+  options->add_flag_callback(
+      "--keep-all", [values] { values->parameters.rejectOutliers = false; }, "Use every pose, however badly it fits");
   return {options, [values](Session& session) { CalibrateTip(session, *values); }};
 }
 

@@ -3,6 +3,7 @@
 #include "Calibrate.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
@@ -18,7 +19,7 @@ namespace {
 struct RigOptions {
   std::string folder;
   std::vector<double> scales = {1.0, 0.6}, handle, sensor;
-  double clearanceMm = 0.0, armMm = 0.0, resolutionMm = 0.0, waterCelsius = CalibrationRigParameters().waterCelsius;
+  CalibrationRigParameters rig;
 };
 
 void WriteStl(Session& session, vtkUltrasoundPrintableSource* source, const std::string& path, const std::string& name)
@@ -58,7 +59,7 @@ nlohmann::ordered_json SceneOf(const CalibrationRigParameters& rig, const std::s
           {"volume", {{"spacingMm", 0.8}, {"knockMm", 8}, {"knockDegrees", 6}}}};
 }
 
-void MakeRig(Session& session, const RigOptions& options)
+void MakeRig(Session& session, const RigOptions& options, vtkUltrasoundPrintableSource* clip)
 {
   OutputFolder folder(options.folder, {});
   session.ShowAs(folder.StageFolder(), options.folder);
@@ -68,12 +69,10 @@ void MakeRig(Session& session, const RigOptions& options)
     const std::string name = "rig_" + NumberText(scale);
     vtkNew<vtkUltrasoundPrintableSource> source;
     source->SetScale(scale);
-    if (options.resolutionMm > 0.0)
-      source->SetResolution(options.resolutionMm);
+    source->SetResolution(clip->GetResolution());
     WriteStl(session, source, folder.Stage(name + ".stl"), name + ".stl");
-    CalibrationRigParameters rig;
+    CalibrationRigParameters rig = options.rig;
     rig.scale = scale;
-    rig.waterCelsius = options.waterCelsius;
     rig.plateDepthMm = std::min(rig.plateDepthMm * std::max(scale, 0.5), 490.0); // so that a small rig is near the probe
     WriteTextFile(folder.Stage(name + ".json"), SceneOf(rig, name).dump(2) + "\n");
     std::string table = "label,x,y,z,radius\n"; // in the world of the scene
@@ -87,7 +86,6 @@ void MakeRig(Session& session, const RigOptions& options)
     session.result["rigs"].push_back(
         {{"scale", scale}, {"stl", name + ".stl"}, {"scene", name + ".json"}, {"balls", name + ".csv"}});
   }
-  vtkNew<vtkUltrasoundPrintableSource> clip;
   clip->SetKindToClip();
   if (!options.handle.empty()) {
     clip->SetHandleWidthMm(options.handle[0]);
@@ -96,10 +94,6 @@ void MakeRig(Session& session, const RigOptions& options)
   }
   if (!options.sensor.empty())
     clip->SetSensorMm(options.sensor.data());
-  clip->SetClearanceMm(options.clearanceMm);
-  clip->SetArmMm(options.armMm);
-  if (options.resolutionMm > 0.0)
-    clip->SetResolution(options.resolutionMm);
   WriteStl(session, clip, folder.Stage("clip.stl"), "clip.stl");
   session.result["clip"] = "clip.stl";
   folder.Commit();
@@ -111,6 +105,7 @@ void MakeRig(Session& session, const RigOptions& options)
 Command CalibrateRigCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<RigOptions>();
+  const auto clip = vtkSmartPointer<vtkUltrasoundPrintableSource>::New();
   CLI::App* options = calibrate.add_subcommand("rig", "Make the calibration rig and the sensor's clip for a 3D printer (STL)");
   options->add_option("-o,--output", values->folder, "Folder for the files")->required();
   options->add_option("--scale", values->scales, "Sizes of the rig; again for each")
@@ -121,21 +116,11 @@ Command CalibrateRigCommand(CLI::App& calibrate)
       ->expected(2);
   options->add_option("--sensor", values->sensor, "The sensor across, sideways and along the handle, mm (default: 8.2 8.2 20)")
       ->expected(3);
-  const ProbeClipParameters clip;
-  values->clearanceMm = clip.clearanceMm;
-  values->armMm = clip.armMm;
-  options->add_option("--clearance", values->clearanceMm, "Between clip and handle, mm")
-      ->check(CLI::Range(0.0, 5.0))
-      ->capture_default_str();
-  options->add_option("--arm", values->armMm, "From the middle of the clip back to the sensor, mm")
-      ->check(CLI::Range(0.0, 300.0))
-      ->capture_default_str();
-  options->add_option("--water", values->waterCelsius, "Temperature of the scenes' bath, degrees Celsius")
-      ->check(CLI::Range(0.0, 95.0))
-      ->capture_default_str();
-  options->add_option("--resolution", values->resolutionMm, "Sampling cells of the solids, mm (default: 0.5)")
-      ->check(CLI::Range(0.1, 5.0));
-  return {options, [values](Session& session) { MakeRig(session, *values); }};
+  AddParameter(options, clip, "ClearanceMm", "--clearance");
+  AddParameter(options, clip, "ArmMm", "--arm");
+  AddParameter(options, Describe(values->rig), "WaterCelsius", "--water");
+  AddParameter(options, clip, "Resolution");
+  return {options, [values, clip](Session& session) { MakeRig(session, *values, clip); }};
 }
 
 } // namespace echorama

@@ -3,30 +3,27 @@
 #include "Calibrate.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/TextFile.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
 #include "Tracking/Calibration/CalibrationJson.h"
-#include <CLI/Validators.hpp>
 #include <memory>
 
 namespace echorama {
 namespace {
 
 struct TemporalOptions {
-  std::string first, firstTool, second, secondTool, signal = "automatic", output;
-  double unitMm = 0.0;
+  std::string first, firstTool, second, secondTool, output;
+  PoseLogOptions reading;
   TemporalParameters parameters;
 };
 
-void CalibrateClocks(Session& session, TemporalOptions options)
+void CalibrateClocks(Session& session, const TemporalOptions& options)
 {
   if (!options.output.empty())
     CheckOutput(options.output, {options.first, options.second});
-  options.parameters.signal = options.signal == "rotation"      ? SpeedSignal::Rotation
-                              : options.signal == "translation" ? SpeedSignal::Translation
-                                                                : SpeedSignal::Automatic;
-  const ToolTrack first = ReadTool(session, options.first, options.firstTool, options.unitMm);
-  const ToolTrack second = ReadTool(session, options.second, options.secondTool, options.unitMm);
+  const ToolTrack first = ReadTool(session, options.first, options.firstTool, options.reading);
+  const ToolTrack second = ReadTool(session, options.second, options.secondTool, options.reading);
   TemporalResult result;
   session.Work("calibrate", "", [&](const Progress& progress) {
     result = CalibrateTime(first.poses, second.poses, options.parameters, progress);
@@ -58,14 +55,9 @@ Command CalibrateTemporalCommand(CLI::App& calibrate)
       ->required();
   options->add_option("--tool", values->firstTool, "The tool in the first recording (default: its only one)");
   options->add_option("--second-tool", values->secondTool, "The tool in the second (default: its only one)");
-  options->add_option("--signal", values->signal, "Speeds that are compared: rotation is the same for everything on one body")
-      ->check(CLI::IsMember({"automatic", "rotation", "translation"}))
-      ->capture_default_str();
-  options->add_option("--largest", values->parameters.largestOffsetSeconds, "How far the search goes either way, in seconds")
-      ->check(CLI::Range(1e-3, 3600.0))
-      ->capture_default_str();
-  options->add_option("--unit", values->unitMm, "Unit of the recordings' lengths in mm; 1000: metres (default: as the files say)")
-      ->check(CLI::Range(1e-3, 1e6));
+  AddParameter(options, Describe(values->parameters), "Signal");
+  AddParameter(options, Describe(values->parameters), "LargestOffset", "--largest");
+  AddParameter(options, Describe(values->reading), "UnitMm", "--unit");
   options->add_option("-o,--output", values->output, "Write the result as JSON");
   return {options, [values](Session& session) { CalibrateClocks(session, *values); }};
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "CalibrationRigFile.h"
+#include "Core/Base/CsvLine.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
 #include "Filters/Phantoms/CalibrationRig.h"
-#include "Readers/CsvLine.h"
 #include <algorithm>
 #include <sstream>
 

@@ -2,12 +2,13 @@
 // echorama convert: from one file format to another. Volumes go through VTK's reader and writer; sequences go frame by frame from
 // kernel to kernel, so that they need no memory; transforms become our JSON.
 #include "Commands.h"
+#include "Core/Geometry/TransformFile.h"
 #include "FrameList.h"
+#include "ParameterOptions.h"
 #include "Readers/FileKind.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/OutputFiles.h"
 #include "Readers/SequenceWriter.h"
-#include "Readers/TransformFile.h"
 #include "Volumes.h"
 #include <algorithm>
 #include <cctype>
@@ -23,16 +24,15 @@ namespace {
 struct ConvertOptions {
   std::string input, output, frames;
   VolumeReading reading;
-  std::vector<double> stackSpacingMm;
 };
 
 void ConvertVolume(Session& session, const ConvertOptions& options)
 {
   CheckVolumeOutput(options.output, {options.input});
   const LoadedVolume volume = LoadVolume(session, options.input, options.reading);
-  if (options.reading.spacingMm > 0.0 && (!volume.content.beams || options.reading.beams))
+  if (options.reading.parameters.spacingMm > 0.0 && (!volume.content.beams || options.reading.beams))
     Misused("--spacing: " + options.input + " is not scan-converted, so there is nothing to choose");
-  if (!options.stackSpacingMm.empty() && volume.content.format != FileFormat::ImageStack)
+  if (!options.reading.parameters.stackSpacingMm.isZero(0.0) && volume.content.format != FileFormat::ImageStack)
     Misused("--stack-spacing: " + options.input + " is no stack of pictures; it says itself what its spacing is");
   const std::vector<std::string> lost = SaveVolume(session, volume.image, options.output);
   const std::size_t steps = volume.content.Volumes();
@@ -95,17 +95,15 @@ void ConvertTransforms(Session& session, const ConvertOptions& options)
   session.Say("wrote " + options.output + ": " + std::to_string(transforms.size()) + " transforms");
 }
 
-void Convert(Session& session, ConvertOptions options)
+void Convert(Session& session, const ConvertOptions& options)
 {
-  if (!options.stackSpacingMm.empty())
-    options.reading.stackSpacingMm = Eigen::Vector3d(options.stackSpacingMm.data());
   session.result["input"] = options.input;
   session.result["output"] = options.output;
   const FileKind kind = KindOf(options.input);
   if (kind != FileKind::Sequence && !options.frames.empty())
     Misused("--frames: " + options.input + " is no tracked sequence");
-  if (kind != FileKind::Volume &&
-      (options.reading.spacingMm > 0.0 || options.reading.step > 0 || options.reading.beams || !options.stackSpacingMm.empty()))
+  if (kind != FileKind::Volume && (options.reading.parameters.spacingMm > 0.0 || options.reading.step > 0 ||
+                                   options.reading.beams || !options.reading.parameters.stackSpacingMm.isZero(0.0)))
     Misused("--time, --beams, --spacing and --stack-spacing: " + options.input + " is no volume");
   switch (kind) {
   case FileKind::Volume:
@@ -134,15 +132,8 @@ Command ConvertCommand(CLI::App& program)
       ->capture_default_str();
   options->add_flag("--beams", values->reading.beams,
                     "Write the samples along beams that the file holds, not their scan conversion");
-  options
-      ->add_option("--spacing", values->reading.spacingMm,
-                   "Edge of the voxels in mm that beams are scan-converted to (0: as many voxels in the fan as samples)")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  options
-      ->add_option("--stack-spacing", values->stackSpacingMm, "Spacing in mm of a stack of pictures: x, y, from one to the next")
-      ->expected(3)
-      ->check(CLI::Range(1e-6, 1e6));
+  AddParameter(options, Describe(values->reading.parameters), "SpacingMm", "--spacing");
+  AddParameter(options, Describe(values->reading.parameters), "StackSpacingMm", "--stack-spacing");
   options->add_option("--frames", values->frames,
                       "Frames of a sequence, from 0: a list of single ones and FROM:TO:STEP, both included");
   return {options, [values](Session& session) { Convert(session, *values); }};

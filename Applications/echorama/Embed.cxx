@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama embed: a stitched volume in a background of noise, as one scan of a real machine.
 #include "Commands.h"
+#include "Core/Base/SizeText.h"
 #include "Filters/Embedding/Feather.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <algorithm>
 #include <array>
-#include <CLI/Validators.hpp>
 #include <memory>
-#include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUltrasoundAcquisition.h>
 #include <vtkUltrasoundEmbedder.h>
 #include <vtkUltrasoundVolume.h>
@@ -20,26 +21,9 @@ namespace {
 struct EmbedOptions {
   std::string file, output, form;
   std::vector<std::string> noise;
-  bool match = true, contrast = true;
-  double featherMm, marginMm, smoothMm, overlapDegrees, insideExponent, outsideExponent;
-  std::int64_t seed;
-  int preview;
-
-  EmbedOptions()
-  {
-    const vtkNew<vtkUltrasoundEmbedder> defaults;
-    featherMm = defaults->GetFeatherMm();
-    marginMm = defaults->GetMarginMm();
-    smoothMm = defaults->GetSmoothMm();
-    overlapDegrees = defaults->GetOverlapDegrees();
-    insideExponent = defaults->GetInsideExponent();
-    outsideExponent = defaults->GetOutsideExponent();
-    seed = defaults->GetSeed();
-    preview = defaults->GetPreviewFactor();
-  }
 };
 
-void Embed(Session& session, const EmbedOptions& options)
+void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder* embedder)
 {
   std::vector<std::string> inputs{options.file};
   inputs.insert(inputs.end(), options.noise.begin(), options.noise.end());
@@ -50,7 +34,6 @@ void Embed(Session& session, const EmbedOptions& options)
   const LoadedVolume volume = LoadVolume(session, options.file);
   const std::vector<LoadedVolume> noise = LoadVolumes(session, WithoutCompanions(session, options.noise));
   LoadedVolume form;
-  vtkNew<vtkUltrasoundEmbedder> embedder;
   embedder->SetInputData(0, volume.image);
   if (!noise.empty())
     embedder->SetInputData(1, BlocksOf(noise));
@@ -58,16 +41,6 @@ void Embed(Session& session, const EmbedOptions& options)
     form = LoadVolume(session, options.form);
     embedder->SetInputData(2, form.image);
   }
-  embedder->SetMatchGrain(options.match);
-  embedder->SetMatchContrast(options.contrast);
-  embedder->SetFeatherMm(options.featherMm);
-  embedder->SetMarginMm(options.marginMm);
-  embedder->SetSmoothMm(options.smoothMm);
-  embedder->SetOverlapDegrees(options.overlapDegrees);
-  embedder->SetInsideExponent(options.insideExponent);
-  embedder->SetOutsideExponent(options.outsideExponent);
-  embedder->SetSeed(options.seed);
-  embedder->SetPreviewFactor(options.preview);
   try {
     session.Update(embedder, "embed", options.file);
   } catch (const Error& error) { // the filter knows no files, but for the names of noise volumes
@@ -104,8 +77,7 @@ void Embed(Session& session, const EmbedOptions& options)
   session.result["voxels_blend"] = count(EmbeddedVoxel::Blend);
   session.result["voxels_invented"] = count(EmbeddedVoxel::Invented);
   session.result["report"] = LinesOf(embedder->GetNotes());
-  session.Say("wrote " + options.output + ": " + std::to_string(geometry.dimensions[0]) + " x " +
-              std::to_string(geometry.dimensions[1]) + " x " + std::to_string(geometry.dimensions[2]) + " voxels of " +
+  session.Say("wrote " + options.output + ": " + SizeText(geometry.dimensions) + " voxels of " +
               Triple(geometry.spacing, " x ", 3) + " mm");
   session.Say("  outline     " + ProbeText(*probe));
   const double shown =
@@ -122,38 +94,24 @@ void Embed(Session& session, const EmbedOptions& options)
 Command EmbedCommand(CLI::App& program)
 {
   auto values = std::make_shared<EmbedOptions>();
+  const auto embedder = vtkSmartPointer<vtkUltrasoundEmbedder>::New();
   CLI::App* options = program.add_subcommand("embed", "Put a stitched volume into a background, so that it looks as one scan");
   options->add_option("volume", values->file, "Volume of any format")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
   options->add_option("--noise", values->noise, "Real noise volumes for the background (default: noise is made)");
-  options->add_flag("--match,!--no-match", values->match,
-                    "Make noise with the grain of the volume, or (--no-match) with one of its own (default: --match)");
-  options->add_flag("--contrast,!--no-contrast", values->contrast,
-                    "Give the background the local contrast of the volume, not its brightness alone (default: --contrast)");
-  options->add_option("--feather", values->featherMm, "Depth in the volume at which no background shows any more, mm")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
   options->add_option("--form", values->form, "Volume whose fan is the outline; it grows until it holds all data");
-  options->add_option("--margin", values->marginMm, "How far the outline reaches beyond the volume, at least, mm")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  options->add_option("--smooth", values->smoothMm, "What is smaller than this is grain, mm (standard deviation)")
-      ->check(CLI::Range(1e-3, 1e6))
-      ->capture_default_str();
-  options->add_option("--inside-exponent", values->insideExponent, "How closely values at the border are kept, inside")
-      ->check(CLI::Range(1.0, 64.0))
-      ->capture_default_str();
-  options->add_option("--outside-exponent", values->outsideExponent, "The same, outside")
-      ->check(CLI::Range(1.0, 64.0))
-      ->capture_default_str();
-  options->add_option("--overlap", values->overlapDegrees, "Angle by which noise volumes overlap, degrees")
-      ->check(CLI::Range(0.0, 90.0))
-      ->capture_default_str();
-  options->add_option("--seed", values->seed, "Seed of the noise")->check(CLI::NonNegativeNumber)->capture_default_str();
-  options->add_option("--preview", values->preview, "Use every so many voxels only, for a quick look")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  return {options, [values](Session& session) { Embed(session, *values); }};
+  AddParameter(options, embedder, "MatchGrain", "--match");
+  AddParameter(options, embedder, "MatchContrast", "--contrast");
+  for (const char* asItIs : {"--match", "--contrast"})
+    options->add_flag(asItIs)->group(""); // accepted, and not listed
+  AddParameter(options, embedder, "FeatherMm", "--feather");
+  AddParameter(options, embedder, "MarginMm", "--margin");
+  AddParameter(options, embedder, "SmoothMm", "--smooth");
+  AddParameters(options, embedder, {"InsideExponent", "OutsideExponent"});
+  AddParameter(options, embedder, "OverlapDegrees", "--overlap");
+  AddParameter(options, embedder, "Seed");
+  AddParameter(options, embedder, "PreviewFactor", "--preview");
+  return {options, [values, embedder](Session& session) { Embed(session, *values, embedder); }};
 }
 
 } // namespace echorama

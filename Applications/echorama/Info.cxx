@@ -4,8 +4,8 @@
 #include "Commands.h"
 #include "Core/Base/Angles.h"
 #include "Core/Geometry/PoseFile.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Readers/FileKind.h"
-#include "Readers/TransformFile.h"
 #include "Volumes.h"
 #include <memory>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama motion: a recorded motion, smoothed and resampled, as a path for a probe (dissertation 3.2).
 #include "Commands.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Readers/SequenceWriter.h"
 #include "TrackedVolumes.h"
@@ -14,7 +15,8 @@ namespace {
 
 struct MotionOptions {
   std::string log, tool, output;
-  double unitMm = 0.0, rate = 50.0, from = NAN, to = NAN;
+  PoseLogOptions reading;
+  double rate = 50.0, from = NAN, to = NAN;
   MotionSmoothing smoothing;
 };
 
@@ -23,7 +25,7 @@ void ResampleMotion(Session& session, const MotionOptions& options)
   CheckOutput(options.output, {options.log});
   if (!NamesSequence(options.output))
     throw Error(Error::Kind::InvalidParameter, options.output + ": a sequence ends in .igs.mha or .seq.mha");
-  const ToolTrack tool = ReadTool(session, options.log, options.tool, options.unitMm);
+  const ToolTrack tool = ReadTool(session, options.log, options.tool, options.reading);
   std::unique_ptr<MotionPath> path;
   session.Work("smooth", "",
                [&](const Progress& progress) { path = std::make_unique<MotionPath>(tool.Path(options.smoothing, progress)); });
@@ -91,15 +93,10 @@ Command MotionCommand(CLI::App& program)
   options->add_option("recording", values->log, "Recording of a tracker: a sequence or a table")->required();
   options->add_option("-o,--output", values->output, "Sequence to write (.igs.mha)")->required();
   options->add_option("--tool", values->tool, "The tool, as the recording calls it (default: its only one)");
-  options->add_option("--unit", values->unitMm, "Unit of the recording's lengths in mm (default: as the file says)")
-      ->check(CLI::Range(1e-3, 1e6));
+  AddParameter(options, Describe(values->reading), "UnitMm", "--unit");
   options->add_option("--rate", values->rate, "Poses a second")->check(CLI::Range(1e-3, 1e5))->capture_default_str();
-  options->add_option("--smooth", values->smoothing.sigmaSeconds, "Standard deviation of the window, in seconds; 0: none")
-      ->check(CLI::Range(0.0, 60.0))
-      ->capture_default_str();
-  options->add_option("--gap", values->smoothing.longestGapSeconds, "Longest gap that is bridged, in seconds")
-      ->check(CLI::Range(1e-6, 600.0))
-      ->capture_default_str();
+  AddParameter(options, Describe(values->smoothing), "WindowSeconds", "--smooth");
+  AddParameter(options, Describe(values->smoothing), "LongestGapSeconds", "--gap");
   options->add_option("--from", values->from, "Begin at this time of the recording, in seconds");
   options->add_option("--to", values->to, "End at this time");
   return {options, [values](Session& session) { ResampleMotion(session, *values); }};

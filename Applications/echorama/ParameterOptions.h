@@ -12,6 +12,12 @@ namespace echorama {
 /// parameter lies in must live as long as \a options: \a owner keeps it.
 CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, vtkSmartPointer<vtkObjectBase> owner);
 
+/// The same for one of a struct that outlives \a options: AddParameter(options, Describe(values->smoothing), "WindowSeconds").
+inline CLI::Option* AddParameter(CLI::App* options, ParameterList parameters, const std::string& name, std::string flag = {})
+{
+  return AddParameter(options, Named(parameters, name), std::move(flag), nullptr);
+}
+
 /// The same for one or more parameters of a filter.
 template <class Filter>
 CLI::Option* AddParameter(CLI::App* options, const vtkSmartPointer<Filter>& filter, const std::string& name,

@@ -2,11 +2,12 @@
 // echorama reconstruct: a tracked sequence of 2D images becomes a volume.
 #include "Commands.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Core/Geometry/TransformGraph.h"
 #include "FrameList.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Readers/SequencePoses.h"
-#include "Readers/TransformFile.h"
 #include "Volumes.h"
 #include <algorithm>
 #include <array>
@@ -18,6 +19,7 @@
 #include <vtkFieldData.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUltrasoundSequenceReader.h>
 #include <vtkUltrasoundVolume.h>
 #include <vtkUltrasoundVolumeReconstructor.h>
@@ -27,24 +29,9 @@ namespace {
 
 using Reconstructor = vtkUltrasoundVolumeReconstructor;
 
-// What the options say, in the order of the reconstructor's numbers.
-const std::vector<std::string> Modes{"mean", "maximum", "latest", "alpha", "running-mean"};
-const std::vector<std::string> Interpolations{"nearest", "linear"};
-const std::vector<std::string> Betweens{"nothing", "forward", "backward"};
-const std::vector<std::string> Fillings{"none", "mean", "stick"};
-
-int IndexOf(const std::string& word, const std::vector<std::string>& words)
-{
-  return static_cast<int>(std::find(words.begin(), words.end(), word) - words.begin());
-}
-
 struct ReconstructOptions {
   std::string sequence, output, transforms, transform, frames, clip = "auto", grid = "oriented";
-  std::string mode = Modes[Reconstructor::MEAN], interpolation = Interpolations[Reconstructor::NEAREST],
-              between = Betweens[Reconstructor::FORWARD], fill = Fillings[Reconstructor::MEAN_AROUND];
-  double spacingMm = 0.0, alpha = ReconstructionParameters().alpha, maximumGapMm = ReconstructionParameters().maximumGapMm,
-         memoryGb = 0.0;
-  int reach = HoleFillingParameters().reach;
+  double memoryGb = 0.0;
 };
 
 // "FROM:TO:STEP", checked against what is there.
@@ -114,7 +101,7 @@ SequencePoses PlaceOf(const SequenceContent& content, const ReconstructOptions& 
   }
 }
 
-void Reconstruct(Session& session, const ReconstructOptions& options)
+void Reconstruct(Session& session, const ReconstructOptions& options, Reconstructor* reconstructor)
 {
   std::vector<std::string> inputs{options.sequence};
   if (!options.transforms.empty())
@@ -123,7 +110,7 @@ void Reconstruct(Session& session, const ReconstructOptions& options)
   if (gridIsGiven)
     inputs.push_back(options.grid);
   CheckVolumeOutput(options.output, inputs);
-  if (gridIsGiven && options.spacingMm > 0.0)
+  if (gridIsGiven && reconstructor->GetSpacingMm() > 0.0)
     Misused("--spacing: the grid of " + options.grid + " has its own");
 
   const SequenceContent content = SequenceFile(options.sequence).Content();
@@ -132,17 +119,8 @@ void Reconstruct(Session& session, const ReconstructOptions& options)
   const SequencePoses place = PlaceOf(content, options);
   for (const std::string& note : content.notes)
     session.Note(options.sequence + ": " + note);
-  vtkNew<Reconstructor> reconstructor;
   SetFrames(reconstructor, options.frames, content);
   SetClip(reconstructor, options.clip, content);
-  reconstructor->SetCompounding(IndexOf(options.mode, Modes));
-  reconstructor->SetAlpha(options.alpha);
-  reconstructor->SetSplat(IndexOf(options.interpolation, Interpolations));
-  reconstructor->SetBetween(IndexOf(options.between, Betweens));
-  reconstructor->SetHoles(IndexOf(options.fill, Fillings));
-  reconstructor->SetHoleReach(options.reach);
-  reconstructor->SetMaximumGapMm(options.maximumGapMm);
-  reconstructor->SetSpacingMm(options.spacingMm);
   reconstructor->SetGrid(options.grid == "axis" ? Reconstructor::WORLD : Reconstructor::FITTED);
   reconstructor->SetMemoryLimitMb(1000.0 * options.memoryGb);
   LoadedVolume grid;
@@ -209,6 +187,7 @@ void Reconstruct(Session& session, const ReconstructOptions& options)
 Command ReconstructCommand(CLI::App& program)
 {
   auto values = std::make_shared<ReconstructOptions>();
+  const auto reconstructor = vtkSmartPointer<Reconstructor>::New();
   CLI::App* options = program.add_subcommand("reconstruct", "Make a volume of a tracked sequence of 2D images");
   options->add_option("sequence", values->sequence, "Tracked sequence (.igs.mha .seq.mha .mhd .seq.nrrd .nhdr)")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
@@ -220,9 +199,7 @@ Command ReconstructCommand(CLI::App& program)
       "Name of the transform that places the images, such as ImageToReference (default: from Image to the first of "
       "Reference, World and Tracker that is there)");
   options->add_option("--frames", values->frames, "Frames to use, FROM:TO:STEP, from 0, both included (default: all)");
-  options->add_option("--spacing", values->spacingMm, "Edge of the voxels in mm (0: the longer edge of a pixel)")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
+  AddParameter(options, reconstructor, "SpacingMm", "--spacing");
   options
       ->add_option("--grid", values->grid,
                    "oriented (to the sweep), axis (along the world's axes), or a volume whose grid is taken")
@@ -230,35 +207,17 @@ Command ReconstructCommand(CLI::App& program)
   options
       ->add_option("--clip", values->clip, "Part of the images: auto (the sector is found), none, or X,Y,WIDTH,HEIGHT in pixels")
       ->capture_default_str();
-  options
-      ->add_option("--mode", values->mode, "What becomes of a voxel that several pixels reach; running-mean rounds as Plus does")
-      ->check(CLI::IsMember(Modes))
-      ->capture_default_str();
-  options->add_option("--alpha", values->alpha, "Opacity of a frame for --mode alpha")
-      ->check(CLI::Range(1e-6, 1.0))
-      ->capture_default_str();
-  options->add_option("--interpolation", values->interpolation, "Into the nearest voxel, or by linear weights into eight")
-      ->check(CLI::IsMember(Interpolations))
-      ->capture_default_str();
-  options
-      ->add_option(
-          "--between", values->between,
-          "What lies between frames: nothing, frames interpolated (forward), or a blend of both at each voxel (backward)")
-      ->check(CLI::IsMember(Betweens))
-      ->capture_default_str();
-  options->add_option("--maximum-gap", values->maximumGapMm, "Frames that are further apart than this, mm, are not joined")
-      ->check(CLI::Range(1e-6, 1e6))
-      ->capture_default_str();
-  options->add_option("--fill", values->fill, "How holes are filled: none, mean of the surroundings, or stick (a line across)")
-      ->check(CLI::IsMember(Fillings))
-      ->capture_default_str();
-  options->add_option("--reach", values->reach, "The widest hole that is filled, in voxels")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
+  AddParameter(options, reconstructor, "Compounding", "--mode");
+  AddParameter(options, reconstructor, "Alpha");
+  AddParameter(options, reconstructor, "Splat", "--interpolation");
+  AddParameter(options, reconstructor, "Between");
+  AddParameter(options, reconstructor, "MaximumGapMm", "--maximum-gap");
+  AddParameter(options, reconstructor, "Holes", "--fill");
+  AddParameter(options, reconstructor, "HoleReach", "--reach");
   options->add_option("--memory", values->memoryGb, "Refuse what needs more memory than this, GB (0: what is free)")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  return {options, [values](Session& session) { Reconstruct(session, *values); }};
+  return {options, [values, reconstructor](Session& session) { Reconstruct(session, *values, reconstructor); }};
 }
 
 } // namespace echorama

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama score: how far poses are from the truth, and landmarks from each other.
 #include "Commands.h"
+#include "Core/Geometry/LandmarkFile.h"
 #include "Filters/Registration/LandmarkError.h"
-#include "Readers/LandmarkFile.h"
+#include "ParameterOptions.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
 #include <filesystem>
 #include <memory>
 #include <vtkDataArray.h>
 #include <vtkFieldData.h>
-#include <vtkNew.h>
 #include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUltrasoundAlignmentScore.h>
 
 namespace echorama {
@@ -19,10 +20,11 @@ namespace {
 struct ScoreOptions {
   std::string poses, truth;
   std::vector<std::string> landmarks;
-  int fixed = 1, points = vtkNew<vtkUltrasoundAlignmentScore>()->GetPoints();
+  int fixed = 1; // from 1
 };
 
-void ScoreWithTruth(Session& session, const ScoreOptions& options, const std::vector<VolumePose>& poses)
+void ScoreWithTruth(Session& session, const ScoreOptions& options, vtkUltrasoundAlignmentScore* score,
+                    const std::vector<VolumePose>& poses)
 {
   const std::vector<VolumePose> truth = ReadPoses(options.truth);
   if (options.fixed > static_cast<int>(poses.size()))
@@ -38,11 +40,9 @@ void ScoreWithTruth(Session& session, const ScoreOptions& options, const std::ve
     aligned.push_back(volume);
     belonging.push_back(twin);
   }
-  vtkNew<vtkUltrasoundAlignmentScore> score;
   score->SetInputDataObject(BlocksOf(aligned));
   score->AddTruthData(BlocksOf(belonging));
   score->SetFixedVolume(options.fixed - 1);
-  score->SetPoints(options.points);
   session.Update(score, "score");
 
   session.result["score_mm"] = score->GetScore();
@@ -103,13 +103,13 @@ void ScoreWithLandmarks(Session& session, const ScoreOptions& options, const std
   }
 }
 
-void Score(Session& session, const ScoreOptions& options)
+void Score(Session& session, const ScoreOptions& options, vtkUltrasoundAlignmentScore* score)
 {
   const std::vector<VolumePose> poses = ReadPoses(options.poses);
   if (options.truth.empty() && options.landmarks.empty())
     throw Error(Error::Kind::InvalidParameter, "give --truth or --landmarks to compare the poses with");
   if (!options.truth.empty())
-    ScoreWithTruth(session, options, poses);
+    ScoreWithTruth(session, options, score, poses);
   if (!options.landmarks.empty())
     ScoreWithLandmarks(session, options, poses);
 }
@@ -119,6 +119,7 @@ void Score(Session& session, const ScoreOptions& options)
 Command ScoreCommand(CLI::App& program)
 {
   auto values = std::make_shared<ScoreOptions>();
+  const auto score = vtkSmartPointer<vtkUltrasoundAlignmentScore>::New();
   CLI::App* options = program.add_subcommand("score", "Tell how far poses are from the truth");
   options->add_option("poses", values->poses, "Pose file to score; with --truth its volumes are read")->required();
   options->add_option("--truth", values->truth, "Pose file that says where the volumes belong");
@@ -128,10 +129,8 @@ Command ScoreCommand(CLI::App& program)
   options->add_option("--fixed", values->fixed, "The volume (from 1) that both pose files are taken to agree on")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  options->add_option("--points", values->points, "Points drawn in each valid region")
-      ->check(CLI::Range(1, 10000000))
-      ->capture_default_str();
-  return {options, [values](Session& session) { Score(session, *values); }};
+  AddParameter(options, score, "Points");
+  return {options, [values, score](Session& session) { Score(session, *values, score); }};
 }
 
 } // namespace echorama

@@ -2,18 +2,22 @@
 // echorama stitch: many volumes become one. What fits into the allowed memory is made whole; larger results are made and written
 // slab by slab.
 #include "Commands.h"
+#include "Core/Base/SizeText.h"
+#include "Filters/Stitching/StitchJson.h"
+#include "ParameterOptions.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/OutputFiles.h"
 #include "Volumes.h"
-#include <CLI/Validators.hpp>
+#include <cmath>
 #include <memory>
+#include <optional>
 #include <vtkCallbackCommand.h>
 #include <vtkCommand.h>
 #include <vtkDataArray.h>
 #include <vtkFieldData.h>
-#include <vtkInformation.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUltrasoundReliabilityMap.h>
 #include <vtkUltrasoundStitcher.h>
 #include <vtkUltrasoundStitchQuality.h>
@@ -26,12 +30,7 @@ namespace {
 struct StitchOptions {
   std::vector<std::string> files;
   std::string output, poses;
-  std::string method = vtkUltrasoundStitcher::GetMethodName(static_cast<int>(StitchParameters().method)),
-              texture = vtkUltrasoundStitcher::GetTextureName(static_cast<int>(StitchParameters().texture));
-  double sharpness = StitchParameters().sharpness, detailSharpness = StitchParameters().detailSharpness,
-         detailScale = StitchParameters().detailScale, spacingMm = 0.0, memoryGb = StitchParameters().maximumMemoryGb;
-  bool gain = StitchParameters().equalizeGain, allowDisjoint = StitchParameters().allowDisjoint, reliability = false,
-       uncertainty = false, quality = false, dryRun = false;
+  bool reliability = false, quality = false, dryRun = false;
 };
 
 // Gives every volume its map of what can be trusted, and tells how much cannot.
@@ -54,14 +53,6 @@ void AddReliability(Session& session, std::vector<LoadedVolume>& volumes)
   }
 }
 
-std::vector<std::string> NamesFrom(const char* (*nameOf)(int))
-{
-  std::vector<std::string> names;
-  while (const char* name = nameOf(static_cast<int>(names.size())))
-    names.emplace_back(name);
-  return names;
-}
-
 std::string Gigabytes(double bytes)
 {
   return Fixed(bytes * 1e-9, bytes < 1e9 ? 3 : 1) + " GB";
@@ -73,45 +64,29 @@ bool IsWrittenBySlabs(const std::string& path)
   return format == FileFormat::MetaImage || format == FileFormat::Nrrd || format == FileFormat::Nifti;
 }
 
-std::string VoxelsText(const std::array<int, 3>& size, const Eigen::Vector3d& spacing)
+std::string VoxelsText(const ImageGeometry& grid)
 {
-  return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) + " voxels of " +
-         Triple(spacing, " x ", 3) + " mm";
+  return SizeText(grid.dimensions) + " voxels of " + Triple(grid.spacing, " x ", 3) + " mm";
 }
 
-// What the stitching costs; also among the results.
-nlohmann::ordered_json Cost(Session& session, vtkUltrasoundStitcher* stitcher)
+void TellCost(Session& session, const StitchCost& cost, const std::string& output)
 {
-  std::string report;
-  session.Watch(stitcher, "plan", {}, [&] { report = stitcher->EstimateCost(); });
-  nlohmann::ordered_json cost = nlohmann::ordered_json::parse(report);
-  for (const char* key : {"plan_factor", "plan_bytes", "output_bytes", "allowed_bytes", "slabs"})
-    session.result[key] = cost[key];
-  return cost;
-}
-
-void TellCost(Session& session, const nlohmann::ordered_json& cost, const std::string& output)
-{
-  const double plan = cost["plan_bytes"], whole = cost["output_bytes"], allowed = cost["allowed_bytes"];
-  const int factor = cost["plan_factor"], slabs = cost["slabs"];
-  const std::array<double, 3> spacing = cost["spacing"];
-  session.result["dimensions"] = cost["dimensions"];
-  session.result["spacing"] = spacing;
-  session.Say(VoxelsText(cost["dimensions"], Eigen::Vector3d(spacing.data())));
-  session.Say("  the result needs " + Gigabytes(whole) + ", what is known of the overlaps " + Gigabytes(plan) +
-              (factor > 1 ? " (on a grid that is " + std::to_string(factor) + " times coarser)" : "") + "; allowed are " +
-              Gigabytes(allowed) + " beside the volumes");
-  session.Say(slabs == 0   ? "  that does not fit"
-              : slabs == 1 ? "  that fits as a whole"
+  session.Say(VoxelsText(cost.grid));
+  session.Say("  the result needs " + Gigabytes(cost.outputBytes) + ", what is known of the overlaps " +
+              Gigabytes(cost.planBytes) +
+              (cost.planFactor > 1 ? " (on a grid that is " + std::to_string(cost.planFactor) + " times coarser)" : "") +
+              "; allowed are " + Gigabytes(cost.allowedBytes) + " beside the volumes");
+  session.Say(cost.slabs == 0   ? "  that does not fit"
+              : cost.slabs == 1 ? "  that fits as a whole"
               : IsWrittenBySlabs(output)
-                  ? "  it will be made and written in " + std::to_string(slabs) + " slabs"
-                  : "  it fits in " + std::to_string(slabs) + " slabs, but " + output + " would have to be written whole");
+                  ? "  it will be made and written in " + std::to_string(cost.slabs) + " slabs"
+                  : "  it fits in " + std::to_string(cost.slabs) + " slabs, but " + output + " would have to be written whole");
 }
 
 // What is counted in the result, and what of it is written.
 class Pieces {
 public:
-  Pieces(const StitchOptions& options) : options_(options) {}
+  Pieces(const std::string& output, bool keepsCoverage) : output_(output), keepsCoverage_(keepsCoverage) {}
 
   /// Takes a piece of the result as the stitcher made it.
   void Take(vtkImageData* piece)
@@ -123,10 +98,10 @@ public:
       valid_ += count > 0;
       shared_ += count > 1;
     }
-    if (FormatOfName(options_.output) == FileFormat::VtkXmlImage)
+    if (FormatOfName(output_) == FileFormat::VtkXmlImage)
       return; // it holds all
     // Other formats would only complain about what was not asked for.
-    if (!options_.uncertainty)
+    if (!keepsCoverage_)
       piece->GetPointData()->RemoveArray(vtkUltrasoundStitcher::CoverageName());
     piece->GetFieldData()->RemoveArray(vtkUltrasoundStitcher::StitchedVolumesName());
   }
@@ -134,7 +109,8 @@ public:
   double OverlapFraction() const { return valid_ ? static_cast<double>(shared_) / static_cast<double>(valid_) : 0.0; }
 
 private:
-  const StitchOptions& options_;
+  const std::string output_;
+  const bool keepsCoverage_;
   std::ptrdiff_t valid_ = 0, shared_ = 0;
 };
 
@@ -164,16 +140,14 @@ void TellQuality(Session& session, vtkImageData* stitched, const std::vector<Loa
   quality->SetInputData(stitched);
   quality->AddSourceData(BlocksOf(volumes));
   session.Update(quality, "quality");
-  const nlohmann::ordered_json report = nlohmann::ordered_json::parse(quality->GetReport());
-  session.result["quality"] = report;
-  const auto number = [&report](const char* key) {
-    return report[key].is_number() ? Fixed(report[key], 2) : std::string("not measurable");
-  };
-  session.Say("  seams: " + number("seam_mean") + " in the mean, " + number("seam_gradient") +
-              " in the gradient (1: as within single volumes); texture kept in overlaps: " + number("texture_kept"));
+  const StitchQualityReport& report = quality->Measured();
+  session.result["quality"] = ToJson(report);
+  const auto text = [](double number) { return std::isfinite(number) ? Fixed(number, 2) : std::string("not measurable"); };
+  session.Say("  seams: " + text(report.seamMean) + " in the mean, " + text(report.seamGradient) +
+              " in the gradient (1: as within single volumes); texture kept in overlaps: " + text(report.textureKept));
 }
 
-void Stitch(Session& session, StitchOptions options)
+void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stitcher)
 {
   options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
@@ -185,31 +159,23 @@ void Stitch(Session& session, StitchOptions options)
   if (options.reliability)
     AddReliability(session, volumes);
 
-  vtkNew<vtkUltrasoundStitcher> stitcher;
   stitcher->SetInputDataObject(BlocksOf(volumes));
-  stitcher->SetMethod(vtkUltrasoundStitcher::GetMethodFromName(options.method.c_str()));
-  stitcher->SetTexture(vtkUltrasoundStitcher::GetTextureFromName(options.texture.c_str()));
-  stitcher->SetSharpness(options.sharpness);
-  stitcher->SetDetailSharpness(options.detailSharpness);
-  stitcher->SetDetailScale(options.detailScale);
-  stitcher->SetEqualizeGain(options.gain);
-  stitcher->SetSpacingMm(options.spacingMm);
-  stitcher->SetAllowDisjoint(options.allowDisjoint);
-  stitcher->SetOutputSpread(options.uncertainty);
-  stitcher->SetMaximumMemoryGb(options.memoryGb);
   session.result["files"] = options.files;
   session.result["output"] = options.output;
-  session.result["method"] = options.method;
-  session.result["texture"] = options.texture;
-  session.result["sharpness"] = options.sharpness;
-  const nlohmann::ordered_json cost = Cost(session, stitcher);
+  session.result["method"] = stitcher->GetMethodAsString();
+  session.result["texture"] = stitcher->GetTextureAsString();
+  session.result["sharpness"] = stitcher->GetSharpness();
+  std::optional<StitchCost> known;
+  session.Watch(stitcher, "plan", {}, [&] { known = stitcher->Cost(); });
+  const StitchCost cost = known.value();
+  session.result.update(ToJson(cost));
   if (options.dryRun) {
     TellCost(session, cost, options.output);
     return;
   }
 
-  Pieces pieces(options);
-  const int slabs = cost["slabs"];
+  Pieces pieces(options.output, stitcher->GetOutputSpread());
+  const int slabs = cost.slabs;
   if (slabs > 1 && IsWrittenBySlabs(options.output)) {
     session.Note("the result is larger than the memory that is allowed: it is made and written in " + std::to_string(slabs) +
                  " slabs");
@@ -218,8 +184,8 @@ void Stitch(Session& session, StitchOptions options)
       session.Note("--quality: it needs the whole result in memory, and is left out");
   } else {
     if (slabs > 1)
-      throw Error(Error::Kind::TooLarge, options.output + ": the result needs " + Gigabytes(cost["output_bytes"]) +
-                                             " beside what is known of the overlaps, and " + Gigabytes(cost["allowed_bytes"]) +
+      throw Error(Error::Kind::TooLarge, options.output + ": the result needs " + Gigabytes(cost.outputBytes) +
+                                             " beside what is known of the overlaps, and " + Gigabytes(cost.allowedBytes) +
                                              " are allowed (--memory). Its format is written whole; as .mha, .nrrd or .nii it "
                                              "would be made in " +
                                              std::to_string(slabs) + " slabs");
@@ -229,20 +195,15 @@ void Stitch(Session& session, StitchOptions options)
     SaveVolume(session, stitched, options.output);
   }
 
-  Eigen::Vector3d origin, spacing;
-  stitcher->GetOutputInformation(0)->Get(vtkDataObject::ORIGIN(), origin.data());
-  stitcher->GetOutputInformation(0)->Get(vtkDataObject::SPACING(), spacing.data());
-  session.result["dimensions"] = cost["dimensions"];
-  session.result["spacing"] = JsonOf(spacing);
-  session.result["origin"] = JsonOf(origin);
+  const bool equalized = stitcher->GetEqualizeGain();
+  session.result["origin"] = JsonOf(cost.grid.origin);
   session.result["valid_voxels"] = pieces.Valid();
   session.result["overlap_fraction"] = pieces.OverlapFraction();
-  for (int volume = 0; options.gain && volume < static_cast<int>(volumes.size()); ++volume)
+  for (int volume = 0; equalized && volume < static_cast<int>(volumes.size()); ++volume)
     session.result["gains"].push_back({{"gain", stitcher->GetGain(volume)}, {"offset", stitcher->GetOffset(volume)}});
-  session.Say("wrote " + options.output + ": " + std::to_string(options.files.size()) + " volumes, " +
-              VoxelsText(cost["dimensions"], spacing));
+  session.Say("wrote " + options.output + ": " + std::to_string(options.files.size()) + " volumes, " + VoxelsText(cost.grid));
   session.Say("  " + Fixed(100.0 * pieces.OverlapFraction(), 1) + "% of the real voxels are seen by two volumes or more");
-  for (int volume = 0; options.gain && volume < static_cast<int>(volumes.size()); ++volume)
+  for (int volume = 0; equalized && volume < static_cast<int>(volumes.size()); ++volume)
     session.Say("  " + options.files[static_cast<std::size_t>(volume)] + ": values times " + Fixed(stitcher->GetGain(volume), 3) +
                 ", plus " + Fixed(stitcher->GetOffset(volume), 2));
   if (options.quality && slabs <= 1)
@@ -254,45 +215,24 @@ void Stitch(Session& session, StitchOptions options)
 Command StitchCommand(CLI::App& program)
 {
   auto values = std::make_shared<StitchOptions>();
+  const auto stitcher = vtkSmartPointer<vtkUltrasoundStitcher>::New();
   CLI::App* options = program.add_subcommand("stitch", "Blend overlapping volumes into one");
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong (default: where they say)");
-  options->add_option("--method", values->method, "What decides how much each volume counts in overlaps")
-      ->check(CLI::IsMember(NamesFrom(vtkUltrasoundStitcher::GetMethodName)))
-      ->capture_default_str();
-  options
-      ->add_option("--texture", values->texture, "What becomes of speckle and edges there (distance, feather and membrane only)")
-      ->check(CLI::IsMember(NamesFrom(vtkUltrasoundStitcher::GetTextureName)))
-      ->capture_default_str();
-  options
-      ->add_option("--sharpness", values->sharpness,
-                   "Exponent b of the weights (methods distance and membrane): 0 is the plain average")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  options->add_option("--detail-sharpness", values->detailSharpness, "The same for details (texture split)")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  options->add_option("--detail-scale", values->detailScale, "What is smaller than this is detail, voxels of the output")
-      ->check(CLI::Range(1.0, 100.0))
-      ->capture_default_str();
-  options->add_flag("--gain", values->gain, "Find a gain and an offset for each volume on the overlaps, and apply them");
-  options->add_option("--spacing", values->spacingMm, "Edge of the voxels in mm (0: the smallest of the volumes)")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
+  AddParameters(options, stitcher, {"Method", "Texture", "Sharpness", "DetailSharpness", "DetailScale"});
+  AddParameter(options, stitcher, "EqualizeGain", "--gain");
+  AddParameter(options, stitcher, "SpacingMm", "--spacing");
   options->add_flag("--reliability", values->reliability,
                     "Find shadows and saturated areas first, and weigh voxels by how far they can be trusted");
-  options->add_flag("--uncertainty", values->uncertainty,
-                    "Also write how many volumes see each voxel, and how far they disagree (NAME.Coverage, NAME.Spread)");
+  AddParameter(options, stitcher, "OutputSpread", "--uncertainty")
+      ->description("Also write how many volumes see each voxel, and how far they disagree (NAME.Coverage, NAME.Spread)");
   options->add_flag("--quality", values->quality, "Measure how visible the seams are, and how much texture was kept");
-  options->add_flag("--allow-disjoint", values->allowDisjoint, "Accept volumes that overlap no other");
-  options
-      ->add_option("--memory", values->memoryGb,
-                   "Memory beside the volumes, GB (0: three quarters of the machine's); a larger result is made slab by slab")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
+  AddParameter(options, stitcher, "AllowDisjoint");
+  AddParameter(options, stitcher, "MaximumMemoryGb", "--memory")
+      ->description("Memory beside the volumes, GB (0: three quarters of the machine's); a larger result is made slab by slab");
   options->add_flag("--dry-run", values->dryRun, "Tell the size of the result and the memory that it needs, and write nothing");
-  return {options, [values](Session& session) { Stitch(session, *values); }};
+  return {options, [values, stitcher](Session& session) { Stitch(session, *values, stitcher); }};
 }
 
 } // namespace echorama

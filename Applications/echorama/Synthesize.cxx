@@ -5,6 +5,7 @@
 #include "Filters/Acoustics/SceneTissue.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Meshes.h"
+#include "ParameterOptions.h"
 #include "RecordedMotion.h"
 #include "SyntheticSet.h"
 #include "Volumes.h"
@@ -26,7 +27,8 @@ namespace {
 struct SynthesizeOptions {
   std::string scene, folder, data, format = "mha";
   std::optional<std::uint64_t> seed;
-  std::optional<double> spacingMm;
+  SceneVolume volume;
+  CLI::Option* spacing = nullptr;
   int landmarks = 0;
 };
 
@@ -107,8 +109,8 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
 {
   SynthesisScene scene = ReadScene(options.scene, options.seed);
   scene.dataFolder = options.data;
-  if (options.spacingMm)
-    scene.volume.spacingMm = *options.spacingMm;
+  if (options.spacing->count() > 0)
+    scene.volume.spacingMm = options.volume.spacingMm;
   SynthesisParameters parameters = scene.Parameters();
   const std::vector<SceneView> views = ViewsOf(scene, parameters);
   std::vector<Landmark> places = PlacesOf(scene, options.landmarks, parameters.probe, views);
@@ -192,8 +194,7 @@ Command SynthesizeCommand(CLI::App& program)
       ->required();
   options->add_option("--seed", values->seed, "Seed instead of the scene's")
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62));
-  options->add_option("--spacing", values->spacingMm, "Edge of the voxels instead of the scene's, mm")
-      ->check(CLI::Range(0.05, 20.0));
+  values->spacing = AddParameter(options, Describe(values->volume), "SpacingMm", "--spacing")->default_str("the scene's");
   options->add_option("--data", values->data,
                       "Folder of the meshes and recordings that the scene names, whatever folder it says");
   options

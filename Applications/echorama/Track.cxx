@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama track: a tracker, live, replayed or simulated: what it sees, recorded, and passed on over OpenIGTLink.
 #include "Commands.h"
+#include "Core/Base/JoinedText.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Readers/OutputFiles.h"
-#include "Readers/TransformFile.h"
 #include "Tracking/Devices/OpenIgtLinkServer.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
@@ -66,10 +67,7 @@ void Report(Session& session, const StreamStatistics& statistics)
                 (std::isfinite(tool.latencySpreadSeconds)
                      ? ", latency within " + Fixed(1e3 * tool.latencySpreadSeconds, 2) + " ms of the smallest"
                      : ""));
-  std::uint64_t all = 0;
-  for (const std::uint64_t count : statistics.rejected)
-    all += count;
-  if (all > 0)
+  if (const std::uint64_t all = statistics.Rejected(); all > 0)
     session.Note(std::to_string(all) + " messages were not taken; the last: " + statistics.lastRejection);
 }
 
@@ -110,9 +108,9 @@ void Track(Session& session, TrackOptions options)
   std::unique_ptr<OpenIgtLinkServer> server;
   if (!options.serve.empty()) {
     const bool portAlone = options.serve.find_first_not_of("0123456789") == std::string::npos;
-    const auto place = TrackerAddress::Parse("igtl-listen://" + std::string(portAlone ? ":" : "") + options.serve)
-                           .HostAndPort("127.0.0.1", 18944);
     OpenIgtLinkServerParameters parameters;
+    const auto place = TrackerAddress::Parse("igtl-listen://" + std::string(portAlone ? ":" : "") + options.serve)
+                           .HostAndPort(parameters.host, parameters.port);
     parameters.host = place.host;
     parameters.port = place.port;
     server = std::make_unique<OpenIgtLinkServer>(parameters);
@@ -199,14 +197,11 @@ Command TrackCommand(CLI::App& program)
 {
   auto values = std::make_shared<TrackOptions>();
   CLI::App* options = program.add_subcommand("track", "Follow a tracker: what it sees, recorded, and passed on over OpenIGTLink");
-  std::string schemes;
-  for (const std::string& scheme : TrackerSchemes())
-    schemes += (schemes.empty() ? "" : ", ") + scheme;
   options
       ->add_option(
           "tracker", values->tracker,
           "The tracker, as SCHEME:PLACE?OPTION=VALUE (igtl://localhost:18944, polhemus:/dev/ttyUSB0, simulated: ...; schemes: " +
-              schemes + "), or a recording")
+              Joined(TrackerSchemes()) + "), or a recording")
       ->required();
   options->add_option("--record", values->record,
                       "Record to this sequence (.igs.mha), which must not be there yet; safe against a sudden end");

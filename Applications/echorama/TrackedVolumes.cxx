@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrackedVolumes.h"
-#include <CLI/Validators.hpp>
+#include "ParameterOptions.h"
 #include <vtkUltrasoundTrackerPlacement.h>
 
 namespace echorama {
@@ -17,20 +17,13 @@ void TrackerOptions::AddTo(CLI::App& options, bool required)
       "--at", matching.times,
       "When each volume was made, in seconds on the recording's clock (default: the volumes' time stamps, else the "
       "recording's poses one by one)");
-  options.add_option("--unit", unitMm, "Unit of the recording's lengths in mm; 1000: metres (default: as the file says)")
-      ->check(CLI::Range(1e-3, 1e6));
-  options
-      .add_option("--window", matching.smoothing.sigmaSeconds,
-                  "Standard deviation of the window over which the poses are averaged, in seconds; 0: none")
-      ->check(CLI::Range(0.0, 60.0))
-      ->capture_default_str();
+  AddParameter(&options, Describe(reading), "UnitMm", "--unit");
+  AddParameter(&options, Describe(matching), "WindowSeconds", "--window");
 }
 
-ToolTrack ReadTool(Session& session, const std::string& log, const std::string& tool, double unitMm)
+ToolTrack ReadTool(Session& session, const std::string& log, const std::string& tool, const PoseLogOptions& reading)
 {
-  PoseLogOptions options;
-  options.unitMm = unitMm;
-  const PoseLog recording = ReadPoseLog(log, options);
+  const PoseLog recording = ReadPoseLog(log, reading);
   try {
     const ToolTrack track = ToolTrackOf(recording, tool);
     for (const std::string& note : track.notes)

@@ -11,7 +11,7 @@ namespace echorama {
 /// What a subcommand is told of the recording of a tracker.
 struct TrackerOptions {
   std::string log, tool;
-  double unitMm = 0.0;                 ///< 0: as the file says
+  PoseLogOptions reading;
   TrackerPlacementParameters matching; ///< how volumes and poses belong together
 
   /// Adds --tracker, --tool, --at, --unit and --window.
@@ -19,7 +19,7 @@ struct TrackerOptions {
 };
 
 /// Reads the recording and tells its notes. Throws as ToolTrackOf.
-ToolTrack ReadTool(Session&, const std::string& log, const std::string& tool, double unitMm);
+ToolTrack ReadTool(Session&, const std::string& log, const std::string& tool, const PoseLogOptions& reading);
 
 /// The volumes as placement takes them. Throws when --at does not give a time for each.
 std::vector<TrackedVolume> TrackedVolumesOf(const TrackerOptions&, const std::vector<LoadedVolume>&);

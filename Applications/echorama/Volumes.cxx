@@ -30,13 +30,13 @@ LoadedVolume LoadVolume(Session& session, const std::string& file, const VolumeR
 {
   vtkNew<vtkUltrasoundReader> reader;
   reader->SetFileName(file.c_str());
-  reader->SetSpacingMm(reading.spacingMm);
-  reader->SetStackSpacingMm(reading.stackSpacingMm[0], reading.stackSpacingMm[1], reading.stackSpacingMm[2]);
+  reader->SetSpacingMm(reading.parameters.spacingMm);
+  reader->SetStackSpacingMm(reading.parameters.stackSpacingMm.data());
   LoadedVolume volume;
   volume.file = file;
   volume.content.format = FormatOfContent(file);
   if (volume.content.format != FileFormat::VtkXmlImage)
-    volume.content = OpenVolume(file, {reading.spacingMm, reading.stackSpacingMm})->Content();
+    volume.content = OpenVolume(file, reading.parameters)->Content();
   const std::vector<double>& times = volume.content.times;
   if (reading.step > 0 && reading.step >= static_cast<int>(times.size()))
     throw Error(Error::Kind::InvalidParameter, "--time " + std::to_string(reading.step) + ": " + file + " holds " +

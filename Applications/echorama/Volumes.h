@@ -23,10 +23,9 @@ struct LoadedVolume {
 
 /// How a volume is read where the file leaves it open.
 struct VolumeReading {
-  double spacingMm = 0.0;                                   ///< see vtkUltrasoundReader::SpacingMm
-  Eigen::Vector3d stackSpacingMm = Eigen::Vector3d::Zero(); ///< see vtkUltrasoundReader::StackSpacingMm
-  bool beams = false;                                       ///< the samples along beams, not their scan conversion
-  int step = 0;                                             ///< of a time series, from 0
+  VolumeReadParameters parameters;
+  bool beams = false; ///< the samples along beams, not their scan conversion
+  int step = 0;       ///< of a time series, from 0
 };
 
 /// Reads a volume. Throws Error that names the file.

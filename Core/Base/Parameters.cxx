@@ -77,6 +77,31 @@ constexpr std::string_view switchNames[] = {"off", "on"};
 
 } // namespace
 
+Choice& Choice::ByName()
+{
+  isByName = true;
+  return *this;
+}
+
+int Choice::Number() const
+{
+  return text_ ? static_cast<int>(std::find(names.begin(), names.end(), *text_) - names.begin()) : read_(place_);
+}
+
+void Choice::Set(int number)
+{
+  if (text_)
+    *text_ = names[static_cast<std::size_t>(number)];
+  else
+    write_(place_, number);
+}
+
+std::string Choice::Name() const
+{
+  const auto number = static_cast<std::size_t>(Number());
+  return number < names.size() ? names[number] : text_ ? *text_ : NumberText(Number());
+}
+
 bool ParameterRange::Holds(double value) const
 {
   return std::isfinite(value) && value <= high && (open ? value > low : value >= low);
@@ -99,6 +124,12 @@ std::string ParameterRange::Text() const
   if (fromBelow)
     return (open ? "above " : "at least ") + WholeOrNumber(low);
   return toAbove ? "at most " + WholeOrNumber(high) : "";
+}
+
+std::string ParameterRange::Demand() const
+{
+  const std::string text = Text();
+  return text.empty() ? "finite" : text.find_first_of("[(") == 0 ? "in " + text : text;
 }
 
 Parameter& Parameter::When(std::string other, std::string itsValue)
@@ -171,10 +202,7 @@ void Parameter::SetNumber(double number)
 
 std::string Parameter::Text() const
 {
-  return std::visit(Overloaded{[](const Choice& choice) {
-                                 const auto number = static_cast<std::size_t>(choice.Number());
-                                 return number < choice.names.size() ? choice.names[number] : NumberText(choice.Number());
-                               },
+  return std::visit(Overloaded{[](const Choice& choice) { return choice.Name(); },
                                [](const bool* place) { return std::string(switchNames[*place]); },
                                [](const std::string* place) { return *place; },
                                [](const Eigen::Vector3d* place) {
@@ -220,12 +248,14 @@ void Parameter::Check() const
 {
   const auto demand = [this](double number, const std::string& shown) {
     if (!range.Holds(number))
-      throw Error(Error::Kind::InvalidParameter, name + " is " + shown + (unit.empty() ? "" : " " + unit) + "; it must be " +
-                                                     (range.Text().empty()                    ? "finite"
-                                                      : range.Text().find_first_of("[(") == 0 ? "in " + range.Text()
-                                                                                              : range.Text()));
+      throw Error(Error::Kind::InvalidParameter,
+                  name + " is " + shown + (unit.empty() ? "" : " " + unit) + "; it must be " + range.Demand());
   };
-  std::visit(Overloaded{[](const Choice&) {}, [](const bool*) {}, [](const std::string*) {},
+  std::visit(Overloaded{[this](const Choice& choice) {
+                          if (static_cast<std::size_t>(choice.Number()) >= choice.names.size())
+                            Refuse(*this, "'" + choice.Name() + "'", "one of " + Listed(choice.names));
+                        },
+                        [](const bool*) {}, [](const std::string*) {},
                         [&](const Eigen::Vector3d* place) {
                           for (const double number : *place)
                             demand(number, "(" + Text() + ")");
@@ -234,10 +264,16 @@ void Parameter::Check() const
              value);
 }
 
-void CheckRanges(const ParameterList& parameters)
+void CheckRanges(const ParameterList& parameters, const std::string& place)
 {
-  for (const Parameter& parameter : parameters)
-    parameter.Check();
+  try {
+    for (const Parameter& parameter : parameters)
+      parameter.Check();
+  } catch (const Error& error) {
+    if (place.empty())
+      throw;
+    throw Error(error.GetKind(), place + ": " + error.what());
+  }
 }
 
 Parameter* Find(ParameterList& parameters, std::string_view name)
@@ -274,6 +310,15 @@ ParameterList Without(ParameterList parameters, const std::vector<std::string>& 
   return parameters;
 }
 
+ParameterList Renamed(ParameterList parameters, const std::string& from, const std::string& to)
+{
+  Named(parameters, from).name = to;
+  for (Parameter& parameter : parameters)
+    if (parameter.whenName == from)
+      parameter.whenName = to;
+  return parameters;
+}
+
 std::string DescriptionText(const ParameterList& parameters)
 {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -288,7 +333,10 @@ std::string DescriptionText(const ParameterList& parameters)
     std::visit(
         Overloaded{
             [&](const Choice& choice) {
-              describe("choice", choice.Number());
+              if (choice.isByName)
+                describe("name", choice.Name());
+              else
+                describe("choice", choice.Number());
               one["choices"] = choice.names;
             },
             [&](const double* place) { describe("number", *place); }, [&](const bool* place) { describe("switch", *place); },

@@ -31,10 +31,12 @@ struct ParameterRange {
   bool open = false; ///< low itself is not in it
 
   bool Holds(double value) const;
-  std::string Text() const; ///< "[0, 1000]", "above 0", "at least 1"; empty when every number is in it
+  std::string Text() const;   ///< "[0, 1000]", "above 0", "at least 1"; empty when every number is in it
+  std::string Demand() const; ///< what messages say that it must be: "in [0, 1000]", "above 0", "finite"
 };
 
-/// A value of an enumeration whose numbers are 0, 1, 2 ...; its names in that order, in small letters with hyphens.
+/// A value of an enumeration whose numbers are 0, 1, 2 ...; its names in that order, in small letters with hyphens. Or a text
+/// that is one of these names.
 class Choice {
 public:
   template <class T>
@@ -44,15 +46,23 @@ public:
     read_ = [](const void* from) { return static_cast<int>(*static_cast<const T*>(from)); };
     write_ = [](void* to, int number) { *static_cast<T*>(to) = static_cast<T>(number); };
   }
-  int Number() const { return read_(place_); }
-  void Set(int number) { write_(place_, number); }
+  Choice(std::string& place, std::vector<std::string> theNames) : names(std::move(theNames)), isByName(true), text_(&place) {}
+
+  /// VTK classes set and get it by its name ("tracked"), not by its number, as they do with a text.
+  Choice& ByName();
+
+  int Number() const; ///< beyond the last one for a text that is none of the names
+  void Set(int number);
+  std::string Name() const; ///< or the number that has none
 
   std::vector<std::string> names;
+  bool isByName = false;
 
 private:
-  void* place_;
-  int (*read_)(const void*);
-  void (*write_)(void*, int);
+  void* place_ = nullptr;
+  int (*read_)(const void*) = nullptr;
+  void (*write_)(void*, int) = nullptr;
+  std::string* text_ = nullptr;
 };
 
 /// One parameter of one struct: what it is, and where its value lies.
@@ -106,18 +116,19 @@ public:
   std::string Text() const;
   void Set(std::string_view text);
   ///@}
-  /// \throws Error(InvalidParameter) that names it, its value and its range, when it lies outside or is not finite
+  /// \throws Error(InvalidParameter) that names it, its value and its range, when it lies outside, is not finite, or is no choice
   void Check() const;
 };
 
 using ParameterList = std::vector<Parameter>;
 
-/// \throws Error(InvalidParameter) as Parameter::Check(), for the first that is out of its range
-void CheckRanges(const ParameterList& parameters);
+/// \throws Error(InvalidParameter) as Parameter::Check(), for the first that is out of its range; its message begins with
+/// \a place ("ball 4") when there is one
+void CheckRanges(const ParameterList& parameters, const std::string& place = {});
 template <class Struct>
-void CheckRanges(const Struct& parameters)
+void CheckRanges(const Struct& parameters, const std::string& place = {})
 {
-  CheckRanges(Describe(const_cast<Struct&>(parameters))); // which only reads
+  CheckRanges(Describe(const_cast<Struct&>(parameters)), place); // which only reads
 }
 
 /// \returns the one of that name, or nullptr.
@@ -129,9 +140,11 @@ Parameter& Named(ParameterList& parameters, std::string_view name);
 ParameterList Join(std::vector<ParameterList> lists);
 /// Without those of these names.
 ParameterList Without(ParameterList parameters, const std::vector<std::string>& names);
+/// With another name for one of them, also where others depend on it.
+ParameterList Renamed(ParameterList parameters, const std::string& from, const std::string& to);
 
-/// All but the places, as a JSON array of objects: name, label, type (number, integer, integer64, switch, choice, text, vector),
-/// value, unit, low, high, open, choices, when, advanced, help. Keys without a meaning for a parameter are left out.
+/// All but the places, as a JSON array of objects: name, label, type (number, integer, integer64, switch, choice, name, text,
+/// vector), value, unit, low, high, open, choices, when, advanced, help. Keys without a meaning for a parameter are left out.
 std::string DescriptionText(const ParameterList& parameters);
 
 } // namespace echorama

@@ -475,6 +475,12 @@ PlacedProbe FoundFrom(const ValidVoxels& region, const Progress& progress)
 
 } // namespace
 
+ParameterList Describe(EnclosingFanParameters& p)
+{
+  return {Parameter("MarginMm", p.marginMm, {0, Unlimited}, "mm",
+                    "How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides.")};
+}
+
 double FanVolume(const ProbeGeometry& geometry)
 {
   // Over depth the area is a polynomial of degree 2 at most (Simpson's rule is exact), over the fan it is smooth (Gauss).
@@ -501,9 +507,7 @@ double FanVolume(const ProbeGeometry& geometry)
 PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeometry& geometry,
                           const EnclosingFanParameters& parameters, const Progress& progress)
 {
-  if (!(parameters.marginMm >= 0.0) || !std::isfinite(parameters.marginMm))
-    throw Error(Error::Kind::InvalidParameter,
-                "enclosing fan: marginMm is " + std::to_string(parameters.marginMm) + "; it must be at least 0");
+  CheckRanges(parameters);
   geometry.Check("the volume");
   if (parameters.shape) {
     parameters.shape->geometry.Check();

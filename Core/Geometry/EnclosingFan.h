@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
@@ -8,10 +9,11 @@
 namespace echorama {
 
 struct EnclosingFanParameters {
-  double marginMm = 0.0; ///< that the fan reaches beyond the voxels' centres at least: in depth, and to all sides; >= 0
+  double marginMm = 0.0;
   /// The fan to enlarge, that of the machine which acquired the volumes; none: one is found from the region.
   std::optional<PlacedProbe> shape;
 };
+ParameterList Describe(EnclosingFanParameters& p);
 
 /// The fan of a machine that would have seen the whole region: the outline for a volume that is put together from many.
 ///

@@ -87,22 +87,19 @@ void CheckPoses(const std::vector<TimedPose>& poses)
 
 } // namespace
 
-void MotionSmoothing::Check() const
+ParameterList Describe(MotionSmoothing& p)
 {
-  const auto fail = [](const char* what, double value, const char* range) {
-    throw Error(Error::Kind::InvalidParameter,
-                std::string("motion path: ") + what + " is " + NumberText(value) + "; it must be in " + range);
-  };
-  if (!(sigmaSeconds >= 0.0 && sigmaSeconds <= 60.0))
-    fail("sigmaSeconds", sigmaSeconds, "[0, 60]");
-  if (!(longestGapSeconds > 0.0 && longestGapSeconds <= 600.0))
-    fail("longestGapSeconds", longestGapSeconds, "(0, 600]");
+  return {Parameter("WindowSeconds", p.sigmaSeconds, {0, 60}, "s",
+                    "Standard deviation of the window over which poses are averaged. 0: they stay as they are."),
+          Parameter("LongestGapSeconds", p.longestGapSeconds, {0, 600, true}, "s",
+                    "Poses that lie further apart are not connected: no pose is known between them.")
+              .Advanced()};
 }
 
 MotionPath::MotionPath(std::vector<TimedPose> poses, const MotionSmoothing& smoothing, const Progress& progress)
   : poses_(std::move(poses))
 {
-  smoothing.Check();
+  CheckRanges(smoothing);
   CheckPoses(poses_);
   const std::size_t count = poses_.size();
   std::vector<std::size_t> pieceBegin(count, 0), pieceEnd(count, count);

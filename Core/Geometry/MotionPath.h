@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <vector>
@@ -14,12 +15,9 @@ struct TimedPose {
 
 /// How a recorded motion is cleaned.
 struct MotionSmoothing {
-  double sigmaSeconds = 0.1;      ///< standard deviation of the Gaussian window, in [0, 60]; 0: poses stay as they are
-  double longestGapSeconds = 0.5; ///< poses that lie further apart are not connected, in (0, 600]
-
-  /// Throws Error(InvalidParameter) that names the number that is out of its range.
-  void Check() const;
+  double sigmaSeconds = 0.1, longestGapSeconds = 0.5;
 };
+ParameterList Describe(MotionSmoothing& p);
 
 /// A recorded motion, made smooth, that can be asked for any moment: of a tracked probe whose planes are to be imaged where
 /// they were.

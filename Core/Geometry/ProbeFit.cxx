@@ -577,15 +577,24 @@ std::vector<std::string> NotesOn(const FitChoice& choice, const Region& region, 
 
 } // namespace
 
+ParameterList Describe(ProbeFitParameters& p)
+{
+  return {
+      Parameter("MinimumOverlap", p.minimumOverlap, {0, 1}, "",
+                "Fits are refused when intersection over union of region and fan is less."),
+      Parameter("MaximumDistance", p.maximumDistance, {0, Unlimited, true}, "",
+                "Fits are refused when the outline of the region lies further from the fan's surface in the mean: a part of the "
+                "region's size, which is the cube root of its volume (of an image the square root of its area)."),
+      Parameter("OutlinePoints", p.outlinePoints, {100, Unlimited}, "",
+                "How many points of the outline take part in the last fit.")
+          .Advanced(),
+  };
+}
+
 ProbeFit FitProbe(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, const ProbeFitParameters& parameters,
                   const Progress& progress)
 {
-  if (!(parameters.minimumOverlap >= 0.0 && parameters.minimumOverlap <= 1.0))
-    throw Error(Error::Kind::InvalidParameter, "probe fit: minimumOverlap must be in [0, 1]");
-  if (!(parameters.maximumDistance > 0.0))
-    throw Error(Error::Kind::InvalidParameter, "probe fit: maximumDistance must be greater than 0");
-  if (parameters.outlinePoints < 100)
-    throw Error(Error::Kind::InvalidParameter, "probe fit: outlinePoints must be at least 100");
+  CheckRanges(parameters);
 
   Volume<unsigned char> all;
   if (valid.Empty()) {

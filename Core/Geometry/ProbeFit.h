@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
@@ -10,13 +11,13 @@ namespace echorama {
 
 /// How a probe geometry is fitted to a valid region, and what is refused.
 struct ProbeFitParameters {
-  double minimumOverlap = 0.75; ///< fits with less overlap are refused, [0, 1]
-  /// Fits whose surface lies further from the outline, in the mean, are refused: a part of the region's size, which is the
-  /// cube root of its volume (the square root of the area of a single slice); > 0. A ball has 0.05, a cylinder 0.03, a fan
-  /// without a fifth of its far end 0.02, a freehand sweep 0.01, a whole fan 0.003.
+  double minimumOverlap = 0.75;
+  /// A part of the region's size, which is the cube root of its volume (the square root of the area of a single slice). A ball
+  /// has 0.05, a cylinder 0.03, a fan without a fifth of its far end 0.02, a freehand sweep 0.01, a whole fan 0.003.
   double maximumDistance = 0.026;
-  int outlinePoints = 4000; ///< how many points of the outline take part in the last fit, >= 100
+  int outlinePoints = 4000;
 };
+ParameterList Describe(ProbeFitParameters& p);
 
 /// A probe geometry that was found, and how well it explains the region.
 struct ProbeFit {

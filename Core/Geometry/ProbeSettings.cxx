@@ -20,6 +20,25 @@ ParameterList Describe(ProbeSettings& p)
   };
 }
 
+ParameterList Describe(ConvexProbeSettings& p)
+{
+  ParameterList list = Describe(static_cast<ProbeSettings&>(p));
+  Named(list, "SweepAngle").help = "Angle that the array sweeps.";
+  Named(list, "FanWidth") = Parameter("FanRadius", p.fanRadius, {0, 10000}, "mm", "Radius of the array's arc.");
+  Named(list, "SweepWidth") =
+      Parameter("SweepRadius", p.sweepRadius, {0, 10000}, "mm",
+                "Distance of the sweep's axis behind the middle of the face. The edges of the fan must stay in front of it.");
+  return list;
+}
+
+PlacedProbe ConvexProbeSettings::Place() const
+{
+  PlacedProbe placed = ProbeSettings::Place();
+  placed.geometry.fanWidth = placed.geometry.fanAngle * fanRadius;
+  placed.geometry.sweepWidth = placed.geometry.sweepAngle * sweepRadius;
+  return placed;
+}
+
 PlacedProbe ProbeSettings::Place() const
 {
   PlacedProbe placed;

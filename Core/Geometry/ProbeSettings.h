@@ -18,4 +18,13 @@ struct ProbeSettings {
 
 ParameterList Describe(ProbeSettings& p);
 
+/// The same with the radii of a curved probe, from which the widths follow as its angles change.
+struct ConvexProbeSettings : ProbeSettings {
+  double fanRadius = 40.0, sweepRadius = 30.0;
+
+  PlacedProbe Place() const;
+};
+
+ParameterList Describe(ConvexProbeSettings& p);
+
 } // namespace echorama

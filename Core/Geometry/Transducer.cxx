@@ -6,11 +6,8 @@
 // the echo is the mean of both fronts'.
 #include "Core/Geometry/Transducer.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 namespace echorama {
 namespace {
@@ -36,21 +33,27 @@ double Transducer::PulseSigmaMm() const
   return 0.5e-3 * assumedSoundSpeed * sigmaMicroseconds;
 }
 
-void Transducer::Check() const
+ParameterList Describe(Transducer& t)
 {
-  const auto check = [](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, std::string("transducer: ") + what + " is " + NumberText(value) +
-                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
+  return {
+      Parameter("FrequencyMHz", t.frequencyMHz, {0.5, 50}, "MHz", "Centre frequency of the pulse."),
+      Parameter("Bandwidth", t.bandwidth, {0.05, 1.5}, "",
+                "Width of the two-way spectrum at -6 dB, as a share of the centre frequency."),
+      Parameter("LateralApertureMm", t.lateralApertureMm, {0.1, 100}, "mm", "Width of the active aperture along the fan."),
+      Parameter("LateralFocusMm", t.lateralFocusMm, {1, 1000}, "mm", "Way from the face to the transmit focus along the fan."),
+      Parameter("DynamicReceive", t.dynamicReceive,
+                "Whether receiving is focused at every depth along the fan; else at the transmit focus.")
+          .Advanced(),
+      Parameter("SmallestFNumber", t.smallestFNumber, {0.5, 10}, "",
+                "Dynamic receiving uses no more of the aperture than the depth divided by this.")
+          .When("DynamicReceive", "on")
+          .Advanced(),
+      Parameter("ElevationApertureMm", t.elevationApertureMm, {0.1, 100}, "mm", "Width of the lens along the sweep."),
+      Parameter("ElevationFocusMm", t.elevationFocusMm, {1, 1000}, "mm",
+                "Way from the face to the focus of the lens, for sending and receiving."),
+      Parameter("AssumedSoundSpeed", t.assumedSoundSpeed, {500, 5000}, "m/s", "How the scanner turns time into depth.")
+          .Advanced(),
   };
-  check("frequencyMHz", frequencyMHz, 0.5, 50.0);
-  check("bandwidth", bandwidth, 0.05, 1.5);
-  check("lateralApertureMm", lateralApertureMm, 0.1, 100.0);
-  check("lateralFocusMm", lateralFocusMm, 1.0, 1000.0);
-  check("smallestFNumber", smallestFNumber, 0.5, 10.0);
-  check("elevationApertureMm", elevationApertureMm, 0.1, 100.0);
-  check("elevationFocusMm", elevationFocusMm, 1.0, 1000.0);
-  check("assumedSoundSpeed (m/s)", assumedSoundSpeed, 500.0, 5000.0);
 }
 
 BeamWidth WidthAt(const Transducer& transducer, double wayMm)

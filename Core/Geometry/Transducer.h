@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 
 namespace echorama {
 
@@ -9,20 +10,14 @@ namespace echorama {
 /// the edges are 27 dB down, much like a Hann window. Sound leaves focused on one way; it is received with the focus on every
 /// way (dynamic) along the fan. Along the sweep a lens focuses both.
 struct Transducer {
-  double frequencyMHz = 3.5;         ///< centre frequency, in [0.5, 50]
-  double bandwidth = 0.6;            ///< -6 dB width of the two-way spectrum beside the centre frequency, in [0.05, 1.5]
-  double lateralApertureMm = 14.0;   ///< width of the active aperture along the fan, in [0.1, 100]
-  double lateralFocusMm = 70.0;      ///< transmit focus along the fan, way from the face, in [1, 1000]
-  bool dynamicReceive = true;        ///< whether receiving is focused everywhere; else at the transmit focus
-  double smallestFNumber = 1.0;      ///< dynamic receiving uses no more of the aperture than the way over this, in [0.5, 10]
-  double elevationApertureMm = 10.0; ///< of the lens along the sweep, in [0.1, 100]
-  double elevationFocusMm = 70.0;    ///< of the lens, sending and receiving, in [1, 1000]
-  double assumedSoundSpeed = 1540.0; ///< m/s, in [500, 5000]: how the scanner turns time into depth
+  double frequencyMHz = 3.5, bandwidth = 0.6;
+  double lateralApertureMm = 14.0, lateralFocusMm = 70.0;
+  bool dynamicReceive = true;
+  double smallestFNumber = 1.0;
+  double elevationApertureMm = 10.0, elevationFocusMm = 70.0;
+  double assumedSoundSpeed = 1540.0;
 
   static constexpr double sigmasPerAperture = 5.0; ///< of the apodisation, from edge to edge
-
-  /// Throws Error(InvalidParameter) that names the number that is out of its range.
-  void Check() const;
 
   double WavelengthMm(double soundSpeed) const { return 1e-3 * soundSpeed / frequencyMHz; } ///< \a soundSpeed in m/s
   double WavelengthMm() const { return WavelengthMm(assumedSoundSpeed); }
@@ -31,6 +26,8 @@ struct Transducer {
   /// Standard deviation of the Gaussian envelope of the two-way pulse (amplitudes), mm of scan depth.
   double PulseSigmaMm() const;
 };
+
+ParameterList Describe(Transducer& t);
 
 /// The two-way response across a beam, of amplitudes: exp(-x^2 / (2 sigma^2)) along the fan and alike along the sweep. An
 /// echo from x beside the axis comes later by curvature x^2 / 2 mm of depth.

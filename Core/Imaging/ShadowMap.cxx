@@ -17,6 +17,7 @@
 // Random walks (Karamalis et al. 2012) ask for the same with a sparse system as large as the image, in which a bright reflector
 // and a cyst both hold walkers up; here fluid is excused by the tissue behind it.
 #include "Core/Imaging/ShadowMap.h"
+#include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/VoxelTypes.h"
@@ -545,27 +546,44 @@ int DepthAxisOf(const ReliabilityParameters& p, const std::array<int, 3>& n)
 
 } // namespace
 
-void ReliabilityParameters::Check() const
+ParameterList Describe(ReliabilityParameters& p)
 {
-  const auto check = [](bool good, const char* name, double value, const char* range) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter,
-                  "reliability: " + std::string(name) + " is " + std::to_string(value) + "; it must be in " + range);
+  return {
+      Parameter("DepthAxis", p.depthAxis, {-1, 2}, "",
+                "Where no probe is known: the index axis along which depth grows. -1: the last one with several voxels.")
+          .Advanced(),
+      Parameter("DepthReversed", p.depthReversed, "Whether, where no probe is known, depth grows towards smaller indices.")
+          .Advanced(),
+      Parameter("Resolution", p.resolution, {16, 512}, "cells",
+                "How finely shadows are sought: cells along the longest side of the volume, at most one per voxel. More show "
+                "narrower shadows, and more noise.")
+          .Advanced(),
+      Parameter("ShadowLevel", p.shadowLevel, {0, 1}, "",
+                "The end of a beam that gets no brighter than this is in shadow, reliability 0: a part of the way from black to "
+                "ordinary tissue at its depth."),
+      Parameter("TissueLevel", p.tissueLevel, {0, 1}, "",
+                "The end of a beam that gets as bright as this is fully reliable; above ShadowLevel."),
+      Parameter("LeastEcho", p.leastEcho, {0, 0.25}, "",
+                "What is bright over less than this part of a beam is a speck, and no proof of sound.")
+          .Advanced(),
+      Parameter("LeastShadow", p.leastShadow, {0, 1}, "",
+                "Dark ends shorter than half of this part of a beam are left alone, those longer than it count in full.")
+          .Advanced(),
+      Parameter("SaturatedShare", p.saturatedShare, {0, 0.999}, "",
+                "Where more than this part of 3 x 3 x 3 cells has the largest value of the volume, reliability falls, to 0 where "
+                "all of it has.")
+          .Advanced(),
   };
-  check(resolution >= 16 && resolution <= 512, "the resolution", resolution, "[16, 512]");
-  check(shadowLevel >= 0.0 && shadowLevel < 1.0, "the shadow level", shadowLevel, "[0, 1)");
-  check(tissueLevel > shadowLevel && tissueLevel <= 1.0, "the tissue level", tissueLevel, "(shadow level, 1]");
-  check(leastEcho >= 0.0 && leastEcho <= 0.25, "the least echo", leastEcho, "[0, 0.25]");
-  check(leastShadow >= 0.0 && leastShadow <= 1.0, "the least shadow", leastShadow, "[0, 1]");
-  check(saturatedShare >= 0.0 && saturatedShare < 1.0, "the saturated share", saturatedShare, "[0, 1)");
-  check(depthAxis >= -1 && depthAxis <= 2, "the depth axis", depthAxis, "[-1, 2]");
 }
 
 template <class T>
 Reliability MeasureReliability(const PosedVolume<T>& volume, const std::optional<PlacedProbe>& probe,
                                const ReliabilityParameters& p, const Progress& progress)
 {
-  p.Check();
+  CheckRanges(p);
+  if (!(p.tissueLevel > p.shadowLevel))
+    throw Error(Error::Kind::InvalidParameter, "TissueLevel is " + NumberText(p.tissueLevel) +
+                                                   "; it must be above ShadowLevel, which is " + NumberText(p.shadowLevel));
   const auto& n = volume.geometry.dimensions;
   volume.geometry.Check("the volume");
   if (volume.intensity.Dimensions() != n || (!volume.valid.Empty() && volume.valid.Dimensions() != n))

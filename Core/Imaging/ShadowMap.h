@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeFit.h"
 #include "Core/Geometry/ProbeGeometry.h"
@@ -13,19 +14,14 @@ namespace echorama {
 /// What counts as a shadow and what as saturated. Levels are parts of the way from black (a voxel in a hundred or so is as dark)
 /// to the grey of ordinary tissue at that depth, so that gain and type do not matter. Lengths are parts of a beam.
 struct ReliabilityParameters {
-  int resolution = 96;         ///< cells along the longest side of the volume, at most one per voxel, [16, 512]
-  double shadowLevel = 0.3;    ///< a tail of a beam no brighter than this is shadow: reliability 0, [0, 1)
-  double tissueLevel = 0.7;    ///< one that gets as bright as this is not: reliability 1, (shadowLevel, 1]
-  double leastEcho = 0.03;     ///< what is brighter over less than this length is a speck, and no proof of sound, [0, 0.25]
-  double leastShadow = 0.2;    ///< dark tails shorter than half of this are left alone, those longer count in full, [0, 1]
-  double saturatedShare = 0.5; ///< of a neighbourhood of 3 x 3 x 3 cells at the top value: below it reliability is 1, then falls
-                               ///< to 0 where all of it is, [0, 1)
-  int depthAxis = -1;          ///< without a probe: index axis along which depth grows, 0 to 2; -1: the last with several voxels
-  bool depthReversed = false;  ///< without a probe: whether depth grows towards smaller indices
-
-  /// Throws Error(InvalidParameter) that names the number which is out of its range.
-  void Check() const;
+  int resolution = 96;
+  double shadowLevel = 0.3, tissueLevel = 0.7;
+  double leastEcho = 0.03, leastShadow = 0.2;
+  double saturatedShare = 0.5;
+  int depthAxis = -1;
+  bool depthReversed = false;
 };
+ParameterList Describe(ReliabilityParameters& p);
 
 /// A map and what was found.
 struct Reliability {
@@ -56,7 +52,8 @@ struct Reliability {
 /// Source: dark tails of beams as shadows after Hellier et al. 2010; what can be trusted as a matter of transmission after
 /// Karamalis et al. 2012, by a closed form in place of their random walks.
 /// \throws Error(BadInput) for a geometry that is not one, views that do not agree with it, no real voxel, or a pose that is
-/// not rigid; Error(InvalidParameter) as the parameters' and the probe's Check(), Error(Cancelled).
+/// not rigid; Error(InvalidParameter) for parameters out of range, a tissueLevel that is not above shadowLevel, and as the
+/// probe's Check(); Error(Cancelled).
 template <class T>
 Reliability MeasureReliability(const PosedVolume<T>& volume, const std::optional<PlacedProbe>& probe,
                                const ReliabilityParameters& parameters = {}, const Progress& progress = {});

@@ -15,6 +15,8 @@
 
 vtkStandardNewMacro(vtkUltrasoundDistanceMap);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundDistanceMap);
+
 namespace {
 // 1 in the region, else 0.
 echorama::Volume<unsigned char> RegionOf(const vtkUltrasoundVolume::Input& input, bool chosen)
@@ -38,6 +40,16 @@ echorama::Volume<unsigned char> RegionOf(const vtkUltrasoundVolume::Input& input
 } // namespace
 
 //----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundDistanceMap::Parameters()
+{
+  using echorama::Parameter;
+  return {Parameter("Measure", echorama::Choice(this->Measured, {"outside", "inside", "signed"}),
+                    "Outside: the distance to the nearest voxel of the region, 0 inside it. Inside: the distance to the nearest "
+                    "voxel outside the region or beyond the grid, 0 outside it. Signed: the first less the second."),
+          Parameter("Squared", this->Squares, "Whether distances are put out squared (mm^2), with their sign.")};
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundDistanceMap::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
@@ -49,20 +61,20 @@ void vtkUltrasoundDistanceMap::Execute(vtkInformationVector** inputs, vtkImageDa
   output->ShallowCopy(image);
   const auto distance = vtkUltrasoundVolume::ViewOf<float>(AddArray(output, DistanceName(), VTK_FLOAT), output);
   echorama::Volume<float> inside;
-  if (this->Measure == INSIDE) {
+  if (this->Measured == INSIDE) {
     echorama::SquaredDepthMap(region.View(), spacing, distance, progress);
   } else {
-    echorama::SquaredDistanceMap(region.View(), spacing, distance, progress.Part(0.0, this->Measure == SIGNED ? 0.5 : 1.0));
+    echorama::SquaredDistanceMap(region.View(), spacing, distance, progress.Part(0.0, this->Measured == SIGNED ? 0.5 : 1.0));
   }
-  if (this->Measure == SIGNED) {
+  if (this->Measured == SIGNED) {
     inside = echorama::Volume<float>(region.Dimensions());
     echorama::SquaredDepthMap(region.View(), spacing, inside.View(), progress.Part(0.5, 1.0));
   }
   echorama::ParallelRanges(distance.Size(), 65536, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (std::ptrdiff_t i = begin; i < end; ++i) {
-      const bool deep = this->Measure == SIGNED && region.View()[i];
+      const bool deep = this->Measured == SIGNED && region.View()[i];
       const float square = deep ? inside.View()[i] : distance[i];
-      const float size = this->Squared ? square : std::sqrt(square);
+      const float size = this->Squares ? square : std::sqrt(square);
       distance[i] = deep ? -size : size;
     }
   });
@@ -72,6 +84,5 @@ void vtkUltrasoundDistanceMap::Execute(vtkInformationVector** inputs, vtkImageDa
 void vtkUltrasoundDistanceMap::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Measure: " << (this->Measure == OUTSIDE ? "outside" : this->Measure == INSIDE ? "inside" : "signed") << "\n";
-  os << indent << "Squared: " << this->Squared << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

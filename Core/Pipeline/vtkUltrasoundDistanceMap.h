@@ -21,36 +21,67 @@
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
+#ifndef __VTK_WRAP__
+#include "vtkUltrasoundParameters.h"
+#endif
+
 class ECHORAMACORE_EXPORT vtkUltrasoundDistanceMap : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundDistanceMap* New();
   vtkTypeMacro(vtkUltrasoundDistanceMap, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum MeasureType {
-    OUTSIDE = 0, ///< distance to the nearest voxel of the region; 0 inside
-    INSIDE = 1,  ///< distance to the nearest voxel outside the region, or beyond the grid; 0 outside
-    SIGNED = 2   ///< OUTSIDE less INSIDE: negative inside the region
-  };
+  // BEGIN parameters
+  enum Measures { OUTSIDE = 0, INSIDE = 1, SIGNED = 2 };
 
   ///@{
-  /** What is measured. Default OUTSIDE. */
-  vtkSetClampMacro(Measure, int, OUTSIDE, SIGNED);
-  vtkGetMacro(Measure, int);
+  /**
+   * Outside: the distance to the nearest voxel of the region, 0 inside it. Inside: the distance to the nearest voxel outside the
+   * region or beyond the grid, 0 outside it. Signed: the first less the second. Default outside. There are OUTSIDE, INSIDE,
+   * SIGNED.
+   */
+  void SetMeasure(int value) { this->SetParameter("Measure", value); }
+  int GetMeasure() { return static_cast<int>(this->GetParameter("Measure")); }
   void SetMeasureToOutside() { this->SetMeasure(OUTSIDE); }
   void SetMeasureToInside() { this->SetMeasure(INSIDE); }
   void SetMeasureToSigned() { this->SetMeasure(SIGNED); }
+  std::string GetMeasureAsString() { return this->GetParameterAsText("Measure"); }
   ///@}
 
   ///@{
-  /** Put out squared distances (mm^2; with their sign for SIGNED). Default off. */
-  vtkSetMacro(Squared, bool);
-  vtkGetMacro(Squared, bool);
-  vtkBooleanMacro(Squared, bool);
+  /** Whether distances are put out squared (mm^2), with their sign. Default off. */
+  void SetSquared(bool value) { this->SetParameter("Squared", value); }
+  bool GetSquared() { return this->GetParameter("Squared") != 0.0; }
+  void SquaredOn() { this->SetSquared(true); }
+  void SquaredOff() { this->SetSquared(false); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   /** Name of the array that is added. */
   static const char* DistanceName() { return "Distance"; }
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundDistanceMap() = default;
@@ -64,8 +95,8 @@ private:
   vtkUltrasoundDistanceMap(const vtkUltrasoundDistanceMap&) = delete;
   void operator=(const vtkUltrasoundDistanceMap&) = delete;
 
-  int Measure = OUTSIDE;
-  bool Squared = false;
+  int Measured = 0; // of Measures
+  bool Squares = false;
 };
 
 #endif

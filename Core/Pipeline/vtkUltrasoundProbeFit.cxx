@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundProbeFit.h"
 
-#include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "vtkUltrasoundAcquisition.h"
 
@@ -9,8 +8,11 @@
 #include "vtkObjectFactory.h"
 
 #include <algorithm>
+#include <utility>
 
 vtkStandardNewMacro(vtkUltrasoundProbeFit);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundProbeFit);
 
 namespace {
 // 1 where a voxel is real, else 0.
@@ -25,13 +27,21 @@ echorama::Volume<unsigned char> RegionOf(const vtkUltrasoundVolume::Input& input
 } // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundProbeFit::vtkUltrasoundProbeFit()
+echorama::ParameterList vtkUltrasoundProbeFit::Parameters()
 {
-  const echorama::ProbeFitParameters defaults;
-  this->MinimumOverlap = defaults.minimumOverlap;
-  this->MaximumDistance = defaults.maximumDistance;
-  this->OutlinePoints = defaults.outlinePoints;
-  this->MarginMm = echorama::EnclosingFanParameters().marginMm;
+  echorama::ParameterList fit = Describe(this->Fitting), enclose = Describe(this->Enclosing);
+  for (echorama::Parameter& parameter : fit) {
+    parameter.When("EncloseRegion", "off");
+  }
+  for (echorama::Parameter& parameter : enclose) {
+    parameter.When("EncloseRegion", "on");
+  }
+  return echorama::Join({std::move(fit),
+                         {echorama::Parameter("EncloseRegion", this->Encloses,
+                                              "Whether the fan must hold every real voxel: the least that does, found from the "
+                                              "region or enlarged from the probe that the volume has, for regions of any shape "
+                                              "such as stitched volumes.")},
+                         std::move(enclose)});
 }
 
 //----------------------------------------------------------------------------
@@ -80,8 +90,7 @@ echorama::ProbeFit vtkUltrasoundProbeFit::Enclose(vtkImageData* image, const ech
   const auto geometry = vtkUltrasoundVolume::GeometryOf(image);
   const auto recorded = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
   const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image);
-  echorama::EnclosingFanParameters parameters;
-  parameters.marginMm = this->MarginMm;
+  echorama::EnclosingFanParameters parameters = this->Enclosing;
   if (recorded && pose) {
     parameters.shape = echorama::PlacedProbe{*recorded, *pose};
   }
@@ -101,27 +110,24 @@ echorama::ProbeFit vtkUltrasoundProbeFit::Enclose(vtkImageData* image, const ech
 //----------------------------------------------------------------------------
 void vtkUltrasoundProbeFit::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
+  echorama::CheckRanges(this->Parameters());
   this->Remember({});
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
   const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
   const auto region = RegionOf(input);
 
-  echorama::ProbeFitParameters parameters;
-  parameters.minimumOverlap = this->MinimumOverlap;
-  parameters.maximumDistance = this->MaximumDistance;
-  parameters.outlinePoints = this->OutlinePoints;
-  echorama::ProbeFit fit = this->EncloseRegion
-                               ? this->Enclose(image, region, progress)
-                               : echorama::FitProbe(region.View(), vtkUltrasoundVolume::GeometryOf(image), parameters, progress);
+  echorama::ProbeFit fit =
+      this->Encloses ? this->Enclose(image, region, progress)
+                     : echorama::FitProbe(region.View(), vtkUltrasoundVolume::GeometryOf(image), this->Fitting, progress);
 
   if (!input.ValidRegion) {
     fit.notes.insert(fit.notes.begin(), "The volume has no valid region: every voxel counts as valid.");
   }
   if (const auto known = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
-      known && this->EncloseRegion && vtkUltrasoundAcquisition::ProbeToWorldOf(image)) {
+      known && this->Encloses && vtkUltrasoundAcquisition::ProbeToWorldOf(image)) {
     fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry; the fan is that, or larger.");
   } else if (known) {
-    fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry; it was replaced.");
+    fit.notes.insert(fit.notes.begin(), "The volume had a probe geometry, which the fit does not use.");
   }
   output->ShallowCopy(image);
   vtkUltrasoundAcquisition::SetProbeGeometry(output, fit.geometry);
@@ -133,11 +139,7 @@ void vtkUltrasoundProbeFit::Execute(vtkInformationVector** inputs, vtkImageData*
 void vtkUltrasoundProbeFit::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "MinimumOverlap: " << this->MinimumOverlap << "\n";
-  os << indent << "MaximumDistance: " << this->MaximumDistance << "\n";
-  os << indent << "OutlinePoints: " << this->OutlinePoints << "\n";
-  os << indent << "EncloseRegion: " << this->EncloseRegion << "\n";
-  os << indent << "MarginMm: " << this->MarginMm << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "ResidualMm: " << this->ResidualMm << "\n";
   os << indent << "MeanDistance: " << this->MeanDistance << "\n";
   os << indent << "Overlap: " << this->Overlap << "\n";

@@ -22,7 +22,9 @@
 #include "vtkUltrasoundImageAlgorithm.h"
 
 #ifndef __VTK_WRAP__
+#include "Core/Geometry/EnclosingFan.h"
 #include "Core/Geometry/ProbeFit.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 #include <string>
@@ -33,43 +35,71 @@ public:
   vtkTypeMacro(vtkUltrasoundProbeFit, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** Fits are refused when intersection over union of region and fan is less, in [0, 1]. Default 0.75. */
-  vtkSetClampMacro(MinimumOverlap, double, 0.0, 1.0);
-  vtkGetMacro(MinimumOverlap, double);
+  /**
+   * Fits are refused when intersection over union of region and fan is less. Used when EncloseRegion is off. In [0, 1]; default
+   * 0.75.
+   */
+  void SetMinimumOverlap(double value) { this->SetParameter("MinimumOverlap", value); }
+  double GetMinimumOverlap() { return this->GetParameter("MinimumOverlap"); }
   ///@}
 
   ///@{
   /**
-   * Fits are refused when the outline of the region lies further from the fan's surface, in the mean: a part of the region's
-   * size (cube root of its volume, square root of the area of an image), in [0.0001, 10]. Default 0.026.
+   * Fits are refused when the outline of the region lies further from the fan's surface in the mean: a part of the region's size,
+   * which is the cube root of its volume (of an image the square root of its area). Used when EncloseRegion is off. Above 0;
+   * default 0.026.
    */
-  vtkSetClampMacro(MaximumDistance, double, 1e-4, 10.0);
-  vtkGetMacro(MaximumDistance, double);
+  void SetMaximumDistance(double value) { this->SetParameter("MaximumDistance", value); }
+  double GetMaximumDistance() { return this->GetParameter("MaximumDistance"); }
   ///@}
 
   ///@{
-  /** How many points of the outline take part in the last fit, in [100, 1000000]. Default 4000. */
-  vtkSetClampMacro(OutlinePoints, int, 100, 1000000);
-  vtkGetMacro(OutlinePoints, int);
+  /** How many points of the outline take part in the last fit. Used when EncloseRegion is off. At least 100; default 4000. */
+  void SetOutlinePoints(int value) { this->SetParameter("OutlinePoints", value); }
+  int GetOutlinePoints() { return static_cast<int>(this->GetParameter("OutlinePoints")); }
   ///@}
 
   ///@{
   /**
-   * Whether the fan must hold every real voxel: the least that does, found from the region or, where the volume has probe
-   * geometry and pose, enlarged from these (they stay when they hold all). Such a region need not be a fan, so
-   * MinimumOverlap, MaximumDistance and OutlinePoints are not used. Default off.
+   * Whether the fan must hold every real voxel: the least that does, found from the region or enlarged from the probe that the
+   * volume has, for regions of any shape such as stitched volumes. Default off.
    */
-  vtkSetMacro(EncloseRegion, bool);
-  vtkGetMacro(EncloseRegion, bool);
-  vtkBooleanMacro(EncloseRegion, bool);
+  void SetEncloseRegion(bool value) { this->SetParameter("EncloseRegion", value); }
+  bool GetEncloseRegion() { return this->GetParameter("EncloseRegion") != 0.0; }
+  void EncloseRegionOn() { this->SetEncloseRegion(true); }
+  void EncloseRegionOff() { this->SetEncloseRegion(false); }
   ///@}
 
   ///@{
-  /** With EncloseRegion: how far the fan reaches beyond the voxels at least, mm, in [0, 1000]. Default 0. */
-  vtkSetClampMacro(MarginMm, double, 0.0, 1000.0);
-  vtkGetMacro(MarginMm, double);
+  /**
+   * How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. Used when EncloseRegion is on.
+   * At least 0 mm; default 0.
+   */
+  void SetMarginMm(double value) { this->SetParameter("MarginMm", value); }
+  double GetMarginMm() { return this->GetParameter("MarginMm"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /**
@@ -86,6 +116,8 @@ public:
   std::string GetNotes() const { return this->Notes; }
 
 #ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+
   /**
    * The probe of a volume: the recorded one (`ProbeGeometry` and `ProbeToWorld` both), else one that is fitted to where the
    * volume is real; \a notes then tells so and what the region leaves open, one per line. Throws echorama::Error that names the
@@ -96,7 +128,7 @@ public:
 #endif
 
 protected:
-  vtkUltrasoundProbeFit();
+  vtkUltrasoundProbeFit() = default;
   ~vtkUltrasoundProbeFit() override = default;
 
 #ifndef __VTK_WRAP__
@@ -111,13 +143,12 @@ private:
   void Remember(const echorama::ProbeFit& fit);
   echorama::ProbeFit Enclose(vtkImageData* image, const echorama::Volume<unsigned char>& region,
                              const echorama::Progress& progress) const;
+
+  echorama::ProbeFitParameters Fitting;
+  echorama::EnclosingFanParameters Enclosing;
 #endif
 
-  double MinimumOverlap;
-  double MaximumDistance;
-  int OutlinePoints;
-  bool EncloseRegion = false;
-  double MarginMm;
+  bool Encloses = false;
   double ResidualMm = 0.0;
   double MeanDistance = 0.0;
   double Overlap = 0.0;

@@ -10,23 +10,21 @@
 
 vtkStandardNewMacro(vtkUltrasoundReliabilityMap);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundReliabilityMap);
+
 //----------------------------------------------------------------------------
-vtkUltrasoundReliabilityMap::vtkUltrasoundReliabilityMap()
+echorama::ParameterList vtkUltrasoundReliabilityMap::Parameters()
 {
-  const echorama::ReliabilityParameters defaults;
-  this->DepthAxis = defaults.depthAxis;
-  this->DepthReversed = defaults.depthReversed;
-  this->Resolution = defaults.resolution;
-  this->ShadowLevel = defaults.shadowLevel;
-  this->TissueLevel = defaults.tissueLevel;
-  this->LeastEcho = defaults.leastEcho;
-  this->LeastShadow = defaults.leastShadow;
-  this->SaturatedShare = defaults.saturatedShare;
+  return echorama::Join({{echorama::Parameter("FitProbe", this->Fitted,
+                                              "Whether a probe is fitted to the valid region of a volume that brings none. Where "
+                                              "none fits, beams are lines of voxels along the depth axis.")},
+                         Describe(this->Values)});
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundReliabilityMap::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
+  echorama::CheckRanges(this->Parameters());
   this->ShadowFraction = this->SaturatedFraction = 0.0;
   this->Note.clear();
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
@@ -40,7 +38,7 @@ void vtkUltrasoundReliabilityMap::Execute(vtkInformationVector** inputs, vtkImag
   if (geometry && pose) {
     probe = {*geometry, *pose};
     note = "Beams are those of the volume's probe.";
-  } else if (this->FitProbe) {
+  } else if (this->Fitted) {
     vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
       std::string reason;
       probe =
@@ -51,18 +49,9 @@ void vtkUltrasoundReliabilityMap::Execute(vtkInformationVector** inputs, vtkImag
   }
 
   // 2. the map
-  echorama::ReliabilityParameters parameters;
-  parameters.depthAxis = this->DepthAxis;
-  parameters.depthReversed = this->DepthReversed;
-  parameters.resolution = this->Resolution;
-  parameters.shadowLevel = this->ShadowLevel;
-  parameters.tissueLevel = this->TissueLevel;
-  parameters.leastEcho = this->LeastEcho;
-  parameters.leastShadow = this->LeastShadow;
-  parameters.saturatedShare = this->SaturatedShare;
   echorama::Reliability reliability;
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
-    reliability = echorama::MeasureReliability(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), probe, parameters,
+    reliability = echorama::MeasureReliability(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), probe, this->Values,
                                                progress.Part(0.7, 1.0));
   });
   for (const std::string& further : reliability.notes) {
@@ -83,15 +72,7 @@ void vtkUltrasoundReliabilityMap::Execute(vtkInformationVector** inputs, vtkImag
 void vtkUltrasoundReliabilityMap::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FitProbe: " << this->FitProbe << "\n";
-  os << indent << "DepthAxis: " << this->DepthAxis << "\n";
-  os << indent << "DepthReversed: " << this->DepthReversed << "\n";
-  os << indent << "Resolution: " << this->Resolution << "\n";
-  os << indent << "ShadowLevel: " << this->ShadowLevel << "\n";
-  os << indent << "TissueLevel: " << this->TissueLevel << "\n";
-  os << indent << "LeastEcho: " << this->LeastEcho << "\n";
-  os << indent << "LeastShadow: " << this->LeastShadow << "\n";
-  os << indent << "SaturatedShare: " << this->SaturatedShare << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "ShadowFraction: " << this->ShadowFraction << "\n";
   os << indent << "SaturatedFraction: " << this->SaturatedFraction << "\n";
   os << indent << "Note: " << this->Note << "\n";

@@ -17,6 +17,21 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundScanConverter);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundScanConverter);
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundScanConverter::Parameters()
+{
+  using echorama::Parameter;
+  return {Parameter("SpacingMm", this->Spacing, {0, 1000}, "mm",
+                    "Edge of a voxel. 0: the geometric mean of the distances between samples, beams and steps halfway down the "
+                    "middle beam, so that about as many voxels lie inside the fan as there are samples."),
+          Parameter("MaximumVoxels", this->MostVoxels, {1, echorama::Unlimited}, "",
+                    "The output is refused when it would have more voxels. A voxel takes the bytes of its type and one for its "
+                    "valid region.")
+              .Advanced()};
+}
+
 // What the input says and the grid that follows from it.
 struct vtkUltrasoundScanConverter::Job {
   vtkUltrasoundVolume::Input Input;
@@ -28,6 +43,7 @@ struct vtkUltrasoundScanConverter::Job {
 //----------------------------------------------------------------------------
 vtkUltrasoundScanConverter::Job vtkUltrasoundScanConverter::Prepare(vtkInformationVector** inputs)
 {
+  echorama::CheckRanges(this->Parameters());
   Job job;
   job.Input = vtkUltrasoundVolume::CheckInput(this, vtkImageData::GetData(inputs[0]), "the beam volume");
   const auto probe = vtkUltrasoundAcquisition::ProbeGeometryOf(job.Input.Image);
@@ -45,8 +61,8 @@ vtkUltrasoundScanConverter::Job vtkUltrasoundScanConverter::Prepare(vtkInformati
   job.ProbeToWorld = pose.value_or(echorama::Pose::Identity());
   const auto dimensions = vtkUltrasoundVolume::GeometryOf(job.Input.Image).dimensions;
   echorama::CheckBeamVolume(dimensions, job.Probe);
-  const double spacing = this->SpacingMm == 0.0 ? echorama::SampleSpacing(dimensions, job.Probe) : this->SpacingMm;
-  job.Grid = echorama::ScanConversionGrid(job.Probe, job.ProbeToWorld, spacing, static_cast<std::size_t>(this->MaximumVoxels));
+  const double spacing = this->Spacing == 0.0 ? echorama::SampleSpacing(dimensions, job.Probe) : this->Spacing;
+  job.Grid = echorama::ScanConversionGrid(job.Probe, job.ProbeToWorld, spacing, static_cast<std::size_t>(this->MostVoxels));
   return job;
 }
 
@@ -102,6 +118,5 @@ void vtkUltrasoundScanConverter::Execute(vtkInformationVector** inputs, vtkImage
 void vtkUltrasoundScanConverter::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
-  os << indent << "MaximumVoxels: " << this->MaximumVoxels << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -25,29 +25,59 @@
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
+#ifndef __VTK_WRAP__
+#include "vtkUltrasoundParameters.h"
+#endif
+
+#include <cstdint> // for counts
+
 class ECHORAMACORE_EXPORT vtkUltrasoundScanConverter : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundScanConverter* New();
   vtkTypeMacro(vtkUltrasoundScanConverter, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
   /**
-   * Edge of a voxel in mm, in [0, 1000]. 0, the default, takes the geometric mean of the distances between samples, beams and
-   * steps halfway down the middle beam: about as many voxels inside the fan as there are samples.
+   * Edge of a voxel. 0: the geometric mean of the distances between samples, beams and steps halfway down the middle beam, so
+   * that about as many voxels lie inside the fan as there are samples. In [0, 1000] mm; default 0.
    */
-  vtkSetClampMacro(SpacingMm, double, 0.0, 1000.0);
-  vtkGetMacro(SpacingMm, double);
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
   ///@}
 
   ///@{
   /**
-   * The output is refused when it would have more voxels, >= 1. Default 2^30. A voxel takes the bytes of its type and one
-   * for its ValidRegion, so a volume of unsigned char at the default limit takes 2 GB.
+   * The output is refused when it would have more voxels. A voxel takes the bytes of its type and one for its valid region. At
+   * least 1; default 1073741824.
    */
-  vtkSetClampMacro(MaximumVoxels, vtkIdType, 1, VTK_ID_MAX);
-  vtkGetMacro(MaximumVoxels, vtkIdType);
+  void SetMaximumVoxels(vtkTypeInt64 value) { this->SetParameterAsInteger("MaximumVoxels", value); }
+  vtkTypeInt64 GetMaximumVoxels() { return this->GetParameterAsInteger("MaximumVoxels"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundScanConverter() = default;
@@ -66,8 +96,8 @@ private:
   vtkUltrasoundScanConverter(const vtkUltrasoundScanConverter&) = delete;
   void operator=(const vtkUltrasoundScanConverter&) = delete;
 
-  double SpacingMm = 0.0;
-  vtkIdType MaximumVoxels = vtkIdType(1) << 30;
+  double Spacing = 0.0;
+  std::int64_t MostVoxels = std::int64_t(1) << 30;
 };
 
 #endif

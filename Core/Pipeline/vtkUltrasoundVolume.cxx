@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundVolume.h"
 
+#include "Core/Geometry/MatrixRows.h"
 #include "vtkAlgorithm.h"
 #include "vtkCompositeDataSet.h"
 #include "vtkDataObjectTree.h"
@@ -104,15 +105,30 @@ void vtkUltrasoundVolume::Move(vtkImageData* volume, const echorama::Pose& pose)
 //----------------------------------------------------------------------------
 bool vtkUltrasoundVolume::Move(vtkImageData* volume, vtkMatrix4x4* matrix)
 {
-  echorama::Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-  if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
-      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  const auto pose = RigidPoseOf(matrix);
+  if (!pose) {
     vtkGenericWarningMacro("vtkUltrasoundVolume::Move: the matrix is not a rigid transform; the volume was not moved");
     return false;
   }
-  Move(volume, pose);
+  Move(volume, *pose);
   return true;
+}
+
+//----------------------------------------------------------------------------
+std::optional<echorama::Pose> vtkUltrasoundVolume::RigidPoseOf(vtkMatrix4x4* matrix)
+{
+  const auto pose = echorama::FromRows<echorama::Pose>(matrix->GetData());
+  if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
+      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+    return std::nullopt;
+  }
+  return pose;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundVolume::SetMatrix(vtkMatrix4x4* matrix, const echorama::Pose& pose)
+{
+  matrix->DeepCopy(echorama::MatrixRows(pose.matrix()).data());
 }
 
 //----------------------------------------------------------------------------

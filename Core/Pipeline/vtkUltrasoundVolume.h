@@ -20,6 +20,7 @@
 #include "vtkDataArray.h"
 #include "vtkTypeTraits.h"
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 #endif
@@ -78,6 +79,10 @@ public:
 
   /** Moves geometry, `ProbeToWorld` and `ImageToWorld`. */
   static void Move(vtkImageData* volume, const echorama::Pose& pose);
+
+  /** A matrix as a pose; none when it is not a rigid transform. */
+  static std::optional<echorama::Pose> RigidPoseOf(vtkMatrix4x4* matrix);
+  static void SetMatrix(vtkMatrix4x4* matrix, const echorama::Pose& pose);
 
   /** A volume that came into a filter. */
   struct Input {

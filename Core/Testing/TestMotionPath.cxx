@@ -186,6 +186,6 @@ TEST(MotionPath, SaysWhichPoseIsWrong)
             "motion path: pose 2 is of 1 s, and the one before it of 1 s; times must rise");
   EXPECT_EQ(ReasonAgainst({{0.0, good}, {std::nan(""), good}}), "motion path: the time of pose 1 is not finite");
   EXPECT_EQ(ReasonAgainst({{0.5, scaled}}), "motion path: pose 0 (at 0.5 s) is not a rotation and a translation");
-  EXPECT_NE(ReasonAgainst({{0.0, good}}, {-1.0, 0.5}).find("sigmaSeconds is -1; it must be in [0, 60]"), std::string::npos);
-  EXPECT_NE(ReasonAgainst({{0.0, good}}, {0.1, 0.0}).find("longestGapSeconds is 0; it must be in (0, 600]"), std::string::npos);
+  EXPECT_NE(ReasonAgainst({{0.0, good}}, {-1.0, 0.5}).find("WindowSeconds is -1 s; it must be in [0, 60]"), std::string::npos);
+  EXPECT_NE(ReasonAgainst({{0.0, good}}, {0.1, 0.0}).find("LongestGapSeconds is 0 s; it must be in (0, 600]"), std::string::npos);
 }

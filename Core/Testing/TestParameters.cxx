@@ -105,6 +105,21 @@ TEST(Parameters, AChoiceIsNamedByABeginningThatNoOtherHas)
   EXPECT_EQ(number, 0);
 }
 
+TEST(Parameters, ATextMayBeOneOfSomeNames)
+{
+  std::string metric = "ncc";
+  Parameter choice("Metric", Choice(metric, {"local-ncc", "ncc", "lc2"}), "");
+  EXPECT_EQ(choice.Number(), 1.0);
+  choice.SetNumber(2);
+  EXPECT_EQ(metric, "lc2");
+  choice.Set("local");
+  EXPECT_EQ(choice.Text(), "local-ncc");
+  EXPECT_EQ(MessageOf([&] { choice.Check(); }), "");
+  EXPECT_NE(DescriptionText({choice}).find(R"("type":"name","value":"local-ncc")"), std::string::npos);
+  metric = "ssd";
+  EXPECT_EQ(MessageOf([&] { choice.Check(); }), "Metric is 'ssd'; it must be one of local-ncc, ncc, lc2");
+}
+
 TEST(Parameters, RefusesWhatIsNoSuchValueAndKeepsTheOld)
 {
   Sample s;
@@ -169,6 +184,17 @@ TEST(Parameters, ListsCanBeJoinedAndShortened)
   list[7].SetNumber(4.0);
   EXPECT_EQ(b.lengthMm, 4.0);
   EXPECT_EQ(a.lengthMm, 1.5);
+}
+
+TEST(Parameters, OneOfAListCanBeRenamed)
+{
+  Sample s;
+  ParameterList list = Renamed(Describe(s), "Shape", "Form");
+  EXPECT_EQ(Find(list, "Shape"), nullptr);
+  EXPECT_EQ(Named(list, "Form").Text(), "flat-box");
+  EXPECT_EQ(Named(list, "Count").whenName, "Form");
+  s.count = 0;
+  EXPECT_EQ(MessageOf([&] { CheckRanges(s, "box 2"); }), "box 2: Count is 0; it must be in [1, 100]");
 }
 
 TEST(Parameters, TellAllOfThemAsJson)

@@ -548,13 +548,13 @@ TEST(ShadowMap, Refusals)
     refused(Error::Kind::InvalidParameter, word, [&] { ReliabilityMap(image.Posed(), image.probe, parameters); });
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  with([](auto& p) { p.resolution = 8; }, "resolution");
-  with([](auto& p) { p.shadowLevel = 1.0; }, "shadow level");
-  with([](auto& p) { p.tissueLevel = p.shadowLevel; }, "tissue level");
-  with([nan](auto& p) { p.leastEcho = nan; }, "least echo");
-  with([](auto& p) { p.leastShadow = -0.1; }, "least shadow");
-  with([](auto& p) { p.saturatedShare = 1.0; }, "saturated share");
-  with([](auto& p) { p.depthAxis = 3; }, "depth axis");
+  with([](auto& p) { p.resolution = 8; }, "Resolution is 8");
+  with([](auto& p) { p.shadowLevel = 1.0; }, "above ShadowLevel, which is 1");
+  with([](auto& p) { p.tissueLevel = p.shadowLevel; }, "TissueLevel is 0.3");
+  with([nan](auto& p) { p.leastEcho = nan; }, "LeastEcho is nan");
+  with([](auto& p) { p.leastShadow = -0.1; }, "LeastShadow is -0.1");
+  with([](auto& p) { p.saturatedShare = 1.0; }, "SaturatedShare is 1");
+  with([](auto& p) { p.depthAxis = 3; }, "DepthAxis is 3");
 
   PlacedProbe skewed = image.probe;
   skewed.probeToWorld.linear()(0, 0) += 0.2;

@@ -87,8 +87,11 @@ vectors.SetName("Vectors")
 pair.GetPointData().AddArray(vectors)
 assert distance(pair, "Vectors") is None
 
-# Properties keep to their range, and say themselves.
+# A measure that there is not is refused, and the parameters say themselves.
 filter = echorama.vtkUltrasoundDistanceMap()
+filter.SetMeasureToSigned()
+complaints = []
+filter.AddObserver("ErrorEvent", lambda *_: complaints.append(1))
 filter.SetMeasure(9)
-assert filter.GetMeasure() == 2
+assert complaints and filter.GetMeasure() == filter.SIGNED
 assert "Measure: signed" in str(filter)

@@ -98,7 +98,7 @@ def check_phantoms():
         assert np.linalg.norm(found_pose[:3, 3] - near[:3]) < 1.0, (found_pose, near)
         assert found_pose[:3, 2] @ pose[:3, 2] > 0.9999
         assert filter.GetOverlap() > 0.98 and filter.GetResidualMm() < 1.5 and filter.GetMeanDistance() < 0.01
-        assert "was replaced" in filter.GetNotes() and "Depth 0" in filter.GetNotes()
+        assert "had a probe geometry" in filter.GetNotes() and "Depth 0" in filter.GetNotes()
 
 
 def check_output(probe_less):
@@ -108,7 +108,7 @@ def check_output(probe_less):
     probe_less.GetFieldData().AddArray(remark)
     filter, errors = fit(probe_less)
     output = filter.GetOutput()
-    assert not errors and "was replaced" not in filter.GetNotes()
+    assert not errors and "had a probe geometry" not in filter.GetNotes()
     for i in range(probe_less.GetPointData().GetNumberOfArrays()):
         assert output.GetPointData().GetAbstractArray(i) is probe_less.GetPointData().GetAbstractArray(i)
     assert output.GetFieldData().GetArray("Remark") is not None
@@ -127,11 +127,9 @@ def check_refusals():
     assert not errors and 0 < filter.GetOverlap() < 0.85
     filter, errors = fit(image_of(grey, np.zeros_like(ball)))
     assert len(errors) == 1 and "empty" in errors[0], errors
-    # Clamped, as documented.
-    filter.SetMinimumOverlap(7)
-    filter.SetMaximumDistance(-1)
-    filter.SetOutlinePoints(3)
-    assert (filter.GetMinimumOverlap(), filter.GetMaximumDistance(), filter.GetOutlinePoints()) == (1, 1e-4, 100)
+    for name, wrong in (("MinimumOverlap", 7), ("MaximumDistance", -1), ("OutlinePoints", 3), ("MarginMm", -1)):
+        filter, errors = fit(image_of(grey, ball), **{name: wrong})
+        assert len(errors) == 1 and f"{name} is {wrong}" in errors[0], errors
 
 
 def check_region():

@@ -24,7 +24,7 @@ NAMES = ("square", "triangle", "circle")
 WAYS = (("plain average", "average", "mix"), ("feather (Szeliski)", "feather", "mix"), ("distance", "distance", "mix"),
         ("membrane", "membrane", "mix"))
 TEXTURES = (("plain average", "average", "mix"), ("membrane, mix", "membrane", "mix"),
-            ("membrane, split", "membrane", "split"), ("membrane, seam", "membrane", "seam"))
+            ("membrane, split", "membrane", "split"))
 
 
 def shapes(size):
@@ -57,8 +57,8 @@ def stitched(volumes, method, texture="mix", sharpness=1.5, weights=False):
     stitcher = vtkUltrasoundStitcher()
     for volume in volumes:
         stitcher.AddInputDataObject(volume)
-    stitcher.SetMethod(stitcher.GetMethodFromName(method))
-    stitcher.SetTexture(stitcher.GetTextureFromName(texture))
+    stitcher.SetParameterAsText("Method", method)
+    stitcher.SetParameterAsText("Texture", texture)
     stitcher.SetSharpness(sharpness)
     stitcher.SetOutputWeights(weights)
     stitcher.Update()
@@ -201,8 +201,7 @@ def volumes_in_slices(folder, paths):
         panel = np.take(array(volume, "Intensity"), place[1], axis=place[0])
         panels.append(255 * np.sqrt(np.clip(panel / bright, 0, 1))) # echoes span more than a screen shows
         titles.append(title)
-    save(folder, "stitching_volumes.png", [panels[:4]], titles[:4], width=2.6)
-    save(folder, "stitching_volumes_textures.png", [panels[4:]], titles[4:], width=2.6)
+    save(folder, "stitching_volumes.png", [panels], titles, width=2.6)
 
 
 def main():

@@ -51,16 +51,16 @@ def main():
     figure, grid = plt.subplots(2, 2, figsize=(11, 8.4))
     for row, (source, position, name) in zip(grid, scenes):
         synthesizer = synthesizer_of(source, position, options.quick)
-        for axes, mode, what in ((row[0], synthesizer.Coherent, "coherent echoes"), (row[1], synthesizer.Counting, "counted events")):
+        for axes, mode, what in ((row[0], synthesizer.COHERENT, "coherent echoes"), (row[1], synthesizer.COUNTING, "counted events")):
             synthesizer.SetMode(mode)
-            synthesizer.SetTgcDbPerCm(3.5 if mode == synthesizer.Coherent else 0) # events are counted without attenuation
+            synthesizer.SetTgcDbPerCm(3.5 if mode == synthesizer.COHERENT else 0) # events are counted without attenuation
             picture(axes, synthesizer, f"{name}: {what}")
     figure.tight_layout()
     figure.savefig(options.folder / "Synthesizer.png", dpi=60)
 
     figure, row = plt.subplots(1, 4, figsize=(15, 4))
     synthesizer = synthesizer_of(*scenes[1][:2], options.quick)
-    synthesizer.SetMode(synthesizer.Counting)
+    synthesizer.SetMode(synthesizer.COUNTING)
     for axes, clarity in zip(row, (1, 10, 50, 200)):
         synthesizer.SetClarity(clarity)
         synthesizer.SetTgcDbPerCm(0)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <cstdint>
+#include <string>
+#include <vector>
 
 namespace echorama {
 
@@ -10,6 +12,8 @@ enum class Sampling {
   Stratified, ///< of n rays each takes another n-th of the range, in every dimension (Latin hypercube)
   Sobol,      ///< Sobol sequence, scrambled (Owen), evenly spread in several dimensions at once
 };
+
+inline const std::vector<std::string> SamplingNames{"random", "stratified", "sobol"};
 
 /// The random numbers of one ray among several of a beam: dimension after dimension. The same for the same seed, beam and ray,
 /// whoever asks.

@@ -118,25 +118,35 @@ void DetectRows(const BeamEchoes& echoes, const Receiver& receiver, int samples,
 
 } // namespace
 
+ParameterList Describe(Receiver::GainPoint& p)
+{
+  return {Parameter("DepthMm", p.depthMm, {-1000, 10000}, "mm", "Scan depth; it rises from point to point."),
+          Parameter("GainDb", p.gainDb, {-200, 200}, "dB", "Further gain at that depth.")};
+}
+
+ParameterList Describe(Receiver& r)
+{
+  return {
+      Parameter("GainDb", r.gainDb, {-200, 200}, "dB", "Gain of everything."),
+      Parameter("TgcDbPerCm", r.tgcDbPerCm, {-20, 100}, "dB/cm", "Time-gain compensation: further gain by the depth."),
+      Parameter("DynamicRangeDb", r.dynamicRangeDb, {10, 200}, "dB", "How much the 255 steps of grey span."),
+      Parameter("ReferenceGrey", r.referenceGrey, {0, 255}, "", "Mean grey of the reference tissue, liver, at a gain of 0 dB."),
+      Parameter("NoiseDb", r.noiseDb, {Receiver::noNoiseDb, 100}, "dB",
+                "Mean power of the noise of the electronics beside the reference tissue, before all gain; -200: none."),
+      Parameter("NoiseSeed", r.noiseSeed, {0, 9223372036854775807.0}, "",
+                "Seed of the noise. Volumes of one scan have different ones."),
+  };
+}
+
 void Receiver::Check() const
 {
-  const auto check = [](const std::string& what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, "receiver: " + what + " is " + NumberText(value) + "; it must be in [" +
-                                                     NumberText(from) + ", " + NumberText(to) + "]");
-  };
-  check("gainDb", gainDb, -200.0, 200.0);
-  check("tgcDbPerCm", tgcDbPerCm, -20.0, 100.0);
-  check("dynamicRangeDb", dynamicRangeDb, 10.0, 200.0);
-  check("referenceGrey", referenceGrey, 0.0, 255.0);
-  check("noiseDb", noiseDb, noNoiseDb, 100.0);
+  CheckRanges(*this);
   for (std::size_t i = 0; i < tgcPoints.size(); ++i) {
-    const std::string name = "tgcPoints[" + std::to_string(i) + "]";
-    check(name + ".depthMm", tgcPoints[i].depthMm, -1000.0, 10000.0);
-    check(name + ".gainDb", tgcPoints[i].gainDb, -200.0, 200.0);
+    const std::string name = "TgcPoints[" + std::to_string(i) + "]";
+    CheckRanges(tgcPoints[i], name);
     if (i > 0 && !(tgcPoints[i].depthMm > tgcPoints[i - 1].depthMm))
-      throw Error(Error::Kind::InvalidParameter, "receiver: " + name + ".depthMm is " + NumberText(tgcPoints[i].depthMm) +
-                                                     "; it must be greater than that of the point before it");
+      throw Error(Error::Kind::InvalidParameter, name + ": DepthMm is " + NumberText(tgcPoints[i].depthMm) +
+                                                     " mm; it must be greater than that of the point before it");
   }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/BeamEchoes.h"
 #include "Core/Imaging/VolumeView.h"
@@ -14,27 +15,25 @@ namespace echorama {
 struct Receiver {
   /// A slider of the scanner.
   struct GainPoint {
-    double depthMm = 0.0; ///< of scan depth, in [-1000, 10000]
-    double gainDb = 0.0;  ///< in [-200, 200]
+    double depthMm = 0.0, gainDb = 0.0;
   };
 
-  double gainDb = 0.0;              ///< of everything, in [-200, 200]
-  double tgcDbPerCm = 0.0;          ///< further gain per cm of scan depth below the face, in [-20, 100]
+  double gainDb = 0.0, tgcDbPerCm = 0.0;
   std::vector<GainPoint> tgcPoints; ///< further gain, linear between points of rising depth, constant beyond; may be empty
-  double dynamicRangeDb = 60.0;     ///< how many dB the 255 steps of grey span, in [10, 200]
-  double referenceGrey = 110.0;     ///< mean grey of the reference tissue at gain 0, in [0, 255]
-  /// Mean power of the electronics' noise (white, complex Gaussian, on every sample of the beams), dB, in [-200, 100]; at
-  /// -200 there is none. It is added before all gain, so it rises with the TGC.
-  double noiseDb = noNoiseDb;
+  double dynamicRangeDb = 60.0, referenceGrey = 110.0;
+  double noiseDb = noNoiseDb;  ///< white, complex Gaussian, on every sample of the beams; added before all gain
   std::uint64_t noiseSeed = 1; ///< every row of samples has its own stream
   static constexpr double noNoiseDb = -200.0;
 
-  /// Throws Error(InvalidParameter) that names the number that is out of its range.
+  /// The ranges, and the order of the points. \throws Error(InvalidParameter)
   void Check() const;
 
   /// All gain at a scan depth, dB.
   double GainDbAt(double depthMm) const;
 };
+
+ParameterList Describe(Receiver::GainPoint& p);
+ParameterList Describe(Receiver& r); ///< but the points
 
 /// The envelope after noise and gain, before compression. \a envelope has the beams and planes of the echoes and any number
 /// (>= 2) of depth samples over the same range of depth: each is the mean of the finer samples around it, weighted by a

@@ -14,7 +14,6 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Interface.h"
 #include <algorithm>
@@ -150,13 +149,27 @@ private:
 
 } // namespace
 
-void ScatterCounting::Check() const
+ParameterList Describe(ScatterCounting& c)
 {
-  CheckRange("raysPerElement", raysPerElement, 1, 1e7);
-  CheckRange("clarity", clarity, 0.0, 200.0);
-  CheckRange("coneDegrees", coneDegrees, 0.0, 180.0);
-  CheckRange("maxEvents", maxEvents, 1, 1e6);
-  CheckRange("assumedSoundSpeed (m/s)", assumedSoundSpeed, 100.0, 10000.0);
+  return {
+      Parameter("RaysPerElement", c.raysPerElement, {1, 1e7}, "", "Rays that each element sends.")
+          .When("Mode", "counting")
+          .Advanced(),
+      Parameter("Clarity", c.clarity, {0, 200}, "",
+                "Exponent of the angle at which an echo comes in (dissertation, eq. 3.4): the larger, the clearer.")
+          .When("Mode", "counting")
+          .Advanced(),
+      Parameter("ConeDegrees", c.coneDegrees, {0, 180}, "degrees",
+                "A ray that was scattered goes on within this half angle of its old direction.")
+          .When("Mode", "counting")
+          .Advanced(),
+      Parameter("MaxEvents", c.maxEvents, {1, 1e6}, "", "The most scatter events of one ray.")
+          .When("Mode", "counting")
+          .Advanced(),
+      Parameter("AssumedSoundSpeed", c.assumedSoundSpeed, {100, 10000}, "m/s", "How the scanner turns time into depth."),
+      Parameter("Sampling", Choice(c.sampling, SamplingNames), "How the rays of an element are drawn."),
+      Parameter("Seed", c.seed, {0, 9223372036854775807.0}, "", "Seed of the rays."),
+  };
 }
 
 double ScatterDistance(double p, double u)
@@ -181,7 +194,7 @@ double ReceiverAttenuation(const Eigen::Vector3d& element, const Eigen::Vector3d
 Volume<float> CountScatters(const AcousticScene& scene, const ScatterCounting& parameters, const ProbeGeometry& probe,
                             const Pose& probeToWorld, const std::array<int, 3>& dimensions, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   probe.Check();
   CheckRange("number of samples", dimensions[0], 2, 1e6);
   CheckRange("number of elements", dimensions[1], 1, 1e6);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "AcousticScene.h"
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
 #include "RaySamples.h"
@@ -10,20 +11,16 @@ namespace echorama {
 /// The counting of random scatter events of dissertation 3.4.3-3.4.5 (eqs 3.1-3.4), in a form that is stable for every
 /// probability in [0, 1].
 struct ScatterCounting {
-  int raysPerElement = 256; ///< in [1, 1e7]
-  /// Exponent c of the angle at which an echo comes in (eq. 3.4): larger is clearer, in [0, 200].
+  int raysPerElement = 256;
   double clarity = 20.0;
-  /// After a scatter event the new direction is uniform in solid angle within this half angle of the old one, degrees, in
-  /// [0, 180]. The dissertation leaves the cone open.
-  double coneDegrees = 30.0;
-  int maxEvents = 1000;              ///< of one ray, in [1, 1e6]
-  double assumedSoundSpeed = 1540.0; ///< m/s, in [100, 10000]
+  double coneDegrees = 30.0; ///< the dissertation leaves the cone open
+  int maxEvents = 1000;
+  double assumedSoundSpeed = 1540.0; ///< m/s
   Sampling sampling = Sampling::Sobol;
   std::uint64_t seed = 1;
-
-  /// Throws Error(InvalidParameter) that names the field that is out of range.
-  void Check() const;
 };
+
+ParameterList Describe(ScatterCounting& c);
 
 /// How far sound goes until it scatters, mm (infinite for p = 0, 0 for p = 1): \a p is the probability within a mm, \a u
 /// uniform in [0, 1). One draw for eqs 3.1-3.3.
@@ -36,7 +33,8 @@ double ReceiverAttenuation(const Eigen::Vector3d& element, const Eigen::Vector3d
 
 /// Intensities on the beams, linear, per ray sent: depth fastest, then fan, then sweep; samples lie evenly from the first to
 /// the last depth, beam and plane. The same for any number of threads.
-/// \throws Error(InvalidParameter) also for a probe that fails its Check(), and for dimensions below 2 x 1 x 1.
+/// \throws Error(InvalidParameter) for a number out of its range, for a probe that fails its Check(), and for dimensions below 2
+/// x 1 x 1.
 Volume<float> CountScatters(const AcousticScene& scene, const ScatterCounting& parameters, const ProbeGeometry& probe,
                             const Pose& probeToWorld, const std::array<int, 3>& dimensions, const Progress& progress = {});
 

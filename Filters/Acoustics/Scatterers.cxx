@@ -227,20 +227,22 @@ std::vector<Share> Shares(const std::vector<Material>& materials, double density
 
 } // namespace
 
-void ScattererParameters::Check() const
+ParameterList Describe(ScattererParameters& p)
 {
-  if (!(densityPerMm3 >= 0.0 && densityPerMm3 <= 1000.0))
-    throw Error(Error::Kind::InvalidParameter,
-                "scatterers: densityPerMm3 is " + NumberText(densityPerMm3) + "; it must be in [0, 1000]");
-  if (!(maxBytes > 0.0))
-    throw Error(Error::Kind::InvalidParameter, "scatterers: maxBytes is " + NumberText(maxBytes) + "; it must be positive");
+  return {
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "Seed of places and signs."),
+      Parameter("DensityPerMm3", p.densityPerMm3, {0, 1000}, "per mm^3",
+                "Scatterers of the lattice; 0: those of the densest material. Materials that have more get this many, as loud as "
+                "before."),
+      Parameter("MaxBytes", p.maxBytes, {0, Unlimited, true}, "bytes", "No more memory than this is taken."),
+  };
 }
 
 Scatterers Scatterers::Make(const ScattererParameters& parameters, const std::vector<Material>& materials,
                             const MediumLookup& mediumAt, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted,
                             const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   double density = 0.0;
   for (const Material& material : materials) {
     material.Check();

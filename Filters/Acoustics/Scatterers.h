@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/DisplacementField.h"
 #include "Filters/Tissue/Material.h"
@@ -19,17 +20,15 @@ using BoxPredicate = std::function<bool(const Eigen::AlignedBox3d& box)>;
 
 /// How scatterers are strewn.
 struct ScattererParameters {
-  std::uint64_t seed = 1; ///< of places and signs
-  /// Of the lattice, in [0, 1000]; 0: the largest of all materials. Materials that have more get this many, as loud as before.
+  std::uint64_t seed = 1;
   double densityPerMm3 = 0.0;
   /// Where the material has gone: world = material + displacement at the material's place. None: it is at rest. Must live
   /// until the scatterers are made.
   const DisplacementField* displacement = nullptr;
-  double maxBytes = 8.0e9; ///< no more memory than this, > 0
-
-  /// Throws Error(InvalidParameter) that names the number that is out of its range.
-  void Check() const;
+  double maxBytes = 8.0e9;
 };
+
+ParameterList Describe(ScattererParameters& p);
 
 /// The points that scatter sound, fixed to the material.
 ///
@@ -61,8 +60,9 @@ public:
 
   /// All scatterers of the bricks that \a wanted wants (an empty function: all) and that may reach into \a region (world, mm).
   /// Same result for any number of threads.
-  /// \throws Error(InvalidParameter) as Check(), for a region that is not finite or further away than 1e7 mm, and for materials
-  /// that are wrong; Error(TooLarge) when they would need more than maxBytes or the memory that is free; Error(Cancelled).
+  /// \throws Error(InvalidParameter) for a parameter out of range, for a region that is not finite or further away than 1e7 mm,
+  /// and for materials that are wrong; Error(TooLarge) when they would need more than maxBytes or the memory that is free;
+  /// Error(Cancelled).
   static Scatterers Make(const ScattererParameters& parameters, const std::vector<Material>& materials,
                          const MediumLookup& mediumAt, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted = {},
                          const Progress& progress = {});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/TextFile.h"
 #include "SceneKeys.h"
 #include <algorithm>
@@ -21,14 +22,6 @@ std::string Shown(const Json& value)
   return text.size() <= 60 ? text : text.substr(0, 60) + " ...";
 }
 
-std::string Join(const std::vector<std::string>& names)
-{
-  std::string text;
-  for (const std::string& name : names)
-    text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 bool IsAffine(const Eigen::Matrix4d& rows)
 {
   return rows.allFinite() && rows.row(3) == Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0);
@@ -40,7 +33,7 @@ template <class T>
 void Validate(const T& value)
 {
   if constexpr (std::is_same_v<T, AnatomyParameters> || std::is_same_v<T, CalibrationRigParameters> ||
-                std::is_same_v<T, Transducer> || std::is_same_v<T, Receiver>)
+                std::is_same_v<T, Receiver>)
     value.Check();
 }
 
@@ -76,15 +69,9 @@ void Validate(const SceneProbe& probe)
 
 void Validate(const ScenePacking& packing)
 {
-  packing.spheres.Check();
+  packing.tissue.packing.Check();
   if (std::none_of(packing.materials.begin(), packing.materials.end(), [](const auto& share) { return share.weight > 0.0; }))
     Refuse("no material has a weight above 0");
-}
-
-void Validate(const SceneTransport& transport)
-{
-  transport.sound.Check();
-  transport.counting.Check();
 }
 
 void Validate(const SceneCylinder& cylinder)
@@ -108,7 +95,7 @@ void Inherit(const SynthesisScene&, T&)
 
 void Inherit(const SynthesisScene& scene, ScenePacking& packing)
 {
-  packing.spheres.seed = scene.seed;
+  packing.tissue.packing.seed = scene.seed;
 }
 
 void Inherit(const SynthesisScene& scene, AnatomyParameters& anatomy)
@@ -155,77 +142,20 @@ public:
       Fail(At(key), Shown(*found) + " is not known; \"" + wanted + "\" is needed");
   }
 
-  void Text(const char* key, std::string& value, const char*, Presence presence = {})
+  /// \returns whether it is there.
+  bool Value(Parameter parameter, Presence presence = {})
   {
-    if (const Json* found = FindNeeded(key, presence)) {
-      if (!found->is_string())
-        Fail(At(key), "a text is needed, not " + Shown(*found));
-      value = found->get<std::string>();
-      if (value.size() > longestText || value.find('\0') != std::string::npos || (presence == Presence::Needed && value.empty()))
-        Fail(At(key), "the text must be of 1 to " + std::to_string(longestText) + " characters");
-    }
+    const std::string key = parameter.Key();
+    const Json* found = FindNeeded(key, presence);
+    if (found)
+      std::visit([&](auto& value) { Take(*found, At(key), parameter.range, presence, value); }, parameter.value);
+    return found != nullptr;
   }
-
-  template <class T>
-  void Number(const char* key, T& value, const Range& range, const char*)
-  {
-    if (const Json* found = Find(key))
-      value = NumberFrom<T>(*found, At(key), range);
-  }
-  template <class T>
-  void Number(const char* key, std::optional<T>& value, const Range& range, const char*)
-  {
-    if (const Json* found = Find(key))
-      value = NumberFrom<T>(*found, At(key), range);
-  }
-
-  void Seed(const char* key, std::uint64_t& value, const char*)
-  {
-    if (const Json* found = Find(key)) {
-      if (!found->is_number_unsigned() || found->get<std::uint64_t>() > largestSeed)
-        Fail(At(key), "a whole number in [0, 2^63) is needed, not " + Shown(*found));
-      value = found->get<std::uint64_t>();
-    }
-  }
-
-  void Flag(const char* key, bool& value, const char*)
-  {
-    if (const Json* found = Find(key)) {
-      if (!found->is_boolean())
-        Fail(At(key), "true or false is needed, not " + Shown(*found));
-      value = found->get<bool>();
-    }
-  }
-
-  template <class T>
-  void Choice(const char* key, T& value, const Choices<T>& choices, const char*)
-  {
-    if (const Json* found = Find(key)) {
-      std::string names;
-      for (const auto& [name, choice] : choices) {
-        if (found->is_string() && found->get<std::string>() == name) {
-          value = choice;
-          return;
-        }
-        names += std::string(names.empty() ? "\"" : ", \"") + name + "\"";
-      }
-      Fail(At(key), Shown(*found) + " is not known; there are " + names);
-    }
-  }
-
-  void Vector(const char* key, Vector3d& value, const Range& range, const char*)
-  {
-    if (const Json* found = Find(key)) {
-      if (!found->is_array() || found->size() != 3)
-        Fail(At(key), "a list of 3 numbers is needed, not " + Shown(*found));
-      for (std::size_t i = 0; i < 3; ++i)
-        value[static_cast<Eigen::Index>(i)] = NumberFrom<double>((*found)[i], At(key, i), range);
-    }
-  }
+  bool Maybe(const Parameter& parameter, bool) { return Value(parameter); }
 
   void MaterialName(const char* key, std::string& value, Presence presence = {})
   {
-    Text(key, value, nullptr, presence);
+    Value(Parameter(key, value, ""), presence);
     Try(At(key), [this, &value] { text_.scene->MaterialOf(value); });
   }
 
@@ -257,7 +187,8 @@ public:
   {
     const int there = (static_cast<int>(object_.contains(forms.key)) + ...);
     if (there != 1)
-      Fail(path_, (there == 0 ? "one of " : "just one of ") + Join({forms.key...}) + " is needed");
+      Fail(path_,
+           (there == 0 ? "one of " : "just one of ") + Joined(std::initializer_list<std::string>{forms.key...}) + " is needed");
     const auto read = [this, &value](const auto& form, auto fresh) {
       if (const Json* found = Find(form.key)) {
         Inherit(*text_.scene, fresh);
@@ -311,14 +242,13 @@ public:
         Fail(At(key), "the name of a material must be of 1 to 100 characters");
       Reader reader(text_, json, place);
       std::string like;
-      reader.Text("like", like, nullptr);
+      reader.Value(Parameter("Like", like, ""));
       Material material;
       if (!like.empty())
         reader.Try(place + ".like", [this, &like, &material] { material = text_.scene->MaterialOf(like); });
       material.name = name;
       Describe(reader, material);
       reader.Finish();
-      reader.Try(place, [&material] { material.Check(); });
       materials.push_back(material);
     }
   }
@@ -328,7 +258,7 @@ public:
   {
     for (const auto& item : object_.items())
       if (std::find(known_.begin(), known_.end(), item.key()) == known_.end())
-        Fail(At(item.key().c_str()), "there is no such key; there are " + Join(known_));
+        Fail(At(item.key()), "there is no such key; there are " + Joined(known_));
   }
 
   /// Names the key to what other kernels complain of.
@@ -348,18 +278,18 @@ public:
   }
 
 private:
-  std::string At(const char* key) const { return path_.empty() ? key : path_ + "." + key; }
-  std::string At(const char* key, std::size_t index) const { return At(key) + "[" + std::to_string(index) + "]"; }
-  static std::string Missing(const char* key) { return std::string("\"") + key + "\" is missing"; }
+  std::string At(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+  std::string At(const std::string& key, std::size_t index) const { return At(key) + "[" + std::to_string(index) + "]"; }
+  static std::string Missing(const std::string& key) { return "\"" + key + "\" is missing"; }
 
-  const Json* Find(const char* key)
+  const Json* Find(const std::string& key)
   {
     known_.push_back(key);
     const auto found = object_.find(key);
     return found == object_.end() ? nullptr : &*found;
   }
 
-  const Json* FindNeeded(const char* key, Presence presence)
+  const Json* FindNeeded(const std::string& key, Presence presence)
   {
     const Json* found = Find(key);
     if (!found && presence == Presence::Needed)
@@ -368,13 +298,46 @@ private:
   }
 
   template <class T>
-  T NumberFrom(const Json& json, const std::string& path, const Range& range) const
+  void Take(const Json& json, const std::string& path, const ParameterRange& range, Presence presence, T& value) const
+  {
+    if constexpr (std::is_same_v<T, Choice>) {
+      const auto name = std::find(value.names.begin(), value.names.end(), json);
+      if (name == value.names.end())
+        Fail(path, Shown(json) + " is not known; there are \"" + Joined(value.names, "\", \"") + "\"");
+      value.Set(static_cast<int>(name - value.names.begin()));
+    } else if constexpr (std::is_same_v<T, std::string*>) {
+      if (!json.is_string())
+        Fail(path, "a text is needed, not " + Shown(json));
+      *value = json.get<std::string>();
+      if (value->size() > longestText || value->find('\0') != std::string::npos ||
+          (presence == Presence::Needed && value->empty()))
+        Fail(path, "the text must be of 1 to " + std::to_string(longestText) + " characters");
+    } else if constexpr (std::is_same_v<T, bool*>) {
+      if (!json.is_boolean())
+        Fail(path, "true or false is needed, not " + Shown(json));
+      *value = json.get<bool>();
+    } else if constexpr (std::is_same_v<T, std::uint64_t*>) {
+      if (!json.is_number_unsigned() || json.get<std::uint64_t>() > largestSeed)
+        Fail(path, "a whole number in [0, 2^63) is needed, not " + Shown(json));
+      *value = json.get<std::uint64_t>();
+    } else if constexpr (std::is_same_v<T, Vector3d*>) {
+      if (!json.is_array() || json.size() != 3)
+        Fail(path, "a list of 3 numbers is needed, not " + Shown(json));
+      for (std::size_t i = 0; i < 3; ++i)
+        (*value)[static_cast<Eigen::Index>(i)] = NumberFrom<double>(json[i], path + "[" + std::to_string(i) + "]", range);
+    } else {
+      *value = NumberFrom<std::remove_pointer_t<T>>(json, path, range);
+    }
+  }
+
+  template <class T>
+  T NumberFrom(const Json& json, const std::string& path, const ParameterRange& range) const
   {
     if (!json.is_number())
       Fail(path, "a number is needed, not " + Shown(json));
     const auto value = json.get<double>();
     if (!range.Holds(value))
-      Fail(path, Shown(json) + " is out of range; it must be in " + range.Text());
+      Fail(path, Shown(json) + " is out of range; it must be " + range.Demand());
     if constexpr (std::is_integral_v<T>)
       if (value != std::floor(value))
         Fail(path, "a whole number is needed, not " + Shown(json));

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/ParameterJson.h"
 #include "SceneKeys.h"
-#include <nlohmann/json.hpp>
+#include <cmath>
 
 namespace echorama {
 namespace scene {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Eigen::Vector3d;
 
 class SchemaMaker {
 public:
@@ -37,51 +37,20 @@ public:
     properties_[key] = {{"const", text}};
     required_.push_back(key);
   }
-  void Text(const char* key, const std::string& value, const char* help, Presence presence = {})
+  void Value(const Parameter& parameter, Presence presence = {})
   {
-    Add(key, {{"type", "string"}, {"maxLength", longestText}}, help, presence);
+    const std::string key = parameter.Key(), unit = parameter.unit.empty() ? "" : " Unit: " + parameter.unit + ".";
+    Add(key, SchemaOf(parameter), parameter.help + unit, presence);
     if (presence == Presence::Needed)
-      properties_[key]["minLength"] = 1;
+      properties_[key]["minLength"] = 1; // it is a text
     else
-      properties_[key]["default"] = value;
+      properties_[key]["default"] = JsonOf(parameter);
   }
-  template <class T>
-  void Number(const char* key, const T& value, const Range& range, const char* help)
+  bool Maybe(const Parameter& parameter, bool there)
   {
-    Add(key, NumberSchema<T>(range), help);
-    properties_[key]["default"] = value;
-  }
-  template <class T>
-  void Number(const char* key, const std::optional<T>&, const Range& range, const char* help)
-  {
-    Add(key, NumberSchema<T>(range), help);
-  }
-  void Seed(const char* key, std::uint64_t value, const char* help)
-  {
-    Add(key, {{"type", "integer"}, {"minimum", 0}, {"maximum", largestSeed}, {"default", value}}, help);
-  }
-  void Flag(const char* key, bool value, const char* help) { Add(key, {{"type", "boolean"}, {"default", value}}, help); }
-  template <class T>
-  void Choice(const char* key, const T& value, const Choices<T>& choices, const char* help)
-  {
-    Json names = Json::array();
-    Json standard;
-    for (const auto& [name, choice] : choices) {
-      names.push_back(name);
-      if (choice == value)
-        standard = name;
-    }
-    Add(key, {{"enum", std::move(names)}, {"default", std::move(standard)}}, help);
-  }
-  void Vector(const char* key, const Vector3d& value, const Range& range, const char* help)
-  {
-    Add(key,
-        {{"type", "array"},
-         {"items", NumberSchema<double>(range)},
-         {"minItems", 3},
-         {"maxItems", 3},
-         {"default", Json::array({value.x(), value.y(), value.z()})}},
-        help);
+    Value(parameter);
+    properties_[parameter.Key()].erase("default");
+    return there;
   }
   void MaterialName(const char* key, const std::string& value, Presence presence = {})
   {
@@ -126,7 +95,7 @@ public:
     Json standard = Json::object();
     for (const ScenePacking::Share& share : shares)
       standard[share.material] = share.weight;
-    Add(key, {{"type", "object"}, {"additionalProperties", NumberSchema<double>(weights)}, {"default", std::move(standard)}},
+    Add(key, {{"type", "object"}, {"additionalProperties", NumberSchema("number", weights)}, {"default", std::move(standard)}},
         help);
   }
 
@@ -138,7 +107,7 @@ private:
     return schema;
   }
 
-  void Add(const char* key, Json schema, const char* help, Presence presence = Presence::Optional)
+  void Add(const std::string& key, Json schema, const std::string& help, Presence presence = Presence::Optional)
   {
     schema["description"] = help;
     properties_[key] = std::move(schema);
@@ -146,12 +115,35 @@ private:
       required_.push_back(key);
   }
 
-  template <class T>
-  static Json NumberSchema(const Range& range)
+  static Json NumberSchema(const char* type, const ParameterRange& range)
   {
-    return {{"type", std::is_integral_v<T> ? "integer" : "number"},
-            {range.open ? "exclusiveMinimum" : "minimum", range.low},
-            {"maximum", range.high}};
+    Json schema{{"type", type}};
+    if (std::isfinite(range.low))
+      schema[range.open ? "exclusiveMinimum" : "minimum"] = range.low;
+    if (std::isfinite(range.high))
+      schema["maximum"] = range.high;
+    return schema;
+  }
+
+  static Json SchemaOf(const Parameter& parameter)
+  {
+    return std::visit(
+        [&parameter](const auto& value) -> Json {
+          using T = std::decay_t<decltype(value)>;
+          if constexpr (std::is_same_v<T, Choice>)
+            return {{"enum", value.names}};
+          else if constexpr (std::is_same_v<T, std::string*>)
+            return {{"type", "string"}, {"maxLength", longestText}};
+          else if constexpr (std::is_same_v<T, bool*>)
+            return {{"type", "boolean"}};
+          else if constexpr (std::is_same_v<T, std::uint64_t*>)
+            return {{"type", "integer"}, {"minimum", 0}, {"maximum", largestSeed}};
+          else if constexpr (std::is_same_v<T, Eigen::Vector3d*>)
+            return {{"type", "array"}, {"items", NumberSchema("number", parameter.range)}, {"minItems", 3}, {"maxItems", 3}};
+          else
+            return NumberSchema(std::is_same_v<T, double*> ? "number" : "integer", parameter.range);
+        },
+        parameter.value);
   }
 
   Json properties_ = Json::object(), required_ = Json::array(), oneOf_;

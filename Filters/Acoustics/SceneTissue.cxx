@@ -30,8 +30,8 @@ private:
     const PackedTissue packed = MakePackedTissue(scene_.ParametersOf(packing), progress_);
     if (packed.packing.saturated)
       notes_.push_back("the packing is full: " + std::to_string(packed.packing.spheres.size()) + " spheres fill " +
-                       NumberText(packed.packing.fillFraction) + " of their region, " + NumberText(packing.spheres.fillFraction) +
-                       " was asked for");
+                       NumberText(packed.packing.fillFraction) + " of their region, " +
+                       NumberText(packing.tissue.packing.fillFraction) + " was asked for");
     tissue_.Append(packed.surface);
   }
 

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Check() writes a scene and reads it again, and so says the same as the reader.
 #include "Core/Base/Error.h"
+#include "Core/Base/ParameterJson.h"
 #include "SceneKeys.h"
-#include <nlohmann/json.hpp>
 
 namespace echorama {
 namespace scene {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Eigen::Vector3d;
 
 class Writer {
 public:
@@ -30,38 +29,17 @@ public:
   }
 
   void Constant(const char* key, const char* text) { object_[key] = text; }
-  void Text(const char* key, const std::string& value, const char*, Presence presence = {})
+  void Value(const Parameter& parameter, Presence presence = {})
   {
-    if (presence == Presence::Needed || !value.empty())
-      object_[key] = value;
+    const auto* text = std::get_if<std::string*>(&parameter.value);
+    if (!text || presence == Presence::Needed || !(*text)->empty())
+      object_[parameter.Key()] = JsonOf(parameter);
   }
-  template <class T>
-  void Number(const char* key, const T& value, const Range&, const char*)
+  bool Maybe(const Parameter& parameter, bool there)
   {
-    object_[key] = value;
-  }
-  template <class T>
-  void Number(const char* key, const std::optional<T>& value, const Range&, const char*)
-  {
-    if (value)
-      object_[key] = *value;
-  }
-  void Seed(const char* key, std::uint64_t value, const char*) { object_[key] = value; }
-  void Flag(const char* key, bool value, const char*) { object_[key] = value; }
-  template <class T>
-  void Choice(const char* key, const T& value, const Choices<T>& choices, const char*)
-  {
-    for (const auto& [name, choice] : choices)
-      if (choice == value)
-        object_[key] = name;
-    if (!object_.contains(key)) {
-      if constexpr (std::is_same_v<T, std::string>)
-        object_[key] = value; // for the reader to refuse
-    }
-  }
-  void Vector(const char* key, const Vector3d& value, const Range&, const char*)
-  {
-    object_[key] = Json::array({value.x(), value.y(), value.z()});
+    if (there)
+      Value(parameter);
+    return there;
   }
   void MaterialName(const char* key, const std::string& value, Presence = {}) { object_[key] = value; }
   template <class T>

@@ -8,9 +8,7 @@
 // each way.
 #include "SoundTransport.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>
@@ -34,21 +32,33 @@ Eigen::Vector3d LambertDirection(const Eigen::Vector3d& normal, double u, double
 
 } // namespace
 
-void SoundTransport::Check() const
+ParameterList Describe(SoundTransport& t)
 {
-  CheckRange("maxBounces", maxBounces, 0, 100);
-  CheckRange("dynamicRangeDb", dynamicRangeDb, 10.0, 300.0);
-  CheckRange("faceReflection", faceReflection, 0.0, 1.0);
-  CheckRange("faceRadius (mm)", faceRadius, 0.0, 1000.0);
-  CheckRange("acceptanceDegrees", acceptanceDegrees, 0.1, 90.0);
-  CheckRange("maxSegments", maxSegments, 1, 1e8);
+  return {
+      Parameter("MaxBounces", t.maxBounces, {0, 100}, "", "Reflections that are followed.").Advanced(),
+      Parameter("DynamicRangeDb", t.dynamicRangeDb, {10, 300}, "dB",
+                "A way of sound ends where its echoes are this far below those of a perfect mirror at the face."),
+      Parameter("Refraction", t.refraction, "Whether rays bend where the speed of sound changes.").Advanced(),
+      Parameter("FaceReflection", t.faceReflection, {0, 1}, "",
+                "Share of the pressure that the face of the probe turns back; 0: no reverberation between probe and tissue.")
+          .Advanced(),
+      Parameter("FaceRadiusMm", t.faceRadius, {0, 1000}, "mm", "The face turns sound back up to this far from its middle.")
+          .Advanced(),
+      Parameter("AcceptanceDegrees", t.acceptanceDegrees, {0.1, 90}, "degrees",
+                "How far from the normal of a surface its mirror echo is still received: standard deviation of a Gaussian, about "
+                "the angle of half the aperture as seen from the focus.")
+          .Advanced(),
+      Parameter("MaxSegments", t.maxSegments, {1, 1e8}, "",
+                "The most straight pieces of one ray's way: a stop for scenes of many mirrors.")
+          .Advanced(),
+  };
 }
 
-void SoundConditions::Check() const
+ParameterList Describe(SoundConditions& c)
 {
-  CheckRange("frequencyMHz", frequencyMHz, 0.1, 100.0);
-  CheckRange("assumedSoundSpeed (m/s)", assumedSoundSpeed, 100.0, 10000.0);
-  CheckRange("maxScanDepth (mm)", maxScanDepth, std::numeric_limits<double>::min(), 1e5);
+  return {Parameter("FrequencyMHz", c.frequencyMHz, {0.1, 100}, "MHz", "Centre frequency."),
+          Parameter("AssumedSoundSpeed", c.assumedSoundSpeed, {100, 10000}, "m/s", "How the scanner turns time into depth."),
+          Parameter("MaxScanDepth", c.maxScanDepth, {0, 1e5, true}, "mm", "Later echoes are not waited for.")};
 }
 
 // A way that is still to be followed.
@@ -63,8 +73,8 @@ struct SoundTracer::Way {
 SoundTracer::SoundTracer(const AcousticScene& scene, const SoundTransport& transport, const SoundConditions& conditions)
   : scene_(scene), transport_(transport), conditions_(conditions)
 {
-  transport.Check();
-  conditions.Check();
+  CheckRanges(transport);
+  CheckRanges(conditions);
   const double neperPerDb = std::log(10.0) / 20.0;
   for (const Material& material : scene.Materials())
     media_.push_back({{material.Impedance(), material.soundSpeed},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "AcousticScene.h"
+#include "Core/Base/Parameters.h"
 #include "Interface.h"
 #include "RaySamples.h"
 #include "SoundPath.h"
@@ -9,32 +10,25 @@ namespace echorama {
 
 /// How sound is followed through a scene.
 struct SoundTransport {
-  int maxBounces = 4; ///< reflections that are followed, in [0, 100]
-  /// A way ends where its echoes, there and back, would be this far below those of a perfect mirror at the face, in [10, 300].
+  int maxBounces = 4;
   double dynamicRangeDb = 120.0;
-  bool refraction = true; ///< false: rays go straight on, whatever the speeds of sound
-  /// Share of the pressure that the probe's own face turns back, in [0, 1]; 0: no reverberation between probe and tissue.
+  bool refraction = true;
   double faceReflection = 0.2;
-  /// How far from the middle of the face that happens, mm, in [0, 1000]: a disc in the plane of the element.
-  double faceRadius = 20.0;
-  /// How far from a surface's normal its mirror echo still finds the element: standard deviation of a Gaussian in the
-  /// angle, degrees, in [0.1, 90]. About that under which half of the aperture is seen from the depth of the focus.
+  double faceRadius = 20.0; ///< mm, of a disc in the plane of the element
   double acceptanceDegrees = 5.0;
-  int maxSegments = 10000; ///< of one ray, in [1, 1e8]: a stop for scenes of many mirrors
-
-  /// Throws Error(InvalidParameter) that names the field that is out of range.
-  void Check() const;
+  int maxSegments = 10000;
 };
+
+ParameterList Describe(SoundTransport& t);
 
 /// What the scanner sends and assumes.
 struct SoundConditions {
-  double frequencyMHz = 3.5;         ///< in [0.1, 100]
-  double assumedSoundSpeed = 1540.0; ///< m/s, in [100, 10000]
-  double maxScanDepth = 150.0;       ///< mm, in (0, 1e5]: later echoes are not waited for
-
-  /// Throws Error(InvalidParameter) that names the field that is out of range.
-  void Check() const;
+  double frequencyMHz = 3.5;
+  double assumedSoundSpeed = 1540.0; ///< m/s
+  double maxScanDepth = 150.0;       ///< mm
 };
+
+ParameterList Describe(SoundConditions& c);
 
 /// Where a ray begins.
 struct RayStart {
@@ -57,7 +51,7 @@ struct RayStart {
 /// The scene must outlive it. Thread safe.
 class SoundTracer {
 public:
-  /// \throws Error(InvalidParameter), see the two Check()s.
+  /// \throws Error(InvalidParameter) for a number out of its range.
   SoundTracer(const AcousticScene& scene, const SoundTransport& transport, const SoundConditions& conditions);
 
   /// \a path is overwritten (its memory is used again). \a samples, if any, turn the reflections of rough surfaces: each is a

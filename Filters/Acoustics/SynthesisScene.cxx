@@ -5,6 +5,14 @@
 #include <filesystem>
 
 namespace echorama {
+
+ParameterList Describe(SceneVolume& volume)
+{
+  return {Parameter("SpacingMm", volume.spacingMm, {0.05, 20}, "mm", "Edge of the cubic voxels."),
+          Parameter("KnockMm", volume.knockMm, {0, 1000}, "mm", "How far every volume but the first is put out of place."),
+          Parameter("KnockDegrees", volume.knockDegrees, {0, 180}, "degrees", "How far every volume but the first is turned.")};
+}
+
 Eigen::Affine3d ScenePlace::Matrix() const
 {
   if (rows)
@@ -101,17 +109,12 @@ SynthesisParameters SynthesisScene::Parameters() const
 {
   const ProbePreset resolved = probe.Resolve();
   SynthesisParameters parameters;
-  parameters.mode = transport.mode;
+  static_cast<EchoModel&>(parameters) = echoes;
   parameters.probe = resolved.probe;
   parameters.elements = resolved.elements;
   parameters.steps = resolved.sweepSteps;
   parameters.samples = resolved.samples;
   parameters.transducer = transducer;
-  parameters.transport = transport.sound;
-  parameters.subRays = transport.subRays;
-  parameters.sampling = transport.sampling;
-  parameters.mirrorDb = transport.mirrorDb;
-  parameters.counting = transport.counting;
   parameters.counting.assumedSoundSpeed = transducer.assumedSoundSpeed;
   parameters.counting.seed = seed;
   parameters.receiver = receiver;
@@ -121,17 +124,11 @@ SynthesisParameters SynthesisScene::Parameters() const
 
 PackedTissueParameters SynthesisScene::ParametersOf(const ScenePacking& packing) const
 {
-  PackedTissueParameters parameters;
-  parameters.packing = packing.spheres;
+  PackedTissueParameters parameters = packing.tissue;
   parameters.background = MaterialOf(background);
   parameters.materials.clear();
   for (const ScenePacking::Share& share : packing.materials)
     parameters.materials.push_back({MaterialOf(share.material), share.weight});
-  parameters.cell.mm = packing.cellMm;
-  parameters.cell.growth = packing.cellGrowth;
-  parameters.deviation = packing.deviation;
-  parameters.trueVolume = packing.trueVolume;
-  parameters.turned = packing.turned;
   return parameters;
 }
 

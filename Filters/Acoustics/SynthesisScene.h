@@ -28,7 +28,7 @@ struct ScenePlace {
   std::optional<Eigen::Matrix4d> rows;
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();     ///< mm, comes last
   Eigen::Vector3d rotationDegrees = Eigen::Vector3d::Zero(); ///< axis times angle
-  double scale = 1.0;                                        ///< comes first, in [1e-6, 1e6]
+  double scale = 1.0;                                        ///< comes first
 
   Eigen::Affine3d Matrix() const;
 };
@@ -59,7 +59,7 @@ struct SceneProbe {
 
 /// Triangles from a file.
 struct SceneMesh {
-  enum class Unit { Metres, Millimetres };
+  enum class Unit { Millimetres, Metres };
   enum class Axes {
     Lps, ///< +x to the patient's left, +y to the back, +z to the head
     YUp, ///< +x to the patient's left, +y to the head, +z to the front, as in glTF
@@ -76,13 +76,13 @@ struct SceneMesh {
 
 struct SceneSphere {
   Eigen::Vector3d centre = {0.0, 0.0, 50.0}; ///< mm
-  double radius = 10.0;                      ///< mm, > 0
+  double radius = 10.0;                      ///< mm
   std::string material = "liver";
 };
 
 struct SceneBox {
   Eigen::Vector3d centre = {0.0, 0.0, 50.0};                 ///< mm
-  Eigen::Vector3d size = {20.0, 20.0, 20.0};                 ///< mm, > 0
+  Eigen::Vector3d size = {20.0, 20.0, 20.0};                 ///< mm
   Eigen::Vector3d rotationDegrees = Eigen::Vector3d::Zero(); ///< axis times angle, about the centre
   std::string material = "liver";
 };
@@ -90,7 +90,7 @@ struct SceneBox {
 struct SceneCylinder {
   Eigen::Vector3d from = {0.0, -50.0, 50.0}; ///< mm, the middle of one end
   Eigen::Vector3d to = {0.0, 50.0, 50.0};    ///< mm, of the other
-  double radius = 5.0;                       ///< mm, > 0
+  double radius = 5.0;                       ///< mm
   std::string material = "blood";
 };
 
@@ -98,15 +98,10 @@ struct SceneCylinder {
 struct ScenePacking {
   struct Share {
     std::string material;
-    double weight = 1.0; ///< beside the others', in [0, 1e9]
+    double weight = 1.0; ///< beside the others'
   };
-  SpherePackingParameters spheres;
+  PackedTissueParameters tissue; ///< but its materials
   std::vector<Share> materials = {{"lesion-dark", 2.0}, {"liver", 2.0}, {"lesion-bright", 2.0}, {"cyst", 1.0}};
-  double cellMm = 1.0;     ///< resolution cell at the origin, for the level of detail, in [0.01, 100]
-  double cellGrowth = 0.0; ///< mm more per mm from there, in [0, 1]
-  double deviation = 0.25; ///< of meshes from their spheres, in cells, in [0.001, 10]
-  bool trueVolume = false; ///< as in PackedTissueParameters
-  bool turned = true;
 };
 
 /// One entry of the list of tissue; it may stand for many bodies. Where several hold a point the later counts.
@@ -117,8 +112,8 @@ struct SceneItem {
 
 /// Views side by side along a convex body, as PhantomViews() places them.
 struct SceneRow {
-  int count = 3;         ///< in [1, 1000]
-  double overlap = 0.55; ///< fraction that neighbours share, in [0.05, 0.95]
+  int count = 3;
+  double overlap = 0.55; ///< fraction that neighbours share
   ScenePose middle;      ///< where the middle of the row is held
 };
 
@@ -132,14 +127,14 @@ struct SceneRecording {
   std::string file;                         ///< a sequence file; PathOf() resolves it
   std::string transform = "ProbeToTracker"; ///< which of its transforms; "ProbeToReference" may be composed
   ScenePlace trackerToWorld;                ///< rigid
-  double smoothSeconds = 0.1;               ///< sigma of the smoothing, in [0, 60]
-  double longestGapSeconds = 0.5;           ///< drop-outs up to this are bridged, in (0, 600]
-  int count = 3;                            ///< evenly from the first pose to the last, in [1, 1000]
+  double smoothSeconds = 0.1;               ///< sigma of the smoothing
+  double longestGapSeconds = 0.5;           ///< drop-outs up to this are bridged
+  int count = 3;                            ///< evenly from the first pose to the last
 };
 
 /// The time a sweep takes and how the probe moves meanwhile; each plane is then imaged at its own pose.
 struct SceneSweep {
-  double seconds = 0.0;                                           ///< in [0, 60]; 0: all planes at once
+  double seconds = 0.0;                                           ///< 0: all planes at once
   Eigen::Vector3d velocityMmPerSecond = Eigen::Vector3d::Zero();  ///< in the probe's frame
   Eigen::Vector3d turnDegreesPerSecond = Eigen::Vector3d::Zero(); ///< axis times angle in the probe's frame, about its face
   bool alongRecording = false; ///< the motion is that of the recording around the moment of the view; views need one
@@ -148,21 +143,12 @@ struct SceneSweep {
   Pose ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) const;
 };
 
-/// How echoes are made.
-struct SceneTransport {
-  SynthesisParameters::Mode mode = SynthesisParameters::Mode::Coherent;
-  SoundTransport sound;
-  int subRays = SynthesisParameters().subRays; ///< as in SynthesisParameters
-  Sampling sampling = Sampling::Stratified;    ///< as in SynthesisParameters
-  double mirrorDb = SynthesisParameters().mirrorDb;
-  ScatterCounting counting; ///< of the mode counting; its speed of sound is the transducer's, its seed the scene's
+struct SceneVolume {
+  double spacingMm = 1.0;                   ///< of the cubic voxels
+  double knockMm = 8.0, knockDegrees = 6.0; ///< how far every volume but the first is put out of place
 };
 
-struct SceneVolume {
-  double spacingMm = 1.0;    ///< of the cubic voxels, in [0.05, 20]
-  double knockMm = 8.0;      ///< how far every volume but the first is put out of place, in [0, 1000]
-  double knockDegrees = 6.0; ///< and turned, in [0, 180]
-};
+ParameterList Describe(SceneVolume& volume);
 
 struct SynthesisScene {
   std::string name = "scene";
@@ -171,7 +157,7 @@ struct SynthesisScene {
   SceneProbe probe;
   Transducer transducer = ProbePresetOf("mechanical-3d").transducer; ///< numbers that a file does not say are the preset's
   Receiver receiver = SynthesisParameters::DefaultReceiver();
-  SceneTransport transport;
+  EchoModel echoes;                ///< counting's speed of sound is the transducer's, its seed the scene's
   std::vector<Material> materials; ///< the scene's own, which come before the standard ones
   std::string background = "water";
   std::vector<SceneItem> tissue;

@@ -10,9 +10,11 @@
 // With several rays a beam, the mean amplitude of the direct way is a function of depth; it multiplies the row of the
 // direct way, which is summed with amplitude 1. That is right to the length of a pulse, and costs one sum instead of many.
 #include "Synthesize.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/ParameterJson.h"
 #include "EchoSum.h"
 #include "Scatterers.h"
 #include "VisitedSpace.h"
@@ -21,7 +23,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 namespace echorama {
 namespace {
@@ -304,11 +305,6 @@ VisitedSpace SpaceOf(const std::vector<BeamWays>& beams, const Transducer& trans
   return space;
 }
 
-const char* NameOf(Sampling sampling)
-{
-  return sampling == Sampling::Random ? "random" : sampling == Sampling::Stratified ? "stratified" : "sobol";
-}
-
 } // namespace
 
 Receiver SynthesisParameters::DefaultReceiver()
@@ -332,25 +328,57 @@ std::array<int, 3> SynthesisParameters::BeamDimensions() const
   return {samples, elements, probe.IsPlane() ? 1 : steps};
 }
 
+ParameterList Describe(EchoModel& m)
+{
+  return Join({{Parameter("Mode", Choice(m.mode, {"coherent", "counting"}),
+                          "Coherent: the echoes of scatterers are summed with their phases. Counting: random scatter events of "
+                          "rays are counted (dissertation 3.4).")},
+               Describe(m.transport),
+               {Parameter("SubRays", m.subRays, {1, 4096}, "",
+                          "Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged.")
+                    .Advanced(),
+                Parameter("Sampling", Choice(m.sampling, SamplingNames), "How the rays of an element are spread.").Advanced(),
+                Parameter("MirrorDb", m.mirrorDb, {0, 120}, "dB",
+                          "Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference "
+                          "tissue.")
+                    .Advanced()}});
+}
+
+ParameterList Describe(SynthesisParameters& p)
+{
+  return Join(
+      {{Parameter(
+            "Seed", p.seed, {0, 9223372036854775807.0}, "",
+            "Seed of the scatterers of the tissue, and of all else that is random but the noise. Volumes of one seed see the "
+            "same."),
+        Parameter("Elements", p.elements, {2, 4096}, "", "Beams of a plane."),
+        Parameter("Steps", p.steps, {1, 4096}, "", "Planes of the sweep, at least 2 of a probe that sweeps."),
+        Parameter("Samples", p.samples, {2, 16384}, "", "Samples along a beam.")},
+       Describe(p.transducer),
+       Describe(p.receiver),
+       Without(Describe(static_cast<EchoModel&>(p)), {"DynamicRangeDb"}),
+       {Parameter(
+            "ScatterersPerMm3", p.scatterersPerMm3, {0, 1000}, "per mm^3",
+            "The most scatterers that are made of any material; fewer are faster. 0: " +
+                NumberText(SynthesisParameters::scatterersPerCell) +
+                " in every resolution cell at the transmit focus. Volumes share their speckle when they have the same number.")
+            .Advanced(),
+        Parameter("InvisibleDb", p.invisibleDb, {0, 300}, "dB",
+                  "Ways of sound whose speckle would stay this far below black, after all gain, are not summed.")
+            .Advanced()},
+       Without(Describe(p.counting), {"AssumedSoundSpeed", "Sampling", "Seed"})});
+}
+
 void SynthesisParameters::Check() const
 {
-  const auto check = [](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, std::string(what) + " is " + NumberText(value) + "; it must be in [" +
-                                                     NumberText(from) + ", " + NumberText(to) + "]");
-  };
-  if (mode != Mode::Coherent && mode != Mode::Counting)
-    throw Error(Error::Kind::InvalidParameter, "mode is " + std::to_string(static_cast<int>(mode)) + "; it must be 0 or 1");
+  CheckRanges(*this);
+  CheckRanges(transport);
+  CheckRanges(counting);
+  receiver.Check();
   if (mode == Mode::Counting && !stepPoses.empty())
     throw Error(Error::Kind::InvalidParameter, "stepPoses: events are counted for a probe at rest alone");
-  check("elements", elements, 2, 4096);
-  if (!probe.IsPlane())
-    check("steps", steps, 2, 4096);
-  check("samples", samples, 2, 16384);
-  check("subRays", subRays, 1, 4096);
-  check("mirrorDb", mirrorDb, 0.0, 120.0);
-  check("invisibleDb", invisibleDb, 0.0, 300.0);
-  check("scatterersPerMm3", scatterersPerMm3, 0.0, 1000.0);
+  if (!probe.IsPlane() && steps < 2)
+    throw Error(Error::Kind::InvalidParameter, "Steps is " + std::to_string(steps) + "; a probe that sweeps needs at least 2");
   probe.Check();
   const auto checkPose = [](const Pose& pose, const std::string& name) {
     if (!IsRotation(pose.linear()) || !(pose.translation().cwiseAbs().maxCoeff() <= 1e6))
@@ -363,10 +391,6 @@ void SynthesisParameters::Check() const
   if (!stepPoses.empty() && stepPoses.size() != planes)
     throw Error(Error::Kind::InvalidParameter, "stepPoses has " + std::to_string(stepPoses.size()) + " poses for " +
                                                    std::to_string(planes) + " steps of the sweep");
-  transducer.Check();
-  transport.Check();
-  counting.Check();
-  receiver.Check();
 }
 
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& p, const Progress& progress,
@@ -488,10 +512,10 @@ Volume<unsigned char> SynthesizeBeams(const AcousticScene& scene, const Synthesi
   return beams;
 }
 
-std::string DescribeSynthesis(const SynthesisParameters& p)
+std::string DescribeSynthesis(const SynthesisParameters& parameters)
 {
   using Json = nlohmann::ordered_json;
-  constexpr double degrees = 57.29577951308232;
+  SynthesisParameters p = parameters;
   const auto rows = [](const Pose& pose) {
     Json list = Json::array();
     for (int i = 0; i < 4; ++i) {
@@ -508,60 +532,32 @@ std::string DescribeSynthesis(const SynthesisParameters& p)
     tgc.push_back({point.depthMm, point.gainDb});
   const std::array<int, 3> n = p.BeamDimensions();
   Json text{{"schema", "echorama-synthesis-1"},
-            {"mode", p.mode == SynthesisParameters::Mode::Coherent ? "coherent" : "counting"},
+            {"mode", JsonOf(Describe(static_cast<EchoModel&>(p)).front())},
             {"seed", p.seed},
             {"scatterersPerMm3", p.ScatterersPerMm3()},
             {"samples", n[0]},
             {"elements", n[1]},
             {"steps", n[2]},
             {"probe",
-             {{"fanAngleDegrees", p.probe.fanAngle * degrees},
+             {{"fanAngleDegrees", p.probe.fanAngle * DegreesPerRadian},
               {"fanWidthMm", p.probe.fanWidth},
               {"fanOffset", p.probe.fanOffset},
-              {"sweepAngleDegrees", p.probe.sweepAngle * degrees},
+              {"sweepAngleDegrees", p.probe.sweepAngle * DegreesPerRadian},
               {"sweepWidthMm", p.probe.sweepWidth},
               {"depthMinMm", p.probe.depthMin},
               {"depthMaxMm", p.probe.depthMax}}},
             {"ProbeToWorld", rows(p.probeToWorld)},
-            {"transducer",
-             {{"frequencyMHz", p.transducer.frequencyMHz},
-              {"bandwidth", p.transducer.bandwidth},
-              {"lateralApertureMm", p.transducer.lateralApertureMm},
-              {"lateralFocusMm", p.transducer.lateralFocusMm},
-              {"dynamicReceive", p.transducer.dynamicReceive},
-              {"smallestFNumber", p.transducer.smallestFNumber},
-              {"elevationApertureMm", p.transducer.elevationApertureMm},
-              {"elevationFocusMm", p.transducer.elevationFocusMm},
-              {"assumedSoundSpeed", p.transducer.assumedSoundSpeed}}},
-            {"receiver",
-             {{"gainDb", p.receiver.gainDb},
-              {"tgcDbPerCm", p.receiver.tgcDbPerCm},
-              {"tgcPoints", tgc},
-              {"dynamicRangeDb", p.receiver.dynamicRangeDb},
-              {"referenceGrey", p.receiver.referenceGrey},
-              {"noiseDb", p.receiver.noiseDb},
-              {"noiseSeed", p.receiver.noiseSeed}}}};
+            {"transducer", JsonOf(Describe(p.transducer))},
+            {"receiver", JsonOf(Describe(p.receiver))}};
+  text["receiver"]["tgcPoints"] = tgc;
   if (!stepPoses.empty())
     text["stepPoses"] = stepPoses;
   if (p.mode == SynthesisParameters::Mode::Coherent) {
-    text["transport"] = {{"maxBounces", p.transport.maxBounces},
-                         {"dynamicRangeDb", p.transport.dynamicRangeDb},
-                         {"refraction", p.transport.refraction},
-                         {"faceReflection", p.transport.faceReflection},
-                         {"faceRadius", p.transport.faceRadius},
-                         {"acceptanceDegrees", p.transport.acceptanceDegrees},
-                         {"maxSegments", p.transport.maxSegments},
-                         {"displaced", !p.displacement.IsZero()},
-                         {"subRays", p.subRays},
-                         {"sampling", NameOf(p.sampling)},
-                         {"mirrorDb", p.mirrorDb},
-                         {"invisibleDb", p.invisibleDb}};
+    text["transport"] = JsonOf(Without(Describe(static_cast<EchoModel&>(p)), {"Mode"}));
+    text["transport"]["displaced"] = !p.displacement.IsZero();
+    text["transport"]["invisibleDb"] = p.invisibleDb;
   } else {
-    text["counting"] = {{"raysPerElement", p.counting.raysPerElement},
-                        {"clarity", p.counting.clarity},
-                        {"coneDegrees", p.counting.coneDegrees},
-                        {"maxEvents", p.counting.maxEvents},
-                        {"sampling", NameOf(p.counting.sampling)}};
+    text["counting"] = JsonOf(Without(Describe(p.counting), {"AssumedSoundSpeed", "Seed"}));
   }
   return text.dump();
 }

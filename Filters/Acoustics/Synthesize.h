@@ -15,39 +15,37 @@
 
 namespace echorama {
 
-/// What a synthesised volume is made with: probe, sound and receiver. Numbers that lie in other structs are documented there.
-struct SynthesisParameters {
-  /// How echoes are made.
+/// How echoes are made.
+struct EchoModel {
   enum class Mode {
     Coherent, ///< rays for the ways of sound, and the coherent sum of the echoes of scatterers fixed to the tissue
     Counting, ///< random scatter events of rays, counted (ScatterCounting): the algorithm of dissertation 3.4
   };
   Mode mode = Mode::Coherent;
+  SoundTransport transport;
+  int subRays = 8;
+  Sampling sampling = Sampling::Stratified; ///< also of how rough surfaces scatter rays
+  double mirrorDb = 45.0;
+  ScatterCounting counting; ///< of the mode Counting
+};
 
+ParameterList Describe(EchoModel& m); ///< but counting
+
+/// What a synthesised volume is made with: probe, sound and receiver.
+struct SynthesisParameters : EchoModel {
   ProbeGeometry probe = ProbeGeometry::Convex(1.1344640137963142, 40.0, 0.9599310885968813, 30.0, 5.0, 120.0);
   Pose probeToWorld = Pose::Identity(); ///< rigid
   /// Where the probe was at each step of the sweep, first to last, when it moved during the sweep; empty: at probeToWorld all
   /// the time. The scanner does not know: it places every plane as if the probe had rested at probeToWorld. Coherent only.
   std::vector<Pose> stepPoses;
 
-  int elements = 128; ///< beams of a plane, in [2, 4096]
-  int steps = 96;     ///< planes of the sweep, in [2, 4096]; 1 (whatever is given) of a probe that does not sweep
-  int samples = 512;  ///< depths on each beam, in [2, 16384]
+  int elements = 128, samples = 512;
+  int steps = 96; ///< 1, whatever is given, of a probe that does not sweep
 
   Transducer transducer;
-  SoundTransport transport;
-  int subRays = 8; ///< rays per element, spread over its aperture, in [1, 4096]; 1: the axis alone, fast and hard-edged
-  Sampling sampling = Sampling::Stratified; ///< how they are spread, and how rough surfaces scatter them
-  /// Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue: dB, in [0, 120].
-  double mirrorDb = 45.0;
-  /// Ways of sound whose speckle would stay this far below black, after all gain, are not summed: dB, in [0, 300].
-  double invisibleDb = 12.0;
-  ScatterCounting counting; ///< of the mode Counting
   Receiver receiver = DefaultReceiver();
-  std::uint64_t seed = 1; ///< of the tissue: volumes of one seed see the same scatterers
-  /// The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0: scatterersPerCell in every resolution cell at
-  /// the transmit focus. Volumes share their speckle when they have the same number.
-  double scatterersPerMm3 = 0.0;
+  std::uint64_t seed = 1;
+  double scatterersPerMm3 = 0.0, invisibleDb = 12.0;
   static constexpr double scatterersPerCell = 10.0; ///< enough for speckle that is all but fully developed
   /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. (So a simulator of tissue says
   /// it; the fields of an aligner point the other way.) The surfaces of the scene are those that the tissue has now. The default
@@ -64,9 +62,12 @@ struct SynthesisParameters {
   /// Samples, elements and steps of the beam volume.
   std::array<int, 3> BeamDimensions() const;
 
-  /// Throws Error(InvalidParameter) that names the number which is out of its range, and what the parts' own checks throw.
+  /// All ranges, the probe and poses, and what goes together. \throws Error(InvalidParameter)
   void Check() const;
 };
+
+/// With transducer, receiver, transport and counting, but transport's dynamic range: the receiver's has that name.
+ParameterList Describe(SynthesisParameters& p);
 
 /// What a run cost, stage by stage.
 struct SynthesisCost {

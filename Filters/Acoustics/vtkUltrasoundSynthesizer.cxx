@@ -4,6 +4,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Imaging/ScanConversion.h"
+#include "SynthesisScene.h"
 #include "vtkAlgorithmOutput.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
@@ -19,12 +20,19 @@
 #include "vtkUltrasoundTissue.h"
 
 #include <algorithm>
-#include <utility>
 
 using echorama::Error;
 using echorama::SynthesisParameters;
 
 vtkStandardNewMacro(vtkUltrasoundSynthesizer);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundSynthesizer);
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundSynthesizer::GetSceneSchema()
+{
+  return echorama::SceneSchema();
+}
 
 namespace {
 constexpr std::size_t MaximumVoxels = 536870912; // 2^29
@@ -87,61 +95,39 @@ vtkUltrasoundSynthesizer::vtkUltrasoundSynthesizer()
 {
   this->SetNumberOfInputPorts(3);
   this->SetNumberOfOutputPorts(2);
-  const echorama::ProbeGeometry& probe = this->Values.probe;
-  this->FanAngle = probe.fanAngle * echorama::DegreesPerRadian;
-  this->FanRadius = probe.fanWidth / probe.fanAngle;
-  this->SweepAngle = probe.sweepAngle * echorama::DegreesPerRadian;
-  this->SweepRadius = probe.sweepWidth / probe.sweepAngle;
-  this->DepthMin = probe.depthMin;
-  this->DepthMax = probe.depthMax;
-  std::fill_n(this->Position, 3, 0.0);
-  std::fill_n(this->Orientation, 3, 0.0);
 }
 
 //----------------------------------------------------------------------------
 vtkUltrasoundSynthesizer::~vtkUltrasoundSynthesizer() = default;
 
 //----------------------------------------------------------------------------
-// Each number has its home in the kernel's parameters, which also know its range.
-#define EchoramaParameter(Name, Type, place)                                                                                     \
-  void vtkUltrasoundSynthesizer::Set##Name(Type value)                                                                           \
-  {                                                                                                                              \
-    using Value = decltype(this->Values.place);                                                                                  \
-    if (this->Values.place != static_cast<Value>(value)) {                                                                       \
-      this->Values.place = static_cast<Value>(value);                                                                            \
-      this->Modified();                                                                                                          \
-    }                                                                                                                            \
-  }                                                                                                                              \
-  Type vtkUltrasoundSynthesizer::Get##Name() const                                                                               \
-  {                                                                                                                              \
-    return static_cast<Type>(this->Values.place);                                                                                \
-  }
+echorama::ParameterList vtkUltrasoundSynthesizer::Parameters()
+{
+  using echorama::Parameter;
+  auto& v = this->Own;
+  const std::string otherwise = " Not used with a probe input.";
+  return echorama::Join(
+      {{Parameter("Position", v.position, {}, "mm", "Where the middle of the probe's face lies in the world." + otherwise),
+        Parameter("Orientation", v.orientation, {}, "degrees",
+                  "How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x." + otherwise),
+        Parameter("FanAngle", v.fanAngle, {0, 359.999}, "degrees",
+                  "Angle between the first and the last beam of a fan." + otherwise),
+        Parameter("FanRadius", v.fanRadius, {0, 10000}, "mm", "Radius of the array." + otherwise),
+        Parameter("SweepAngle", v.sweepAngle, {0, 359.999}, "degrees",
+                  "Angle that the array sweeps. 0: a single plane." + otherwise),
+        Parameter("SweepRadius", v.sweepRadius, {0, 10000}, "mm", "How far the face is from the axis of the sweep." + otherwise),
+        Parameter("DepthMin", v.depthMin, {-10000, 10000}, "mm", "First depth along the beams, from the face." + otherwise),
+        Parameter("DepthMax", v.depthMax, {-10000, 10000}, "mm", "Last depth along the beams, from the face." + otherwise),
+        Parameter("SliceOnly", v.sliceOnly, "Whether only one plane of the sweep is made, a 2D image: for interaction."),
+        Parameter("SlicePosition", v.slicePosition, {-0.5, 0.5}, "whole sweeps",
+                  "Which plane of the sweep: -0.5 is the first, 0.5 the last.")
+            .When("SliceOnly", "on"),
+        Parameter("SpacingMm", v.spacingMm, {0, 1000}, "mm", "Edge of the cubic voxels. 0: about as many voxels as samples.")},
+       Describe(this->Values)});
+}
 
-EchoramaParameter(Mode, int, mode) EchoramaParameter(Seed, vtkTypeInt64, seed) EchoramaParameter(Elements, int, elements)
-    EchoramaParameter(Steps, int, steps) EchoramaParameter(Samples, int, samples)
-        EchoramaParameter(FrequencyMHz, double, transducer.frequencyMHz)
-            EchoramaParameter(Bandwidth, double, transducer.bandwidth) EchoramaParameter(LateralApertureMm, double,
-                                                                                         transducer.lateralApertureMm)
-                EchoramaParameter(LateralFocusMm, double, transducer.lateralFocusMm)
-                    EchoramaParameter(ElevationApertureMm, double, transducer.elevationApertureMm)
-                        EchoramaParameter(ElevationFocusMm, double, transducer.elevationFocusMm)
-                            EchoramaParameter(MaxBounces, int, transport.maxBounces) EchoramaParameter(FaceReflection, double,
-                                                                                                       transport.faceReflection)
-                                EchoramaParameter(MirrorDb, double, mirrorDb) EchoramaParameter(SubRays, int, subRays)
-                                    EchoramaParameter(ScatterersPerMm3, double, scatterersPerMm3)
-                                        EchoramaParameter(RaysPerElement, int, counting.raysPerElement)
-                                            EchoramaParameter(Clarity, double, counting.clarity)
-                                                EchoramaParameter(GainDb, double, receiver.gainDb)
-                                                    EchoramaParameter(TgcDbPerCm, double, receiver.tgcDbPerCm)
-                                                        EchoramaParameter(DynamicRangeDb, double, receiver.dynamicRangeDb)
-                                                            EchoramaParameter(ReferenceGrey, double, receiver.referenceGrey)
-                                                                EchoramaParameter(NoiseDb, double, receiver.noiseDb)
-                                                                    EchoramaParameter(NoiseSeed, vtkTypeInt64, receiver.noiseSeed)
-
-#undef EchoramaParameter
-
-    //----------------------------------------------------------------------------
-    void vtkUltrasoundSynthesizer::SetParameters(const SynthesisParameters& parameters)
+//----------------------------------------------------------------------------
+void vtkUltrasoundSynthesizer::SetParameters(const SynthesisParameters& parameters)
 {
   this->Values = parameters;
   this->Modified();
@@ -162,31 +148,28 @@ void vtkUltrasoundSynthesizer::SetDisplacementConnection(vtkAlgorithmOutput* dis
 //----------------------------------------------------------------------------
 void vtkUltrasoundSynthesizer::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  echorama::Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(probeToWorld->GetData());
-  if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
-      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  const auto pose = vtkUltrasoundVolume::RigidPoseOf(probeToWorld);
+  if (!pose) {
     vtkErrorMacro("ProbeToWorld is not a rigid transform; the pose was not changed");
     return;
   }
-  const Eigen::Vector3d turn = echorama::LogRotation(pose.linear()) * echorama::DegreesPerRadian;
-  this->SetOrientation(turn.x(), turn.y(), turn.z());
-  this->SetPosition(pose.translation().x(), pose.translation().y(), pose.translation().z());
+  this->Own.orientation = echorama::LogRotation(pose->linear()) * echorama::DegreesPerRadian;
+  this->Own.position = pose->translation();
+  this->Modified();
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundSynthesizer::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = this->OwnPose().matrix();
-  probeToWorld->DeepCopy(rows.data());
+  vtkUltrasoundVolume::SetMatrix(probeToWorld, this->OwnPose());
 }
 
 //----------------------------------------------------------------------------
 echorama::Pose vtkUltrasoundSynthesizer::OwnPose() const
 {
   echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
-  pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
+  pose.linear() = echorama::ExpRotation(this->Own.orientation / echorama::DegreesPerRadian);
+  pose.translation() = this->Own.position;
   return pose;
 }
 
@@ -205,14 +188,10 @@ int vtkUltrasoundSynthesizer::FillInputPortInformation(int port, vtkInformation*
 //----------------------------------------------------------------------------
 vtkUltrasoundSynthesizer::Job vtkUltrasoundSynthesizer::Prepare(vtkInformationVector** inputs)
 {
+  echorama::CheckRanges(this->Parameters());
   Job job;
   SynthesisParameters& p = job.Parameters;
   p = this->Values;
-  for (const auto& [name, seed] : {std::pair("Seed", this->GetSeed()), std::pair("NoiseSeed", this->GetNoiseSeed())}) {
-    if (seed < 0) {
-      throw Error(Error::Kind::InvalidParameter, std::string(name) + " is " + std::to_string(seed) + "; it must be at least 0");
-    }
-  }
   if (vtkDataObject* probe = DataOn(inputs[Probe])) {
     const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(probe);
     if (!geometry) {
@@ -222,17 +201,17 @@ vtkUltrasoundSynthesizer::Job vtkUltrasoundSynthesizer::Prepare(vtkInformationVe
     p.probe = *geometry;
     p.probeToWorld = vtkUltrasoundAcquisition::ProbeToWorldOf(probe).value_or(echorama::Pose::Identity());
   } else {
-    p.probe = echorama::ProbeGeometry::Convex(this->FanAngle / echorama::DegreesPerRadian, this->FanRadius,
-                                              this->SweepAngle / echorama::DegreesPerRadian, this->SweepRadius, this->DepthMin,
-                                              this->DepthMax);
+    const auto& v = this->Own;
+    p.probe = echorama::ProbeGeometry::Convex(v.fanAngle / echorama::DegreesPerRadian, v.fanRadius,
+                                              v.sweepAngle / echorama::DegreesPerRadian, v.sweepRadius, v.depthMin, v.depthMax);
     p.probeToWorld = this->OwnPose();
   }
   p.probe.Check();
-  if (this->SliceOnly && !p.probe.IsPlane()) {
-    p = echorama::SliceOf(p, this->SlicePosition);
+  if (this->Own.sliceOnly && !p.probe.IsPlane()) {
+    p = echorama::SliceOf(p, this->Own.slicePosition);
   }
   p.Check();
-  const double spacing = this->SpacingMm == 0.0 ? echorama::SampleSpacing(p.BeamDimensions(), p.probe) : this->SpacingMm;
+  const double spacing = this->Own.spacingMm == 0.0 ? echorama::SampleSpacing(p.BeamDimensions(), p.probe) : this->Own.spacingMm;
   job.Grid = echorama::ScanConversionGrid(p.probe, p.probeToWorld, spacing, MaximumVoxels);
   return job;
 }
@@ -320,13 +299,6 @@ void vtkUltrasoundSynthesizer::Execute(vtkInformationVector** inputs, vtkImageDa
 void vtkUltrasoundSynthesizer::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Parameters: " << echorama::DescribeSynthesis(this->Values) << "\n";
-  os << indent << "Fan: " << this->FanAngle << " degrees, radius " << this->FanRadius << "\n";
-  os << indent << "Sweep: " << this->SweepAngle << " degrees, radius " << this->SweepRadius << "\n";
-  os << indent << "Depth: " << this->DepthMin << " to " << this->DepthMax << "\n";
-  os << indent << "Position: " << this->Position[0] << " " << this->Position[1] << " " << this->Position[2] << "\n";
-  os << indent << "Orientation: " << this->Orientation[0] << " " << this->Orientation[1] << " " << this->Orientation[2] << "\n";
-  os << indent << "SliceOnly: " << this->SliceOnly << " at " << this->SlicePosition << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->Notes << "\n";
 }

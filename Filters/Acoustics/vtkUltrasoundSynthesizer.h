@@ -30,6 +30,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Acoustics/Synthesize.h"
+#include "vtkUltrasoundParameters.h"
 #include <memory>
 #endif
 
@@ -48,185 +49,380 @@ public:
   void SetDisplacementConnection(vtkAlgorithmOutput* displacement);
   ///@}
 
-  enum { Coherent = 0, Counting = 1 };
-
   ///@{
-  /**
-   * How echoes are made: Coherent (0, the default) sums the echoes of scatterers coherently along the ways of sound; Counting
-   * (1) counts random scatter events of rays, the algorithm of dissertation 3.4.
-   */
-  void SetMode(int);
-  int GetMode() const;
-  ///@}
-
-  ///@{
-  /**
-   * Seed of the tissue's scatterers, and of all else that is random but the noise. Volumes of one seed see the same. At least 0.
-   * Default 1.
-   */
-  void SetSeed(vtkTypeInt64);
-  vtkTypeInt64 GetSeed() const;
-  ///@}
-
-  ///@{
-  /**
-   * Pose of the probe when there is no probe input: where the middle of its face lies (mm), and how it is turned (axis times
-   * angle, degrees). Default: at the origin, looking along +z with its fan along x.
-   */
-  vtkSetVector3Macro(Position, double);
-  vtkGetVector3Macro(Position, double);
-  vtkSetVector3Macro(Orientation, double);
-  vtkGetVector3Macro(Orientation, double);
-  ///@}
-
-  ///@{
-  /** The same as one rigid matrix. Another is refused with an error message. */
+  /** Position and Orientation as one rigid matrix. Another is refused with an error message. */
   void SetProbeToWorld(vtkMatrix4x4* probeToWorld);
   void GetProbeToWorld(vtkMatrix4x4* probeToWorld);
   ///@}
 
+  // BEGIN parameters
   ///@{
-  /**
-   * A curved array swept about an axis, when there is no probe input: angles in degrees, radii and depths in mm. Default: 65
-   * degrees of fan at a radius of 40 mm, 55 degrees of sweep at 30 mm, 5 to 120 mm deep.
-   */
-  vtkSetMacro(FanAngle, double);
-  vtkGetMacro(FanAngle, double);
-  vtkSetMacro(FanRadius, double);
-  vtkGetMacro(FanRadius, double);
-  vtkSetMacro(SweepAngle, double);
-  vtkGetMacro(SweepAngle, double);
-  vtkSetMacro(SweepRadius, double);
-  vtkGetMacro(SweepRadius, double);
-  vtkSetMacro(DepthMin, double);
-  vtkGetMacro(DepthMin, double);
-  vtkSetMacro(DepthMax, double);
-  vtkGetMacro(DepthMax, double);
-  ///@}
-
-  ///@{
-  /** Beams of a plane and planes of the sweep, in [2, 4096], and samples on a beam, in [2, 16384]. Default 128, 96, 512. */
-  void SetElements(int);
-  int GetElements() const;
-  void SetSteps(int);
-  int GetSteps() const;
-  void SetSamples(int);
-  int GetSamples() const;
+  /** Where the middle of the probe's face lies in the world. Not used with a probe input. In mm; default (0, 0, 0). */
+  void SetPosition(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetPosition(value);
+  }
+  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
+  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
   ///@}
 
   ///@{
   /**
-   * Whether only one plane of the sweep is made, a 2D image, for interaction. Default off. SlicePosition says which: -0.5 (first)
-   * to 0.5 (last), default 0.
+   * How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. Not used with a probe input. In
+   * degrees; default (0, 0, 0).
    */
-  vtkSetMacro(SliceOnly, bool);
-  vtkGetMacro(SliceOnly, bool);
-  vtkBooleanMacro(SliceOnly, bool);
-  vtkSetClampMacro(SlicePosition, double, -0.5, 0.5);
-  vtkGetMacro(SlicePosition, double);
+  void SetOrientation(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetOrientation(value);
+  }
+  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
+  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
   ///@}
 
   ///@{
-  /** Edge of the voxels in mm, in [0, 1000]; 0, the default, makes about as many voxels as samples. */
-  vtkSetClampMacro(SpacingMm, double, 0.0, 1000.0);
-  vtkGetMacro(SpacingMm, double);
+  /** Angle between the first and the last beam of a fan. Not used with a probe input. In [0, 359.999] degrees; default 65. */
+  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
+  double GetFanAngle() { return this->GetParameter("FanAngle"); }
   ///@}
 
   ///@{
-  /** Centre frequency in MHz, in [0.5, 50], and the -6 dB width of the two-way spectrum over it, in [0.05, 1.5]. Default 3.5,
-   * 0.6. */
-  void SetFrequencyMHz(double);
-  double GetFrequencyMHz() const;
-  void SetBandwidth(double);
-  double GetBandwidth() const;
+  /** Radius of the array. Not used with a probe input. In [0, 10000] mm; default 40. */
+  void SetFanRadius(double value) { this->SetParameter("FanRadius", value); }
+  double GetFanRadius() { return this->GetParameter("FanRadius"); }
+  ///@}
+
+  ///@{
+  /** Angle that the array sweeps. 0: a single plane. Not used with a probe input. In [0, 359.999] degrees; default 55. */
+  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
+  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
+  ///@}
+
+  ///@{
+  /** How far the face is from the axis of the sweep. Not used with a probe input. In [0, 10000] mm; default 30. */
+  void SetSweepRadius(double value) { this->SetParameter("SweepRadius", value); }
+  double GetSweepRadius() { return this->GetParameter("SweepRadius"); }
+  ///@}
+
+  ///@{
+  /** First depth along the beams, from the face. Not used with a probe input. In [-10000, 10000] mm; default 5. */
+  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
+  double GetDepthMin() { return this->GetParameter("DepthMin"); }
+  ///@}
+
+  ///@{
+  /** Last depth along the beams, from the face. Not used with a probe input. In [-10000, 10000] mm; default 120. */
+  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
+  double GetDepthMax() { return this->GetParameter("DepthMax"); }
+  ///@}
+
+  ///@{
+  /** Whether only one plane of the sweep is made, a 2D image: for interaction. Default off. */
+  void SetSliceOnly(bool value) { this->SetParameter("SliceOnly", value); }
+  bool GetSliceOnly() { return this->GetParameter("SliceOnly") != 0.0; }
+  void SliceOnlyOn() { this->SetSliceOnly(true); }
+  void SliceOnlyOff() { this->SetSliceOnly(false); }
   ///@}
 
   ///@{
   /**
-   * Width of the active aperture, in [0.1, 100] mm, and way to the focus, in [1, 1000] mm, along the fan and along the sweep.
-   * Default 14 and 70, 10 and 70.
+   * Which plane of the sweep: -0.5 is the first, 0.5 the last. Used when SliceOnly is on. In [-0.5, 0.5] whole sweeps; default 0.
    */
-  void SetLateralApertureMm(double);
-  double GetLateralApertureMm() const;
-  void SetLateralFocusMm(double);
-  double GetLateralFocusMm() const;
-  void SetElevationApertureMm(double);
-  double GetElevationApertureMm() const;
-  void SetElevationFocusMm(double);
-  double GetElevationFocusMm() const;
+  void SetSlicePosition(double value) { this->SetParameter("SlicePosition", value); }
+  double GetSlicePosition() { return this->GetParameter("SlicePosition"); }
   ///@}
 
   ///@{
-  /** Reflections that are followed, in [0, 100]. Default 4. */
-  void SetMaxBounces(int);
-  int GetMaxBounces() const;
-  ///@}
-
-  ///@{
-  /** Share of the pressure that the probe's own face turns back, in [0, 1]; 0: no reverberation between face and tissue. */
-  void SetFaceReflection(double);
-  double GetFaceReflection() const;
-  ///@}
-
-  ///@{
-  /** Level of the echo of a perfect mirror beside the speckle of the reference tissue, dB, in [0, 120]. Default 45. */
-  void SetMirrorDb(double);
-  double GetMirrorDb() const;
-  ///@}
-
-  ///@{
-  /** Rays per element, over its aperture, in [1, 4096]; 1 follows the axis of the beam alone, which is fast. Default 8. */
-  void SetSubRays(int);
-  int GetSubRays() const;
+  /** Edge of the cubic voxels. 0: about as many voxels as samples. In [0, 1000] mm; default 0. */
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
   ///@}
 
   ///@{
   /**
-   * The most scatterers that are made of any material, per mm^3, in [0, 1000]; 0, the default: 10 in every resolution cell at the
-   * transmit focus. Fewer are faster; volumes share their speckle when they have the same number.
+   * Seed of the scatterers of the tissue, and of all else that is random but the noise. Volumes of one seed see the same. At
+   * least 0; default 1.
    */
-  void SetScatterersPerMm3(double);
-  double GetScatterersPerMm3() const;
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
   ///@}
 
   ///@{
-  /** Of the mode Counting: rays per element, in [1, 1e7], and the clarity c of dissertation eq. 3.4, in [0, 200]. Default
-   * 256, 20. */
-  void SetRaysPerElement(int);
-  int GetRaysPerElement() const;
-  void SetClarity(double);
-  double GetClarity() const;
+  /** Beams of a plane. In [2, 4096]; default 128. */
+  void SetElements(int value) { this->SetParameter("Elements", value); }
+  int GetElements() { return static_cast<int>(this->GetParameter("Elements")); }
+  ///@}
+
+  ///@{
+  /** Planes of the sweep, at least 2 of a probe that sweeps. In [1, 4096]; default 96. */
+  void SetSteps(int value) { this->SetParameter("Steps", value); }
+  int GetSteps() { return static_cast<int>(this->GetParameter("Steps")); }
+  ///@}
+
+  ///@{
+  /** Samples along a beam. In [2, 16384]; default 512. */
+  void SetSamples(int value) { this->SetParameter("Samples", value); }
+  int GetSamples() { return static_cast<int>(this->GetParameter("Samples")); }
+  ///@}
+
+  ///@{
+  /** Centre frequency of the pulse. In [0.5, 50] MHz; default 3.5. */
+  void SetFrequencyMHz(double value) { this->SetParameter("FrequencyMHz", value); }
+  double GetFrequencyMHz() { return this->GetParameter("FrequencyMHz"); }
+  ///@}
+
+  ///@{
+  /** Width of the two-way spectrum at -6 dB, as a share of the centre frequency. In [0.05, 1.5]; default 0.6. */
+  void SetBandwidth(double value) { this->SetParameter("Bandwidth", value); }
+  double GetBandwidth() { return this->GetParameter("Bandwidth"); }
+  ///@}
+
+  ///@{
+  /** Width of the active aperture along the fan. In [0.1, 100] mm; default 14. */
+  void SetLateralApertureMm(double value) { this->SetParameter("LateralApertureMm", value); }
+  double GetLateralApertureMm() { return this->GetParameter("LateralApertureMm"); }
+  ///@}
+
+  ///@{
+  /** Way from the face to the transmit focus along the fan. In [1, 1000] mm; default 70. */
+  void SetLateralFocusMm(double value) { this->SetParameter("LateralFocusMm", value); }
+  double GetLateralFocusMm() { return this->GetParameter("LateralFocusMm"); }
+  ///@}
+
+  ///@{
+  /** Whether receiving is focused at every depth along the fan; else at the transmit focus. Default on. */
+  void SetDynamicReceive(bool value) { this->SetParameter("DynamicReceive", value); }
+  bool GetDynamicReceive() { return this->GetParameter("DynamicReceive") != 0.0; }
+  void DynamicReceiveOn() { this->SetDynamicReceive(true); }
+  void DynamicReceiveOff() { this->SetDynamicReceive(false); }
   ///@}
 
   ///@{
   /**
-   * Receiver: gain, in [-200, 200] dB; time-gain compensation, in [-20, 100] dB per cm of depth; dynamic range, in [10, 200] dB;
-   * mean grey of the reference tissue, in [0, 255]; noise of the electronics beside the reference tissue, in [-200, 100] dB
-   * (-200: none). Default 0, 3.5, 60, 110, -65.
+   * Dynamic receiving uses no more of the aperture than the depth divided by this. Used when DynamicReceive is on. In [0.5, 10];
+   * default 1.
    */
-  void SetGainDb(double);
-  double GetGainDb() const;
-  void SetTgcDbPerCm(double);
-  double GetTgcDbPerCm() const;
-  void SetDynamicRangeDb(double);
-  double GetDynamicRangeDb() const;
-  void SetReferenceGrey(double);
-  double GetReferenceGrey() const;
-  void SetNoiseDb(double);
-  double GetNoiseDb() const;
+  void SetSmallestFNumber(double value) { this->SetParameter("SmallestFNumber", value); }
+  double GetSmallestFNumber() { return this->GetParameter("SmallestFNumber"); }
   ///@}
 
   ///@{
-  /** Seed of the noise of the electronics, at least 0. Default 1. Volumes of one scan have different ones. */
-  void SetNoiseSeed(vtkTypeInt64);
-  vtkTypeInt64 GetNoiseSeed() const;
+  /** Width of the lens along the sweep. In [0.1, 100] mm; default 10. */
+  void SetElevationApertureMm(double value) { this->SetParameter("ElevationApertureMm", value); }
+  double GetElevationApertureMm() { return this->GetParameter("ElevationApertureMm"); }
   ///@}
+
+  ///@{
+  /** Way from the face to the focus of the lens, for sending and receiving. In [1, 1000] mm; default 70. */
+  void SetElevationFocusMm(double value) { this->SetParameter("ElevationFocusMm", value); }
+  double GetElevationFocusMm() { return this->GetParameter("ElevationFocusMm"); }
+  ///@}
+
+  ///@{
+  /** How the scanner turns time into depth. In [500, 5000] m/s; default 1540. */
+  void SetAssumedSoundSpeed(double value) { this->SetParameter("AssumedSoundSpeed", value); }
+  double GetAssumedSoundSpeed() { return this->GetParameter("AssumedSoundSpeed"); }
+  ///@}
+
+  ///@{
+  /** Gain of everything. In [-200, 200] dB; default 0. */
+  void SetGainDb(double value) { this->SetParameter("GainDb", value); }
+  double GetGainDb() { return this->GetParameter("GainDb"); }
+  ///@}
+
+  ///@{
+  /** Time-gain compensation: further gain by the depth. In [-20, 100] dB/cm; default 3.5. */
+  void SetTgcDbPerCm(double value) { this->SetParameter("TgcDbPerCm", value); }
+  double GetTgcDbPerCm() { return this->GetParameter("TgcDbPerCm"); }
+  ///@}
+
+  ///@{
+  /** How much the 255 steps of grey span. In [10, 200] dB; default 60. */
+  void SetDynamicRangeDb(double value) { this->SetParameter("DynamicRangeDb", value); }
+  double GetDynamicRangeDb() { return this->GetParameter("DynamicRangeDb"); }
+  ///@}
+
+  ///@{
+  /** Mean grey of the reference tissue, liver, at a gain of 0 dB. In [0, 255]; default 110. */
+  void SetReferenceGrey(double value) { this->SetParameter("ReferenceGrey", value); }
+  double GetReferenceGrey() { return this->GetParameter("ReferenceGrey"); }
+  ///@}
+
+  ///@{
+  /**
+   * Mean power of the noise of the electronics beside the reference tissue, before all gain; -200: none. In [-200, 100] dB;
+   * default -65.
+   */
+  void SetNoiseDb(double value) { this->SetParameter("NoiseDb", value); }
+  double GetNoiseDb() { return this->GetParameter("NoiseDb"); }
+  ///@}
+
+  ///@{
+  /** Seed of the noise. Volumes of one scan have different ones. At least 0; default 1. */
+  void SetNoiseSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("NoiseSeed", value); }
+  vtkTypeInt64 GetNoiseSeed() { return this->GetParameterAsInteger("NoiseSeed"); }
+  ///@}
+
+  enum Modes { COHERENT = 0, COUNTING = 1 };
+
+  ///@{
+  /**
+   * Coherent: the echoes of scatterers are summed with their phases. Counting: random scatter events of rays are counted
+   * (dissertation 3.4). Default coherent. There are COHERENT, COUNTING.
+   */
+  void SetMode(int value) { this->SetParameter("Mode", value); }
+  int GetMode() { return static_cast<int>(this->GetParameter("Mode")); }
+  void SetModeToCoherent() { this->SetMode(COHERENT); }
+  void SetModeToCounting() { this->SetMode(COUNTING); }
+  std::string GetModeAsString() { return this->GetParameterAsText("Mode"); }
+  ///@}
+
+  ///@{
+  /** Reflections that are followed. In [0, 100]; default 4. */
+  void SetMaxBounces(int value) { this->SetParameter("MaxBounces", value); }
+  int GetMaxBounces() { return static_cast<int>(this->GetParameter("MaxBounces")); }
+  ///@}
+
+  ///@{
+  /** Whether rays bend where the speed of sound changes. Default on. */
+  void SetRefraction(bool value) { this->SetParameter("Refraction", value); }
+  bool GetRefraction() { return this->GetParameter("Refraction") != 0.0; }
+  void RefractionOn() { this->SetRefraction(true); }
+  void RefractionOff() { this->SetRefraction(false); }
+  ///@}
+
+  ///@{
+  /**
+   * Share of the pressure that the face of the probe turns back; 0: no reverberation between probe and tissue. In [0, 1]; default
+   * 0.2.
+   */
+  void SetFaceReflection(double value) { this->SetParameter("FaceReflection", value); }
+  double GetFaceReflection() { return this->GetParameter("FaceReflection"); }
+  ///@}
+
+  ///@{
+  /** The face turns sound back up to this far from its middle. In [0, 1000] mm; default 20. */
+  void SetFaceRadiusMm(double value) { this->SetParameter("FaceRadiusMm", value); }
+  double GetFaceRadiusMm() { return this->GetParameter("FaceRadiusMm"); }
+  ///@}
+
+  ///@{
+  /**
+   * How far from the normal of a surface its mirror echo is still received: standard deviation of a Gaussian, about the angle of
+   * half the aperture as seen from the focus. In [0.1, 90] degrees; default 5.
+   */
+  void SetAcceptanceDegrees(double value) { this->SetParameter("AcceptanceDegrees", value); }
+  double GetAcceptanceDegrees() { return this->GetParameter("AcceptanceDegrees"); }
+  ///@}
+
+  ///@{
+  /** The most straight pieces of one ray's way: a stop for scenes of many mirrors. In [1, 100000000]; default 10000. */
+  void SetMaxSegments(int value) { this->SetParameter("MaxSegments", value); }
+  int GetMaxSegments() { return static_cast<int>(this->GetParameter("MaxSegments")); }
+  ///@}
+
+  ///@{
+  /** Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged. In [1, 4096]; default 8. */
+  void SetSubRays(int value) { this->SetParameter("SubRays", value); }
+  int GetSubRays() { return static_cast<int>(this->GetParameter("SubRays")); }
+  ///@}
+
+  enum Samplings { RANDOM = 0, STRATIFIED = 1, SOBOL = 2 };
+
+  ///@{
+  /** How the rays of an element are spread. Default stratified. There are RANDOM, STRATIFIED, SOBOL. */
+  void SetSampling(int value) { this->SetParameter("Sampling", value); }
+  int GetSampling() { return static_cast<int>(this->GetParameter("Sampling")); }
+  void SetSamplingToRandom() { this->SetSampling(RANDOM); }
+  void SetSamplingToStratified() { this->SetSampling(STRATIFIED); }
+  void SetSamplingToSobol() { this->SetSampling(SOBOL); }
+  std::string GetSamplingAsString() { return this->GetParameterAsText("Sampling"); }
+  ///@}
+
+  ///@{
+  /**
+   * Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue. In [0, 120] dB;
+   * default 45.
+   */
+  void SetMirrorDb(double value) { this->SetParameter("MirrorDb", value); }
+  double GetMirrorDb() { return this->GetParameter("MirrorDb"); }
+  ///@}
+
+  ///@{
+  /**
+   * The most scatterers that are made of any material; fewer are faster. 0: 10 in every resolution cell at the transmit focus.
+   * Volumes share their speckle when they have the same number. In [0, 1000] per mm^3; default 0.
+   */
+  void SetScatterersPerMm3(double value) { this->SetParameter("ScatterersPerMm3", value); }
+  double GetScatterersPerMm3() { return this->GetParameter("ScatterersPerMm3"); }
+  ///@}
+
+  ///@{
+  /** Ways of sound whose speckle would stay this far below black, after all gain, are not summed. In [0, 300] dB; default 12. */
+  void SetInvisibleDb(double value) { this->SetParameter("InvisibleDb", value); }
+  double GetInvisibleDb() { return this->GetParameter("InvisibleDb"); }
+  ///@}
+
+  ///@{
+  /** Rays that each element sends. Used when Mode is counting. In [1, 10000000]; default 256. */
+  void SetRaysPerElement(int value) { this->SetParameter("RaysPerElement", value); }
+  int GetRaysPerElement() { return static_cast<int>(this->GetParameter("RaysPerElement")); }
+  ///@}
+
+  ///@{
+  /**
+   * Exponent of the angle at which an echo comes in (dissertation, eq. 3.4): the larger, the clearer. Used when Mode is counting.
+   * In [0, 200]; default 20.
+   */
+  void SetClarity(double value) { this->SetParameter("Clarity", value); }
+  double GetClarity() { return this->GetParameter("Clarity"); }
+  ///@}
+
+  ///@{
+  /**
+   * A ray that was scattered goes on within this half angle of its old direction. Used when Mode is counting. In [0, 180]
+   * degrees; default 30.
+   */
+  void SetConeDegrees(double value) { this->SetParameter("ConeDegrees", value); }
+  double GetConeDegrees() { return this->GetParameter("ConeDegrees"); }
+  ///@}
+
+  ///@{
+  /** The most scatter events of one ray. Used when Mode is counting. In [1, 1000000]; default 1000. */
+  void SetMaxEvents(int value) { this->SetParameter("MaxEvents", value); }
+  int GetMaxEvents() { return static_cast<int>(this->GetParameter("MaxEvents")); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+
+  /** The JSON schema of scenes, the text of Examples/scenes/echorama-scene-1.schema.json. */
+  static std::string GetSceneSchema();
 
   /** What the last run noticed about the tissue (open or inverted surfaces) and what it cost, a line each; never fatal. */
   std::string GetNotes() const { return this->Notes; }
 
 #ifndef __VTK_WRAP__
-  /** Sets what the setters above set, but for probe geometry and pose, and all that has no setter of its own. */
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+  /** Sets all of them but for probe geometry and pose, and what has no setter of its own. */
   void SetParameters(const echorama::SynthesisParameters& parameters);
   /** What the last run cost. */
   const echorama::SynthesisCost& Cost() const
@@ -253,14 +449,17 @@ private:
   echorama::Pose OwnPose() const;
 
   echorama::SynthesisParameters Values; ///< probe, pose and displacement are those of the Job
+  /// The probe without a probe input (degrees, mm), and the form of the output.
+  struct {
+    double fanAngle = 65.0, fanRadius = 40.0, sweepAngle = 55.0, sweepRadius = 30.0, depthMin = 5.0, depthMax = 120.0;
+    Eigen::Vector3d position = Eigen::Vector3d::Zero(), orientation = Eigen::Vector3d::Zero();
+    bool sliceOnly = false;
+    double slicePosition = 0.0, spacingMm = 0.0;
+  } Own;
   echorama::SynthesisCost LastCost;
   struct SceneOfInput; ///< rays' structure of the tissue that came in last
   std::unique_ptr<SceneOfInput> Kept;
 #endif
-  double Position[3], Orientation[3];
-  double FanAngle, FanRadius, SweepAngle, SweepRadius, DepthMin, DepthMax;
-  bool SliceOnly = false;
-  double SlicePosition = 0.0, SpacingMm = 0.0;
   std::string Notes;
 
   vtkUltrasoundSynthesizer(const vtkUltrasoundSynthesizer&) = delete;

@@ -255,9 +255,11 @@ void Check(const BeamNoiseParameters& p, const ProbeGeometry& geometry)
   const auto fail = [](const std::string& reason) { throw Error(Error::Kind::InvalidParameter, "noise: " + reason); };
   BeamNoiseParameters described = p;
   if (geometry.IsPlane())
-    described.steps = 2; // it has one, whatever is said
-  if (p.intensity == NoiseIntensity::Histogram)
-    described.mean = described.dynamicRangeDb = 100.0; // the quantiles say it
+    described.steps = 2;                          // it has one, whatever is said
+  if (p.intensity == NoiseIntensity::Histogram) { // the quantiles say it
+    described.intensity = NoiseIntensity::Rayleigh;
+    described.mean = described.dynamicRangeDb = 100.0;
+  }
   CheckRanges(described);
   CheckRange("DepthCorrelationMm", p.depthCorrelationMm, 0.0, 0.25 * (geometry.depthMax - geometry.depthMin));
   if (p.intensity == NoiseIntensity::LogCompressed && !(p.mean < 255.0))

@@ -12,6 +12,7 @@
 // Cost: with n source voxels on a surface, some ten n points are summed over a few hundred sources and clusters each.
 // Memory beyond the result: five bytes per voxel for distances and nodes, and coarser lattices of some bytes per voxel in all.
 #include "Diffusion.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/DistanceMap.h"
 #include "DiffusionLevels.h"
@@ -48,15 +49,8 @@ void Check(const DiffusionParameters& parameters, const DiffusionSources& source
            VolumeView<const unsigned char> region, VolumeView<const unsigned char> wanted,
            const std::vector<VolumeView<float>>& result)
 {
-  const auto parameter = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw Error(Error::Kind::InvalidParameter, std::string(name) + " must be in [" + std::to_string(low) + ", " +
-                                                     std::to_string(high) + "], not " + std::to_string(value));
-  };
-  parameter("the inside exponent", parameters.insideExponent, 1.0, 64.0);
-  parameter("the outside exponent", parameters.outsideExponent, 1.0, 64.0);
-  parameter("the accuracy", parameters.accuracy, 1e-4, 0.1);
-  parameter("the number of channels", sources.channels, 1, DiffusionRows - 1);
+  CheckRanges(parameters);
+  CheckRange("the number of channels", sources.channels, 1, DiffusionRows - 1);
   if (sources.voxels.empty())
     throw Error(Error::Kind::BadInput, "there is nothing to spread: no source voxel was given");
   if (sources.values.size() != sources.voxels.size() * static_cast<std::size_t>(sources.channels))
@@ -308,6 +302,22 @@ void DiffuseWith(const Problem& problem, double d, const Wanted& wanted, const P
 }
 
 } // namespace
+
+ParameterList Describe(DiffusionParameters& p)
+{
+  const std::string text = " the data: the larger, the more the nearest surface counts alone.";
+  return {
+      Parameter("InsideExponent", p.insideExponent, {1, 64}, "",
+                "Exponent of distance by which values at the surface spread inside" + text),
+      Parameter("OutsideExponent", p.outsideExponent, {1, 64}, "",
+                "Exponent of distance by which values at the surface spread outside of" + text),
+      Parameter("Exact", p.exact, "Sum over the whole surface for every voxel: slow, to compare with.").Advanced(),
+      Parameter("Accuracy", p.accuracy, {0.0001, 0.1}, "",
+                "The largest error that is aimed at, as a share of the range of the values at the surface.")
+          .When("Exact", "off")
+          .Advanced(),
+  };
+}
 
 void Diffuse(const DiffusionParameters& parameters, const DiffusionSources& sources, const Eigen::Vector3d& spacing,
              VolumeView<const unsigned char> region, VolumeView<const unsigned char> wanted,

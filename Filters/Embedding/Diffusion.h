@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 #include <array>
@@ -8,14 +9,13 @@
 namespace echorama {
 
 struct DiffusionParameters {
-  double insideExponent = 6.0;  ///< d where the region is, [1, 64]
-  double outsideExponent = 4.0; ///< d elsewhere, [1, 64]
-  /// Every sum over all sources, one by one: slow, to compare with.
+  double insideExponent = 6.0;  ///< d where the region is
+  double outsideExponent = 4.0; ///< d elsewhere
   bool exact = false;
-  /// What the fast way aims at: its largest error, as a share of the range of the values (0.002 is half a grey level of 255),
-  /// in [0.0001, 0.1]. It is no bound: see Documentation/filters/SurfaceDiffuser.md for what was measured.
-  double accuracy = 0.002;
+  double accuracy = 0.002; ///< no bound: see Documentation/filters/SurfaceDiffuser.md for what was measured
 };
+
+ParameterList Describe(DiffusionParameters& p);
 
 /// The values that are spread: where they lie and what they are.
 struct DiffusionSources {

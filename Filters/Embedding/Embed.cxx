@@ -139,14 +139,18 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
 
 } // namespace
 
-void EmbedParameters::Check() const
+ParameterList Describe(EmbedParameters& p)
 {
-  if (!(featherMm >= 0.0) || !std::isfinite(featherMm))
-    throw Error(Error::Kind::InvalidParameter, "featherMm must be a number from 0 on");
-  if (!(smoothMm > 0.0) || !std::isfinite(smoothMm))
-    throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
-  if (diffusionVoxels < 1000)
-    throw Error(Error::Kind::InvalidParameter, "diffusionVoxels must be 1000 or more");
+  ParameterList diffusion = Describe(p.diffusion);
+  for (Parameter& each : diffusion)
+    each.Advanced();
+  return Join({Describe(static_cast<FeatherParameters&>(p)),
+               {Parameter("MatchContrast", p.matchContrast,
+                          "Give the background the local deviation of the data too, not their local mean alone.")},
+               diffusion,
+               {Parameter("DiffusionVoxels", p.diffusionVoxels, {1000, Unlimited}, "",
+                          "Brightness and contrast spread on a grid of at most so many blocks.")
+                    .Advanced()}});
 }
 
 double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
@@ -168,7 +172,7 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
            VolumeView<float> noise, VolumeView<const unsigned char> form, VolumeView<T> intensity,
            VolumeView<unsigned char> labels, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   const auto& n = intensity.Dimensions();
   if (region.Dimensions() != n || noise.Dimensions() != n || labels.Dimensions() != n ||
       (!form.Empty() && form.Dimensions() != n))
@@ -176,9 +180,8 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   if (std::none_of(region.begin(), region.end(), [](unsigned char real) { return real != 0; }))
     throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
 
-  const FeatherParameters feather{parameters.featherMm, parameters.keepTexture, parameters.smoothMm};
   Volume<float> weights(n);
-  FeatherWeights(feather, region, form, spacing, weights.View(), progress.Part(0.0, 0.15));
+  FeatherWeights(parameters, region, form, spacing, weights.View(), progress.Part(0.0, 0.15));
 
   // 1. what the data are like at their surface, everywhere
   const LocalStatistics statistics =
@@ -207,7 +210,7 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   });
 
   // 3. the data over it
-  Feather<T>(feather, weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0));
+  Feather<T>(parameters, weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0));
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 #include "Diffusion.h"
@@ -7,16 +8,13 @@
 
 namespace echorama {
 
-struct EmbedParameters {
-  double featherMm = 3.0;        ///< the depth in the data at which no background shows any more, mm, >= 0
-  bool keepTexture = true;       ///< whether what the mean of two textures loses in the feather band is given back
-  double smoothMm = 3.0;         ///< standard deviation of the blur that parts local mean and contrast from grain, mm, > 0
-  bool matchContrast = true;     ///< whether the background has the local deviation of the data too, not only their mean
+struct EmbedParameters : FeatherParameters { // smoothMm is that of all steps
+  bool matchContrast = true;
   DiffusionParameters diffusion; ///< how values at the surface of the data spread
-  int diffusionVoxels = 2000000; ///< they spread on a grid of at most so many blocks, >= 1000
-
-  void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
+  int diffusionVoxels = 2000000;
 };
+
+ParameterList Describe(EmbedParameters& p);
 
 /// Bytes of memory that embedding on a grid takes beside its arrays of intensities: noise, masks, weights, and the lattices of
 /// local statistics, which are as fine as the voxels where these are large.

@@ -440,19 +440,19 @@ void CompareWithOriginal(VolumeView<const T> embedded, VolumeView<const unsigned
 
 } // namespace
 
-void EmbedQualityParameters::Check() const
+ParameterList Describe(EmbedQualityParameters& p)
 {
-  const auto refuse = [](const std::string& what) { throw Error(Error::Kind::InvalidParameter, what); };
-  if (!(shellMm > 0.0) || !std::isfinite(shellMm))
-    refuse("ShellMm is " + std::to_string(shellMm) + "; it must be above 0");
-  if (!(leastJump >= 0.0) || !std::isfinite(leastJump))
-    refuse("LeastJump is " + std::to_string(leastJump) + "; it must not be negative");
-  if (!(mostDeviation >= 0.0 && mostDeviation < 1.0))
-    refuse("MostDeviation is " + std::to_string(mostDeviation) + "; it must be at least 0 and below 1");
-  if (!(featherMm >= 0.0))
-    refuse("FeatherMm is " + std::to_string(featherMm) + "; it must not be negative");
-  if (randomSurfaces < 0 || randomSurfaces > 1000)
-    refuse("RandomSurfaces is " + std::to_string(randomSurfaces) + "; it must be 0 to 1000");
+  return {
+      Parameter("ShellMm", p.shellMm, {0, Unlimited, true}, "mm",
+                "How thick the shells on either side of the border are, and how wide its patches."),
+      Parameter("LeastJump", p.leastJump, {0, Unlimited}, "grey levels", "Jumps up to this are not seen by anyone."),
+      Parameter("MostDeviation", p.mostDeviation, {0, 1}, "", "How far from 1 the ratio of deviations may be."),
+      Parameter("FeatherMm", p.featherMm, {0, Unlimited}, "mm",
+                "The embedder's feather: data deeper than this must be shown as they are."),
+      Parameter("RandomSurfaces", p.randomSurfaces, {0, 1000}, "",
+                "With how many random surfaces inside the data the border is compared."),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same random surfaces.").Advanced(),
+  };
 }
 
 template <class T>
@@ -460,7 +460,7 @@ EmbedQualityReport MeasureEmbedding(VolumeView<const T> embedded, VolumeView<con
                                     const ImageGeometry& grid, const PosedVolume<T>* original, const PlacedProbe* fan,
                                     const EmbedQualityParameters& parameters, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   grid.Check("the embedded volume");
   if (embedded.Dimensions() != grid.dimensions || labels.Dimensions() != grid.dimensions)
     throw Error(Error::Kind::BadInput, "the embedded volume: its voxels and labels are not of the size that its geometry says");

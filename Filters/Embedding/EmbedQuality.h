@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "LargestCrop.h"
 #include <cstdint>
@@ -8,15 +9,15 @@
 namespace echorama {
 
 struct EmbedQualityParameters {
-  double shellMm = 5.0;        ///< how thick the shells on either side of a surface are, and how wide a patch of it, mm, > 0
-  double leastJump = 2.0;      ///< jumps up to this, in grey levels, are not seen by anyone, >= 0
-  double mostDeviation = 0.15; ///< how far from 1 the ratio of deviations may be, [0, 1)
-  double featherMm = 3.0;      ///< data deeper than this must be shown as they are, mm, >= 0
-  int randomSurfaces = 24;     ///< inside the data, to compare with, [0, 1000]
-  std::uint64_t seed = 1;      ///< of the random surfaces
-
-  void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
+  double shellMm = 5.0;
+  double leastJump = 2.0;
+  double mostDeviation = 0.15;
+  double featherMm = 3.0;
+  int randomSurfaces = 24;
+  std::uint64_t seed = 1;
 };
+
+ParameterList Describe(EmbedQualityParameters& p);
 
 /// How much changes from one side of a surface to the other. Numbers that could not be measured are NaN.
 struct SurfaceJumps {

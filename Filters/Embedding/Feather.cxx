@@ -27,23 +27,31 @@ void CheckShape(const std::array<int, 3>& wanted, const std::array<int, 3>& give
 
 } // namespace
 
-void FeatherParameters::Check() const
+ParameterList Describe(FeatherParameters& p)
 {
-  if (!(radiusMm >= 0.0) || !std::isfinite(radiusMm))
-    throw Error(Error::Kind::InvalidParameter, "radiusMm must be a number from 0 on");
-  if (!(smoothMm > 0.0) || !std::isfinite(smoothMm))
-    throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
+  return {
+      Parameter(
+          "FeatherMm", p.featherMm, {0, Unlimited}, "mm",
+          "The depth in the data at which no background shows any more; from the border to there their share grows linearly. "
+          "0: a hard border."),
+      Parameter(
+          "KeepTexture", p.keepTexture,
+          "Give back what a mean of two textures loses: that of two independent speckle patterns has 0.71 of their deviation.")
+          .Advanced(),
+      Parameter("SmoothMm", p.smoothMm, {0, Unlimited, true}, "mm",
+                "Standard deviation of the blur that parts local brightness and contrast from texture."),
+  };
 }
 
 void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region,
                     VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing, VolumeView<float> weights,
                     const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   CheckShape(region.Dimensions(), weights.Dimensions(), "array of weights");
   if (!backgroundRegion.Empty())
     CheckShape(region.Dimensions(), backgroundRegion.Dimensions(), "background's region");
-  const float radius = static_cast<float>(parameters.radiusMm);
+  const float radius = static_cast<float>(parameters.featherMm);
   if (radius > 0.0f) {
     Volume<unsigned char> shown(region.Dimensions());
     ParallelRanges(region.Size(), 1 << 16, progress.Part(0.0, 0.1), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -63,7 +71,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
              VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,
              VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   const auto& n = intensity.Dimensions();
   CheckShape(n, weights.Dimensions(), "array of weights");
   CheckShape(n, region.Dimensions(), "region");
@@ -73,7 +81,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
     CheckShape(n, backgroundRegion.Dimensions(), "background's region");
 
   std::optional<LocalStatistics> own, others;
-  if (parameters.keepTexture && parameters.radiusMm > 0.0) {
+  if (parameters.keepTexture && parameters.featherMm > 0.0) {
     own.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3));
     others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6));
   }

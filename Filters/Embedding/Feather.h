@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 
@@ -14,14 +15,14 @@ enum class EmbeddedVoxel : unsigned char {
 };
 
 struct FeatherParameters {
-  double radiusMm = 3.0;   ///< the depth in the data at which they no longer show any background, >= 0; 0: a hard border
-  bool keepTexture = true; ///< whether what a mean of two independent textures loses is given back
-  double smoothMm = 3.0;   ///< standard deviation that parts texture from the rest, with keepTexture, mm, > 0
-
-  void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
+  double featherMm = 3.0;
+  bool keepTexture = true;
+  double smoothMm = 3.0;
 };
 
-/// How much of the data a voxel shows: 0 outside the region, 1 at depths of the radius or more, linear in between. Depth is the
+ParameterList Describe(FeatherParameters& p);
+
+/// How much of the data a voxel shows: 0 outside the region, 1 at depths of featherMm or more, linear in between. Depth is the
 /// distance to the nearest voxel that shows background: outside of the region, but in \a backgroundRegion (empty: everywhere). So
 /// data do not fade where the background ends as well, nor at the ends of the grid.
 /// Source: dissertation 6.5.

@@ -107,7 +107,7 @@ void RefuseOverlap(const NoiseInput& input, const ProbeArc& arc, const char* wha
 {
   const bool turns = Turns(arc);
   throw Error(Error::Kind::InvalidParameter,
-              std::string("noise tiling: ") + (turns ? "overlapDegrees" : "overlapMm") +
+              std::string("noise tiling: ") + (turns ? "OverlapDegrees" : "OverlapMm") +
                   Format(" is %.4g, but the ", turns ? parameters.overlapDegrees : parameters.overlapMm) + what + " of " +
                   input.name + Format(" is %.4g", turns ? arc.angle / RadiansPerDegree : arc.width) +
                   (turns ? " degrees" : " mm") + ": nothing would be left of it beside its neighbour");
@@ -132,7 +132,7 @@ struct Plan {
 
 void CheckInputs(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   if (volumes.empty())
     throw Error(Error::Kind::BadInput, "noise tiling: there is no volume");
   const NoiseInput& first = volumes[0];
@@ -152,7 +152,7 @@ void CheckInputs(const NoiseTilingParameters& parameters, const std::vector<Nois
   }
   if (head.IsPlane() && parameters.rows > 1)
     throw Error(Error::Kind::InvalidParameter,
-                "noise tiling: rows is " + std::to_string(parameters.rows) + ", but planes do not sweep");
+                "noise tiling: Rows is " + std::to_string(parameters.rows) + ", but planes do not sweep");
 }
 
 Plan PlanOf(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes)
@@ -287,22 +287,21 @@ StitchParameters NoiseTilingParameters::ForNoise()
   return parameters;
 }
 
-void NoiseTilingParameters::Check() const
+ParameterList Describe(NoiseTilingParameters& p)
 {
-  const auto fail = [](const std::string& reason) { throw Error(Error::Kind::InvalidParameter, "noise tiling: " + reason); };
-  if (columns < 0)
-    fail("columns is " + std::to_string(columns) + "; it must be at least 0");
-  if (rows < 1)
-    fail("rows is " + std::to_string(rows) + "; it must be at least 1");
-  if (columns > 1000 || rows > 1000)
-    fail("there are more than 1000 columns or rows");
-  const auto notNegative = [&fail](const char* name, double value) {
-    if (!(value >= 0.0) || !std::isfinite(value))
-      fail(std::string(name) + " is " + std::to_string(value) + "; it must be at least 0");
+  return {
+      Parameter(
+          "Columns", p.columns, {0, 1000}, "",
+          "Volumes side by side across the fan; 0: as many as there are for the rows. When there are fewer volumes than places "
+          "they are used again, turned or mirrored."),
+      Parameter("Rows", p.rows, {1, 1000}, "", "Rows of volumes along the sweep."),
+      Parameter("OverlapDegrees", p.overlapDegrees, {0, 360}, "degrees",
+                "By how much neighbouring noise volumes overlap where fan or sweep turn. It sets the angle of the whole."),
+      Parameter("OverlapMm", p.overlapMm, {0, 10000}, "mm",
+                "The same where fan or sweep run straight (turn by less than half a degree in all)."),
+      Parameter("SpacingMm", p.spacingMm, {0, Unlimited}, "mm",
+                "Edge of the cubic voxels of the output. 0: the voxel size of the first volume."),
   };
-  notNegative("overlapDegrees", overlapDegrees);
-  notNegative("overlapMm", overlapMm);
-  notNegative("spacingMm", spacingMm);
 }
 
 TiledBeams TileNoiseBeams(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes,

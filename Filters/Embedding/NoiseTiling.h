@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
@@ -17,19 +18,18 @@ struct NoiseInput {
 };
 
 struct NoiseTilingParameters {
-  int columns = 0;              ///< volumes side by side across the fan; 0: as many as there are for these rows; >= 0
-  int rows = 1;                 ///< rows of them along the sweep, >= 1
-  double overlapDegrees = 10.0; ///< by how much neighbours overlap, across the fan and along the sweep, where these turn, >= 0
-  double overlapMm = 8.0;       ///< the same where these run straight (turn by less than half a degree in all), mm, >= 0
-  double spacingMm = 0.0;       ///< of the cubic voxels of the result; 0: the voxel size of the first volume; >= 0
+  int columns = 0;
+  int rows = 1;
+  double overlapDegrees = 10.0;
+  double overlapMm = 8.0;
+  double spacingMm = 0.0;
   std::size_t maxVoxels = std::size_t{1} << 30; ///< of the result
   StitchParameters stitch = ForNoise();         ///< how they are blended; gains are equalized, and nothing need overlap
 
   static StitchParameters ForNoise();
-
-  /// Throws Error(InvalidParameter) that names the number which is out of its range.
-  void Check() const;
 };
+
+ParameterList Describe(NoiseTilingParameters& p); ///< but for how they are blended
 
 /// Noise volumes as one.
 struct TiledNoise {
@@ -57,9 +57,9 @@ struct NoiseTiling {
 /// angles (by their widths, where the first runs straight), and by their depths; where one ends before its neighbours the result
 /// has a hole.
 /// \throws Error(BadInput) for no volume, fans of which some turn and some run straight, or planes among volumes;
-/// Error(InvalidParameter) as Check(), for a probe that does not pass its own, and for an overlap that leaves nothing of a
-/// volume beside its neighbour (named); Error(NotPossible) when no probe has a fan as large as they make together;
-/// Error(TooLarge); what Stitch throws; Error(Cancelled).
+/// Error(InvalidParameter) for a parameter out of range, for a probe that does not pass its Check(), and for an overlap that
+/// leaves nothing of a volume beside its neighbour (named); Error(NotPossible) when no probe has a fan as large as they make
+/// together; Error(TooLarge); what Stitch throws; Error(Cancelled).
 TiledNoise TileNoise(const NoiseTilingParameters& parameters, const std::vector<NoiseInput>& volumes,
                      const Progress& progress = {});
 

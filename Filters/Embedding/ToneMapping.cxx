@@ -60,17 +60,20 @@ void Normalise(bool byDeviation, const LocalStatistics& statistics, VolumeView<c
 
 } // namespace
 
-void ToneMappingParameters::Check() const
+ParameterList Describe(ToneMappingParameters& p)
 {
-  if (!(smoothMm > 0.0) || !std::isfinite(smoothMm))
-    throw Error(Error::Kind::InvalidParameter, "smoothMm must be a number above 0");
+  return {
+      Parameter("SmoothMm", p.smoothMm, {0, Unlimited, true}, "mm",
+                "Standard deviation of the blur that parts grain from the rest."),
+      Parameter("MatchDeviation", p.matchDeviation, "Match the local deviation too, not the local mean alone."),
+  };
 }
 
 void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const float> intensity,
                   VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> grain,
                   const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   if (intensity.Dimensions() != grain.Dimensions() || (!region.Empty() && region.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "tone mapping: the volumes do not have one size");
   const LocalStatistics first(intensity, region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3));

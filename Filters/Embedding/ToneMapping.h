@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 
 namespace echorama {
 
 struct ToneMappingParameters {
-  double smoothMm = 3.0; ///< standard deviation of the blur that parts grain from the rest, mm, > 0
-  /// Whether the grain also gets one deviation everywhere, so that it can be given the contrast of its new neighbours.
-  bool matchDeviation = true;
-
-  void Check() const; ///< \throws Error(InvalidParameter) that names the number which is out of its range
+  double smoothMm = 3.0;
+  bool matchDeviation = true; ///< the grain gets one deviation everywhere, so that it can be given that of its new neighbours
 };
+
+ParameterList Describe(ToneMappingParameters& p);
 
 /// Removes what varies slowly from a volume, and leaves its grain; in place is allowed.
 ///

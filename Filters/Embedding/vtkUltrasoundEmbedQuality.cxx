@@ -17,6 +17,8 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundEmbedQuality);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundEmbedQuality);
+
 namespace {
 echorama::VolumeView<const unsigned char> LabelsOf(vtkImageData* image)
 {
@@ -51,6 +53,12 @@ nlohmann::ordered_json JsonOf(const echorama::Crop& crop)
           {"sweep", {crop.first.sweep, crop.last.sweep}}};
 }
 } // namespace
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundEmbedQuality::Parameters()
+{
+  return echorama::Without(Describe(this->Values), {"LeastJump", "MostDeviation"});
+}
 
 //----------------------------------------------------------------------------
 vtkUltrasoundEmbedQuality::vtkUltrasoundEmbedQuality()
@@ -95,11 +103,6 @@ void vtkUltrasoundEmbedQuality::Execute(vtkInformationVector** inputs, vtkImageD
   }
 
   // 2. the kernel
-  echorama::EmbedQualityParameters parameters;
-  parameters.shellMm = this->ShellMm;
-  parameters.featherMm = this->FeatherMm;
-  parameters.randomSurfaces = this->RandomSurfaces;
-  parameters.seed = static_cast<std::uint64_t>(this->Seed);
   vtkUltrasoundVolume::Dispatch(embedded.Intensity, [&](auto voxel) {
     using T = decltype(voxel);
     const auto posed = vtkUltrasoundVolume::PosedVolumeOf<T>(embedded);
@@ -108,7 +111,7 @@ void vtkUltrasoundEmbedQuality::Execute(vtkInformationVector** inputs, vtkImageD
       source = vtkUltrasoundVolume::PosedVolumeOf<T>(*original);
     }
     this->Quality = echorama::MeasureEmbedding<T>(posed.intensity, labels, posed.geometry, source ? &*source : nullptr,
-                                                  fan ? &*fan : nullptr, parameters, progress);
+                                                  fan ? &*fan : nullptr, this->Values, progress);
   });
 
   // 3. what goes out
@@ -207,9 +210,6 @@ double vtkUltrasoundEmbedQuality::GetCropShare() const
 void vtkUltrasoundEmbedQuality::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "ShellMm: " << this->ShellMm << "\n";
-  os << indent << "FeatherMm: " << this->FeatherMm << "\n";
-  os << indent << "RandomSurfaces: " << this->RandomSurfaces << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Report: " << this->Report << "\n";
 }

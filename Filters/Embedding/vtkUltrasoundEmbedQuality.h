@@ -25,6 +25,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/EmbedQuality.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundEmbedQuality : public vtkUltrasoundImageAlgorithm {
@@ -33,29 +34,50 @@ public:
   vtkTypeMacro(vtkUltrasoundEmbedQuality, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** How thick the shells on either side of the border are, and how wide its patches, mm, in [0.1, 100]. Default 5. */
-  vtkSetClampMacro(ShellMm, double, 0.1, 100.0);
-  vtkGetMacro(ShellMm, double);
+  /** How thick the shells on either side of the border are, and how wide its patches. Above 0 mm; default 5. */
+  void SetShellMm(double value) { this->SetParameter("ShellMm", value); }
+  double GetShellMm() { return this->GetParameter("ShellMm"); }
   ///@}
 
   ///@{
-  /** Data deeper than this, in mm, must be shown as they are: the embedder's feather, at least 0. Default 3. */
-  vtkSetClampMacro(FeatherMm, double, 0.0, VTK_DOUBLE_MAX);
-  vtkGetMacro(FeatherMm, double);
+  /** The embedder's feather: data deeper than this must be shown as they are. At least 0 mm; default 3. */
+  void SetFeatherMm(double value) { this->SetParameter("FeatherMm", value); }
+  double GetFeatherMm() { return this->GetParameter("FeatherMm"); }
   ///@}
 
   ///@{
-  /** With how many surfaces inside the data the border is compared, in [0, 1000]. Default 24. */
-  vtkSetClampMacro(RandomSurfaces, int, 0, 1000);
-  vtkGetMacro(RandomSurfaces, int);
+  /** With how many random surfaces inside the data the border is compared. In [0, 1000]; default 24. */
+  void SetRandomSurfaces(int value) { this->SetParameter("RandomSurfaces", value); }
+  int GetRandomSurfaces() { return static_cast<int>(this->GetParameter("RandomSurfaces")); }
   ///@}
 
   ///@{
-  /** Which surfaces these are, at least 0. Default 1. */
-  vtkSetClampMacro(Seed, int, 0, VTK_INT_MAX);
-  vtkGetMacro(Seed, int);
+  /** The same seed makes the same random surfaces. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** The volume that was embedded goes to input 1; nullptr: not known. */
@@ -107,6 +129,10 @@ public:
    */
   std::string GetReport() const { return this->Report; }
 
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
+
 protected:
   vtkUltrasoundEmbedQuality();
   ~vtkUltrasoundEmbedQuality() override = default;
@@ -121,10 +147,7 @@ private:
   void operator=(const vtkUltrasoundEmbedQuality&) = delete;
 
 #ifndef __VTK_WRAP__
-  double ShellMm = echorama::EmbedQualityParameters().shellMm;
-  double FeatherMm = echorama::EmbedQualityParameters().featherMm;
-  int RandomSurfaces = echorama::EmbedQualityParameters().randomSurfaces;
-  int Seed = static_cast<int>(echorama::EmbedQualityParameters().seed);
+  echorama::EmbedQualityParameters Values;
   echorama::EmbedQualityReport Quality;
   std::string Report;
 #endif

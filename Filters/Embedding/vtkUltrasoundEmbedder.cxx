@@ -58,18 +58,43 @@ vtkSmartPointer<vtkDataArray> OnGrid(vtkDataArray* array, vtkImageData* data, co
 
 vtkStandardNewMacro(vtkUltrasoundEmbedder);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundEmbedder);
+
+struct vtkUltrasoundEmbedder::Settings {
+  echorama::EmbedParameters embed;
+  echorama::EnclosingFanParameters enclosing{5.0, {}};
+  echorama::NoiseTilingParameters tiling;
+  bool matchGrain = true;
+  std::uint64_t seed = 1;
+  int previewFactor = 1;
+};
+
 //----------------------------------------------------------------------------
-vtkUltrasoundEmbedder::vtkUltrasoundEmbedder()
+echorama::ParameterList vtkUltrasoundEmbedder::Parameters()
 {
-  const echorama::EmbedParameters defaults;
-  this->FeatherMm = defaults.featherMm;
-  this->KeepTexture = defaults.keepTexture;
-  this->SmoothMm = defaults.smoothMm;
-  this->InsideExponent = defaults.diffusion.insideExponent;
-  this->OutsideExponent = defaults.diffusion.outsideExponent;
-  this->MatchContrast = defaults.matchContrast;
+  using echorama::Parameter;
+  Settings& v = *this->Values;
+  return echorama::Join(
+      {Describe(v.enclosing),
+       echorama::Without(Describe(v.embed), {"Exact", "Accuracy", "DiffusionVoxels"}),
+       {Parameter(
+           "MatchGrain", v.matchGrain,
+           "Give noise that is made the grain of the data: its size along depth, fan and sweep, and its distribution. Where "
+           "the data have too little texture to tell, the grain is that of vtkUltrasoundNoiseSource.")},
+       echorama::Without(Describe(v.tiling), {"Columns", "Rows", "OverlapMm", "SpacingMm"}),
+       {Parameter("Seed", v.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same noise."),
+        Parameter("PreviewFactor", v.previewFactor, {1, 64}, "",
+                  "For a quick look: only every so many voxels along each axis.")}});
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundEmbedder::vtkUltrasoundEmbedder() : Values(new Settings)
+{
   this->SetNumberOfInputPorts(3);
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundEmbedder::~vtkUltrasoundEmbedder() = default;
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundEmbedder::FillInputPortInformation(int port, vtkInformation* info)
@@ -95,6 +120,7 @@ int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVec
     return 1; // a composite data set, whose blocks come one by one later
   }
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
     // It takes well below a second: a stop is left to the data, whose request takes it back.
     vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs, {}).Grid.geometry);
   });
@@ -123,8 +149,7 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
   });
 
   Plan plan;
-  echorama::EnclosingFanParameters enclosing;
-  enclosing.marginMm = this->MarginMm;
+  echorama::EnclosingFanParameters enclosing = this->Values->enclosing;
   if (shape) {
     enclosing.shape = vtkUltrasoundProbeFit::ProbeOf(vtkUltrasoundVolume::CheckInput(this, shape, "the form"), nullptr,
                                                      progress.Part(0.0, 0.3));
@@ -134,7 +159,7 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
               : IsSame(plan.Form, *enclosing.shape) ? "The outline is the fan of the form."
                                                     : "The fan of the form does not hold all data: the outline is a larger one.";
 
-  plan.Grid = echorama::EmbedGridOf(geometry, region.View(), plan.Form, this->PreviewFactor);
+  plan.Grid = echorama::EmbedGridOf(geometry, region.View(), plan.Form, this->Values->previewFactor);
   this->Planned = plan;
   this->PlannedFor = key;
   return *this->Planned;
@@ -154,7 +179,7 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
       std::min(parameters.depthCorrelationMm, 0.25 * (plan.Form.geometry.depthMax - plan.Form.geometry.depthMin));
   parameters = echorama::ResolvingCounts(parameters, plan.Form.geometry);
   std::string note = "The noise is made";
-  if (this->MatchGrain && volumes.empty()) {
+  if (this->Values->matchGrain && volumes.empty()) {
     try {
       vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
         const auto match = echorama::MatchNoise(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), plan.Form.geometry,
@@ -171,7 +196,7 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
   } else {
     note += ".";
   }
-  parameters.seed = static_cast<std::uint64_t>(this->Seed);
+  parameters.seed = this->Values->seed;
   {
     const Volume<float> beams = echorama::MakeBeamNoise(parameters, plan.Form.geometry, progress.Part(0.4, 0.6));
     echorama::ScanConvert<float>(beams.View(), plan.Form.geometry, plan.Form.probeToWorld, grid, noise, form,
@@ -180,8 +205,6 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
 
   // 2. real noise in its place, wherever there is any
   if (!volumes.empty()) {
-    echorama::NoiseTilingParameters tiling;
-    tiling.overlapDegrees = this->OverlapDegrees;
     std::vector<echorama::NoiseInput> tiles;
     for (const auto& volume : volumes) {
       vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
@@ -189,7 +212,7 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
                          vtkUltrasoundProbeFit::ProbeOf(volume, nullptr, progress.Part(0.8, 0.82)), volume.Name});
       });
     }
-    const echorama::TiledBeams tiled = echorama::TileNoiseBeams(tiling, tiles, progress.Part(0.82, 0.9));
+    const echorama::TiledBeams tiled = echorama::TileNoiseBeams(this->Values->tiling, tiles, progress.Part(0.82, 0.9));
     Volume<float> real(grid.dimensions);
     Volume<unsigned char> there(grid.dimensions);
     echorama::FillFanFromBeams(tiled.samples.View(), tiled.fan.geometry, {0, 0, 0}, plan.Form, grid, real.View(), there.View(),
@@ -211,13 +234,7 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   const echorama::ImageGeometry& grid = plan.Grid.geometry;
   this->Notes = plan.Note + "\n";
 
-  echorama::EmbedParameters parameters;
-  parameters.featherMm = this->FeatherMm;
-  parameters.keepTexture = this->KeepTexture;
-  parameters.smoothMm = this->SmoothMm;
-  parameters.matchContrast = this->MatchContrast;
-  parameters.diffusion.insideExponent = this->InsideExponent;
-  parameters.diffusion.outsideExponent = this->OutsideExponent;
+  const echorama::EmbedParameters& parameters = this->Values->embed;
   double bytes = echorama::EmbedMemory(parameters, grid);
   for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
     if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
@@ -270,16 +287,6 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
 void vtkUltrasoundEmbedder::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FeatherMm: " << this->FeatherMm << "\n";
-  os << indent << "KeepTexture: " << (this->KeepTexture ? "on" : "off") << "\n";
-  os << indent << "MarginMm: " << this->MarginMm << "\n";
-  os << indent << "SmoothMm: " << this->SmoothMm << "\n";
-  os << indent << "InsideExponent: " << this->InsideExponent << "\n";
-  os << indent << "OutsideExponent: " << this->OutsideExponent << "\n";
-  os << indent << "MatchContrast: " << (this->MatchContrast ? "on" : "off") << "\n";
-  os << indent << "MatchGrain: " << (this->MatchGrain ? "on" : "off") << "\n";
-  os << indent << "OverlapDegrees: " << this->OverlapDegrees << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
-  os << indent << "PreviewFactor: " << this->PreviewFactor << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->Notes << "\n";
 }

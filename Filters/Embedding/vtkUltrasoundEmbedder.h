@@ -32,7 +32,9 @@
 #ifndef __VTK_WRAP__
 #include "Core/Geometry/ProbeGeometry.h"
 #include "EmbedGrid.h"
+#include "vtkUltrasoundParameters.h"
 #include <array>
+#include <memory> // for what is set
 #include <optional>
 #include <utility>
 #endif
@@ -52,81 +54,127 @@ public:
   /** Sets the volume whose fan gives the outline (input port 2). */
   void SetFormConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
 
+  // BEGIN parameters
   ///@{
-  /** The depth in the data, in mm, at which no background shows any more, from 0. Default 3. */
-  vtkSetClampMacro(FeatherMm, double, 0.0, VTK_DOUBLE_MAX);
-  vtkGetMacro(FeatherMm, double);
-  ///@}
-
-  ///@{
-  /** Whether what the mean of two textures loses in the feather band is given back. Default on. */
-  vtkSetMacro(KeepTexture, bool);
-  vtkGetMacro(KeepTexture, bool);
-  vtkBooleanMacro(KeepTexture, bool);
-  ///@}
-
-  ///@{
-  /** How far the fan reaches beyond the data, at least, in mm, in [0, 1000]. Default 5. */
-  vtkSetClampMacro(MarginMm, double, 0.0, 1000.0);
-  vtkGetMacro(MarginMm, double);
-  ///@}
-
-  ///@{
-  /** Standard deviation of the blur that parts local mean and contrast from grain, in mm, above 0. Default 3. */
-  vtkSetClampMacro(SmoothMm, double, 1e-3, VTK_DOUBLE_MAX);
-  vtkGetMacro(SmoothMm, double);
-  ///@}
-
-  ///@{
-  /** The exponents of distance by which values at the surface spread into the data and out of them, in [1, 64]. Default 6 and 4.
-   */
-  vtkSetClampMacro(InsideExponent, double, 1.0, 64.0);
-  vtkGetMacro(InsideExponent, double);
-  vtkSetClampMacro(OutsideExponent, double, 1.0, 64.0);
-  vtkGetMacro(OutsideExponent, double);
-  ///@}
-
-  ///@{
-  /** Whether the background gets the local deviation of the data too, not their local mean alone. Default on. */
-  vtkSetMacro(MatchContrast, bool);
-  vtkGetMacro(MatchContrast, bool);
-  vtkBooleanMacro(MatchContrast, bool);
+  /** How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. At least 0 mm; default 5. */
+  void SetMarginMm(double value) { this->SetParameter("MarginMm", value); }
+  double GetMarginMm() { return this->GetParameter("MarginMm"); }
   ///@}
 
   ///@{
   /**
-   * Whether noise that is made gets the grain of the data: its size along depth, fan and sweep and its distribution, measured in
-   * beam space. Where the data have too little texture to tell, the grain is that of vtkUltrasoundNoiseSource. Default on.
+   * The depth in the data at which no background shows any more; from the border to there their share grows linearly. 0: a hard
+   * border. At least 0 mm; default 3.
    */
-  vtkSetMacro(MatchGrain, bool);
-  vtkGetMacro(MatchGrain, bool);
-  vtkBooleanMacro(MatchGrain, bool);
+  void SetFeatherMm(double value) { this->SetParameter("FeatherMm", value); }
+  double GetFeatherMm() { return this->GetParameter("FeatherMm"); }
   ///@}
 
   ///@{
-  /** The angle by which real noise volumes overlap their neighbours, in degrees, [0, 90]. Default 10. */
-  vtkSetClampMacro(OverlapDegrees, double, 0.0, 90.0);
-  vtkGetMacro(OverlapDegrees, double);
+  /**
+   * Give back what a mean of two textures loses: that of two independent speckle patterns has 0.71 of their deviation. Default
+   * on.
+   */
+  void SetKeepTexture(bool value) { this->SetParameter("KeepTexture", value); }
+  bool GetKeepTexture() { return this->GetParameter("KeepTexture") != 0.0; }
+  void KeepTextureOn() { this->SetKeepTexture(true); }
+  void KeepTextureOff() { this->SetKeepTexture(false); }
   ///@}
 
   ///@{
-  /** Seed of the noise that is made, at least 0. Default 1. */
-  vtkSetClampMacro(Seed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
-  vtkGetMacro(Seed, vtkTypeInt64);
+  /** Standard deviation of the blur that parts local brightness and contrast from texture. Above 0 mm; default 3. */
+  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
+  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
   ///@}
 
   ///@{
-  /** For a quick look: only every so many voxels along each axis, in [1, 64]. Default 1: all. */
-  vtkSetClampMacro(PreviewFactor, int, 1, 64);
-  vtkGetMacro(PreviewFactor, int);
+  /** Give the background the local deviation of the data too, not their local mean alone. Default on. */
+  void SetMatchContrast(bool value) { this->SetParameter("MatchContrast", value); }
+  bool GetMatchContrast() { return this->GetParameter("MatchContrast") != 0.0; }
+  void MatchContrastOn() { this->SetMatchContrast(true); }
+  void MatchContrastOff() { this->SetMatchContrast(false); }
   ///@}
+
+  ///@{
+  /**
+   * Exponent of distance by which values at the surface spread inside the data: the larger, the more the nearest surface counts
+   * alone. In [1, 64]; default 6.
+   */
+  void SetInsideExponent(double value) { this->SetParameter("InsideExponent", value); }
+  double GetInsideExponent() { return this->GetParameter("InsideExponent"); }
+  ///@}
+
+  ///@{
+  /**
+   * Exponent of distance by which values at the surface spread outside of the data: the larger, the more the nearest surface
+   * counts alone. In [1, 64]; default 4.
+   */
+  void SetOutsideExponent(double value) { this->SetParameter("OutsideExponent", value); }
+  double GetOutsideExponent() { return this->GetParameter("OutsideExponent"); }
+  ///@}
+
+  ///@{
+  /**
+   * Give noise that is made the grain of the data: its size along depth, fan and sweep, and its distribution. Where the data have
+   * too little texture to tell, the grain is that of vtkUltrasoundNoiseSource. Default on.
+   */
+  void SetMatchGrain(bool value) { this->SetParameter("MatchGrain", value); }
+  bool GetMatchGrain() { return this->GetParameter("MatchGrain") != 0.0; }
+  void MatchGrainOn() { this->SetMatchGrain(true); }
+  void MatchGrainOff() { this->SetMatchGrain(false); }
+  ///@}
+
+  ///@{
+  /**
+   * By how much neighbouring noise volumes overlap where fan or sweep turn. It sets the angle of the whole. In [0, 360] degrees;
+   * default 10.
+   */
+  void SetOverlapDegrees(double value) { this->SetParameter("OverlapDegrees", value); }
+  double GetOverlapDegrees() { return this->GetParameter("OverlapDegrees"); }
+  ///@}
+
+  ///@{
+  /** The same seed makes the same noise. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
+  ///@}
+
+  ///@{
+  /** For a quick look: only every so many voxels along each axis. In [1, 64]; default 1. */
+  void SetPreviewFactor(int value) { this->SetParameter("PreviewFactor", value); }
+  int GetPreviewFactor() { return static_cast<int>(this->GetParameter("PreviewFactor")); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   /** Of the last volume: where the noise and the fan came from, sentences, one per line. */
   std::string GetNotes() const { return this->Notes; }
 
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
+
 protected:
   vtkUltrasoundEmbedder();
-  ~vtkUltrasoundEmbedder() override = default;
+  ~vtkUltrasoundEmbedder() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
@@ -138,7 +186,10 @@ private:
   vtkUltrasoundEmbedder(const vtkUltrasoundEmbedder&) = delete;
   void operator=(const vtkUltrasoundEmbedder&) = delete;
 
+  struct Settings;
 #ifndef __VTK_WRAP__
+  std::unique_ptr<Settings> Values;
+
   // What the grid depends on, worked out once for information and data.
   struct Plan {
     echorama::PlacedProbe Form;
@@ -154,17 +205,6 @@ private:
   std::optional<Plan> Planned;
   PlanKey PlannedFor{};
 #endif
-  double FeatherMm;
-  bool KeepTexture;
-  double MarginMm = 5.0;
-  double SmoothMm;
-  double InsideExponent;
-  double OutsideExponent;
-  bool MatchContrast;
-  bool MatchGrain = true;
-  double OverlapDegrees = 10.0;
-  vtkTypeInt64 Seed = 1;
-  int PreviewFactor = 1;
   std::string Notes;
 };
 

@@ -2,7 +2,6 @@
 #include "vtkUltrasoundFeather.h"
 
 #include "Core/Imaging/Sampling.h"
-#include "Feather.h"
 
 #include "vtkImageData.h"
 #include "vtkObjectFactory.h"
@@ -14,13 +13,17 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundFeather);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundFeather);
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundFeather::Parameters()
+{
+  return Describe(this->Values);
+}
+
 //----------------------------------------------------------------------------
 vtkUltrasoundFeather::vtkUltrasoundFeather()
 {
-  const echorama::FeatherParameters defaults;
-  this->FeatherMm = defaults.radiusMm;
-  this->KeepTexture = defaults.keepTexture;
-  this->SmoothMm = defaults.smoothMm;
   this->SetNumberOfInputPorts(2);
 }
 
@@ -34,10 +37,6 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
   if (!vtkUltrasoundVolume::GeometryOf(other.Image).AgreesWith(geometry)) {
     throw Error(Error::Kind::BadInput, "the background does not lie on the grid of the volume");
   }
-  echorama::FeatherParameters parameters;
-  parameters.radiusMm = this->FeatherMm;
-  parameters.keepTexture = this->KeepTexture;
-  parameters.smoothMm = this->SmoothMm;
 
   echorama::Volume<unsigned char> region, otherRegion;
   echorama::Volume<float> background(geometry.dimensions);
@@ -54,7 +53,7 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
                    [](auto value) { return static_cast<float>(value); });
   });
   echorama::Volume<float> weights(geometry.dimensions);
-  echorama::FeatherWeights(parameters, region.View(), otherRegion.View(), geometry.spacing, weights.View(),
+  echorama::FeatherWeights(this->Values, region.View(), otherRegion.View(), geometry.spacing, weights.View(),
                            progress.Part(0.1, 0.4));
 
   vtkDataArray* result = CopyWithNewIntensity(input.Image, input.Intensity, output, input.Intensity->GetDataType());
@@ -67,8 +66,8 @@ void vtkUltrasoundFeather::Execute(vtkInformationVector** inputs, vtkImageData* 
     const auto values = vtkUltrasoundVolume::ViewOf<const T>(input.Intensity, input.Image);
     const auto out = vtkUltrasoundVolume::ViewOf<T>(result, output);
     std::copy(values.begin(), values.end(), out.begin());
-    echorama::Feather<T>(parameters, weights.View(), region.View(), background.View(), otherRegion.View(), geometry.spacing, out,
-                         vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output), progress.Part(0.4, 1.0));
+    echorama::Feather<T>(this->Values, weights.View(), region.View(), background.View(), otherRegion.View(), geometry.spacing,
+                         out, vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output), progress.Part(0.4, 1.0));
   });
 }
 
@@ -91,7 +90,5 @@ void vtkUltrasoundFeather::RefuseEmbedded(vtkImageData* volume)
 void vtkUltrasoundFeather::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FeatherMm: " << this->FeatherMm << "\n";
-  os << indent << "KeepTexture: " << (this->KeepTexture ? "on" : "off") << "\n";
-  os << indent << "SmoothMm: " << this->SmoothMm << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -20,49 +20,75 @@
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
+#ifndef __VTK_WRAP__
+#include "Filters/Embedding/Feather.h"
+#include "vtkUltrasoundParameters.h"
+#endif
+
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundFeather : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundFeather* New();
   vtkTypeMacro(vtkUltrasoundFeather, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
   /**
-   * The depth in the data, in mm, from which on nothing of the background shows; the share of the data grows linearly from the
-   * border to there. 0: a hard border. Default 3.
+   * The depth in the data at which no background shows any more; from the border to there their share grows linearly. 0: a hard
+   * border. At least 0 mm; default 3.
    */
-  vtkSetClampMacro(FeatherMm, double, 0.0, VTK_DOUBLE_MAX);
-  vtkGetMacro(FeatherMm, double);
+  void SetFeatherMm(double value) { this->SetParameter("FeatherMm", value); }
+  double GetFeatherMm() { return this->GetParameter("FeatherMm"); }
   ///@}
 
   ///@{
   /**
-   * Whether what a mean of two textures loses is given back: a plain mean of two independent speckle patterns has 0.71 of their
-   * deviation. Default on.
+   * Give back what a mean of two textures loses: that of two independent speckle patterns has 0.71 of their deviation. Default
+   * on.
    */
-  vtkSetMacro(KeepTexture, bool);
-  vtkGetMacro(KeepTexture, bool);
-  vtkBooleanMacro(KeepTexture, bool);
+  void SetKeepTexture(bool value) { this->SetParameter("KeepTexture", value); }
+  bool GetKeepTexture() { return this->GetParameter("KeepTexture") != 0.0; }
+  void KeepTextureOn() { this->SetKeepTexture(true); }
+  void KeepTextureOff() { this->SetKeepTexture(false); }
   ///@}
 
   ///@{
-  /** With KeepTexture: the standard deviation, in mm, that parts texture from the rest, above 0. Default 3. */
-  vtkSetClampMacro(SmoothMm, double, 1e-3, VTK_DOUBLE_MAX);
-  vtkGetMacro(SmoothMm, double);
+  /** Standard deviation of the blur that parts local brightness and contrast from texture. Above 0 mm; default 3. */
+  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
+  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+
+  /** Sets the background (input port 1). */
+  void SetBackgroundConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
 
 #ifndef __VTK_WRAP__
   /**
    * Throws echorama::Error(BadInput) for a volume that was embedded before: its mixed and invented voxels would pass as data.
    */
   static void RefuseEmbedded(vtkImageData* volume);
-#endif
 
-  /** Sets the background (input port 1). */
-  void SetBackgroundConnection(vtkAlgorithmOutput* output)
-  {
-    this->SetInputConnection(1, output);
-  }
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundFeather();
@@ -76,9 +102,9 @@ private:
   vtkUltrasoundFeather(const vtkUltrasoundFeather&) = delete;
   void operator=(const vtkUltrasoundFeather&) = delete;
 
-  double FeatherMm;
-  bool KeepTexture;
-  double SmoothMm;
+#ifndef __VTK_WRAP__
+  echorama::FeatherParameters Values;
+#endif
 };
 
 #endif

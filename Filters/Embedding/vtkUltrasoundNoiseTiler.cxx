@@ -2,7 +2,6 @@
 #include "vtkUltrasoundNoiseTiler.h"
 
 #include "Core/Base/Error.h"
-#include "Filters/Embedding/NoiseTiling.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -19,6 +18,8 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundNoiseTiler);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundNoiseTiler);
+
 //----------------------------------------------------------------------------
 struct vtkUltrasoundNoiseTiler::Volumes {
   using Key = std::tuple<vtkImageData*, vtkMTimeType, vtkDataArray*, vtkDataArray*, std::string>;
@@ -27,15 +28,13 @@ struct vtkUltrasoundNoiseTiler::Volumes {
 };
 
 //----------------------------------------------------------------------------
-vtkUltrasoundNoiseTiler::vtkUltrasoundNoiseTiler()
+echorama::ParameterList vtkUltrasoundNoiseTiler::Parameters()
 {
-  const echorama::NoiseTilingParameters defaults;
-  this->Columns = defaults.columns;
-  this->Rows = defaults.rows;
-  this->OverlapDegrees = defaults.overlapDegrees;
-  this->OverlapMm = defaults.overlapMm;
-  this->SpacingMm = defaults.spacingMm;
+  return Describe(this->Values);
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundNoiseTiler::vtkUltrasoundNoiseTiler() = default;
 
 //----------------------------------------------------------------------------
 vtkUltrasoundNoiseTiler::~vtkUltrasoundNoiseTiler() = default;
@@ -45,18 +44,6 @@ int vtkUltrasoundNoiseTiler::FillInputPortInformation(int, vtkInformation* infor
 {
   vtkUltrasoundVolume::AcceptVolumes(information);
   return 1;
-}
-
-//----------------------------------------------------------------------------
-echorama::NoiseTilingParameters vtkUltrasoundNoiseTiler::Parameters() const
-{
-  echorama::NoiseTilingParameters parameters;
-  parameters.columns = this->Columns;
-  parameters.rows = this->Rows;
-  parameters.overlapDegrees = this->OverlapDegrees;
-  parameters.overlapMm = this->OverlapMm;
-  parameters.spacingMm = this->SpacingMm;
-  return parameters;
 }
 
 //----------------------------------------------------------------------------
@@ -93,7 +80,8 @@ int vtkUltrasoundNoiseTiler::RequestInformation(vtkInformation*, vtkInformationV
   // How large the whole is depends on the fans, and field data does not travel with the information of the pipeline.
   vtkUltrasoundVolume::MakeInput(this, 0);
   return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress& progress) {
-    const auto tiling = echorama::PlanNoiseTiling(this->Parameters(), this->Prepare(inputs[0], progress));
+    echorama::CheckRanges(this->Parameters());
+    const auto tiling = echorama::PlanNoiseTiling(this->Values, this->Prepare(inputs[0], progress));
     vtkInformation* out = outputs->GetInformationObject(0);
     vtkUltrasoundVolume::SetGeometry(out, tiling.geometry);
     vtkDataObject::SetPointDataActiveScalarInfo(out, VTK_FLOAT, 1);
@@ -104,7 +92,7 @@ int vtkUltrasoundNoiseTiler::RequestInformation(vtkInformation*, vtkInformationV
 void vtkUltrasoundNoiseTiler::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   const auto& volumes = this->Prepare(inputs[0], progress.Part(0.0, 0.2));
-  const auto tiled = echorama::TileNoise(this->Parameters(), volumes, progress.Part(0.2, 1.0));
+  const auto tiled = echorama::TileNoise(this->Values, volumes, progress.Part(0.2, 1.0));
   vtkUltrasoundVolume::SetGeometry(output, tiled.geometry);
   vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), VTK_FLOAT);
   vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
@@ -121,10 +109,6 @@ void vtkUltrasoundNoiseTiler::Execute(vtkInformationVector** inputs, vtkImageDat
 void vtkUltrasoundNoiseTiler::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Columns: " << this->Columns << "\n";
-  os << indent << "Rows: " << this->Rows << "\n";
-  os << indent << "OverlapDegrees: " << this->OverlapDegrees << "\n";
-  os << indent << "OverlapMm: " << this->OverlapMm << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->Notes << "\n";
 }

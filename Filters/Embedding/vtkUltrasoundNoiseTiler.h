@@ -28,6 +28,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/NoiseTiling.h"
+#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is kept
 #include <vector> // for volumes
 #endif
@@ -38,38 +39,69 @@ public:
   vtkTypeMacro(vtkUltrasoundNoiseTiler, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** Volumes side by side across the fan, in [0, 100]; 0 (default): as many as there are for the rows. */
-  vtkSetClampMacro(Columns, int, 0, 100);
-  vtkGetMacro(Columns, int);
+  /**
+   * Volumes side by side across the fan; 0: as many as there are for the rows. When there are fewer volumes than places they are
+   * used again, turned or mirrored. In [0, 1000]; default 0.
+   */
+  void SetColumns(int value) { this->SetParameter("Columns", value); }
+  int GetColumns() { return static_cast<int>(this->GetParameter("Columns")); }
   ///@}
 
   ///@{
-  /** Rows of them along the sweep, in [1, 100]. Default 1. */
-  vtkSetClampMacro(Rows, int, 1, 100);
-  vtkGetMacro(Rows, int);
+  /** Rows of volumes along the sweep. In [1, 1000]; default 1. */
+  void SetRows(int value) { this->SetParameter("Rows", value); }
+  int GetRows() { return static_cast<int>(this->GetParameter("Rows")); }
   ///@}
 
   ///@{
-  /** By how much neighbours overlap where fan or sweep turn, degrees, in [0, 360]. Default 10. */
-  vtkSetClampMacro(OverlapDegrees, double, 0.0, 360.0);
-  vtkGetMacro(OverlapDegrees, double);
+  /**
+   * By how much neighbouring noise volumes overlap where fan or sweep turn. It sets the angle of the whole. In [0, 360] degrees;
+   * default 10.
+   */
+  void SetOverlapDegrees(double value) { this->SetParameter("OverlapDegrees", value); }
+  double GetOverlapDegrees() { return this->GetParameter("OverlapDegrees"); }
   ///@}
 
   ///@{
-  /** By how much neighbours overlap where fan or sweep run straight, mm, in [0, 1000]. Default 8. */
-  vtkSetClampMacro(OverlapMm, double, 0.0, 1000.0);
-  vtkGetMacro(OverlapMm, double);
+  /** The same where fan or sweep run straight (turn by less than half a degree in all). In [0, 10000] mm; default 8. */
+  void SetOverlapMm(double value) { this->SetParameter("OverlapMm", value); }
+  double GetOverlapMm() { return this->GetParameter("OverlapMm"); }
   ///@}
 
   ///@{
-  /** Edge length of the cubic voxels of the output, mm, in [0, 100]; 0 (default): the voxel size of the first volume. */
-  vtkSetClampMacro(SpacingMm, double, 0.0, 100.0);
-  vtkGetMacro(SpacingMm, double);
+  /** Edge of the cubic voxels of the output. 0: the voxel size of the first volume. At least 0 mm; default 0. */
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   /** Of which volumes the fan was fitted, and what that left open: sentences, one per line. */
   std::string GetNotes() const { return this->Notes; }
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundNoiseTiler();
@@ -88,16 +120,11 @@ private:
 
 #ifndef __VTK_WRAP__
   struct Volumes;
-  echorama::NoiseTilingParameters Parameters() const;
   const std::vector<echorama::NoiseInput>& Prepare(vtkInformationVector* port, const echorama::Progress& progress);
   std::unique_ptr<Volumes> Kept; // the inputs of the last run and their fans
+  echorama::NoiseTilingParameters Values;
 #endif
 
-  int Columns;
-  int Rows;
-  double OverlapDegrees;
-  double OverlapMm;
-  double SpacingMm;
   std::string Notes;
 };
 

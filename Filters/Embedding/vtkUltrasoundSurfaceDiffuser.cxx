@@ -2,7 +2,6 @@
 #include "vtkUltrasoundSurfaceDiffuser.h"
 
 #include "Core/Imaging/Sampling.h"
-#include "Diffusion.h"
 #include "LocalStatistics.h"
 #include "RegionSurface.h"
 #include "vtkUltrasoundToneMapper.h"
@@ -13,6 +12,8 @@
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundSurfaceDiffuser);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundSurfaceDiffuser);
 
 namespace {
 
@@ -47,15 +48,17 @@ echorama::DiffusionSources SurfaceLevels(echorama::VolumeView<const T> intensity
 } // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundSurfaceDiffuser::vtkUltrasoundSurfaceDiffuser()
+echorama::ParameterList vtkUltrasoundSurfaceDiffuser::Parameters()
 {
-  const echorama::DiffusionParameters defaults;
-  this->InsideExponent = defaults.insideExponent;
-  this->OutsideExponent = defaults.outsideExponent;
-  this->Exact = defaults.exact;
-  this->Accuracy = defaults.accuracy;
-  this->SmoothMm = 3.0;
+  return echorama::Join(
+      {Describe(this->Values),
+       {echorama::Parameter("SmoothMm", this->SmoothMm, {0, echorama::Unlimited}, "mm",
+                            "Standard deviation of the windows in which mean and deviation of the grain are taken "
+                            "at the surface. 0: the voxels' own values, which deviate by 0.")}});
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundSurfaceDiffuser::vtkUltrasoundSurfaceDiffuser() {}
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundSurfaceDiffuser::Execute(vtkInformationVector** inputs, vtkImageData* output,
@@ -66,12 +69,7 @@ void vtkUltrasoundSurfaceDiffuser::Execute(vtkInformationVector** inputs, vtkIma
   if (!input.ValidRegion) {
     throw Error(Error::Kind::BadInput, "the input has no ValidRegion, so it has no surface");
   }
-  echorama::DiffusionParameters parameters;
-  parameters.insideExponent = this->InsideExponent;
-  parameters.outsideExponent = this->OutsideExponent;
-  parameters.exact = this->Exact;
-  parameters.accuracy = this->Accuracy;
-
+  echorama::CheckRanges(this->Parameters());
   echorama::Volume<unsigned char> region;
   echorama::DiffusionSources sources;
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
@@ -81,7 +79,7 @@ void vtkUltrasoundSurfaceDiffuser::Execute(vtkInformationVector** inputs, vtkIma
   });
   vtkDataArray* mean = CopyWithNewIntensity(input.Image, input.Intensity, output, VTK_FLOAT);
   vtkDataArray* deviation = AddArray(output, vtkUltrasoundToneMapper::DeviationName(), VTK_FLOAT);
-  echorama::Diffuse(parameters, sources, geometry.spacing, region.View(), {},
+  echorama::Diffuse(this->Values, sources, geometry.spacing, region.View(), {},
                     {vtkUltrasoundVolume::ViewOf<float>(mean, output), vtkUltrasoundVolume::ViewOf<float>(deviation, output)},
                     progress.Part(0.2, 1.0));
 }
@@ -90,9 +88,5 @@ void vtkUltrasoundSurfaceDiffuser::Execute(vtkInformationVector** inputs, vtkIma
 void vtkUltrasoundSurfaceDiffuser::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "InsideExponent: " << this->InsideExponent << "\n";
-  os << indent << "OutsideExponent: " << this->OutsideExponent << "\n";
-  os << indent << "SmoothMm: " << this->SmoothMm << "\n";
-  os << indent << "Exact: " << (this->Exact ? "on" : "off") << "\n";
-  os << indent << "Accuracy: " << this->Accuracy << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -20,46 +20,85 @@
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
+#ifndef __VTK_WRAP__
+#include "Filters/Embedding/Diffusion.h"
+#include "vtkUltrasoundParameters.h"
+#endif
+
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundSurfaceDiffuser : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundSurfaceDiffuser* New();
   vtkTypeMacro(vtkUltrasoundSurfaceDiffuser, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** The exponent d in the region, in [1, 64]: the larger, the more the nearest surface counts alone. Default 6. */
-  vtkSetClampMacro(InsideExponent, double, 1.0, 64.0);
-  vtkGetMacro(InsideExponent, double);
-  ///@}
-
-  ///@{
-  /** The exponent d outside of the region, in [1, 64]. Default 4. */
-  vtkSetClampMacro(OutsideExponent, double, 1.0, 64.0);
-  vtkGetMacro(OutsideExponent, double);
+  /**
+   * Exponent of distance by which values at the surface spread inside the data: the larger, the more the nearest surface counts
+   * alone. In [1, 64]; default 6.
+   */
+  void SetInsideExponent(double value) { this->SetParameter("InsideExponent", value); }
+  double GetInsideExponent() { return this->GetParameter("InsideExponent"); }
   ///@}
 
   ///@{
   /**
-   * Standard deviation, in mm, of the windows in which mean and deviation of the grain are taken at the surface; only the region
-   * counts. 0: the voxels' own values, which deviate by 0. Default 3.
+   * Exponent of distance by which values at the surface spread outside of the data: the larger, the more the nearest surface
+   * counts alone. In [1, 64]; default 4.
    */
-  vtkSetClampMacro(SmoothMm, double, 0.0, VTK_DOUBLE_MAX);
-  vtkGetMacro(SmoothMm, double);
+  void SetOutsideExponent(double value) { this->SetParameter("OutsideExponent", value); }
+  double GetOutsideExponent() { return this->GetParameter("OutsideExponent"); }
   ///@}
 
   ///@{
-  /** Whether every sum goes over the whole surface: slow, to compare with. Default off. */
-  vtkSetMacro(Exact, bool);
-  vtkGetMacro(Exact, bool);
-  vtkBooleanMacro(Exact, bool);
+  /** Sum over the whole surface for every voxel: slow, to compare with. Default off. */
+  void SetExact(bool value) { this->SetParameter("Exact", value); }
+  bool GetExact() { return this->GetParameter("Exact") != 0.0; }
+  void ExactOn() { this->SetExact(true); }
+  void ExactOff() { this->SetExact(false); }
   ///@}
 
   ///@{
-  /** The largest error that is aimed at, as a share of the range of the values at the surface, in [0.0001, 0.1]. Default 0.002.
+  /**
+   * The largest error that is aimed at, as a share of the range of the values at the surface. Used when Exact is off. In [0.0001,
+   * 0.1]; default 0.002.
    */
-  vtkSetClampMacro(Accuracy, double, 1e-4, 0.1);
-  vtkGetMacro(Accuracy, double);
+  void SetAccuracy(double value) { this->SetParameter("Accuracy", value); }
+  double GetAccuracy() { return this->GetParameter("Accuracy"); }
   ///@}
+
+  ///@{
+  /**
+   * Standard deviation of the windows in which mean and deviation of the grain are taken at the surface. 0: the voxels' own
+   * values, which deviate by 0. At least 0 mm; default 3.
+   */
+  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
+  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundSurfaceDiffuser();
@@ -73,11 +112,10 @@ private:
   vtkUltrasoundSurfaceDiffuser(const vtkUltrasoundSurfaceDiffuser&) = delete;
   void operator=(const vtkUltrasoundSurfaceDiffuser&) = delete;
 
-  double InsideExponent;
-  double OutsideExponent;
-  double SmoothMm;
-  bool Exact;
-  double Accuracy;
+#ifndef __VTK_WRAP__
+  echorama::DiffusionParameters Values;
+  double SmoothMm = 3.0;
+#endif
 };
 
 #endif

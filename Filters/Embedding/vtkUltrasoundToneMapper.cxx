@@ -2,7 +2,6 @@
 #include "vtkUltrasoundToneMapper.h"
 
 #include "Core/Imaging/Sampling.h"
-#include "ToneMapping.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -16,12 +15,17 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundToneMapper);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundToneMapper);
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundToneMapper::Parameters()
+{
+  return Describe(this->Values);
+}
+
 //----------------------------------------------------------------------------
 vtkUltrasoundToneMapper::vtkUltrasoundToneMapper()
 {
-  const echorama::ToneMappingParameters defaults;
-  this->SmoothMm = defaults.smoothMm;
-  this->MatchDeviation = defaults.matchDeviation;
   this->SetNumberOfInputPorts(2);
 }
 
@@ -47,14 +51,10 @@ void vtkUltrasoundToneMapper::Execute(vtkInformationVector** inputs, vtkImageDat
       throw Error(Error::Kind::BadInput, "the levels do not lie on the grid of the volume");
     }
     deviation = levels.Image->GetPointData()->GetArray(DeviationName());
-    if (this->MatchDeviation && (!deviation || deviation->GetNumberOfComponents() != 1)) {
+    if (this->Values.matchDeviation && (!deviation || deviation->GetNumberOfComponents() != 1)) {
       throw Error(Error::Kind::BadInput, "the levels have no point array Deviation, which MatchDeviation needs");
     }
   }
-  echorama::ToneMappingParameters parameters;
-  parameters.smoothMm = this->SmoothMm;
-  parameters.matchDeviation = this->MatchDeviation;
-
   vtkDataArray* result = CopyWithNewIntensity(input.Image, input.Intensity, output, VTK_FLOAT);
   const auto out = vtkUltrasoundVolume::ViewOf<float>(result, output);
   vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
@@ -62,7 +62,7 @@ void vtkUltrasoundToneMapper::Execute(vtkInformationVector** inputs, vtkImageDat
     const echorama::Volume<unsigned char> region = echorama::RealRegionOf(volume);
     std::transform(volume.intensity.begin(), volume.intensity.end(), out.begin(),
                    [](auto value) { return static_cast<float>(value); });
-    echorama::ExtractGrain(parameters, out, region.View(), geometry.spacing, out, progress);
+    echorama::ExtractGrain(this->Values, out, region.View(), geometry.spacing, out, progress);
     // Voxels that are not numbers become some, and stay unreal.
     if (input.ValidRegion || std::any_of(region.View().begin(), region.View().end(), [](unsigned char real) { return !real; })) {
       vtkDataArray* real = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
@@ -71,8 +71,8 @@ void vtkUltrasoundToneMapper::Execute(vtkInformationVector** inputs, vtkImageDat
   });
   if (levels.Intensity) {
     for (vtkIdType i = 0; i < result->GetNumberOfTuples(); ++i) {
-      out[i] = echorama::ApplyGrain(this->MatchDeviation, out[i], static_cast<float>(levels.Intensity->GetComponent(i, 0)),
-                                    this->MatchDeviation ? static_cast<float>(deviation->GetComponent(i, 0)) : 0.0f);
+      out[i] = echorama::ApplyGrain(this->Values.matchDeviation, out[i], static_cast<float>(levels.Intensity->GetComponent(i, 0)),
+                                    this->Values.matchDeviation ? static_cast<float>(deviation->GetComponent(i, 0)) : 0.0f);
     }
   }
 }
@@ -81,6 +81,5 @@ void vtkUltrasoundToneMapper::Execute(vtkInformationVector** inputs, vtkImageDat
 void vtkUltrasoundToneMapper::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "SmoothMm: " << this->SmoothMm << "\n";
-  os << indent << "MatchDeviation: " << (this->MatchDeviation ? "on" : "off") << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

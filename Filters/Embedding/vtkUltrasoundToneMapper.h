@@ -21,30 +21,61 @@
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
+#ifndef __VTK_WRAP__
+#include "Filters/Embedding/ToneMapping.h"
+#include "vtkUltrasoundParameters.h"
+#endif
+
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundToneMapper : public vtkUltrasoundImageAlgorithm {
 public:
   static vtkUltrasoundToneMapper* New();
   vtkTypeMacro(vtkUltrasoundToneMapper, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** Standard deviation of the blur that parts grain from the rest, in mm, above 0. Default 3. */
-  vtkSetClampMacro(SmoothMm, double, 1e-3, VTK_DOUBLE_MAX);
-  vtkGetMacro(SmoothMm, double);
+  /** Standard deviation of the blur that parts grain from the rest. Above 0 mm; default 3. */
+  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
+  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
   ///@}
 
   ///@{
-  /** Whether the local deviation is matched too, not the mean alone. Default on. */
-  vtkSetMacro(MatchDeviation, bool);
-  vtkGetMacro(MatchDeviation, bool);
-  vtkBooleanMacro(MatchDeviation, bool);
+  /** Match the local deviation too, not the local mean alone. Default on. */
+  void SetMatchDeviation(bool value) { this->SetParameter("MatchDeviation", value); }
+  bool GetMatchDeviation() { return this->GetParameter("MatchDeviation") != 0.0; }
+  void MatchDeviationOn() { this->SetMatchDeviation(true); }
+  void MatchDeviationOff() { this->SetMatchDeviation(false); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   /** Sets the levels that the result shall have (input port 1). */
   void SetLevelsConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
 
   /** Name of the point array of the levels that holds the local deviation. */
   static const char* DeviationName() { return "Deviation"; }
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundToneMapper();
@@ -59,8 +90,9 @@ private:
   vtkUltrasoundToneMapper(const vtkUltrasoundToneMapper&) = delete;
   void operator=(const vtkUltrasoundToneMapper&) = delete;
 
-  double SmoothMm;
-  bool MatchDeviation;
+#ifndef __VTK_WRAP__
+  echorama::ToneMappingParameters Values;
+#endif
 };
 
 #endif

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace echorama {
 namespace {
@@ -585,70 +586,67 @@ private:
   TissueSurface tissue_;
 };
 
-[[noreturn]] void RefuseAnatomy(const std::string& reason)
-{
-  throw Error(Error::Kind::InvalidParameter, "anatomy: " + reason);
-}
-
 } // namespace
 
-const std::vector<AnatomyParameter>& AnatomyParameterTable()
+ParameterList Describe(AnatomyParameters& p)
 {
-  using P = AnatomyParameters;
-  static const std::vector<AnatomyParameter> table{
-      {"variation", &P::variation, 0.0, 2.0},
-      {"detailMm", &P::detailMm, 0.5, 10.0},
-      {"organScale", &P::organScale, 0.5, 1.2},
-      {"trunkWidthMm", &P::trunkWidthMm, 150.0, 600.0},
-      {"trunkLengthMm", &P::trunkLengthMm, 120.0, 600.0},
-      {"trunkDepthMm", &P::trunkDepthMm, 60.0, 400.0},
-      {"standoffMm", &P::standoffMm, -10.0, 20.0},
-      {"undulationMm", &P::undulationMm, 0.0, 4.0},
-      {"skinMm", &P::skinMm, 0.5, 5.0},
-      {"fatMm", &P::fatMm, 2.0, 60.0},
-      {"muscleMm", &P::muscleMm, 2.0, 30.0},
-      {"fasciaMm", &P::fasciaMm, 0.0, 2.0},
-      {"septa", &P::septa, 0.0, 2000.0},
-      {"lumps", &P::lumps, 0.0, 1000.0},
-      {"liver", &P::liver, 0.0, 1.0},
-      {"kidney", &P::kidney, 0.0, 1.0},
-      {"gallbladder", &P::gallbladder, 0.0, 1.0},
-      {"capsuleMm", &P::capsuleMm, 0.0, 3.0},
-      {"stones", &P::stones, 0.0, 5.0},
-      {"stoneMm", &P::stoneMm, 1.0, 7.0},
-      {"greatVessels", &P::greatVessels, 0.0, 1.0},
-      {"generations", &P::generations, 0.0, 9.0},
-      {"vesselRadiusMm", &P::vesselRadiusMm, 1.0, 8.0},
-      {"smallestVesselMm", &P::smallestVesselMm, 0.4, 8.0},
-      {"branchAsymmetry", &P::branchAsymmetry, 0.0, 0.6},
-      {"wallShare", &P::wallShare, 0.02, 0.5},
-      {"cysts", &P::cysts, 0.0, 20.0},
-      {"darkLesions", &P::darkLesions, 0.0, 20.0},
-      {"brightLesions", &P::brightLesions, 0.0, 20.0},
-      {"lesionRadiusMm", &P::lesionRadiusMm, 1.0, 20.0},
-      {"ribs", &P::ribs, 0.0, 6.0},
-      {"spine", &P::spine, 0.0, 1.0},
+  return {
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "Which individual: shapes, places, vessels and lesions."),
+      Parameter("Variation", p.variation, {0, 2}, "",
+                "How far individuals (seeds) differ in shape and place; 0: they are alike but for their vessels and lesions."),
+      Parameter("DetailMm", p.detailMm, {0.5, 10}, "mm", "Edge of the triangles of large bodies; small bodies are finer."),
+      Parameter("OrganScale", p.organScale, {0.5, 1.2}, "", "Size of all organs and of the spine beside an adult's."),
+      Parameter("TrunkWidthMm", p.trunkWidthMm, {150, 600}, "mm", "Size of the trunk along x."),
+      Parameter("TrunkLengthMm", p.trunkLengthMm, {120, 600}, "mm", "Size of the trunk along y."),
+      Parameter("TrunkDepthMm", p.trunkDepthMm, {60, 400}, "mm", "Size of the trunk along z, from the skin."),
+      Parameter("StandoffMm", p.standoffMm, {-10, 20}, "mm",
+                "Gel between the middle of the probe's face (z = 0) and the skin; below 0 the face lies inside the body, which "
+                "is not deformed."),
+      Parameter("UndulationMm", p.undulationMm, {0, 4}, "mm",
+                "How far a layer's thickness deviates from its mean, never by more than half of it."),
+      Parameter("SkinMm", p.skinMm, {0.5, 5}, "mm", "Thickness of the skin."),
+      Parameter("FatMm", p.fatMm, {2, 60}, "mm", "Thickness of the fat."),
+      Parameter("MuscleMm", p.muscleMm, {2, 30}, "mm", "Thickness of the muscle."),
+      Parameter("FasciaMm", p.fasciaMm, {0, 2}, "mm", "Thickness of the bright sheets on both sides of the muscle; 0: none."),
+      Parameter("Septa", p.septa, {0, 2000}, "", "Number of thin bright leaves in fat and muscle."),
+      Parameter("Lumps", p.lumps, {0, 1000}, "", "Number of lobules of fat and loops of bowel around the organs."),
+      Parameter("Liver", p.liver, "Whether there is a liver, with its vessels and what is found in it."),
+      Parameter("Kidney", p.kidney, "Whether there is a kidney, with pyramids and a bright sinus."),
+      Parameter("Gallbladder", p.gallbladder, "Whether there is a gallbladder, with its stones."),
+      Parameter("CapsuleMm", p.capsuleMm, {0, 3}, "mm",
+                "Thickness of the capsules of liver and kidney and of the wall of the gallbladder; 0: none."),
+      Parameter("Stones", p.stones, {0, 5}, "", "Number of stones in the gallbladder."),
+      Parameter("StoneMm", p.stoneMm, {1, 7}, "mm", "Radius of the largest stone."),
+      Parameter("GreatVessels", p.greatVessels, "Whether aorta and vena cava run along the spine."),
+      Parameter("Generations", p.generations, {0, 9}, "",
+                "Branchings from the root of the liver's vessels to a tip at most; 0: no trees."),
+      Parameter("VesselRadiusMm", p.vesselRadiusMm, {1, 8}, "mm", "Radius of the portal vein."),
+      Parameter("SmallestVesselMm", p.smallestVesselMm, {0.4, 8}, "mm", "Radius of the narrowest vessels."),
+      Parameter("BranchAsymmetry", p.branchAsymmetry, {0, 0.6}, "",
+                "By which share the smaller of two branches is narrower, on average."),
+      Parameter("WallShare", p.wallShare, {0.02, 0.5}, "", "Thickness of a vessel's wall beside its radius."),
+      Parameter("Cysts", p.cysts, {0, 20}, "", "Number of cysts in the liver, as far as there is room."),
+      Parameter("DarkLesions", p.darkLesions, {0, 20}, "", "Number of dark lesions in the liver, as far as there is room."),
+      Parameter("BrightLesions", p.brightLesions, {0, 20}, "", "Number of bright lesions in the liver, as far as there is room."),
+      Parameter("LesionRadiusMm", p.lesionRadiusMm, {1, 20}, "mm",
+                "Radius of the largest cyst and lesions; the others are down to half of it."),
+      Parameter("Ribs", p.ribs, {0, 6}, "", "Number of ribs across the muscle on the -x side."),
+      Parameter("Spine", p.spine, "Whether there are vertebrae behind the great vessels."),
   };
-  return table;
 }
 
 void AnatomyParameters::Check() const
 {
-  for (const AnatomyParameter& one : AnatomyParameterTable()) {
-    const double value = std::visit([this](auto member) { return static_cast<double>(this->*member); }, one.member);
-    if (!(value >= one.from && value <= one.to))
-      RefuseAnatomy(std::string(one.name) + " is " + NumberText(value) + "; it must be in [" + NumberText(one.from) + ", " +
-                    NumberText(one.to) + "]");
-  }
+  CheckRanges(*this);
   const double shift = shiftMm * variation;
   const auto atLeast = [](const char* what, double value, double least) {
     if (value < least)
-      RefuseAnatomy(std::string(what) + " is " + NumberText(value) + "; the organs need " + NumberText(std::ceil(least)) +
-                    " at least");
+      throw Error(Error::Kind::InvalidParameter, std::string(what) + " is " + NumberText(value) + " mm; the organs need " +
+                                                     NumberText(std::ceil(least)) + " at least");
   };
-  atLeast("trunkWidthMm", trunkWidthMm, 2.0 * (organScale * (halfWidth + shift) + edge));
-  atLeast("trunkLengthMm", trunkLengthMm, 2.0 * (organScale * (halfLength + shift) + edge));
-  atLeast("trunkDepthMm", trunkDepthMm,
+  atLeast("TrunkWidthMm", trunkWidthMm, 2.0 * (organScale * (halfWidth + shift) + edge));
+  atLeast("TrunkLengthMm", trunkLengthMm, 2.0 * (organScale * (halfLength + shift) + edge));
+  atLeast("TrunkDepthMm", trunkDepthMm,
           Wall(*this).Deepest() - standoffMm + 1.0 + organScale * ((spine ? depthOfSpine : depthOfOrgans) + shift) + edge);
 }
 

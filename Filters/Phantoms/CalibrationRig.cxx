@@ -3,6 +3,7 @@
 // overlap.
 #include "CalibrationRig.h"
 #include "BodyShapes.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -50,27 +51,40 @@ std::vector<CalibrationRigParameters::Ball> CalibrationRigParameters::DefaultBal
           {"G", {30.0, -1.0, -47.0}, 4.5}};
 }
 
+ParameterList Describe(CalibrationRigParameters& p)
+{
+  return {
+      Parameter("Scale", p.scale, {0.2, 5}, "", "Size of the rig: places and radii of the balls are multiplied by it."),
+      Parameter("PlateDepthMm", p.plateDepthMm, {10, 500}, "mm", "z of the glass plate's upper side in the world."),
+      Parameter("PlateMm", p.plateMm, {0, 50}, "mm", "Thickness of the plate; 0: no plate, base and stems."),
+      Parameter("BaseMm", p.baseMm, {0, 20}, "mm", "Thickness of the slab on the glass that the pins stand on; 0: none."),
+      Parameter("StemRadiusMm", p.stemRadiusMm, {0, 5}, "mm", "Radius of the pins that carry the balls; 0: none."),
+      Parameter("WaterCelsius", p.waterCelsius, {0, 95}, "degrees Celsius",
+                "Temperature of the bath; the water's speed of sound follows."),
+      Parameter("DetailMm", p.detailMm, {0.1, 5}, "mm", "Edge of the triangles of the balls."),
+      Parameter("Material", p.material, "What balls and stems are made of: the name of a standard material."),
+  };
+}
+
+ParameterList Describe(CalibrationRigParameters::Ball& ball)
+{
+  return {
+      Parameter("Name", ball.name, "Of the landmark."),
+      Parameter("Centre", ball.centre, {-1000, 1000}, "mm",
+                "In the rig: z = 0 is the plate's upper side, -z is up to the probe."),
+      Parameter("Radius", ball.radius, {0.5, 30}, "mm", "Before the rig is scaled."),
+  };
+}
+
 void CalibrationRigParameters::Check() const
 {
-  const auto check = [](const std::string& what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      RefuseRig(what + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
-  };
-  check("scale", scale, 0.2, 5.0);
-  check("plateDepthMm", plateDepthMm, 10.0, 500.0);
-  check("plateMm", plateMm, 0.0, 50.0);
-  check("baseMm", baseMm, 0.0, 20.0);
-  check("stemRadiusMm", stemRadiusMm, 0.0, 5.0);
-  check("waterCelsius", waterCelsius, 0.0, 95.0);
-  check("detailMm", detailMm, 0.1, 5.0);
-  check("the number of balls", static_cast<double>(balls.size()), 1.0, 1000.0);
+  CheckRanges(*this);
+  CheckRange("the number of balls", static_cast<double>(balls.size()), 1.0, 1000.0);
   StandardMaterial(material);
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const Ball& ball = balls[i];
     const std::string name = "ball " + std::to_string(i + 1) + (ball.name.empty() ? "" : " (" + ball.name + ")");
-    check("the radius of " + name, ball.radius, 0.5, 30.0);
-    for (int axis = 0; axis < 3; ++axis)
-      check("a coordinate of " + name, ball.centre[axis], -1000.0, 1000.0);
+    CheckRanges(ball, name);
     if (ball.centre.z() + ball.radius >= -baseMm / scale)
       RefuseRig(name + " touches the plate or the base; its centre's z must be below " +
                 NumberText(-ball.radius - baseMm / scale));

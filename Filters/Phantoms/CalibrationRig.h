@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/Landmark.h"
 #include "Filters/Tissue/TissueSurface.h"
@@ -16,21 +17,21 @@ namespace echorama {
 struct CalibrationRigParameters {
   struct Ball {
     std::string name;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< mm, in the rig: z = 0 is the plate's upper side, -z is up to the probe
-    double radius = 4.0;                              ///< mm, in [0.5, 30]
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    double radius = 4.0;
   };
 
   /// Seven balls of different radii and heights. The distances of any two pairs differ by 1.7 mm at least, so that
   /// each ball is known by its neighbours, too. None lies above another.
   std::vector<Ball> balls = DefaultBalls();
-  double scale = 1.0;             ///< size of the whole rig, in [0.2, 5]
-  double plateDepthMm = 105.0;    ///< z of the plate's upper side in the world, in [10, 500]
-  double plateMm = 6.0;           ///< thickness of the glass, in [0, 50]; 0: no plate, base and stems
-  double baseMm = 2.0;            ///< thickness of the slab on the glass that the pins stand on, in [0, 20]; 0: none
-  double stemRadiusMm = 1.2;      ///< of the pins that carry the balls, in [0, 5]; 0: none
-  double waterCelsius = 20.0;     ///< in [0, 95]; the bath's speed of sound follows
-  double detailMm = 0.5;          ///< edge of the triangles of the balls, in [0.1, 5]
-  std::string material = "nylon"; ///< of the balls and stems, a standard one
+  double scale = 1.0;
+  double plateDepthMm = 105.0;
+  double plateMm = 6.0;
+  double baseMm = 2.0;
+  double stemRadiusMm = 1.2;
+  double waterCelsius = 20.0;
+  double detailMm = 0.5;
+  std::string material = "nylon";
 
   static std::vector<Ball> DefaultBalls();
 
@@ -43,6 +44,10 @@ struct CalibrationRigParameters {
   /// What the base covers, mm, at the rig's scale: the feet of all pins and 6 mm around them (less below a scale of 0.3).
   Eigen::AlignedBox2d BaseOutline() const;
 };
+
+/// All but the balls.
+ParameterList Describe(CalibrationRigParameters& p);
+ParameterList Describe(CalibrationRigParameters::Ball& ball);
 
 /// Speed of sound in pure water at atmospheric pressure, m/s, for a temperature in [0, 95] degrees Celsius: the polynomial of
 /// Marczak, J. Acoust. Soc. Am. 102, 1997.

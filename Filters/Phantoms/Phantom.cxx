@@ -20,11 +20,11 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/ParameterJson.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace echorama {
 namespace {
@@ -354,14 +354,46 @@ void AddNoise(const PhantomParameters& p, float amplitude, std::uint64_t row, st
 
 } // namespace
 
+ParameterList Describe(PhantomParameters& p)
+{
+  const ParameterRange sigmas{0.05, 20}, growths{0, 1}, seeds{0, 9223372036854775807.0};
+  return {
+      Parameter(
+          "Seed", p.seed, seeds, "",
+          "Seed of the tissue: where the scatterers lie and how strong they are. Volumes with one seed show the same tissue."),
+      Parameter("SpacingMm", p.spacingMm, {0, Unlimited, true}, "mm", "Edge of the cubic voxels."),
+      Parameter("GainDb", p.gainDb, {-200, 200}, "dB", "Gain of this volume."),
+      Parameter("DynamicRangeDb", p.dynamicRangeDb, {10, 200}, "dB", "How much the 255 steps of grey span."),
+      Parameter("BackgroundGrey", p.backgroundGrey, {0, 255}, "", "Mean grey of the background at a gain of 0 dB."),
+      Parameter("Shadows", p.shadows, "Whether attenuating bodies (the stone of the default scene) cast shadows."),
+      Parameter("Decorrelation", p.decorrelation, {0, 1}, "",
+                "How far the speckle has changed: complex echoes of volumes of one Seed and different ChangeSeeds that are seen "
+                "alike correlate by 1 less this. Bodies stay where and as loud as they are."),
+      Parameter("ChangeSeed", p.changeSeed, seeds, "",
+                "Seed of the change and of the noise: volumes with the same one have changed alike."),
+      Parameter("DeformationMm", p.press.mm, {0, ProbePress::maxMm}, "mm",
+                "How far the pressed probe moves the tissue below the middle of its face. It fades with depth and sideways."),
+      Parameter("NoiseDb", p.noiseDb, {PhantomParameters::noNoiseDb, 60}, "dB",
+                "Power of the receiver's noise beside that of the background; -120: none."),
+      Parameter("RibShare", p.ribShare, {0, 0.6}, "", "Share of the fan in the shadow of a rib close below the face; 0: no rib."),
+      Parameter("Jets", p.jets, "Whether bodies that come and go (jets and puffs at places of the default scene) are there."),
+      Parameter("WavelengthMm", p.wavelengthMm, {0.05, 10}, "mm",
+                "Wavelength in tissue. The longer, the longer speckle stays alike as the probe turns.")
+          .Advanced(),
+      Parameter("PulseSigmaMm", p.pulseSigmaMm, sigmas, "mm",
+                "Standard deviation of the Gaussian pulse in depth, of amplitudes."),
+      Parameter("LateralSigmaMm", p.lateralSigmaMm, sigmas, "mm", "That of the beam along the fan at depth 0."),
+      Parameter("LateralGrowth", p.lateralGrowth, growths, "", "Its growth per mm of depth."),
+      Parameter("ElevationSigmaMm", p.elevationSigmaMm, sigmas, "mm", "That of the beam along the sweep at depth 0."),
+      Parameter("ElevationGrowth", p.elevationGrowth, growths, "", "Its growth per mm of depth."),
+      Parameter("ScatterersPerMm3", p.scatterersPerMm3, {0.01, 100}, "per mm^3", "Scatterers, one in each cell of a lattice."),
+  };
+}
+
 void PhantomParameters::Check() const
 {
   const auto fail = [](const std::string& reason) { throw Error(Error::Kind::InvalidParameter, "phantom: " + reason); };
-  const auto require = [&fail](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      fail(std::string(name) + " is " + std::to_string(value) + "; it must be in [" + std::to_string(low) + ", " +
-           std::to_string(high) + "]");
-  };
+  CheckRanges(*this);
   scene.Check();
   probe.Check();
   if (probe.IsPlane())
@@ -378,22 +410,6 @@ void PhantomParameters::Check() const
     fail("ProbeToWorld is not a finite rigid transform");
   if (!(probeToWorld.translation().cwiseAbs().maxCoeff() <= 1e6))
     fail("ProbeToWorld lies more than 1e6 mm away");
-  if (!(spacingMm > 0.0) || !std::isfinite(spacingMm))
-    fail("the spacing is " + std::to_string(spacingMm) + " mm; it must be positive");
-  require("the gain in dB", gainDb, -200.0, 200.0);
-  require("the dynamic range in dB", dynamicRangeDb, 10.0, 200.0);
-  require("the grey of the background", backgroundGrey, 0.0, 255.0);
-  require("the decorrelation", decorrelation, 0.0, 1.0);
-  require("the deformation in mm", press.mm, 0.0, ProbePress::maxMm);
-  require("the noise in dB", noiseDb, noNoiseDb, 60.0);
-  require("the share of the rib", ribShare, 0.0, 0.6);
-  require("the wavelength in mm", wavelengthMm, 0.05, 10.0);
-  require("the pulse sigma in mm", pulseSigmaMm, 0.05, 20.0);
-  require("the lateral sigma in mm", lateralSigmaMm, 0.05, 20.0);
-  require("the lateral growth", lateralGrowth, 0.0, 1.0);
-  require("the elevation sigma in mm", elevationSigmaMm, 0.05, 20.0);
-  require("the elevation growth", elevationGrowth, 0.0, 1.0);
-  require("the number of scatterers per mm^3", scatterersPerMm3, 0.01, 100.0);
 }
 
 PhantomScene PhantomParameters::WholeScene() const
@@ -518,24 +534,8 @@ void MakePhantom(const PhantomParameters& p, VolumeView<unsigned char> intensity
 std::string DescribePhantom(const PhantomParameters& p)
 {
   nlohmann::ordered_json text = nlohmann::ordered_json::parse(SceneToJson(p.scene)); // without rib and jets: they are parameters
-  text["parameters"] = {{"spacingMm", p.spacingMm},
-                        {"gainDb", p.gainDb},
-                        {"dynamicRangeDb", p.dynamicRangeDb},
-                        {"backgroundGrey", p.backgroundGrey},
-                        {"shadows", p.shadows},
-                        {"decorrelation", p.decorrelation},
-                        {"changeSeed", p.changeSeed},
-                        {"deformationMm", p.press.mm},
-                        {"noiseDb", p.noiseDb},
-                        {"ribShare", p.ribShare},
-                        {"jets", p.jets},
-                        {"wavelengthMm", p.wavelengthMm},
-                        {"pulseSigmaMm", p.pulseSigmaMm},
-                        {"lateralSigmaMm", p.lateralSigmaMm},
-                        {"lateralGrowth", p.lateralGrowth},
-                        {"elevationSigmaMm", p.elevationSigmaMm},
-                        {"elevationGrowth", p.elevationGrowth},
-                        {"scatterersPerMm3", p.scatterersPerMm3}};
+  PhantomParameters readable = p;
+  text["parameters"] = JsonOf(Without(Describe(readable), {"Seed"})); // which has its own array
   return text.dump();
 }
 

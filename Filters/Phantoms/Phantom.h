@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/BeamEchoes.h"
@@ -17,35 +18,29 @@ struct PhantomParameters {
   /// A curved 3D probe: 65 degrees of fan at a radius of 40 mm, 55 degrees of sweep at 30 mm, 5 to 100 mm deep.
   ProbeGeometry probe = ProbeGeometry::Convex(1.1344640137963142, 40.0, 0.9599310885968813, 30.0, 5.0, 100.0);
   Pose probeToWorld = Pose::Identity(); ///< rigid, at most 1e6 mm away
-  std::uint64_t seed = 1;               ///< of the tissue: views with one seed see the same scatterers
-  double spacingMm = 1.0;               ///< of the cubic voxels, > 0
-  double gainDb = 0.0;                  ///< of this volume, in [-200, 200]
-  double dynamicRangeDb = 60.0;         ///< how many dB the 255 steps of grey span, in [10, 200]
-  double backgroundGrey = 100.0;        ///< mean grey of the background at gain 0, in [0, 255]
-  bool shadows = true;                  ///< whether bodies attenuate what lies behind them
+  std::uint64_t seed = 1;
+  double spacingMm = 1.0;
+  double gainDb = 0.0;
+  double dynamicRangeDb = 60.0;
+  double backgroundGrey = 100.0;
+  bool shadows = true;
 
   // What sets one volume apart from another of the same tissue.
-  /// How far the speckle has changed, in [0, 1]. Volumes of one tissue seed, different change seeds and decorrelation d that
-  /// are seen alike have complex echoes that correlate by 1 - d (their powers by about (1 - d)^2); where which body lies and how
-  /// loud it is stay.
-  double decorrelation = 0.0;
-  std::uint64_t changeSeed = 1; ///< of the change and of the noise: volumes of the same one have changed alike
-  ProbePress press;             ///< how the probe deforms the tissue: scatterers and bodies together
-  /// Power of the receiver's noise (white, complex Gaussian, on every sample of the beams) beside that of the background, in dB,
-  /// in [-120, 60]; -120: none. It is added behind all shadows.
-  double noiseDb = noNoiseDb;
+  double decorrelation = 0.0; ///< powers of echoes correlate by about (1 - d)^2
+  std::uint64_t changeSeed = 1;
+  ProbePress press;           ///< moves scatterers and bodies together
+  double noiseDb = noNoiseDb; ///< white, complex Gaussian, on every sample of the beams, behind all shadows
   static constexpr double noNoiseDb = -120.0;
-  /// Share of the fan that lies in the shadow of a rib close below the face, in [0, 0.6]; 0: no rib (RibBelow).
-  double ribShare = 0.0;
-  bool jets = false; ///< whether the short-lived bodies Jets() are there
+  double ribShare = 0.0; ///< RibBelow
+  bool jets = false;     ///< whether the short-lived bodies Jets() are there
 
-  double wavelengthMm = 0.6;      ///< in tissue, in [0.05, 10]: 0.6 mm is 2.6 MHz
-  double pulseSigmaMm = 0.5;      ///< standard deviation of the Gaussian pulse in depth, amplitudes, in [0.05, 20]
-  double lateralSigmaMm = 0.7;    ///< of the beam along the fan at depth 0, in [0.05, 20]
-  double lateralGrowth = 0.008;   ///< its growth per mm of depth, in [0, 1]
-  double elevationSigmaMm = 0.9;  ///< of the beam along the sweep at depth 0, in [0.05, 20]
-  double elevationGrowth = 0.012; ///< its growth per mm of depth, in [0, 1]
-  double scatterersPerMm3 = 1.5;  ///< in [0.01, 100]
+  double wavelengthMm = 0.6; ///< 2.6 MHz
+  double pulseSigmaMm = 0.5;
+  double lateralSigmaMm = 0.7;
+  double lateralGrowth = 0.008;
+  double elevationSigmaMm = 0.9;
+  double elevationGrowth = 0.012;
+  double scatterersPerMm3 = 1.5;
 
   /// Throws Error(InvalidParameter) that names the number that is out of its range; also for a probe whose sweep is a single
   /// plane, or whose beams start at or behind the sweep axis.
@@ -54,6 +49,9 @@ struct PhantomParameters {
   /// The scene with the rib and the jets of this volume.
   PhantomScene WholeScene() const;
 };
+
+/// All but the scene and the probe.
+ParameterList Describe(PhantomParameters& p);
 
 /// A rib below the face of one view: a long bright body across the sweep, 6 mm behind the first depth, on the +x side of the
 /// fan, that takes all echoes behind it over about \a share (in (0, 0.6]) of the fan. World coordinates.

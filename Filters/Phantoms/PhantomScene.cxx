@@ -3,10 +3,10 @@
 // against the body's box before the distance to it: some 20 comparisons for most points.
 #include "PhantomScene.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/ParameterJson.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 namespace echorama {
 namespace {
@@ -90,6 +90,24 @@ Vector3d VectorFrom(const Json& value, const std::string& place)
   return {NumberFrom(value[0], place), NumberFrom(value[1], place), NumberFrom(value[2], place)};
 }
 
+// Reads the parameters that are there; those named must be.
+void Read(const Json& object, const ParameterList& parameters, std::initializer_list<std::string_view> needed,
+          const std::string& place)
+{
+  for (const Parameter& parameter : parameters) {
+    const std::string key = parameter.Key();
+    if (std::find(needed.begin(), needed.end(), key) != needed.end())
+      Field(object, key.c_str(), place);
+    const auto found = object.find(key);
+    if (found == object.end())
+      continue;
+    if (auto* const* vector = std::get_if<Vector3d*>(&parameter.value))
+      **vector = VectorFrom(*found, place + ", " + key);
+    else
+      *std::get<double*>(parameter.value) = NumberFrom(*found, place + ", " + key);
+  }
+}
+
 Inclusion InclusionFrom(const Json& value, const std::string& place)
 {
   if (!value.is_object())
@@ -106,60 +124,61 @@ Inclusion InclusionFrom(const Json& value, const std::string& place)
   if (ellipsoid != value.end()) {
     if (!ellipsoid->is_object())
       RefusePhantom(place + ", ellipsoid", "is not an object");
-    Ellipsoid shape;
-    shape.centre = VectorFrom(Field(*ellipsoid, "centre", place), place + ", centre");
-    shape.radii = VectorFrom(Field(*ellipsoid, "radii", place), place + ", radii");
-    if (const auto rotation = ellipsoid->find("rotation"); rotation != ellipsoid->end())
-      shape.rotation = VectorFrom(*rotation, place + ", rotation");
-    inclusion.shape = shape;
+    Read(*ellipsoid, Describe(inclusion.shape.emplace<Ellipsoid>()), {"centre", "radii"}, place);
   } else {
     if (!tube->is_object())
       RefusePhantom(place + ", tube", "is not an object");
-    Tube shape;
     const Json& path = Field(*tube, "path", place);
     if (!path.is_array())
       RefusePhantom(place + ", path", "is not a list of points");
+    Tube& shape = inclusion.shape.emplace<Tube>();
     for (const Json& point : path)
       shape.path.push_back(VectorFrom(point, place + ", path"));
-    shape.radius = NumberFrom(Field(*tube, "radius", place), place + ", radius");
-    inclusion.shape = std::move(shape);
+    Read(*tube, Describe(shape), {"radius"}, place);
   }
-  const std::pair<const char*, double*> numbers[] = {{"echogenicityDb", &inclusion.echogenicityDb},
-                                                     {"wallMm", &inclusion.wallMm},
-                                                     {"wallDb", &inclusion.wallDb},
-                                                     {"attenuationDbPerMm", &inclusion.attenuationDbPerMm}};
-  for (const auto& [key, number] : numbers)
-    if (const auto found = value.find(key); found != value.end())
-      *number = NumberFrom(*found, place + ", " + key);
+  Read(value, Describe(inclusion), {}, place);
   return inclusion;
 }
 
 } // namespace
 
+ParameterList Describe(Ellipsoid& ellipsoid)
+{
+  return {Parameter("Centre", ellipsoid.centre, {}, "mm", "In the world."),
+          Parameter("Radii", ellipsoid.radii, {0, Unlimited, true}, "mm", "Along its own axes."),
+          Parameter("Rotation", ellipsoid.rotation, {}, "radians", "How its axes are turned: axis times angle.")};
+}
+
+ParameterList Describe(Tube& tube)
+{
+  return {Parameter("Radius", tube.radius, {0, Unlimited, true}, "mm", "Of the tube, its wall included.")};
+}
+
+ParameterList Describe(Inclusion& inclusion)
+{
+  const ParameterRange levels{Inclusion::anechoicDb, 60};
+  return {Parameter("EchogenicityDb", inclusion.echogenicityDb, levels, "dB", "How loud it echoes; -120: clear fluid."),
+          Parameter("WallMm", inclusion.wallMm, {0, Unlimited}, "mm", "Thickness of the wall, its outermost part; 0: none."),
+          Parameter("WallDb", inclusion.wallDb, levels, "dB", "Echogenicity of the wall."),
+          Parameter("AttenuationDbPerMm", inclusion.attenuationDbPerMm, {0, 1000}, "dB/mm",
+                    "How much of the echo a mm of the body on its way takes, there and back; of ellipsoids alone.")};
+}
+
 void PhantomScene::Check() const
 {
   for (std::size_t i = 0; i < inclusions.size(); ++i) {
     const Inclusion& inclusion = inclusions[i];
-    const auto require = [this, i](bool good, const char* what) {
+    const std::string place = "phantom scene: " + NameOf(*this, i);
+    const auto require = [&place](bool good, const char* what) {
       if (!good)
-        throw Error(Error::Kind::InvalidParameter, "phantom scene: " + NameOf(*this, i) + ": " + what);
+        throw Error(Error::Kind::InvalidParameter, place + ": " + what);
     };
-    const auto isLevel = [](double db) { return db >= Inclusion::anechoicDb && db <= 60.0; };
-    require(isLevel(inclusion.echogenicityDb), "the echogenicity must be in [-120, 60] dB");
-    require(inclusion.wallMm >= 0.0 && std::isfinite(inclusion.wallMm), "the wall must be at least 0 mm thick");
-    require(isLevel(inclusion.wallDb), "the echogenicity of the wall must be in [-120, 60] dB");
-    require(inclusion.attenuationDbPerMm >= 0.0 && inclusion.attenuationDbPerMm <= 1000.0,
-            "the attenuation must be in [0, 1000] dB/mm");
-    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape)) {
-      require(ellipsoid->centre.allFinite(), "the centre is not finite");
-      require(ellipsoid->rotation.allFinite(), "the rotation is not finite");
-      require(ellipsoid->radii.allFinite() && ellipsoid->radii.minCoeff() > 0.0, "the radii must be positive");
-    } else {
-      const Tube& tube = std::get<Tube>(inclusion.shape);
-      require(tube.path.size() >= 2, "a tube needs at least two points");
-      require(std::all_of(tube.path.begin(), tube.path.end(), [](const Vector3d& p) { return p.allFinite(); }),
+    CheckRanges(inclusion, place);
+    std::visit([&place](const auto& shape) { CheckRanges(shape, place); }, inclusion.shape);
+    if (const auto* tube = std::get_if<Tube>(&inclusion.shape)) {
+      require(tube->path.size() >= 2, "a tube needs at least two points");
+      require(std::all_of(tube->path.begin(), tube->path.end(), [](const Vector3d& p) { return p.allFinite(); }),
               "a point of the path is not finite");
-      require(tube.radius > 0.0 && std::isfinite(tube.radius), "the radius must be positive");
       require(inclusion.attenuationDbPerMm == 0.0, "only ellipsoids can attenuate");
     }
   }
@@ -211,22 +230,19 @@ std::vector<Inclusion> Jets()
 std::string SceneToJson(const PhantomScene& scene)
 {
   Json list = Json::array();
-  for (const Inclusion& inclusion : scene.inclusions) {
+  for (Inclusion inclusion : scene.inclusions) {
     Json item{{"name", inclusion.name}};
-    if (const auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape))
-      item["ellipsoid"] = {
-          {"centre", ToJson(ellipsoid->centre)}, {"radii", ToJson(ellipsoid->radii)}, {"rotation", ToJson(ellipsoid->rotation)}};
+    if (auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape))
+      item["ellipsoid"] = JsonOf(Describe(*ellipsoid));
     else {
-      const Tube& tube = std::get<Tube>(inclusion.shape);
+      Tube& tube = std::get<Tube>(inclusion.shape);
       Json path = Json::array();
       for (const Vector3d& point : tube.path)
         path.push_back(ToJson(point));
-      item["tube"] = {{"path", path}, {"radius", tube.radius}};
+      item["tube"] = {{"path", path}};
+      item["tube"].update(JsonOf(Describe(tube)));
     }
-    item["echogenicityDb"] = inclusion.echogenicityDb;
-    item["wallMm"] = inclusion.wallMm;
-    item["wallDb"] = inclusion.wallDb;
-    item["attenuationDbPerMm"] = inclusion.attenuationDbPerMm;
+    item.update(JsonOf(Describe(inclusion)));
     list.push_back(std::move(item));
   }
   return Json{{"schema", phantomSchema}, {"inclusions", std::move(list)}}.dump();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <string>
 #include <variant>
@@ -9,15 +10,15 @@ namespace echorama {
 
 /// An ellipsoid in the world.
 struct Ellipsoid {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< mm
-  Eigen::Vector3d radii = Eigen::Vector3d::Ones();    ///< mm, > 0, along its own axes
-  Eigen::Vector3d rotation = Eigen::Vector3d::Zero(); ///< rotation vector (axis times angle, radians) of its own axes
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d radii = Eigen::Vector3d::Ones();
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
 };
 
 /// Everything within a radius of a line through points: a vessel. The ends are round.
 struct Tube {
   std::vector<Eigen::Vector3d> path; ///< mm, at least two points
-  double radius = 1.0;               ///< mm, > 0
+  double radius = 1.0;
 };
 
 /// A body in the scene. How loud it echoes is given in dB beside the background.
@@ -27,17 +28,22 @@ struct Inclusion {
 
   std::string name;
   std::variant<Ellipsoid, Tube> shape;
-  double echogenicityDb = 0.0;     ///< [-120, 60]
-  double wallMm = 0.0;             ///< thickness of the wall, the outermost part of the body; 0: none
-  double wallDb = 0.0;             ///< echogenicity of the wall, [-120, 60]
-  double attenuationDbPerMm = 0.0; ///< how much of the echo a mm of the body on its way takes, there and back; ellipsoids only
+  double echogenicityDb = 0.0;
+  double wallMm = 0.0;
+  double wallDb = 0.0;
+  double attenuationDbPerMm = 0.0;
 };
+
+/// Without the path, and without name and shape.
+ParameterList Describe(Ellipsoid& ellipsoid);
+ParameterList Describe(Tube& tube);
+ParameterList Describe(Inclusion& inclusion);
 
 /// What lies in the world: a background of 0 dB and bodies in it. Where bodies overlap the later one counts.
 struct PhantomScene {
   std::vector<Inclusion> inclusions;
 
-  /// Throws Error(InvalidParameter) that names the inclusion and the number which is out of range or not finite.
+  /// Throws Error(InvalidParameter) that names the inclusion and the number which is out of range.
   void Check() const;
 };
 

@@ -13,7 +13,7 @@ struct ProbePress {
   static constexpr double maxMm = 10.0;
   static constexpr double depthSigmaMm = 35.0, sideSigmaMm = 45.0;
 
-  double mm = 0.0; ///< in [0, maxMm]; 0: nothing moves
+  double mm = 0.0; ///< at most maxMm; 0: nothing moves
 
   /// How far the tissue at \a point (where it lies unpressed) goes, mm.
   Eigen::Vector3d DisplacementAt(const Eigen::Vector3d& point) const;

@@ -5,8 +5,7 @@
 // Cost: candidates x samples x (branches so far + one look-up of room); below a millisecond for a hundred branches.
 #include "VesselTree.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Random.h"
 #include <algorithm>
 #include <array>
@@ -45,28 +44,26 @@ double RoomAlong(const std::vector<VesselBranch>& tree, int parent, const Vector
   return least - radius;
 }
 
-void Check(const VesselTreeParameters& p)
-{
-  const auto check = [](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, std::string("vessel tree: ") + what + " is " + NumberText(value) +
-                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
-  };
-  check("rootRadiusMm", p.rootRadiusMm, 0.01, 100.0);
-  check("rootLengthMm", p.rootLengthMm, 0.01, 1000.0);
-  check("smallestRadiusMm", p.smallestRadiusMm, 0.01, 100.0);
-  check("generations", p.generations, 0.0, 16.0);
-  check("lengthOverRadius", p.lengthOverRadius, 3.0, 100.0);
-  check("asymmetry", p.asymmetry, 0.0, 0.6);
-  check("the length of direction", p.direction.norm(), 1e-9, 1e9);
-  check("the largest coordinate of root", p.root.cwiseAbs().maxCoeff(), 0.0, 1e6);
-}
-
 } // namespace
+
+ParameterList Describe(VesselTreeParameters& p)
+{
+  return {
+      Parameter("Root", p.root, {-1e6, 1e6}, "mm", "Where the tree begins, in the world."),
+      Parameter("Direction", p.direction, {}, "", "Of the first branch; any length above 0."),
+      Parameter("RootRadiusMm", p.rootRadiusMm, {0.01, 100}, "mm", "Lumen of the first branch."),
+      Parameter("RootLengthMm", p.rootLengthMm, {0.01, 1000}, "mm", "Length of the first branch."),
+      Parameter("SmallestRadiusMm", p.smallestRadiusMm, {0.01, 100}, "mm", "No branch is narrower."),
+      Parameter("Generations", p.generations, {0, 16}, "", "Branchings from the root to a tip at most."),
+      Parameter("LengthOverRadius", p.lengthOverRadius, {3, 100}, "", "Length of the other branches, about."),
+      Parameter("Asymmetry", p.asymmetry, {0, 0.6}, "", "By which share the smaller of two branches is narrower, on average."),
+  };
+}
 
 std::vector<VesselBranch> GrowVessels(const VesselTreeParameters& p, const VesselRoom& room)
 {
-  Check(p);
+  CheckRanges(p);
+  CheckRange("the length of Direction", p.direction.norm(), 1e-9, 1e9);
   std::vector<VesselBranch> tree;
   std::vector<double> planes{0.0}; // the angle of the plane in which each branch parted from its sibling
   tree.push_back({p.root, p.root + p.rootLengthMm * p.direction.normalized(), p.rootRadiusMm, 0, -1, true});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include <cstdint>
 #include <Eigen/Core>
 #include <functional>
@@ -10,15 +11,18 @@ namespace echorama {
 /// How a tree of vessels grows from its root into an organ.
 struct VesselTreeParameters {
   std::uint64_t seed = 1;
-  Eigen::Vector3d root = Eigen::Vector3d::Zero();       ///< mm, world
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ(); ///< of the first branch; any length > 0
-  double rootRadiusMm = 5.0;                            ///< of the lumen, in [0.01, 100]
-  double rootLengthMm = 30.0;                           ///< of the first branch, in [0.01, 1000]
-  double smallestRadiusMm = 0.9;                        ///< no branch is narrower, in [0.01, 100]
-  int generations = 6;                                  ///< branchings from the root to a tip at most, in [0, 16]
-  double lengthOverRadius = 6.0;                        ///< of the others, about, in [3, 100]
-  double asymmetry = 0.25; ///< in [0, 0.6]: children's radii are as 1 - a to 1, a uniform from 0 to twice this, or 0.75
+  Eigen::Vector3d root = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  double rootRadiusMm = 5.0;
+  double rootLengthMm = 30.0;
+  double smallestRadiusMm = 0.9;
+  int generations = 6;
+  double lengthOverRadius = 6.0;
+  double asymmetry = 0.25; ///< children's radii are as 1 - a to 1, a uniform from 0 to twice this, or 0.75
 };
+
+/// All but the seed.
+ParameterList Describe(VesselTreeParameters& p);
 
 /// A straight piece of a tree between two branchings.
 struct VesselBranch {

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundPhantomSource.h"
 
 #include "Core/Base/Angles.h"
+#include "Core/Geometry/ProbeSettings.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -17,6 +18,14 @@
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundPhantomSource);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundPhantomSource);
+
+struct vtkUltrasoundPhantomSource::Settings {
+  echorama::PhantomParameters phantom; // but for scene and probe, which come from the others
+  echorama::ConvexProbeSettings probe;
+  std::string scene;
+};
 
 namespace {
 
@@ -40,129 +49,92 @@ void MapPoints(const echorama::Pose& probeToWorld, vtkPoints* from, vtkPoints* t
 } // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundPhantomSource::vtkUltrasoundPhantomSource()
+echorama::ParameterList vtkUltrasoundPhantomSource::Parameters()
+{
+  Settings& v = *this->Values;
+  return echorama::Join(
+      {Without(Describe(v.phantom),
+               {"PulseSigmaMm", "LateralSigmaMm", "LateralGrowth", "ElevationSigmaMm", "ElevationGrowth", "ScatterersPerMm3"}),
+       Describe(v.probe),
+       {echorama::Parameter("Scene", v.scene,
+                            "The scene as JSON text, as it stands in the field data Scene of a phantom; empty: the "
+                            "default scene.")
+            .Advanced()}});
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundPhantomSource::vtkUltrasoundPhantomSource() : Values(new Settings)
 {
   this->SetNumberOfInputPorts(0);
-  const echorama::PhantomParameters defaults;
-  this->Seed = static_cast<vtkTypeInt64>(defaults.seed);
-  this->SpacingMm = defaults.spacingMm;
-  this->GainDb = defaults.gainDb;
-  this->DynamicRangeDb = defaults.dynamicRangeDb;
-  this->BackgroundGrey = defaults.backgroundGrey;
-  this->Shadows = defaults.shadows;
-  this->Decorrelation = defaults.decorrelation;
-  this->ChangeSeed = static_cast<vtkTypeInt64>(defaults.changeSeed);
-  this->DeformationMm = defaults.press.mm;
-  this->NoiseDb = defaults.noiseDb;
-  this->RibShare = defaults.ribShare;
-  this->Jets = defaults.jets;
-  this->WavelengthMm = defaults.wavelengthMm;
-  this->FanAngle = defaults.probe.fanAngle * echorama::DegreesPerRadian;
-  this->FanRadius = defaults.probe.fanWidth / defaults.probe.fanAngle;
-  this->SweepAngle = defaults.probe.sweepAngle * echorama::DegreesPerRadian;
-  this->SweepRadius = defaults.probe.sweepWidth / defaults.probe.sweepAngle;
-  this->DepthMin = defaults.probe.depthMin;
-  this->DepthMax = defaults.probe.depthMax;
-  for (int axis = 0; axis < 3; ++axis) {
-    this->Position[axis] = this->Orientation[axis] = 0.0;
-  }
-  this->Scene = nullptr;
+  this->Values->probe.depthMin = this->Values->phantom.probe.depthMin;
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundPhantomSource::~vtkUltrasoundPhantomSource()
-{
-  this->SetScene(nullptr);
-}
+vtkUltrasoundPhantomSource::~vtkUltrasoundPhantomSource() = default;
 
 //----------------------------------------------------------------------------
-echorama::PhantomParameters vtkUltrasoundPhantomSource::Parameters() const
+echorama::PhantomParameters vtkUltrasoundPhantomSource::Phantom() const
 {
-  echorama::PhantomParameters parameters;
-  if (this->Scene && *this->Scene) {
-    parameters.scene = echorama::SceneFromJson(this->Scene);
+  echorama::PhantomParameters phantom = this->Values->phantom;
+  if (!this->Values->scene.empty()) {
+    phantom.scene = echorama::SceneFromJson(this->Values->scene);
   }
-  parameters.probe = echorama::ProbeGeometry::Convex(this->FanAngle / echorama::DegreesPerRadian, this->FanRadius,
-                                                     this->SweepAngle / echorama::DegreesPerRadian, this->SweepRadius,
-                                                     this->DepthMin, this->DepthMax);
-  parameters.probeToWorld = this->ProbeToWorld();
-  parameters.seed = static_cast<std::uint64_t>(this->Seed);
-  parameters.spacingMm = this->SpacingMm;
-  parameters.gainDb = this->GainDb;
-  parameters.dynamicRangeDb = this->DynamicRangeDb;
-  parameters.backgroundGrey = this->BackgroundGrey;
-  parameters.shadows = this->Shadows;
-  parameters.decorrelation = this->Decorrelation;
-  parameters.changeSeed = static_cast<std::uint64_t>(this->ChangeSeed);
-  parameters.press.mm = this->DeformationMm;
-  parameters.noiseDb = this->NoiseDb;
-  parameters.ribShare = this->RibShare;
-  parameters.jets = this->Jets;
-  parameters.wavelengthMm = this->WavelengthMm;
-  return parameters;
+  const echorama::PlacedProbe placed = this->Values->probe.Place();
+  phantom.probe = placed.geometry;
+  phantom.probeToWorld = placed.probeToWorld;
+  return phantom;
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::SetView(const echorama::Pose& probeToWorld, double gainDb)
 {
-  const Eigen::Vector3d turn = echorama::LogRotation(probeToWorld.linear()) * echorama::DegreesPerRadian;
-  const Eigen::Vector3d place = probeToWorld.translation();
-  this->SetOrientation(turn.x(), turn.y(), turn.z());
-  this->SetPosition(place.x(), place.y(), place.z());
-  this->SetGainDb(gainDb);
+  this->Values->probe.orientation = echorama::LogRotation(probeToWorld.linear()) * echorama::DegreesPerRadian;
+  this->Values->probe.position = probeToWorld.translation();
+  this->Values->phantom.gainDb = gainDb;
+  this->Modified();
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  echorama::Pose pose;
-  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(probeToWorld->GetData());
-  if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
-      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  const auto pose = vtkUltrasoundVolume::RigidPoseOf(probeToWorld);
+  if (!pose) {
     vtkErrorMacro("ProbeToWorld is not a rigid transform; the pose was not changed");
     return;
   }
-  this->SetView(pose, this->GainDb);
-}
-
-//----------------------------------------------------------------------------
-echorama::Pose vtkUltrasoundPhantomSource::ProbeToWorld() const
-{
-  echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
-  pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
-  return pose;
+  this->SetView(*pose, this->Values->phantom.gainDb);
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = this->ProbeToWorld().matrix();
-  probeToWorld->DeepCopy(rows.data());
+  vtkUltrasoundVolume::SetMatrix(probeToWorld, this->Values->probe.Place().probeToWorld);
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::TissueToSeen(vtkPoints* from, vtkPoints* to)
 {
-  const echorama::ProbePress press{this->DeformationMm};
-  MapPoints(this->ProbeToWorld(), from, to, [&press](const Eigen::Vector3d& point) { return press.Seen(point); });
+  const echorama::ProbePress& press = this->Values->phantom.press;
+  MapPoints(this->Values->probe.Place().probeToWorld, from, to,
+            [&press](const Eigen::Vector3d& point) { return press.Seen(point); });
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::SeenToTissue(vtkPoints* from, vtkPoints* to)
 {
-  const echorama::ProbePress press{this->DeformationMm};
-  MapPoints(this->ProbeToWorld(), from, to, [&press](const Eigen::Vector3d& point) { return press.Unpressed(point); });
+  const echorama::ProbePress& press = this->Values->phantom.press;
+  MapPoints(this->Values->probe.Place().probeToWorld, from, to,
+            [&press](const Eigen::Vector3d& point) { return press.Unpressed(point); });
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::Add(echorama::Inclusion inclusion)
 {
   try {
-    echorama::PhantomScene scene = this->Parameters().scene;
+    echorama::PhantomScene scene = this->Phantom().scene;
     scene.inclusions.push_back(std::move(inclusion));
     scene.Check();
-    this->SetScene(echorama::SceneToJson(scene).c_str());
+    this->SetParameterAsText("Scene", echorama::SceneToJson(scene).c_str());
   } catch (const Error& error) {
     vtkErrorMacro(<< error.what());
   }
@@ -189,15 +161,16 @@ void vtkUltrasoundPhantomSource::AddTube(const double from[3], const double to[3
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::ClearScene()
 {
-  this->SetScene(echorama::SceneToJson(echorama::UniformScene()).c_str());
+  this->SetParameterAsText("Scene", echorama::SceneToJson(echorama::UniformScene()).c_str());
 }
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundPhantomSource::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
   return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
     vtkInformation* out = outputs->GetInformationObject(0);
-    vtkUltrasoundVolume::SetGeometry(out, echorama::PhantomGeometry(this->Parameters()));
+    vtkUltrasoundVolume::SetGeometry(out, echorama::PhantomGeometry(this->Phantom()));
     vtkDataObject::SetPointDataActiveScalarInfo(out, VTK_UNSIGNED_CHAR, 1);
   });
 }
@@ -205,7 +178,7 @@ int vtkUltrasoundPhantomSource::RequestInformation(vtkInformation*, vtkInformati
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::Execute(vtkInformationVector**, vtkImageData* output, const echorama::Progress& progress)
 {
-  const echorama::PhantomParameters parameters = this->Parameters();
+  const echorama::PhantomParameters parameters = this->Phantom();
   vtkUltrasoundVolume::SetGeometry(output, echorama::PhantomGeometry(parameters));
   vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), VTK_UNSIGNED_CHAR);
   vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
@@ -224,23 +197,5 @@ void vtkUltrasoundPhantomSource::Execute(vtkInformationVector**, vtkImageData* o
 void vtkUltrasoundPhantomSource::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Seed: " << this->Seed << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
-  os << indent << "GainDb: " << this->GainDb << "\n";
-  os << indent << "DynamicRangeDb: " << this->DynamicRangeDb << "\n";
-  os << indent << "BackgroundGrey: " << this->BackgroundGrey << "\n";
-  os << indent << "Shadows: " << this->Shadows << "\n";
-  os << indent << "Decorrelation: " << this->Decorrelation << "\n";
-  os << indent << "ChangeSeed: " << this->ChangeSeed << "\n";
-  os << indent << "DeformationMm: " << this->DeformationMm << "\n";
-  os << indent << "NoiseDb: " << this->NoiseDb << "\n";
-  os << indent << "RibShare: " << this->RibShare << "\n";
-  os << indent << "Jets: " << this->Jets << "\n";
-  os << indent << "WavelengthMm: " << this->WavelengthMm << "\n";
-  os << indent << "Fan: " << this->FanAngle << " degrees, radius " << this->FanRadius << "\n";
-  os << indent << "Sweep: " << this->SweepAngle << " degrees, radius " << this->SweepRadius << "\n";
-  os << indent << "Depth: " << this->DepthMin << " to " << this->DepthMax << "\n";
-  os << indent << "Position: " << this->Position[0] << " " << this->Position[1] << " " << this->Position[2] << "\n";
-  os << indent << "Orientation: " << this->Orientation[0] << " " << this->Orientation[1] << " " << this->Orientation[2] << "\n";
-  os << indent << "Scene: " << (this->Scene && *this->Scene ? this->Scene : "(default)") << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -25,6 +25,8 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Phantoms/Phantom.h"
+#include "vtkUltrasoundParameters.h"
+#include <memory> // for what is set
 #endif
 
 class vtkMatrix4x4;
@@ -36,130 +38,187 @@ public:
   vtkTypeMacro(vtkUltrasoundPhantomSource, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
   /**
-   * Seed of the tissue: where the scatterers lie and how strong they are. Views with one seed see the same. At least 0.
-   * Default 1.
+   * Seed of the tissue: where the scatterers lie and how strong they are. Volumes with one seed show the same tissue. At least 0;
+   * default 1.
    */
-  vtkSetClampMacro(Seed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
-  vtkGetMacro(Seed, vtkTypeInt64);
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
   ///@}
 
   ///@{
-  /** Edge of the cubic voxels in mm, > 0. Default 1. */
-  vtkSetMacro(SpacingMm, double);
-  vtkGetMacro(SpacingMm, double);
+  /** Edge of the cubic voxels. Above 0 mm; default 1. */
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
   ///@}
 
   ///@{
-  /** Gain of this volume in dB, in [-200, 200]. Default 0. */
-  vtkSetClampMacro(GainDb, double, -200.0, 200.0);
-  vtkGetMacro(GainDb, double);
+  /** Gain of this volume. In [-200, 200] dB; default 0. */
+  void SetGainDb(double value) { this->SetParameter("GainDb", value); }
+  double GetGainDb() { return this->GetParameter("GainDb"); }
   ///@}
 
   ///@{
-  /** How many dB the 255 steps of grey span, in [10, 200]. Default 60. */
-  vtkSetClampMacro(DynamicRangeDb, double, 10.0, 200.0);
-  vtkGetMacro(DynamicRangeDb, double);
+  /** How much the 255 steps of grey span. In [10, 200] dB; default 60. */
+  void SetDynamicRangeDb(double value) { this->SetParameter("DynamicRangeDb", value); }
+  double GetDynamicRangeDb() { return this->GetParameter("DynamicRangeDb"); }
   ///@}
 
   ///@{
-  /** Mean grey of the background at a gain of 0 dB, in [0, 255]. Default 100. */
-  vtkSetClampMacro(BackgroundGrey, double, 0.0, 255.0);
-  vtkGetMacro(BackgroundGrey, double);
+  /** Mean grey of the background at a gain of 0 dB. In [0, 255]; default 100. */
+  void SetBackgroundGrey(double value) { this->SetParameter("BackgroundGrey", value); }
+  double GetBackgroundGrey() { return this->GetParameter("BackgroundGrey"); }
   ///@}
 
   ///@{
   /** Whether attenuating bodies (the stone of the default scene) cast shadows. Default on. */
-  vtkSetMacro(Shadows, bool);
-  vtkGetMacro(Shadows, bool);
-  vtkBooleanMacro(Shadows, bool);
+  void SetShadows(bool value) { this->SetParameter("Shadows", value); }
+  bool GetShadows() { return this->GetParameter("Shadows") != 0.0; }
+  void ShadowsOn() { this->SetShadows(true); }
+  void ShadowsOff() { this->SetShadows(false); }
   ///@}
 
   ///@{
   /**
-   * How far the speckle has changed, in [0, 1]. Volumes of one Seed, different ChangeSeeds and decorrelation d that are seen
-   * alike have complex echoes that correlate by 1 - d; bodies stay where and as loud as they are. Default 0.
+   * How far the speckle has changed: complex echoes of volumes of one Seed and different ChangeSeeds that are seen alike
+   * correlate by 1 less this. Bodies stay where and as loud as they are. In [0, 1]; default 0.
    */
-  vtkSetClampMacro(Decorrelation, double, 0.0, 1.0);
-  vtkGetMacro(Decorrelation, double);
+  void SetDecorrelation(double value) { this->SetParameter("Decorrelation", value); }
+  double GetDecorrelation() { return this->GetParameter("Decorrelation"); }
   ///@}
 
   ///@{
-  /** Seed of the change and of the noise: volumes with the same one have changed alike. At least 0. Default 1. */
-  vtkSetClampMacro(ChangeSeed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
-  vtkGetMacro(ChangeSeed, vtkTypeInt64);
+  /** Seed of the change and of the noise: volumes with the same one have changed alike. At least 0; default 1. */
+  void SetChangeSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("ChangeSeed", value); }
+  vtkTypeInt64 GetChangeSeed() { return this->GetParameterAsInteger("ChangeSeed"); }
   ///@}
 
   ///@{
   /**
-   * How far the pressed probe moves the tissue below the middle of its face, in mm, in [0, 10]. The displacement fades with
-   * depth and sideways; TissueToSeen gives it exactly. Default 0.
+   * How far the pressed probe moves the tissue below the middle of its face. It fades with depth and sideways. In [0, 10] mm;
+   * default 0.
    */
-  vtkSetClampMacro(DeformationMm, double, 0.0, 10.0);
-  vtkGetMacro(DeformationMm, double);
+  void SetDeformationMm(double value) { this->SetParameter("DeformationMm", value); }
+  double GetDeformationMm() { return this->GetParameter("DeformationMm"); }
   ///@}
 
   ///@{
-  /** Power of the receiver's noise beside that of the background, in dB, in [-120, 60]. Default -120: none. */
-  vtkSetClampMacro(NoiseDb, double, -120.0, 60.0);
-  vtkGetMacro(NoiseDb, double);
+  /** Power of the receiver's noise beside that of the background; -120: none. In [-120, 60] dB; default -120. */
+  void SetNoiseDb(double value) { this->SetParameter("NoiseDb", value); }
+  double GetNoiseDb() { return this->GetParameter("NoiseDb"); }
   ///@}
 
   ///@{
-  /** Share of the fan in the shadow of a rib close below the face of this view, in [0, 0.6]. Default 0: no rib. */
-  vtkSetClampMacro(RibShare, double, 0.0, 0.6);
-  vtkGetMacro(RibShare, double);
+  /** Share of the fan in the shadow of a rib close below the face; 0: no rib. In [0, 0.6]; default 0. */
+  void SetRibShare(double value) { this->SetParameter("RibShare", value); }
+  double GetRibShare() { return this->GetParameter("RibShare"); }
   ///@}
 
   ///@{
-  /** Whether bodies that come and go (jets and puffs at places of the default scene) are there in this volume. Default off. */
-  vtkSetMacro(Jets, bool);
-  vtkGetMacro(Jets, bool);
-  vtkBooleanMacro(Jets, bool);
+  /** Whether bodies that come and go (jets and puffs at places of the default scene) are there. Default off. */
+  void SetJets(bool value) { this->SetParameter("Jets", value); }
+  bool GetJets() { return this->GetParameter("Jets") != 0.0; }
+  void JetsOn() { this->SetJets(true); }
+  void JetsOff() { this->SetJets(false); }
   ///@}
 
   ///@{
-  /** Wavelength in tissue in mm, in [0.05, 10]. Default 0.6 (2.6 MHz). The longer, the longer speckle stays alike as the
-   * probe turns. */
-  vtkSetClampMacro(WavelengthMm, double, 0.05, 10.0);
-  vtkGetMacro(WavelengthMm, double);
+  /** Wavelength in tissue. The longer, the longer speckle stays alike as the probe turns. In [0.05, 10] mm; default 0.6. */
+  void SetWavelengthMm(double value) { this->SetParameter("WavelengthMm", value); }
+  double GetWavelengthMm() { return this->GetParameter("WavelengthMm"); }
+  ///@}
+
+  ///@{
+  /** Angle between the first and the last beam of a fan. In [0, 359.999] degrees; default 65. */
+  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
+  double GetFanAngle() { return this->GetParameter("FanAngle"); }
+  ///@}
+
+  ///@{
+  /** Radius of the array's arc. In [0, 10000] mm; default 40. */
+  void SetFanRadius(double value) { this->SetParameter("FanRadius", value); }
+  double GetFanRadius() { return this->GetParameter("FanRadius"); }
+  ///@}
+
+  ///@{
+  /** Angle that the array sweeps. In [0, 359.999] degrees; default 55. */
+  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
+  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
   ///@}
 
   ///@{
   /**
-   * The head: angle of the fan (degrees, below 180; default 65) and its radius (mm, at least 0; default 40), angle of the
-   * sweep (degrees, above 0 and below 180; default 55) and its radius (mm, at least 0; default 30).
+   * Distance of the sweep's axis behind the middle of the face. The edges of the fan must stay in front of it. In [0, 10000] mm;
+   * default 30.
    */
-  vtkSetMacro(FanAngle, double);
-  vtkGetMacro(FanAngle, double);
-  vtkSetMacro(FanRadius, double);
-  vtkGetMacro(FanRadius, double);
-  vtkSetMacro(SweepAngle, double);
-  vtkGetMacro(SweepAngle, double);
-  vtkSetMacro(SweepRadius, double);
-  vtkGetMacro(SweepRadius, double);
+  void SetSweepRadius(double value) { this->SetParameter("SweepRadius", value); }
+  double GetSweepRadius() { return this->GetParameter("SweepRadius"); }
   ///@}
 
   ///@{
-  /** First and last depth along the beams, mm from the face. Default 5 and 100. */
-  vtkSetMacro(DepthMin, double);
-  vtkGetMacro(DepthMin, double);
-  vtkSetMacro(DepthMax, double);
-  vtkGetMacro(DepthMax, double);
+  /** First depth along the beams, from the face. In [-10000, 10000] mm; default 5. */
+  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
+  double GetDepthMin() { return this->GetParameter("DepthMin"); }
   ///@}
 
   ///@{
-  /** Where the middle of the probe's face lies in the world, mm. Default (0, 0, 0). */
-  vtkSetVector3Macro(Position, double);
-  vtkGetVector3Macro(Position, double);
+  /** Last depth along the beams, from the face. In [-10000, 10000] mm; default 100. */
+  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
+  double GetDepthMax() { return this->GetParameter("DepthMax"); }
   ///@}
 
   ///@{
-  /** How the probe is turned: axis times angle, in degrees. Default (0, 0, 0): it looks along +z, its fan along x. */
-  vtkSetVector3Macro(Orientation, double);
-  vtkGetVector3Macro(Orientation, double);
+  /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
+  void SetPosition(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetPosition(value);
+  }
+  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
+  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
   ///@}
+
+  ///@{
+  /** How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. In degrees; default (0, 0, 0). */
+  void SetOrientation(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetOrientation(value);
+  }
+  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
+  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
+  ///@}
+
+  ///@{
+  /** The scene as JSON text, as it stands in the field data Scene of a phantom; empty: the default scene. Default none. */
+  void SetScene(const char* value) { this->SetParameterAsText("Scene", value); }
+  std::string GetScene() { return this->GetParameterAsText("Scene"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
   /**
    * Sets Position and Orientation from a rigid transform. Any other matrix is refused with an error, and nothing changes.
@@ -180,15 +239,6 @@ public:
 
   ///@{
   /**
-   * The scene as JSON text, as it stands in the field data `Scene` of our volumes (see Documentation/filters/PhantomSource.md).
-   * Empty (default): the default scene.
-   */
-  vtkSetStringMacro(Scene);
-  vtkGetStringMacro(Scene);
-  ///@}
-
-  ///@{
-  /**
    * Adds a body to the scene: \a echogenicityDb beside the background of 0 dB, in [-120, 60], -120 for clear fluid. Later
    * bodies count where they overlap. Lengths in mm, world coordinates.
    */
@@ -201,7 +251,7 @@ public:
 
 #ifndef __VTK_WRAP__
   /** The kernel's parameters for the present properties; throws echorama::Error when the scene cannot be read. */
-  echorama::PhantomParameters Parameters() const;
+  echorama::PhantomParameters Phantom() const;
 
   /** Sets Position, Orientation and GainDb. */
   void SetView(const echorama::Pose& probeToWorld, double gainDb);
@@ -217,33 +267,11 @@ protected:
 #endif
 
 private:
+  struct Settings;
 #ifndef __VTK_WRAP__
   void Add(echorama::Inclusion inclusion);
-  echorama::Pose ProbeToWorld() const;
+  std::unique_ptr<Settings> Values;
 #endif
-
-  vtkTypeInt64 Seed;
-  double SpacingMm;
-  double GainDb;
-  double DynamicRangeDb;
-  double BackgroundGrey;
-  bool Shadows;
-  double Decorrelation;
-  vtkTypeInt64 ChangeSeed;
-  double DeformationMm;
-  double NoiseDb;
-  double RibShare;
-  bool Jets;
-  double WavelengthMm;
-  double FanAngle;
-  double FanRadius;
-  double SweepAngle;
-  double SweepRadius;
-  double DepthMin;
-  double DepthMax;
-  double Position[3];
-  double Orientation[3];
-  char* Scene;
 
   vtkUltrasoundPhantomSource(const vtkUltrasoundPhantomSource&) = delete;
   void operator=(const vtkUltrasoundPhantomSource&) = delete;

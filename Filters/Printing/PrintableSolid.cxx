@@ -141,28 +141,41 @@ PrintableSolid PrintableRig(const CalibrationRigParameters& p)
   return solid;
 }
 
+ParameterList Describe(ProbeClipParameters& p)
+{
+  return {
+      Parameter("HandleWidthMm", p.handleWidthMm, {5, 200}, "mm",
+                "The handle along the fan; its outline is a rectangle with round sides."),
+      Parameter("HandleThicknessMm", p.handleThicknessMm, {5, 200}, "mm", "The handle along the sweep."),
+      Parameter("LengthMm", p.lengthMm, {10, 200}, "mm", "Length of the sleeve, along the handle."),
+      Parameter("WallMm", p.wallMm, {1, 20}, "mm", "Thickness of all walls."),
+      Parameter("ClearanceMm", p.clearanceMm, {0, 5}, "mm",
+                "Between sleeve and handle: a printer's tolerance, or a coat of rubber."),
+      Parameter("OpeningMm", p.openingMm, {0, 180}, "mm",
+                "Width of the sleeve's open side, at most 0.9 of the handle's. 0: a ring that is pushed on."),
+      Parameter("TieGrooves", p.tieGrooves, {0, 8}, "", "Number of grooves for cable ties."),
+      Parameter("TieWidthMm", p.tieWidthMm, {1, 15}, "mm", "Width of a groove."),
+      Parameter("ArmMm", p.armMm, {0, 300}, "mm",
+                "From the middle of the sleeve to the middle of the sensor, backwards along the handle."),
+      Parameter("StandOffMm", p.standOffMm, {0, 100}, "mm", "From the sleeve to the sensor, sideways."),
+      Parameter("ArmWidthMm", p.armWidthMm, {3, 50}, "mm", "Width of the arm."),
+      Parameter("SensorMm", p.sensorMm, {1, 80}, "mm", "The sensor: across, sideways and along the handle."),
+      Parameter("SensorClearanceMm", p.sensorClearanceMm, {0, 3}, "mm", "Between pocket and sensor, on each side."),
+  };
+}
+
 void ProbeClipParameters::Check() const
 {
-  const auto check = [](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, std::string("probe clip: ") + what + " is " + NumberText(value) +
-                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
-  };
-  check("handleWidthMm", handleWidthMm, 5.0, 200.0);
-  check("handleThicknessMm", handleThicknessMm, 5.0, 200.0);
-  check("lengthMm", lengthMm, 10.0, 200.0);
-  check("wallMm", wallMm, 1.0, 20.0);
-  check("clearanceMm", clearanceMm, 0.0, 5.0);
-  check("openingMm", openingMm, 0.0, 0.9 * handleWidthMm);
-  check("tieGrooves", tieGrooves, 0, 8);
-  check("tieWidthMm", tieWidthMm, 1.0, 15.0);
-  check("armMm", armMm, 0.0, 300.0);
-  check("standOffMm", standOffMm, 0.0, 100.0);
-  check("armWidthMm", armWidthMm, 3.0, 50.0);
-  check("lengthMm without the arm's width", lengthMm - armWidthMm, std::max(2.0, 1.25 * tieGrooves * tieWidthMm), 200.0);
-  for (int axis = 0; axis < 3; ++axis)
-    check("sensorMm", sensorMm[axis], 1.0, 80.0);
-  check("sensorClearanceMm", sensorClearanceMm, 0.0, 3.0);
+  CheckRanges(*this);
+  if (openingMm > 0.9 * handleWidthMm)
+    throw Error(Error::Kind::InvalidParameter, "OpeningMm is " + NumberText(openingMm) +
+                                                   " mm; it must be at most 0.9 of HandleWidthMm, which is " +
+                                                   NumberText(handleWidthMm) + " mm");
+  const double least = armWidthMm + std::max(2.0, 1.25 * tieGrooves * tieWidthMm);
+  if (lengthMm < least)
+    throw Error(Error::Kind::InvalidParameter, "LengthMm is " + NumberText(lengthMm) + " mm; an arm of " +
+                                                   NumberText(armWidthMm) + " mm and " + NumberText(tieGrooves) +
+                                                   " grooves need at least " + NumberText(least) + " mm");
 }
 
 Vector3d ProbeClipParameters::SensorPlace() const

@@ -28,26 +28,28 @@ Pose PrintToWorld(const CalibrationRigParameters& parameters);
 /// A clip that holds a tracker's sensor to the handle of a probe, away from its metal and electronics (dissertation 4.1.1): a
 /// sleeve, open on one side, with grooves for cable ties; an arm; and a pocket for the sensor.
 struct ProbeClipParameters {
-  double handleWidthMm = ProbeHousing().handleWidthMm;         ///< of the handle along the fan, as in ProbeHousing, in [5, 200]
-  double handleThicknessMm = ProbeHousing().handleThicknessMm; ///< along the sweep, in [5, 200]
-  double lengthMm = 36.0;                                      ///< of the sleeve, along the handle, in [10, 200]
-  double wallMm = 3.0;                                         ///< in [1, 20]
-  double clearanceMm = 0.4; ///< between sleeve and handle, for a printer's tolerance or a rubber coat, in [0, 5]
-  double openingMm = 12.0;  ///< width of the open side, in [0, 0.9 of the handle's width]; 0: a ring that is pushed on
-  int tieGrooves = 2;       ///< in [0, 8]
-  double tieWidthMm = 4.0;  ///< of a groove, in [1, 15]; its depth is a third of the wall
-  double armMm = 70.0;      ///< from the handle's middle to the sensor's, backwards along the handle, in [0, 300]
-  double standOffMm = 15.0; ///< from the sleeve to the sensor, sideways, in [0, 100]
-  double armWidthMm = 10.0; ///< in [3, 50]
-  Eigen::Vector3d sensorMm{8.2, 8.2, 20.0}; ///< across, sideways, along the handle; in [1, 80]. The Ascension 800 is 8 x 8 x 20
-  double sensorClearanceMm = 0.2;           ///< on each side of the sensor, in [0, 3]
+  double handleWidthMm = ProbeHousing().handleWidthMm, handleThicknessMm = ProbeHousing().handleThicknessMm;
+  double lengthMm = 36.0;
+  double wallMm = 3.0;
+  double clearanceMm = 0.4;
+  double openingMm = 12.0;
+  int tieGrooves = 2;
+  double tieWidthMm = 4.0; ///< the depth of a groove is a third of the wall
+  double armMm = 70.0;
+  double standOffMm = 15.0;
+  double armWidthMm = 10.0;
+  Eigen::Vector3d sensorMm{8.2, 8.2, 20.0}; ///< the Ascension 800 is 8 x 8 x 20
+  double sensorClearanceMm = 0.2;
 
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  /// \throws Error(InvalidParameter) for what is out of its range, an opening of more than 0.9 of the handle's width, and a
+  /// sleeve that is too short for its arm and grooves.
+  void Check() const;
 
   /// Where the middle of the sensor's pocket is, with x along the fan, y along the sweep and z the probe's, from the middle of
   /// the sleeve on the handle's axis: a first guess of the calibration.
   Eigen::Vector3d SensorPlace() const;
 };
+ParameterList Describe(ProbeClipParameters& p);
 
 /// It stands on the front end of its sleeve: z is the probe's -z, from that end. \throws Error(InvalidParameter) as Check().
 PrintableSolid PrintableClip(const ProbeClipParameters& parameters = {});

@@ -235,22 +235,23 @@ private:
 
 } // namespace
 
-void ProbeHousing::Check() const
+ParameterList Describe(ProbeHousing& p)
 {
-  const auto check = [](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      RefuseProbe(std::string(what) + " is " + NumberText(value) + "; it must be in [" + NumberText(from) + ", " +
-                  NumberText(to) + "]");
+  return {
+      Parameter("RimMm", p.rimMm, {0.1, 50}, "mm", "Radius of the edge between face and wall.").Advanced(),
+      Parameter("SkirtMm", p.skirtMm, {0.1, 200}, "mm", "Straight wall below the lowest point of that edge.").Advanced(),
+      Parameter("NeckMm", p.neckMm, {1, 500}, "mm", "From the wall to the handle.").Advanced(),
+      Parameter("HandleMm", p.handleMm, {1, 1000}, "mm", "Length of the handle.").Advanced(),
+      Parameter("HandleWidthMm", p.handleWidthMm, {1, 500}, "mm", "The handle along the fan.").Advanced(),
+      Parameter("HandleThicknessMm", p.handleThicknessMm, {1, 500}, "mm", "The handle along the sweep.").Advanced(),
+      Parameter("FaceWidthMm", p.faceWidthMm, {1, 300}, "mm",
+                "The face of a phased array along the fan: its beams start in one point, which has no size.")
+          .Advanced(),
+      Parameter("FaceThicknessMm", p.faceThicknessMm, {1, 300}, "mm",
+                "The face of a single plane, or of a sweep about a line in the face, along the sweep.")
+          .Advanced(),
+      Parameter("ResolutionMm", p.resolutionMm, {0.1, 50}, "mm", "Edge of the triangles, about."),
   };
-  check("rimMm", rimMm, 0.1, 50.0);
-  check("skirtMm", skirtMm, 0.1, 200.0);
-  check("neckMm", neckMm, 1.0, 500.0);
-  check("handleMm", handleMm, 1.0, 1000.0);
-  check("handleWidthMm", handleWidthMm, 1.0, 500.0);
-  check("handleThicknessMm", handleThicknessMm, 1.0, 500.0);
-  check("faceWidthMm", faceWidthMm, 1.0, 300.0);
-  check("faceThicknessMm", faceThicknessMm, 1.0, 300.0);
-  check("resolutionMm", resolutionMm, 0.1, 50.0);
 }
 
 double ProbeMesh::Volume() const
@@ -264,20 +265,14 @@ double ProbeMesh::Volume() const
 ProbeMesh MakeProbeMesh(const ProbeGeometry& geometry, const ProbeHousing& housing)
 {
   geometry.Check();
-  housing.Check();
+  CheckRanges(housing);
   return Builder(geometry, housing).Build();
 }
 
 std::vector<Pose> ElementPoses(const ProbeGeometry& geometry, int elements, int sweepSteps)
 {
   geometry.Check();
-  const auto check = [](const char* what, int count) {
-    if (count < 1 || count > 65536)
-      throw Error(Error::Kind::InvalidParameter,
-                  std::string(what) + " is " + std::to_string(count) + "; it must be in [1, 65536]");
-  };
-  check("elements", elements);
-  check("sweepSteps", sweepSteps);
+  CheckRanges({Parameter("Elements", elements, {1, 65536}, "", ""), Parameter("SweepSteps", sweepSteps, {1, 65536}, "", "")});
   if (static_cast<std::int64_t>(elements) * sweepSteps > (1 << 24))
     throw Error(Error::Kind::TooLarge, "elements times sweepSteps must not be more than 16777216");
   std::vector<Pose> poses;

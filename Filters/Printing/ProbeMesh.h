@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include <array>
 #include <cstdint>
@@ -9,20 +10,14 @@ namespace echorama {
 
 /// What is around the face of a probe. Lengths in mm.
 struct ProbeHousing {
-  double rimMm = 4.0;              ///< radius of the edge between face and wall, in [0.1, 50]
-  double skirtMm = 10.0;           ///< straight wall below the lowest point of that edge, in [0.1, 200]
-  double neckMm = 30.0;            ///< from the wall to the handle, in [1, 500]
-  double handleMm = 80.0;          ///< length of the handle, in [1, 1000]
-  double handleWidthMm = 30.0;     ///< along the fan, in [1, 500]
-  double handleThicknessMm = 22.0; ///< along the sweep, in [1, 500]
-  double faceWidthMm = 22.0;       ///< of a phased array's face: its beams start in one point, which has no size; in [1, 300]
-  /// Of the face of a single plane, and of a sweep about a line in the face; in [1, 300].
-  double faceThicknessMm = 13.0;
-  double resolutionMm = 1.5; ///< edge of the triangles, about; in [0.1, 50]
-
-  /// Throws Error(InvalidParameter) that names the number that is out of its range.
-  void Check() const;
+  double rimMm = 4.0;
+  double skirtMm = 10.0;
+  double neckMm = 30.0;
+  double handleMm = 80.0, handleWidthMm = 30.0, handleThicknessMm = 22.0;
+  double faceWidthMm = 22.0, faceThicknessMm = 13.0;
+  double resolutionMm = 1.5;
 };
+ParameterList Describe(ProbeHousing& p);
 
 /// A handle's outline is a superellipse, a rectangle with round sides: (|x| / a)^n + (|y| / b)^n = 1 with this n.
 inline constexpr double handleRoundness = 2.6;
@@ -45,9 +40,9 @@ struct ProbeMesh {
 };
 
 /// Builds the solid.
-/// \throws Error(InvalidParameter) as the two Check()s, and when it cannot be built, with the reason: a fan of more than half a
-/// turn, a sweep of 178 degrees or more, a fan that reaches the sweep axis, where the face would cut itself; Error(TooLarge)
-/// beyond 5 million triangles.
+/// \throws Error(InvalidParameter) as ProbeGeometry::Check(), for a housing out of its ranges, and when it cannot be built, with
+/// the reason: a fan of more than half a turn, a sweep of 178 degrees or more, a fan that reaches the sweep axis, where the face
+/// would cut itself; Error(TooLarge) beyond 5 million triangles.
 ProbeMesh MakeProbeMesh(const ProbeGeometry& geometry, const ProbeHousing& housing = {});
 
 /// Where the beams begin, in the probe's frame, fan fastest: origin on the face (depth 0), +x along the array, +z along the beam.

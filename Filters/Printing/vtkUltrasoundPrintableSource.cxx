@@ -15,54 +15,46 @@
 #include "vtkUltrasoundVolume.h"
 
 #include <cmath>
+#include <utility>
 
 vtkStandardNewMacro(vtkUltrasoundPrintableSource);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundPrintableSource);
+
 vtkUltrasoundPrintableSource::vtkUltrasoundPrintableSource()
 {
-  const echorama::CalibrationRigParameters rig;
-  this->Scale = rig.scale;
-  this->BaseMm = rig.baseMm;
-  this->StemRadiusMm = rig.stemRadiusMm;
-  const echorama::ProbeClipParameters clip;
-  this->HandleWidthMm = clip.handleWidthMm;
-  this->HandleThicknessMm = clip.handleThicknessMm;
-  this->LengthMm = clip.lengthMm;
-  this->WallMm = clip.wallMm;
-  this->ClearanceMm = clip.clearanceMm;
-  this->OpeningMm = clip.openingMm;
-  this->TieGrooves = clip.tieGrooves;
-  this->ArmMm = clip.armMm;
-  this->StandOffMm = clip.standOffMm;
-  std::copy_n(clip.sensorMm.data(), 3, this->SensorMm);
   this->SetNumberOfInputPorts(0);
+}
+
+echorama::ParameterList vtkUltrasoundPrintableSource::Parameters()
+{
+  using echorama::Parameter;
+  echorama::ParameterList rig{
+      Parameter("Scale", this->RigValues.scale, {0.2, 5}, "", "Size of the whole rig."),
+      Parameter("BaseMm", this->RigValues.baseMm, {0, 20, true}, "mm", "Thickness of the base."),
+      Parameter("StemRadiusMm", this->RigValues.stemRadiusMm, {0, 5, true}, "mm",
+                "Radius of the pins; never wider than 0.6 of a ball."),
+  };
+  echorama::ParameterList clip = echorama::Without(Describe(this->ClipValues), {"TieWidthMm", "ArmWidthMm", "SensorClearanceMm"});
+  for (Parameter& parameter : rig) {
+    parameter.When("Kind", "rig");
+  }
+  for (Parameter& parameter : clip) {
+    parameter.When("Kind", "clip");
+  }
+  return echorama::Join({{Parameter("Kind", echorama::Choice(this->Printed, {"rig", "clip"}),
+                                    "What is made: the rig of balls, or the clip that holds a sensor to a probe."),
+                          Parameter("Resolution", this->CellMm, {0.1, 5}, "mm", "Edge of the sampling cells.")},
+                         std::move(rig),
+                         std::move(clip)});
 }
 
 int vtkUltrasoundPrintableSource::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
   return vtkUltrasoundVolume::Run(this, outputs, [&](const echorama::Progress& progress) {
-    echorama::PrintableSolid solid;
-    if (this->Kind == Rig) {
-      echorama::CalibrationRigParameters rig;
-      rig.scale = this->Scale;
-      rig.baseMm = this->BaseMm;
-      rig.stemRadiusMm = this->StemRadiusMm;
-      solid = echorama::PrintableRig(rig);
-    } else {
-      echorama::ProbeClipParameters clip;
-      clip.handleWidthMm = this->HandleWidthMm;
-      clip.handleThicknessMm = this->HandleThicknessMm;
-      clip.lengthMm = this->LengthMm;
-      clip.wallMm = this->WallMm;
-      clip.clearanceMm = this->ClearanceMm;
-      clip.openingMm = this->OpeningMm;
-      clip.tieGrooves = this->TieGrooves;
-      clip.armMm = this->ArmMm;
-      clip.standOffMm = this->StandOffMm;
-      clip.sensorMm = Eigen::Vector3d(this->SensorMm);
-      solid = echorama::PrintableClip(clip);
-    }
-    Mesh(solid, this->Resolution, vtkPolyData::GetData(outputs), progress);
+    echorama::CheckRanges(this->Parameters());
+    Mesh(this->Printed == RIG ? echorama::PrintableRig(this->RigValues) : echorama::PrintableClip(this->ClipValues), this->CellMm,
+         vtkPolyData::GetData(outputs), progress);
   });
 }
 
@@ -70,8 +62,6 @@ void vtkUltrasoundPrintableSource::Mesh(const echorama::PrintableSolid& solid, d
                                         const echorama::Progress& progress)
 {
   using echorama::Error;
-  if (!(resolution >= 0.1 && resolution <= 5.0))
-    throw Error(Error::Kind::InvalidParameter, "Resolution must be in [0.1, 5] mm");
   // A side that lies in a plane of samples would give triangles without area; this origin is no round number.
   const Eigen::Vector3d low = solid.bounds.min() - Eigen::Vector3d::Constant(1.3719 * resolution);
   Eigen::Array3i size;
@@ -114,18 +104,5 @@ void vtkUltrasoundPrintableSource::Mesh(const echorama::PrintableSolid& solid, d
 void vtkUltrasoundPrintableSource::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Kind: " << (this->Kind == Rig ? "Rig" : "Clip") << "\n";
-  os << indent << "Resolution: " << this->Resolution << "\n";
-  os << indent << "Scale: " << this->Scale << "\n";
-  os << indent << "BaseMm: " << this->BaseMm << "\n";
-  os << indent << "StemRadiusMm: " << this->StemRadiusMm << "\n";
-  os << indent << "Handle: " << this->HandleWidthMm << " x " << this->HandleThicknessMm << " mm\n";
-  os << indent << "LengthMm: " << this->LengthMm << "\n";
-  os << indent << "WallMm: " << this->WallMm << "\n";
-  os << indent << "ClearanceMm: " << this->ClearanceMm << "\n";
-  os << indent << "OpeningMm: " << this->OpeningMm << "\n";
-  os << indent << "TieGrooves: " << this->TieGrooves << "\n";
-  os << indent << "ArmMm: " << this->ArmMm << "\n";
-  os << indent << "StandOffMm: " << this->StandOffMm << "\n";
-  os << indent << "SensorMm: " << this->SensorMm[0] << " x " << this->SensorMm[1] << " x " << this->SensorMm[2] << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

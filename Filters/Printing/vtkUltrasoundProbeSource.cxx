@@ -2,8 +2,9 @@
 #include "vtkUltrasoundProbeSource.h"
 
 #include "Core/Base/Angles.h"
-#include "Core/Base/Error.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Core/Geometry/ProbePresets.h"
+#include "Core/Geometry/ProbeSettings.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDoubleArray.h"
@@ -19,19 +20,19 @@
 #include "vtkUltrasoundVolume.h"
 #include "vtkUnsignedCharArray.h"
 
-#include <cmath>
+#include <utility>
 
 vtkStandardNewMacro(vtkUltrasoundProbeSource);
 
-namespace {
+vtkUltrasoundParametersMacro(vtkUltrasoundProbeSource);
 
-using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+namespace {
 
 // The kernel's preset behind a number of the enumeration, or nullptr.
 const echorama::ProbePreset* PresetOf(int preset)
 {
-  static const char* const names[] = {"", "curvilinear", "linear", "phased", "endocavity-3d", "mechanical-3d"};
-  return preset == vtkUltrasoundProbeSource::Custom ? nullptr : &echorama::ProbePresetOf(names[preset]);
+  return preset == vtkUltrasoundProbeSource::CUSTOM ? nullptr
+                                                    : &echorama::ProbePresets().at(static_cast<std::size_t>(preset) - 1);
 }
 
 vtkNew<vtkDoubleArray> NewArray(const char* name, int components, std::size_t count)
@@ -81,7 +82,7 @@ void WriteElements(const std::vector<echorama::Pose>& poses, int elements, const
   vtkNew<vtkCellArray> vertices;
   vertices->AllocateExact(static_cast<vtkIdType>(count), static_cast<vtkIdType>(count));
   for (vtkIdType i = 0; i < static_cast<vtkIdType>(count); ++i) {
-    const RowMajor rows = (probeToWorld * poses[static_cast<std::size_t>(i)]).matrix();
+    const echorama::MatrixRows rows = (probeToWorld * poses[static_cast<std::size_t>(i)]).matrix();
     points->SetPoint(i, rows(0, 3), rows(1, 3), rows(2, 3));
     direction->SetTuple3(i, rows(0, 2), rows(1, 2), rows(2, 2));
     fan->SetValue(i, echorama::PositionOf(static_cast<int>(i) % elements, elements));
@@ -99,120 +100,111 @@ void WriteElements(const std::vector<echorama::Pose>& poses, int elements, const
 } // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundProbeSource::vtkUltrasoundProbeSource() : Preset(Mechanical3D)
+// The head is that of the mechanical 3D probe, in round numbers.
+struct vtkUltrasoundProbeSource::Settings {
+  int preset = MECHANICAL_3D;
+  echorama::ProbeSettings head{70.0, 40.0, 65.0, 0.0, 0.0, 150.0};
+  double fanRadius = 40.0, sweepRadius = 30.0;
+  int elements = 128, sweepSteps = 128;
+  echorama::ProbeHousing housing;
+};
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundProbeSource::Parameters()
+{
+  using echorama::Parameter;
+  Settings& v = *this->Values;
+  echorama::ParameterList custom = echorama::Without(Describe(v.head), {"Position", "Orientation"});
+  echorama::Named(custom, "FanWidth").help = "Length of a flat array: where FanAngle is 0.";
+  echorama::Named(custom, "SweepWidth").help = "How far the array moves along a line where SweepAngle is 0. 0: a single plane.";
+  custom.insert(custom.begin() + 1, Parameter("FanRadius", v.fanRadius, {0, 10000}, "mm",
+                                              "Radius of the array's arc; of no meaning where FanAngle is 0."));
+  custom.insert(custom.begin() + 4, Parameter("SweepRadius", v.sweepRadius, {0, 10000}, "mm",
+                                              "From the axis of the sweep to the face; of no meaning where SweepAngle is 0."));
+  custom.push_back(Parameter("Elements", v.elements, {1, 65536}, "", "Beams across the fan."));
+  custom.push_back(Parameter("SweepSteps", v.sweepSteps, {1, 65536}, "", "Planes of the sweep; a single plane has one."));
+  for (Parameter& parameter : custom) {
+    parameter.When("Preset", "custom");
+  }
+  std::vector<std::string> presets{"custom"};
+  for (const echorama::ProbePreset& preset : echorama::ProbePresets()) {
+    presets.push_back(preset.name);
+  }
+  const std::vector<std::string> head{"FanAngle", "FanWidth", "SweepAngle", "SweepWidth", "DepthMin", "DepthMax"};
+  return echorama::Join({{Parameter("Preset", echorama::Choice(v.preset, std::move(presets)),
+                                    "The kind of probe. Custom: the head that the following parameters describe.")},
+                         std::move(custom),
+                         Describe(v.housing),
+                         echorama::Without(Describe(v.head), head)});
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundProbeSource::vtkUltrasoundProbeSource() : Values(new Settings)
 {
   this->SetNumberOfInputPorts(0);
   this->SetNumberOfOutputPorts(2);
-  const echorama::ProbePreset& preset = *PresetOf(Mechanical3D);
-  this->FanAngle = std::round(preset.probe.fanAngle * echorama::DegreesPerRadian);
-  this->FanRadius = std::round(preset.probe.fanWidth / preset.probe.fanAngle);
-  this->FanWidth = 40.0;
-  this->SweepAngle = std::round(preset.probe.sweepAngle * echorama::DegreesPerRadian);
-  this->SweepRadius = std::round(preset.probe.sweepWidth / preset.probe.sweepAngle);
-  this->SweepWidth = 0.0;
-  this->DepthMin = preset.probe.depthMin;
-  this->DepthMax = preset.probe.depthMax;
-  this->Elements = preset.elements;
-  this->SweepSteps = preset.sweepSteps;
-  const echorama::ProbeHousing housing;
-  this->RimMm = housing.rimMm;
-  this->SkirtMm = housing.skirtMm;
-  this->NeckMm = housing.neckMm;
-  this->HandleMm = housing.handleMm;
-  this->HandleWidthMm = housing.handleWidthMm;
-  this->HandleThicknessMm = housing.handleThicknessMm;
-  this->FaceWidthMm = housing.faceWidthMm;
-  this->FaceThicknessMm = housing.faceThicknessMm;
-  this->ResolutionMm = housing.resolutionMm;
-  for (int axis = 0; axis < 3; ++axis) {
-    this->Position[axis] = this->Orientation[axis] = 0.0;
-  }
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundProbeSource::~vtkUltrasoundProbeSource() = default;
 
 //----------------------------------------------------------------------------
 const char* vtkUltrasoundProbeSource::GetPresetSource()
 {
-  const echorama::ProbePreset* preset = PresetOf(this->Preset);
+  const echorama::ProbePreset* preset = PresetOf(this->Values->preset);
   return preset ? preset->source.c_str() : "";
 }
 
 //----------------------------------------------------------------------------
 echorama::ProbeGeometry vtkUltrasoundProbeSource::Geometry() const
 {
-  if (const echorama::ProbePreset* preset = PresetOf(this->Preset)) {
+  if (const echorama::ProbePreset* preset = PresetOf(this->Values->preset)) {
     return preset->probe;
   }
-  echorama::ProbeGeometry geometry;
-  geometry.fanAngle = this->FanAngle / echorama::DegreesPerRadian;
-  geometry.fanWidth = geometry.fanAngle > 0.0 ? geometry.fanAngle * this->FanRadius : this->FanWidth;
-  geometry.sweepAngle = this->SweepAngle / echorama::DegreesPerRadian;
-  geometry.sweepWidth = geometry.sweepAngle > 0.0 ? geometry.sweepAngle * this->SweepRadius : this->SweepWidth;
-  geometry.depthMin = this->DepthMin;
-  geometry.depthMax = this->DepthMax;
+  const Settings& v = *this->Values;
+  echorama::ProbeGeometry geometry = v.head.Place().geometry;
+  geometry.fanWidth = geometry.fanAngle > 0.0 ? geometry.fanAngle * v.fanRadius : geometry.fanWidth;
+  geometry.sweepWidth = geometry.sweepAngle > 0.0 ? geometry.sweepAngle * v.sweepRadius : geometry.sweepWidth;
   return geometry;
-}
-
-//----------------------------------------------------------------------------
-echorama::ProbeHousing vtkUltrasoundProbeSource::Housing() const
-{
-  echorama::ProbeHousing housing;
-  housing.rimMm = this->RimMm;
-  housing.skirtMm = this->SkirtMm;
-  housing.neckMm = this->NeckMm;
-  housing.handleMm = this->HandleMm;
-  housing.handleWidthMm = this->HandleWidthMm;
-  housing.handleThicknessMm = this->HandleThicknessMm;
-  housing.faceWidthMm = this->FaceWidthMm;
-  housing.faceThicknessMm = this->FaceThicknessMm;
-  housing.resolutionMm = this->ResolutionMm;
-  return housing;
 }
 
 //----------------------------------------------------------------------------
 echorama::Pose vtkUltrasoundProbeSource::ProbeToWorld() const
 {
-  echorama::Pose pose = echorama::Pose::Identity();
-  pose.linear() = echorama::ExpRotation(Eigen::Map<const Eigen::Vector3d>(this->Orientation) / echorama::DegreesPerRadian);
-  pose.translation() = Eigen::Map<const Eigen::Vector3d>(this->Position);
-  return pose;
+  return this->Values->head.Place().probeToWorld;
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundProbeSource::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  echorama::Pose pose;
-  pose.matrix() = Eigen::Map<const RowMajor>(probeToWorld->GetData());
-  if (!echorama::IsRotation(pose.linear()) || !pose.translation().allFinite() ||
-      pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  const auto pose = vtkUltrasoundVolume::RigidPoseOf(probeToWorld);
+  if (!pose) {
     vtkErrorMacro("ProbeToWorld is not a rigid transform; the pose was not changed");
     return;
   }
-  const Eigen::Vector3d turn = echorama::LogRotation(pose.linear()) * echorama::DegreesPerRadian;
-  this->SetOrientation(turn.x(), turn.y(), turn.z());
-  this->SetPosition(pose.translation().x(), pose.translation().y(), pose.translation().z());
+  const Eigen::Vector3d turn = echorama::LogRotation(pose->linear()) * echorama::DegreesPerRadian;
+  this->SetParameterAsVector("Orientation", turn.data());
+  this->SetParameterAsVector("Position", pose->translation().data());
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundProbeSource::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
-  const RowMajor rows = this->ProbeToWorld().matrix();
-  probeToWorld->DeepCopy(rows.data());
+  vtkUltrasoundVolume::SetMatrix(probeToWorld, this->ProbeToWorld());
 }
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundProbeSource::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
   return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress& progress) {
+    echorama::CheckRanges(this->Parameters());
     progress(0.0);
-    const echorama::ProbePreset* preset = PresetOf(this->Preset);
+    const echorama::ProbePreset* preset = PresetOf(this->Values->preset);
     const echorama::ProbeGeometry geometry = this->Geometry();
     const echorama::Pose probeToWorld = this->ProbeToWorld();
-    if (!probeToWorld.matrix().allFinite()) {
-      throw echorama::Error(echorama::Error::Kind::InvalidParameter, "Position and Orientation must be finite");
-    }
-    const int elements = preset ? preset->elements : this->Elements;
-    const int steps = geometry.IsPlane() ? 1 : preset ? preset->sweepSteps : this->SweepSteps;
-    WriteMesh(echorama::MakeProbeMesh(geometry, this->Housing()), probeToWorld, vtkPolyData::GetData(outputs, 0));
+    const int elements = preset ? preset->elements : this->Values->elements;
+    const int steps = geometry.IsPlane() ? 1 : preset ? preset->sweepSteps : this->Values->sweepSteps;
+    WriteMesh(echorama::MakeProbeMesh(geometry, this->Values->housing), probeToWorld, vtkPolyData::GetData(outputs, 0));
     progress(0.5);
     WriteElements(echorama::ElementPoses(geometry, elements, steps), elements, probeToWorld, vtkPolyData::GetData(outputs, 1));
     for (const int port : {0, 1}) {
@@ -228,26 +220,5 @@ int vtkUltrasoundProbeSource::RequestData(vtkInformation*, vtkInformationVector*
 void vtkUltrasoundProbeSource::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Preset: " << this->Preset << "\n";
-  os << indent << "FanAngle: " << this->FanAngle << "\n";
-  os << indent << "FanRadius: " << this->FanRadius << "\n";
-  os << indent << "FanWidth: " << this->FanWidth << "\n";
-  os << indent << "SweepAngle: " << this->SweepAngle << "\n";
-  os << indent << "SweepRadius: " << this->SweepRadius << "\n";
-  os << indent << "SweepWidth: " << this->SweepWidth << "\n";
-  os << indent << "DepthMin: " << this->DepthMin << "\n";
-  os << indent << "DepthMax: " << this->DepthMax << "\n";
-  os << indent << "Elements: " << this->Elements << "\n";
-  os << indent << "SweepSteps: " << this->SweepSteps << "\n";
-  os << indent << "RimMm: " << this->RimMm << "\n";
-  os << indent << "SkirtMm: " << this->SkirtMm << "\n";
-  os << indent << "NeckMm: " << this->NeckMm << "\n";
-  os << indent << "HandleMm: " << this->HandleMm << "\n";
-  os << indent << "HandleWidthMm: " << this->HandleWidthMm << "\n";
-  os << indent << "HandleThicknessMm: " << this->HandleThicknessMm << "\n";
-  os << indent << "FaceWidthMm: " << this->FaceWidthMm << "\n";
-  os << indent << "FaceThicknessMm: " << this->FaceThicknessMm << "\n";
-  os << indent << "ResolutionMm: " << this->ResolutionMm << "\n";
-  os << indent << "Position: " << this->Position[0] << " " << this->Position[1] << " " << this->Position[2] << "\n";
-  os << indent << "Orientation: " << this->Orientation[0] << " " << this->Orientation[1] << " " << this->Orientation[2] << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -29,6 +29,8 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Printing/ProbeMesh.h"
+#include "vtkUltrasoundParameters.h"
+#include <memory> // for what is set
 #endif
 
 class vtkMatrix4x4;
@@ -39,149 +41,192 @@ public:
   vtkTypeMacro(vtkUltrasoundProbeSource, vtkPolyDataAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum Presets { Custom = 0, Curvilinear, Linear, Phased, Endocavity3D, Mechanical3D };
-
-  ///@{
-  /** The kind of probe; Custom takes the head below instead. Default Mechanical3D. */
-  vtkSetClampMacro(Preset, int, Custom, Mechanical3D);
-  vtkGetMacro(Preset, int);
-  void SetPresetToCustom() { this->SetPreset(Custom); }
-  void SetPresetToCurvilinear() { this->SetPreset(Curvilinear); }
-  void SetPresetToLinear() { this->SetPreset(Linear); }
-  void SetPresetToPhased() { this->SetPreset(Phased); }
-  void SetPresetToEndocavity3D() { this->SetPreset(Endocavity3D); }
-  void SetPresetToMechanical3D() { this->SetPreset(Mechanical3D); }
-  ///@}
-
   /** Where the figures of the present preset come from; empty for Custom. */
   const char* GetPresetSource();
 
-  // The head, of Custom alone.
+  // BEGIN parameters
+  enum Presets { CUSTOM = 0, CURVILINEAR = 1, LINEAR = 2, PHASED = 3, ENDOCAVITY_3D = 4, MECHANICAL_3D = 5 };
 
   ///@{
-  /** Whole fan in degrees, in [0, 180]; 0: a flat array. Default 70. */
-  vtkSetMacro(FanAngle, double);
-  vtkGetMacro(FanAngle, double);
+  /**
+   * The kind of probe. Custom: the head that the following parameters describe. Default mechanical-3d. There are CUSTOM,
+   * CURVILINEAR, LINEAR, PHASED, ENDOCAVITY_3D, MECHANICAL_3D.
+   */
+  void SetPreset(int value) { this->SetParameter("Preset", value); }
+  int GetPreset() { return static_cast<int>(this->GetParameter("Preset")); }
+  void SetPresetToCustom() { this->SetPreset(CUSTOM); }
+  void SetPresetToCurvilinear() { this->SetPreset(CURVILINEAR); }
+  void SetPresetToLinear() { this->SetPreset(LINEAR); }
+  void SetPresetToPhased() { this->SetPreset(PHASED); }
+  void SetPresetToEndocavity3D() { this->SetPreset(ENDOCAVITY_3D); }
+  void SetPresetToMechanical3D() { this->SetPreset(MECHANICAL_3D); }
+  std::string GetPresetAsString() { return this->GetParameterAsText("Preset"); }
   ///@}
 
   ///@{
-  /** Radius of the array's arc in mm, at least 0; of no meaning when FanAngle is 0. Default 40. */
-  vtkSetMacro(FanRadius, double);
-  vtkGetMacro(FanRadius, double);
+  /** Angle between the first and the last beam of a fan. Used when Preset is custom. In [0, 359.999] degrees; default 70. */
+  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
+  double GetFanAngle() { return this->GetParameter("FanAngle"); }
   ///@}
 
   ///@{
-  /** Length of a flat array in mm, at least 0: when FanAngle is 0. Default 40. */
-  vtkSetMacro(FanWidth, double);
-  vtkGetMacro(FanWidth, double);
+  /** Radius of the array's arc; of no meaning where FanAngle is 0. Used when Preset is custom. In [0, 10000] mm; default 40. */
+  void SetFanRadius(double value) { this->SetParameter("FanRadius", value); }
+  double GetFanRadius() { return this->GetParameter("FanRadius"); }
   ///@}
 
   ///@{
-  /** Whole sweep in degrees, in [0, 178); 0: the array moves along a line, or not at all. Default 65. */
-  vtkSetMacro(SweepAngle, double);
-  vtkGetMacro(SweepAngle, double);
+  /** Length of a flat array: where FanAngle is 0. Used when Preset is custom. In [0, 10000] mm; default 40. */
+  void SetFanWidth(double value) { this->SetParameter("FanWidth", value); }
+  double GetFanWidth() { return this->GetParameter("FanWidth"); }
   ///@}
 
   ///@{
-  /** From the axis of the sweep to the face in mm, at least 0; of no meaning when SweepAngle is 0. Default 30. */
-  vtkSetMacro(SweepRadius, double);
-  vtkGetMacro(SweepRadius, double);
+  /**
+   * Angle that the array sweeps. With an angle and a width of 0 the sweep is a single plane. Used when Preset is custom. In [0,
+   * 359.999] degrees; default 65.
+   */
+  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
+  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
   ///@}
 
   ///@{
-  /** How far the array moves along a line in mm, at least 0: when SweepAngle is 0; 0: a single plane. Default 0. */
-  vtkSetMacro(SweepWidth, double);
-  vtkGetMacro(SweepWidth, double);
+  /**
+   * From the axis of the sweep to the face; of no meaning where SweepAngle is 0. Used when Preset is custom. In [0, 10000] mm;
+   * default 30.
+   */
+  void SetSweepRadius(double value) { this->SetParameter("SweepRadius", value); }
+  double GetSweepRadius() { return this->GetParameter("SweepRadius"); }
   ///@}
 
   ///@{
-  /** First depth along the beams, mm from the face. Default 0. */
-  vtkSetMacro(DepthMin, double);
-  vtkGetMacro(DepthMin, double);
+  /**
+   * How far the array moves along a line where SweepAngle is 0. 0: a single plane. Used when Preset is custom. In [0, 10000] mm;
+   * default 0.
+   */
+  void SetSweepWidth(double value) { this->SetParameter("SweepWidth", value); }
+  double GetSweepWidth() { return this->GetParameter("SweepWidth"); }
   ///@}
 
   ///@{
-  /** Last depth along the beams, mm from the face. Default 150. */
-  vtkSetMacro(DepthMax, double);
-  vtkGetMacro(DepthMax, double);
+  /** First depth along the beams, from the face. Used when Preset is custom. In [-10000, 10000] mm; default 0. */
+  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
+  double GetDepthMin() { return this->GetParameter("DepthMin"); }
   ///@}
 
   ///@{
-  /** Beams across the fan, and planes of the sweep (1 of a single plane), in [1, 65536]: the points of output 1. Default 128,
-   * 128. */
-  vtkSetMacro(Elements, int);
-  vtkGetMacro(Elements, int);
-  vtkSetMacro(SweepSteps, int);
-  vtkGetMacro(SweepSteps, int);
-  ///@}
-
-  // What is around the face.
-
-  ///@{
-  /** Radius of the edge between face and wall in mm, in [0.1, 50]. Default 4. */
-  vtkSetMacro(RimMm, double);
-  vtkGetMacro(RimMm, double);
+  /** Last depth along the beams, from the face. Used when Preset is custom. In [-10000, 10000] mm; default 150. */
+  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
+  double GetDepthMax() { return this->GetParameter("DepthMax"); }
   ///@}
 
   ///@{
-  /** Straight wall below that edge in mm, in [0.1, 200]. Default 10. */
-  vtkSetMacro(SkirtMm, double);
-  vtkGetMacro(SkirtMm, double);
+  /** Beams across the fan. Used when Preset is custom. In [1, 65536]; default 128. */
+  void SetElements(int value) { this->SetParameter("Elements", value); }
+  int GetElements() { return static_cast<int>(this->GetParameter("Elements")); }
   ///@}
 
   ///@{
-  /** From the wall to the handle in mm, in [1, 500]. Default 30. */
-  vtkSetMacro(NeckMm, double);
-  vtkGetMacro(NeckMm, double);
+  /** Planes of the sweep; a single plane has one. Used when Preset is custom. In [1, 65536]; default 128. */
+  void SetSweepSteps(int value) { this->SetParameter("SweepSteps", value); }
+  int GetSweepSteps() { return static_cast<int>(this->GetParameter("SweepSteps")); }
   ///@}
 
   ///@{
-  /** Length of the handle in mm, in [1, 1000]. Default 80. */
-  vtkSetMacro(HandleMm, double);
-  vtkGetMacro(HandleMm, double);
+  /** Radius of the edge between face and wall. In [0.1, 50] mm; default 4. */
+  void SetRimMm(double value) { this->SetParameter("RimMm", value); }
+  double GetRimMm() { return this->GetParameter("RimMm"); }
   ///@}
 
   ///@{
-  /** The handle along the fan in mm, in [1, 500]. Default 30. */
-  vtkSetMacro(HandleWidthMm, double);
-  vtkGetMacro(HandleWidthMm, double);
+  /** Straight wall below the lowest point of that edge. In [0.1, 200] mm; default 10. */
+  void SetSkirtMm(double value) { this->SetParameter("SkirtMm", value); }
+  double GetSkirtMm() { return this->GetParameter("SkirtMm"); }
   ///@}
 
   ///@{
-  /** The handle along the sweep in mm, in [1, 500]. Default 22. */
-  vtkSetMacro(HandleThicknessMm, double);
-  vtkGetMacro(HandleThicknessMm, double);
+  /** From the wall to the handle. In [1, 500] mm; default 30. */
+  void SetNeckMm(double value) { this->SetParameter("NeckMm", value); }
+  double GetNeckMm() { return this->GetParameter("NeckMm"); }
   ///@}
 
   ///@{
-  /** The face of a phased array along the fan in mm, in [1, 300]: its beams start in one point, which has no size. Default 22. */
-  vtkSetMacro(FaceWidthMm, double);
-  vtkGetMacro(FaceWidthMm, double);
+  /** Length of the handle. In [1, 1000] mm; default 80. */
+  void SetHandleMm(double value) { this->SetParameter("HandleMm", value); }
+  double GetHandleMm() { return this->GetParameter("HandleMm"); }
   ///@}
 
   ///@{
-  /** The face of a single plane, or of a sweep about a line in the face, along the sweep in mm, in [1, 300]. Default 13. */
-  vtkSetMacro(FaceThicknessMm, double);
-  vtkGetMacro(FaceThicknessMm, double);
+  /** The handle along the fan. In [1, 500] mm; default 30. */
+  void SetHandleWidthMm(double value) { this->SetParameter("HandleWidthMm", value); }
+  double GetHandleWidthMm() { return this->GetParameter("HandleWidthMm"); }
   ///@}
 
   ///@{
-  /** Edge of the triangles in mm, about; in [0.1, 50]. Default 1.5. */
-  vtkSetMacro(ResolutionMm, double);
-  vtkGetMacro(ResolutionMm, double);
+  /** The handle along the sweep. In [1, 500] mm; default 22. */
+  void SetHandleThicknessMm(double value) { this->SetParameter("HandleThicknessMm", value); }
+  double GetHandleThicknessMm() { return this->GetParameter("HandleThicknessMm"); }
   ///@}
 
   ///@{
-  /** Where the middle of the probe's face lies in the world, mm. Default (0, 0, 0). */
-  vtkSetVector3Macro(Position, double);
-  vtkGetVector3Macro(Position, double);
+  /** The face of a phased array along the fan: its beams start in one point, which has no size. In [1, 300] mm; default 22. */
+  void SetFaceWidthMm(double value) { this->SetParameter("FaceWidthMm", value); }
+  double GetFaceWidthMm() { return this->GetParameter("FaceWidthMm"); }
   ///@}
 
   ///@{
-  /** How the probe is turned: axis times angle, in degrees. Default (0, 0, 0): it looks along +z, its fan along x. */
-  vtkSetVector3Macro(Orientation, double);
-  vtkGetVector3Macro(Orientation, double);
+  /** The face of a single plane, or of a sweep about a line in the face, along the sweep. In [1, 300] mm; default 13. */
+  void SetFaceThicknessMm(double value) { this->SetParameter("FaceThicknessMm", value); }
+  double GetFaceThicknessMm() { return this->GetParameter("FaceThicknessMm"); }
   ///@}
+
+  ///@{
+  /** Edge of the triangles, about. In [0.1, 50] mm; default 1.5. */
+  void SetResolutionMm(double value) { this->SetParameter("ResolutionMm", value); }
+  double GetResolutionMm() { return this->GetParameter("ResolutionMm"); }
+  ///@}
+
+  ///@{
+  /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
+  void SetPosition(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetPosition(value);
+  }
+  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
+  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
+  ///@}
+
+  ///@{
+  /** How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. In degrees; default (0, 0, 0). */
+  void SetOrientation(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetOrientation(value);
+  }
+  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
+  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** The pose that Position and Orientation make. A matrix that is not rigid is refused with an error, and nothing changes. */
@@ -199,41 +244,24 @@ public:
   ///@}
 
 #ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+
   /** The present head, by preset or by its own numbers. */
   echorama::ProbeGeometry Geometry() const;
-  echorama::ProbeHousing Housing() const;
   echorama::Pose ProbeToWorld() const;
 #endif
 
 protected:
   vtkUltrasoundProbeSource();
-  ~vtkUltrasoundProbeSource() override = default;
+  ~vtkUltrasoundProbeSource() override;
 
   int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
 private:
-  int Preset;
-  double FanAngle;
-  double FanRadius;
-  double FanWidth;
-  double SweepAngle;
-  double SweepRadius;
-  double SweepWidth;
-  double DepthMin;
-  double DepthMax;
-  int Elements;
-  int SweepSteps;
-  double RimMm;
-  double SkirtMm;
-  double NeckMm;
-  double HandleMm;
-  double HandleWidthMm;
-  double HandleThicknessMm;
-  double FaceWidthMm;
-  double FaceThicknessMm;
-  double ResolutionMm;
-  double Position[3];
-  double Orientation[3];
+  struct Settings;
+#ifndef __VTK_WRAP__
+  std::unique_ptr<Settings> Values;
+#endif
 
   vtkUltrasoundProbeSource(const vtkUltrasoundProbeSource&) = delete;
   void operator=(const vtkUltrasoundProbeSource&) = delete;

@@ -4,14 +4,12 @@
 // in the rows around, so that a voxel costs 2 reach + 3 such steps. Only near what was seen are the 13 lines tried. Seen voxels
 // are read and others written, so slices are independent.
 #include "HoleFilling.h"
-#include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <vector>
 
 namespace echorama {
@@ -110,12 +108,24 @@ private:
 
 } // namespace
 
+ParameterList Describe(HoleFillingParameters& p)
+{
+  return {
+      Parameter("Holes", Choice(p.method, {"none", "mean-around", "stick"}),
+                "How voxels are filled that were not seen but lie between others that were: not at all; by the mean of the "
+                "smallest cube that reaches across; or by linear interpolation along the shortest line across."),
+      Parameter("HoleReach", p.reach, {1, longestReach}, "voxels",
+                "The widest gap that is filled, along one of 13 lines. 1: single voxels.")
+          .When("Holes", "mean-around")
+          .When("Holes", "stick"),
+  };
+}
+
 template <class T>
 std::size_t FillHoles(const HoleFillingParameters& parameters, VolumeView<T> intensity, VolumeView<unsigned char> valid,
                       VolumeView<const unsigned short> coverage, const Progress& progress)
 {
-  if (parameters.reach < 1 || parameters.reach > longestReach)
-    throw Error(Error::Kind::InvalidParameter, "HoleReach is " + std::to_string(parameters.reach) + "; it must be in [1, 100]");
+  CheckRanges(parameters);
   const int reach = parameters.reach;
   const auto& n = coverage.Dimensions();
   const Holes<T> holes(intensity, coverage, reach);

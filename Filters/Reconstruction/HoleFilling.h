@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 #include <cstddef>
@@ -15,15 +16,13 @@ enum class HoleFilling {
 
 struct HoleFillingParameters {
   HoleFilling method = HoleFilling::Mean;
-
-  /// The widest gap that is bridged, in voxels along a line, [1, 100]. A voxel that was not seen is a hole when, along one of 13
-  /// lines through it (axes, diagonals of faces and of the cube), voxels that were seen lie on both sides with no more than
-  /// this many others between them. 1: single voxels. The stick length of the Plus toolkit is this plus 2.
-  int reach = 1;
+  int reach = 1; ///< the stick length of the Plus toolkit is this plus 2
 };
+ParameterList Describe(HoleFillingParameters& p);
 
-/// Fills holes: voxels without coverage that lie between others. Their valid becomes 1, their coverage stays 0, so that
-/// valid and not covered means filled. What an earlier call has filled is forgotten first.
+/// Fills holes: voxels without coverage for which, along one of 13 lines (axes, diagonals of faces and of the cube), voxels that
+/// were seen lie on both sides with no more than \a reach others between them. Their valid becomes 1, their coverage stays 0, so
+/// that valid and not covered means filled. What an earlier call has filled is forgotten first.
 ///
 /// Mean takes the cube with half edge (gap + 1) / 2, rounded up, of the narrowest gap at the voxel: for a single voxel the 3^3
 /// mean. Both work on what was seen alone, so the order of voxels does not matter.

@@ -138,9 +138,7 @@ ImageGeometry ReconstructionGrid(const std::vector<FramePlace>& frames, GridDire
 {
   if (frames.empty())
     throw Error(Error::Kind::BadInput, "there is no frame with a valid pose");
-  if (!(spacingMm >= 0.0) || !std::isfinite(spacingMm))
-    throw Error(Error::Kind::InvalidParameter,
-                "SpacingMm is " + std::to_string(spacingMm) + "; it must be positive, or 0 for the size of a pixel");
+  Parameter("SpacingMm", spacingMm, {0, Unlimited}, "mm", "").Check();
   std::vector<Eigen::Vector3d> corners;
   double pixel = 0.0;
   for (const FramePlace& frame : frames) {
@@ -177,8 +175,7 @@ ImageGeometry WithSpacing(const ImageGeometry& grid, double spacingMm)
 
 void CheckMemory(const ImageGeometry& grid, double bytesPerVoxel, double limitMb)
 {
-  if (!(limitMb >= 0.0))
-    throw Error(Error::Kind::InvalidParameter, "MemoryLimitMb is " + std::to_string(limitMb) + "; it must not be negative");
+  Parameter("MemoryLimitMb", limitMb, {0, Unlimited}, "MB", "").Check();
   const double allowed = limitMb > 0.0 ? limitMb * megabyte : FreeMemory();
   const double needed = static_cast<double>(grid.VoxelCount()) * bytesPerVoxel;
   if (needed <= allowed)

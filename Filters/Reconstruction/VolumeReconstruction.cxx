@@ -530,19 +530,37 @@ bool VolumeReconstruction<T>::Body::Blend(const ReconstructionFrame<T>& a, const
   return std::find(reached.begin(), reached.end(), 1) != reached.end();
 }
 
+ParameterList Describe(ReconstructionParameters& p)
+{
+  return {
+      Parameter("Splat", Choice(p.splat, {"nearest", "linear"}),
+                "How a pixel goes into the volume: into its nearest voxel, or by linear weights into the eight around it."),
+      Parameter(
+          "Compounding", Choice(p.compounding, {"mean", "maximum", "latest", "alpha", "running-mean"}),
+          "What becomes of a voxel that several pixels reach: their mean, the maximum, the mean of the latest frame's, each "
+          "frame laid over the others, or the rounded mean that the Plus toolkit keeps, for comparison."),
+      Parameter("Alpha", p.alpha, {0, 1, true}, "", "Opacity of a frame that is laid over the others.")
+          .When("Compounding", "alpha"),
+      Parameter("Between", Choice(p.between, {"nothing", "forward", "backward"}),
+                "What lies between frames that follow each other: nothing; frames with pixels and matrices interpolated; or, "
+                "backward, at each voxel a blend of what both frames show at its perpendicular feet."),
+      Parameter("StepMm", p.stepMm, {0, Unlimited}, "mm",
+                "No pixel moves further than this from one interpolated frame to the next. 0: 0.7 of the smallest spacing.")
+          .When("Between", "forward")
+          .Advanced(),
+      Parameter("MaximumGapMm", p.maximumGapMm, {0, Unlimited, true}, "mm",
+                "Frames between which a pixel moves further than this are not joined: the probe was lifted.")
+          .When("Between", "forward")
+          .When("Between", "backward")
+          .Advanced(),
+  };
+}
+
 template <class T>
 VolumeReconstruction<T>::VolumeReconstruction(const ReconstructionParameters& parameters, const ImageGeometry& grid,
                                               const ReconstructionOutput<T>& output)
 {
-  const auto require = [](bool good, const std::string& message) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, message);
-  };
-  require(parameters.alpha > 0.0 && parameters.alpha <= 1.0,
-          "Alpha is " + std::to_string(parameters.alpha) + "; it must be in (0, 1]");
-  require(parameters.stepMm >= 0.0 && std::isfinite(parameters.stepMm),
-          "StepMm is " + std::to_string(parameters.stepMm) + "; it must be positive, or 0 for 0.7 of the spacing");
-  require(parameters.maximumGapMm > 0.0, "MaximumGapMm is " + std::to_string(parameters.maximumGapMm) + "; it must be positive");
+  CheckRanges(parameters);
   grid.Check("the output grid");
   for (const int n : grid.dimensions)
     if (n > longestAxis)
@@ -595,8 +613,7 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
   const BetweenFrames between = body.parameters.between;
   const bool neighbours = body.hasPrevious && body.previous.size == body.current.size;
   const double step = neighbours ? LargestStep(body.previous, body.current) : 0.0;
-  const bool joined = neighbours && between != BetweenFrames::Nothing && std::isfinite(step) &&
-                      step <= body.parameters.maximumGapMm &&
+  const bool joined = neighbours && between != BetweenFrames::Nothing && step <= body.parameters.maximumGapMm &&
                       (between == BetweenFrames::Backward || step <= mostParts * body.parameters.stepMm);
   bool reached = false;
   if (joined && between == BetweenFrames::Backward) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Imaging/VolumeView.h"
 #include <cstddef>
@@ -37,12 +38,13 @@ struct ReconstructionParameters {
   /// and the weight to 1/256. Late pixels with little weight then change nothing, and a voxel whose weight rounds to 0 counts
   /// as not seen. It is there to compare with volumes that Plus made.
   Compounding compounding = Compounding::Mean;
-  double alpha = 0.5; ///< opacity of Compounding::Alpha, (0, 1]; 1 is Latest
+  double alpha = 0.5; ///< 1 is Latest
 
   BetweenFrames between = BetweenFrames::Forward;
-  double stepMm = 0.0;        ///< Forward: no pixel moves further from frame to frame, mm; 0: 0.7 of the smallest spacing
-  double maximumGapMm = 10.0; ///< frames between which a pixel moves further than this, or 1000 steps, are not joined, mm, > 0
+  double stepMm = 0.0;
+  double maximumGapMm = 10.0; ///< nor are those joined between which a pixel moves further than 1000 steps
 };
+ParameterList Describe(ReconstructionParameters& p);
 
 /// A 2D image and where it lies.
 template <class T>

@@ -27,6 +27,8 @@ using Pipeline = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkUltrasoundVolumeReconstructor);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundVolumeReconstructor);
+
 namespace {
 const char* const NoPose = "it has no valid pose (ImageToWorld)";
 const char* const OtherType = "its pixels are of another type than those of the first frame";
@@ -89,14 +91,14 @@ public:
     }
     this->Timed = !times.empty();
     this->Total = this->Timed ? static_cast<int>(times.size()) : 1;
-    const int last = self->LastFrame < 0 ? this->Total - 1 : std::min(self->LastFrame, this->Total - 1);
-    for (long frame = self->FirstFrame; frame <= last; frame += self->FrameStep) {
+    const int last = self->To < 0 ? this->Total - 1 : std::min(self->To, this->Total - 1);
+    for (long frame = self->From; frame <= last; frame += self->EveryNth) {
       this->Numbers.push_back(static_cast<int>(frame));
       this->Times.push_back(this->Timed ? times[static_cast<std::size_t>(frame)] : 0.0);
     }
     if (this->Numbers.empty()) {
-      throw Error(Error::Kind::InvalidParameter, "there is no frame from FirstFrame " + std::to_string(self->FirstFrame) +
-                                                     " to LastFrame " + std::to_string(self->LastFrame) + " in a sequence of " +
+      throw Error(Error::Kind::InvalidParameter, "there is no frame from FirstFrame " + std::to_string(self->From) +
+                                                     " to LastFrame " + std::to_string(self->To) + " in a sequence of " +
                                                      std::to_string(this->Total) + " frames");
     }
   }
@@ -219,23 +221,36 @@ int vtkUltrasoundVolumeReconstructor::FillInputPortInformation(int port, vtkInfo
 }
 
 //----------------------------------------------------------------------------
-echorama::ReconstructionParameters vtkUltrasoundVolumeReconstructor::Parameters() const
+echorama::ParameterList vtkUltrasoundVolumeReconstructor::Parameters()
 {
-  echorama::ReconstructionParameters parameters;
-  parameters.splat = static_cast<echorama::SplatMethod>(this->Splat);
-  parameters.compounding = static_cast<echorama::Compounding>(this->Compounding);
-  parameters.alpha = this->Alpha;
-  parameters.between = static_cast<echorama::BetweenFrames>(this->Between);
-  parameters.stepMm = this->StepMm;
-  parameters.maximumGapMm = this->MaximumGapMm;
-  return parameters;
+  using echorama::Choice;
+  using echorama::Parameter;
+  using echorama::Unlimited;
+  return echorama::Join(
+      {Describe(this->Making),
+       Describe(this->Filling),
+       {Parameter(
+            "Sector", Choice(this->Part, {"all", "detected", "rectangle", "fan"}),
+            "Which part of the images goes into the volume, of what their valid regions allow. Detected: the sector is found "
+            "by what changes from frame to frame, so that what a scanner prints stays out; all pixels, with a warning, where "
+            "hardly anything changes or frames come live."),
+        Parameter("Grid", Choice(this->Directions, {"fitted", "world"}),
+                  "How the grid lies when none is given: fitted to the data's own directions, or along the axes of the world."),
+        Parameter("SpacingMm", this->Spacing, {0, Unlimited}, "mm",
+                  "Edge of a voxel when no grid is given. 0: the longer edge of a pixel."),
+        Parameter("FirstFrame", this->From, {0, Unlimited}, "", "The first frame to use, counted from 0 in the order of time."),
+        Parameter("LastFrame", this->To, {-1, Unlimited}, "", "The last frame to use. -1: the last of the sequence."),
+        Parameter("FrameStep", this->EveryNth, {1, Unlimited}, "", "Every n-th frame is used."),
+        Parameter("MemoryLimitMb", this->MostMemoryMb, {0, Unlimited}, "MB",
+                  "What takes more memory (in 10^6 bytes) is refused. 0: what is free on this machine.")
+            .Advanced()}});
 }
 
 //----------------------------------------------------------------------------
 echorama::SectorParameters vtkUltrasoundVolumeReconstructor::GivenSector() const
 {
   echorama::SectorParameters sector;
-  sector.choice = static_cast<echorama::SectorChoice>(this->Sector);
+  sector.choice = this->Part;
   std::copy_n(this->Rectangle, 4, sector.rectangle.begin());
   sector.fan = {this->FanApex[0],   this->FanApex[1],   this->FanAngles[0],
                 this->FanAngles[1], this->FanDepths[0], this->FanDepths[1]};
@@ -246,8 +261,8 @@ echorama::SectorParameters vtkUltrasoundVolumeReconstructor::GivenSector() const
 void vtkUltrasoundVolumeReconstructor::Begin(const echorama::ImageGeometry& grid, int type)
 {
   const double bytes =
-      echorama::ReconstructionMemory(this->Parameters(), grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)));
-  echorama::CheckMemory(grid, bytes / static_cast<double>(grid.VoxelCount()), this->MemoryLimitMb);
+      echorama::ReconstructionMemory(this->Making, grid, static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(type)));
+  echorama::CheckMemory(grid, bytes / static_cast<double>(grid.VoxelCount()), this->MostMemoryMb);
   this->Statistics = Counts();
   this->Statistics.MemoryMb = bytes / 1e6;
   this->Statistics.Grid = echorama::SizeText(grid.dimensions);
@@ -282,6 +297,7 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
     return *this->Prepared;
   }
   this->Prepared.reset();
+  echorama::CheckRanges(this->Parameters());
   auto plan = std::make_unique<Plan>();
   plan->Times = times;
 
@@ -300,7 +316,7 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
         plan->Type = frame.Intensity->GetDataType();
       }
     });
-    if (given && this->Sector != DETECTED && !survey.Empty()) {
+    if (given && this->Part != echorama::SectorChoice::Detected && !survey.Empty()) {
       break; // the type is all that was to be learned
     }
   }
@@ -318,7 +334,7 @@ const vtkUltrasoundVolumeReconstructor::Plan& vtkUltrasoundVolumeReconstructor::
     grid->Check("the reference volume");
   }
   static_cast<echorama::ReconstructionPlan&>(*plan) =
-      survey.Finish(grid, static_cast<echorama::GridDirections>(this->Grid), this->SpacingMm, progress.Part(0.9, 1.0));
+      survey.Finish(grid, this->Directions, this->Spacing, progress.Part(0.9, 1.0));
   if (!plan->sectorFound) {
     vtkWarningMacro(<< plan->sectorText);
   }
@@ -372,7 +388,7 @@ void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vt
   vtkUltrasoundVolume::Dispatch(arrays.Intensity, [&](auto type) {
     using T = decltype(type);
     const echorama::ReconstructionOutput<T> views = arrays.Views<T>(output);
-    echorama::VolumeReconstruction<T> reconstruction(this->Parameters(), plan.grid, views);
+    echorama::VolumeReconstruction<T> reconstruction(this->Making, plan.grid, views);
     echorama::Volume<unsigned char> store;
     for (int index = 0; index < frames.Count(); ++index) {
       progress(0.9 * index / frames.Count());
@@ -402,10 +418,9 @@ void vtkUltrasoundVolumeReconstructor::Execute(vtkInformationVector** inputs, vt
       throw Error(Error::Kind::BadInput, "none of the frames could be used; " + this->GetReport());
     }
     this->Statistics.Seen = static_cast<vtkIdType>(views.valid.Size() - std::count(views.valid.begin(), views.valid.end(), 0));
-    if (this->Holes != KEEP_HOLES) {
-      const echorama::HoleFillingParameters holes{static_cast<echorama::HoleFilling>(this->Holes), this->HoleReach};
+    if (this->Filling.method != echorama::HoleFilling::Nothing) {
       this->Statistics.Filled = static_cast<vtkIdType>(
-          echorama::FillHoles<T>(holes, views.intensity, views.valid, views.coverage, progress.Part(0.9, 1.0)));
+          echorama::FillHoles<T>(this->Filling, views.intensity, views.valid, views.coverage, progress.Part(0.9, 1.0)));
     }
   });
   frames.Restore(in);
@@ -445,6 +460,7 @@ bool vtkUltrasoundVolumeReconstructor::BeginLive(vtkImageData* grid, int vtkType
            if (!grid) {
              throw Error(Error::Kind::BadInput, "a live volume needs a grid");
            }
+           echorama::CheckRanges(this->Parameters());
            const echorama::ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(grid);
            geometry.Check("the grid");
            this->Begin(geometry, vtkType);
@@ -456,7 +472,7 @@ bool vtkUltrasoundVolumeReconstructor::BeginLive(vtkImageData* grid, int vtkType
            vtkUltrasoundVolume::Dispatch(live->Data->Intensity, [&](auto type) {
              using T = decltype(type);
              auto reconstruction = std::make_shared<echorama::VolumeReconstruction<T>>(
-                 this->Parameters(), geometry, live->Data->template Views<T>(live->Image));
+                 this->Making, geometry, live->Data->template Views<T>(live->Image));
              live->Between = [reconstruction] { return reconstruction->FramesBetween(); };
              live->Add = [reconstruction](const vtkUltrasoundVolume::Input& frame, echorama::VolumeView<const unsigned char> mask,
                                           const Eigen::Affine3d& pose) {
@@ -527,9 +543,8 @@ vtkIdType vtkUltrasoundVolumeReconstructor::FillLiveHoles()
     Live& live = *this->LiveVolume;
     vtkUltrasoundVolume::Dispatch(live.Data->Intensity, [&](auto type) {
       const auto views = live.Data->template Views<decltype(type)>(live.Image);
-      const echorama::HoleFillingParameters holes{static_cast<echorama::HoleFilling>(this->Holes), this->HoleReach};
       this->Statistics.Filled = static_cast<vtkIdType>(
-          echorama::FillHoles<decltype(type)>(holes, views.intensity, views.valid, views.coverage, progress));
+          echorama::FillHoles<decltype(type)>(this->Filling, views.intensity, views.valid, views.coverage, progress));
       this->Statistics.Seen =
           static_cast<vtkIdType>(views.coverage.Size() - std::count(views.coverage.begin(), views.coverage.end(), 0));
     });
@@ -550,25 +565,11 @@ void vtkUltrasoundVolumeReconstructor::EndLive()
 void vtkUltrasoundVolumeReconstructor::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Splat: " << this->Splat << "\n";
-  os << indent << "Compounding: " << this->Compounding << "\n";
-  os << indent << "Alpha: " << this->Alpha << "\n";
-  os << indent << "Between: " << this->Between << "\n";
-  os << indent << "StepMm: " << this->StepMm << "\n";
-  os << indent << "MaximumGapMm: " << this->MaximumGapMm << "\n";
-  os << indent << "Holes: " << this->Holes << "\n";
-  os << indent << "HoleReach: " << this->HoleReach << "\n";
-  os << indent << "Sector: " << this->Sector << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Rectangle: " << this->Rectangle[0] << " " << this->Rectangle[1] << " " << this->Rectangle[2] << " "
      << this->Rectangle[3] << "\n";
   os << indent << "FanApex: " << this->FanApex[0] << " " << this->FanApex[1] << "\n";
   os << indent << "FanAngles: " << this->FanAngles[0] << " " << this->FanAngles[1] << "\n";
   os << indent << "FanDepths: " << this->FanDepths[0] << " " << this->FanDepths[1] << "\n";
-  os << indent << "Grid: " << this->Grid << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
-  os << indent << "FirstFrame: " << this->FirstFrame << "\n";
-  os << indent << "LastFrame: " << this->LastFrame << "\n";
-  os << indent << "FrameStep: " << this->FrameStep << "\n";
-  os << indent << "MemoryLimitMb: " << this->MemoryLimitMb << "\n";
   os << indent << "Report: " << this->GetReport();
 }

@@ -42,6 +42,7 @@
 #include "Filters/Reconstruction/HoleFilling.h"
 #include "Filters/Reconstruction/ReconstructionPlan.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkAlgorithmOutput;
@@ -52,87 +53,191 @@ public:
   vtkTypeMacro(vtkUltrasoundVolumeReconstructor, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum SplatMethods { NEAREST = 0, LINEAR = 1 };
-  enum Compoundings { MEAN = 0, MAXIMUM = 1, LATEST = 2, ALPHA = 3, RUNNING_MEAN = 4 };
-  enum BetweenMethods { NOTHING = 0, FORWARD = 1, BACKWARD = 2 };
-  enum HoleMethods { KEEP_HOLES = 0, MEAN_AROUND = 1, STICK = 2 };
-  enum Sectors { ALL = 0, DETECTED = 1, RECTANGLE = 2, FAN = 3 };
-  enum Grids { FITTED = 0, WORLD = 1 };
-
   ///@{
   /** A volume whose grid the output takes: origin, spacing, direction and size. Its values are not used. */
   void SetReferenceConnection(vtkAlgorithmOutput* output);
   void SetReferenceData(vtkImageData* volume);
   ///@}
 
+  // BEGIN parameters
+  enum Splats { NEAREST = 0, LINEAR = 1 };
+
   ///@{
-  /** How a pixel goes into the volume: into its NEAREST voxel (default), or by LINEAR weights into the eight around it. */
-  vtkSetClampMacro(Splat, int, NEAREST, LINEAR);
-  vtkGetMacro(Splat, int);
+  /**
+   * How a pixel goes into the volume: into its nearest voxel, or by linear weights into the eight around it. Default nearest.
+   * There are NEAREST, LINEAR.
+   */
+  void SetSplat(int value) { this->SetParameter("Splat", value); }
+  int GetSplat() { return static_cast<int>(this->GetParameter("Splat")); }
+  void SetSplatToNearest() { this->SetSplat(NEAREST); }
+  void SetSplatToLinear() { this->SetSplat(LINEAR); }
+  std::string GetSplatAsString() { return this->GetParameterAsText("Splat"); }
+  ///@}
+
+  enum Compoundings { MEAN = 0, MAXIMUM = 1, LATEST = 2, ALPHA = 3, RUNNING_MEAN = 4 };
+
+  ///@{
+  /**
+   * What becomes of a voxel that several pixels reach: their mean, the maximum, the mean of the latest frame's, each frame laid
+   * over the others, or the rounded mean that the Plus toolkit keeps, for comparison. Default mean. There are MEAN, MAXIMUM,
+   * LATEST, ALPHA, RUNNING_MEAN.
+   */
+  void SetCompounding(int value) { this->SetParameter("Compounding", value); }
+  int GetCompounding() { return static_cast<int>(this->GetParameter("Compounding")); }
+  void SetCompoundingToMean() { this->SetCompounding(MEAN); }
+  void SetCompoundingToMaximum() { this->SetCompounding(MAXIMUM); }
+  void SetCompoundingToLatest() { this->SetCompounding(LATEST); }
+  void SetCompoundingToAlpha() { this->SetCompounding(ALPHA); }
+  void SetCompoundingToRunningMean() { this->SetCompounding(RUNNING_MEAN); }
+  std::string GetCompoundingAsString() { return this->GetParameterAsText("Compounding"); }
+  ///@}
+
+  ///@{
+  /** Opacity of a frame that is laid over the others. Used when Compounding is alpha. In (0, 1]; default 0.5. */
+  void SetAlpha(double value) { this->SetParameter("Alpha", value); }
+  double GetAlpha() { return this->GetParameter("Alpha"); }
+  ///@}
+
+  enum Betweens { NOTHING = 0, FORWARD = 1, BACKWARD = 2 };
+
+  ///@{
+  /**
+   * What lies between frames that follow each other: nothing; frames with pixels and matrices interpolated; or, backward, at each
+   * voxel a blend of what both frames show at its perpendicular feet. Default forward. There are NOTHING, FORWARD, BACKWARD.
+   */
+  void SetBetween(int value) { this->SetParameter("Between", value); }
+  int GetBetween() { return static_cast<int>(this->GetParameter("Between")); }
+  void SetBetweenToNothing() { this->SetBetween(NOTHING); }
+  void SetBetweenToForward() { this->SetBetween(FORWARD); }
+  void SetBetweenToBackward() { this->SetBetween(BACKWARD); }
+  std::string GetBetweenAsString() { return this->GetParameterAsText("Between"); }
   ///@}
 
   ///@{
   /**
-   * What becomes of a voxel that several pixels reach: their MEAN (default), the MAXIMUM, the LATEST frame's mean, each frame
-   * laid over the others with the opacity ALPHA, or the RUNNING_MEAN, the rounded mean that the Plus toolkit keeps, for
-   * comparison.
+   * No pixel moves further than this from one interpolated frame to the next. 0: 0.7 of the smallest spacing. Used when Between
+   * is forward. At least 0 mm; default 0.
    */
-  vtkSetClampMacro(Compounding, int, MEAN, RUNNING_MEAN);
-  vtkGetMacro(Compounding, int);
-  ///@}
-
-  ///@{
-  /** Opacity of a frame for ALPHA, in (0, 1]. Default 0.5. */
-  vtkSetMacro(Alpha, double);
-  vtkGetMacro(Alpha, double);
+  void SetStepMm(double value) { this->SetParameter("StepMm", value); }
+  double GetStepMm() { return this->GetParameter("StepMm"); }
   ///@}
 
   ///@{
   /**
-   * What lies between frames that follow each other: NOTHING; FORWARD (default), frames with pixels and matrices interpolated; or
-   * BACKWARD, where each voxel between the two planes blends what both show at its perpendicular feet.
+   * Frames between which a pixel moves further than this are not joined: the probe was lifted. Used when Between is forward or
+   * backward. Above 0 mm; default 10.
    */
-  vtkSetClampMacro(Between, int, NOTHING, BACKWARD);
-  vtkGetMacro(Between, int);
+  void SetMaximumGapMm(double value) { this->SetParameter("MaximumGapMm", value); }
+  double GetMaximumGapMm() { return this->GetParameter("MaximumGapMm"); }
   ///@}
 
-  ///@{
-  /** FORWARD: no pixel moves further than this from frame to frame, mm. 0 (default): 0.7 of the smallest spacing. */
-  vtkSetMacro(StepMm, double);
-  vtkGetMacro(StepMm, double);
-  ///@}
+  enum Holes { NONE = 0, MEAN_AROUND = 1, STICK = 2 };
 
   ///@{
-  /** Frames between which a pixel moves further than this, in mm, are not joined: the probe was lifted. Default 10. */
-  vtkSetMacro(MaximumGapMm, double);
-  vtkGetMacro(MaximumGapMm, double);
+  /**
+   * How voxels are filled that were not seen but lie between others that were: not at all; by the mean of the smallest cube that
+   * reaches across; or by linear interpolation along the shortest line across. Default mean-around. There are NONE, MEAN_AROUND,
+   * STICK.
+   */
+  void SetHoles(int value) { this->SetParameter("Holes", value); }
+  int GetHoles() { return static_cast<int>(this->GetParameter("Holes")); }
+  void SetHolesToNone() { this->SetHoles(NONE); }
+  void SetHolesToMeanAround() { this->SetHoles(MEAN_AROUND); }
+  void SetHolesToStick() { this->SetHoles(STICK); }
+  std::string GetHolesAsString() { return this->GetParameterAsText("Holes"); }
   ///@}
 
   ///@{
   /**
-   * What becomes of holes, voxels that were not seen between others that were: KEEP_HOLES; MEAN_AROUND (default), the mean of the
-   * smallest cube that reaches across; or STICK, linear interpolation along the shortest line across. See echorama::FillHoles.
+   * The widest gap that is filled, along one of 13 lines. 1: single voxels. Used when Holes is mean-around or stick. In [1, 100]
+   * voxels; default 1.
    */
-  vtkSetClampMacro(Holes, int, KEEP_HOLES, STICK);
-  vtkGetMacro(Holes, int);
+  void SetHoleReach(int value) { this->SetParameter("HoleReach", value); }
+  int GetHoleReach() { return static_cast<int>(this->GetParameter("HoleReach")); }
+  ///@}
+
+  enum Sectors { ALL = 0, DETECTED = 1, RECTANGLE = 2, FAN = 3 };
+
+  ///@{
+  /**
+   * Which part of the images goes into the volume, of what their valid regions allow. Detected: the sector is found by what
+   * changes from frame to frame, so that what a scanner prints stays out; all pixels, with a warning, where hardly anything
+   * changes or frames come live. Default detected. There are ALL, DETECTED, RECTANGLE, FAN.
+   */
+  void SetSector(int value) { this->SetParameter("Sector", value); }
+  int GetSector() { return static_cast<int>(this->GetParameter("Sector")); }
+  void SetSectorToAll() { this->SetSector(ALL); }
+  void SetSectorToDetected() { this->SetSector(DETECTED); }
+  void SetSectorToRectangle() { this->SetSector(RECTANGLE); }
+  void SetSectorToFan() { this->SetSector(FAN); }
+  std::string GetSectorAsString() { return this->GetParameterAsText("Sector"); }
+  ///@}
+
+  enum Grids { FITTED = 0, WORLD = 1 };
+
+  ///@{
+  /**
+   * How the grid lies when none is given: fitted to the data's own directions, or along the axes of the world. Default fitted.
+   * There are FITTED, WORLD.
+   */
+  void SetGrid(int value) { this->SetParameter("Grid", value); }
+  int GetGrid() { return static_cast<int>(this->GetParameter("Grid")); }
+  void SetGridToFitted() { this->SetGrid(FITTED); }
+  void SetGridToWorld() { this->SetGrid(WORLD); }
+  std::string GetGridAsString() { return this->GetParameterAsText("Grid"); }
   ///@}
 
   ///@{
-  /** The widest gap that is filled, in voxels along a line, in [1, 100]. Default 1: single voxels. */
-  vtkSetClampMacro(HoleReach, int, 1, 100);
-  vtkGetMacro(HoleReach, int);
+  /** Edge of a voxel when no grid is given. 0: the longer edge of a pixel. At least 0 mm; default 0. */
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
+  ///@}
+
+  ///@{
+  /** The first frame to use, counted from 0 in the order of time. At least 0; default 0. */
+  void SetFirstFrame(int value) { this->SetParameter("FirstFrame", value); }
+  int GetFirstFrame() { return static_cast<int>(this->GetParameter("FirstFrame")); }
+  ///@}
+
+  ///@{
+  /** The last frame to use. -1: the last of the sequence. At least -1; default -1. */
+  void SetLastFrame(int value) { this->SetParameter("LastFrame", value); }
+  int GetLastFrame() { return static_cast<int>(this->GetParameter("LastFrame")); }
+  ///@}
+
+  ///@{
+  /** Every n-th frame is used. At least 1; default 1. */
+  void SetFrameStep(int value) { this->SetParameter("FrameStep", value); }
+  int GetFrameStep() { return static_cast<int>(this->GetParameter("FrameStep")); }
+  ///@}
+
+  ///@{
+  /** What takes more memory (in 10^6 bytes) is refused. 0: what is free on this machine. At least 0 MB; default 0. */
+  void SetMemoryLimitMb(double value) { this->SetParameter("MemoryLimitMb", value); }
+  double GetMemoryLimitMb() { return this->GetParameter("MemoryLimitMb"); }
   ///@}
 
   ///@{
   /**
-   * Which part of the images goes into the volume, of what their ValidRegion allows: ALL; the sector that is DETECTED in the
-   * sequence (default), by what changes from frame to frame, with a fan or rectangle fitted to it; a RECTANGLE; or a FAN. Where
-   * what changes is too small for a sector (echorama::DetectSector), all pixels are taken, with a warning. Live there is nothing
-   * to detect: DETECTED is then ALL.
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
    */
-  vtkSetClampMacro(Sector, int, ALL, FAN);
-  vtkGetMacro(Sector, int);
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
   ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+
+  enum { KEEP_HOLES = NONE }; ///< the same
 
   ///@{
   /** First and last column, first and last row of RECTANGLE, inclusive. Default: 0 to 2147483647. */
@@ -151,34 +256,6 @@ public:
   vtkGetVector2Macro(FanAngles, double);
   vtkSetVector2Macro(FanDepths, double);
   vtkGetVector2Macro(FanDepths, double);
-  ///@}
-
-  ///@{
-  /** How the grid lies when none is given: FITTED to the data's own directions (default), or along the axes of the WORLD. */
-  vtkSetClampMacro(Grid, int, FITTED, WORLD);
-  vtkGetMacro(Grid, int);
-  ///@}
-
-  ///@{
-  /** Edge of a voxel, mm, when no grid is given. 0 (default): the longer edge of a pixel. */
-  vtkSetMacro(SpacingMm, double);
-  vtkGetMacro(SpacingMm, double);
-  ///@}
-
-  ///@{
-  /** Frames to use, counted from 0 in the order of time: from the first to the last (-1, default: to the end), every n-th. */
-  vtkSetClampMacro(FirstFrame, int, 0, VTK_INT_MAX);
-  vtkGetMacro(FirstFrame, int);
-  vtkSetClampMacro(LastFrame, int, -1, VTK_INT_MAX);
-  vtkGetMacro(LastFrame, int);
-  vtkSetClampMacro(FrameStep, int, 1, VTK_INT_MAX);
-  vtkGetMacro(FrameStep, int);
-  ///@}
-
-  ///@{
-  /** Refuse what takes more memory than this, in 10^6 bytes. 0 (default): what is free on this machine. */
-  vtkSetMacro(MemoryLimitMb, double);
-  vtkGetMacro(MemoryLimitMb, double);
   ///@}
 
   ///@{
@@ -221,6 +298,10 @@ public:
   static const char* ReportName() { return "ReconstructionReport"; }
   ///@}
 
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
+
 protected:
   vtkUltrasoundVolumeReconstructor();
   ~vtkUltrasoundVolumeReconstructor() override;
@@ -239,7 +320,6 @@ private:
   struct Plan;
   struct Live;
   const Plan& Prepare(vtkInformationVector** inputs, const echorama::Progress& progress);
-  echorama::ReconstructionParameters Parameters() const;
   echorama::SectorParameters GivenSector() const;
   void Begin(const echorama::ImageGeometry& grid, int type);
   void Refuse(const std::string& reason);
@@ -255,30 +335,22 @@ private:
   vtkUltrasoundVolumeReconstructor(const vtkUltrasoundVolumeReconstructor&) = delete;
   void operator=(const vtkUltrasoundVolumeReconstructor&) = delete;
 
-  int Splat = NEAREST;
-  int Compounding = MEAN;
-  int Between = FORWARD;
-  int Holes = MEAN_AROUND;
-  int Sector = DETECTED;
+#ifndef __VTK_WRAP__
+  echorama::ReconstructionParameters Making;
+  echorama::HoleFillingParameters Filling;
+  echorama::SectorChoice Part = echorama::SectorParameters().choice;
+  echorama::GridDirections Directions = echorama::GridDirections::Fitted;
+  std::unique_ptr<Plan> Prepared;
+  std::unique_ptr<Live> LiveVolume;
+#endif
   int Rectangle[4] = {0, VTK_INT_MAX, 0, VTK_INT_MAX};
   double FanApex[2] = {0.0, 0.0};
   double FanAngles[2] = {-30.0, 30.0};
   double FanDepths[2] = {0.0, 100.0};
-  int Grid = FITTED;
-  double SpacingMm = 0.0;
-  int FirstFrame = 0;
-  int LastFrame = -1;
-  int FrameStep = 1;
-  double MemoryLimitMb = 0.0;
+  double Spacing = 0.0;
+  int From = 0, To = -1, EveryNth = 1; // frames
+  double MostMemoryMb = 0.0;
   bool Stopped = false; // while information was made
-#ifndef __VTK_WRAP__
-  double Alpha = echorama::ReconstructionParameters().alpha;
-  double StepMm = echorama::ReconstructionParameters().stepMm;
-  double MaximumGapMm = echorama::ReconstructionParameters().maximumGapMm;
-  int HoleReach = echorama::HoleFillingParameters().reach;
-  std::unique_ptr<Plan> Prepared;
-  std::unique_ptr<Live> LiveVolume;
-#endif
 };
 
 #endif

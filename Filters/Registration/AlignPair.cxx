@@ -290,30 +290,11 @@ private:
   double largestTurn_ = HUGE_VAL, largestMoveMm_ = HUGE_VAL; // from the start, radians and mm
 };
 
-// The start's names, how far it may be off, and whether the whole world is searched when that has no clear answer.
-constexpr std::array<const char*, 4> StartNames{"automatic", "tracked", "hand-made", "unknown"};
-
 } // namespace
-
-const char* NameOf(AlignStart start)
-{
-  return StartNames[static_cast<std::size_t>(start)];
-}
 
 std::vector<std::string> AlignStartNames()
 {
-  return {StartNames.begin(), StartNames.end()};
-}
-
-AlignStart AlignStartOf(const std::string& name)
-{
-  std::string names;
-  for (std::size_t i = 0; i < StartNames.size(); ++i) {
-    if (name == StartNames[i])
-      return static_cast<AlignStart>(i);
-    names += (names.empty() ? "" : ", ") + std::string(StartNames[i]);
-  }
-  throw Error(Error::Kind::InvalidParameter, "there is no start named \"" + name + "\"; the names are: " + names);
+  return {"automatic", "tracked", "hand-made", "unknown"};
 }
 
 const char* NameOf(Verdict verdict)
@@ -321,28 +302,38 @@ const char* NameOf(Verdict verdict)
   return verdict == Verdict::Aligned ? "aligned" : verdict == Verdict::Ambiguous ? "ambiguous" : "failed";
 }
 
-void AlignPairParameters::Check() const
+ParameterList Describe(AlignPairParameters& p)
 {
-  const auto check = [](const char* name, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter,
-                  std::string(name) + " must be in [" + Number(from, 2) + ", " + Number(to, 2) + "]; it is " + Number(value, 4));
+  return {
+      Parameter("Start", Choice(p.start, AlignStartNames()).ByName(),
+                "What is known about where the volumes belong: tracked, within some 12 degrees and 20 mm; hand-made, within some "
+                "35 degrees and a third of a volume; unknown, nothing; automatic, one after the other while there is no clear "
+                "answer."),
+      Parameter("Metric", Choice(p.metric, MetricNames()),
+                "The likeness that refines poses: normalised cross-correlation, local or over the whole overlap, the mean "
+                "absolute difference, self-similarity descriptors, or local linear correlation of intensity and gradient."),
+      Parameter("MinimumOverlap", p.minimumOverlap, {0.01, 1}, "",
+                "The share of the smaller volume of a pair that must lie in the other for a pose to count."),
+      Parameter("FinestMm", p.finestMm, {0, 1000}, "mm",
+                "Refinement ends at voxels not smaller than this; larger is faster and less exact. 0: at the volumes' own."),
+      Parameter("Candidates", p.candidates, {1, MostCandidates}, "",
+                "Poses of the global search that are refined, four times as many when every rotation is tried.")
+          .Advanced(),
+      Parameter("MinimumSimilarity", p.minimumSimilarity, {0, 1}, "",
+                "Less similarity in the overlap (1 identical, 0 chance) is failed.")
+          .Advanced(),
+      Parameter("MinimumPeakRatio", p.minimumPeakRatio, {1, HighestRatio}, "",
+                "A smaller ratio of the best evidence to that of the next different pose is ambiguous.")
+          .Advanced(),
+      Parameter("MaximumErrorVoxels", p.maximumErrorVoxels, {1e-3, 1000}, "voxels", "A larger predicted error is ambiguous.")
+          .Advanced(),
+      Parameter("MaximumSplitVoxels", p.maximumSplitVoxels, {1e-3, 1000}, "voxels",
+                "Poses found from two halves of the voxels that lie further apart are failed.")
+          .Advanced(),
+      Parameter("Points", p.points, ComparedPoints, "", "Random points of each volume that are compared on each level.")
+          .Advanced(),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed draws the same points.").Advanced(),
   };
-  check("minimumOverlap", minimumOverlap, 0.01, 1.0);
-  check("candidates", candidates, 1, MostCandidates);
-  check("finestMm", finestMm, 0.0, 1000.0);
-  check("points", points, 1000, 1e7);
-  check("minimumSimilarity", minimumSimilarity, 0.0, 1.0);
-  check("minimumPeakRatio", minimumPeakRatio, 1.0, HighestRatio);
-  check("maximumErrorVoxels", maximumErrorVoxels, 1e-3, 1000.0);
-  check("maximumSplitVoxels", maximumSplitVoxels, 1e-3, 1000.0);
-  const std::vector<std::string> metrics = MetricNames();
-  if (std::find(metrics.begin(), metrics.end(), metric) == metrics.end()) {
-    std::string names;
-    for (const std::string& name : metrics)
-      names += (names.empty() ? "" : ", ") + name;
-    throw Error(Error::Kind::InvalidParameter, "there is no metric named \"" + metric + "\"; the metrics are: " + names);
-  }
 }
 
 Information CovarianceOf(const Information& information, double radiusMm)
@@ -392,7 +383,7 @@ PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const M
                         const PlacedVolume& moving, const std::shared_ptr<const MetricPyramid>& movingFeatures,
                         const AlignPairParameters& p, const Progress& progress)
 {
-  p.Check();
+  CheckRanges(p);
   Pair pair(fixed, *fixedFeatures, moving, *movingFeatures, p);
   struct Stage {
     AlignStart start;

@@ -16,10 +16,8 @@ enum class AlignStart {
   Unknown,   ///< any rotation and any translation
 };
 
-/// "automatic", "tracked", "hand-made", "unknown"; and back. AlignStartOf throws Error(InvalidParameter) that lists the names.
-const char* NameOf(AlignStart);
+/// "automatic", "tracked", "hand-made", "unknown".
 std::vector<std::string> AlignStartNames();
-AlignStart AlignStartOf(const std::string& name);
 
 /// What an alignment is worth.
 enum class Verdict {
@@ -35,20 +33,19 @@ const char* NameOf(Verdict);
 struct AlignPairParameters {
   AlignStart start = AlignStart::Automatic;
   std::string metric = "local-ncc"; ///< of the local stage, one of MetricNames()
-  double minimumOverlap = 0.1;      ///< share of the smaller volume, [0.01, 1]: poses with less do not count
-  int candidates = 16;              ///< poses of the global stage that are refined, four times as many for Unknown, [1, 1000]
-  double finestMm = 0.0;            ///< the local stage ends at voxels not smaller than this, mm; 0: the volumes' own
-  int points = 200000;              ///< of each volume that the local stage compares on a level, at most, [1000, 10 million]
+  double minimumOverlap = 0.1;
+  int candidates = 16;
+  double finestMm = 0.0;
+  int points = 200000;
 
-  double minimumSimilarity = 0.06; ///< of the overlap, [0, 1]: less is Failed
-  double minimumPeakRatio = 1.25;  ///< evidence of the best pose : of the next different one, [1, 99]: less is Ambiguous
-  double maximumErrorVoxels = 1.0; ///< predicted root mean square error over the moving volume, > 0: more is Ambiguous
-  double maximumSplitVoxels = 2.0; ///< how far the poses that two halves of the voxels find may lie apart, > 0: more is Failed
-  std::uint64_t seed = 1;          ///< of the points that are compared
-
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
-  void Check() const;
+  double minimumSimilarity = 0.06; ///< less is Failed
+  double minimumPeakRatio = 1.25;  ///< less is Ambiguous
+  double maximumErrorVoxels = 1.0; ///< more is Ambiguous
+  double maximumSplitVoxels = 2.0; ///< more is Failed
+  std::uint64_t seed = 1;
 };
+
+ParameterList Describe(AlignPairParameters& p);
 
 /// Where the moving volume belongs beside the fixed one, and how sure that is.
 struct PairAlignment {

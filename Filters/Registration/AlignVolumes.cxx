@@ -522,24 +522,25 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
 
 } // namespace
 
-void AlignVolumesParameters::Check() const
+ParameterList Describe(AlignVolumesParameters& p)
 {
-  pair.Check();
-  const auto check = [](bool good, const char* message) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, message);
-  };
-  check(pairsPerVolume >= 1 && pairsPerVolume <= 1000, "pairsPerVolume must be in [1, 1000]");
-  check(rounds >= 1 && rounds <= 5, "rounds must be in [1, 5]");
-  check(floorVoxels >= 0.0 && floorVoxels <= 10.0, "floorVoxels must be in [0, 10]");
-  check(outlierVoxels >= 0.0 && outlierVoxels <= 100.0, "outlierVoxels must be in [0, 100]");
-  check(outlierSigmas > 0.0 && outlierSigmas <= 1000.0, "outlierSigmas must be in (0, 1000]");
+  return Join(
+      {Describe(p.pair),
+       {Parameter("PairsPerVolume", p.pairsPerVolume, {1, 1000}, "",
+                  "A volume is paired with so many others, those that it overlaps most."),
+        Parameter("Rounds", p.rounds, {1, 5}, "",
+                  "1: every pair is aligned once; more: pairs are aligned again from where the others place them."),
+        Parameter("FloorVoxels", p.floorVoxels, {0, 10}, "voxels",
+                  "No pair is believed to be better than this standard deviation."),
+        Parameter("OutlierVoxels", p.outlierVoxels, {0, 100}, "voxels", "Pairs that disagree by less are never voted down."),
+        Parameter("OutlierSigmas", p.outlierSigmas, {0, 1000, true}, "standard deviations",
+                  "Nor are those that disagree by less of their own.")}});
 }
 
 AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fixed, const AlignVolumesParameters& p,
                                 const Progress& progress, const PairAligner& aligner)
 {
-  p.Check();
+  CheckRanges(p);
   const std::size_t count = volumes.size();
   if (count < 2)
     throw Error(Error::Kind::BadInput,
@@ -557,7 +558,14 @@ AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fi
   for (const PlacedVolume& volume : volumes)
     if (!volume.pyramid || volume.pyramid->empty())
       throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");
-  return Alignment(volumes, fixed, p, aligner).Run(progress);
+  AlignVolumesResult result = Alignment(volumes, fixed, p, aligner).Run(progress);
+  for (std::size_t v = 0; v < count; ++v) {
+    constexpr double FarMm = 100.0; // where what nothing is known of is 1 km off
+    result.volumes[v].name = volumes[v].name;
+    if (v != Index(fixed))
+      result.volumes[v].covariance = CovarianceOf(result.volumes[v].information, FarMm);
+  }
+  return result;
 }
 
 } // namespace echorama

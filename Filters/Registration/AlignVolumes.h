@@ -13,27 +13,26 @@ using PairAligner = std::function<PairAlignment(
 /// Which pairs are aligned, and when a pair is voted down.
 struct AlignVolumesParameters {
   AlignPairParameters pair; ///< of every pair
-  /// Volumes that stay where they are beside the fixed one: the others are aligned with all of them.
-  std::vector<int> held;
-  int pairsPerVolume = 6; ///< a volume is paired with so many others, those it overlaps most, [1, 1000]
-  int rounds = 2; ///< 1: every pair is aligned once; more: pairs are aligned again from where the others place them, [1, 5]
-  double floorVoxels = 0.3;   ///< no pair is believed to be better than this standard deviation, voxels, [0, 10]
-  double outlierVoxels = 2.0; ///< pairs that disagree by less are never voted down, voxels, [0, 100]
-  double outlierSigmas = 6.0; ///< nor are those that disagree by less of their standard deviations, (0, 1000]
-  std::uint64_t seed = 1;     ///< of the pose graph's trees
-
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
-  void Check() const;
+  std::vector<int> held;    ///< stay where they are beside the fixed one: the others are aligned with all of them
+  int pairsPerVolume = 6;
+  int rounds = 2;
+  double floorVoxels = 0.3;
+  double outlierVoxels = 2.0, outlierSigmas = 6.0;
+  std::uint64_t seed = 1; ///< of the pose graph's trees
 };
+
+ParameterList Describe(AlignVolumesParameters& p);
 
 /// Where a volume belongs, and how sure that is.
 struct VolumeAlignment {
+  std::string name;
   Pose volumeToWorld = Pose::Identity(); ///< where it started if it Failed
   Verdict verdict = Verdict::Failed;     ///< the fixed volume and those held are Aligned
   std::string reason;                    ///< why it is not Aligned, for people; else empty
   /// Inverse covariance, relative to the fixed volume, of (translation mm, rotation vector radians) in
   /// MotionAbout(centre, rotation, translation) * volumeToWorld; zero for the fixed volume, those held and those that Failed.
   Information information = Information::Zero();
+  Information covariance = Information::Zero();     ///< CovarianceOf() it; zero for the fixed volume
   Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world
   double overlap = 0.0;                             ///< of the pair that stands and overlaps most, share of the smaller volume
   double similarity = 0.0;                          ///< mean of the pairs that stand, by overlap

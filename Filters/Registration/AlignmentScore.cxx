@@ -10,6 +10,17 @@
 #include <cmath>
 
 namespace echorama {
+
+ParameterList Describe(ScoreParameters& p)
+{
+  return {
+      Parameter("FixedVolume", p.fixedVolume, {0, Unlimited}, "",
+                "The volume that alignment and truth are taken to agree on, counted from 0."),
+      Parameter("Points", p.points, {1, 1e7}, "", "Points of each volume that are scored."),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed draws the same points.").Advanced(),
+  };
+}
+
 namespace {
 
 void Check(const ScoredVolume& volume)

@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ImageGeometry.h"
 #include <string>
 #include <vector>
 
 namespace echorama {
+
+/// What is scored: the same seed draws the same points of a volume (ValidPoints), so that scores are comparable.
+struct ScoreParameters {
+  int fixedVolume = 0;
+  int points = 2000;
+  std::uint64_t seed = 1;
+};
+
+ParameterList Describe(ScoreParameters& p);
 
 /// A volume to be scored: where an alignment put it, where it belongs, and the points that speak for it.
 struct ScoredVolume {

@@ -8,7 +8,6 @@
 // The matrix couples control points at most three apart: it is kept as a stencil of 7^3 blocks of 3 x 3 per control point, the
 // penalty is added to it, and conjugate gradients solve it (LatticeEquations).
 #include "DeformableAlign.h"
-#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -422,20 +421,28 @@ void CheckVolume(const DeformableVolume& volume)
 
 } // namespace
 
-void DeformableAlignParameters::Check() const
+ParameterList Describe(DeformableAlignParameters& p)
 {
-  CheckRange("ControlSpacingMm", controlSpacingMm, 5.0, 500.0);
-  CheckRange("BendingWeight", bendingWeight, 1e-6, 1e12);
-  CheckRange("Levels", levels, 1, 6);
-  CheckRange("Iterations", iterations, 1, 1000);
-  CheckRange("FinestMm", finestMm, 0.01, 100.0);
-  CheckRange("MinimumOverlap", minimumOverlap, 0.001, 1.0);
+  return {
+      Parameter("ControlSpacingMm", p.controlSpacingMm, {5, 500}, "mm",
+                "Distance of the control points: about the size of what can bend by itself."),
+      Parameter("BendingWeight", p.bendingWeight, {1e-6, 1e12}, "per mm",
+                "How stiff tissue is taken to be. A lower one follows larger deformations and more noise."),
+      Parameter("Levels", p.levels, {1, 6}, "", "Resolutions, each half as fine as the next.").Advanced(),
+      Parameter("Iterations", p.iterations, {1, 1000}, "", "Steps per resolution, at most.").Advanced(),
+      Parameter("FinestMm", p.finestMm, {0.01, 100}, "mm",
+                "Voxels of the last resolution are about this large. Finer is slower and more exact.")
+          .Advanced(),
+      Parameter("MinimumOverlap", p.minimumOverlap, {0.001, 1}, "",
+                "The share of a volume that must lie in others for it to be bent.")
+          .Advanced(),
+  };
 }
 
 DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed, const DeformableVolume& moving,
                                       const DeformableAlignParameters& parameters, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   if (fixed.empty())
     throw Error(Error::Kind::BadInput, "deformable alignment needs at least one fixed volume");
   CheckVolume(moving);
@@ -544,7 +551,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
 std::vector<DeformableAlignResult> DeformInTurn(const std::vector<DeformableVolume>& volumes, int fixed,
                                                 const DeformableAlignParameters& parameters, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   const int count = static_cast<int>(volumes.size());
   if (count < 2)
     throw Error(Error::Kind::BadInput, "deformable alignment needs at least two volumes, got " + std::to_string(count));

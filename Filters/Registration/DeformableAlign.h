@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Imaging/DisplacementField.h"
 #include "LocalAlign.h"
 
@@ -13,16 +14,15 @@ struct DeformableVolume {
 };
 
 struct DeformableAlignParameters {
-  double controlSpacingMm = 30.0; ///< of the lattice, mm, [5, 500]; about the size of what can be told apart
-  double bendingWeight = 2000.0;  ///< of the bending energy, in voxels that agree as little as they do, per mm, [1e-6, 1e12]
-  int levels = 2;               ///< resolutions, each half as fine as the next, [1, 6]; the lattice of the first is twice as wide
-  int iterations = 15;          ///< per resolution, at most, [1, 1000]
-  double finestMm = 1.0;        ///< voxels of the last level are about this large, mm, [0.01, 100]
-  double minimumOverlap = 0.02; ///< share of the moving volume that must lie in others, by weight, [0.001, 1]
-
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
-  void Check() const;
+  double controlSpacingMm = 30.0; ///< twice as much on the first level
+  double bendingWeight = 2000.0;  ///< of the bending energy, in voxels that agree as little as they do
+  int levels = 2;
+  int iterations = 15;
+  double finestMm = 1.0;
+  double minimumOverlap = 0.02; ///< by weight
 };
+
+ParameterList Describe(DeformableAlignParameters& p);
 
 struct DeformableAlignResult {
   DisplacementField field;          ///< pull-back of the moving volume in the world; zero when it is not applied

@@ -26,7 +26,6 @@ namespace {
 using Complex = MaskedCorrelator::Complex;
 
 // All measured (BenchmarkGlobalSearch).
-constexpr double DefaultStepDegrees = 20.0;
 constexpr double CoarseVoxels = 2.0;         // edge of the voxels that are correlated, in voxels of the resolution asked for
 constexpr double FewestCoarseVoxels = 500.0; // of the smaller volume, where its own resolution allows it
 constexpr int MostVoxels = 128;              // along the longest side of the larger volume
@@ -594,19 +593,23 @@ double CoarseEdge(const Region& fixed, const Region& moving, int resolution)
 
 } // namespace
 
+ParameterList Describe(GlobalSearchParameters& p)
+{
+  return {
+      Parameter("ConeDegrees", p.coneDegrees, {0, 180}, "degrees", "Rotations about the start by more are not tried."),
+      Parameter("MinimumOverlap", p.minimumOverlap, {0, 1, true}, "",
+                "The least share of the smaller valid region in the other."),
+      Parameter("Resolution", p.resolution, {16, 96}, "voxels", "Voxels along the longest side of the larger valid region."),
+      Parameter("StepDegrees", p.stepDegrees, {2, 45}, "degrees", "Between neighbouring rotations."),
+      Parameter("Candidates", p.candidates, {1, 1000}, "", "How many distinct poses are kept."),
+  };
+}
+
 void GlobalSearchParameters::Check() const
 {
-  const auto check = [](bool good, const char* message) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, message);
-  };
-  check(coneDegrees >= 0.0 && coneDegrees <= 180.0, "the cone of rotations must be in [0, 180] degrees");
-  check(reachMm > 0.0, "the reach must be more than 0 mm");
-  check(minimumOverlap > 0.0 && minimumOverlap <= 1.0, "the minimum overlap must be in (0, 1]");
-  check(resolution >= 16 && resolution <= 96, "the resolution must be in [16, 96] voxels");
-  check(stepDegrees == 0.0 || (stepDegrees >= 2.0 && stepDegrees <= 45.0),
-        "the step between rotations must be in [2, 45] degrees, or 0");
-  check(candidates >= 1 && candidates <= 1000, "the number of candidates must be in [1, 1000]");
+  CheckRanges(*this);
+  if (!(reachMm > 0.0))
+    throw Error(Error::Kind::InvalidParameter, "the reach must be more than 0 mm");
 }
 
 GlobalSearchResult GlobalSearch(const PlacedVolume& fixed, const PlacedVolume& moving, const GlobalSearchParameters& p,
@@ -626,9 +629,8 @@ GlobalSearchResult GlobalSearch(const PlacedVolume& fixed, const PlacedVolume& m
   const Pose fixedToWorld = fixed.volumeToWorld * fixedRegion.toVolume,
              movingToWorld = moving.volumeToWorld * movingRegion.toVolume;
   const Eigen::Vector3d start = fixedToWorld.inverse() * movingToWorld.translation();
-  const double stepDegrees = p.stepDegrees > 0.0 ? p.stepDegrees : DefaultStepDegrees;
-  const double stepMm = stepDegrees * RadiansPerDegree * movingRegion.MmPerRadian();
-  std::vector<Eigen::Matrix3d> turns = RotationCover(p.coneDegrees, stepDegrees);
+  const double stepMm = p.stepDegrees * RadiansPerDegree * movingRegion.MmPerRadian();
+  std::vector<Eigen::Matrix3d> turns = RotationCover(p.coneDegrees, p.stepDegrees);
   for (Eigen::Matrix3d& turn : turns)
     turn = fixedToWorld.linear().transpose() * turn * movingToWorld.linear();
   const std::ptrdiff_t rotations = static_cast<std::ptrdiff_t>(turns.size());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "PlacedVolume.h"
 #include "RotationCover.h"
@@ -11,16 +12,19 @@ namespace echorama {
 
 /// Which poses the global search looks at, and how closely.
 struct GlobalSearchParameters {
-  double coneDegrees = 180.0; ///< rotations by at most so much about the start are tried, [0, 180]; 180: all there are
+  double coneDegrees = 180.0;
   double reachMm = std::numeric_limits<double>::infinity(); ///< the valid centroid moves at most so far from the start, > 0
-  double minimumOverlap = 0.1; ///< of the smaller volume's valid region, (0, 1]: poses with less do not count
-  int resolution = 40;         ///< voxels along the longest side of the larger valid region, [16, 96]
-  double stepDegrees = 0.0;    ///< between neighbouring rotations, [2, 45]; 0: 20
-  int candidates = 12;         ///< how many distinct poses are kept, [1, 1000]
+  double minimumOverlap = 0.1;
+  int resolution = 40;
+  double stepDegrees = 20.0;
+  int candidates = 12;
 
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  /// \throws Error(InvalidParameter)
   void Check() const;
 };
+
+/// All but the reach, which may be infinite.
+ParameterList Describe(GlobalSearchParameters& p);
 
 /// A pose that looks right at low resolution.
 struct GlobalCandidate {

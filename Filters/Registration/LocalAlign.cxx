@@ -81,7 +81,7 @@ public:
               const LocalAlignParameters& p)
     : p_(p), fixedToWorld_(fixedToWorld), start_(movingToWorld), pose_(movingToWorld)
   {
-    p.Check();
+    CheckRanges(p);
     if (fixed.metric != moving.metric || fixed.levels.empty() || moving.levels.empty())
       throw Error(Error::Kind::BadInput, fixed.name + " and " + moving.name +
                                              " cannot be compared: they were prepared for different metrics (" + fixed.metric +
@@ -281,19 +281,22 @@ private:
 
 } // namespace
 
-void LocalAlignParameters::Check() const
+ParameterList Describe(LocalAlignParameters& p)
 {
-  const auto check = [](bool good, const char* message) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, message);
+  return {
+      Parameter("CoarsestMm", p.coarsestMm, {0, Unlimited}, "mm",
+                "The first level is the coarsest whose voxels are not larger. 0: the coarsest of both volumes."),
+      Parameter("FinestMm", p.finestMm, {0, Unlimited}, "mm",
+                "The last level is the finest whose voxels are not smaller. 0: the finest of both volumes."),
+      Parameter("Iterations", p.iterations, {1, 1000}, "", "Steps on a level, at most."),
+      Parameter("Points", p.points, ComparedPoints, "", "Random points of each volume that are compared on each level, at most."),
+      Parameter("MinimumOverlap", p.minimumOverlap, {0.001, 1}, "",
+                "Steps to less overlap are not taken, as a share of the smaller volume."),
+      Parameter("StopVoxels", p.stopVoxels, {1e-7, 0.002}, "voxels",
+                "The last level ends with a step that moves no point further."),
+      Parameter("Part", p.part, {0, 2}, "",
+                "0: all points; 1 or 2: one of two disjoint halves, a 3D checkerboard of blocks of 12 voxels."),
   };
-  check(coarsestMm >= 0.0, "the coarsest voxel size must not be negative");
-  check(finestMm >= 0.0, "the finest voxel size must not be negative");
-  check(iterations >= 1 && iterations <= 1000, "the number of iterations must be in [1, 1000]");
-  check(points >= 100 && points <= 10000000, "the points must be in [100, 10000000]");
-  check(minimumOverlap >= 0.001 && minimumOverlap <= 1.0, "the minimum overlap must be in [0.001, 1]");
-  check(stopVoxels >= 1e-7 && stopVoxels <= 0.002, "the step that ends must be in [1e-7, 0.002] voxels");
-  check(part >= 0 && part <= 2, "the part must be 0, 1 or 2");
 }
 
 LocalAlignResult LocalAlign(const MetricPyramid& fixed, const Pose& fixedToWorld, const MetricPyramid& moving,

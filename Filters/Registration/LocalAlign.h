@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "PlacedVolume.h"
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 namespace echorama {
 
-/// The metrics by name, the default first: "local-ncc", "ncc", "mind-ssc", "lc2".
+/// The metrics by name, the default first: "local-ncc", "ncc", "mad", "mind-ssc", "lc2".
 std::vector<std::string> MetricNames();
 
 /// What a metric sees of one volume at each of its resolutions. It owns all it needs: the pyramid that it was built from
@@ -24,20 +25,21 @@ class MetricPyramid;
 std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volume, const std::string& metric,
                                                         const Progress& progress = {});
 
+/// How many random points of a volume can be compared.
+inline constexpr ParameterRange ComparedPoints{100, 1e7};
+
 /// How the local alignment goes. The defaults serve volumes within some 10 degrees and 15 voxels of where they belong.
 struct LocalAlignParameters {
-  double coarsestMm = 0.0;      ///< first level: the coarsest whose voxels are not larger, mm (0: the coarsest of both), >= 0
-  double finestMm = 0.0;        ///< last level: the finest whose voxels are not smaller, mm (0: the finest of both), >= 0
-  int iterations = 30;          ///< per level, at most, [1, 1000]
-  int points = 200000;          ///< drawn in each volume on each level, at most, [100, 10 million]
-  double minimumOverlap = 0.05; ///< steps to less overlap are not taken, share of the smaller volume, [0.001, 1]
-  double stopVoxels = 0.002;    ///< the last level ends with a step that moves no point further, voxels, [1e-7, 0.002]
-  int part = 0;                 ///< 0: all points; 1 or 2: one of two disjoint halves, a 3D checkerboard of blocks of 12 voxels
-  std::uint64_t seed = 1;       ///< of the points
-
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
-  void Check() const;
+  double coarsestMm = 0.0, finestMm = 0.0;
+  int iterations = 30;
+  int points = 200000;
+  double minimumOverlap = 0.05;
+  double stopVoxels = 0.002;
+  int part = 0;
+  std::uint64_t seed = 1; ///< of the points
 };
+
+ParameterList Describe(LocalAlignParameters& p);
 
 /// Of (translation in mm, rotation vector in radians).
 using Information = Eigen::Matrix<double, 6, 6>;

@@ -11,7 +11,7 @@ constexpr std::ptrdiff_t FewestOfLevel = 200;
 
 const std::vector<const Metric*>& Metrics()
 {
-  static const std::vector<const Metric*> metrics{&LocalNccMetric, &NccMetric, &MindSscMetric, &Lc2Metric};
+  static const std::vector<const Metric*> metrics{&LocalNccMetric, &NccMetric, &MadMetric, &MindSscMetric, &Lc2Metric};
   return metrics;
 }
 

@@ -54,10 +54,13 @@ struct Metric {
   void (*see)(const MetricSource& source, MetricLevel& level);
 };
 
-extern const Metric LocalNccMetric, NccMetric, MindSscMetric, Lc2Metric;
+extern const Metric LocalNccMetric, NccMetric, MadMetric, MindSscMetric, Lc2Metric;
 
 /// \throws Error(InvalidParameter) for a name that is not one of MetricNames().
 const Metric& MetricNamed(const std::string& name);
+
+/// Sees intensities brought to mean 0 and deviation 1 over the volume (ncc, mad, lc2).
+void SeeIntensity(const MetricSource& source, MetricLevel& level);
 
 /// What both volumes say at one pose. Sums are over points of both, each point by the volume of tissue it stands for.
 struct MetricSums {

@@ -9,9 +9,6 @@
 #include <cmath>
 
 namespace echorama {
-
-void SeeIntensity(const MetricSource& source, MetricLevel& level);
-
 namespace {
 
 void SeeLc2(const MetricSource& source, MetricLevel& level)

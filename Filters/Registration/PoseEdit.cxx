@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "PoseEdit.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/Error.h"
 #include <cmath>
 
 namespace echorama {
+
+ParameterList Describe(PoseEdit& p)
+{
+  return {
+      Parameter("Translation", p.translationMm, {}, "mm", "Motion along the axes of the world, after the rotation."),
+      Parameter("Rotation", p.degrees, {}, "degrees", "Turns about the axes of the world: about y first, then x, then z."),
+      Parameter("Centre", p.centreMm, {}, "mm", "The point that the rotation turns about."),
+  };
+}
+
 namespace {
 
 Eigen::Matrix3d TurnAbout(int axis, double degrees)
@@ -27,11 +36,10 @@ Eigen::Matrix3d TurnAbout(int axis, double degrees)
 
 Pose PoseEdit::Motion() const
 {
+  CheckRanges(*this);
   Pose motion = Pose::Identity();
   motion.linear() = TurnAbout(2, degrees.z()) * TurnAbout(0, degrees.x()) * TurnAbout(1, degrees.y());
   motion.translation() = centreMm - motion.linear() * centreMm + translationMm;
-  if (!motion.matrix().allFinite())
-    throw Error(Error::Kind::InvalidParameter, "Translation, Rotation and Centre must be numbers");
   return motion;
 }
 

@@ -87,12 +87,12 @@ private:
     std::vector<Pose> poses;
   };
 
-  struct Judgement {
+  struct Gap {
     double mm, sigmas;
   };
 
   JoinedSets Joined(const Flags& used) const;
-  Judgement Judge(std::size_t e, const MarginalCovariances& covariances) const;
+  Gap GapOf(std::size_t e, const MarginalCovariances& covariances) const;
   Twist ResidualOf(std::size_t e) const
   {
     return Disagreement(edges_[e], poses[Index(edges_[e].from)], poses[Index(edges_[e].to)]);
@@ -332,7 +332,7 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
 }
 
 // How far an edge disagrees with what all the others that stand predict for it.
-Graph::Judgement Graph::Judge(std::size_t e, const MarginalCovariances& covariances) const
+Graph::Gap Graph::GapOf(std::size_t e, const MarginalCovariances& covariances) const
 {
   const Twist gap = ResidualOf(e), whitened = edges_[e].root * gap;
   const Information predicted = edges_[e].root * covariances.OfEdge(e) * edges_[e].root.transpose();
@@ -371,12 +371,12 @@ void Graph::Settle(const Flags& take, const Flags& keep)
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       if (!take[e] || (stands[e] && keep[e]) || (!stands[e] && falls[e] >= MostFalls))
         continue;
-      const Judgement judgement = Judge(e, covariances);
-      const bool isGood = judgement.mm <= p_.outlierMm || judgement.sigmas <= p_.outlierSigmas;
+      const Gap gap = GapOf(e, covariances);
+      const bool isGood = gap.mm <= p_.outlierMm || gap.sigmas <= p_.outlierSigmas;
       if (!stands[e])
         next[e] = isGood;
       else if (!isGood)
-        bad.push_back({-judgement.sigmas, e});
+        bad.push_back({-gap.sigmas, e});
     }
     bool isChanged = next != stands;
     stands = next;
@@ -582,25 +582,26 @@ void CheckGraph(const std::vector<Pose>& start, const std::vector<PoseEdge>& edg
 
 } // namespace
 
-void PoseGraphParameters::Check() const
+ParameterList Describe(PoseGraphParameters& p)
 {
-  const auto check = [](bool good, const char* message) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, message);
+  return {
+      Parameter("RadiusMm", p.radiusMm, {1, 10000}, "mm",
+                "Where a rotation is felt: it counts as the distance that it moves points so far away."),
+      Parameter("FloorMm", p.floorMm, {0, 100}, "mm", "Standard deviation added to every edge's own, at the radius."),
+      Parameter("OutlierMm", p.outlierMm, {0, 1000}, "mm", "Edges that disagree by less are never wrong."),
+      Parameter("OutlierSigmas", p.outlierSigmas, {0, 1000, true}, "standard deviations",
+                "Nor are edges that disagree by less of their own."),
+      Parameter("LossSigmas", p.lossSigmas, {0, 1000, true}, "standard deviations", "Scale of the robust (Cauchy) loss."),
+      Parameter("UndeterminedMm", p.undeterminedMm, {0, 1000, true}, "mm",
+                "A volume with a larger standard deviation in some direction is not determined."),
+      Parameter("Trees", p.trees, {1, 100000}, "", "Spanning trees that are tried as starts, at most."),
   };
-  check(radiusMm >= 1.0 && radiusMm <= 10000.0, "the radius of the pose graph must be in [1, 10000] mm");
-  check(floorMm >= 0.0 && floorMm <= 100.0, "the floor of standard deviations must be in [0, 100] mm");
-  check(outlierMm >= 0.0 && outlierMm <= 1000.0, "the distance of outliers must be in [0, 1000] mm");
-  check(outlierSigmas > 0.0 && outlierSigmas <= 1000.0, "the distance of outliers must be in (0, 1000] standard deviations");
-  check(lossSigmas > 0.0 && lossSigmas <= 1000.0, "the scale of the robust loss must be in (0, 1000] standard deviations");
-  check(undeterminedMm > 0.0 && undeterminedMm <= 1000.0, "the limit of what is determined must be in (0, 1000] mm");
-  check(trees >= 1 && trees <= 100000, "the number of spanning trees must be in [1, 100000]");
 }
 
 PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector<PoseEdge>& edges, int fixed,
                                const PoseGraphParameters& p, const Progress& progress)
 {
-  p.Check();
+  CheckRanges(p);
   CheckGraph(start, edges, fixed);
   const std::size_t volumes = start.size(), count = edges.size();
   std::vector<WeighedEdge> weighed;

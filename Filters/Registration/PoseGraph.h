@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <cstdint>
@@ -22,18 +23,16 @@ struct PoseEdge {
 
 /// When edges disagree so much that one of them must be wrong.
 struct PoseGraphParameters {
-  double radiusMm = 50.0;       ///< where a rotation is felt: it counts as the distance it moves points so far away, > 0
-  double floorMm = 0.3;         ///< standard deviation added to every edge's own, mm at the radius, >= 0: Hessians are optimistic
-  double outlierMm = 2.0;       ///< edges that disagree by less are never wrong, mm, >= 0
-  double outlierSigmas = 6.0;   ///< nor are edges that disagree by less of their standard deviations, > 0
-  double lossSigmas = 2.0;      ///< scale of the Cauchy loss, standard deviations, > 0
-  double undeterminedMm = 10.0; ///< a volume with a larger standard deviation in some direction is not determined, > 0
-  int trees = 100;              ///< spanning trees that are tried as starts, at most, >= 1
-  std::uint64_t seed = 1;       ///< of these trees
-
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
-  void Check() const;
+  double radiusMm = 50.0;
+  double floorMm = 0.3; ///< Hessians are optimistic
+  double outlierMm = 2.0, outlierSigmas = 6.0;
+  double lossSigmas = 2.0;
+  double undeterminedMm = 10.0;
+  int trees = 100;
+  std::uint64_t seed = 1; ///< of the spanning trees
 };
+
+ParameterList Describe(PoseGraphParameters& p);
 
 struct PoseGraphResult {
   std::vector<Pose> volumeToWorld; ///< per volume; the fixed one keeps its own, those not placed their start

@@ -465,14 +465,25 @@ Refined Refine(const Scene& scene, const VolumeView<const float>& intensity, con
 
 } // namespace
 
+ParameterList Describe(RigFitParameters& p)
+{
+  return {
+      Parameter("DepthScale", p.depthScale, {0, 1.1}, "",
+                "Depth in the image over true depth, at least 0.9: the scanner's speed of sound over the bath's, 1540 / 1482 in "
+                "water at 20 degrees Celsius. 0: found out from the distances between the balls."),
+      Parameter("ToleranceMm", p.toleranceMm, {0.1, 20}, "mm", "How far a ball may be from where the others say."),
+      Parameter("FewestBalls", p.fewestBalls, {3, 1000}, "", "Balls that must be found."),
+      Parameter("LargestRmsMm", p.largestRmsMm, {0.01, 20}, "mm",
+                "Root mean square distance of the balls from where the pose puts them, at most."),
+      Parameter("Candidates", p.candidates, {4, 1000}, "", "The volume's brightest echoes of their kind, that may be balls."),
+  };
+}
+
 void RigFitParameters::Check() const
 {
+  CheckRanges(*this);
   if (depthScale != 0.0)
-    CheckRange("rig fit: depthScale", depthScale, 0.9, 1.1);
-  CheckRange("rig fit: toleranceMm", toleranceMm, 0.1, 20.0);
-  CheckRange("rig fit: largestRmsMm", largestRmsMm, 0.01, 20.0);
-  CheckRange("rig fit: fewestBalls", fewestBalls, 3, 1000);
-  CheckRange("rig fit: candidates", candidates, 4, 1000);
+    CheckRange("rig fit: DepthScale", depthScale, 0.9, 1.1);
 }
 
 RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const unsigned char>& valid,

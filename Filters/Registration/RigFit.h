@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/ProbeGeometry.h"
@@ -17,16 +18,17 @@ struct RigBall {
 };
 
 struct RigFitParameters {
-  /// Depth in the image over true depth: the speed of sound that the scanner assumes over that of the bath, 1540 / 1482 in water
-  /// at 20 degrees Celsius. In [0.9, 1.1]; 0: found out from the distances between the balls.
   double depthScale = 0.0;
-  double toleranceMm = 3.0;  ///< how far a ball may be from where the others say, in [0.1, 20]
-  double largestRmsMm = 1.0; ///< of the balls from where the pose puts them, in [0.01, 20]: a chance likeness fits worse
-  int fewestBalls = 4;       ///< that must be found, in [3, 1000]
-  int candidates = 80;       ///< of the volume's echoes that may be balls, the brightest of their kind; in [4, 1000]
+  double toleranceMm = 3.0;
+  double largestRmsMm = 1.0; ///< a chance likeness fits worse
+  int fewestBalls = 4;
+  int candidates = 80;
 
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  /// \throws Error(InvalidParameter)
+  void Check() const;
 };
+
+ParameterList Describe(RigFitParameters& p);
 
 /// Where a rig is, as a volume shows it.
 struct RigFit {

@@ -37,9 +37,8 @@
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "Filters/Registration/AlignVolumes.h" // for the defaults
-#include <string>
-#include <vector>
+#include "Filters/Registration/AlignVolumes.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkMatrix4x4;
@@ -50,11 +49,117 @@ public:
   vtkTypeMacro(vtkUltrasoundAligner, vtkUltrasoundMultiBlockAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** The volume that stays where it is, counted from 0. Default 0. */
-  vtkSetClampMacro(FixedVolume, int, 0, VTK_INT_MAX);
-  vtkGetMacro(FixedVolume, int);
+  /** The volume that stays where it is, counted from 0. At least 0; default 0. */
+  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
+  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
   ///@}
+
+  ///@{
+  /** Whether shadowed and saturated voxels count less. Default on. */
+  void SetUseReliability(bool value) { this->SetParameter("UseReliability", value); }
+  bool GetUseReliability() { return this->GetParameter("UseReliability") != 0.0; }
+  void UseReliabilityOn() { this->SetUseReliability(true); }
+  void UseReliabilityOff() { this->SetUseReliability(false); }
+  ///@}
+
+  ///@{
+  /**
+   * What is known about where the volumes belong: tracked, within some 12 degrees and 20 mm; hand-made, within some 35 degrees
+   * and a third of a volume; unknown, nothing; automatic, one after the other while there is no clear answer. Default automatic.
+   * There are "automatic", "tracked", "hand-made", "unknown".
+   */
+  void SetStart(const char* value) { this->SetParameterAsText("Start", value); }
+  std::string GetStart() { return this->GetParameterAsText("Start"); }
+  ///@}
+
+  ///@{
+  /**
+   * The likeness that refines poses: normalised cross-correlation, local or over the whole overlap, the mean absolute difference,
+   * self-similarity descriptors, or local linear correlation of intensity and gradient. Default local-ncc. There are "local-ncc",
+   * "ncc", "mad", "mind-ssc", "lc2".
+   */
+  void SetMetric(const char* value) { this->SetParameterAsText("Metric", value); }
+  std::string GetMetric() { return this->GetParameterAsText("Metric"); }
+  ///@}
+
+  ///@{
+  /** The share of the smaller volume of a pair that must lie in the other for a pose to count. In [0.01, 1]; default 0.1. */
+  void SetMinimumOverlap(double value) { this->SetParameter("MinimumOverlap", value); }
+  double GetMinimumOverlap() { return this->GetParameter("MinimumOverlap"); }
+  ///@}
+
+  ///@{
+  /**
+   * Refinement ends at voxels not smaller than this; larger is faster and less exact. 0: at the volumes' own. In [0, 1000] mm;
+   * default 0.
+   */
+  void SetFinestMm(double value) { this->SetParameter("FinestMm", value); }
+  double GetFinestMm() { return this->GetParameter("FinestMm"); }
+  ///@}
+
+  ///@{
+  /** Poses of the global search that are refined, four times as many when every rotation is tried. In [1, 1000]; default 16. */
+  void SetCandidates(int value) { this->SetParameter("Candidates", value); }
+  int GetCandidates() { return static_cast<int>(this->GetParameter("Candidates")); }
+  ///@}
+
+  ///@{
+  /** Less similarity in the overlap (1 identical, 0 chance) is failed. In [0, 1]; default 0.06. */
+  void SetMinimumSimilarity(double value) { this->SetParameter("MinimumSimilarity", value); }
+  double GetMinimumSimilarity() { return this->GetParameter("MinimumSimilarity"); }
+  ///@}
+
+  ///@{
+  /** A smaller ratio of the best evidence to that of the next different pose is ambiguous. In [1, 99]; default 1.25. */
+  void SetMinimumPeakRatio(double value) { this->SetParameter("MinimumPeakRatio", value); }
+  double GetMinimumPeakRatio() { return this->GetParameter("MinimumPeakRatio"); }
+  ///@}
+
+  ///@{
+  /** A larger predicted error is ambiguous. In [0.001, 1000] voxels; default 1. */
+  void SetMaximumErrorVoxels(double value) { this->SetParameter("MaximumErrorVoxels", value); }
+  double GetMaximumErrorVoxels() { return this->GetParameter("MaximumErrorVoxels"); }
+  ///@}
+
+  ///@{
+  /** Poses found from two halves of the voxels that lie further apart are failed. In [0.001, 1000] voxels; default 2. */
+  void SetMaximumSplitVoxels(double value) { this->SetParameter("MaximumSplitVoxels", value); }
+  double GetMaximumSplitVoxels() { return this->GetParameter("MaximumSplitVoxels"); }
+  ///@}
+
+  ///@{
+  /** Random points of each volume that are compared on each level. In [100, 10000000]; default 200000. */
+  void SetPoints(int value) { this->SetParameter("Points", value); }
+  int GetPoints() { return static_cast<int>(this->GetParameter("Points")); }
+  ///@}
+
+  ///@{
+  /** The same seed draws the same points. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /**
@@ -65,92 +170,6 @@ public:
   void ClearHeldVolumes();
   int GetNumberOfHeldVolumes() const;
   ///@}
-
-  ///@{
-  /**
-   * What is known about where the volumes belong: "tracked" (within some 12 degrees and 20 mm), "hand-made"
-   * (within some 35 degrees and a third of a volume's size), "unknown" (nothing: every rotation and translation is tried), or
-   * "automatic" (default: tracked, then hand-made, then unknown, while there is no clear answer). Another name is an error and
-   * changes nothing.
-   */
-  void SetStart(const char* name);
-  const char* GetStart() const;
-  ///@}
-
-  ///@{
-  /**
-   * The measure of likeness that refines poses: "local-ncc" (default), "ncc", "mind-ssc" or "lc2". Another name is an error and
-   * changes nothing.
-   */
-  void SetMetric(const char* name);
-  const char* GetMetric() const;
-  ///@}
-
-  ///@{
-  /** Whether shadowed and saturated voxels count less (echorama::ReliabilityMap). Default on. */
-  vtkSetMacro(UseReliability, bool);
-  vtkGetMacro(UseReliability, bool);
-  vtkBooleanMacro(UseReliability, bool);
-  ///@}
-
-  ///@{
-  /**
-   * The share of the smaller volume of a pair that must lie in the other for a pose to count, in [0.01, 1]. 0 (default): 0.1.
-   */
-  vtkSetClampMacro(MinimumOverlap, double, 0.0, 1.0);
-  vtkGetMacro(MinimumOverlap, double);
-  ///@}
-
-  ///@{
-  /** Poses of the global search that are refined, in [1, 1000]. Default 16. */
-  vtkSetClampMacro(Candidates, int, 1, 1000);
-  vtkGetMacro(Candidates, int);
-  ///@}
-
-  ///@{
-  /**
-   * Refinement ends at voxels not smaller than this, mm, in [0, 1000]: larger is faster and less accurate. 0 (default): at the
-   * volumes' own.
-   */
-  vtkSetClampMacro(FinestMm, double, 0.0, 1000.0);
-  vtkGetMacro(FinestMm, double);
-  ///@}
-
-  ///@{
-  /**
-   * When an answer is trusted: least similarity in the overlap, [0, 1]; least ratio of the best evidence to that
-   * of the next different pose, [1, 99]; largest predicted error and largest distance of the poses that two halves of the voxels
-   * find, voxels, (0, 1000]. Defaults as echorama::AlignPairParameters.
-   */
-  vtkSetClampMacro(MinimumSimilarity, double, 0.0, 1.0);
-  vtkGetMacro(MinimumSimilarity, double);
-  vtkSetClampMacro(MinimumPeakRatio, double, 1.0, 99.0);
-  vtkGetMacro(MinimumPeakRatio, double);
-  vtkSetClampMacro(MaximumErrorVoxels, double, 1e-3, 1000.0);
-  vtkGetMacro(MaximumErrorVoxels, double);
-  vtkSetClampMacro(MaximumSplitVoxels, double, 1e-3, 1000.0);
-  vtkGetMacro(MaximumSplitVoxels, double);
-  ///@}
-
-  ///@{
-  /**
-   * Random points of each volume that are compared on each level, in [1000, 10000000]; fewer become 1000. 0 (default): 200000.
-   */
-  void SetPoints(int points);
-  vtkGetMacro(Points, int);
-  ///@}
-
-  ///@{
-  /** Seed of the random points, >= 0. Default 1. */
-  vtkSetClampMacro(Seed, int, 0, VTK_INT_MAX);
-  vtkGetMacro(Seed, int);
-  ///@}
-
-  /**
-   * Sets a number by its name. Unlike the setters it does not clamp: a name that is none, or a value out of range, is an error
-   * that says what is allowed, changes nothing, and returns false.
-   */
-  bool SetParameter(const char* name, double value);
 
   /** How many volumes the last update aligned; 0 when it failed. */
   int GetNumberOfVolumes() const;
@@ -186,11 +205,9 @@ public:
    * What the last update did, as JSON: {"volumes": [{"name", "verdict", "reason", "similarity", "overlap",
    * "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity", "overlap",
    * "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds": {"global",
-   * "local", "confidence"}},
-   * ...], "seconds":
-   * {"prepare", "pairs", "graph"}}. Empty when it failed.
+   * "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}}. Empty when it failed.
    */
-  std::string GetReport() const { return this->Report; }
+  std::string GetReport() const;
 
   ///@{
   /** Names of the field data. */
@@ -202,6 +219,15 @@ public:
   static const char* AlignmentCovarianceName() { return "AlignmentCovariance"; }
   static const char* AlignmentCentreName() { return "AlignmentCentre"; }
   ///@}
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+  /// Of the last update, for C++; without volumes when it failed.
+  const echorama::AlignVolumesResult& Result() const
+  {
+    return this->Found;
+  }
+#endif
 
 protected:
   vtkUltrasoundAligner();
@@ -216,36 +242,15 @@ private:
   void operator=(const vtkUltrasoundAligner&) = delete;
 
 #ifndef __VTK_WRAP__
-  // What is told of a volume.
-  struct Result {
-    echorama::Pose VolumeToWorld = echorama::Pose::Identity();
-    double Similarity = 0.0, Overlap = 0.0;
-    std::string Verdict, Reason;
-    echorama::Information Covariance = echorama::Information::Zero();
-    Eigen::Vector3d Centre = Eigen::Vector3d::Zero();
-  };
-  bool Choose(std::string& choice, const char* name, const char* what, const std::vector<std::string>& names);
-  echorama::AlignVolumesParameters Parameters() const;
-  std::vector<Result> AlignAll(const std::vector<echorama::PlacedVolume>& volumes, double prepareSeconds,
-                               const echorama::Progress& progress);
-  const Result* ResultOf(int volume) const;
+  const echorama::VolumeAlignment* ResultOf(int volume) const;
 
-  int FixedVolume = 0;
-  std::vector<int> HeldVolumes;
-  std::string Start;
-  std::string Metric;
-  bool UseReliability = true;
-  double MinimumOverlap = 0.0;
-  int Points = 0;
-  int Seed;
-  int Candidates;
-  double FinestMm;
-  double MinimumSimilarity;
-  double MinimumPeakRatio;
-  double MaximumErrorVoxels;
-  double MaximumSplitVoxels;
-  std::vector<Result> Results;
-  std::string Report;
+  struct Settings {
+    int fixedVolume = 0;
+    bool useReliability = true;
+    echorama::AlignVolumesParameters align;
+  };
+  Settings Values;
+  echorama::AlignVolumesResult Found;
 #endif
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundAlignmentScore.h"
 
-#include "AlignmentScore.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "vtkCellArray.h"
 #include "vtkDoubleArray.h"
@@ -25,6 +24,8 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundAlignmentScore);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundAlignmentScore);
+
 namespace {
 constexpr double NotANumber = std::numeric_limits<double>::quiet_NaN();
 
@@ -36,6 +37,12 @@ vtkSmartPointer<vtkDoubleArray> NewNumbers(const char* name, int components = 1)
   return array;
 }
 } // namespace
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundAlignmentScore::Parameters()
+{
+  return Describe(this->Values);
+}
 
 //----------------------------------------------------------------------------
 vtkUltrasoundAlignmentScore::vtkUltrasoundAlignmentScore() : Score(NotANumber)
@@ -68,6 +75,7 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
   this->VolumeScores.clear();
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
     // 1. what came in
+    echorama::CheckRanges(this->Parameters());
     const auto aligned = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
     const auto truth = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
     if (aligned.size() != truth.size()) {
@@ -85,12 +93,12 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
       volume.name = aligned[i].Name;
       vtkUltrasoundVolume::Dispatch(aligned[i].Intensity, [&](auto type) {
         const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(aligned[i]);
-        volume.indexPoints = echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Points,
-                                                                   static_cast<std::uint64_t>(this->Seed));
+        volume.indexPoints =
+            echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Values.points, this->Values.seed);
       });
       volumes.push_back(std::move(volume));
     }
-    const echorama::AlignmentScore score = echorama::ScoreAlignment(volumes, this->FixedVolume);
+    const echorama::AlignmentScore score = echorama::ScoreAlignment(volumes, this->Values.fixedVolume);
 
     // 3. what goes out
     const auto errors = NewNumbers("Error", 3), mean = NewNumbers("VolumeScore"), rms = NewNumbers("VolumeRms"),
@@ -153,8 +161,6 @@ double vtkUltrasoundAlignmentScore::GetVolumeScore(int volume) const
 void vtkUltrasoundAlignmentScore::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FixedVolume: " << this->FixedVolume << "\n";
-  os << indent << "Points: " << this->Points << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Score: " << this->Score << "\n";
 }

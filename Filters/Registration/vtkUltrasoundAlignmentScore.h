@@ -34,7 +34,8 @@
 #include "vtkPolyDataAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include <vector>
+#include "Filters/Registration/AlignmentScore.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAlignmentScore : public vtkPolyDataAlgorithm {
@@ -43,23 +44,44 @@ public:
   vtkTypeMacro(vtkUltrasoundAlignmentScore, vtkPolyDataAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** The volume that alignment and truth are taken to agree on, counted from 0. Default 0. */
-  vtkSetClampMacro(FixedVolume, int, 0, VTK_INT_MAX);
-  vtkGetMacro(FixedVolume, int);
+  /** The volume that alignment and truth are taken to agree on, counted from 0. At least 0; default 0. */
+  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
+  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
   ///@}
 
   ///@{
-  /** Points drawn in each volume, in [1, 10000000]. Default 2000. */
-  vtkSetClampMacro(Points, int, 1, 10000000);
-  vtkGetMacro(Points, int);
+  /** Points of each volume that are scored. In [1, 10000000]; default 2000. */
+  void SetPoints(int value) { this->SetParameter("Points", value); }
+  int GetPoints() { return static_cast<int>(this->GetParameter("Points")); }
   ///@}
 
   ///@{
-  /** Seed of the points, >= 0. Default 1. */
-  vtkSetClampMacro(Seed, int, 0, VTK_INT_MAX);
-  vtkGetMacro(Seed, int);
+  /** The same seed draws the same points. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** The true volumes: adds one to input 1, or sets it. */
@@ -77,6 +99,10 @@ public:
   /** The score of one volume, mm; NaN when there is no such volume. */
   double GetVolumeScore(int volume) const;
 
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
+
 protected:
   vtkUltrasoundAlignmentScore();
   ~vtkUltrasoundAlignmentScore() override;
@@ -90,9 +116,7 @@ private:
   void operator=(const vtkUltrasoundAlignmentScore&) = delete;
 
 #ifndef __VTK_WRAP__
-  int FixedVolume = 0;
-  int Points = 2000;
-  int Seed = 1;
+  echorama::ScoreParameters Values;
   double Score;
   std::vector<double> VolumeScores;
 #endif

@@ -14,6 +14,8 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundDeformableAligner);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundDeformableAligner);
+
 namespace {
 // What the metric sees of a volume, by its Reliability where it has one.
 std::shared_ptr<const echorama::MetricPyramid> FeaturesOf(const vtkUltrasoundVolume::Input& volume,
@@ -53,6 +55,14 @@ echorama::DisplacementField ZeroField(const echorama::ImageGeometry& volume)
 } // namespace
 
 //----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundDeformableAligner::Parameters()
+{
+  return echorama::Join({{echorama::Parameter("FixedVolume", this->Values.fixedVolume, {0, echorama::Unlimited}, "",
+                                              "The volume that is not bent, counted from 0.")},
+                         Describe(this->Values.align)});
+}
+
+//----------------------------------------------------------------------------
 vtkUltrasoundDeformableAligner::vtkUltrasoundDeformableAligner()
 {
   this->SetNumberOfOutputPorts(2);
@@ -63,15 +73,8 @@ void vtkUltrasoundDeformableAligner::Execute(vtkInformationVector** inputs, vtkI
                                              const echorama::Progress& progress)
 {
   // 1. what came in
+  echorama::CheckRanges(this->Parameters());
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-  echorama::DeformableAlignParameters parameters;
-  parameters.controlSpacingMm = this->ControlSpacingMm;
-  parameters.bendingWeight = this->BendingWeight;
-  parameters.levels = this->Levels;
-  parameters.iterations = this->Iterations;
-  parameters.finestMm = this->FinestMm;
-  parameters.minimumOverlap = this->MinimumOverlap;
-  parameters.Check();
   std::vector<std::shared_ptr<const echorama::MetricPyramid>> features;
   std::vector<echorama::DeformableVolume> seen;
   const double count = static_cast<double>(volumes.size());
@@ -82,7 +85,7 @@ void vtkUltrasoundDeformableAligner::Execute(vtkInformationVector** inputs, vtkI
   }
 
   // 2. the kernel
-  const auto results = echorama::DeformInTurn(seen, this->FixedVolume, parameters, progress.Part(0.2, 1.0));
+  const auto results = echorama::DeformInTurn(seen, this->Values.fixedVolume, this->Values.align, progress.Part(0.2, 1.0));
 
   // 3. the same volumes, and their displacements
   for (std::size_t i = 0; i < volumes.size(); ++i) {
@@ -98,7 +101,7 @@ void vtkUltrasoundDeformableAligner::Execute(vtkInformationVector** inputs, vtkI
     add(DeformationLargestName(), {result.largestMm});
     add(DeformationJacobianName(), {result.smallestDeterminant});
     vtkUltrasoundVolume::AddField(volume, DeformationReasonName(),
-                                  static_cast<int>(i) == this->FixedVolume ? "it is the fixed volume" : result.reason);
+                                  static_cast<int>(i) == this->Values.fixedVolume ? "it is the fixed volume" : result.reason);
     vtkNew<vtkImageData> displacement;
     vtkUltrasoundDisplacement::ImageOf(
         result.isApplied ? result.field : ZeroField(vtkUltrasoundVolume::GeometryOf(volumes[i].Image)), displacement);
@@ -111,11 +114,5 @@ void vtkUltrasoundDeformableAligner::Execute(vtkInformationVector** inputs, vtkI
 void vtkUltrasoundDeformableAligner::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FixedVolume: " << this->FixedVolume << "\n";
-  os << indent << "ControlSpacingMm: " << this->ControlSpacingMm << "\n";
-  os << indent << "BendingWeight: " << this->BendingWeight << "\n";
-  os << indent << "Levels: " << this->Levels << "\n";
-  os << indent << "Iterations: " << this->Iterations << "\n";
-  os << indent << "FinestMm: " << this->FinestMm << "\n";
-  os << indent << "MinimumOverlap: " << this->MinimumOverlap << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

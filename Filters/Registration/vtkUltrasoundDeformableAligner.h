@@ -38,8 +38,8 @@
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "Filters/Registration/DeformableAlign.h" // for the defaults
-#include <vector>
+#include "Filters/Registration/DeformableAlign.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundDeformableAligner : public vtkUltrasoundMultiBlockAlgorithm {
@@ -48,50 +48,71 @@ public:
   vtkTypeMacro(vtkUltrasoundDeformableAligner, vtkUltrasoundMultiBlockAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** The volume that is not bent, counted from 0. Default 0. */
-  vtkSetClampMacro(FixedVolume, int, 0, VTK_INT_MAX);
-  vtkGetMacro(FixedVolume, int);
+  /** The volume that is not bent, counted from 0. At least 0; default 0. */
+  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
+  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
   ///@}
 
   ///@{
-  /** Distance of the control points, mm, in [5, 500]: about the size of what can bend by itself. Default 30. */
-  vtkSetClampMacro(ControlSpacingMm, double, 5.0, 500.0);
-  vtkGetMacro(ControlSpacingMm, double);
+  /** Distance of the control points: about the size of what can bend by itself. In [5, 500] mm; default 30. */
+  void SetControlSpacingMm(double value) { this->SetParameter("ControlSpacingMm", value); }
+  double GetControlSpacingMm() { return this->GetParameter("ControlSpacingMm"); }
   ///@}
 
   ///@{
   /**
-   * How stiff tissue is taken to be, per mm, in [1e-6, 1e12]. A lower one follows larger deformations and more noise. Default
-   * 2000.
+   * How stiff tissue is taken to be. A lower one follows larger deformations and more noise. In [1e-06, 1000000000000] per mm;
+   * default 2000.
    */
-  vtkSetClampMacro(BendingWeight, double, 1e-6, 1e12);
-  vtkGetMacro(BendingWeight, double);
+  void SetBendingWeight(double value) { this->SetParameter("BendingWeight", value); }
+  double GetBendingWeight() { return this->GetParameter("BendingWeight"); }
   ///@}
 
   ///@{
-  /** Resolutions, each half as fine as the next, in [1, 6]. Default 2. */
-  vtkSetClampMacro(Levels, int, 1, 6);
-  vtkGetMacro(Levels, int);
+  /** Resolutions, each half as fine as the next. In [1, 6]; default 2. */
+  void SetLevels(int value) { this->SetParameter("Levels", value); }
+  int GetLevels() { return static_cast<int>(this->GetParameter("Levels")); }
   ///@}
 
   ///@{
-  /** Steps per resolution, at most, in [1, 1000]. Default 15. */
-  vtkSetClampMacro(Iterations, int, 1, 1000);
-  vtkGetMacro(Iterations, int);
+  /** Steps per resolution, at most. In [1, 1000]; default 15. */
+  void SetIterations(int value) { this->SetParameter("Iterations", value); }
+  int GetIterations() { return static_cast<int>(this->GetParameter("Iterations")); }
   ///@}
 
   ///@{
-  /** Voxels of the last resolution are about this large, mm, in [0.01, 100]. Default 1. */
-  vtkSetClampMacro(FinestMm, double, 0.01, 100.0);
-  vtkGetMacro(FinestMm, double);
+  /** Voxels of the last resolution are about this large. Finer is slower and more exact. In [0.01, 100] mm; default 1. */
+  void SetFinestMm(double value) { this->SetParameter("FinestMm", value); }
+  double GetFinestMm() { return this->GetParameter("FinestMm"); }
   ///@}
 
   ///@{
-  /** The share of a volume that must lie in others for it to be bent, in [0.001, 1]. Default 0.02. */
-  vtkSetClampMacro(MinimumOverlap, double, 0.001, 1.0);
-  vtkGetMacro(MinimumOverlap, double);
+  /** The share of a volume that must lie in others for it to be bent. In [0.001, 1]; default 0.02. */
+  void SetMinimumOverlap(double value) { this->SetParameter("MinimumOverlap", value); }
+  double GetMinimumOverlap() { return this->GetParameter("MinimumOverlap"); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** Names of the field data. */
@@ -102,6 +123,10 @@ public:
   static const char* DeformationJacobianName() { return "DeformationJacobian"; }
   static const char* DeformationReasonName() { return "DeformationReason"; }
   ///@}
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundDeformableAligner();
@@ -115,14 +140,12 @@ private:
   vtkUltrasoundDeformableAligner(const vtkUltrasoundDeformableAligner&) = delete;
   void operator=(const vtkUltrasoundDeformableAligner&) = delete;
 
-  int FixedVolume = 0;
 #ifndef __VTK_WRAP__
-  double ControlSpacingMm = echorama::DeformableAlignParameters().controlSpacingMm;
-  double BendingWeight = echorama::DeformableAlignParameters().bendingWeight;
-  int Levels = echorama::DeformableAlignParameters().levels;
-  int Iterations = echorama::DeformableAlignParameters().iterations;
-  double FinestMm = echorama::DeformableAlignParameters().finestMm;
-  double MinimumOverlap = echorama::DeformableAlignParameters().minimumOverlap;
+  struct Settings {
+    int fixedVolume = 0;
+    echorama::DeformableAlignParameters align;
+  };
+  Settings Values;
 #endif
 };
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundPoseEditor.h"
 
-#include "AlignmentScore.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Core/Imaging/ValidPoints.h"
-#include "PoseEdit.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
@@ -26,8 +25,9 @@ using Eigen::Vector3d;
 
 vtkStandardNewMacro(vtkUltrasoundPoseEditor);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundPoseEditor);
+
 namespace {
-using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 constexpr double NotANumber = std::numeric_limits<double>::quiet_NaN();
 
 // The motion that an earlier filter has told, as far as it is one.
@@ -36,14 +36,33 @@ Pose VolumeToWorldOf(vtkImageData* image)
   auto* array = vtkDoubleArray::SafeDownCast(image->GetFieldData()->GetArray(vtkUltrasoundAligner::VolumeToWorldName()));
   Pose pose = Pose::Identity();
   if (array && array->GetNumberOfValues() == 16) {
-    const RowMajor matrix = Eigen::Map<const RowMajor>(array->GetPointer(0));
-    if (matrix.allFinite() && echorama::IsRotation(matrix.topLeftCorner<3, 3>())) {
-      pose.matrix() = matrix;
+    const auto told = echorama::FromRows<Pose>(array->GetPointer(0));
+    if (told.matrix().allFinite() && echorama::IsRotation(told.linear())) {
+      pose = told;
     }
   }
   return pose;
 }
 } // namespace
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundPoseEditor::Parameters()
+{
+  using echorama::Parameter;
+  Settings& v = this->Values;
+  echorama::ParameterList edit = Describe(v.edit), score = Describe(v.score);
+  echorama::Named(edit, "Centre").When("RotateAbout", "centre");
+  echorama::Named(score, "FixedVolume").help =
+      "The volume that stays unless it is named, and on which alignment and truth are taken to agree; counted from 0.";
+  echorama::Named(score, "Points").Advanced();
+  return echorama::Join(
+      {{Parameter(
+           "RotateAbout", echorama::Choice(v.rotateAbout, {"world-origin", "middle", "centre"}),
+           "What the rotation turns about. The box in ParaView's view shows the motion with the world's origin; the middle "
+           "of the chosen volumes is handier to turn by numbers.")},
+       edit,
+       score});
+}
 
 //----------------------------------------------------------------------------
 vtkUltrasoundPoseEditor::vtkUltrasoundPoseEditor() : Score(NotANumber)
@@ -73,8 +92,7 @@ void vtkUltrasoundPoseEditor::ClearVolumes()
 //----------------------------------------------------------------------------
 void vtkUltrasoundPoseEditor::GetMotion(vtkMatrix4x4* motion) const
 {
-  const RowMajor rows = this->Motion.matrix();
-  motion->DeepCopy(rows.data());
+  vtkUltrasoundVolume::SetMatrix(motion, this->Motion);
 }
 
 //----------------------------------------------------------------------------
@@ -92,6 +110,7 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
   this->Motion = Pose::Identity();
   // 1. what came in, and which of it is moved
   progress(0.0);
+  echorama::CheckRanges(this->Parameters());
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
   const auto truth = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
   const int count = static_cast<int>(volumes.size());
@@ -104,14 +123,15 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
     moves[static_cast<std::size_t>(volume)] = true;
   }
   for (int volume = 0; this->Volumes.empty() && volume < count; ++volume) {
-    moves[static_cast<std::size_t>(volume)] = count == 1 || volume != this->FixedVolume;
+    moves[static_cast<std::size_t>(volume)] = count == 1 || volume != this->Values.score.fixedVolume;
   }
 
   // 2. the motion
-  echorama::PoseEdit edit{Vector3d(this->Translation), Vector3d(this->Rotation)};
-  if (this->RotateAbout == CENTRE) {
-    edit.centreMm = Vector3d(this->Centre);
-  } else if (this->RotateAbout == MIDDLE) {
+  echorama::PoseEdit edit = this->Values.edit;
+  if (this->Values.rotateAbout != Settings::Centre::Given) {
+    edit.centreMm.setZero();
+  }
+  if (this->Values.rotateAbout == Settings::Centre::Middle) {
     for (std::size_t i = 0; i < volumes.size(); ++i) {
       edit.centreMm += moves[i] ? vtkUltrasoundVolume::GeometryOf(volumes[i].Image).Centre() : Vector3d::Zero();
     }
@@ -128,8 +148,8 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
       vtkUltrasoundVolume::Move(placed, motion);
       pose = motion * pose;
     }
-    const RowMajor rows = pose.matrix();
-    vtkUltrasoundVolume::AddField(placed, vtkUltrasoundAligner::VolumeToWorldName(), rows.data(), 16);
+    vtkUltrasoundVolume::AddField(placed, vtkUltrasoundAligner::VolumeToWorldName(), echorama::MatrixRows(pose.matrix()).data(),
+                                  16);
     PutBlock(outputs, 0, i, placed, volumes[i].Name);
   }
   this->Motion = motion;
@@ -148,7 +168,7 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const auto& volume = volumes[i];
     const DrawnFrom from{volume.Intensity->GetMTime(), volume.ValidRegion ? volume.ValidRegion->GetMTime() : 0,
-                         static_cast<unsigned long long>(this->Points), static_cast<unsigned long long>(this->Seed)};
+                         static_cast<unsigned long long>(this->Values.score.points), this->Values.score.seed};
     const auto known = this->Drawn.find(from);
     auto& points = drawn[from];
     if (known != this->Drawn.end()) {
@@ -156,8 +176,8 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
     } else {
       vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
         const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume);
-        points = echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Points,
-                                                       static_cast<std::uint64_t>(this->Seed));
+        points = echorama::ValidPoints<decltype(type)>(posed.intensity, posed.valid, this->Values.score.points,
+                                                       this->Values.score.seed);
       });
     }
     scored[i].aligned =
@@ -167,7 +187,7 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
     scored[i].name = volume.Name;
   }
   this->Drawn = std::move(drawn);
-  const echorama::AlignmentScore score = echorama::ScoreAlignment(scored, this->FixedVolume);
+  const echorama::AlignmentScore score = echorama::ScoreAlignment(scored, this->Values.score.fixedVolume);
   vtkNew<vtkDoubleArray> each;
   each->SetName("VolumeScore");
   for (const echorama::VolumeScore& volume : score.volumes) {
@@ -186,16 +206,7 @@ void vtkUltrasoundPoseEditor::PrintSelf(ostream& os, vtkIndent indent)
   for (const int volume : this->Volumes) {
     os << " " << volume;
   }
-  const auto print = [&](const char* name, const double numbers[3]) {
-    os << indent << name << ": " << numbers[0] << " " << numbers[1] << " " << numbers[2] << "\n";
-  };
   os << "\n";
-  print("Translation", this->Translation);
-  print("Rotation", this->Rotation);
-  os << indent << "RotateAbout: " << this->RotateAbout << "\n";
-  print("Centre", this->Centre);
-  os << indent << "FixedVolume: " << this->FixedVolume << "\n";
-  os << indent << "Points: " << this->Points << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Score: " << this->Score << "\n";
 }

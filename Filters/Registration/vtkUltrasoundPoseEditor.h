@@ -29,7 +29,9 @@
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "Core/Geometry/RigidTransform.h"
+#include "Filters/Registration/AlignmentScore.h"
+#include "Filters/Registration/PoseEdit.h"
+#include "vtkUltrasoundParameters.h"
 #include <array>
 #include <map>
 #include <vector>
@@ -50,48 +52,95 @@ public:
   int GetNumberOfChosenVolumes() const { return static_cast<int>(this->Volumes.size()); }
   ///@}
 
+  // BEGIN parameters
+  enum RotateAbouts { WORLD_ORIGIN = 0, MIDDLE = 1, CENTRE = 2 };
+
   ///@{
-  /** mm, in the world. Default 0. */
-  vtkSetVector3Macro(Translation, double);
-  vtkGetVector3Macro(Translation, double);
+  /**
+   * What the rotation turns about. The box in ParaView's view shows the motion with the world's origin; the middle of the chosen
+   * volumes is handier to turn by numbers. Default world-origin. There are WORLD_ORIGIN, MIDDLE, CENTRE.
+   */
+  void SetRotateAbout(int value) { this->SetParameter("RotateAbout", value); }
+  int GetRotateAbout() { return static_cast<int>(this->GetParameter("RotateAbout")); }
+  void SetRotateAboutToWorldOrigin() { this->SetRotateAbout(WORLD_ORIGIN); }
+  void SetRotateAboutToMiddle() { this->SetRotateAbout(MIDDLE); }
+  void SetRotateAboutToCentre() { this->SetRotateAbout(CENTRE); }
+  std::string GetRotateAboutAsString() { return this->GetParameterAsText("RotateAbout"); }
   ///@}
 
   ///@{
-  /** Degrees about the world's x, y and z: turned about y first, then x, then z. Default 0. */
-  vtkSetVector3Macro(Rotation, double);
-  vtkGetVector3Macro(Rotation, double);
-  ///@}
-
-  enum RotateAbouts {
-    WORLD_ORIGIN = 0, ///< the world's origin: what ParaView's box writes
-    MIDDLE = 1,       ///< the middle of the chosen volumes
-    CENTRE = 2        ///< Centre
-  };
-  ///@{
-  /** What the rotation turns about. Default WORLD_ORIGIN. */
-  vtkSetClampMacro(RotateAbout, int, WORLD_ORIGIN, CENTRE);
-  vtkGetMacro(RotateAbout, int);
+  /** Motion along the axes of the world, after the rotation. In mm; default (0, 0, 0). */
+  void SetTranslation(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetTranslation(value);
+  }
+  void SetTranslation(const double value[3]) { this->SetParameterAsVector("Translation", value); }
+  double* GetTranslation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Translation"); }
   ///@}
 
   ///@{
-  /** The point that the rotation turns about with RotateAbout CENTRE, mm. Default 0. */
-  vtkSetVector3Macro(Centre, double);
-  vtkGetVector3Macro(Centre, double);
+  /** Turns about the axes of the world: about y first, then x, then z. In degrees; default (0, 0, 0). */
+  void SetRotation(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetRotation(value);
+  }
+  void SetRotation(const double value[3]) { this->SetParameterAsVector("Rotation", value); }
+  double* GetRotation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Rotation"); }
   ///@}
 
   ///@{
-  /** The volume that stays unless it is named, and on which alignment and truth are taken to agree; counted from 0. Default 0. */
-  vtkSetClampMacro(FixedVolume, int, 0, VTK_INT_MAX);
-  vtkGetMacro(FixedVolume, int);
+  /** The point that the rotation turns about. Used when RotateAbout is centre. In mm; default (0, 0, 0). */
+  void SetCentre(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetCentre(value);
+  }
+  void SetCentre(const double value[3]) { this->SetParameterAsVector("Centre", value); }
+  double* GetCentre() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Centre"); }
   ///@}
 
   ///@{
-  /** Points of each volume that are scored, in [1, 10000000], and their seed, >= 0. Defaults 2000 and 1. */
-  vtkSetClampMacro(Points, int, 1, 10000000);
-  vtkGetMacro(Points, int);
-  vtkSetClampMacro(Seed, int, 0, VTK_INT_MAX);
-  vtkGetMacro(Seed, int);
+  /**
+   * The volume that stays unless it is named, and on which alignment and truth are taken to agree; counted from 0. At least 0;
+   * default 0.
+   */
+  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
+  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
   ///@}
+
+  ///@{
+  /** Points of each volume that are scored. In [1, 10000000]; default 2000. */
+  void SetPoints(int value) { this->SetParameter("Points", value); }
+  int GetPoints() { return static_cast<int>(this->GetParameter("Points")); }
+  ///@}
+
+  ///@{
+  /** The same seed draws the same points. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** Where the volumes belong: adds one to input 1, or sets it. */
@@ -105,6 +154,10 @@ public:
 
   /** The motion of the last update: from where the input was to where the output is. Identity before the first. */
   void GetMotion(vtkMatrix4x4* motion) const;
+
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
 
 protected:
   vtkUltrasoundPoseEditor();
@@ -121,13 +174,12 @@ private:
 
 #ifndef __VTK_WRAP__
   std::vector<int> Volumes;
-  double Translation[3] = {0.0, 0.0, 0.0};
-  double Rotation[3] = {0.0, 0.0, 0.0};
-  int RotateAbout = WORLD_ORIGIN;
-  double Centre[3] = {0.0, 0.0, 0.0};
-  int FixedVolume = 0;
-  int Points = 2000;
-  int Seed = 1;
+  struct Settings {
+    enum class Centre { WorldOrigin, Middle, Given } rotateAbout = Centre::WorldOrigin;
+    echorama::PoseEdit edit;
+    echorama::ScoreParameters score;
+  };
+  Settings Values;
   double Score;
   echorama::Pose Motion = echorama::Pose::Identity();
   // The points that are scored, by what they were drawn from: the handle asks for a score many times a second.

@@ -3,6 +3,7 @@
 
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "vtkDoubleArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -22,17 +23,11 @@
 
 vtkStandardNewMacro(vtkUltrasoundRigFit);
 
-namespace {
-using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+vtkUltrasoundParametersMacro(vtkUltrasoundRigFit);
 
-} // namespace
-
-vtkUltrasoundRigFit::vtkUltrasoundRigFit()
+echorama::ParameterList vtkUltrasoundRigFit::Parameters()
 {
-  const echorama::RigFitParameters parameters;
-  this->DepthScale = parameters.depthScale;
-  this->ToleranceMm = parameters.toleranceMm;
-  this->FewestBalls = parameters.fewestBalls;
+  return echorama::Without(Describe(this->Values), {"LargestRmsMm", "Candidates"});
 }
 
 void vtkUltrasoundRigFit::AddBall(const char* name, const double centre[3], double radius)
@@ -78,8 +73,7 @@ void vtkUltrasoundRigFit::SetBalls(const char* text)
 
 bool vtkUltrasoundRigFit::GetRigToWorld(vtkMatrix4x4* matrix) const
 {
-  const RowMajor rows = this->RigToWorld.matrix();
-  matrix->DeepCopy(rows.data());
+  vtkUltrasoundVolume::SetMatrix(matrix, this->RigToWorld);
   return this->Last.found > 0;
 }
 
@@ -125,10 +119,6 @@ int vtkUltrasoundRigFit::RequestData(vtkInformation*, vtkInformationVector** inp
     if (!geometry || !pose)
       throw Error(Error::Kind::BadInput,
                   "the volume does not say which probe imaged it, and from where (ProbeGeometry, ProbeToWorld)");
-    echorama::RigFitParameters parameters;
-    parameters.depthScale = this->DepthScale;
-    parameters.toleranceMm = this->ToleranceMm;
-    parameters.fewestBalls = this->FewestBalls;
     const echorama::ImageGeometry grid = vtkUltrasoundVolume::GeometryOf(image);
     echorama::Volume<float> samples(grid.dimensions);
     vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto zero) {
@@ -136,7 +126,7 @@ int vtkUltrasoundRigFit::RequestData(vtkInformation*, vtkInformationVector** inp
       std::copy(view.begin(), view.end(), samples.View().begin());
     });
     this->Last = echorama::FitRig(samples.View(), vtkUltrasoundVolume::ViewOf<const unsigned char>(input.ValidRegion, image),
-                                  grid, {*geometry, *pose}, this->Balls, parameters, progress);
+                                  grid, {*geometry, *pose}, this->Balls, this->Values, progress);
     this->RigToWorld = *pose * this->Last.rigToProbe;
 
     vtkPolyData* output = vtkPolyData::GetData(outputs);
@@ -160,8 +150,8 @@ int vtkUltrasoundRigFit::RequestData(vtkInformation*, vtkInformationVector** inp
     output->GetPointData()->AddArray(names);
     output->GetPointData()->AddArray(found);
     output->GetPointData()->AddArray(residuals);
-    vtkUltrasoundVolume::AddField(output, "RigToWorld", RowMajor(this->RigToWorld.matrix()).data(), 16);
-    vtkUltrasoundVolume::AddField(output, "RigToProbe", RowMajor(this->Last.rigToProbe.matrix()).data(), 16);
+    vtkUltrasoundVolume::AddField(output, "RigToWorld", echorama::MatrixRows(this->RigToWorld.matrix()).data(), 16);
+    vtkUltrasoundVolume::AddField(output, "RigToProbe", echorama::MatrixRows(this->Last.rigToProbe.matrix()).data(), 16);
     vtkUltrasoundVolume::AddField(output, "DepthScale", &this->Last.depthScale, 1);
   });
 }
@@ -170,7 +160,5 @@ void vtkUltrasoundRigFit::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Balls: " << this->Balls.size() << "\n";
-  os << indent << "DepthScale: " << this->DepthScale << "\n";
-  os << indent << "ToleranceMm: " << this->ToleranceMm << "\n";
-  os << indent << "FewestBalls: " << this->FewestBalls << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -24,6 +24,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/RigFit.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkMatrix4x4;
@@ -54,26 +55,47 @@ public:
   void SetBalls(const char* text);
   ///@}
 
+  // BEGIN parameters
   ///@{
   /**
-   * Depth in the image over true depth: the scanner's speed of sound over the bath's, 1540 / 1482 in water at 20 degrees Celsius.
-   * In [0.9, 1.1]; 0 (default): found out from the distances between the balls.
+   * Depth in the image over true depth, at least 0.9: the scanner's speed of sound over the bath's, 1540 / 1482 in water at 20
+   * degrees Celsius. 0: found out from the distances between the balls. In [0, 1.1]; default 0.
    */
-  vtkSetMacro(DepthScale, double);
-  vtkGetMacro(DepthScale, double);
+  void SetDepthScale(double value) { this->SetParameter("DepthScale", value); }
+  double GetDepthScale() { return this->GetParameter("DepthScale"); }
   ///@}
 
   ///@{
-  /** How far a ball may be from where the others say, mm, in [0.1, 20]. Default 3. */
-  vtkSetMacro(ToleranceMm, double);
-  vtkGetMacro(ToleranceMm, double);
+  /** How far a ball may be from where the others say. In [0.1, 20] mm; default 3. */
+  void SetToleranceMm(double value) { this->SetParameter("ToleranceMm", value); }
+  double GetToleranceMm() { return this->GetParameter("ToleranceMm"); }
   ///@}
 
   ///@{
-  /** Balls that must be found, in [3, 1000]. Default 4. */
-  vtkSetMacro(FewestBalls, int);
-  vtkGetMacro(FewestBalls, int);
+  /** Balls that must be found. In [3, 1000]; default 4. */
+  void SetFewestBalls(int value) { this->SetParameter("FewestBalls", value); }
+  int GetFewestBalls() { return static_cast<int>(this->GetParameter("FewestBalls")); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** Of the last run. Matrix: false, and the identity, when there was none. Rms: mm. */
@@ -84,6 +106,7 @@ public:
   ///@}
 
 #ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
   const std::vector<echorama::RigBall>& RigBalls() const
   {
     return this->Balls;
@@ -95,22 +118,19 @@ public:
 #endif
 
 protected:
-  vtkUltrasoundRigFit();
+  vtkUltrasoundRigFit() = default;
   ~vtkUltrasoundRigFit() override = default;
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
   int RequestUpdateExtent(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestData(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
-  double DepthScale;
-  double ToleranceMm;
-  int FewestBalls;
-
 private:
   vtkUltrasoundRigFit(const vtkUltrasoundRigFit&) = delete;
   void operator=(const vtkUltrasoundRigFit&) = delete;
 
 #ifndef __VTK_WRAP__
+  echorama::RigFitParameters Values;
   std::vector<echorama::RigBall> Balls;
   std::string Complaint; // about the text of SetBalls
   echorama::RigFit Last;

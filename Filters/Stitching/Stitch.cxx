@@ -2,8 +2,8 @@
 // The plan, in its order:
 //   1. masks of the volumes on the plan's grid, from which RegionMap knows pure, overlap and empty regions; cores;
 //   2. a scale per volume at the voxels of its overlap (StitchScales), kept in spans of rows;
-//   3. where gains, seams or textures are wanted: smooth parts of the volumes (LowPass, on their own lattices), and all volumes
-//      on a coarse copy of the grid, on which gains, correlations and seams are found.
+//   3. where gains or textures are wanted: smooth parts of the volumes (LowPass, on their own lattices), and all volumes on a
+//      coarse copy of the grid, on which gains and correlations are found.
 // Masks and maps are gone when the plan stands. Rendering goes row by row: every volume that covers the row is sampled, and
 // what belongs to a voxel is gathered and blended there. Nothing is kept per voxel but the output, and no voxel needs its
 // neighbours, so boxes and threads do not change the result.
@@ -14,7 +14,6 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include "LowPass.h"
 #include "RegionMap.h"
-#include "SeamCut.h"
 #include "StitchGain.h"
 #include "StitchMemory.h"
 #include "StitchSampler.h"
@@ -22,7 +21,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace echorama {
 
@@ -60,6 +58,49 @@ bool IsTextured(const StitchParameters& parameters)
 
 } // namespace
 
+ParameterList Describe(StitchParameters& p)
+{
+  return {
+      Parameter(
+          "Method", Choice(p.method, {"distance", "feather", "average", "maximum", "membrane"}),
+          "What decides how much each volume counts. Membrane: the smoothest surface from where it is alone to where only "
+          "others are; distance: the distances to these; feather: the distance to its own border; average: nothing, so that "
+          "the plain mean is shown; maximum: the largest value is shown."),
+      Parameter(
+          "Texture", Choice(p.texture, {"mix", "split"}),
+          "What becomes of speckle and edges where volumes overlap. Mix: their weighted mean, which washes them out; split: they "
+          "change over in a narrow transition, amplified by what mixtures lose.")
+          .When("Method", "distance")
+          .When("Method", "feather")
+          .When("Method", "membrane"),
+      Parameter(
+          "Sharpness", p.sharpness, {0, 1000}, "",
+          "Exponent of the weights: 0 is the plain average, 1 a ramp across the whole overlap, 50 nearly a hard edge half-way.")
+          .When("Method", "distance")
+          .When("Method", "membrane"),
+      Parameter("DetailSharpness", p.detailSharpness, {0, 1000}, "",
+                "The same exponent for speckle and edges. With 32 about a sixteenth of the overlap is transition.")
+          .When("Texture", "split")
+          .Advanced(),
+      Parameter("DetailScale", p.detailScale, {1, 100}, "voxels of the output",
+                "What counts as smooth: the standard deviation of the filter that parts it from details.")
+          .Advanced(),
+      Parameter("EqualizeGain", p.equalizeGain,
+                "Find a gain and an offset for each volume where volumes overlap, and apply them."),
+      Parameter("ReliabilityFloor", p.reliabilityFloor, {0, 1, true}, "",
+                "What cannot be trusted at all still counts by this: where nothing better is there it is shown.")
+          .When("UseReliability", "on")
+          .Advanced(),
+      Parameter("AllowDisjoint", p.allowDisjoint,
+                "Accept volumes that overlap no other, and put them in their place. Off, that is an error.")
+          .Advanced(),
+      Parameter("MaximumMemoryGb", p.maximumMemoryGb, {0, Unlimited}, "GB",
+                "Refuse what needs more memory beside the volumes, in 10^9 bytes. 0: three quarters of the machine's memory.")
+          .Advanced(),
+      Parameter("MembraneTolerance", p.membraneTolerance, {0, 1, true}, "", "Largest error of the weights of two volumes."),
+  };
+}
+
 ImageGeometry ReachOf(const StitchInput& input)
 {
   ImageGeometry reach = GeometryOf(input);
@@ -96,8 +137,7 @@ struct StitchPlan::Parts {
   BlockLattice blocks;                   // of the smooth parts
   std::vector<SmoothPart> lows;
   StitchGains gains;
-  std::vector<CoarseField> shares; // of the details (Seam)
-  std::vector<CoarseSampler> scaleSamplers, lowSamplers, deviationSamplers, shareSamplers;
+  std::vector<CoarseSampler> scaleSamplers, lowSamplers, deviationSamplers;
 
   bool NeedsLows() const { return textured || parameters.equalizeGain; }
   CoarseSampler BlockSampler(const Boxed<float>& field, const ImageGeometry& where) const
@@ -262,27 +302,6 @@ void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
     lowSamplers.push_back(BlockSampler(lows[v].low, grid));
     deviationSamplers.push_back(BlockSampler(lows[v].deviation, grid));
   }
-  if (!textured || parameters.texture != StitchTexture::Seam)
-    return;
-  for (std::size_t v = 0; v < inputs.size(); ++v)
-    for (Boxed<float>* field : {&volumes[v].value, &volumes[v].low})
-      for (float& value : field->values.View())
-        value = static_cast<float>(gains.gain[v] * value + gains.offset[v]);
-  const Volume<unsigned short> labels = CutSeams(volumes, coarse.dimensions, {}, progress.Part(0.5, 0.9));
-  for (std::size_t v = 0; v < inputs.size(); ++v) {
-    const GridBox box = volumes[v].inside.box;
-    CoarseField share{{box, Volume<float>(box.size)}, {box, Volume<unsigned char>(box.size)}};
-    ForRows(box, Progress(), [&](int j, int k) {
-      const unsigned short* label = labels.View().Row(j, k) + box.first[0];
-      for (int i = 0; i < box.size[0]; ++i) {
-        share.values.Row(j, k)[i] = label[i] == v;
-        share.known.Row(j, k)[i] = label[i] != noVolume;
-      }
-    });
-    shares.push_back(std::move(share));
-  }
-  for (const CoarseField& share : shares)
-    shareSamplers.emplace_back(share.values, share.known, coarse, grid);
 }
 
 StitchPlan::StitchPlan(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const ImageGeometry& grid,
@@ -399,7 +418,7 @@ private:
     int start = 0, first = 0, end = 0;
     std::vector<unsigned char> inside;
     std::vector<A> values, low;
-    std::vector<float> trust, scale, share, deviation;
+    std::vector<float> trust, scale, deviation;
     std::vector<unsigned char> shared; // of the box that is made: 1 where it meets others
     unsigned char Inside(int i) const { return inside[static_cast<std::size_t>(i - start)]; }
   };
@@ -460,10 +479,6 @@ private:
         parts_.lowSamplers[v].Row(j, k, first, first + n, layer.shared.data(), noValue, layer.low.data());
         parts_.deviationSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.deviation.data());
       }
-      if (!parts_.shareSamplers.empty()) {
-        layer.share.resize(static_cast<std::size_t>(n));
-        parts_.shareSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.share.data());
-      }
     }
   }
 
@@ -482,7 +497,6 @@ private:
       if (parts_.textured)
         here_[n].deviation = static_cast<float>(gain) * layer.deviation[i];
       voxel_.scale[n] = layer.scale[i];
-      voxel_.detail[n] = parts_.shareSamplers.empty() ? 0.0f : layer.share[i];
       const bool trust = parts_.samplers[v].HasTrust();
       voxel_.trust[n] = trust ? layer.trust[i - layer.start] : 1.0f;
       trusted = trusted || trust;
@@ -527,25 +541,13 @@ private:
       voxel_.weight[a] = a == largest;
   }
 
-  static bool Normalize(float* shares, std::size_t n)
-  {
-    const float total = std::accumulate(shares, shares + n, 0.0f);
-    if (!(total > 0.0f))
-      return false;
-    for (std::size_t a = 0; a < n; ++a)
-      shares[a] /= total;
-    return true;
-  }
-
   // The blend of the details, with the variance that they would have one by one.
   A Detail(std::size_t n)
   {
     float* h = voxel_.detail.data();
-    if (parts_.parameters.texture != StitchTexture::Seam || !Normalize(h, n)) {
-      for (std::size_t a = 0; a < n; ++a)
-        voxel_.scale[a] *= voxel_.trust[a];
-      BlendWeights(voxel_.scale.data(), nullptr, n, detailPower_, h);
-    }
+    for (std::size_t a = 0; a < n; ++a)
+      voxel_.scale[a] *= voxel_.trust[a];
+    BlendWeights(voxel_.scale.data(), nullptr, n, detailPower_, h);
     // Details change over as narrowly as their weights, how strong they are as widely as the smooth part does: a texture that
     // ends abruptly at a stronger one is a seam as well.
     float strength = here_[0].deviation;

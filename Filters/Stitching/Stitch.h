@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/DisplacementField.h"
 #include "Core/Imaging/VolumeView.h"
@@ -22,30 +23,27 @@ enum class StitchMethod {
 };
 
 /// What becomes of speckle and edges where volumes overlap. A weighted mean of two speckle patterns has less texture than either,
-/// so all but Mix blend the smooth part of the volumes by the weights and the rest, the detail, in another way.
+/// so Split blends the smooth part of the volumes by the weights and the rest, the detail, in another way.
 enum class StitchTexture {
   Mix,   ///< the weighted mean of all
   Split, ///< details change over in a narrow transition, amplified by as much as their mixture has lost
-  Seam,  ///< details come from one volume per voxel, along a seam where the volumes differ least (graph cut)
 };
 
 struct StitchParameters {
   StitchMethod method = StitchMethod::Membrane;
   StitchTexture texture = StitchTexture::Split; ///< for Distance, Feather and Membrane
-  double sharpness =
-      1.5; ///< the exponent b of eq. 5.10, [0, 1000]; 0 is the plain average, large a hard edge. Distance and Membrane
-  double detailSharpness = 32.0; ///< the same for the details of Split, [0, 1000]
-  double detailScale = 2.0;      ///< standard deviation that parts smooth from detail, in voxels of the output, [1, 100]
-  /// Whether a gain and an offset per volume are found on the overlaps, and applied.
+  double sharpness = 1.5;                       ///< the exponent b of eq. 5.10
+  double detailSharpness = 32.0;
+  double detailScale = 2.0;
   bool equalizeGain = false;
-  /// Volumes that say how far their voxels can be trusted count by that (their weight is multiplied), but by no less than this,
-  /// (0, 1]: where none can be trusted they are blended as ever. Not for Maximum.
   double reliabilityFloor = 0.01;
-  bool allowDisjoint = false;   ///< whether a volume may overlap no other; it is then just put in its place
-  double maximumMemoryGb = 0.0; ///< 10^9 bytes; 0: three quarters of this machine's memory
-  /// Largest error of the weights of two volumes that comes from their membrane, certified for exponents from 1 to 32, (0, 1].
+  bool allowDisjoint = false;
+  double maximumMemoryGb = 0.0;
+  /// Largest error of the weights of two volumes that comes from their membrane, certified for exponents from 1 to 32.
   double membraneTolerance = 1.0 / 512;
 };
+
+ParameterList Describe(StitchParameters& p);
 
 /// A volume of any of our voxel types.
 using AnyPosedVolume = std::variant<PosedVolume<unsigned char>, PosedVolume<short>, PosedVolume<unsigned short>,
@@ -79,8 +77,8 @@ struct StitchOutputs {
   bool weights = false, spread = false;
 };
 
-/// Stitching in two steps: what is global is found once (where volumes overlap, how they share each voxel of it, gains,
-/// seams), and then any box of the output is made from it, voxel by voxel, whatever the other boxes are. So slabs that are
+/// Stitching in two steps: what is global is found once (where volumes overlap, how they share each voxel of it, gains),
+/// and then any box of the output is made from it, voxel by voxel, whatever the other boxes are. So slabs that are
 /// written one after the other, or pieces that several processes make, are those of the whole to the last bit.
 ///
 /// Weights are s^b / sum s^b times reliability. s is that of StitchMethod; a volume without a pure region gets a core

@@ -72,6 +72,8 @@ StitchCost CostOfStitch(const StitchParameters& parameters, const std::vector<Im
   for (const ImageGeometry& volume : volumes)
     boxes.push_back(BoxOf(volume, grid));
   StitchCost cost;
+  cost.volumes = volumes.size();
+  cost.grid = grid;
   cost.voxelBytes = static_cast<double>(outputs.voxelBytes) + 2.0 + (outputs.spread ? 4.0 : 0.0) +
                     (outputs.weights ? 4.0 * static_cast<double>(volumes.size()) : 0.0);
   cost.outputBytes = cost.voxelBytes * voxels;
@@ -95,17 +97,7 @@ StitchCost CostOfStitch(const StitchParameters& parameters, const std::vector<Im
 void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
                  const StitchOutputs& outputs, const GridBox& box)
 {
-  const auto check = [](bool good, const char* name, double value, const char* range) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, std::string(name) + " is " + std::to_string(value) + "; it must be " + range);
-  };
-  const auto& p = parameters;
-  check(p.sharpness >= 0.0 && p.sharpness <= 1000.0, "Sharpness", p.sharpness, "in [0, 1000]");
-  check(p.detailSharpness >= 0.0 && p.detailSharpness <= 1000.0, "DetailSharpness", p.detailSharpness, "in [0, 1000]");
-  check(p.detailScale >= 1.0 && p.detailScale <= 100.0, "DetailScale", p.detailScale, "in [1, 100]");
-  check(p.reliabilityFloor > 0.0 && p.reliabilityFloor <= 1.0, "ReliabilityFloor", p.reliabilityFloor, "in (0, 1]");
-  check(p.maximumMemoryGb >= 0.0, "MaximumMemoryGb", p.maximumMemoryGb, "not negative");
-  check(p.membraneTolerance > 0.0 && p.membraneTolerance <= 1.0, "MembraneTolerance", p.membraneTolerance, "in (0, 1]");
+  CheckRanges(parameters);
   grid.Check("the output grid");
   const StitchCost cost = CostOfStitch(parameters, volumes, grid, outputs);
   const double needed = cost.planBytes + cost.voxelBytes * static_cast<double>(box.VoxelCount());

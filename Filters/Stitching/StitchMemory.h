@@ -6,6 +6,8 @@ namespace echorama {
 
 /// What a stitching needs, known before anything is allocated.
 struct StitchCost {
+  std::size_t volumes = 0;
+  ImageGeometry grid; ///< of the output
   int planFactor = 1; ///< of the grid on which what is global is found; 1: the output's own
   /// At most, of regions, scales and membranes, while they are found; what is kept is less. Smooth parts and the coarse grid of
   /// gains and seams are not in it: 8 bytes per block of the volumes' boxes, and some tens of bytes per voxel of that grid.

@@ -546,16 +546,20 @@ double Larger(double a, double b)
 
 } // namespace
 
+ParameterList Describe(StitchQualityParameters& p)
+{
+  return {Parameter("Stride", p.stride, {1, 1000}, "", "One of Stride^3 windows and one of Stride^2 faces is measured.")};
+}
+
 template <class T>
 StitchQualityReport MeasureStitch(const std::vector<StitchInput>& volumes, const ImageGeometry& grid,
                                   VolumeView<const T> stitched, VolumeView<const unsigned char> valid,
                                   const AnyPosedVolume* reference, const StitchQualityParameters& parameters,
                                   const Progress& progress)
 {
+  CheckRanges(parameters);
   if (volumes.empty())
     throw Error(Error::Kind::BadInput, "there are no volumes to measure the result against");
-  if (parameters.stride < 1)
-    throw Error(Error::Kind::InvalidParameter, "Stride is " + std::to_string(parameters.stride) + "; it must be at least 1");
   grid.Check("the stitched volume");
   if (stitched.Dimensions() != grid.dimensions || (!valid.Empty() && valid.Dimensions() != grid.dimensions))
     throw Error(Error::Kind::BadInput, "the stitched volume: its voxels are not of the size that its geometry says");

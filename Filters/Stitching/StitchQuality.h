@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Stitch.h"
 #include <limits>
@@ -35,9 +36,10 @@ struct StitchQualityReport {
 };
 
 struct StitchQualityParameters {
-  /// One of stride^3 windows and one of stride^2 faces is measured, >= 1. The volumes of a scan have plenty.
-  int stride = 3;
+  int stride = 3; ///< the volumes of a scan have plenty of windows
 };
+
+ParameterList Describe(StitchQualityParameters& p);
 
 /// Measures what stitching did: how visible its seams are, how much of the texture it kept, and how far it is from a reference.
 ///

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundStitchQuality.h"
 
-#include "Core/Base/Error.h"
-#include "Core/Base/Json.h"
+#include "StitchJson.h"
+#include "vtkUltrasoundStitcher.h"
 
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkObjectFactory.h"
-#include "vtkPointData.h"
 
 #include <optional>
 
-using echorama::Error;
-
 vtkStandardNewMacro(vtkUltrasoundStitchQuality);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundStitchQuality);
 
 namespace {
 echorama::AnyPosedVolume AnyVolumeOf(const vtkUltrasoundVolume::Input& input)
@@ -24,22 +23,13 @@ echorama::AnyPosedVolume AnyVolumeOf(const vtkUltrasoundVolume::Input& input)
                                 [&](auto voxel) { any = vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(input); });
   return any;
 }
-
-echorama::VolumeView<const float> ReliabilityOf(const vtkUltrasoundVolume::Input& input)
-{
-  vtkDataArray* array = input.Image->GetPointData()->GetArray(vtkUltrasoundVolume::ReliabilityName());
-  if (array && (array->GetDataType() != VTK_FLOAT || array->GetNumberOfComponents() != 1 ||
-                array->GetNumberOfTuples() != input.Image->GetNumberOfPoints())) {
-    throw Error(Error::Kind::BadInput, input.Name + ": its Reliability is not one float per voxel");
-  }
-  return vtkUltrasoundVolume::ViewOf<const float>(array, input.Image);
-}
-
-nlohmann::ordered_json JsonOf(const echorama::SeamVisibility& seam)
-{
-  return {{"mean", seam.mean}, {"gradient", seam.gradient}, {"faces", seam.faces}};
-}
 } // namespace
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundStitchQuality::Parameters()
+{
+  return Describe(this->Values);
+}
 
 //----------------------------------------------------------------------------
 vtkUltrasoundStitchQuality::vtkUltrasoundStitchQuality()
@@ -73,7 +63,7 @@ void vtkUltrasoundStitchQuality::Execute(vtkInformationVector** inputs, vtkImage
   const auto sources = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
   std::vector<echorama::StitchInput> volumes;
   for (const vtkUltrasoundVolume::Input& source : sources) {
-    volumes.push_back({AnyVolumeOf(source), source.Name, ReliabilityOf(source)});
+    volumes.push_back({AnyVolumeOf(source), source.Name, vtkUltrasoundStitcher::ReliabilityOf(source)});
   }
   std::optional<echorama::AnyPosedVolume> reference;
   if (inputs[2]->GetNumberOfInformationObjects() > 0) {
@@ -81,24 +71,21 @@ void vtkUltrasoundStitchQuality::Execute(vtkInformationVector** inputs, vtkImage
   }
 
   // 2. the kernel
-  echorama::StitchQualityParameters parameters;
-  parameters.stride = this->Stride;
   vtkUltrasoundVolume::Dispatch(stitched.Intensity, [&](auto voxel) {
     const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(stitched);
     this->Quality = echorama::MeasureStitch<decltype(voxel)>(volumes, posed.geometry, posed.intensity, posed.valid,
-                                                             reference ? &*reference : nullptr, parameters, progress);
+                                                             reference ? &*reference : nullptr, this->Values, progress);
   });
 
   // 3. what goes out
   output->ShallowCopy(image);
-  const echorama::StitchQualityReport& q = this->Quality;
-  this->Report = nlohmann::ordered_json{{"seam_mean", q.seamMean},           {"seam_gradient", q.seamGradient},
-                                        {"borders", JsonOf(q.borders)},      {"cuts", JsonOf(q.cuts)},
-                                        {"texture_kept", q.textureKept},     {"snr", q.snr},
-                                        {"snr_sources", q.snrSources},       {"overlap_windows", q.overlapWindows},
-                                        {"overlap_voxels", q.overlapVoxels}, {"error_overlap", q.errorOverlap},
-                                        {"error_outside", q.errorOutside}}
-                     .dump();
+  this->Report = echorama::Report(this->Quality);
+}
+
+//----------------------------------------------------------------------------
+const echorama::StitchQualityReport& vtkUltrasoundStitchQuality::Measured() const
+{
+  return this->Quality;
 }
 
 //----------------------------------------------------------------------------
@@ -147,6 +134,6 @@ double vtkUltrasoundStitchQuality::GetErrorOutside() const
 void vtkUltrasoundStitchQuality::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Stride: " << this->Stride << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Report: " << this->Report << "\n";
 }

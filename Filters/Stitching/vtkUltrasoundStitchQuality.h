@@ -25,6 +25,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Stitching/StitchQuality.h"
+#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSSTITCHING_EXPORT vtkUltrasoundStitchQuality : public vtkUltrasoundImageAlgorithm {
@@ -33,11 +34,32 @@ public:
   vtkTypeMacro(vtkUltrasoundStitchQuality, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   ///@{
-  /** One of Stride^3 windows and one of Stride^2 faces is measured, in [1, 100]. Default 3. */
-  vtkSetClampMacro(Stride, int, 1, 100);
-  vtkGetMacro(Stride, int);
+  /** One of Stride^3 windows and one of Stride^2 faces is measured. In [1, 1000]; default 3. */
+  void SetStride(int value) { this->SetParameter("Stride", value); }
+  int GetStride() { return static_cast<int>(this->GetParameter("Stride")); }
   ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** The volumes that were stitched go to input 1. */
@@ -80,6 +102,11 @@ public:
    */
   std::string GetReport() const { return this->Report; }
 
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters();                  ///< for C++: they point into this object
+  const echorama::StitchQualityReport& Measured() const; ///< GetReport() for C++
+#endif
+
 protected:
   vtkUltrasoundStitchQuality();
   ~vtkUltrasoundStitchQuality() override = default;
@@ -94,7 +121,7 @@ private:
   void operator=(const vtkUltrasoundStitchQuality&) = delete;
 
 #ifndef __VTK_WRAP__
-  int Stride = echorama::StitchQualityParameters().stride;
+  echorama::StitchQualityParameters Values;
   echorama::StitchQualityReport Quality;
   std::string Report;
 #endif

@@ -2,9 +2,8 @@
 #include "vtkUltrasoundStitcher.h"
 
 #include "Core/Base/Error.h"
-#include "Core/Base/Json.h"
 #include "Filters/Stitching/StitchGrid.h"
-#include "Filters/Stitching/StitchMemory.h"
+#include "Filters/Stitching/StitchJson.h"
 
 #include "vtkDataObjectTree.h"
 #include "vtkDataObjectTreeIterator.h"
@@ -22,33 +21,14 @@
 #include "vtkUltrasoundDisplacement.h"
 
 #include <algorithm>
-#include <cstring>
 
 using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundStitcher);
 
+vtkUltrasoundParametersMacro(vtkUltrasoundStitcher);
+
 namespace {
-const char* const METHOD_NAMES[] = {"distance", "feather", "average", "maximum", "membrane"};
-const char* const TEXTURE_NAMES[] = {"mix", "split", "seam"};
-
-template <std::size_t count>
-const char* NameOf(const char* const (&names)[count], int number)
-{
-  return number >= 0 && number < static_cast<int>(count) ? names[number] : nullptr;
-}
-
-template <std::size_t count>
-int NumberOf(const char* const (&names)[count], const char* name)
-{
-  for (std::size_t number = 0; name && number < count; ++number) {
-    if (!std::strcmp(name, names[number])) {
-      return static_cast<int>(number);
-    }
-  }
-  return -1;
-}
-
 // The smallest of our voxel types that holds the values of both.
 int CommonType(int a, int b)
 {
@@ -93,32 +73,31 @@ struct vtkUltrasoundStitcher::Scene {
   std::vector<echorama::StitchInput> Stitched;
   std::vector<echorama::ImageGeometry> Geometries, Reaches;
   int Type = VTK_UNSIGNED_CHAR;
+  echorama::StitchOutputs Outputs;
   echorama::ImageGeometry Grid;
   std::unique_ptr<echorama::StitchPlan> Plan;
 };
 
 //----------------------------------------------------------------------------
-const char* vtkUltrasoundStitcher::GetMethodName(int method)
+echorama::ParameterList vtkUltrasoundStitcher::Parameters()
 {
-  return NameOf(METHOD_NAMES, method);
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundStitcher::GetMethodFromName(const char* name)
-{
-  return NumberOf(METHOD_NAMES, name);
-}
-
-//----------------------------------------------------------------------------
-const char* vtkUltrasoundStitcher::GetTextureName(int texture)
-{
-  return NameOf(TEXTURE_NAMES, texture);
-}
-
-//----------------------------------------------------------------------------
-int vtkUltrasoundStitcher::GetTextureFromName(const char* name)
-{
-  return NumberOf(TEXTURE_NAMES, name);
+  using echorama::Parameter;
+  return echorama::Join(
+      {echorama::Without(Describe(this->Values), {"MembraneTolerance"}),
+       {Parameter(
+            "SpacingMm", this->SpacingMm, {0, echorama::Unlimited}, "mm",
+            "Edge of the cubic voxels of the output. 0: the smallest spacing of the volumes, axis by axis where they all share "
+            "their directions."),
+        Parameter(
+            "UseReliability", this->UseReliability,
+            "Weigh volumes that have the array Reliability by it, so that a shadow in one is filled by another. Not for the "
+            "method maximum."),
+        Parameter("OutputWeights", this->Wanted.weights, "Also put out the share of each volume, as arrays Weight0, Weight1 ...")
+            .Advanced(),
+        Parameter(
+            "OutputSpread", this->Wanted.spread,
+            "Also put out how far the volumes are apart at each voxel, as the array Spread: the largest minus the smallest of "
+            "their values, 0 where one is alone.")}});
 }
 
 //----------------------------------------------------------------------------
@@ -156,6 +135,7 @@ int vtkUltrasoundStitcher::FillInputPortInformation(int port, vtkInformation* in
 int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
     std::vector<echorama::ImageGeometry> geometries;
     bool typeKnown = true;
     int type = VTK_UNSIGNED_CHAR;
@@ -191,10 +171,9 @@ int vtkUltrasoundStitcher::RequestInformation(vtkInformation*, vtkInformationVec
 }
 
 //----------------------------------------------------------------------------
-echorama::VolumeView<const float> vtkUltrasoundStitcher::ReliabilityOf(const vtkUltrasoundVolume::Input& volume) const
+echorama::VolumeView<const float> vtkUltrasoundStitcher::ReliabilityOf(const vtkUltrasoundVolume::Input& volume)
 {
-  vtkDataArray* array =
-      this->UseReliability ? volume.Image->GetPointData()->GetArray(vtkUltrasoundVolume::ReliabilityName()) : nullptr;
+  vtkDataArray* array = volume.Image->GetPointData()->GetArray(vtkUltrasoundVolume::ReliabilityName());
   if (array && (array->GetDataType() != VTK_FLOAT || array->GetNumberOfComponents() != 1 ||
                 array->GetNumberOfTuples() != volume.Image->GetNumberOfPoints())) {
     throw Error(Error::Kind::BadInput, volume.Name + ": its Reliability is not one float per voxel");
@@ -237,22 +216,6 @@ vtkUltrasoundStitcher::DisplacementsOf(vtkInformationVector* port, const std::ve
 }
 
 //----------------------------------------------------------------------------
-echorama::StitchParameters vtkUltrasoundStitcher::Parameters() const
-{
-  echorama::StitchParameters parameters;
-  parameters.method = static_cast<echorama::StitchMethod>(this->Method);
-  parameters.texture = static_cast<echorama::StitchTexture>(this->Texture);
-  parameters.sharpness = this->Sharpness;
-  parameters.detailSharpness = this->DetailSharpness;
-  parameters.detailScale = this->DetailScale;
-  parameters.equalizeGain = this->EqualizeGain;
-  parameters.reliabilityFloor = this->ReliabilityFloor;
-  parameters.allowDisjoint = this->AllowDisjoint;
-  parameters.maximumMemoryGb = this->MaximumMemoryGb;
-  return parameters;
-}
-
-//----------------------------------------------------------------------------
 std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtkInformationVector** inputs)
 {
   auto scene = std::make_unique<Scene>();
@@ -266,10 +229,12 @@ std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtk
   }
   for (const vtkUltrasoundVolume::Input& volume : scene->Volumes) {
     vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto voxel) {
-      scene->Stitched.push_back(
-          {vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name, this->ReliabilityOf(volume)});
+      scene->Stitched.push_back({vtkUltrasoundVolume::PosedVolumeOf<decltype(voxel)>(volume), volume.Name});
     });
     echorama::StitchInput& stitched = scene->Stitched.back();
+    if (this->UseReliability) {
+      stitched.reliability = ReliabilityOf(volume);
+    }
     stitched.displacement = scene->Fields.empty() ? nullptr : &scene->Fields[scene->Stitched.size() - 1];
     scene->Geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
     scene->Reaches.push_back(echorama::ReachOf(stitched));
@@ -277,6 +242,8 @@ std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtk
     scene->Made = std::max({scene->Made, volume.Image->GetMTime(), volume.Intensity->GetMTime()});
   }
   scene->Grid = echorama::StitchGrid(scene->Geometries, this->SpacingMm);
+  scene->Outputs = this->Wanted;
+  scene->Outputs.voxelBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(scene->Type));
   return scene;
 }
 
@@ -303,10 +270,7 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
     box.size[axis] = wanted[2 * axis + 1] - wanted[2 * axis] + 1;
     whole = whole && box.size[axis] == grid.dimensions[axis];
   }
-  const echorama::StitchParameters parameters = this->Parameters();
-  const echorama::StitchOutputs outputs{static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(scene->Type)), this->OutputWeights,
-                                        this->OutputSpread};
-  echorama::CheckStitch(parameters, scene->Reaches, grid, outputs, box);
+  echorama::CheckStitch(this->Values, scene->Reaches, grid, scene->Outputs, box);
 
   // 2. the plan, new or that of the piece before
   double planned = 0.0;
@@ -315,8 +279,8 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   } else {
     this->Kept.reset();
     planned = 0.6;
-    scene->Plan =
-        std::make_unique<echorama::StitchPlan>(parameters, scene->Stitched, scene->Grid, outputs, progress.Part(0.0, planned));
+    scene->Plan = std::make_unique<echorama::StitchPlan>(this->Values, scene->Stitched, scene->Grid, scene->Outputs,
+                                                         progress.Part(0.0, planned));
   }
   this->PlanFactor = scene->Plan->Factor();
   this->MembraneBound = scene->Plan->MembraneBound();
@@ -338,11 +302,11 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
   output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
   output->GetFieldData()->AddArray(names);
   echorama::VolumeView<float> spread;
-  if (this->OutputSpread) {
+  if (this->Wanted.spread) {
     spread = vtkUltrasoundVolume::ViewOf<float>(AddArray(output, SpreadName(), VTK_FLOAT), output);
   }
   std::vector<echorama::VolumeView<float>> weights;
-  for (std::size_t volume = 0; this->OutputWeights && volume < scene->Volumes.size(); ++volume) {
+  for (std::size_t volume = 0; this->Wanted.weights && volume < scene->Volumes.size(); ++volume) {
     vtkDataArray* weight = AddArray(output, ("Weight" + std::to_string(volume)).c_str(), VTK_FLOAT);
     weights.push_back(vtkUltrasoundVolume::ViewOf<float>(weight, output));
   }
@@ -362,47 +326,30 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
 }
 
 //----------------------------------------------------------------------------
-std::string vtkUltrasoundStitcher::EstimateCost()
+std::optional<echorama::StitchCost> vtkUltrasoundStitcher::Cost()
 {
-  std::string report;
+  std::optional<echorama::StitchCost> cost;
   this->UpdateInformation();
   vtkInformationVector* inputs[2] = {this->GetExecutive()->GetInputInformation(0), this->GetExecutive()->GetInputInformation(1)};
   vtkUltrasoundVolume::MakeInput(this, 0);
   vtkUltrasoundVolume::MakeInput(this, 1);
   vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
     const std::unique_ptr<Scene> scene = this->Collect(inputs);
-    const echorama::StitchOutputs outputs{static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(scene->Type)),
-                                          this->OutputWeights, this->OutputSpread};
-    const echorama::StitchCost cost = echorama::CostOfStitch(this->Parameters(), scene->Reaches, scene->Grid, outputs);
-    const auto& spacing = scene->Grid.spacing;
-    report = nlohmann::ordered_json{{"volumes", scene->Volumes.size()},
-                                    {"dimensions", scene->Grid.dimensions},
-                                    {"spacing", {spacing[0], spacing[1], spacing[2]}},
-                                    {"plan_factor", cost.planFactor},
-                                    {"plan_bytes", cost.planBytes},
-                                    {"output_bytes", cost.outputBytes},
-                                    {"allowed_bytes", cost.allowedBytes},
-                                    {"slabs", cost.slabs}}
-                 .dump();
+    cost = echorama::CostOfStitch(this->Values, scene->Reaches, scene->Grid, scene->Outputs);
   });
-  return report;
+  return cost;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundStitcher::EstimateCost()
+{
+  const std::optional<echorama::StitchCost> cost = this->Cost();
+  return cost ? echorama::Report(*cost) : std::string();
 }
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundStitcher::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Method: " << this->GetMethodAsString() << "\n";
-  os << indent << "Texture: " << this->GetTextureAsString() << "\n";
-  os << indent << "Sharpness: " << this->Sharpness << "\n";
-  os << indent << "DetailSharpness: " << this->DetailSharpness << "\n";
-  os << indent << "DetailScale: " << this->DetailScale << "\n";
-  os << indent << "EqualizeGain: " << this->EqualizeGain << "\n";
-  os << indent << "SpacingMm: " << this->SpacingMm << "\n";
-  os << indent << "AllowDisjoint: " << this->AllowDisjoint << "\n";
-  os << indent << "UseReliability: " << this->UseReliability << "\n";
-  os << indent << "ReliabilityFloor: " << this->ReliabilityFloor << "\n";
-  os << indent << "OutputWeights: " << this->OutputWeights << "\n";
-  os << indent << "OutputSpread: " << this->OutputSpread << "\n";
-  os << indent << "MaximumMemoryGb: " << this->MaximumMemoryGb << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
 }

@@ -26,9 +26,9 @@
  * Texture). A volume that others cover wholly counts as alone where it lies deepest inside its border. A volume with the point
  * array `Reliability` (vtkUltrasoundReliabilityMap: shadows, saturation) is weighted by it as well.
  *
- * The filter makes the extent that is asked for and no more: what is global (how volumes share the overlaps, gains,
- * seams) is found once and kept until the inputs or a parameter change, so slabs or pieces are those of the whole to the last
- * bit. When the memory that is allowed does not suffice, the global part is found on a coarser grid (GetPlanFactor).
+ * The filter makes the extent that is asked for and no more: what is global (how volumes share the overlaps, gains) is found
+ * once and kept until the inputs or a parameter change, so slabs or pieces are those of the whole to the last bit. When the
+ * memory that is allowed does not suffice, the global part is found on a coarser grid (GetPlanFactor).
  *
  * Refuses, with a message: fewer than two volumes, a volume that overlaps no other (see AllowDisjoint), one with no real
  * voxels, a bad geometry or type, and a result that needs more memory than allowed.
@@ -45,8 +45,11 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Stitching/Stitch.h"
-#include <memory> // for what is kept
-#include <vector> // for gains
+#include "Filters/Stitching/StitchMemory.h"
+#include "vtkUltrasoundParameters.h"
+#include <memory>   // for what is kept
+#include <optional> // for what it costs
+#include <vector>   // for gains
 #endif
 
 class ECHORAMAFILTERSSTITCHING_EXPORT vtkUltrasoundStitcher : public vtkUltrasoundImageAlgorithm {
@@ -55,128 +58,159 @@ public:
   vtkTypeMacro(vtkUltrasoundStitcher, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  // BEGIN parameters
   enum Methods { DISTANCE = 0, FEATHER = 1, AVERAGE = 2, MAXIMUM = 3, MEMBRANE = 4 };
-  enum Textures { MIX = 0, SPLIT = 1, SEAM = 2 };
 
   ///@{
   /**
-   * What decides how much each volume counts: the smoothest surface from pure to empty regions (MEMBRANE, default), the distances
-   * to them (DISTANCE), the distance to the own border (FEATHER, Szeliski 1996), nothing (AVERAGE), or the largest value is shown
-   * (MAXIMUM).
+   * What decides how much each volume counts. Membrane: the smoothest surface from where it is alone to where only others are;
+   * distance: the distances to these; feather: the distance to its own border; average: nothing, so that the plain mean is shown;
+   * maximum: the largest value is shown. Default membrane. There are DISTANCE, FEATHER, AVERAGE, MAXIMUM, MEMBRANE.
    */
-  vtkSetClampMacro(Method, int, DISTANCE, MEMBRANE);
-  vtkGetMacro(Method, int);
+  void SetMethod(int value) { this->SetParameter("Method", value); }
+  int GetMethod() { return static_cast<int>(this->GetParameter("Method")); }
   void SetMethodToDistance() { this->SetMethod(DISTANCE); }
   void SetMethodToFeather() { this->SetMethod(FEATHER); }
   void SetMethodToAverage() { this->SetMethod(AVERAGE); }
   void SetMethodToMaximum() { this->SetMethod(MAXIMUM); }
   void SetMethodToMembrane() { this->SetMethod(MEMBRANE); }
-  const char* GetMethodAsString() { return GetMethodName(this->Method); }
+  std::string GetMethodAsString() { return this->GetParameterAsText("Method"); }
   ///@}
 
-  ///@{
-  /** The name of a method in small letters (nullptr for another number), and its number by name (or -1). */
-  static const char* GetMethodName(int method);
-  static int GetMethodFromName(const char* name);
-  ///@}
+  enum Textures { MIX = 0, SPLIT = 1 };
 
   ///@{
   /**
-   * What becomes of speckle and edges where volumes overlap (for DISTANCE, FEATHER, MEMBRANE): the weighted mean of all
-   * (MIX), details that change over in a narrow transition, amplified by what their mixture has lost (SPLIT, default), or details
-   * of one volume per voxel along a seam where the volumes differ least (SEAM, graph cut).
+   * What becomes of speckle and edges where volumes overlap. Mix: their weighted mean, which washes them out; split: they change
+   * over in a narrow transition, amplified by what mixtures lose. Used when Method is distance or feather or membrane. Default
+   * split. There are MIX, SPLIT.
    */
-  vtkSetClampMacro(Texture, int, MIX, SEAM);
-  vtkGetMacro(Texture, int);
+  void SetTexture(int value) { this->SetParameter("Texture", value); }
+  int GetTexture() { return static_cast<int>(this->GetParameter("Texture")); }
   void SetTextureToMix() { this->SetTexture(MIX); }
   void SetTextureToSplit() { this->SetTexture(SPLIT); }
-  void SetTextureToSeam() { this->SetTexture(SEAM); }
-  const char* GetTextureAsString() { return GetTextureName(this->Texture); }
-  ///@}
-
-  ///@{
-  /** The name of a texture in small letters (nullptr for another number), and its number by name (or -1). */
-  static const char* GetTextureName(int texture);
-  static int GetTextureFromName(const char* name);
+  std::string GetTextureAsString() { return this->GetParameterAsText("Texture"); }
   ///@}
 
   ///@{
   /**
-   * The exponent b of the weights of DISTANCE and MEMBRANE, in [0, 1000]. 0 is the plain average, 1 a ramp across the
-   * whole overlap, large values a hard edge half-way. Default 1.5.
+   * Exponent of the weights: 0 is the plain average, 1 a ramp across the whole overlap, 50 nearly a hard edge half-way. Used when
+   * Method is distance or membrane. In [0, 1000]; default 1.5.
    */
-  vtkSetClampMacro(Sharpness, double, 0.0, 1000.0);
-  vtkGetMacro(Sharpness, double);
-  ///@}
-
-  ///@{
-  /** The same exponent for the details of SPLIT, in [0, 1000]. Default 32: about a sixteenth of the overlap is transition. */
-  vtkSetClampMacro(DetailSharpness, double, 0.0, 1000.0);
-  vtkGetMacro(DetailSharpness, double);
-  ///@}
-
-  ///@{
-  /** What counts as smooth: the standard deviation of the filter that parts it from details, in voxels of the output, [1, 100].
-   * Default 2. */
-  vtkSetClampMacro(DetailScale, double, 1.0, 100.0);
-  vtkGetMacro(DetailScale, double);
+  void SetSharpness(double value) { this->SetParameter("Sharpness", value); }
+  double GetSharpness() { return this->GetParameter("Sharpness"); }
   ///@}
 
   ///@{
   /**
-   * Whether a gain and an offset per volume are found where volumes overlap (least squares over all pairs), and applied. For
-   * volumes of different gain or depth compensation. Default off. What was applied: GetGain(), GetOffset().
+   * The same exponent for speckle and edges. With 32 about a sixteenth of the overlap is transition. Used when Texture is split.
+   * In [0, 1000]; default 32.
    */
-  vtkSetMacro(EqualizeGain, bool);
-  vtkGetMacro(EqualizeGain, bool);
-  vtkBooleanMacro(EqualizeGain, bool);
+  void SetDetailSharpness(double value) { this->SetParameter("DetailSharpness", value); }
+  double GetDetailSharpness() { return this->GetParameter("DetailSharpness"); }
   ///@}
 
   ///@{
-  /** Spacing of the output, mm. 0 (default): the smallest among the volumes. A negative one is refused. */
-  vtkSetMacro(SpacingMm, double);
-  vtkGetMacro(SpacingMm, double);
+  /**
+   * What counts as smooth: the standard deviation of the filter that parts it from details. In [1, 100] voxels of the output;
+   * default 2.
+   */
+  void SetDetailScale(double value) { this->SetParameter("DetailScale", value); }
+  double GetDetailScale() { return this->GetParameter("DetailScale"); }
   ///@}
 
   ///@{
-  /** Whether a volume may overlap no other; it is then just put in its place. Default off: that is an error. */
-  vtkSetMacro(AllowDisjoint, bool);
-  vtkGetMacro(AllowDisjoint, bool);
-  vtkBooleanMacro(AllowDisjoint, bool);
+  /** Find a gain and an offset for each volume where volumes overlap, and apply them. Default off. */
+  void SetEqualizeGain(bool value) { this->SetParameter("EqualizeGain", value); }
+  bool GetEqualizeGain() { return this->GetParameter("EqualizeGain") != 0.0; }
+  void EqualizeGainOn() { this->SetEqualizeGain(true); }
+  void EqualizeGainOff() { this->SetEqualizeGain(false); }
   ///@}
 
   ///@{
-  /** Whether the `Reliability` of volumes that have it multiplies their weights (but for MAXIMUM). Default on. */
-  vtkSetMacro(UseReliability, bool);
-  vtkGetMacro(UseReliability, bool);
-  vtkBooleanMacro(UseReliability, bool);
+  /**
+   * What cannot be trusted at all still counts by this: where nothing better is there it is shown. Used when UseReliability is
+   * on. In (0, 1]; default 0.01.
+   */
+  void SetReliabilityFloor(double value) { this->SetParameter("ReliabilityFloor", value); }
+  double GetReliabilityFloor() { return this->GetParameter("ReliabilityFloor"); }
   ///@}
 
   ///@{
-  /** What cannot be trusted at all still counts by this, in [1e-6, 1]: enough where nothing else is there. Default 0.01. */
-  vtkSetClampMacro(ReliabilityFloor, double, 1e-6, 1.0);
-  vtkGetMacro(ReliabilityFloor, double);
+  /** Accept volumes that overlap no other, and put them in their place. Off, that is an error. Default off. */
+  void SetAllowDisjoint(bool value) { this->SetParameter("AllowDisjoint", value); }
+  bool GetAllowDisjoint() { return this->GetParameter("AllowDisjoint") != 0.0; }
+  void AllowDisjointOn() { this->SetAllowDisjoint(true); }
+  void AllowDisjointOff() { this->SetAllowDisjoint(false); }
   ///@}
 
   ///@{
-  /** Whether the share of each volume is put out too (4 bytes per voxel and volume). Default off. */
-  vtkSetMacro(OutputWeights, bool);
-  vtkGetMacro(OutputWeights, bool);
-  vtkBooleanMacro(OutputWeights, bool);
+  /**
+   * Refuse what needs more memory beside the volumes, in 10^9 bytes. 0: three quarters of the machine's memory. At least 0 GB;
+   * default 0.
+   */
+  void SetMaximumMemoryGb(double value) { this->SetParameter("MaximumMemoryGb", value); }
+  double GetMaximumMemoryGb() { return this->GetParameter("MaximumMemoryGb"); }
   ///@}
 
   ///@{
-  /** Whether `Spread` is put out too (4 bytes per voxel). Default off. */
-  vtkSetMacro(OutputSpread, bool);
-  vtkGetMacro(OutputSpread, bool);
-  vtkBooleanMacro(OutputSpread, bool);
+  /**
+   * Edge of the cubic voxels of the output. 0: the smallest spacing of the volumes, axis by axis where they all share their
+   * directions. At least 0 mm; default 0.
+   */
+  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
+  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
   ///@}
 
   ///@{
-  /** Refuse what needs more memory than this, in 10^9 bytes. 0 (default): three quarters of this machine's memory. */
-  vtkSetClampMacro(MaximumMemoryGb, double, 0.0, VTK_DOUBLE_MAX);
-  vtkGetMacro(MaximumMemoryGb, double);
+  /**
+   * Weigh volumes that have the array Reliability by it, so that a shadow in one is filled by another. Not for the method
+   * maximum. Default on.
+   */
+  void SetUseReliability(bool value) { this->SetParameter("UseReliability", value); }
+  bool GetUseReliability() { return this->GetParameter("UseReliability") != 0.0; }
+  void UseReliabilityOn() { this->SetUseReliability(true); }
+  void UseReliabilityOff() { this->SetUseReliability(false); }
   ///@}
+
+  ///@{
+  /** Also put out the share of each volume, as arrays Weight0, Weight1 ... Default off. */
+  void SetOutputWeights(bool value) { this->SetParameter("OutputWeights", value); }
+  bool GetOutputWeights() { return this->GetParameter("OutputWeights") != 0.0; }
+  void OutputWeightsOn() { this->SetOutputWeights(true); }
+  void OutputWeightsOff() { this->SetOutputWeights(false); }
+  ///@}
+
+  ///@{
+  /**
+   * Also put out how far the volumes are apart at each voxel, as the array Spread: the largest minus the smallest of their
+   * values, 0 where one is alone. Default off.
+   */
+  void SetOutputSpread(bool value) { this->SetParameter("OutputSpread", value); }
+  bool GetOutputSpread() { return this->GetParameter("OutputSpread") != 0.0; }
+  void OutputSpreadOn() { this->SetOutputSpread(true); }
+  void OutputSpreadOff() { this->SetOutputSpread(false); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
 
   ///@{
   /** Displacements go to input 1, in the order of the volumes. */
@@ -212,6 +246,13 @@ public:
   static const char* StitchedVolumesName() { return "StitchedVolumes"; }
   ///@}
 
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters();       ///< for C++: they point into this object
+  std::optional<echorama::StitchCost> Cost(); ///< EstimateCost() for C++
+  /** How far the voxels of a volume can be trusted, empty when it does not say. Throws echorama::Error(BadInput). */
+  static echorama::VolumeView<const float> ReliabilityOf(const vtkUltrasoundVolume::Input& volume);
+#endif
+
 protected:
   vtkUltrasoundStitcher();
   ~vtkUltrasoundStitcher() override;
@@ -229,30 +270,19 @@ private:
 #ifndef __VTK_WRAP__
   struct Scene; // what came in, and the plan for it
   std::unique_ptr<Scene> Collect(vtkInformationVector** inputs);
-  echorama::StitchParameters Parameters() const;
-  echorama::VolumeView<const float> ReliabilityOf(const vtkUltrasoundVolume::Input& volume) const;
   std::vector<echorama::DisplacementField> DisplacementsOf(vtkInformationVector* port,
                                                            const std::vector<vtkUltrasoundVolume::Input>& volumes) const;
 
   std::unique_ptr<Scene> Kept; // between pieces of one output
 #endif
 
-  int Method = MEMBRANE;
-  int Texture = SPLIT;
-  bool OutputWeights = false;
-  bool OutputSpread = false;
-  bool UseReliability = true;
-  double SpacingMm = 0.0;
   int PlanFactor = 0;
   double MembraneBound = 0.0;
 #ifndef __VTK_WRAP__
-  double Sharpness = echorama::StitchParameters().sharpness;
-  double DetailSharpness = echorama::StitchParameters().detailSharpness;
-  double DetailScale = echorama::StitchParameters().detailScale;
-  bool EqualizeGain = echorama::StitchParameters().equalizeGain;
-  double ReliabilityFloor = echorama::StitchParameters().reliabilityFloor;
-  bool AllowDisjoint = echorama::StitchParameters().allowDisjoint;
-  double MaximumMemoryGb = echorama::StitchParameters().maximumMemoryGb;
+  echorama::StitchParameters Values;
+  echorama::StitchOutputs Wanted;
+  bool UseReliability = true;
+  double SpacingMm = 0.0;
   std::vector<double> Gains, Offsets;
 #endif
 };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Material.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
 
@@ -14,20 +13,27 @@ double Material::AttenuationDbPerMm(double frequencyMHz) const
 
 void Material::Check() const
 {
-  const auto check = [this](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, "material \"" + name + "\": " + what + " is " + NumberText(value) +
-                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
+  CheckRanges(*this, "material \"" + name + "\"");
+}
+
+ParameterList Describe(Material& m)
+{
+  return {
+      Parameter("SoundSpeed", m.soundSpeed, {100, 10000}, "m/s", "Speed of sound."),
+      Parameter("Density", m.density, {0.1, 20000}, "kg/m^3", "Mass per volume; times the speed of sound it is the impedance."),
+      Parameter("Attenuation", m.attenuation, {0, 200}, "dB/cm", "Attenuation at 1 MHz, one way."),
+      Parameter("AttenuationPower", m.attenuationPower, {0, 2}, "", "Exponent of the frequency in the attenuation."),
+      Parameter(
+          "ScattererDensity", m.scattererDensity, {0, 1000}, "per mm^3",
+          "Point scatterers; 0: clear. No scanner resolves so many, and a synthesis may make fewer that are as loud together."),
+      Parameter("BackscatterDb", m.backscatterDb, {Material::clearDb, 60}, "dB",
+                "Power that a volume of it scatters back, beside liver. It does not change with the number of scatterers."),
+      Parameter("Roughness", m.roughness, {0, 1}, "",
+                "Of its surface: 0 mirrors, 1 sends sound every way alike. Where two materials meet, the rougher counts."),
+      Parameter("ScatterProbability", m.scatterProbability, {0, 1}, "per mm",
+                "Probability that sound scatters, when random scatter events are counted."),
+      Parameter("YoungsModulusKPa", m.youngsModulusKPa, {0, 1e9}, "kPa", "Stiffness."),
   };
-  check("soundSpeed (m/s)", soundSpeed, 100.0, 10000.0);
-  check("density (kg/m^3)", density, 0.1, 20000.0);
-  check("attenuation (dB/cm at 1 MHz)", attenuation, 0.0, 200.0);
-  check("attenuationPower", attenuationPower, 0.0, 2.0);
-  check("scattererDensity (per mm^3)", scattererDensity, 0.0, 1000.0);
-  check("backscatterDb", backscatterDb, -120.0, 60.0);
-  check("roughness", roughness, 0.0, 1.0);
-  check("scatterProbability", scatterProbability, 0.0, 1.0);
-  check("youngsModulusKPa", youngsModulusKPa, 0.0, 1e9);
 }
 
 const std::vector<Material>& StandardMaterials()

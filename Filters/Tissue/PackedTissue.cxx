@@ -2,8 +2,8 @@
 // Levels are chosen first, so that the count of triangles is known, and refused, before there is any. Then each sphere copies
 // the mesh of its level, turned and scaled, to a place of its own, in parallel.
 #include "PackedTissue.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Icosphere.h"
@@ -46,29 +46,43 @@ std::vector<WeightedMaterial> PackedTissueParameters::DefaultMaterials()
           {StandardMaterial("cyst"), 0.5}};
 }
 
+ParameterList Describe(PackedTissueParameters& p)
+{
+  return {
+      Parameter("CellMm", p.cell.mm, {0.01, 100}, "mm",
+                "Resolution cell of the scan at the probe's face: it decides how fine meshes are."),
+      Parameter("CellGrowth", p.cell.growth, {0, 1}, "", "How many mm the cell grows per mm of way from the probe.").Advanced(),
+      Parameter("ProbePosition", p.cell.probe, {}, "mm", "Where the face of the probe is. It matters when the cell grows.")
+          .Advanced(),
+      Parameter("Deviation", p.deviation, {0.001, 10}, "",
+                "How far triangles may leave their sphere, as a part of the cell there.")
+          .Advanced(),
+      Parameter(
+          "TrueVolume", p.trueVolume,
+          "Whether meshes have the volume of their spheres; corners then lie a bit outside, and spheres that touch overlap. "
+          "Else corners lie on the spheres.")
+          .Advanced(),
+      Parameter("Turned", p.turned,
+                "Whether each mesh is turned at random, so that not all have a triangle that faces the probe.")
+          .Advanced(),
+      Parameter("MaxTriangles", p.maxTriangles, {20, 1e8}, "", "More triangles are refused, with the count that it would take.")
+          .Advanced(),
+  };
+}
+
 void PackedTissueParameters::Check() const
 {
-  const auto check = [](const std::string& what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, "the packed tissue's " + what + " is " + NumberText(value) +
-                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
-  };
   packing.Check();
+  CheckRanges(*this);
   background.Check();
   double sum = 0.0;
   for (const WeightedMaterial& one : materials) {
     one.material.Check();
-    check("weight of \"" + one.material.name + "\"", one.weight, 0.0, 1e9);
+    CheckRange("the packed tissue's weight of \"" + one.material.name + "\"", one.weight, 0.0, 1e9);
     sum += one.weight;
   }
   if (!(sum > 0.0))
     throw Error(Error::Kind::InvalidParameter, "the packed tissue has no material with a weight above 0");
-  check("cell (mm)", cell.mm, 0.01, 100.0);
-  check("cell's growth", cell.growth, 0.0, 1.0);
-  if (!cell.probe.allFinite())
-    throw Error(Error::Kind::InvalidParameter, "the place of the packed tissue's probe is not finite");
-  check("deviation", deviation, 0.001, 10.0);
-  check("maxTriangles", static_cast<double>(maxTriangles), 20.0, 1e8);
 }
 
 TissueSurface MeshSpheres(const PackedTissueParameters& parameters, const std::vector<Sphere>& spheres, const Progress& progress)
@@ -86,7 +100,7 @@ TissueSurface MeshSpheres(const PackedTissueParameters& parameters, const std::v
   }
   if (firstTriangle.back() > static_cast<std::size_t>(parameters.maxTriangles))
     throw Error(Error::Kind::TooLarge, std::to_string(spheres.size()) + " spheres take " + std::to_string(firstTriangle.back()) +
-                                           " triangles, more than maxTriangles (" + std::to_string(parameters.maxTriangles) +
+                                           " triangles, more than MaxTriangles (" + std::to_string(parameters.maxTriangles) +
                                            "); raise the cell or the deviation");
 
   TissueSurface surface;

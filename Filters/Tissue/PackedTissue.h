@@ -11,9 +11,9 @@ namespace echorama {
 
 /// The size of what a scan can tell apart, as it grows with the way from the probe.
 struct ResolutionCell {
-  double mm = 1.0;                                 ///< at the probe's face, in [0.01, 100]
-  double growth = 0.0;                             ///< mm more per mm of way, in [0, 1]
-  Eigen::Vector3d probe = Eigen::Vector3d::Zero(); ///< where the face is, mm
+  double mm = 1.0;
+  double growth = 0.0;
+  Eigen::Vector3d probe = Eigen::Vector3d::Zero();
 
   double At(const Eigen::Vector3d& point) const { return mm + growth * (point - probe).norm(); }
 };
@@ -29,19 +29,21 @@ struct PackedTissueParameters {
   Material background = StandardMaterial("tissue");
   std::vector<WeightedMaterial> materials = DefaultMaterials(); ///< at least one with a weight above 0
   ResolutionCell cell;
-  double deviation = 0.25; ///< a mesh leaves its sphere by at most this part of the resolution cell there, in [0.001, 10]
-  /// Corners lie on their spheres, so that bodies never overlap; or a bit outside, so that each mesh has its sphere's
-  /// volume, and spheres that touch overlap by up to twice two thirds of the deviation allowed.
-  bool trueVolume = false;
-  bool turned = true;                   ///< each mesh is turned at random, so that triangles do not face the probe all at once
-  std::int64_t maxTriangles = 10000000; ///< more are refused, in [20, 100 million]
+  double deviation = 0.25;
+  bool trueVolume = false; ///< spheres that touch then overlap by up to twice two thirds of the deviation allowed
+  bool turned = true;
+  std::int64_t maxTriangles = 10000000;
 
   /// lesion-dark, liver and lesion-bright alike, and half as many cysts.
   static std::vector<WeightedMaterial> DefaultMaterials();
 
-  /// Throws Error(InvalidParameter) that names the number which is out of its range.
+  /// Throws Error(InvalidParameter) that names the number which is out of its range, and what SpherePackingParameters::Check
+  /// throws; also when no material has a weight.
   void Check() const;
 };
+
+/// What decides the meshes; not the packing and the materials.
+ParameterList Describe(PackedTissueParameters& p);
 
 struct PackedTissue {
   TissueSurface surface; ///< a body per sphere, in the order of the packing

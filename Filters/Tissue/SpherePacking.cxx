@@ -350,33 +350,44 @@ private:
 
 } // namespace
 
+ParameterList Describe(SpherePackingParameters& p)
+{
+  constexpr double far = 1e6;
+  return {
+      Parameter("Method", Choice(p.method, {"random", "empty-space"}),
+                "How spheres find their places. Random: sizes are drawn first, and each is tried at random places, large ones "
+                "first. Empty space: at random places of the empty space, each with the largest sphere that fits (Manna 1992)."),
+      Parameter("Region", Choice(p.region, {"box", "ball"}), "What is filled: the box, or the largest ball about its middle."),
+      Parameter("BoxMin", p.boxMin, {-far, far}, "mm", "Least x, y and z of the box."),
+      Parameter("BoxMax", p.boxMax, {-far, far}, "mm", "Greatest x, y and z of the box."),
+      Parameter("Radii", Choice(p.radii, {"uniform", "log-uniform", "power-law"}),
+                "How radii are distributed: all alike, all factors alike (density 1 / r), or of density r^-Exponent.")
+          .When("Method", "random"),
+      Parameter("Exponent", p.exponent, {-10, 10}, "", "Exponent of the power law.").When("Radii", "power-law").Advanced(),
+      Parameter("RadiusMin", p.radiusMin, {1e-6, far}, "mm", "The smallest radius."),
+      Parameter("RadiusMax", p.radiusMax, {1e-6, far}, "mm", "The largest radius; a sphere of it must fit into the region."),
+      Parameter("GapMm", p.gapMm, {0, 1000}, "mm", "Least way between two surfaces; 0: they may touch."),
+      Parameter("FillFraction", p.fillFraction, {0, 1}, "",
+                "Wanted share of the region within spheres. Above 0.6 few packings get there, and take seconds."),
+      Parameter("Count", p.count, {0, static_cast<double>(SpherePackingParameters::mostSpheres)}, "",
+                "Packing ends at so many spheres, or at the fill fraction, whichever comes first."),
+      Parameter("Misses", p.misses, {1, 1e9}, "", "So many misses in a row mean that there is no more room.").Advanced(),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "Seed of sizes, places, materials and turns."),
+  };
+}
+
 void SpherePackingParameters::Check() const
 {
-  const auto check = [](const char* what, double value, double from, double to) {
-    if (!(value >= from && value <= to))
-      throw Error(Error::Kind::InvalidParameter, std::string("the packing's ") + what + " is " + NumberText(value) +
-                                                     "; it must be in [" + NumberText(from) + ", " + NumberText(to) + "]");
-  };
-  constexpr double far = 1e6;
-  for (int axis = 0; axis < 3; ++axis) {
-    check("boxMin", boxMin[axis], -far, far);
-    check("boxMax", boxMax[axis], -far, far);
-    if (!(boxMax[axis] > boxMin[axis]))
-      throw Error(Error::Kind::InvalidParameter,
-                  "the packing's box has no volume: its boxMax must be above its boxMin on every axis");
-  }
-  check("exponent", exponent, -10.0, 10.0);
-  check("radiusMin", radiusMin, 1e-6, far);
-  check("radiusMax", radiusMax, radiusMin, far);
+  CheckRanges(*this);
+  const auto refuse = [](const std::string& reason) { throw Error(Error::Kind::InvalidParameter, reason); };
+  if (!((boxMax - boxMin).minCoeff() > 0.0))
+    refuse("the packing's box has no volume: BoxMax must be above BoxMin on every axis");
+  if (radiusMax < radiusMin)
+    refuse("RadiusMax is " + NumberText(radiusMax) + " mm; it must be at least RadiusMin, " + NumberText(radiusMin));
   const double room = 0.5 * (boxMax - boxMin).minCoeff();
   if (radiusMax > room)
-    throw Error(Error::Kind::InvalidParameter, "the packing's radiusMax is " + NumberText(radiusMax) +
-                                                   " mm; a sphere of more than " + NumberText(room) +
-                                                   " mm does not fit into the region");
-  check("gapMm", gapMm, 0.0, 1000.0);
-  check("fillFraction", fillFraction, 0.0, 1.0);
-  check("count", static_cast<double>(count), 0.0, static_cast<double>(mostSpheres));
-  check("misses", misses, 1.0, 1e9);
+    refuse("RadiusMax is " + NumberText(radiusMax) + " mm; a sphere of more than " + NumberText(room) +
+           " mm does not fit into the region");
 }
 
 double SpherePackingParameters::Volume() const

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include <cstdint>
 #include <Eigen/Core>
@@ -30,26 +31,29 @@ struct SpherePackingParameters {
 
   Method method = Method::Random;
   Region region = Region::Box;
-  Eigen::Vector3d boxMin{-50.0, -50.0, 0.0}; ///< mm
-  Eigen::Vector3d boxMax{50.0, 50.0, 100.0}; ///< mm
-  Radii radii = Radii::LogUniform;           ///< of Method::Random alone
-  double exponent = 3.0;                     ///< of Radii::PowerLaw, in [-10, 10]
-  double radiusMin = 1.0;                    ///< mm, > 0
-  double radiusMax = 8.0;                    ///< mm, >= radiusMin; a sphere of it must fit into the region
-  double gapMm = 0.0;                        ///< least way between two surfaces, in [0, 1000]; 0: they may touch
-  double fillFraction = 0.3;                 ///< wanted share of the region within spheres, in [0, 1]
-  std::int64_t count = mostSpheres;          ///< it ends at so many spheres, in [0, mostSpheres]
-  int misses = 20000;                        ///< so many misses in a row mean that there is no more room, in [1, 1e9]
+  Eigen::Vector3d boxMin{-50.0, -50.0, 0.0};
+  Eigen::Vector3d boxMax{50.0, 50.0, 100.0};
+  Radii radii = Radii::LogUniform;
+  double exponent = 3.0;
+  double radiusMin = 1.0;
+  double radiusMax = 8.0;
+  double gapMm = 0.0;
+  double fillFraction = 0.3;
+  std::int64_t count = mostSpheres;
+  int misses = 20000;
   std::uint64_t seed = 1;
 
   static constexpr std::int64_t mostSpheres = 5000000;
 
-  /// Throws Error(InvalidParameter) that names the number which is out of its range.
+  /// Throws Error(InvalidParameter) that names the number which is out of its range; also for a box without volume, and for
+  /// spheres that do not fit into the region.
   void Check() const;
 
   /// Of the region, mm^3.
   double Volume() const;
 };
+
+ParameterList Describe(SpherePackingParameters& p);
 
 struct SpherePacking {
   std::vector<Sphere> spheres;

@@ -577,11 +577,26 @@ std::string SurfaceReport::Faults() const
   return text;
 }
 
+ParameterList Describe(SurfaceCheckParameters& p)
+{
+  return {Parameter("SelfIntersections", p.selfIntersections,
+                    "Whether self-intersections are looked for: by far the longest of the checks.")
+              .Advanced(),
+          Parameter("MostPlaces", p.mostPlaces, {0, Unlimited}, "", "Places that are kept per kind of fault.")};
+}
+
+ParameterList Describe(SurfaceMendParameters& p)
+{
+  return {Parameter("WeldMm", p.weldMm, {0, 10}, "mm", "Points nearer than that become one; 0: those that are equal.").Advanced(),
+          Parameter("Orient", p.orient, "Whether triangles are turned so that bodies face outwards, and cavities inwards."),
+          Parameter("CloseHoles", p.closeHoles,
+                    "Whether holes are closed by triangles about the middle of their border. Those whose border branches stay "
+                    "open.")};
+}
+
 SurfaceReport CheckSurface(const TriangleSurface& surface, const SurfaceCheckParameters& parameters, const Progress& progress)
 {
-  if (parameters.mostPlaces < 0)
-    throw Error(Error::Kind::InvalidParameter,
-                "mostPlaces is " + std::to_string(parameters.mostPlaces) + "; it must be at least 0");
+  CheckRanges(parameters);
   CheckIndices(surface);
   const Mesh mesh(surface);
   const int most = parameters.mostPlaces;
@@ -627,9 +642,7 @@ SurfaceReport CheckSurface(const TriangleSurface& surface, const SurfaceCheckPar
 
 SurfaceMending MendSurface(TriangleSurface& surface, const SurfaceMendParameters& parameters, const Progress& progress)
 {
-  if (!(parameters.weldMm >= 0.0 && parameters.weldMm <= 10.0))
-    throw Error(Error::Kind::InvalidParameter,
-                "the welding distance is " + NumberText(parameters.weldMm) + " mm; it must be in [0, 10]");
+  CheckRanges(parameters);
   CheckIndices(surface);
   SurfaceMending mending;
   const std::vector<std::uint32_t> target = Weld(surface.points, parameters.weldMm);

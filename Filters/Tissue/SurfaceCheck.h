@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include <array>
 #include <cstdint>
@@ -46,9 +47,11 @@ struct SurfaceReport {
 };
 
 struct SurfaceCheckParameters {
-  bool selfIntersections = true; ///< by far the longest of all checks
-  int mostPlaces = 100;          ///< kept per kind of fault, >= 0
+  bool selfIntersections = true;
+  int mostPlaces = 100;
 };
+
+ParameterList Describe(SurfaceCheckParameters& p);
 
 /// Looks for faults; changes nothing. Cost: a sort of the edges; for self-intersections, a box tree and about 2 us per triangle.
 /// Two triangles cross when an edge of one goes through the other by more than the rounding of doubles.
@@ -57,11 +60,12 @@ SurfaceReport CheckSurface(const TriangleSurface& surface, const SurfaceCheckPar
                            const Progress& progress = {});
 
 struct SurfaceMendParameters {
-  double weldMm = 1e-3; ///< points nearer than that become one, in [0, 10]; 0: those that are equal
-  bool orient = true;   ///< turn triangles so that each component faces outwards, and each cavity inwards
-  /// Close each hole by triangles about the middle of its border. Holes whose border branches stay open.
+  double weldMm = 1e-3;
+  bool orient = true;
   bool closeHoles = false;
 };
+
+ParameterList Describe(SurfaceMendParameters& p);
 
 /// What was mended.
 struct SurfaceMending {

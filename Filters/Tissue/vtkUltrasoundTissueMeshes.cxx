@@ -39,6 +39,8 @@ vtkStandardNewMacro(vtkUltrasoundTissueMeshes);
 
 namespace {
 
+enum class MeshAxes { LPS, YUp, RAS };
+
 // A body to be: a material and the blocks that bound it together.
 struct Body {
   std::string Material;
@@ -162,7 +164,7 @@ std::vector<Body> BodiesOf(const std::string& entry, const Input& input)
 }
 
 // Adds the triangles of a block, in mm and LPS.
-void AddBlock(vtkPolyData* data, double scale, int axes, TriangleSurface& surface)
+void AddBlock(vtkPolyData* data, double scale, MeshAxes axes, TriangleSurface& surface)
 {
   vtkNew<vtkTriangleFilter> cut;
   cut->SetInputData(data);
@@ -175,9 +177,9 @@ void AddBlock(vtkPolyData* data, double scale, int axes, TriangleSurface& surfac
     Eigen::Vector3d point;
     mesh->GetPoint(i, point.data());
     point *= scale;
-    if (axes == vtkUltrasoundTissueMeshes::Y_UP) {
+    if (axes == MeshAxes::YUp) {
       point = Eigen::Vector3d(point.x(), -point.z(), point.y());
-    } else if (axes == vtkUltrasoundTissueMeshes::RAS) {
+    } else if (axes == MeshAxes::RAS) {
       point = Eigen::Vector3d(-point.x(), -point.y(), point.z());
     }
     surface.points.push_back(point.cast<float>());
@@ -204,12 +206,10 @@ struct Findings {
 };
 
 // Welds, checks, turns and closes a surface.
-Findings Mend(TriangleSurface& surface, const echorama::SurfaceMendParameters& mend, bool selfIntersections,
-              const echorama::Progress& progress)
+Findings Mend(TriangleSurface& surface, const echorama::SurfaceMendParameters& mend,
+              const echorama::SurfaceCheckParameters& check, const echorama::Progress& progress)
 {
   const auto welded = echorama::MendSurface(surface, {mend.weldMm, false, false}, progress.Part(0.0, 0.2));
-  echorama::SurfaceCheckParameters check;
-  check.selfIntersections = selfIntersections;
   Findings findings{echorama::CheckSurface(surface, check, progress.Part(0.2, 0.9)), ""};
   const auto mended = echorama::MendSurface(surface, {0.0, mend.orient, mend.closeHoles}, progress.Part(0.9, 1.0));
   findings.Report.volumeMm3 = 0.0;
@@ -312,25 +312,46 @@ private:
 
 } // namespace
 
+vtkUltrasoundParametersMacro(vtkUltrasoundTissueMeshes);
+
+struct vtkUltrasoundTissueMeshes::Settings {
+  std::string materials = "tissue", background = "tissue";
+  double scale = 1.0;
+  MeshAxes axes = MeshAxes::LPS;
+  echorama::SurfaceMendParameters mend;
+  echorama::SurfaceCheckParameters check;
+};
+
 //----------------------------------------------------------------------------
-vtkUltrasoundTissueMeshes::vtkUltrasoundTissueMeshes()
+echorama::ParameterList vtkUltrasoundTissueMeshes::Parameters()
 {
-  this->SetNumberOfOutputPorts(2);
-  this->SetMaterials("tissue");
-  this->SetBackground("tissue");
-  const echorama::SurfaceMendParameters mend;
-  this->WeldMm = mend.weldMm;
-  this->Orient = mend.orient;
-  this->CloseHoles = mend.closeHoles;
-  this->SelfIntersections = echorama::SurfaceCheckParameters().selfIntersections;
+  using echorama::Parameter;
+  Settings& v = *this->Values;
+  return echorama::Join(
+      {{Parameter(
+            "Materials", v.materials,
+            "What each input is made of, in their order, separated by commas; the last holds for all further inputs. Either "
+            "the name of a standard material: each block of polygons is a body. Or bodies of chosen blocks, joined by plus "
+            "signs: liver[10-19], or kidney[0] + lesion-dark[2], or spleen[*] for all; blocks are counted from 0. The "
+            "blocks of one body are welded into one surface: organs often come in patches."),
+        Parameter("Background", v.background, "The standard material around all bodies."),
+        Parameter("Scale", v.scale, {1e-6, 1e6}, "mm", "One unit of the inputs: 1000 for metres, as in GLTF."),
+        Parameter(
+            "Axes", echorama::Choice(v.axes, {"LPS", "y-up", "RAS"}),
+            "The axes of the inputs. LPS: as they are. Y up: x left, y up, z to the front, of a patient who stands upright, "
+            "as in GLTF. RAS: as in 3D Slicer's world.")},
+       Describe(v.mend),
+       Without(Describe(v.check), {"MostPlaces"})});
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundTissueMeshes::~vtkUltrasoundTissueMeshes()
+vtkUltrasoundTissueMeshes::vtkUltrasoundTissueMeshes() : Values(new Settings)
 {
-  this->SetMaterials(nullptr);
-  this->SetBackground(nullptr);
+  this->SetNumberOfOutputPorts(2);
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTissueMeshes::~vtkUltrasoundTissueMeshes() = default;
 
 //----------------------------------------------------------------------------
 int vtkUltrasoundTissueMeshes::FillInputPortInformation(int, vtkInformation* info)
@@ -355,6 +376,8 @@ int vtkUltrasoundTissueMeshes::RequestData(vtkInformation*, vtkInformationVector
   this->Report.clear();
   this->NumberOfFaultyBodies = 0;
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+    echorama::CheckRanges(this->Parameters());
+    const Settings& v = *this->Values;
     std::vector<Input> given;
     std::size_t blocks = 0;
     for (int connection = 0; connection < inputs[0]->GetNumberOfInformationObjects(); ++connection) {
@@ -364,13 +387,13 @@ int vtkUltrasoundTissueMeshes::RequestData(vtkInformation*, vtkInformationVector
     if (blocks == 0) {
       throw Error(Error::Kind::BadInput, "no input has polygons");
     }
-    const std::vector<std::string> entries = Split(this->Materials ? this->Materials : "", ',');
+    const std::vector<std::string> entries = Split(v.materials, ',');
     const auto part = [](const echorama::Progress& whole, std::size_t which, std::size_t count) {
       return whole.Part(static_cast<double>(which) / static_cast<double>(count),
                         static_cast<double>(which + 1) / static_cast<double>(count));
     };
 
-    Collection collection(echorama::StandardMaterial(this->Background ? this->Background : ""));
+    Collection collection(echorama::StandardMaterial(v.background));
     for (std::size_t i = 0; i < given.size(); ++i) {
       const std::vector<Body> bodies = BodiesOf(entries[std::min(i, entries.size() - 1)], given[i]);
       for (std::size_t j = 0; j < bodies.size(); ++j) {
@@ -380,10 +403,9 @@ int vtkUltrasoundTissueMeshes::RequestData(vtkInformation*, vtkInformationVector
         }
         TriangleSurface surface;
         for (const std::size_t block : bodies[j].Blocks) {
-          AddBlock(given[i].Blocks[block], this->Scale, this->Axes, surface);
+          AddBlock(given[i].Blocks[block], v.scale, v.axes, surface);
         }
-        const Findings findings = Mend(surface, {this->WeldMm, this->Orient, this->CloseHoles}, this->SelfIntersections,
-                                       part(part(progress, i, given.size()), j, bodies.size()));
+        const Findings findings = Mend(surface, v.mend, v.check, part(part(progress, i, given.size()), j, bodies.size()));
         collection.Add(bodies[j], std::move(surface), findings);
       }
     }
@@ -397,14 +419,7 @@ int vtkUltrasoundTissueMeshes::RequestData(vtkInformation*, vtkInformationVector
 void vtkUltrasoundTissueMeshes::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Materials: " << (this->Materials ? this->Materials : "(none)") << "\n";
-  os << indent << "Background: " << (this->Background ? this->Background : "(none)") << "\n";
-  os << indent << "Scale: " << this->Scale << "\n";
-  os << indent << "Axes: " << (this->Axes == LPS ? "LPS" : this->Axes == Y_UP ? "y up" : "RAS") << "\n";
-  os << indent << "WeldMm: " << this->WeldMm << "\n";
-  os << indent << "Orient: " << this->Orient << "\n";
-  os << indent << "CloseHoles: " << this->CloseHoles << "\n";
-  os << indent << "SelfIntersections: " << this->SelfIntersections << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "NumberOfFaultyBodies: " << this->NumberOfFaultyBodies << "\n";
   os << indent << "Report: " << this->Report << "\n";
 }

@@ -2,6 +2,7 @@
 #include "vtkUltrasoundTissueSource.h"
 
 #include "Core/Base/NumberText.h"
+#include "PackedTissue.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkInformation.h"
@@ -16,8 +17,6 @@
 #include <sstream>
 
 using echorama::Error;
-using echorama::PackedTissueParameters;
-using echorama::SpherePackingParameters;
 
 vtkStandardNewMacro(vtkUltrasoundTissueSource);
 
@@ -64,71 +63,52 @@ void AddField(vtkPolyData* data, const char* name, Value value)
 
 } // namespace
 
+vtkUltrasoundParametersMacro(vtkUltrasoundTissueSource);
+
+struct vtkUltrasoundTissueSource::Settings {
+  echorama::PackedTissueParameters tissue; // but for the materials, which are named here
+  std::string background = tissue.background.name, materials = TextOf(tissue.materials);
+};
+
 //----------------------------------------------------------------------------
-vtkUltrasoundTissueSource::vtkUltrasoundTissueSource()
+echorama::ParameterList vtkUltrasoundTissueSource::Parameters()
+{
+  using echorama::Parameter;
+  Settings& v = *this->Values;
+  return echorama::Join(
+      {Renamed(Describe(v.tissue.packing), "Radii", "Distribution"),
+       {Parameter("Materials", v.materials,
+                  "The standard materials of the spheres, separated by commas, each with its share beside the others' (1 when "
+                  "left out)."),
+        Parameter("Background", v.background, "The standard material between the spheres.")},
+       Describe(v.tissue)});
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTissueSource::vtkUltrasoundTissueSource() : Values(new Settings)
 {
   this->SetNumberOfInputPorts(0);
-  const PackedTissueParameters defaults;
-  const SpherePackingParameters& packing = defaults.packing;
-  this->Method = static_cast<int>(packing.method);
-  this->Region = static_cast<int>(packing.region);
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTissueSource::~vtkUltrasoundTissueSource() = default;
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTissueSource::SetBox(double xMin, double xMax, double yMin, double yMax, double zMin, double zMax)
+{
+  const double low[3] = {xMin, yMin, zMin}, high[3] = {xMax, yMax, zMax};
+  this->SetParameterAsVector("BoxMin", low);
+  this->SetParameterAsVector("BoxMax", high);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTissueSource::GetBox(double box[6])
+{
+  const echorama::SpherePackingParameters& packing = this->Values->tissue.packing;
   for (int axis = 0; axis < 3; ++axis) {
-    this->Box[2 * axis] = packing.boxMin[axis];
-    this->Box[2 * axis + 1] = packing.boxMax[axis];
-    this->ProbePosition[axis] = defaults.cell.probe[axis];
+    box[2 * axis] = packing.boxMin[axis];
+    box[2 * axis + 1] = packing.boxMax[axis];
   }
-  this->Distribution = static_cast<int>(packing.radii);
-  this->Exponent = packing.exponent;
-  this->RadiusMin = packing.radiusMin;
-  this->RadiusMax = packing.radiusMax;
-  this->GapMm = packing.gapMm;
-  this->FillFraction = packing.fillFraction;
-  this->Count = static_cast<int>(packing.count);
-  this->Misses = packing.misses;
-  this->Seed = static_cast<vtkTypeInt64>(packing.seed);
-  this->CellMm = defaults.cell.mm;
-  this->CellGrowth = defaults.cell.growth;
-  this->Deviation = defaults.deviation;
-  this->TrueVolume = defaults.trueVolume;
-  this->Turned = defaults.turned;
-  this->MaxTriangles = static_cast<int>(defaults.maxTriangles);
-  this->SetBackground(defaults.background.name.c_str());
-  this->SetMaterials(TextOf(defaults.materials).c_str());
-}
-
-//----------------------------------------------------------------------------
-vtkUltrasoundTissueSource::~vtkUltrasoundTissueSource()
-{
-  this->SetBackground(nullptr);
-  this->SetMaterials(nullptr);
-}
-
-//----------------------------------------------------------------------------
-PackedTissueParameters vtkUltrasoundTissueSource::Parameters() const
-{
-  PackedTissueParameters parameters;
-  SpherePackingParameters& packing = parameters.packing;
-  packing.method = static_cast<SpherePackingParameters::Method>(this->Method);
-  packing.region = static_cast<SpherePackingParameters::Region>(this->Region);
-  packing.boxMin = {this->Box[0], this->Box[2], this->Box[4]};
-  packing.boxMax = {this->Box[1], this->Box[3], this->Box[5]};
-  packing.radii = static_cast<SpherePackingParameters::Radii>(this->Distribution);
-  packing.exponent = this->Exponent;
-  packing.radiusMin = this->RadiusMin;
-  packing.radiusMax = this->RadiusMax;
-  packing.gapMm = this->GapMm;
-  packing.fillFraction = this->FillFraction;
-  packing.count = this->Count;
-  packing.misses = this->Misses;
-  packing.seed = static_cast<std::uint64_t>(this->Seed);
-  parameters.cell = {this->CellMm, this->CellGrowth, Eigen::Vector3d(this->ProbePosition)};
-  parameters.deviation = this->Deviation;
-  parameters.trueVolume = this->TrueVolume;
-  parameters.turned = this->Turned;
-  parameters.maxTriangles = this->MaxTriangles;
-  parameters.background = echorama::StandardMaterial(this->Background ? this->Background : "");
-  parameters.materials = MaterialsFrom(this->Materials ? this->Materials : "");
-  return parameters;
 }
 
 //----------------------------------------------------------------------------
@@ -138,7 +118,11 @@ int vtkUltrasoundTissueSource::RequestData(vtkInformation*, vtkInformationVector
   this->SphereCount = 0;
   this->Saturated = false;
   return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress& progress) {
-    const echorama::PackedTissue tissue = echorama::MakePackedTissue(this->Parameters(), progress);
+    echorama::CheckRanges(this->Parameters());
+    echorama::PackedTissueParameters parameters = this->Values->tissue;
+    parameters.background = echorama::StandardMaterial(this->Values->background);
+    parameters.materials = MaterialsFrom(this->Values->materials);
+    const echorama::PackedTissue tissue = echorama::MakePackedTissue(parameters, progress);
     vtkPolyData* output = vtkPolyData::GetData(outputs);
     vtkUltrasoundTissue::Set(output, tissue.surface);
 
@@ -164,28 +148,7 @@ int vtkUltrasoundTissueSource::RequestData(vtkInformation*, vtkInformationVector
 void vtkUltrasoundTissueSource::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Method: " << (this->Method == RANDOM ? "random" : "empty space") << "\n";
-  os << indent << "Region: " << (this->Region == BOX ? "box" : "ball") << "\n";
-  os << indent << "Box:";
-  for (const double side : this->Box) {
-    os << " " << side;
-  }
-  os << "\n";
-  os << indent << "Distribution: " << this->Distribution << ", exponent " << this->Exponent << "\n";
-  os << indent << "Radii: " << this->RadiusMin << " to " << this->RadiusMax << "\n";
-  os << indent << "GapMm: " << this->GapMm << "\n";
-  os << indent << "FillFraction: " << this->FillFraction << "\n";
-  os << indent << "Count: " << this->Count << "\n";
-  os << indent << "Misses: " << this->Misses << "\n";
-  os << indent << "Seed: " << this->Seed << "\n";
-  os << indent << "CellMm: " << this->CellMm << ", growing by " << this->CellGrowth << " from " << this->ProbePosition[0] << " "
-     << this->ProbePosition[1] << " " << this->ProbePosition[2] << "\n";
-  os << indent << "Deviation: " << this->Deviation << "\n";
-  os << indent << "TrueVolume: " << this->TrueVolume << "\n";
-  os << indent << "Turned: " << this->Turned << "\n";
-  os << indent << "MaxTriangles: " << this->MaxTriangles << "\n";
-  os << indent << "Background: " << (this->Background ? this->Background : "(none)") << "\n";
-  os << indent << "Materials: " << (this->Materials ? this->Materials : "(none)") << "\n";
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "PackedFillFraction: " << this->PackedFillFraction << "\n";
   os << indent << "SphereCount: " << this->SphereCount << (this->Saturated ? " (saturated)" : "") << "\n";
 }

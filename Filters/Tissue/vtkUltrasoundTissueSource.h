@@ -25,8 +25,8 @@
 #include "vtkPolyDataAlgorithm.h"
 
 #ifndef __VTK_WRAP__
-#include "Filters/Tissue/PackedTissue.h"
-#include <string>
+#include "vtkUltrasoundParameters.h"
+#include <memory> // for what is set
 #endif
 
 class ECHORAMAFILTERSTISSUE_EXPORT vtkUltrasoundTissueSource : public vtkPolyDataAlgorithm {
@@ -35,157 +35,226 @@ public:
   vtkTypeMacro(vtkUltrasoundTissueSource, vtkPolyDataAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum Methods { RANDOM, EMPTY_SPACE };
-  enum Regions { BOX, BALL };
-  enum Distributions { UNIFORM, LOG_UNIFORM, POWER_LAW };
+  // BEGIN parameters
+  enum Methods { RANDOM = 0, EMPTY_SPACE = 1 };
 
   ///@{
   /**
-   * How spheres find their places. RANDOM (default): sizes are drawn first, and each is tried at random places, large ones first.
-   * EMPTY_SPACE: at random places of the empty space, each with the largest sphere that fits (Manna 1992).
+   * How spheres find their places. Random: sizes are drawn first, and each is tried at random places, large ones first. Empty
+   * space: at random places of the empty space, each with the largest sphere that fits (Manna 1992). Default random. There are
+   * RANDOM, EMPTY_SPACE.
    */
-  vtkSetClampMacro(Method, int, RANDOM, EMPTY_SPACE);
-  vtkGetMacro(Method, int);
+  void SetMethod(int value) { this->SetParameter("Method", value); }
+  int GetMethod() { return static_cast<int>(this->GetParameter("Method")); }
+  void SetMethodToRandom() { this->SetMethod(RANDOM); }
+  void SetMethodToEmptySpace() { this->SetMethod(EMPTY_SPACE); }
+  std::string GetMethodAsString() { return this->GetParameterAsText("Method"); }
+  ///@}
+
+  enum Regions { BOX = 0, BALL = 1 };
+
+  ///@{
+  /** What is filled: the box, or the largest ball about its middle. Default box. There are BOX, BALL. */
+  void SetRegion(int value) { this->SetParameter("Region", value); }
+  int GetRegion() { return static_cast<int>(this->GetParameter("Region")); }
+  void SetRegionToBox() { this->SetRegion(BOX); }
+  void SetRegionToBall() { this->SetRegion(BALL); }
+  std::string GetRegionAsString() { return this->GetParameterAsText("Region"); }
   ///@}
 
   ///@{
-  /** What is filled: the BOX (default), or the largest BALL about its middle. */
-  vtkSetClampMacro(Region, int, BOX, BALL);
-  vtkGetMacro(Region, int);
+  /** Least x, y and z of the box. In [-1000000, 1000000] mm; default (-50, -50, 0). */
+  void SetBoxMin(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetBoxMin(value);
+  }
+  void SetBoxMin(const double value[3]) { this->SetParameterAsVector("BoxMin", value); }
+  double* GetBoxMin() VTK_SIZEHINT(3) { return this->GetParameterAsVector("BoxMin"); }
   ///@}
 
   ///@{
-  /** The box: least and greatest x, y and z, mm. Default -50, 50, -50, 50, 0, 100. */
-  vtkSetVector6Macro(Box, double);
-  vtkGetVector6Macro(Box, double);
+  /** Greatest x, y and z of the box. In [-1000000, 1000000] mm; default (50, 50, 100). */
+  void SetBoxMax(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetBoxMax(value);
+  }
+  void SetBoxMax(const double value[3]) { this->SetParameterAsVector("BoxMax", value); }
+  double* GetBoxMax() VTK_SIZEHINT(3) { return this->GetParameterAsVector("BoxMax"); }
+  ///@}
+
+  enum Distributions { UNIFORM = 0, LOG_UNIFORM = 1, POWER_LAW = 2 };
+
+  ///@{
+  /**
+   * How radii are distributed: all alike, all factors alike (density 1 / r), or of density r^-Exponent. Used when Method is
+   * random. Default log-uniform. There are UNIFORM, LOG_UNIFORM, POWER_LAW.
+   */
+  void SetDistribution(int value) { this->SetParameter("Distribution", value); }
+  int GetDistribution() { return static_cast<int>(this->GetParameter("Distribution")); }
+  void SetDistributionToUniform() { this->SetDistribution(UNIFORM); }
+  void SetDistributionToLogUniform() { this->SetDistribution(LOG_UNIFORM); }
+  void SetDistributionToPowerLaw() { this->SetDistribution(POWER_LAW); }
+  std::string GetDistributionAsString() { return this->GetParameterAsText("Distribution"); }
+  ///@}
+
+  ///@{
+  /** Exponent of the power law. Used when Distribution is power-law. In [-10, 10]; default 3. */
+  void SetExponent(double value) { this->SetParameter("Exponent", value); }
+  double GetExponent() { return this->GetParameter("Exponent"); }
+  ///@}
+
+  ///@{
+  /** The smallest radius. In [1e-06, 1000000] mm; default 1. */
+  void SetRadiusMin(double value) { this->SetParameter("RadiusMin", value); }
+  double GetRadiusMin() { return this->GetParameter("RadiusMin"); }
+  ///@}
+
+  ///@{
+  /** The largest radius; a sphere of it must fit into the region. In [1e-06, 1000000] mm; default 8. */
+  void SetRadiusMax(double value) { this->SetParameter("RadiusMax", value); }
+  double GetRadiusMax() { return this->GetParameter("RadiusMax"); }
+  ///@}
+
+  ///@{
+  /** Least way between two surfaces; 0: they may touch. In [0, 1000] mm; default 0. */
+  void SetGapMm(double value) { this->SetParameter("GapMm", value); }
+  double GetGapMm() { return this->GetParameter("GapMm"); }
+  ///@}
+
+  ///@{
+  /** Wanted share of the region within spheres. Above 0.6 few packings get there, and take seconds. In [0, 1]; default 0.3. */
+  void SetFillFraction(double value) { this->SetParameter("FillFraction", value); }
+  double GetFillFraction() { return this->GetParameter("FillFraction"); }
+  ///@}
+
+  ///@{
+  /** Packing ends at so many spheres, or at the fill fraction, whichever comes first. In [0, 5000000]; default 5000000. */
+  void SetCount(vtkTypeInt64 value) { this->SetParameterAsInteger("Count", value); }
+  vtkTypeInt64 GetCount() { return this->GetParameterAsInteger("Count"); }
+  ///@}
+
+  ///@{
+  /** So many misses in a row mean that there is no more room. In [1, 1000000000]; default 20000. */
+  void SetMisses(int value) { this->SetParameter("Misses", value); }
+  int GetMisses() { return static_cast<int>(this->GetParameter("Misses")); }
+  ///@}
+
+  ///@{
+  /** Seed of sizes, places, materials and turns. At least 0; default 1. */
+  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
+  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
   ///@}
 
   ///@{
   /**
-   * How radii are distributed, with RANDOM: UNIFORM, LOG_UNIFORM (default: all factors alike), or POWER_LAW: density
-   * r^-Exponent.
+   * The standard materials of the spheres, separated by commas, each with its share beside the others' (1 when left out). Default
+   * lesion-dark 1, liver 1, lesion-bright 1, cyst 0.5.
    */
-  vtkSetClampMacro(Distribution, int, UNIFORM, POWER_LAW);
-  vtkGetMacro(Distribution, int);
-  ///@}
-
-  ///@{
-  /** Of the power law, in [-10, 10]. Default 3. */
-  vtkSetClampMacro(Exponent, double, -10.0, 10.0);
-  vtkGetMacro(Exponent, double);
-  ///@}
-
-  ///@{
-  /** The smallest and the largest radius, mm. Spheres of the largest must fit into the box. Default 1 and 8. */
-  vtkSetMacro(RadiusMin, double);
-  vtkGetMacro(RadiusMin, double);
-  vtkSetMacro(RadiusMax, double);
-  vtkGetMacro(RadiusMax, double);
-  ///@}
-
-  ///@{
-  /** The least way between two surfaces in mm, in [0, 1000]. Default 0: they may touch. */
-  vtkSetClampMacro(GapMm, double, 0.0, 1000.0);
-  vtkGetMacro(GapMm, double);
-  ///@}
-
-  ///@{
-  /** Wanted share of the region within spheres, in [0, 1]. Default 0.3. See PackedFillFraction for what came of it. */
-  vtkSetClampMacro(FillFraction, double, 0.0, 1.0);
-  vtkGetMacro(FillFraction, double);
-  ///@}
-
-  ///@{
-  /** It ends at so many spheres, in [0, 5000000]. Default 5000000: the fill fraction decides. */
-  vtkSetClampMacro(Count, int, 0, 5000000);
-  vtkGetMacro(Count, int);
-  ///@}
-
-  ///@{
-  /** So many misses in a row mean that there is no more room, in [1, 1000000000]. Default 20000. */
-  vtkSetClampMacro(Misses, int, 1, 1000000000);
-  vtkGetMacro(Misses, int);
-  ///@}
-
-  ///@{
-  /** Seed of sizes, places, materials and turns, at least 0. Default 1. */
-  vtkSetClampMacro(Seed, vtkTypeInt64, 0, VTK_TYPE_INT64_MAX);
-  vtkGetMacro(Seed, vtkTypeInt64);
-  ///@}
-
-  ///@{
-  /** The resolution cell of the scan at the probe's face in mm, in [0.01, 100]. Default 1. */
-  vtkSetClampMacro(CellMm, double, 0.01, 100.0);
-  vtkGetMacro(CellMm, double);
-  ///@}
-
-  ///@{
-  /** How much the cell grows per mm of way from the probe, in [0, 1]. Default 0. */
-  vtkSetClampMacro(CellGrowth, double, 0.0, 1.0);
-  vtkGetMacro(CellGrowth, double);
-  ///@}
-
-  ///@{
-  /** Where the face of the probe is, mm. It matters when the cell grows. Default 0, 0, 0. */
-  vtkSetVector3Macro(ProbePosition, double);
-  vtkGetVector3Macro(ProbePosition, double);
-  ///@}
-
-  ///@{
-  /** How far triangles may leave their sphere, as a part of the cell there, in [0.001, 10]. Default 0.25. */
-  vtkSetClampMacro(Deviation, double, 0.001, 10.0);
-  vtkGetMacro(Deviation, double);
-  ///@}
-
-  ///@{
-  /**
-   * Whether meshes have the volume of their spheres; their corners then lie a bit outside, and those of spheres that touch
-   * overlap. Default off: corners lie on the spheres.
-   */
-  vtkSetMacro(TrueVolume, bool);
-  vtkGetMacro(TrueVolume, bool);
-  vtkBooleanMacro(TrueVolume, bool);
-  ///@}
-
-  ///@{
-  /** Whether each mesh is turned at random, so that not all have a triangle that faces the probe. Default on. */
-  vtkSetMacro(Turned, bool);
-  vtkGetMacro(Turned, bool);
-  vtkBooleanMacro(Turned, bool);
-  ///@}
-
-  ///@{
-  /** More triangles are refused, in [20, 100000000]. Default 10000000. */
-  vtkSetClampMacro(MaxTriangles, int, 20, 100000000);
-  vtkGetMacro(MaxTriangles, int);
+  void SetMaterials(const char* value) { this->SetParameterAsText("Materials", value); }
+  std::string GetMaterials() { return this->GetParameterAsText("Materials"); }
   ///@}
 
   ///@{
   /** The standard material between the spheres. Default tissue. */
-  vtkSetStringMacro(Background);
-  vtkGetStringMacro(Background);
+  void SetBackground(const char* value) { this->SetParameterAsText("Background", value); }
+  std::string GetBackground() { return this->GetParameterAsText("Background"); }
+  ///@}
+
+  ///@{
+  /** Resolution cell of the scan at the probe's face: it decides how fine meshes are. In [0.01, 100] mm; default 1. */
+  void SetCellMm(double value) { this->SetParameter("CellMm", value); }
+  double GetCellMm() { return this->GetParameter("CellMm"); }
+  ///@}
+
+  ///@{
+  /** How many mm the cell grows per mm of way from the probe. In [0, 1]; default 0. */
+  void SetCellGrowth(double value) { this->SetParameter("CellGrowth", value); }
+  double GetCellGrowth() { return this->GetParameter("CellGrowth"); }
+  ///@}
+
+  ///@{
+  /** Where the face of the probe is. It matters when the cell grows. In mm; default (0, 0, 0). */
+  void SetProbePosition(double x, double y, double z)
+  {
+    const double value[3] = {x, y, z};
+    this->SetProbePosition(value);
+  }
+  void SetProbePosition(const double value[3]) { this->SetParameterAsVector("ProbePosition", value); }
+  double* GetProbePosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("ProbePosition"); }
+  ///@}
+
+  ///@{
+  /** How far triangles may leave their sphere, as a part of the cell there. In [0.001, 10]; default 0.25. */
+  void SetDeviation(double value) { this->SetParameter("Deviation", value); }
+  double GetDeviation() { return this->GetParameter("Deviation"); }
   ///@}
 
   ///@{
   /**
-   * The standard materials of the spheres, separated by commas, each with its share beside the others' (1 when left out).
-   * Default "lesion-dark 1, liver 1, lesion-bright 1, cyst 0.5".
+   * Whether meshes have the volume of their spheres; corners then lie a bit outside, and spheres that touch overlap. Else corners
+   * lie on the spheres. Default off.
    */
-  vtkSetStringMacro(Materials);
-  vtkGetStringMacro(Materials);
+  void SetTrueVolume(bool value) { this->SetParameter("TrueVolume", value); }
+  bool GetTrueVolume() { return this->GetParameter("TrueVolume") != 0.0; }
+  void TrueVolumeOn() { this->SetTrueVolume(true); }
+  void TrueVolumeOff() { this->SetTrueVolume(false); }
+  ///@}
+
+  ///@{
+  /** Whether each mesh is turned at random, so that not all have a triangle that faces the probe. Default on. */
+  void SetTurned(bool value) { this->SetParameter("Turned", value); }
+  bool GetTurned() { return this->GetParameter("Turned") != 0.0; }
+  void TurnedOn() { this->SetTurned(true); }
+  void TurnedOff() { this->SetTurned(false); }
+  ///@}
+
+  ///@{
+  /** More triangles are refused, with the count that it would take. In [20, 100000000]; default 10000000. */
+  void SetMaxTriangles(vtkTypeInt64 value) { this->SetParameterAsInteger("MaxTriangles", value); }
+  vtkTypeInt64 GetMaxTriangles() { return this->GetParameterAsInteger("MaxTriangles"); }
+  ///@}
+
+  ///@{
+  /**
+   * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
+   * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
+   * parameter or value.
+   */
+  bool SetParameter(const char* name, double value);
+  bool SetParameterAsText(const char* name, const char* value);
+  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
+  bool SetParameterAsVector(const char* name, const double value[3]);
+  double GetParameter(const char* name);
+  std::string GetParameterAsText(const char* name);
+  vtkTypeInt64 GetParameterAsInteger(const char* name);
+  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
+  ///@}
+
+  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
+  std::string GetParameterDescriptions();
+  // END parameters
+#ifndef __VTK_WRAP__
+  echorama::ParameterList Parameters(); ///< for C++: they point into this object
+#endif
+
+  ///@{
+  /** BoxMin and BoxMax as one: least and greatest x, y and z, mm. */
+  void SetBox(double xMin, double xMax, double yMin, double yMax, double zMin, double zMax);
+  void SetBox(const double box[6]) { this->SetBox(box[0], box[1], box[2], box[3], box[4], box[5]); }
+  void GetBox(double box[6]);
   ///@}
 
   ///@{
   /** What the last update made: share of the region within spheres, their count, and whether no more found room. */
   double GetPackedFillFraction() const { return this->PackedFillFraction; }
-  int GetSphereCount() const { return this->SphereCount; }
+  int GetSphereCount() const
+  {
+    return this->SphereCount;
+  }
   bool GetSaturated() const { return this->Saturated; }
   ///@}
-
-#ifndef __VTK_WRAP__
-  /** The properties as the kernel takes them. Throws echorama::Error for a material that does not exist. */
-  echorama::PackedTissueParameters Parameters() const;
-#endif
 
 protected:
   vtkUltrasoundTissueSource();
@@ -197,27 +266,10 @@ private:
   vtkUltrasoundTissueSource(const vtkUltrasoundTissueSource&) = delete;
   void operator=(const vtkUltrasoundTissueSource&) = delete;
 
-  int Method;
-  int Region;
-  double Box[6];
-  int Distribution;
-  double Exponent;
-  double RadiusMin;
-  double RadiusMax;
-  double GapMm;
-  double FillFraction;
-  int Count;
-  int Misses;
-  vtkTypeInt64 Seed;
-  double CellMm;
-  double CellGrowth;
-  double ProbePosition[3];
-  double Deviation;
-  bool TrueVolume;
-  bool Turned;
-  int MaxTriangles;
-  char* Background = nullptr;
-  char* Materials = nullptr;
+  struct Settings;
+#ifndef __VTK_WRAP__
+  std::unique_ptr<Settings> Values;
+#endif
   double PackedFillFraction = 0.0;
   int SphereCount = 0;
   bool Saturated = false;

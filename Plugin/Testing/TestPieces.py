@@ -19,7 +19,7 @@ with tempfile.TemporaryDirectory() as folder:
         run = subprocess.run(["mpirun", "-np", str(ranks), "pvbatch", script, str(out)], capture_output=True, text=True)
         print(run.stdout, run.stderr)
         assert run.returncode == 0, f"{ranks} rank(s): exit status {run.returncode}"
-        for texture in ("Split", "Seam"):
+        for texture in ("Split", "Mix"):
             pieces = list(out.rglob(f"{texture}*.vti"))
             assert len(pieces) == ranks, pieces  # every rank has made some of it
             reader = vtkXMLPImageDataReader()

@@ -38,7 +38,7 @@ assert abs(blocks.GetFieldData().GetArray("Score").GetValue(0) - 5.0) < 1e-9
 # Volumes by number, about their middle.
 editor.Volumes = [0]
 editor.Translation = [0.0, 0.0, 0.0]
-editor.RotateAbout = "middle of the volumes"
+editor.RotateAbout = "Middle"
 editor.Rotation = [0.0, 0.0, 180.0]
 editor.UpdatePipeline()
 blocks = servermanager.Fetch(editor)

@@ -8,7 +8,6 @@ using namespace echorama;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
 {
-  LooksLikePoseLog({reinterpret_cast<const char*>(data), size});
   const MemoryFile file(data, size);
   return Survives([&] {
     for (const ToolPose& pose : ReadPoseLog(file.Path()).poses)

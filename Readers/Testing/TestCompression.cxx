@@ -2,7 +2,7 @@
 // Streams in pieces: the same bytes as in one go, and going back to a moment that was kept.
 #include "Core/Base/Random.h"
 #include "Readers/Compression.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 
 using namespace echorama;
 using namespace echorama::testing;

@@ -4,7 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>

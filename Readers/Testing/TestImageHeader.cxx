@@ -2,8 +2,8 @@
 // Headers as other programs write them, and headers that lie.
 #include "Readers/ImageHeader.h"
 #include "Readers/Testing/ObliqueVolume.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
+#include "Testing/TemporaryFolder.h"
 #include <clocale>
 #include <map>
 

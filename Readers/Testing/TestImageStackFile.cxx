@@ -2,7 +2,7 @@
 // The images are made here with the libraries' writers.
 #include "Core/Base/Random.h"
 #include "Readers/ImageStackFile.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include <algorithm>
 #include <cstring>
 
@@ -197,7 +197,8 @@ TEST_F(ImageStackFile, AFolderInTheNaturalOrderOfItsNames)
   EXPECT_EQ(spaced->Content().geometry.spacing, parameters.stackSpacingMm);
   EXPECT_FALSE(HasNote(spaced->Content(), "spacing"));
   parameters.stackSpacingMm[1] = -1.0;
-  ExpectRefused([&] { OpenImageStack(folder.string(), parameters); }, Error::Kind::InvalidParameter, "stackSpacingMm", "-1");
+  ExpectRefused([&] { OpenImageStack(folder.string(), parameters); }, Error::Kind::InvalidParameter, folder.string(),
+                "StackSpacingMm is (0.1 -1 0.3) mm; it must be at least 0");
 }
 
 TEST_F(ImageStackFile, OneFileStandsForTheStackBesideIt)

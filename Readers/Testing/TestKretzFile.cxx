@@ -3,7 +3,7 @@
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Readers/KretzFile.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -354,7 +354,8 @@ TEST_F(KretzFile, RefusesWhatIsMissingOrOutOfRange)
 TEST_F(KretzFile, RefusesGridsThatAreTooLarge)
 {
   ExpectRefused([&] { Open({}, 1e-4); }, Error::Kind::TooLarge, "test.vol", "larger spacing");
-  ExpectRefused([&] { Open({}, -1.0); }, Error::Kind::InvalidParameter, "test.vol", "spacing");
+  ExpectRefused([&] { Open({}, -1.0); }, Error::Kind::InvalidParameter, "test.vol",
+                "SpacingMm is -1 mm; it must be in [0, 1000]");
   // A shell of one thousandth of its radius: its box is all but empty.
   ExpectRefused(
       [&] {

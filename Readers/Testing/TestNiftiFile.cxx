@@ -3,9 +3,9 @@
 #include "Readers/Compression.h"
 #include "Readers/NiftiFile.h"
 #include "Readers/Testing/ObliqueVolume.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeWriter.h"
+#include "Testing/TemporaryFolder.h"
 #include <algorithm>
 #include <cstring>
 #include <limits>

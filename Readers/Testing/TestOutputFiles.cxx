@@ -3,7 +3,7 @@
 #include "Core/Base/TextFile.h"
 #include "Readers/FileKind.h"
 #include "Readers/OutputFiles.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include <algorithm>
 
 using namespace echorama;

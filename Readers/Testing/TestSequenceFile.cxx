@@ -5,8 +5,8 @@
 #include "Readers/Compression.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/Testing/ObliqueVolume.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
+#include "Testing/TemporaryFolder.h"
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>

@@ -2,7 +2,7 @@
 // Which frame is the world, and poses in it against products of matrices written out.
 #include "Core/Base/Random.h"
 #include "Readers/SequencePoses.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 
 using namespace echorama;
 using namespace echorama::testing;

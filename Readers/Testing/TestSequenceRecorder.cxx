@@ -3,7 +3,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/SequenceRecorder.h"
 #include "Readers/SequenceWriter.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -257,7 +257,11 @@ TEST_F(SequenceRecorderTest, Refused)
   Put("b.raw", "pixels");
   refused("b.mhd", Images(2, 2), Error::Kind::FileSystem, "it is there already");
   EXPECT_EQ(std::filesystem::file_size(Path("b.raw")), 6u);
-  ExpectRefused([&] { SequenceRecorder(Path("c.mha"), {}, {false, 2.0, true}); }, Error::Kind::InvalidParameter, "", "0 to 1");
+  ExpectRefused(
+      [&] {
+        SequenceRecorder(Path("c.mha"), {}, {false, 2.0, true});
+      },
+      Error::Kind::InvalidParameter, "", "FlushSeconds is 2 s; it must be in [0, 1]");
   {
     const class FullDisk full(100);
     refused("d.mha", {}, Error::Kind::FileSystem, "cannot be written");

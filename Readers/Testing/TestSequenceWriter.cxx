@@ -2,7 +2,7 @@
 // What is written comes back: pixels, matrices and times to the last bit. What cannot be written leaves nothing behind.
 #include "Core/Base/Random.h"
 #include "Readers/SequenceWriter.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include <cmath>
 
 using namespace echorama;

@@ -3,8 +3,8 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Readers/Testing/ObliqueVolume.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VdbFile.h"
+#include "Testing/TemporaryFolder.h"
 #include <cstring>
 #include <limits>
 #include <numeric>

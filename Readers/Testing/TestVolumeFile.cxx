@@ -5,9 +5,9 @@
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
 #include "Readers/Testing/ObliqueVolume.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeWriter.h"
+#include "Testing/TemporaryFolder.h"
 #include <algorithm>
 #include <cstring>
 #include <fstream>

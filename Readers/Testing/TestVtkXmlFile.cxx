@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // That VTK reads the good ones is checked in TestUltrasoundReader.py, and by the fuzzer, which reads with VTK.
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Readers/VtkXmlFile.h"
+#include "Testing/TemporaryFolder.h"
 
 using namespace echorama;
 using namespace echorama::testing;

@@ -17,7 +17,7 @@
 #include "Readers/PoseLog.h"
 #include "Testing/Benchmark.h"
 #include "Tracking/Benchmarks/HandEyeContestants.h"
-#include "Tracking/Calibration/HandEyeSimulation.h"
+#include "Tracking/Testing/HandEyeSimulation.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>

@@ -27,18 +27,6 @@ constexpr double SuspectScale = 1.3, HopelessScale = 10.0, HopelessEstimatedScal
 // Three scans agree by chance too easily to outvote another.
 constexpr std::size_t LeastMajority = 4, ManyScans = 8;
 
-void CheckNoise(const PoseNoise& noise, const char* side)
-{
-  const auto complain = [side](const char* what, const char* range) {
-    throw Error(Error::Kind::InvalidParameter,
-                "hand-eye calibration: the noise of the " + std::string(side) + ", " + what + ", must be in " + range);
-  };
-  if (!(noise.degrees >= 0.0 && noise.degrees <= 45.0))
-    complain("degrees", "[0, 45]");
-  if (!(noise.mm >= 0.0 && noise.mm <= 100.0))
-    complain("mm", "[0, 100]");
-}
-
 PoseNoise Scaled(const PoseNoise& noise, double scale)
 {
   return {noise.degrees * scale, noise.mm * scale};
@@ -74,15 +62,34 @@ std::string TypicalResidual(const HandEyeModel& model, const HandEyeSolution& so
 
 } // namespace
 
+ParameterList Describe(HandEyeParameters& p)
+{
+  const ParameterRange degrees{0, 45}, mm{0, 100};
+  return {
+      Parameter("Target", p.target, {}, "mm", "Where in the volume the error counts, in the volume's frame: usually its centre."),
+      Parameter("SensorNoiseDegrees", p.sensorNoise.degrees, degrees, "degrees",
+                "Standard deviation of the sensor's turns by the tracker, about each of its own axes."),
+      Parameter("SensorNoiseMm", p.sensorNoise.mm, mm, "mm",
+                "Standard deviation of the sensor's position by the tracker, along each of its own axes."),
+      Parameter("VolumeNoiseDegrees", p.volumeNoise.degrees, degrees, "degrees",
+                "Standard deviation of the turns of the alignments, about each axis of the volume."),
+      Parameter("VolumeNoiseMm", p.volumeNoise.mm, mm, "mm",
+                "Standard deviation of the target's place by the alignments, along each axis of the volume."),
+      Parameter("EstimateNoise", p.estimateNoise,
+                "Whether both noises are scaled, in their ratio, to what the residuals show. With fewer than five scans that "
+                "agree they stay "
+                "as stated, and a note says so."),
+      Parameter("RejectOutliers", p.rejectOutliers, "Whether scans that do not agree with the others are left out, and named."),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "Seed of the search for scans that agree.").Advanced(),
+  };
+}
+
 void HandEyeParameters::Check() const
 {
-  CheckNoise(sensorNoise, "sensor");
-  CheckNoise(volumeNoise, "alignments");
+  CheckRanges(*this);
   if (!(std::max(sensorNoise.degrees, volumeNoise.degrees) >= 1e-6 && std::max(sensorNoise.mm, volumeNoise.mm) >= 1e-6))
     throw Error(Error::Kind::InvalidParameter,
                 "hand-eye calibration: the noise of one side at least must not be zero (1e-6 degrees and mm)");
-  if (!target.allFinite())
-    throw Error(Error::Kind::InvalidParameter, "hand-eye calibration: the target must be finite");
 }
 
 HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const HandEyeParameters& parameters,

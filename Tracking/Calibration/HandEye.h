@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <string>
@@ -26,16 +27,16 @@ struct PoseNoise {
 };
 
 struct HandEyeParameters {
-  PoseNoise sensorNoise; ///< of S, in the sensor's own axes; degrees in [0, 45], mm in [0, 100]
-  PoseNoise volumeNoise; ///< of M, in the volume's axes about \a target; not both sides without noise
-  /// Where in the volume the error counts: mm, in the volume's frame. Usually its centre.
+  PoseNoise sensorNoise; ///< of S, in the sensor's own axes
+  PoseNoise volumeNoise; ///< of M, in the volume's axes about \a target
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
   bool rejectOutliers = true;
-  bool estimateNoise = false; ///< scale both noises to what the residuals say; with fewer than 5 inliers they stay as stated
-  std::uint64_t seed = 1;     ///< of the search among many pairs with outliers
+  bool estimateNoise = false;
+  std::uint64_t seed = 1;
 
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  void Check() const; ///< Throws Error(InvalidParameter): ranges, and that not both sides are without noise.
 };
+ParameterList Describe(HandEyeParameters& p);
 
 /// How one scan fits.
 struct HandEyeResidual {

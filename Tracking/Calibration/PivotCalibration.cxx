@@ -369,30 +369,28 @@ std::string OutlierNote(const std::vector<TimedPose>& poses, const std::vector<P
 
 } // namespace
 
-void PivotParameters::Check() const
+ParameterList Describe(PivotParameters& p)
 {
-  const auto refuse = [](const char* what) {
-    throw Error(Error::Kind::InvalidParameter, std::string("pivot calibration: ") + what);
+  return {
+      Parameter("NoiseDegrees", p.noise.degrees, {0, 45}, "degrees",
+                "Standard deviation of the angle of a pose, about each axis of the tool."),
+      Parameter("NoiseMm", p.noise.mm, {0, 100, true}, "mm",
+                "Standard deviation of the position of a pose, along each axis of the tool."),
+      Parameter(
+          "EstimateNoise", p.estimateNoise,
+          "Whether the noise is scaled to what the residuals say. Off: it is taken as stated, and decides what is an outlier."),
+      Parameter("RejectOutliers", p.rejectOutliers, "Whether poses at which the tip was not in place are left out."),
+      Parameter(
+          "LeastSwing", p.leastSwingDegrees, {0.1, 45}, "degrees",
+          "What every direction of the tool must swing by (RMS), less what the noise pretends; otherwise the tip is refused.")
+          .Advanced(),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "Seed of the search among poses with outliers.").Advanced(),
   };
-  if (!(noise.degrees >= 0.0 && noise.degrees <= 45.0))
-    refuse("the noise in degrees must be in [0, 45]");
-  if (!(noise.mm > 0.0 && noise.mm <= 100.0))
-    refuse("the noise in mm must be in (0, 100]");
-  if (!(leastSwingDegrees >= 0.1 && leastSwingDegrees <= 45.0))
-    refuse("the least swing must be in [0.1, 45] degrees");
-}
-
-bool SolvePivot(const std::vector<Pose>& poses, Vector3d& tip, Vector3d& pivot)
-{
-  const LeastSquares fit = Solve(poses, [](std::size_t) { return 1.0; });
-  tip = fit.solution.tip;
-  pivot = fit.solution.pivot;
-  return fit.determined;
 }
 
 PivotResult CalibratePivot(const std::vector<TimedPose>& timed, const PivotParameters& parameters, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   if (timed.size() < LeastPoses)
     RefusePivot("at least " + std::to_string(LeastPoses) + " poses are needed, and there are " + std::to_string(timed.size()));
   const std::vector<Pose> poses = RigidPoses(timed);
@@ -400,10 +398,11 @@ PivotResult CalibratePivot(const std::vector<TimedPose>& timed, const PivotParam
   PivotResult result;
   std::vector<char> use(count, 1);
   MeasureSwing(poses, use, parameters.noise.degrees, parameters.leastSwingDegrees, result);
-  SolvePivot(poses, result.algebraicTip, result.algebraicPivot);
+  Solution solution = Solve(poses, [](std::size_t) { return 1.0; }).solution; // by least squares, all poses alike
+  result.algebraicTip = solution.tip;
+  result.algebraicPivot = solution.pivot;
   progress(0.1);
 
-  Solution solution{result.algebraicTip, result.algebraicPivot};
   double scale = 1.0;
   const auto chiSquares = [&] {
     const Whitening whitening(parameters.noise, solution.tip);

@@ -10,15 +10,12 @@
 namespace echorama {
 
 struct PivotParameters {
-  PoseNoise noise; ///< of the poses, in the tool's own axes; degrees in [0, 45], mm in (0, 100]
-  /// Scale the noise to what the residuals say. Otherwise it is taken as stated, and decides what is an outlier.
-  bool estimateNoise = true;
-  bool rejectOutliers = true;     ///< poses at which the tip was not in place
-  double leastSwingDegrees = 2.0; ///< what every direction of the tool must swing by (RMS), in [0.1, 45]
-  std::uint64_t seed = 1;         ///< of the search among poses with outliers
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  PoseNoise noise; ///< of the poses, in the tool's own axes
+  bool estimateNoise = true, rejectOutliers = true;
+  double leastSwingDegrees = 2.0;
+  std::uint64_t seed = 1;
 };
+ParameterList Describe(PivotParameters& p);
 
 /// How one pose fits.
 struct PivotResidual {
@@ -63,15 +60,11 @@ struct PivotResult {
 /// Cost: linear in the number of poses.
 ///
 /// \param poses times may be NaN; they are for messages alone
-/// \throws Error(InvalidParameter) as Check(); Error(BadInput) that names the pose when one is not finite or not rigid;
-/// Error(NotPossible) with the reason: fewer than four poses; the tool turned too little, or about one axis only (its tip is then
-/// known only up to a line); most poses do not agree on a fixed point. Where rotations the wrong way round explain that, the
-/// message says so. Error(Cancelled).
+/// \throws Error(InvalidParameter) for what is out of its range; Error(BadInput) that names the pose when one is not finite or
+/// not rigid; Error(NotPossible) with the reason: fewer than four poses; the tool turned too little, or about one axis only (its
+/// tip is then known only up to a line); most poses do not agree on a fixed point. Where rotations the wrong way round explain
+/// that, the message says so. Error(Cancelled).
 PivotResult CalibratePivot(const std::vector<TimedPose>& poses, const PivotParameters& parameters = {},
                            const Progress& progress = {});
-
-/// Tip and pivot by least squares, all poses alike (algebraic; the peer of most programs).
-/// \returns false when the turns do not determine them
-bool SolvePivot(const std::vector<Pose>& poses, Eigen::Vector3d& tip, Eigen::Vector3d& pivot);
 
 } // namespace echorama

@@ -430,25 +430,28 @@ TemporalResult Compare(const MotionPath& first, const MotionPath& second, SpeedS
 
 } // namespace
 
-void TemporalParameters::Check() const
+ParameterList Describe(TemporalParameters& p)
 {
-  const auto refuse = [](const char* what) {
-    throw Error(Error::Kind::InvalidParameter, std::string("temporal calibration: ") + what);
+  return {
+      Parameter(
+          "Signal", Choice(p.signal, {"automatic", "rotation", "translation"}),
+          "Which speed is compared: of rotation, the same for all that is fixed to one body; of translation, the same for two "
+          "that follow one point; or of rotation, and where that does not tell, of translation."),
+      Parameter("LargestOffset", p.largestOffsetSeconds, {0, 3600, true}, "s", "How far the search goes either way."),
+      Parameter("Smoothing", p.smoothingSeconds, {0.005, 2}, "s",
+                "Standard deviation of the window that poses are smoothed with, made at least the time between two poses.")
+          .Advanced(),
+      Parameter("LongestGap", p.longestGapSeconds, {0, 600, true}, "s", "Poses further apart are not connected.").Advanced(),
+      Parameter("LeastOverlap", p.leastOverlapSeconds, {0.5, 3600}, "s",
+                "What both streams must have in common at every offset that is looked at.")
+          .Advanced(),
   };
-  if (!(largestOffsetSeconds > 0.0 && largestOffsetSeconds <= 3600.0))
-    refuse("the largest offset must be in (0, 3600] s");
-  if (!(smoothingSeconds >= 0.005 && smoothingSeconds <= 2.0))
-    refuse("the smoothing must be in [0.005, 2] s");
-  if (!(longestGapSeconds > 0.0 && longestGapSeconds <= 600.0))
-    refuse("the longest gap must be in (0, 600] s");
-  if (!(leastOverlapSeconds >= 0.5 && leastOverlapSeconds <= 3600.0))
-    refuse("the least overlap must be in [0.5, 3600] s");
 }
 
 TemporalResult CalibrateTime(const std::vector<TimedPose>& first, const std::vector<TimedPose>& second,
                              const TemporalParameters& parameters, const Progress& progress)
 {
-  parameters.Check();
+  CheckRanges(parameters);
   std::vector<TimedPose> a = Sorted(first, "first"), b = Sorted(second, "second");
   const double sigma = std::max({parameters.smoothingSeconds, MedianInterval(a), MedianInterval(b)});
   const MotionSmoothing smoothing{sigma, std::max(parameters.longestGapSeconds, 3.0 * sigma)};

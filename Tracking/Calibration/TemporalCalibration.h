@@ -16,15 +16,9 @@ enum class SpeedSignal {
 
 struct TemporalParameters {
   SpeedSignal signal = SpeedSignal::Automatic;
-  double largestOffsetSeconds = 5.0; ///< the search goes this far either way, in (0, 3600]
-  /// Standard deviation of the window that poses are smoothed with, in [0.005, 2]. It is made at least the time between two
-  /// poses.
-  double smoothingSeconds = 0.05;
-  double longestGapSeconds = 0.5;   ///< poses further apart are not connected, in (0, 600]
-  double leastOverlapSeconds = 3.0; ///< of both streams, at every offset that is looked at, in [0.5, 3600]
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  double largestOffsetSeconds = 5.0, smoothingSeconds = 0.05, longestGapSeconds = 0.5, leastOverlapSeconds = 3.0;
 };
+ParameterList Describe(TemporalParameters& p);
 
 struct TemporalResult {
   double offsetSeconds = 0.0; ///< what is to be added to the times of the second stream to have those of the first
@@ -50,9 +44,9 @@ struct TemporalResult {
 /// the offset that makes both begin together.
 ///
 /// \param first, second valid poses; they are sorted by time, and of equal times the first counts
-/// \throws Error(InvalidParameter) as Check(); Error(BadInput) when a pose or time is not finite or not rigid; Error(NotPossible)
-/// with the reason: streams too short, no or too little motion, a speed that hardly changes, speeds that agree at no offset, a
-/// motion that repeats itself so that several offsets fit, a peak at the end of the range. Error(Cancelled).
+/// \throws Error(InvalidParameter) for what is out of its range; Error(BadInput) when a pose or time is not finite or not rigid;
+/// Error(NotPossible) with the reason: streams too short, no or too little motion, a speed that hardly changes, speeds that agree
+/// at no offset, a motion that repeats itself so that several offsets fit, a peak at the end of the range. Error(Cancelled).
 TemporalResult CalibrateTime(const std::vector<TimedPose>& first, const std::vector<TimedPose>& second,
                              const TemporalParameters& parameters = {}, const Progress& progress = {});
 

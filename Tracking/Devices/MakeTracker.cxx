@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkListener.h"
 #include "Tracking/Devices/PolhemusTracker.h"
@@ -21,15 +22,18 @@ std::unique_ptr<TrackerDevice> Make(const TrackerAddress& address)
 {
   return std::make_unique<Device>(address);
 }
+template <class Device, class Parameters>
+std::unique_ptr<TrackerDevice> MakeBy(const TrackerAddress& address)
+{
+  return std::make_unique<Device>(Parameters::Of(address));
+}
 
 // Every kind of device, one line each.
 const std::vector<Kind>& Kinds()
 {
   static const std::vector<Kind> kinds = {
-      {"replay", MakeReplayTracker},
-      {"simulated", MakeSimulatedTracker},
-      {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>},
-      {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
+      {"replay", MakeBy<ReplayTracker, ReplayParameters>},  {"simulated", MakeBy<SimulatedTracker, SimulatedTrackerParameters>},
+      {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>}, {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
       {PolhemusTracker::Scheme, Make<PolhemusTracker>},
   };
   return kinds;
@@ -48,13 +52,11 @@ std::vector<std::string> TrackerSchemes()
 std::unique_ptr<TrackerDevice> MakeTracker(const std::string& text)
 {
   const TrackerAddress address = TrackerAddress::Parse(text);
-  std::string list;
-  for (const Kind& kind : Kinds()) {
+  for (const Kind& kind : Kinds())
     if (address.scheme == kind.scheme)
       return kind.make(address);
-    list += (list.empty() ? "" : ", ") + std::string(kind.scheme);
-  }
-  throw Error(Error::Kind::InvalidParameter, text + ": there is no tracker " + address.scheme + "; there are: " + list);
+  throw Error(Error::Kind::InvalidParameter,
+              text + ": there is no tracker " + address.scheme + "; there are: " + Joined(TrackerSchemes()));
 }
 
 } // namespace echorama

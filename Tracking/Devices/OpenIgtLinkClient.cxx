@@ -9,16 +9,17 @@ namespace echorama {
 
 OpenIgtLinkClient::OpenIgtLinkClient(const TrackerAddress& address)
 {
-  std::vector<std::string> options = OpenIgtLinkOptions;
-  options.insert(options.end(), {"frame", "header", "resolution", "retry", "tdata"});
-  address.CheckOptions(options);
   endpoint_ = address.HostAndPort("localhost", DefaultPort);
-  decoding_ = OpenIgtLinkDecodingOf(address);
-  trackingData_ = address.Number("tdata", 0.0, 0.0, 1.0) != 0.0;
-  header_ = static_cast<int>(address.Number("header", 2.0, 1.0, 2.0));
-  resolutionSeconds_ = address.Number("resolution", 0.0, 0.0, 1e6) / 1000.0;
-  retrySeconds_ = address.Number("retry", 1.0, 0.05, 3600.0);
-  frame_ = address.Text("frame", "");
+  double milliseconds = 0.0;
+  decoding_ = OpenIgtLinkDecodingOf(
+      address,
+      {Parameter("Tdata", trackingData_, "Whether TDATA is asked for (STT_TDATA)."),
+       Parameter("Resolution", milliseconds, {0, 1e6}, "ms", "Shortest time between two poses that is asked for with TDATA."),
+       Parameter("Frame", frame_, "Name of the coordinate system that is asked for with TDATA."),
+       Parameter("Header", header_, {1, 2}, "",
+                 "2 says that we read meta data, so that poses that are not valid come too; 1 is for an old server."),
+       Parameter("Retry", retrySeconds_, {0.05, 3600}, "s", "Time between two attempts.")});
+  resolutionSeconds_ = milliseconds / 1000.0;
 }
 
 void OpenIgtLinkClient::Start(PoseStream& poses, ImageStream* images)

@@ -11,17 +11,6 @@ namespace echorama {
 /// trying when nobody is there, and again when the connection is lost or what comes is no OpenIGTLink.
 ///
 /// Poses keep their numbers, whatever frame their sender means; images become L, P, S (see axes).
-///
-/// | option     | meaning                                                                         | default |
-/// | ---------- | ------------------------------------------------------------------------------- | ------- |
-/// | tdata      | 1: asks for TDATA (STT_TDATA)                                                   | 0       |
-/// | resolution | shortest time between two poses that is asked for with tdata=1, ms, in [0, 1e6] | 0       |
-/// | frame      | name of the coordinate system that is asked for with tdata=1                    | (none)  |
-/// | header     | 2: says that we read meta data, so that poses that are not valid come too; 1: an old server | 2 |
-/// | retry      | seconds between two attempts, in [0.05, 3600]                                   | 1       |
-/// | check      | 0: does not look at check sums                                                  | 1       |
-/// | axes       | sender: the numbers of images stay as they are, and match those of the poses    | patient |
-/// | image-mb   | largest image, MiB, in [1, 2047]                                                | 64      |
 class OpenIgtLinkClient : public TrackerDevice {
 public:
   static constexpr const char* Scheme = "igtl";

@@ -10,6 +10,7 @@
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/BigEndian.h"
 #include "Tracking/Devices/OpenIgtLinkSum.h"
+#include "Tracking/Devices/OpenIgtLinkVoxels.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -183,26 +184,10 @@ void DecodeTrackingData(BodyBytes content, Message& message)
 
 VoxelType VoxelTypeOf(int type)
 {
-  switch (type) {
-  case IGTL_IMAGE_STYPE_TYPE_INT8:
-    return VoxelType::Int8;
-  case IGTL_IMAGE_STYPE_TYPE_UINT8:
-    return VoxelType::UInt8;
-  case IGTL_IMAGE_STYPE_TYPE_INT16:
-    return VoxelType::Int16;
-  case IGTL_IMAGE_STYPE_TYPE_UINT16:
-    return VoxelType::UInt16;
-  case IGTL_IMAGE_STYPE_TYPE_INT32:
-    return VoxelType::Int32;
-  case IGTL_IMAGE_STYPE_TYPE_UINT32:
-    return VoxelType::UInt32;
-  case IGTL_IMAGE_STYPE_TYPE_FLOAT32:
-    return VoxelType::Float32;
-  case IGTL_IMAGE_STYPE_TYPE_FLOAT64:
-    return VoxelType::Float64;
-  default:
-    Complain("has voxels of an unknown type (" + std::to_string(type) + ")");
-  }
+  for (const OpenIgtLinkVoxel& one : OpenIgtLinkVoxels)
+    if (one.number == type)
+      return one.type;
+  Complain("has voxels of an unknown type (" + std::to_string(type) + ")");
 }
 
 // The geometry of the part that is sent. The message places the middle of the whole volume, and its axes are steps from voxel to
@@ -356,17 +341,20 @@ Message Refused(const Message& header, Rejection reason, const std::string& comp
 
 } // namespace
 
-void OpenIgtLinkDecoding::Check() const
+ParameterList Describe(OpenIgtLinkDecoding& p)
 {
-  if (imageBytes < 1024 || imageBytes >= std::size_t{1} << 31)
-    throw Error(Error::Kind::InvalidParameter, "the largest image must be 1 KiB to 2 GiB");
-  if (otherBytes < 1024 || otherBytes > std::size_t{64} << 20)
-    throw Error(Error::Kind::InvalidParameter, "the largest message other than an image must be 1 KiB to 64 MiB");
+  return {Parameter("Check", p.checkSums, "Whether check sums are looked at; off is for peers that do not compute them."),
+          Parameter(
+              "TurnImages", p.turnImages,
+              "Whether images that say that their axes are R, A, S become L, P, S. Off: their numbers stay as they are, so that "
+              "images lie where the poses of the same sender lie; Plus marks every frame of reference as R, A, S."),
+          Parameter("ImageBytes", p.imageBytes, {1024, 2147483647}, "bytes", "Voxels of the largest image."),
+          Parameter("OtherBytes", p.otherBytes, {1024, 67108864}, "bytes", "Largest of all other messages that are decoded.")};
 }
 
 OpenIgtLinkDecoder::OpenIgtLinkDecoder(const OpenIgtLinkDecoding& decoding) : decoding_(decoding)
 {
-  decoding.Check();
+  CheckRanges(decoding);
 }
 
 std::vector<Message> OpenIgtLinkDecoder::Feed(const unsigned char* bytes, std::size_t size)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ToolPose.h"
 #include "Tracking/Stream/ImageStream.h"
 #include "Tracking/Stream/PoseStream.h"
@@ -14,15 +15,10 @@ namespace echorama {
 
 /// What a decoder takes.
 struct OpenIgtLinkDecoding {
-  std::size_t imageBytes = std::size_t{64} << 20; ///< voxels of the largest IMAGE, in [1 KiB, 2 GiB)
-  std::size_t otherBytes = std::size_t{1} << 20;  ///< largest of all others that are decoded, in [1 KiB, 64 MiB]
-  bool checkSums = true;                          ///< off: for peers that do not compute them
-  /// Whether images that say that their axes are R, A, S become L, P, S. Off: their numbers stay as they are, so that images
-  /// lie where the poses of the same sender lie; Plus marks every frame of reference as R, A, S.
-  bool turnImages = true;
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  std::size_t imageBytes = std::size_t{64} << 20, otherBytes = std::size_t{1} << 20;
+  bool checkSums = true, turnImages = true;
 };
+ParameterList Describe(OpenIgtLinkDecoding& p);
 
 /// One message, checked and taken apart.
 struct OpenIgtLinkMessage {

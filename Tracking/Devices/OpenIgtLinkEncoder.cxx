@@ -5,6 +5,7 @@
 #include "Core/Base/Error.h"
 #include "Tracking/Devices/BigEndian.h"
 #include "Tracking/Devices/OpenIgtLinkSum.h"
+#include "Tracking/Devices/OpenIgtLinkVoxels.h"
 #include <algorithm>
 #include <cmath>
 #include <igtl_header.h>
@@ -30,26 +31,10 @@ void WriteTransform(Bytes& bytes, const Pose& pose)
 
 int WireType(VoxelType type, const std::string& name)
 {
-  switch (type) {
-  case VoxelType::Int8:
-    return IGTL_IMAGE_STYPE_TYPE_INT8;
-  case VoxelType::UInt8:
-    return IGTL_IMAGE_STYPE_TYPE_UINT8;
-  case VoxelType::Int16:
-    return IGTL_IMAGE_STYPE_TYPE_INT16;
-  case VoxelType::UInt16:
-    return IGTL_IMAGE_STYPE_TYPE_UINT16;
-  case VoxelType::Int32:
-    return IGTL_IMAGE_STYPE_TYPE_INT32;
-  case VoxelType::UInt32:
-    return IGTL_IMAGE_STYPE_TYPE_UINT32;
-  case VoxelType::Float32:
-    return IGTL_IMAGE_STYPE_TYPE_FLOAT32;
-  case VoxelType::Float64:
-    return IGTL_IMAGE_STYPE_TYPE_FLOAT64;
-  default:
-    throw Error(Error::Kind::BadInput, name + ": OpenIGTLink has no voxels of 64-bit integers");
-  }
+  for (const OpenIgtLinkVoxel& one : OpenIgtLinkVoxels)
+    if (one.type == type)
+      return one.number;
+  throw Error(Error::Kind::BadInput, name + ": OpenIGTLink has no voxels of 64-bit integers");
 }
 
 } // namespace

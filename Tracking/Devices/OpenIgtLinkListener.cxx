@@ -8,12 +8,10 @@ namespace echorama {
 
 OpenIgtLinkListener::OpenIgtLinkListener(const TrackerAddress& address)
 {
-  std::vector<std::string> options = OpenIgtLinkOptions;
-  options.emplace_back("peers");
-  address.CheckOptions(options);
   endpoint_ = address.HostAndPort("127.0.0.1", OpenIgtLinkClient::DefaultPort);
-  decoding_ = OpenIgtLinkDecodingOf(address);
-  peers_ = static_cast<std::size_t>(address.Number("peers", 8.0, 1.0, 64.0));
+  decoding_ = OpenIgtLinkDecodingOf(
+      address,
+      {Parameter("Peers", peers_, {1, 64}, "", "How many at once; those beyond are turned away, and count as foreign.")});
 }
 
 void OpenIgtLinkListener::Start(PoseStream& poses, ImageStream* images)

@@ -10,11 +10,6 @@ namespace echorama {
 
 /// Scheme igtl-listen: peers such as 3D Slicer connect to us and push poses and images. On this machine alone unless the
 /// address names a host: igtl-listen://0.0.0.0:18944 takes everybody who can reach it, and OpenIGTLink knows no passwords.
-///
-/// | option   | meaning                                                                      | default |
-/// | -------- | ---------------------------------------------------------------------------- | ------- |
-/// | peers    | how many at once, in [1, 64]; those beyond are turned away, and count as foreign | 8   |
-/// | check, axes, image-mb | as for OpenIgtLinkClient                                         |         |
 class OpenIgtLinkListener : public TrackerDevice {
 public:
   static constexpr const char* Scheme = "igtl-listen";

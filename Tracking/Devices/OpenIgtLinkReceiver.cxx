@@ -70,17 +70,19 @@ void OpenIgtLinkReceiver::Take(OpenIgtLinkMessage message, double arrival, PoseS
   }
 }
 
-const std::vector<std::string> OpenIgtLinkOptions = {"axes", "check", "image-mb"};
-
-OpenIgtLinkDecoding OpenIgtLinkDecodingOf(const TrackerAddress& address)
+OpenIgtLinkDecoding OpenIgtLinkDecodingOf(const TrackerAddress& address, ParameterList others)
 {
   OpenIgtLinkDecoding decoding;
-  decoding.checkSums = address.Number("check", 1.0, 0.0, 1.0) != 0.0;
-  const std::string axes = address.Text("axes", "patient");
-  if (axes != "patient" && axes != "sender")
-    throw Error(Error::Kind::InvalidParameter, address.text + ": axes must be patient or sender");
-  decoding.turnImages = axes == "patient";
-  decoding.imageBytes = static_cast<std::size_t>(address.Number("image-mb", 64.0, 1.0, 2047.0)) << 20;
+  enum class Axes { Sender, Patient } axes = Axes::Patient;
+  int megabytes = static_cast<int>(decoding.imageBytes >> 20);
+  address.Set(
+      Join({Without(Describe(decoding), {"TurnImages", "ImageBytes", "OtherBytes"}),
+            {Parameter("Axes", Choice(axes, {"sender", "patient"}),
+                       "Whether the numbers of images stay as they are, and match those of the poses, or become L, P, S."),
+             Parameter("ImageMb", megabytes, {1, 2047}, "MiB", "Largest image.")},
+            std::move(others)}));
+  decoding.turnImages = axes == Axes::Patient;
+  decoding.imageBytes = static_cast<std::size_t>(megabytes) << 20;
   return decoding;
 }
 

@@ -29,9 +29,8 @@ private:
   std::string end_, complaint_;
 };
 
-/// The options that igtl and igtl-listen have in common: check=0, axes=sender, image-mb=N.
-extern const std::vector<std::string> OpenIgtLinkOptions;
+/// Reads the options that igtl and igtl-listen have in common (check=0, axes=sender, image-mb=N), and sets \a others.
 /// \throws Error(InvalidParameter) that names the option.
-OpenIgtLinkDecoding OpenIgtLinkDecodingOf(const TrackerAddress& address);
+OpenIgtLinkDecoding OpenIgtLinkDecodingOf(const TrackerAddress& address, ParameterList others);
 
 } // namespace echorama

@@ -277,22 +277,24 @@ void OpenIgtLinkServer::Parts::Answer(Client& client, const OpenIgtLinkMessage& 
   }
 }
 
-void OpenIgtLinkServerParameters::Check() const
+ParameterList Describe(OpenIgtLinkServerParameters& p)
 {
-  const auto refuse = [](const char* what) { throw Error(Error::Kind::InvalidParameter, what); };
-  if (port < 0 || port > 65535)
-    refuse("the port must be 0 to 65535");
-  if (clients < 1 || clients > 256)
-    refuse("the number of clients must be 1 to 256");
-  if (queuedBytes < 4096 || queuedBytes > std::size_t{1} << 30)
-    refuse("the bytes that wait for a client must be 4 KiB to 1 GiB");
-  if (rememberedImages < 1 || rememberedImages > 64)
-    refuse("the number of images that are remembered must be 1 to 64");
+  return {
+      Parameter("Host", p.host,
+                "Where it listens: 127.0.0.1 for this machine alone, 0.0.0.0 for all that can reach it (OpenIGTLink knows no "
+                "passwords).")
+          .Advanced(),
+      Parameter("Port", p.port, {0, 65535}, "", "The port that clients connect to; 0 takes one that is free."),
+      Parameter("Clients", p.clients, {1, 256}, "", "How many at once; those beyond are turned away."),
+      Parameter("QueuedBytes", p.queuedBytes, {4096, 1073741824}, "bytes", "Of poses that wait for a client."),
+      Parameter("RememberedImages", p.rememberedImages, {1, 64}, "",
+                "Names of images of which the newest is kept for clients that come later."),
+  };
 }
 
 OpenIgtLinkServer::OpenIgtLinkServer(const OpenIgtLinkServerParameters& parameters) : parts_(std::make_unique<Parts>())
 {
-  parameters.Check();
+  CheckRanges(parameters);
   parts_->parameters = parameters;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Tracking/Stream/ImageStream.h"
 #include "Tracking/Stream/PoseStream.h"
 #include <cstddef>
@@ -10,16 +11,14 @@
 namespace echorama {
 
 struct OpenIgtLinkServerParameters {
-  std::string host = "127.0.0.1"; ///< this machine alone; "0.0.0.0": everybody who can reach it (there are no passwords)
-  int port = 18944;               ///< in [0, 65535]; 0: any that is free
-  std::size_t clients = 16;       ///< at once, in [1, 256]; those beyond are turned away
-  std::size_t queuedBytes =
-      std::size_t{1} << 20;         ///< of poses that wait for a client, in [4 KiB, 1 GiB]: 1 MiB is 5 s of 8 tools at 250 Hz
-  std::size_t rememberedImages = 4; ///< names of which the newest is kept for clients that come later, in [1, 64]
-  bool turnImages = true;           ///< see OpenIgtLinkEncoder::Image
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  std::string host = "127.0.0.1";
+  int port = 18944;
+  std::size_t clients = 16;
+  std::size_t queuedBytes = std::size_t{1} << 20; ///< 5 s of 8 tools at 250 Hz
+  std::size_t rememberedImages = 4;
+  bool turnImages = true; ///< see OpenIgtLinkEncoder::Image
 };
+ParameterList Describe(OpenIgtLinkServerParameters& p);
 
 struct OpenIgtLinkServerStatistics {
   std::size_t clients = 0;      ///< now
@@ -42,7 +41,7 @@ struct OpenIgtLinkServerStatistics {
 /// disconnected.
 class OpenIgtLinkServer {
 public:
-  /// \throws Error(InvalidParameter) as Check().
+  /// \throws Error(InvalidParameter) for what is out of its range.
   explicit OpenIgtLinkServer(const OpenIgtLinkServerParameters& parameters = {});
   ~OpenIgtLinkServer();
   OpenIgtLinkServer(const OpenIgtLinkServer&) = delete;

@@ -165,8 +165,19 @@ std::size_t PolhemusRecordBytes(const PolhemusLayout& layout, PolhemusFormat for
   return bytes;
 }
 
+ParameterList Describe(PolhemusSpeech& p)
+{
+  return {Parameter("Format", Choice(p.format, {"binary", "ascii"}), "How records are written."),
+          Parameter("UnitMm", p.unitMm, {0, 1000, true}, "mm", "What the device counts in."),
+          Parameter("Range", p.rangeMm, {0, 20000, true}, "mm",
+                    "Poses further away are out of range; those beyond three times that are damaged."),
+          Parameter("Distortion", p.distortion, {}, "",
+                    "From this level on, as the device judges the field, poses are out of range; the default never is.")};
+}
+
 void PolhemusSpeech::Check() const
 {
+  CheckRanges(*this);
   const auto refuse = [](const std::string& what) { throw Error(Error::Kind::InvalidParameter, "Polhemus: " + what); };
   const auto count = [this](PolhemusItem item) { return std::count(layout.begin(), layout.end(), item); };
   for (const PolhemusItem item : layout)
@@ -179,12 +190,6 @@ void PolhemusSpeech::Check() const
   if (stations == 0 || stations >> PolhemusStations(model) != 0)
     refuse(std::string("a ") + PolhemusModelText(model) + " has stations 1 to " + std::to_string(PolhemusStations(model)) +
            ", and at least one must be there");
-  if (!(unitMm > 0.0 && unitMm <= 1000.0))
-    refuse("the unit must be above 0 and at most 1000 mm");
-  if (!(rangeMm > 0.0 && rangeMm <= 20000.0))
-    refuse("the range must be above 0 and at most 20000 mm");
-  if (std::isnan(distortion))
-    refuse("the level of distortion must be a number");
 }
 
 std::optional<TransformStatus> PolhemusStatusOf(unsigned char error)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Core/Geometry/TransformGraph.h"
 #include <array>
@@ -48,12 +49,11 @@ struct PolhemusSpeech {
   PolhemusFormat format = PolhemusFormat::Binary;
   PolhemusLayout layout = PolhemusTwofold(true); ///< position and quaternion at least, and LineEnd at the end
   std::uint32_t stations = 3;                    ///< bit n: station n + 1 is there
-  double unitMm = 10.0;                          ///< what the device counts in: centimetres
-  double rangeMm = 1800.0;   ///< beyond it, poses are OutOfRange; beyond three times that, damaged. In (0, 20000]
-  double distortion = 1e300; ///< from this level on, poses are OutOfRange; the default never is
+  double unitMm = 10.0, rangeMm = 1800.0, distortion = 1e300;
 
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  void Check() const; ///< Throws Error(InvalidParameter): ranges, and whether layout and stations are possible.
 };
+ParameterList Describe(PolhemusSpeech& p);
 
 /// One station at one moment.
 struct PolhemusRecord {

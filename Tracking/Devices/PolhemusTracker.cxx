@@ -38,7 +38,6 @@ std::uint32_t Bits(const std::string& data, std::size_t at)
 
 PolhemusOptions PolhemusOptions::From(const TrackerAddress& address)
 {
-  address.CheckOptions({"baud", "model", "format", "names", "hemisphere", "record", "range", "distortion"});
   const auto refuse = [&address](const std::string& what) {
     throw Error(Error::Kind::InvalidParameter, address.text + ": " + what);
   };
@@ -46,39 +45,20 @@ PolhemusOptions PolhemusOptions::From(const TrackerAddress& address)
   options.path = address.place;
   if (options.path.empty())
     refuse("the line is missing, such as polhemus:/dev/ttyUSB0");
-  options.baud = static_cast<int>(address.Number("baud", options.baud, 1200, 1000000));
-
-  const std::string model = address.Text("model", "auto");
-  if (model == "patriot")
-    options.model = PolhemusModel::Patriot;
-  else if (model == "liberty")
-    options.model = PolhemusModel::Liberty;
-  else if (model != "auto")
-    refuse("model must be auto, patriot or liberty");
-
-  const std::string format = address.Text("format", "binary");
-  if (format == "ascii")
-    options.format = PolhemusFormat::Ascii;
-  else if (format != "binary")
-    refuse("format must be binary or ascii");
-
-  const std::string record = address.Text("record", "auto");
-  if (record == "twofold")
-    options.record = Record::Twofold;
-  else if (record == "single")
-    options.record = Record::Single;
-  else if (record == "bare")
-    options.record = Record::Bare;
-  else if (record != "auto")
-    refuse("record must be auto, twofold, single or bare");
-
-  options.hemisphere = address.Text("hemisphere", "");
-  if (!options.hemisphere.empty() &&
-      (options.hemisphere.size() != 2 || std::string("+-").find(options.hemisphere[0]) == std::string::npos ||
-       std::string("xyz").find(options.hemisphere[1]) == std::string::npos))
-    refuse("hemisphere must be +x, -x, +y, -y, +z or -z");
-
-  std::istringstream names(address.Text("names", ""));
+  enum class Model { Auto, Patriot, Liberty } model = Model::Auto;
+  std::string list;
+  address.Set(
+      Join({{Parameter("Baud", options.baud, {1200, 1000000}, "bits/s", "Speed of the line, as the switches on the device say."),
+             Parameter("Model", Choice(model, {"auto", "patriot", "liberty"}), "Which device is expected; another is refused."),
+             Parameter("Names", list, "Names of the stations, separated by commas; the rest are Station1, Station2 ..."),
+             Parameter("Hemisphere", Choice(options.hemisphere, {"as-set", "+x", "-x", "+y", "-y", "+z", "-z"}),
+                       "On which side of the source the sensors are."),
+             Parameter("Record", Choice(options.record, {"auto", "twofold", "single", "bare"}),
+                       "How much is sent: twofold when the line is fast enough for it, else single.")},
+            Without(Describe(options.speech), {"UnitMm"})}));
+  if (model != Model::Auto)
+    options.model = model == Model::Patriot ? PolhemusModel::Patriot : PolhemusModel::Liberty;
+  std::istringstream names(list);
   std::set<std::string> seen;
   for (std::string name; std::getline(names, name, ',');) {
     if (!name.empty() && !seen.insert(ToolTransformName(name)).second)
@@ -88,8 +68,6 @@ PolhemusOptions PolhemusOptions::From(const TrackerAddress& address)
   const int most = PolhemusStations(options.model.value_or(PolhemusModel::Liberty));
   if (options.names.size() > static_cast<std::size_t>(most))
     refuse("there are " + std::to_string(options.names.size()) + " names for at most " + std::to_string(most) + " stations");
-  options.rangeMm = address.Number("range", options.rangeMm, 1.0, 20000.0);
-  options.distortion = address.Number("distortion", options.distortion, 0.0, 1e300);
   return options;
 }
 
@@ -199,7 +177,7 @@ std::vector<PolhemusLayout> PolhemusTracker::Layouts(PolhemusModel model, int st
   using Record = PolhemusOptions::Record;
   // A byte takes 10 bits; a line that is full to the brim has no room to catch up.
   const double room = 0.97 * options_.baud / 10.0 / FramesPerSecond(model) / stations;
-  const bool fits = static_cast<double>(PolhemusRecordBytes(PolhemusTwofold(true), options_.format)) <= room;
+  const bool fits = static_cast<double>(PolhemusRecordBytes(PolhemusTwofold(true), options_.speech.format)) <= room;
   std::vector<PolhemusLayout> layouts;
   if (options_.record == Record::Twofold || (options_.record == Record::Auto && fits))
     layouts = {PolhemusTwofold(true), PolhemusTwofold(false)};
@@ -237,11 +215,8 @@ PolhemusTracker::Step PolhemusTracker::Converse(const Worker::Signal& signal)
     return Step::Impossible;
   }
 
-  PolhemusSpeech speech;
+  PolhemusSpeech speech = options_.speech;
   speech.model = who->model;
-  speech.format = options_.format;
-  speech.rangeMm = options_.rangeMm;
-  speech.distortion = options_.distortion;
   speech.stations = (1u << PolhemusStations(speech.model)) - 1;
   const auto sensors = Ask(signal, std::string(1, ControlU) + "0\r", ControlU);
   if (sensors && sensors->data.size() >= 4) {
@@ -262,12 +237,10 @@ PolhemusTracker::Step PolhemusTracker::Converse(const Worker::Signal& signal)
       return Step::Again;
     }
   }
-  if (!options_.hemisphere.empty()) {
-    const std::string one = options_.hemisphere[0] == '-' ? "-1" : "1";
-    const char axis = options_.hemisphere[1];
-    if (!Tell("H*," + (axis == 'x' ? one : "0") + "," + (axis == 'y' ? one : "0") + "," + (axis == 'z' ? one : "0") + "\r"))
-      return Step::Lost;
-  }
+  static const char* const directions[] = {"1,0,0", "-1,0,0", "0,1,0", "0,-1,0", "0,0,1", "0,0,-1"};
+  if (const auto side = static_cast<std::size_t>(options_.hemisphere);
+      side > 0 && !Tell("H*," + std::string(directions[side - 1]) + "\r"))
+    return Step::Lost;
   return TryLayouts(signal, speech);
 }
 

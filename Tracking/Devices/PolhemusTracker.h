@@ -16,18 +16,16 @@ namespace echorama {
 /// What an address polhemus:/dev/ttyUSB0 may say.
 struct PolhemusOptions {
   std::string path;
-  int baud = 115200;                              ///< as the switches on the device say
-  std::optional<PolhemusModel> model;             ///< else the device says; another one is refused
-  PolhemusFormat format = PolhemusFormat::Binary; ///< binary or ascii
-  std::vector<std::string> names;                 ///< of the stations; the rest are Station1, Station2 ...
-  std::string hemisphere; ///< "+x" ... "-z": on which side of the source the sensors are. Else as it is set
+  int baud = 115200;                  ///< as the switches on the device say
+  std::optional<PolhemusModel> model; ///< else the device says; another one is refused
+  PolhemusSpeech speech;              ///< its format, range and distortion
+  std::vector<std::string> names;     ///< of the stations; the rest are Station1, Station2 ...
+  enum class Hemisphere { AsSet, PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
+  Hemisphere hemisphere = Hemisphere::AsSet; ///< on which side of the source the sensors are
   enum class Record { Auto, Twofold, Single, Bare };
   Record record = Record::Auto; ///< Auto: twofold when the line is fast enough for it, else single
-  double rangeMm = 1800.0;      ///< see PolhemusSpeech
-  double distortion = 1e300;    ///< see PolhemusSpeech
 
-  /// The options baud, model (auto, patriot, liberty), format, names (separated by commas), hemisphere, record, range (mm) and
-  /// distortion. \throws Error(InvalidParameter) that names what does not fit.
+  /// \throws Error(InvalidParameter) that names what does not fit.
   static PolhemusOptions From(const TrackerAddress& address);
 };
 

@@ -21,38 +21,33 @@ constexpr double HalfFull = 0.5, LookSeconds = 0.001, PatienceSeconds = 10.0;
 
 } // namespace
 
+ParameterList Describe(ReplayParameters& p)
+{
+  return Join({{Parameter("Speed", p.speed, {0, 1000}, "", "1: as it was recorded; 0: as fast as it is taken."),
+                Parameter("Loop", p.loop, "Whether at the end it begins again; times go on. Not at speed 0."),
+                Parameter("Step", p.step, "Whether poses come one moment at a time, when asked."),
+                Parameter("From", p.from, {0, Unlimited}, "s", "Begins so long after the first pose."),
+                Parameter("To", p.to, {0, Unlimited}, "s", "Ends so long after the first pose.")},
+               Describe(p.log)});
+}
+
 void ReplayParameters::Check() const
 {
+  CheckRanges(*this);
   const auto refuse = [](const char* what) { throw Error(Error::Kind::InvalidParameter, what); };
   if (path.empty())
     refuse("a replay needs a file: replay:FILE");
-  if (!(speed >= 0.0 && speed <= 1000.0))
-    refuse("the speed of a replay must be 0 to 1000");
   if (loop && !step && speed == 0.0)
     refuse("a replay that begins again and again needs a speed above 0");
-  if (!(from >= 0.0 && std::isfinite(from)) || !(to >= from))
-    refuse("\"from\" must be at least 0, and \"to\" must not be less than \"from\"");
-  log.Check();
+  if (!(to >= from))
+    refuse("\"to\" must not be less than \"from\"");
 }
 
 ReplayParameters ReplayParameters::Of(const TrackerAddress& address)
 {
-  address.CheckOptions({"speed", "loop", "step", "from", "to", "unitMm", "rowsPerSecond"});
-  const auto yes = [&address](const char* option) {
-    const double value = address.Number(option, 0.0, 0.0, 1.0);
-    if (value != 0.0 && value != 1.0)
-      throw Error(Error::Kind::InvalidParameter, address.text + ": " + option + " must be 0 or 1");
-    return value == 1.0;
-  };
   ReplayParameters p;
   p.path = address.place;
-  p.speed = address.Number("speed", p.speed, 0.0, 1000.0);
-  p.loop = yes("loop");
-  p.step = yes("step");
-  p.from = address.Number("from", p.from, 0.0, 1e9);
-  p.to = address.Number("to", p.to, 0.0, 1e9);
-  p.log.unitMm = address.Number("unitMm", p.log.unitMm, 0.0, 1e6);
-  p.log.rowsPerSecond = address.Number("rowsPerSecond", p.log.rowsPerSecond, 0.0, 1e6);
+  address.Set(Describe(p));
   return p;
 }
 
@@ -302,11 +297,6 @@ void ReplayTracker::ShowImage(double time)
     return;
   recording_->ShowFrame(nearest->frame, nearest->time);
   recording_->shown = nearest->frame;
-}
-
-std::unique_ptr<TrackerDevice> MakeReplayTracker(const TrackerAddress& address)
-{
-  return std::make_unique<ReplayTracker>(ReplayParameters::Of(address));
 }
 
 } // namespace echorama

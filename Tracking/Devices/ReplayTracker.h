@@ -4,7 +4,6 @@
 #include "Readers/PoseLog.h"
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Tracking/Devices/TrackerDevice.h"
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,18 +12,17 @@ namespace echorama {
 
 struct ReplayParameters {
   std::string path;
-  double speed = 1.0; ///< 1: as it was recorded, in [0, 1000]; 0: as fast as it is taken
-  bool loop = false;  ///< at the end it begins again; times go on. Not at speed 0
-  bool step = false;  ///< nothing comes but by Step()
-  /// The part that is replayed, seconds after the first pose, both included.
-  double from = 0.0, to = std::numeric_limits<double>::infinity();
-  PoseLogOptions log; ///< how the file is read
+  double speed = 1.0;
+  bool loop = false, step = false;
+  double from = 0.0, to = 1e300; ///< the part that is replayed, both included
+  PoseLogOptions log;            ///< how the file is read
 
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  void Check() const; ///< Throws Error(InvalidParameter): ranges, a file, a part that is one, a speed with loop.
   /// From the place and options of "replay:FILE?speed=2&loop=1&step=1&from=10&to=20&unitMm=1000".
   /// \throws Error(InvalidParameter)
   static ReplayParameters Of(const TrackerAddress& address);
 };
+ParameterList Describe(ReplayParameters& p);
 
 /// A recording, as if it were a tracker: everything that ReadPoseLog reads, and the images of sequences.
 ///
@@ -61,8 +59,5 @@ private:
   std::unique_ptr<Recording> recording_; // of the thread while it runs
   Worker worker_;
 };
-
-/// The line of MakeTracker.
-std::unique_ptr<TrackerDevice> MakeReplayTracker(const TrackerAddress& address);
 
 } // namespace echorama

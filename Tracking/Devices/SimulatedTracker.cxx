@@ -79,73 +79,43 @@ Pose Moved(const SimulatedTrackerParameters& p, int tool, double time)
 
 } // namespace
 
-const char* SimulatedMotionName(SimulatedMotion motion)
-{
-  static const char* const names[] = {"still", "sweep", "circle", "freehand", "pivot"};
-  return names[static_cast<int>(motion)];
-}
-
 std::vector<std::string> SimulatedMotionNames()
 {
-  std::vector<std::string> names;
-  for (int i = 0; i <= static_cast<int>(SimulatedMotion::Pivot); ++i)
-    names.push_back(SimulatedMotionName(static_cast<SimulatedMotion>(i)));
-  return names;
+  return {"still", "sweep", "circle", "freehand", "pivot"};
 }
 
-void SimulatedTrackerParameters::Check() const
+ParameterList Describe(SimulatedTrackerParameters& p)
 {
-  const auto check = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw Error(Error::Kind::InvalidParameter, std::string("the simulated tracker's ") + name + " must be from " +
-                                                     NumberText(low) + " to " + NumberText(high));
+  return {
+      Parameter("Rate", p.rateHz, {0.1, 10000}, "Hz", "Poses per second of each tool."),
+      Parameter("Tools", p.tools, {1, 64}, "", "How many tools there are."),
+      Parameter("Motion", Choice(p.motion, SimulatedMotionNames()), "How the first tool moves."),
+      Parameter("NoiseMm", p.noiseMm, {0, 100}, "mm", "Standard deviation of the position, along each axis."),
+      Parameter("NoiseDegrees", p.noiseDegrees, {0, 45}, "degrees",
+                "Standard deviation of a small turn, about each axis of the tool."),
+      Parameter("Dropout", p.dropout, {0, 1}, "", "Share of poses that are missing."),
+      Parameter("LatencyMs", p.latencyMs, {0, 10000}, "ms", "From the measurement to when it is sent."),
+      Parameter("JitterMs", p.jitterMs, {0, 1000}, "ms",
+                "Of the latency: the mean of what is added, exponentially distributed; order is kept."),
+      Parameter(
+          "DistortionMm", p.distortionMm, {0, 100}, "mm",
+          "What metal nearby does to a magnetic field: how far a tool 300 mm from the transmitter is seen from where it is. It "
+          "grows with the square of that distance; tools are turned as the field is (half the curl of the displacement)."),
+      Parameter("RangeMm", p.rangeMm, {0, 100000}, "mm",
+                "Tools further from the transmitter are out of range; 0: there is no border."),
+      Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same noise."),
+      Parameter("UnplugAfter", p.unplugAfter, {0, 1e9}, "s", "After so long the device is lost; 0: never."),
+      Parameter("Start", p.start, {-1, 1e10}, "s",
+                "The sender's clock at the start; below 0: as ours. With a fixed one each run sends the same."),
   };
-  check("rate", rateHz, 0.1, 10000.0);
-  check("tools", tools, 1, 64);
-  check("noiseMm", noiseMm, 0.0, 100.0);
-  check("noiseDegrees", noiseDegrees, 0.0, 45.0);
-  check("dropout", dropout, 0.0, 1.0);
-  check("latencyMs", latencyMs, 0.0, 10000.0);
-  check("jitterMs", jitterMs, 0.0, 1000.0);
-  check("distortionMm", distortionMm, 0.0, 100.0);
-  check("rangeMm", rangeMm, 0.0, 100000.0);
-  check("unplugAfter", unplugAfter, 0.0, 1e9);
-  if (!std::isnan(start))
-    check("start", start, 0.0, 1e10);
 }
 
 SimulatedTrackerParameters SimulatedTrackerParameters::Of(const TrackerAddress& address)
 {
-  const auto refuse = [&address](const std::string& reason) {
-    throw Error(Error::Kind::InvalidParameter, address.text + ": " + reason);
-  };
   if (!address.place.empty())
-    refuse("a simulated tracker has no place; its options follow a ?");
-  address.CheckOptions({"rate", "tools", "motion", "noiseMm", "noiseDegrees", "dropout", "latencyMs", "jitterMs", "distortionMm",
-                        "rangeMm", "seed", "unplugAfter", "start"});
+    throw Error(Error::Kind::InvalidParameter, address.text + ": a simulated tracker has no place; its options follow a ?");
   SimulatedTrackerParameters p;
-  p.rateHz = address.Number("rate", p.rateHz, 0.1, 10000.0);
-  const double tools = address.Number("tools", p.tools, 1, 64), seed = address.Number("seed", 1.0, 0.0, 9007199254740992.0);
-  if (tools != std::floor(tools))
-    refuse("tools must be a whole number");
-  if (seed != std::floor(seed))
-    refuse("seed must be a whole number");
-  p.tools = static_cast<int>(tools);
-  p.seed = static_cast<std::uint64_t>(seed);
-  const std::vector<std::string> motions = SimulatedMotionNames();
-  const auto motion = std::find(motions.begin(), motions.end(), address.Text("motion", SimulatedMotionName(p.motion)));
-  if (motion == motions.end())
-    refuse("motion must be one of still, sweep, circle, freehand, pivot");
-  p.motion = static_cast<SimulatedMotion>(motion - motions.begin());
-  p.noiseMm = address.Number("noiseMm", p.noiseMm, 0.0, 100.0);
-  p.noiseDegrees = address.Number("noiseDegrees", p.noiseDegrees, 0.0, 45.0);
-  p.dropout = address.Number("dropout", p.dropout, 0.0, 1.0);
-  p.latencyMs = address.Number("latencyMs", p.latencyMs, 0.0, 10000.0);
-  p.jitterMs = address.Number("jitterMs", p.jitterMs, 0.0, 1000.0);
-  p.distortionMm = address.Number("distortionMm", p.distortionMm, 0.0, 100.0);
-  p.rangeMm = address.Number("rangeMm", p.rangeMm, 0.0, 100000.0);
-  p.unplugAfter = address.Number("unplugAfter", p.unplugAfter, 0.0, 1e9);
-  p.start = address.Number("start", p.start, 0.0, 1e10);
+  address.Set(Describe(p));
   return p;
 }
 
@@ -216,7 +186,7 @@ ToolPose SimulatedMeasurement(const SimulatedTrackerParameters& p, int tool, std
 
 SimulatedTracker::SimulatedTracker(const SimulatedTrackerParameters& parameters) : parameters_(parameters)
 {
-  parameters_.Check();
+  CheckRanges(parameters_);
 }
 
 void SimulatedTracker::Start(PoseStream& poses, ImageStream*)
@@ -224,10 +194,11 @@ void SimulatedTracker::Start(PoseStream& poses, ImageStream*)
   Stop();
   poses.SetLive(true);
   poses.SetState(DeviceState::Running, "simulated: " + std::to_string(parameters_.tools) + " tools at " +
-                                           NumberText(parameters_.rateHz) + " Hz, " + SimulatedMotionName(parameters_.motion));
+                                           NumberText(parameters_.rateHz) + " Hz, " +
+                                           SimulatedMotionNames()[static_cast<std::size_t>(parameters_.motion)]);
   RunDevice(worker_, poses, [&poses, p = parameters_](const Worker::Signal& signal) {
     const double begun = ClockNow();
-    const double start = std::isnan(p.start) ? begun : p.start; // the sender's clock, when ours says begun
+    const double start = p.start < 0.0 ? begun : p.start; // the sender's clock, when ours says begun
     double sent = 0.0;
     for (auto sample = static_cast<std::uint64_t>(std::ceil(start * p.rateHz));; ++sample) {
       const double time = static_cast<double>(sample) / p.rateHz;
@@ -255,11 +226,6 @@ void SimulatedTracker::Start(PoseStream& poses, ImageStream*)
       }
     }
   });
-}
-
-std::unique_ptr<TrackerDevice> MakeSimulatedTracker(const TrackerAddress& address)
-{
-  return std::make_unique<SimulatedTracker>(SimulatedTrackerParameters::Of(address));
 }
 
 } // namespace echorama

@@ -2,7 +2,6 @@
 #include "Tracking/Devices/TrackerAddress.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
-#include <cmath>
 
 namespace echorama {
 namespace {
@@ -10,11 +9,6 @@ namespace {
 [[noreturn]] void RefuseAddress(const std::string& address, const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, address + ": " + reason);
-}
-
-bool ReadNumber(const std::string& text, double& number)
-{
-  return ParseNumber(text, number) && std::isfinite(number);
 }
 
 } // namespace
@@ -45,35 +39,25 @@ TrackerAddress TrackerAddress::Parse(const std::string& text)
   return address;
 }
 
-void TrackerAddress::CheckOptions(const std::vector<std::string>& known) const
+void TrackerAddress::Set(ParameterList parameters) const
 {
   for (const auto& [name, value] : options) {
-    bool found = false;
+    Parameter* found = nullptr;
     std::string list;
-    for (const std::string& option : known) {
-      found = found || option == name;
-      list += (list.empty() ? "" : ", ") + option;
+    for (Parameter& parameter : parameters) {
+      if (name == parameter.Key() || "--" + name == parameter.Flag())
+        found = &parameter;
+      list += (list.empty() ? "" : ", ") + parameter.Key();
     }
     if (!found)
-      RefuseAddress(text, "there is no option " + name + "; there are: " + (list.empty() ? "none" : list));
+      RefuseAddress(text, "there is no option " + name + "; there are: " + list);
+    try {
+      found->Set(value);
+      found->Check();
+    } catch (const Error& error) {
+      RefuseAddress(text, error.what());
+    }
   }
-}
-
-double TrackerAddress::Number(const std::string& option, double fallback, double low, double high) const
-{
-  const auto found = options.find(option);
-  if (found == options.end())
-    return fallback;
-  double number = 0.0;
-  if (!ReadNumber(found->second, number) || number < low || number > high)
-    RefuseAddress(text, option + " must be a number from " + NumberText(low) + " to " + NumberText(high));
-  return number;
-}
-
-std::string TrackerAddress::Text(const std::string& option, const std::string& fallback) const
-{
-  const auto found = options.find(option);
-  return found == options.end() ? fallback : found->second;
 }
 
 TrackerAddress::Endpoint TrackerAddress::HostAndPort(const std::string& fallbackHost, int fallbackPort) const
@@ -86,10 +70,8 @@ TrackerAddress::Endpoint TrackerAddress::HostAndPort(const std::string& fallback
     rest.pop_back();
   const std::size_t colon = rest.rfind(':');
   if (colon != std::string::npos) {
-    double port = 0.0;
-    if (!ReadNumber(rest.substr(colon + 1), port) || port < 0.0 || port > 65535.0 || port != std::floor(port))
+    if (!ParseNumber(rest.substr(colon + 1), endpoint.port) || endpoint.port < 0 || endpoint.port > 65535)
       RefuseAddress(text, "the port must be a whole number from 0 to 65535");
-    endpoint.port = static_cast<int>(port);
     rest.erase(colon);
   }
   if (!rest.empty())

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include <map>
 #include <string>
 #include <vector>
@@ -23,13 +24,10 @@ struct TrackerAddress {
   /// \throws Error(InvalidParameter) when the text is not of that form or an option is given twice.
   static TrackerAddress Parse(const std::string& text);
 
-  /// \throws Error(InvalidParameter) that names the options there are, when another one was given.
-  void CheckOptions(const std::vector<std::string>& known) const;
+  /// Sets \a parameters by the options of their names: "noiseMm" (or "noise-mm") sets NoiseMm.
+  /// \throws Error(InvalidParameter) that names the address and what is wrong: no such option, no such value, out of range
+  void Set(ParameterList parameters) const;
 
-  /// An option as a number in [low, high], or \a fallback. \throws Error(InvalidParameter) that names it.
-  double Number(const std::string& option, double fallback, double low, double high) const;
-  /// An option, or \a fallback.
-  std::string Text(const std::string& option, const std::string& fallback) const;
   /// "HOST:PORT" of a place like //HOST:PORT. Without a host \a fallbackHost, without a port \a fallbackPort.
   /// \throws Error(InvalidParameter) for a port outside [0, 65535].
   struct Endpoint {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Placement/ToolTrack.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -79,12 +80,9 @@ ToolTrack ToolTrackOf(const PoseLog& recording, const std::string& tool)
 {
   std::string name = tool;
   if (name.empty()) {
-    if (recording.tools.size() != 1) {
-      std::string list;
-      for (const std::string& each : recording.tools)
-        list += (list.empty() ? "" : ", ") + each;
-      throw Error(Error::Kind::InvalidParameter, recording.path + ": it holds several tools; choose one of " + list);
-    }
+    if (recording.tools.size() != 1)
+      throw Error(Error::Kind::InvalidParameter,
+                  recording.path + ": it holds several tools; choose one of " + Joined(recording.tools));
     name = recording.tools.front();
   }
   const bool known = std::find(recording.tools.begin(), recording.tools.end(), ToolTransformName(name)) != recording.tools.end();

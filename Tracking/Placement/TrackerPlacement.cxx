@@ -2,7 +2,7 @@
 #include "Tracking/Placement/TrackerPlacement.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Json.h"
-#include "Readers/TransformFile.h"
+#include "Core/Geometry/TransformFile.h"
 
 namespace echorama {
 namespace {
@@ -32,6 +32,12 @@ VolumeCalibration ReadVolumeCalibration(const std::string& path, const std::stri
   calibration.errorMm = edge->errorMm;
   calibration.frame = FrameIn(ReadTransformReport(path));
   return calibration;
+}
+
+ParameterList Describe(TrackerPlacementParameters& p)
+{
+  return Join({Describe(p.smoothing),
+               {Parameter("FixedVolume", p.fixed, {0, Unlimited}, "", "The volume that stays where it is, counted from 0.")}});
 }
 
 SensorPoses MatchSensor(const ToolTrack& track, const std::vector<TrackedVolume>& volumes,
@@ -103,7 +109,8 @@ VolumeFrames FindVolumeFrames(const std::vector<TrackedVolume>& volumes, const s
 TrackerPlacement PlaceByTracker(const ToolTrack& track, const std::vector<TrackedVolume>& volumes,
                                 const VolumeCalibration& calibration, const TrackerPlacementParameters& parameters)
 {
-  const std::size_t fixed = parameters.fixed;
+  CheckRanges(parameters);
+  const auto fixed = static_cast<std::size_t>(parameters.fixed);
   if (fixed >= volumes.size())
     throw Error(Error::Kind::InvalidParameter,
                 "the fixed volume is number " + std::to_string(fixed) + " (from 0) of " + std::to_string(volumes.size()));

@@ -29,10 +29,11 @@ struct VolumeCalibration {
 VolumeCalibration ReadVolumeCalibration(const std::string& path, const std::string& sensor);
 
 struct TrackerPlacementParameters {
-  std::vector<double> times;           ///< when each volume was made, instead of what the volumes say
-  MotionSmoothing smoothing{0.2, 0.5}; ///< poses are means over this window; in a longer gap none is known
-  std::size_t fixed = 0;               ///< the volume that stays
+  std::vector<double> times; ///< when each volume was made, instead of what the volumes say
+  MotionSmoothing smoothing{0.2, 0.5};
+  int fixed = 0;
 };
+ParameterList Describe(TrackerPlacementParameters& p);
 
 /// Where the sensor was when each volume was made.
 struct SensorPoses {

@@ -42,35 +42,25 @@ double Middle(std::vector<double>& values) // which change places; not empty
 
 } // namespace
 
-void StreamLimits::Check() const
+ParameterList Describe(StreamLimits& p)
 {
-  const auto refuse = [](const char* what) { throw Error(Error::Kind::InvalidParameter, what); };
-  if (posesPerTool < 2 || posesPerTool > 1000000)
-    refuse("the poses that are remembered per tool must be 2 to 1000000");
-  if (tools < 1 || tools > 4096)
-    refuse("the number of tools must be 1 to 4096");
-  if (!(longestGapSeconds > 0.0 && longestGapSeconds <= 600.0))
-    refuse("the longest gap must be above 0 and at most 600 s");
-  if (!(jumpSeconds > 0.0 && jumpSeconds <= 600.0))
-    refuse("the jump of a clock must be above 0 and at most 600 s");
+  return {
+      Parameter("LongestGapSeconds", p.longestGapSeconds, {0, 600, true}, "s",
+                "Poses that lie further apart in time are not interpolated. Counts when the device is opened.")
+          .Advanced(),
+      Parameter("PosesPerTool", p.posesPerTool, {2, 1000000}, "", "The newest poses of a tool that are remembered."),
+      Parameter("Tools", p.tools, {1, 4096}, "", "The most tools of which poses are taken."),
+      Parameter(
+          "JumpSeconds", p.jumpSeconds, {0, 600, true}, "s",
+          "A sender's clock that goes back by more than this has jumped, and so has one that runs ahead of ours by this much "
+          "more than before. A pose that is held up on its way is no jump. After one, what came before is forgotten."),
+  };
 }
 
 const char* DeviceStateText(DeviceState state)
 {
-  switch (state) {
-  case DeviceState::Connecting:
-    return "connecting";
-  case DeviceState::Running:
-    return "running";
-  case DeviceState::Lost:
-    return "lost";
-  case DeviceState::Ended:
-    return "ended";
-  case DeviceState::Failed:
-    return "failed";
-  default:
-    return "idle";
-  }
+  static const char* const texts[] = {"idle", "connecting", "running", "lost", "ended", "failed"};
+  return texts[static_cast<int>(state)];
 }
 
 const char* RejectionText(Rejection reason)
@@ -82,13 +72,22 @@ const char* RejectionText(Rejection reason)
 
 double ToolStatistics::DropoutShare() const
 {
-  const double all = static_cast<double>(valid + missing + outOfRange);
+  const double all = static_cast<double>(Taken());
   return all > 0.0 ? 1.0 - static_cast<double>(valid) / all : 0.0;
 }
 
 std::uint64_t StreamStatistics::Rejected() const
 {
   return std::accumulate(rejected.begin(), rejected.end(), std::uint64_t{0});
+}
+
+const ToolStatistics* StreamStatistics::Find(const std::string& tool) const
+{
+  const auto found = std::find_if(tools.begin(), tools.end(), [&tool](const ToolStatistics& one) {
+    const auto frames = FramesOf(one.name);
+    return one.name == tool || (frames && frames->first == tool);
+  });
+  return found == tools.end() ? nullptr : &*found;
 }
 
 struct PoseSubscription::Parts {
@@ -354,7 +353,7 @@ struct PoseStream::Parts {
 
 PoseStream::PoseStream(const StreamLimits& limits) : parts_(std::make_unique<Parts>())
 {
-  limits.Check();
+  CheckRanges(limits);
   parts_->limits = limits;
 }
 
@@ -518,6 +517,23 @@ std::uint64_t PoseStream::WaitBeyond(std::uint64_t seen, double seconds) const
   std::unique_lock<std::mutex> lock(parts_->mutex);
   parts_->changed.wait_for(lock, Patience(seconds), [&] { return parts_->version != seen; });
   return parts_->version;
+}
+
+bool PoseStream::WaitForPoses(std::uint64_t count, double seconds) const
+{
+  const double until = ClockNow() + seconds;
+  for (std::uint64_t version = Version();;) {
+    const StreamStatistics statistics = Statistics();
+    std::uint64_t taken = 0;
+    for (const ToolStatistics& tool : statistics.tools)
+      taken += tool.Taken();
+    if (taken >= count)
+      return true;
+    const double left = until - ClockNow();
+    if (!(left > 0.0) || statistics.state == DeviceState::Ended || statistics.state == DeviceState::Failed)
+      return false;
+    version = WaitBeyond(version, left);
+  }
 }
 
 std::shared_ptr<PoseSubscription> PoseStream::Subscribe(std::size_t bound)

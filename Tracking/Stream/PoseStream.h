@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ToolPose.h"
 #include <array>
 #include <cstddef>
@@ -13,15 +14,11 @@ namespace echorama {
 
 /// What a stream of poses remembers.
 struct StreamLimits {
-  std::size_t posesPerTool = 4096; ///< the newest ones, in [2, 1000000]: 16 s at 250 Hz, 0.7 MB a tool
-  std::size_t tools = 64;          ///< names that a peer may make up, in [1, 4096]
-  double longestGapSeconds = 0.5;  ///< poses further apart are not interpolated, in (0, 600]
-  /// In (0, 600]. A sender's clock that goes back by more than this has jumped, and so has one that runs ahead of ours by this
-  /// much more than before. A pose that is held up on its way is no jump. After a jump, what came before is forgotten.
-  double jumpSeconds = 1.0;
-
-  void Check() const; ///< Throws Error(InvalidParameter) that names what is out of its range.
+  std::size_t posesPerTool = 4096; ///< 16 s at 250 Hz, 0.7 MB a tool
+  std::size_t tools = 64;          ///< a peer may make up names
+  double longestGapSeconds = 0.5, jumpSeconds = 1.0;
 };
+ParameterList Describe(StreamLimits& p);
 
 /// What a device is doing.
 enum class DeviceState {
@@ -64,6 +61,7 @@ struct ToolStatistics {
   double latencySpreadSeconds = 0.0;
   double secondsSinceLast = 0.0; ///< on our clock
 
+  std::uint64_t Taken() const { return valid + missing + outOfRange; }
   /// Share of poses without a valid measurement, in [0, 1].
   double DropoutShare() const;
 };
@@ -77,6 +75,8 @@ struct StreamStatistics {
   std::string lastRejection; ///< a sentence about the newest
   std::uint64_t Rejected(Rejection reason) const { return rejected[static_cast<std::size_t>(reason)]; }
   std::uint64_t Rejected() const; ///< for any reason
+  /// A tool by its name or that of its frame ("Probe"), or nullptr.
+  const ToolStatistics* Find(const std::string& tool) const;
 };
 
 /// Every pose once, in the order in which they came: for recorders and servers. Bounded: what is not taken in time is lost,
@@ -141,6 +141,10 @@ public:
   std::uint64_t Version() const;
   /// Waits for up to \a seconds (at most an hour) until the version is not \a seen any more. \returns the version
   std::uint64_t WaitBeyond(std::uint64_t seen, double seconds) const;
+
+  /// Waits until so many poses, of all tools together, have been taken. \returns false when they have not after \a seconds, or
+  /// the device is at its end or has failed
+  bool WaitForPoses(std::uint64_t count, double seconds) const;
 
   /// From now on. It goes when the last copy of the pointer goes. \a bound: poses it holds.
   std::shared_ptr<PoseSubscription> Subscribe(std::size_t bound = 65536);

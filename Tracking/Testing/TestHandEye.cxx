@@ -6,7 +6,7 @@
 #include "Testing/Sanitized.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Tracking/Calibration/HandEyeModel.h"
-#include "Tracking/Calibration/HandEyeSimulation.h"
+#include "Tracking/Testing/HandEyeSimulation.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Cholesky>
@@ -551,10 +551,12 @@ TEST(HandEye, ParametersAreChecked)
     spoil(parameters);
     return Complaint(Error::Kind::InvalidParameter, [&] { CalibrateHandEye({}, parameters); });
   };
-  EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.sensorNoise.degrees = -1.0; }), "sensor, degrees"));
-  EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.volumeNoise.mm = std::nan(""); }), "alignments, mm"));
+  EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.sensorNoise.degrees = -1.0; }),
+                   "SensorNoiseDegrees is -1 degrees; it must be in [0, 45]"));
+  EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.volumeNoise.mm = std::nan(""); }),
+                   "VolumeNoiseMm is nan mm; it must be in [0, 100]"));
   EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.sensorNoise = p.volumeNoise = {0.0, 0.0}; }), "must not be zero"));
-  EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.target.x() = std::nan(""); }), "target"));
+  EXPECT_TRUE(Says(complaint([](HandEyeParameters& p) { p.target.x() = std::nan(""); }), "Target"));
 }
 
 TEST(HandEye, StopsAndRepeats)

@@ -4,7 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Tracking/Benchmarks/HandEyeContestants.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
-#include "Tracking/Calibration/HandEyeSimulation.h"
+#include "Tracking/Testing/HandEyeSimulation.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 #include "Tracking/Calibration/HandEyeAdvice.h"
 #include "Tracking/Calibration/HandEyeModel.h"
 #include "Tracking/Calibration/HandEyeSearch.h"
-#include "Tracking/Calibration/HandEyeSimulation.h"
+#include "Tracking/Testing/HandEyeSimulation.h"
 #include <cmath>
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>

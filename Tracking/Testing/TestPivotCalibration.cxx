@@ -2,8 +2,8 @@
 #include "Core/Base/Random.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Readers/PoseLog.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Testing/Sanitized.h"
+#include "Testing/TemporaryFolder.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/PivotCalibration.h"
 #include <cmath>
@@ -54,7 +54,8 @@ Motion Exact(Motion motion = {})
 void Refused(const std::vector<TimedPose>& poses, Error::Kind kind, const std::string& words,
              const PivotParameters& parameters = {})
 {
-  ExpectRefused([&] { CalibratePivot(poses, parameters); }, kind, "pivot calibration", words);
+  ExpectRefused([&] { CalibratePivot(poses, parameters); }, kind,
+                kind == Error::Kind::InvalidParameter ? "" : "pivot calibration", words);
 }
 
 bool HasNote(const PivotResult& result, const std::string& words)
@@ -341,13 +342,13 @@ TEST(PivotCalibration, Parameters)
 {
   PivotParameters parameters;
   parameters.noise.mm = 0.0;
-  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "(0, 100]", parameters);
+  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "NoiseMm is 0 mm; it must be in (0, 100]", parameters);
   parameters = {};
   parameters.noise.degrees = NAN;
-  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "[0, 45]", parameters);
+  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "NoiseDegrees is nan degrees; it must be in [0, 45]", parameters);
   parameters = {};
   parameters.leastSwingDegrees = 0.0;
-  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "least swing", parameters);
+  Refused(Turned({}, 1), Error::Kind::InvalidParameter, "LeastSwing is 0 degrees; it must be in [0.1, 45]", parameters);
   EXPECT_THROW(CalibratePivot(Turned({}, 1), {}, Progress([](double) { return false; })), Error);
 }
 

@@ -371,10 +371,10 @@ TEST(PolhemusDecoder, RefusesSpeechThatItCannotCheck)
   refused(speech, "at least one");
   speech = {};
   speech.rangeMm = NAN;
-  refused(speech, "range");
+  refused(speech, "Range is nan mm; it must be in (0, 20000]");
   speech = {};
   speech.unitMm = -1.0;
-  refused(speech, "unit");
+  refused(speech, "UnitMm is -1 mm; it must be in (0, 1000]");
 }
 
 TEST(PolhemusReply, IsFoundAmongOtherThings)

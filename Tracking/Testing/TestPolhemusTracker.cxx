@@ -265,14 +265,14 @@ TEST(PolhemusTracker, RefusesWhatItCannotDo)
     }
   };
   refused("polhemus:", "line is missing");
-  refused("polhemus:/dev/x?model=fastrak", "model must be");
-  refused("polhemus:/dev/x?format=hex", "format must be");
-  refused("polhemus:/dev/x?record=triple", "record must be");
-  refused("polhemus:/dev/x?hemisphere=x", "hemisphere must be");
+  refused("polhemus:/dev/x?model=fastrak", "Model is 'fastrak'; it must be one of auto, patriot, liberty");
+  refused("polhemus:/dev/x?format=hex", "Format is 'hex'");
+  refused("polhemus:/dev/x?record=triple", "Record is 'triple'");
+  refused("polhemus:/dev/x?hemisphere=x", "Hemisphere is 'x'; it must be one of as-set, +x");
   refused("polhemus:/dev/x?baud=31337", "speed must be one of");
   refused("polhemus:/dev/x?names=A,B,A", "twice");
   refused("polhemus:/dev/x?model=patriot&names=A,B,C", "3 names for at most 2 stations");
-  refused("polhemus:/dev/x?range=-1", "range must be");
+  refused("polhemus:/dev/x?range=-1", "Range is -1 mm; it must be in (0, 20000]");
   refused("polhemus:/dev/x?colour=red", "there is no option colour");
   PoseStream poses;
   const auto tracker = MakeTracker("polhemus:/dev/echorama-has-no-such-line");

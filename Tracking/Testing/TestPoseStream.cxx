@@ -330,6 +330,26 @@ TEST(PoseStream, MemoryIsBounded)
   EXPECT_LT(stream.Statistics().lastRejection.size(), 1000u);
 }
 
+TEST(PoseStream, WaitsForPosesOfAllTools)
+{
+  PoseStream stream;
+  EXPECT_TRUE(stream.WaitForPoses(0, 0.0));
+  EXPECT_FALSE(stream.WaitForPoses(1, 0.0));
+  Worker worker;
+  worker.Start([&stream](const Worker::Signal&) {
+    stream.Add(Along(1.0, 1.0, "ProbeToTracker"));
+    stream.Add(Along(1.0, 1.0, "StylusToTracker"));
+  });
+  EXPECT_TRUE(stream.WaitForPoses(2, 60.0));
+  const StreamStatistics statistics = stream.Statistics();
+  ASSERT_NE(statistics.Find("Stylus"), nullptr);
+  EXPECT_EQ(statistics.Find("Stylus"), statistics.Find("StylusToTracker"));
+  EXPECT_EQ(statistics.Find("Stylus")->Taken(), 1u);
+  EXPECT_EQ(statistics.Find("Needle"), nullptr);
+  stream.SetState(DeviceState::Ended);
+  EXPECT_FALSE(stream.WaitForPoses(3, 3600.0)); // nothing will come any more
+}
+
 TEST(PoseStream, Limits)
 {
   StreamLimits limits;

@@ -245,6 +245,7 @@ TEST(SimulatedTracker, BadAddresses)
     EXPECT_THROW(MakeTracker(std::string("simulated:?") + options), Error) << options;
   EXPECT_THROW(MakeTracker("simulated:place"), Error);
   EXPECT_NO_THROW(MakeTracker("simulated:"));
+  EXPECT_EQ(Parameters("noise-mm=0.5").noiseMm, 0.5); // as the command line spells names
   SimulatedTrackerParameters p;
   p.noiseDegrees = std::nan("");
   EXPECT_THROW(SimulatedTracker{p}, Error);

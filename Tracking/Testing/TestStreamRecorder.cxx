@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include "Tracking/Stream/StreamRecorder.h"
 #include <chrono>
 #include <functional>

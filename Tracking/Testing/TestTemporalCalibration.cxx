@@ -3,8 +3,8 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Readers/PoseLog.h"
-#include "Readers/Testing/TemporaryFolder.h"
 #include "Testing/Sanitized.h"
+#include "Testing/TemporaryFolder.h"
 #include "Tracking/Calibration/TemporalCalibration.h"
 #include <algorithm>
 #include <array>
@@ -98,7 +98,8 @@ std::function<Pose(double)> Moving(std::uint64_t seed)
 void Refused(const std::vector<TimedPose>& a, const std::vector<TimedPose>& b, Error::Kind kind, const std::string& words,
              TemporalParameters parameters = {})
 {
-  ExpectRefused([&] { CalibrateTime(a, b, parameters); }, kind, "temporal calibration", words);
+  ExpectRefused([&] { CalibrateTime(a, b, parameters); }, kind,
+                kind == Error::Kind::InvalidParameter ? "" : "temporal calibration", words);
 }
 
 bool HasNote(const TemporalResult& result, const std::string& words)
@@ -324,11 +325,12 @@ TEST(TemporalCalibration, BadInput)
   bad[7].pose.linear() *= 2.0;
   Refused(bad, good, Error::Kind::BadInput, "the first stream");
   Refused(good, {good.begin(), good.begin() + 60}, Error::Kind::NotPossible, "overlap for less than 3 s");
-  for (const TemporalParameters& parameters :
-       {TemporalParameters{SpeedSignal::Automatic, 0.0}, TemporalParameters{SpeedSignal::Automatic, 5.0, 3.0},
-        TemporalParameters{SpeedSignal::Automatic, 5.0, 0.05, NAN},
-        TemporalParameters{SpeedSignal::Automatic, 5.0, 0.05, 0.5, 0.0}})
-    Refused(good, good, Error::Kind::InvalidParameter, "", parameters);
+  for (const auto& [parameters, words] :
+       {std::pair{TemporalParameters{SpeedSignal::Automatic, 0.0}, "LargestOffset is 0 s; it must be in (0, 3600]"},
+        std::pair{TemporalParameters{SpeedSignal::Automatic, 5.0, 3.0}, "Smoothing is 3 s"},
+        std::pair{TemporalParameters{SpeedSignal::Automatic, 5.0, 0.05, NAN}, "LongestGap is nan s"},
+        std::pair{TemporalParameters{SpeedSignal::Automatic, 5.0, 0.05, 0.5, 0.0}, "LeastOverlap is 0 s"}})
+    Refused(good, good, Error::Kind::InvalidParameter, words, parameters);
   EXPECT_THROW(CalibrateTime(good, good, {}, Progress([](double) { return false; })), Error);
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
-#include "Readers/Testing/TemporaryFolder.h"
-#include "Readers/TransformFile.h"
+#include "Core/Geometry/TransformFile.h"
+#include "Testing/TemporaryFolder.h"
 #include "Tracking/Placement/TrackerPlacement.h"
 #include <cmath>
 #include <gtest/gtest.h>
@@ -90,7 +90,7 @@ TEST(TrackerPlacement, PutsVolumesBackAsSeenFromAnyFixedOne)
   for (const std::size_t fixed : {0u, 1u, 2u}) {
     const Scans scans(7);
     TrackerPlacementParameters parameters;
-    parameters.fixed = fixed;
+    parameters.fixed = static_cast<int>(fixed);
     const TrackerPlacement placed = PlaceByTracker(scans.track, scans.volumes, scans.Calibration(), parameters);
     EXPECT_EQ(placed.volumeToWorld[fixed].matrix(), Eigen::Matrix4d::Identity());
     EXPECT_TRUE(Says(placed.how, "time stamps"));

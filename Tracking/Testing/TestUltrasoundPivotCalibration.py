@@ -111,7 +111,7 @@ refused(vtkPolyData(), "the track: it is empty")
 refused(track_of(poses), 'no point array "ProbeToTracker" of 16 numbers', PoseArray="ProbeToTracker")
 refused(track_of(turned(degrees=0.1)), "turned by only")
 refused(track_of(poses[:3]), "at least 4 poses")
-refused(track_of(poses), "the noise in mm must be in (0, 100]", NoiseMm=0.0)
+refused(track_of(poses), "NoiseMm is 0 mm; it must be in (0, 100]", NoiseMm=0.0)
 broken = turned()
 broken[4, 0, 0] = np.nan
 refused(track_of(broken), "pose 5 (at 0.08 s) holds a number that is not finite")

@@ -212,7 +212,7 @@ between = volumes()
 add_field(between[1], vtkUltrasoundAcquisition.TimeStampName(), [5.5])
 check_refused(make(between, track()), "volume 2", "is not known")
 assert not make(between, track(), LongestGapSeconds=2.0).messages
-check_refused(make(volumes(), track(), LongestGapSeconds=-1.0), "is -1; it must be in")
+check_refused(make(volumes(), track(), LongestGapSeconds=-1.0), "LongestGapSeconds is -1 s; it must be in (0, 600]")
 
 # What else is refused.
 some = volumes()

@@ -3,47 +3,38 @@
 // state shares what it has in common with it.
 #include "Widgets/Painting/Stroke.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/NumberText.h"
 #include <algorithm>
-#include <cmath>
 
 namespace echorama {
 namespace {
 
-constexpr std::pair<const char*, BrushMode> Modes[] = {
-    {"paint", BrushMode::Paint}, {"carve", BrushMode::Carve}, {"restore", BrushMode::Restore}};
-
-void CheckRange(const char* name, double value, double from, double to, bool openBelow = false)
-{
-  if (!(value <= to && (openBelow ? value > from : value >= from)))
-    throw Error(Error::Kind::InvalidParameter, std::string("the brush's ") + name + " is " + NumberText(value) +
-                                                   "; it must be in " + (openBelow ? "(" : "[") + NumberText(from) + ", " +
-                                                   NumberText(to) + "]");
-}
+const std::vector<std::string> modeNames{"paint", "carve", "restore"}; // in their order
 
 } // namespace
 
 std::string NameOf(BrushMode mode)
 {
-  const auto found = std::find_if(std::begin(Modes), std::end(Modes), [&](const auto& each) { return each.second == mode; });
-  return found == std::end(Modes) ? "" : found->first;
+  return modeNames.at(static_cast<std::size_t>(mode));
 }
 
 std::optional<BrushMode> BrushModeNamed(const std::string& name)
 {
-  const auto found = std::find_if(std::begin(Modes), std::end(Modes), [&](const auto& each) { return name == each.first; });
-  return found == std::end(Modes) ? std::nullopt : std::optional(found->second);
+  const auto found = std::find(modeNames.begin(), modeNames.end(), name);
+  return found == modeNames.end() ? std::nullopt : std::optional(static_cast<BrushMode>(found - modeNames.begin()));
 }
 
-void Brush::Check() const
+ParameterList Describe(Brush& b)
 {
-  if (NameOf(mode).empty())
-    throw Error(Error::Kind::InvalidParameter, "the brush's mode is none of paint, carve and restore");
-  CheckRange("radius (mm)", radiusMm, 0.0, 1000.0, true);
-  if (!std::isfinite(intensity))
-    throw Error(Error::Kind::InvalidParameter, "the brush's intensity is not finite");
-  CheckRange("opacity", opacity, 0.0, 1.0);
-  CheckRange("hardness", hardness, 0.0, 1.0);
+  return {
+      Parameter("Mode", Choice(b.mode, modeNames), "What the brush does to the voxels that it touches."),
+      Parameter("RadiusMm", b.radiusMm, {0, 1000, true}, "mm", "Radius of the brush."),
+      Parameter("Intensity", b.intensity, {}, "grey levels", "What is painted, as far as the volume's type can hold it."),
+      Parameter("Opacity", b.opacity, {0, 1}, "", "How far paint changes intensities at the middle of the brush."),
+      Parameter("Hardness", b.hardness, {0, 1}, "",
+                "Share of the radius that is painted in full; from there it falls off smoothly."),
+      Parameter("InsideValid", b.insideValid,
+                "Whether paint leaves voxels alone that are not real; otherwise it makes them real."),
+  };
 }
 
 bool operator==(const Brush& a, const Brush& b)
@@ -68,7 +59,7 @@ StrokeNode::~StrokeNode()
 
 StrokeChain Append(const StrokeChain& chain, Stroke stroke)
 {
-  stroke.brush.Check();
+  CheckRanges(stroke.brush);
   if (stroke.pathMm.empty())
     throw Error(Error::Kind::InvalidParameter, "the stroke has no points");
   for (const Eigen::Vector3d& point : stroke.pathMm)

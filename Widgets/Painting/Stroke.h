@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
@@ -24,14 +25,13 @@ std::optional<BrushMode> BrushModeNamed(const std::string& name);
 /// A spherical brush.
 struct Brush {
   BrushMode mode = BrushMode::Paint;
-  double radiusMm = 3.0;   ///< (0, 1000]
-  double intensity = 0.0;  ///< grey levels of the volume; clamped to its voxel type
-  double opacity = 1.0;    ///< [0, 1]: how far towards the intensity, at the middle of the brush; Paint only
-  double hardness = 0.5;   ///< [0, 1]: share of the radius that is painted in full; from there it falls off smoothly; Paint only
-  bool insideValid = true; ///< Paint leaves voxels alone that are not real; otherwise it makes them real
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
-  void Check() const;
+  double radiusMm = 3.0;
+  double intensity = 0.0;
+  double opacity = 1.0;
+  double hardness = 0.5;
+  bool insideValid = true;
 };
+ParameterList Describe(Brush& b);
 bool operator==(const Brush&, const Brush&); ///< exact
 
 /// One stroke from press to release: the brush goes along straight lines through the points. A voxel is painted once, however
@@ -57,8 +57,8 @@ struct StrokeNode {
 };
 using StrokeChain = std::shared_ptr<const StrokeNode>;
 
-/// The chain with one more stroke. \throws Error(InvalidParameter) as Brush::Check, and for a path without points or with one
-/// that is not finite.
+/// The chain with one more stroke. \throws Error(InvalidParameter) for a brush out of its ranges, and for a path without points
+/// or with one that is not finite.
 StrokeChain Append(const StrokeChain& chain, Stroke stroke);
 /// From the first to the last.
 std::vector<Stroke> StrokesOf(const StrokeChain& chain);

@@ -232,7 +232,7 @@ struct VoxelEdits<T>::Parts {
 
   void Begin(const Brush& brush)
   {
-    brush.Check();
+    CheckRanges(brush);
     drawing = true;
     stroke = Stroke{brush, {}};
     live.clear();

@@ -2,11 +2,11 @@
 // The history of attempts. Lines are added in place, under a lock and by one write: a history is never copied, so it cannot be
 // lost by a failed copy. The project is the last column and always quoted: so the end of a line that was cut off cannot be
 // taken for the end of a line.
+#include "Core/Base/CsvLine.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
 #include "LiveScore.h"
-#include "Readers/CsvLine.h"
 #include <cerrno>
 #include <cmath>
 #include <cstring>

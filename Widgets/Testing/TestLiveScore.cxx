@@ -2,7 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/TextFile.h"
 #include "Core/Imaging/ValidPoints.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Testing/TemporaryFolder.h"
 #include "Widgets/Session/LiveScore.h"
 #include <cmath>
 #include <csignal>

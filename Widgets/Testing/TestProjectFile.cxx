@@ -133,7 +133,7 @@ TEST_F(ProjectFile, RefusesWhatIsNotAProject)
   ExpectRefused(With("\"group\": 0", "\"group\": 1.5"), "volume 1, group");
   ExpectRefused(With("\"mode\": \"", "\"mode\": \"air"), "volume 2, stroke 1, mode");
   ExpectRefused(With("\"radiusMm\": ", "\"radiusMm\": -"), "volume 2, stroke 1");
-  ExpectRefused(With("\"hardness\": 0.", "\"hardness\": 3."), "hardness");
+  ExpectRefused(With("\"hardness\": 0.", "\"hardness\": 3."), "Hardness is 3.");
   ExpectRefused(With("\"pathMm\": [", "\"pathMm\": [], \"x\": ["), "no points");
   ExpectRefused(With("\"strokes\": []", "\"strokes\": {}"), "volume 1, strokes");
   ExpectRefused(With("v1.mha", "v0.mha"), "v0.mha is named twice");

@@ -57,6 +57,7 @@ private slots:
   void aSureAnswerIsTakenUnasked();
   void aCancelledJobChangesNothing();
   void whatMovedMeanwhileStays();
+  void aTrackerPlacesVolumesBesideTheFirst();
   void aWindowMayCloseWhileAJobRuns();
   void stitchingMakesAndSavesOneVolume();
   void exportWritesAndNeverReplaces();
@@ -174,6 +175,49 @@ void TestPanels::whatMovedMeanwhileStays()
   put = window.Pose(2);
   QVERIFY(window.Wait());
   QVERIFY(window.Pose(2) == put);
+}
+
+void TestPanels::aTrackerPlacesVolumesBesideTheFirst()
+{
+  // A pose for each volume. The sensor was turned by 90 degrees about z and moved; the calibration is a translation, so that
+  // C^-1 S1^-1 S2 C is neither of the two nor its inverse.
+  const auto write = [this](const char* name, const QByteArray& text) {
+    QFile file(Folder().filePath(name));
+    return file.open(QIODevice::WriteOnly) && file.write(text) == text.size() ? file.fileName() : QString();
+  };
+  QByteArray frames("ObjectType = Image\nNDims = 3\nDimSize = 1 1 2\nElementType = MET_UCHAR\nElementSpacing = 1 1 1\n");
+  for (const char* pose : {"1 0 0 7 0 1 0 0 0 0 1 0 0 0 0 1", "0 -1 0 7 1 0 0 30 0 0 1 4 0 0 0 1"}) {
+    const QByteArray frame = QByteArray("Seq_Frame000") + (frames.contains("Seq_") ? "1" : "0");
+    frames += frame + "_ProbeToTrackerTransform = " + pose + "\n" + frame + "_ProbeToTrackerTransformStatus = OK\n";
+  }
+  const QString recording = write("recording.igs.mha", frames + "ElementDataFile = LOCAL\n" + QByteArray(2, '\0'));
+  const QString calibration = write("calibration.json", R"({"schema": "echorama-transforms-1", "unit": "mm", "transforms": [
+    {"from": "Volume", "to": "Probe", "matrix": [[1, 0, 0, 10], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})");
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  // The first is not where its file has it, and the others follow it; where the second one was does not matter.
+  window.Session()->Select(1, true, true);
+  window.Session()->TranslateSelection(0.0, 0.0, 100.0);
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(3.0, 0.0, 0.0);
+  window.Session()->RotateSelection(0.0, 20.0, 0.0);
+  const auto first = window.Pose(1), before = window.Pose(2);
+  const int entries = window.Session()->GetUndoCount();
+  Raise(window, "registrationPanel");
+  QTest::mouseClick(window.Part<QPushButton>("placeByTracker"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  QVERIFY(window.Pose(2) == before && window.HasMessage("recording")); // none was named
+  window.Type(window.Part<QLineEdit>("placeRecording"), recording);
+  window.Type(window.Part<QLineEdit>("placeCalibration"), calibration);
+  QTest::mouseClick(window.Part<QPushButton>("placeByTracker"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  const std::array<double, 16> expected{0, -1, 0, -10, 1, 0, 0, 40, 0, 0, 1, 104, 0, 0, 0, 1};
+  QVERIFY2(Distance(window.Pose(2), expected) < 1e-9, qPrintable(window.Messages().join("; ")));
+  QVERIFY(window.Pose(1) == first);
+  QCOMPARE(window.Part<QTableWidget>("alignResults")->item(1, 1)->text(), QString("placed"));
+  QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
+  window.Session()->Undo();
+  QVERIFY(window.Pose(2) == before);
 }
 
 void TestPanels::aWindowMayCloseWhileAJobRuns()

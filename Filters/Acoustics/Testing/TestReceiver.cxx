@@ -176,13 +176,13 @@ TEST(Receiver, RefusesWhatIsOutOfRange)
     EXPECT_EQ(KindOf([&] { receiver.Check(); }, name), Error::Kind::InvalidParameter);
   };
   EXPECT_NO_THROW(Receiver().Check());
-  refuses([](Receiver& r) { r.gainDb = 201.0; }, "gainDb");
-  refuses([](Receiver& r) { r.tgcDbPerCm = std::nan(""); }, "tgcDbPerCm");
-  refuses([](Receiver& r) { r.dynamicRangeDb = 5.0; }, "dynamicRangeDb");
-  refuses([](Receiver& r) { r.referenceGrey = 256.0; }, "referenceGrey");
-  refuses([](Receiver& r) { r.noiseDb = -201.0; }, "noiseDb");
-  refuses([](Receiver& r) { r.tgcPoints = {{10.0, 300.0}}; }, "tgcPoints[0].gainDb");
-  refuses([](Receiver& r) { r.tgcPoints = {{10.0, 0.0}, {10.0, 1.0}}; }, "tgcPoints[1].depthMm");
+  refuses([](Receiver& r) { r.gainDb = 201.0; }, "GainDb");
+  refuses([](Receiver& r) { r.tgcDbPerCm = std::nan(""); }, "TgcDbPerCm");
+  refuses([](Receiver& r) { r.dynamicRangeDb = 5.0; }, "DynamicRangeDb");
+  refuses([](Receiver& r) { r.referenceGrey = 256.0; }, "ReferenceGrey");
+  refuses([](Receiver& r) { r.noiseDb = -201.0; }, "NoiseDb");
+  refuses([](Receiver& r) { r.tgcPoints = {{10.0, 300.0}}; }, "TgcPoints[0]: GainDb");
+  refuses([](Receiver& r) { r.tgcPoints = {{10.0, 0.0}, {10.0, 1.0}}; }, "TgcPoints[1]: DepthMm");
 
   const BeamEchoes echoes = Constant(1.0f);
   Volume<unsigned char> wrong({101, 4, 2}), thin({1, 3, 2});

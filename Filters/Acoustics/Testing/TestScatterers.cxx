@@ -261,7 +261,7 @@ TEST(Scatterers, RefuseWhatIsOutOfRange)
 {
   ScattererParameters parameters;
   parameters.densityPerMm3 = 1001.0;
-  EXPECT_NE(MessageOf([&] { InBox(Tissue(8.0), parameters); }, Error::Kind::InvalidParameter).find("densityPerMm3"),
+  EXPECT_NE(MessageOf([&] { InBox(Tissue(8.0), parameters); }, Error::Kind::InvalidParameter).find("DensityPerMm3"),
             std::string::npos);
   parameters = {};
   parameters.maxBytes = 1e5;

@@ -99,7 +99,7 @@ TEST(SynthesisScene, ReadsPackedSpheres)
   EXPECT_EQ(parameters.cell.mm, 0.7);
   EXPECT_TRUE(parameters.trueVolume);
   EXPECT_NO_THROW(parameters.Check());
-  EXPECT_EQ(std::get<ScenePacking>(scene.tissue[1].what).spheres.seed, 9u);
+  EXPECT_EQ(std::get<ScenePacking>(scene.tissue[1].what).tissue.packing.seed, 9u);
 
   ExpectComplaint(Tissue(R"({"packing": {"materials": {"lver": 1}}})"),
                   "scene.json: tissue[0].packing.materials: there is no material \"lver\"");
@@ -278,7 +278,7 @@ TEST(SynthesisScene, SaysWhichKeyIsWrong)
   ExpectComplaint(Tissue(R"({"mesh": {"file": "a", "material": "liver", "unit": "cm"}})"),
                   "scene.json: tissue[0].mesh.unit: \"cm\" is not known; there are \"mm\", \"m\"");
   ExpectComplaint(Tissue(R"({"mesh": {"file": "a", "material": "liver", "transform": {"scale": 0}}})"),
-                  "scene.json: tissue[0].mesh.transform.scale: 0 is out of range; it must be in [1e-06, 1e+06]");
+                  "scene.json: tissue[0].mesh.transform.scale: 0 is out of range; it must be in [1e-06, 1000000]");
   ExpectComplaint(
       Tissue(
           R"({"mesh": {"file": "a", "material": "liver", "transform": [[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}})"),
@@ -341,9 +341,9 @@ TEST(SynthesisScene, ComesBackBitByBit)
   scene.tissue.push_back({"", SceneBox{}});
   scene.tissue.push_back({"", SceneCylinder{}});
   ScenePacking packing;
-  packing.spheres.seed = 1ull << 62;
-  packing.spheres.radiusMin = 0.1 + 0.2;
-  packing.spheres.radii = SpherePackingParameters::Radii::PowerLaw;
+  packing.tissue.packing.seed = 1ull << 62;
+  packing.tissue.packing.radiusMin = 0.1 + 0.2;
+  packing.tissue.packing.radii = SpherePackingParameters::Radii::PowerLaw;
   packing.materials = {{"odd", 1.0 / 3.0}, {"cyst", 1e-9}};
   scene.tissue.push_back({"balls", packing});
   AnatomyParameters anatomy;
@@ -355,8 +355,8 @@ TEST(SynthesisScene, ComesBackBitByBit)
   CalibrationRigParameters rig;
   rig.balls[0].centre.x() += 1.0 / 3.0;
   scene.tissue.push_back({"", rig});
-  scene.transport.sound.acceptanceDegrees = 5.0 / 3.0;
-  scene.transport.counting.coneDegrees = 0.1 + 0.2;
+  scene.echoes.transport.acceptanceDegrees = 5.0 / 3.0;
+  scene.echoes.counting.coneDegrees = 0.1 + 0.2;
   scene.transducer.bandwidth = 1.0 / 3.0;
   scene.receiver.tgcPoints = {{0.1, 0.2}, {1.0 / 3.0, 4.0}};
   SceneRecording recording;
@@ -378,12 +378,12 @@ TEST(SynthesisScene, ComesBackBitByBit)
             std::get<SceneMesh>(scene.tissue[0].what).transform.rotationDegrees);
   EXPECT_EQ(*std::get<SceneMesh>(back.tissue[1].what).transform.rows, *mesh.transform.rows);
   EXPECT_EQ(std::get<SceneSphere>(back.tissue[2].what).radius, 1.0 / 7.0);
-  EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).spheres.radiusMin, packing.spheres.radiusMin);
+  EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).tissue.packing.radiusMin, packing.tissue.packing.radiusMin);
   EXPECT_EQ(std::get<ScenePacking>(back.tissue[5].what).materials[0].weight, 1.0 / 3.0);
   EXPECT_EQ(std::get<AnatomyParameters>(back.tissue[6].what).fatMm, anatomy.fatMm);
   EXPECT_EQ(std::get<CalibrationRigParameters>(back.tissue[7].what).balls[0].centre, rig.balls[0].centre);
-  EXPECT_EQ(back.transport.sound.acceptanceDegrees, scene.transport.sound.acceptanceDegrees);
-  EXPECT_EQ(back.transport.counting.coneDegrees, scene.transport.counting.coneDegrees);
+  EXPECT_EQ(back.echoes.transport.acceptanceDegrees, scene.echoes.transport.acceptanceDegrees);
+  EXPECT_EQ(back.echoes.counting.coneDegrees, scene.echoes.counting.coneDegrees);
   EXPECT_EQ(back.transducer.bandwidth, scene.transducer.bandwidth);
   EXPECT_EQ(back.receiver.tgcPoints[1].depthMm, scene.receiver.tgcPoints[1].depthMm);
   EXPECT_EQ(std::get<SceneRecording>(back.views).smoothSeconds, recording.smoothSeconds);

@@ -476,18 +476,18 @@ TEST(Synthesize, RefusesWhatIsOutOfRange)
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
     }
   };
-  refuses([](auto& p) { p.elements = 1; }, "elements");
-  refuses([](auto& p) { p.steps = 5000; }, "steps");
-  refuses([](auto& p) { p.samples = 0; }, "samples");
-  refuses([](auto& p) { p.mode = static_cast<SynthesisParameters::Mode>(7); }, "mode");
+  refuses([](auto& p) { p.elements = 1; }, "Elements");
+  refuses([](auto& p) { p.steps = 5000; }, "Steps");
+  refuses([](auto& p) { p.samples = 0; }, "Samples");
+  refuses([](auto& p) { p.mode = static_cast<SynthesisParameters::Mode>(7); }, "Mode");
   refuses(
       [](auto& p) {
         p.mode = SynthesisParameters::Mode::Counting;
         p.stepPoses.assign(5, Pose::Identity());
       },
       "stepPoses");
-  refuses([](auto& p) { p.subRays = 0; }, "subRays");
-  refuses([](auto& p) { p.mirrorDb = std::nan(""); }, "mirrorDb");
+  refuses([](auto& p) { p.subRays = 0; }, "SubRays");
+  refuses([](auto& p) { p.mirrorDb = std::nan(""); }, "MirrorDb");
   refuses([](auto& p) { p.transducer.frequencyMHz = -1.0; }, "requency");
   refuses([](auto& p) { p.transport.maxBounces = -1; }, "ounces");
   refuses([](auto& p) { p.probeToWorld.linear() *= 2.0; }, "probeToWorld");

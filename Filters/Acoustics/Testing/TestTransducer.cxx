@@ -69,7 +69,7 @@ TEST(Transducer, RefusesWhatIsOutOfRange)
     Transducer transducer;
     change(transducer);
     try {
-      transducer.Check();
+      CheckRanges(transducer);
       ADD_FAILURE() << name;
     } catch (const Error& error) {
       EXPECT_EQ(error.GetKind(), Error::Kind::InvalidParameter);
@@ -77,13 +77,13 @@ TEST(Transducer, RefusesWhatIsOutOfRange)
       EXPECT_NE(std::string(error.what()).find("["), std::string::npos) << error.what();
     }
   };
-  EXPECT_NO_THROW(Transducer().Check());
-  refuses([](Transducer& t) { t.frequencyMHz = 0.0; }, "frequencyMHz");
-  refuses([](Transducer& t) { t.bandwidth = 1.6; }, "bandwidth");
-  refuses([](Transducer& t) { t.lateralApertureMm = 0.0; }, "lateralApertureMm");
-  refuses([](Transducer& t) { t.lateralFocusMm = std::nan(""); }, "lateralFocusMm");
-  refuses([](Transducer& t) { t.smallestFNumber = 0.1; }, "smallestFNumber");
-  refuses([](Transducer& t) { t.elevationApertureMm = 1000.0; }, "elevationApertureMm");
-  refuses([](Transducer& t) { t.elevationFocusMm = -1.0; }, "elevationFocusMm");
-  refuses([](Transducer& t) { t.assumedSoundSpeed = 0.0; }, "assumedSoundSpeed");
+  EXPECT_NO_THROW(CheckRanges(Transducer()));
+  refuses([](Transducer& t) { t.frequencyMHz = 0.0; }, "FrequencyMHz");
+  refuses([](Transducer& t) { t.bandwidth = 1.6; }, "Bandwidth");
+  refuses([](Transducer& t) { t.lateralApertureMm = 0.0; }, "LateralApertureMm");
+  refuses([](Transducer& t) { t.lateralFocusMm = std::nan(""); }, "LateralFocusMm");
+  refuses([](Transducer& t) { t.smallestFNumber = 0.1; }, "SmallestFNumber");
+  refuses([](Transducer& t) { t.elevationApertureMm = 1000.0; }, "ElevationApertureMm");
+  refuses([](Transducer& t) { t.elevationFocusMm = -1.0; }, "ElevationFocusMm");
+  refuses([](Transducer& t) { t.assumedSoundSpeed = 0.0; }, "AssumedSoundSpeed");
 }

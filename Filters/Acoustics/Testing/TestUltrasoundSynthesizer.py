@@ -168,7 +168,7 @@ class Volumes(unittest.TestCase):
 
     def test_counting(self):
         synthesizer = small()
-        synthesizer.SetMode(synthesizer.Counting)
+        synthesizer.SetModeToCounting()
         synthesizer.SetRaysPerElement(16)
         synthesizer.Update()
         self.assertGreater(grey(synthesizer.GetOutput()).max(), 50)
@@ -200,17 +200,26 @@ class Refusals(unittest.TestCase):
         self.assertEqual(synthesizer.GetOutput().GetNumberOfPoints(), 0)
 
     def test_parameters(self):
-        self.refuses(lambda s: s.SetElements(1), "elements", "[2, 4096]")
-        self.refuses(lambda s: s.SetNoiseSeed(-1), "NoiseSeed", "at least 0")
-        self.refuses(lambda s: s.SetMode(7), "mode")
-        self.refuses(lambda s: s.SetSamples(100000), "samples", "16384")
-        self.refuses(lambda s: s.SetFrequencyMHz(0), "requency", "[0.5, 50]")
-        self.refuses(lambda s: s.SetSubRays(0), "subRays")
-        self.refuses(lambda s: s.SetDynamicRangeDb(1), "ynamicRange")
-        self.refuses(lambda s: s.SetFanAngle(-5), "fan")
+        self.refuses(lambda s: s.SetElements(1), "Elements", "[2, 4096]")
+        self.refuses(lambda s: s.SetSamples(100000), "Samples", "16384")
+        self.refuses(lambda s: s.SetSteps(1), "Steps", "at least 2")
+        self.refuses(lambda s: s.SetFrequencyMHz(0), "FrequencyMHz", "[0.5, 50]")
+        self.refuses(lambda s: s.SetSubRays(0), "SubRays")
+        self.refuses(lambda s: s.SetDynamicRangeDb(1), "DynamicRangeDb")
+        self.refuses(lambda s: s.SetFanAngle(-5), "FanAngle")
+        self.refuses(lambda s: s.SetSlicePosition(1), "SlicePosition", "[-0.5, 0.5]")
         self.refuses(lambda s: s.SetDepthMax(1), "depth")
-        self.refuses(lambda s: s.SetScatterersPerMm3(-1), "scatterersPerMm3")
-        self.refuses(lambda s: s.SetMaxBounces(1000), "ounces")
+        self.refuses(lambda s: s.SetScatterersPerMm3(-1), "ScatterersPerMm3")
+        self.refuses(lambda s: s.SetMaxBounces(1000), "MaxBounces")
+
+    def test_what_is_no_value_is_refused_when_it_is_set(self):
+        synthesizer, errors = small(), []
+        synthesizer.AddObserver(vtkCommand.ErrorEvent, lambda *_: errors.append(1))
+        for change in (lambda: synthesizer.SetSeed(-1), lambda: synthesizer.SetNoiseSeed(-1), lambda: synthesizer.SetMode(7)):
+            errors.clear()
+            change()
+            self.assertEqual(errors, [1])
+        self.assertEqual((synthesizer.GetSeed(), synthesizer.GetNoiseSeed(), synthesizer.GetMode()), (1, 1, synthesizer.COHERENT))
 
     def test_inputs(self):
         self.refuses(lambda s: s.SetInputData(vtkPolyData()), "MaterialName")

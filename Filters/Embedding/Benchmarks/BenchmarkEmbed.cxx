@@ -10,6 +10,7 @@
 // Arguments: [word of a case's name]...; without words all cases.
 #include "Core/Base/Parallel.h"
 #include "Core/Geometry/EnclosingFan.h"
+#include "Core/Imaging/BorderZeros.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Filters/Embedding/BeamNoise.h"
 #include "Filters/Embedding/Embed.h"
@@ -20,7 +21,6 @@
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Stitching/Stitch.h"
 #include "Filters/Stitching/StitchGrid.h"
-#include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"

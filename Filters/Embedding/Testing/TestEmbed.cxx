@@ -285,10 +285,10 @@ TEST(Embed, StopsOnRequestAndRefusesBadParameters)
                Error);
   EXPECT_GE(last, 0.6);
   for (const auto& [change, name] : std::vector<std::pair<void (*)(EmbedParameters&), std::string>>{
-           {[](EmbedParameters& p) { p.featherMm = -1.0; }, "featherMm"},
-           {[](EmbedParameters& p) { p.smoothMm = 0.0; }, "smoothMm"},
-           {[](EmbedParameters& p) { p.diffusionVoxels = 0; }, "diffusionVoxels"},
-           {[](EmbedParameters& p) { p.diffusion.outsideExponent = 0.5; }, "outside exponent"}}) {
+           {[](EmbedParameters& p) { p.featherMm = -1.0; }, "FeatherMm"},
+           {[](EmbedParameters& p) { p.smoothMm = 0.0; }, "SmoothMm"},
+           {[](EmbedParameters& p) { p.diffusionVoxels = 0; }, "DiffusionVoxels"},
+           {[](EmbedParameters& p) { p.diffusion.outsideExponent = 0.5; }, "OutsideExponent"}}) {
     EmbedParameters parameters;
     change(parameters);
     try {

@@ -340,7 +340,7 @@ TEST(EmbedQuality, BadInputIsRefused)
   refuses([](EmbedQualityParameters& p) { p.shellMm = 0.0; });
   refuses([](EmbedQualityParameters& p) { p.shellMm = NAN; });
   refuses([](EmbedQualityParameters& p) { p.leastJump = -1.0; });
-  refuses([](EmbedQualityParameters& p) { p.mostDeviation = 1.0; });
+  refuses([](EmbedQualityParameters& p) { p.mostDeviation = 1.1; });
   refuses([](EmbedQualityParameters& p) { p.featherMm = -1.0; });
   refuses([](EmbedQualityParameters& p) { p.randomSurfaces = -1; });
   EXPECT_THROW(MeasureEmbedding<float>(scene.values.View(), {}, scene.grid), Error);

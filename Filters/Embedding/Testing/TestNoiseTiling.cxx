@@ -549,11 +549,11 @@ TEST(NoiseTiling, ThreadsCancellingAndBadInput)
     spoil(wrong);
     EXPECT_EQ(RefusalOf([&] { TileNoise(wrong, {a.Input("a"), b.Input("b")}); }, words), kind) << words;
   };
-  refuse("columns", Error::Kind::InvalidParameter, [](auto& p) { p.columns = -1; });
-  refuse("rows", Error::Kind::InvalidParameter, [](auto& p) { p.rows = 0; });
-  refuse("overlapDegrees", Error::Kind::InvalidParameter, [](auto& p) { p.overlapDegrees = -1.0; });
-  refuse("overlapMm", Error::Kind::InvalidParameter, [](auto& p) { p.overlapMm = std::numeric_limits<double>::quiet_NaN(); });
-  refuse("spacingMm", Error::Kind::InvalidParameter, [](auto& p) { p.spacingMm = -1.0; });
+  refuse("Columns", Error::Kind::InvalidParameter, [](auto& p) { p.columns = -1; });
+  refuse("Rows", Error::Kind::InvalidParameter, [](auto& p) { p.rows = 0; });
+  refuse("OverlapDegrees", Error::Kind::InvalidParameter, [](auto& p) { p.overlapDegrees = -1.0; });
+  refuse("OverlapMm", Error::Kind::InvalidParameter, [](auto& p) { p.overlapMm = std::numeric_limits<double>::quiet_NaN(); });
+  refuse("SpacingMm", Error::Kind::InvalidParameter, [](auto& p) { p.spacingMm = -1.0; });
   refuse("million voxels", Error::Kind::TooLarge, [](auto& p) { p.spacingMm = 0.01; });
   NoiseInput bad = a.Input("a");
   bad.fan.geometry.depthMax = -5.0;

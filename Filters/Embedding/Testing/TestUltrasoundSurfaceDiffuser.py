@@ -87,10 +87,8 @@ assert (mean == data[3, 4, 5]).all()
 assert "no valid voxel" in run({"Intensity": data, "ValidRegion": one * 0})[1]
 assert "no ValidRegion" in run({"Intensity": data})[1]
 
-# Parameters stay in their ranges.
+# Parameters, and what is out of their ranges.
 filter = echorama.vtkUltrasoundSurfaceDiffuser()
 assert (filter.GetInsideExponent(), filter.GetOutsideExponent(), filter.GetSmoothMm(), filter.GetExact()) == (6, 4, 3, False)
-filter.SetInsideExponent(0)
-filter.SetOutsideExponent(100)
-filter.SetAccuracy(1)
-assert (filter.GetInsideExponent(), filter.GetOutsideExponent(), filter.GetAccuracy()) == (1, 64, 0.1)
+for name, value in {"InsideExponent": 0, "OutsideExponent": 100, "Accuracy": 1, "SmoothMm": -1}.items():
+    assert f"{name} is {value}" in run({"Intensity": data, "ValidRegion": region}, **{name: value})[1]

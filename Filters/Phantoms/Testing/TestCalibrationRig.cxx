@@ -91,12 +91,12 @@ TEST(CalibrationRig, RefusesWhatCannotBe)
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
     }
   };
-  refused([](auto& p) { p.scale = 0.0; }, "[0.2, 5]");
-  refused([](auto& p) { p.waterCelsius = 120.0; }, "waterCelsius");
+  refused([](auto& p) { p.scale = 0.0; }, "Scale is 0; it must be in [0.2, 5]");
+  refused([](auto& p) { p.waterCelsius = 120.0; }, "WaterCelsius is 120");
   refused([](auto& p) { p.balls.clear(); }, "number of balls");
   refused([](auto& p) { p.balls[1].centre = p.balls[0].centre; }, "touches ball 1");
   refused([](auto& p) { p.balls[2].centre.z() = -1.0; }, "touches the plate");
   refused([](auto& p) { p.baseMm = 16.0; }, "or the base");
-  refused([](auto& p) { p.balls[3].radius = 0.0; }, "ball 4 (D)");
+  refused([](auto& p) { p.balls[3].radius = 0.0; }, "ball 4 (D): Radius is 0 mm");
   refused([](auto& p) { p.material = "cheese"; }, "cheese");
 }

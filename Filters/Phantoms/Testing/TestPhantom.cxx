@@ -580,9 +580,9 @@ TEST(Phantom, RefusesWhatItCannotMake)
     return MessageOf(p);
   };
   EXPECT_EQ(with([](auto&) {}), "");
-  EXPECT_NE(with([](auto& p) { p.spacingMm = 0.0; }).find("spacing"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.spacingMm = -1.0; }).find("spacing"), std::string::npos);
-  EXPECT_NE(with([&](auto& p) { p.spacingMm = nan; }).find("spacing"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.spacingMm = 0.0; }).find("SpacingMm is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.spacingMm = -1.0; }).find("SpacingMm is "), std::string::npos);
+  EXPECT_NE(with([&](auto& p) { p.spacingMm = nan; }).find("SpacingMm is "), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-3; }).find("larger spacing"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-300; }).find("larger spacing"), std::string::npos);
   EXPECT_NE(with([&](auto& p) { p.probeToWorld.translation().x() = nan; }).find("ProbeToWorld"), std::string::npos);
@@ -593,15 +593,15 @@ TEST(Phantom, RefusesWhatItCannotMake)
   EXPECT_NE(with([](auto& p) { p.probe.sweepAngle = p.probe.sweepWidth = 0.0; }).find("plane"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probe = ProbeGeometry::Convex(3.0, 40, 1.0, 5, 0, 50); }).find("axis"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probe.depthMax = 1e9; }).find("larger spacing"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.scatterersPerMm3 = 0.0; }).find("scatterers"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.wavelengthMm = 0.0; }).find("wavelength"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.pulseSigmaMm = -1.0; }).find("pulse"), std::string::npos);
-  EXPECT_NE(with([&](auto& p) { p.gainDb = nan; }).find("gain"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.decorrelation = 1.1; }).find("decorrelation"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.press.mm = 11.0; }).find("deformation"), std::string::npos);
-  EXPECT_NE(with([&](auto& p) { p.noiseDb = nan; }).find("noise"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.ribShare = -0.1; }).find("rib"), std::string::npos);
-  EXPECT_NE(with([](auto& p) { p.dynamicRangeDb = 0.0; }).find("dynamic range"), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.scatterersPerMm3 = 0.0; }).find("ScatterersPerMm3 is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.wavelengthMm = 0.0; }).find("WavelengthMm is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.pulseSigmaMm = -1.0; }).find("PulseSigmaMm is "), std::string::npos);
+  EXPECT_NE(with([&](auto& p) { p.gainDb = nan; }).find("GainDb is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.decorrelation = 1.1; }).find("Decorrelation is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.press.mm = 11.0; }).find("DeformationMm is "), std::string::npos);
+  EXPECT_NE(with([&](auto& p) { p.noiseDb = nan; }).find("NoiseDb is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.ribShare = -0.1; }).find("RibShare is "), std::string::npos);
+  EXPECT_NE(with([](auto& p) { p.dynamicRangeDb = 0.0; }).find("DynamicRangeDb is "), std::string::npos);
 
   PhantomParameters p = Small();
   Volume<unsigned char> wrong({3, 3, 3});

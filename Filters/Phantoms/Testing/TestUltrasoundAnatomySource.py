@@ -65,7 +65,7 @@ names = names_of(source.GetOutput())
 assert names.count("cyst") == 5 and "kidney" not in names and "rib" not in names
 
 # Numbers out of range are refused with the range, and nothing comes out.
-for setter, wrong, words in ((source.SetFatMm, 500, "fatMm is 500; it must be in [2, 60]"), (source.SetGenerations, 99, "generations"),
+for setter, wrong, words in ((source.SetFatMm, 500, "FatMm is 500 mm; it must be in [2, 60]"), (source.SetGenerations, 99, "Generations is 99"),
                              (source.SetTrunkDepthMm, 80, "the organs need")):
     getter = getattr(source, setter.__name__.replace("Set", "Get", 1))
     before = getter()
@@ -96,6 +96,9 @@ assert "number of balls" in errors_of(source, source.Update)
 source.AddBall("one", (0, 0, -20), 5)
 assert not errors_of(source, source.Update)
 assert names_of(source.GetOutput()) == ["plate", "base", "stem of one", "one"]
+source.SetRigScale(9)
+assert "RigScale is 9; it must be in [0.2, 5]" in errors_of(source, source.Update)
+source.SetRigScale(1)
 source.SetBallMaterial("cheese")
 assert "cheese" in errors_of(source, lambda: source.GetLandmarks(centres, labels)) and centres.GetNumberOfPoints() == 0
 print("the anatomy source holds")

@@ -157,11 +157,11 @@ TEST(VesselTree, RefusesWhatIsOutOfRange)
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
     }
   };
-  refused([](auto& p) { p.rootRadiusMm = 0.0; }, "rootRadiusMm");
-  refused([](auto& p) { p.rootLengthMm = -1.0; }, "rootLengthMm");
-  refused([](auto& p) { p.generations = 40; }, "generations");
-  refused([](auto& p) { p.asymmetry = 0.7; }, "asymmetry");
-  refused([](auto& p) { p.lengthOverRadius = 1.0; }, "lengthOverRadius");
-  refused([](auto& p) { p.direction.setZero(); }, "direction");
-  refused([](auto& p) { p.root.x() = std::numeric_limits<double>::quiet_NaN(); }, "root");
+  refused([](auto& p) { p.rootRadiusMm = 0.0; }, "RootRadiusMm is ");
+  refused([](auto& p) { p.rootLengthMm = -1.0; }, "RootLengthMm is ");
+  refused([](auto& p) { p.generations = 40; }, "Generations is ");
+  refused([](auto& p) { p.asymmetry = 0.7; }, "Asymmetry is ");
+  refused([](auto& p) { p.lengthOverRadius = 1.0; }, "LengthOverRadius is ");
+  refused([](auto& p) { p.direction.setZero(); }, "length of Direction is 0");
+  refused([](auto& p) { p.root.x() = std::numeric_limits<double>::quiet_NaN(); }, "Root is ");
 }

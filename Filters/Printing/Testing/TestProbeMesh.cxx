@@ -221,7 +221,7 @@ TEST(ProbeMesh, SaysWhyItCannotBeBuilt)
   EXPECT_NE(ReasonAgainst(ProbeGeometry{}).find("probe geometry"), std::string::npos);
   ProbeHousing housing;
   housing.handleMm = std::nan("");
-  EXPECT_NE(ReasonAgainst(ProbePresetOf("linear").probe, housing).find("handleMm is nan; it must be in [1, 1000]"),
+  EXPECT_NE(ReasonAgainst(ProbePresetOf("linear").probe, housing).find("HandleMm is nan mm; it must be in [1, 1000]"),
             std::string::npos);
 }
 

@@ -102,11 +102,12 @@ for arm in (0, 13, 300):
         mesh_of()
 
 for change, word in (
-    (lambda: source.SetWallMm(0), "wallMm"),
-    (lambda: source.SetOpeningMm(29), "openingMm"),
-    (lambda: source.SetResolution(0), "Resolution"),
-    (lambda: source.SetArmMm(float("nan")), "armMm"),
-    (lambda: (source.SetKindToRig(), source.SetBaseMm(0)), "base"),
+    (lambda: source.SetWallMm(0), "WallMm is 0 mm"),
+    (lambda: source.SetOpeningMm(29), "OpeningMm is 29 mm; it must be at most 0.9 of HandleWidthMm"),
+    (lambda: source.SetResolution(0), "Resolution is 0 mm"),
+    (lambda: source.SetTieGrooves(8), "LengthMm is 36 mm; an arm of 10 mm and 8 grooves need at least 50 mm"),
+    (lambda: source.SetArmMm(float("nan")), "ArmMm is nan"),
+    (lambda: (source.SetKindToRig(), source.SetBaseMm(0)), "BaseMm is 0 mm"),
 ):
     source = vtkUltrasoundPrintableSource()
     source.SetKindToClip()

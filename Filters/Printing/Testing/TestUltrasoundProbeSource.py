@@ -115,9 +115,9 @@ assert np.allclose(source.GetPosition(), [10, 20, 30])
 
 # What cannot be built is refused, and nothing comes out.
 for setter, wrong, words in ((source.SetSweepRadius, 5, "axis of the sweep"), (source.SetFanAngle, 200, "200 degrees"),
-                             (source.SetHandleMm, -1, "handleMm is -1; it must be in [1, 1000]"), (source.SetElements, 0, "elements is 0"),
-                             (source.SetResolutionMm, 0, "resolutionMm"), (source.SetDepthMax, -1, "depths go from"),
-                             (source.SetFanAngle, float("nan"), "fan angle")):
+                             (source.SetHandleMm, -1, "HandleMm is -1 mm; it must be in [1, 1000]"), (source.SetElements, 0, "Elements is 0"),
+                             (source.SetResolutionMm, 0, "ResolutionMm is 0 mm"), (source.SetDepthMax, -1, "depths go from"),
+                             (source.SetFanAngle, float("nan"), "FanAngle is nan")):
     before = getattr(source, setter.__name__.replace("Set", "Get", 1))()
     setter(wrong)
     text = errors_of(source, source.Update)

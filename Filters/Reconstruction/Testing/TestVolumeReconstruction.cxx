@@ -298,7 +298,7 @@ TEST(VolumeReconstruction, FramesFarApartAreNotJoined)
   }
   // Nor where that would take more than 1000 frames; and no gap is too wide for those who want it so.
   parameters.between = BetweenFrames::Forward;
-  parameters.maximumGapMm = std::numeric_limits<double>::infinity();
+  parameters.maximumGapMm = std::numeric_limits<double>::max();
   EXPECT_EQ(Reconstruct(parameters, grid, frames).valid.View()(3, 3, 2), 1);
   parameters.stepMm = 1e-12;
   EXPECT_EQ(Reconstruct(parameters, grid, frames).valid.View()(3, 3, 2), 0);
@@ -321,7 +321,7 @@ TEST(VolumeReconstruction, FramesWithoutANeighbourAreNotJoined)
   small.pose.translation() = Eigen::Vector3d(0.0, 0.0, 4.0);
   far.pose.translation() = Eigen::Vector3d(0.0, 0.0, 1e200); // the square of the distance is not finite
   ReconstructionParameters parameters;
-  parameters.maximumGapMm = std::numeric_limits<double>::infinity();
+  parameters.maximumGapMm = std::numeric_limits<double>::max();
   for (const BetweenFrames between : {BetweenFrames::Forward, BetweenFrames::Backward})
     for (const double stepMm : {0.0, 1e-300, 1e308}) {
       parameters.between = between;

@@ -16,6 +16,8 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ValidPoints.h"
+#include "Filters/Registration/LocalAlign.h"
+#include "Filters/Registration/MetricBlock.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -28,11 +30,6 @@ namespace {
 struct PlainField {
   const float* voxels;
   int nx, ny, nz;
-};
-
-// From a point to the index coordinates of a field.
-struct IndexMap {
-  float xx, xy, xz, x0, yx, yy, yz, y0, zx, zy, zz, z0;
 };
 
 // Points with the moving volume's values there, one array per component.
@@ -71,7 +68,7 @@ inline void AddCorner(float v, float v0, float w, float& sum, float& weights)
 // Reads a field at up to BlockSize moved points: the difference to the values they carry, and whether they lie inside.
 // The reading is Sampler::Linear in single precision on voxels that are their own mask: the nearest voxel decides what is
 // inside, corners that are not real have no say. No branches, so that compilers make it wide.
-ECHORAMA_HOT void Differences(const PlainField& field, const IndexMap& m, const float* px, const float* py, const float* pz,
+ECHORAMA_HOT void Differences(const PlainField& field, const Map& m, const float* px, const float* py, const float* pz,
                               const float* value, int count, float* difference, int* inside)
 {
   const float* voxels = field.voxels;
@@ -111,7 +108,7 @@ ECHORAMA_HOT void Differences(const PlainField& field, const IndexMap& m, const 
 
 // Compares a block of points with every field. Sums run in lanes of their own, so that their order, and with it the last
 // digit, does not depend on how wide the machine is.
-Comparison Compare(const std::vector<PlainField>& fields, const IndexMap* maps, const SearchPoints& points, std::ptrdiff_t begin,
+Comparison Compare(const std::vector<PlainField>& fields, const Map* maps, const SearchPoints& points, std::ptrdiff_t begin,
                    int count)
 {
   Comparison result;
@@ -173,14 +170,11 @@ public:
   std::vector<Comparison> At(const std::vector<Pose>& poses, const SearchPoints& points, const Progress& progress) const
   {
     const std::size_t fields = fields_.size();
-    std::vector<IndexMap> maps;
+    std::vector<Map> maps;
     maps.reserve(poses.size() * fields);
     for (const Pose& pose : poses)
-      for (const Eigen::Affine3d& toIndex : worldToIndex_) {
-        const Eigen::Matrix4f m = (toIndex.matrix() * pose.matrix()).cast<float>();
-        maps.push_back(
-            {m(0, 0), m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1), m(2, 2), m(2, 3)});
-      }
+      for (const Eigen::Affine3d& toIndex : worldToIndex_)
+        maps.push_back(MapOf(Eigen::Affine3d(toIndex.matrix() * pose.matrix())));
     // Neighbouring blocks form a task when there are many, so that the parts of the sums stay few.
     const std::ptrdiff_t blocks = (points.Count() + ReadTogether - 1) / ReadTogether, blocksPerTask = (blocks + 63) / 64;
     const std::ptrdiff_t tasks = (blocks + blocksPerTask - 1) / blocksPerTask;
@@ -266,19 +260,28 @@ Pose FromCentre(const Pose& volumeToWorld, const Eigen::Vector3d& centre)
 
 } // namespace
 
+ParameterList Describe(AlignSearchParameters& p)
+{
+  return {
+      Parameter("MinimumOverlap", p.minimumOverlap, {0.01, 1}, "",
+                "The share of the moving volume that must lie in others for a pose to count."),
+      Parameter("Samples", p.samples, {3, 7}, "", "Poses tried along each of the six dimensions: 3, 5 or 7."),
+      Parameter("Levels", p.levels, {1, 20}, "", "How often the steps are halved, plus one."),
+      Parameter("FirstStepMm", p.firstStepMm, {0, 1000, true}, "mm", "Between poses on the first level."),
+      Parameter("FirstStepDegrees", p.firstStepDegrees, {0, 60, true}, "degrees", "Between poses on the first level."),
+      Parameter("Repeats", p.repeats, {0, 100}, "",
+                "How often a level starts again from a better pose. 0 is the dissertation's search."),
+      Parameter("Points", p.points, ComparedPoints, "", "Random points of the moving volume that are compared."),
+      Parameter("Pyramid", p.pyramid,
+                "Whether averaged volumes are compared while steps are larger than voxels, or always the finest."),
+  };
+}
+
 void AlignSearchParameters::Check() const
 {
-  const auto check = [](bool good, const char* message) {
-    if (!good)
-      throw Error(Error::Kind::InvalidParameter, message);
-  };
-  check(minimumOverlap >= 0.01 && minimumOverlap <= 1.0, "the minimum overlap must be in [0.01, 1]");
-  check(samples == 3 || samples == 5 || samples == 7, "the samples per dimension must be 3, 5 or 7");
-  check(levels >= 1 && levels <= 20, "the number of levels must be in [1, 20]");
-  check(firstStepMm > 0.0 && firstStepMm <= 1000.0, "the first step must be in (0, 1000] mm");
-  check(firstStepDegrees > 0.0 && firstStepDegrees <= 60.0, "the first step must be in (0, 60] degrees");
-  check(repeats >= 0 && repeats <= 100, "the number of repeats must be in [0, 100]");
-  check(points >= 1000 && points <= 10000000, "the number of points must be in [1000, 10000000]");
+  CheckRanges(*this);
+  if (samples % 2 == 0)
+    throw Error(Error::Kind::InvalidParameter, "Samples is " + std::to_string(samples) + "; it must be 3, 5 or 7");
 }
 
 AlignSearchResult AlignSearch(const std::vector<PlacedVolume>& fixed, const PlacedVolume& moving, const AlignSearchParameters& p,

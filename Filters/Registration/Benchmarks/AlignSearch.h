@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Filters/Registration/PlacedVolume.h"
 #include <cstdint>
@@ -10,19 +11,20 @@ namespace echorama {
 
 /// How the search goes. The defaults are for neighbouring volumes of a sweep, some 10 mm and 10 degrees out of place.
 struct AlignSearchParameters {
-  double minimumOverlap = 0.4;   ///< t of eq. 4.13, share of the moving volume, [0.01, 1]: poses with less do not count
-  int samples = 3;               ///< n, poses tried along each of the six dimensions: 3, 5 or 7 (n^6 poses per level)
-  int levels = 8;                ///< how often the steps are halved, plus one, [1, 20]
-  double firstStepMm = 8.0;      ///< between poses on the first level, mm, (0, 1000]
-  double firstStepDegrees = 6.0; ///< between poses on the first level, degrees, (0, 60]
-  int repeats = 3;               ///< how often a level starts again from a better pose, [0, 100]; the dissertation's search: 0
-  int points = 20000;            ///< random points of the moving volume that are compared, [1000, 10 million]
-  std::uint64_t seed = 1;        ///< of these points
-  bool pyramid = true;           ///< compare averaged volumes while steps are larger than voxels; else always the finest
+  double minimumOverlap = 0.4; ///< t of eq. 4.13
+  int samples = 3;             ///< n: n^6 poses per level
+  int levels = 8;
+  double firstStepMm = 8.0, firstStepDegrees = 6.0;
+  int repeats = 3;
+  int points = 20000;
+  std::uint64_t seed = 1; ///< of these points
+  bool pyramid = true;
 
-  /// Throws Error(InvalidParameter) that names the parameter and its range.
+  /// \throws Error(InvalidParameter)
   void Check() const;
 };
+
+ParameterList Describe(AlignSearchParameters& p);
 
 /// One level of the search, the way it went.
 struct AlignSearchLevel {

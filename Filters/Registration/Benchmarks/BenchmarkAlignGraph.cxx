@@ -174,10 +174,8 @@ PoseEdge EdgeOf(const PairOfVolumes& pair, const AlignVolumesResult& result)
   return edge;
 }
 
-void BenchmarkVolumes(AlignStart start)
+void BenchmarkVolumes(const AlignVolumesParameters& parameters)
 {
-  AlignVolumesParameters parameters;
-  parameters.pair.start = start;
   const Ring ring;
   const auto volumes = ring.Volumes();
   ReportPoses(ring, "ten volumes", "start", ring.starts, 0.0);
@@ -203,8 +201,8 @@ void BenchmarkVolumes(AlignStart start)
         benchmark::Seconds([&] { answer = AlignPair(fixed, fixedFeatures, moving, movingFeatures, p, progress); });
     known[question] = {answer, seconds};
     if (std::getenv("ECHORAMA_TRACE"))
-      std::cerr << number(fixed) << "-" << number(moving) << " " << NameOf(p.start) << ": " << NameOf(answer.verdict) << " "
-                << answer.reason << " error "
+      std::cerr << number(fixed) << "-" << number(moving) << " " << AlignStartNames()[static_cast<std::size_t>(p.start)] << ": "
+                << NameOf(answer.verdict) << " " << answer.reason << " error "
                 << ring.PairError(number(fixed), number(moving), answer.volumeToWorld, fixed.volumeToWorld) << " predicted "
                 << answer.errorMm / SpacingMm << " voxels, overlap " << answer.overlap << ", " << seconds << " s" << std::endl;
     return answer;
@@ -376,7 +374,11 @@ int main(int argc, char** argv)
   if (which != "volumes")
     for (const int count : {10, 100, 1000})
       BenchmarkGraph(count);
-  if (which != "graph")
-    BenchmarkVolumes(AlignStartOf(argc > 2 ? argv[2] : "tracked"));
+  if (which != "graph") {
+    AlignVolumesParameters parameters;
+    ParameterList list = Describe(parameters);
+    Named(list, "Start").Set(argc > 2 ? argv[2] : "tracked");
+    BenchmarkVolumes(parameters);
+  }
   return 0;
 }

@@ -5,12 +5,12 @@
 // of points of its valid region from where they belong, the median over trials. Peer: the search of the dissertation.
 // Arguments: metrics to run (default: all); --trials N.
 #include "Core/Base/Random.h"
+#include "Core/Imaging/BorderZeros.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/Benchmarks/AlignSearch.h"
 #include "Filters/Registration/LocalAlign.h"
-#include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"

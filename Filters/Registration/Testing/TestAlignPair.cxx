@@ -217,7 +217,7 @@ TEST(AlignPair, RefusesParametersThatAreNone)
 {
   const auto message = [](const AlignPairParameters& p) {
     try {
-      p.Check();
+      CheckRanges(p);
     } catch (const Error& error) {
       return std::string(error.what());
     }
@@ -226,17 +226,19 @@ TEST(AlignPair, RefusesParametersThatAreNone)
   AlignPairParameters p;
   EXPECT_EQ(message(p), "");
   p.minimumOverlap = 0.0;
-  EXPECT_NE(message(p).find("minimumOverlap"), std::string::npos);
+  EXPECT_NE(message(p).find("MinimumOverlap"), std::string::npos);
   p = {};
   p.metric = "banana";
   EXPECT_NE(message(p).find("banana"), std::string::npos);
   EXPECT_NE(message(p).find("local-ncc"), std::string::npos);
   p = {};
   p.maximumErrorVoxels = std::nan("");
-  EXPECT_NE(message(p).find("maximumErrorVoxels"), std::string::npos);
-  EXPECT_THROW(AlignStartOf("nowhere"), Error);
-  for (const std::string& name : AlignStartNames())
-    EXPECT_EQ(NameOf(AlignStartOf(name)), name);
+  EXPECT_NE(message(p).find("MaximumErrorVoxels"), std::string::npos);
+  p = {};
+  ParameterList list = Describe(p);
+  EXPECT_THROW(Named(list, "Start").Set("nowhere"), Error);
+  Named(list, "Start").Set("hand-made");
+  EXPECT_EQ(p.start, AlignStart::HandMade);
 }
 
 TEST(AlignPair, TheCovarianceOfNothingIsLargeAndFinite)

@@ -212,14 +212,14 @@ TEST_F(AlignSearchTest, NamesTheParameterThatIsOutOfRange)
     change(p);
     return MessageOf([&] { p.Check(); }, Error::Kind::InvalidParameter);
   };
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.minimumOverlap = 1.5; }).find("overlap"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.minimumOverlap = std::nan(""); }).find("overlap"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.samples = 4; }).find("samples"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.levels = 0; }).find("levels"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.firstStepMm = 0.0; }).find("mm"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.firstStepDegrees = 90.0; }).find("degrees"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.points = 1; }).find("points"), std::string::npos);
-  EXPECT_NE(refused([](AlignSearchParameters& p) { p.repeats = -1; }).find("repeats"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.minimumOverlap = 1.5; }).find("MinimumOverlap"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.minimumOverlap = std::nan(""); }).find("MinimumOverlap"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.samples = 4; }).find("Samples"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.levels = 0; }).find("Levels"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.firstStepMm = 0.0; }).find("FirstStepMm"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.firstStepDegrees = 90.0; }).find("FirstStepDegrees"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.points = 1; }).find("Points"), std::string::npos);
+  EXPECT_NE(refused([](AlignSearchParameters& p) { p.repeats = -1; }).find("Repeats"), std::string::npos);
 }
 
 TEST_F(AlignSearchTest, StopsWhenAsked)

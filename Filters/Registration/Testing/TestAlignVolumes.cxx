@@ -404,7 +404,7 @@ TEST(AlignVolumes, RefusesWhatIsWrong)
   const auto wrong = [](void (*change)(AlignVolumesParameters&)) {
     AlignVolumesParameters p;
     change(p);
-    EXPECT_THROW(p.Check(), Error);
+    EXPECT_THROW(CheckRanges(p), Error);
   };
   wrong([](AlignVolumesParameters& p) { p.pairsPerVolume = 0; });
   wrong([](AlignVolumesParameters& p) { p.rounds = 0; });

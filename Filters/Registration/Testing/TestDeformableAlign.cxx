@@ -260,7 +260,7 @@ TEST_F(DeformableAlignTest, RefusesAndStops)
       bad.*real = value;
     else
       bad.*whole = static_cast<int>(value);
-    EXPECT_NE(MessageOf([&] { bad.Check(); }, Error::Kind::InvalidParameter).find(name), std::string::npos);
+    EXPECT_NE(MessageOf([&] { CheckRanges(bad); }, Error::Kind::InvalidParameter).find(name), std::string::npos);
   };
   refuse("ControlSpacingMm", &DeformableAlignParameters::controlSpacingMm, nullptr, 1.0);
   refuse("BendingWeight", &DeformableAlignParameters::bendingWeight, nullptr, std::nan(""));

@@ -469,13 +469,13 @@ TEST(GlobalSearchParametersTest, NamesWhatIsOutOfRange)
     change(p);
     return MessageOf([&] { p.Check(); }, Error::Kind::InvalidParameter);
   };
-  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.coneDegrees = 181.0; }).find("cone"), std::string::npos);
+  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.coneDegrees = 181.0; }).find("ConeDegrees"), std::string::npos);
   EXPECT_NE(refused([](GlobalSearchParameters& p) { p.reachMm = 0.0; }).find("reach"), std::string::npos);
   EXPECT_NE(refused([](GlobalSearchParameters& p) { p.reachMm = std::nan(""); }).find("reach"), std::string::npos);
-  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.minimumOverlap = 0.0; }).find("overlap"), std::string::npos);
-  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.resolution = 8; }).find("resolution"), std::string::npos);
-  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.stepDegrees = 1.0; }).find("step"), std::string::npos);
-  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.candidates = 0; }).find("candidates"), std::string::npos);
+  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.minimumOverlap = 0.0; }).find("MinimumOverlap"), std::string::npos);
+  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.resolution = 8; }).find("Resolution"), std::string::npos);
+  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.stepDegrees = 1.0; }).find("StepDegrees"), std::string::npos);
+  EXPECT_NE(refused([](GlobalSearchParameters& p) { p.candidates = 0; }).find("Candidates"), std::string::npos);
 }
 
 TEST_F(GlobalSearchTest, StopsWhenAskedAndProgressGrowsToOne)

@@ -148,7 +148,7 @@ TEST_P(MetricTest, HalvesAreDisjoint)
 
 TEST(MetricNames, TheDefaultComesFirstAndOthersAreRefused)
 {
-  EXPECT_EQ(MetricNames(), (std::vector<std::string>{"local-ncc", "ncc", "mind-ssc", "lc2"}));
+  EXPECT_EQ(MetricNames(), (std::vector<std::string>{"local-ncc", "ncc", "mad", "mind-ssc", "lc2"}));
   const std::string message = MessageOf([] { MetricNamed("ssd"); }, Error::Kind::InvalidParameter);
   EXPECT_NE(message.find("\"ssd\""), std::string::npos) << message;
   EXPECT_NE(message.find("mind-ssc"), std::string::npos) << message;

@@ -576,7 +576,7 @@ TEST(PoseGraph, RefusesWhatIsNoGraph)
   const auto wrong = [](void (*change)(PoseGraphParameters&)) {
     PoseGraphParameters p;
     change(p);
-    EXPECT_THROW(p.Check(), Error);
+    EXPECT_THROW(CheckRanges(p), Error);
   };
   wrong([](PoseGraphParameters& p) { p.radiusMm = 0.0; });
   wrong([](PoseGraphParameters& p) { p.floorMm = -1.0; });

@@ -193,10 +193,10 @@ TEST(RigFit, BadInput)
   Drawn drawn = Draw(drawing);
   RigFitParameters p;
   p.depthScale = 2.0;
-  EXPECT_NE(RefusalOf(drawn, p).find("depthScale"), std::string::npos);
+  EXPECT_NE(RefusalOf(drawn, p).find("DepthScale"), std::string::npos);
   p = {};
   p.toleranceMm = std::nan("");
-  EXPECT_NE(RefusalOf(drawn, p).find("toleranceMm"), std::string::npos);
+  EXPECT_NE(RefusalOf(drawn, p).find("ToleranceMm"), std::string::npos);
   auto rig = Rig;
   rig[2].radius = 0.0;
   EXPECT_NE(RefusalOf(drawn, {}, rig).find("ball C"), std::string::npos);

@@ -179,8 +179,9 @@ assert (named.GetStart(), named.GetMetric()) == ("automatic", "local-ncc")
 assert named.SetParameter("Candidates", 5) and named.GetCandidates() == 5
 assert named.SetParameter("UseReliability", 0) and not named.GetUseReliability()
 assert named.SetParameter("MinimumOverlap", 0.25) and named.GetMinimumOverlap() == 0.25
-for name, value, expected in (("MinimumOverlap", 2.0, "[0.01, 1]"), ("Candidates", 2.5, "whole number"), ("Candidates", 0, "[1, 1000]"),
-                              ("FinestMm", float("nan"), "FinestMm"), ("Colour", 1.0, "MinimumPeakRatio")):
+assert named.SetParameterAsText("Metric", "mad") and named.GetMetric() == "mad"
+named.SetMetric("local-ncc")
+for name, value, expected in (("Candidates", 2.5, "whole number"), ("Metric", 5, "lc2"), ("Colour", 1.0, "MinimumPeakRatio")):
     messages = []
     note = lambda caller, event, text: messages.append(text)
     note.CallDataType = "string0"
@@ -193,9 +194,18 @@ messages = []
 named.AddObserver(vtkCommand.ErrorEvent, note)
 named.SetStart("nowhere")
 assert "nowhere" in messages[0] and "hand-made" in messages[0]
-named.SetMetric("mad")
-assert "mad" in messages[1] and "mind-ssc" in messages[1]
+named.SetMetric("banana")
+assert "banana" in messages[1] and "mind-ssc" in messages[1] and "mad" in messages[1]
 assert (named.GetStart(), named.GetMetric()) == ("automatic", "local-ncc") and len(messages) == 2
+
+out_of_range = aligner(a, wrong)
+for name, value, expected in (("MinimumOverlap", 2.0, "[0.01, 1]"), ("Candidates", 0, "[1, 1000]"), ("Points", 99, "[100, 10000000]"),
+                              ("FinestMm", float("nan"), "FinestMm"), ("FixedVolume", -1, "at least 0")):
+    was = out_of_range.GetParameter(name)
+    out_of_range.SetParameter(name, value)
+    assert f"{name} is" in (said := errors_of(out_of_range)) and expected in said, said
+    assert out_of_range.GetNumberOfVolumes() == 0
+    out_of_range.SetParameter(name, was)
 
 # 6. abort: no output, and the filter itself reports no error
 stopped = aligner(a, wrong)

@@ -145,7 +145,7 @@ none = aligner(a, b)
 none.SetFixedVolume(2)
 assert "fixed volume must be one of the 2" in errors_of(none)
 none.SetControlSpacingMm(1)
-assert none.GetControlSpacingMm() == 5
+assert "ControlSpacingMm is 1 mm; it must be in [5, 500]" in errors_of(none)
 
 # 6. abort: no output, and the filter itself reports no error
 stopped, messages = aligner(a, b), []

@@ -157,7 +157,7 @@ score.Update()
 assert abs(score.GetScore() - editor.GetScore()) < 1e-12 and not editor.messages
 
 # What is not there is said, and nothing half-made is put out.
-for spoil, words in ((lambda e: e.AddVolume(2), "no volume 2"), (lambda e: e.SetTranslation(math.nan, 0, 0), "must be numbers"),
+for spoil, words in ((lambda e: e.AddVolume(2), "no volume 2"), (lambda e: e.SetTranslation(math.nan, 0, 0), "Translation is (nan 0 0) mm; it must be finite"),
                      (lambda e: e.AddTruthData(c), "3 true ones"), (lambda e: e.RemoveAllTruths(), None)):
     editor = editor_of(a, b, truth=(a, b))
     spoil(editor)

@@ -117,7 +117,7 @@ assert "name x y z radius" in errors_of(typed)
 # What cannot be done is said.
 fit = rig_fit(volume)
 fit.SetDepthScale(3)
-assert "depthScale" in errors_of(fit) and fit.GetOutput().GetNumberOfPoints() == 0 and not fit.GetRigToWorld(vtkMatrix4x4())
+assert "DepthScale" in errors_of(fit) and fit.GetOutput().GetNumberOfPoints() == 0 and not fit.GetRigToWorld(vtkMatrix4x4())
 fit = rig_fit(volume)
 fit.ClearBalls()
 assert "0 balls" in errors_of(fit)

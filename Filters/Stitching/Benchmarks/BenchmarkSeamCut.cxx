@@ -4,7 +4,7 @@
 // a mean of 3^3, and their overlap is a cube. The error is what the seam costs more than the exact one, counted face by face as
 // SeamCut.h defines it, as a share of that.
 #include "Core/Base/Random.h"
-#include "Filters/Stitching/SeamCut.h"
+#include "Filters/Stitching/Benchmarks/SeamCut.h"
 #include "Testing/Benchmark.h"
 #include <algorithm>
 #include <cmath>

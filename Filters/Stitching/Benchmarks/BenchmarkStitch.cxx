@@ -486,10 +486,8 @@ void Measure(const Case& scene, const Wanted& wanted)
       {"membrane", StitchMethod::Membrane, StitchTexture::Mix, narrow},
       {"distance restore", StitchMethod::Distance, StitchTexture::Split, wide},
       {"distance split", StitchMethod::Distance, StitchTexture::Split, narrow},
-      {"distance seam", StitchMethod::Distance, StitchTexture::Seam, narrow},
       {"membrane restore", StitchMethod::Membrane, StitchTexture::Split, wide},
       {"membrane split", StitchMethod::Membrane, StitchTexture::Split, narrow},
-      {"membrane seam", StitchMethod::Membrane, StitchTexture::Seam, narrow},
   };
   const auto with = [&scene](StitchMethod method, StitchTexture texture, double detailSharpness) {
     StitchParameters parameters;
@@ -503,7 +501,8 @@ void Measure(const Case& scene, const Wanted& wanted)
     if (Wanted::Has(wanted.methods, contender.name))
       Contest(scene, contender.name, with(contender.method, contender.texture, contender.detailSharpness), average, wanted.runs,
               tbb::info::default_concurrency());
-  for (const auto& [name, stitch] : {std::pair("multiband", StitchByMultiband), std::pair("offset", StitchByOffsets)})
+  for (const auto& [name, stitch] :
+       {std::pair("multiband", StitchByMultiband), std::pair("offset", StitchByOffsets), std::pair("seam", StitchBySeams)})
     if (Wanted::Has(wanted.methods, name))
       Contest(
           scene, name, [&scene, stitch = stitch] { return Bytes(stitch(scene.Inputs(), scene.grid)); }, average, wanted.runs,

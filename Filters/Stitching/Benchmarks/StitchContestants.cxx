@@ -2,9 +2,9 @@
 // Offsets and the labels that they belong to are found on a grid of some 1.5 million voxels, as seams are.
 #include "Filters/Stitching/Benchmarks/StitchContestants.h"
 #include "Filters/Stitching/Benchmarks/Multiband.h"
+#include "Filters/Stitching/Benchmarks/SeamCut.h"
 #include "Filters/Stitching/Benchmarks/StitchOffsets.h"
 #include "Filters/Stitching/LowPass.h"
-#include "Filters/Stitching/SeamCut.h"
 #include "Filters/Stitching/StitchSampler.h"
 #include "Filters/Stitching/StitchScales.h"
 #include <cmath>
@@ -70,21 +70,11 @@ Boxed<float> ShareOf(std::size_t volume, const GridBox& box, const Volume<unsign
   return share;
 }
 
-} // namespace
+using Labels = Volume<unsigned short>;
 
-ContestantStitch StitchByMultiband(const std::vector<StitchInput>& volumes, const ImageGeometry& grid)
-{
-  ContestantStitch result{{}, Volume<unsigned char>(grid.dimensions)};
-  std::vector<CoarseVolume> sampled = Resampled(SamplersOf(volumes, grid), grid, result.coverage);
-  const Volume<unsigned short> labels = LargestScale(sampled, grid.dimensions);
-  std::vector<ResampledVolume> resampled;
-  for (std::size_t v = 0; v < sampled.size(); ++v)
-    resampled.push_back({std::move(sampled[v].value), std::move(sampled[v].inside), ShareOf(v, sampled[v].scale.box, labels)});
-  result.values = BlendMultiband(resampled, grid.dimensions);
-  return result;
-}
-
-ContestantStitch StitchByOffsets(const std::vector<StitchInput>& volumes, const ImageGeometry& grid)
+// One volume per voxel, as \a choose says, and offsets that make them meet.
+template <class Choose>
+ContestantStitch StitchByLabels(const std::vector<StitchInput>& volumes, const ImageGeometry& grid, const Choose& choose)
 {
   int step = 1;
   while (static_cast<double>(Coarsened(grid, step).VoxelCount()) > coarseVoxels)
@@ -108,7 +98,7 @@ ContestantStitch StitchByOffsets(const std::vector<StitchInput>& volumes, const 
         row[i] = std::isnan(row[i]) ? sampled[v].value.Row(j, k)[i] : row[i];
     });
   }
-  const Volume<unsigned short> labels = LargestScale(sampled, coarse.dimensions);
+  const Labels labels = choose(sampled, coarse.dimensions);
   std::vector<Boxed<float>> shares, offsets = OffsetFields(sampled, labels, coarse.spacing);
   for (std::size_t v = 0; v < sampled.size(); ++v)
     shares.push_back(ShareOf(v, sampled[v].inside.box, labels));
@@ -142,6 +132,30 @@ ContestantStitch StitchByOffsets(const std::vector<StitchInput>& volumes, const 
     if (total.View()[at] > 0.0f)
       result.values.View()[at] /= total.View()[at];
   return result;
+}
+
+} // namespace
+
+ContestantStitch StitchByMultiband(const std::vector<StitchInput>& volumes, const ImageGeometry& grid)
+{
+  ContestantStitch result{{}, Volume<unsigned char>(grid.dimensions)};
+  std::vector<CoarseVolume> sampled = Resampled(SamplersOf(volumes, grid), grid, result.coverage);
+  const Volume<unsigned short> labels = LargestScale(sampled, grid.dimensions);
+  std::vector<ResampledVolume> resampled;
+  for (std::size_t v = 0; v < sampled.size(); ++v)
+    resampled.push_back({std::move(sampled[v].value), std::move(sampled[v].inside), ShareOf(v, sampled[v].scale.box, labels)});
+  result.values = BlendMultiband(resampled, grid.dimensions);
+  return result;
+}
+
+ContestantStitch StitchByOffsets(const std::vector<StitchInput>& volumes, const ImageGeometry& grid)
+{
+  return StitchByLabels(volumes, grid, LargestScale);
+}
+
+ContestantStitch StitchBySeams(const std::vector<StitchInput>& volumes, const ImageGeometry& grid)
+{
+  return StitchByLabels(volumes, grid, [](const auto& sampled, const auto& size) { return CutSeams(sampled, size); });
 }
 
 Volume<unsigned short> LargestScale(const std::vector<CoarseVolume>& volumes, const std::array<int, 3>& dimensions)

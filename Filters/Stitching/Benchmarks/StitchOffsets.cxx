@@ -4,8 +4,8 @@
 // the other side too, where the volume goes on unseen, so that interpolation between voxels of the grid crosses no step.
 #include "Filters/Stitching/Benchmarks/StitchOffsets.h"
 #include "Core/Base/Error.h"
+#include "Filters/Stitching/Benchmarks/SeamCut.h"
 #include "Filters/Stitching/Membrane.h"
-#include "Filters/Stitching/SeamCut.h"
 #include <algorithm>
 #include <cmath>
 #include <memory>

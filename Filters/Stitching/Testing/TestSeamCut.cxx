@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
-#include "Filters/Stitching/SeamCut.h"
+#include "Filters/Stitching/Benchmarks/SeamCut.h"
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>

@@ -32,7 +32,7 @@ TEST(StitchContestants, ConstantsStayAndCoverageCounts)
 {
   const Scene<float> scene = TwoBoxes(50.0f, 50.0f);
   const ImageGeometry grid = StitchGrid(scene.geometries);
-  for (const auto stitch : {StitchByMultiband, StitchByOffsets}) {
+  for (const auto stitch : {StitchByMultiband, StitchByOffsets, StitchBySeams}) {
     const ContestantStitch result = stitch(scene.inputs, grid);
     for (int i = 0; i < 60; ++i) {
       EXPECT_NEAR(result.values.View()(i, 5, 4), 50.0f, 1e-3f) << i;

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Two overlapping volumes of a real sweep, stitched, against the volume that was made of the whole sweep."""
+import json
 import os
 import sys
 
@@ -59,9 +60,9 @@ def main():
         stitcher.AddInputConnection(reader.GetOutputPort())
     errors = {}
     default = stitcher.GetMethodAsString()
-    methods = range(stitcher.GetMethodMaxValue() + 1)
+    methods = next(one["choices"] for one in json.loads(stitcher.GetParameterDescriptions()) if one["name"] == "Method")
     for method in methods:
-        stitcher.SetMethod(method)
+        stitcher.SetParameterAsText("Method", method)
         stitcher.Update()
         out = stitcher.GetOutput()
         if not errors:

@@ -86,7 +86,7 @@ def test_common_lattice_is_copied():
     a = volume(world[:, :, :26], origin, spacing, pose)
     b = volume(world[2:, 3:, 15:], origin + pose @ (spacing * [15, 3, 2]), spacing, pose)
     filter, messages = stitcher(a, b)
-    for texture in range(3):
+    for texture in range(2):
         filter.SetTexture(texture)
         filter.Update()
         assert not messages, messages
@@ -217,26 +217,23 @@ def test_methods_and_parameters():
     assert filter.GetSharpness() == 1.5 and filter.GetSpacingMm() == 0
     assert not filter.GetAllowDisjoint() and not filter.GetOutputWeights()
     for number, name in enumerate(("distance", "feather", "average", "maximum", "membrane")):
-        assert filter.GetMethodFromName(name) == number
+        assert filter.SetParameterAsText("Method", name) and filter.GetMethod() == number
         getattr(filter, "SetMethodTo" + name.capitalize())()
         assert filter.GetMethod() == number and filter.GetMethodAsString() == name
-    for number, name in enumerate(("mix", "split", "seam")):
-        assert filter.GetTextureFromName(name) == number
+    for number, name in enumerate(("mix", "split")):
+        assert filter.SetParameterAsText("Texture", name) and filter.GetTexture() == number
         getattr(filter, "SetTextureTo" + name.capitalize())()
         assert filter.GetTexture() == number and filter.GetTextureAsString() == name
-    assert filter.GetMethodFromName("nothing") == -1 and filter.GetTextureFromName("nothing") == -1
-    assert filter.GetTextureName(3) is None and filter.GetMethodName(5) is None
-    filter.SetSharpness(-3)
-    assert filter.GetSharpness() == 0
-    filter.SetSharpness(1e9)
-    assert filter.GetSharpness() == 1000
+    messages = watch(filter)
+    filter.SetMethod(5)
+    assert not filter.SetParameterAsText("Texture", "nothing") and len(messages) == 2 and filter.GetMethodAsString() == "membrane"
 
     a, b = volume(np.full((3, 20, 30), 100, np.uint8)), volume(np.full((3, 20, 30), 201, np.uint8), (20, 0, 0))
     middle = {"distance": range(101, 201), "feather": range(101, 201), "average": [151], "maximum": [201],
               "membrane": range(101, 201)}
     for name, allowed in middle.items():
         filter, messages = stitcher(a, b)
-        filter.SetMethod(filter.GetMethodFromName(name))
+        filter.SetParameterAsText("Method", name)
         filter.OutputWeightsOn()
         filter.Update()
         assert not messages, messages
@@ -340,7 +337,10 @@ def test_bad_input():
     expect_error("volume 2", good, volume(np.full((4, 10, 20), 7, np.uint8), (10, 0, 0), direction=np.diag([1.0, 1.0, 0.5])))
     expect_error("volume 2", good, volume(np.full((4, 10, 20), 7, np.uint8), (10, 0, 0), valid=np.zeros((4, 10, 20), np.uint8)))
     expect_error("volume 1: no voxel is valid and finite", volume(np.zeros((4, 10, 20), np.uint8), valid=np.zeros((4, 10, 20), np.uint8)), good)
-    expect_error("SpacingMm", good, right, prepare=lambda f: f.SetSpacingMm(-1))
+    for name, value, words in (("SpacingMm", -1, "at least 0"), ("Sharpness", 2000, "[0, 1000]"), ("DetailScale", 0.5, "[1, 100]"),
+                               ("ReliabilityFloor", 0, "(0, 1]")):
+        expect_error(f"{name} is {value}", good, right, prepare=lambda f: f.SetParameter(name, value))
+        expect_error(words, good, right, prepare=lambda f: f.SetParameter(name, value))
     expect_error("MaximumMemoryGb", good, right, prepare=lambda f: f.SetMaximumMemoryGb(1e-6))
     expect_error("SpacingMm", good, right, prepare=lambda f: f.SetSpacingMm(1e-9))
     empty = vtkImageData()

@@ -65,15 +65,15 @@ TEST(Material, EachNumberHasItsRange)
     double Material::*value;
     double least, most;
     const char* name;
-  } ranges[] = {{&Material::soundSpeed, 100, 10000, "soundSpeed"},
-                {&Material::density, 0.1, 20000, "density"},
-                {&Material::attenuation, 0, 200, "attenuation"},
-                {&Material::attenuationPower, 0, 2, "attenuationPower"},
-                {&Material::scattererDensity, 0, 1000, "scattererDensity"},
-                {&Material::backscatterDb, -120, 60, "backscatterDb"},
-                {&Material::roughness, 0, 1, "roughness"},
-                {&Material::scatterProbability, 0, 1, "scatterProbability"},
-                {&Material::youngsModulusKPa, 0, 1e9, "youngsModulusKPa"}};
+  } ranges[] = {{&Material::soundSpeed, 100, 10000, "SoundSpeed is "},
+                {&Material::density, 0.1, 20000, "Density is "},
+                {&Material::attenuation, 0, 200, "Attenuation is "},
+                {&Material::attenuationPower, 0, 2, "AttenuationPower is "},
+                {&Material::scattererDensity, 0, 1000, "ScattererDensity is "},
+                {&Material::backscatterDb, -120, 60, "BackscatterDb is "},
+                {&Material::roughness, 0, 1, "Roughness is "},
+                {&Material::scatterProbability, 0, 1, "ScatterProbability is "},
+                {&Material::youngsModulusKPa, 0, 1e9, "YoungsModulusKPa is "}};
   for (const auto& range : ranges) {
     Material material;
     material.name = "jelly";

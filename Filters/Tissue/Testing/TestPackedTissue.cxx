@@ -158,14 +158,14 @@ TEST(PackedTissue, RefusesWithTheNameOfTheNumber)
     spoil(p);
     EXPECT_NE(MessageOf(p).find(words), std::string::npos) << MessageOf(p);
   };
-  expect("maxTriangles (1000)", [](auto& p) { p.maxTriangles = 1000; });
+  expect("MaxTriangles (1000)", [](auto& p) { p.maxTriangles = 1000; });
   expect("weight of \"liver\"", [](auto& p) { p.materials[1].weight = -1.0; });
   expect("no material with a weight", [](auto& p) { p.materials.clear(); });
   expect("no material with a weight", [](auto& p) { p.materials = {{StandardMaterial("liver"), 0.0}}; });
-  expect("density", [](auto& p) { p.materials[0].material.density = -1.0; });
-  expect("soundSpeed", [](auto& p) { p.background.soundSpeed = 0.0; });
-  expect("cell (mm)", [](auto& p) { p.cell.mm = 0.0; });
-  expect("growth", [](auto& p) { p.cell.growth = -0.1; });
-  expect("deviation", [](auto& p) { p.deviation = 0.0; });
-  expect("radiusMin", [](auto& p) { p.packing.radiusMin = -1.0; });
+  expect("Density is ", [](auto& p) { p.materials[0].material.density = -1.0; });
+  expect("SoundSpeed is ", [](auto& p) { p.background.soundSpeed = 0.0; });
+  expect("CellMm is ", [](auto& p) { p.cell.mm = 0.0; });
+  expect("CellGrowth is ", [](auto& p) { p.cell.growth = -0.1; });
+  expect("Deviation is ", [](auto& p) { p.deviation = 0.0; });
+  expect("RadiusMin is ", [](auto& p) { p.packing.radiusMin = -1.0; });
 }

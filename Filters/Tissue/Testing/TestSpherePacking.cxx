@@ -264,18 +264,18 @@ TEST(SpherePacking, RefusesWithTheNameOfTheNumber)
     EXPECT_NE(MessageOf(p).find(word), std::string::npos) << MessageOf(p);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect("radiusMax", [](Parameters& p) { p.radiusMax = 12.6; }); // the box is 25 mm deep
+  expect("RadiusMax is ", [](Parameters& p) { p.radiusMax = 12.6; }); // the box is 25 mm deep
   expect("12.5", [](Parameters& p) { p.radiusMax = 12.6; });
-  expect("radiusMax", [](Parameters& p) { p.radiusMax = 0.5; });
-  expect("radiusMin", [](Parameters& p) { p.radiusMin = 0.0; });
-  expect("radiusMin", [nan](Parameters& p) { p.radiusMin = nan; });
+  expect("RadiusMax is ", [](Parameters& p) { p.radiusMax = 0.5; });
+  expect("RadiusMin is ", [](Parameters& p) { p.radiusMin = 0.0; });
+  expect("RadiusMin is ", [nan](Parameters& p) { p.radiusMin = nan; });
   expect("box", [](Parameters& p) { p.boxMax.y() = p.boxMin.y(); });
-  expect("boxMin", [nan](Parameters& p) { p.boxMin.x() = nan; });
-  expect("gapMm", [](Parameters& p) { p.gapMm = -0.1; });
-  expect("fillFraction", [](Parameters& p) { p.fillFraction = 1.1; });
-  expect("fillFraction", [nan](Parameters& p) { p.fillFraction = nan; });
-  expect("count", [](Parameters& p) { p.count = -1; });
-  expect("misses", [](Parameters& p) { p.misses = 0; });
-  expect("exponent", [nan](Parameters& p) { p.exponent = nan; });
+  expect("BoxMin is ", [nan](Parameters& p) { p.boxMin.x() = nan; });
+  expect("GapMm is ", [](Parameters& p) { p.gapMm = -0.1; });
+  expect("FillFraction is ", [](Parameters& p) { p.fillFraction = 1.1; });
+  expect("FillFraction is ", [nan](Parameters& p) { p.fillFraction = nan; });
+  expect("Count is ", [](Parameters& p) { p.count = -1; });
+  expect("Misses is ", [](Parameters& p) { p.misses = 0; });
+  expect("Exponent is ", [nan](Parameters& p) { p.exponent = nan; });
   expect("more than 5000000 spheres", [](Parameters& p) { p.radiusMin = p.radiusMax = 0.01; });
 }

@@ -86,7 +86,7 @@ TEST(TissueSurface, CheckSaysWhatIsWrong)
     EXPECT_NE(MessageOf(surface).find(words), std::string::npos) << MessageOf(surface);
   };
   expect("no material", [](TissueSurface& s) { s.materials.clear(); });
-  expect("soundSpeed", [](TissueSurface& s) { s.materials[1].soundSpeed = -1.0; });
+  expect("SoundSpeed is -1 m/s", [](TissueSurface& s) { s.materials[1].soundSpeed = -1.0; });
   expect("body \"liver\"", [](TissueSurface& s) { s.bodies[0].material = 2; });
   expect("body \"liver\"", [](TissueSurface& s) { s.bodies[0].material = -1; });
   expect("names the body of 3", [](TissueSurface& s) { s.bodyOfTriangle.pop_back(); });

@@ -185,8 +185,8 @@ for spoil, words in (
     (lambda d: d.GetFieldData().AddArray(with_field(vtkDoubleArray(), "MaterialProperty", [(1.0, 2.0)] * 5)), "MaterialProperty"),
     (lambda d: d.GetFieldData().GetAbstractArray("MaterialName").SetNumberOfValues(3), "Material"),
     (lambda d: d.GetFieldData().AddArray(with_field(vtkDoubleArray(), "MaterialName", [(1.0,)] * 5)), "MaterialName"),
-    (lambda d: set_property(d, "SoundSpeed", -1.0), "soundSpeed"),
-    (lambda d: set_property(d, "Density", float("nan")), "density"),
+    (lambda d: set_property(d, "SoundSpeed", -1.0), "SoundSpeed is -1 m/s"),
+    (lambda d: set_property(d, "Density", float("nan")), "Density is nan"),
     (lambda d: d.GetPoints().SetPoint(3, float("inf"), 0, 0), "point (3)"),
 ):
     data, errors = spoiled(spoil)

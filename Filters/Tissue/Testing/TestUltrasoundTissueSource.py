@@ -35,6 +35,9 @@ def errors_of(source):
 
 # Tissue, with one closed component per sphere.
 source = small()
+box = [0.0] * 6
+source.GetBox(box)
+assert box == [-20, 20, -20, 20, 0, 30] and source.GetBoxMax() == (20, 20, 30)
 source.Update()
 tissue = source.GetOutput()
 assert vtkUltrasoundTissue.IsTissue(tissue)
@@ -114,11 +117,12 @@ assert full.GetSaturated() and field(full, "Saturated")[0] == 1 and 0.4 < full.G
 
 # Errors name what is wrong, leave nothing behind, and pass.
 for spoil, words in (
-    (lambda s: s.SetRadiusMax(25), "radiusMax"),
-    (lambda s: s.SetRadiusMin(6), "radiusMax"),
-    (lambda s: s.SetRadiusMin(float("nan")), "radiusMin"),
+    (lambda s: s.SetRadiusMax(25), "RadiusMax is 25 mm"),
+    (lambda s: s.SetRadiusMin(6), "at least RadiusMin, 6"),
+    (lambda s: s.SetRadiusMin(float("nan")), "RadiusMin is nan"),
     (lambda s: s.SetBox(0, 0, 0, 10, 0, 10), "box"),
-    (lambda s: s.SetMaxTriangles(100), "maxTriangles (100)"),
+    (lambda s: s.SetMaxTriangles(100), "MaxTriangles (100)"),
+    (lambda s: s.SetFillFraction(1.1), "FillFraction is 1.1"),
     (lambda s: s.SetMaterials("livre 2"), "liver"),
     (lambda s: s.SetMaterials("liver two"), "liver two"),
     (lambda s: s.SetMaterials("liver 1 2"), "liver 1 2"),
@@ -133,6 +137,7 @@ for spoil, words in (
     assert words in errors, (words, errors)
     assert source.GetOutput().GetNumberOfCells() == 0 and source.GetSphereCount() == 0
     source.SetBox(-20, 20, -20, 20, 0, 30)
+    source.SetFillFraction(0.3)
     source.SetRadiusMin(1)
     source.SetRadiusMax(5)
     source.SetMaxTriangles(10000000)

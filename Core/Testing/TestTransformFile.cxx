@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
-#include "Readers/Testing/TemporaryFolder.h"
-#include "Readers/TransformFile.h"
+#include "Core/Geometry/TransformFile.h"
+#include "Testing/TemporaryFolder.h"
 #include <clocale>
 
 using namespace echorama;

@@ -1,22 +1,40 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// True poses come from turning the volume about its target and moving it, which is what an examiner does with a probe over a
-// rig; the sensor follows by S = O M C^-1. Noise is drawn as the model of HandEyeModel.h says, not linearised.
-#include "Tracking/Calibration/HandEyeSimulation.h"
+#pragma once
 #include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "Tracking/Calibration/HandEyeModel.h"
+#include <cstdint>
+#include <vector>
 
 namespace echorama {
-namespace {
+
+/// A calibration session with a known truth.
+struct HandEyeScenario {
+  int poses = 20;
+  double degrees = 60.0;              ///< turns from the middle pose: about directions drawn at random, by up to this
+  double travelMm = 40.0;             ///< the target moves by up to this along each axis of the world
+  double leverMm = 150.0;             ///< from the sensor to the target
+  PoseNoise sensorNoise, volumeNoise; ///< as HandEyeParameters
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();
+  int outliers = 0; ///< so many of the scans have an alignment that is wrong by 10 to 40 degrees and 20 to 60 mm
+  std::uint64_t seed = 1;
+};
+
+struct HandEyeSimulation {
+  HandEyeSolution truth;
+  std::vector<HandEyePair> pairs;      ///< as measured
+  std::vector<HandEyePair> exactPairs; ///< the same without noise and outliers
+  std::vector<char> isOutlier;
+};
 
 // In any direction, of a length in [low, high]. In two statements: compilers may call the functions of one in any order.
-Eigen::Vector3d Someway(Random& random, double low, double high)
+inline Eigen::Vector3d Someway(Random& random, double low, double high)
 {
   const Eigen::Vector3d direction = random.Direction();
   return direction * random.Uniform(low, high);
 }
 
-Twist NoiseTwist(const PoseNoise& noise, Random& random)
+inline Twist NoiseTwist(const PoseNoise& noise, Random& random)
 {
   Twist twist;
   for (int i = 0; i < 6; ++i)
@@ -24,7 +42,7 @@ Twist NoiseTwist(const PoseNoise& noise, Random& random)
   return twist;
 }
 
-Pose RandomPose(Random& random)
+inline Pose RandomPose(Random& random)
 {
   Pose pose = Pose::Identity();
   pose.linear() = ExpRotation(Someway(random, 0.0, 3.0));
@@ -32,9 +50,9 @@ Pose RandomPose(Random& random)
   return pose;
 }
 
-} // namespace
-
-HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
+/// True poses come from turning the volume about its target and moving it, which is what an examiner does with a probe over a
+/// rig; the sensor follows by S = O M C^-1. Noise is drawn as the model of HandEyeModel.h says, not linearised.
+inline HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
 {
   Random random(scenario.seed);
   HandEyeSimulation simulation;
@@ -67,7 +85,9 @@ HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
   return simulation;
 }
 
-Eigen::Matrix3d HandEyeBound(const HandEyeScenario& scenario, const HandEyeSimulation& simulation)
+/// The Cramer-Rao bound on the covariance of C target, mm^2: no unbiased estimate is better. It holds for the noise of the
+/// scenario on all scans that are no outliers.
+inline Eigen::Matrix3d HandEyeBound(const HandEyeScenario& scenario, const HandEyeSimulation& simulation)
 {
   const HandEyeModel model(simulation.exactPairs, scenario.sensorNoise, scenario.volumeNoise, scenario.target);
   std::vector<char> use;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Any bytes as named transforms, of Plus (XML) or ours (JSON); what is accepted is composed in every way.
-#include "Readers/TransformFile.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Testing/Fuzzing.h"
 
 using namespace echorama;

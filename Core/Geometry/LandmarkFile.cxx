@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All three formats come down to rows of a label and three numbers in one of two frames. The two tables share a parser: an .fcsv
 // is a CSV whose columns and frame stand in comments.
-#include "Readers/LandmarkFile.h"
+#include "Core/Geometry/LandmarkFile.h"
+#include "Core/Base/CsvLine.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
-#include "Readers/CsvLine.h"
-#include "Readers/HeaderLines.h"
+#include "Core/Base/Words.h"
 #include <algorithm>
 #include <array>
 
@@ -24,7 +24,7 @@ Landmark MakeLandmark(std::string_view label, Eigen::Vector3d position, Frame fr
     place.Fail("a coordinate is not a number within 1e7 mm");
   if (frame == Frame::Ras)
     position.head<2>() = -position.head<2>();
-  return {std::string(HeaderLines::Trimmed(label)), position};
+  return {std::string(TrimBlanks(label)), position};
 }
 
 void Add(Landmark landmark, std::vector<Landmark>& landmarks, const JsonPlace& file)
@@ -89,7 +89,7 @@ std::vector<std::string> Cells(std::string_view line, const JsonPlace& place)
 
 std::string Lower(std::string_view text)
 {
-  std::string lower(HeaderLines::Trimmed(text));
+  std::string lower(TrimBlanks(text));
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   return lower;
@@ -132,7 +132,7 @@ bool CommentValue(std::string_view line, const char* key, std::string& value)
   const std::size_t equals = line.find('=');
   if (equals == std::string_view::npos || Lower(line.substr(1, equals - 1)) != key)
     return false;
-  value = HeaderLines::Trimmed(line.substr(equals + 1));
+  value = TrimBlanks(line.substr(equals + 1));
   return true;
 }
 
@@ -144,7 +144,7 @@ std::vector<Landmark> TableLandmarks(std::string_view text, const JsonPlace& fil
   int number = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-    const std::string_view line = HeaderLines::Trimmed(text.substr(0, end));
+    const std::string_view line = TrimBlanks(text.substr(0, end));
     const bool isWindows = text.substr(end, 2) == "\r\n";
     text.remove_prefix(std::min(text.size(), end + (isWindows ? 2 : 1)));
     const JsonPlace place = file.In("line " + std::to_string(++number));
@@ -178,7 +178,7 @@ std::vector<Landmark> TableLandmarks(std::string_view text, const JsonPlace& fil
     if (mayBeNames) {
       mayBeNames = false;
       double x = 0.0;
-      if (cells.size() > 1 && !ParseNumber(HeaderLines::Trimmed(cells[1]), x)) {
+      if (cells.size() > 1 && !ParseNumber(TrimBlanks(cells[1]), x)) {
         columns = ColumnsOf(cells);
         if (!columns.IsWhole())
           place.Fail("a landmark (label,x,y,z) or names of columns (label,x,y,z or label,l,p,s or label,r,a,s) are needed");
@@ -191,7 +191,7 @@ std::vector<Landmark> TableLandmarks(std::string_view text, const JsonPlace& fil
     const auto cell = [&](int column, const char* name) -> std::string_view {
       if (column >= static_cast<int>(cells.size()))
         place.Fail(std::string(name) + " is missing; it has only " + std::to_string(cells.size()) + " cells");
-      return HeaderLines::Trimmed(cells[static_cast<std::size_t>(column)]);
+      return TrimBlanks(cells[static_cast<std::size_t>(column)]);
     };
     if (columns.defined >= 0 && cell(columns.defined, "defined") == "0")
       continue;

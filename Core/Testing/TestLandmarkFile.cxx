@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Readers/LandmarkFile.h"
-#include "Readers/Testing/TemporaryFolder.h"
+#include "Core/Geometry/LandmarkFile.h"
+#include "Testing/TemporaryFolder.h"
 
 using namespace echorama;
 using namespace echorama::testing;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Readers/CsvLine.h"
-#include "Readers/HeaderLines.h"
+#include "Core/Base/CsvLine.h"
 
 namespace echorama {
 
@@ -12,7 +11,7 @@ bool SplitCsvLine(std::string_view line, char separator, std::vector<std::string
     const char c = line[i];
     if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
       cells.back() += line[++i];
-    else if (c == '"' && (quoted || HeaderLines::Trimmed(cells.back()).empty()))
+    else if (c == '"' && (quoted || cells.back().find_first_not_of(" \t\r\v\f") == std::string::npos))
       quoted = !quoted;
     else if (c == separator && !quoted)
       cells.emplace_back();

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Both formats come down to a list of edges; what they have in common (names, doubles, cycles) is checked on that list. The
 // XML parser neither follows external entities nor expands own ones, and keeps no stack per level, so nesting is harmless.
-#include "Readers/TransformFile.h"
+#include "Core/Geometry/TransformFile.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "Core/Base/Words.h"
 #include "Core/Geometry/MatrixRows.h"
-#include "Readers/HeaderLines.h"
 #include <pugixml.hpp>
 
 namespace echorama {
@@ -54,7 +54,7 @@ NamedTransform PlusTransform(const pugi::xml_node& element, const JsonPlace& pla
   transform.to = Capitalized(text("To"));
   const JsonPlace named = place.In(transform.Name());
   const std::string matrixText = text("Matrix");
-  const std::vector<std::string_view> words = HeaderLines::Words(matrixText);
+  const std::vector<std::string_view> words = SplitWords(matrixText);
   if (words.size() != 16)
     named.Fail("Matrix holds " + std::to_string(words.size()) + " values; 16 are needed");
   MatrixRows matrix;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "CoarseVolume.h"
 #include "Core/Base/Progress.h"
+#include "Filters/Stitching/CoarseVolume.h"
 #include <limits>
 #include <vector>
 

@@ -15,7 +15,7 @@
 //
 // Passes: what each volume may show (one byte per voxel of its box); the median difference; then per move one scan that
 // numbers the nodes, one that prices their faces, the cut, and one that writes labels.
-#include "SeamCut.h"
+#include "Filters/Stitching/Benchmarks/SeamCut.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <boost/graph/boykov_kolmogorov_max_flow.hpp>

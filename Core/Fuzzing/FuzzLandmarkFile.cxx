@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Any bytes as a list of landmarks: markups, fiducials or CSV.
-#include "Readers/LandmarkFile.h"
+#include "Core/Geometry/LandmarkFile.h"
 #include "Testing/Fuzzing.h"
 #include <cstdlib>
 

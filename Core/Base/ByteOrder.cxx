@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "ByteOrder.h"
+#include "Core/Base/ByteOrder.h"
 #include <algorithm>
 
 namespace echorama {

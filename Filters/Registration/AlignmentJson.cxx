@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "AlignmentJson.h"
+
+namespace echorama {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ToJson(const VolumeAlignment& volume)
+{
+  Json rows = Json::array();
+  for (const auto& row : volume.covariance.rowwise())
+    rows.push_back(std::vector<double>(row.begin(), row.end()));
+  return {{"name", volume.name},       {"verdict", NameOf(volume.verdict)},
+          {"reason", volume.reason},   {"similarity", volume.similarity},
+          {"overlap", volume.overlap}, {"centre", {volume.centre.x(), volume.centre.y(), volume.centre.z()}},
+          {"covariance", rows}};
+}
+
+Json ToJson(const PairOfVolumes& pair, int first)
+{
+  const PairAlignment& a = pair.alignment;
+  return {{"fixed", first + pair.fixed},
+          {"moving", first + pair.moving},
+          {"verdict", NameOf(pair.verdict)},
+          {"reason", pair.reason},
+          {"score", a.score},
+          {"similarity", a.similarity},
+          {"overlap", a.overlap},
+          {"peak_ratio", a.peakRatio},
+          {"split_mm", a.splitMm},
+          {"error_mm", a.errorMm},
+          {"voted_down", pair.votedDown},
+          {"stands", pair.stands},
+          {"attempts", pair.attempts},
+          {"residual_mm", pair.residualMm},
+          {"anywhere", a.anywhere},
+          {"seconds", {{"global", a.globalSeconds}, {"local", a.localSeconds}, {"confidence", a.confidenceSeconds}}}};
+}
+
+} // namespace
+
+Json ToJson(const AlignVolumesResult& result, int first)
+{
+  Json volumes = Json::array(), pairs = Json::array();
+  for (const VolumeAlignment& volume : result.volumes)
+    volumes.push_back(ToJson(volume));
+  for (const PairOfVolumes& pair : result.pairs)
+    pairs.push_back(ToJson(pair, first));
+  return {{"volumes", volumes},
+          {"pairs", pairs},
+          {"seconds", {{"prepare", result.featureSeconds}, {"pairs", result.pairSeconds}, {"graph", result.graphSeconds}}}};
+}
+
+std::string Report(const AlignVolumesResult& result)
+{
+  return ToJson(result).dump();
+}
+
+} // namespace echorama
