@@ -327,6 +327,8 @@ ParameterList Describe(AlignPairParameters& p)
           .Advanced(),
       Parameter("MaximumErrorVoxels", p.maximumErrorVoxels, {1e-3, 1000}, "voxels", "A larger predicted error is ambiguous.")
           .Advanced(),
+      Parameter("MaximumErrorMm", p.maximumErrorMm, {1e-3, 1000}, "mm",
+                "A larger predicted error is ambiguous, too, whatever the size of the voxels: what your use can bear."),
       Parameter("MaximumSplitVoxels", p.maximumSplitVoxels, {1e-3, 1000}, "voxels",
                 "Poses found from two halves of the voxels that lie further apart are failed.")
           .Advanced(),
@@ -368,6 +370,10 @@ void Judge(const AlignPairParameters& p, const Information& covariance, double r
     result.reason = "the image contents do not determine the pose (predicted error " +
                     Number(std::min(result.errorMm, 999.0), 1) + " mm); the least certain motion is " +
                     LeastDetermined(covariance, radiusMm);
+  } else if (result.errorMm > p.maximumErrorMm) {
+    result.verdict = Verdict::Ambiguous;
+    result.reason = "the predicted error is " + Number(result.errorMm, 2) + " mm, and at most " + Number(p.maximumErrorMm, 2) +
+                    " mm are accepted";
   } else if (result.splitMm > p.maximumSplitVoxels * voxel) {
     result.verdict = Verdict::Failed;
     result.reason = "aligning two halves of the voxels separately gives poses " + Number(result.splitMm, 1) + " mm apart";

@@ -41,6 +41,7 @@ struct AlignPairParameters {
   double minimumSimilarity = 0.06; ///< less is Failed
   double minimumPeakRatio = 1.25;  ///< less is Ambiguous
   double maximumErrorVoxels = 1.0; ///< more is Ambiguous
+  double maximumErrorMm = 1000.0;  ///< more is Ambiguous
   double maximumSplitVoxels = 2.0; ///< more is Failed
   std::uint64_t seed = 1;
 };

@@ -124,6 +124,15 @@ public:
   ///@}
 
   ///@{
+  /**
+   * A larger predicted error is ambiguous, too, whatever the size of the voxels: what your use can bear. In [0.001, 1000] mm;
+   * default 1000.
+   */
+  void SetMaximumErrorMm(double value) { this->SetParameter("MaximumErrorMm", value); }
+  double GetMaximumErrorMm() { return this->GetParameter("MaximumErrorMm"); }
+  ///@}
+
+  ///@{
   /** Poses found from two halves of the voxels that lie further apart are failed. In [0.001, 1000] voxels; default 2. */
   void SetMaximumSplitVoxels(double value) { this->SetParameter("MaximumSplitVoxels", value); }
   double GetMaximumSplitVoxels() { return this->GetParameter("MaximumSplitVoxels"); }

@@ -120,6 +120,12 @@ TEST(AlignPair, EachCheckOfTheVerdictByItself)
   judged([](PairAlignment& a) { a.similarity = 0.0, a.errorMm = 9.0; }, Verdict::Failed, "by chance");
   judged([](PairAlignment& a) { a.errorMm = a.splitMm = 9.0; }, Verdict::Ambiguous, "do not determine");
   judged([](PairAlignment& a) { a.splitMm = 9.0, a.peakRatio = 1.0; }, Verdict::Failed, "two halves");
+
+  // A bound in mm holds whatever the voxels.
+  p.maximumErrorMm = 0.75;
+  judged([](PairAlignment&) {}, Verdict::Aligned, "");
+  p.maximumErrorMm = 0.74;
+  judged([](PairAlignment&) {}, Verdict::Ambiguous, "the predicted error is 0.75 mm, and at most 0.74 mm are accepted");
 }
 
 TEST(AlignPair, TheLeastCertainMotionIsNamed)
@@ -160,6 +166,7 @@ TEST(AlignPair, EveryCheckIsMade)
   };
   fails([&](AlignPairParameters& p) { p.minimumOverlap = 1.0; }, "overlap");
   fails([&](AlignPairParameters& p) { p.minimumSimilarity = 1.0; }, "by chance");
+  fails([&](AlignPairParameters& p) { p.maximumErrorMm = std::max(1e-3, 0.9 * good.errorMm); }, "mm are accepted");
   fails([&](AlignPairParameters& p) { p.maximumErrorVoxels = std::max(1e-3, 0.9 * good.errorMm / good.voxelMm); }, "determine");
   fails([&](AlignPairParameters& p) { p.maximumSplitVoxels = std::max(1e-3, 0.9 * good.splitMm / good.voxelMm); }, "halves");
   if (good.peakRatio < 99.0)
