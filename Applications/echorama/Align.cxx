@@ -166,9 +166,7 @@ Command AlignCommand(CLI::App& program)
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  AddParameters(options, aligner,
-                {"Start", "Metric", "UseReliability", "MinimumOverlap", "FinestMm", "Candidates", "MinimumSimilarity",
-                 "MinimumPeakRatio", "MaximumErrorVoxels", "MaximumSplitVoxels", "Points", "Seed"});
+  AddParametersBut(options, aligner, {"FixedVolume"}); // --fixed counts from 1
   values->tracker.AddTo(*options, false);
   options->add_option("--calibration", values->calibration,
                       "Calibration of the tracked probe, as echorama calibrate hand-eye writes it");

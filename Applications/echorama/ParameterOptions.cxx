@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ParameterOptions.h"
+#include <cctype>
 #include <CLI/Error.hpp>
 
 namespace echorama {
@@ -20,6 +21,22 @@ std::string HelpOf(const Parameter& parameter)
   return facts.empty() ? text : text + " (" + facts + ")";
 }
 
+// Of a switch: what the flag does. "Whether shadowed voxels count less" is turned on or off.
+std::string FlagHelp(std::string help, bool on)
+{
+  const std::string whether = "Whether ";
+  if (help.rfind(whether, 0) == 0) {
+    help.erase(0, whether.size());
+    if (on)
+      help[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(help[0])));
+    else
+      help.insert(0, "Turn off that ");
+  } else if (!on) {
+    help.insert(0, "Turn off: ");
+  }
+  return help;
+}
+
 } // namespace
 
 CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, vtkSmartPointer<vtkObjectBase> owner)
@@ -31,7 +48,7 @@ CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string fl
     if (!wanted && flag.rfind("--no-", 0) != 0)
       flag.insert(2, "no-");
     return options->add_flag_callback(
-        flag, [target = *place, wanted, owner] { *target = wanted; }, (wanted ? "" : "Turn off: ") + HelpOf(parameter));
+        flag, [target = *place, wanted, owner] { *target = wanted; }, FlagHelp(HelpOf(parameter), wanted));
   }
   const std::string help = HelpOf(parameter);
   const bool isVector = std::holds_alternative<Eigen::Vector3d*>(parameter.value);

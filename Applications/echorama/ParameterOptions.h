@@ -32,5 +32,12 @@ void AddParameters(CLI::App* options, const vtkSmartPointer<Filter>& filter, con
   for (const std::string& name : names)
     AddParameter(options, filter, name);
 }
+/// The same for all parameters of a filter but those named.
+template <class Filter>
+void AddParametersBut(CLI::App* options, const vtkSmartPointer<Filter>& filter, const std::vector<std::string>& names)
+{
+  for (const Parameter& parameter : Without(filter->Parameters(), names))
+    AddParameter(options, parameter, {}, filter);
+}
 
 } // namespace echorama
