@@ -674,6 +674,10 @@ class Manners(unittest.TestCase):
         before = snapshot(folder)
         process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, cwd=folder)
+        caught = re.compile(r"^SigCgt:\s*(\w+)", re.M)
+        status = pathlib.Path(f"/proc/{process.pid}/status")
+        while process.poll() is None and not int(caught.search(status.read_text())[1], 16) >> (signal_number - 1) & 1:
+            time.sleep(0.05)  # however long the machine takes to start it
         time.sleep(1.5)
         process.send_signal(signal_number)
         output, messages = process.communicate(timeout=120)
