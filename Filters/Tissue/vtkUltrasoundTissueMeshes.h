@@ -136,7 +136,10 @@ public:
 
   ///@{
   /** What the last update found and mended, a line per body; and how many bodies came with faults. */
-  const char* GetReport() const { return this->Report.c_str(); }
+  const char* GetReport() const
+  {
+    return this->Report.c_str();
+  }
   int GetNumberOfFaultyBodies() const
   {
     return this->NumberOfFaultyBodies;

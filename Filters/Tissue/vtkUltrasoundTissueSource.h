@@ -242,18 +242,27 @@ public:
   ///@{
   /** BoxMin and BoxMax as one: least and greatest x, y and z, mm. */
   void SetBox(double xMin, double xMax, double yMin, double yMax, double zMin, double zMax);
-  void SetBox(const double box[6]) { this->SetBox(box[0], box[1], box[2], box[3], box[4], box[5]); }
+  void SetBox(const double box[6])
+  {
+    this->SetBox(box[0], box[1], box[2], box[3], box[4], box[5]);
+  }
   void GetBox(double box[6]);
   ///@}
 
   ///@{
   /** What the last update made: share of the region within spheres, their count, and whether no more found room. */
-  double GetPackedFillFraction() const { return this->PackedFillFraction; }
+  double GetPackedFillFraction() const
+  {
+    return this->PackedFillFraction;
+  }
   int GetSphereCount() const
   {
     return this->SphereCount;
   }
-  bool GetSaturated() const { return this->Saturated; }
+  bool GetSaturated() const
+  {
+    return this->Saturated;
+  }
   ///@}
 
 protected:
