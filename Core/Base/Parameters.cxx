@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Parameters.h"
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/Json.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
@@ -63,14 +64,6 @@ T Parsed(const Parameter& parameter, std::string_view text)
   if (!ParseNumber(text, number))
     Refuse(parameter, "'" + std::string(text) + "'", std::is_integral_v<T> ? "a whole number" : "a number");
   return number;
-}
-
-std::string Listed(const std::vector<std::string>& names)
-{
-  std::string text;
-  for (const std::string& name : names)
-    text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 constexpr std::string_view switchNames[] = {"off", "on"};
@@ -186,7 +179,7 @@ void Parameter::SetNumber(double number)
                           const double count = static_cast<double>(choice.names.size());
                           if (!(number >= 0.0 && number < count) || number != std::floor(number))
                             Refuse(*this, NumberText(number),
-                                   "one of 0 to " + NumberText(count - 1.0) + ": " + Listed(choice.names));
+                                   "one of 0 to " + NumberText(count - 1.0) + ": " + Joined(choice.names));
                           choice.Set(static_cast<int>(number));
                         },
                         [number](double* place) { *place = number; }, [number](bool* place) { *place = number != 0.0; },
@@ -220,7 +213,7 @@ void Parameter::Set(std::string_view text)
                           if (found == choice.names.end() && std::count_if(choice.names.begin(), choice.names.end(), begins) == 1)
                             found = std::find_if(choice.names.begin(), choice.names.end(), begins);
                           if (found == choice.names.end())
-                            Refuse(*this, "'" + std::string(text) + "'", "one of " + Listed(choice.names));
+                            Refuse(*this, "'" + std::string(text) + "'", "one of " + Joined(choice.names));
                           choice.Set(static_cast<int>(found - choice.names.begin()));
                         },
                         [this, text](bool* place) {
@@ -253,7 +246,7 @@ void Parameter::Check() const
   };
   std::visit(Overloaded{[this](const Choice& choice) {
                           if (static_cast<std::size_t>(choice.Number()) >= choice.names.size())
-                            Refuse(*this, "'" + choice.Name() + "'", "one of " + Listed(choice.names));
+                            Refuse(*this, "'" + choice.Name() + "'", "one of " + Joined(choice.names));
                         },
                         [](const bool*) {}, [](const std::string*) {},
                         [&](const Eigen::Vector3d* place) {
@@ -290,7 +283,7 @@ Parameter& Named(ParameterList& parameters, std::string_view name)
   std::vector<std::string> names;
   for (const Parameter& parameter : parameters)
     names.push_back(parameter.name);
-  throw Error(Error::Kind::InvalidParameter, "there is no parameter '" + std::string(name) + "'; there are " + Listed(names));
+  throw Error(Error::Kind::InvalidParameter, "there is no parameter '" + std::string(name) + "'; there are " + Joined(names));
 }
 
 ParameterList Join(std::vector<ParameterList> lists)

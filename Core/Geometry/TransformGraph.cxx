@@ -5,6 +5,7 @@
 #include "Core/Geometry/TransformGraph.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -51,14 +52,6 @@ bool IsInvertible(const Eigen::Affine3d& matrix)
 int Badness(TransformStatus status)
 {
   return status == TransformStatus::Valid ? 0 : status == TransformStatus::OutOfRange ? 1 : 2;
-}
-
-std::string Joined(const std::vector<std::string>& words)
-{
-  std::string text;
-  for (const std::string& word : words)
-    text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 std::string Rounded(double value)

@@ -88,8 +88,9 @@ struct ReplayTracker::Recording {
       moments.back().end = i + 1;
     }
     if (moments.empty())
-      throw Error(Error::Kind::BadFile, p.path + ": there are no poses from " + NumberText(p.from) + " to " + NumberText(p.to) +
-                                            " s; it lasts " + NumberText(log.poses.back().time - first) + " s");
+      throw Error(Error::Kind::BadFile, p.path + ": there are no poses from " + NumberText(p.from) + " s " +
+                                            (p.to < ReplayParameters().to ? "to " + NumberText(p.to) + " s" : "on") +
+                                            "; it lasts " + NumberText(log.poses.back().time - first) + " s");
     if (images && LooksLikeSequence(p.path))
       OpenImages(wanted);
     const double duration = moments.back().time - moments.front().time;

@@ -244,6 +244,8 @@ TEST_F(ReplayTrackerTest, FilesThatCannotBeReplayed)
   Refusal(start(WriteText("noise.csv", std::string("\0\1\2\3\377garbage", 12))), Error::Kind::BadFile);
   const std::string sequence = WriteSequence();
   EXPECT_NE(Refusal(start(sequence + "?from=50"), Error::Kind::BadFile).find("0.95"), std::string::npos);
+  EXPECT_NE(Refusal(start(sequence + "?from=50"), Error::Kind::BadFile).find("no poses from 50 s on;"), std::string::npos);
+  EXPECT_NE(Refusal(start(sequence + "?from=50&to=60"), Error::Kind::BadFile).find("from 50 s to 60 s;"), std::string::npos);
   const auto size = std::filesystem::file_size(sequence);
   std::filesystem::resize_file(sequence, size - 30);
   Refusal(start(sequence), Error::Kind::BadFile);
