@@ -62,51 +62,28 @@ std::size_t BytesOf(const BeamWays& ways)
          ways.directAmplitude.capacity() * sizeof(float);
 }
 
-struct Element {
-  Vector3d position, direction, across;
-};
-
-// Where a beam starts on the face, in the world.
-Element ElementOf(const SynthesisParameters& p, int element, int step)
+// The ray of a beam's axis turned into one of several over the aperture, which meet at the focus at one time.
+RayStart SubRayOf(const RayStart& axis, const Transducer& transducer, RaySamples& samples)
 {
-  const auto n = p.BeamDimensions();
-  BeamPoint at;
-  at.fan = static_cast<double>(element) / (n[1] - 1) - 0.5;
-  at.sweep = n[2] > 1 ? static_cast<double>(step) / (n[2] - 1) - 0.5 : 0.0;
-  const Pose& pose = p.stepPoses.empty() ? p.probeToWorld : p.stepPoses[static_cast<std::size_t>(step)];
-  const Vector3d direction = DirectionOf(p.probe, at);
-  const double turn = p.probe.sweepAngle * at.sweep;
-  const Vector3d outOfPlane(0.0, std::cos(turn), -std::sin(turn));
-  return {pose * PointOf(p.probe, at), pose.linear() * direction, pose.linear() * outOfPlane.cross(direction).normalized()};
-}
-
-// The ray of a beam's axis, or one of several over the aperture, which meet at the focus at one time.
-RayStart StartOf(const Element& element, const Transducer& transducer, RaySamples* samples)
-{
-  RayStart start;
-  start.origin = element.position;
-  start.direction = element.direction;
-  start.across = element.across;
-  if (!samples)
-    return start;
-  const double lateral = (samples->Next() - 0.5) * transducer.lateralApertureMm,
-               elevation = (samples->Next() - 0.5) * transducer.elevationApertureMm;
-  const Vector3d out = element.direction.cross(element.across);
-  const Vector3d focus = element.position + transducer.lateralFocusMm * element.direction;
-  start.origin += lateral * element.across + elevation * out;
+  RayStart start = axis;
+  const double lateral = (samples.Next() - 0.5) * transducer.lateralApertureMm,
+               elevation = (samples.Next() - 0.5) * transducer.elevationApertureMm;
+  const Vector3d out = axis.direction.cross(axis.across);
+  const Vector3d focus = axis.origin + transducer.lateralFocusMm * axis.direction;
+  start.origin += lateral * axis.across + elevation * out;
   const double way = (focus - start.origin).norm();
   start.direction = (focus - start.origin) / way;
-  start.across = (element.across - element.across.dot(start.direction) * start.direction).normalized();
+  start.across = (axis.across - axis.across.dot(start.direction) * start.direction).normalized();
   start.scanDepth = transducer.lateralFocusMm - way; // the same time at the focus
   return start;
 }
 
 // How much a ray from that part of the aperture counts: its apodisation.
-double WeightOf(const RayStart& start, const Element& element, const Transducer& transducer)
+double WeightOf(const RayStart& start, const RayStart& axis, const Transducer& transducer)
 {
-  const Vector3d offset = start.origin - element.position;
-  const double lateral = offset.dot(element.across) / (transducer.lateralApertureMm / Transducer::sigmasPerAperture),
-               elevation = offset.dot(element.direction.cross(element.across)) /
+  const Vector3d offset = start.origin - axis.origin;
+  const double lateral = offset.dot(axis.across) / (transducer.lateralApertureMm / Transducer::sigmasPerAperture),
+               elevation = offset.dot(axis.direction.cross(axis.across)) /
                            (transducer.elevationApertureMm / Transducer::sigmasPerAperture);
   return std::exp(-0.5 * (lateral * lateral + elevation * elevation));
 }
@@ -142,30 +119,21 @@ public:
     return {p.probe.depthMin, step / finer, static_cast<int>(std::min((p.samples - 1) * finer + 1.0, 1e9))};
   }
 
-  // Echoes from behind the last sample still reach it.
-  static double LastDepth(const SynthesisParameters& p) { return p.probe.depthMax + 4.0 * p.transducer.PulseSigmaMm(); }
-
-  static SoundConditions ConditionsOf(const SynthesisParameters& p)
-  {
-    return {p.transducer.frequencyMHz, p.transducer.assumedSoundSpeed, LastDepth(p)};
-  }
-
   const DepthAxis& Axis() const { return axis_; }
   std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(n_[1]) * n_[2]; }
 
   BeamWays Trace(std::ptrdiff_t beam, std::int64_t& rays) const
   {
-    const Element element = ElementOf(p_, static_cast<int>(beam % n_[1]), static_cast<int>(beam / n_[1]));
+    RayStart axis = AxisOf(p_, static_cast<int>(beam % n_[1]), static_cast<int>(beam / n_[1]));
+    axis.inside = scene_.BodiesAt(axis.origin);
     SoundPath path;
     BeamWays ways;
-    RayStart start = StartOf(element, p_.transducer, nullptr);
-    start.inside = scene_.BodiesAt(start.origin);
     RaySamples ofAxis(Sampling::Random, p_.seed, static_cast<std::uint64_t>(beam % n_[1]), 0, 1); // however many rays there are
-    tracer_.Trace(start, path, &ofAxis);
+    tracer_.Trace(axis, path, &ofAxis);
     rays += path.rays;
     const bool alone = p_.subRays == 1;
     if (!alone)
-      MakeBare(start, path.segments);
+      MakeBare(axis, path.segments);
     std::copy_if(path.segments.begin(), path.segments.end(), std::back_inserter(ways.segments),
                  [&](const SoundSegment& segment) { return (segment.bounces == 0 && !alone) || IsVisible(segment); });
     ways.segments.shrink_to_fit();
@@ -178,9 +146,9 @@ public:
     double sum = 0.0;
     for (int ray = 0; ray < p_.subRays; ++ray) {
       RaySamples samples = SamplesOf(beam, ray);
-      start = StartOf(element, p_.transducer, &samples);
+      RayStart start = SubRayOf(axis, p_.transducer, samples);
       start.inside = scene_.BodiesAt(start.origin);
-      const double weight = WeightOf(start, element, p_.transducer);
+      const double weight = WeightOf(start, axis, p_.transducer);
       sum += weight;
       tracer_.Trace(start, path, &samples);
       rays += path.rays;
@@ -212,7 +180,7 @@ public:
       on.way += on.length;
       on.scanDepth += on.length * on.scanDepthPerMm;
     }
-    on.length = (LastDepth(p_) - on.scanDepth) / on.scanDepthPerMm;
+    on.length = (ConditionsOf(p_).maxScanDepth - on.scanDepth) / on.scanDepthPerMm;
     for (auto segment = segments.begin(); segment != end; ++segment) {
       segment->amplitude = 1.0;
       segment->attenuation = 0.0;
@@ -326,6 +294,34 @@ double SynthesisParameters::ScatterersPerMm3() const
 std::array<int, 3> SynthesisParameters::BeamDimensions() const
 {
   return {samples, elements, probe.IsPlane() ? 1 : steps};
+}
+
+BeamPoint BeamOf(const SynthesisParameters& p, int element, int step)
+{
+  const auto n = p.BeamDimensions();
+  BeamPoint at;
+  at.fan = static_cast<double>(element) / (n[1] - 1) - 0.5;
+  at.sweep = n[2] > 1 ? static_cast<double>(step) / (n[2] - 1) - 0.5 : 0.0;
+  return at;
+}
+
+RayStart AxisOf(const SynthesisParameters& p, int element, int step)
+{
+  const BeamPoint at = BeamOf(p, element, step);
+  const Pose& pose = p.stepPoses.empty() ? p.probeToWorld : p.stepPoses[static_cast<std::size_t>(step)];
+  const Vector3d direction = DirectionOf(p.probe, at);
+  const double turn = p.probe.sweepAngle * at.sweep;
+  const Vector3d outOfPlane(0.0, std::cos(turn), -std::sin(turn));
+  RayStart axis;
+  axis.origin = pose * PointOf(p.probe, at);
+  axis.direction = pose.linear() * direction;
+  axis.across = pose.linear() * outOfPlane.cross(direction).normalized();
+  return axis;
+}
+
+SoundConditions ConditionsOf(const SynthesisParameters& p)
+{
+  return {p.transducer.frequencyMHz, p.transducer.assumedSoundSpeed, p.probe.depthMax + 4.0 * p.transducer.PulseSigmaMm()};
 }
 
 ParameterList Describe(EchoModel& m)

@@ -66,6 +66,15 @@ struct SynthesisParameters : EchoModel {
   void Check() const;
 };
 
+/// Which beam an element makes at a step of the sweep; its depth is 0, on the face.
+BeamPoint BeamOf(const SynthesisParameters& p, int element, int step);
+
+/// The ray of a beam's axis, in the world; what it starts inside of is left open.
+RayStart AxisOf(const SynthesisParameters& p, int element, int step);
+
+/// What the scanner sends and assumes. Sound is waited for a little longer than to the last sample, as later echoes reach it.
+SoundConditions ConditionsOf(const SynthesisParameters& p);
+
 /// With transducer, receiver, transport and counting, but transport's dynamic range: the receiver's has that name.
 ParameterList Describe(SynthesisParameters& p);
 

@@ -3,16 +3,21 @@
 
 #include "Core/Base/Angles.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
+#include "SeenTissue.h"
 #include "SynthesisScene.h"
 #include "vtkAlgorithmOutput.h"
+#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix4x4.h"
+#include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
+#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkUltrasoundAcquisition.h"
@@ -20,6 +25,7 @@
 #include "vtkUltrasoundTissue.h"
 
 #include <algorithm>
+#include <limits>
 
 using echorama::Error;
 using echorama::SynthesisParameters;
@@ -217,13 +223,66 @@ vtkUltrasoundSynthesizer::Job vtkUltrasoundSynthesizer::Prepare(vtkInformationVe
 }
 
 //----------------------------------------------------------------------------
+void vtkUltrasoundSynthesizer::UpdateInput(int port)
+{
+  if (this->GetNumberOfInputConnections(port) > 0) {
+    int output = 0;
+    this->GetInputAlgorithm(port, 0, output)->Update(output);
+  }
+}
+
+//----------------------------------------------------------------------------
+const echorama::AcousticScene& vtkUltrasoundSynthesizer::SceneOf(vtkPolyData* tissue, const echorama::Progress& progress)
+{
+  if (!this->Kept || this->Kept->Tissue != tissue || this->Kept->Time != tissue->GetMTime()) {
+    this->Kept.reset();
+    this->Kept.reset(
+        new SceneOfInput{tissue, tissue->GetMTime(), echorama::AcousticScene(vtkUltrasoundTissue::Of(tissue), progress)});
+  }
+  return this->Kept->Scene;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundSynthesizer::TissueToSeen(vtkPoints* from, vtkPoints* to)
+{
+  if (!from || !to) {
+    return;
+  }
+  vtkNew<vtkPoints> seen;
+  seen->SetDataTypeToDouble();
+  seen->SetNumberOfPoints(from->GetNumberOfPoints());
+  auto* places = static_cast<double*>(seen->GetVoidPointer(0));
+  std::fill_n(places, 3 * from->GetNumberOfPoints(), std::numeric_limits<double>::quiet_NaN());
+  this->UpdateInput(Tissue);
+  this->UpdateInput(Probe);
+  vtkUltrasoundVolume::Run(this, nullptr, [this, from, places](const echorama::Progress& progress) {
+    vtkInformationVector** inputs = this->GetExecutive()->GetInputInformation();
+    vtkPolyData* tissue = vtkPolyData::SafeDownCast(DataOn(inputs[Tissue]));
+    if (!tissue) {
+      throw Error(Error::Kind::BadInput, "there is no tissue on input 0");
+    }
+    const SynthesisParameters parameters = this->Prepare(inputs).Parameters;
+    const echorama::SeenTissue map(this->SceneOf(tissue, progress.Part(0.0, 0.2)), parameters, progress.Part(0.2, 0.9));
+    constexpr std::ptrdiff_t pointsPerRange = 64;
+    echorama::ParallelRanges(from->GetNumberOfPoints(), pointsPerRange, progress.Part(0.9, 1.0),
+                             [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+                               for (std::ptrdiff_t i = begin; i < end; ++i) {
+                                 Eigen::Vector3d point;
+                                 from->GetPoint(i, point.data());
+                                 if (const auto place = map.Seen(point)) {
+                                   std::copy_n(place->data(), 3, places + 3 * i);
+                                 }
+                               }
+                             });
+  });
+  to->ShallowCopy(seen);
+}
+
+//----------------------------------------------------------------------------
 int vtkUltrasoundSynthesizer::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   // Field data does not travel with the information of the pipeline.
-  if (this->GetNumberOfInputConnections(Probe) > 0) {
-    int port = 0;
-    this->GetInputAlgorithm(Probe, 0, port)->Update(port);
-  }
+  this->UpdateInput(Probe);
   return vtkUltrasoundVolume::Run(this, nullptr, [this, inputs, outputs](const echorama::Progress&) {
     const Job job = this->Prepare(inputs);
     echorama::ImageGeometry beams;
@@ -262,13 +321,9 @@ void vtkUltrasoundSynthesizer::Execute(vtkInformationVector** inputs, vtkImageDa
   if (auto* displacement = vtkImageData::SafeDownCast(DataOn(inputs[Displacement]))) {
     p.displacement = vtkUltrasoundDisplacement::FieldOf(displacement, "the displacement of the tissue");
   }
-  if (!this->Kept || this->Kept->Tissue != tissue || this->Kept->Time != tissue->GetMTime()) {
-    this->Kept.reset();
-    this->Kept.reset(new SceneOfInput{tissue, tissue->GetMTime(),
-                                      echorama::AcousticScene(vtkUltrasoundTissue::Of(tissue), progress.Part(0.0, 0.1))});
-  }
-  const auto made = echorama::SynthesizeBeams(this->Kept->Scene, p, progress.Part(0.1, 0.95), &this->LastCost);
-  this->Notes = NotesOn(this->Kept->Scene, this->LastCost);
+  const echorama::AcousticScene& scene = this->SceneOf(tissue, progress.Part(0.0, 0.1));
+  const auto made = echorama::SynthesizeBeams(scene, p, progress.Part(0.1, 0.95), &this->LastCost);
+  this->Notes = NotesOn(scene, this->LastCost);
 
   vtkImageData* beams = vtkImageData::SafeDownCast(this->GetOutputDataObject(1));
   beams->Initialize();

@@ -36,6 +36,8 @@
 
 class vtkAlgorithmOutput;
 class vtkMatrix4x4;
+class vtkPoints;
+class vtkPolyData;
 
 class ECHORAMAFILTERSACOUSTICS_EXPORT vtkUltrasoundSynthesizer : public vtkUltrasoundImageAlgorithm {
 public:
@@ -414,6 +416,17 @@ public:
   std::string GetParameterDescriptions();
   // END parameters
 
+  /**
+   * Where the image (output 0) shows the tissue at each point of the world, mm: sound bends, and its speed is not the one that
+   * the scanner assumes. The tissue is where input 0 has it now. (NaN, NaN, NaN) where it is not seen: outside of the fan or its
+   * depths (of a single plane: off the surface that it images), where no direct sound gets to, as behind total reflection, and
+   * where neighbouring beams are bent apart by more than they are wide. The points that come out replace those in \a to; their
+   * precision is double. The inputs are brought up to date, the outputs need not be. Each call follows the axes of all beams, so
+   * ask for all points at once. For coherent echoes alone: with the mode counting, and where the inputs cannot be used, an error
+   * event, and no point is seen.
+   */
+  void TissueToSeen(vtkPoints* from, vtkPoints* to);
+
   /** The JSON schema of scenes, the text of Examples/scenes/echorama-scene-1.schema.json. */
   static std::string GetSceneSchema();
 
@@ -446,6 +459,8 @@ private:
 #ifndef __VTK_WRAP__
   struct Job;
   Job Prepare(vtkInformationVector** inputs);
+  void UpdateInput(int port);
+  const echorama::AcousticScene& SceneOf(vtkPolyData* tissue, const echorama::Progress& progress);
   echorama::Pose OwnPose() const;
 
   echorama::SynthesisParameters Values; ///< probe, pose and displacement are those of the Job

@@ -5,10 +5,11 @@ import json
 import unittest
 
 import numpy as np
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkCommand, vtkDoubleArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
+from vtkmodules.vtkFiltersSources import vtkCubeSource, vtkSphereSource
 from vtkmodules.vtkFiltersGeneral import vtkTransformPolyDataFilter
 from vtkmodules.vtkCommonTransforms import vtkTransform
 
@@ -188,6 +189,95 @@ class Volumes(unittest.TestCase):
         synthesizer.source.SetSeed(99)
         synthesizer.Update()
         self.assertGreater(np.abs(before.astype(float) - grey(synthesizer.GetOutput())).mean(), 1)
+
+
+def seen_by(synthesizer, places):
+    tissue, seen = vtkPoints(), vtkPoints()
+    tissue.SetData(numpy_to_vtk(np.asarray(places, dtype=float), deep=True))
+    synthesizer.TissueToSeen(tissue, seen)
+    return vtk_to_numpy(seen.GetData())
+
+
+class WhereTissueIsSeen(unittest.TestCase):
+    places = np.array([(0, 0, 10), (2, -3, 30), (-15, 8, 45), (0, 0, 80), (90, 0, 30)])  # the last two: too deep, beside the fan
+
+    def moved(self, background):
+        """A probe somewhere in a uniform background; the places in the world, and what turns its frame into the world's."""
+        synthesizer = small(tissue(FillFraction=0, Background=background))
+        synthesizer.SetPosition(10, -20, 30)
+        synthesizer.SetOrientation(20, 30, -10)
+        pose = vtkMatrix4x4()
+        synthesizer.GetProbeToWorld(pose)
+        rotation = np.array([[pose.GetElement(i, j) for j in range(3)] for i in range(3)])
+        return synthesizer, self.places @ rotation.T + (10, -20, 30), rotation
+
+    def test_with_the_speed_that_is_assumed_where_it_is(self):
+        synthesizer, world, _ = self.moved("tissue")
+        seen = seen_by(synthesizer, world)
+        np.testing.assert_allclose(seen[:3], world[:3], atol=1e-6)
+        self.assertTrue(np.isnan(seen[3:]).all())
+        self.assertEqual(synthesizer.GetOutput().GetNumberOfPoints(), 0)  # no update was needed
+
+    def test_with_another_speed_deeper(self):
+        synthesizer, world, rotation = self.moved("fat")
+        seen = seen_by(synthesizer, world)
+        np.testing.assert_allclose(seen[0] - world[0], rotation @ (0, 0, 10 * (1540 / 1450 - 1)), atol=1e-2)  # between beams
+        synthesizer.SetAssumedSoundSpeed(1450)
+        np.testing.assert_allclose(seen_by(synthesizer, world)[:3], world[:3], atol=1e-6)
+
+    def test_tissue_and_probe_that_change(self):
+        synthesizer = small(tissue(FillFraction=0))
+        np.testing.assert_allclose(seen_by(synthesizer, self.places)[:3], self.places[:3], atol=1e-6)
+        synthesizer.source.SetBackground("fat")
+        self.assertGreater(seen_by(synthesizer, self.places)[1, 2], self.places[1, 2] + 1)
+        probe = echorama.vtkUltrasoundProbeSource()
+        probe.SetPosition(0, 0, 100)
+        synthesizer.SetProbeConnection(probe.GetOutputPort())
+        self.assertTrue(np.isnan(seen_by(synthesizer, self.places)).all())
+
+    def test_a_ball_is_shown_there(self):
+        """Behind a slanted layer, all in clear water: the middle of the power in the image."""
+        ball, layer, slant, slanted = vtkSphereSource(), vtkCubeSource(), vtkTransform(), vtkTransformPolyDataFilter()
+        centre = (2, -1, 45)
+        ball.SetCenter(centre)
+        ball.SetRadius(0.6)
+        for length in (layer.SetXLength, layer.SetYLength):
+            length(120)
+        layer.SetZLength(12)
+        slant.Translate(0, 0, 22)
+        slant.RotateY(35)
+        slanted.SetTransform(slant)
+        slanted.SetInputConnection(layer.GetOutputPort())
+        meshes = echorama.vtkUltrasoundTissueMeshes()
+        meshes.AddInputConnection(slanted.GetOutputPort())
+        meshes.AddInputConnection(ball.GetOutputPort())
+        meshes.SetMaterials("cyst, tissue")
+        meshes.SetBackground("water")
+        synthesizer = small(meshes)
+        for name, value in dict(FanAngle=15, SweepAngle=10, DepthMin=38, DepthMax=54, Elements=40, Steps=16, Samples=200,
+                                SpacingMm=0.25, NoiseDb=-200, MirrorDb=0, ScatterersPerMm3=100).items():
+            synthesizer.SetParameter(name, value)
+        power = 0.0
+        for seed in range(1, 6):  # few scatterers have their middle anywhere in the ball
+            synthesizer.SetSeed(seed)
+            synthesizer.Update()
+            greys = grey(synthesizer.GetOutput()).astype(float)
+            self.assertTrue(100 < greys.max() < 255, greys.max())
+            power += np.where(greys > 0, 10 ** (greys / 255 * synthesizer.GetDynamicRangeDb() / 10), 0)
+        index = [(power * axis).sum() / power.sum() for axis in np.indices(power.shape)[::-1]]
+        middle = index * np.array(synthesizer.GetOutput().GetSpacing()) + synthesizer.GetOutput().GetOrigin()
+        seen = seen_by(synthesizer, [centre])[0]
+        np.testing.assert_allclose(middle, seen, atol=0.3)
+        self.assertGreater(np.linalg.norm(seen - centre), 1.2)
+
+    def test_errors_leave_nothing_seen(self):
+        for change in (lambda s: s.SetModeToCounting(), lambda s: s.SetElements(1), lambda s: s.RemoveAllInputs(),
+                       lambda s: s.SetInputData(vtkPolyData()), lambda s: s.SetInputData(1, vtkPolyData())):
+            synthesizer, errors = small(), []
+            change(synthesizer)
+            synthesizer.AddObserver(vtkCommand.ErrorEvent, lambda *_: errors.append(1))
+            self.assertTrue(np.isnan(seen_by(synthesizer, self.places)).all())
+            self.assertEqual(len(errors), 1)
 
 
 class Refusals(unittest.TestCase):
