@@ -216,7 +216,7 @@ int vtkUltrasoundHandEyeCalibration::RequestData(vtkInformation*, vtkInformation
     this->Result = echorama::CalibrateHandEye(pairs, this->Values, progress);
     this->Result.notes.insert(this->Result.notes.begin(), notes.begin(), notes.end());
     this->PutOut(vtkPolyData::GetData(outputs), pairs);
-    this->Report = echorama::Report(this->Result, this->Values);
+    this->Report = echorama::Report(this->Result, this->Values.With(this->Result.noise));
     this->HasResult = true;
   });
 }

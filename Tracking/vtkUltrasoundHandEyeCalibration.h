@@ -127,8 +127,9 @@ public:
 
   ///@{
   /**
-   * Whether both noises are scaled, in their ratio, to what the residuals show. With fewer than five scans that agree they stay
-   * as stated, and a note says so. Default off.
+   * Whether the noise is estimated from the residuals: its size from five scans that agree; from eight also the ratio of its
+   * parts, and about which point of the volume alignments err, where residuals contradict what is stated. Otherwise it stays as
+   * stated. Notes say which. Default on.
    */
   void SetEstimateNoise(bool value) { this->SetParameter("EstimateNoise", value); }
   bool GetEstimateNoise() { return this->GetParameter("EstimateNoise") != 0.0; }

@@ -158,8 +158,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
     if (trusted[i])
       pairs.push_back({sensor.poses[i], volumes[i].volumeToWorld * frames.toWorld[i], volumes[i].file});
   }
-  constexpr int fewest = 5; // below, residuals say too little about the noise
-  parameters.estimateNoise = !options.noiseGiven && pairs.size() >= fewest;
+  parameters.estimateNoise = !options.noiseGiven;
 
   HandEyeResult result;
   session.Work("calibrate", "", [&](const Progress& progress) { result = CalibrateHandEye(pairs, parameters, progress); });
@@ -174,7 +173,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   world.from = "World";
   world.to = tool.to;
   world.matrix = result.solution.worldToTracker;
-  nlohmann::ordered_json report = ToJson(result, parameters);
+  nlohmann::ordered_json report = ToJson(result, parameters.With(result.noise));
   report["volume_frame"] = frames.Name();
   if (rig.depthScale > 0.0)
     report["rig"] = {{"rig", options.rig},

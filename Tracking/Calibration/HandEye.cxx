@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The order of work: check the poses; refuse motions that cannot answer; find what the scans agree on, and who does not
-// (HandEyeSearch); when too few agree, look for the mistake (HandEyeDiagnosis); refuse again, for the scans that are left; then
-// state how well the target is known (HandEyeModel) and what would help (HandEyeAdvice).
+// (HandEyeSearch); ask what the residuals say of the noise (HandEyeComponents), and again who agrees; when they disagree, look
+// for the mistake (HandEyeDiagnosis), with the noise estimated, which a mistake makes large, so that noise in another ratio than
+// stated is none; refuse again, for the scans that are left; then state how well the target is known (HandEyeModel) and what
+// would help (HandEyeAdvice).
 //
-// The covariance is the inverse of Fisher's information at the optimum, with the noise as stated or, on request, scaled to the
-// inliers' residuals.
+// The covariance is the inverse of Fisher's information at the optimum, with the noise as stated, scaled to the inliers'
+// residuals, or estimated from them in its parts.
 #include "Tracking/Calibration/HandEye.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
@@ -12,6 +14,7 @@
 #include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include "Tracking/Calibration/HandEyeAdvice.h"
+#include "Tracking/Calibration/HandEyeComponents.h"
 #include "Tracking/Calibration/HandEyeDiagnosis.h"
 #include "Tracking/Calibration/HandEyeSearch.h"
 #include <algorithm>
@@ -21,15 +24,33 @@
 namespace echorama {
 namespace {
 
-constexpr std::size_t LeastForNoise = 5; // scans
+constexpr std::size_t LeastForNoise = 5, LeastForRatio = 8; // scans
+constexpr int RatioRounds = 5;                              // until the same scans agree
 // Residuals of so many times the noise may come from a mistake; are no noise; are no noise either when it is to be estimated.
 constexpr double SuspectScale = 1.3, HopelessScale = 10.0, HopelessEstimatedScale = 40.0;
 // Three scans agree by chance too easily to outvote another.
 constexpr std::size_t LeastMajority = 4, ManyScans = 8;
 
-PoseNoise Scaled(const PoseNoise& noise, double scale)
+HandEyeNoise Scaled(HandEyeNoise noise, double scale)
 {
-  return {noise.degrees * scale, noise.mm * scale};
+  for (PoseNoise* side : {&noise.sensor, &noise.volume}) {
+    side->degrees *= scale;
+    side->mm *= scale;
+  }
+  return noise;
+}
+
+// Which parts were estimated, and what they are.
+std::string TextOf(const HandEyeNoise& noise, const HandEyeNoise& stated, bool withCentre)
+{
+  std::string text =
+      Format("The residuals contradict the ratio of the noises stated; as estimated they are %.2g mm and %.2g degrees of "
+             "the sensor, %.2g mm and %.2g degrees of the alignments",
+             noise.sensor.mm, noise.sensor.degrees, noise.volume.mm, noise.volume.degrees);
+  if (withCentre)
+    text += Format(", which turn about (%.1f, %.1f, %.1f) of the volume, %.0f mm from the target", noise.centre.x(),
+                   noise.centre.y(), noise.centre.z(), (noise.centre - stated.centre).norm());
+  return text + ".";
 }
 
 // A sensor pose that comes again with another alignment was not read anew, or the scan was aligned twice.
@@ -75,13 +96,22 @@ ParameterList Describe(HandEyeParameters& p)
                 "Standard deviation of the turns of the alignments, about each axis of the volume."),
       Parameter("VolumeNoiseMm", p.volumeNoise.mm, mm, "mm",
                 "Standard deviation of the target's place by the alignments, along each axis of the volume."),
-      Parameter("EstimateNoise", p.estimateNoise,
-                "Whether both noises are scaled, in their ratio, to what the residuals show. With fewer than five scans that "
-                "agree they stay "
-                "as stated, and a note says so."),
+      Parameter(
+          "EstimateNoise", p.estimateNoise,
+          "Whether the noise is estimated from the residuals: its size from five scans that agree; from eight also the ratio "
+          "of its parts, and about which point of the volume alignments err, where residuals contradict what is stated. "
+          "Otherwise it stays as stated. Notes say which."),
       Parameter("RejectOutliers", p.rejectOutliers, "Whether scans that do not agree with the others are left out, and named."),
       Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "Seed of the search for scans that agree.").Advanced(),
   };
+}
+
+HandEyeParameters HandEyeParameters::With(const HandEyeNoise& noise) const
+{
+  HandEyeParameters changed = *this;
+  changed.sensorNoise = noise.sensor;
+  changed.volumeNoise = noise.volume;
+  return changed;
 }
 
 void HandEyeParameters::Check() const
@@ -122,7 +152,8 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
 
   // The solution.
   const std::size_t count = pairs.size();
-  const HandEyeModel model(pairs, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
+  const HandEyeNoise stated = parameters.Noise();
+  HandEyeModel model(pairs, stated, parameters.target);
   const auto search = [&](bool estimate, const Progress& part) {
     return FindHandEyeConsensus(pairs, model, parameters.rejectOutliers, parameters.target, estimate, parameters.seed, part);
   };
@@ -130,32 +161,61 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
     return static_cast<std::size_t>(std::count(found.inlier.begin(), found.inlier.end(), 1));
   };
   result.noiseEstimated = parameters.estimateNoise && count >= LeastForNoise;
-  HandEyeConsensus consensus = search(result.noiseEstimated, progress.Part(0.0, 0.5));
+  HandEyeConsensus consensus = search(result.noiseEstimated, progress.Part(0.0, 0.4));
   if (result.noiseEstimated && inliersOf(consensus) < LeastForNoise) {
     result.noiseEstimated = false;
-    consensus = search(false, progress.Part(0.5, 0.8));
+    consensus = search(false, progress.Part(0.4, 0.7));
   }
   if (parameters.estimateNoise && !result.noiseEstimated)
     result.notes.push_back(Format("The noise was taken as stated: it cannot be estimated from fewer than %d scans that agree.",
                                   static_cast<int>(LeastForNoise)));
-  const std::size_t inliers = inliersOf(consensus);
-  const bool tooFew = inliers < count && (inliers < LeastMajority || 2 * inliers < count);
-  const bool hopeless = tooFew || consensus.scale > (result.noiseEstimated ? HopelessEstimatedScale : HopelessScale);
-  if (hopeless || consensus.scale > SuspectScale || (inliers < count && (count < ManyScans || 4 * inliers < 3 * count))) {
-    const std::string explanation = ExplainDisagreement(pairs, parameters, consensus, progress.Part(0.8, 0.9));
+
+  // Do they agree at all?
+  const auto refuseMistake = [&](const HandEyeNoise& noise) {
+    const std::string explanation = ExplainDisagreement(pairs, parameters, noise, consensus, progress.Part(0.8, 0.9));
     if (!explanation.empty())
       RefuseHandEye("the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
                     " are left. " + explanation);
-    if (tooFew)
-      RefuseHandEye(Format(
-          "no more than %d of %d scans agree with each other, which may be chance. Check that every sensor pose belongs to "
-          "its volume, or add scans",
-          static_cast<int>(inliers), static_cast<int>(count)));
-    if (hopeless)
-      RefuseHandEye(
-          "the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
-          Format(" are left, %.3g times the noise stated. Check that every sensor pose belongs to its volume", consensus.scale));
+  };
+  const auto tooFew = [count](std::size_t inliers) {
+    return inliers < count && (inliers < LeastMajority || 2 * inliers < count);
+  };
+  const auto refuseTooFew = [&] {
+    RefuseHandEye(Format("no more than %d of %d scans agree with each other, which may be chance. Check that every sensor pose "
+                         "belongs to its volume, or add scans",
+                         static_cast<int>(inliersOf(consensus)), static_cast<int>(count)));
+  };
+  const double scale = consensus.scale; // of the noise as stated
+  if (tooFew(inliersOf(consensus)) || scale > (result.noiseEstimated ? HopelessEstimatedScale : HopelessScale)) {
+    refuseMistake(stated);
+    if (tooFew(inliersOf(consensus)))
+      refuseTooFew();
+    RefuseHandEye("the scans do not agree with each other: typically " + TypicalResidual(model, consensus.fit.solution) +
+                  Format(" are left, %.3g times the noise stated. Check that every sensor pose belongs to its volume", scale));
   }
+
+  // What residuals say of the noise, and who agrees when they are weighed by it.
+  HandEyeComponents components;
+  for (int round = 0; result.noiseEstimated && round < RatioRounds && inliersOf(consensus) >= LeastForRatio; ++round) {
+    const HandEyeComponents found = EstimateHandEyeComponents(model, stated, consensus.fit.solution, consensus.inlier);
+    if (!found.ratio)
+      break;
+    components = found;
+    model.SetNoise(found.noise);
+    const std::vector<char> before = consensus.inlier;
+    consensus = HandEyeConsensusNear(found.solution, 1.0, model, parameters.rejectOutliers, true);
+    progress(0.7 + 0.02 * round);
+    if (consensus.inlier == before)
+      break;
+  }
+  const std::size_t inliers = inliersOf(consensus);
+  if (scale > SuspectScale || (inliers < count && (count < ManyScans || 4 * inliers < 3 * count)))
+    refuseMistake(components.ratio ? components.noise : stated);
+  if (tooFew(inliers))
+    refuseTooFew();
+  result.ratioEstimated = components.ratio;
+  result.centreEstimated = components.centre;
+  result.noise = components.ratio ? components.noise : stated;
   result.solution = consensus.fit.solution;
   progress(0.9);
 
@@ -198,7 +258,9 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   // The noise that the residuals show.
   const int degreesOfFreedom = 6 * result.inliers - 12;
   const double shown = degreesOfFreedom > 0 ? std::sqrt(chiSquare / degreesOfFreedom) : 1.0;
-  if (result.noiseEstimated)
+  if (result.ratioEstimated)
+    result.notes.push_back(TextOf(result.noise, stated, result.centreEstimated));
+  else if (result.noiseEstimated)
     result.noiseScale = std::max(shown, 1e-6);
   else if (chiSquare > degreesOfFreedom + 4.0 * std::sqrt(2.0 * degreesOfFreedom))
     result.notes.push_back(
@@ -216,27 +278,28 @@ HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& given, const Hand
   for (std::size_t i = 0; i < count; ++i)
     if (consensus.inlier[i])
       agreed.push_back(pairs[i]);
-  RefuseTooLittleMotion(agreed, Scaled(parameters.sensorNoise, result.noiseScale),
-                        Scaled(parameters.volumeNoise, result.noiseScale));
+  const HandEyeNoise used = Scaled(result.noise, result.noiseScale);
+  RefuseTooLittleMotion(agreed, used.sensor, used.volume);
 
   RefuseTwoAnswers(pairs, consensus.inlier, model, result.solution, parameters.target, result.noiseScale);
 
   // How well it is known.
   const HandEyeMatrix covariance =
-      result.noiseScale * result.noiseScale * model.CovarianceOfStep(result.solution, consensus.inlier);
+      result.ratioEstimated
+          ? components.covariance
+          : HandEyeMatrix(result.noiseScale * result.noiseScale * model.CovarianceOfStep(result.solution, consensus.inlier));
   if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0)
     RefuseHandEye("the motions do not determine the calibration; add scans that turn about other axes");
   result.covariance = model.CovarianceOfPoses(covariance);
   const Eigen::Matrix3d& R = result.solution.volumeToSensor.linear();
   result.targetCovariance = R * covariance.topLeftCorner<3, 3>() * R.transpose();
   result.targetRmsMm = std::sqrt(result.targetCovariance.trace());
-  const int residualFreedom = result.noiseEstimated ? degreesOfFreedom : 0;
+  const int residualFreedom = result.ratioEstimated   ? static_cast<int>(components.degreesOfFreedom)
+                              : result.noiseEstimated ? degreesOfFreedom
+                                                      : 0;
   result.targetRadius95Mm = ConfidenceRadius(result.targetCovariance, residualFreedom);
 
-  HandEyeParameters scaled = parameters;
-  scaled.sensorNoise = Scaled(parameters.sensorNoise, result.noiseScale);
-  scaled.volumeNoise = Scaled(parameters.volumeNoise, result.noiseScale);
-  result.advice = AdviseHandEye(pairs, consensus.inlier, result.solution, covariance, scaled, residualFreedom);
+  result.advice = AdviseHandEye(pairs, consensus.inlier, result.solution, covariance, used, parameters.target, residualFreedom);
   for (const std::string& note : HandEyeSuspicions(agreed, result.solution, parameters))
     result.notes.push_back(note);
   progress(1.0);

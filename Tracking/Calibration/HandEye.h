@@ -26,14 +26,23 @@ struct PoseNoise {
   double degrees = 0.25, mm = 0.7;
 };
 
+/// The noise of both sides.
+struct HandEyeNoise {
+  PoseNoise sensor;                                 ///< of S, in the sensor's own axes
+  PoseNoise volume;                                 ///< of M, in the volume's axes about the centre
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< in the volume's frame, mm
+};
+
 struct HandEyeParameters {
   PoseNoise sensorNoise; ///< of S, in the sensor's own axes
   PoseNoise volumeNoise; ///< of M, in the volume's axes about \a target
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
   bool rejectOutliers = true;
-  bool estimateNoise = false;
+  bool estimateNoise = true;
   std::uint64_t seed = 1;
 
+  HandEyeNoise Noise() const { return {sensorNoise, volumeNoise, target}; }
+  HandEyeParameters With(const HandEyeNoise& noise) const; ///< but for its centre
   void Check() const; ///< Throws Error(InvalidParameter): ranges, and that not both sides are without noise.
 };
 ParameterList Describe(HandEyeParameters& p);
@@ -67,7 +76,10 @@ struct HandEyeResult {
   double targetRadius95Mm = 0.0;        ///< of the sphere that holds the true place with 95%, computed from all three axes
   double rmsMm = 0.0, rmsDegrees = 0.0; ///< of the inliers' residuals
   bool noiseEstimated = false;          ///< whether it was asked for, and the inliers are enough
-  double noiseScale = 1.0;              ///< what the noise was multiplied with; 1 unless estimated
+  bool ratioEstimated = false;          ///< whether the ratio of its parts was, too,
+  bool centreEstimated = false;         ///< and where alignments turn
+  HandEyeNoise noise;                   ///< as stated or, where its ratio was estimated, as estimated
+  double noiseScale = 1.0;              ///< what it was multiplied with, where its size alone was estimated; else 1
   std::vector<HandEyeAdvice> advice;    ///< the best first
   std::vector<std::string> notes;       ///< what was noticed: units, conventions, outliers; sentences for people
 };
@@ -79,7 +91,8 @@ struct HandEyeResult {
 /// or all about parallel axes, identical poses, pure translation; when the sides disagree in a way that units (metres against mm)
 /// or an exchanged convention (S or M inverted) explain, the message says so. Where scans disagree, four must agree, and half of
 /// all: three do by chance too easily, and for the same reason three scans with a side inverted are not found out.
-/// Error(Cancelled). Cost: 2.5 ms for 20 scans; linear in their number, but for one pass over all pairs that looks for repeats.
+/// Error(Cancelled). Cost: 2.5 ms for 20 scans with the noise as stated; linear in their number, but for one pass over all pairs
+/// that looks for repeats.
 HandEyeResult CalibrateHandEye(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters = {},
                                const Progress& progress = {});
 

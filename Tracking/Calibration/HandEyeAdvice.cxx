@@ -45,7 +45,7 @@ std::string AxisText(const Eigen::Vector3d& axis)
 
 std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier,
                                          const HandEyeSolution& solution, const HandEyeMatrix& covariance,
-                                         const HandEyeParameters& parameters, int degreesOfFreedom)
+                                         const HandEyeNoise& noise, const Eigen::Vector3d& target, int degreesOfFreedom)
 {
   struct Candidate {
     double variance = 0.0;
@@ -60,14 +60,14 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
         if (x > 0 || y > 0 || (y == 0 && z > 0)) // one of each pair of opposite ones
           axes.emplace_back(x, y, z);
 
-  const Pose mean = MeanPose(pairs, inlier, parameters.target);
+  const Pose mean = MeanPose(pairs, inlier, target);
   std::vector<HandEyePair> asked;
   std::vector<Candidate> candidates;
   for (std::size_t axis = 0; axis < axes.size(); ++axis)
     for (const double degrees : {15.0, -15.0, 30.0, -30.0, 45.0, -45.0, 60.0, -60.0}) {
       HandEyePair pair;
       const Eigen::Vector3d turn = axes[axis].normalized() * degrees * RadiansPerDegree;
-      pair.volumeToWorld = mean * MotionAbout(parameters.target, turn, Eigen::Vector3d::Zero());
+      pair.volumeToWorld = mean * MotionAbout(target, turn, Eigen::Vector3d::Zero());
       pair.sensorToTracker = solution.worldToTracker * pair.volumeToWorld * solution.volumeToSensor.inverse();
       asked.push_back(pair);
       candidates.push_back({0.0, axis, degrees, Eigen::Matrix3d::Zero()});
@@ -75,15 +75,14 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
   // The model's step turns O about the middle of its scans; the candidates come behind the scans to keep it where it is.
   std::vector<HandEyePair> together = pairs;
   together.insert(together.end(), asked.begin(), asked.end());
-  const HandEyeModel model(together, parameters.sensorNoise, parameters.volumeNoise, parameters.target,
-                           static_cast<int>(pairs.size()));
-  const Eigen::Matrix<double, 6, 6> noise = model.Covariance(solution.volumeToSensor);
+  const HandEyeModel model(together, noise, target, static_cast<int>(pairs.size()));
+  const Eigen::Matrix<double, 6, 6> ofResidual = model.Covariance(solution.volumeToSensor);
   const Eigen::Matrix<double, 3, 12> top = covariance.topRows<3>();
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     // What is known of the target after it (Woodbury).
     const Eigen::Matrix<double, 6, 12> jacobian = model.Jacobian(static_cast<int>(pairs.size() + i), Twist::Zero());
     const Eigen::Matrix<double, 6, 3> gain = jacobian * top.transpose();
-    const Eigen::Matrix<double, 6, 6> seen = noise + jacobian * covariance * jacobian.transpose();
+    const Eigen::Matrix<double, 6, 6> seen = ofResidual + jacobian * covariance * jacobian.transpose();
     candidates[i].covariance = covariance.topLeftCorner<3, 3>() - gain.transpose() * SolveSymmetric(seen, gain);
     candidates[i].variance = candidates[i].covariance.trace();
   }

@@ -11,6 +11,6 @@ namespace echorama {
 /// the residuals that the noise was estimated from, 0 when it was stated; a further scan brings six more.
 std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier,
                                          const HandEyeSolution& solution, const HandEyeMatrix& covariance,
-                                         const HandEyeParameters& parameters, int degreesOfFreedom);
+                                         const HandEyeNoise& noise, const Eigen::Vector3d& target, int degreesOfFreedom);
 
 } // namespace echorama

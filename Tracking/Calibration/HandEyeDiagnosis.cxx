@@ -162,7 +162,7 @@ void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<c
 }
 
 std::string ExplainDisagreement(const std::vector<HandEyePair>& given, const HandEyeParameters& parameters,
-                                const HandEyeConsensus& consensus, const Progress& progress)
+                                const HandEyeNoise& noise, const HandEyeConsensus& consensus, const Progress& progress)
 {
   std::vector<HandEyePair> pairs = given;
   if (given.size() > AskedScans) {
@@ -198,8 +198,8 @@ std::string ExplainDisagreement(const std::vector<HandEyePair>& given, const Han
     }
     return result;
   };
-  const auto solve = [&parameters](const std::vector<HandEyePair>& tried) {
-    const HandEyeModel model(tried, parameters.sensorNoise, parameters.volumeNoise, parameters.target);
+  const auto solve = [&parameters, &noise](const std::vector<HandEyePair>& tried) {
+    const HandEyeModel model(tried, noise, parameters.target);
     return FindHandEyeConsensus(tried, model, true, parameters.target, false, parameters.seed);
   };
   const Repair* best = nullptr;

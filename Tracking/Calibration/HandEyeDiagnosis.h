@@ -27,10 +27,10 @@ void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<c
 
 /// When the scans do not agree well: what would make them, as a sentence. Tried are lengths in metres, centimetres and inches on
 /// either side, and one side given the wrong way round, alone and with a side in metres. Empty when nothing explains the scans a
-/// thousand times better than \a consensus, by their likelihoods. Of more than 60 scans 60 are asked, evenly chosen.
-/// \throws Error(Cancelled).
+/// thousand times better than \a consensus, by their likelihoods with this \a noise. Of more than 60 scans 60 are asked, evenly
+/// chosen. \throws Error(Cancelled).
 std::string ExplainDisagreement(const std::vector<HandEyePair>& pairs, const HandEyeParameters& parameters,
-                                const HandEyeConsensus& consensus, const Progress& progress = {});
+                                const HandEyeNoise& noise, const HandEyeConsensus& consensus, const Progress& progress = {});
 
 /// What looks strange although the scans agree: both sides in metres, a lever that suggests both inverted. Sentences.
 std::vector<std::string> HandEyeSuspicions(const std::vector<HandEyePair>& pairs, const HandEyeSolution& solution,

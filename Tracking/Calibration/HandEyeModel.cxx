@@ -3,7 +3,8 @@
 // Moving C by Exp(c) about the target and O by Exp(o) about the middle gives Exp(-c) F Exp(Ad o), where Ad belongs to the scan
 // and is made once. So the derivatives are -J_l^-1(e) and J_r^-1(e) Ad, of which the first three terms of the series are taken.
 //
-// Noise s of S, S = S* Exp(s), and m of M about the target, M T = M* T Exp(m), give e = m - Ad((C T)^-1) s to first order.
+// Noise s of S, S = S* Exp(s), and m of M about the target, M T = M* T Exp(m), give e = m - Ad((C T)^-1) s to first order; noise
+// about another centre c is m = Ad(c - target) m'.
 //
 // Twelve unknowns and six residuals per scan: the normal matrix is made in some 0.3 microseconds per scan. The weights
 // depend on C through the lever; they follow it from step to step and are not differentiated, as in iteratively weighted least
@@ -48,9 +49,9 @@ Eigen::Matrix<double, 6, 6> Adjoint(const Pose& pose)
   return m;
 }
 
-HandEyeModel::HandEyeModel(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise,
-                           const Eigen::Vector3d& target, int middleOf)
-  : sensorNoise_(sensorNoise), volumeNoise_(volumeNoise), target_(target)
+HandEyeModel::HandEyeModel(const std::vector<HandEyePair>& pairs, const HandEyeNoise& noise, const Eigen::Vector3d& target,
+                           int middleOf)
+  : noise_(noise), target_(target)
 {
   const std::size_t within = middleOf > 0 ? static_cast<std::size_t>(middleOf) : pairs.size();
   for (std::size_t i = 0; i < within; ++i)
@@ -79,7 +80,8 @@ Twist HandEyeModel::Residual(int scan, const HandEyeSolution& solution) const
 Matrix6 HandEyeModel::Covariance(const Pose& volumeToSensor) const
 {
   const Matrix6 lever = Adjoint(Pose(volumeToSensor * Eigen::Translation3d(target_)).inverse());
-  return lever * CovarianceOf(sensorNoise_) * lever.transpose() + CovarianceOf(volumeNoise_);
+  const Matrix6 turn = Adjoint(Pose(Eigen::Translation3d(noise_.centre - target_)));
+  return lever * CovarianceOf(noise_.sensor) * lever.transpose() + turn * CovarianceOf(noise_.volume) * turn.transpose();
 }
 
 Eigen::Matrix<double, 6, 12> HandEyeModel::Jacobian(int scan, const Twist& residual) const

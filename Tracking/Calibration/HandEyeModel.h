@@ -13,15 +13,16 @@ using HandEyeMatrix = Eigen::Matrix<double, 12, 12>;
 /// The statistics of S C = O M with noise on both sides.
 ///
 /// The residual of a scan is the twist between the volume as the tracker places it, S C, and as the alignment does, O M, about
-/// the target and in the volume's axes. The noise of M is that of the target's placement. The noise of S is turned into the
-/// volume's axes and carried along the lever from the sensor to the target: an error of the sensor's angle moves the target, and
-/// does so together with the turn. So one full 6x6 covariance, which depends on C and is the same for all scans, weighs the
-/// residuals.
+/// the target and in the volume's axes. The noise of M turns about its centre, which moves the target where that is another
+/// place. The noise of S is turned into the volume's axes and carried along the lever from the sensor to the target: an error of
+/// the sensor's angle moves the target, and does so together with the turn. So one full 6x6 covariance, which depends on C and is
+/// the same for all scans, weighs the residuals.
 class HandEyeModel {
 public:
   /// At least one pair; rigid ones. The middle is that of the first \a middleOf pairs (0: all).
-  HandEyeModel(const std::vector<HandEyePair>& pairs, const PoseNoise& sensorNoise, const PoseNoise& volumeNoise,
-               const Eigen::Vector3d& target, int middleOf = 0);
+  HandEyeModel(const std::vector<HandEyePair>& pairs, const HandEyeNoise& noise, const Eigen::Vector3d& target, int middleOf = 0);
+
+  void SetNoise(const HandEyeNoise& noise) { noise_ = noise; }
 
   int Count() const { return static_cast<int>(scans_.size()); }
 
@@ -65,7 +66,7 @@ private:
     Eigen::Matrix<double, 6, 6> worldToTarget; // adjoint of the way from the middle of the world to the target
   };
   std::vector<Scan> scans_;
-  PoseNoise sensorNoise_, volumeNoise_;
+  HandEyeNoise noise_;
   Eigen::Vector3d target_, middle_ = Eigen::Vector3d::Zero();
 };
 

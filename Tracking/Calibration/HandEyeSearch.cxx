@@ -190,6 +190,69 @@ HandEyeSolution HandEyeRival(const std::vector<HandEyePair>& pairs, const std::v
   return rival;
 }
 
+// Those far off leave at once, then the worst, one by one or by tenths; who agrees after all comes back.
+HandEyeConsensus HandEyeConsensusNear(const HandEyeSolution& start, double scale, const HandEyeModel& model, bool rejectOutliers,
+                                      bool estimateNoise, const Progress& progress)
+{
+  const auto count = static_cast<std::size_t>(model.Count());
+  const bool reject = rejectOutliers && count > 3;
+  const std::vector<char> all(count, 1);
+  HandEyeConsensus consensus;
+  consensus.fit = model.Refine(start, all, reject ? std::max(1.0, scale) : 0.0);
+  consensus.inlier = all;
+  consensus.scale = ScaleOf(consensus.fit.chiSquare);
+  double limit = RareChiSquare6;
+  if (reject) {
+    const double tested = estimateNoise ? std::max(consensus.scale, 0.02) : std::max(consensus.scale, 1.0);
+    const double rough = estimateNoise ? 1.0 + 5.0 / (static_cast<double>(count) - 2.0) : 1.0; // the median of few
+    limit *= tested * tested * rough * rough;
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t i = 0; i < count; ++i)
+      order.emplace_back(consensus.fit.chiSquare[i], i);
+    std::sort(order.begin(), order.end());
+    for (std::size_t i = 3; i < count; ++i) // at least three stay
+      if (order[i].first > 2.0 * limit)
+        consensus.inlier[order[i].second] = 0;
+  }
+  bool returned = false;
+  for (std::size_t round = 0; round <= 2 * count; ++round) {
+    if (reject || round > 0)
+      consensus.fit = model.Refine(consensus.fit.solution, consensus.inlier);
+    const HandEyeMatrix covariance = model.CovarianceOfStep(consensus.fit.solution, consensus.inlier);
+    consensus.square.assign(count, 0.0);
+    std::vector<std::pair<double, std::size_t>> beyond;
+    for (std::size_t i = 0; i < count; ++i) {
+      consensus.square[i] =
+          model.PredictedChiSquare(static_cast<int>(i), consensus.fit.solution, covariance, consensus.inlier[i] != 0);
+      if (consensus.inlier[i] && consensus.square[i] > limit)
+        beyond.emplace_back(-consensus.square[i], i);
+    }
+    if (!reject)
+      break;
+    progress(1.0 - 1.0 / (1.0 + 0.1 * static_cast<double>(round)));
+    const auto present = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
+    if (!beyond.empty() && present > 3) {
+      std::sort(beyond.begin(), beyond.end());
+      const std::size_t some = count > OneByOne ? std::max<std::size_t>(1, beyond.size() / 10) : 1;
+      for (std::size_t i = 0; i < std::min(some, present - 3); ++i)
+        consensus.inlier[beyond[i].second] = 0;
+      continue;
+    }
+    bool changed = false;
+    if (!returned)
+      for (std::size_t i = 0; i < count; ++i)
+        if (!consensus.inlier[i] && consensus.square[i] <= limit) {
+          consensus.inlier[i] = 1;
+          changed = true;
+        }
+    returned = true;
+    if (!changed)
+      break;
+  }
+  progress(1.0);
+  return consensus;
+}
+
 HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, const HandEyeModel& model, bool rejectOutliers,
                                       const Eigen::Vector3d& target, bool estimateNoise, std::uint64_t seed,
                                       const Progress& progress)
@@ -253,60 +316,7 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
   }
 
   // 3. outliers leave
-  HandEyeConsensus consensus;
-  consensus.fit = reject ? model.Refine(fits[best].solution, all, common) : fits[best];
-  consensus.inlier = all;
-  consensus.scale = ScaleOf(consensus.fit.chiSquare);
-  double limit = RareChiSquare6;
-  if (reject) {
-    const double tested = estimateNoise ? std::max(consensus.scale, 0.02) : std::max(consensus.scale, 1.0);
-    const double rough = estimateNoise ? 1.0 + 5.0 / (static_cast<double>(count) - 2.0) : 1.0; // the median of few
-    limit *= tested * tested * rough * rough;
-    std::vector<std::pair<double, std::size_t>> order;
-    for (std::size_t i = 0; i < count; ++i)
-      order.emplace_back(consensus.fit.chiSquare[i], i);
-    std::sort(order.begin(), order.end());
-    for (std::size_t i = 3; i < count; ++i) // at least three stay
-      if (order[i].first > 2.0 * limit)
-        consensus.inlier[order[i].second] = 0;
-  }
-  bool returned = false;
-  for (std::size_t round = 0; round <= 2 * count; ++round) {
-    if (reject || round > 0)
-      consensus.fit = model.Refine(consensus.fit.solution, consensus.inlier);
-    const HandEyeMatrix covariance = model.CovarianceOfStep(consensus.fit.solution, consensus.inlier);
-    consensus.square.assign(count, 0.0);
-    std::vector<std::pair<double, std::size_t>> beyond;
-    for (std::size_t i = 0; i < count; ++i) {
-      consensus.square[i] =
-          model.PredictedChiSquare(static_cast<int>(i), consensus.fit.solution, covariance, consensus.inlier[i] != 0);
-      if (consensus.inlier[i] && consensus.square[i] > limit)
-        beyond.emplace_back(-consensus.square[i], i);
-    }
-    if (!reject)
-      break;
-    progress(1.0 - 0.3 / (1.0 + 0.1 * static_cast<double>(round)));
-    const auto present = static_cast<std::size_t>(std::count(consensus.inlier.begin(), consensus.inlier.end(), 1));
-    if (!beyond.empty() && present > 3) {
-      std::sort(beyond.begin(), beyond.end());
-      const std::size_t some = count > OneByOne ? std::max<std::size_t>(1, beyond.size() / 10) : 1;
-      for (std::size_t i = 0; i < std::min(some, present - 3); ++i)
-        consensus.inlier[beyond[i].second] = 0;
-      continue;
-    }
-    bool changed = false;
-    if (!returned)
-      for (std::size_t i = 0; i < count; ++i)
-        if (!consensus.inlier[i] && consensus.square[i] <= limit) {
-          consensus.inlier[i] = 1;
-          changed = true;
-        }
-    returned = true;
-    if (!changed)
-      break;
-  }
-  progress(1.0);
-  return consensus;
+  return HandEyeConsensusNear(fits[best].solution, common, model, rejectOutliers, estimateNoise, progress.Part(0.7, 1.0));
 }
 
 } // namespace echorama

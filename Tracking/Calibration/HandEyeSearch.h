@@ -20,6 +20,11 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
                                       const Eigen::Vector3d& target, bool estimateNoise, std::uint64_t seed,
                                       const Progress& progress = {});
 
+/// The same from a solution that is near, without a search: for a model whose noise has changed. \a scale: as above, of the
+/// start.
+HandEyeConsensus HandEyeConsensusNear(const HandEyeSolution& start, double scale, const HandEyeModel& model, bool rejectOutliers,
+                                      bool estimateNoise, const Progress& progress = {});
+
 /// How far the poses of one side are turned from each other: the root of 1 - s^2 for the singular values s of their mean
 /// rotation, radians, least first. The least is what the calibration lives on: of small turns, the root mean square over
 /// the two lesser axes; 0 when all turns have one axis, which is \a axis then, in the frame of the sensor or the volume.

@@ -16,9 +16,26 @@ struct HandEyeScenario {
   double leverMm = 150.0;             ///< from the sensor to the target
   PoseNoise sensorNoise, volumeNoise; ///< as HandEyeParameters
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< from the target: about where volumes are turned, and alignments err
   int outliers = 0; ///< so many of the scans have an alignment that is wrong by 10 to 40 degrees and 20 to 60 mm
   std::uint64_t seed = 1;
+
+  HandEyeNoise Noise() const { return {sensorNoise, volumeNoise, target + centre}; }
 };
+
+/// A camera near the sensor that looks at a board 1.3 m away, and errs by turning about it by 0.05 degrees. All noise is smaller
+/// than HandEyeParameters state, and in another ratio.
+inline HandEyeScenario BoardScenario(int poses, std::uint64_t seed)
+{
+  HandEyeScenario scenario;
+  scenario.poses = poses;
+  scenario.leverMm = 100.0;
+  scenario.centre << 0.0, 0.0, 1300.0;
+  scenario.sensorNoise = {0.02, 0.1};
+  scenario.volumeNoise = {0.05, 0.1};
+  scenario.seed = seed;
+  return scenario;
+}
 
 struct HandEyeSimulation {
   HandEyeSolution truth;
@@ -61,18 +78,19 @@ inline HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
   C.translation() = random.Direction() * scenario.leverMm - C.linear() * scenario.target;
   O = RandomPose(random);
   const Pose middle = RandomPose(random); // of the volume in the world
-  const Eigen::Translation3d toTarget(scenario.target), fromTarget(-scenario.target);
+  const Eigen::Vector3d about = scenario.target + scenario.centre;
+  const Eigen::Translation3d toCentre(about), fromCentre(-about);
   for (int i = 0; i < scenario.poses; ++i) {
     HandEyePair exact;
     Pose turn = Pose::Identity();
     turn.linear() = ExpRotation(Someway(random, 0.0, scenario.degrees * RadiansPerDegree));
     for (int axis = 0; axis < 3; ++axis)
       turn.translation()[axis] = random.Uniform(-scenario.travelMm, scenario.travelMm);
-    exact.volumeToWorld = middle * turn * fromTarget;
+    exact.volumeToWorld = middle * turn * fromCentre;
     exact.sensorToTracker = O * exact.volumeToWorld * C.inverse();
     HandEyePair measured = exact;
     measured.sensorToTracker = exact.sensorToTracker * Exp(NoiseTwist(scenario.sensorNoise, random));
-    measured.volumeToWorld = exact.volumeToWorld * toTarget * Exp(NoiseTwist(scenario.volumeNoise, random)) * fromTarget;
+    measured.volumeToWorld = exact.volumeToWorld * toCentre * Exp(NoiseTwist(scenario.volumeNoise, random)) * fromCentre;
     const bool isOutlier = i < scenario.outliers;
     if (isOutlier) {
       const Eigen::Vector3d turned = Someway(random, 10.0, 40.0) * RadiansPerDegree, moved = Someway(random, 20.0, 60.0);
@@ -89,7 +107,7 @@ inline HandEyeSimulation SimulateHandEye(const HandEyeScenario& scenario)
 /// scenario on all scans that are no outliers.
 inline Eigen::Matrix3d HandEyeBound(const HandEyeScenario& scenario, const HandEyeSimulation& simulation)
 {
-  const HandEyeModel model(simulation.exactPairs, scenario.sensorNoise, scenario.volumeNoise, scenario.target);
+  const HandEyeModel model(simulation.exactPairs, scenario.Noise(), scenario.target);
   std::vector<char> use;
   for (const char isOutlier : simulation.isOutlier)
     use.push_back(isOutlier ? 0 : 1);

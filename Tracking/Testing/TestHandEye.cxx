@@ -2,15 +2,14 @@
 // The whole calibration: as good as the Cramer-Rao bound allows, honest about it, and hard to fool.
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
-#include "Readers/PoseLog.h"
 #include "Testing/Sanitized.h"
 #include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Tracking/Calibration/HandEyeModel.h"
+#include "Tracking/Testing/HandEyeRecording.h"
 #include "Tracking/Testing/HandEyeSimulation.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Cholesky>
-#include <filesystem>
 #include <functional>
 #include <gtest/gtest.h>
 
@@ -26,6 +25,7 @@ HandEyeParameters ParametersOf(const HandEyeScenario& scenario)
   parameters.sensorNoise = scenario.sensorNoise;
   parameters.volumeNoise = scenario.volumeNoise;
   parameters.target = scenario.target;
+  parameters.estimateNoise = false; // it is known
   return parameters;
 }
 
@@ -215,6 +215,7 @@ TEST(HandEye, NoiseOfFewScansIsThatStated)
     scenario.outliers = outliers;
     const HandEyeSimulation simulation = SimulateHandEye(scenario);
     HandEyeParameters parameters;
+    parameters.estimateNoise = false;
     const HandEyeResult stated = CalibrateHandEye(simulation.pairs, parameters);
     parameters.estimateNoise = true;
     const HandEyeResult asked = CalibrateHandEye(simulation.pairs, parameters);
@@ -290,7 +291,7 @@ TEST(HandEye, WithoutRejectionOutliersCount)
   const HandEyeSimulation simulation = SimulateHandEye(scenario);
   std::vector<HandEyePair> pairs = simulation.pairs;
   pairs[4].volumeToWorld.translation().x() += 8.0;
-  HandEyeParameters parameters;
+  HandEyeParameters parameters = ParametersOf(scenario);
   EXPECT_FALSE(CalibrateHandEye(pairs, parameters).residuals[4].inlier);
   parameters.rejectOutliers = false;
   EXPECT_EQ(CalibrateHandEye(pairs, parameters).inliers, 10);
@@ -600,26 +601,12 @@ TEST(HandEye, ManyScansLeaveTogether)
 TEST(HandEye, TwoRecordingsOfOneRigAgree)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const std::filesystem::path folder = std::filesystem::path(ECHORAMA_SOURCE_DIR) / "../shared/data/handeye_ethz";
-  if (!std::filesystem::exists(folder))
-    GTEST_SKIP() << folder << " is not there";
   Pose likely[2], plain[2];
   for (int k = 0; k < 2; ++k) {
-    const PoseLog log = ReadPoseLog((folder / ("paired_vicon_" + std::to_string(k + 1) + ".csv")).string());
-    const std::vector<ToolPose> hand = log.Of("HandToBase"), board = log.Of("TargetToCamera");
-    std::vector<HandEyePair> pairs;
-    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-    ASSERT_EQ(hand.size(), board.size());
-    for (std::size_t i = 0; i < hand.size(); ++i) {
-      pairs.push_back({hand[i].pose, board[i].pose.inverse(), ""});
-      middle += board[i].pose.translation() / static_cast<double>(board.size());
-    }
-    HandEyeParameters parameters;
-    parameters.target = middle; // a camera that sees a board errs by turning about it
-    parameters.sensorNoise = {0.0, 0.0};
-    parameters.volumeNoise = {0.5, 5.0};
-    parameters.estimateNoise = true;
-    const HandEyeResult result = CalibrateHandEye(pairs, parameters);
+    const std::vector<HandEyePair> pairs = HandEyeRecording("vicon_" + std::to_string(k + 1));
+    if (pairs.empty())
+      GTEST_SKIP() << "../shared/data/handeye_ethz is not there";
+    const HandEyeResult result = CalibrateHandEye(pairs); // nothing is chosen
     EXPECT_GT(result.inliers, 400);
     likely[k] = result.solution.volumeToSensor;
     plain[k] = SolveHandEyeParkMartin(pairs).volumeToSensor;

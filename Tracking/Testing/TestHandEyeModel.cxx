@@ -26,7 +26,7 @@ HandEyeScenario SomeScenario()
 
 HandEyeModel ModelOf(const HandEyeScenario& scenario, const std::vector<HandEyePair>& pairs)
 {
-  return HandEyeModel(pairs, scenario.sensorNoise, scenario.volumeNoise, scenario.target);
+  return HandEyeModel(pairs, scenario.Noise(), scenario.target);
 }
 
 TEST(HandEyeModel, JacobianIsTheDerivative)

@@ -187,6 +187,18 @@ def check_noise():
     filter, errors = calibrate(zip(sensors, volumes), EstimateNoise=True, SensorNoiseDegrees=0.05, SensorNoiseMm=0.14,
                                VolumeNoiseDegrees=0.05, VolumeNoiseMm=0.14)
     assert not errors and 3 < json.loads(filter.GetReport())["noise"]["scale"] < 8, errors
+    # a camera that errs by turning about a board
+    sensors, volumes = scans(20, noise=0.1)
+    board = pose((0, 0, 0), (0, 0, 1300))
+    volumes = np.array([M @ board @ pose(random.normal(0, math.radians(0.05), 3), (0, 0, 0)) @ np.linalg.inv(board) for M in volumes])
+    filter, errors = calibrate(zip(sensors, volumes))
+    report = json.loads(filter.GetReport())
+    assert not errors and report["noise"]["estimated"] and report["noise"]["scale"] == 1, report["noise"]
+    assert 0.035 < report["noise"]["volume_degrees"] < 0.075 and report["noise"]["sensor_mm"] < 0.2, report["noise"]
+    assert "contradict the ratio" in " ".join(report["notes"]), report["notes"]
+    filter, errors = calibrate(zip(sensors, volumes), EstimateNoise=False)
+    report = json.loads(filter.GetReport())
+    assert not errors and report["noise"]["volume_degrees"] == 0.25 and not report["noise"]["estimated"], report["noise"]
 
 
 def check_refusals():
