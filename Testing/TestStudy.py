@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The study: coarse cases made twice alike, aligned in a batch that nothing ends, judged rightly, and drawn."""
 import csv
+import dataclasses
 import json
 import pathlib
 import shutil
@@ -9,6 +10,7 @@ import sys
 import tempfile
 import types
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -34,7 +36,7 @@ class Study(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = work / "cases"
-        cases.make_case(cls.folder / "plain", "plain", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
+        cases.make_case(cls.folder / "plain", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
         cls.case = cases.Case(cls.folder / "plain")
 
     def test_the_truth_is_true(self):
@@ -61,14 +63,32 @@ class Study(unittest.TestCase):
         self.assertAlmostEqual(Probe().overlap(motion, Probe().points(np.random.default_rng(9), 20000)), 0.7, delta=0.02)
 
     def test_landmarks_know_the_deformation(self):
-        cases.make_case(work / "pressed", "pressed", {"deformation_mm": 3.0}, (), seed=3, spacing=3.0)
+        cases.make_case(work / "pressed", {"deformation_mm": 3.0}, (), seed=3, spacing=3.0)
         case = cases.Case(work / "pressed")
         found = study.Judge(case, PROGRAM).figures(case.truth)
         self.assertEqual(found["tre_mm"], 0)
         self.assertTrue(0.3 < found["landmarks_mm"] < found["landmarks_max_mm"] <= 3, found)
 
+    def test_the_floor_of_a_body(self):
+        """Landmarks lie where bent sound shows pressed tissue: no rigid pose fits them better than the floor, the truth less well."""
+        from bodies import CONDITIONS, make_bodies
+        folder = work / "bodies"
+        condition = dataclasses.replace(CONDITIONS["pressed_6"], overlaps=(0.75,))
+        with unittest.mock.patch.dict(CONDITIONS, {"pressed_6": condition}):
+            make_bodies(folder, ["pressed_6"], [1], spacing=3.0, landmarks=100, say=quiet)
+        (place,) = cases.cases_in(folder)
+        case = cases.Case(place)
+        judge = study.Judge(case, PROGRAM)
+        floor, truth = judge.figures(case.floor), judge.figures(case.truth)
+        self.assertAlmostEqual(floor["excess_mm"], 0, places=9)
+        self.assertLess(floor["beside_floor_mm"], 1e-9)
+        self.assertTrue(0.1 < floor["landmarks_mm"] < truth["landmarks_mm"] < 6, (floor, truth))
+        self.assertGreater(judge.figures(about(judge.points.mean(axis=0), pose((0.02, 0, 0))) @ case.floor)["excess_mm"], 0.1)
+        self.assertLess(floor["tre_mm"], 3)  # tissue is seen within some mm of where it is
+        self.assertEqual((case.properties["overlap"], case.properties["pressed_mm"]), (0.75, 6.0))
+
     def test_the_same_seed_makes_the_same_case(self):
-        cases.make_case(work / "again", "plain", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
+        cases.make_case(work / "again", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
         names = sorted(path.name for path in (work / "again").iterdir())
         self.assertEqual(names, sorted(path.name for path in (self.folder / "plain").iterdir()))
         for name in names:

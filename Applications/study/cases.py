@@ -2,7 +2,8 @@
 """Cases of the study: pairs of volumes whose truth is known, and starts from which they are to be aligned.
 
 A case is a folder with two volumes and at least one of `truth.json` (a pose file: where the volumes belong) and `landmarks_1.csv`
-with `landmarks_2.csv` (or .fcsv, .mrk.json), in the frames of the files. Every `start*.json` (a pose file) in it is one thing
+with `landmarks_2.csv` (or .fcsv, .mrk.json), in the frames of the files. `floor.json`, if it is there, is the pose in which the
+landmarks fit best: no rigid pose is nearer to what both volumes show, where sound is bent or tissue gives way. Every `start*.json` (a pose file) in it is one thing
 to align; without one the volumes start where their files say. `case.json` may name properties to plot against. The first volume stays.
 """
 import dataclasses
@@ -12,10 +13,9 @@ import pathlib
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 import echorama
-from geometry import Probe, about, apply, pose, random_motion, read_poses, write_poses
+from geometry import Probe, about, apply, best_rigid, matrix_of, pose, random_motion, read_poses, write_poses
 
 # What is planted in a pair, one thing at a time, beside a plain pair that overlaps by 55%.
 PLAIN = {"overlap": 0.55, "gain_db": 2.5, "noise_db": -120.0, "rib": 0.0, "decorrelation": 0.0, "jets": 0, "deformation_mm": 0.0}
@@ -35,24 +35,9 @@ PAIRS = {
     "deformation_3mm": {"deformation_mm": 3.0},
     "everything": {"noise_db": -6.0, "rib": 0.2, "decorrelation": 0.3, "jets": 1, "deformation_mm": 1.5, "gain_db": 5.0},
 }
-# The same probe over an invented abdomen: sound is bent, reflected, attenuated and shadowed. Each pair is another individual.
-ANATOMY_PAIRS = {
-    "anatomy_75": {"overlap": 0.75},
-    "anatomy_55": {},
-    "anatomy_55_other": {},
-    "anatomy_35": {"overlap": 0.35},
-    "anatomy_20": {"overlap": 0.2},
-    "anatomy_noise": {"noise_db": -40.0},
-}
 STARTS = ((10.0, 15.0), (20.0, 25.0))  # degrees, mm
 FAR_STARTS = ((5.0, 5.0), (30.0, 40.0), (60.0, 60.0))  # of the plain pairs
 PLAIN_PAIRS = ("plain", "overlap_75", "overlap_35")
-
-
-def matrix_of(array):
-    matrix = vtkMatrix4x4()
-    matrix.DeepCopy(np.asarray(array, float).ravel())
-    return matrix
 
 
 def second_view(probe, overlap, random):
@@ -68,6 +53,15 @@ def second_view(probe, overlap, random):
         middle = (near + far) / 2
         near, far = (middle, far) if probe.overlap(at(middle), points) > overlap else (near, middle)
     return at(near)
+
+
+def both_see(probe, views, count, random, batch=1):
+    """So many places of the world that lie in the fans of both, drawn batch by batch."""
+    found, back = np.empty((0, 3)), np.linalg.inv(views[1])
+    while len(found) < count:
+        points = apply(views[0], probe.points(random, batch))
+        found = np.concatenate([found, points[probe.sees(apply(back, points))]])
+    return found[:count]
 
 
 def write_landmarks(path, labels, points):
@@ -101,86 +95,69 @@ def phantom(view, number, properties, seed, spacing):
     return source.GetOutput(), lambda points: seen(source, points)
 
 
-def anatomy(view, number, properties, seed, spacing):
-    """The same of an abdomen, wide enough for both views of a pair that overlaps little."""
-    body = echorama.vtkUltrasoundAnatomySource()
-    body.SetSeed(seed)
-    body.SetTrunkWidthMm(380.0)
-    body.SetTrunkLengthMm(320.0)
-    source = echorama.vtkUltrasoundSynthesizer()
-    source.SetInputConnection(body.GetOutputPort())
-    source.SetSeed(seed)
-    source.SetDepthMin(5.0)  # the probe of the phantom's pairs
-    source.SetDepthMax(100.0)
-    source.SetElements(96)
-    source.SetSteps(64)
-    source.SetSamples(384)
-    source.SetSpacingMm(spacing)
-    source.SetProbeToWorld(matrix_of(view))
-    source.SetGainDb(4.0 + properties["gain_db"] * number)
-    source.SetNoiseDb(max(properties["noise_db"], -65.0))
-    source.SetNoiseSeed(2 * seed + number)
-    source.Update()
-    return source.GetOutput(), lambda points: points
+def knock_of(view, random):
+    """A motion by which a file says something wrong about the place of a view, as files do; the truth undoes it."""
+    return about((view @ (0, 0, 55, 1))[:3], random_motion(random, 12, 30))
 
 
-def make_case(folder, name, planted, starts, seed, spacing=1.0, landmarks=200):
-    """Writes one case. The same seed gives the same volumes."""
-    properties = {**PLAIN, **planted}
+def write_image(path, image):
+    writer = echorama.vtkUltrasoundWriter()
+    writer.SetInputDataObject(image)
+    writer.SetFileName(str(path))
+    writer.Write()
+
+
+def write_case(folder, files, knock, landmarks, starts, properties, random):
+    """Landmarks, truth, rigid floor, starts and properties of two volumes, the second of which was knocked out of its place."""
     folder.mkdir(parents=True, exist_ok=True)
-    random = np.random.default_rng(seed)
-    probe = Probe()
-    of_anatomy = name in ANATOMY_PAIRS
-    # Where on the body the pair lies differs from pair to pair, so that they do not all show the same structures.
-    middle = np.array((-25.0, 0, 0) if of_anatomy else (0, 0, 0))
-    first = pose(np.radians(random.uniform((-6, -6, -35), (6, 6, 35))), middle + random.uniform((-25, -12, -3), (5, 12, 3)))
-    views = [first, first @ second_view(probe, properties["overlap"], random)]
-    # The second file says something wrong about its place, as files do; the truth undoes that.
-    centre = views[1] @ (0, 0, 55, 1)
-    knock = about(centre[:3], random_motion(random, 12, 30))
-    places = []
-    while len(places) < landmarks:
-        point = apply(views[0], probe.points(random, 1))
-        if all(probe.sees(apply(np.linalg.inv(view), point))[0] for view in views):
-            places.append(point[0])
-    places = np.array(places)
-
-    files, lists = [], []
-    for number, view in enumerate(views):
-        image, moved = (anatomy if of_anatomy else phantom)(view, number, properties, seed, spacing)
-        if image.GetNumberOfPoints() == 0:
-            raise RuntimeError(f"{name}: the volume could not be made")
-        points = moved(places)
-        if number == 1:
-            echorama.vtkUltrasoundVolume.Move(image, matrix_of(knock))
-            points = apply(knock, points)
-        files.append(folder / f"volume_{number + 1}.mha")
-        writer = echorama.vtkUltrasoundWriter()
-        writer.SetInputDataObject(image)
-        writer.SetFileName(str(files[-1]))
-        writer.Write()
-        write_landmarks(folder / f"landmarks_{number + 1}.csv", [f"L{i + 1}" for i in range(landmarks)], points)
-
+    landmarks = landmarks[0], apply(knock, landmarks[1])
+    for number, points in enumerate(landmarks, 1):
+        write_landmarks(folder / f"landmarks_{number}.csv", [f"L{i + 1}" for i in range(len(points))], points)
     truth = np.linalg.inv(knock)
     write_poses(folder / "truth.json", files, [np.eye(4), truth])
+    write_poses(folder / "floor.json", files, [np.eye(4), best_rigid(*landmarks)])
     centre = apply(truth, Case(folder).points(1, 1000)).mean(axis=0)
     for degrees, mm in starts:
         wrong = about(centre, random_motion(random, degrees, mm))
         write_poses(folder / f"start_{degrees:g}deg_{mm:g}mm.json", files, [np.eye(4), wrong @ truth])
-    (folder / "case.json").write_text(json.dumps({**properties, "seed": seed, "spacing_mm": spacing}, indent=1))
+    (folder / "case.json").write_text(json.dumps(properties, indent=1))
+
+
+def make_case(folder, planted, starts, seed, spacing=1.0, landmarks=200):
+    """Writes one case of the phantom. The same seed gives the same volumes."""
+    properties = {**PLAIN, **planted}
+    random = np.random.default_rng(seed)
+    probe = Probe()
+    # Where on the body the pair lies differs from pair to pair, so that they do not all show the same structures.
+    first = pose(np.radians(random.uniform((-6, -6, -35), (6, 6, 35))), random.uniform((-25, -12, -3), (5, 12, 3)))
+    views = [first, first @ second_view(probe, properties["overlap"], random)]
+    knock = knock_of(views[1], random)
+    places = both_see(probe, views, landmarks, random)
+    files = [folder / f"volume_{number}.mha" for number in (1, 2)]
+    folder.mkdir(parents=True, exist_ok=True)
+    points = []
+    for number, view in enumerate(views):
+        image, moved = phantom(view, number, properties, seed, spacing)
+        if image.GetNumberOfPoints() == 0:
+            raise RuntimeError(f"{folder.name}: the volume could not be made")
+        points.append(moved(places))
+        if number == 1:
+            echorama.vtkUltrasoundVolume.Move(image, matrix_of(knock))
+        write_image(files[number], image)
+    write_case(folder, files, knock, points, starts, {**properties, "seed": seed, "spacing_mm": spacing}, random)
 
 
 def make(folder, pairs=None, seed=1, repeats=1, spacing=1.0, say=print):
-    """Writes the cases of the study that are not there yet: those named, else all of the phantom."""
+    """Writes the cases of the phantom that are not there yet: those named, else all."""
     for repeat in range(repeats):
-        for number, (name, planted) in enumerate({**PAIRS, **ANATOMY_PAIRS}.items()):
-            if name not in (pairs or PAIRS):
+        for number, (name, planted) in enumerate(PAIRS.items()):
+            if pairs and name not in pairs:
                 continue
             case = pathlib.Path(folder) / (name if repeats == 1 else f"{name}_{repeat + 1}")
             if (case / "case.json").exists():
                 continue
             say(f"{case}")
-            make_case(case, name, planted, STARTS + (FAR_STARTS if name in PLAIN_PAIRS else ()),
+            make_case(case, planted, STARTS + (FAR_STARTS if name in PLAIN_PAIRS else ()),
                       seed=seed * 1000 + repeat * 100 + number, spacing=spacing)
 
 
@@ -201,6 +178,8 @@ class Case:
         self.properties = json.loads(own.read_text()) if own.exists() else {}
         truth = self.folder / "truth.json"
         self.truth = self.relative(truth) if truth.exists() else None
+        floor = self.folder / "floor.json"
+        self.floor = self.relative(floor) if floor.exists() else None
         poses = [truth] if truth.exists() else sorted(self.folder.glob("start*.json"))
         self.files = ([file for file, _ in read_poses(poses[0])] if poses else
                       sorted(path for path in self.folder.iterdir()

@@ -17,8 +17,7 @@ import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 import echorama
-from cases import matrix_of
-from geometry import read_poses, rotation
+from geometry import matrix_of, read_poses, rotation
 
 
 @dataclasses.dataclass
@@ -28,6 +27,7 @@ class Answer:
     cpu_seconds: float = 0.0  # of all its threads, reading and writing included; other work on the machine does not count
     verdict: str = ""  # aligned, ambiguous or failed; empty: the method gives none
     reason: str = ""
+    predicted_mm: float = float("nan")  # root mean square over the second volume, as the method states it
 
 
 class Failed(Exception):
@@ -71,7 +71,8 @@ class Echorama:
             second = said["volumes"][1]
             (_, first), (_, moved) = read_poses(out)
             seconds = stage_seconds(said.get("stages", {}), "align", said["seconds"])
-            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, second["verdict"], second["reason"])
+            return Answer(np.linalg.inv(first) @ moved, seconds, cpu_seconds() - before, second["verdict"], second["reason"],
+                          second.get("error_mm", float("nan")))
 
 
 def stage_seconds(stages, name, otherwise):

@@ -76,6 +76,44 @@ def tables(rows):
     return "\n".join(text) + "\n"
 
 
+def tables_of_bodies(rows):
+    """Markdown: how far from the rigid floor, by overlap and start; and what the stated errors and verdicts are worth, for either
+    half of the individuals: one served to choose what was to be chosen, the other did not."""
+    rows = [row for row in rows if "scan" in row and row["method"] != "start"]
+    methods = in_order(rows)
+    text = ["| overlap | start | method | pairs | beyond the floor, mm: median | 90% | worst | lost | aligned, and false | CPU seconds (median) |",
+            "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
+    for overlap in sorted({row["overlap"] for row in rows}, reverse=True):
+        for start in sorted({row["start"] for row in rows}, key=lambda name: float(name.split("_")[1][:-3])):
+            for method in methods:
+                found = [row for row in rows if (row["overlap"], row["start"], row["method"]) == (overlap, start, method)]
+                if not found:
+                    continue
+                excess = np.array([row["excess_mm"] for row in found])
+                aligned = [row for row in found if row["verdict"] == "aligned"]
+                verdicts = f"{len(aligned)}, {sum(map(is_false, aligned))}" if any(row["verdict"] for row in found) else ""
+                text.append(f"| {100 * overlap:.0f}% | {start_of(found[0])} | {method} | {len(found)} | {np.median(excess):.2f} | {np.percentile(excess, 90):.2f} | "
+                            f"{excess.max():.2f} | {(excess > LOST_MM).sum()} | {verdicts} | {median_seconds(found, 'cpu_seconds')} |")
+    text += ["", "| individuals | method | pairs | error beside what was predicted: median | within twice of it |", "| --- | --- | --- | --- | --- |"]
+    for method in methods:
+        for half in (1, 0):
+            found = [row for row in rows if row["method"] == method and row["individual"] % 2 == half and "predicted_mm" in row
+                     and row["excess_mm"] <= LOST_MM]
+            if found:
+                ratio = np.array([row["tre_rms_mm"] / row["predicted_mm"] for row in found])
+                text.append(f"| {'odd' if half else 'even'} | {method} | {len(found)} | {np.median(ratio):.2f} | {percent((ratio <= 2).sum(), len(ratio))} |")
+    return "\n".join(text) + "\n"
+
+
+LOST_MM = 5.0  # beyond the floor: another pose, not a worse one
+FALSE_MM = 2.0
+
+
+def is_false(row):
+    """Whether what was said to be aligned is not: beyond 2 mm of what both volumes show, or of twice the stated error."""
+    return row["beside_floor_mm"] > FALSE_MM or row["beside_floor_mm"] > 2 * row.get("predicted_mm", np.inf)
+
+
 def size_of(row):
     """Degrees and mm of the start's error; nothing where the truth is not known."""
     return (round(row["start_degrees"]), round(row["start_mm"])) if "start_degrees" in row else None
@@ -213,6 +251,8 @@ def plot(folder, rows, out, show=None):
     out = pathlib.Path(out)
     out.mkdir(parents=True, exist_ok=True)
     (out / "table.md").write_text(tables(rows))
+    if any("scan" in row for row in rows):
+        (out / "bodies.md").write_text(tables_of_bodies(rows))
     plot_results(out / "results.png", rows)
     pairs = [f"{row['case']}/{row['start']}" for row in rows]
     show = show or next((pair for pair in pairs if pair.startswith("plain/") and "20deg" in pair), pairs[0])

@@ -6,6 +6,13 @@ import os
 import pathlib
 
 import numpy as np
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
+
+def matrix_of(array):
+    matrix = vtkMatrix4x4()
+    matrix.DeepCopy(np.asarray(array, float).ravel())
+    return matrix
 
 
 def rotation(vector):
@@ -34,6 +41,16 @@ def about(centre, motion):
 
 def apply(matrix, points):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def best_rigid(fixed, moving):
+    """The rigid motion that brings points of one list nearest to those of another, in the sense of least squares."""
+    centres = fixed.mean(axis=0), moving.mean(axis=0)
+    left, _, right = np.linalg.svd((fixed - centres[0]).T @ (moving - centres[1]))
+    motion = np.eye(4)
+    motion[:3, :3] = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+    motion[:3, 3] = centres[0] - motion[:3, :3] @ centres[1]
+    return motion
 
 
 def degrees_of(matrix):

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study with truth: study.py make FOLDER, run FOLDER, plot FOLDER (see Documentation/study.md).
+"""The study with truth: study.py make, run, plot (see Documentation/study.md).
 
 It needs the Python package echorama and, to run, the program; ./run study provides both.
 """
@@ -14,13 +14,14 @@ import time
 
 import numpy as np
 
-from cases import ANATOMY_PAIRS, PAIRS, Case, cases_in, make
+from bodies import CONDITIONS, INDIVIDUALS, default_folder, make_bodies
+from cases import PAIRS, Case, cases_in, make
 from contestants import Answer, Failed, contestants, run_program
 from geometry import apply, degrees_of, write_poses
 
-PROPERTIES = ["overlap", "gain_db", "noise_db", "rib", "decorrelation", "jets", "deformation_mm"]
+PROPERTIES = ["overlap", "gain_db", "noise_db", "rib", "decorrelation", "jets", "deformation_mm", "scan", "individual", "pressed_mm", "refraction"]
 COLUMNS = ["case", "start", "method", "verdict", "start_degrees", "start_mm", "tre_mm", "tre_voxels", "percentile95_mm", "landmarks_mm",
-           "landmarks_max_mm", "seconds", "cpu_seconds", *PROPERTIES, "reason", "error"]
+           "landmarks_max_mm", "floor_mm", "excess_mm", "beside_floor_mm", "predicted_mm", "seconds", "cpu_seconds", *PROPERTIES, "reason", "error"]
 
 
 class Judge:
@@ -29,22 +30,30 @@ class Judge:
     def __init__(self, case, program, points=1000):
         self.case, self.program, self.voxel = case, program, case.voxel_mm()
         self.points = case.points(1, points)
+        self.floor_mm = self.landmarks_mm(case.floor)["landmarks_mm"] if case.floor is not None else None
+
+    def landmarks_mm(self, motion):
+        with tempfile.TemporaryDirectory() as folder:
+            poses = pathlib.Path(folder) / "poses.json"
+            write_poses(poses, self.case.files, [np.eye(4), motion])
+            done = run_program([self.program, "score", poses, "--landmarks", *self.case.landmarks, "--json"], 60)
+        said = json.loads(done.stdout or "{}")
+        if "landmarks" not in said:
+            raise ValueError(f"{self.case.folder}: {said.get('error', 'its landmarks cannot be read')}")
+        return {"landmarks_mm": said["landmarks"]["mean_mm"], "landmarks_max_mm": said["landmarks"]["max_mm"]}
 
     def figures(self, motion):
         found = {}
         if self.case.truth is not None:
             wrong = np.linalg.norm(apply(motion, self.points) - apply(self.case.truth, self.points), axis=1)
-            found = {"tre_mm": float(wrong.mean()), "percentile95_mm": float(np.percentile(wrong, 95))}
+            found = {"tre_mm": float(wrong.mean()), "tre_rms_mm": float(np.sqrt((wrong ** 2).mean())), "percentile95_mm": float(np.percentile(wrong, 95))}
         if None not in self.case.landmarks:
-            with tempfile.TemporaryDirectory() as folder:
-                poses = pathlib.Path(folder) / "poses.json"
-                write_poses(poses, self.case.files, [np.eye(4), motion])
-                done = run_program([self.program, "score", poses, "--landmarks", *self.case.landmarks, "--json"], 60)
-            said = json.loads(done.stdout or "{}")
-            if "landmarks" not in said:
-                raise ValueError(f"{self.case.folder}: {said.get('error', 'its landmarks cannot be read')}")
-            found |= {"landmarks_mm": said["landmarks"]["mean_mm"], "landmarks_max_mm": said["landmarks"]["max_mm"]}
+            found |= self.landmarks_mm(motion)
             found.setdefault("tre_mm", found["landmarks_mm"])
+        if self.floor_mm is not None:
+            beside = np.linalg.norm(apply(motion, self.points) - apply(self.case.floor, self.points), axis=1)
+            found |= {"floor_mm": self.floor_mm, "excess_mm": found["landmarks_mm"] - self.floor_mm,
+                      "beside_floor_mm": float(np.sqrt((beside ** 2).mean()))}
         return found | {"tre_voxels": found["tre_mm"] / self.voxel}
 
     def size_of_start(self, start):
@@ -109,6 +118,8 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
                     say(f"{name} {start.name} {method}: not judged: {problem}")
                     continue
                 row |= {"seconds": round(answer.seconds, 3), "cpu_seconds": round(answer.cpu_seconds, 3), "verdict": answer.verdict, "motion": answer.motion.tolist()}
+                if np.isfinite(answer.predicted_mm):
+                    row["predicted_mm"] = answer.predicted_mm
                 row.setdefault("reason", answer.reason)
                 with open(folder / "results.jsonl", "a") as stream:
                     stream.write(json.dumps(row) + "\n")
@@ -122,16 +133,20 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
 def main(arguments=None):
     parser = argparse.ArgumentParser(prog="study", description="Cases with truth, contestants that align them, tables and plots.")
     commands = parser.add_subparsers(dest="command", required=True)
-    command = commands.add_parser("make", help="write the cases: pairs of volumes of a phantom or an abdomen, with truth and starts")
-    command.add_argument("folder", type=pathlib.Path)
-    command.add_argument("--pairs", nargs="+", choices=[*PAIRS, *ANATOMY_PAIRS], metavar="NAME",
-                         help=f"some of: {' '.join([*PAIRS, *ANATOMY_PAIRS])}")
-    command.add_argument("--anatomy", action="store_true", help="pairs of a synthesised abdomen, half a minute for each volume, instead of the phantom's")
+    def add_command(name, about):
+        command = commands.add_parser(name, help=about)
+        command.add_argument("folder", type=pathlib.Path, nargs="?", help="where the cases are (default with --bodies: the user's cache)")
+        command.add_argument("--bodies", action="store_true", help="the bench of bodies instead of the phantom's pairs")
+        return command
+
+    command = add_command("make", "write the cases: pairs of volumes of a phantom or of bodies, with truth and starts")
+    command.add_argument("--pairs", nargs="+", choices=[*PAIRS, *CONDITIONS], metavar="NAME",
+                         help=f"some of: {' '.join(PAIRS)}; of the bodies: {' '.join(CONDITIONS)}")
+    command.add_argument("--individuals", nargs="+", type=int, default=INDIVIDUALS, help="seeds of the bodies (default 1 to 6)")
     command.add_argument("--repeats", type=int, default=1, help="pairs of each kind (default 1)")
     command.add_argument("--seed", type=int, default=1)
     command.add_argument("--spacing", type=float, default=1.0, help="edge of the voxels, mm (default 1)")
-    command = commands.add_parser("run", help="align every start of every case below a folder, ours or your own")
-    command.add_argument("folder", type=pathlib.Path)
+    command = add_command("run", "align every start of every case below a folder, ours or your own")
     command.add_argument("--methods", nargs="+", metavar="NAME", help="only these (default: all that are installed)")
     command.add_argument("--method", action="append", default=[], metavar="NAME=OPTIONS",
                          help="one more contestant: echorama align with these options; again for each")
@@ -139,16 +154,21 @@ def main(arguments=None):
     command.add_argument("--again", action="store_true", help="also what was done before")
     command.add_argument("--limit", type=float, default=300.0, help="seconds for one alignment (default 300)")
     command.add_argument("--program", default="echorama", help="the program echorama")
-    command = commands.add_parser("plot", help="tables and plots of what was found")
-    command.add_argument("folder", type=pathlib.Path)
+    command = add_command("plot", "tables and plots of what was found")
     command.add_argument("--out", type=pathlib.Path, help="folder for the pictures (default: the folder of the cases)")
     command.add_argument("--show", metavar="CASE/START", help="the pair for the picture of slices (default: the first plain one)")
     options = parser.parse_args(arguments)
 
     begin = time.monotonic()
+    if options.folder is None:
+        if not options.bodies:
+            parser.error(f"{options.command} needs a folder, or --bodies")
+        options.folder = default_folder()
     try:
-        if options.command == "make":
-            make(options.folder, options.pairs or (list(ANATOMY_PAIRS) if options.anatomy else None), options.seed, options.repeats, options.spacing)
+        if options.command == "make" and options.bodies:
+            make_bodies(options.folder, options.pairs, options.individuals, options.spacing)
+        elif options.command == "make":
+            make(options.folder, options.pairs, options.seed, options.repeats, options.spacing)
         elif options.command == "run":
             known = contestants(options.program, options.method)
             unknown = [name for name in options.methods or [] if name not in known]
