@@ -23,6 +23,13 @@ namespace echorama {
 namespace {
 
 constexpr int CoarseOctave = 2; // voxels of about 4 mm tell where volumes overlap
+// Coarser levels have an eighth of the voxels per octave. The bending counts less there by as much: it would hold back what the
+// finest level then is too near-sighted to find.
+constexpr double SofterPerOctave = 1.0 / 8.0;
+// Some places resemble each other more than others do: correlations are those of boxes of about this size.
+constexpr double BoxMm = 12.0;
+// What is seen in all boxes counts in each as much as this share of a mean box: few voxels have no correlation of their own.
+constexpr double FromAllBoxes = 0.3;
 
 using Vectors = LatticeEquations::Vectors;
 
@@ -134,12 +141,21 @@ struct Common {
     mm += c.mm;
     fm += c.fm;
   }
-  double Correlation() const { return ff > 0.0 && mm > 0.0 ? fm / std::sqrt(ff * mm) : 0.0; }
+  /// Opposites are not alike.
+  double Correlation() const { return ff > 0.0 && mm > 0.0 ? std::fmax(0.0, fm / std::sqrt(ff * mm)) : 0.0; }
+  // Of the same weight, as if a part of another one had been seen as well.
+  Common With(const Common& other, double part) const
+  {
+    if (!(weight > 0.0))
+      return {};
+    const double own = weight / (weight + part), shared = own * part / other.weight;
+    return {weight, own * ff + shared * other.ff, own * mm + shared * other.mm, own * fm + shared * other.fm};
+  }
   // The share of the variance that neither explains of the other. The floor keeps identical volumes finite.
   double Unexplained() const { return std::fmax(0.0, 1.0 - Correlation() * Correlation()) + 1e-3; }
 };
 
-// One per fixed volume.
+// One per box and fixed volume, boxes fastest.
 using Commons = std::vector<Common>;
 
 double Similarity(const Commons& commons)
@@ -150,6 +166,15 @@ double Similarity(const Commons& commons)
     weight += c.weight;
   }
   return weight > 0.0 ? sum / weight : 0.0;
+}
+
+// What the volumes say of each other, in nats: the negative logarithm of the likelihood, by the weights before anything moved.
+double InformationOf(const Commons& commons, const Commons& rigid)
+{
+  double sum = 0.0;
+  for (std::size_t c = 0; c < commons.size(); ++c)
+    sum -= 0.5 * rigid[c].weight * std::log(commons[c].Unexplained());
+  return sum;
 }
 
 // One resolution: a grid, what the fixed volumes show there, and a lattice.
@@ -175,6 +200,8 @@ public:
       const int cells = std::max(1, static_cast<int>(std::ceil(length / controlSpacing - 0.01)));
       lattice_.dimensions[Index(axis)] = cells + 3;
       lattice_.spacing[axis] = controlSpacing;
+      boxes_[Index(axis)] =
+          std::max(1, static_cast<int>(std::lround(grid_.dimensions[Index(axis)] * grid_.spacing[axis] / BoxMm)));
     }
     grid_.origin = whole.IndexToWorld() * first;
     const Eigen::Vector3d size(lattice_.dimensions[0] - 1, lattice_.dimensions[1] - 1, lattice_.dimensions[2] - 1);
@@ -204,25 +231,30 @@ public:
 
   Commons Compare(const Seen& warped) const
   {
-    const std::ptrdiff_t slice = static_cast<std::ptrdiff_t>(grid_.dimensions[0]) * grid_.dimensions[1];
+    const auto& n = grid_.dimensions;
     Commons commons;
-    for (const Seen& fixed : fixed_)
-      commons.push_back(ParallelSum<Common>(grid_.dimensions[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
-        Common sum;
-        for (std::ptrdiff_t i = k * slice; i < (k + 1) * slice; ++i) {
-          const float *f = fixed.data() + 2 * i, *m = warped.data() + 2 * i;
-          const double w = static_cast<double>(f[1] * m[1]), a = static_cast<double>(f[0]), b = static_cast<double>(m[0]);
-          sum.weight += w;
-          sum.ff += w * a * a;
-          sum.mm += w * b * b;
-          sum.fm += w * a * b;
-        }
-        return sum;
-      }));
+    for (const Seen& fixed : fixed_) {
+      Commons boxes(BoxCount());
+      ParallelFor(boxes_[2], [&](std::ptrdiff_t layer) {
+        for (int k = 0; k < n[2]; ++k)
+          for (int j = 0; BoxAlong(2, k) == layer && j < n[1]; ++j)
+            for (int i = 0; i < n[0]; ++i) {
+              const std::ptrdiff_t at = 2 * ((static_cast<std::ptrdiff_t>(k) * n[1] + j) * n[0] + i);
+              const float *f = fixed.data() + at, *m = warped.data() + at;
+              const double w = static_cast<double>(f[1] * m[1]), a = static_cast<double>(f[0]), b = static_cast<double>(m[0]);
+              boxes[BoxOf(i, j, k)] += {w, w * a * a, w * b * b, w * a * b};
+            }
+      });
+      Common all;
+      for (const Common& box : boxes)
+        all += box;
+      for (const Common& box : boxes)
+        commons.push_back(box.With(all, FromAllBoxes * all.weight / static_cast<double>(boxes.size())));
+    }
     return commons;
   }
 
-  // How residuals and slopes follow from what is seen, per fixed volume: the residual is scale * (f / deviation of f -
+  // How residuals and slopes follow from what is seen, per box and fixed volume: the residual is scale * (f / deviation of f -
   // correlation * m / deviation of m), and its derivative -slope times that of m.
   struct Weighing {
     double weight, f, m;
@@ -295,9 +327,10 @@ private:
             slope[axis] = static_cast<double>(m[steps[axis]] - m[-steps[axis]]);
         const Eigen::Vector3d g = toWorld * slope;
         double square = 0.0, residual = 0.0;
+        const std::size_t box = BoxOf(i, j, k);
         for (std::size_t v = 0; v < fixed_.size(); ++v) {
           const float* f = fixed_[v].data() + at;
-          const Weighing& by = weighing[v];
+          const Weighing& by = weighing[v * BoxCount() + box];
           const double w = by.weight * static_cast<double>(f[1] * m[1]);
           square += w * by.m * by.m;
           residual += w * by.m * (by.f * static_cast<double>(f[0]) - by.m * static_cast<double>(m[0]));
@@ -342,6 +375,14 @@ private:
         }
   }
 
+  int BoxAlong(std::size_t axis, int i) const { return i * boxes_[axis] / grid_.dimensions[axis]; }
+  std::size_t BoxOf(int i, int j, int k) const
+  {
+    return Index((static_cast<std::ptrdiff_t>(BoxAlong(2, k)) * boxes_[1] + BoxAlong(1, j)) * boxes_[0] + BoxAlong(0, i));
+  }
+  std::size_t BoxCount() const { return Index(static_cast<std::ptrdiff_t>(boxes_[0]) * boxes_[1] * boxes_[2]); }
+
+  std::array<int, 3> boxes_{1, 1, 1};
   const MetricLevel& moving_;
   Pose movingToWorld_;
   ImageGeometry grid_, lattice_;
@@ -392,18 +433,18 @@ LatticeEquations::Penalty PenaltyEntries(double bending, double reachMm, const E
   return entries;
 }
 
-// The cost of a fixed volume is W/2 log(1 - r^2), W being its weight before anything moved: the likelihood of two signals of
-// correlation r. Its gradient and Gauss-Newton matrix are those of the residual (f - r m) / sqrt(1 - r^2) of signals of
-// variance one. So what does not agree lends no weight, and blur that comes from reading between voxels wins nothing.
+// The cost of a box of a fixed volume is W/2 log(1 - r^2), W being its weight before anything moved: the likelihood of two
+// signals of correlation r. Its gradient and Gauss-Newton matrix are those of the residual (f - r m) / sqrt(1 - r^2) of signals
+// of variance one. So what does not agree lends no weight, and blur that comes from reading between voxels wins nothing.
 std::vector<Level::Weighing> WeighingOf(const Commons& now, const Commons& rigid)
 {
   std::vector<Level::Weighing> weighing;
   for (std::size_t v = 0; v < now.size(); ++v) {
     const Common& c = now[v];
-    const double r = std::fmax(0.0, c.Correlation()), scale = 1.0 / std::sqrt(c.Unexplained());
-    if (c.ff > 0.0 && c.mm > 0.0)
-      weighing.push_back(
-          {rigid[v].weight / c.weight, scale * std::sqrt(c.weight / c.ff), scale * r * std::sqrt(c.weight / c.mm)});
+    const double r = c.Correlation(), scale = 1.0 / std::sqrt(c.Unexplained());
+    if (c.ff > 0.0 && c.mm > 0.0) // a box that has almost left the overlap is not made up for by what is left of it
+      weighing.push_back({std::fmin(2.0, rigid[v].weight / c.weight), scale * std::sqrt(c.weight / c.ff),
+                          scale * r * std::sqrt(c.weight / c.mm)});
     else
       weighing.push_back({0.0, 0.0, 0.0});
   }
@@ -428,6 +469,9 @@ ParameterList Describe(DeformableAlignParameters& p)
                 "Distance of the control points: about the size of what can bend by itself."),
       Parameter("BendingWeight", p.bendingWeight, {1e-6, 1e12}, "per mm",
                 "How stiff tissue is taken to be. A lower one follows larger deformations and more noise."),
+      Parameter("MinimumGain", p.minimumGain, {0, 1}, "",
+                "The share of what volumes then say of each other that a displacement must add to be applied. Views of the same "
+                "tissue under different angles seem to differ by some 0.1."),
       Parameter("Levels", p.levels, {1, 6}, "", "Resolutions, each half as fine as the next.").Advanced(),
       Parameter("Iterations", p.iterations, {1, 1000}, "", "Steps per resolution, at most.").Advanced(),
       Parameter("FinestMm", p.finestMm, {0.01, 100}, "mm",
@@ -471,7 +515,8 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
     const double spacing = parameters.controlSpacingMm * (l == 0 && !isLast ? 2.0 : 1.0);
     const Level level(fixed, moving, first - l, overlap, spacing);
     result.voxelMm = level.VoxelMm();
-    const auto penalty = PenaltyEntries(parameters.bendingWeight, 3.0 * parameters.controlSpacingMm, level.Lattice().spacing);
+    const double bending = parameters.bendingWeight * std::pow(SofterPerOctave, parameters.levels - 1 - l);
+    const auto penalty = PenaltyEntries(bending, 3.0 * parameters.controlSpacingMm, level.Lattice().spacing);
 
     level.Warp(DisplacementField(), warped, {});
     const Commons rigid = level.Compare(warped);
@@ -483,10 +528,7 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
     Commons now = level.Compare(warped);
     const LatticeEquations shape(level.Lattice().dimensions);
     const auto costOf = [&](const Commons& commons, const Vectors& coefficients) {
-      double cost = shape.PenaltyOf(penalty, coefficients);
-      for (std::size_t v = 0; v < commons.size(); ++v)
-        cost += 0.5 * rigid[v].weight * std::log(commons[v].Unexplained());
-      return cost;
+      return shape.PenaltyOf(penalty, coefficients) - InformationOf(commons, rigid);
     };
     double cost = costOf(now, c), damping = 0.0;
     for (int iteration = 0; iteration < parameters.iterations; ++iteration, ++result.iterations) {
@@ -527,6 +569,8 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
     }
     result.similarityBefore = Similarity(rigid);
     result.similarityAfter = Similarity(now);
+    const double information = InformationOf(now, rigid);
+    result.gain = information > 0.0 ? 1.0 - InformationOf(rigid, rigid) / information : 0.0;
     if (isLast) {
       const auto displacements = field.SampledOn(level.Grid());
       for (std::size_t i = 0; i < level.Grid().VoxelCount(); ++i)
@@ -538,8 +582,8 @@ DeformableAlignResult DeformableAlign(const std::vector<DeformableVolume>& fixed
   result.smallestDeterminant = field.SmallestDeterminant();
   if (!(result.smallestDeterminant > 0.0))
     result.reason = "the displacement folds space; increase BendingWeight or ControlSpacingMm";
-  else if (!(result.similarityAfter > result.similarityBefore))
-    result.reason = "no displacement makes the volumes more alike";
+  else if (!(result.gain >= parameters.minimumGain))
+    result.reason = "no displacement makes the volumes clearly more alike (MinimumGain)";
   else {
     result.isApplied = true;
     result.field = field;

@@ -15,7 +15,8 @@ struct DeformableVolume {
 
 struct DeformableAlignParameters {
   double controlSpacingMm = 30.0; ///< twice as much on the first level
-  double bendingWeight = 2000.0;  ///< of the bending energy, in voxels that agree as little as they do
+  double bendingWeight = 200.0;   ///< of the bending energy, in voxels of the last level that agree as little as they do
+  double minimumGain = 0.2;       ///< of what they then say of each other
   int levels = 2;
   int iterations = 15;
   double finestMm = 1.0;
@@ -28,8 +29,9 @@ struct DeformableAlignResult {
   DisplacementField field;          ///< pull-back of the moving volume in the world; zero when it is not applied
   bool isApplied = false;           ///< false: the rigid result stands
   std::string reason;               ///< why not; empty when applied
-  double similarityBefore = 0.0;    ///< correlation of what is seen, by weight, on the last level: 1 identical, 0 chance
+  double similarityBefore = 0.0;    ///< local correlation of what is seen, by weight, on the last level: 1 identical, 0 chance
   double similarityAfter = 0.0;     ///< of the field that was found, applied or not
+  double gain = 0.0;                ///< share of the information (-log(1 - r^2)), on the last level, that the field adds
   double overlap = 0.0;             ///< share of the moving volume that lies in others, by weight
   double bendingEnergy = 0.0;       ///< DisplacementField::BendingEnergy() of the field that was found
   double largestMm = 0.0;           ///< its longest displacement in the overlap
@@ -41,12 +43,13 @@ struct DeformableAlignResult {
 /// What a rigid motion leaves over: finds the smooth displacement that makes a moving volume agree with others.
 ///
 /// Free-form deformation (Rueckert et al. 1999): cubic B-splines on a lattice along the axes of the moving volume over the
-/// overlap, whose coefficients minimise W / 2 log(1 - r^2), r the correlation of what the metric sees (weighted by both volumes,
-/// W in all, over the overlap alone) plus bendingWeight times the bending energy, by Levenberg-Marquardt, coarse to fine. Beyond
-/// the overlap nothing but the bending counts, and the field goes smoothly to zero within three spacings of the lattice. What is
-/// left of a rigid motion becomes part of the field.
+/// overlap, whose coefficients minimise the sum of W / 2 log(1 - r^2) over boxes of 12 mm, r the correlation of what the metric
+/// sees (weighted by both volumes, W in all, over the overlap alone), plus bendingWeight times the bending energy, by
+/// Levenberg-Marquardt, coarse to fine. Beyond the overlap nothing but the bending counts, and the field goes smoothly to zero
+/// within three spacings of the lattice. What is left of a rigid motion becomes part of the field.
 ///
-/// A field that folds anywhere, or does not raise the similarity, is not applied: the result says why and holds a zero field.
+/// Structures look a little different from everywhere, which a field can follow as well. So one that adds less than minimumGain
+/// is not applied, nor one that folds anywhere: the result says why and holds a zero field.
 /// The result does not depend on the number of threads.
 /// \throws Error(InvalidParameter); Error(BadInput) without a fixed volume or for pyramids of descriptors;
 /// Error(NotPossible) when they overlap by less than minimumOverlap; Error(Cancelled).

@@ -85,11 +85,11 @@ void vtkUltrasoundDeformableAligner::Execute(vtkInformationVector** inputs, vtkI
   }
 
   // 2. the kernel
-  const auto results = echorama::DeformInTurn(seen, this->Values.fixedVolume, this->Values.align, progress.Part(0.2, 1.0));
+  this->Found = echorama::DeformInTurn(seen, this->Values.fixedVolume, this->Values.align, progress.Part(0.2, 1.0));
 
   // 3. the same volumes, and their displacements
   for (std::size_t i = 0; i < volumes.size(); ++i) {
-    const echorama::DeformableAlignResult& result = results[i];
+    const echorama::DeformableAlignResult& result = this->Found[i];
     vtkNew<vtkImageData> volume;
     volume->ShallowCopy(volumes[i].Image);
     const auto add = [&volume](const char* name, std::initializer_list<double> values) {

@@ -23,7 +23,7 @@
  *
  * The volume number FixedVolume is not bent. The others follow in turn, the one that overlaps the placed ones most first,
  * each compared by local correlation with all that came before, through their displacements (echorama::DeformInTurn). A
- * displacement that folds, or does not make volumes more alike, is not applied; a volume without overlap stays as it is.
+ * displacement that folds, or adds less than MinimumGain, is not applied; a volume without overlap stays as it is.
  * What the rigid alignment missed becomes part of the displacement.
  *
  * Fails with a message when there are fewer than two volumes, one is not three-dimensional, constant or nearly empty, or a
@@ -64,10 +64,19 @@ public:
   ///@{
   /**
    * How stiff tissue is taken to be. A lower one follows larger deformations and more noise. In [1e-06, 1000000000000] per mm;
-   * default 2000.
+   * default 200.
    */
   void SetBendingWeight(double value) { this->SetParameter("BendingWeight", value); }
   double GetBendingWeight() { return this->GetParameter("BendingWeight"); }
+  ///@}
+
+  ///@{
+  /**
+   * The share of what volumes then say of each other that a displacement must add to be applied. Views of the same tissue under
+   * different angles seem to differ by some 0.1. In [0, 1]; default 0.2.
+   */
+  void SetMinimumGain(double value) { this->SetParameter("MinimumGain", value); }
+  double GetMinimumGain() { return this->GetParameter("MinimumGain"); }
   ///@}
 
   ///@{
@@ -126,6 +135,12 @@ public:
 
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
+
+  /** What the last update found of a volume. */
+  const echorama::DeformableAlignResult& Result(std::size_t volume) const
+  {
+    return this->Found.at(volume);
+  }
 #endif
 
 protected:
@@ -146,6 +161,7 @@ private:
     echorama::DeformableAlignParameters align;
   };
   Settings Values;
+  std::vector<echorama::DeformableAlignResult> Found;
 #endif
 };
 

@@ -2,8 +2,9 @@
 // Two views of the phantom under different angles, so that their speckle is only partly the same; the tissue in the second one
 // is pressed by 0 to 3 mm. Both lie where they belong, so that what is left is the deformation alone. The error is the
 // distance, over the overlap, between where the second volume shows a point and where the displacement reads it.
-// The peer is the B-spline transform of elastix with the same spacing of its grid, masks and normalised correlation; its
-// control points are those of our own field, so both are measured alike.
+// The peer is the B-spline transform of elastix with the same spacing of its grid, masks and normalised correlation;
+// its penalty, longest step and iterations were tuned on pairs of pressed bodies. Its transform becomes a field of our own kind,
+// so both are measured alike.
 #include "Core/Imaging/Sampling.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
@@ -73,10 +74,10 @@ std::string BSplineParameters(double spacingMm)
          "(FixedImagePyramid \"FixedSmoothingImagePyramid\")\n(MovingImagePyramid \"MovingSmoothingImagePyramid\")\n"
          "(Optimizer \"AdaptiveStochasticGradientDescent\")\n(Transform \"BSplineTransform\")\n"
          "(Metric \"AdvancedNormalizedCorrelation\" \"TransformBendingEnergyPenalty\")\n(Metric0Weight 1.0)\n(Metric1Weight "
-         "50.0)\n"
+         "1000.0)\n(MaximumStepLength 0.25)\n"
          "(FinalGridSpacingInPhysicalUnits " +
          std::to_string(spacingMm) +
-         ")\n(NumberOfResolutions 3)\n(MaximumNumberOfIterations 300)\n(NumberOfSpatialSamples 5000)\n"
+         ")\n(NumberOfResolutions 3)\n(MaximumNumberOfIterations 500)\n(NumberOfSpatialSamples 5000)\n"
          "(NewSamplesEveryIteration \"true\")\n(ImageSampler \"RandomCoordinate\")\n(ErodeMask \"false\")\n"
          "(RequiredRatioOfValidSamples 0.05)\n(HowToCombineTransforms \"Compose\")\n(WriteResultImage \"false\")\n"
          "(DefaultPixelValue 0)\n(RandomSeed 1)\n";
@@ -140,6 +141,8 @@ int main()
            {{"cpu_seconds", benchmark::CpuSeconds() - before},
             {"similarity_before", result.similarityBefore},
             {"similarity_after", result.similarityAfter},
+            {"gain", result.gain},
+            {"applied", result.isApplied},
             {"bending_energy", result.bendingEnergy},
             {"smallest_determinant", result.smallestDeterminant},
             {"iterations", result.iterations}});

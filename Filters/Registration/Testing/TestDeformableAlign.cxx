@@ -144,6 +144,12 @@ TEST_F(DeformableAlignTest, FindsABumpUnderTheProbe)
   EXPECT_LT(result.overlap, 0.95);
   EXPECT_GT(result.smallestDeterminant, 0.5);
   EXPECT_NEAR(result.largestMm, 3.0, 1.0);
+  EXPECT_GT(result.gain, 0.2);
+  Random random(5, 0);
+  for (int i = 0; i < 2000; ++i) { // it folds nowhere, in the overlap and around it
+    const Eigen::Vector3d at(random.Uniform(-60.0, 140.0), random.Uniform(-60.0, 140.0), random.Uniform(-60.0, 130.0));
+    EXPECT_GT(result.field.Jacobian(at).determinant(), 0.4) << at.transpose();
+  }
   EXPECT_DOUBLE_EQ(result.bendingEnergy, result.field.BendingEnergy());
   EXPECT_DOUBLE_EQ(result.voxelMm, 2.0);
   // beyond the overlap it fades to exactly nothing, and never grows on the way
@@ -157,6 +163,22 @@ TEST_F(DeformableAlignTest, LeavesStraightVolumesAlone)
   // noise of their own must not bend them: less than a tenth of a voxel on the average
   const auto result = DeformableAlign({Volume(fixed)}, Volume(straight), Quick());
   EXPECT_LT(ErrorsOf(result.field, 0.0).after, 0.2);
+}
+
+TEST_F(DeformableAlignTest, WhatAddsLittleIsNotApplied)
+{
+  DeformableAlignParameters p = Quick();
+  p.minimumGain = 0.2;
+  const auto left = DeformableAlign({Volume(fixed)}, Volume(straight), p);
+  EXPECT_FALSE(left.isApplied);
+  EXPECT_TRUE(left.field.IsZero());
+  EXPECT_NE(left.reason.find("MinimumGain"), std::string::npos) << left.reason;
+  EXPECT_GE(left.gain, 0.0);
+  EXPECT_LT(left.gain, p.minimumGain);
+  p.minimumGain = 0.0;
+  EXPECT_TRUE(DeformableAlign({Volume(fixed)}, Volume(straight), p).isApplied) << "what it found is what was left out";
+  p.minimumGain = 1.0;
+  EXPECT_FALSE(DeformableAlign({Volume(fixed)}, Volume(bent), p).isApplied) << "nothing is as much alike as that";
 }
 
 TEST_F(DeformableAlignTest, IdenticalVolumesStayAsTheyAre)
@@ -173,7 +195,9 @@ TEST_F(DeformableAlignTest, ThreadsDoNotChangeIt)
   p.iterations = 2;
   const auto on = [&](int threads) {
     const ThreadLimit limit(threads);
-    return DeformableAlign({Volume(fixed)}, Volume(bent), p).field.Coefficients();
+    const auto result = DeformableAlign({Volume(fixed)}, Volume(bent), p);
+    EXPECT_TRUE(result.isApplied) << result.reason;
+    return result.field.Coefficients();
   };
   EXPECT_TRUE(on(1) == on(2));
 }
@@ -264,6 +288,7 @@ TEST_F(DeformableAlignTest, RefusesAndStops)
   };
   refuse("ControlSpacingMm", &DeformableAlignParameters::controlSpacingMm, nullptr, 1.0);
   refuse("BendingWeight", &DeformableAlignParameters::bendingWeight, nullptr, std::nan(""));
+  refuse("MinimumGain", &DeformableAlignParameters::minimumGain, nullptr, 1.5);
   refuse("FinestMm", &DeformableAlignParameters::finestMm, nullptr, 0.0);
   refuse("MinimumOverlap", &DeformableAlignParameters::minimumOverlap, nullptr, 1.5);
   refuse("Levels", nullptr, &DeformableAlignParameters::levels, 0);
