@@ -22,7 +22,8 @@ from program_under_test import PROGRAM, blobs, read_mha, run, run_json, snapshot
 work = None     # a folder for all tests
 phantom = None  # the folder of phantom volumes in it
 FILES = ["volume_1.mha", "volume_2.mha", "volume_3.mha"]
-FEWER_POINTS = ["--points", "4000"]  # enough for these volumes, and quick
+# Enough points for these volumes, and quick; and sound in a phantom is as fast as the scanner takes it to be.
+FEWER_POINTS = ["--points", "4000", "--sound-speed-error", "0"]
 
 
 def setUpModule():
@@ -267,6 +268,36 @@ class MainJob(unittest.TestCase):
         self.assertAlmostEqual(off["mean_mm"], 2, places=9)  # 0 for the first pair of volumes, 3 for the others
         self.assertAlmostEqual(off["max_mm"], 3, places=9)
         numpy.testing.assert_allclose(off["errors"][3]["vector_mm"], [0, -3, 0], atol=1e-9)
+        self.assertEqual(off["unmatched"], [])
+        with open(lists[0], "a") as file:
+            file.write("mine,0,0,0\n")
+        more = run_json("score", phantom / "truth.json", "--landmarks", *lists)
+        self.assertEqual([lone["label"] for lone in more["landmarks"]["unmatched"]], ["mine"])
+        self.assertTrue(any('"mine"' in note for note in more["notes"]))
+
+    def test_align_with_landmarks(self):
+        """They say where to begin, whatever the poses to start from, and the result tells how far apart they are in the end."""
+        places = numpy.array([[10.0, -5, 40], [-20, 8, 55], [0, 12, 70]])
+        lists = []
+        for number, pose in enumerate([affine_of(pose) for pose in truth()["volumes"]][:2], 1):
+            lists.append(work / f"marks{number}.csv")
+            lists[-1].write_text("".join(f"p{i},{x},{y},{z}\n" for i, (x, y, z) in enumerate((places - pose[:3, 3]) @ pose[:3, :3])))
+        far = numpy.eye(4)
+        far[:3] = [[0, -1, 0, 200], [1, 0, 0, -50], [0, 0, 1, 30]]
+        write_poses(work / "far.json", volumes()[:2], [numpy.eye(4), far])
+        told = run_json("align", *volumes()[:2], "--landmarks", *lists, "--poses", work / "far.json", "-o", work / "marked.json", *FEWER_POINTS)
+        self.assertEqual(told["verdict"], "aligned")
+        self.assertEqual(told["landmarks"]["pairs"], 3)
+        self.assertLess(told["landmarks"]["max_mm"], 2)
+        self.assertFalse(told["pairs"][0]["anywhere"])
+        lists[1].write_text(lists[1].read_text().replace("p0", "x").replace("p1", "p0").replace("x,", "p1,"))
+        wrong = run("align", *volumes()[:2], "--landmarks", *lists, "-o", work / "swapped.json", *FEWER_POINTS, "--json")
+        self.assertEqual(wrong.returncode, 3, wrong.stderr)
+        self.assertNotEqual(json.loads(wrong.stdout)["volumes"][1]["verdict"], "aligned")
+        for arguments in (["--landmarks", lists[0]], ["--landmarks", lists[0], work / "missing.csv"], ["--landmarks", lists[0], "-"]):
+            done = run("align", *volumes()[:2], *arguments, "-o", work / "nothing.json")
+            self.assertNotEqual(done.returncode, 0)
+            self.assertFalse((work / "nothing.json").exists())
 
     def test_pose_file(self):
         text = json.loads(self.poses.read_text())
@@ -311,6 +342,34 @@ class MainJob(unittest.TestCase):
             numpy.testing.assert_allclose(again["volumes"][i]["VolumeToWorld"], affine_of(truth()["volumes"][i]), atol=1e-12)
         self.assertEqual(sorted((pair["fixed"], pair["moving"]) for pair in again["pairs"]), [(1, 3), (2, 3)])
         self.assertGreater(abs(numpy.array(again["volumes"][2]["VolumeToWorld"]) - affine_of(truth()["volumes"][2])).max(), 0)
+
+    def test_align_deformable(self):
+        """The displacements lie beside the poses, which name them, and stitch reads the volumes through them."""
+        poses, files = work / "bent.json", volumes()[:2]
+        common = ["--poses", phantom / "truth.json", "--start", "tracked", "--deformable", *FEWER_POINTS]
+        told = run_json("align", *files, "-o", poses, *common, "--minimum-gain", 0)  # so that the little there is is taken
+        bent = told["volumes"][1]["deformation"]
+        self.assertTrue(bent["applied"], bent)
+        self.assertGreater(bent["similarity_after"], bent["similarity_before"])
+        self.assertGreater(bent["smallest_determinant"], 0.5)
+        self.assertNotIn("deformation", told["volumes"][0])
+        text = json.loads(poses.read_text())
+        self.assertNotIn("displacement", text["volumes"][0])
+        self.assertEqual(text["volumes"][1].pop("displacement"), "bent.displacement-2.vti")
+        (work / "unbent.json").write_text(json.dumps(text))
+        stitched = []
+        for name in ("bent", "unbent"):
+            run_json("stitch", *files, "-o", work / f"{name}.mha", "--poses", work / f"{name}.json", "--spacing", 3)
+            stitched.append(read_mha(work / f"{name}.mha")[1].astype(int))
+        self.assertTrue((stitched[0] != stitched[1]).any())
+        (work / "bent.displacement-2.vti").unlink()
+        missing = run("stitch", *files, "-o", work / "missing.mha", "--poses", poses, "--spacing", 3)
+        self.assertEqual(missing.returncode, 1)
+        self.assertIn("bent.displacement-2.vti", missing.stderr)
+        none = run_json("align", *files, "-o", work / "straight.json", *common, "--minimum-gain", 1)["volumes"][1]["deformation"]
+        self.assertFalse(none["applied"])
+        self.assertIn("MinimumGain", none["reason"])
+        self.assertNotIn("displacement", (work / "straight.json").read_text())
 
     def test_stitch(self):
         """Stitched with poses, or from volumes that were moved there: the same."""

@@ -200,6 +200,18 @@ class Score(Several):
             filter.AddInputDataObject(1, copy_of(image))
 
 
+class LandmarkError(Several):
+    output = "points"
+    same_grid = False
+    accepts = () # it reads no voxels
+
+    def connect(self, filter, images):
+        super().connect(filter, images)
+        filter.ClearLandmarks()
+        for number in range(len(images)):
+            filter.AddLandmark(number, "apex", 1.0 * number, 2.0, 3.0)
+
+
 class Stitcher(Several):
     same_grid = False
     keeps_fields = False # an acquisition is that of one volume
@@ -517,6 +529,7 @@ Special = {
     "vtkUltrasoundAligner": Aligner,
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundDeformableAligner": DeformableAligner,
+    "vtkUltrasoundLandmarkError": LandmarkError,
     "vtkUltrasoundPoseEditor": PoseEditor,
     "vtkUltrasoundStitcher": Stitcher,
     "vtkUltrasoundEmbedder": Embedder,

@@ -14,7 +14,7 @@
  *
  * | event                  | when                                                                    |
  * | ---------------------- | ----------------------------------------------------------------------- |
- * | VolumesChangedEvent    | volumes came or went, or names, groups, colours, opacity, visibility     |
+ * | VolumesChangedEvent    | volumes came or went, or names, groups, looks, landmarks                |
  * | PosesChangedEvent      | at every step of a drag                                                  |
  * | SelectionChangedEvent  | the selection, or the centre of rotation                                 |
  * | VoxelsChangedEvent     | painted, carved                                                         |
@@ -157,6 +157,31 @@ public:
   std::string GetRedoLabel() const { return this->GetKernel().RedoLabel(); }
   /** What was done stays done: nothing before can be undone, and volumes that were removed are let go. */
   bool ForgetHistory() { return this->Do(&Kernel::ForgetHistory); }
+  ///@}
+
+  ///@{
+  /** Landmarks: places with labels, which are the same place of the body in every volume that has one of that label. A place of
+   * the world, mm: it moves with the volume from then on. RemoveLandmark: from all volumes. GetNextLandmarkLabel: the first that
+   * other volumes have and this one has not, else a new number. */
+  bool SetLandmark(int id, const char* label, double x, double y, double z)
+  {
+    return this->Do(&Kernel::SetLandmark, id, label ? label : "", {x, y, z});
+  }
+  bool RemoveLandmark(const char* label) { return this->Do(&Kernel::RemoveLandmark, label ? label : ""); }
+  bool ClearLandmarks() { return this->Do(&Kernel::ClearLandmarks); }
+  std::string GetNextLandmarkLabel(int id) const { return this->GetKernel().NextLandmarkLabel(id); }
+  int GetNumberOfLandmarks(int id) const { return static_cast<int>(this->Of(id, &echorama::SessionVolume::landmarks).size()); }
+  /** Empty: there are not so many. */
+  std::string GetLandmarkLabel(int id, int index) const
+  {
+    return index >= 0 && index < this->GetNumberOfLandmarks(id) ? this->Find(id)->landmarks[static_cast<std::size_t>(index)].label
+                                                                : std::string();
+  }
+  bool GetLandmark(int id, const char* label, double place[3]) const
+  {
+    const auto found = this->GetKernel().PlaceOfLandmark(id, label ? label : "");
+    return found && std::copy_n(found->data(), 3, place) != place;
+  }
   ///@}
 
   ///@{

@@ -149,7 +149,7 @@ public:
         changes.Unpainted.push_back(volume.name);
       }
       if (!old || old->name != volume.name || old->group != volume.group || old->colour != volume.colour ||
-          old->opacity != volume.opacity || old->visible != volume.visible) {
+          old->opacity != volume.opacity || old->visible != volume.visible || !(old->landmarks == volume.landmarks)) {
         add(changes.Volumes, volume.id);
       }
     }

@@ -7,11 +7,13 @@
 // picture.
 #include "vtkUltrasoundSliceView.h"
 
+#include "Core/Base/FormatText.h"
 #include "vtkCamera.h"
 #include "vtkImageData.h"
 #include "vtkObjectFactory.h"
 #include "vtkSmartPointer.h"
 #include "vtkUltrasoundAlignmentSession.h"
+#include "vtkUltrasoundLandmarkCrosses.h"
 #include "vtkUltrasoundSliceInput.h"
 #include "vtkUltrasoundViewProps.h"
 #include "vtkUltrasoundVolume.h"
@@ -67,6 +69,7 @@ struct vtkUltrasoundSliceView::Internals {
   ScreenLines Overlay;
   vtkNew<vtkTextActor> ScaleText;
   std::array<vtkNew<vtkTextActor>, 4> Letters;
+  LandmarkCrosses Landmarks;
 
   explicit Internals(vtkUltrasoundSliceView* view) : View(view), Frame(view->Frame)
   {
@@ -163,9 +166,7 @@ struct vtkUltrasoundSliceView::Internals {
     const double left = 12.0, bottom = 12.0, tick = 4.0, grey = 230 / 255.0;
     this->Overlay.Add({{left, bottom + tick}, {left, bottom}, {left + pixels, bottom}, {left + pixels, bottom + tick}},
                       {grey, grey, grey}, 220);
-    char text[32];
-    std::snprintf(text, sizeof text, "%g mm", length);
-    this->ScaleText->SetInput(text);
+    this->ScaleText->SetInput(Format("%g mm", length).c_str());
     this->ScaleText->SetPosition(left, bottom + tick + 2.0);
   }
 
@@ -177,10 +178,10 @@ struct vtkUltrasoundSliceView::Internals {
     if (this->View->Annotated && this->View->IsLinked()) {
       this->DrawLinkedPlanes();
     }
-    const std::vector<Vector2d> brush = this->Frame.CutOf(this->Brush, this->BrushMm);
-    if (!brush.empty()) {
+    if (const std::vector<Vector2d> brush = this->Frame.CutOf(this->Brush, this->BrushMm); !brush.empty()) {
       this->Overlay.Add(brush, {1.0, 1.0, 1.0}, 200);
     }
+    this->Landmarks.Draw(this->Session, this->Frame, this->Overlay, this->Renderer);
     if (room) {
       this->DrawScaleBar();
     }
@@ -593,8 +594,7 @@ vtkImageData* vtkUltrasoundSliceView::GetPicture() const
 
 void vtkUltrasoundSliceView::GetPlaneCorners(double corners[12]) const
 {
-  const std::array<Vector3d, 4> points = this->Frame.Corners();
-  std::copy_n(points[0].data(), 12, corners);
+  std::copy_n(this->Frame.Corners()[0].data(), 12, corners);
 }
 
 #undef EchoramaRequire

@@ -20,6 +20,8 @@
  * Linked views have the zoom and the cursor in common, a point of the world that all their planes go through; each shows where
  * the others' planes cut its own. Pixels count from the lower left one, (0, 0), whose middle that is.
  *
+ * Landmarks of the session that lie within 5 mm of the plane are crosses with labels, the fainter the farther.
+ *
  * Names that are none and numbers out of range are reported as errors, and change nothing.
  *
  * Source: dissertation 4.3.

@@ -10,7 +10,7 @@ namespace echorama {
 namespace {
 
 constexpr const char* Mouse[][2] = {
-    {"Left", "the tool in hand: move volumes, paint, carve, restore, or point"},
+    {"Left", "the tool in hand: move volumes, paint, carve, restore, mark, or point"},
     {"Shift + left (Align)", "turn volumes"},
     {"Wheel", "through the slices (Shift: ten at a time)"},
     {"Ctrl + wheel", "zoom"},

@@ -10,6 +10,7 @@
 #include "HistoryPanel.h"
 #include "JobBar.h"
 #include "KeysPage.h"
+#include "LandmarkBox.h"
 #include "MessageBar.h"
 #include "Messages.h"
 #include "PosePanel.h"
@@ -138,6 +139,8 @@ void MainWindow::MakePanels()
   Workspace& workspace = bench_->Shared();
   auto* registration = new RegistrationPanel(workspace, this);
   AddPanel(registration, tr("Align"));
+  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged})
+    connect(bench_, changed, registration->Landmarks(), &LandmarkBox::ShowLandmarks);
   Menu(Place::Align)
       ->addAction(MakeAction(this, "refineAction", tr("&Refine from here"), "R",
                              tr("Align the selected volumes to the others from where they are; can be undone"),

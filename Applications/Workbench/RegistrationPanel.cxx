@@ -6,6 +6,7 @@
 #include "Core/Geometry/MatrixRows.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Registration/AlignPair.h"
+#include "LandmarkBox.h"
 #include "Workspace.h"
 #include <QCheckBox>
 #include <QComboBox>
@@ -132,6 +133,7 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : Jo
   place_ = Button(this, "placeByTracker", tr("&Place by tracker"),
                   tr("Puts all volumes beside the first as the tracker saw them"), [this] { PlaceByTracker(); });
   trackerForm->addRow(place_);
+  landmarks_ = new LandmarkBox(workspace, this);
   table_ = TableField(this, "alignResults", tr("What came out last; rest the mouse on an answer for its reason"),
                       {tr("Volume"), tr("Answer"), tr("Moved"), tr("Overlap")});
   table_->setSelectionMode(QAbstractItemView::NoSelection);
@@ -145,6 +147,7 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : Jo
   form->addRow(tr("Metric"), metric_);
   layout->addLayout(form);
   layout->addWidget(doubtful_);
+  layout->addWidget(landmarks_);
   layout->addWidget(byTracker);
   layout->addWidget(table_, 1);
 }
@@ -208,6 +211,14 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
   for (const int number : held) {
     aligner->AddHeldVolume(number);
     result->volumes[static_cast<std::size_t>(number)].held = true;
+  }
+  aligner->SetLandmarkSigmaMm(landmarks_->SigmaMm());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const SessionVolume& volume = *workspace_.session->GetKernel().State().Find(ids[i]);
+    for (const Landmark& landmark : volume.landmarks) {
+      const Eigen::Vector3d place = volume.volumeToWorld * landmark.position;
+      aligner->AddLandmark(static_cast<int>(i), landmark.label.c_str(), place.x(), place.y(), place.z());
+    }
   }
   const auto work = [aligner, result](const Progress& progress) {
     Update(aligner, progress);

@@ -11,14 +11,19 @@ class QTableWidget;
 
 namespace echorama {
 
+class LandmarkBox;
+
 /// Automatic alignment of what is in the session: refining what is selected from where it is, aligning all volumes from scratch,
 /// or placing them as a tracker saw them. It runs in the background, tells what each answer is worth, and its result is one edit.
+/// Landmarks that volumes share are used.
 /// Volumes that were moved meanwhile are left where they are, and doubtful answers are not taken unless the user says so.
 class RegistrationPanel : public JobPanel {
   Q_OBJECT
 
 public:
   explicit RegistrationPanel(Workspace& workspace, QWidget* parent = nullptr);
+
+  LandmarkBox* Landmarks() const { return landmarks_; }
 
 public slots:
   void Refine();         ///< selected volumes onto the others, which stay; with all or none selected: all onto the first
@@ -38,6 +43,7 @@ private:
   QCheckBox* doubtful_;
   QLineEdit *recording_, *tool_, *calibration_;
   QPushButton *refine_, *alignAll_, *place_;
+  LandmarkBox* landmarks_;
   QTableWidget* table_;
 };
 

@@ -16,6 +16,7 @@
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundAlignmentSession.h>
+#include <vtkUltrasoundDeformableAligner.h>
 #include <vtkUltrasoundEmbedder.h>
 #include <vtkUltrasoundStitcher.h>
 #include <vtkUltrasoundWriter.h>
@@ -49,6 +50,8 @@ ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : JobPanel(works
   gain_ = CheckField(this, "stitchGain", tr("Equalise gain"),
                      tr("First gives the volumes the same brightness and contrast where they overlap"));
   gain_->setChecked(defaults->GetEqualizeGain());
+  deformable_ = CheckField(this, "stitchDeformable", tr("Deformable"),
+                           tr("First finds how tissue was deformed between the volumes, and reads them where it belongs"));
   embed_ = CheckField(this, "embed", tr("Embed in a background"),
                       tr("Puts the result into the fan that holds it, in noise of its own brightness and grain"),
                       [this](bool) { ShowState(); });
@@ -72,6 +75,7 @@ ResultPanel::ResultPanel(Workspace& workspace, QWidget* parent) : JobPanel(works
   form->addRow(tr("Texture"), texture_);
   form->addRow(tr("Voxels"), spacing_);
   form->addRow(gain_);
+  form->addRow(deformable_);
   form->addRow(embed_);
   form->addRow(tr("Margin"), margin_);
   layout->addLayout(form);
@@ -120,22 +124,32 @@ void ResultPanel::Make(bool preview)
     embedder = vtkSmartPointer<vtkUltrasoundEmbedder>::New();
     embedder->SetMarginMm(margin_->value());
   }
+  vtkSmartPointer<vtkUltrasoundDeformableAligner> deformer;
+  if (deformable_->isChecked() && count > 1) {
+    deformer = vtkSmartPointer<vtkUltrasoundDeformableAligner>::New();
+    deformer->SetInputDataObject(shown);
+  }
   const auto made = std::make_shared<vtkSmartPointer<vtkImageData>>();
   const QString label = embedder ? tr("Stitch and embed") : tr("Stitch");
   Start(
       preview ? tr("%1 (preview)").arg(label) : label,
-      [stitcher, embedder, made, preview](const Progress& progress) {
+      [stitcher, deformer, embedder, made, preview](const Progress& progress) {
+        if (deformer) {
+          Update(deformer, progress.Part(0.0, 0.5));
+          stitcher->AddDisplacementData(deformer->GetOutputDataObject(1));
+        }
+        const Progress rest = progress.Part(deformer ? 0.5 : 0.0, 1.0);
         if (preview) {
           stitcher->UpdateInformation();
           double spacing[3];
           stitcher->GetOutputInformation(0)->Get(vtkDataObject::SPACING(), spacing);
           stitcher->SetSpacingMm(2.0 * *std::min_element(spacing, spacing + 3));
         }
-        Update(stitcher, progress.Part(0.0, embedder ? 0.4 : 1.0));
+        Update(stitcher, rest.Part(0.0, embedder ? 0.4 : 1.0));
         *made = stitcher->GetOutput();
         if (embedder) {
           embedder->SetInputData(0, *made);
-          Update(embedder, progress.Part(0.4, 1.0));
+          Update(embedder, rest.Part(0.4, 1.0));
           *made = embedder->GetOutput();
         }
       },

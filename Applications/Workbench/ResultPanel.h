@@ -42,7 +42,7 @@ private:
   vtkSmartPointer<vtkImageData> volume_;
   QComboBox *method_, *texture_;
   QDoubleSpinBox *spacing_, *margin_;
-  QCheckBox *gain_, *embed_;
+  QCheckBox *gain_, *deformable_, *embed_;
   QPushButton *preview_, *make_, *save_;
   QLabel* text_;
 };

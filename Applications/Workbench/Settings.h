@@ -6,7 +6,7 @@
 namespace echorama {
 
 /// What the left mouse button does in a slice.
-enum class Tool { Look, Align, Paint, Carve, Restore };
+enum class Tool { Look, Align, Paint, Carve, Restore, Mark };
 
 /// The brush of Paint, Carve and Restore; see echorama::Brush.
 struct BrushSettings {

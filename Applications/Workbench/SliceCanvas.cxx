@@ -194,6 +194,8 @@ void SliceCanvas::mousePressEvent(QMouseEvent* event)
     drag_ = Drag::Widget;
   } else if (event->button() == Qt::LeftButton && IsBrush(bench_->CurrentTool())) {
     BeginStroke(point);
+  } else if (event->button() == Qt::LeftButton && bench_->CurrentTool() == Tool::Mark) {
+    BeginLandmark(pixel, point);
   } else if (event->button() == Qt::LeftButton) {
     drag_ = Drag::Cursor;
     view_->SetCursor(point[0], point[1], point[2]);
@@ -208,15 +210,57 @@ void SliceCanvas::ChangePlane()
   Ask();
 }
 
+int SliceCanvas::VolumeToChange(const QString& toSelectOne)
+{
+  const QVector<int> volumes = bench_->Volumes();
+  const int id = volumes.size() == 1 ? volumes.first() : bench_->ActiveVolume();
+  if (id != 0 && bench_->SelectedVolumes().size() <= 1)
+    return id;
+  bench_->Note(volumes.isEmpty() ? tr("Open a volume first.") : toSelectOne);
+  return 0;
+}
+
+// A press beside a landmark of the volume takes hold of it, any other makes a new one. Until the release it is one edit.
+void SliceCanvas::BeginLandmark(const QPointF& pixel, const double point[3])
+{
+  constexpr double reach = 8.0; // pixels
+  auto* session = bench_->Session();
+  const int id = VolumeToChange(tr("Select the one volume to mark in."));
+  if (id == 0)
+    return;
+  landmark_ = {id, session->GetNextLandmarkLabel(id)};
+  double nearest = reach * devicePixelRatioF();
+  for (int i = 0; i < session->GetNumberOfLandmarks(id); ++i) {
+    const std::string label = session->GetLandmarkLabel(id, i);
+    double place[3] = {0.0, 0.0, 0.0}, at[2], shown[3];
+    session->GetLandmark(id, label.c_str(), place);
+    view_->WorldToPixel(place[0], place[1], place[2], at);
+    view_->PixelToWorld(at[0], at[1], shown);
+    const double distance = std::hypot(at[0] - pixel.x(), at[1] - pixel.y());
+    const double depth = std::hypot(place[0] - shown[0], place[1] - shown[1], place[2] - shown[2]);
+    if (distance < nearest && depth < nearest * view_->GetMillimetresPerPixel()) {
+      nearest = distance;
+      landmark_.second = label;
+    }
+  }
+  session->BeginEdit(tr("Mark %1 in %2").arg(QString::fromStdString(landmark_.second), bench_->NameOf(id)).toUtf8());
+  drag_ = Drag::Landmark;
+  DragLandmark(point);
+}
+
+void SliceCanvas::DragLandmark(const double point[3])
+{
+  bench_->Session()->SetLandmark(landmark_.first, landmark_.second.c_str(), point[0], point[1], point[2]);
+  view_->SetCursor(point[0], point[1], point[2]);
+  ChangePlane();
+}
+
 void SliceCanvas::BeginStroke(const double point[3])
 {
   auto* session = bench_->Session();
-  const QVector<int> volumes = bench_->Volumes();
-  const int id = volumes.size() == 1 ? volumes.first() : bench_->ActiveVolume();
-  if (id == 0 || bench_->SelectedVolumes().size() > 1) {
-    bench_->Note(volumes.isEmpty() ? tr("Open a volume to paint in.") : tr("Select the one volume to paint in."));
+  const int id = VolumeToChange(tr("Select the one volume to paint in."));
+  if (id == 0)
     return;
-  }
   const BrushSettings& brush = bench_->Brush();
   if (!session->BeginStroke(id, BrushModeOf(bench_->CurrentTool()), brush.radiusMm, brush.intensity, brush.opacity,
                             brush.hardness, brush.insideValid))
@@ -242,6 +286,9 @@ void SliceCanvas::mouseMoveEvent(QMouseEvent* event)
     break;
   case Drag::Stroke:
     bench_->Session()->ExtendStroke(point[0], point[1], point[2]);
+    break;
+  case Drag::Landmark:
+    DragLandmark(point);
     break;
   case Drag::Pan:
     view_->Pan(by.x() * ratio, -by.y() * ratio);
@@ -292,6 +339,8 @@ void SliceCanvas::EndDrag()
     interactor()->InvokeEvent(vtkCommand::LeftButtonReleaseEvent); // the widget knows it already, unless the release was lost
   if (drag == Drag::Stroke)
     bench_->Session()->EndStroke();
+  if (drag == Drag::Landmark)
+    bench_->Session()->EndEdit();
   if (drag == Drag::Stroke || drag == Drag::Window)
     bench_->SetInteracting(false);
   Ask();
@@ -307,7 +356,7 @@ void SliceCanvas::CancelStroke()
 void SliceCanvas::mouseDoubleClickEvent(QMouseEvent* event)
 {
   event->accept();
-  if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool())) {
+  if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool()) || bench_->CurrentTool() == Tool::Mark) {
     mousePressEvent(event); // dabs in quick succession
     return;
   }
@@ -368,7 +417,7 @@ void SliceCanvas::leaveEvent(QEvent* event)
 
 void SliceCanvas::keyPressEvent(QKeyEvent* event)
 {
-  if (event->key() == Qt::Key_Escape && drag_ == Drag::Stroke) {
+  if (event->key() == Qt::Key_Escape && (drag_ == Drag::Stroke || drag_ == Drag::Landmark)) {
     event->accept();
     CancelStroke();
     return;

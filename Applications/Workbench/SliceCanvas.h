@@ -2,6 +2,8 @@
 #pragma once
 #include <QVector>
 #include <QVTKOpenGLNativeWidget.h>
+#include <string>
+#include <utility>
 #include <vtkSmartPointer.h>
 
 class vtkUltrasoundSliceView;
@@ -16,13 +18,13 @@ class Workbench;
 ///
 /// | mouse                 | does                                                                            |
 /// | --------------------- | ------------------------------------------------------------------------------- |
-/// | left                  | what the tool in hand does: moves volumes, paints, carves, restores, or points    |
+/// | left                  | what the tool in hand does: moves volumes, paints, carves, restores, marks, points |
 /// | wheel                 | goes through the slices, by one voxel (Shift: ten)                              |
 /// | Ctrl + wheel          | zooms at the mouse                                                              |
 /// | middle drag           | moves the picture; with Shift: turns the plane, which becomes oblique           |
 /// | right drag            | grey levels: contrast to the sides, brightness up and down                      |
 /// | double click          | makes the view large, and back                                                  |
-/// | Escape while painting | takes the stroke back                                                           |
+/// | Escape while painting | takes the stroke back; so with a landmark while it is dragged                   |
 class SliceCanvas : public QVTKOpenGLNativeWidget {
   Q_OBJECT
 
@@ -60,11 +62,15 @@ protected:
   void keyPressEvent(QKeyEvent* event) override;
 
 private:
-  enum class Drag { None, Widget, Cursor, Stroke, Pan, Turn, Window };
+  enum class Drag { None, Widget, Cursor, Stroke, Landmark, Pan, Turn, Window };
 
   bool IsForHandles(QEvent* event) const;
   void Look();
+  /// The volume that a tool changes; 0, and says so, when it is not clear which.
+  int VolumeToChange(const QString& toSelectOne);
   void BeginStroke(const double point[3]);
+  void BeginLandmark(const QPointF& pixel, const double point[3]);
+  void DragLandmark(const double point[3]);
   void CancelStroke();
   Qt::MouseButton ButtonOfDrag() const;
   void EndDrag();
@@ -79,7 +85,8 @@ private:
   Redraw* redraw_;
   Drag drag_ = Drag::None;
   QPointF last_;
-  QVector<int> selected_; ///< before the last press
+  QVector<int> selected_;                ///< before the last press
+  std::pair<int, std::string> landmark_; ///< that is dragged: volume and label
   bool isPlaced_ = false;
 };
 

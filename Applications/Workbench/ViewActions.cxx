@@ -32,6 +32,9 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   addTool("toolPaint", tr("&Paint"), "3", tr("Paint in the selected volume"), Tool::Paint);
   addTool("toolCarve", tr("&Carve"), "4", tr("Take away parts of the selected volume"), Tool::Carve);
   addTool("toolRestore", tr("&Restore"), "5", tr("Bring back what was painted over or carved away"), Tool::Restore);
+  addTool("toolMark", tr("&Mark"), "6",
+          tr("Mark landmarks in the selected volume: the same places in two volumes help to align them; drag one to move it"),
+          Tool::Mark);
 
   const auto addShown = [&](const char* name, const QString& label, const char* key, const QString& help, const QString& word) {
     addTo(shown_, name, label, key, help, word, [this, word] { bench_->Set(&SliceLook::shown, word); });

@@ -125,7 +125,7 @@ def demo(options):
     out.mkdir(parents=True, exist_ok=True)
     for old in RESULTS:  # a step that fails must not leave the report of an earlier run
         (out / old).unlink(missing_ok=True)
-    truth_file = None
+    truth_file, straight = None, []
     if options.volumes:
         # A shell's * finds the companions NAME.ValidRegion.EXT too; they are parts of NAME.EXT.
         named = {str(short(volume)) for volume in options.volumes}
@@ -137,12 +137,13 @@ def demo(options):
         truth_file = out / "synthetic" / "truth.json"
         files = files_of(truth_file)
     else:
+        straight = ["--sound-speed-error", "0"]  # sound in a phantom is as fast as the scanner takes it to be
         steps.run("making three volumes of a phantom, knocked out of place", "phantom", "-o", out / "phantom",
                   *(["--spacing", 2] if options.quick else []))
         truth_file = out / "phantom" / "truth.json"
         files = files_of(truth_file)
 
-    steps.run("aligning", "align", *files, "-o", out / "poses.json")
+    steps.run("aligning", "align", *files, *straight, "-o", out / "poses.json")
     before = after = None
     if truth_file:
         write_identities(out / "start.json", files)

@@ -2,7 +2,9 @@
 // echorama align: where do overlapping volumes belong?
 #include "Commands.h"
 #include "Core/Base/Angles.h"
+#include "Displacements.h"
 #include "Filters/Registration/AlignmentJson.h"
+#include "Landmarks.h"
 #include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
@@ -12,6 +14,7 @@
 #include <memory>
 #include <vtkSmartPointer.h>
 #include <vtkUltrasoundAligner.h>
+#include <vtkUltrasoundDeformableAligner.h>
 
 namespace echorama {
 namespace {
@@ -23,9 +26,10 @@ struct AlignOptions {
   std::string output, poses, apply;
   int fixed = 1;
   std::vector<int> held; // from 1
+  std::vector<std::string> landmarks;
   TrackerOptions tracker;
   std::string calibration;
-  bool trackerOnly = false;
+  bool trackerOnly = false, deformable = false;
 };
 
 // Puts each volume where the tracker says, as seen from the fixed one.
@@ -47,13 +51,25 @@ void PlaceVolumes(Session& session, AlignOptions& options, std::vector<LoadedVol
     session.Say("tracker: the calibration states an error of " + Fixed(*calibration.errorMm, 2) + " mm");
 }
 
-void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner)
+// Each list goes where its volume is, which may have left the place that its file says.
+void GiveLandmarks(const std::vector<LandmarkList>& lists, const std::vector<LoadedVolume>& volumes,
+                   vtkUltrasoundAligner* aligner)
+{
+  for (std::size_t i = 0; i < lists.size(); ++i)
+    for (const Landmark& landmark : lists[i].landmarks) {
+      const Eigen::Vector3d place = volumes[i].volumeToWorld * landmark.position;
+      aligner->AddLandmark(static_cast<int>(i), landmark.label.c_str(), place.x(), place.y(), place.z());
+    }
+}
+
+void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner, vtkUltrasoundDeformableAligner* deformer)
 {
   options.files = WithoutCompanions(session, options.files);
   std::vector<std::string> inputs = options.files;
   for (const std::string& input : {options.tracker.log, options.calibration})
     if (!input.empty())
       inputs.push_back(input);
+  inputs.insert(inputs.end(), options.landmarks.begin(), options.landmarks.end());
   if (!options.poses.empty())
     inputs.push_back(options.poses);
   if (options.output.empty()) {
@@ -62,6 +78,8 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
       throw Error(Error::Kind::FileSystem, options.output + ": it is there already; name it with -o to replace it");
   }
   CheckOutput(options.output, inputs);
+  for (std::size_t i = 0; options.deformable && i < options.files.size(); ++i)
+    CheckOutput(DisplacementPath(options.output, i), inputs);
   if (options.fixed > static_cast<int>(options.files.size()))
     throw Error(Error::Kind::InvalidParameter, "--fixed: there are only " + std::to_string(options.files.size()) + " volumes");
   aligner->SetFixedVolume(options.fixed - 1);
@@ -69,6 +87,11 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     if (number > static_cast<int>(options.files.size()))
       throw Error(Error::Kind::InvalidParameter, "--hold: there are only " + std::to_string(options.files.size()) + " volumes");
     aligner->AddHeldVolume(number - 1);
+  }
+  std::vector<LandmarkList> landmarks;
+  if (!options.landmarks.empty()) {
+    landmarks = ReadLandmarkLists(options.landmarks, options.files.size(), "there are ");
+    MeasureLandmarkError(landmarks); // whether they can be compared at all
   }
   // Places for the moved volumes are looked for first, so that nothing is refused after all the work.
   std::unique_ptr<OutputFolder> folder;
@@ -101,6 +124,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     session.Say("wrote " + options.output + ", as the tracker says");
     return;
   }
+  GiveLandmarks(landmarks, volumes, aligner);
   aligner->SetInputDataObject(BlocksOf(volumes));
   session.Update(aligner, "align");
 
@@ -109,6 +133,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   session.result["fixed"] = options.fixed;
   session.result["volumes"] = nlohmann::ordered_json::array();
   std::vector<VolumePose> poses;
+  std::vector<bool> isPlaced;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     LoadedVolume& volume = volumes[i];
     const VolumeAlignment& found = aligner->Result().volumes[i];
@@ -117,6 +142,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     const double degrees = RotationAngle(pose) * DegreesPerRadian, mm = (pose * start.Centre() - start.Centre()).norm();
     MoveVolume(volume, pose);
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
+    isPlaced.push_back(found.verdict != Verdict::Failed);
     nlohmann::ordered_json entry{{"file", volume.file}, {"turned_degrees", degrees}, {"moved_mm", mm}};
     report["volumes"][i].erase("name");
     entry.update(report["volumes"][i]);
@@ -129,6 +155,11 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
                            "; turned by " + Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
                            " mm, overlap " + Fixed(100.0 * found.overlap, 0) + "%"));
   }
+  if (!landmarks.empty()) {
+    for (std::size_t i = 0; i < volumes.size(); ++i)
+      landmarks[i].volumeToWorld = volumes[i].volumeToWorld;
+    TellLandmarkError(session, landmarks, options.files);
+  }
   session.result["pairs"] = report["pairs"];
   session.result["align_seconds"] = report["seconds"];
   session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
@@ -137,6 +168,8 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     session.Note("not every volume is aligned: check the poses before using them");
   }
 
+  if (options.deformable)
+    DeformVolumes(session, deformer, volumes, isPlaced, options.fixed - 1, options.output, poses);
   for (std::size_t i = 0; i < places.size(); ++i)
     SaveVolume(session, volumes[i].image, places[i]);
   WritePoses(options.output, poses);
@@ -154,6 +187,7 @@ Command AlignCommand(CLI::App& program)
 {
   auto values = std::make_shared<AlignOptions>();
   const auto aligner = vtkSmartPointer<vtkUltrasoundAligner>::New();
+  const auto deformer = vtkSmartPointer<vtkUltrasoundDeformableAligner>::New();
   CLI::App* options = program.add_subcommand("align", "Find where overlapping volumes belong");
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output,
@@ -167,15 +201,24 @@ Command AlignCommand(CLI::App& program)
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   AddParametersBut(options, aligner, {"FixedVolume"}); // --fixed counts from 1
+  CLI::Option* landmarks = AddLandmarksOption(
+      options, values->landmarks, "Places that were found in the volumes; those with one label in two volumes belong together");
   values->tracker.AddTo(*options, false);
   options->add_option("--calibration", values->calibration,
                       "Calibration of the tracked probe, as echorama calibrate hand-eye writes it");
   options->add_flag("--tracker-only", values->trackerOnly, "Leave the volumes where the tracker says");
   options->get_option("--tracker")->needs("--calibration")->excludes("--poses");
   options->get_option("--calibration")->needs("--tracker");
-  options->get_option("--tracker-only")->needs("--tracker");
+  options->get_option("--tracker-only")->needs("--tracker")->excludes(landmarks);
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry");
-  return {options, [values, aligner](Session& session) { Align(session, *values, aligner); }};
+  CLI::Option* deformable =
+      options
+          ->add_flag("--deformable", values->deformable,
+                     "Also find how tissue was deformed; the displacements are written beside the pose file, which names them")
+          ->excludes("--tracker-only");
+  for (const char* name : {"ControlSpacingMm", "BendingWeight", "MinimumGain"})
+    AddParameter(options, deformer, name)->needs(deformable);
+  return {options, [values, aligner, deformer](Session& session) { Align(session, *values, aligner, deformer); }};
 }
 
 } // namespace echorama

@@ -20,8 +20,6 @@ struct PhantomOptions {
   double overlap = 0.55, knockMm = 8.0, knockDegrees = 6.0;
 };
 
-using Source = vtkSmartPointer<vtkUltrasoundPhantomSource>;
-
 void Phantom(Session& session, const PhantomOptions& options, vtkUltrasoundPhantomSource* source)
 {
   const PhantomParameters wanted = source->Phantom();
@@ -64,7 +62,7 @@ void Phantom(Session& session, const PhantomOptions& options, vtkUltrasoundPhant
 Command PhantomCommand(CLI::App& program)
 {
   auto values = std::make_shared<PhantomOptions>();
-  const Source source = Source::New();
+  const auto source = vtkSmartPointer<vtkUltrasoundPhantomSource>::New();
   CLI::App* options =
       program.add_subcommand("phantom", "Make overlapping volumes of an invented body, out of place by a known amount");
   options->add_option("-o,--output", values->folder, "Folder for the volumes and truth.json, the poses that put them back")

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama score: how far poses are from the truth, and landmarks from each other.
 #include "Commands.h"
-#include "Core/Geometry/LandmarkFile.h"
-#include "Filters/Registration/LandmarkError.h"
+#include "Landmarks.h"
 #include "ParameterOptions.h"
 #include "Volumes.h"
 #include <CLI/Validators.hpp>
@@ -72,35 +71,13 @@ void ScoreWithTruth(Session& session, const ScoreOptions& options, vtkUltrasound
 
 void ScoreWithLandmarks(Session& session, const ScoreOptions& options, const std::vector<VolumePose>& poses)
 {
-  if (options.landmarks.size() != poses.size())
-    throw Error(Error::Kind::InvalidParameter,
-                "--landmarks: " + options.poses + " has " + std::to_string(poses.size()) +
-                    " volumes, so that as many files of landmarks are needed, in their order; there are " +
-                    std::to_string(options.landmarks.size()));
-  std::vector<LandmarkList> lists;
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    lists.push_back({poses[i].volumeToWorld, ReadLandmarks(options.landmarks[i]), options.landmarks[i]});
-  const LandmarkError error = MeasureLandmarkError(lists);
-
-  nlohmann::ordered_json& result = session.result["landmarks"];
-  result = {{"pairs", error.distances.size()},
-            {"mean_mm", error.mean},
-            {"median_mm", error.median},
-            {"rms_mm", error.rms},
-            {"percentile95_mm", error.percentile95},
-            {"max_mm", error.max},
-            {"errors", nlohmann::ordered_json::array()}};
-  session.Say("landmarks: " + std::to_string(error.distances.size()) + " pairs, mean " + Fixed(error.mean, 3) + ", median " +
-              Fixed(error.median, 3) + ", 95% within " + Fixed(error.percentile95, 3) + ", at most " + Fixed(error.max, 3) +
-              " mm");
-  for (const LandmarkDistance& distance : error.distances) {
-    const Eigen::Vector3d& e = distance.error;
-    result["errors"].push_back({{"label", distance.label},
-                                {"from", poses[static_cast<std::size_t>(distance.first)].file},
-                                {"to", poses[static_cast<std::size_t>(distance.second)].file},
-                                {"mm", e.norm()},
-                                {"vector_mm", {e.x(), e.y(), e.z()}}});
+  std::vector<LandmarkList> lists = ReadLandmarkLists(options.landmarks, poses.size(), options.poses + " has ");
+  std::vector<std::string> files;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    lists[i].volumeToWorld = poses[i].volumeToWorld;
+    files.push_back(poses[i].file);
   }
+  TellLandmarkError(session, lists, files);
 }
 
 void Score(Session& session, const ScoreOptions& options, vtkUltrasoundAlignmentScore* score)
@@ -123,9 +100,7 @@ Command ScoreCommand(CLI::App& program)
   CLI::App* options = program.add_subcommand("score", "Tell how far poses are from the truth");
   options->add_option("poses", values->poses, "Pose file to score; with --truth its volumes are read")->required();
   options->add_option("--truth", values->truth, "Pose file that says where the volumes belong");
-  options->add_option(
-      "--landmarks", values->landmarks,
-      "A list of landmarks (.fcsv, .mrk.json, .csv) for each volume, in their order, each in the frame of its volume's file");
+  AddLandmarksOption(options, values->landmarks, "Landmarks to compare the poses with");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that both pose files are taken to agree on")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

@@ -3,6 +3,7 @@
 // slab by slab.
 #include "Commands.h"
 #include "Core/Base/SizeText.h"
+#include "Displacements.h"
 #include "Filters/Stitching/StitchJson.h"
 #include "ParameterOptions.h"
 #include "Readers/ImageHeader.h"
@@ -160,6 +161,10 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
     AddReliability(session, volumes);
 
   stitcher->SetInputDataObject(BlocksOf(volumes));
+  if (const auto displacements = DisplacementsOf(session, volumes, options.poses)) {
+    stitcher->AddDisplacementData(displacements);
+    session.Note("volumes are read through the displacements that " + options.poses + " names");
+  }
   session.result["files"] = options.files;
   session.result["output"] = options.output;
   session.result["method"] = stitcher->GetMethodAsString();
@@ -219,7 +224,8 @@ Command StitchCommand(CLI::App& program)
   CLI::App* options = program.add_subcommand("stitch", "Blend overlapping volumes into one");
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
-  options->add_option("--poses", values->poses, "Pose file that says where the volumes belong (default: where they say)");
+  options->add_option("--poses", values->poses,
+                      "Pose file that says where the volumes belong, and how they are bent (default: where they say)");
   AddParameters(options, stitcher, {"Method", "Texture", "Sharpness", "DetailSharpness", "DetailScale"});
   AddParameter(options, stitcher, "EqualizeGain", "--gain");
   AddParameter(options, stitcher, "SpacingMm", "--spacing");

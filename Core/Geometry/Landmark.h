@@ -11,4 +11,9 @@ struct Landmark {
   Eigen::Vector3d position; ///< mm, LPS, in the frame of the volume's own file
 };
 
+inline bool operator==(const Landmark& a, const Landmark& b)
+{
+  return a.label == b.label && a.position == b.position;
+}
+
 } // namespace echorama

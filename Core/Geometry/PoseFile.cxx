@@ -40,21 +40,25 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
     file.Fail("\"volumes\" is not a list");
 
   const fs::path folder = Resolved(path).parent_path(), beside = fs::absolute(path).parent_path();
+  const auto fileOf = [&](const ordered_json& volume, const char* key, const JsonPlace& place) {
+    const ordered_json& name = place.Member(volume, key);
+    if (!name.is_string() || name.get<std::string>().empty())
+      place.Fail("\"" + std::string(key) + "\" is not a file name");
+    const fs::path found = (folder / name.get<std::string>()).lexically_normal(); // an absolute name replaces the folder
+    std::error_code error;
+    const bool isBeside = !fs::exists(found, error) && fs::exists(beside / name.get<std::string>(), error);
+    return (isBeside ? beside / name.get<std::string>() : found).string(); // beside a link to the pose file
+  };
   std::vector<VolumePose> poses;
   std::set<std::string> seen;
   for (const ordered_json& volume : volumes) {
     const JsonPlace place = file.In("volume " + std::to_string(poses.size() + 1));
-    const ordered_json& name = place.Member(volume, "file");
-    if (!name.is_string() || name.get<std::string>().empty())
-      place.Fail("\"file\" is not a file name");
     VolumePose pose;
-    fs::path found = (folder / name.get<std::string>()).lexically_normal(); // an absolute name replaces the folder
-    std::error_code error;
-    if (!fs::exists(found, error) && fs::exists(beside / name.get<std::string>(), error))
-      found = beside / name.get<std::string>(); // beside a link to the pose file
-    pose.file = found.string();
+    pose.file = fileOf(volume, "file", place);
     if (!seen.insert(Resolved(pose.file).string()).second)
-      place.Fail(name.get<std::string>() + " is named twice");
+      place.Fail(volume["file"].get<std::string>() + " is named twice");
+    if (volume.contains("displacement"))
+      pose.displacement = fileOf(volume, "displacement", place);
     if (volume.contains("geometry"))
       pose.geometry = PoseJson::ToGeometry(volume["geometry"], place.In("geometry"));
     pose.volumeToWorld = PoseJson::ToPose(place.Member(volume, "VolumeToWorld"), place.In("VolumeToWorld"));
@@ -66,6 +70,10 @@ std::vector<VolumePose> ReadPoses(const std::string& path)
 void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
 {
   const fs::path folder = Resolved(fs::absolute(path)).parent_path();
+  const auto nameOf = [&folder](const std::string& file) {
+    const fs::path relative = Resolved(file).lexically_relative(folder);
+    return (relative.empty() ? Resolved(file) : relative).generic_string();
+  };
   ordered_json volumes = ordered_json::array();
   for (const VolumePose& pose : poses) {
     const auto fail = [&](const std::string& reason) {
@@ -77,10 +85,11 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
       fail("its geometry is not given");
     if (!IsRotation(pose.volumeToWorld.linear()) || !pose.volumeToWorld.translation().allFinite())
       fail("its pose is not rigid");
-    const fs::path relative = Resolved(pose.file).lexically_relative(folder);
-    volumes.push_back({{"file", (relative.empty() ? Resolved(pose.file) : relative).generic_string()},
+    volumes.push_back({{"file", nameOf(pose.file)},
                        {"geometry", PoseJson::Of(*pose.geometry)},
                        {"VolumeToWorld", JsonPlace::RowsOf(pose.volumeToWorld.matrix())}});
+    if (!pose.displacement.empty())
+      volumes.back()["displacement"] = nameOf(pose.displacement);
   }
   const ordered_json root{{"schema", Schema}, {"unit", "mm"}, {"frame", "LPS"}, {"volumes", volumes}};
 

@@ -12,12 +12,14 @@ struct VolumePose {
   std::string file;                      ///< as given; made relative to the JSON's folder when written, resolved when read
   std::optional<ImageGeometry> geometry; ///< of the file as it stands; needed for writing
   Pose volumeToWorld = Pose::Identity(); ///< from the physical space of the file as it stands (identity: where the file says)
+  std::string displacement{};            ///< image of what a rigid pose leaves over, a path as \a file; empty: there is none
 };
 
 /// Poses on disk: {"schema": "echorama-poses-1", "unit": "mm", "frame": "LPS", "volumes": [{"file": .., "geometry":
-/// {"origin": [3], "spacing": [3], "direction": [[3] x 3], "dimensions": [3]}, "VolumeToWorld": [[4 numbers] x 4]}, ...]}.
-/// Matrices are lists of rows. "geometry" may be missing; keys that are not named here are ignored. Files of the schema
-/// "echorama-project-1" (the projects of alignment sessions, which hold the same fields and more) are read as well.
+/// {"origin": [3], "spacing": [3], "direction": [[3] x 3], "dimensions": [3]}, "VolumeToWorld": [[4 numbers] x 4],
+/// "displacement": ..}, ...]}. Matrices are lists of rows. "geometry" and "displacement" may be missing; keys that are not named
+/// here are ignored. Files of the schema "echorama-project-1" (the projects of alignment sessions, which hold the same fields and
+/// more) are read as well.
 /// \throws Error(FileSystem) when the file cannot be opened, Error(BadFile) that names file, volume and field when it is
 /// not JSON, of another schema, unit or frame, lacks a field, names a volume twice, or a matrix is not rigid.
 std::vector<VolumePose> ReadPoses(const std::string& path);

@@ -90,7 +90,9 @@ TEST_F(PoseFile, EveryBitComesBackAndPathsFollowTheFile)
     poses[i].geometry = SomeGeometry(i);
     poses[i].volumeToWorld = MotionAbout(random.Direction(), random.Direction(), 50.0 * random.Direction());
   }
+  poses[1].displacement = Path("sub/b.vti");
   WritePoses(Path("poses.json"), poses);
+  EXPECT_NE(Text(Path("poses.json")).find("\"sub/b.vti\""), std::string::npos) << "so are those of displacements";
   EXPECT_NE(Text(Path("poses.json")).find("\"sub/c.mha\""), std::string::npos) << "paths are relative to the JSON";
   EXPECT_EQ(FileCount(), 1) << "no temporary file stays";
 
@@ -98,6 +100,7 @@ TEST_F(PoseFile, EveryBitComesBackAndPathsFollowTheFile)
   ASSERT_EQ(back.size(), poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     EXPECT_EQ(fs::path(back[i].file), fs::path(poses[i].file));
+    EXPECT_EQ(fs::path(back[i].displacement), fs::path(poses[i].displacement));
     EXPECT_EQ(back[i].volumeToWorld.matrix(), poses[i].volumeToWorld.matrix());
     ASSERT_TRUE(back[i].geometry);
     EXPECT_EQ(back[i].geometry->origin, poses[i].geometry->origin);
@@ -110,6 +113,7 @@ TEST_F(PoseFile, EveryBitComesBackAndPathsFollowTheFile)
   fs::create_directories(folder / "moved");
   fs::rename(folder / "poses.json", folder / "moved" / "poses.json");
   EXPECT_EQ(fs::path(ReadPoses(Path("moved/poses.json"))[0].file), folder / "moved" / "a.mha");
+  EXPECT_EQ(fs::path(ReadPoses(Path("moved/poses.json"))[1].displacement), folder / "moved" / "sub" / "b.vti");
 }
 
 TEST_F(PoseFile, GeometryAndFurtherKeysAreOptional)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The candidates of the global search, and the start itself, are refined at a coarse level, where that takes a few
-// milliseconds each; those that meet are one. The best few go on to a middle level and the best of these to the finest.
+// The candidates of the global search, and the start itself, are refined at a middle level, where that takes some ten
+// milliseconds each; those that meet are one. The best of them go on to the finest.
 // They are ranked as a test of correlation would: likeness times the square root of how much is compared. The likeness alone
 // prefers chance matches of small overlaps, the sum over the overlap those of large ones.
 //
@@ -10,29 +10,40 @@
 // middle, a slab along itself). Two halves of the voxels, a checkerboard, refined each for itself from the same pose: where
 // the match is an accident of the noise, the halves share no optimum and part.
 //
+// Landmarks are one more witness. Candidates that they contradict are moved, by as little as can be, to where they do not, and
+// poses that slide back are dropped: so a repeated structure is told from the next one. But landmarks may be wrong, and then they
+// drop the right pose and leave an accident without a rival. So candidates are also refined without them: a pose that they
+// contradict may fit about as well as the answer, but not better; and where one does, the automatic start looks everywhere.
+//
 // The automatic start widens its search as long as there is no clear answer: near the start a search costs a few
 // milliseconds, over all rotations some seconds. What is clear already at the middle level to be no answer is not refined.
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/SymmetricMatrix.h"
+#include "VolumeShape.h"
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <utility>
 
 namespace echorama {
 namespace {
 
 constexpr double HighestRatio = 99.0;
-constexpr int MostPoints = 1000;
 constexpr int MostCandidates = 1000;
 constexpr double FinalStop = 2e-5; // voxels: where the answer stops should tell little of the CPU
 constexpr double Slack = 1.5;      // how much further from the start than was said an answer may be
+constexpr double TrackedDegrees = 12.0, TrackedMm = 20.0, HandMadeDegrees = 35.0;
 constexpr std::size_t Rivals = 3;
-constexpr std::size_t Finalists = 5; // of the coarse level, that are looked at more closely
+constexpr std::size_t Finalists = 5; // of the coarse level
+// Less similarity needs a pose that is better determined. Where two bodies have nothing in common but layers that run alike, the
+// layers still fit, by a similarity of some 0.1, and what they say nothing of is nearly undetermined (bench of bodies: other
+// bodies, mirror images).
+constexpr double SureSimilarity = 0.15;
 
 std::string Number(double value, int digits)
 {
@@ -40,62 +51,6 @@ std::string Number(double value, int digits)
   std::snprintf(text, sizeof text, "%.*f", digits, value);
   return text;
 }
-
-// The shape of a volume: some of its real voxels, and how far it goes.
-struct Shape {
-  std::vector<Eigen::Vector3d> points; // mm, where the geometry of the volume has them
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-  double radius = 0.0; // root mean square distance from the centroid, mm
-  double extent = 0.0; // the longest side of the box around them, mm
-
-  explicit Shape(const PlacedVolume& volume)
-  {
-    const PyramidLevel& level = volume.pyramid->back();
-    const VolumeView<const float> view = level.intensity.View();
-    const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, level.realVoxels / MostPoints);
-    const auto& n = view.Dimensions();
-    const Eigen::Affine3d toWorld = level.geometry.IndexToWorld();
-    Eigen::AlignedBox3d box;
-    std::ptrdiff_t real = 0, index = 0;
-    for (int k = 0; k < n[2]; ++k)
-      for (int j = 0; j < n[1]; ++j)
-        for (int i = 0; i < n[0]; ++i)
-          if (std::isfinite(view[index++])) {
-            const Eigen::Vector3d p = toWorld * Eigen::Vector3d(i, j, k);
-            box.extend(p);
-            if (real++ % step == 0)
-              points.push_back(p);
-          }
-    for (const Eigen::Vector3d& p : points)
-      centroid += p / static_cast<double>(points.size());
-    for (const Eigen::Vector3d& p : points)
-      radius += (p - centroid).squaredNorm() / static_cast<double>(points.size());
-    radius = std::sqrt(radius);
-    extent = points.empty() ? 0.0 : box.sizes().maxCoeff();
-  }
-
-  /// How far two poses put the volume apart: the mean over its points, mm.
-  double Distance(const Pose& a, const Pose& b) const
-  {
-    double sum = 0.0;
-    for (const Eigen::Vector3d& p : points)
-      sum += (a * p - b * p).norm();
-    return sum / static_cast<double>(points.size());
-  }
-
-  /// The root mean square displacement of the points under a twist of this covariance about \a centre (world), mm.
-  double Error(const Information& covariance, const Eigen::Vector3d& centre, const Pose& pose) const
-  {
-    double sum = 0.0;
-    for (const Eigen::Vector3d& p : points) {
-      const Eigen::Vector3d r = pose * p - centre;
-      Eigen::Matrix<double, 3, 6> jacobian;
-      jacobian << 1.0, 0.0, 0.0, 0.0, r.z(), -r.y(), 0.0, 1.0, 0.0, -r.z(), 0.0, r.x(), 0.0, 0.0, 1.0, r.y(), -r.x(), 0.0;
-      sum += (jacobian * covariance * jacobian.transpose()).trace();
-    }
-    return std::sqrt(std::max(0.0, sum / static_cast<double>(points.size())));
-  }
-};
 
 // The motion that is least determined, in words.
 std::string LeastDetermined(const Information& covariance, double radius)
@@ -122,6 +77,8 @@ public:
     finestMm_ = std::max({p.finestMm, finest(fixed), finest(moving)});
     // Coarse: some 32 voxels along the smaller of both; never finer than what there is.
     coarseMm_ = std::max(finestMm_, std::min(shape_.extent, fixedShape_.extent) / 32.0);
+    landmarks_ = LandmarkTerm(PairLandmarks(fixed.landmarks, fixed.name, moving.landmarks, moving.name), fixed.volumeToWorld,
+                              p.landmarkSigmaMm);
   }
 
   /// \param isLast whether nobody will search further, so that a doubtful answer is worth its refinement
@@ -133,6 +90,16 @@ public:
     largestMoveMm_ = isKnown ? Slack * reachMm : HUGE_VAL;
     result.volumeToWorld = moving_.volumeToWorld;
     result.anywhere = coneDegrees >= 180.0;
+    PlacedVolume from = moving_;
+    from.volumeToWorld = Reconciled(moving_.volumeToWorld);
+    if (!landmarks_.Agrees(from.volumeToWorld)) {
+      result.reason = "the landmarks contradict each other: where they fit best, " + landmarks_.Worst(from.volumeToWorld);
+      return result;
+    }
+    if (!IsNearStart(from.volumeToWorld)) {
+      result.reason = "the landmarks are further from each other at the start than the start is said to be from the truth";
+      return result;
+    }
 
     // 1. where it could be
     Clock::time_point start = Clock::now();
@@ -141,31 +108,43 @@ public:
     global.reachMm = reachMm;
     global.minimumOverlap = p_.minimumOverlap;
     global.candidates = result.anywhere ? std::min(4 * p_.candidates, MostCandidates) : p_.candidates;
-    std::vector<Pose> poses{moving_.volumeToWorld};
-    for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving_, global, progress.Part(0.0, 0.6)).candidates)
-      poses.push_back(candidate.volumeToWorld);
+    std::vector<Pose> poses{from.volumeToWorld}, free{moving_.volumeToWorld}; // with and without the landmarks
+    const auto search = [&](const PlacedVolume& moving, const Progress& part) {
+      for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving, global, part).candidates) {
+        free.push_back(candidate.volumeToWorld);
+        if (const Pose pose = Reconciled(candidate.volumeToWorld); landmarks_.Empty() || IsNew(pose, poses))
+          poses.push_back(pose);
+      }
+    };
+    search(from, progress.Part(0.0, 0.6));
+    if (from.volumeToWorld.matrix() != moving_.volumeToWorld.matrix() && !result.anywhere)
+      search(moving_, progress.Part(0.6, 0.6));
     result.globalSeconds = SecondsSince(start);
 
-    // 2. refined, coarse to fine
+    // 2. refined, at the middle level: at the coarse one the layers alongside the face weigh most, and poses slide along them.
+    // But from there what is sparse is found from farther away, so the best of it are tried beside the others; and beside a
+    // tracker's start alone, where it keeps a rig that can turn about an axis nearer to where the tracker has it.
     start = Clock::now();
-    std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.7));
-    if (found.empty()) {
-      result.reason = "no pose was found " + std::string(isKnown && !result.anywhere ? "near the start " : "") +
-                      "in which they overlap by " + Number(100.0 * p_.minimumOverlap, 0) + "% of the smaller one";
-      return result;
-    }
-    poses.clear();
+    double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
+    std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.65));
+    if (isKnown && coneDegrees <= TrackedDegrees)
+      poses.clear();
     for (std::size_t i = 0; i < std::min<std::size_t>(Finalists, found.size()); ++i)
       poses.push_back(found[i].volumeToWorld);
-    double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
-    found = Refine(poses, coarseMm_, middleMm, progress.Part(0.7, 0.8));
+    found = Refine(poses, middleMm, middleMm, progress.Part(0.65, 0.8));
     if (found.empty()) {
-      result.reason =
-          isKnown && !result.anywhere
-              ? "every pose found at low resolution lost its overlap, or moved too far from the start, when it was refined"
-              : "every pose found at low resolution lost its overlap when it was refined";
+      result.reason = "no pose was found " + std::string(isKnown && !result.anywhere ? "near the start " : "") +
+                      "in which they overlap by " + Number(100.0 * p_.minimumOverlap, 0) + "% of the smaller one" +
+                      (landmarks_.Empty() ? "" : " and agree with the landmarks");
       return result;
     }
+    const double rival = landmarks_.Empty() ? 0.0 : Contradicting(free, progress.Part(0.8, 0.8)), own = Evidence(found.front());
+    landmarksDecide_ = rival * p_.minimumPeakRatio > own;
+    if (rival > p_.minimumPeakRatio * own) {
+      result.reason = "the images agree better in a pose that the landmarks contradict";
+      return result;
+    }
+
     // What this level cannot tell apart a finer one may.
     while (Ratio(found) < p_.minimumPeakRatio && middleMm > finestMm_) {
       const double finerMm = std::max(finestMm_, 0.5 * middleMm);
@@ -186,6 +165,10 @@ public:
     }
     const LocalAlignResult best = Local(found.front().volumeToWorld, middleMm, finestMm_, 0, progress.Part(0.8, 0.9), FinalStop);
     result.localSeconds = SecondsSince(start);
+    if (!landmarks_.Agrees(best.volumeToWorld)) {
+      result.reason = "the pose that fits best contradicts the landmarks: " + landmarks_.Worst(best.volumeToWorld);
+      return result;
+    }
     if (!IsNearStart(best.volumeToWorld)) {
       result.reason = "the pose that fits best is not near the start";
       return result;
@@ -213,6 +196,8 @@ public:
     return result;
   }
 
+  /// Whether without the landmarks a different pose would have done as well.
+  bool LandmarksDecide() const { return landmarksDecide_; }
   double ReachHandMade() const { return std::max(shape_.extent, fixedShape_.extent) / 3.0; }
 
 private:
@@ -227,6 +212,7 @@ private:
     local.part = part;
     local.stopVoxels = stopVoxels;
     local.seed = p_.seed;
+    local.landmarks = landmarks_;
     return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, Rounded(start), local, progress);
   }
 
@@ -255,7 +241,31 @@ private:
            (pose * shape_.centroid - start * shape_.centroid).norm() <= largestMoveMm_;
   }
 
-  // Refines the poses and keeps those that are different, overlap and are near the start, the best first.
+  // The nearest pose that the landmarks do not contradict.
+  Pose Reconciled(const Pose& pose) const { return landmarks_.Agrees(pose) ? pose : landmarks_.Nearest(pose); }
+
+  // The most evidence for a pose that the landmarks contradict.
+  double Contradicting(const std::vector<Pose>& poses, const Progress& progress)
+  {
+    LandmarkTerm landmarks;
+    std::swap(landmarks, landmarks_);
+    const double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
+    const std::vector<LocalAlignResult> found = Refine(poses, middleMm, middleMm, progress);
+    std::swap(landmarks, landmarks_);
+    for (const LocalAlignResult& one : found) // the best first
+      if (!landmarks_.Agrees(one.volumeToWorld, 0.5 * one.voxelMm))
+        return Evidence(one);
+    return 0.0;
+  }
+
+  bool IsNew(const Pose& pose, const std::vector<Pose>& others) const
+  {
+    return std::none_of(others.begin(), others.end(),
+                        [&](const Pose& other) { return shape_.Distance(pose, other) < coarseMm_; });
+  }
+
+  // Refines the poses and keeps those that are different, overlap, are near the start and agree with the landmarks, the best
+  // first.
   std::vector<LocalAlignResult> Refine(const std::vector<Pose>& poses, double coarsestMm, double finestMm,
                                        const Progress& progress) const
   {
@@ -268,6 +278,7 @@ private:
                      [](const LocalAlignResult& a, const LocalAlignResult& b) { return Evidence(a) > Evidence(b); });
     for (const LocalAlignResult& one : all)
       if (one.overlap >= p_.minimumOverlap && IsNearStart(one.volumeToWorld) &&
+          landmarks_.Agrees(one.volumeToWorld, 0.5 * one.voxelMm) &&
           std::none_of(different.begin(), different.end(), [&](const LocalAlignResult& other) {
             return shape_.Distance(one.volumeToWorld, other.volumeToWorld) < 3.0 * coarseMm_;
           }))
@@ -285,7 +296,9 @@ private:
   const PlacedVolume &fixed_, &moving_;
   const MetricPyramid &fixedFeatures_, &movingFeatures_;
   const AlignPairParameters& p_;
-  Shape shape_, fixedShape_;
+  LandmarkTerm landmarks_;
+  bool landmarksDecide_ = false;
+  VolumeShape shape_, fixedShape_;
   double finestMm_ = 0.0, coarseMm_ = 0.0;
   double largestTurn_ = HUGE_VAL, largestMoveMm_ = HUGE_VAL; // from the start, radians and mm
 };
@@ -325,13 +338,23 @@ ParameterList Describe(AlignPairParameters& p)
       Parameter("MinimumPeakRatio", p.minimumPeakRatio, {1, HighestRatio}, "",
                 "A smaller ratio of the best evidence to that of the next different pose is ambiguous.")
           .Advanced(),
-      Parameter("MaximumErrorVoxels", p.maximumErrorVoxels, {1e-3, 1000}, "voxels", "A larger predicted error is ambiguous.")
+      Parameter(
+          "MaximumErrorVoxels", p.maximumErrorVoxels, {1e-3, 1000}, "voxels",
+          "A larger predicted error is ambiguous; where volumes are hardly alike (similarity below 0.15), in proportion less.")
           .Advanced(),
       Parameter("MaximumErrorMm", p.maximumErrorMm, {1e-3, 1000}, "mm",
                 "A larger predicted error is ambiguous, too, whatever the size of the voxels: what your use can bear."),
+      Parameter(
+          "SoundSpeedError", p.soundSpeedError, {0, 0.2}, "",
+          "How far the speed of sound in the tissue may be from what the scanner takes it for, as a share. A volume may be off "
+          "by this share of its distance from the fixed one although both show the same: that is added to its error.")
+          .Advanced(),
       Parameter("MaximumSplitVoxels", p.maximumSplitVoxels, {1e-3, 1000}, "voxels",
                 "Poses found from two halves of the voxels that lie further apart are failed.")
           .Advanced(),
+      Parameter("LandmarkSigmaMm", p.landmarkSigmaMm, {1e-3, 1000}, "mm",
+                "How exactly landmarks were found: the standard deviation of the difference between the two points of one, along "
+                "each axis. Poses in which they differ by more than chance would have it are no answers."),
       Parameter("Points", p.points, ComparedPoints, "", "Random points of each volume that are compared on each level.")
           .Advanced(),
       Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed draws the same points.").Advanced(),
@@ -365,7 +388,7 @@ void Judge(const AlignPairParameters& p, const Information& covariance, double r
     result.verdict = Verdict::Failed;
     result.reason = "even at the best pose the volumes are hardly more similar than by chance (similarity " +
                     Number(result.similarity, 3) + ")";
-  } else if (result.errorMm > p.maximumErrorVoxels * voxel) {
+  } else if (result.errorMm > p.maximumErrorVoxels * voxel * std::min(1.0, result.similarity / SureSimilarity)) {
     result.verdict = Verdict::Ambiguous;
     result.reason = "the image contents do not determine the pose (predicted error " +
                     Number(std::min(result.errorMm, 999.0), 1) + " mm); the least certain motion is " +
@@ -395,8 +418,8 @@ PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const M
     AlignStart start;
     double coneDegrees, reachMm, costs;
   };
-  const std::array<Stage, 3> stages{{{AlignStart::Tracked, 12.0, 20.0, 0.05},
-                                     {AlignStart::HandMade, 35.0, pair.ReachHandMade(), 0.2},
+  const std::array<Stage, 3> stages{{{AlignStart::Tracked, TrackedDegrees, TrackedMm, 0.05},
+                                     {AlignStart::HandMade, HandMadeDegrees, pair.ReachHandMade(), 0.2},
                                      {AlignStart::Unknown, 180.0, std::numeric_limits<double>::infinity(), 0.75}}};
   if (p.start != AlignStart::Automatic) {
     const Stage& stage = *std::find_if(stages.begin(), stages.end(), [&p](const Stage& s) { return s.start == p.start; });
@@ -413,7 +436,7 @@ PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const M
     found.localSeconds += result.localSeconds;
     found.confidenceSeconds += result.confidenceSeconds;
     result = found;
-    if (result.verdict == Verdict::Aligned)
+    if (result.verdict == Verdict::Aligned && !pair.LandmarksDecide())
       break;
   }
   return result;

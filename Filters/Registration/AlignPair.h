@@ -41,8 +41,10 @@ struct AlignPairParameters {
   double minimumSimilarity = 0.06; ///< less is Failed
   double minimumPeakRatio = 1.25;  ///< less is Ambiguous
   double maximumErrorVoxels = 1.0; ///< more is Ambiguous
-  double maximumErrorMm = 1000.0;  ///< more is Ambiguous
+  double maximumErrorMm = 2.5;     ///< more is Ambiguous
+  double soundSpeedError = 0.025;  ///< of tissue, as a share of what the scanner assumes
   double maximumSplitVoxels = 2.0; ///< more is Failed
+  double landmarkSigmaMm = 2.0;
   std::uint64_t seed = 1;
 };
 
@@ -77,6 +79,9 @@ Information CovarianceOf(const Information& information, double radiusMm);
 void Judge(const AlignPairParameters& parameters, const Information& covariance, double radiusMm, PairAlignment& alignment);
 
 /// Aligns two volumes: global search, local refinement of its candidates, and a verdict on the best.
+///
+/// Landmarks that both volumes have (PlacedVolume) say where to begin, pull poses towards where they agree with them, and add to
+/// what is known of the answer. A pose that contradicts them is no answer, and none else is when they contradict each other.
 ///
 /// The start is always one of the candidates. All are refined at a coarse level, the best down to the finest. Four checks
 /// decide: enough overlap and more similarity than chance; no different pose that does nearly as well; the covariance; and the

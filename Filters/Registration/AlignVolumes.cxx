@@ -10,10 +10,10 @@
 #include "AlignVolumes.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
-#include "Core/Imaging/ValidPoints.h"
 #include "Index.h"
 #include "PoseGraph.h"
 #include "VolumeOverlap.h"
+#include "VolumeShape.h"
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -38,26 +38,6 @@ std::string Millimetres(double mm)
   std::snprintf(text, sizeof text, "%.1f mm", mm);
   return text;
 }
-
-// Round about how large a volume is, from its coarsest resolution.
-struct Size {
-  explicit Size(const PlacedVolume& volume)
-  {
-    const PyramidLevel& level = volume.pyramid->back();
-    std::ptrdiff_t real = 0;
-    const Eigen::Affine3d toWorld = level.geometry.IndexToWorld();
-    centre = toWorld * ValidCentroid<float>(level.intensity.View(), {}, real);
-    for (const Eigen::Vector3d& index : ValidPoints<float>(level.intensity.View(), {}, 1000, 1)) {
-      const double square = (toWorld * index - centre).squaredNorm();
-      radius += square / 1000.0;
-      reach = std::max(reach, std::sqrt(square));
-    }
-    radius = std::sqrt(radius);
-  }
-  Eigen::Vector3d centre; // where the geometry has it, mm
-  double radius = 0.0;    // root mean square distance from it, mm
-  double reach = 0.0;     // the largest, mm
-};
 
 // A motion's information in other axes.
 Information Turned(const Information& information, const Eigen::Matrix3d& rotation)
@@ -102,6 +82,7 @@ private:
   void BuildFeatures(const Progress& progress);
   double Overlap(int a, int b, const std::vector<Pose>& poses, const Eigen::Vector3d& shift) const;
   std::vector<Numbers> PairsAt(const std::vector<Pose>& poses, double reachMm) const;
+  std::vector<Numbers> PairsWithLandmarks() const;
   void Try(const Numbers& pair, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
   void TryAll(const std::vector<Numbers>& pairs, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
   void Solve(const Progress& progress);
@@ -109,6 +90,7 @@ private:
   void FindTheLost(const Progress& progress);
   std::vector<Numbers> PairsToTryAgain() const;
   AlignVolumesResult Report() const;
+  void StateErrors(AlignVolumesResult& result) const;
   std::string WhyDoubtful(int v) const;
   std::string WhyFailed(int v) const;
 
@@ -119,7 +101,7 @@ private:
   std::vector<Features> features_;
   std::vector<std::string> troubles_; // why a volume cannot be aligned
   std::vector<bool> held_;
-  std::vector<Size> sizes_;
+  std::vector<VolumeShape> shapes_;
   std::map<Numbers, Attempt> attempts_;
   std::vector<Numbers> edges_; // of the graph, as last solved
   PoseGraphResult graph_;
@@ -146,7 +128,7 @@ void Alignment::BuildFeatures(const Progress& progress)
   if (good < 2)
     throw *trouble;
   for (int v = 0; v < Count(); ++v)
-    sizes_.emplace_back(volumes_[Index(v)]);
+    shapes_.emplace_back(volumes_[Index(v)]);
   featureSeconds_ = SecondsSince(start);
 }
 
@@ -169,9 +151,9 @@ std::vector<Numbers> Alignment::PairsAt(const std::vector<Pose>& poses, double r
     for (int b = a + 1; b < Count(); ++b) {
       if (!IsPair(a, b))
         continue;
-      const Eigen::Vector3d way = poses[Index(a)] * sizes_[Index(a)].centre - poses[Index(b)] * sizes_[Index(b)].centre;
+      const Eigen::Vector3d way = poses[Index(a)] * shapes_[Index(a)].centroid - poses[Index(b)] * shapes_[Index(b)].centroid;
       const double distance = way.norm();
-      if (distance - reachMm > sizes_[Index(a)].reach + sizes_[Index(b)].reach)
+      if (distance - reachMm > shapes_[Index(a)].reach + shapes_[Index(b)].reach)
         continue; // their spheres do not meet
       double overlap = Overlap(a, b, poses, Eigen::Vector3d::Zero());
       auto* list = &near;
@@ -197,6 +179,17 @@ std::vector<Numbers> Alignment::PairsAt(const std::vector<Pose>& poses, double r
   }
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+// Those in which one place was found twice: they overlap, however far apart they are.
+std::vector<Numbers> Alignment::PairsWithLandmarks() const
+{
+  std::vector<Numbers> pairs;
+  for (int a = 0; a < Count(); ++a)
+    for (int b = a + 1; b < Count(); ++b)
+      if (IsPair(a, b) && !PairLandmarks(volumes_[Index(a)].landmarks, {}, volumes_[Index(b)].landmarks, {}).empty())
+        pairs.push_back(Ordered(a, b));
   return pairs;
 }
 
@@ -272,8 +265,8 @@ void Alignment::Solve(const Progress& progress)
     graph.outlierMm = std::min(1000.0, p_.outlierVoxels * voxelMm);
   }
   double radius = 0.0;
-  for (const Size& size : sizes_)
-    radius += size.radius / Count();
+  for (const VolumeShape& shape : shapes_)
+    radius += shape.radius / Count();
   graph.radiusMm = std::clamp(radius, 1.0, 10000.0);
   graph_ = SolvePoseGraph(start, edges, fixed_, graph, progress);
   for (std::size_t e = 0; e < edges.size(); ++e) {
@@ -315,8 +308,8 @@ void Alignment::FindTheLost(const Progress& progress)
     std::vector<std::pair<double, int>> others; // by distance
     for (int other = 0; other < Count(); ++other)
       if (graph_.isPlaced[Index(other)] && CanBeAligned(other))
-        others.push_back({(graph_.volumeToWorld[Index(other)] * sizes_[Index(other)].centre -
-                           graph_.volumeToWorld[Index(v)] * sizes_[Index(v)].centre)
+        others.push_back({(graph_.volumeToWorld[Index(other)] * shapes_[Index(other)].centroid -
+                           graph_.volumeToWorld[Index(v)] * shapes_[Index(v)].centroid)
                               .norm(),
                           other});
     std::sort(others.begin(), others.end());
@@ -470,6 +463,35 @@ AlignVolumesResult Alignment::Report() const
   return result;
 }
 
+// What the images leave open, along all pairs to the fixed volume, and what they cannot show: sound that is faster or slower than
+// the scanner takes it for stretches what each volume shows about its own face. Rays that are bent do about the same. Two views
+// that lie apart then fit best where neither is, by that share of their distance, and no pair of a chain sees it.
+void Alignment::StateErrors(AlignVolumesResult& result) const
+{
+  const auto middle = [&](int v) { return result.volumes[Index(v)].volumeToWorld * shapes_[Index(v)].centroid; };
+  for (int v = 0; v < Count(); ++v) {
+    VolumeAlignment& volume = result.volumes[Index(v)];
+    volume.name = volumes_[Index(v)].name;
+    if (v == fixed_)
+      continue;
+    constexpr double FarMm = 100.0; // where what nothing is known of is 1 km off
+    volume.covariance = CovarianceOf(volume.information, FarMm);
+    if (IsHeld(v) || volume.verdict == Verdict::Failed)
+      continue;
+    const double bentMm = p_.pair.soundSpeedError * (middle(v) - middle(fixed_)).norm();
+    volume.errorMm = std::hypot(shapes_[Index(v)].Error(volume.covariance, volume.centre, volume.volumeToWorld), bentMm);
+    if (volume.verdict == Verdict::Aligned && volume.errorMm > p_.pair.maximumErrorMm) {
+      volume.verdict = Verdict::Ambiguous;
+      volume.reason =
+          "it may be off by " + Millimetres(volume.errorMm) + ", and at most " + Millimetres(p_.pair.maximumErrorMm) +
+          " are accepted" +
+          (bentMm > 0.5 * volume.errorMm
+               ? "; most of it is what the speed of sound may have bent over the distance to " + volumes_[Index(fixed_)].name
+               : "");
+    }
+  }
+}
+
 AlignVolumesResult Alignment::Run(const Progress& progress)
 {
   BuildFeatures(progress.Part(0.0, 0.1));
@@ -477,7 +499,7 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
   double reachMm = 0.0;
   for (int v = 0; v < Count(); ++v) {
     start.push_back(volumes_[Index(v)].volumeToWorld);
-    reachMm = std::max(reachMm, 2.0 / 3.0 * sizes_[Index(v)].reach);
+    reachMm = std::max(reachMm, 2.0 / 3.0 * shapes_[Index(v)].reach);
   }
   if (Count() == 2) {
     TryAll({Ordered(0, 1)}, p_.pair.start, start, progress.Part(0.1, 1.0));
@@ -490,6 +512,7 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
     moving.reason = pair.alignment.reason;
     moving.information = pair.alignment.information;
     moving.centre = pair.alignment.centre;
+    StateErrors(result);
     return result;
   }
 
@@ -504,7 +527,12 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
     near = near == AlignStart::Automatic ? AlignStart::HandMade : near;
     pairs = PairsAt(start, near == AlignStart::Tracked ? TrackedReachMm : reachMm);
   }
-  TryAll(pairs, near, start, progress.Part(0.1, 0.7));
+  const std::vector<Numbers> sure = PairsWithLandmarks();
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                             [&sure](const Numbers& pair) { return std::find(sure.begin(), sure.end(), pair) != sure.end(); }),
+              pairs.end());
+  TryAll(sure, p_.pair.start, start, progress.Part(0.1, sure.empty() ? 0.1 : 0.4));
+  TryAll(pairs, near, start, progress.Part(sure.empty() ? 0.1 : 0.4, 0.7));
   Solve({});
   if (p_.pair.start == AlignStart::Automatic)
     FindTheLost(progress.Part(0.7, 0.8));
@@ -517,7 +545,9 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
     Solve({});
   }
   progress(1.0);
-  return Report();
+  AlignVolumesResult result = Report();
+  StateErrors(result);
+  return result;
 }
 
 } // namespace
@@ -555,17 +585,12 @@ AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fi
   }
   if (staying.size() == count)
     throw Error(Error::Kind::InvalidParameter, "every volume is fixed or held: none is left to be aligned");
-  for (const PlacedVolume& volume : volumes)
+  for (const PlacedVolume& volume : volumes) {
     if (!volume.pyramid || volume.pyramid->empty())
       throw Error(Error::Kind::BadInput, volume.name + ": it has no voxels");
-  AlignVolumesResult result = Alignment(volumes, fixed, p, aligner).Run(progress);
-  for (std::size_t v = 0; v < count; ++v) {
-    constexpr double FarMm = 100.0; // where what nothing is known of is 1 km off
-    result.volumes[v].name = volumes[v].name;
-    if (v != Index(fixed))
-      result.volumes[v].covariance = CovarianceOf(result.volumes[v].information, FarMm);
+    PairLandmarks(volume.landmarks, volume.name, {}, {}); // for its checks
   }
-  return result;
+  return Alignment(volumes, fixed, p, aligner).Run(progress);
 }
 
 } // namespace echorama

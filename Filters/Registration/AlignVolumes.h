@@ -34,8 +34,11 @@ struct VolumeAlignment {
   Information information = Information::Zero();
   Information covariance = Information::Zero();     ///< CovarianceOf() it; zero for the fixed volume
   Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world
-  double overlap = 0.0;                             ///< of the pair that stands and overlaps most, share of the smaller volume
-  double similarity = 0.0;                          ///< mean of the pairs that stand, by overlap
+  /// Predicted root mean square distance of its points from where they belong beside the fixed volume, mm: what the covariance
+  /// says, and what the speed of sound may have bent. 0 for the fixed volume, those held and those that Failed.
+  double errorMm = 0.0;
+  double overlap = 0.0;    ///< of the pair that stands and overlaps most, share of the smaller volume
+  double similarity = 0.0; ///< mean of the pairs that stand, by overlap
 };
 
 /// What became of a pair.
@@ -65,6 +68,7 @@ struct AlignVolumesResult {
 /// if it were moved as far as the start may be off; all when the start is unknown. From where the first solution places
 /// the volumes, pairs that failed, were voted down or were not thought of are tried again. With an automatic start, the search
 /// over all rotations is kept for volumes that no pair places otherwise.
+/// Pairs that share landmarks are always tried.
 /// Two volumes are AlignPair and nothing else. Volumes that cannot be aligned (constant, nearly empty) fail for themselves.
 /// \throws Error(InvalidParameter) when \a fixed or one of those held is not a volume, or none is left to be moved,
 /// Error(BadInput) for fewer than two volumes or when the fixed one or all others cannot be aligned, Error(Cancelled).

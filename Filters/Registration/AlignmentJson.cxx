@@ -11,9 +11,13 @@ Json ToJson(const VolumeAlignment& volume)
   Json rows = Json::array();
   for (const auto& row : volume.covariance.rowwise())
     rows.push_back(std::vector<double>(row.begin(), row.end()));
-  return {{"name", volume.name},       {"verdict", NameOf(volume.verdict)},
-          {"reason", volume.reason},   {"similarity", volume.similarity},
-          {"overlap", volume.overlap}, {"centre", {volume.centre.x(), volume.centre.y(), volume.centre.z()}},
+  return {{"name", volume.name},
+          {"verdict", NameOf(volume.verdict)},
+          {"reason", volume.reason},
+          {"error_mm", volume.errorMm},
+          {"similarity", volume.similarity},
+          {"overlap", volume.overlap},
+          {"centre", {volume.centre.x(), volume.centre.y(), volume.centre.z()}},
           {"covariance", rows}};
 }
 

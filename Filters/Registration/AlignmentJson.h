@@ -7,9 +7,10 @@ namespace echorama {
 
 /// Classes of VTK take the text (Report): in ParaView their JSON library is another copy. A heavy header, for .cxx files only.
 
-/// {"volumes": [{"name", "verdict", "reason", "similarity", "overlap", "centre", "covariance"}, ...], "pairs": [{"fixed",
-/// "moving" (from \a first), "verdict", "reason", "score", "similarity", "overlap", "peak_ratio", "split_mm", "error_mm",
-/// "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds": {"global", "local", "confidence"}}, ...], "seconds":
+/// {"volumes": [{"name", "verdict", "reason", "error_mm", "similarity", "overlap", "centre", "covariance"}, ...], "pairs":
+/// [{"fixed", "moving" (from \a first), "verdict", "reason", "score", "similarity", "overlap", "peak_ratio", "split_mm",
+/// "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds": {"global", "local", "confidence"}},
+/// ...], "seconds":
 /// {"prepare", "pairs", "graph"}}
 nlohmann::ordered_json ToJson(const AlignVolumesResult& result, int first = 0);
 std::string Report(const AlignVolumesResult& result);

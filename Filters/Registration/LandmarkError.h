@@ -21,13 +21,20 @@ struct LandmarkDistance {
   Eigen::Vector3d error;     ///< from there to where it puts that of the second
 };
 
+/// A label that no other list has.
+struct LoneLandmark {
+  std::string label;
+  int list = 0;
+};
+
 struct LandmarkError {
   std::vector<LandmarkDistance> distances; ///< by pair of lists, then in the order of the first list
+  std::vector<LoneLandmark> unmatched;     ///< in the order of the lists
   double mean = 0.0, rms = 0.0, median = 0.0, percentile95 = 0.0, max = 0.0; ///< of their lengths, mm
 };
 
 /// The target registration error (TRE): how far landmarks of one label lie apart once the volumes are aligned. Landmarks with a
-/// label that no other list has do not count. What is measured includes how exactly the landmarks were found.
+/// label that no other list has do not count; they are named. What is measured includes how exactly the landmarks were found.
 /// \throws Error(BadInput) for fewer than two lists, an empty label, a label that one list holds twice (the message names
 /// both), numbers that are not finite, and when no label is in two lists.
 LandmarkError MeasureLandmarkError(const std::vector<LandmarkList>& lists);

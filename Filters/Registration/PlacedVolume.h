@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Geometry/Landmark.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Core/Imaging/Pyramid.h"
 #include <string>
@@ -14,6 +15,8 @@ struct PlacedVolume {
   std::string name; ///< for messages
   /// How much each voxel of each level counts, in [0, 1] (the pyramid of its ReliabilityMap); none: all alike
   const std::vector<PyramidLevel>* reliability = nullptr;
+  /// Places that were found in it, where its geometry has them: those with one label in two volumes belong together.
+  std::vector<Landmark> landmarks = {};
 };
 
 /// \throws Error(BadInput) that names a volume without voxels, one voxel thick, constant, or with fewer than 100 real voxels.

@@ -83,12 +83,41 @@ int vtkUltrasoundAligner::GetNumberOfHeldVolumes() const
 }
 
 //----------------------------------------------------------------------------
+void vtkUltrasoundAligner::AddLandmarkFile(const char* file)
+{
+  this->Landmarks.files.emplace_back(file ? file : "");
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::ClearLandmarkFiles()
+{
+  this->Landmarks.files.clear();
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::AddLandmark(int volume, const char* label, double x, double y, double z)
+{
+  this->Landmarks.points[volume].push_back({label ? label : "", {x, y, z}});
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::ClearLandmarks()
+{
+  this->Landmarks.points.clear();
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformationVector* outputs,
                                    const echorama::Progress& progress)
 {
   this->Found = {};
   echorama::CheckRanges(this->Parameters());
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+  const auto landmarks = this->Landmarks.Lists(static_cast<int>(volumes.size()));
 
   // 1. the resolutions of each volume
   const auto begin = std::chrono::steady_clock::now();
@@ -103,6 +132,7 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
     placed[i].pyramid = &prepared[i].Pyramid;
     placed[i].reliability = prepared[i].Reliability.empty() ? nullptr : &prepared[i].Reliability;
     placed[i].name = volumes[i].Name;
+    placed[i].landmarks = landmarks[i];
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
 
@@ -202,5 +232,6 @@ void vtkUltrasoundAligner::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "HeldVolumes: " << this->Values.align.held.size() << "\n";
+  os << indent << "LandmarksOfVolumes: " << this->Landmarks.Count() << "\n";
   os << indent << "Volumes: " << this->Found.volumes.size() << "\n";
 }

@@ -28,7 +28,7 @@
  * Fails with a message when there are fewer than two volumes, or one is not three-dimensional, constant or nearly empty.
  * The whole of every volume is needed: under MPI each rank computes and holds the whole result.
  *
- * @sa vtkUltrasoundAlignmentScore
+ * @sa vtkUltrasoundAlignmentScore, vtkUltrasoundLandmarkError
  */
 #ifndef vtkUltrasoundAligner_h
 #define vtkUltrasoundAligner_h
@@ -38,6 +38,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/AlignVolumes.h"
+#include "Filters/Registration/LandmarkInput.h"
 #include "vtkUltrasoundParameters.h"
 #endif
 
@@ -126,16 +127,34 @@ public:
   ///@{
   /**
    * A larger predicted error is ambiguous, too, whatever the size of the voxels: what your use can bear. In [0.001, 1000] mm;
-   * default 1000.
+   * default 2.
    */
   void SetMaximumErrorMm(double value) { this->SetParameter("MaximumErrorMm", value); }
   double GetMaximumErrorMm() { return this->GetParameter("MaximumErrorMm"); }
   ///@}
 
   ///@{
+  /**
+   * How far the speed of sound in the tissue may be from what the scanner takes it for, as a share. A volume may be off by this
+   * share of its distance from the fixed one although both show the same: that is added to its error. In [0, 0.2]; default 0.02.
+   */
+  void SetSoundSpeedError(double value) { this->SetParameter("SoundSpeedError", value); }
+  double GetSoundSpeedError() { return this->GetParameter("SoundSpeedError"); }
+  ///@}
+
+  ///@{
   /** Poses found from two halves of the voxels that lie further apart are failed. In [0.001, 1000] voxels; default 2. */
   void SetMaximumSplitVoxels(double value) { this->SetParameter("MaximumSplitVoxels", value); }
   double GetMaximumSplitVoxels() { return this->GetParameter("MaximumSplitVoxels"); }
+  ///@}
+
+  ///@{
+  /**
+   * How exactly landmarks were found: the standard deviation of the difference between the two points of one, along each axis.
+   * Poses in which they differ by more than chance would have it are no answers. In [0.001, 1000] mm; default 2.
+   */
+  void SetLandmarkSigmaMm(double value) { this->SetParameter("LandmarkSigmaMm", value); }
+  double GetLandmarkSigmaMm() { return this->GetParameter("LandmarkSigmaMm"); }
   ///@}
 
   ///@{
@@ -178,6 +197,18 @@ public:
   void AddHeldVolume(int volume);
   void ClearHeldVolumes();
   int GetNumberOfHeldVolumes() const;
+  ///@}
+
+  ///@{
+  /**
+   * Landmarks: places with labels that were found in the volumes, mm, LPS, where the input has these. Those with one label in two
+   * volumes belong together to LandmarkSigmaMm: they say where to begin, tell poses apart that the images cannot, and a pose
+   * that contradicts them is none. From a file (.mrk.json, .fcsv or .csv; "": none) for the next volume, or one by one.
+   */
+  void AddLandmarkFile(const char* file);
+  void ClearLandmarkFiles();
+  void AddLandmark(int volume, const char* label, double x, double y, double z);
+  void ClearLandmarks();
   ///@}
 
   /** How many volumes the last update aligned; 0 when it failed. */
@@ -259,6 +290,7 @@ private:
     echorama::AlignVolumesParameters align;
   };
   Settings Values;
+  echorama::LandmarkInput Landmarks;
   echorama::AlignVolumesResult Found;
 #endif
 };

@@ -66,6 +66,16 @@ public:
   void SetVisible(int id, bool visible);
   void AddStroke(int id, Stroke stroke);
   ///@}
+  ///@{ Landmarks: places with labels. Those with one label in several volumes are the same place of the body.
+  /// Sets or moves one. Error(InvalidParameter) for an empty label or a place (of the world, mm) that is not finite.
+  void SetLandmark(int id, const std::string& label, const Eigen::Vector3d& place);
+  void RemoveLandmark(const std::string& label); ///< of all volumes
+  void ClearLandmarks();
+  /// Where one is in the world; none: the volume has no such landmark.
+  std::optional<Eigen::Vector3d> PlaceOfLandmark(int id, const std::string& label) const;
+  /// For the next one in a volume: the first label that others have and it has not; else a number that none has.
+  std::string NextLandmarkLabel(int id) const;
+  ///@}
   ///@{ Selection: no edits.
   const std::set<int>& Selection() const { return selection_; }
   void Select(int id, bool on, bool alone = false); ///< with all of its group; \a alone: nothing else

@@ -131,6 +131,22 @@ StrokeChain ToStrokes(const Json& value, const JsonPlace& place)
   return chain;
 }
 
+std::vector<Landmark> ToLandmarks(const Json& value, const JsonPlace& place)
+{
+  if (!value.is_array())
+    place.Fail("a list is needed");
+  std::vector<Landmark> landmarks;
+  std::set<std::string> labels;
+  for (const Json& each : value) {
+    const JsonPlace here = place.In("landmark " + std::to_string(landmarks.size() + 1));
+    const std::string label = here.In("label").Text(here.Member(each, "label"));
+    if (label.empty() || !labels.insert(label).second)
+      here.In("label").Fail("a label that no other landmark of the volume has is needed");
+    landmarks.push_back({label, here.In("position").Vector<3>(here.Member(each, "position"))});
+  }
+  return landmarks;
+}
+
 // A relative name counts from the folder; from \a beside (where a link to the project lies) when only there is something.
 fs::path Located(const fs::path& name, const fs::path& folder, const fs::path& beside)
 {
@@ -174,6 +190,8 @@ SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path
     volume.group = Count(*group, place.In("group"));
   if (const Json* strokes = given("strokes"))
     volume.strokes = ToStrokes(*strokes, place);
+  if (const Json* landmarks = given("landmarks"))
+    volume.landmarks = ToLandmarks(*landmarks, place.In("landmarks"));
   return volume;
 }
 
@@ -290,6 +308,10 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
     Json strokes = Json::array();
     for (const Stroke& stroke : StrokesOf(volume.strokes))
       strokes.push_back(JsonOf(stroke));
+    Json landmarks = Json::array();
+    for (const Landmark& landmark : volume.landmarks)
+      landmarks.push_back(
+          {{"label", landmark.label}, {"position", {landmark.position.x(), landmark.position.y(), landmark.position.z()}}});
     volumes.push_back({{"name", volume.name},
                        {"file", Relative(volume.file, folder)},
                        {"path", volume.file.empty() ? std::string() : Resolved(volume.file).generic_string()},
@@ -299,7 +321,8 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
                        {"opacity", volume.opacity},
                        {"visible", volume.visible},
                        {"group", volume.group},
-                       {"strokes", std::move(strokes)}});
+                       {"strokes", std::move(strokes)},
+                       {"landmarks", std::move(landmarks)}});
   }
   Json root{{"schema", Schema},
             {"unit", "mm"},

@@ -40,7 +40,7 @@ bool operator==(const SessionVolume& a, const SessionVolume& b)
 {
   return a.id == b.id && a.name == b.name && a.file == b.file && SameGeometry(a.geometry, b.geometry) &&
          a.volumeToWorld.matrix() == b.volumeToWorld.matrix() && a.colour == b.colour && a.opacity == b.opacity &&
-         a.visible == b.visible && a.group == b.group && SameStrokes(a.strokes, b.strokes);
+         a.visible == b.visible && a.group == b.group && a.landmarks == b.landmarks && SameStrokes(a.strokes, b.strokes);
 }
 
 bool operator==(const SessionState& a, const SessionState& b)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Geometry/ImageGeometry.h"
+#include "Core/Geometry/Landmark.h"
 #include "Widgets/Painting/Stroke.h"
 #include <array>
 #include <string>
@@ -18,8 +19,9 @@ struct SessionVolume {
   std::array<double, 3> colour{1.0, 1.0, 1.0}; ///< RGB in [0, 1]
   double opacity = 1.0;                        ///< [0, 1]
   bool visible = true;
-  int group = 0;       ///< volumes of one group are selected together; 0: none
-  StrokeChain strokes; ///< painted and carved
+  int group = 0;                   ///< volumes of one group are selected together; 0: none
+  StrokeChain strokes;             ///< painted and carved
+  std::vector<Landmark> landmarks; ///< in the physical space of the file as it stands; each label once
 };
 
 /// All that undo brings back. Cheap to copy. The selection is not part of it: choosing is not an edit.

@@ -202,6 +202,42 @@ TEST(AlignmentSession, ADragIsOneEntryAndNothingIsNone)
   EXPECT_EQ(session.RedoCount(), 0) << "from here another way";
 }
 
+TEST(AlignmentSession, LandmarksGoWithTheirVolumes)
+{
+  AlignmentSession session = Three();
+  const int entries = session.UndoCount();
+  EXPECT_EQ(session.NextLandmarkLabel(1), "1");
+  session.SetLandmark(1, "1", {1, 2, 3});
+  session.SetLandmark(1, "apex", {4, 5, 6});
+  EXPECT_EQ(session.UndoLabel(), "Mark apex in a");
+  EXPECT_EQ(session.NextLandmarkLabel(1), "2") << "a new one";
+  EXPECT_EQ(session.NextLandmarkLabel(2), "1") << "the first that it has not";
+  session.SetPose(2, Shift(10.0));
+  session.SetLandmark(2, "1", {11, 2, 3});
+  EXPECT_EQ(session.NextLandmarkLabel(2), "apex");
+  const auto positionIn = [&](int id, std::size_t i) { return session.State().Find(id)->landmarks.at(i).position; };
+  EXPECT_EQ(positionIn(2, 0), session.State().Find(2)->volumeToWorld.inverse() * Eigen::Vector3d(11, 2, 3));
+  session.SetPose(2, Shift(20.0));
+  session.SetLandmark(1, "1", {0, 0, 0});
+  EXPECT_EQ(session.State().Find(1)->landmarks.size(), 2u) << "it moved, and is no other";
+  EXPECT_EQ(positionIn(1, 0), Eigen::Vector3d::Zero());
+  EXPECT_EQ(session.UndoCount(), entries + 6);
+  session.RemoveLandmark("1");
+  EXPECT_EQ(session.State().Find(1)->landmarks.size(), 1u);
+  EXPECT_TRUE(session.State().Find(2)->landmarks.empty());
+  session.RemoveLandmark("nobody's");
+  EXPECT_EQ(session.UndoCount(), entries + 7);
+  session.Undo();
+  session.Undo();
+  EXPECT_EQ(positionIn(1, 0), Eigen::Vector3d(1, 2, 3));
+  session.ClearLandmarks();
+  for (const SessionVolume& volume : session.State().volumes)
+    EXPECT_TRUE(volume.landmarks.empty());
+  for (const char* label : {"", "x"})
+    EXPECT_THROW(session.SetLandmark(1, label, {0, 0, *label ? std::nan("") : 0.0}), Error);
+  EXPECT_THROW(session.SetLandmark(99, "x", {0, 0, 0}), Error);
+}
+
 TEST(AlignmentSession, GroupsAreChosenAsAWhole)
 {
   AlignmentSession session = Three();

@@ -50,6 +50,7 @@ TEST_F(ProjectFile, EveryBitComesBack)
   Project extreme = SomeProject(3, Path());
   extreme.state.volumes[0].volumeToWorld.translation() = Eigen::Vector3d(-0.0, 5e-324, 1.7976931348623157e308);
   extreme.state.volumes[1].name = "\u00e4\u6f22 \\ \n";
+  extreme.state.volumes[1].landmarks = {{"apex \"", {1.0 / 3.0, -0.0, 5e-324}}, {"2", {1, 2, 3}}};
   WriteProject(Path("p.json"), extreme);
   EXPECT_TRUE(ReadProject(Path("p.json")).state == extreme.state);
   EXPECT_TRUE(std::signbit(ReadProject(Path("p.json")).state.volumes[0].volumeToWorld.translation().x()));
@@ -136,6 +137,12 @@ TEST_F(ProjectFile, RefusesWhatIsNotAProject)
   ExpectRefused(With("\"hardness\": 0.", "\"hardness\": 3."), "Hardness is 3.");
   ExpectRefused(With("\"pathMm\": [", "\"pathMm\": [], \"x\": ["), "no points");
   ExpectRefused(With("\"strokes\": []", "\"strokes\": {}"), "volume 1, strokes");
+  const auto landmarks = [this](const char* list) { return With("\"landmarks\": []", std::string("\"landmarks\": ") + list); };
+  ExpectRefused(landmarks("3"), "volume 1, landmarks: a list");
+  ExpectRefused(landmarks("[{\"label\": \"a\", \"position\": [1, 2]}]"), "landmarks, landmark 1, position");
+  ExpectRefused(landmarks("[{\"label\": \"\", \"position\": [1, 2, 3]}]"), "landmark 1, label");
+  ExpectRefused(landmarks("[{\"label\": \"a\", \"position\": [1, 2, 3]}, {\"label\": \"a\", \"position\": [1, 2, 3]}]"),
+                "landmark 2, label");
   ExpectRefused(With("v1.mha", "v0.mha"), "v0.mha is named twice");
   ExpectRefused(With("volume \\\"1", "volume \\\"0"), "another volume");
   ExpectRefused(With("\"comment\": \"", "\"comment\": 3, \"x\": \""), "comment");

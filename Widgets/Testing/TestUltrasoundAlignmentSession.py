@@ -247,6 +247,9 @@ class Session(unittest.TestCase):
         tells("Volumes History", session.SetOpacity, two, 0.5)
         tells("", session.SetOpacity, two, 0.5)
         tells("Volumes History", session.SetName, two, "second")
+        tells("Volumes History", session.SetLandmark, one, "apex", 1, 2, 3)
+        tells("", session.SetLandmark, one, "apex", 1, 2, 3)
+        tells("Volumes History", session.Undo)
         tells("Selection", session.SetCentreOfRotation, 1, 2, 3)
         tells("Selection", session.InvertSelection)
         tells("", session.BeginStroke, one, "carve", 3, 0, 1, 0.5, True)
@@ -257,6 +260,23 @@ class Session(unittest.TestCase):
         tells("Selection", session.SelectAll)
         tells("Volumes Selection History", session.RemoveVolume, two)
         tells("", session.Select, 77)
+
+    # ---------------------------------------------------------------------------------------------------------- landmarks
+
+    def test_landmarks_are_places_of_the_world_that_move_with_their_volume(self):
+        session = vtkUltrasoundAlignmentSession()
+        one, two = session.AddVolume(volume(), None), session.AddVolume(volume(1), None)
+        self.assertTrue(session.SetLandmark(one, "apex", 1, 2, 3) and session.SetLandmark(two, "apex", 4, 5, 6))
+        self.assertEqual((session.GetNumberOfLandmarks(one), session.GetLandmarkLabel(one, 0), session.GetLandmarkLabel(one, 1)), (1, "apex", ""))
+        session.Select(two)
+        session.TranslateSelection(10, 0, 0)
+        place = [0.0] * 3
+        self.assertTrue(session.GetLandmark(two, "apex", place))
+        np.testing.assert_allclose(place, (14, 5, 6), atol=1e-12)
+        self.assertFalse(session.GetLandmark(two, "nobody's", place))
+        self.assertEqual(session.GetNextLandmarkLabel(two), "1")
+        session.RemoveLandmark("apex")
+        self.assertEqual(session.GetNumberOfLandmarks(one) + session.GetNumberOfLandmarks(two), 0)
 
     # ------------------------------------------------------------------------------------------------------------ strokes
 

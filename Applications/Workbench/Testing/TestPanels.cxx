@@ -31,6 +31,8 @@
 #include <vtkImageData.h>
 #include <vtkPointData.h>
 #include <vtkUltrasoundAlignmentSession.h>
+#include <vtkUltrasoundSliceView.h>
+#include <vtkUltrasoundVolume.h>
 
 using namespace echorama;
 
@@ -55,9 +57,11 @@ class TestPanels : public WindowTest {
 private slots:
   void refineBringsAVolumeBack();
   void aSureAnswerIsTakenUnasked();
+  void landmarksTellWhatRepeatsApart();
   void aCancelledJobChangesNothing();
   void whatMovedMeanwhileStays();
   void aTrackerPlacesVolumesBesideTheFirst();
+  void stitchingReadsThroughDisplacements();
   void aWindowMayCloseWhileAJobRuns();
   void stitchingMakesAndSavesOneVolume();
   void exportWritesAndNeverReplaces();
@@ -136,6 +140,92 @@ void TestPanels::aSureAnswerIsTakenUnasked()
     QVERIFY2(Distance(window.Pose(2), belongs) < 0.5, button);
     QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
   }
+}
+
+// The volumes of the first test, which the images alone leave ambiguous: the same three places are clicked on in both.
+void TestPanels::landmarksTellWhatRepeatsApart()
+{
+  QStringList files;
+  for (const char* name : {"a.mha", "b.mha"})
+    files.append(WriteVolume(name, 1, {0.0, 0.0, 0.0}, 64, true));
+  WindowUnderTest window;
+  QVERIFY(window.Open(files));
+  vtkUltrasoundAlignmentSession* session = window.Session();
+  const auto belongs = window.Pose(2);
+  session->Select(2, true, true);
+  session->TranslateSelection(3.0, -2.0, 0.0);
+  Raise(window, "registrationPanel");
+  auto* table = window.Part<QTableWidget>("landmarkTable");
+  QCOMPARE(table->rowCount(), 0);
+
+  SliceCanvas* slice = window.Slice(0);
+  const auto at = [slice](double x, double y) {
+    double pixel[2], focus[3];
+    slice->View()->GetFocus(focus);
+    slice->View()->WorldToPixel(x, y, focus[2], pixel);
+    return slice->PositionOf({pixel[0], pixel[1]}).toPoint();
+  };
+  slice->setFocus();
+  window.Key(Qt::Key_6);
+  session->SelectNone();
+  window.Click(slice, at(0, 0));
+  QVERIFY(window.HasMessage("Select the one volume"));
+  QCOMPARE(session->GetNumberOfLandmarks(1) + session->GetNumberOfLandmarks(2), 0);
+  const int entries = session->GetUndoCount();
+  const double places[3][2] = {{-15.0, -10.0}, {12.0, -8.0}, {2.0, 16.0}};
+  session->Select(1, true, true);
+  for (const auto& place : places)
+    window.Click(slice, at(place[0], place[1]));
+  session->Select(2, true, true);
+  for (const auto& place : places)
+    window.Click(slice, at(place[0] + 3.0, place[1] - 2.0));
+  QCOMPARE(session->GetUndoCount(), entries + 6);
+  QCOMPARE(session->GetNumberOfLandmarks(2), 3);
+  QCOMPARE(session->GetLandmarkLabel(2, 2), std::string("3"));
+  double marked[3];
+  QVERIFY(session->GetLandmark(2, "3", marked));
+  const double pixelMm = slice->View()->GetMillimetresPerPixel();
+  QVERIFY(std::hypot(marked[0] - 5.0, marked[1] - 14.0) < 1.5 * pixelMm);
+  QCOMPARE(table->rowCount(), 3);
+  QCOMPARE(table->item(0, 0)->text(), QString("1"));
+  QCOMPARE(table->item(0, 1)->text(), QString("a, b"));
+  const double apart = table->item(0, 2)->text().section(' ', 0, 0).toDouble();
+  QVERIFY2(std::abs(apart - std::hypot(3.0, 2.0)) < 2.0 * pixelMm, qPrintable(table->item(0, 2)->text()));
+  const QImage picture = window.Screenshot("landmarks");
+
+  // One that is dragged is the same one, and it is one edit; Escape takes it back.
+  window.Drag(slice, at(5.0, 14.0), at(9.0, 14.0));
+  QCOMPARE(session->GetUndoCount(), entries + 7);
+  QCOMPARE(session->GetNumberOfLandmarks(2), 3);
+  QVERIFY(session->GetLandmark(2, "3", marked) && std::abs(marked[0] - 9.0) < 1.5 * pixelMm);
+  window.Press(slice, at(9.0, 14.0));
+  window.Move(slice, at(20.0, 20.0));
+  window.Key(Qt::Key_Escape);
+  window.Release(slice, at(20.0, 20.0));
+  QVERIFY(session->GetLandmark(2, "3", marked) && std::abs(marked[0] - 9.0) < 1.5 * pixelMm);
+  QVERIFY(window.Screenshot("landmarks") != picture);
+  QVERIFY(session->Undo());
+  QVERIFY(session->GetLandmark(2, "3", marked) && std::abs(marked[0] - 5.0) < 1.5 * pixelMm);
+
+  const int before = session->GetUndoCount();
+  QVERIFY(!window.Part<QCheckBox>("alignDoubtful")->isChecked());
+  QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  auto* results = window.Part<QTableWidget>("alignResults");
+  QVERIFY2(results->item(1, 1)->text() == "aligned", qPrintable(results->item(1, 1)->toolTip()));
+  QVERIFY2(Distance(window.Pose(2), belongs) < 0.3, qPrintable(QString::number(Distance(window.Pose(2), belongs))));
+  QCOMPARE(session->GetUndoCount(), before + 1);
+  QVERIFY(table->item(0, 2)->text().section(' ', 0, 0).toDouble() < 3.0 * pixelMm);
+
+  // What is selected in the list goes, then all; undo brings them back.
+  table->selectRow(1);
+  QTest::mouseClick(window.Part<QPushButton>("landmarkRemove"), Qt::LeftButton);
+  QCOMPARE(table->rowCount(), 2);
+  QCOMPARE(session->GetNextLandmarkLabel(1), std::string("2"));
+  QTest::mouseClick(window.Part<QPushButton>("landmarkClear"), Qt::LeftButton);
+  QCOMPARE(table->rowCount(), 0);
+  QVERIFY(session->Undo() && session->Undo());
+  QCOMPARE(table->rowCount(), 3);
 }
 
 void TestPanels::aCancelledJobChangesNothing()
@@ -218,6 +308,30 @@ void TestPanels::aTrackerPlacesVolumesBesideTheFirst()
   QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
   window.Session()->Undo();
   QVERIFY(window.Pose(2) == before);
+}
+
+void TestPanels::stitchingReadsThroughDisplacements()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(2.0, 0.0, 0.0); // what is left of a rigid motion becomes part of the displacement
+  Raise(window, "resultPanel");
+  auto* panel = window.Part<ResultPanel>("resultPanel");
+  std::vector<double> sums;
+  for (const bool deformable : {false, true}) {
+    window.Part<QCheckBox>("stitchDeformable")->setChecked(deformable);
+    panel->Make(true);
+    QVERIFY(window.Wait());
+    auto* result = panel->Result().session.Get();
+    QCOMPARE(result->GetNumberOfVolumes(), 1);
+    vtkDataArray* values = vtkUltrasoundVolume::GetIntensity(result->GetImage(result->GetVolumeId(0)));
+    double sum = 0.0;
+    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i)
+      sum += values->GetTuple1(i) * static_cast<double>(i % 1009);
+    sums.push_back(sum);
+  }
+  QVERIFY(sums[0] != sums[1]);
 }
 
 void TestPanels::aWindowMayCloseWhileAJobRuns()

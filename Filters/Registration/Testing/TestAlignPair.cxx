@@ -90,7 +90,7 @@ TEST(AlignPair, EachCheckOfTheVerdictByItself)
 {
   AlignPairParameters p;
   p.minimumOverlap = 0.25;
-  p.minimumSimilarity = 0.125;
+  p.minimumSimilarity = 0.16;
   p.maximumErrorVoxels = 1.5;
   p.maximumSplitVoxels = 2.5;
   p.minimumPeakRatio = 1.25;
@@ -108,12 +108,18 @@ TEST(AlignPair, EachCheckOfTheVerdictByItself)
     EXPECT_NE(spoilt.reason.find(reason), std::string::npos) << spoilt.reason << " instead of " << reason;
   };
   judged([](PairAlignment& a) { a.overlap = 0.2449; }, Verdict::Failed, "overlap by only 24%");
-  judged([](PairAlignment& a) { a.similarity = 0.1241; }, Verdict::Failed, "by chance (similarity 0.124)");
+  judged([](PairAlignment& a) { a.similarity = 0.1591; }, Verdict::Failed, "by chance (similarity 0.159)");
   judged([](PairAlignment& a) { a.similarity = std::nan(""); }, Verdict::Failed, "by chance");
   judged([](PairAlignment& a) { a.errorMm = 0.76; }, Verdict::Ambiguous, "do not determine the pose (predicted error 0.8 mm)");
   judged([](PairAlignment& a) { a.errorMm = 1e6; }, Verdict::Ambiguous, "predicted error 999.0 mm");
   judged([](PairAlignment& a) { a.splitMm = 1.26; }, Verdict::Failed, "two halves of the voxels separately gives poses 1.3 mm");
   judged([](PairAlignment& a) { a.peakRatio = 1.2449; }, Verdict::Ambiguous, "a different pose fits nearly as well (ratio 1.24)");
+
+  // The less alike, the better the pose must be determined.
+  p.minimumSimilarity = 0.075;
+  judged([](PairAlignment& a) { a.errorMm *= 0.499; }, Verdict::Aligned, "");
+  judged([](PairAlignment& a) { a.errorMm *= 0.501; }, Verdict::Ambiguous, "do not determine the pose");
+  p.minimumSimilarity = 0.16;
 
   // What is wrong with most of it is said first.
   judged([](PairAlignment& a) { a.overlap = a.similarity = 0.0; }, Verdict::Failed, "overlap");

@@ -131,6 +131,34 @@ AlignVolumesParameters Tracked()
   return p;
 }
 
+// Half a ring: an open chain. What pairs leave open adds up along it, and what the speed of sound may bend grows with the
+// distance.
+TEST(AlignVolumes, ErrorsGrowAlongAChain)
+{
+  Ring ring(6);
+  AlignVolumesParameters p = Tracked();
+  p.pair.soundSpeedError = 0.0;
+  const AlignVolumesResult open = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  p.pair.soundSpeedError = 0.03;
+  const AlignVolumesResult bent = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  EXPECT_EQ(open.volumes[0].errorMm, 0.0);
+  const Eigen::Vector3d first = ring.truth[0] * -Ring::Corner();
+  for (std::size_t v = 1; v < 6; ++v) {
+    EXPECT_EQ(bent.volumes[v].verdict, Verdict::Aligned) << bent.volumes[v].reason;
+    EXPECT_GT(open.volumes[v].errorMm, v == 1 ? 0.05 : open.volumes[v - 1].errorMm);
+    const double apart = (ring.truth[v] * -Ring::Corner() - first).norm();
+    EXPECT_NEAR(bent.volumes[v].errorMm, std::hypot(open.volumes[v].errorMm, 0.03 * apart), 0.01);
+  }
+
+  p.pair.maximumErrorMm = 0.5 * (bent.volumes[3].errorMm + bent.volumes[4].errorMm);
+  const AlignVolumesResult strict = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  EXPECT_EQ(strict.volumes[3].verdict, Verdict::Aligned);
+  EXPECT_EQ(strict.volumes[4].verdict, Verdict::Ambiguous);
+  EXPECT_NE(strict.volumes[4].reason.find("the speed of sound may have bent over the distance to volume 0"), std::string::npos)
+      << strict.volumes[4].reason;
+  EXPECT_EQ(strict.volumes[4].volumeToWorld.matrix(), bent.volumes[4].volumeToWorld.matrix()) << "only the verdict changes";
+}
+
 TEST(AlignVolumes, ARingComesTogether)
 {
   Ring ring;

@@ -75,6 +75,9 @@ TEST(LandmarkError, EveryPairOfVolumesCounts)
   EXPECT_DOUBLE_EQ(error.mean, (1.0 + 3.0 + 2.0 + 5.0) / 4.0);
   EXPECT_EQ(error.distances[1].first, 0);
   EXPECT_EQ(error.distances[1].second, 2);
+  ASSERT_EQ(error.unmatched.size(), 1u);
+  EXPECT_EQ(error.unmatched[0].label, "only a");
+  EXPECT_EQ(error.unmatched[0].list, 0);
 }
 
 TEST(LandmarkError, WhatCannotBePairedIsRefused)

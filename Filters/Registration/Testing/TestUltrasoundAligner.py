@@ -249,7 +249,29 @@ corners = np.array([[i, j, k, 1.0] for i in (0, 86) for j in (0, 78) for k in (0
 assert np.linalg.norm(((swapped - forward) @ corners)[:3], axis=0).mean() < 0.2, "voxels of 2 mm"
 
 
-# 8. the score
+# 8. landmarks: they bring a volume back from far away, wherever it was; wrong ones yield no answer
+far = [[-1, 0, 0, 300], [0, -1, 0, -100], [0, 0, 1, 50], [0, 0, 0, 1]]
+lost = knocked(b, far)
+marked = aligner(a, lost)
+marked.SetStart("automatic")
+places = np.array([[20.0, 40, 30], [45, 60, 20], [30, 70, 50]])
+for number, place in enumerate(places):
+    marked.AddLandmark(0, str(number), *place)
+    marked.AddLandmark(1, str(number), *(np.array(far) @ [*place, 1])[:3])
+marked.Update()
+assert marked.GetVerdict(1) == "aligned", marked.GetReason(1)
+assert np.allclose(geometry(marked.GetOutput().GetBlock(1)), geometry(b), atol=0.3)
+assert not json.loads(marked.GetReport())["pairs"][0]["anywhere"], "landmarks say where to look"
+marked.AddLandmark(0, "wrong", 0, 0, 0)
+marked.AddLandmark(1, "wrong", 0, 0, 0)
+marked.Update()
+assert marked.GetVerdict(1) == "failed" and "contradict each other" in marked.GetReason(1)
+marked.AddLandmark(2, "beyond", 0, 0, 0)
+assert "landmarks of volume 2" in errors_of(marked)
+marked.ClearLandmarks()
+
+
+# 9. the score
 def score(aligned, truth):
     filter = vtkUltrasoundAlignmentScore()
     filter.SetPoints(500)

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Displacements are files of their own beside the poses: images that ParaView and other programs of VTK read as they are.
+#include "Displacements.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
+#include <algorithm>
+#include <filesystem>
+#include <vtkInformation.h>
+#include <vtkNew.h>
+#include <vtkUltrasoundDeformableAligner.h>
+#include <vtkUltrasoundDisplacement.h>
+#include <vtkUltrasoundVolume.h>
+#include <vtkXMLImageDataReader.h>
+#include <vtkXMLImageDataWriter.h>
+
+namespace echorama {
+namespace {
+
+void WriteDisplacement(vtkImageData* image, const std::string& path)
+{
+  FileReplacement files;
+  const vtkNew<vtkXMLImageDataWriter> writer;
+  writer->SetInputData(image);
+  writer->SetFileName(files.Stage(path).c_str());
+  writer->SetDataModeToBinary();
+  if (!writer->Write())
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
+  files.Commit();
+}
+
+vtkSmartPointer<vtkImageData> ReadDisplacement(Session& session, const std::string& path)
+{
+  if (!std::filesystem::exists(path))
+    throw Error(Error::Kind::FileSystem, path + ": a displacement that the poses name is not there");
+  const vtkNew<vtkXMLImageDataReader> reader;
+  reader->SetFileName(path.c_str());
+  session.Update(reader, "read", path);
+  vtkUltrasoundDisplacement::FieldOf(reader->GetOutput(), path); // or be told what is wrong with it
+  return reader->GetOutput();
+}
+
+} // namespace
+
+std::string DisplacementPath(const std::string& poses, std::size_t number)
+{
+  const std::filesystem::path path(poses);
+  return (path.parent_path() / (path.stem().string() + ".displacement-" + std::to_string(number + 1) + ".vti")).string();
+}
+
+void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, const std::vector<LoadedVolume>& volumes,
+                   const std::vector<bool>& aligned, int fixed, const std::string& output, std::vector<VolumePose>& poses)
+{
+  std::vector<LoadedVolume> placed;
+  std::vector<std::size_t> numbers;
+  for (std::size_t i = 0; i < volumes.size(); ++i)
+    if (aligned[i]) {
+      if (static_cast<int>(i) == fixed)
+        aligner->SetFixedVolume(static_cast<int>(placed.size()));
+      placed.push_back(volumes[i]);
+      numbers.push_back(i);
+    } else {
+      session.Note(volumes[i].file + ": it is not aligned, and is not bent");
+    }
+  if (placed.size() < 2)
+    return;
+  aligner->SetInputDataObject(BlocksOf(placed));
+  session.Update(aligner, "deform");
+  for (std::size_t p = 0; p < placed.size(); ++p) {
+    const auto block = static_cast<unsigned int>(p);
+    const std::size_t number = numbers[p];
+    if (static_cast<int>(number) == fixed)
+      continue;
+    const DeformableAlignResult& found = aligner->Result(p);
+    nlohmann::ordered_json told{{"applied", found.isApplied},
+                                {"reason", found.reason},
+                                {"similarity_before", found.similarityBefore},
+                                {"similarity_after", found.similarityAfter},
+                                {"largest_mm", found.largestMm},
+                                {"smallest_determinant", found.smallestDeterminant},
+                                {"bending_mm", found.bendingEnergy}};
+    if (found.isApplied) {
+      poses[number].displacement = DisplacementPath(output, number);
+      WriteDisplacement(
+          vtkImageData::SafeDownCast(vtkMultiBlockDataSet::SafeDownCast(aligner->GetOutputDataObject(1))->GetBlock(block)),
+          poses[number].displacement);
+      told["file"] = poses[number].displacement;
+    }
+    session.result["volumes"][number]["deformation"] = told;
+    session.Say(volumes[number].file + ": " +
+                (found.isApplied ? "bent by up to " + Fixed(found.largestMm, 2) + " mm" : "not bent: " + found.reason));
+  }
+}
+
+vtkSmartPointer<vtkMultiBlockDataSet> DisplacementsOf(Session& session, const std::vector<LoadedVolume>& volumes,
+                                                      const std::string& path)
+{
+  if (path.empty())
+    return nullptr;
+  const std::vector<VolumePose> poses = ReadPoses(path);
+  auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+  bool any = false;
+  for (unsigned int i = 0; i < volumes.size(); ++i) {
+    const LoadedVolume& volume = volumes[i];
+    const std::string& file = PoseIn(poses, path, volume).displacement;
+    vtkSmartPointer<vtkImageData> image;
+    if (!file.empty()) {
+      image = ReadDisplacement(session, file);
+      any = true;
+    } else {
+      ImageGeometry somewhere;
+      somewhere.dimensions = {2, 2, 2};
+      image = vtkSmartPointer<vtkImageData>::New();
+      vtkUltrasoundDisplacement::ImageOf(DisplacementField(somewhere), image);
+    }
+    blocks->SetBlock(i, image);
+    blocks->GetMetaData(i)->Set(vtkCompositeDataSet::NAME(), volume.file.c_str());
+  }
+  return any ? blocks : nullptr;
+}
+
+} // namespace echorama

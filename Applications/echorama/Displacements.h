@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Volumes.h"
+
+class vtkUltrasoundDeformableAligner;
+
+namespace echorama {
+
+/// Where the displacement of the volume \a number (from 0) belongs that a pose file names: POSES.displacement-NUMBER.vti, from 1.
+std::string DisplacementPath(const std::string& poses, std::size_t number);
+
+/// Finds what the poses of those volumes leave over that have an \a aligned beside them, and writes it for the pose file
+/// \a output: each displacement is named in its pose. Tells what was found, as "deformation" in the results of each volume.
+/// \param fixed the volume (from 0) that is not bent
+void DeformVolumes(Session&, vtkUltrasoundDeformableAligner*, const std::vector<LoadedVolume>&, const std::vector<bool>& aligned,
+                   int fixed, const std::string& output, std::vector<VolumePose>& poses);
+
+/// The displacements that the pose file \a path names for volumes that it has placed, as blocks in their order, zero for those
+/// without; nothing when it names none. Throws Error that names the file.
+vtkSmartPointer<vtkMultiBlockDataSet> DisplacementsOf(Session&, const std::vector<LoadedVolume>&, const std::string& path);
+
+} // namespace echorama
