@@ -119,7 +119,10 @@ public:
   ///@}
 
   ///@{
-  /** A larger predicted error is ambiguous. In [0.001, 1000] voxels; default 1. */
+  /**
+   * A larger predicted error is ambiguous; where volumes are hardly alike (similarity below 0.15), in proportion less. In [0.001,
+   * 1000] voxels; default 1.
+   */
   void SetMaximumErrorVoxels(double value) { this->SetParameter("MaximumErrorVoxels", value); }
   double GetMaximumErrorVoxels() { return this->GetParameter("MaximumErrorVoxels"); }
   ///@}
@@ -127,7 +130,7 @@ public:
   ///@{
   /**
    * A larger predicted error is ambiguous, too, whatever the size of the voxels: what your use can bear. In [0.001, 1000] mm;
-   * default 2.
+   * default 2.5.
    */
   void SetMaximumErrorMm(double value) { this->SetParameter("MaximumErrorMm", value); }
   double GetMaximumErrorMm() { return this->GetParameter("MaximumErrorMm"); }
@@ -136,7 +139,7 @@ public:
   ///@{
   /**
    * How far the speed of sound in the tissue may be from what the scanner takes it for, as a share. A volume may be off by this
-   * share of its distance from the fixed one although both show the same: that is added to its error. In [0, 0.2]; default 0.02.
+   * share of its distance from the fixed one although both show the same: that is added to its error. In [0, 0.2]; default 0.025.
    */
   void SetSoundSpeedError(double value) { this->SetParameter("SoundSpeedError", value); }
   double GetSoundSpeedError() { return this->GetParameter("SoundSpeedError"); }
