@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::ptrdiff_t beamsPerRange = 8;
+constexpr std::ptrdiff_t tracedPerRange = 8;
 constexpr double toleranceMm = 1e-6;
 constexpr double leastWeight = 1e-6; // a beam that counts less does not tell whether sound gets to a point
 constexpr int maxIterations = 100;
@@ -30,7 +30,7 @@ SeenTissue::SeenTissue(const AcousticScene& scene, const SynthesisParameters& p,
   const SoundTracer tracer(scene, direct, ConditionsOf(p));
   const Pose worldToProbe = probeToWorld_.inverse();
   beams_.resize(static_cast<std::size_t>(elements_) * static_cast<std::size_t>(steps_));
-  ParallelRanges(static_cast<std::ptrdiff_t>(beams_.size()), beamsPerRange, progress,
+  ParallelRanges(static_cast<std::ptrdiff_t>(beams_.size()), tracedPerRange, progress,
                  [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
                    SoundPath path;
                    for (std::ptrdiff_t i = begin; i < end; ++i) {
