@@ -51,10 +51,7 @@ void Phantom(Session& session, const PhantomOptions& options, vtkUltrasoundPhant
       return parameters.probeToWorld * seen;
     });
   }
-  set.WriteTruth();
-  folder.Commit();
-  session.Say("wrote " + folder.Final("truth.json") + ": the poses that put the volumes back, all but the first by " +
-              Fixed(options.knockMm, 1) + " mm and " + Fixed(options.knockDegrees, 1) + " degrees");
+  set.Finish();
 }
 
 } // namespace
@@ -90,14 +87,7 @@ Command PhantomCommand(CLI::App& program)
   butTheFirst("DeformationMm", "--deformation");
   butTheFirst("RibShare", "--rib");
   butTheFirst("Jets", "--jets");
-  options
-      ->add_option("--landmarks", values->landmarks,
-                   "How many places that two volumes see are listed for each volume, as landmarks_N.csv")
-      ->check(CLI::Range(0, 10000))
-      ->capture_default_str();
-  options->add_option("--format", values->format, "File format")
-      ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))
-      ->capture_default_str();
+  AddSetOptions(*options, values->landmarks, values->format);
   return {options, [values, source](Session& session) { Phantom(session, *values, source); }};
 }
 

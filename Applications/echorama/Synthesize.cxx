@@ -174,10 +174,7 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
     vtkUltrasoundAcquisition::SetProbeToWorld(beams, knock * views[i].probeToWorld);
     SaveVolume(session, beams, folder.Stage(name));
   }
-  set.WriteTruth();
-  folder.Commit();
-  session.Say("wrote " + folder.Final("truth.json") + ": the poses that put the volumes back, all but the first by " +
-              Fixed(scene.volume.knockMm, 1) + " mm and " + Fixed(scene.volume.knockDegrees, 1) + " degrees");
+  set.Finish();
 }
 
 } // namespace
@@ -197,14 +194,7 @@ Command SynthesizeCommand(CLI::App& program)
   values->spacing = AddParameter(options, Describe(values->volume), "SpacingMm", "--spacing")->default_str("the scene's");
   options->add_option("--data", values->data,
                       "Folder of the meshes and recordings that the scene names, whatever folder it says");
-  options
-      ->add_option("--landmarks", values->landmarks,
-                   "How many places that two volumes see are listed for each volume, as landmarks_N.csv")
-      ->check(CLI::Range(0, 10000))
-      ->capture_default_str();
-  options->add_option("--format", values->format, "File format")
-      ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))
-      ->capture_default_str();
+  AddSetOptions(*options, values->landmarks, values->format);
   return {options, [values](Session& session) { Synthesize(session, *values); }};
 }
 

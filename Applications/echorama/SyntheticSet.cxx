@@ -8,6 +8,7 @@
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Volumes.h"
 #include <algorithm>
+#include <CLI/Validators.hpp>
 #include <vtkImageData.h>
 #include <vtkUltrasoundVolume.h>
 
@@ -29,6 +30,17 @@ Eigen::Vector3d CentroidOf(vtkImageData* image)
 }
 
 } // namespace
+
+void AddSetOptions(CLI::App& options, int& landmarks, std::string& format)
+{
+  options
+      .add_option("--landmarks", landmarks, "How many places that two volumes see are listed for each volume, as landmarks_N.csv")
+      ->check(CLI::Range(0, 10000))
+      ->capture_default_str();
+  options.add_option("--format", format, "File format")
+      ->check(CLI::IsMember({"mha", "mhd", "nrrd", "nhdr", "vti"}))
+      ->capture_default_str();
+}
 
 SyntheticSet::SyntheticSet(Session& session, OutputFolder& folder, const std::string& format, const Knock& knock)
   : session_(session), folder_(folder), format_(format), knock_(knock)
@@ -67,9 +79,12 @@ Pose SyntheticSet::Add(vtkImageData* image, const nlohmann::ordered_json& more, 
   return knock;
 }
 
-void SyntheticSet::WriteTruth()
+void SyntheticSet::Finish()
 {
   WritePoses(folder_.Stage("truth.json"), truth_); // relative to the folder, so they stay right when it gets its place
+  folder_.Commit();
+  session_.Say("wrote " + folder_.Final("truth.json") + ": the poses that put the volumes back, all but the first by " +
+               Fixed(knock_.mm, 1) + " mm and " + Fixed(knock_.degrees, 1) + " degrees");
 }
 
 std::vector<Landmark> SharedPlaces(std::uint64_t seed, int count, const ProbeGeometry& probe, const std::vector<Pose>& views)

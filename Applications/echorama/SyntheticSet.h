@@ -5,6 +5,7 @@
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Readers/OutputFiles.h"
 #include "Session.h"
+#include <CLI/App.hpp>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -34,8 +35,8 @@ public:
   Pose Add(vtkImageData* image, const nlohmann::ordered_json& more, const std::vector<Landmark>& places = {},
            const SeenAt& seenAt = {});
 
-  /// Writes the truth. The folder is then ready to be committed.
-  void WriteTruth();
+  /// Writes the truth and commits the folder.
+  void Finish();
 
 private:
   Session& session_;
@@ -44,6 +45,9 @@ private:
   Knock knock_;
   std::vector<VolumePose> truth_;
 };
+
+/// The options --landmarks and --format.
+void AddSetOptions(CLI::App& options, int& landmarks, std::string& format);
 
 /// Places of the tissue that two views at least see, at random: \a count of them, or fewer when they are hard to find.
 std::vector<Landmark> SharedPlaces(std::uint64_t seed, int count, const ProbeGeometry& probe, const std::vector<Pose>& views);
