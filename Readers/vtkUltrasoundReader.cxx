@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundReader.h"
 
-#include "Core/Base/JoinedText.h"
 #include "Core/Imaging/BorderZeros.h"
 #include "Readers/DataFile.h"
 #include "Readers/SequenceFile.h"
@@ -205,9 +204,9 @@ vtkUltrasoundReader::vtkUltrasoundReader()
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundReader::~vtkUltrasoundReader()
+echorama::ParameterList vtkUltrasoundReader::Parameters()
 {
-  this->SetFileName(nullptr);
+  return Describe(this->Values);
 }
 
 //----------------------------------------------------------------------------
@@ -228,18 +227,6 @@ int vtkUltrasoundReader::CanReadFile(const char* fileName)
   } catch (const Error&) {
     return 0;
   }
-}
-
-//----------------------------------------------------------------------------
-echorama::ParameterList vtkUltrasoundReader::Parameters()
-{
-  return Describe(this->Values);
-}
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundReader::GetNotes() const
-{
-  return echorama::Joined(this->Notes, "\n");
 }
 
 //----------------------------------------------------------------------------

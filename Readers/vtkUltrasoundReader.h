@@ -42,6 +42,7 @@
 #include <vector> // for the notes
 
 #ifndef __VTK_WRAP__
+#include "Core/Base/JoinedText.h"
 #include "Readers/VolumeSource.h"
 #include "vtkUltrasoundParameters.h"
 #endif
@@ -59,6 +60,17 @@ public:
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
   ///@}
+
+  /**
+   * 1 when \a fileName is there and begins like a file that this class reads, else 0 (also for tracked sequences). The voxels
+   * are not looked at.
+   */
+  static int CanReadFile(const char* fileName);
+
+  /**
+   * What the last update had to assume, or could not keep, one sentence per line. Empty when the file said everything.
+   */
+  std::string GetNotes() const { return echorama::Joined(this->Notes, "\n"); }
 
   // BEGIN parameters
   ///@{
@@ -107,20 +119,12 @@ public:
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 #endif
 
-  /**
-   * 1 when \a fileName is there and begins like a file that this class reads, else 0 (also for tracked sequences). The voxels
-   * are not looked at.
-   */
-  static int CanReadFile(const char* fileName);
-
-  /**
-   * What the last update had to assume, or could not keep, one sentence per line. Empty when the file said everything.
-   */
-  std::string GetNotes() const;
-
 protected:
   vtkUltrasoundReader();
-  ~vtkUltrasoundReader() override;
+  ~vtkUltrasoundReader() override
+  {
+    this->SetFileName(nullptr);
+  }
 
   int ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundSequenceWriter.h"
 
-#include "Core/Base/JoinedText.h"
 #include "Readers/SequenceWriter.h"
 
 #include "vtkCommand.h"
@@ -166,12 +165,6 @@ SequenceFrame FrameOf(vtkImageData* image, double timeStep, bool& placed)
 } // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundSequenceWriter::~vtkUltrasoundSequenceWriter()
-{
-  this->SetFileName(nullptr);
-}
-
-//----------------------------------------------------------------------------
 echorama::ParameterList vtkUltrasoundSequenceWriter::Parameters()
 {
   using echorama::Parameter;
@@ -185,12 +178,6 @@ void vtkUltrasoundSequenceWriter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
   vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->GetNotes() << "\n";
-}
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundSequenceWriter::GetNotes() const
-{
-  return echorama::Joined(this->Notes, "\n");
 }
 
 //----------------------------------------------------------------------------
@@ -216,12 +203,6 @@ int vtkUltrasoundSequenceWriter::Write()
     vtkWarningMacro(<< this->FileName << ": " << this->GetNotes());
   }
   return written;
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundSequenceWriter::WriteData()
-{
-  // All is done by Write(), which asks for one time step after the other.
 }
 
 //----------------------------------------------------------------------------

@@ -32,6 +32,7 @@
 #include <vector> // for the notes
 
 #ifndef __VTK_WRAP__
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/Progress.h"
 #include "vtkUltrasoundParameters.h"
 #endif
@@ -47,6 +48,15 @@ public:
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
   ///@}
+
+  /**
+   * Updates the input at each of its time steps and writes them. Returns 1 when the file is there, complete; 0 after any
+   * error, also of the input.
+   */
+  int Write() override;
+
+  /** What the last Write() could not keep, one sentence per line. */
+  std::string GetNotes() const { return echorama::Joined(this->Notes, "\n"); }
 
   // BEGIN parameters
   ///@{
@@ -78,18 +88,6 @@ public:
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
-#endif
-
-  /**
-   * Updates the input at each of its time steps and writes them. Returns 1 when the file is there, complete; 0 after any
-   * error, also of the input.
-   */
-  int Write() override;
-
-  /** What the last Write() could not keep, one sentence per line. */
-  std::string GetNotes() const;
-
-#ifndef __VTK_WRAP__
   /**
    * Writes what is connected to port 0 of \a sink, one time step after the other. Returns notes on what could not be kept;
    * throws echorama::Error.
@@ -100,10 +98,13 @@ public:
 
 protected:
   vtkUltrasoundSequenceWriter() = default;
-  ~vtkUltrasoundSequenceWriter() override;
+  ~vtkUltrasoundSequenceWriter() override
+  {
+    this->SetFileName(nullptr);
+  }
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
-  void WriteData() override;
+  void WriteData() override {} // all is done by Write(), which asks for one time step after the other
 
   char* FileName = nullptr;
 

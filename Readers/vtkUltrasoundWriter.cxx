@@ -2,7 +2,6 @@
 #include "vtkUltrasoundWriter.h"
 
 #include "Core/Base/FileReplacement.h"
-#include "Core/Base/JoinedText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Imaging/BorderZeros.h"
 #include "Readers/ImageHeader.h"
@@ -200,12 +199,6 @@ std::unique_ptr<VolumeWriter> OpenFile(const std::string& path, ImageHeader head
 } // namespace
 
 //----------------------------------------------------------------------------
-vtkUltrasoundWriter::~vtkUltrasoundWriter()
-{
-  this->SetFileName(nullptr);
-}
-
-//----------------------------------------------------------------------------
 echorama::ParameterList vtkUltrasoundWriter::Parameters()
 {
   using echorama::Parameter;
@@ -226,12 +219,6 @@ void vtkUltrasoundWriter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << "\n";
   vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "Notes: " << this->GetNotes() << "\n";
-}
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundWriter::GetNotes() const
-{
-  return echorama::Joined(this->Notes, "\n");
 }
 
 //----------------------------------------------------------------------------

@@ -36,6 +36,7 @@
 #include <vector> // for the notes
 
 #ifndef __VTK_WRAP__
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/Progress.h"
 #include "vtkUltrasoundParameters.h"
 #include <array>      // for extents
@@ -55,6 +56,14 @@ public:
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
   ///@}
+
+  /**
+   * Updates the input and writes it. Returns 1 when the file is there, complete; 0 after any error, also of the input.
+   */
+  int Write() override;
+
+  /** What the last Write() could not keep, one sentence per line. */
+  std::string GetNotes() const { return echorama::Joined(this->Notes, "\n"); }
 
   // BEGIN parameters
   ///@{
@@ -98,17 +107,12 @@ public:
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 #endif
 
-  /**
-   * Updates the input and writes it. Returns 1 when the file is there, complete; 0 after any error, also of the input.
-   */
-  int Write() override;
-
-  /** What the last Write() could not keep, one sentence per line. */
-  std::string GetNotes() const;
-
 protected:
   vtkUltrasoundWriter() = default;
-  ~vtkUltrasoundWriter() override;
+  ~vtkUltrasoundWriter() override
+  {
+    this->SetFileName(nullptr);
+  }
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
   void WriteData() override;

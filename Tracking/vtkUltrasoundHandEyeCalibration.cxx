@@ -3,23 +3,13 @@
 
 #include "Core/Geometry/MatrixRows.h"
 #include "Tracking/Calibration/CalibrationJson.h"
-#include "vtkCellArray.h"
 #include "vtkDataSet.h"
-#include "vtkDoubleArray.h"
-#include "vtkFieldData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix4x4.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
-#include "vtkPointData.h"
-#include "vtkPoints.h"
-#include "vtkPolyData.h"
-#include "vtkSmartPointer.h"
-#include "vtkStringArray.h"
 #include "vtkTable.h"
-#include "vtkUltrasoundVolume.h"
-#include "vtkUnsignedCharArray.h"
+#include "vtkUltrasoundTrackerOutputs.h"
 
 #include <map>
 
@@ -227,14 +217,11 @@ void vtkUltrasoundHandEyeCalibration::PutOut(vtkPolyData* output, const std::vec
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   vtkNew<vtkCellArray> vertices;
-  vtkNew<vtkDoubleArray> residuals, degrees;
-  residuals->SetName("Residual");
-  residuals->SetNumberOfComponents(3);
-  degrees->SetName("ResidualDegrees");
-  vtkNew<vtkUnsignedCharArray> inliers;
-  inliers->SetName("Inlier");
-  vtkNew<vtkStringArray> names;
-  names->SetName("ScanName");
+  vtkPointData* arrays = output->GetPointData();
+  const auto residuals = echorama::NewTrackerArray<vtkDoubleArray>(arrays, "Residual", 3);
+  const auto degrees = echorama::NewTrackerArray<vtkDoubleArray>(arrays, "ResidualDegrees");
+  const auto inliers = echorama::NewTrackerArray<vtkUnsignedCharArray>(arrays, "Inlier");
+  const auto names = echorama::NewTrackerArray<vtkStringArray>(arrays, "ScanName");
   const Eigen::Vector3d& target = this->Values.target;
   const echorama::HandEyeSolution& solution = this->Result.solution;
   const echorama::Pose trackerToWorld = solution.worldToTracker.inverse();
@@ -250,10 +237,8 @@ void vtkUltrasoundHandEyeCalibration::PutOut(vtkPolyData* output, const std::vec
   }
   output->SetPoints(points);
   output->SetVerts(vertices);
-  output->GetPointData()->SetVectors(residuals);
-  output->GetPointData()->AddArray(degrees);
-  output->GetPointData()->SetScalars(inliers);
-  output->GetPointData()->AddArray(names);
+  arrays->SetActiveVectors("Residual");
+  arrays->SetActiveScalars("Inlier");
   AddField(output, "VolumeToSensor", solution.volumeToSensor.matrix());
   AddField(output, "WorldToTracker", solution.worldToTracker.matrix());
   AddField(output, "Covariance", this->Result.covariance);

@@ -23,9 +23,8 @@
 #include "EchoramaTrackingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
 
-#include <memory> // for the server
-
 #ifndef __VTK_WRAP__
+#include "Tracking/Devices/OpenIgtLinkServer.h"
 #include "vtkUltrasoundParameters.h"
 #endif
 
@@ -36,6 +35,30 @@ public:
   static vtkUltrasoundOpenIGTLinkSender* New();
   vtkTypeMacro(vtkUltrasoundOpenIGTLinkSender, vtkUltrasoundImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  /** Listens from now on. Returns false, with an error event, when that is not possible. Does nothing when it does already. */
+  bool Start();
+  /** Closes the port and all connections. */
+  void Stop() { this->Server.reset(); }
+
+  /**
+   * Sends a named transform to all clients, such as ProbeToTracker or VolumeToReference; in mm, as KeepCoordinates says. Returns
+   * false, with an error event, for a name that is empty or has more than 20 bytes, or a matrix that is not finite or
+   * not affine.
+   */
+  bool SendTransform(const char* name, vtkMatrix4x4* matrix);
+
+  /** Waits for up to \a seconds until all has been handed over. Returns whether it has. */
+  bool Flush(double seconds) { return !this->Server || this->Server->Flush(seconds); }
+
+  /** The port it listens at; 0 when it does not. */
+  int GetListeningPort() { return this->Server ? this->Server->Port() : 0; }
+  /** The clients that are connected. */
+  int GetNumberOfClients() { return static_cast<int>(this->Statistics().clients); }
+  /** Messages that went out whole, over all clients, since Start(). */
+  vtkIdType GetNumberOfSentMessages() { return static_cast<vtkIdType>(this->Statistics().sent); }
+  /** Messages that slow clients did not take in time, and volumes that a newer one replaced on their way. */
+  vtkIdType GetNumberOfDroppedMessages() { return static_cast<vtkIdType>(this->Statistics().dropped); }
 
   // BEGIN parameters
   ///@{
@@ -103,30 +126,6 @@ public:
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 #endif
 
-  /** Listens from now on. Returns false, with an error event, when that is not possible. Does nothing when it does already. */
-  bool Start();
-  /** Closes the port and all connections. */
-  void Stop();
-
-  /**
-   * Sends a named transform to all clients, such as ProbeToTracker or VolumeToReference; in mm, as KeepCoordinates says. Returns
-   * false, with an error event, for a name that is empty or has more than 20 bytes, or a matrix that is not finite or
-   * not affine.
-   */
-  bool SendTransform(const char* name, vtkMatrix4x4* matrix);
-
-  /** Waits for up to \a seconds until all has been handed over. Returns whether it has. */
-  bool Flush(double seconds);
-
-  /** The port it listens at; 0 when it does not. */
-  int GetListeningPort();
-  /** The clients that are connected. */
-  int GetNumberOfClients();
-  /** Messages that went out whole, over all clients, since Start(). */
-  vtkIdType GetNumberOfSentMessages();
-  /** Messages that slow clients did not take in time, and volumes that a newer one replaced on their way. */
-  vtkIdType GetNumberOfDroppedMessages();
-
 protected:
   vtkUltrasoundOpenIGTLinkSender();
   ~vtkUltrasoundOpenIGTLinkSender() override;
@@ -139,8 +138,19 @@ private:
   vtkUltrasoundOpenIGTLinkSender(const vtkUltrasoundOpenIGTLinkSender&) = delete;
   void operator=(const vtkUltrasoundOpenIGTLinkSender&) = delete;
 
-  struct Internals;
-  std::unique_ptr<Internals> Parts;
+#ifndef __VTK_WRAP__
+  echorama::OpenIgtLinkServer& Listen(); ///< a server as is wanted; throws what it throws
+  echorama::OpenIgtLinkServerStatistics Statistics() const
+  {
+    return this->Server ? this->Server->Statistics() : echorama::OpenIgtLinkServerStatistics();
+  }
+
+  echorama::OpenIgtLinkServerParameters Wanted, Served; // Served: of the server
+  std::string DeviceName = "Volume";
+  bool KeepCoordinates = false;
+  double WaitSeconds = 0.0;
+  std::unique_ptr<echorama::OpenIgtLinkServer> Server;
+#endif
 };
 
 #endif

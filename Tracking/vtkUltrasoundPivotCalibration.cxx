@@ -2,17 +2,12 @@
 #include "vtkUltrasoundPivotCalibration.h"
 
 #include "Tracking/Calibration/CalibrationJson.h"
+#include "vtkUltrasoundTrackerOutputs.h"
 #include "vtkUltrasoundTrackPoses.h"
-#include "vtkUltrasoundVolume.h"
 
-#include "vtkCellArray.h"
-#include "vtkDoubleArray.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
-#include "vtkPoints.h"
-#include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
 #include <limits>
@@ -28,12 +23,9 @@ void Fill(vtkPolyData* output, const echorama::TrackPoses& track, const echorama
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   vtkNew<vtkCellArray> vertices;
-  vtkNew<vtkDoubleArray> residuals, times;
-  residuals->SetName("Residual");
-  residuals->SetNumberOfComponents(3);
-  times->SetName("TimeStamp");
-  vtkNew<vtkUnsignedCharArray> inliers;
-  inliers->SetName("Inlier");
+  const auto residuals = echorama::NewTrackerArray<vtkDoubleArray>(output->GetPointData(), "Residual", 3);
+  const auto times = echorama::NewTrackerArray<vtkDoubleArray>(output->GetPointData(), "TimeStamp");
+  const auto inliers = echorama::NewTrackerArray<vtkUnsignedCharArray>(output->GetPointData(), "Inlier");
   for (std::size_t i = 0; i < track.poses.size(); ++i) {
     const Eigen::Vector3d tip = track.poses[i].pose * result.tip, residual = tip - result.pivot;
     const vtkIdType id = points->InsertNextPoint(tip.data());
@@ -44,9 +36,7 @@ void Fill(vtkPolyData* output, const echorama::TrackPoses& track, const echorama
   }
   output->SetPoints(points);
   output->SetVerts(vertices);
-  output->GetPointData()->AddArray(residuals);
-  output->GetPointData()->AddArray(times);
-  output->GetPointData()->SetScalars(inliers);
+  output->GetPointData()->SetActiveScalars("Inlier");
   const Eigen::Matrix3d covariance = result.covariance.topLeftCorner<3, 3>();
   vtkUltrasoundVolume::AddField(output, "Tip", result.tip.data(), 3);
   vtkUltrasoundVolume::AddField(output, "TipRadius95", &result.tipRadius95Mm, 1);

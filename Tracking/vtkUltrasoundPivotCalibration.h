@@ -43,6 +43,18 @@ public:
   vtkTypeMacro(vtkUltrasoundPivotCalibration, vtkPolyDataAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  ///@{
+  /** Results of the last update: tip in the tool's frame and fixed point in the world, mm. NaN when there is none. */
+  vtkGetVector3Macro(Tip, double);
+  vtkGetVector3Macro(Pivot, double);
+  ///@}
+
+  /** The radius of the sphere about the tip that holds the true one with 95%, mm. NaN when there is none. */
+  vtkGetMacro(Radius95, double);
+
+  /** All results, as JSON. Empty when there are none. */
+  std::string GetReport() const { return this->Report; }
+
   // BEGIN parameters
   ///@{
   /** The tool, by its name in ToolNames. Empty takes the only one. Default none. */
@@ -124,21 +136,6 @@ public:
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 #endif
-
-  ///@{
-  /** Results of the last update: tip in the tool's frame and fixed point in the world, mm. NaN when there is none. */
-  vtkGetVector3Macro(Tip, double);
-  vtkGetVector3Macro(Pivot, double);
-  ///@}
-
-  /** The radius of the sphere about the tip that holds the true one with 95%, mm. NaN when there is none. */
-  vtkGetMacro(Radius95, double);
-
-  /** All results, as JSON. Empty when there are none. */
-  std::string GetReport() const
-  {
-    return this->Report;
-  }
 
 protected:
   vtkUltrasoundPivotCalibration();

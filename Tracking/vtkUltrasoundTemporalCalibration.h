@@ -34,6 +34,18 @@ public:
   vtkTypeMacro(vtkUltrasoundTemporalCalibration, vtkPolyDataAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  ///@{
+  /**
+   * Results of the last update, seconds: what was added to the times of the second track, and its standard error. NaN when there
+   * are none.
+   */
+  vtkGetMacro(Offset, double);
+  vtkGetMacro(StandardError, double);
+  ///@}
+
+  /** All results, as JSON. Empty when there are none. */
+  std::string GetReport() const { return this->Report; }
+
   // BEGIN parameters
   ///@{
   /** The tool of the first track, by its name in ToolNames. Empty takes the only one. Default none. */
@@ -126,21 +138,6 @@ public:
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 #endif
-
-  ///@{
-  /**
-   * Results of the last update, seconds: what was added to the times of the second track, and its standard error. NaN when there
-   * are none.
-   */
-  vtkGetMacro(Offset, double);
-  vtkGetMacro(StandardError, double);
-  ///@}
-
-  /** All results, as JSON. Empty when there are none. */
-  std::string GetReport() const
-  {
-    return this->Report;
-  }
 
 protected:
   vtkUltrasoundTemporalCalibration();

@@ -4,6 +4,7 @@
 #define vtkUltrasoundTrackPoses_h
 
 #include "Core/Base/Error.h"
+#include "Core/Geometry/MatrixRows.h"
 #include "Core/Geometry/MotionPath.h"
 
 #include "vtkDataArray.h"
@@ -18,11 +19,9 @@
 
 namespace echorama {
 
-/// Poses, and which points of the track they are.
 struct TrackPoses {
   std::string tool; ///< empty: the track names none
   std::vector<TimedPose> poses;
-  std::vector<vtkIdType> points;
 };
 
 /// Those of \a tool by its name in ToolNames; empty takes the only one. The point array \a array holds 16 numbers, row by row;
@@ -68,13 +67,10 @@ inline TrackPoses TrackPosesOf(vtkPolyData* track, const std::string& array, con
         (status && status->GetComponent(i, 0) != 0.0)) {
       continue;
     }
-    TimedPose pose;
-    pose.time = times ? times->GetComponent(i, 0) : std::numeric_limits<double>::quiet_NaN();
-    for (int k = 0; k < 16; ++k) {
-      pose.pose.matrix()(k / 4, k % 4) = matrices->GetComponent(i, k);
-    }
-    result.poses.push_back(pose);
-    result.points.push_back(i);
+    double rows[16];
+    matrices->GetTuple(i, rows);
+    const double time = times ? times->GetComponent(i, 0) : std::numeric_limits<double>::quiet_NaN();
+    result.poses.push_back({time, FromRows<Pose>(rows)});
   }
   return result;
 }

@@ -7,7 +7,6 @@
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/TrackerDevice.h"
 #include "Tracking/Stream/Clock.h"
-#include "Tracking/Stream/StreamRecorder.h"
 #include "Tracking/Stream/StreamReport.h"
 
 #include "vtkInformation.h"
@@ -246,10 +245,7 @@ bool vtkUltrasoundTrackerSource::GetNeedsUpdate()
 //----------------------------------------------------------------------------
 bool vtkUltrasoundTrackerSource::WaitForPoses(int count, double seconds)
 {
-  if (!this->Start()) {
-    return false;
-  }
-  return this->Opened->Poses.WaitForPoses(static_cast<std::uint64_t>(std::max(count, 0)), seconds);
+  return this->Start() && this->Opened->Poses.WaitForPoses(static_cast<std::uint64_t>(std::max(count, 0)), seconds);
 }
 
 //----------------------------------------------------------------------------
@@ -269,8 +265,10 @@ bool vtkUltrasoundTrackerSource::Step()
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundTrackerSource::GetState() const
 {
-  return !this->Failure.empty() ? DeviceStateText(echorama::DeviceState::Failed)
-                                : DeviceStateText(this->Opened ? this->Opened->Poses.State().first : echorama::DeviceState::Idle);
+  using echorama::DeviceState;
+  return DeviceStateText(!this->Failure.empty() ? DeviceState::Failed
+                         : this->Opened         ? this->Opened->Poses.State().first
+                                                : DeviceState::Idle);
 }
 
 //----------------------------------------------------------------------------
@@ -298,49 +296,13 @@ std::string vtkUltrasoundTrackerSource::GetToolName(int index) const
   return index >= 0 && static_cast<std::size_t>(index) < tools.size() ? tools[static_cast<std::size_t>(index)] : "";
 }
 
+//----------------------------------------------------------------------------
 // By the name of the tool, or that of its frame.
-template <class T, class Value>
-T vtkUltrasoundTrackerSource::StatisticOf(const char* name, T otherwise, const Value& value) const
+double vtkUltrasoundTrackerSource::StatisticOf(const char* name, const Statistic& value, double otherwise) const
 {
   const echorama::StreamStatistics all = this->Opened ? this->Opened->Poses.Statistics() : echorama::StreamStatistics();
   const echorama::ToolStatistics* tool = all.Find(TextOf(name));
-  return tool ? static_cast<T>(value(*tool)) : otherwise;
-}
-
-//----------------------------------------------------------------------------
-vtkIdType vtkUltrasoundTrackerSource::GetNumberOfPoses(const char* tool) const
-{
-  return this->StatisticOf<vtkIdType>(tool, 0, [](const auto& s) { return s.Taken(); });
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::GetRate(const char* tool) const
-{
-  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.rateHz; });
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::GetJitter(const char* tool) const
-{
-  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.jitterSeconds; });
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::GetLatency(const char* tool) const
-{
-  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.medianLatencySeconds; });
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::GetDropoutShare(const char* tool) const
-{
-  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.DropoutShare(); });
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::GetSecondsSinceLast(const char* tool) const
-{
-  return this->StatisticOf(tool, NaN, [](const auto& s) { return s.secondsSinceLast; });
+  return tool ? value(*tool) : otherwise;
 }
 
 //----------------------------------------------------------------------------
@@ -387,24 +349,6 @@ echorama::RecordingState vtkUltrasoundTrackerSource::Recording() const
 }
 
 //----------------------------------------------------------------------------
-vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRecordedPoses() const
-{
-  return static_cast<vtkIdType>(this->Recording().poses);
-}
-
-//----------------------------------------------------------------------------
-vtkIdType vtkUltrasoundTrackerSource::GetNumberOfUnrecordedPoses() const
-{
-  return static_cast<vtkIdType>(this->Recording().lost);
-}
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundTrackerSource::GetRecordingProblem() const
-{
-  return this->Recording().problem;
-}
-
-//----------------------------------------------------------------------------
 vtkIdType vtkUltrasoundTrackerSource::GetNumberOfRejected() const
 {
   return this->Opened ? static_cast<vtkIdType>(this->Opened->Poses.Statistics().Rejected()) : 0;
@@ -435,18 +379,6 @@ int vtkUltrasoundTrackerSource::GetTransform(const char* name, vtkMatrix4x4* mat
     matrix->DeepCopy(rows.data());
   }
   return static_cast<int>(found.Status());
-}
-
-//----------------------------------------------------------------------------
-double vtkUltrasoundTrackerSource::GetTransformError(const char* name)
-{
-  return this->Found(name).transform.errorMm.value_or(-1.0);
-}
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundTrackerSource::GetTransformMessage(const char* name)
-{
-  return this->Found(name).message;
 }
 
 //----------------------------------------------------------------------------
@@ -499,12 +431,8 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
 {
   return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress& progress) {
     progress(0.0);
-    vtkPolyData* tools = vtkPolyData::GetData(outputs, 0);
-    vtkImageData* image = vtkImageData::GetData(outputs, 1);
-    vtkPolyData* axes = vtkPolyData::GetData(outputs, 2);
-    for (vtkDataObject* output :
-         {static_cast<vtkDataObject*>(tools), static_cast<vtkDataObject*>(image), static_cast<vtkDataObject*>(axes)}) {
-      output->Initialize();
+    for (int port = 0; port < 3; ++port) {
+      vtkDataObject::GetData(outputs, port)->Initialize();
     }
     Session* session = this->Updated();
     if (!session) {
@@ -528,9 +456,9 @@ int vtkUltrasoundTrackerSource::RequestData(vtkInformation*, vtkInformationVecto
         vtkDataObject::GetData(outputs, port)->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
       }
     }
-    this->ShowTools(tools, axes, time);
+    this->ShowTools(vtkPolyData::GetData(outputs, 0), vtkPolyData::GetData(outputs, 2), time);
     if (session->Image) {
-      echorama::PutImage(*session->Image, image);
+      echorama::PutImage(*session->Image, vtkImageData::GetData(outputs, 1));
     }
   });
 }

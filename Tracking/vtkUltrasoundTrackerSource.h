@@ -46,11 +46,9 @@
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Stream/LiveTransforms.h"
+#include "Tracking/Stream/StreamRecorder.h"
 #include "vtkUltrasoundParameters.h"
-
-namespace echorama {
-struct RecordingState;
-} // namespace echorama
+#include <functional>
 #endif
 
 class vtkMatrix4x4;
@@ -112,6 +110,95 @@ public:
   vtkBooleanMacro(FollowTime, bool);
   ///@}
 
+  /**
+   * Whether something has come (or has become too old) since the last update; then this is Modified() too. What ParaView calls.
+   */
+  bool GetNeedsUpdate();
+
+  /**
+   * Opens the device if it is not open, and waits until so many poses, of all tools together, have come since then, or for
+   * \a seconds. Returns false when they have not: also at once when the device is at its end or has failed.
+   */
+  bool WaitForPoses(int count, double seconds);
+
+  /** The next poses of a recording that is to be stepped (replay:FILE?step=1). Returns false when there are no more. */
+  bool Step();
+
+  ///@{
+  /**
+   * What the device is doing: "idle", "connecting", "running", "lost", "ended" or "failed"; and a sentence about it.
+   */
+  std::string GetState() const;
+  std::string GetMessage() const;
+  ///@}
+
+  /** All statistics, as JSON (echorama::StreamReport). Empty when nothing was opened. */
+  std::string GetReport() const;
+
+  ///@{
+  /**
+   * Tools that have been heard of, by the names of their transforms ("ProbeToTracker"); "" beyond.
+   */
+  int GetNumberOfTools() const;
+  std::string GetToolName(int index) const;
+  ///@}
+
+  ///@{
+  /**
+   * Statistics of a tool, by its name or that of its frame ("Probe"): poses taken, rate in Hz, standard deviation of the
+   * intervals in seconds, median latency in seconds (of meaning when both clocks agree; NaN in recordings and of senders without
+   * times), share of poses that were not valid, and seconds since the last one. See echorama::ToolStatistics. 0 poses, and NaN,
+   * of a tool that is not there.
+   */
+  vtkIdType GetNumberOfPoses(const char* tool) const
+  {
+    return static_cast<vtkIdType>(this->StatisticOf(tool, &echorama::ToolStatistics::Taken, 0.0));
+  }
+  double GetRate(const char* tool) const { return this->StatisticOf(tool, &echorama::ToolStatistics::rateHz); }
+  double GetJitter(const char* tool) const { return this->StatisticOf(tool, &echorama::ToolStatistics::jitterSeconds); }
+  double GetLatency(const char* tool) const { return this->StatisticOf(tool, &echorama::ToolStatistics::medianLatencySeconds); }
+  double GetDropoutShare(const char* tool) const { return this->StatisticOf(tool, &echorama::ToolStatistics::DropoutShare); }
+  double GetSecondsSinceLast(const char* tool) const
+  {
+    return this->StatisticOf(tool, &echorama::ToolStatistics::secondsSinceLast);
+  }
+  ///@}
+
+  ///@{
+  /**
+   * Records every pose from now on to a sequence (.igs.mha) that a crash leaves whole up to the last half second; opens the
+   * device if it is not open. A file that is there already is refused. No name, or an empty one, ends the recording, as
+   * StopRecording() does. Ends with the device when another one is set, and with the next StartRecording(): the new one begins
+   * first, so that nothing is lost between the two, and what is wrong with the earlier one is an error, but does not stop it.
+   * Returns false, with an error that names the reason, when it cannot be; StopRecording also when nothing was recorded. See
+   * echorama::StreamRecorder.
+   */
+  bool StartRecording(VTK_FILEPATH const char* fileName);
+  bool StopRecording();
+  ///@}
+
+  ///@{
+  /** Of the present recording: poses written, poses that came faster than that and were lost, and what is wrong; empty: nothing.
+   */
+  vtkIdType GetNumberOfRecordedPoses() const { return static_cast<vtkIdType>(this->Recording().poses); }
+  vtkIdType GetNumberOfUnrecordedPoses() const { return static_cast<vtkIdType>(this->Recording().lost); }
+  std::string GetRecordingProblem() const { return this->Recording().problem; }
+  ///@}
+
+  /** How much came that was not taken: garbage, duplicates, poses that are none. GetReport() says why. */
+  vtkIdType GetNumberOfRejected() const;
+
+  ///@{
+  /**
+   * Any transform by its name, "ImageToReference", out of what the device sends and the fixed ones, at Time (with FollowTime,
+   * at the time that is shown), with its status: 0 valid, 1 missing (the matrix is identity then), 2 out of range.
+   * GetTransformError is its stated error in mm, -1 when none is stated; GetTransformMessage says why it is not valid.
+   */
+  int GetTransform(const char* name, vtkMatrix4x4* matrix);
+  double GetTransformError(const char* name) { return this->Found(name).transform.errorMm.value_or(-1.0); }
+  std::string GetTransformMessage(const char* name) { return this->Found(name).message; }
+  ///@}
+
   // BEGIN parameters
   ///@{
   /**
@@ -169,89 +256,6 @@ public:
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 #endif
 
-  /**
-   * Whether something has come (or has become too old) since the last update; then this is Modified() too. What ParaView calls.
-   */
-  bool GetNeedsUpdate();
-
-  /**
-   * Opens the device if it is not open, and waits until so many poses, of all tools together, have come since then, or for
-   * \a seconds. Returns false when they have not: also at once when the device is at its end or has failed.
-   */
-  bool WaitForPoses(int count, double seconds);
-
-  /** The next poses of a recording that is to be stepped (replay:FILE?step=1). Returns false when there are no more. */
-  bool Step();
-
-  ///@{
-  /**
-   * What the device is doing: "idle", "connecting", "running", "lost", "ended" or "failed"; and a sentence about it.
-   */
-  std::string GetState() const;
-  std::string GetMessage() const;
-  ///@}
-
-  /** All statistics, as JSON (echorama::StreamReport). Empty when nothing was opened. */
-  std::string GetReport() const;
-
-  ///@{
-  /**
-   * Tools that have been heard of, by the names of their transforms ("ProbeToTracker"); "" beyond.
-   */
-  int GetNumberOfTools() const;
-  std::string GetToolName(int index) const;
-  ///@}
-
-  ///@{
-  /**
-   * Statistics of a tool, by its name or that of its frame ("Probe"): poses taken, rate in Hz, standard deviation of the
-   * intervals in seconds, median latency in seconds (of meaning when both clocks agree; NaN in recordings and of senders without
-   * times), share of poses that were not valid, and seconds since the last one. See echorama::ToolStatistics. 0 poses, and NaN,
-   * of a tool that is not there.
-   */
-  vtkIdType GetNumberOfPoses(const char* tool) const;
-  double GetRate(const char* tool) const;
-  double GetJitter(const char* tool) const;
-  double GetLatency(const char* tool) const;
-  double GetDropoutShare(const char* tool) const;
-  double GetSecondsSinceLast(const char* tool) const;
-  ///@}
-
-  ///@{
-  /**
-   * Records every pose from now on to a sequence (.igs.mha) that a crash leaves whole up to the last half second; opens the
-   * device if it is not open. A file that is there already is refused. No name, or an empty one, ends the recording, as
-   * StopRecording() does. Ends with the device when another one is set, and with the next StartRecording(): the new one begins
-   * first, so that nothing is lost between the two, and what is wrong with the earlier one is an error, but does not stop it.
-   * Returns false, with an error that names the reason, when it cannot be; StopRecording also when nothing was recorded. See
-   * echorama::StreamRecorder.
-   */
-  bool StartRecording(VTK_FILEPATH const char* fileName);
-  bool StopRecording();
-  ///@}
-
-  ///@{
-  /** Of the present recording: poses written, poses that came faster than that and were lost, and what is wrong; empty: nothing.
-   */
-  vtkIdType GetNumberOfRecordedPoses() const;
-  vtkIdType GetNumberOfUnrecordedPoses() const;
-  std::string GetRecordingProblem() const;
-  ///@}
-
-  /** How much came that was not taken: garbage, duplicates, poses that are none. GetReport() says why. */
-  vtkIdType GetNumberOfRejected() const;
-
-  ///@{
-  /**
-   * Any transform by its name, "ImageToReference", out of what the device sends and the fixed ones, at Time (with FollowTime,
-   * at the time that is shown), with its status: 0 valid, 1 missing (the matrix is identity then), 2 out of range.
-   * GetTransformError is its stated error in mm, -1 when none is stated; GetTransformMessage says why it is not valid.
-   */
-  int GetTransform(const char* name, vtkMatrix4x4* matrix);
-  double GetTransformError(const char* name);
-  std::string GetTransformMessage(const char* name);
-  ///@}
-
 protected:
   vtkUltrasoundTrackerSource();
   ~vtkUltrasoundTrackerSource() override;
@@ -274,8 +278,8 @@ private:
   void Close();
   Session* Updated();
   std::string World() const;
-  template <class T, class Value>
-  T StatisticOf(const char* name, T otherwise, const Value& value) const;
+  using Statistic = std::function<double(const echorama::ToolStatistics&)>;
+  double StatisticOf(const char* name, const Statistic& value, double otherwise = std::numeric_limits<double>::quiet_NaN()) const;
   echorama::RecordingState Recording() const;
   echorama::LiveTransform Found(const char* name);
   void ReadImage(double time);

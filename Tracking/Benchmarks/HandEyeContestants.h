@@ -5,6 +5,17 @@
 
 namespace echorama {
 
+/// How the sensor and the volume moved between two scans: A C = C B, with A = S_i^-1 S_j and B = M_i^-1 M_j (dissertation
+/// eq. 4.4).
+struct HandEyeMotion {
+  Pose sensor = Pose::Identity(); ///< A
+  Pose volume = Pose::Identity(); ///< B
+};
+
+/// The motions between all pairs of scans, n (n - 1) / 2, not only between neighbours: a short way round is not better than a
+/// long one, and each says something. \throws Error(NotPossible) for fewer than two pairs, as all that need them.
+std::vector<HandEyeMotion> HandEyeMotions(const std::vector<HandEyePair>& pairs);
+
 /// A closed form as published; all weigh every pair the same and know of no outliers.
 struct HandEyeClosedForm {
   const char* name;

@@ -10,6 +10,7 @@
 #include "Tracking/Calibration/HandEye.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Median.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Tracking/Calibration/CalibrationText.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
@@ -74,11 +75,7 @@ std::string TypicalResidual(const HandEyeModel& model, const HandEyeSolution& so
     mm.push_back(Exp(residual).translation().norm());
     degrees.push_back(residual.tail<3>().norm() * DegreesPerRadian);
   }
-  const auto median = [](std::vector<double>& values) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
-  };
-  return Format("%.3g mm and %.3g degrees", median(mm), median(degrees));
+  return Format("%.3g mm and %.3g degrees", Median(std::move(mm)), Median(std::move(degrees)));
 }
 
 } // namespace

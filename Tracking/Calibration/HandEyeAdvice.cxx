@@ -3,12 +3,11 @@
 // every candidate is judged by the covariance it would lead to, without a simulation. Some 100 candidates, 12x12 each.
 #include "Tracking/Calibration/HandEyeAdvice.h"
 #include "Core/Base/Angles.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Tracking/Calibration/ConfidenceRadius.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <Eigen/SVD>
 
 namespace echorama {
 namespace {
@@ -24,10 +23,8 @@ Pose MeanPose(const std::vector<HandEyePair>& pairs, const std::vector<char>& in
       place += pairs[i].volumeToWorld * target;
       count += 1.0;
     }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
   Pose mean = Pose::Identity();
-  mean.linear() = svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
+  mean.linear() = NearestRotation(sum);
   mean.translation() = place / count - mean.linear() * target;
   return mean;
 }
@@ -48,9 +45,8 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
                                          const HandEyeNoise& noise, const Eigen::Vector3d& target, int degreesOfFreedom)
 {
   struct Candidate {
-    double variance = 0.0;
-    std::size_t axis = 0;
-    double degrees = 0.0;
+    std::size_t axis;
+    double degrees;
     Eigen::Matrix3d covariance;
   };
   std::vector<Eigen::Vector3d> axes;
@@ -70,7 +66,7 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
       pair.volumeToWorld = mean * MotionAbout(target, turn, Eigen::Vector3d::Zero());
       pair.sensorToTracker = solution.worldToTracker * pair.volumeToWorld * solution.volumeToSensor.inverse();
       asked.push_back(pair);
-      candidates.push_back({0.0, axis, degrees, Eigen::Matrix3d::Zero()});
+      candidates.push_back({axis, degrees, Eigen::Matrix3d::Zero()});
     }
   // The model's step turns O about the middle of its scans; the candidates come behind the scans to keep it where it is.
   std::vector<HandEyePair> together = pairs;
@@ -84,10 +80,9 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
     const Eigen::Matrix<double, 6, 3> gain = jacobian * top.transpose();
     const Eigen::Matrix<double, 6, 6> seen = ofResidual + jacobian * covariance * jacobian.transpose();
     candidates[i].covariance = covariance.topLeftCorner<3, 3>() - gain.transpose() * SolveSymmetric(seen, gain);
-    candidates[i].variance = candidates[i].covariance.trace();
   }
   std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.variance < b.variance; });
+                   [](const Candidate& a, const Candidate& b) { return a.covariance.trace() < b.covariance.trace(); });
   const double before = ConfidenceRadius(covariance.topLeftCorner<3, 3>(), degreesOfFreedom);
   std::vector<HandEyeAdvice> advice;
   std::vector<char> seen(axes.size(), 0);
@@ -99,13 +94,10 @@ std::vector<HandEyeAdvice> AdviseHandEye(const std::vector<HandEyePair>& pairs, 
     one.axis = axes[candidate.axis].normalized();
     one.degrees = candidate.degrees;
     one.radiusMm = ConfidenceRadius(candidate.covariance, degreesOfFreedom > 0 ? degreesOfFreedom + 6 : 0);
-    char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "Turn the volume by %.0f degrees about its axis %s from the mean of the scans: the 95%% radius falls from %.2f to "
-        "%.2f mm.",
-        one.degrees, AxisText(axes[candidate.axis]).c_str(), before, one.radiusMm);
-    one.text = text;
+    one.text =
+        Format("Turn the volume by %.0f degrees about its axis %s from the mean of the scans: the 95%% radius falls from %.2f to "
+               "%.2f mm.",
+               one.degrees, AxisText(axes[candidate.axis]).c_str(), before, one.radiusMm);
     advice.push_back(one);
     if (advice.size() == 3)
       break;

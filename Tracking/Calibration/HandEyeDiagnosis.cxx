@@ -101,32 +101,27 @@ void RefuseTooLittleMotion(const std::vector<HandEyePair>& pairs, const PoseNois
     RefuseHandEye(Format("three different scans are needed at least, 8 to 20 for accuracy, and there %s %d",
                          pairs.size() == 1 ? "is" : "are", static_cast<int>(pairs.size())));
   const Sides sides = SidesOf(pairs);
-  const HandEyeSpread sensor = SpreadOf(sides.sensors), volume = SpreadOf(sides.volumes);
-  // Two of three axes count in a spread, so noise alone shows the root of two.
-  const auto limit = [](const PoseNoise& noise) { return 3.0 * std::sqrt(2.0) * std::max(noise.degrees, 0.01); };
-  struct Side {
-    const char* name;
-    double least, most, limit, extent;
-    PoseNoise noise;
-  };
-  for (const Side& side : {Side{"sensor", sensor.turns[0] * DegreesPerRadian, sensor.turns[2] * DegreesPerRadian,
-                                limit(sensorNoise), Extent(sides.sensors), sensorNoise},
-                           Side{"volumes", volume.turns[0] * DegreesPerRadian, volume.turns[2] * DegreesPerRadian,
-                                limit(volumeNoise), Extent(sides.volumes), volumeNoise}}) {
-    if (side.most < side.limit && side.extent < std::max(6.0 * side.noise.mm, 1e-6))
-      RefuseHandEye(Format("the poses of the %s are all the same; the probe must be turned between scans", side.name));
-    if (side.most < side.limit)
+  const Eigen::Vector3d axis = SpreadOf(sides.volumes).axis;
+  const auto check = [&axis](const char* name, const std::vector<Pose>& poses, const PoseNoise& noise) {
+    const Eigen::Vector3d turns = SpreadOf(poses).turns * DegreesPerRadian; // the least first
+    // Two of three axes count in a spread, so noise alone shows the root of two.
+    const double limit = 3.0 * std::sqrt(2.0) * std::max(noise.degrees, 0.01);
+    if (turns[2] < limit && Extent(poses) < std::max(6.0 * noise.mm, 1e-6))
+      RefuseHandEye(Format("the poses of the %s are all the same; the probe must be turned between scans", name));
+    if (turns[2] < limit)
       RefuseHandEye(Format(
           "the %s turned by %.2g degrees only (root mean square), no more than the noise may be, and translations alone say "
           "nothing of where the volume lies on the sensor; turn by 30 degrees and more, about different axes",
-          side.name, side.most));
-    if (side.least < side.limit)
+          name, turns[2]));
+    if (turns[0] < limit)
       RefuseHandEye(
           Format("all turns of the %s are about one axis, or parallel ones (across it: %.2f degrees); the calibration may "
                  "shift along it. Axis in the volume's frame: (%.2f, %.2f, %.2f). Add scans that turn about an axis across it by "
                  "30 degrees and more",
-                 side.name, side.least, volume.axis.x(), volume.axis.y(), volume.axis.z()));
-  }
+                 name, turns[0], axis.x(), axis.y(), axis.z()));
+  };
+  check("sensor", sides.sensors, sensorNoise);
+  check("volumes", sides.volumes, volumeNoise);
 }
 
 void RefuseTwoAnswers(const std::vector<HandEyePair>& pairs, const std::vector<char>& inlier, const HandEyeModel& model,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Starts are the closed forms from all scans, which are good when few are wrong, and from triples, which are good when a triple
-// holds no wrong one. Triples are drawn at random and sorted before anything is solved: the angle and the shift along the axis of
+// Starts are the closed form of all scans, which is good when few are wrong, and of triples, which is good when a triple holds no
+// wrong one. Triples are drawn at random and sorted before anything is solved: the angle and the shift along the axis of
 // a motion are the same on both sides whatever C is, so a triple that holds a wrong scan mostly shows it at once; and
 // those that turn far are worth more. The starts that fit best, by a cost that grows with the logarithm and so lets no scan
 // dominate, are refined with that cost. From the best of them, those that are far off leave at once; the others are solved anew
@@ -27,7 +27,7 @@ constexpr double MedianChiSquare6 = 5.348;
 constexpr double RareChiSquare6 = 22.458; // exceeded once in a thousand
 constexpr double ExplainedScale = 1.5;    // noise alone explains the residuals of most scans: no start leads to a better fit
 constexpr std::size_t OneByOne = 40;      // scans, up to which they leave one at a time
-constexpr int ClosedFormScans = 40, DrawnTriples = 250, SolvedTriples = 25, RefinedStarts = 4;
+constexpr int DrawnTriples = 250, SolvedTriples = 25, RefinedStarts = 4;
 
 // The fit follows 12 numbers of the 6 n, and residuals are smaller for it.
 double ScaleOf(const std::vector<double>& chiSquare)
@@ -36,21 +36,23 @@ double ScaleOf(const std::vector<double>& chiSquare)
   return std::sqrt(Median(chiSquare) / (MedianChiSquare6 * std::max(0.1, (count - 2.0) / count)));
 }
 
-double SoftCost(const HandEyeModel& model, const Eigen::Matrix<double, 6, 6>& weight, const HandEyeSolution& solution,
-                double scale)
+std::vector<double> ChiSquares(const HandEyeModel& model, const HandEyeSolution& solution)
 {
-  double cost = 0.0;
-  const double soft = 6.0 * scale * scale;
+  const Eigen::Matrix<double, 6, 6> weight = InverseOfSymmetric(model.Covariance(solution.volumeToSensor));
+  std::vector<double> chiSquares;
   for (int i = 0; i < model.Count(); ++i) {
     const Twist residual = model.Residual(i, solution);
-    cost += std::log1p(residual.dot(weight * residual) / soft);
+    chiSquares.push_back(residual.dot(weight * residual));
   }
-  return cost;
+  return chiSquares;
 }
 
 double SoftCost(const HandEyeModel& model, const HandEyeSolution& solution, double scale)
 {
-  return SoftCost(model, InverseOfSymmetric(model.Covariance(solution.volumeToSensor)), solution, scale);
+  double cost = 0.0;
+  for (const double chiSquare : ChiSquares(model, solution))
+    cost += std::log1p(chiSquare / (6.0 * scale * scale));
+  return cost;
 }
 
 // A triple that is worth solving has a small value.
@@ -79,14 +81,6 @@ std::vector<HandEyeSolution> Starts(const std::vector<HandEyePair>& pairs, bool 
 {
   const std::size_t count = pairs.size();
   std::vector<HandEyeSolution> starts{SolveHandEyeByKronecker(pairs)};
-  std::vector<HandEyePair> some = pairs;
-  if (count > ClosedFormScans) { // evenly spread
-    some.clear();
-    for (std::size_t i = 0; i < ClosedFormScans; ++i)
-      some.push_back(pairs[i * count / ClosedFormScans]);
-  }
-  starts.push_back(SolveHandEyeParkMartin(some));
-  starts.push_back(SolveHandEyeDaniilidis(some));
   if (!withTriples)
     return starts;
 
@@ -275,17 +269,8 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
   std::vector<HandEyeModel::Fit> fits;
   double scale = -1.0;
   for (const auto& start : starts) {
-    double own = 1.0;
-    if (reject) {
-      std::vector<double> chiSquare;
-      const Eigen::Matrix<double, 6, 6> weight = InverseOfSymmetric(model.Covariance(start.second.volumeToSensor));
-      for (int i = 0; i < model.Count(); ++i) {
-        const Twist residual = model.Residual(i, start.second);
-        chiSquare.push_back(residual.dot(weight * residual));
-      }
-      own = std::max(1.0, ScaleOf(chiSquare));
-    }
-    fits.push_back(model.Refine(start.second, all, reject ? own : 0.0, reject ? 12 : 60));
+    const double own = reject ? std::max(1.0, ScaleOf(ChiSquares(model, start.second))) : 0.0;
+    fits.push_back(model.Refine(start.second, all, own, reject ? 12 : 60));
     const double after = ScaleOf(fits.back().chiSquare);
     scale = scale < 0.0 ? after : std::min(scale, after);
     if (after < ExplainedScale)
@@ -303,7 +288,7 @@ HandEyeConsensus FindHandEyeConsensus(const std::vector<HandEyePair>& pairs, con
     }
   }
 
-  // Turns that keep an axis leave the closed forms with a choice that only the shifts can make.
+  // Turns that keep an axis leave the closed form with a choice that only the shifts can make.
   for (const Eigen::Vector3d& axis : HandEyeRivalAxes(pairs, all, model, fits[best].solution, common)) {
     HandEyeModel::Fit rival =
         model.Refine(HandEyeRival(pairs, all, fits[best].solution, axis, target), all, reject ? common : 0.0);

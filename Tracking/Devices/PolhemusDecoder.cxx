@@ -27,18 +27,9 @@ constexpr double AsciiCopyTolerance = 6e-3;   // the shorter form has two decima
 
 int NumbersOf(PolhemusItem item)
 {
-  switch (item) {
-  case PolhemusItem::LineEnd:
-    return 0;
-  case PolhemusItem::Quaternion:
-    return 4;
-  case PolhemusItem::Time:
-  case PolhemusItem::Frame:
-  case PolhemusItem::Distortion:
-    return 1;
-  default:
-    return 3;
-  }
+  using Item = PolhemusItem;
+  const bool single = item == Item::Time || item == Item::Frame || item == Item::Distortion;
+  return item == Item::LineEnd ? 0 : item == Item::Quaternion ? 4 : single ? 1 : 3;
 }
 
 /// How long a frame of the device may last, ms: 60 Hz; 240 or 120 Hz.
@@ -71,11 +62,6 @@ double Float(const char* bytes)
 const char* TagOf(PolhemusModel model)
 {
   return model == PolhemusModel::Patriot ? "PA" : "LY";
-}
-
-bool SameCommand(unsigned char a, unsigned char b)
-{
-  return (a & 0x1f) == (b & 0x1f); // C, c and control-C
 }
 
 /// Whether a hand could have moved the sensor from \a a to \a b in the time between, or in \a pause seconds when they have none.
@@ -175,6 +161,11 @@ ParameterList Describe(PolhemusSpeech& p)
                     "From this level on, as the device judges the field, poses are out of range; the default never is.")};
 }
 
+bool PolhemusSpeech::Has(int station) const
+{
+  return station >= 1 && station <= 32 && (stations >> (station - 1) & 1) != 0;
+}
+
 void PolhemusSpeech::Check() const
 {
   CheckRanges(*this);
@@ -206,39 +197,10 @@ std::optional<TransformStatus> PolhemusStatusOf(unsigned char error)
 struct PolhemusDecoder::Fields {
   int station = 0;
   unsigned char error = 0;
-  std::optional<Eigen::Vector3d> position, positionExtended, euler;
-  Eigen::Vector4d quaternion = Eigen::Vector4d::Zero(); // w, x, y, z
-  std::optional<std::uint32_t> milliseconds, frame;
-  double distortion = -1e300;
+  std::array<std::optional<Eigen::Vector4d>, 12> items; // by their numbers; of no more than three, the rest is 0
 
-  void Set(PolhemusItem item, const double* n)
-  {
-    switch (item) {
-    case PolhemusItem::Position:
-      position = Eigen::Vector3d(n[0], n[1], n[2]);
-      break;
-    case PolhemusItem::PositionExtended:
-      positionExtended = Eigen::Vector3d(n[0], n[1], n[2]);
-      break;
-    case PolhemusItem::EulerExtended:
-      euler = Eigen::Vector3d(n[0], n[1], n[2]);
-      break;
-    case PolhemusItem::Quaternion:
-      quaternion = Eigen::Vector4d(n[0], n[1], n[2], n[3]);
-      break;
-    case PolhemusItem::Time:
-      milliseconds = static_cast<std::uint32_t>(n[0]);
-      break;
-    case PolhemusItem::Frame:
-      frame = static_cast<std::uint32_t>(n[0]);
-      break;
-    case PolhemusItem::Distortion:
-      distortion = n[0];
-      break;
-    case PolhemusItem::LineEnd:
-      break;
-    }
-  }
+  std::optional<Eigen::Vector4d>& operator[](PolhemusItem item) { return items[static_cast<std::size_t>(item)]; }
+  const std::optional<Eigen::Vector4d>& operator[](PolhemusItem item) const { return items[static_cast<std::size_t>(item)]; }
 };
 
 PolhemusDecoder::PolhemusDecoder(const PolhemusSpeech& speech) : speech_(speech)
@@ -297,7 +259,7 @@ bool PolhemusDecoder::NextBinary(std::vector<PolhemusRecord>& out)
   // The header is judged as far as it is there, so that half a one does not hold up what comes behind it.
   const auto byte = [head](std::size_t i) { return static_cast<unsigned char>(head[i]); };
   const char* wrong = nullptr;
-  if (left > 2 && (byte(2) < 1 || byte(2) > 32 || (speech_.stations >> (byte(2) - 1) & 1) == 0))
+  if (left > 2 && !speech_.Has(byte(2)))
     wrong = "a record of a station that is not there";
   else if (left > 3 && byte(3) != 'C' && byte(3) != 'P' && byte(3) != 'c' && byte(3) != 'p')
     wrong = "a record that answers another command";
@@ -324,12 +286,11 @@ bool PolhemusDecoder::NextBinary(std::vector<PolhemusRecord>& out)
       at += 2;
       continue;
     }
-    double numbers[4] = {};
+    Eigen::Vector4d& numbers = fields[item].emplace(Eigen::Vector4d::Zero());
     for (int i = 0; i < NumbersOf(item); ++i, at += 4)
       numbers[i] = IsWhole(item)                      ? Word(at)
                    : item == PolhemusItem::Distortion ? static_cast<double>(static_cast<std::int32_t>(Word(at)))
                                                       : Float(at);
-    fields.Set(item, numbers);
   }
   PolhemusRecord record;
   if (complaint.empty())
@@ -356,78 +317,15 @@ bool PolhemusDecoder::NextLine(std::vector<PolhemusRecord>& out)
     }
     return false;
   }
-  std::string_view line(buffer_.data() + begin_, end - begin_);
+  const std::string_view line(buffer_.data() + begin_, end - begin_);
   begin_ = end + 1;
-  if (lineTooLong_) { // the rest of it; it is counted
-    lineTooLong_ = false;
-    return true;
-  }
-  if (line.empty() || line.back() != '\r') {
-    Complain("a line without its end");
-    return true;
-  }
-  line.remove_suffix(1);
-  if (line.size() < 4 || line.size() > LongestLine) {
-    Complain("a line that is no record");
-    return true;
-  }
+  if (std::exchange(lineTooLong_, false))
+    return true; // the rest of it; it is counted
   Fields fields;
-  std::string_view station = line.substr(0, 2);
-  if (station[0] == ' ')
-    station.remove_prefix(1);
-  if (!ParseNumber(station, fields.station) || fields.station < 1 || fields.station > 32 ||
-      (speech_.stations >> (fields.station - 1) & 1) == 0) {
-    Complain("a line of a station that is not there");
-    return true;
-  }
-  fields.error = static_cast<unsigned char>(line[2]);
-  if (fields.error == 0 || !PolhemusStatusOf(fields.error)) {
-    Complain("a line with an error that does not exist");
-    return true;
-  }
-  const std::vector<std::string_view> words = Words(line.substr(3));
-  std::size_t at = 0, columns = 0;
-  for (const PolhemusItem item : speech_.layout) {
-    double numbers[4] = {};
-    const int count = NumbersOf(item);
-    if (at + static_cast<std::size_t>(count) > words.size()) {
-      Complain("a line with too few numbers");
-      return true;
-    }
-    for (int i = 0; i < count; ++i) {
-      const std::string_view word = words[at + static_cast<std::size_t>(i)];
-      std::uint32_t whole = 0;
-      // Numbers of one item have the same decimals; where one lacks a digit, the line has lost it.
-      const bool good =
-          IsWhole(item) ? ParseNumber(word, whole) : ParseNumber(word, numbers[i]) && Decimals(word) == Decimals(words[at]);
-      if (!good) {
-        Complain("a line with \"" + std::string(word.substr(0, 20)) + "\" in place of a number");
-        return true;
-      }
-      if (IsWhole(item))
-        numbers[i] = whole;
-    }
-    if (columns == 0 && count > 1) { // the counters before may be of any length; from here on the columns are fixed
-      const char* begin = at == 0 ? line.data() + 3 : words[at - 1].data() + words[at - 1].size();
-      columns = static_cast<std::size_t>(line.data() + line.size() - begin);
-    }
-    fields.Set(item, numbers);
-    at += static_cast<std::size_t>(count);
-  }
-  if (at != words.size()) {
-    Complain("a line with too many numbers");
-    return true;
-  }
-  // A line that is shorter than those before it has lost something, a sign perhaps; three of them are how it is now.
-  strangeLines_ = columns == strangeColumns_ ? strangeLines_ + 1 : 1;
-  strangeColumns_ = columns;
-  if (columns_ != 0 && columns != columns_ && strangeLines_ < 3) {
-    Complain("a line of another length");
-    return true;
-  }
-  columns_ = columns;
   PolhemusRecord record;
-  const std::string complaint = Understand(fields, record);
+  std::string complaint = ReadLine(line, fields);
+  if (complaint.empty())
+    complaint = Understand(fields, record);
   if (complaint.empty())
     Deliver(fields, record, out);
   else
@@ -435,40 +333,87 @@ bool PolhemusDecoder::NextLine(std::vector<PolhemusRecord>& out)
   return true;
 }
 
+std::string PolhemusDecoder::ReadLine(std::string_view line, Fields& fields)
+{
+  if (line.empty() || line.back() != '\r')
+    return "a line without its end";
+  line.remove_suffix(1);
+  if (line.size() < 4 || line.size() > LongestLine)
+    return "a line that is no record";
+  if (!ParseNumber(line.substr(line[0] == ' ' ? 1 : 0, line[0] == ' ' ? 1 : 2), fields.station) || !speech_.Has(fields.station))
+    return "a line of a station that is not there";
+  fields.error = static_cast<unsigned char>(line[2]);
+  if (fields.error == 0 || !PolhemusStatusOf(fields.error))
+    return "a line with an error that does not exist";
+  const std::vector<std::string_view> words = Words(line.substr(3));
+  std::size_t at = 0, columns = 0;
+  for (const PolhemusItem item : speech_.layout) {
+    Eigen::Vector4d& numbers = fields[item].emplace(Eigen::Vector4d::Zero());
+    const int count = NumbersOf(item);
+    if (at + static_cast<std::size_t>(count) > words.size())
+      return "a line with too few numbers";
+    for (int i = 0; i < count; ++i) {
+      const std::string_view word = words[at + static_cast<std::size_t>(i)];
+      std::uint32_t whole = 0;
+      // Numbers of one item have the same decimals; where one lacks a digit, the line has lost it.
+      if (!(IsWhole(item) ? ParseNumber(word, whole) : ParseNumber(word, numbers[i]) && Decimals(word) == Decimals(words[at])))
+        return "a line with \"" + std::string(word.substr(0, 20)) + "\" in place of a number";
+      if (IsWhole(item))
+        numbers[i] = whole;
+    }
+    if (columns == 0 && count > 1) { // the counters before may be of any length; from here on the columns are fixed
+      const char* begin = at == 0 ? line.data() + 3 : words[at - 1].data() + words[at - 1].size();
+      columns = static_cast<std::size_t>(line.data() + line.size() - begin);
+    }
+    at += static_cast<std::size_t>(count);
+  }
+  if (at != words.size())
+    return "a line with too many numbers";
+  // A line that is shorter than those before it has lost something, a sign perhaps; three of them are how it is now.
+  strangeLines_ = columns == strangeColumns_ ? strangeLines_ + 1 : 1;
+  strangeColumns_ = columns;
+  if (columns_ != 0 && columns != columns_ && strangeLines_ < 3)
+    return "a line of another length";
+  columns_ = columns;
+  return "";
+}
+
 std::string PolhemusDecoder::Understand(const Fields& f, PolhemusRecord& record) const
 {
+  using Item = PolhemusItem;
   record.station = f.station;
-  record.milliseconds = f.milliseconds;
+  if (f[Item::Time])
+    record.milliseconds = static_cast<std::uint32_t>(f[Item::Time]->x());
   record.status = *PolhemusStatusOf(f.error);
   if (record.status == TransformStatus::Missing) // its numbers mean nothing
     return "";
 
-  const Eigen::Vector3d position = f.positionExtended ? *f.positionExtended : *f.position;
-  if (!position.allFinite() || !f.quaternion.allFinite())
+  const auto &longer = f[Item::PositionExtended], &shorter = f[Item::Position];
+  const Eigen::Vector3d position = (longer ? *longer : *shorter).head<3>();
+  const Eigen::Vector4d& q = *f[Item::Quaternion]; // w, x, y, z
+  if (!position.allFinite() || !q.allFinite())
     return "a record with a number that is none";
   if (position.norm() * speech_.unitMm > 3.0 * speech_.rangeMm)
     return "a position far beyond the range of the device";
-  if (std::fabs(f.quaternion.norm() - 1.0) > UnitTolerance)
+  if (std::fabs(q.norm() - 1.0) > UnitTolerance)
     return "a quaternion that is not of unit length";
-  const Eigen::Quaterniond turn =
-      Eigen::Quaterniond(f.quaternion[0], f.quaternion[1], f.quaternion[2], f.quaternion[3]).normalized();
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
 
-  if (f.position && f.positionExtended) {
-    const double tolerance = speech_.format == PolhemusFormat::Binary ? BinaryCopyTolerance : AsciiCopyTolerance;
-    if (!((*f.position - *f.positionExtended).cwiseAbs().maxCoeff() <= tolerance)) // not >, for NaN
-      return "a position that differs from its copy";
-  }
-  if (f.euler) {
+  const double tolerance = speech_.format == PolhemusFormat::Binary ? BinaryCopyTolerance : AsciiCopyTolerance;
+  if (longer && shorter && !((*shorter - *longer).cwiseAbs().maxCoeff() <= tolerance)) // not >, for NaN
+    return "a position that differs from its copy";
+  if (const auto& euler = f[Item::EulerExtended]) {
     using Axis = Eigen::AngleAxisd;
-    const Eigen::Quaterniond copy = Axis((*f.euler)[0] * RadiansPerDegree, Eigen::Vector3d::UnitZ()) *
-                                    Axis((*f.euler)[1] * RadiansPerDegree, Eigen::Vector3d::UnitY()) *
-                                    Axis((*f.euler)[2] * RadiansPerDegree, Eigen::Vector3d::UnitX());
-    if (!(f.euler->cwiseAbs().maxCoeff() <= 360.0) || !(copy.angularDistance(turn) <= OrientationTolerance))
+    const Eigen::Quaterniond copy = Axis((*euler)[0] * RadiansPerDegree, Eigen::Vector3d::UnitZ()) *
+                                    Axis((*euler)[1] * RadiansPerDegree, Eigen::Vector3d::UnitY()) *
+                                    Axis((*euler)[2] * RadiansPerDegree, Eigen::Vector3d::UnitX());
+    if (!(euler->cwiseAbs().maxCoeff() <= 360.0) || !(copy.angularDistance(turn) <= OrientationTolerance))
       return "an orientation that differs from its copy";
   }
   record.pose.linear() = turn.toRotationMatrix();
   record.pose.translation() = position * speech_.unitMm;
-  if (record.pose.translation().norm() > speech_.rangeMm || f.distortion >= speech_.distortion)
+  const bool distorted = f[Item::Distortion] && f[Item::Distortion]->x() >= speech_.distortion;
+  if (distorted || record.pose.translation().norm() > speech_.rangeMm)
     record.status = TransformStatus::OutOfRange;
   return "";
 }
@@ -507,11 +452,12 @@ void PolhemusDecoder::Settle(const PolhemusRecord& record, std::vector<PolhemusR
 
 void PolhemusDecoder::Deliver(const Fields& fields, const PolhemusRecord& record, std::vector<PolhemusRecord>& out)
 {
-  if (!fields.milliseconds) {
+  if (!record.milliseconds) {
     Settle(record, out);
     return;
   }
-  const Moment moment{*fields.milliseconds, fields.frame.value_or(0), fields.frame.has_value()};
+  const auto& frame = fields[PolhemusItem::Frame];
+  const Moment moment{*record.milliseconds, frame ? static_cast<std::uint32_t>(frame->x()) : 0, frame.has_value()};
   const bool goesOn = last_ && moment.Follows(*last_, speech_.model);
   if (goesOn || (held_ && moment.Follows(held_->first, speech_.model))) {
     if (held_ && !goesOn)
@@ -536,7 +482,8 @@ std::optional<PolhemusReply> TakePolhemusReply(std::string& bytes, unsigned char
         continue;
       const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(bytes[at + i]); };
       const std::size_t size = byte(6) + 256u * byte(7);
-      if (!SameCommand(byte(3), command) || at + HeaderBytes + size > bytes.size())
+      const bool same = (byte(3) & 0x1f) == (command & 0x1f); // C, c and control-C
+      if (!same || at + HeaderBytes + size > bytes.size())
         continue;
       PolhemusReply reply{model, byte(2), byte(3), byte(4), bytes.substr(at + HeaderBytes, size)};
       bytes.erase(0, at + HeaderBytes + size);

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -51,7 +52,8 @@ struct PolhemusSpeech {
   std::uint32_t stations = 3;                    ///< bit n: station n + 1 is there
   double unitMm = 10.0, rangeMm = 1800.0, distortion = 1e300;
 
-  void Check() const; ///< Throws Error(InvalidParameter): ranges, and whether layout and stations are possible.
+  bool Has(int station) const; ///< \a station from 1
+  void Check() const;          ///< Throws Error(InvalidParameter): ranges, and whether layout and stations are possible.
 };
 ParameterList Describe(PolhemusSpeech& p);
 
@@ -97,6 +99,7 @@ private:
   };
   bool NextBinary(std::vector<PolhemusRecord>& out);
   bool NextLine(std::vector<PolhemusRecord>& out);
+  std::string ReadLine(std::string_view line, Fields& fields); ///< what is wrong with it, or ""
   std::string Understand(const Fields& fields, PolhemusRecord& record) const;
   void Settle(const PolhemusRecord& record, std::vector<PolhemusRecord>& out);
   void Deliver(const Fields& fields, const PolhemusRecord& record, std::vector<PolhemusRecord>& out);

@@ -5,7 +5,7 @@
 // that fits the line is asked for with O and started with C; if within half a second no record can be believed, because the
 // firmware does not know an item or writes it otherwise than we think, the next simpler one is tried.
 #include "Tracking/Devices/PolhemusTracker.h"
-#include "Core/Base/Error.h"
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Geometry/ToolPose.h"
 #include "Tracking/Devices/RunDevice.h"
@@ -97,28 +97,23 @@ void PolhemusTracker::Run(const Worker::Signal& signal)
 {
   bool wasThere = false;
   while (!signal.Stopped()) {
-    Step step = Step::Lost;
+    std::string problem;
     try {
       port_.Open();
-      step = Converse(signal);
-      if (step == Step::Done) {
+      if (Converse(signal)) {
         wasThere = true;
         poses_->SetState(DeviceState::Running, running_);
-        step = Listen(signal, 0.0);
+        Listen(signal, 0.0);
       }
+      break; // it was stopped
     } catch (const Error& error) {
-      problem_ = error.what();
+      problem = error.what();
+      if (error.GetKind() == Error::Kind::NotPossible) {
+        poses_->SetState(DeviceState::Failed, problem);
+        break;
+      }
     }
-    if (step == Step::Stopped)
-      break;
-    if (step == Step::Impossible) {
-      poses_->SetState(DeviceState::Failed, problem_);
-      break;
-    }
-    if (step == Step::Lost && problem_.empty())
-      problem_ = options_.path + ": the line is gone";
-    poses_->SetState(wasThere ? DeviceState::Lost : DeviceState::Connecting, problem_);
-    problem_.clear();
+    poses_->SetState(wasThere ? DeviceState::Lost : DeviceState::Connecting, problem);
     if (!signal.Sleep(0.5))
       break;
   }
@@ -126,45 +121,44 @@ void PolhemusTracker::Run(const Worker::Signal& signal)
     port_.Write("P", ListenSeconds); // ends continuous output
 }
 
-bool PolhemusTracker::Tell(const std::string& command)
+void PolhemusTracker::Fail(const std::string& why, Error::Kind kind) const
 {
-  return port_.Write(command, Silence) == SerialPort::Outcome::Done;
+  throw Error(kind, options_.path + ": " + why);
 }
 
-PolhemusTracker::Step PolhemusTracker::Quiet(const Worker::Signal& signal)
+void PolhemusTracker::Tell(const std::string& command)
 {
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    if (!Tell("\rP"))
-      return Step::Lost;
-    const double begin = ClockNow();
-    std::vector<unsigned char> bytes;
-    while (ClockNow() - begin < 2.0 * AnswerSeconds) {
-      if (signal.Stopped())
-        return Step::Stopped;
-      bytes.clear();
-      const auto outcome = port_.Read(bytes, Silence);
-      if (outcome == SerialPort::Outcome::Lost)
-        return Step::Lost;
-      if (outcome == SerialPort::Outcome::Timeout)
-        return Step::Done;
-    }
+  if (port_.Write(command, Silence) != SerialPort::Outcome::Done)
+    Fail("the line is gone");
+}
+
+std::vector<unsigned char> PolhemusTracker::Hear(double seconds)
+{
+  std::vector<unsigned char> bytes;
+  if (port_.Read(bytes, seconds) == SerialPort::Outcome::Lost)
+    Fail("the line is gone");
+  return bytes;
+}
+
+void PolhemusTracker::Quiet(const Worker::Signal& signal)
+{
+  for (int attempt = 0; attempt < 3 && !signal.Stopped(); ++attempt) {
+    Tell("\rP");
+    for (const double begin = ClockNow(); ClockNow() - begin < 2.0 * AnswerSeconds && !signal.Stopped();)
+      if (Hear(Silence).empty())
+        return;
   }
-  problem_ = options_.path + ": the device does not stop sending; is it a Polhemus tracker, set to " +
-             std::to_string(options_.baud) + " bits per second?";
-  return Step::Again;
+  if (!signal.Stopped())
+    Fail("the device does not stop sending; is it a Polhemus tracker, set to " + std::to_string(options_.baud) +
+         " bits per second?");
 }
 
 std::optional<PolhemusReply> PolhemusTracker::Ask(const Worker::Signal& signal, const std::string& command, unsigned char answers)
 {
-  if (!Tell(command))
-    return std::nullopt;
+  Tell(command);
   std::string bytes;
-  std::vector<unsigned char> piece;
   for (const double begin = ClockNow(); ClockNow() - begin < AnswerSeconds && !signal.Stopped();) {
-    piece.clear();
-    const auto outcome = port_.Read(piece, ListenSeconds);
-    if (outcome == SerialPort::Outcome::Lost)
-      break;
+    const std::vector<unsigned char> piece = Hear(ListenSeconds);
     bytes.append(piece.begin(), piece.end());
     if (auto reply = TakePolhemusReply(bytes, answers))
       return reply;
@@ -188,117 +182,87 @@ std::vector<PolhemusLayout> PolhemusTracker::Layouts(PolhemusModel model, int st
   return layouts;
 }
 
-PolhemusTracker::Step PolhemusTracker::Converse(const Worker::Signal& signal)
+bool PolhemusTracker::Converse(const Worker::Signal& signal)
 {
-  const Step quiet = Quiet(signal);
-  if (quiet != Step::Done)
-    return quiet;
+  Quiet(signal);
   std::optional<PolhemusReply> who;
-  for (int attempt = 0; attempt < 3 && !who; ++attempt) {
-    if (signal.Stopped())
-      return Step::Stopped;
-    if (!Tell("F1\r"))
-      return Step::Lost;
+  for (int attempt = 0; attempt < 3 && !who && !signal.Stopped(); ++attempt) {
+    Tell("F1\r");
     who = Ask(signal, std::string(1, ControlV) + "\r", ControlV);
   }
-  if (!port_.IsOpen())
-    return Step::Lost;
   if (signal.Stopped())
-    return Step::Stopped;
-  if (!who) {
-    problem_ = options_.path + ": nothing there answers like a Polhemus; is it on, and set to " + std::to_string(options_.baud) +
-               " bits per second?";
-    return Step::Again;
-  }
-  if (options_.model && *options_.model != who->model) {
-    problem_ = options_.path + ": it is a " + PolhemusModelText(who->model) + ", not a " + PolhemusModelText(*options_.model);
-    return Step::Impossible;
-  }
+    return false;
+  if (!who)
+    Fail("nothing there answers like a Polhemus; is it on, and set to " + std::to_string(options_.baud) + " bits per second?");
+  if (options_.model && *options_.model != who->model)
+    Fail(std::string("it is a ") + PolhemusModelText(who->model) + ", not a " + PolhemusModelText(*options_.model),
+         Error::Kind::NotPossible);
 
   PolhemusSpeech speech = options_.speech;
   speech.model = who->model;
   speech.stations = (1u << PolhemusStations(speech.model)) - 1;
   const auto sensors = Ask(signal, std::string(1, ControlU) + "0\r", ControlU);
-  if (sensors && sensors->data.size() >= 4) {
+  if (sensors && sensors->data.size() >= 4)
     speech.stations &= Bits(sensors->data, 0) & Bits(sensors->data, 2); // those that are plugged in, those that are on
-    if (speech.stations == 0) {
-      problem_ = options_.path + ": no sensor is plugged in";
-      return Step::Again;
-    }
-  }
+  if (speech.stations == 0)
+    Fail("no sensor is plugged in");
   for (int attempt = 0;; ++attempt) {
-    if (!Tell("U1\r"))
-      return Step::Lost;
+    Tell("U1\r");
     const auto unit = Ask(signal, "U\r", 'U');
     if (!unit || unit->data.size() < 2 || Bits(unit->data, 0) == 1)
       break;
-    if (attempt == 2) {
-      problem_ = options_.path + ": it does not go over to centimetres";
-      return Step::Again;
-    }
+    if (attempt == 2)
+      Fail("it does not go over to centimetres");
   }
   static const char* const directions[] = {"1,0,0", "-1,0,0", "0,1,0", "0,-1,0", "0,0,1", "0,0,-1"};
-  if (const auto side = static_cast<std::size_t>(options_.hemisphere);
-      side > 0 && !Tell("H*," + std::string(directions[side - 1]) + "\r"))
-    return Step::Lost;
+  if (const auto side = static_cast<std::size_t>(options_.hemisphere); side > 0)
+    Tell("H*," + std::string(directions[side - 1]) + "\r");
   return TryLayouts(signal, speech);
 }
 
-PolhemusTracker::Step PolhemusTracker::TryLayouts(const Worker::Signal& signal, PolhemusSpeech speech)
+bool PolhemusTracker::TryLayouts(const Worker::Signal& signal, PolhemusSpeech speech)
 {
-  int stations = 0;
-  std::string list;
+  std::vector<std::string> stations;
   for (int station = 1; station <= PolhemusStations(speech.model); ++station)
-    if (speech.stations >> (station - 1) & 1) {
-      ++stations;
-      list += (list.empty() ? "" : ", ") + std::to_string(station);
-    }
+    if (speech.Has(station))
+      stations.push_back(std::to_string(station));
   std::string complaint;
-  for (const PolhemusLayout& layout : Layouts(speech.model, stations)) {
+  for (const PolhemusLayout& layout : Layouts(speech.model, static_cast<int>(stations.size()))) {
     speech.layout = layout;
     std::string items;
     for (const PolhemusItem item : layout)
       items += "," + std::to_string(static_cast<int>(item));
     // What went wrong with the layout before may still lie in the line.
-    const Step quiet = Quiet(signal);
-    if (quiet != Step::Done)
-      return quiet;
-    if (!Tell("O*" + items + "\r") || (speech.format == PolhemusFormat::Ascii && !Tell("F0\r")) || !Tell("C\r"))
-      return Step::Lost;
+    Quiet(signal);
+    Tell("O*" + items + "\r");
+    if (speech.format == PolhemusFormat::Ascii)
+      Tell("F0\r");
+    Tell("C\r");
     speech_ = speech;
     decoder_.emplace(speech);
     clock_.Reset();
     jumpsTold_ = 0;
     const bool twofold = std::count(layout.begin(), layout.end(), PolhemusItem::Position) > 0;
     const bool timed = std::count(layout.begin(), layout.end(), PolhemusItem::Time) > 0;
-    running_ = options_.path + ": " + PolhemusModelText(speech.model) + ", stations " + list + ", " +
-               (twofold ? "twofold"
-                : timed ? "single"
-                        : "bare") +
-               " records";
-    const Step step = Listen(signal, AnswerSeconds);
-    if (step != Step::Again)
-      return step;
+    const char* const kind = twofold ? "twofold" : timed ? "single" : "bare";
+    running_ =
+        options_.path + ": " + PolhemusModelText(speech.model) + ", stations " + Joined(stations) + ", " + kind + " records";
+    const bool heard = Listen(signal, AnswerSeconds);
+    if (heard || signal.Stopped())
+      return heard;
     complaint = decoder_->LastComplaint();
-    if (speech.format == PolhemusFormat::Ascii && !Tell("F1\r"))
-      return Step::Lost;
+    if (speech.format == PolhemusFormat::Ascii)
+      Tell("F1\r");
   }
-  problem_ = options_.path + ": its records cannot be read" + (complaint.empty() ? "; none came" : ": " + complaint);
-  return Step::Again;
+  Fail("its records cannot be read" + (complaint.empty() ? "; none came" : ": " + complaint));
 }
 
-/// With \a trial > 0: until the first record (Done), or until that many seconds have passed without one (Again). Else until
-/// something ends it.
-PolhemusTracker::Step PolhemusTracker::Listen(const Worker::Signal& signal, double trial)
+bool PolhemusTracker::Listen(const Worker::Signal& signal, double trial)
 {
   double lastRecord = ClockNow();
   std::uint64_t malformed = decoder_->Malformed();
-  std::vector<unsigned char> bytes;
   while (!signal.Stopped()) {
-    bytes.clear();
-    const auto outcome = port_.Read(bytes, ListenSeconds);
-    if (outcome == SerialPort::Outcome::Lost)
-      return Step::Lost;
+    const std::vector<unsigned char> bytes = Hear(ListenSeconds);
     const double arrival = ClockNow();
     const auto records = decoder_->Take(bytes.data(), bytes.size());
     Pass(records, arrival);
@@ -307,15 +271,12 @@ PolhemusTracker::Step PolhemusTracker::Listen(const Worker::Signal& signal, doub
         poses_->Reject(Rejection::Malformed, options_.path + ": " + decoder_->LastComplaint());
     if (!records.empty())
       lastRecord = arrival;
-    if (trial > 0.0 && !records.empty())
-      return Step::Done;
-    if (arrival - lastRecord > (trial > 0.0 ? trial : LongSilence)) {
-      if (trial <= 0.0)
-        problem_ = options_.path + ": no record has come for " + NumberText(LongSilence) + " s";
-      return Step::Again;
-    }
+    if (trial > 0.0 && (!records.empty() || arrival - lastRecord > trial))
+      return !records.empty();
+    if (arrival - lastRecord > LongSilence)
+      Fail("no record has come for " + NumberText(LongSilence) + " s");
   }
-  return Step::Stopped;
+  return false;
 }
 
 void PolhemusTracker::Pass(const std::vector<PolhemusRecord>& records, double arrival)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Error.h"
 #include "Core/Base/Worker.h"
 #include "Tracking/Devices/DeviceClock.h"
 #include "Tracking/Devices/PolhemusDecoder.h"
@@ -45,16 +46,17 @@ public:
   void Stop() override;
 
 private:
-  /// How a step of the conversation ended.
-  enum class Step { Done, Again, Lost, Stopped, Impossible };
-
+  // All throw Error(FileSystem) when the conversation has failed, and may go better another time; NotPossible when it cannot.
   void Run(const Worker::Signal& signal);
-  Step Converse(const Worker::Signal& signal);
-  Step Listen(const Worker::Signal& signal, double trial);
-  Step Quiet(const Worker::Signal& signal);
-  bool Tell(const std::string& command);
+  bool Converse(const Worker::Signal& signal); ///< false when it was stopped, as the next two
+  bool TryLayouts(const Worker::Signal& signal, PolhemusSpeech speech);
+  /// With \a trial > 0 until the first record, or false after so many seconds without one; else until something ends it.
+  bool Listen(const Worker::Signal& signal, double trial);
+  void Quiet(const Worker::Signal& signal);
+  void Tell(const std::string& command);
+  std::vector<unsigned char> Hear(double seconds); ///< nothing when nothing comes
+  [[noreturn]] void Fail(const std::string& why, Error::Kind kind = Error::Kind::FileSystem) const;
   std::optional<PolhemusReply> Ask(const Worker::Signal& signal, const std::string& command, unsigned char answers);
-  Step TryLayouts(const Worker::Signal& signal, PolhemusSpeech speech);
   void Pass(const std::vector<PolhemusRecord>& records, double arrival);
   std::vector<PolhemusLayout> Layouts(PolhemusModel model, int stations) const;
 
@@ -64,7 +66,6 @@ private:
   PoseStream* poses_ = nullptr;
 
   // of the worker alone
-  std::string problem_; ///< why the last conversation failed
   std::string running_; ///< the message while all is well
   std::optional<PolhemusDecoder> decoder_;
   PolhemusSpeech speech_;

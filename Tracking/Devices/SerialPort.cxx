@@ -177,9 +177,7 @@ SerialPort::Outcome SerialPort::Read(std::vector<unsigned char>& bytes, double s
     const int ready = poll(&wait, 1, MillisecondsUntil(end));
     if (ready == 0)
       return Outcome::Timeout;
-    if (ready < 0 && errno != EINTR)
-      break;
-    if (ready > 0 && (wait.revents & POLLIN) == 0) // an error or hang-up, and nothing left to read
+    if ((ready < 0 && errno != EINTR) || (ready > 0 && (wait.revents & POLLIN) == 0)) // hung up, and nothing left to read
       break;
   }
   Close();
@@ -197,24 +195,19 @@ SerialPort::Outcome SerialPort::Write(std::string_view bytes, double seconds)
       bytes.remove_prefix(static_cast<std::size_t>(count));
       continue;
     }
-    if (count < 0 && errno != EAGAIN && errno != EINTR) {
-      Close();
-      return Outcome::Lost;
-    }
+    if (count < 0 && errno != EAGAIN && errno != EINTR)
+      break;
     pollfd wait{line_->file, POLLOUT, 0};
     const int ready = poll(&wait, 1, MillisecondsUntil(end));
     if (ready == 0)
       return Outcome::Timeout;
-    if (ready < 0 && errno != EINTR) {
-      Close();
-      return Outcome::Lost;
-    }
-    if (ready > 0 && (wait.revents & POLLOUT) == 0) {
-      Close();
-      return Outcome::Lost;
-    }
+    if ((ready < 0 && errno != EINTR) || (ready > 0 && (wait.revents & POLLOUT) == 0))
+      break;
   }
-  return Outcome::Done;
+  if (bytes.empty())
+    return Outcome::Done;
+  Close();
+  return Outcome::Lost;
 }
 
 } // namespace echorama

@@ -36,11 +36,6 @@ std::string Reason(int error)
   throw Error(Error::Kind::FileSystem, place + ": " + reason);
 }
 
-std::string PlaceOf(const sockaddr_in& address)
-{
-  return HostNumber(address.sin_addr) + ":" + std::to_string(ntohs(address.sin_port));
-}
-
 sockaddr_in AddressOf(const in_addr& host, int port)
 {
   sockaddr_in address{};
@@ -163,7 +158,7 @@ TcpSocket TcpSocket::Accept() const
   result.descriptor_ = accept4(descriptor_, reinterpret_cast<sockaddr*>(&address), &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (result.IsOpen()) {
     Tune(result.descriptor_);
-    result.peer_ = PlaceOf(address);
+    result.peer_ = HostNumber(address.sin_addr) + ":" + std::to_string(ntohs(address.sin_port));
   } else if (!Again(errno)) {
     result.end_ = Reason(errno);
   }

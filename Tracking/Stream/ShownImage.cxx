@@ -39,15 +39,8 @@ std::string UsualWorld(const std::vector<std::string>& tools)
       ++counts[frames->second];
     }
   }
-  std::string world;
-  int most = 0;
-  for (const auto& [frame, count] : counts) {
-    if (count > most) {
-      world = frame;
-      most = count;
-    }
-  }
-  return world;
+  const auto most = std::max_element(counts.begin(), counts.end(), [](auto& a, auto& b) { return a.second < b.second; });
+  return most == counts.end() ? "" : most->first;
 }
 
 std::optional<ShownImage> ChooseImage(std::vector<StreamedImage> images, const LiveTransforms& transforms,

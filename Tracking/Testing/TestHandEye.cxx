@@ -3,7 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Testing/Sanitized.h"
-#include "Tracking/Calibration/HandEyeClosedForms.h"
+#include "Tracking/Benchmarks/HandEyeContestants.h"
 #include "Tracking/Calibration/HandEyeModel.h"
 #include "Tracking/Testing/HandEyeRecording.h"
 #include "Tracking/Testing/HandEyeSimulation.h"
@@ -609,7 +609,7 @@ TEST(HandEye, TwoRecordingsOfOneRigAgree)
     const HandEyeResult result = CalibrateHandEye(pairs); // nothing is chosen
     EXPECT_GT(result.inliers, 400);
     likely[k] = result.solution.volumeToSensor;
-    plain[k] = SolveHandEyeParkMartin(pairs).volumeToSensor;
+    plain[k] = HandEyeClosedForms()[2].solve(pairs).volumeToSensor; // Park-Martin
   }
   EXPECT_NEAR((plain[0].translation() - plain[1].translation()).norm(), 11.0, 1.0);
   EXPECT_LT((likely[0].translation() - likely[1].translation()).norm(), 5.0);

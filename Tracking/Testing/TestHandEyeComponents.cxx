@@ -2,7 +2,6 @@
 // The parts of the noise: found where they are not as stated, left alone where they are, and never worse than closed forms.
 #include "Testing/Sanitized.h"
 #include "Tracking/Benchmarks/HandEyeContestants.h"
-#include "Tracking/Calibration/HandEyeClosedForms.h"
 #include "Tracking/Testing/HandEyeRecording.h"
 #include "Tracking/Testing/HandEyeSimulation.h"
 #include <algorithm>
