@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The candidates of the global search, and the start itself, are refined at a middle level, where that takes some ten
-// milliseconds each; those that meet are one. The best of them go on to the finest.
-// They are ranked as a test of correlation would: likeness times the square root of how much is compared. The likeness alone
-// prefers chance matches of small overlaps, the sum over the overlap those of large ones.
+// milliseconds each; so are the best of what a coarse level makes of them. Those that meet are one. The best goes on to the
+// finest. They are ranked as a test of correlation would: likeness times the square root of how much is compared. The likeness
+// alone prefers chance matches of small overlaps, the sum over the overlap those of large ones.
 //
 // What is trusted. A measure alone cannot tell: any two volumes have a best pose. So the answer is questioned from four
 // sides, each of which sees what the others do not. Overlap and similarity above chance: nothing in common. The next best of
@@ -15,8 +15,10 @@
 // drop the right pose and leave an accident without a rival. So candidates are also refined without them: a pose that they
 // contradict may fit about as well as the answer, but not better; and where one does, the automatic start looks everywhere.
 //
-// The automatic start widens its search as long as there is no clear answer: near the start a search costs a few
-// milliseconds, over all rotations some seconds. What is clear already at the middle level to be no answer is not refined.
+// The search widens as long as there is no clear answer: the automatic start's to larger cones, and beyond a tracker's cone,
+// where little is alike, to more candidates (between ribs, whose shadows look alike at low resolution, the right pose may be the
+// fiftieth). Near the start a search costs a few milliseconds, over all rotations some seconds. What is clear already at the
+// middle level to be no answer is not refined.
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
@@ -38,12 +40,15 @@ constexpr int MostCandidates = 1000;
 constexpr double FinalStop = 2e-5; // voxels: where the answer stops should tell little of the CPU
 constexpr double Slack = 1.5;      // how much further from the start than was said an answer may be
 constexpr double TrackedDegrees = 12.0, TrackedMm = 20.0, HandMadeDegrees = 35.0;
+constexpr int ManyCandidates = 4; // times as many
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level
 // Less similarity needs a pose that is better determined. Where two bodies have nothing in common but layers that run alike, the
 // layers still fit, by a similarity of some 0.1, and what they say nothing of is nearly undetermined (bench of bodies: other
 // bodies, mirror images).
 constexpr double SureSimilarity = 0.15;
+// More candidates can help where the best are less alike than this; what is alike and yet not unique they do not tell apart.
+constexpr double WeakSimilarity = 2.0 * SureSimilarity;
 
 std::string Number(double value, int digits)
 {
@@ -66,6 +71,14 @@ std::string LeastDetermined(const Information& covariance, double radius)
          Number(axis.y(), 2) + ", " + Number(axis.z(), 2) + ")";
 }
 
+// One search: how far around the start, and how many of its candidates are refined.
+struct Stage {
+  double coneDegrees, reachMm;
+  int candidates;
+  double costs;            // share of the time of all, about
+  bool onlyIfWeak = false; // skipped when what was found before is alike
+};
+
 class Pair {
 public:
   Pair(const PlacedVolume& fixed, const MetricPyramid& fixedFeatures, const PlacedVolume& moving,
@@ -77,19 +90,41 @@ public:
     finestMm_ = std::max({p.finestMm, finest(fixed), finest(moving)});
     // Coarse: some 32 voxels along the smaller of both; never finer than what there is.
     coarseMm_ = std::max(finestMm_, std::min(shape_.extent, fixedShape_.extent) / 32.0);
+    middleMm_ = std::max(finestMm_, 0.5 * coarseMm_);
     landmarks_ = LandmarkTerm(PairLandmarks(fixed.landmarks, fixed.name, moving.landmarks, moving.name), fixed.volumeToWorld,
                               p.landmarkSigmaMm);
   }
 
+  /// The searches, one after the other until there is a clear answer. A later one sees what an earlier one has seen.
+  std::vector<Stage> Stages() const
+  {
+    const int many = std::min(ManyCandidates * p_.candidates, MostCandidates);
+    const double handMadeMm = std::max(shape_.extent, fixedShape_.extent) / 3.0;
+    const Stage tracked{TrackedDegrees, TrackedMm, p_.candidates, 0.05},
+        handMade{HandMadeDegrees, handMadeMm, p_.candidates, 0.1}, closer{HandMadeDegrees, handMadeMm, many, 0.2, true},
+        unknown{180.0, std::numeric_limits<double>::infinity(), many, 0.75};
+    switch (p_.start) {
+    case AlignStart::Tracked:
+      return {tracked};
+    case AlignStart::HandMade:
+      return {handMade, closer};
+    case AlignStart::Unknown:
+      return {unknown};
+    default:
+      return {tracked, handMade, closer, unknown};
+    }
+  }
+
   /// \param isLast whether nobody will search further, so that a doubtful answer is worth its refinement
-  /// \param isKnown whether the true pose is said to lie in the cone and reach: what slides out of them is no answer
-  PairAlignment Align(double coneDegrees, double reachMm, bool isLast, bool isKnown, const Progress& progress)
+  PairAlignment Align(const Stage& stage, bool isLast, const Progress& progress)
   {
     PairAlignment result;
-    largestTurn_ = isKnown ? Slack * coneDegrees * EIGEN_PI / 180.0 : HUGE_VAL;
-    largestMoveMm_ = isKnown ? Slack * reachMm : HUGE_VAL;
+    // Whether the true pose is said to lie in the cone and reach: what slides out of them is no answer.
+    const bool isKnown = p_.start != AlignStart::Automatic;
+    largestTurn_ = isKnown ? Slack * stage.coneDegrees * EIGEN_PI / 180.0 : HUGE_VAL;
+    largestMoveMm_ = isKnown ? Slack * stage.reachMm : HUGE_VAL;
     result.volumeToWorld = moving_.volumeToWorld;
-    result.anywhere = coneDegrees >= 180.0;
+    result.anywhere = stage.coneDegrees >= 180.0;
     PlacedVolume from = moving_;
     from.volumeToWorld = Reconciled(moving_.volumeToWorld);
     if (!landmarks_.Agrees(from.volumeToWorld)) {
@@ -104,10 +139,10 @@ public:
     // 1. where it could be
     Clock::time_point start = Clock::now();
     GlobalSearchParameters global;
-    global.coneDegrees = coneDegrees;
-    global.reachMm = reachMm;
+    global.coneDegrees = stage.coneDegrees;
+    global.reachMm = stage.reachMm;
     global.minimumOverlap = p_.minimumOverlap;
-    global.candidates = result.anywhere ? std::min(4 * p_.candidates, MostCandidates) : p_.candidates;
+    global.candidates = stage.candidates;
     std::vector<Pose> poses{from.volumeToWorld}, free{moving_.volumeToWorld}; // with and without the landmarks
     const auto search = [&](const PlacedVolume& moving, const Progress& part) {
       for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving, global, part).candidates) {
@@ -125,13 +160,12 @@ public:
     // But from there what is sparse is found from farther away, so the best of it are tried beside the others; and beside a
     // tracker's start alone, where it keeps a rig that can turn about an axis nearer to where the tracker has it.
     start = Clock::now();
-    double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
     std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.65));
-    if (isKnown && coneDegrees <= TrackedDegrees)
+    if (p_.start == AlignStart::Tracked)
       poses.clear();
     for (std::size_t i = 0; i < std::min<std::size_t>(Finalists, found.size()); ++i)
       poses.push_back(found[i].volumeToWorld);
-    found = Refine(poses, middleMm, middleMm, progress.Part(0.65, 0.8));
+    found = Refine(poses, middleMm_, middleMm_, progress.Part(0.65, 0.8));
     if (found.empty()) {
       result.reason = "no pose was found " + std::string(isKnown && !result.anywhere ? "near the start " : "") +
                       "in which they overlap by " + Number(100.0 * p_.minimumOverlap, 0) + "% of the smaller one" +
@@ -146,6 +180,7 @@ public:
     }
 
     // What this level cannot tell apart a finer one may.
+    double middleMm = middleMm_;
     while (Ratio(found) < p_.minimumPeakRatio && middleMm > finestMm_) {
       const double finerMm = std::max(finestMm_, 0.5 * middleMm);
       poses.clear();
@@ -158,8 +193,9 @@ public:
       middleMm = finerMm;
     }
     result.peakRatio = Ratio(found);
+    isLast |= p_.start == AlignStart::HandMade && found.front().similarity >= WeakSimilarity;
     if (!isLast && (result.peakRatio < p_.minimumPeakRatio || found.front().similarity < p_.minimumSimilarity)) {
-      result.verdict = Verdict::Failed;
+      result.similarity = found.front().similarity;
       result.localSeconds = SecondsSince(start);
       return result;
     }
@@ -198,7 +234,6 @@ public:
 
   /// Whether without the landmarks a different pose would have done as well.
   bool LandmarksDecide() const { return landmarksDecide_; }
-  double ReachHandMade() const { return std::max(shape_.extent, fixedShape_.extent) / 3.0; }
 
 private:
   LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int part, const Progress& progress,
@@ -249,8 +284,7 @@ private:
   {
     LandmarkTerm landmarks;
     std::swap(landmarks, landmarks_);
-    const double middleMm = std::max(finestMm_, 0.5 * coarseMm_);
-    const std::vector<LocalAlignResult> found = Refine(poses, middleMm, middleMm, progress);
+    const std::vector<LocalAlignResult> found = Refine(poses, middleMm_, middleMm_, progress);
     std::swap(landmarks, landmarks_);
     for (const LocalAlignResult& one : found) // the best first
       if (!landmarks_.Agrees(one.volumeToWorld, 0.5 * one.voxelMm))
@@ -299,7 +333,7 @@ private:
   LandmarkTerm landmarks_;
   bool landmarksDecide_ = false;
   VolumeShape shape_, fixedShape_;
-  double finestMm_ = 0.0, coarseMm_ = 0.0;
+  double finestMm_ = 0.0, coarseMm_ = 0.0, middleMm_ = 0.0;
   double largestTurn_ = HUGE_VAL, largestMoveMm_ = HUGE_VAL; // from the start, radians and mm
 };
 
@@ -330,7 +364,8 @@ ParameterList Describe(AlignPairParameters& p)
       Parameter("FinestMm", p.finestMm, {0, 1000}, "mm",
                 "Refinement ends at voxels not smaller than this; larger is faster and less exact. 0: at the volumes' own."),
       Parameter("Candidates", p.candidates, {1, MostCandidates}, "",
-                "Poses of the global search that are refined, four times as many when every rotation is tried.")
+                "Poses of the global search that are refined; four times as many when every rotation is tried, and where fewer "
+                "give no clear answer.")
           .Advanced(),
       Parameter("MinimumSimilarity", p.minimumSimilarity, {0, 1}, "",
                 "Less similarity in the overlap (1 identical, 0 chance) is failed.")
@@ -414,24 +449,17 @@ PairAlignment AlignPair(const PlacedVolume& fixed, const std::shared_ptr<const M
 {
   CheckRanges(p);
   Pair pair(fixed, *fixedFeatures, moving, *movingFeatures, p);
-  struct Stage {
-    AlignStart start;
-    double coneDegrees, reachMm, costs;
-  };
-  const std::array<Stage, 3> stages{{{AlignStart::Tracked, TrackedDegrees, TrackedMm, 0.05},
-                                     {AlignStart::HandMade, HandMadeDegrees, pair.ReachHandMade(), 0.2},
-                                     {AlignStart::Unknown, 180.0, std::numeric_limits<double>::infinity(), 0.75}}};
-  if (p.start != AlignStart::Automatic) {
-    const Stage& stage = *std::find_if(stages.begin(), stages.end(), [&p](const Stage& s) { return s.start == p.start; });
-    return pair.Align(stage.coneDegrees, stage.reachMm, true, true, progress);
-  }
-  // A wider search sees what a narrower one has seen: its answer is the one that counts.
+  const std::vector<Stage> stages = pair.Stages();
+  double all = 0.0, done = 0.0;
+  for (const Stage& stage : stages)
+    all += stage.costs;
   PairAlignment result;
-  double done = 0.0;
   for (const Stage& stage : stages) {
-    const bool isLast = stage.start == AlignStart::Unknown;
-    PairAlignment found = pair.Align(stage.coneDegrees, stage.reachMm, isLast, false, progress.Part(done, done + stage.costs));
-    done += stage.costs;
+    const double end = done + stage.costs / all;
+    if (stage.onlyIfWeak && result.similarity >= WeakSimilarity)
+      continue;
+    PairAlignment found = pair.Align(stage, &stage == &stages.back(), progress.Part(done, end));
+    done = end;
     found.globalSeconds += result.globalSeconds;
     found.localSeconds += result.localSeconds;
     found.confidenceSeconds += result.confidenceSeconds;

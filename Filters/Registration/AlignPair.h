@@ -58,11 +58,10 @@ struct PairAlignment {
   double similarity = 0.0; ///< mean over the overlap: 1 identical, 0 chance
   double overlap = 0.0;    ///< share of the smaller volume, [0, 1]
   double score = 0.0;      ///< of both, see LocalAlignResult
-  double peakRatio =
-      0.0;              ///< best score : that of the next different pose, at the coarse level; 99 when there is none above chance
-  double splitMm = 0.0; ///< how far the poses that two halves of the voxels find lie apart, in the mean over the moving volume
-  double errorMm = 0.0; ///< predicted root mean square error over the moving volume
-  double voxelMm = 0.0; ///< of the last level
+  double peakRatio = 0.0;  ///< best score : that of the next different pose, where all are compared; 99: none above chance
+  double splitMm = 0.0;    ///< how far the poses that two halves of the voxels find lie apart, in the mean over the moving volume
+  double errorMm = 0.0;    ///< predicted root mean square error over the moving volume
+  double voxelMm = 0.0;    ///< of the last level
   Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world: the twist below acts about it
   /// Inverse covariance of (translation mm, rotation vector radians) in MotionAbout(centre, rotation, translation) *
   /// volumeToWorld.
@@ -83,7 +82,7 @@ void Judge(const AlignPairParameters& parameters, const Information& covariance,
 /// Landmarks that both volumes have (PlacedVolume) say where to begin, pull poses towards where they agree with them, and add to
 /// what is known of the answer. A pose that contradicts them is no answer, and none else is when they contradict each other.
 ///
-/// The start is always one of the candidates. All are refined at a coarse level, the best down to the finest. Four checks
+/// The start is always one of the candidates. All are refined at a middle level, the best down to the finest. Four checks
 /// decide: enough overlap and more similarity than chance; no different pose that does nearly as well; the covariance; and the
 /// poses that two disjoint halves of the voxels find, each for itself: where nothing real is matched they drift apart.
 /// \throws Error(InvalidParameter), Error(BadInput) for volumes that cannot be aligned at all (constant, nearly empty, flat),

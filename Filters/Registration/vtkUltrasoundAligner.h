@@ -101,7 +101,10 @@ public:
   ///@}
 
   ///@{
-  /** Poses of the global search that are refined, four times as many when every rotation is tried. In [1, 1000]; default 16. */
+  /**
+   * Poses of the global search that are refined; four times as many when every rotation is tried, and where fewer give no clear
+   * answer. In [1, 1000]; default 16.
+   */
   void SetCandidates(int value) { this->SetParameter("Candidates", value); }
   int GetCandidates() { return static_cast<int>(this->GetParameter("Candidates")); }
   ///@}
@@ -245,8 +248,8 @@ public:
   bool GetAllAligned() const;
 
   /**
-   * What the last update did, as JSON: {"volumes": [{"name", "verdict", "reason", "similarity", "overlap",
-   * "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity", "overlap",
+   * What the last update did, as JSON: {"volumes": [{"name", "verdict", "reason", "error_mm", "similarity",
+   * "overlap", "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity", "overlap",
    * "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds": {"global",
    * "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}}. Empty when it failed.
    */

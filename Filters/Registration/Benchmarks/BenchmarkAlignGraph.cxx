@@ -376,6 +376,7 @@ int main(int argc, char** argv)
       BenchmarkGraph(count);
   if (which != "graph") {
     AlignVolumesParameters parameters;
+    parameters.pair.soundSpeedError = 0.0; // the phantom's is what its probe takes it for
     ParameterList list = Describe(parameters);
     Named(list, "Start").Set(argc > 2 ? argv[2] : "tracked");
     BenchmarkVolumes(parameters);
