@@ -80,7 +80,7 @@ for room in [room for room in built if room in uses]:
             check_use(f"{room}/{file}", room, named[other])
 
 # Sizes. What is too large as yet; whoever mends one takes it off the list.
-too_large = {"Tracking"}
+too_large = set()
 GENERATED = re.compile(r"(?<=// BEGIN parameters\n).*?(?=  // END parameters\n)", re.S)  # nobody reads or writes these
 lines, limits = dict.fromkeys(built, 0), dict.fromkeys(built, 12000)
 for path in [*ours("*.h"), *ours("*.cxx")]:

@@ -87,6 +87,21 @@ class Study(unittest.TestCase):
         self.assertLess(floor["tre_mm"], 3)  # tissue is seen within some mm of where it is
         self.assertEqual((case.properties["overlap"], case.properties["pressed_mm"]), (0.75, 6.0))
 
+    def test_tables_of_bodies(self):
+        """Lost pairs count in the error beyond the floor but not in what is predicted; what was said to be aligned is held against the floor."""
+        def row(individual, excess, beside, verdict, rms, predicted, cpu):
+            return {"scan": "bent", "individual": individual, "overlap": 0.55, "start": "start_20deg_25mm", "start_degrees": 20.0, "start_mm": 25.0,
+                    "method": "echorama", "excess_mm": excess, "beside_floor_mm": beside, "verdict": verdict, "tre_rms_mm": rms,
+                    "predicted_mm": predicted, "cpu_seconds": cpu}
+
+        rows = [row(1, 0.1, 0.2, "aligned", 1.0, 2.0, 3.0), row(2, 0.3, 2.1, "aligned", 3.0, 1.0, 5.0), row(2, 0.2, 1.0, "aligned", 1.0, 0.4, 4.0),
+                row(3, 30.0, 31.0, "ambiguous", 31.0, 1.0, 9.0)]
+        text = figures.tables_of_bodies(rows + [dict(rows[0], method="start")])
+        self.assertIn("| 55% | 20 deg, 25 mm | echorama | 4 | 0.25 | 21.09 | 30.00 | 1 | 3, 2 | 4.5 |\n", text)
+        self.assertIn("| odd | echorama | 1 | 0.50 | 100% |\n", text)
+        self.assertIn("| even | echorama | 2 | 2.75 | 0% |\n", text)
+        self.assertNotIn("| start |", text.partition("\n| --- ")[2])
+
     def test_the_same_seed_makes_the_same_case(self):
         cases.make_case(work / "again", {"overlap": 0.7}, ((4.0, 4.0), (20.0, 25.0)), seed=3, spacing=3.0)
         names = sorted(path.name for path in (work / "again").iterdir())

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The bench of bodies: pairs of views of invented abdomens, with everything in the way of a match that an abdomen holds.
 
-Six individuals, each scanned five times under different conditions; each scan is a first view and others that overlap it less and less.
-The volumes are made once, by ./run study make --bodies, which takes a quarter of an hour, and lie in the user's cache.
+Six individuals, each scanned under six conditions; each scan is a first view and others that overlap it less and less.
+The volumes are made once, by ./run study make --bodies, at some five seconds each, and lie in the user's cache.
 """
 import dataclasses
 import os
@@ -21,7 +21,7 @@ INDIVIDUALS = range(1, 7)
 PROBE = Probe()
 STARTS = ((5.0, 5.0), (20.0, 25.0), (120.0, 60.0))  # degrees, mm: of a tracker, by hand, none
 DARK = 8.0  # grey: places in a black shadow are no landmarks
-REACH_MM = 35.0  # how far beside and below the face of the probe pressed tissue gives way: to 1/e
+REACH_MM = 35.0  # pressed tissue gives way by 1/e at this depth; sideways it is the sigma of a Gaussian
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +77,7 @@ class View:
         source.SetElements(96)
         source.SetSteps(64)
         source.SetSamples(384)
-        source.SetSubRays(4)  # nearly as many as the default's 8, in three quarters of the time
+        source.SetSubRays(4)  # half of the default's: they take three quarters of its time
         source.SetSpacingMm(spacing)
         source.SetProbeToWorld(matrix_of(self.place))
         source.SetRefraction(condition.refraction)

@@ -193,6 +193,37 @@ def plot_results(path, rows):
     plt.close(figure)
 
 
+def plot_bodies(path, rows):
+    """Of bodies: each answer a dot, beyond the floor, over the overlap, one panel for a size of start; and the median of processor time."""
+    methods = [method for method in in_order(rows) if method != "start"]
+    overlaps = sorted({row["overlap"] for row in rows}, reverse=True)
+    sizes = sorted({size_of(row) for row in rows if row["method"] != "start"})
+    figure, axes = plt.subplots(1, len(sizes) + 1, figsize=(4.6 * (len(sizes) + 1), 3.6), squeeze=False)
+    for number, method in enumerate(methods):
+        colour, shift = colour_of(method, methods), 0.12 * (number - (len(methods) - 1) / 2)
+        for axis, size in zip(axes[0], sizes):
+            groups = [[max(row["excess_mm"], 0.01) for row in rows if (row["method"], size_of(row), row["overlap"]) == (method, size, overlap)]
+                      for overlap in overlaps]
+            for place, errors in enumerate(groups):
+                axis.plot([place + shift] * len(errors), errors, "o", color=colour, markersize=3, alpha=0.7)
+            axis.plot(range(len(overlaps)), [np.median(errors) if errors else np.nan for errors in groups], "-", color=colour, label=method)
+            axis.set_yscale("log")
+            axis.set_ylabel(f"beyond the rigid floor, mm (start {size[0]}°, {size[1]} mm)")
+        seconds = [[row["cpu_seconds"] for row in rows if row["method"] == method and row["overlap"] == overlap] for overlap in overlaps]
+        axes[0, -1].plot(range(len(overlaps)), [np.median(one) if one else np.nan for one in seconds], "o-", color=colour)
+    axes[0, -1].set_ylabel("CPU seconds, median")
+    axes[0, -1].set_ylim(bottom=0)
+    for axis in axes[0]:
+        axis.set_xticks(range(len(overlaps)), [f"{100 * overlap:.0f}%" for overlap in overlaps])
+        axis.set_xlabel("overlap")
+        axis.spines[["top", "right"]].set_visible(False)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.tight_layout(rect=(0, 0.08, 1, 1))
+    figure.legend(handles, labels, loc="lower center", ncol=len(labels), frameon=False)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
 def two_colours(first, second, points):
     """Orange and blue that add up to grey where both agree; what is not real is white, what only one sees keeps its colour."""
     values = [volume.at(points) for volume in (first, second)]
@@ -251,9 +282,12 @@ def plot(folder, rows, out, show=None):
     out = pathlib.Path(out)
     out.mkdir(parents=True, exist_ok=True)
     (out / "table.md").write_text(tables(rows))
-    if any("scan" in row for row in rows):
-        (out / "bodies.md").write_text(tables_of_bodies(rows))
-    plot_results(out / "results.png", rows)
+    bodies = [row for row in rows if "scan" in row and "excess_mm" in row]
+    if bodies:
+        (out / "bodies.md").write_text(tables_of_bodies(bodies))
+        plot_bodies(out / "bodies.png", bodies)
+    if len(bodies) < len(rows):
+        plot_results(out / "results.png", [row for row in rows if "scan" not in row])
     pairs = [f"{row['case']}/{row['start']}" for row in rows]
     show = show or next((pair for pair in pairs if pair.startswith("plain/") and "20deg" in pair), pairs[0])
     shown = [row for row, pair in zip(rows, pairs) if pair == show]
