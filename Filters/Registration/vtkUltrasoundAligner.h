@@ -249,9 +249,9 @@ public:
 
   /**
    * What the last update did, as JSON: {"volumes": [{"name", "verdict", "reason", "error_mm", "similarity",
-   * "overlap", "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity", "overlap",
-   * "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds": {"global",
-   * "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}}. Empty when it failed.
+   * "overlap", "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity",
+   * "overlap", "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds":
+   * {"global", "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}}. Empty when it failed.
    */
   std::string GetReport() const;
 
