@@ -13,7 +13,9 @@ import unittest
 import unittest.mock
 
 import numpy as np
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
+import echorama
 from program_under_test import PROGRAM, SOURCE, run_json
 
 sys.path.insert(0, str(SOURCE / "Applications" / "study"))
@@ -30,6 +32,10 @@ QUICK = "--start tracked --points 2000"
 
 def quiet(*_):
     pass
+
+
+def grey_of(image):
+    return vtk_to_numpy(echorama.vtkUltrasoundVolume.GetIntensity(image)).reshape(image.GetDimensions()[::-1])
 
 
 class Study(unittest.TestCase):
@@ -71,7 +77,7 @@ class Study(unittest.TestCase):
 
     def test_the_floor_of_a_body(self):
         """Landmarks lie where bent sound shows pressed tissue: no rigid pose fits them better than the floor, the truth less well."""
-        from bodies import CONDITIONS, make_bodies
+        from bodies import CONDITIONS, make_bodies, make_impossible
         folder = work / "bodies"
         condition = dataclasses.replace(CONDITIONS["pressed_6"], overlaps=(0.75,))
         with unittest.mock.patch.dict(CONDITIONS, {"pressed_6": condition}):
@@ -86,6 +92,26 @@ class Study(unittest.TestCase):
         self.assertGreater(judge.figures(about(judge.points.mean(axis=0), pose((0.02, 0, 0))) @ case.floor)["excess_mm"], 0.1)
         self.assertLess(floor["tre_mm"], 3)  # tissue is seen within some mm of where it is
         self.assertEqual((case.properties["overlap"], case.properties["pressed_mm"]), (0.75, 6.0))
+
+        # Pairs without an answer start as far from where the right view lies as by a hand; only their verdicts count.
+        make_impossible(folder, ["pressed_6"], [1], say=quiet)
+        mirror, negative = (cases.Case(path) for path in cases.cases_in(folder / "impossible"))
+        self.assertEqual((mirror.impossible, negative.impossible), ("mirror image", "negative"))
+        right, back, dark = (grey_of(one.image(1)) for one in (case, mirror, negative))
+        np.testing.assert_array_equal(back, right[:, :, ::-1])
+        np.testing.assert_array_equal(dark, 255 - right)
+        for one in (mirror, negative):
+            (start,) = one.starts()
+            middle = np.array(case.image(1).GetCenter())[np.newaxis]
+            self.assertAlmostEqual(degrees_of(start.motion @ np.linalg.inv(case.truth)), 20, places=6)
+            self.assertAlmostEqual(np.linalg.norm(apply(start.motion, middle) - apply(case.truth, middle)), 25, places=6)
+        methods = {"quick": contestants.contestants(PROGRAM, [f"quick={QUICK}"])["quick"]}
+        rows = study.run(folder / "impossible", methods, PROGRAM, say=quiet)
+        self.assertEqual([(row["impossible"], row["method"], "tre_mm" in row) for row in rows],
+                         [("mirror image", "quick", False), ("negative", "quick", False)])
+        self.assertNotIn("aligned", [row["verdict"] for row in rows])
+        self.assertIn(f"| mirror image | quick | 1 | 0 | {(rows[0]['verdict'] == 'ambiguous') + 0} |", figures.tables_of_bodies(rows))
+        figures.plot(folder, rows, folder / "out")
 
     def test_tables_of_bodies(self):
         """Lost pairs count in the error beyond the floor but not in what is predicted; what was said to be aligned is held against the floor."""

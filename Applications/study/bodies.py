@@ -5,6 +5,8 @@ Six individuals, each scanned under six conditions; each scan is a first view an
 The volumes are made once, by ./run study make --bodies, at some five seconds each, and lie in the user's cache.
 """
 import dataclasses
+import itertools
+import json
 import os
 import pathlib
 
@@ -13,8 +15,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 
 import echorama
-from cases import both_see, knock_of, second_view, seen, write_case, write_image
-from geometry import Probe, apply, matrix_of, pose
+from cases import Case, both_see, knock_of, read_image, second_view, seen, write_case, write_image
+from geometry import Probe, about, apply, matrix_of, pose, random_motion, write_poses
 
 OVERLAPS = (0.75, 0.55, 0.45, 0.35, 0.25)
 INDIVIDUALS = range(1, 7)
@@ -165,3 +167,60 @@ def make_bodies(folder, scans=None, individuals=INDIVIDUALS, spacing=1.0, landma
     for name in scans or CONDITIONS:
         for seed in individuals:
             make_scan(pathlib.Path(folder), seed, name, spacing, landmarks, say)
+
+
+def changed(path, out, change):
+    """Writes a volume whose grey values and valid region a function of their array, slowest axis first, has changed."""
+    if not out.exists():
+        image = read_image(path)
+        shape = image.GetDimensions()[::-1]
+        for array in (echorama.vtkUltrasoundVolume.GetIntensity(image), echorama.vtkUltrasoundVolume.GetValidRegion(image)):
+            values = vtk_to_numpy(array).reshape(shape)
+            values[:] = change(values.copy(), array.GetName())
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_image(out, image)
+    return out
+
+
+def probe_to_world(image):
+    return np.array(image.GetFieldData().GetArray("ProbeToWorld").GetTuple(0)).reshape(4, 4)
+
+
+def mirrored(values, _):
+    return values[:, :, ::-1]
+
+
+def inverted(values, name):
+    return values if name == echorama.vtkUltrasoundVolume.ValidRegionName() else 255 - values
+
+
+def make_impossible(folder, scans=None, individuals=INDIVIDUALS, say=print):
+    """Cases without an answer, of the volumes that are there: the second view shows another body, or is a mirror image or a negative.
+
+    They start where the right second view would lie, turned and moved as by a hand: nothing but the images tells that they are wrong.
+    """
+    folder = pathlib.Path(folder)
+    wanted = []
+    for name in scans or [name for name, condition in CONDITIONS.items() if condition.overlaps == OVERLAPS]:
+        for number, (one, other) in enumerate(itertools.permutations(individuals, 2)):
+            wanted.append(("other body", name, one, other, OVERLAPS[number % len(OVERLAPS)]))
+        for number, one in enumerate(individuals):
+            overlap = OVERLAPS[number % len(OVERLAPS)]
+            wanted += [(kind, name, one, one, overlap) for kind in ("mirror image", "negative")]
+    for kind, name, one, other, overlap in wanted:
+        case = folder / "impossible" / f"{name}_{one}_{kind.replace(' ', '_')}_{other}_{100 * overlap:.0f}"
+        first, second = folder / f"{name}_{one}" / "first.mha", folder / f"{name}_{other}" / f"overlap_{100 * overlap:.0f}.mha"
+        truth = folder / f"{name}_{one}" / f"overlap_{100 * overlap:.0f}" / "truth.json"
+        if (case / "case.json").exists() or not (first.exists() and second.exists() and truth.exists()):
+            continue
+        say(case)
+        if kind != "other body":
+            second = changed(second, case / "second.mha", mirrored if kind == "mirror image" else inverted)
+        random = np.random.default_rng((one, other, *case.name.encode()))
+        right = Case(truth.parent)
+        place = right.truth @ probe_to_world(right.image(1)) @ np.linalg.inv(probe_to_world(read_image(second)))
+        middle = apply(place, np.array(read_image(second).GetCenter())[np.newaxis])[0]
+        place = about(middle, random_motion(random, *STARTS[1])) @ place
+        case.mkdir(parents=True, exist_ok=True)
+        write_poses(case / "start_20deg_25mm.json", [first, second], [np.eye(4), place])
+        (case / "case.json").write_text(json.dumps({"impossible": kind, "scan": name, "individual": one, "overlap": overlap}, indent=1))

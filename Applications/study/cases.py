@@ -4,7 +4,8 @@
 A case is a folder with two volumes and at least one of `truth.json` (a pose file: where the volumes belong) and `landmarks_1.csv`
 with `landmarks_2.csv` (or .fcsv, .mrk.json), in the frames of the files. `floor.json`, if it is there, is the pose in which the
 landmarks fit best: no rigid pose is nearer to what both volumes show, where sound is bent or tissue gives way. Every `start*.json` (a pose file) in it is one thing
-to align; without one the volumes start where their files say. `case.json` may name properties to plot against. The first volume stays.
+to align; without one the volumes start where their files say. `case.json` may name properties to plot against; with `impossible` among them the
+volumes belong nowhere beside each other, and only the verdict counts. The first volume stays.
 """
 import dataclasses
 import json
@@ -100,6 +101,15 @@ def knock_of(view, random):
     return about((view @ (0, 0, 55, 1))[:3], random_motion(random, 12, 30))
 
 
+def read_image(path):
+    reader = echorama.vtkUltrasoundReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    if reader.GetOutput().GetNumberOfPoints() == 0:
+        raise OSError(f"{path}: cannot be read")
+    return reader.GetOutput()
+
+
 def write_image(path, image):
     writer = echorama.vtkUltrasoundWriter()
     writer.SetInputDataObject(image)
@@ -188,7 +198,8 @@ class Case:
         if len(self.files) != 2:
             raise ValueError(f"{self.folder}: two volumes are needed; there are {len(self.files)}")
         self.landmarks = [next((path for path in self.folder.glob(f"landmarks_{number}.*")), None) for number in (1, 2)]
-        if self.truth is None and None in self.landmarks:
+        self.impossible = self.properties.get("impossible", "")
+        if self.truth is None and None in self.landmarks and not self.impossible:
             raise ValueError(f"{self.folder}: neither truth.json nor landmarks_1 and landmarks_2 is there")
 
     @staticmethod
@@ -204,13 +215,7 @@ class Case:
         return [Start(path.stem, path, self.relative(path)) for path in paths]
 
     def image(self, number):
-        reader = echorama.vtkUltrasoundReader()
-        reader.SetFileName(str(self.files[number]))
-        reader.Update()
-        image = reader.GetOutput()
-        if image.GetNumberOfPoints() == 0:
-            raise OSError(f"{self.files[number]}: cannot be read")
-        return image
+        return read_image(self.files[number])
 
     def points(self, number, count):
         """The same points of the valid region of a volume every time, in the frame of its file."""

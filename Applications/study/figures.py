@@ -79,7 +79,8 @@ def tables(rows):
 def tables_of_bodies(rows):
     """Markdown: how far from the rigid floor, by overlap and start; and what the stated errors and verdicts are worth, for either
     half of the individuals: one served to choose what was to be chosen, the other did not."""
-    rows = [row for row in rows if "scan" in row and row["method"] != "start"]
+    impossible = [row for row in rows if "impossible" in row]
+    rows = [row for row in rows if "excess_mm" in row and row["method"] != "start"]
     methods = in_order(rows)
     text = ["| overlap | start | method | pairs | beyond the floor, mm: median | 90% | worst | lost | aligned, and false | CPU seconds (median) |",
             "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
@@ -102,6 +103,11 @@ def tables_of_bodies(rows):
             if found:
                 ratio = np.array([row["tre_rms_mm"] / row["predicted_mm"] for row in found])
                 text.append(f"| {'odd' if half else 'even'} | {method} | {len(found)} | {np.median(ratio):.2f} | {percent((ratio <= 2).sum(), len(ratio))} |")
+    if impossible:
+        text += ["", "| second view | method | pairs | aligned | ambiguous | failed |", "| --- | --- | --- | --- | --- | --- |"]
+    for kind, method in sorted({(row["impossible"], row["method"]) for row in impossible}):
+        verdicts = [row["verdict"] for row in impossible if (row["impossible"], row["method"]) == (kind, method)]
+        text.append(f"| {kind} | {method} | {len(verdicts)} | {verdicts.count('aligned')} | {verdicts.count('ambiguous')} | {verdicts.count('failed')} |")
     return "\n".join(text) + "\n"
 
 
@@ -281,10 +287,15 @@ def plot(folder, rows, out, show=None):
         raise ValueError(f"{folder}: there are no results; run comes first")
     out = pathlib.Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    (out / "table.md").write_text(tables(rows))
-    bodies = [row for row in rows if "scan" in row and "excess_mm" in row]
+    bodies = [row for row in rows if "scan" in row]
     if bodies:
         (out / "bodies.md").write_text(tables_of_bodies(bodies))
+    rows = [row for row in rows if "impossible" not in row]
+    if not rows:
+        return
+    (out / "table.md").write_text(tables(rows))
+    bodies = [row for row in rows if "excess_mm" in row]
+    if bodies:
         plot_bodies(out / "bodies.png", bodies)
     if len(bodies) < len(rows):
         plot_results(out / "results.png", [row for row in rows if "scan" not in row])

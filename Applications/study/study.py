@@ -14,12 +14,12 @@ import time
 
 import numpy as np
 
-from bodies import CONDITIONS, INDIVIDUALS, default_folder, make_bodies
+from bodies import CONDITIONS, INDIVIDUALS, default_folder, make_bodies, make_impossible
 from cases import PAIRS, Case, cases_in, make
-from contestants import Answer, Failed, contestants, run_program
+from contestants import Answer, Echorama, Failed, contestants, run_program
 from geometry import apply, degrees_of, write_poses
 
-PROPERTIES = ["overlap", "gain_db", "noise_db", "rib", "decorrelation", "jets", "deformation_mm", "scan", "individual", "pressed_mm", "refraction"]
+PROPERTIES = ["overlap", "gain_db", "noise_db", "rib", "decorrelation", "jets", "deformation_mm", "scan", "individual", "pressed_mm", "refraction", "impossible"]
 COLUMNS = ["case", "start", "method", "verdict", "start_degrees", "start_mm", "tre_mm", "tre_voxels", "percentile95_mm", "landmarks_mm",
            "landmarks_max_mm", "floor_mm", "excess_mm", "beside_floor_mm", "predicted_mm", "seconds", "cpu_seconds", *PROPERTIES, "reason", "error"]
 
@@ -54,7 +54,9 @@ class Judge:
             beside = np.linalg.norm(apply(motion, self.points) - apply(self.case.floor, self.points), axis=1)
             found |= {"floor_mm": self.floor_mm, "excess_mm": found["landmarks_mm"] - self.floor_mm,
                       "beside_floor_mm": float(np.sqrt((beside ** 2).mean()))}
-        return found | {"tre_voxels": found["tre_mm"] / self.voxel}
+        if "tre_mm" in found:
+            found["tre_voxels"] = found["tre_mm"] / self.voxel
+        return found
 
     def size_of_start(self, start):
         """How far a start is off: degrees, and mm at the middle of the volume; nothing without a truth."""
@@ -102,8 +104,8 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
             continue
         for start in chosen:
             for method, contestant in {"start": None, **methods}.items():
-                if (name, start.name, method) in done:
-                    continue
+                if (name, start.name, method) in done or (case.impossible and not isinstance(contestant, Echorama)):
+                    continue  # there is only a verdict to judge
                 row = {"case": name, "start": start.name, "method": method, **judge.size_of_start(start),
                        **{key: case.properties[key] for key in PROPERTIES if key in case.properties}}
                 try:
@@ -123,7 +125,8 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
                 row.setdefault("reason", answer.reason)
                 with open(folder / "results.jsonl", "a") as stream:
                     stream.write(json.dumps(row) + "\n")
-                say(f"{name} {start.name} {method}: {row['tre_mm']:.3f} mm, {row['seconds']:.1f} s {row['verdict']}"
+                error = f"{row['tre_mm']:.3f} mm, " if "tre_mm" in row else ""
+                say(f"{name} {start.name} {method}: {error}{row['seconds']:.1f} s {row['verdict']}"
                     + (f" ({row['error']})" if "error" in row else ""))
     rows = results_of(folder)
     write_table(folder, rows)
@@ -167,6 +170,7 @@ def main(arguments=None):
     try:
         if options.command == "make" and options.bodies:
             make_bodies(options.folder, options.pairs, options.individuals, options.spacing)
+            make_impossible(options.folder, options.pairs, options.individuals)
         elif options.command == "make":
             make(options.folder, options.pairs, options.seed, options.repeats, options.spacing)
         elif options.command == "run":

@@ -41,6 +41,7 @@ constexpr double FinalStop = 2e-5; // voxels: where the answer stops should tell
 constexpr double Slack = 1.5;      // how much further from the start than was said an answer may be
 constexpr double TrackedDegrees = 12.0, TrackedMm = 20.0, HandMadeDegrees = 35.0;
 constexpr int ManyCandidates = 4; // times as many
+constexpr int FewPoints = 4;      // candidates are compared by this many times fewer points than the answer
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level
 // Less similarity needs a pose that is better determined. Where two bodies have nothing in common but layers that run alike, the
@@ -161,7 +162,7 @@ public:
     // tracker's start alone, where it keeps a rig that can turn about an axis nearer to where the tracker has it.
     start = Clock::now();
     std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.65));
-    if (p_.start == AlignStart::Tracked)
+    if (p_.start == AlignStart::Tracked && !found.empty())
       poses.clear();
     for (std::size_t i = 0; i < std::min<std::size_t>(Finalists, found.size()); ++i)
       poses.push_back(found[i].volumeToWorld);
@@ -199,7 +200,8 @@ public:
       result.localSeconds = SecondsSince(start);
       return result;
     }
-    const LocalAlignResult best = Local(found.front().volumeToWorld, middleMm, finestMm_, 0, progress.Part(0.8, 0.9), FinalStop);
+    const LocalAlignResult best =
+        Local(found.front().volumeToWorld, middleMm, finestMm_, p_.points, 0, progress.Part(0.8, 0.9), FinalStop);
     result.localSeconds = SecondsSince(start);
     if (!landmarks_.Agrees(best.volumeToWorld)) {
       result.reason = "the pose that fits best contradicts the landmarks: " + landmarks_.Worst(best.volumeToWorld);
@@ -223,8 +225,8 @@ public:
     result.errorMm = shape_.Error(covariance, best.centre, best.volumeToWorld);
     std::array<Pose, 2> halves;
     for (int half = 0; half < 2; ++half)
-      halves[static_cast<std::size_t>(half)] = Local(best.volumeToWorld, std::max(finestMm_, 0.5 * middleMm), finestMm_, half + 1,
-                                                     progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
+      halves[static_cast<std::size_t>(half)] = Local(best.volumeToWorld, std::max(finestMm_, 0.5 * middleMm), finestMm_,
+                                                     p_.points, half + 1, progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
                                                    .volumeToWorld;
     result.splitMm = shape_.Distance(halves[0], halves[1]);
     Judge(p_, covariance, shape_.radius, result);
@@ -236,13 +238,13 @@ public:
   bool LandmarksDecide() const { return landmarksDecide_; }
 
 private:
-  LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int part, const Progress& progress,
+  LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int points, int part, const Progress& progress,
                          double stopVoxels = LocalAlignParameters().stopVoxels) const
   {
     LocalAlignParameters local;
     local.coarsestMm = coarsestMm;
     local.finestMm = finestMm;
-    local.points = p_.points;
+    local.points = points;
     local.minimumOverlap = 0.5 * p_.minimumOverlap;
     local.part = part;
     local.stopVoxels = stopVoxels;
@@ -305,8 +307,9 @@ private:
   {
     std::vector<LocalAlignResult> all, different;
     const double count = static_cast<double>(poses.size());
+    const int points = std::max(p_.points / FewPoints, static_cast<int>(ComparedPoints.low));
     for (std::size_t i = 0; i < poses.size(); ++i)
-      all.push_back(Local(poses[i], coarsestMm, finestMm, 0,
+      all.push_back(Local(poses[i], coarsestMm, finestMm, points, 0,
                           progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count)));
     std::stable_sort(all.begin(), all.end(),
                      [](const LocalAlignResult& a, const LocalAlignResult& b) { return Evidence(a) > Evidence(b); });

@@ -90,6 +90,7 @@ private:
   void FindTheLost(const Progress& progress);
   std::vector<Numbers> PairsToTryAgain() const;
   AlignVolumesResult Report() const;
+  std::vector<bool> JoinedByClearPairs() const;
   void StateErrors(AlignVolumesResult& result) const;
   std::string WhyDoubtful(int v) const;
   std::string WhyFailed(int v) const;
@@ -463,11 +464,29 @@ AlignVolumesResult Alignment::Report() const
   return result;
 }
 
+// Which volumes pairs that were clear by themselves join to those that stay.
+std::vector<bool> Alignment::JoinedByClearPairs() const
+{
+  std::vector<bool> joined = held_;
+  for (bool grows = true; grows;) {
+    grows = false;
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      const auto a = Index(edges_[e].first), b = Index(edges_[e].second);
+      if (joined[a] != joined[b] && !graph_.isWrong[e] && attempts_.at(edges_[e]).edge.verified)
+        joined[a] = joined[b] = grows = true;
+    }
+  }
+  return joined;
+}
+
 // What the images leave open, along all pairs to the fixed volume, and what they cannot show: sound that is faster or slower than
 // the scanner takes it for stretches what each volume shows about its own face. Rays that are bent do about the same. Two views
 // that lie apart then fit best where neither is, by that share of their distance, and no pair of a chain sees it.
+// Pairs that leave a pose open do not determine it by agreeing: what misled one (a rig that can turn about an axis) may have
+// misled all. So what no clear pair places must be known as exactly from all as from one.
 void Alignment::StateErrors(AlignVolumesResult& result) const
 {
+  const std::vector<bool> isClear = JoinedByClearPairs();
   const auto middle = [&](int v) { return result.volumes[Index(v)].volumeToWorld * shapes_[Index(v)].centroid; };
   for (int v = 0; v < Count(); ++v) {
     VolumeAlignment& volume = result.volumes[Index(v)];
@@ -479,7 +498,17 @@ void Alignment::StateErrors(AlignVolumesResult& result) const
     if (IsHeld(v) || volume.verdict == Verdict::Failed)
       continue;
     const double bentMm = p_.pair.soundSpeedError * (middle(v) - middle(fixed_)).norm();
-    volume.errorMm = std::hypot(shapes_[Index(v)].Error(volume.covariance, volume.centre, volume.volumeToWorld), bentMm);
+    const double openMm = shapes_[Index(v)].Error(volume.covariance, volume.centre, volume.volumeToWorld);
+    volume.errorMm = std::hypot(openMm, bentMm);
+    double voxelMm = 0.0;
+    for (const auto& [numbers, attempt] : attempts_)
+      if (attempt.stands && (numbers.first == v || numbers.second == v))
+        voxelMm = std::max(voxelMm, attempt.pair.alignment.voxelMm);
+    if (volume.verdict == Verdict::Aligned && !isClear[Index(v)] && openMm > p_.pair.maximumErrorVoxels * voxelMm) {
+      volume.verdict = Verdict::Ambiguous;
+      volume.reason =
+          "the image contents do not determine its pose: by all pairs together it may be off by " + Millimetres(openMm);
+    }
     if (volume.verdict == Verdict::Aligned && volume.errorMm > p_.pair.maximumErrorMm) {
       volume.verdict = Verdict::Ambiguous;
       volume.reason =
