@@ -84,6 +84,7 @@ public:
       found.centre = fixed.volumeToWorld * truth[a].inverse() * (0.5 * (truth[a] * -Corner() + truth[b] * -Corner()));
       found.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (0.05 * 0.05)),
           Eigen::Vector3d::Constant(1.0 / (0.002 * 0.002));
+      found.information /= looseness * looseness;
       return found;
     };
   }
@@ -112,6 +113,7 @@ public:
   std::map<Numbers, Pose> lies;
   std::map<Numbers, Verdict> verdicts;
   bool isStubborn = true; // lies again when asked again
+  double looseness = 1.0; // how much less the pairs say that they know
   std::vector<std::pair<Numbers, AlignStart>> calls;
 };
 
@@ -292,6 +294,33 @@ TEST(AlignVolumes, ChainsAreAsSureAsTheirPairs)
   ring.verdicts = {{{0, 2}, Verdict::Ambiguous}, {{1, 2}, Verdict::Ambiguous}};
   result = AlignVolumes(ring.Volumes(), 0, Tracked(), {}, ring.Aligner());
   EXPECT_EQ(result.volumes[2].verdict, Verdict::Aligned) << result.volumes[2].reason;
+}
+
+// Pairs with several answers that agree on one are right; pairs that leave a pose open may agree because one thing misled them
+// all.
+TEST(AlignVolumes, AgreementDeterminesNothingThatAllPairsLeaveOpen)
+{
+  Ring ring(3);
+  AlignVolumesParameters p = Tracked();
+  p.pair.maximumErrorMm = 100.0;
+  for (const Numbers& pair : {Numbers(0, 1), Numbers(0, 2), Numbers(1, 2)})
+    ring.verdicts[pair] = Verdict::Ambiguous;
+  AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  for (const std::size_t v : {1u, 2u})
+    EXPECT_EQ(result.volumes[v].verdict, Verdict::Aligned) << result.volumes[v].reason;
+
+  ring.looseness = 40.0;
+  result = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  for (const std::size_t v : {1u, 2u}) {
+    EXPECT_EQ(result.volumes[v].verdict, Verdict::Ambiguous);
+    EXPECT_NE(result.volumes[v].reason.find("do not determine its pose"), std::string::npos) << result.volumes[v].reason;
+    EXPECT_GT(result.volumes[v].errorMm, 1.0);
+  }
+
+  ring.verdicts.clear(); // what clear pairs place may add up to more than a voxel
+  result = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  for (const std::size_t v : {1u, 2u})
+    EXPECT_EQ(result.volumes[v].verdict, Verdict::Aligned) << result.volumes[v].reason;
 }
 
 TEST(AlignVolumes, ATriangleKnowsOnlyThatSomethingIsWrong)
