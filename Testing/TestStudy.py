@@ -94,7 +94,8 @@ class Study(unittest.TestCase):
         self.assertEqual((case.properties["overlap"], case.properties["pressed_mm"]), (0.75, 6.0))
 
         # Pairs without an answer start as far from where the right view lies as by a hand; only their verdicts count.
-        make_impossible(folder, ["pressed_6"], [1], say=quiet)
+        with unittest.mock.patch("bodies.OVERLAPS", (0.75,)):
+            make_impossible(folder, ["pressed_6"], [1], say=quiet)
         mirror, negative = (cases.Case(path) for path in cases.cases_in(folder / "impossible"))
         self.assertEqual((mirror.impossible, negative.impossible), ("mirror image", "negative"))
         right, back, dark = (grey_of(one.image(1)) for one in (case, mirror, negative))

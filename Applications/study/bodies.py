@@ -202,12 +202,10 @@ def make_impossible(folder, scans=None, individuals=INDIVIDUALS, say=print):
     folder = pathlib.Path(folder)
     wanted = []
     for name in scans or [name for name, condition in CONDITIONS.items() if condition.overlaps == OVERLAPS]:
-        for number, (one, other) in enumerate(itertools.permutations(individuals, 2)):
-            wanted.append(("other body", name, one, other, OVERLAPS[number % len(OVERLAPS)]))
-        for number, one in enumerate(individuals):
-            overlap = OVERLAPS[number % len(OVERLAPS)]
-            wanted += [(kind, name, one, one, overlap) for kind in ("mirror image", "negative")]
-    for kind, name, one, other, overlap in wanted:
+        wanted += [("other body", name, *two) for two in itertools.permutations(individuals, 2)]
+        wanted += [(kind, name, one, one) for one in individuals for kind in ("mirror image", "negative")]
+    for kind, name, one, other in wanted:
+        overlap = OVERLAPS[(2 * one + other) % len(OVERLAPS)]
         case = folder / "impossible" / f"{name}_{one}_{kind.replace(' ', '_')}_{other}_{100 * overlap:.0f}"
         first, second = folder / f"{name}_{one}" / "first.mha", folder / f"{name}_{other}" / f"overlap_{100 * overlap:.0f}.mha"
         truth = folder / f"{name}_{one}" / f"overlap_{100 * overlap:.0f}" / "truth.json"
