@@ -18,27 +18,17 @@ from xml.sax.saxutils import escape, quoteattr
 
 WIDTH = 130
 MULTI_LINE = {"Scene"}  # texts that are edited in a field of several lines
-TYPES = {"number": "double", "integer": "int", "integer64": "vtkTypeInt64", "choice": "int", "switch": "bool"}
+MACROS = {"number": "Number", "integer": "Integer", "integer64": "Integer64", "switch": "Switch", "choice": "Choice", "name": "Text", "text": "Text",
+          "vector": "Vector"}
 
 COMMON = """
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
 """
 
 
@@ -124,28 +114,11 @@ def setters(one):
     lines = []
     if kind == "choice":
         lines += [f"  enum {plural(name)} {{ " + ", ".join(f"{constant(choice)} = {i}" for i, choice in enumerate(one["choices"])) + " };", ""]
-    lines += ["  ///@{", comment(text)]
-    if kind == "vector":
-        lines += [f"  void Set{name}(double x, double y, double z)", "  {", "    const double value[3] = {x, y, z};",
-                  f"    this->Set{name}(value);", "  }",
-                  f"  void Set{name}(const double value[3]) {{ this->SetParameterAsVector(\"{name}\", value); }}",
-                  f"  double* Get{name}() VTK_SIZEHINT(3) {{ return this->GetParameterAsVector(\"{name}\"); }}"]
-    elif kind in ("name", "text"):
-        lines += [f"  void Set{name}(const char* value) {{ this->SetParameterAsText(\"{name}\", value); }}",
-                  f"  std::string Get{name}() {{ return this->GetParameterAsText(\"{name}\"); }}"]
-    elif kind == "integer64":
-        lines += [f"  void Set{name}(vtkTypeInt64 value) {{ this->SetParameterAsInteger(\"{name}\", value); }}",
-                  f"  vtkTypeInt64 Get{name}() {{ return this->GetParameterAsInteger(\"{name}\"); }}"]
-    else:
-        got = f"this->GetParameter(\"{name}\")"
-        got = {"integer": f"static_cast<int>({got})", "choice": f"static_cast<int>({got})", "switch": f"{got} != 0.0"}.get(kind, got)
-        lines += [f"  void Set{name}({TYPES[kind]} value) {{ this->SetParameter(\"{name}\", value); }}",
-                  f"  {TYPES[kind]} Get{name}() {{ return {got}; }}"]
-        if kind == "switch":
-            lines += [f"  void {name}On() {{ this->Set{name}(true); }}", f"  void {name}Off() {{ this->Set{name}(false); }}"]
-        if kind == "choice":
-            lines += [f"  void Set{name}To{camel(choice)}() {{ this->Set{name}({constant(choice)}); }}" for choice in one["choices"]]
-            lines += [f"  std::string Get{name}AsString() {{ return this->GetParameterAsText(\"{name}\"); }}"]
+    made = f"  vtkUltrasound{MACROS[kind]}Macro({name});"
+    if kind != "choice":
+        return "\n".join([comment(text), made])
+    lines += ["  ///@{", comment(text), made]
+    lines += [f"  void Set{name}To{camel(choice)}() {{ this->Set{name}({constant(choice)}); }}" for choice in one["choices"]]
     return "\n".join([*lines, "  ///@}"])
 
 

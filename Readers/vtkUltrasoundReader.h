@@ -37,6 +37,7 @@
 
 #include "EchoramaReadersModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <string> // for the notes
 #include <vector> // for the notes
@@ -44,7 +45,6 @@
 #ifndef __VTK_WRAP__
 #include "Core/Base/JoinedText.h"
 #include "Readers/VolumeSource.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkXMLImageDataReader;
@@ -73,47 +73,25 @@ public:
   std::string GetNotes() const { return echorama::Joined(this->Notes, "\n"); }
 
   // BEGIN parameters
-  ///@{
   /**
    * Edge of the voxels that a file of beams (GE Kretz) is scan-converted to. 0 takes about as many voxels inside the fan as there
    * are samples. In [0, 1000] mm; default 0.
    */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /**
    * Spacing of a stack of pictures: along x, along y and from picture to picture. Where it is 0, that of the files is taken, else
    * 1 mm, with a note. Other formats know theirs. At least 0 mm; default (0, 0, 0).
    */
-  void SetStackSpacingMm(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetStackSpacingMm(value);
-  }
-  void SetStackSpacingMm(const double value[3]) { this->SetParameterAsVector("StackSpacingMm", value); }
-  double* GetStackSpacingMm() VTK_SIZEHINT(3) { return this->GetParameterAsVector("StackSpacingMm"); }
-  ///@}
+  vtkUltrasoundVectorMacro(StackSpacingMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

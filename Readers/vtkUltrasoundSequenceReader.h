@@ -40,14 +40,11 @@
 
 #include "EchoramaReadersModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <memory> // for what is open
 #include <string> // for the notes
 #include <vector> // for the notes
-
-#ifndef __VTK_WRAP__
-#include "vtkUltrasoundParameters.h"
-#endif
 
 class vtkPolyData;
 
@@ -73,49 +70,29 @@ public:
   ///@}
 
   // BEGIN parameters
-  ///@{
   /**
    * The frame of coordinates that is the world. Empty takes the first of Reference, World and Tracker that transforms lead to
    * from the image (from anything, when none begins at the image), else the only frame that transforms lead to and none leads
    * from; where that leaves a choice, it has to be made here. Default none.
    */
-  void SetWorldFrame(const char* value) { this->SetParameterAsText("WorldFrame", value); }
-  std::string GetWorldFrame() { return this->GetParameterAsText("WorldFrame"); }
-  ///@}
+  vtkUltrasoundTextMacro(WorldFrame);
 
-  ///@{
   /** The frame of coordinates that counts pixels. Default Image. */
-  void SetImageFrame(const char* value) { this->SetParameterAsText("ImageFrame", value); }
-  std::string GetImageFrame() { return this->GetParameterAsText("ImageFrame"); }
-  ///@}
+  vtkUltrasoundTextMacro(ImageFrame);
 
-  ///@{
   /**
    * Whose track output 1 is: a frame of coordinates. Empty takes the image where it can be placed, else every frame that a
    * transform of the file begins at and that can be placed. Default none.
    */
-  void SetToolFrame(const char* value) { this->SetParameterAsText("ToolFrame", value); }
-  std::string GetToolFrame() { return this->GetParameterAsText("ToolFrame"); }
-  ///@}
+  vtkUltrasoundTextMacro(ToolFrame);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

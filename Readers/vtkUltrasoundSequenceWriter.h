@@ -26,6 +26,7 @@
 #define vtkUltrasoundSequenceWriter_h
 
 #include "EchoramaReadersModule.h"
+#include "vtkUltrasoundParameters.h"
 #include "vtkWriter.h"
 
 #include <string> // for the notes
@@ -34,7 +35,6 @@
 #ifndef __VTK_WRAP__
 #include "Core/Base/JoinedText.h"
 #include "Core/Base/Progress.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAREADERS_EXPORT vtkUltrasoundSequenceWriter : public vtkWriter {
@@ -59,32 +59,16 @@ public:
   std::string GetNotes() const { return echorama::Joined(this->Notes, "\n"); }
 
   // BEGIN parameters
-  ///@{
   /** Whether pixels are compressed, without loss. Default on. */
-  void SetUseCompression(bool value) { this->SetParameter("UseCompression", value); }
-  bool GetUseCompression() { return this->GetParameter("UseCompression") != 0.0; }
-  void UseCompressionOn() { this->SetUseCompression(true); }
-  void UseCompressionOff() { this->SetUseCompression(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(UseCompression);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

@@ -40,10 +40,10 @@
 #include "EchoramaTrackingModule.h"
 #include "vtkMath.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Calibration/HandEye.h"
-#include "vtkUltrasoundParameters.h"
 #include <vector>
 #endif
 #include <string>
@@ -90,108 +90,55 @@ public:
   std::string GetReport() const { return this->Report; }
 
   // BEGIN parameters
-  ///@{
   /** Where in the volume the error counts, in the volume's frame: usually its centre. In mm; default (0, 0, 0). */
-  void SetTarget(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetTarget(value);
-  }
-  void SetTarget(const double value[3]) { this->SetParameterAsVector("Target", value); }
-  double* GetTarget() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Target"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Target);
 
-  ///@{
   /** Standard deviation of the sensor's turns by the tracker, about each of its own axes. In [0, 45] degrees; default 0.25. */
-  void SetSensorNoiseDegrees(double value) { this->SetParameter("SensorNoiseDegrees", value); }
-  double GetSensorNoiseDegrees() { return this->GetParameter("SensorNoiseDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SensorNoiseDegrees);
 
-  ///@{
   /** Standard deviation of the sensor's position by the tracker, along each of its own axes. In [0, 100] mm; default 0.7. */
-  void SetSensorNoiseMm(double value) { this->SetParameter("SensorNoiseMm", value); }
-  double GetSensorNoiseMm() { return this->GetParameter("SensorNoiseMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SensorNoiseMm);
 
-  ///@{
   /** Standard deviation of the turns of the alignments, about each axis of the volume. In [0, 45] degrees; default 0.25. */
-  void SetVolumeNoiseDegrees(double value) { this->SetParameter("VolumeNoiseDegrees", value); }
-  double GetVolumeNoiseDegrees() { return this->GetParameter("VolumeNoiseDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(VolumeNoiseDegrees);
 
-  ///@{
   /** Standard deviation of the target's place by the alignments, along each axis of the volume. In [0, 100] mm; default 0.7. */
-  void SetVolumeNoiseMm(double value) { this->SetParameter("VolumeNoiseMm", value); }
-  double GetVolumeNoiseMm() { return this->GetParameter("VolumeNoiseMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(VolumeNoiseMm);
 
-  ///@{
   /**
    * Whether the noise is estimated from the residuals: its size from five scans that agree; from eight also the ratio of its
    * parts, and about which point of the volume alignments err, where residuals contradict what is stated. Otherwise it stays as
    * stated. Notes say which. Default on.
    */
-  void SetEstimateNoise(bool value) { this->SetParameter("EstimateNoise", value); }
-  bool GetEstimateNoise() { return this->GetParameter("EstimateNoise") != 0.0; }
-  void EstimateNoiseOn() { this->SetEstimateNoise(true); }
-  void EstimateNoiseOff() { this->SetEstimateNoise(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(EstimateNoise);
 
-  ///@{
   /** Whether scans that do not agree with the others are left out, and named. Default on. */
-  void SetRejectOutliers(bool value) { this->SetParameter("RejectOutliers", value); }
-  bool GetRejectOutliers() { return this->GetParameter("RejectOutliers") != 0.0; }
-  void RejectOutliersOn() { this->SetRejectOutliers(true); }
-  void RejectOutliersOff() { this->SetRejectOutliers(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(RejectOutliers);
 
-  ///@{
   /** Seed of the search for scans that agree. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Name of the array of the sensor's poses. When it is not there, the only one of 16 components is taken. Default
    * SensorToTracker.
    */
-  void SetSensorArray(const char* value) { this->SetParameterAsText("SensorArray", value); }
-  std::string GetSensorArray() { return this->GetParameterAsText("SensorArray"); }
-  ///@}
+  vtkUltrasoundTextMacro(SensorArray);
 
-  ///@{
   /** Name of the array of the alignments. When it is not there, the only one of 16 components is taken. Default VolumeToWorld. */
-  void SetVolumeArray(const char* value) { this->SetParameterAsText("VolumeArray", value); }
-  std::string GetVolumeArray() { return this->GetParameterAsText("VolumeArray"); }
-  ///@}
+  vtkUltrasoundTextMacro(VolumeArray);
 
-  ///@{
   /**
    * Name of the array of the scans' names. When both inputs have it, scans belong together by name, else by order. Default Name.
    */
-  void SetNameArray(const char* value) { this->SetParameterAsText("NameArray", value); }
-  std::string GetNameArray() { return this->GetParameterAsText("NameArray"); }
-  ///@}
+  vtkUltrasoundTextMacro(NameArray);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

@@ -22,10 +22,10 @@
 
 #include "EchoramaTrackingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Devices/OpenIgtLinkServer.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkMatrix4x4;
@@ -61,66 +61,38 @@ public:
   vtkIdType GetNumberOfDroppedMessages() { return static_cast<vtkIdType>(this->Statistics().dropped); }
 
   // BEGIN parameters
-  ///@{
   /**
    * Where it listens: 127.0.0.1 for this machine alone, 0.0.0.0 for all that can reach it (OpenIGTLink knows no passwords).
    * Default 127.0.0.1.
    */
-  void SetHost(const char* value) { this->SetParameterAsText("Host", value); }
-  std::string GetHost() { return this->GetParameterAsText("Host"); }
-  ///@}
+  vtkUltrasoundTextMacro(Host);
 
-  ///@{
   /** The port that clients connect to; 0 takes one that is free. In [0, 65535]; default 18944. */
-  void SetPort(int value) { this->SetParameter("Port", value); }
-  int GetPort() { return static_cast<int>(this->GetParameter("Port")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Port);
 
-  ///@{
   /** What the volume is called there: 1 to 20 bytes. Default Volume. */
-  void SetDeviceName(const char* value) { this->SetParameterAsText("DeviceName", value); }
-  std::string GetDeviceName() { return this->GetParameterAsText("DeviceName"); }
-  ///@}
+  vtkUltrasoundTextMacro(DeviceName);
 
-  ///@{
   /**
    * Whether volume and transforms are sent with their own numbers, so that they lie where the poses of a tracker lie that 3D
    * Slicer is given as they are. Off: both are turned from L, P, S to R, A, S, so that patients lie in 3D Slicer as they should.
    * Default off.
    */
-  void SetKeepCoordinates(bool value) { this->SetParameter("KeepCoordinates", value); }
-  bool GetKeepCoordinates() { return this->GetParameter("KeepCoordinates") != 0.0; }
-  void KeepCoordinatesOn() { this->SetKeepCoordinates(true); }
-  void KeepCoordinatesOff() { this->SetKeepCoordinates(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(KeepCoordinates);
 
-  ///@{
   /**
    * How long an update waits for a first client when there is none, and then again until the volume has been handed over. For
    * scripts that end after their update. In [0, 3600] s; default 0.
    */
-  void SetWaitSeconds(double value) { this->SetParameter("WaitSeconds", value); }
-  double GetWaitSeconds() { return this->GetParameter("WaitSeconds"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WaitSeconds);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

@@ -29,12 +29,12 @@
 
 #include "EchoramaTrackingModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <string> // for the report
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Calibration/PivotCalibration.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMATRACKING_EXPORT vtkUltrasoundPivotCalibration : public vtkPolyDataAlgorithm {
@@ -56,82 +56,43 @@ public:
   std::string GetReport() const { return this->Report; }
 
   // BEGIN parameters
-  ///@{
   /** The tool, by its name in ToolNames. Empty takes the only one. Default none. */
-  void SetTool(const char* value) { this->SetParameterAsText("Tool", value); }
-  std::string GetTool() { return this->GetParameterAsText("Tool"); }
-  ///@}
+  vtkUltrasoundTextMacro(Tool);
 
-  ///@{
   /** The point array of 16 numbers that holds the poses, from the tool to the world. Default ToolToWorld. */
-  void SetPoseArray(const char* value) { this->SetParameterAsText("PoseArray", value); }
-  std::string GetPoseArray() { return this->GetParameterAsText("PoseArray"); }
-  ///@}
+  vtkUltrasoundTextMacro(PoseArray);
 
-  ///@{
   /** Standard deviation of the angle of a pose, about each axis of the tool. In [0, 45] degrees; default 0.25. */
-  void SetNoiseDegrees(double value) { this->SetParameter("NoiseDegrees", value); }
-  double GetNoiseDegrees() { return this->GetParameter("NoiseDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(NoiseDegrees);
 
-  ///@{
   /** Standard deviation of the position of a pose, along each axis of the tool. In (0, 100] mm; default 0.7. */
-  void SetNoiseMm(double value) { this->SetParameter("NoiseMm", value); }
-  double GetNoiseMm() { return this->GetParameter("NoiseMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(NoiseMm);
 
-  ///@{
   /**
    * Whether the noise is scaled to what the residuals say. Off: it is taken as stated, and decides what is an outlier. Default
    * on.
    */
-  void SetEstimateNoise(bool value) { this->SetParameter("EstimateNoise", value); }
-  bool GetEstimateNoise() { return this->GetParameter("EstimateNoise") != 0.0; }
-  void EstimateNoiseOn() { this->SetEstimateNoise(true); }
-  void EstimateNoiseOff() { this->SetEstimateNoise(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(EstimateNoise);
 
-  ///@{
   /** Whether poses at which the tip was not in place are left out. Default on. */
-  void SetRejectOutliers(bool value) { this->SetParameter("RejectOutliers", value); }
-  bool GetRejectOutliers() { return this->GetParameter("RejectOutliers") != 0.0; }
-  void RejectOutliersOn() { this->SetRejectOutliers(true); }
-  void RejectOutliersOff() { this->SetRejectOutliers(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(RejectOutliers);
 
-  ///@{
   /**
    * What every direction of the tool must swing by (RMS), less what the noise pretends; otherwise the tip is refused. In [0.1,
    * 45] degrees; default 2.
    */
-  void SetLeastSwing(double value) { this->SetParameter("LeastSwing", value); }
-  double GetLeastSwing() { return this->GetParameter("LeastSwing"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LeastSwing);
 
-  ///@{
   /** Seed of the search among poses with outliers. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

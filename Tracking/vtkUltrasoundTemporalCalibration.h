@@ -20,12 +20,12 @@
 
 #include "EchoramaTrackingModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <string> // for the report
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Calibration/TemporalCalibration.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMATRACKING_EXPORT vtkUltrasoundTemporalCalibration : public vtkPolyDataAlgorithm {
@@ -47,23 +47,14 @@ public:
   std::string GetReport() const { return this->Report; }
 
   // BEGIN parameters
-  ///@{
   /** The tool of the first track, by its name in ToolNames. Empty takes the only one. Default none. */
-  void SetFirstTool(const char* value) { this->SetParameterAsText("FirstTool", value); }
-  std::string GetFirstTool() { return this->GetParameterAsText("FirstTool"); }
-  ///@}
+  vtkUltrasoundTextMacro(FirstTool);
 
-  ///@{
   /** The tool of the second track, by its name in ToolNames. Empty takes the only one. Default none. */
-  void SetSecondTool(const char* value) { this->SetParameterAsText("SecondTool", value); }
-  std::string GetSecondTool() { return this->GetParameterAsText("SecondTool"); }
-  ///@}
+  vtkUltrasoundTextMacro(SecondTool);
 
-  ///@{
   /** The point array of 16 numbers that holds the poses, in both tracks. Default ToolToWorld. */
-  void SetPoseArray(const char* value) { this->SetParameterAsText("PoseArray", value); }
-  std::string GetPoseArray() { return this->GetParameterAsText("PoseArray"); }
-  ///@}
+  vtkUltrasoundTextMacro(PoseArray);
 
   enum Signals { AUTOMATIC = 0, ROTATION = 1, TRANSLATION = 2 };
 
@@ -73,67 +64,37 @@ public:
    * follow one point; or of rotation, and where that does not tell, of translation. Default automatic. There are AUTOMATIC,
    * ROTATION, TRANSLATION.
    */
-  void SetSignal(int value) { this->SetParameter("Signal", value); }
-  int GetSignal() { return static_cast<int>(this->GetParameter("Signal")); }
+  vtkUltrasoundChoiceMacro(Signal);
   void SetSignalToAutomatic() { this->SetSignal(AUTOMATIC); }
   void SetSignalToRotation() { this->SetSignal(ROTATION); }
   void SetSignalToTranslation() { this->SetSignal(TRANSLATION); }
-  std::string GetSignalAsString() { return this->GetParameterAsText("Signal"); }
   ///@}
 
-  ///@{
   /** How far the search goes either way. In (0, 3600] s; default 5. */
-  void SetLargestOffset(double value) { this->SetParameter("LargestOffset", value); }
-  double GetLargestOffset() { return this->GetParameter("LargestOffset"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LargestOffset);
 
-  ///@{
   /**
    * Standard deviation of the window that poses are smoothed with, made at least the time between two poses. In [0.005, 2] s;
    * default 0.05.
    */
-  void SetSmoothing(double value) { this->SetParameter("Smoothing", value); }
-  double GetSmoothing() { return this->GetParameter("Smoothing"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Smoothing);
 
-  ///@{
   /** Poses further apart are not connected. In (0, 600] s; default 0.5. */
-  void SetLongestGap(double value) { this->SetParameter("LongestGap", value); }
-  double GetLongestGap() { return this->GetParameter("LongestGap"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LongestGap);
 
-  ///@{
   /** What both streams must have in common at every offset that is looked at. In [0.5, 3600] s; default 3. */
-  void SetLeastOverlap(double value) { this->SetParameter("LeastOverlap", value); }
-  double GetLeastOverlap() { return this->GetParameter("LeastOverlap"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LeastOverlap);
 
-  ///@{
   /** Whether a drift between the clocks, where one was found, is taken out of the times too. Default on. */
-  void SetCorrectDrift(bool value) { this->SetParameter("CorrectDrift", value); }
-  bool GetCorrectDrift() { return this->GetParameter("CorrectDrift") != 0.0; }
-  void CorrectDriftOn() { this->SetCorrectDrift(true); }
-  void CorrectDriftOff() { this->SetCorrectDrift(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(CorrectDrift);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

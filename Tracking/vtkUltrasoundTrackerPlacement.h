@@ -28,10 +28,10 @@
 
 #include "EchoramaTrackingModule.h"
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Tracking/Placement/TrackerPlacement.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 #include <string>
 
@@ -92,32 +92,20 @@ public:
   static const char* VolumeToWorldName() { return "VolumeToWorld"; }
 
   // BEGIN parameters
-  ///@{
   /**
    * The tool that is fixed to the probe: ProbeToTracker, or by its name in ToolNames. Of a recording also one that is composed,
    * such as ProbeToReference. Empty takes the only one. Default none.
    */
-  void SetTool(const char* value) { this->SetParameterAsText("Tool", value); }
-  std::string GetTool() { return this->GetParameterAsText("Tool"); }
-  ///@}
+  vtkUltrasoundTextMacro(Tool);
 
-  ///@{
   /** Standard deviation of the window over which poses are averaged. 0: they stay as they are. In [0, 60] s; default 0.2. */
-  void SetWindowSeconds(double value) { this->SetParameter("WindowSeconds", value); }
-  double GetWindowSeconds() { return this->GetParameter("WindowSeconds"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WindowSeconds);
 
-  ///@{
   /** Poses that lie further apart are not connected: no pose is known between them. In (0, 600] s; default 0.5. */
-  void SetLongestGapSeconds(double value) { this->SetParameter("LongestGapSeconds", value); }
-  double GetLongestGapSeconds() { return this->GetParameter("LongestGapSeconds"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LongestGapSeconds);
 
-  ///@{
   /** The volume that stays where it is, counted from 0. At least 0; default 0. */
-  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
-  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FixedVolume);
 
   enum VolumeFrames { AUTOMATIC = 0, PROBE = 1, FILE_FRAME = 2 };
 
@@ -127,44 +115,25 @@ public:
    * they were acquired. Automatic: as the file of the calibration says, else the probe's where all volumes know it. Default
    * automatic. There are AUTOMATIC, PROBE, FILE_FRAME.
    */
-  void SetVolumeFrame(int value) { this->SetParameter("VolumeFrame", value); }
-  int GetVolumeFrame() { return static_cast<int>(this->GetParameter("VolumeFrame")); }
+  vtkUltrasoundChoiceMacro(VolumeFrame);
   void SetVolumeFrameToAutomatic() { this->SetVolumeFrame(AUTOMATIC); }
   void SetVolumeFrameToProbe() { this->SetVolumeFrame(PROBE); }
   void SetVolumeFrameToFileFrame() { this->SetVolumeFrame(FILE_FRAME); }
-  std::string GetVolumeFrameAsString() { return this->GetParameterAsText("VolumeFrame"); }
   ///@}
 
-  ///@{
   /** The point array of 16 numbers that holds the poses of the track, from the tool to the world. Default ToolToWorld. */
-  void SetPoseArray(const char* value) { this->SetParameterAsText("PoseArray", value); }
-  std::string GetPoseArray() { return this->GetParameterAsText("PoseArray"); }
-  ///@}
+  vtkUltrasoundTextMacro(PoseArray);
 
-  ///@{
   /** Unit of the recording's lengths; 1000: metres. 0: as the file says. In [0, 1000000] mm; default 0. */
-  void SetRecordingUnitMm(double value) { this->SetParameter("RecordingUnitMm", value); }
-  double GetRecordingUnitMm() { return this->GetParameter("RecordingUnitMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(RecordingUnitMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

@@ -40,6 +40,7 @@
 
 #include "EchoramaTrackingModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <memory> // for what is open
 #include <string> // for texts
@@ -47,7 +48,6 @@
 #ifndef __VTK_WRAP__
 #include "Tracking/Stream/LiveTransforms.h"
 #include "Tracking/Stream/StreamRecorder.h"
-#include "vtkUltrasoundParameters.h"
 #include <functional>
 #endif
 
@@ -200,57 +200,31 @@ public:
   ///@}
 
   // BEGIN parameters
-  ///@{
   /**
    * The frame of coordinates that is the world. Tools that no transforms lead from to it are missing. Empty takes the frame that
    * most tools are seen in, usually Tracker. Default none.
    */
-  void SetWorldFrame(const char* value) { this->SetParameterAsText("WorldFrame", value); }
-  std::string GetWorldFrame() { return this->GetParameterAsText("WorldFrame"); }
-  ///@}
+  vtkUltrasoundTextMacro(WorldFrame);
 
-  ///@{
   /** The frame of coordinates that counts pixels of the image. Default Image. */
-  void SetImageFrame(const char* value) { this->SetParameterAsText("ImageFrame", value); }
-  std::string GetImageFrame() { return this->GetParameterAsText("ImageFrame"); }
-  ///@}
+  vtkUltrasoundTextMacro(ImageFrame);
 
-  ///@{
   /** Poses that lie further apart in time are not interpolated. Counts when the device is opened. In (0, 600] s; default 0.5. */
-  void SetLongestGapSeconds(double value) { this->SetParameter("LongestGapSeconds", value); }
-  double GetLongestGapSeconds() { return this->GetParameter("LongestGapSeconds"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LongestGapSeconds);
 
-  ///@{
   /** A tool whose newest pose, of a live device, came longer ago is missing. In (0, 3600] s; default 1. */
-  void SetFreshSeconds(double value) { this->SetParameter("FreshSeconds", value); }
-  double GetFreshSeconds() { return this->GetParameter("FreshSeconds"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FreshSeconds);
 
-  ///@{
   /** Length of the axes in output 2. At least 0 mm; default 50. */
-  void SetAxisLengthMm(double value) { this->SetParameter("AxisLengthMm", value); }
-  double GetAxisLengthMm() { return this->GetParameter("AxisLengthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(AxisLengthMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

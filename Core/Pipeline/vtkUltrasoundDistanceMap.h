@@ -20,10 +20,7 @@
 
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
-
-#ifndef __VTK_WRAP__
 #include "vtkUltrasoundParameters.h"
-#endif
 
 class ECHORAMACORE_EXPORT vtkUltrasoundDistanceMap : public vtkUltrasoundImageAlgorithm {
 public:
@@ -40,40 +37,22 @@ public:
    * region or beyond the grid, 0 outside it. Signed: the first less the second. Default outside. There are OUTSIDE, INSIDE,
    * SIGNED.
    */
-  void SetMeasure(int value) { this->SetParameter("Measure", value); }
-  int GetMeasure() { return static_cast<int>(this->GetParameter("Measure")); }
+  vtkUltrasoundChoiceMacro(Measure);
   void SetMeasureToOutside() { this->SetMeasure(OUTSIDE); }
   void SetMeasureToInside() { this->SetMeasure(INSIDE); }
   void SetMeasureToSigned() { this->SetMeasure(SIGNED); }
-  std::string GetMeasureAsString() { return this->GetParameterAsText("Measure"); }
   ///@}
 
-  ///@{
   /** Whether distances are put out squared (mm^2), with their sign. Default off. */
-  void SetSquared(bool value) { this->SetParameter("Squared", value); }
-  bool GetSquared() { return this->GetParameter("Squared") != 0.0; }
-  void SquaredOn() { this->SetSquared(true); }
-  void SquaredOff() { this->SetSquared(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Squared);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   /** Name of the array that is added. */

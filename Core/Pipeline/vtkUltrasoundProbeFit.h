@@ -20,11 +20,11 @@
 
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Geometry/ProbeFit.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 #include <string>
@@ -36,69 +36,41 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * Fits are refused when intersection over union of region and fan is less. Used when EncloseRegion is off. In [0, 1]; default
    * 0.75.
    */
-  void SetMinimumOverlap(double value) { this->SetParameter("MinimumOverlap", value); }
-  double GetMinimumOverlap() { return this->GetParameter("MinimumOverlap"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MinimumOverlap);
 
-  ///@{
   /**
    * Fits are refused when the outline of the region lies further from the fan's surface in the mean: a part of the region's size,
    * which is the cube root of its volume (of an image the square root of its area). Used when EncloseRegion is off. Above 0;
    * default 0.026.
    */
-  void SetMaximumDistance(double value) { this->SetParameter("MaximumDistance", value); }
-  double GetMaximumDistance() { return this->GetParameter("MaximumDistance"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MaximumDistance);
 
-  ///@{
   /** How many points of the outline take part in the last fit. Used when EncloseRegion is off. At least 100; default 4000. */
-  void SetOutlinePoints(int value) { this->SetParameter("OutlinePoints", value); }
-  int GetOutlinePoints() { return static_cast<int>(this->GetParameter("OutlinePoints")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(OutlinePoints);
 
-  ///@{
   /**
    * Whether the fan must hold every real voxel: the least that does, found from the region or enlarged from the probe that the
    * volume has, for regions of any shape such as stitched volumes. Default off.
    */
-  void SetEncloseRegion(bool value) { this->SetParameter("EncloseRegion", value); }
-  bool GetEncloseRegion() { return this->GetParameter("EncloseRegion") != 0.0; }
-  void EncloseRegionOn() { this->SetEncloseRegion(true); }
-  void EncloseRegionOff() { this->SetEncloseRegion(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(EncloseRegion);
 
-  ///@{
   /**
    * How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. Used when EncloseRegion is on.
    * At least 0 mm; default 0.
    */
-  void SetMarginMm(double value) { this->SetParameter("MarginMm", value); }
-  double GetMarginMm() { return this->GetParameter("MarginMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MarginMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

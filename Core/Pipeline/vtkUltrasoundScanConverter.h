@@ -24,10 +24,7 @@
 
 #include "EchoramaCoreModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
-
-#ifndef __VTK_WRAP__
 #include "vtkUltrasoundParameters.h"
-#endif
 
 #include <cstdint> // for counts
 
@@ -38,42 +35,25 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * Edge of a voxel. 0: the geometric mean of the distances between samples, beams and steps halfway down the middle beam, so
    * that about as many voxels lie inside the fan as there are samples. In [0, 1000] mm; default 0.
    */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /**
    * The output is refused when it would have more voxels. A voxel takes the bytes of its type and one for its valid region. At
    * least 1; default 1073741824.
    */
-  void SetMaximumVoxels(vtkTypeInt64 value) { this->SetParameterAsInteger("MaximumVoxels", value); }
-  vtkTypeInt64 GetMaximumVoxels() { return this->GetParameterAsInteger("MaximumVoxels"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(MaximumVoxels);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

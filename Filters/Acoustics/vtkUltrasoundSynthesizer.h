@@ -26,11 +26,11 @@
 
 #include "EchoramaFiltersAcousticsModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 #include <string> // for the notes
 
 #ifndef __VTK_WRAP__
 #include "Filters/Acoustics/Synthesize.h"
-#include "vtkUltrasoundParameters.h"
 #include <memory>
 #endif
 
@@ -58,213 +58,109 @@ public:
   ///@}
 
   // BEGIN parameters
-  ///@{
   /** Where the middle of the probe's face lies in the world. Not used with a probe input. In mm; default (0, 0, 0). */
-  void SetPosition(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetPosition(value);
-  }
-  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
-  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Position);
 
-  ///@{
   /**
    * How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. Not used with a probe input. In
    * degrees; default (0, 0, 0).
    */
-  void SetOrientation(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetOrientation(value);
-  }
-  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
-  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Orientation);
 
-  ///@{
   /** Angle between the first and the last beam of a fan. Not used with a probe input. In [0, 359.999] degrees; default 65. */
-  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
-  double GetFanAngle() { return this->GetParameter("FanAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanAngle);
 
-  ///@{
   /** Radius of the array. Not used with a probe input. In [0, 10000] mm; default 40. */
-  void SetFanRadius(double value) { this->SetParameter("FanRadius", value); }
-  double GetFanRadius() { return this->GetParameter("FanRadius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanRadius);
 
-  ///@{
   /** Angle that the array sweeps. 0: a single plane. Not used with a probe input. In [0, 359.999] degrees; default 55. */
-  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
-  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepAngle);
 
-  ///@{
   /** How far the face is from the axis of the sweep. Not used with a probe input. In [0, 10000] mm; default 30. */
-  void SetSweepRadius(double value) { this->SetParameter("SweepRadius", value); }
-  double GetSweepRadius() { return this->GetParameter("SweepRadius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepRadius);
 
-  ///@{
   /** First depth along the beams, from the face. Not used with a probe input. In [-10000, 10000] mm; default 5. */
-  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
-  double GetDepthMin() { return this->GetParameter("DepthMin"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMin);
 
-  ///@{
   /** Last depth along the beams, from the face. Not used with a probe input. In [-10000, 10000] mm; default 120. */
-  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
-  double GetDepthMax() { return this->GetParameter("DepthMax"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMax);
 
-  ///@{
   /** Whether only one plane of the sweep is made, a 2D image: for interaction. Default off. */
-  void SetSliceOnly(bool value) { this->SetParameter("SliceOnly", value); }
-  bool GetSliceOnly() { return this->GetParameter("SliceOnly") != 0.0; }
-  void SliceOnlyOn() { this->SetSliceOnly(true); }
-  void SliceOnlyOff() { this->SetSliceOnly(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(SliceOnly);
 
-  ///@{
   /**
    * Which plane of the sweep: -0.5 is the first, 0.5 the last. Used when SliceOnly is on. In [-0.5, 0.5] whole sweeps; default 0.
    */
-  void SetSlicePosition(double value) { this->SetParameter("SlicePosition", value); }
-  double GetSlicePosition() { return this->GetParameter("SlicePosition"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SlicePosition);
 
-  ///@{
   /** Edge of the cubic voxels. 0: about as many voxels as samples. In [0, 1000] mm; default 0. */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /**
    * Seed of the scatterers of the tissue, and of all else that is random but the noise. Volumes of one seed see the same. At
    * least 0; default 1.
    */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /** Beams of a plane. In [2, 4096]; default 128. */
-  void SetElements(int value) { this->SetParameter("Elements", value); }
-  int GetElements() { return static_cast<int>(this->GetParameter("Elements")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Elements);
 
-  ///@{
   /** Planes of the sweep, at least 2 of a probe that sweeps. In [1, 4096]; default 96. */
-  void SetSteps(int value) { this->SetParameter("Steps", value); }
-  int GetSteps() { return static_cast<int>(this->GetParameter("Steps")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Steps);
 
-  ///@{
   /** Samples along a beam. In [2, 16384]; default 512. */
-  void SetSamples(int value) { this->SetParameter("Samples", value); }
-  int GetSamples() { return static_cast<int>(this->GetParameter("Samples")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Samples);
 
-  ///@{
   /** Centre frequency of the pulse. In [0.5, 50] MHz; default 3.5. */
-  void SetFrequencyMHz(double value) { this->SetParameter("FrequencyMHz", value); }
-  double GetFrequencyMHz() { return this->GetParameter("FrequencyMHz"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FrequencyMHz);
 
-  ///@{
   /** Width of the two-way spectrum at -6 dB, as a share of the centre frequency. In [0.05, 1.5]; default 0.6. */
-  void SetBandwidth(double value) { this->SetParameter("Bandwidth", value); }
-  double GetBandwidth() { return this->GetParameter("Bandwidth"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Bandwidth);
 
-  ///@{
   /** Width of the active aperture along the fan. In [0.1, 100] mm; default 14. */
-  void SetLateralApertureMm(double value) { this->SetParameter("LateralApertureMm", value); }
-  double GetLateralApertureMm() { return this->GetParameter("LateralApertureMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LateralApertureMm);
 
-  ///@{
   /** Way from the face to the transmit focus along the fan. In [1, 1000] mm; default 70. */
-  void SetLateralFocusMm(double value) { this->SetParameter("LateralFocusMm", value); }
-  double GetLateralFocusMm() { return this->GetParameter("LateralFocusMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LateralFocusMm);
 
-  ///@{
   /** Whether receiving is focused at every depth along the fan; else at the transmit focus. Default on. */
-  void SetDynamicReceive(bool value) { this->SetParameter("DynamicReceive", value); }
-  bool GetDynamicReceive() { return this->GetParameter("DynamicReceive") != 0.0; }
-  void DynamicReceiveOn() { this->SetDynamicReceive(true); }
-  void DynamicReceiveOff() { this->SetDynamicReceive(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(DynamicReceive);
 
-  ///@{
   /**
    * Dynamic receiving uses no more of the aperture than the depth divided by this. Used when DynamicReceive is on. In [0.5, 10];
    * default 1.
    */
-  void SetSmallestFNumber(double value) { this->SetParameter("SmallestFNumber", value); }
-  double GetSmallestFNumber() { return this->GetParameter("SmallestFNumber"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SmallestFNumber);
 
-  ///@{
   /** Width of the lens along the sweep. In [0.1, 100] mm; default 10. */
-  void SetElevationApertureMm(double value) { this->SetParameter("ElevationApertureMm", value); }
-  double GetElevationApertureMm() { return this->GetParameter("ElevationApertureMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ElevationApertureMm);
 
-  ///@{
   /** Way from the face to the focus of the lens, for sending and receiving. In [1, 1000] mm; default 70. */
-  void SetElevationFocusMm(double value) { this->SetParameter("ElevationFocusMm", value); }
-  double GetElevationFocusMm() { return this->GetParameter("ElevationFocusMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ElevationFocusMm);
 
-  ///@{
   /** How the scanner turns time into depth. In [500, 5000] m/s; default 1540. */
-  void SetAssumedSoundSpeed(double value) { this->SetParameter("AssumedSoundSpeed", value); }
-  double GetAssumedSoundSpeed() { return this->GetParameter("AssumedSoundSpeed"); }
-  ///@}
+  vtkUltrasoundNumberMacro(AssumedSoundSpeed);
 
-  ///@{
   /** Gain of everything. In [-200, 200] dB; default 0. */
-  void SetGainDb(double value) { this->SetParameter("GainDb", value); }
-  double GetGainDb() { return this->GetParameter("GainDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(GainDb);
 
-  ///@{
   /** Time-gain compensation: further gain by the depth. In [-20, 100] dB/cm; default 3.5. */
-  void SetTgcDbPerCm(double value) { this->SetParameter("TgcDbPerCm", value); }
-  double GetTgcDbPerCm() { return this->GetParameter("TgcDbPerCm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(TgcDbPerCm);
 
-  ///@{
   /** How much the 255 steps of grey span. In [10, 200] dB; default 60. */
-  void SetDynamicRangeDb(double value) { this->SetParameter("DynamicRangeDb", value); }
-  double GetDynamicRangeDb() { return this->GetParameter("DynamicRangeDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DynamicRangeDb);
 
-  ///@{
   /** Mean grey of the reference tissue, liver, at a gain of 0 dB. In [0, 255]; default 110. */
-  void SetReferenceGrey(double value) { this->SetParameter("ReferenceGrey", value); }
-  double GetReferenceGrey() { return this->GetParameter("ReferenceGrey"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ReferenceGrey);
 
-  ///@{
   /**
    * Mean power of the noise of the electronics beside the reference tissue, before all gain; -200: none. In [-200, 100] dB;
    * default -65.
    */
-  void SetNoiseDb(double value) { this->SetParameter("NoiseDb", value); }
-  double GetNoiseDb() { return this->GetParameter("NoiseDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(NoiseDb);
 
-  ///@{
   /** Seed of the noise. Volumes of one scan have different ones. At least 0; default 1. */
-  void SetNoiseSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("NoiseSeed", value); }
-  vtkTypeInt64 GetNoiseSeed() { return this->GetParameterAsInteger("NoiseSeed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(NoiseSeed);
 
   enum Modes { COHERENT = 0, COUNTING = 1 };
 
@@ -273,147 +169,88 @@ public:
    * Coherent: the echoes of scatterers are summed with their phases. Counting: random scatter events of rays are counted
    * (dissertation 3.4). Default coherent. There are COHERENT, COUNTING.
    */
-  void SetMode(int value) { this->SetParameter("Mode", value); }
-  int GetMode() { return static_cast<int>(this->GetParameter("Mode")); }
+  vtkUltrasoundChoiceMacro(Mode);
   void SetModeToCoherent() { this->SetMode(COHERENT); }
   void SetModeToCounting() { this->SetMode(COUNTING); }
-  std::string GetModeAsString() { return this->GetParameterAsText("Mode"); }
   ///@}
 
-  ///@{
   /** Reflections that are followed. In [0, 100]; default 4. */
-  void SetMaxBounces(int value) { this->SetParameter("MaxBounces", value); }
-  int GetMaxBounces() { return static_cast<int>(this->GetParameter("MaxBounces")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(MaxBounces);
 
-  ///@{
   /** Whether rays bend where the speed of sound changes. Default on. */
-  void SetRefraction(bool value) { this->SetParameter("Refraction", value); }
-  bool GetRefraction() { return this->GetParameter("Refraction") != 0.0; }
-  void RefractionOn() { this->SetRefraction(true); }
-  void RefractionOff() { this->SetRefraction(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Refraction);
 
-  ///@{
   /**
    * Share of the pressure that the face of the probe turns back; 0: no reverberation between probe and tissue. In [0, 1]; default
    * 0.2.
    */
-  void SetFaceReflection(double value) { this->SetParameter("FaceReflection", value); }
-  double GetFaceReflection() { return this->GetParameter("FaceReflection"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FaceReflection);
 
-  ///@{
   /** The face turns sound back up to this far from its middle. In [0, 1000] mm; default 20. */
-  void SetFaceRadiusMm(double value) { this->SetParameter("FaceRadiusMm", value); }
-  double GetFaceRadiusMm() { return this->GetParameter("FaceRadiusMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FaceRadiusMm);
 
-  ///@{
   /**
    * How far from the normal of a surface its mirror echo is still received: standard deviation of a Gaussian, about the angle of
    * half the aperture as seen from the focus. In [0.1, 90] degrees; default 5.
    */
-  void SetAcceptanceDegrees(double value) { this->SetParameter("AcceptanceDegrees", value); }
-  double GetAcceptanceDegrees() { return this->GetParameter("AcceptanceDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(AcceptanceDegrees);
 
-  ///@{
   /** The most straight pieces of one ray's way: a stop for scenes of many mirrors. In [1, 100000000]; default 10000. */
-  void SetMaxSegments(int value) { this->SetParameter("MaxSegments", value); }
-  int GetMaxSegments() { return static_cast<int>(this->GetParameter("MaxSegments")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(MaxSegments);
 
-  ///@{
   /** Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged. In [1, 4096]; default 8. */
-  void SetSubRays(int value) { this->SetParameter("SubRays", value); }
-  int GetSubRays() { return static_cast<int>(this->GetParameter("SubRays")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(SubRays);
 
   enum Samplings { RANDOM = 0, STRATIFIED = 1, SOBOL = 2 };
 
   ///@{
   /** How the rays of an element are spread. Default stratified. There are RANDOM, STRATIFIED, SOBOL. */
-  void SetSampling(int value) { this->SetParameter("Sampling", value); }
-  int GetSampling() { return static_cast<int>(this->GetParameter("Sampling")); }
+  vtkUltrasoundChoiceMacro(Sampling);
   void SetSamplingToRandom() { this->SetSampling(RANDOM); }
   void SetSamplingToStratified() { this->SetSampling(STRATIFIED); }
   void SetSamplingToSobol() { this->SetSampling(SOBOL); }
-  std::string GetSamplingAsString() { return this->GetParameterAsText("Sampling"); }
   ///@}
 
-  ///@{
   /**
    * Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue. In [0, 120] dB;
    * default 45.
    */
-  void SetMirrorDb(double value) { this->SetParameter("MirrorDb", value); }
-  double GetMirrorDb() { return this->GetParameter("MirrorDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MirrorDb);
 
-  ///@{
   /**
    * The most scatterers that are made of any material; fewer are faster. 0: 10 in every resolution cell at the transmit focus.
    * Volumes share their speckle when they have the same number. In [0, 1000] per mm^3; default 0.
    */
-  void SetScatterersPerMm3(double value) { this->SetParameter("ScatterersPerMm3", value); }
-  double GetScatterersPerMm3() { return this->GetParameter("ScatterersPerMm3"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ScatterersPerMm3);
 
-  ///@{
   /** Ways of sound whose speckle would stay this far below black, after all gain, are not summed. In [0, 300] dB; default 12. */
-  void SetInvisibleDb(double value) { this->SetParameter("InvisibleDb", value); }
-  double GetInvisibleDb() { return this->GetParameter("InvisibleDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(InvisibleDb);
 
-  ///@{
   /** Rays that each element sends. Used when Mode is counting. In [1, 10000000]; default 256. */
-  void SetRaysPerElement(int value) { this->SetParameter("RaysPerElement", value); }
-  int GetRaysPerElement() { return static_cast<int>(this->GetParameter("RaysPerElement")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(RaysPerElement);
 
-  ///@{
   /**
    * Exponent of the angle at which an echo comes in (dissertation, eq. 3.4): the larger, the clearer. Used when Mode is counting.
    * In [0, 200]; default 20.
    */
-  void SetClarity(double value) { this->SetParameter("Clarity", value); }
-  double GetClarity() { return this->GetParameter("Clarity"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Clarity);
 
-  ///@{
   /**
    * A ray that was scattered goes on within this half angle of its old direction. Used when Mode is counting. In [0, 180]
    * degrees; default 30.
    */
-  void SetConeDegrees(double value) { this->SetParameter("ConeDegrees", value); }
-  double GetConeDegrees() { return this->GetParameter("ConeDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ConeDegrees);
 
-  ///@{
   /** The most scatter events of one ray. Used when Mode is counting. In [1, 1000000]; default 1000. */
-  void SetMaxEvents(int value) { this->SetParameter("MaxEvents", value); }
-  int GetMaxEvents() { return static_cast<int>(this->GetParameter("MaxEvents")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(MaxEvents);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   /**

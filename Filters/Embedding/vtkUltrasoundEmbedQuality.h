@@ -20,12 +20,12 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <string> // GetReport is wrapped
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/EmbedQuality.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundEmbedQuality : public vtkUltrasoundImageAlgorithm {
@@ -35,48 +35,25 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /** How thick the shells on either side of the border are, and how wide its patches. Above 0 mm; default 5. */
-  void SetShellMm(double value) { this->SetParameter("ShellMm", value); }
-  double GetShellMm() { return this->GetParameter("ShellMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ShellMm);
 
-  ///@{
   /** The embedder's feather: data deeper than this must be shown as they are. At least 0 mm; default 3. */
-  void SetFeatherMm(double value) { this->SetParameter("FeatherMm", value); }
-  double GetFeatherMm() { return this->GetParameter("FeatherMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FeatherMm);
 
-  ///@{
   /** With how many random surfaces inside the data the border is compared. In [0, 1000]; default 24. */
-  void SetRandomSurfaces(int value) { this->SetParameter("RandomSurfaces", value); }
-  int GetRandomSurfaces() { return static_cast<int>(this->GetParameter("RandomSurfaces")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(RandomSurfaces);
 
-  ///@{
   /** The same seed makes the same random surfaces. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

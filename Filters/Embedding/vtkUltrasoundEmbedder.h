@@ -28,11 +28,11 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Core/Geometry/ProbeGeometry.h"
 #include "EmbedGrid.h"
-#include "vtkUltrasoundParameters.h"
 #include <array>
 #include <memory> // for what is set
 #include <optional>
@@ -55,114 +55,64 @@ public:
   void SetFormConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
 
   // BEGIN parameters
-  ///@{
   /** How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. At least 0 mm; default 5. */
-  void SetMarginMm(double value) { this->SetParameter("MarginMm", value); }
-  double GetMarginMm() { return this->GetParameter("MarginMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MarginMm);
 
-  ///@{
   /**
    * The depth in the data at which no background shows any more; from the border to there their share grows linearly. 0: a hard
    * border. At least 0 mm; default 3.
    */
-  void SetFeatherMm(double value) { this->SetParameter("FeatherMm", value); }
-  double GetFeatherMm() { return this->GetParameter("FeatherMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FeatherMm);
 
-  ///@{
   /**
    * Give back what a mean of two textures loses: that of two independent speckle patterns has 0.71 of their deviation. Default
    * on.
    */
-  void SetKeepTexture(bool value) { this->SetParameter("KeepTexture", value); }
-  bool GetKeepTexture() { return this->GetParameter("KeepTexture") != 0.0; }
-  void KeepTextureOn() { this->SetKeepTexture(true); }
-  void KeepTextureOff() { this->SetKeepTexture(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(KeepTexture);
 
-  ///@{
   /** Standard deviation of the blur that parts local brightness and contrast from texture. Above 0 mm; default 3. */
-  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
-  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SmoothMm);
 
-  ///@{
   /** Give the background the local deviation of the data too, not their local mean alone. Default on. */
-  void SetMatchContrast(bool value) { this->SetParameter("MatchContrast", value); }
-  bool GetMatchContrast() { return this->GetParameter("MatchContrast") != 0.0; }
-  void MatchContrastOn() { this->SetMatchContrast(true); }
-  void MatchContrastOff() { this->SetMatchContrast(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(MatchContrast);
 
-  ///@{
   /**
    * Exponent of distance by which values at the surface spread inside the data: the larger, the more the nearest surface counts
    * alone. In [1, 64]; default 6.
    */
-  void SetInsideExponent(double value) { this->SetParameter("InsideExponent", value); }
-  double GetInsideExponent() { return this->GetParameter("InsideExponent"); }
-  ///@}
+  vtkUltrasoundNumberMacro(InsideExponent);
 
-  ///@{
   /**
    * Exponent of distance by which values at the surface spread outside of the data: the larger, the more the nearest surface
    * counts alone. In [1, 64]; default 4.
    */
-  void SetOutsideExponent(double value) { this->SetParameter("OutsideExponent", value); }
-  double GetOutsideExponent() { return this->GetParameter("OutsideExponent"); }
-  ///@}
+  vtkUltrasoundNumberMacro(OutsideExponent);
 
-  ///@{
   /**
    * Give noise that is made the grain of the data: its size along depth, fan and sweep, and its distribution. Where the data have
    * too little texture to tell, the grain is that of vtkUltrasoundNoiseSource. Default on.
    */
-  void SetMatchGrain(bool value) { this->SetParameter("MatchGrain", value); }
-  bool GetMatchGrain() { return this->GetParameter("MatchGrain") != 0.0; }
-  void MatchGrainOn() { this->SetMatchGrain(true); }
-  void MatchGrainOff() { this->SetMatchGrain(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(MatchGrain);
 
-  ///@{
   /**
    * By how much neighbouring noise volumes overlap where fan or sweep turn. It sets the angle of the whole. In [0, 360] degrees;
    * default 10.
    */
-  void SetOverlapDegrees(double value) { this->SetParameter("OverlapDegrees", value); }
-  double GetOverlapDegrees() { return this->GetParameter("OverlapDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(OverlapDegrees);
 
-  ///@{
   /** The same seed makes the same noise. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /** For a quick look: only every so many voxels along each axis. In [1, 64]; default 1. */
-  void SetPreviewFactor(int value) { this->SetParameter("PreviewFactor", value); }
-  int GetPreviewFactor() { return static_cast<int>(this->GetParameter("PreviewFactor")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(PreviewFactor);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   /** Of the last volume: where the noise and the fan came from, sentences, one per line. */

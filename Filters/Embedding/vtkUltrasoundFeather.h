@@ -19,10 +19,10 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/Feather.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundFeather : public vtkUltrasoundImageAlgorithm {
@@ -32,50 +32,28 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * The depth in the data at which no background shows any more; from the border to there their share grows linearly. 0: a hard
    * border. At least 0 mm; default 3.
    */
-  void SetFeatherMm(double value) { this->SetParameter("FeatherMm", value); }
-  double GetFeatherMm() { return this->GetParameter("FeatherMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FeatherMm);
 
-  ///@{
   /**
    * Give back what a mean of two textures loses: that of two independent speckle patterns has 0.71 of their deviation. Default
    * on.
    */
-  void SetKeepTexture(bool value) { this->SetParameter("KeepTexture", value); }
-  bool GetKeepTexture() { return this->GetParameter("KeepTexture") != 0.0; }
-  void KeepTextureOn() { this->SetKeepTexture(true); }
-  void KeepTextureOff() { this->SetKeepTexture(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(KeepTexture);
 
-  ///@{
   /** Standard deviation of the blur that parts local brightness and contrast from texture. Above 0 mm; default 3. */
-  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
-  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SmoothMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   /** Sets the background (input port 1). */

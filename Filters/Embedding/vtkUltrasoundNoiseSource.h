@@ -25,10 +25,10 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Core/Geometry/ProbeGeometry.h"
-#include "vtkUltrasoundParameters.h"
 #include <memory>   // for what is set
 #include <optional> // for inputs
 #endif
@@ -55,12 +55,10 @@ public:
    * Noise along beams looks like ultrasound; white and Perlin noise are there to compare with. Default beams. There are BEAMS,
    * WHITE, PERLIN.
    */
-  void SetKind(int value) { this->SetParameter("Kind", value); }
-  int GetKind() { return static_cast<int>(this->GetParameter("Kind")); }
+  vtkUltrasoundChoiceMacro(Kind);
   void SetKindToBeams() { this->SetKind(BEAMS); }
   void SetKindToWhite() { this->SetKind(WHITE); }
   void SetKindToPerlin() { this->SetKind(PERLIN); }
-  std::string GetKindAsString() { return this->GetParameterAsText("Kind"); }
   ///@}
 
   enum IntensityModels { RAYLEIGH = 0, LOG_COMPRESSED = 1 };
@@ -70,221 +68,119 @@ public:
    * How intensities are distributed: as the envelope of speckle, or as the greys of a machine. A volume to match brings its own
    * distribution. Default log-compressed. There are RAYLEIGH, LOG_COMPRESSED.
    */
-  void SetIntensityModel(int value) { this->SetParameter("IntensityModel", value); }
-  int GetIntensityModel() { return static_cast<int>(this->GetParameter("IntensityModel")); }
+  vtkUltrasoundChoiceMacro(IntensityModel);
   void SetIntensityModelToRayleigh() { this->SetIntensityModel(RAYLEIGH); }
   void SetIntensityModelToLogCompressed() { this->SetIntensityModel(LOG_COMPRESSED); }
-  std::string GetIntensityModelAsString() { return this->GetParameterAsText("IntensityModel"); }
   ///@}
 
-  ///@{
   /** Mean of the intensities; below 255 when they are log-compressed. Above 0; default 40. */
-  void SetMean(double value) { this->SetParameter("Mean", value); }
-  double GetMean() { return this->GetParameter("Mean"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Mean);
 
-  ///@{
   /**
    * How much 255 greys span. With 60 dB the deviation is 24 greys where nothing is cut. Used when IntensityModel is
    * log-compressed. In [10, 200] dB; default 60.
    */
-  void SetDynamicRangeDb(double value) { this->SetParameter("DynamicRangeDb", value); }
-  double GetDynamicRangeDb() { return this->GetParameter("DynamicRangeDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DynamicRangeDb);
 
-  ///@{
   /** The same seed makes the same noise. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Size of the grain along the depth, at most a quarter of the depth range: the lag at which the autocorrelation of the
    * speckle's power is one half. 0: neighbouring samples are independent. A volume to match brings its own. In [0, 10000] mm;
    * default 0.6.
    */
-  void SetDepthCorrelationMm(double value) { this->SetParameter("DepthCorrelationMm", value); }
-  double GetDepthCorrelationMm() { return this->GetParameter("DepthCorrelationMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthCorrelationMm);
 
-  ///@{
   /** The same across the fan. In [0, 0.25] whole fans; default 0.0125. */
-  void SetFanCorrelation(double value) { this->SetParameter("FanCorrelation", value); }
-  double GetFanCorrelation() { return this->GetParameter("FanCorrelation"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanCorrelation);
 
-  ///@{
   /** The same along the sweep. In [0, 0.25] whole sweeps; default 0.025. */
-  void SetSweepCorrelation(double value) { this->SetParameter("SweepCorrelation", value); }
-  double GetSweepCorrelation() { return this->GetParameter("SweepCorrelation"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepCorrelation);
 
-  ///@{
   /**
    * Samples along a beam. 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0. In
    * [0, 100000]; default 0.
    */
-  void SetSamples(int value) { this->SetParameter("Samples", value); }
-  int GetSamples() { return static_cast<int>(this->GetParameter("Samples")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Samples);
 
-  ///@{
   /**
    * Beams across the fan. 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0. In
    * [0, 100000]; default 0.
    */
-  void SetElements(int value) { this->SetParameter("Elements", value); }
-  int GetElements() { return static_cast<int>(this->GetParameter("Elements")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Elements);
 
-  ///@{
   /**
    * Planes of the sweep. 0: three to each length of the grain, or 400 samples, 240 elements and 120 steps where that is 0. In [0,
    * 100000]; default 0.
    */
-  void SetSteps(int value) { this->SetParameter("Steps", value); }
-  int GetSteps() { return static_cast<int>(this->GetParameter("Steps")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Steps);
 
-  ///@{
   /**
    * Of the volume to match, what is smooth over so much along the depth, and twice as much across, is the scene and no grain.
    * Above 0 mm; default 1.5.
    */
-  void SetWindowMm(double value) { this->SetParameter("WindowMm", value); }
-  double GetWindowMm() { return this->GetParameter("WindowMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WindowMm);
 
-  ///@{
   /**
    * Standard deviation of the intensities of white and Perlin noise. Used when Kind is white or perlin. At least 0; default 20.
    */
-  void SetDeviation(double value) { this->SetParameter("Deviation", value); }
-  double GetDeviation() { return this->GetParameter("Deviation"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Deviation);
 
-  ///@{
   /** Distance of the gradients of Perlin noise, at least that of the voxels. Used when Kind is perlin. Above 0 mm; default 4. */
-  void SetCellMm(double value) { this->SetParameter("CellMm", value); }
-  double GetCellMm() { return this->GetParameter("CellMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(CellMm);
 
-  ///@{
   /**
    * Octaves of Perlin noise, each with half the cell and half the amplitude of the one before. Used when Kind is perlin. In [1,
    * 10]; default 3.
    */
-  void SetOctaves(int value) { this->SetParameter("Octaves", value); }
-  int GetOctaves() { return static_cast<int>(this->GetParameter("Octaves")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Octaves);
 
-  ///@{
   /** Edge of the cubic voxels. Used when OnInputGrid is off. In (0, 1000] mm; default 0.5. */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /** Whether the output lies on the grid of the volume that gives the fan. Default off. */
-  void SetOnInputGrid(bool value) { this->SetParameter("OnInputGrid", value); }
-  bool GetOnInputGrid() { return this->GetParameter("OnInputGrid") != 0.0; }
-  void OnInputGridOn() { this->SetOnInputGrid(true); }
-  void OnInputGridOff() { this->SetOnInputGrid(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(OnInputGrid);
 
-  ///@{
   /** Whether intensities are float, neither rounded nor cut; else unsigned char. Default off. */
-  void SetFloatOutput(bool value) { this->SetParameter("FloatOutput", value); }
-  bool GetFloatOutput() { return this->GetParameter("FloatOutput") != 0.0; }
-  void FloatOutputOn() { this->SetFloatOutput(true); }
-  void FloatOutputOff() { this->SetFloatOutput(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(FloatOutput);
 
-  ///@{
   /** The output is refused when it would have more voxels. At least 1; default 1073741824. */
-  void SetMaximumVoxels(vtkTypeInt64 value) { this->SetParameterAsInteger("MaximumVoxels", value); }
-  vtkTypeInt64 GetMaximumVoxels() { return this->GetParameterAsInteger("MaximumVoxels"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(MaximumVoxels);
 
-  ///@{
   /** Angle between the first and the last beam of a fan. In [0, 359.999] degrees; default 65. */
-  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
-  double GetFanAngle() { return this->GetParameter("FanAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanAngle);
 
-  ///@{
   /** Length of the array along its arc. In [0, 10000] mm; default 45. */
-  void SetFanWidth(double value) { this->SetParameter("FanWidth", value); }
-  double GetFanWidth() { return this->GetParameter("FanWidth"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanWidth);
 
-  ///@{
   /**
    * Angle that the array sweeps. With an angle and a width of 0 the sweep is a single plane. In [0, 359.999] degrees; default 55.
    */
-  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
-  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepAngle);
 
-  ///@{
   /** Length of the arc that the middle of the array travels. In [0, 10000] mm; default 29. */
-  void SetSweepWidth(double value) { this->SetParameter("SweepWidth", value); }
-  double GetSweepWidth() { return this->GetParameter("SweepWidth"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepWidth);
 
-  ///@{
   /** First depth along the beams, from the face. In [-10000, 10000] mm; default 0. */
-  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
-  double GetDepthMin() { return this->GetParameter("DepthMin"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMin);
 
-  ///@{
   /** Last depth along the beams, from the face. In [-10000, 10000] mm; default 100. */
-  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
-  double GetDepthMax() { return this->GetParameter("DepthMax"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMax);
 
-  ///@{
   /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
-  void SetPosition(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetPosition(value);
-  }
-  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
-  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Position);
 
-  ///@{
   /** How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. In degrees; default (0, 0, 0). */
-  void SetOrientation(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetOrientation(value);
-  }
-  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
-  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Orientation);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

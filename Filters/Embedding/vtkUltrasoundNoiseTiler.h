@@ -23,12 +23,12 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <string> // for notes
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/NoiseTiling.h"
-#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is kept
 #include <vector> // for volumes
 #endif
@@ -40,60 +40,34 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * Volumes side by side across the fan; 0: as many as there are for the rows. When there are fewer volumes than places they are
    * used again, turned or mirrored. In [0, 1000]; default 0.
    */
-  void SetColumns(int value) { this->SetParameter("Columns", value); }
-  int GetColumns() { return static_cast<int>(this->GetParameter("Columns")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Columns);
 
-  ///@{
   /** Rows of volumes along the sweep. In [1, 1000]; default 1. */
-  void SetRows(int value) { this->SetParameter("Rows", value); }
-  int GetRows() { return static_cast<int>(this->GetParameter("Rows")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Rows);
 
-  ///@{
   /**
    * By how much neighbouring noise volumes overlap where fan or sweep turn. It sets the angle of the whole. In [0, 360] degrees;
    * default 10.
    */
-  void SetOverlapDegrees(double value) { this->SetParameter("OverlapDegrees", value); }
-  double GetOverlapDegrees() { return this->GetParameter("OverlapDegrees"); }
-  ///@}
+  vtkUltrasoundNumberMacro(OverlapDegrees);
 
-  ///@{
   /** The same where fan or sweep run straight (turn by less than half a degree in all). In [0, 10000] mm; default 8. */
-  void SetOverlapMm(double value) { this->SetParameter("OverlapMm", value); }
-  double GetOverlapMm() { return this->GetParameter("OverlapMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(OverlapMm);
 
-  ///@{
   /** Edge of the cubic voxels of the output. 0: the voxel size of the first volume. At least 0 mm; default 0. */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   /** Of which volumes the fan was fitted, and what that left open: sentences, one per line. */

@@ -19,10 +19,10 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/Diffusion.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundSurfaceDiffuser : public vtkUltrasoundImageAlgorithm {
@@ -32,68 +32,40 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * Exponent of distance by which values at the surface spread inside the data: the larger, the more the nearest surface counts
    * alone. In [1, 64]; default 6.
    */
-  void SetInsideExponent(double value) { this->SetParameter("InsideExponent", value); }
-  double GetInsideExponent() { return this->GetParameter("InsideExponent"); }
-  ///@}
+  vtkUltrasoundNumberMacro(InsideExponent);
 
-  ///@{
   /**
    * Exponent of distance by which values at the surface spread outside of the data: the larger, the more the nearest surface
    * counts alone. In [1, 64]; default 4.
    */
-  void SetOutsideExponent(double value) { this->SetParameter("OutsideExponent", value); }
-  double GetOutsideExponent() { return this->GetParameter("OutsideExponent"); }
-  ///@}
+  vtkUltrasoundNumberMacro(OutsideExponent);
 
-  ///@{
   /** Sum over the whole surface for every voxel: slow, to compare with. Default off. */
-  void SetExact(bool value) { this->SetParameter("Exact", value); }
-  bool GetExact() { return this->GetParameter("Exact") != 0.0; }
-  void ExactOn() { this->SetExact(true); }
-  void ExactOff() { this->SetExact(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Exact);
 
-  ///@{
   /**
    * The largest error that is aimed at, as a share of the range of the values at the surface. Used when Exact is off. In [0.0001,
    * 0.1]; default 0.002.
    */
-  void SetAccuracy(double value) { this->SetParameter("Accuracy", value); }
-  double GetAccuracy() { return this->GetParameter("Accuracy"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Accuracy);
 
-  ///@{
   /**
    * Standard deviation of the windows in which mean and deviation of the grain are taken at the surface. 0: the voxels' own
    * values, which deviate by 0. At least 0 mm; default 3.
    */
-  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
-  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SmoothMm);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
 #ifndef __VTK_WRAP__

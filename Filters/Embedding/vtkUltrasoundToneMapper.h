@@ -20,10 +20,10 @@
 
 #include "EchoramaFiltersEmbeddingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Embedding/ToneMapping.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundToneMapper : public vtkUltrasoundImageAlgorithm {
@@ -33,38 +33,19 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /** Standard deviation of the blur that parts grain from the rest. Above 0 mm; default 3. */
-  void SetSmoothMm(double value) { this->SetParameter("SmoothMm", value); }
-  double GetSmoothMm() { return this->GetParameter("SmoothMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SmoothMm);
 
-  ///@{
   /** Match the local deviation too, not the local mean alone. Default on. */
-  void SetMatchDeviation(bool value) { this->SetParameter("MatchDeviation", value); }
-  bool GetMatchDeviation() { return this->GetParameter("MatchDeviation") != 0.0; }
-  void MatchDeviationOn() { this->SetMatchDeviation(true); }
-  void MatchDeviationOff() { this->SetMatchDeviation(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(MatchDeviation);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   /** Sets the levels that the result shall have (input port 1). */

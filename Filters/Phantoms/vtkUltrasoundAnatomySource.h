@@ -19,9 +19,9 @@
 
 #include "EchoramaFiltersPhantomsModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
-#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is set
 #endif
 
@@ -41,316 +41,170 @@ public:
   /**
    * What is made: an invented abdomen, or a rig of balls in a water bath. Default anatomy. There are ANATOMY, CALIBRATION_RIG.
    */
-  void SetKind(int value) { this->SetParameter("Kind", value); }
-  int GetKind() { return static_cast<int>(this->GetParameter("Kind")); }
+  vtkUltrasoundChoiceMacro(Kind);
   void SetKindToAnatomy() { this->SetKind(ANATOMY); }
   void SetKindToCalibrationRig() { this->SetKind(CALIBRATION_RIG); }
-  std::string GetKindAsString() { return this->GetParameterAsText("Kind"); }
   ///@}
 
-  ///@{
   /** Which individual: shapes, places, vessels and lesions. Used when Kind is anatomy. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * How far individuals (seeds) differ in shape and place; 0: they are alike but for their vessels and lesions. Used when Kind is
    * anatomy. In [0, 2]; default 1.
    */
-  void SetVariation(double value) { this->SetParameter("Variation", value); }
-  double GetVariation() { return this->GetParameter("Variation"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Variation);
 
-  ///@{
   /** Edge of the triangles of large bodies; small bodies are finer. Used when Kind is anatomy. In [0.5, 10] mm; default 1.5. */
-  void SetDetailMm(double value) { this->SetParameter("DetailMm", value); }
-  double GetDetailMm() { return this->GetParameter("DetailMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DetailMm);
 
-  ///@{
   /** Size of all organs and of the spine beside an adult's. Used when Kind is anatomy. In [0.5, 1.2]; default 1. */
-  void SetOrganScale(double value) { this->SetParameter("OrganScale", value); }
-  double GetOrganScale() { return this->GetParameter("OrganScale"); }
-  ///@}
+  vtkUltrasoundNumberMacro(OrganScale);
 
-  ///@{
   /** Size of the trunk along x. Used when Kind is anatomy. In [150, 600] mm; default 290. */
-  void SetTrunkWidthMm(double value) { this->SetParameter("TrunkWidthMm", value); }
-  double GetTrunkWidthMm() { return this->GetParameter("TrunkWidthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(TrunkWidthMm);
 
-  ///@{
   /** Size of the trunk along y. Used when Kind is anatomy. In [120, 600] mm; default 240. */
-  void SetTrunkLengthMm(double value) { this->SetParameter("TrunkLengthMm", value); }
-  double GetTrunkLengthMm() { return this->GetParameter("TrunkLengthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(TrunkLengthMm);
 
-  ///@{
   /** Size of the trunk along z, from the skin. Used when Kind is anatomy. In [60, 400] mm; default 190. */
-  void SetTrunkDepthMm(double value) { this->SetParameter("TrunkDepthMm", value); }
-  double GetTrunkDepthMm() { return this->GetParameter("TrunkDepthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(TrunkDepthMm);
 
-  ///@{
   /**
    * Gel between the middle of the probe's face (z = 0) and the skin; below 0 the face lies inside the body, which is not
    * deformed. Used when Kind is anatomy. In [-10, 20] mm; default 1.
    */
-  void SetStandoffMm(double value) { this->SetParameter("StandoffMm", value); }
-  double GetStandoffMm() { return this->GetParameter("StandoffMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(StandoffMm);
 
-  ///@{
   /**
    * How far a layer's thickness deviates from its mean, never by more than half of it. Used when Kind is anatomy. In [0, 4] mm;
    * default 1.5.
    */
-  void SetUndulationMm(double value) { this->SetParameter("UndulationMm", value); }
-  double GetUndulationMm() { return this->GetParameter("UndulationMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(UndulationMm);
 
-  ///@{
   /** Thickness of the skin. Used when Kind is anatomy. In [0.5, 5] mm; default 2. */
-  void SetSkinMm(double value) { this->SetParameter("SkinMm", value); }
-  double GetSkinMm() { return this->GetParameter("SkinMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SkinMm);
 
-  ///@{
   /** Thickness of the fat. Used when Kind is anatomy. In [2, 60] mm; default 12. */
-  void SetFatMm(double value) { this->SetParameter("FatMm", value); }
-  double GetFatMm() { return this->GetParameter("FatMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FatMm);
 
-  ///@{
   /** Thickness of the muscle. Used when Kind is anatomy. In [2, 30] mm; default 10. */
-  void SetMuscleMm(double value) { this->SetParameter("MuscleMm", value); }
-  double GetMuscleMm() { return this->GetParameter("MuscleMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MuscleMm);
 
-  ///@{
   /**
    * Thickness of the bright sheets on both sides of the muscle; 0: none. Used when Kind is anatomy. In [0, 2] mm; default 0.7.
    */
-  void SetFasciaMm(double value) { this->SetParameter("FasciaMm", value); }
-  double GetFasciaMm() { return this->GetParameter("FasciaMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FasciaMm);
 
-  ///@{
   /** Number of thin bright leaves in fat and muscle. Used when Kind is anatomy. In [0, 2000]; default 600. */
-  void SetSepta(int value) { this->SetParameter("Septa", value); }
-  int GetSepta() { return static_cast<int>(this->GetParameter("Septa")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Septa);
 
-  ///@{
   /** Number of lobules of fat and loops of bowel around the organs. Used when Kind is anatomy. In [0, 1000]; default 700. */
-  void SetLumps(int value) { this->SetParameter("Lumps", value); }
-  int GetLumps() { return static_cast<int>(this->GetParameter("Lumps")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Lumps);
 
-  ///@{
   /** Whether there is a liver, with its vessels and what is found in it. Used when Kind is anatomy. Default on. */
-  void SetLiver(bool value) { this->SetParameter("Liver", value); }
-  bool GetLiver() { return this->GetParameter("Liver") != 0.0; }
-  void LiverOn() { this->SetLiver(true); }
-  void LiverOff() { this->SetLiver(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Liver);
 
-  ///@{
   /** Whether there is a kidney, with pyramids and a bright sinus. Used when Kind is anatomy. Default on. */
-  void SetKidney(bool value) { this->SetParameter("Kidney", value); }
-  bool GetKidney() { return this->GetParameter("Kidney") != 0.0; }
-  void KidneyOn() { this->SetKidney(true); }
-  void KidneyOff() { this->SetKidney(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Kidney);
 
-  ///@{
   /** Whether there is a gallbladder, with its stones. Used when Kind is anatomy. Default on. */
-  void SetGallbladder(bool value) { this->SetParameter("Gallbladder", value); }
-  bool GetGallbladder() { return this->GetParameter("Gallbladder") != 0.0; }
-  void GallbladderOn() { this->SetGallbladder(true); }
-  void GallbladderOff() { this->SetGallbladder(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Gallbladder);
 
-  ///@{
   /**
    * Thickness of the capsules of liver and kidney and of the wall of the gallbladder; 0: none. Used when Kind is anatomy. In [0,
    * 3] mm; default 0.8.
    */
-  void SetCapsuleMm(double value) { this->SetParameter("CapsuleMm", value); }
-  double GetCapsuleMm() { return this->GetParameter("CapsuleMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(CapsuleMm);
 
-  ///@{
   /** Number of stones in the gallbladder. Used when Kind is anatomy. In [0, 5]; default 1. */
-  void SetStones(int value) { this->SetParameter("Stones", value); }
-  int GetStones() { return static_cast<int>(this->GetParameter("Stones")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Stones);
 
-  ///@{
   /** Radius of the largest stone. Used when Kind is anatomy. In [1, 7] mm; default 4. */
-  void SetStoneMm(double value) { this->SetParameter("StoneMm", value); }
-  double GetStoneMm() { return this->GetParameter("StoneMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(StoneMm);
 
-  ///@{
   /** Whether aorta and vena cava run along the spine. Used when Kind is anatomy. Default on. */
-  void SetGreatVessels(bool value) { this->SetParameter("GreatVessels", value); }
-  bool GetGreatVessels() { return this->GetParameter("GreatVessels") != 0.0; }
-  void GreatVesselsOn() { this->SetGreatVessels(true); }
-  void GreatVesselsOff() { this->SetGreatVessels(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(GreatVessels);
 
-  ///@{
   /**
    * Branchings from the root of the liver's vessels to a tip at most; 0: no trees. Used when Kind is anatomy. In [0, 9]; default
    * 6.
    */
-  void SetGenerations(int value) { this->SetParameter("Generations", value); }
-  int GetGenerations() { return static_cast<int>(this->GetParameter("Generations")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Generations);
 
-  ///@{
   /** Radius of the portal vein. Used when Kind is anatomy. In [1, 8] mm; default 5.5. */
-  void SetVesselRadiusMm(double value) { this->SetParameter("VesselRadiusMm", value); }
-  double GetVesselRadiusMm() { return this->GetParameter("VesselRadiusMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(VesselRadiusMm);
 
-  ///@{
   /** Radius of the narrowest vessels. Used when Kind is anatomy. In [0.4, 8] mm; default 0.9. */
-  void SetSmallestVesselMm(double value) { this->SetParameter("SmallestVesselMm", value); }
-  double GetSmallestVesselMm() { return this->GetParameter("SmallestVesselMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SmallestVesselMm);
 
-  ///@{
   /** By which share the smaller of two branches is narrower, on average. Used when Kind is anatomy. In [0, 0.6]; default 0.25. */
-  void SetBranchAsymmetry(double value) { this->SetParameter("BranchAsymmetry", value); }
-  double GetBranchAsymmetry() { return this->GetParameter("BranchAsymmetry"); }
-  ///@}
+  vtkUltrasoundNumberMacro(BranchAsymmetry);
 
-  ///@{
   /** Thickness of a vessel's wall beside its radius. Used when Kind is anatomy. In [0.02, 0.5]; default 0.22. */
-  void SetWallShare(double value) { this->SetParameter("WallShare", value); }
-  double GetWallShare() { return this->GetParameter("WallShare"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WallShare);
 
-  ///@{
   /** Number of cysts in the liver, as far as there is room. Used when Kind is anatomy. In [0, 20]; default 2. */
-  void SetCysts(int value) { this->SetParameter("Cysts", value); }
-  int GetCysts() { return static_cast<int>(this->GetParameter("Cysts")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Cysts);
 
-  ///@{
   /** Number of dark lesions in the liver, as far as there is room. Used when Kind is anatomy. In [0, 20]; default 2. */
-  void SetDarkLesions(int value) { this->SetParameter("DarkLesions", value); }
-  int GetDarkLesions() { return static_cast<int>(this->GetParameter("DarkLesions")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(DarkLesions);
 
-  ///@{
   /** Number of bright lesions in the liver, as far as there is room. Used when Kind is anatomy. In [0, 20]; default 2. */
-  void SetBrightLesions(int value) { this->SetParameter("BrightLesions", value); }
-  int GetBrightLesions() { return static_cast<int>(this->GetParameter("BrightLesions")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(BrightLesions);
 
-  ///@{
   /**
    * Radius of the largest cyst and lesions; the others are down to half of it. Used when Kind is anatomy. In [1, 20] mm; default
    * 7.
    */
-  void SetLesionRadiusMm(double value) { this->SetParameter("LesionRadiusMm", value); }
-  double GetLesionRadiusMm() { return this->GetParameter("LesionRadiusMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LesionRadiusMm);
 
-  ///@{
   /** Number of ribs across the muscle on the -x side. Used when Kind is anatomy. In [0, 6]; default 2. */
-  void SetRibs(int value) { this->SetParameter("Ribs", value); }
-  int GetRibs() { return static_cast<int>(this->GetParameter("Ribs")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Ribs);
 
-  ///@{
   /** Whether there are vertebrae behind the great vessels. Used when Kind is anatomy. Default on. */
-  void SetSpine(bool value) { this->SetParameter("Spine", value); }
-  bool GetSpine() { return this->GetParameter("Spine") != 0.0; }
-  void SpineOn() { this->SetSpine(true); }
-  void SpineOff() { this->SetSpine(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Spine);
 
-  ///@{
   /**
    * Size of the rig: places and radii of the balls are multiplied by it. Used when Kind is calibration-rig. In [0.2, 5]; default
    * 1.
    */
-  void SetRigScale(double value) { this->SetParameter("RigScale", value); }
-  double GetRigScale() { return this->GetParameter("RigScale"); }
-  ///@}
+  vtkUltrasoundNumberMacro(RigScale);
 
-  ///@{
   /** z of the glass plate's upper side in the world. Used when Kind is calibration-rig. In [10, 500] mm; default 105. */
-  void SetPlateDepthMm(double value) { this->SetParameter("PlateDepthMm", value); }
-  double GetPlateDepthMm() { return this->GetParameter("PlateDepthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(PlateDepthMm);
 
-  ///@{
   /** Thickness of the plate; 0: no plate, base and stems. Used when Kind is calibration-rig. In [0, 50] mm; default 6. */
-  void SetPlateMm(double value) { this->SetParameter("PlateMm", value); }
-  double GetPlateMm() { return this->GetParameter("PlateMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(PlateMm);
 
-  ///@{
   /**
    * Thickness of the slab on the glass that the pins stand on; 0: none. Used when Kind is calibration-rig. In [0, 20] mm; default
    * 2.
    */
-  void SetBaseMm(double value) { this->SetParameter("BaseMm", value); }
-  double GetBaseMm() { return this->GetParameter("BaseMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(BaseMm);
 
-  ///@{
   /** Radius of the pins that carry the balls; 0: none. Used when Kind is calibration-rig. In [0, 5] mm; default 1.2. */
-  void SetStemRadiusMm(double value) { this->SetParameter("StemRadiusMm", value); }
-  double GetStemRadiusMm() { return this->GetParameter("StemRadiusMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(StemRadiusMm);
 
-  ///@{
   /**
    * Temperature of the bath; the water's speed of sound follows. Used when Kind is calibration-rig. In [0, 95] degrees Celsius;
    * default 20.
    */
-  void SetWaterCelsius(double value) { this->SetParameter("WaterCelsius", value); }
-  double GetWaterCelsius() { return this->GetParameter("WaterCelsius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WaterCelsius);
 
-  ///@{
   /** Edge of the triangles of the balls. Used when Kind is calibration-rig. In [0.1, 5] mm; default 0.5. */
-  void SetBallDetailMm(double value) { this->SetParameter("BallDetailMm", value); }
-  double GetBallDetailMm() { return this->GetParameter("BallDetailMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(BallDetailMm);
 
-  ///@{
   /** What balls and stems are made of: the name of a standard material. Used when Kind is calibration-rig. Default nylon. */
-  void SetBallMaterial(const char* value) { this->SetParameterAsText("BallMaterial", value); }
-  std::string GetBallMaterial() { return this->GetParameterAsText("BallMaterial"); }
-  ///@}
+  vtkUltrasoundTextMacro(BallMaterial);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

@@ -22,10 +22,10 @@
 
 #include "EchoramaFiltersPhantomsModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Phantoms/Phantom.h"
-#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is set
 #endif
 
@@ -39,182 +39,91 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * Seed of the tissue: where the scatterers lie and how strong they are. Volumes with one seed show the same tissue. At least 0;
    * default 1.
    */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /** Edge of the cubic voxels. Above 0 mm; default 1. */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /** Gain of this volume. In [-200, 200] dB; default 0. */
-  void SetGainDb(double value) { this->SetParameter("GainDb", value); }
-  double GetGainDb() { return this->GetParameter("GainDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(GainDb);
 
-  ///@{
   /** How much the 255 steps of grey span. In [10, 200] dB; default 60. */
-  void SetDynamicRangeDb(double value) { this->SetParameter("DynamicRangeDb", value); }
-  double GetDynamicRangeDb() { return this->GetParameter("DynamicRangeDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DynamicRangeDb);
 
-  ///@{
   /** Mean grey of the background at a gain of 0 dB. In [0, 255]; default 100. */
-  void SetBackgroundGrey(double value) { this->SetParameter("BackgroundGrey", value); }
-  double GetBackgroundGrey() { return this->GetParameter("BackgroundGrey"); }
-  ///@}
+  vtkUltrasoundNumberMacro(BackgroundGrey);
 
-  ///@{
   /** Whether attenuating bodies (the stone of the default scene) cast shadows. Default on. */
-  void SetShadows(bool value) { this->SetParameter("Shadows", value); }
-  bool GetShadows() { return this->GetParameter("Shadows") != 0.0; }
-  void ShadowsOn() { this->SetShadows(true); }
-  void ShadowsOff() { this->SetShadows(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Shadows);
 
-  ///@{
   /**
    * How far the speckle has changed: complex echoes of volumes of one Seed and different ChangeSeeds that are seen alike
    * correlate by 1 less this. Bodies stay where and as loud as they are. In [0, 1]; default 0.
    */
-  void SetDecorrelation(double value) { this->SetParameter("Decorrelation", value); }
-  double GetDecorrelation() { return this->GetParameter("Decorrelation"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Decorrelation);
 
-  ///@{
   /** Seed of the change and of the noise: volumes with the same one have changed alike. At least 0; default 1. */
-  void SetChangeSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("ChangeSeed", value); }
-  vtkTypeInt64 GetChangeSeed() { return this->GetParameterAsInteger("ChangeSeed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(ChangeSeed);
 
-  ///@{
   /**
    * How far the pressed probe moves the tissue below the middle of its face. It fades with depth and sideways. In [0, 10] mm;
    * default 0.
    */
-  void SetDeformationMm(double value) { this->SetParameter("DeformationMm", value); }
-  double GetDeformationMm() { return this->GetParameter("DeformationMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DeformationMm);
 
-  ///@{
   /** Power of the receiver's noise beside that of the background; -120: none. In [-120, 60] dB; default -120. */
-  void SetNoiseDb(double value) { this->SetParameter("NoiseDb", value); }
-  double GetNoiseDb() { return this->GetParameter("NoiseDb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(NoiseDb);
 
-  ///@{
   /** Share of the fan in the shadow of a rib close below the face; 0: no rib. In [0, 0.6]; default 0. */
-  void SetRibShare(double value) { this->SetParameter("RibShare", value); }
-  double GetRibShare() { return this->GetParameter("RibShare"); }
-  ///@}
+  vtkUltrasoundNumberMacro(RibShare);
 
-  ///@{
   /** Whether bodies that come and go (jets and puffs at places of the default scene) are there. Default off. */
-  void SetJets(bool value) { this->SetParameter("Jets", value); }
-  bool GetJets() { return this->GetParameter("Jets") != 0.0; }
-  void JetsOn() { this->SetJets(true); }
-  void JetsOff() { this->SetJets(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Jets);
 
-  ///@{
   /** Wavelength in tissue. The longer, the longer speckle stays alike as the probe turns. In [0.05, 10] mm; default 0.6. */
-  void SetWavelengthMm(double value) { this->SetParameter("WavelengthMm", value); }
-  double GetWavelengthMm() { return this->GetParameter("WavelengthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WavelengthMm);
 
-  ///@{
   /** Angle between the first and the last beam of a fan. In [0, 359.999] degrees; default 65. */
-  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
-  double GetFanAngle() { return this->GetParameter("FanAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanAngle);
 
-  ///@{
   /** Radius of the array's arc. In [0, 10000] mm; default 40. */
-  void SetFanRadius(double value) { this->SetParameter("FanRadius", value); }
-  double GetFanRadius() { return this->GetParameter("FanRadius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanRadius);
 
-  ///@{
   /** Angle that the array sweeps. In [0, 359.999] degrees; default 55. */
-  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
-  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepAngle);
 
-  ///@{
   /**
    * Distance of the sweep's axis behind the middle of the face. The edges of the fan must stay in front of it. In [0, 10000] mm;
    * default 30.
    */
-  void SetSweepRadius(double value) { this->SetParameter("SweepRadius", value); }
-  double GetSweepRadius() { return this->GetParameter("SweepRadius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepRadius);
 
-  ///@{
   /** First depth along the beams, from the face. In [-10000, 10000] mm; default 5. */
-  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
-  double GetDepthMin() { return this->GetParameter("DepthMin"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMin);
 
-  ///@{
   /** Last depth along the beams, from the face. In [-10000, 10000] mm; default 100. */
-  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
-  double GetDepthMax() { return this->GetParameter("DepthMax"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMax);
 
-  ///@{
   /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
-  void SetPosition(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetPosition(value);
-  }
-  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
-  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Position);
 
-  ///@{
   /** How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. In degrees; default (0, 0, 0). */
-  void SetOrientation(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetOrientation(value);
-  }
-  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
-  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Orientation);
 
-  ///@{
   /** The scene as JSON text, as it stands in the field data Scene of a phantom; empty: the default scene. Default none. */
-  void SetScene(const char* value) { this->SetParameterAsText("Scene", value); }
-  std::string GetScene() { return this->GetParameterAsText("Scene"); }
-  ///@}
+  vtkUltrasoundTextMacro(Scene);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

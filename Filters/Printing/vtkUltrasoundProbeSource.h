@@ -26,10 +26,10 @@
 
 #include "EchoramaFiltersPrintingModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Printing/ProbeMesh.h"
-#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is set
 #endif
 
@@ -52,180 +52,94 @@ public:
    * The kind of probe. Custom: the head that the following parameters describe. Default mechanical-3d. There are CUSTOM,
    * CURVILINEAR, LINEAR, PHASED, ENDOCAVITY_3D, MECHANICAL_3D.
    */
-  void SetPreset(int value) { this->SetParameter("Preset", value); }
-  int GetPreset() { return static_cast<int>(this->GetParameter("Preset")); }
+  vtkUltrasoundChoiceMacro(Preset);
   void SetPresetToCustom() { this->SetPreset(CUSTOM); }
   void SetPresetToCurvilinear() { this->SetPreset(CURVILINEAR); }
   void SetPresetToLinear() { this->SetPreset(LINEAR); }
   void SetPresetToPhased() { this->SetPreset(PHASED); }
   void SetPresetToEndocavity3D() { this->SetPreset(ENDOCAVITY_3D); }
   void SetPresetToMechanical3D() { this->SetPreset(MECHANICAL_3D); }
-  std::string GetPresetAsString() { return this->GetParameterAsText("Preset"); }
   ///@}
 
-  ///@{
   /** Angle between the first and the last beam of a fan. Used when Preset is custom. In [0, 359.999] degrees; default 70. */
-  void SetFanAngle(double value) { this->SetParameter("FanAngle", value); }
-  double GetFanAngle() { return this->GetParameter("FanAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanAngle);
 
-  ///@{
   /** Radius of the array's arc; of no meaning where FanAngle is 0. Used when Preset is custom. In [0, 10000] mm; default 40. */
-  void SetFanRadius(double value) { this->SetParameter("FanRadius", value); }
-  double GetFanRadius() { return this->GetParameter("FanRadius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanRadius);
 
-  ///@{
   /** Length of a flat array: where FanAngle is 0. Used when Preset is custom. In [0, 10000] mm; default 40. */
-  void SetFanWidth(double value) { this->SetParameter("FanWidth", value); }
-  double GetFanWidth() { return this->GetParameter("FanWidth"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FanWidth);
 
-  ///@{
   /**
    * Angle that the array sweeps. With an angle and a width of 0 the sweep is a single plane. Used when Preset is custom. In [0,
    * 359.999] degrees; default 65.
    */
-  void SetSweepAngle(double value) { this->SetParameter("SweepAngle", value); }
-  double GetSweepAngle() { return this->GetParameter("SweepAngle"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepAngle);
 
-  ///@{
   /**
    * From the axis of the sweep to the face; of no meaning where SweepAngle is 0. Used when Preset is custom. In [0, 10000] mm;
    * default 30.
    */
-  void SetSweepRadius(double value) { this->SetParameter("SweepRadius", value); }
-  double GetSweepRadius() { return this->GetParameter("SweepRadius"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepRadius);
 
-  ///@{
   /**
    * How far the array moves along a line where SweepAngle is 0. 0: a single plane. Used when Preset is custom. In [0, 10000] mm;
    * default 0.
    */
-  void SetSweepWidth(double value) { this->SetParameter("SweepWidth", value); }
-  double GetSweepWidth() { return this->GetParameter("SweepWidth"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SweepWidth);
 
-  ///@{
   /** First depth along the beams, from the face. Used when Preset is custom. In [-10000, 10000] mm; default 0. */
-  void SetDepthMin(double value) { this->SetParameter("DepthMin", value); }
-  double GetDepthMin() { return this->GetParameter("DepthMin"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMin);
 
-  ///@{
   /** Last depth along the beams, from the face. Used when Preset is custom. In [-10000, 10000] mm; default 150. */
-  void SetDepthMax(double value) { this->SetParameter("DepthMax", value); }
-  double GetDepthMax() { return this->GetParameter("DepthMax"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthMax);
 
-  ///@{
   /** Beams across the fan. Used when Preset is custom. In [1, 65536]; default 128. */
-  void SetElements(int value) { this->SetParameter("Elements", value); }
-  int GetElements() { return static_cast<int>(this->GetParameter("Elements")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Elements);
 
-  ///@{
   /** Planes of the sweep; a single plane has one. Used when Preset is custom. In [1, 65536]; default 128. */
-  void SetSweepSteps(int value) { this->SetParameter("SweepSteps", value); }
-  int GetSweepSteps() { return static_cast<int>(this->GetParameter("SweepSteps")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(SweepSteps);
 
-  ///@{
   /** Radius of the edge between face and wall. In [0.1, 50] mm; default 4. */
-  void SetRimMm(double value) { this->SetParameter("RimMm", value); }
-  double GetRimMm() { return this->GetParameter("RimMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(RimMm);
 
-  ///@{
   /** Straight wall below the lowest point of that edge. In [0.1, 200] mm; default 10. */
-  void SetSkirtMm(double value) { this->SetParameter("SkirtMm", value); }
-  double GetSkirtMm() { return this->GetParameter("SkirtMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SkirtMm);
 
-  ///@{
   /** From the wall to the handle. In [1, 500] mm; default 30. */
-  void SetNeckMm(double value) { this->SetParameter("NeckMm", value); }
-  double GetNeckMm() { return this->GetParameter("NeckMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(NeckMm);
 
-  ///@{
   /** Length of the handle. In [1, 1000] mm; default 80. */
-  void SetHandleMm(double value) { this->SetParameter("HandleMm", value); }
-  double GetHandleMm() { return this->GetParameter("HandleMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(HandleMm);
 
-  ///@{
   /** The handle along the fan. In [1, 500] mm; default 30. */
-  void SetHandleWidthMm(double value) { this->SetParameter("HandleWidthMm", value); }
-  double GetHandleWidthMm() { return this->GetParameter("HandleWidthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(HandleWidthMm);
 
-  ///@{
   /** The handle along the sweep. In [1, 500] mm; default 22. */
-  void SetHandleThicknessMm(double value) { this->SetParameter("HandleThicknessMm", value); }
-  double GetHandleThicknessMm() { return this->GetParameter("HandleThicknessMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(HandleThicknessMm);
 
-  ///@{
   /** The face of a phased array along the fan: its beams start in one point, which has no size. In [1, 300] mm; default 22. */
-  void SetFaceWidthMm(double value) { this->SetParameter("FaceWidthMm", value); }
-  double GetFaceWidthMm() { return this->GetParameter("FaceWidthMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FaceWidthMm);
 
-  ///@{
   /** The face of a single plane, or of a sweep about a line in the face, along the sweep. In [1, 300] mm; default 13. */
-  void SetFaceThicknessMm(double value) { this->SetParameter("FaceThicknessMm", value); }
-  double GetFaceThicknessMm() { return this->GetParameter("FaceThicknessMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FaceThicknessMm);
 
-  ///@{
   /** Edge of the triangles, about. In [0.1, 50] mm; default 1.5. */
-  void SetResolutionMm(double value) { this->SetParameter("ResolutionMm", value); }
-  double GetResolutionMm() { return this->GetParameter("ResolutionMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ResolutionMm);
 
-  ///@{
   /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
-  void SetPosition(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetPosition(value);
-  }
-  void SetPosition(const double value[3]) { this->SetParameterAsVector("Position", value); }
-  double* GetPosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Position"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Position);
 
-  ///@{
   /** How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x. In degrees; default (0, 0, 0). */
-  void SetOrientation(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetOrientation(value);
-  }
-  void SetOrientation(const double value[3]) { this->SetParameterAsVector("Orientation", value); }
-  double* GetOrientation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Orientation"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Orientation);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

@@ -34,6 +34,7 @@
 
 #include "EchoramaFiltersReconstructionModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <memory> // for the plan and the live volume
 #include <string> // for the report
@@ -42,7 +43,6 @@
 #include "Filters/Reconstruction/HoleFilling.h"
 #include "Filters/Reconstruction/ReconstructionPlan.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkAlgorithmOutput;
@@ -67,11 +67,9 @@ public:
    * How a pixel goes into the volume: into its nearest voxel, or by linear weights into the eight around it. Default nearest.
    * There are NEAREST, LINEAR.
    */
-  void SetSplat(int value) { this->SetParameter("Splat", value); }
-  int GetSplat() { return static_cast<int>(this->GetParameter("Splat")); }
+  vtkUltrasoundChoiceMacro(Splat);
   void SetSplatToNearest() { this->SetSplat(NEAREST); }
   void SetSplatToLinear() { this->SetSplat(LINEAR); }
-  std::string GetSplatAsString() { return this->GetParameterAsText("Splat"); }
   ///@}
 
   enum Compoundings { MEAN = 0, MAXIMUM = 1, LATEST = 2, ALPHA = 3, RUNNING_MEAN = 4 };
@@ -82,21 +80,16 @@ public:
    * over the others, or the rounded mean that the Plus toolkit keeps, for comparison. Default mean. There are MEAN, MAXIMUM,
    * LATEST, ALPHA, RUNNING_MEAN.
    */
-  void SetCompounding(int value) { this->SetParameter("Compounding", value); }
-  int GetCompounding() { return static_cast<int>(this->GetParameter("Compounding")); }
+  vtkUltrasoundChoiceMacro(Compounding);
   void SetCompoundingToMean() { this->SetCompounding(MEAN); }
   void SetCompoundingToMaximum() { this->SetCompounding(MAXIMUM); }
   void SetCompoundingToLatest() { this->SetCompounding(LATEST); }
   void SetCompoundingToAlpha() { this->SetCompounding(ALPHA); }
   void SetCompoundingToRunningMean() { this->SetCompounding(RUNNING_MEAN); }
-  std::string GetCompoundingAsString() { return this->GetParameterAsText("Compounding"); }
   ///@}
 
-  ///@{
   /** Opacity of a frame that is laid over the others. Used when Compounding is alpha. In (0, 1]; default 0.5. */
-  void SetAlpha(double value) { this->SetParameter("Alpha", value); }
-  double GetAlpha() { return this->GetParameter("Alpha"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Alpha);
 
   enum Betweens { NOTHING = 0, FORWARD = 1, BACKWARD = 2 };
 
@@ -105,31 +98,23 @@ public:
    * What lies between frames that follow each other: nothing; frames with pixels and matrices interpolated; or, backward, at each
    * voxel a blend of what both frames show at its perpendicular feet. Default forward. There are NOTHING, FORWARD, BACKWARD.
    */
-  void SetBetween(int value) { this->SetParameter("Between", value); }
-  int GetBetween() { return static_cast<int>(this->GetParameter("Between")); }
+  vtkUltrasoundChoiceMacro(Between);
   void SetBetweenToNothing() { this->SetBetween(NOTHING); }
   void SetBetweenToForward() { this->SetBetween(FORWARD); }
   void SetBetweenToBackward() { this->SetBetween(BACKWARD); }
-  std::string GetBetweenAsString() { return this->GetParameterAsText("Between"); }
   ///@}
 
-  ///@{
   /**
    * No pixel moves further than this from one interpolated frame to the next. 0: 0.7 of the smallest spacing. Used when Between
    * is forward. At least 0 mm; default 0.
    */
-  void SetStepMm(double value) { this->SetParameter("StepMm", value); }
-  double GetStepMm() { return this->GetParameter("StepMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(StepMm);
 
-  ///@{
   /**
    * Frames between which a pixel moves further than this are not joined: the probe was lifted. Used when Between is forward or
    * backward. Above 0 mm; default 10.
    */
-  void SetMaximumGapMm(double value) { this->SetParameter("MaximumGapMm", value); }
-  double GetMaximumGapMm() { return this->GetParameter("MaximumGapMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MaximumGapMm);
 
   enum Holes { NONE = 0, MEAN_AROUND = 1, STICK = 2 };
 
@@ -139,22 +124,17 @@ public:
    * reaches across; or by linear interpolation along the shortest line across. Default mean-around. There are NONE, MEAN_AROUND,
    * STICK.
    */
-  void SetHoles(int value) { this->SetParameter("Holes", value); }
-  int GetHoles() { return static_cast<int>(this->GetParameter("Holes")); }
+  vtkUltrasoundChoiceMacro(Holes);
   void SetHolesToNone() { this->SetHoles(NONE); }
   void SetHolesToMeanAround() { this->SetHoles(MEAN_AROUND); }
   void SetHolesToStick() { this->SetHoles(STICK); }
-  std::string GetHolesAsString() { return this->GetParameterAsText("Holes"); }
   ///@}
 
-  ///@{
   /**
    * The widest gap that is filled, along one of 13 lines. 1: single voxels. Used when Holes is mean-around or stick. In [1, 100]
    * voxels; default 1.
    */
-  void SetHoleReach(int value) { this->SetParameter("HoleReach", value); }
-  int GetHoleReach() { return static_cast<int>(this->GetParameter("HoleReach")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(HoleReach);
 
   enum Sectors { ALL = 0, DETECTED = 1, RECTANGLE = 2, FAN = 3 };
 
@@ -164,13 +144,11 @@ public:
    * changes from frame to frame, so that what a scanner prints stays out; all pixels, with a warning, where hardly anything
    * changes or frames come live. Default detected. There are ALL, DETECTED, RECTANGLE, FAN.
    */
-  void SetSector(int value) { this->SetParameter("Sector", value); }
-  int GetSector() { return static_cast<int>(this->GetParameter("Sector")); }
+  vtkUltrasoundChoiceMacro(Sector);
   void SetSectorToAll() { this->SetSector(ALL); }
   void SetSectorToDetected() { this->SetSector(DETECTED); }
   void SetSectorToRectangle() { this->SetSector(RECTANGLE); }
   void SetSectorToFan() { this->SetSector(FAN); }
-  std::string GetSectorAsString() { return this->GetParameterAsText("Sector"); }
   ///@}
 
   enum Grids { FITTED = 0, WORLD = 1 };
@@ -180,61 +158,33 @@ public:
    * How the grid lies when none is given: fitted to the data's own directions, or along the axes of the world. Default fitted.
    * There are FITTED, WORLD.
    */
-  void SetGrid(int value) { this->SetParameter("Grid", value); }
-  int GetGrid() { return static_cast<int>(this->GetParameter("Grid")); }
+  vtkUltrasoundChoiceMacro(Grid);
   void SetGridToFitted() { this->SetGrid(FITTED); }
   void SetGridToWorld() { this->SetGrid(WORLD); }
-  std::string GetGridAsString() { return this->GetParameterAsText("Grid"); }
   ///@}
 
-  ///@{
   /** Edge of a voxel when no grid is given. 0: the longer edge of a pixel. At least 0 mm; default 0. */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /** The first frame to use, counted from 0 in the order of time. At least 0; default 0. */
-  void SetFirstFrame(int value) { this->SetParameter("FirstFrame", value); }
-  int GetFirstFrame() { return static_cast<int>(this->GetParameter("FirstFrame")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FirstFrame);
 
-  ///@{
   /** The last frame to use. -1: the last of the sequence. At least -1; default -1. */
-  void SetLastFrame(int value) { this->SetParameter("LastFrame", value); }
-  int GetLastFrame() { return static_cast<int>(this->GetParameter("LastFrame")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(LastFrame);
 
-  ///@{
   /** Every n-th frame is used. At least 1; default 1. */
-  void SetFrameStep(int value) { this->SetParameter("FrameStep", value); }
-  int GetFrameStep() { return static_cast<int>(this->GetParameter("FrameStep")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FrameStep);
 
-  ///@{
   /** What takes more memory (in 10^6 bytes) is refused. 0: what is free on this machine. At least 0 MB; default 0. */
-  void SetMemoryLimitMb(double value) { this->SetParameter("MemoryLimitMb", value); }
-  double GetMemoryLimitMb() { return this->GetParameter("MemoryLimitMb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MemoryLimitMb);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   enum { KEEP_HOLES = NONE }; ///< the same

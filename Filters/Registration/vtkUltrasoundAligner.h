@@ -35,11 +35,11 @@
 
 #include "EchoramaFiltersRegistrationModule.h"
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/AlignVolumes.h"
 #include "Filters/Registration/LandmarkInput.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkMatrix4x4;
@@ -51,148 +51,87 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /** The volume that stays where it is, counted from 0. At least 0; default 0. */
-  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
-  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FixedVolume);
 
-  ///@{
   /** Whether shadowed and saturated voxels count less. Default on. */
-  void SetUseReliability(bool value) { this->SetParameter("UseReliability", value); }
-  bool GetUseReliability() { return this->GetParameter("UseReliability") != 0.0; }
-  void UseReliabilityOn() { this->SetUseReliability(true); }
-  void UseReliabilityOff() { this->SetUseReliability(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(UseReliability);
 
-  ///@{
   /**
    * What is known about where the volumes belong: tracked, within some 12 degrees and 20 mm; hand-made, within some 35 degrees
    * and a third of a volume; unknown, nothing; automatic, one after the other while there is no clear answer. Default automatic.
    * There are "automatic", "tracked", "hand-made", "unknown".
    */
-  void SetStart(const char* value) { this->SetParameterAsText("Start", value); }
-  std::string GetStart() { return this->GetParameterAsText("Start"); }
-  ///@}
+  vtkUltrasoundTextMacro(Start);
 
-  ///@{
   /**
    * The likeness that refines poses: normalised cross-correlation, local or over the whole overlap, the mean absolute difference,
    * self-similarity descriptors, or local linear correlation of intensity and gradient. Default local-ncc. There are "local-ncc",
    * "ncc", "mad", "mind-ssc", "lc2".
    */
-  void SetMetric(const char* value) { this->SetParameterAsText("Metric", value); }
-  std::string GetMetric() { return this->GetParameterAsText("Metric"); }
-  ///@}
+  vtkUltrasoundTextMacro(Metric);
 
-  ///@{
   /** The share of the smaller volume of a pair that must lie in the other for a pose to count. In [0.01, 1]; default 0.1. */
-  void SetMinimumOverlap(double value) { this->SetParameter("MinimumOverlap", value); }
-  double GetMinimumOverlap() { return this->GetParameter("MinimumOverlap"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MinimumOverlap);
 
-  ///@{
   /**
    * Refinement ends at voxels not smaller than this; larger is faster and less exact. 0: at the volumes' own. In [0, 1000] mm;
    * default 0.
    */
-  void SetFinestMm(double value) { this->SetParameter("FinestMm", value); }
-  double GetFinestMm() { return this->GetParameter("FinestMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FinestMm);
 
-  ///@{
   /**
    * Poses of the global search that are refined; four times as many when every rotation is tried, and where fewer give no clear
    * answer. In [1, 1000]; default 16.
    */
-  void SetCandidates(int value) { this->SetParameter("Candidates", value); }
-  int GetCandidates() { return static_cast<int>(this->GetParameter("Candidates")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Candidates);
 
-  ///@{
   /** Less similarity in the overlap (1 identical, 0 chance) is failed. In [0, 1]; default 0.06. */
-  void SetMinimumSimilarity(double value) { this->SetParameter("MinimumSimilarity", value); }
-  double GetMinimumSimilarity() { return this->GetParameter("MinimumSimilarity"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MinimumSimilarity);
 
-  ///@{
   /** A smaller ratio of the best evidence to that of the next different pose is ambiguous. In [1, 99]; default 1.25. */
-  void SetMinimumPeakRatio(double value) { this->SetParameter("MinimumPeakRatio", value); }
-  double GetMinimumPeakRatio() { return this->GetParameter("MinimumPeakRatio"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MinimumPeakRatio);
 
-  ///@{
   /**
    * A larger predicted error is ambiguous; where volumes are hardly alike (similarity below 0.15), in proportion less. In [0.001,
    * 1000] voxels; default 1.
    */
-  void SetMaximumErrorVoxels(double value) { this->SetParameter("MaximumErrorVoxels", value); }
-  double GetMaximumErrorVoxels() { return this->GetParameter("MaximumErrorVoxels"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MaximumErrorVoxels);
 
-  ///@{
   /**
    * A larger predicted error is ambiguous, too, whatever the size of the voxels: what your use can bear. In [0.001, 1000] mm;
    * default 2.5.
    */
-  void SetMaximumErrorMm(double value) { this->SetParameter("MaximumErrorMm", value); }
-  double GetMaximumErrorMm() { return this->GetParameter("MaximumErrorMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MaximumErrorMm);
 
-  ///@{
   /**
    * How far the speed of sound in the tissue may be from what the scanner takes it for, as a share. A volume may be off by this
    * share of its distance from the fixed one although both show the same: that is added to its error. In [0, 0.2]; default 0.025.
    */
-  void SetSoundSpeedError(double value) { this->SetParameter("SoundSpeedError", value); }
-  double GetSoundSpeedError() { return this->GetParameter("SoundSpeedError"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SoundSpeedError);
 
-  ///@{
   /** Poses found from two halves of the voxels that lie further apart are failed. In [0.001, 1000] voxels; default 2. */
-  void SetMaximumSplitVoxels(double value) { this->SetParameter("MaximumSplitVoxels", value); }
-  double GetMaximumSplitVoxels() { return this->GetParameter("MaximumSplitVoxels"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MaximumSplitVoxels);
 
-  ///@{
   /**
    * How exactly landmarks were found: the standard deviation of the difference between the two points of one, along each axis.
    * Poses in which they differ by more than chance would have it are no answers. In [0.001, 1000] mm; default 2.
    */
-  void SetLandmarkSigmaMm(double value) { this->SetParameter("LandmarkSigmaMm", value); }
-  double GetLandmarkSigmaMm() { return this->GetParameter("LandmarkSigmaMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(LandmarkSigmaMm);
 
-  ///@{
   /** Random points of each volume that are compared on each level. In [100, 10000000]; default 200000. */
-  void SetPoints(int value) { this->SetParameter("Points", value); }
-  int GetPoints() { return static_cast<int>(this->GetParameter("Points")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Points);
 
-  ///@{
   /** The same seed draws the same points. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

@@ -32,10 +32,10 @@
 
 #include "EchoramaFiltersRegistrationModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/AlignmentScore.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAlignmentScore : public vtkPolyDataAlgorithm {
@@ -45,42 +45,22 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /** The volume that alignment and truth are taken to agree on, counted from 0. At least 0; default 0. */
-  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
-  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FixedVolume);
 
-  ///@{
   /** Points of each volume that are scored. In [1, 10000000]; default 2000. */
-  void SetPoints(int value) { this->SetParameter("Points", value); }
-  int GetPoints() { return static_cast<int>(this->GetParameter("Points")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Points);
 
-  ///@{
   /** The same seed draws the same points. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

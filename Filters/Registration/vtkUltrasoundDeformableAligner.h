@@ -36,10 +36,10 @@
 
 #include "EchoramaFiltersRegistrationModule.h"
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/DeformableAlign.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundDeformableAligner : public vtkUltrasoundMultiBlockAlgorithm {
@@ -49,78 +49,43 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /** The volume that is not bent, counted from 0. At least 0; default 0. */
-  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
-  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FixedVolume);
 
-  ///@{
   /** Distance of the control points: about the size of what can bend by itself. In [5, 500] mm; default 30. */
-  void SetControlSpacingMm(double value) { this->SetParameter("ControlSpacingMm", value); }
-  double GetControlSpacingMm() { return this->GetParameter("ControlSpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ControlSpacingMm);
 
-  ///@{
   /**
    * How stiff tissue is taken to be. A lower one follows larger deformations and more noise. In [1e-06, 1000000000000] per mm;
    * default 200.
    */
-  void SetBendingWeight(double value) { this->SetParameter("BendingWeight", value); }
-  double GetBendingWeight() { return this->GetParameter("BendingWeight"); }
-  ///@}
+  vtkUltrasoundNumberMacro(BendingWeight);
 
-  ///@{
   /**
    * The share of what volumes then say of each other that a displacement must add to be applied. Views of the same tissue under
    * different angles seem to differ by some 0.1. In [0, 1]; default 0.2.
    */
-  void SetMinimumGain(double value) { this->SetParameter("MinimumGain", value); }
-  double GetMinimumGain() { return this->GetParameter("MinimumGain"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MinimumGain);
 
-  ///@{
   /** Resolutions, each half as fine as the next. In [1, 6]; default 2. */
-  void SetLevels(int value) { this->SetParameter("Levels", value); }
-  int GetLevels() { return static_cast<int>(this->GetParameter("Levels")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Levels);
 
-  ///@{
   /** Steps per resolution, at most. In [1, 1000]; default 15. */
-  void SetIterations(int value) { this->SetParameter("Iterations", value); }
-  int GetIterations() { return static_cast<int>(this->GetParameter("Iterations")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Iterations);
 
-  ///@{
   /** Voxels of the last resolution are about this large. Finer is slower and more exact. In [0.01, 100] mm; default 1. */
-  void SetFinestMm(double value) { this->SetParameter("FinestMm", value); }
-  double GetFinestMm() { return this->GetParameter("FinestMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FinestMm);
 
-  ///@{
   /** The share of a volume that must lie in others for it to be bent. In [0.001, 1]; default 0.02. */
-  void SetMinimumOverlap(double value) { this->SetParameter("MinimumOverlap", value); }
-  double GetMinimumOverlap() { return this->GetParameter("MinimumOverlap"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MinimumOverlap);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

@@ -27,11 +27,11 @@
 
 #include "EchoramaFiltersRegistrationModule.h"
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/AlignmentScore.h"
 #include "Filters/Registration/PoseEdit.h"
-#include "vtkUltrasoundParameters.h"
 #include <array>
 #include <map>
 #include <vector>
@@ -60,86 +60,40 @@ public:
    * What the rotation turns about. The box in ParaView's view shows the motion with the world's origin; the middle of the chosen
    * volumes is handier to turn by numbers. Default world-origin. There are WORLD_ORIGIN, MIDDLE, CENTRE.
    */
-  void SetRotateAbout(int value) { this->SetParameter("RotateAbout", value); }
-  int GetRotateAbout() { return static_cast<int>(this->GetParameter("RotateAbout")); }
+  vtkUltrasoundChoiceMacro(RotateAbout);
   void SetRotateAboutToWorldOrigin() { this->SetRotateAbout(WORLD_ORIGIN); }
   void SetRotateAboutToMiddle() { this->SetRotateAbout(MIDDLE); }
   void SetRotateAboutToCentre() { this->SetRotateAbout(CENTRE); }
-  std::string GetRotateAboutAsString() { return this->GetParameterAsText("RotateAbout"); }
   ///@}
 
-  ///@{
   /** Motion along the axes of the world, after the rotation. In mm; default (0, 0, 0). */
-  void SetTranslation(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetTranslation(value);
-  }
-  void SetTranslation(const double value[3]) { this->SetParameterAsVector("Translation", value); }
-  double* GetTranslation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Translation"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Translation);
 
-  ///@{
   /** Turns about the axes of the world: about y first, then x, then z. In degrees; default (0, 0, 0). */
-  void SetRotation(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetRotation(value);
-  }
-  void SetRotation(const double value[3]) { this->SetParameterAsVector("Rotation", value); }
-  double* GetRotation() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Rotation"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Rotation);
 
-  ///@{
   /** The point that the rotation turns about. Used when RotateAbout is centre. In mm; default (0, 0, 0). */
-  void SetCentre(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetCentre(value);
-  }
-  void SetCentre(const double value[3]) { this->SetParameterAsVector("Centre", value); }
-  double* GetCentre() VTK_SIZEHINT(3) { return this->GetParameterAsVector("Centre"); }
-  ///@}
+  vtkUltrasoundVectorMacro(Centre);
 
-  ///@{
   /**
    * The volume that stays unless it is named, and on which alignment and truth are taken to agree; counted from 0. At least 0;
    * default 0.
    */
-  void SetFixedVolume(int value) { this->SetParameter("FixedVolume", value); }
-  int GetFixedVolume() { return static_cast<int>(this->GetParameter("FixedVolume")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FixedVolume);
 
-  ///@{
   /** Points of each volume that are scored. In [1, 10000000]; default 2000. */
-  void SetPoints(int value) { this->SetParameter("Points", value); }
-  int GetPoints() { return static_cast<int>(this->GetParameter("Points")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Points);
 
-  ///@{
   /** The same seed draws the same points. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

@@ -21,10 +21,10 @@
 
 #include "EchoramaFiltersRegistrationModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Registration/RigFit.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkMatrix4x4;
@@ -56,45 +56,25 @@ public:
   ///@}
 
   // BEGIN parameters
-  ///@{
   /**
    * Depth in the image over true depth, at least 0.9: the scanner's speed of sound over the bath's, 1540 / 1482 in water at 20
    * degrees Celsius. 0: found out from the distances between the balls. In [0, 1.1]; default 0.
    */
-  void SetDepthScale(double value) { this->SetParameter("DepthScale", value); }
-  double GetDepthScale() { return this->GetParameter("DepthScale"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DepthScale);
 
-  ///@{
   /** How far a ball may be from where the others say. In [0.1, 20] mm; default 3. */
-  void SetToleranceMm(double value) { this->SetParameter("ToleranceMm", value); }
-  double GetToleranceMm() { return this->GetParameter("ToleranceMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ToleranceMm);
 
-  ///@{
   /** Balls that must be found. In [3, 1000]; default 4. */
-  void SetFewestBalls(int value) { this->SetParameter("FewestBalls", value); }
-  int GetFewestBalls() { return static_cast<int>(this->GetParameter("FewestBalls")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(FewestBalls);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

@@ -40,13 +40,13 @@
 
 #include "EchoramaFiltersStitchingModule.h"
 #include "vtkUltrasoundImageAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #include <string> // for what it costs
 
 #ifndef __VTK_WRAP__
 #include "Filters/Stitching/Stitch.h"
 #include "Filters/Stitching/StitchMemory.h"
-#include "vtkUltrasoundParameters.h"
 #include <memory>   // for what is kept
 #include <optional> // for what it costs
 #include <vector>   // for gains
@@ -67,14 +67,12 @@ public:
    * distance: the distances to these; feather: the distance to its own border; average: nothing, so that the plain mean is shown;
    * maximum: the largest value is shown. Default membrane. There are DISTANCE, FEATHER, AVERAGE, MAXIMUM, MEMBRANE.
    */
-  void SetMethod(int value) { this->SetParameter("Method", value); }
-  int GetMethod() { return static_cast<int>(this->GetParameter("Method")); }
+  vtkUltrasoundChoiceMacro(Method);
   void SetMethodToDistance() { this->SetMethod(DISTANCE); }
   void SetMethodToFeather() { this->SetMethod(FEATHER); }
   void SetMethodToAverage() { this->SetMethod(AVERAGE); }
   void SetMethodToMaximum() { this->SetMethod(MAXIMUM); }
   void SetMethodToMembrane() { this->SetMethod(MEMBRANE); }
-  std::string GetMethodAsString() { return this->GetParameterAsText("Method"); }
   ///@}
 
   enum Textures { MIX = 0, SPLIT = 1 };
@@ -85,131 +83,75 @@ public:
    * over in a narrow transition, amplified by what mixtures lose. Used when Method is distance or feather or membrane. Default
    * split. There are MIX, SPLIT.
    */
-  void SetTexture(int value) { this->SetParameter("Texture", value); }
-  int GetTexture() { return static_cast<int>(this->GetParameter("Texture")); }
+  vtkUltrasoundChoiceMacro(Texture);
   void SetTextureToMix() { this->SetTexture(MIX); }
   void SetTextureToSplit() { this->SetTexture(SPLIT); }
-  std::string GetTextureAsString() { return this->GetParameterAsText("Texture"); }
   ///@}
 
-  ///@{
   /**
    * Exponent of the weights: 0 is the plain average, 1 a ramp across the whole overlap, 50 nearly a hard edge half-way. Used when
    * Method is distance or membrane. In [0, 1000]; default 1.5.
    */
-  void SetSharpness(double value) { this->SetParameter("Sharpness", value); }
-  double GetSharpness() { return this->GetParameter("Sharpness"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Sharpness);
 
-  ///@{
   /**
    * The same exponent for speckle and edges. With 32 about a sixteenth of the overlap is transition. Used when Texture is split.
    * In [0, 1000]; default 32.
    */
-  void SetDetailSharpness(double value) { this->SetParameter("DetailSharpness", value); }
-  double GetDetailSharpness() { return this->GetParameter("DetailSharpness"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DetailSharpness);
 
-  ///@{
   /**
    * What counts as smooth: the standard deviation of the filter that parts it from details. In [1, 100] voxels of the output;
    * default 2.
    */
-  void SetDetailScale(double value) { this->SetParameter("DetailScale", value); }
-  double GetDetailScale() { return this->GetParameter("DetailScale"); }
-  ///@}
+  vtkUltrasoundNumberMacro(DetailScale);
 
-  ///@{
   /** Find a gain and an offset for each volume where volumes overlap, and apply them. Default off. */
-  void SetEqualizeGain(bool value) { this->SetParameter("EqualizeGain", value); }
-  bool GetEqualizeGain() { return this->GetParameter("EqualizeGain") != 0.0; }
-  void EqualizeGainOn() { this->SetEqualizeGain(true); }
-  void EqualizeGainOff() { this->SetEqualizeGain(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(EqualizeGain);
 
-  ///@{
   /**
    * What cannot be trusted at all still counts by this: where nothing better is there it is shown. Used when UseReliability is
    * on. In (0, 1]; default 0.01.
    */
-  void SetReliabilityFloor(double value) { this->SetParameter("ReliabilityFloor", value); }
-  double GetReliabilityFloor() { return this->GetParameter("ReliabilityFloor"); }
-  ///@}
+  vtkUltrasoundNumberMacro(ReliabilityFloor);
 
-  ///@{
   /** Accept volumes that overlap no other, and put them in their place. Off, that is an error. Default off. */
-  void SetAllowDisjoint(bool value) { this->SetParameter("AllowDisjoint", value); }
-  bool GetAllowDisjoint() { return this->GetParameter("AllowDisjoint") != 0.0; }
-  void AllowDisjointOn() { this->SetAllowDisjoint(true); }
-  void AllowDisjointOff() { this->SetAllowDisjoint(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(AllowDisjoint);
 
-  ///@{
   /**
    * Refuse what needs more memory beside the volumes, in 10^9 bytes. 0: three quarters of the machine's memory. At least 0 GB;
    * default 0.
    */
-  void SetMaximumMemoryGb(double value) { this->SetParameter("MaximumMemoryGb", value); }
-  double GetMaximumMemoryGb() { return this->GetParameter("MaximumMemoryGb"); }
-  ///@}
+  vtkUltrasoundNumberMacro(MaximumMemoryGb);
 
-  ///@{
   /**
    * Edge of the cubic voxels of the output. 0: the smallest spacing of the volumes, axis by axis where they all share their
    * directions. At least 0 mm; default 0.
    */
-  void SetSpacingMm(double value) { this->SetParameter("SpacingMm", value); }
-  double GetSpacingMm() { return this->GetParameter("SpacingMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(SpacingMm);
 
-  ///@{
   /**
    * Weigh volumes that have the array Reliability by it, so that a shadow in one is filled by another. Not for the method
    * maximum. Default on.
    */
-  void SetUseReliability(bool value) { this->SetParameter("UseReliability", value); }
-  bool GetUseReliability() { return this->GetParameter("UseReliability") != 0.0; }
-  void UseReliabilityOn() { this->SetUseReliability(true); }
-  void UseReliabilityOff() { this->SetUseReliability(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(UseReliability);
 
-  ///@{
   /** Also put out the share of each volume, as arrays Weight0, Weight1 ... Default off. */
-  void SetOutputWeights(bool value) { this->SetParameter("OutputWeights", value); }
-  bool GetOutputWeights() { return this->GetParameter("OutputWeights") != 0.0; }
-  void OutputWeightsOn() { this->SetOutputWeights(true); }
-  void OutputWeightsOff() { this->SetOutputWeights(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(OutputWeights);
 
-  ///@{
   /**
    * Also put out how far the volumes are apart at each voxel, as the array Spread: the largest minus the smallest of their
    * values, 0 where one is alone. Default off.
    */
-  void SetOutputSpread(bool value) { this->SetParameter("OutputSpread", value); }
-  bool GetOutputSpread() { return this->GetParameter("OutputSpread") != 0.0; }
-  void OutputSpreadOn() { this->SetOutputSpread(true); }
-  void OutputSpreadOff() { this->SetOutputSpread(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(OutputSpread);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 
   ///@{

@@ -27,9 +27,9 @@
 
 #include "EchoramaFiltersTissueModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
-#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is set
 #include <string>
 #endif
@@ -41,28 +41,19 @@ public:
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   // BEGIN parameters
-  ///@{
   /**
    * What each input is made of, in their order, separated by commas; the last holds for all further inputs. Either the name of a
    * standard material: each block of polygons is a body. Or bodies of chosen blocks, joined by plus signs: liver[10-19], or
    * kidney[0] + lesion-dark[2], or spleen[*] for all; blocks are counted from 0. The blocks of one body are welded into one
    * surface: organs often come in patches. Default tissue.
    */
-  void SetMaterials(const char* value) { this->SetParameterAsText("Materials", value); }
-  std::string GetMaterials() { return this->GetParameterAsText("Materials"); }
-  ///@}
+  vtkUltrasoundTextMacro(Materials);
 
-  ///@{
   /** The standard material around all bodies. Default tissue. */
-  void SetBackground(const char* value) { this->SetParameterAsText("Background", value); }
-  std::string GetBackground() { return this->GetParameterAsText("Background"); }
-  ///@}
+  vtkUltrasoundTextMacro(Background);
 
-  ///@{
   /** One unit of the inputs: 1000 for metres, as in GLTF. In [1e-06, 1000000] mm; default 1. */
-  void SetScale(double value) { this->SetParameter("Scale", value); }
-  double GetScale() { return this->GetParameter("Scale"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Scale);
 
   enum Axes { LPS = 0, Y_UP = 1, RAS = 2 };
 
@@ -71,64 +62,33 @@ public:
    * The axes of the inputs. LPS: as they are. Y up: x left, y up, z to the front, of a patient who stands upright, as in GLTF.
    * RAS: as in 3D Slicer's world. Default LPS. There are LPS, Y_UP, RAS.
    */
-  void SetAxes(int value) { this->SetParameter("Axes", value); }
-  int GetAxes() { return static_cast<int>(this->GetParameter("Axes")); }
+  vtkUltrasoundChoiceMacro(Axes);
   void SetAxesToLPS() { this->SetAxes(LPS); }
   void SetAxesToYUp() { this->SetAxes(Y_UP); }
   void SetAxesToRAS() { this->SetAxes(RAS); }
-  std::string GetAxesAsString() { return this->GetParameterAsText("Axes"); }
   ///@}
 
-  ///@{
   /** Points nearer than that become one; 0: those that are equal. In [0, 10] mm; default 0.001. */
-  void SetWeldMm(double value) { this->SetParameter("WeldMm", value); }
-  double GetWeldMm() { return this->GetParameter("WeldMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(WeldMm);
 
-  ///@{
   /** Whether triangles are turned so that bodies face outwards, and cavities inwards. Default on. */
-  void SetOrient(bool value) { this->SetParameter("Orient", value); }
-  bool GetOrient() { return this->GetParameter("Orient") != 0.0; }
-  void OrientOn() { this->SetOrient(true); }
-  void OrientOff() { this->SetOrient(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Orient);
 
-  ///@{
   /**
    * Whether holes are closed by triangles about the middle of their border. Those whose border branches stay open. Default off.
    */
-  void SetCloseHoles(bool value) { this->SetParameter("CloseHoles", value); }
-  bool GetCloseHoles() { return this->GetParameter("CloseHoles") != 0.0; }
-  void CloseHolesOn() { this->SetCloseHoles(true); }
-  void CloseHolesOff() { this->SetCloseHoles(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(CloseHoles);
 
-  ///@{
   /** Whether self-intersections are looked for: by far the longest of the checks. Default on. */
-  void SetSelfIntersections(bool value) { this->SetParameter("SelfIntersections", value); }
-  bool GetSelfIntersections() { return this->GetParameter("SelfIntersections") != 0.0; }
-  void SelfIntersectionsOn() { this->SetSelfIntersections(true); }
-  void SelfIntersectionsOff() { this->SetSelfIntersections(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(SelfIntersections);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

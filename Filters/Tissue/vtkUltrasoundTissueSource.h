@@ -23,9 +23,9 @@
 
 #include "EchoramaFiltersTissueModule.h"
 #include "vtkPolyDataAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
-#include "vtkUltrasoundParameters.h"
 #include <memory> // for what is set
 #endif
 
@@ -44,45 +44,25 @@ public:
    * space: at random places of the empty space, each with the largest sphere that fits (Manna 1992). Default random. There are
    * RANDOM, EMPTY_SPACE.
    */
-  void SetMethod(int value) { this->SetParameter("Method", value); }
-  int GetMethod() { return static_cast<int>(this->GetParameter("Method")); }
+  vtkUltrasoundChoiceMacro(Method);
   void SetMethodToRandom() { this->SetMethod(RANDOM); }
   void SetMethodToEmptySpace() { this->SetMethod(EMPTY_SPACE); }
-  std::string GetMethodAsString() { return this->GetParameterAsText("Method"); }
   ///@}
 
   enum Regions { BOX = 0, BALL = 1 };
 
   ///@{
   /** What is filled: the box, or the largest ball about its middle. Default box. There are BOX, BALL. */
-  void SetRegion(int value) { this->SetParameter("Region", value); }
-  int GetRegion() { return static_cast<int>(this->GetParameter("Region")); }
+  vtkUltrasoundChoiceMacro(Region);
   void SetRegionToBox() { this->SetRegion(BOX); }
   void SetRegionToBall() { this->SetRegion(BALL); }
-  std::string GetRegionAsString() { return this->GetParameterAsText("Region"); }
   ///@}
 
-  ///@{
   /** Least x, y and z of the box. In [-1000000, 1000000] mm; default (-50, -50, 0). */
-  void SetBoxMin(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetBoxMin(value);
-  }
-  void SetBoxMin(const double value[3]) { this->SetParameterAsVector("BoxMin", value); }
-  double* GetBoxMin() VTK_SIZEHINT(3) { return this->GetParameterAsVector("BoxMin"); }
-  ///@}
+  vtkUltrasoundVectorMacro(BoxMin);
 
-  ///@{
   /** Greatest x, y and z of the box. In [-1000000, 1000000] mm; default (50, 50, 100). */
-  void SetBoxMax(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetBoxMax(value);
-  }
-  void SetBoxMax(const double value[3]) { this->SetParameterAsVector("BoxMax", value); }
-  double* GetBoxMax() VTK_SIZEHINT(3) { return this->GetParameterAsVector("BoxMax"); }
-  ///@}
+  vtkUltrasoundVectorMacro(BoxMax);
 
   enum Distributions { UNIFORM = 0, LOG_UNIFORM = 1, POWER_LAW = 2 };
 
@@ -91,149 +71,76 @@ public:
    * How radii are distributed: all alike, all factors alike (density 1 / r), or of density r^-Exponent. Used when Method is
    * random. Default log-uniform. There are UNIFORM, LOG_UNIFORM, POWER_LAW.
    */
-  void SetDistribution(int value) { this->SetParameter("Distribution", value); }
-  int GetDistribution() { return static_cast<int>(this->GetParameter("Distribution")); }
+  vtkUltrasoundChoiceMacro(Distribution);
   void SetDistributionToUniform() { this->SetDistribution(UNIFORM); }
   void SetDistributionToLogUniform() { this->SetDistribution(LOG_UNIFORM); }
   void SetDistributionToPowerLaw() { this->SetDistribution(POWER_LAW); }
-  std::string GetDistributionAsString() { return this->GetParameterAsText("Distribution"); }
   ///@}
 
-  ///@{
   /** Exponent of the power law. Used when Distribution is power-law. In [-10, 10]; default 3. */
-  void SetExponent(double value) { this->SetParameter("Exponent", value); }
-  double GetExponent() { return this->GetParameter("Exponent"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Exponent);
 
-  ///@{
   /** The smallest radius. In [1e-06, 1000000] mm; default 1. */
-  void SetRadiusMin(double value) { this->SetParameter("RadiusMin", value); }
-  double GetRadiusMin() { return this->GetParameter("RadiusMin"); }
-  ///@}
+  vtkUltrasoundNumberMacro(RadiusMin);
 
-  ///@{
   /** The largest radius; a sphere of it must fit into the region. In [1e-06, 1000000] mm; default 8. */
-  void SetRadiusMax(double value) { this->SetParameter("RadiusMax", value); }
-  double GetRadiusMax() { return this->GetParameter("RadiusMax"); }
-  ///@}
+  vtkUltrasoundNumberMacro(RadiusMax);
 
-  ///@{
   /** Least way between two surfaces; 0: they may touch. In [0, 1000] mm; default 0. */
-  void SetGapMm(double value) { this->SetParameter("GapMm", value); }
-  double GetGapMm() { return this->GetParameter("GapMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(GapMm);
 
-  ///@{
   /** Wanted share of the region within spheres. Above 0.6 few packings get there, and take seconds. In [0, 1]; default 0.3. */
-  void SetFillFraction(double value) { this->SetParameter("FillFraction", value); }
-  double GetFillFraction() { return this->GetParameter("FillFraction"); }
-  ///@}
+  vtkUltrasoundNumberMacro(FillFraction);
 
-  ///@{
   /** Packing ends at so many spheres, or at the fill fraction, whichever comes first. In [0, 5000000]; default 5000000. */
-  void SetCount(vtkTypeInt64 value) { this->SetParameterAsInteger("Count", value); }
-  vtkTypeInt64 GetCount() { return this->GetParameterAsInteger("Count"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Count);
 
-  ///@{
   /** So many misses in a row mean that there is no more room. In [1, 1000000000]; default 20000. */
-  void SetMisses(int value) { this->SetParameter("Misses", value); }
-  int GetMisses() { return static_cast<int>(this->GetParameter("Misses")); }
-  ///@}
+  vtkUltrasoundIntegerMacro(Misses);
 
-  ///@{
   /** Seed of sizes, places, materials and turns. At least 0; default 1. */
-  void SetSeed(vtkTypeInt64 value) { this->SetParameterAsInteger("Seed", value); }
-  vtkTypeInt64 GetSeed() { return this->GetParameterAsInteger("Seed"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(Seed);
 
-  ///@{
   /**
    * The standard materials of the spheres, separated by commas, each with its share beside the others' (1 when left out). Default
    * lesion-dark 1, liver 1, lesion-bright 1, cyst 0.5.
    */
-  void SetMaterials(const char* value) { this->SetParameterAsText("Materials", value); }
-  std::string GetMaterials() { return this->GetParameterAsText("Materials"); }
-  ///@}
+  vtkUltrasoundTextMacro(Materials);
 
-  ///@{
   /** The standard material between the spheres. Default tissue. */
-  void SetBackground(const char* value) { this->SetParameterAsText("Background", value); }
-  std::string GetBackground() { return this->GetParameterAsText("Background"); }
-  ///@}
+  vtkUltrasoundTextMacro(Background);
 
-  ///@{
   /** Resolution cell of the scan at the probe's face: it decides how fine meshes are. In [0.01, 100] mm; default 1. */
-  void SetCellMm(double value) { this->SetParameter("CellMm", value); }
-  double GetCellMm() { return this->GetParameter("CellMm"); }
-  ///@}
+  vtkUltrasoundNumberMacro(CellMm);
 
-  ///@{
   /** How many mm the cell grows per mm of way from the probe. In [0, 1]; default 0. */
-  void SetCellGrowth(double value) { this->SetParameter("CellGrowth", value); }
-  double GetCellGrowth() { return this->GetParameter("CellGrowth"); }
-  ///@}
+  vtkUltrasoundNumberMacro(CellGrowth);
 
-  ///@{
   /** Where the face of the probe is. It matters when the cell grows. In mm; default (0, 0, 0). */
-  void SetProbePosition(double x, double y, double z)
-  {
-    const double value[3] = {x, y, z};
-    this->SetProbePosition(value);
-  }
-  void SetProbePosition(const double value[3]) { this->SetParameterAsVector("ProbePosition", value); }
-  double* GetProbePosition() VTK_SIZEHINT(3) { return this->GetParameterAsVector("ProbePosition"); }
-  ///@}
+  vtkUltrasoundVectorMacro(ProbePosition);
 
-  ///@{
   /** How far triangles may leave their sphere, as a part of the cell there. In [0.001, 10]; default 0.25. */
-  void SetDeviation(double value) { this->SetParameter("Deviation", value); }
-  double GetDeviation() { return this->GetParameter("Deviation"); }
-  ///@}
+  vtkUltrasoundNumberMacro(Deviation);
 
-  ///@{
   /**
    * Whether meshes have the volume of their spheres; corners then lie a bit outside, and spheres that touch overlap. Else corners
    * lie on the spheres. Default off.
    */
-  void SetTrueVolume(bool value) { this->SetParameter("TrueVolume", value); }
-  bool GetTrueVolume() { return this->GetParameter("TrueVolume") != 0.0; }
-  void TrueVolumeOn() { this->SetTrueVolume(true); }
-  void TrueVolumeOff() { this->SetTrueVolume(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(TrueVolume);
 
-  ///@{
   /** Whether each mesh is turned at random, so that not all have a triangle that faces the probe. Default on. */
-  void SetTurned(bool value) { this->SetParameter("Turned", value); }
-  bool GetTurned() { return this->GetParameter("Turned") != 0.0; }
-  void TurnedOn() { this->SetTurned(true); }
-  void TurnedOff() { this->SetTurned(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(Turned);
 
-  ///@{
   /** More triangles are refused, with the count that it would take. In [20, 100000000]; default 10000000. */
-  void SetMaxTriangles(vtkTypeInt64 value) { this->SetParameterAsInteger("MaxTriangles", value); }
-  vtkTypeInt64 GetMaxTriangles() { return this->GetParameterAsInteger("MaxTriangles"); }
-  ///@}
+  vtkUltrasoundInteger64Macro(MaxTriangles);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
