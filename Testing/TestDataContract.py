@@ -261,6 +261,21 @@ class Feather(Feed):
             filter.AddInputDataObject(1, copy_of(image))
 
 
+class DeformGeometry(ToOtherGrid):
+    """A volume in a lattice that does not move. It stays where it is, but what is not real comes out empty."""
+
+    accepts = ("intensit",) # any image can be deformed
+
+    def connect(self, filter, images):
+        super().connect(filter, images)
+        lattice = vtkImageData()
+        lattice.SetDimensions(6, 6, 6)
+        lattice.SetOrigin(-300.0, -300.0, -300.0)
+        lattice.SetSpacing(120.0, 120.0, 120.0)
+        add_array(lattice, "Displacement", np.zeros((216, 3)))
+        filter.SetDisplacementData(lattice)
+
+
 class ScanConverter(ToOtherGrid):
     works_on_blocks = False # where the output lies is in the field data, which VTK's pipeline gives to no block beforehand
     accepts = ("direction", "spacing") # the place of a beam volume says nothing
@@ -529,6 +544,7 @@ Special = {
     "vtkUltrasoundAligner": Aligner,
     "vtkUltrasoundAlignmentScore": Score,
     "vtkUltrasoundDeformableAligner": DeformableAligner,
+    "vtkUltrasoundDeformGeometry": DeformGeometry,
     "vtkUltrasoundLandmarkError": LandmarkError,
     "vtkUltrasoundPoseEditor": PoseEditor,
     "vtkUltrasoundStitcher": Stitcher,
