@@ -10,8 +10,9 @@ namespace echorama {
 
 /// A smooth displacement u of the world: a cubic B-spline over a coarse lattice of control points.
 ///
-/// It pulls back: what belongs at the point x is read at x + u(x), in the volume where its geometry (its pose) places it.
-/// So resampling needs no inverse; where a point of the volume belongs is told by Inverse().
+/// As all displacements here it leads from rest to now: what lies, or belongs, at x is at x + u(x) now, which is where a volume of it,
+/// placed by its geometry (its pose), shows it. So a volume is resampled to rest without an inverse, by reading it at x + u(x);
+/// where something that is seen belongs is told by Inverse().
 ///
 /// u is the sum over control points of coefficient * B(x - control point), B being the product of a cubic B-spline per axis
 /// of the lattice, one spacing a unit. Beyond the lattice all coefficients are zero: u is twice continuously differentiable
@@ -52,7 +53,7 @@ public:
   /// The derivative of x + u(x): row by component, column by axis of the world.
   Eigen::Matrix3d Jacobian(const Eigen::Vector3d& world) const;
 
-  /// Where what is read at \a read belongs: the x with x + u(x) = read, by iterating x = read - u(x).
+  /// Where what is at \a read now belongs: the x with x + u(x) = read, by iterating x = read - u(x).
   ///
   /// Each step shrinks the error by the norm of the derivative of u at worst, so it converges to the only answer where that
   /// norm stays below one; a field that folds has no such answer.

@@ -47,8 +47,7 @@ struct SynthesisParameters : EchoModel {
   std::uint64_t seed = 1;
   double scatterersPerMm3 = 0.0, invisibleDb = 12.0;
   static constexpr double scatterersPerCell = 10.0; ///< enough for speckle that is all but fully developed
-  /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. (So a simulator of tissue says
-  /// it; the fields of an aligner point the other way.) The surfaces of the scene are those that the tissue has now. The default
+  /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. The surfaces of the scene are those that the tissue has now. The default
   /// has not moved.
   DisplacementField displacement;
 

@@ -26,7 +26,7 @@ struct DeformableAlignParameters {
 ParameterList Describe(DeformableAlignParameters& p);
 
 struct DeformableAlignResult {
-  DisplacementField field;          ///< pull-back of the moving volume in the world; zero when it is not applied
+  DisplacementField field;          ///< where the moving volume shows what belongs at x: at x + u(x); zero when it is not applied
   bool isApplied = false;           ///< false: the rigid result stands
   std::string reason;               ///< why not; empty when applied
   double similarityBefore = 0.0;    ///< local correlation of what is seen, by weight, on the last level: 1 identical, 0 chance
