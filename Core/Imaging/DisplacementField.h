@@ -10,9 +10,9 @@ namespace echorama {
 
 /// A smooth displacement u of the world: a cubic B-spline over a coarse lattice of control points.
 ///
-/// As all displacements here it leads from rest to now: what lies, or belongs, at x is at x + u(x) now, which is where a volume of it,
-/// placed by its geometry (its pose), shows it. So a volume is resampled to rest without an inverse, by reading it at x + u(x);
-/// where something that is seen belongs is told by Inverse().
+/// As all displacements here it leads from rest to now: what lies, or belongs, at x is at x + u(x) now, which is where a volume
+/// of it, placed by its geometry (its pose), shows it. So a volume is resampled to rest without an inverse, by reading it at x +
+/// u(x); where something that is seen belongs is told by Inverse().
 ///
 /// u is the sum over control points of coefficient * B(x - control point), B being the product of a cubic B-spline per axis
 /// of the lattice, one spacing a unit. Beyond the lattice all coefficients are zero: u is twice continuously differentiable

@@ -6,8 +6,9 @@
  * A displacement image is a vtkImageData with the point array `Displacement`: three doubles or floats per point, mm, along the
  * axes of the world. It leads from rest to now, whoever made it: what lies, or belongs, at x is at x + u(x) now, and a volume,
  * placed by its geometry, shows it there. So the result of a simulation moves tissue, and the same image lets a stitcher read the
- * scan of that tissue where it was at rest. Between the points u is the cubic spline through them (echorama::DisplacementField), twice continuously differentiable; beyond
- * the image it fades to zero within two spacings. So a lattice of 30 mm, as vtkUltrasoundDeformableAligner makes it, says all.
+ * scan of that tissue where it was at rest. Between the points u is the cubic spline through them (echorama::DisplacementField),
+ * twice continuously differentiable; beyond the image it fades to zero within two spacings. So a lattice of 30 mm, as
+ * vtkUltrasoundDeformableAligner makes it, says all.
  *
  * (vtkUltrasoundDeformGeometry reads the same image as a map that is linear between the points.)
  *
@@ -36,8 +37,8 @@ public:
 
   ///@{
   /**
-   * The displacement of what lies at a point at rest, and where what is at a point now belongs (the inverse), mm. Return false, with
-   * an error message, for an image that is no displacement, or where the inverse does not exist.
+   * The displacement of what lies at a point at rest, and where what is at a point now belongs (the inverse), mm. Return false,
+   * with an error message, for an image that is no displacement, or where the inverse does not exist.
    */
   static bool Evaluate(vtkImageData* displacement, const double point[3], double result[3]);
   static bool Invert(vtkImageData* displacement, const double read[3], double belongs[3]);

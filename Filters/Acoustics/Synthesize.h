@@ -47,8 +47,8 @@ struct SynthesisParameters : EchoModel {
   std::uint64_t seed = 1;
   double scatterersPerMm3 = 0.0, invisibleDb = 12.0;
   static constexpr double scatterersPerCell = 10.0; ///< enough for speckle that is all but fully developed
-  /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. The surfaces of the scene are those that the tissue has now. The default
-  /// has not moved.
+  /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. The surfaces of the scene are
+  /// those that the tissue has now. The default has not moved.
   DisplacementField displacement;
 
   /// A gain that makes up for 0.5 dB/cm/MHz at 3.5 MHz, there and back, and noise of electronics 65 dB below the reference

@@ -6,8 +6,9 @@
  * Input 0: tissue (vtkPolyData, see vtkUltrasoundTissue), from a source or from anything that deforms or adds to it. Input 1,
  * optional: a probe (data with the field data `ProbeGeometry` and `ProbeToWorld`, as vtkUltrasoundProbeSource puts it out);
  * without it the geometry and pose of this filter's own properties are used. Input 2, optional: a displacement image
- * (vtkUltrasoundDisplacement) that says where the tissue has gone: a scatterer at m in the material is now at m + u(m). An aligner
- * that compares the volume with one of tissue at rest finds the same displacement. The surfaces of input 0 are those that the tissue has now.
+ * (vtkUltrasoundDisplacement) that says where the tissue has gone: a scatterer at m in the material is now at m + u(m). An
+ * aligner that compares the volume with one of tissue at rest finds the same displacement. The surfaces of input 0 are those that
+ * the tissue has now.
  *
  * Output 0: the scan-converted volume, a vtkImageData with `Intensity` (unsigned char, log-compressed B-mode), `ValidRegion` (1
  * inside the fan) and the field data `ProbeGeometry`, `ProbeToWorld`, `Seed` and `Scene` (all parameters as JSON). Its geometry

@@ -38,10 +38,10 @@
 
 #include "EchoramaFiltersPhysicsModule.h"
 #include "vtkDataSetAlgorithm.h"
+#include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
 #include "Filters/Physics/DeformGeometry.h"
-#include "vtkUltrasoundParameters.h"
 #endif
 
 class vtkImageData;
@@ -69,11 +69,9 @@ public:
    * Forward: what lies at x at rest goes to x + u(x), to where it is now. Backward: what is at x + u(x) now goes back to x.
    * Default forward. There are FORWARD, BACKWARD.
    */
-  void SetDirection(int value) { this->SetParameter("Direction", value); }
-  int GetDirection() { return static_cast<int>(this->GetParameter("Direction")); }
+  vtkUltrasoundChoiceMacro(Direction);
   void SetDirectionToForward() { this->SetDirection(FORWARD); }
   void SetDirectionToBackward() { this->SetDirection(BACKWARD); }
-  std::string GetDirectionAsString() { return this->GetParameterAsText("Direction"); }
   ///@}
 
   enum Outsides { REFUSE = 0, MASK = 1, KEEP = 2, NEAREST = 3 };
@@ -83,33 +81,21 @@ public:
    * What lies outside of the lattice is refused with a message, is marked as not real, stays where it is, or moves as the nearest
    * point of the lattice does. Default refuse. There are REFUSE, MASK, KEEP, NEAREST.
    */
-  void SetOutside(int value) { this->SetParameter("Outside", value); }
-  int GetOutside() { return static_cast<int>(this->GetParameter("Outside")); }
+  vtkUltrasoundChoiceMacro(Outside);
   void SetOutsideToRefuse() { this->SetOutside(REFUSE); }
   void SetOutsideToMask() { this->SetOutside(MASK); }
   void SetOutsideToKeep() { this->SetOutside(KEEP); }
   void SetOutsideToNearest() { this->SetOutside(NEAREST); }
-  std::string GetOutsideAsString() { return this->GetParameterAsText("Outside"); }
   ///@}
 
-  ///@{
   /**
    * A displacement that turns tetrahedra inside out, or brings several places to one, is refused with a message. When on, what
    * lies there is marked as not real instead. Default off.
    */
-  void SetMaskFolds(bool value) { this->SetParameter("MaskFolds", value); }
-  bool GetMaskFolds() { return this->GetParameter("MaskFolds") != 0.0; }
-  void MaskFoldsOn() { this->SetMaskFolds(true); }
-  void MaskFoldsOff() { this->SetMaskFolds(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(MaskFolds);
 
-  ///@{
   /** Images are read linearly between their voxels. When on, at the nearest voxel, as labels always are. Default off. */
-  void SetNearestVoxel(bool value) { this->SetParameter("NearestVoxel", value); }
-  bool GetNearestVoxel() { return this->GetParameter("NearestVoxel") != 0.0; }
-  void NearestVoxelOn() { this->SetNearestVoxel(true); }
-  void NearestVoxelOff() { this->SetNearestVoxel(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(NearestVoxel);
 
   enum Results { DEFORMED = 0, DISPLACEMENT = 1 };
 
@@ -119,39 +105,21 @@ public:
    * where each voxel is read, less where it is. Forward that is the inverse displacement, backward the displacement itself.
    * Default deformed. There are DEFORMED, DISPLACEMENT.
    */
-  void SetResult(int value) { this->SetParameter("Result", value); }
-  int GetResult() { return static_cast<int>(this->GetParameter("Result")); }
+  vtkUltrasoundChoiceMacro(Result);
   void SetResultToDeformed() { this->SetResult(DEFORMED); }
   void SetResultToDisplacement() { this->SetResult(DISPLACEMENT); }
-  std::string GetResultAsString() { return this->GetParameterAsText("Result"); }
   ///@}
 
-  ///@{
   /** Whether the active vectors of points turn and stretch with what they lie in. Default off. */
-  void SetMoveVectors(bool value) { this->SetParameter("MoveVectors", value); }
-  bool GetMoveVectors() { return this->GetParameter("MoveVectors") != 0.0; }
-  void MoveVectorsOn() { this->SetMoveVectors(true); }
-  void MoveVectorsOff() { this->SetMoveVectors(false); }
-  ///@}
+  vtkUltrasoundSwitchMacro(MoveVectors);
 
-  ///@{
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
-   * parameter or value.
+   * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
+   * value, unit, low, high, choices, help ...
    */
-  bool SetParameter(const char* name, double value);
-  bool SetParameterAsText(const char* name, const char* value);
-  bool SetParameterAsInteger(const char* name, vtkTypeInt64 value);
-  bool SetParameterAsVector(const char* name, const double value[3]);
-  double GetParameter(const char* name);
-  std::string GetParameterAsText(const char* name);
-  vtkTypeInt64 GetParameterAsInteger(const char* name);
-  double* GetParameterAsVector(const char* name) VTK_SIZEHINT(3);
-  ///@}
-
-  /** What parameters there are, as JSON: an array of objects with name, type, value, unit, low, high, choices, help ... */
-  std::string GetParameterDescriptions();
+  vtkUltrasoundAnyParameterMacro();
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object

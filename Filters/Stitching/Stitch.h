@@ -53,7 +53,8 @@ struct StitchInput {
   AnyPosedVolume volume;
   std::string name;                         ///< for messages
   VolumeView<const float> reliability = {}; ///< how far each voxel can be trusted, in [0, 1] (ReliabilityMap); empty: all alike
-  /// What belongs at x is now, in the volume as it lies, at x + u(x), and is read there; none: the volume lies as its geometry says. It must outlive the stitching.
+  /// What belongs at x is now, in the volume as it lies, at x + u(x), and is read there; none: the volume lies as its geometry
+  /// says. It must outlive the stitching.
   const DisplacementField* displacement = nullptr;
 };
 
