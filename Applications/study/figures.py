@@ -214,7 +214,8 @@ def plot_bodies(path, rows):
                 axis.plot([place + shift] * len(errors), errors, "o", color=colour, markersize=3, alpha=0.7)
             axis.plot(range(len(overlaps)), [np.median(errors) if errors else np.nan for errors in groups], "-", color=colour, label=method)
             axis.set_yscale("log")
-            axis.set_ylabel(f"beyond the rigid floor, mm (start {size[0]}°, {size[1]} mm)")
+            axis.set_ylabel("beyond the rigid floor, mm")
+            axis.set_title(f"start {size[0]}°, {size[1]} mm", fontsize=10)
         seconds = [[row["cpu_seconds"] for row in rows if row["method"] == method and row["overlap"] == overlap] for overlap in overlaps]
         axes[0, -1].plot(range(len(overlaps)), [np.median(one) if one else np.nan for one in seconds], "o-", color=colour)
     axes[0, -1].set_ylabel("CPU seconds, median")
