@@ -645,6 +645,30 @@ TEST(DeformGeometry, TypesAndLabels)
   EXPECT_EQ(bytesOut[4], 20);
 }
 
+TEST(DeformGeometry, ImagesReachHalfAVoxelBeyondTheirCentres)
+{
+  ImageGeometry lattice; // a single cell
+  lattice.dimensions = {2, 2, 2};
+  lattice.spacing = {20, 20, 20};
+  lattice.origin = {-10, -10, -10};
+  ImageGeometry geometry;
+  geometry.dimensions = {5, 3, 3};
+  const TestImage image = ImageOf(geometry, [](const Vector3d& x) { return 10.0 + x[0]; });
+  const auto row = [&](double shift) {
+    const LatticeMap map(lattice, std::vector<Vector3d>(8, Vector3d(shift, 0.0, 0.0)));
+    const Out out = Deformed(With(Forward), map, image, geometry);
+    return std::vector<double>(out.values.begin(), out.values.begin() + 5);
+  };
+  const auto near = [](const std::vector<double>& a, const std::vector<double>& b) {
+    for (std::size_t i = 0; i < 5; ++i)
+      EXPECT_NEAR(a[i], b[i], 1e-12);
+  };
+  near(row(0.25), {10, 10.75, 11.75, 12.75, 13.75});
+  near(row(0.75), {0, 10.25, 11.25, 12.25, 13.25});
+  near(row(-0.25), {10.25, 11.25, 12.25, 13.25, 14});
+  near(row(-0.75), {10.75, 11.75, 12.75, 13.75, 0});
+}
+
 TEST(DeformGeometry, ThreadsDoNotMatter)
 {
   const ImageGeometry lattice = Oblique({12, 13, 9}, {2.5, 2.0, 3.0});
@@ -677,10 +701,15 @@ TEST(DeformGeometry, RefusesWhatIsNoDisplacement)
     ExpectThrow([&] { LatticeMap(lattice, spoilt); }, Error::Kind::BadInput, {"lattice point (4, 3, 2)", "not finite"});
   }
   ExpectThrow([&] { LatticeMap(lattice, std::vector<Vector3d>(5)); }, Error::Kind::BadInput, {"210 points", "5 vectors"});
-  ImageGeometry flat = lattice;
-  flat.dimensions[2] = 1;
-  ExpectThrow([&] { LatticeMap(flat, Sampled(flat, Bump{flat.Centre()})); }, Error::Kind::BadInput,
-              {"single point along axis 2"});
+  u[(2 * 7 + 6) * 6 + 5][0] = std::numeric_limits<double>::quiet_NaN();
+  ExpectThrow([&] { LatticeMap(lattice, u); }, Error::Kind::BadInput, {"lattice point (5, 6, 2)"});
+  u[(2 * 7 + 6) * 6 + 5][0] = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    ImageGeometry flat = lattice;
+    flat.dimensions[axis] = 1;
+    ExpectThrow([&] { LatticeMap(flat, Sampled(flat, Bump{flat.Centre()})); }, Error::Kind::BadInput,
+                {"single point along axis " + std::to_string(axis)});
+  }
   const LatticeMap map(lattice, u);
   std::vector<Vector3d> points = PointsIn(lattice, 4);
   points[2][0] = std::numeric_limits<double>::quiet_NaN();
