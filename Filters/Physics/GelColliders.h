@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/Parameters.h"
+#include "Core/Geometry/ImageGeometry.h"
+#include "Core/Geometry/ProbeGeometry.h"
+#include <memory>
+#include <vector>
+
+namespace echorama {
+
+/// A solid as its signed distance, in mm and in its own frame: negative inside.
+class GelShape {
+public:
+  virtual ~GelShape() = default;
+  /// \a when: 0 at the begin of a motion, 1 at its end, for shapes that deform.
+  virtual double Distance(const Eigen::Vector3d& point, double when) const = 0;
+  /// Unit vector that points out of the solid.
+  virtual Eigen::Vector3d Normal(const Eigen::Vector3d& point, double when) const;
+  /// How fast Distance changes at a point during a motion, mm: the value at its end less that at its begin.
+  virtual double Change(const Eigen::Vector3d& /*point*/) const { return 0.0; }
+};
+
+/// What lies below z = 0.
+class GelPlane : public GelShape {
+public:
+  double Distance(const Eigen::Vector3d& point, double when) const override;
+  Eigen::Vector3d Normal(const Eigen::Vector3d& point, double when) const override;
+};
+
+/// The head of a probe, in the probe's frame: its curved face (ProbeGeometry) and what lies behind it.
+/// Distances are exact over the face, and near the edges of a bent one too short by what it bends.
+class GelProbe : public GelShape {
+public:
+  /// \a marginMm: how far the housing reaches beyond the outermost beams, \a lengthMm: how far back.
+  /// \throws Error(InvalidParameter)
+  explicit GelProbe(const ProbeGeometry& geometry, double marginMm = 2.0, double lengthMm = 40.0);
+  double Distance(const Eigen::Vector3d& point, double when) const override;
+
+private:
+  ProbeGeometry geometry_;
+  double marginMm_, lengthMm_;
+};
+
+/// Anything sampled on a grid, for instance the skin: distances are interpolated linearly, and beyond the grid
+/// those of its border hold.
+class GelDistanceGrid : public GelShape {
+public:
+  /// A solid at rest. \throws Error(BadInput) when sizes differ or a distance is not finite
+  GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> distances);
+  /// One that deforms during a motion.
+  GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> atBegin, std::vector<float> atEnd);
+  double Distance(const Eigen::Vector3d& point, double when) const override;
+  double Change(const Eigen::Vector3d& point) const override;
+
+private:
+  double Interpolate(const std::vector<float>& values, const Eigen::Vector3d& point) const;
+  ImageGeometry geometry_;
+  Eigen::Affine3d toIndex_;
+  std::vector<float> begin_, end_;
+};
+
+/// What happens where gel touches a solid.
+struct GelContact {
+  bool stick = true;     ///< gel keeps to the solid, as it does to skin and to a probe
+  double friction = 0.0; ///< Coulomb's coefficient of gel that slides; it may also leave the solid
+};
+ParameterList Describe(GelContact& p);
+
+/// A solid that moves while gel advances. Its motion is even from \a begin to \a end.
+struct GelCollider {
+  std::shared_ptr<const GelShape> shape;
+  GelContact contact;
+  Pose begin = Pose::Identity(), end = Pose::Identity(); ///< shape to world
+};
+
+/// Colliders as they are during one step.
+class GelColliders {
+public:
+  /// \throws Error(InvalidParameter) that names the collider
+  GelColliders(const std::vector<GelCollider>& colliders, double seconds);
+
+  /// The step from \a from to \a to, in parts of the motion.
+  void SetStep(double from, double to);
+  std::size_t Size() const { return colliders_.size(); }
+  /// Whether collider \a n has anything within \a radius of \a centre.
+  bool Reaches(std::size_t n, const Eigen::Vector3d& centre, double radius) const;
+  /// What collider \a n makes of the velocity of gel at \a point. \returns whether the point lies in the solid.
+  bool Collide(std::size_t n, const Eigen::Vector3d& point, Eigen::Vector3d& velocity) const;
+
+private:
+  std::vector<GelCollider> colliders_;
+  double seconds_, when_ = 0.0;
+  std::vector<Pose> toShape_; ///< at the step's begin
+  std::vector<Pose> motion_;  ///< of the world with the solid, in the step
+  double step_ = 0.0;
+};
+
+} // namespace echorama

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Both transfers go over the 27 nodes of one particle after the other, in vectors of four doubles: the components of a node. That
+// needs no conflict to be resolved, where several particles at a time would. Doubles cost what floats would, and keep
+// momentum to rounding. Strains are advanced for eight particles at a time.
+//
+// A particle hands a node at the offset d the momentum w (m v + A d) with A = m C - dt V (4 / h^2) stress: along a row of nodes
+// one addition per node.
+#include "GelTransfer.h"
+#include "Core/Base/Multiversion.h"
+#include <algorithm>
+
+namespace echorama {
+namespace {
+
+using GelQuad = double __attribute__((vector_size(32)));
+
+// The lowest node of a particle, its weights along one axis, and the distance to that node.
+struct GelSpline {
+  int lowest;
+  double weight[3];
+  double toLowest; // mm
+};
+
+[[gnu::always_inline]] inline void FindGelSpline(double position, double origin, double cell, double perCell, GelSpline& spline)
+{
+  const double at = (position - origin) * perCell;
+  int lowest = static_cast<int>(at - 0.5);
+  lowest = lowest < 0 ? 0 : lowest > 3 ? 3 : lowest; // rounding at a block's border
+  const double f = at - lowest;
+  spline.lowest = lowest;
+  spline.weight[0] = 0.5 * (1.5 - f) * (1.5 - f);
+  spline.weight[2] = 0.5 * (f - 0.5) * (f - 0.5);
+  spline.weight[1] = 1.0 - spline.weight[0] - spline.weight[2];
+  spline.toLowest = -f * cell;
+}
+
+ECHORAMA_HOT void ScatterGelParticles(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles,
+                                      const std::int32_t* order, int count, GelNode* tile)
+{
+  const double cell = frame.cellMm, perCell = 1.0 / cell;
+  for (int n = 0; n < count; ++n) {
+    const GelParticle& p = particles[order[n]];
+    GelSpline x, y, z;
+    FindGelSpline(p.position[0], frame.origin[0], cell, perCell, x);
+    FindGelSpline(p.position[1], frame.origin[1], cell, perCell, y);
+    FindGelSpline(p.position[2], frame.origin[2], cell, perCell, z);
+
+    const double mass = law.density * p.volume;
+    const double* b = p.strain.b;
+    const double pull = -frame.seconds * p.volume * 4.0 * perCell * perCell, shear = pull * law.shear;
+    const double mean = (b[0] + b[1] + b[2]) * (1.0 / 3.0);
+    const double pressure = pull * 0.5 * law.bulk * (p.strain.J * p.strain.J - 1.0);
+    const double xx = shear * (b[0] - mean) + pressure, yy = shear * (b[1] - mean) + pressure, zz = shear * (b[2] - mean) + pressure;
+    const double xy = shear * b[3], xz = shear * b[4], yz = shear * b[5];
+    const double* C = p.gradient;
+    const GelQuad alongX = {mass * C[0] + xx, mass * C[3] + xy, mass * C[6] + xz, 0.0};
+    const GelQuad alongY = {mass * C[1] + xy, mass * C[4] + yy, mass * C[7] + yz, 0.0};
+    const GelQuad alongZ = {mass * C[2] + xz, mass * C[5] + yz, mass * C[8] + zz, 0.0};
+    const GelQuad own = {mass * p.velocity[0], mass * p.velocity[1], mass * p.velocity[2], mass};
+    const GelQuad stepX = alongX * cell, stepY = alongY * cell, stepZ = alongZ * cell;
+    GelQuad slice = own + alongX * x.toLowest + alongY * y.toLowest + alongZ * z.toLowest;
+    GelNode* corner = tile + (z.lowest * GelGrid::TileSize + y.lowest) * GelGrid::TileSize + x.lowest;
+    for (int k = 0; k < 3; ++k) {
+      GelQuad row = slice;
+      for (int j = 0; j < 3; ++j) {
+        GelQuad* nodes = reinterpret_cast<GelQuad*>(corner + (k * GelGrid::TileSize + j) * GelGrid::TileSize);
+        const double weight = z.weight[k] * y.weight[j];
+        GelQuad value = row;
+        nodes[0] += value * (weight * x.weight[0]);
+        value += stepX;
+        nodes[1] += value * (weight * x.weight[1]);
+        value += stepX;
+        nodes[2] += value * (weight * x.weight[2]);
+        row += stepY;
+      }
+      slice += stepZ;
+    }
+  }
+}
+
+// Velocity and gradient of up to GelLanes particles.
+ECHORAMA_HOT void GatherGelParticles(const GelTransferFrame& frame, GelParticle* particles, const std::int32_t* order, int count,
+                                     const GelNode* tile, GelStrainLanes& lanes)
+{
+  const double cell = frame.cellMm, perCell = 1.0 / cell, spread = 4.0 * perCell * perCell;
+  for (int n = 0; n < count; ++n) {
+    GelParticle& p = particles[order[n]];
+    GelSpline x, y, z;
+    FindGelSpline(p.position[0], frame.origin[0], cell, perCell, x);
+    FindGelSpline(p.position[1], frame.origin[1], cell, perCell, y);
+    FindGelSpline(p.position[2], frame.origin[2], cell, perCell, z);
+    const double x0 = x.weight[0], x1 = x.weight[1], x2 = x.weight[2];
+    const double m0 = x0 * x.toLowest, m1 = x1 * (x.toLowest + cell), m2 = x2 * (x.toLowest + 2.0 * cell);
+    GelQuad velocity = {}, alongX = {}, alongY = {}, alongZ = {};
+    const GelNode* corner = tile + (z.lowest * GelGrid::TileSize + y.lowest) * GelGrid::TileSize + x.lowest;
+    for (int k = 0; k < 3; ++k) {
+      GelQuad slice = {}, sliceX = {}, sliceY = {};
+      for (int j = 0; j < 3; ++j) {
+        const GelQuad* nodes = reinterpret_cast<const GelQuad*>(corner + (k * GelGrid::TileSize + j) * GelGrid::TileSize);
+        const GelQuad a = nodes[0], b = nodes[1], c = nodes[2];
+        const GelQuad row = (a * x0 + b * x1 + c * x2) * y.weight[j];
+        slice += row;
+        sliceX += (a * m0 + b * m1 + c * m2) * y.weight[j];
+        sliceY += row * (y.toLowest + j * cell);
+      }
+      velocity += slice * z.weight[k];
+      alongX += sliceX * z.weight[k];
+      alongY += sliceY * z.weight[k];
+      alongZ += slice * (z.weight[k] * (z.toLowest + k * cell));
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      p.velocity[axis] = velocity[axis];
+      p.position[axis] += frame.seconds * velocity[axis];
+      lanes.C[3 * axis][n] = p.gradient[3 * axis] = spread * alongX[axis];
+      lanes.C[3 * axis + 1][n] = p.gradient[3 * axis + 1] = spread * alongY[axis];
+      lanes.C[3 * axis + 2][n] = p.gradient[3 * axis + 2] = spread * alongZ[axis];
+    }
+    for (int c = 0; c < 6; ++c)
+      lanes.b[c][n] = p.strain.b[c];
+    lanes.J[n] = p.strain.J;
+  }
+}
+
+} // namespace
+
+void ScatterGel(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles, const std::int32_t* order, int count,
+                GelNode* tile)
+{
+  std::fill(tile, tile + GelGrid::TileNodes, GelNode{});
+  ScatterGelParticles(law, frame, particles, order, count, tile);
+}
+
+int GatherGel(const GelLaw& law, const GelTransferFrame& frame, GelParticle* particles, const std::int32_t* order, int count,
+              const GelNode* tile)
+{
+  int torn = 0;
+  GelStrainLanes lanes{};
+  for (int begin = 0; begin < count; begin += GelLanes) {
+    const int some = std::min(GelLanes, count - begin);
+    for (int l = some; l < GelLanes; ++l) { // at rest
+      for (auto& component : lanes.C)
+        component[l] = 0.0;
+      for (int c = 0; c < 6; ++c)
+        lanes.b[c][l] = c < 3 ? 1.0 : 0.0;
+      lanes.J[l] = 1.0;
+    }
+    GatherGelParticles(frame, particles, order + begin, some, tile, lanes);
+    torn += AdvanceGelStrain(law, frame.seconds, some, lanes);
+    for (int l = 0; l < some; ++l) {
+      GelStrain& strain = particles[order[begin + l]].strain;
+      for (int c = 0; c < 6; ++c)
+        strain.b[c] = lanes.b[c][l];
+      strain.J = lanes.J[l];
+    }
+  }
+  return torn;
+}
+
+} // namespace echorama
