@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Solids act on the nodes of the grid that lie inside them: there gel has the velocity that contact leaves it. A node further from
-// a solid than its distance says is never asked, block by block, since no distance falls faster than one moves.
+// Solids act on the nodes of the grid that lie inside them: there gel has the velocity that contact leaves it. A node further
+// from a solid than its distance says is never asked, block by block, since no distance falls faster than one moves.
 #include "GelColliders.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
@@ -41,8 +41,8 @@ GelProbe::GelProbe(const ProbeGeometry& geometry, double marginMm, double length
 
 double GelProbe::Distance(const Eigen::Vector3d& point, double) const
 {
-  // How far beyond the face, and beyond its edge along fan and sweep. Behind the centre of a bend, and further back than the housing,
-  // the head is straight.
+  // How far beyond the face, and beyond its edge along fan and sweep. Behind the centre of a bend, and further back than the
+  // housing, the head is straight.
   const auto beyond = [this](const ProbeArc& arc, double across, double outward, double offset, double& depth) {
     const ProbeArc::Place place = arc.PlaceOf(across, outward);
     depth = place.depth;
@@ -50,8 +50,7 @@ double GelProbe::Distance(const Eigen::Vector3d& point, double) const
     const double straight = std::max(across - edge, other - across);
     if (depth < 0.0)
       return straight - marginMm_;
-    const double along = (std::abs(place.along - offset) - 0.5) * arc.Span(depth);
-    return std::max(along, straight) - marginMm_;
+    return (std::abs(place.along - offset) - 0.5) * arc.Span(depth) - marginMm_;
   };
   double inSweep = 0.0, depth = 0.0;
   const double overSweep = beyond(geometry_.Sweep(), point.y(), point.z(), 0.0, inSweep);
@@ -72,8 +71,8 @@ GelDistanceGrid::GelDistanceGrid(const ImageGeometry& geometry, std::vector<floa
   geometry_.Check("the grid of distances");
   toIndex_ = geometry_.WorldToIndex();
   if (begin_.size() != geometry_.VoxelCount() || (!end_.empty() && end_.size() != begin_.size()))
-    throw Error(Error::Kind::BadInput, "the grid of distances has " + std::to_string(geometry_.VoxelCount()) +
-                                           " points, but " + std::to_string(begin_.size()) + " distances");
+    throw Error(Error::Kind::BadInput, "the grid of distances has " + std::to_string(geometry_.VoxelCount()) + " points, but " +
+                                           std::to_string(begin_.size()) + " distances");
   for (const std::vector<float>* values : {&begin_, &end_})
     if (!std::all_of(values->begin(), values->end(), [](float value) { return std::isfinite(value); }))
       throw Error(Error::Kind::BadInput, "the grid of distances: a distance is not finite");
@@ -134,9 +133,7 @@ GelColliders::GelColliders(const std::vector<GelCollider>& colliders, double sec
 {
   for (std::size_t n = 0; n < colliders_.size(); ++n) {
     const std::string name = "collider " + std::to_string(n + 1);
-    const auto fail = [&name](const std::string& reason) {
-      throw Error(Error::Kind::InvalidParameter, name + ": " + reason);
-    };
+    const auto fail = [&name](const std::string& reason) { throw Error(Error::Kind::InvalidParameter, name + ": " + reason); };
     if (!colliders_[n].shape)
       fail("it has no shape");
     CheckRanges(colliders_[n].contact, name);
@@ -161,6 +158,13 @@ void GelColliders::SetStep(double from, double to)
 bool GelColliders::Reaches(std::size_t n, const Eigen::Vector3d& centre, double radius) const
 {
   return colliders_[n].shape->Distance(toShape_[n] * centre, when_) <= radius;
+}
+
+Eigen::Vector3d GelColliders::ToSurface(std::size_t n, const Eigen::Vector3d& point) const
+{
+  const GelShape& shape = *colliders_[n].shape;
+  const Eigen::Vector3d inShape = toShape_[n] * point;
+  return toShape_[n].linear().transpose() * (-shape.Distance(inShape, when_) * shape.Normal(inShape, when_));
 }
 
 bool GelColliders::Collide(std::size_t n, const Eigen::Vector3d& point, Eigen::Vector3d& velocity) const

@@ -86,6 +86,9 @@ public:
   bool Reaches(std::size_t n, const Eigen::Vector3d& centre, double radius) const;
   /// What collider \a n makes of the velocity of gel at \a point. \returns whether the point lies in the solid.
   bool Collide(std::size_t n, const Eigen::Vector3d& point, Eigen::Vector3d& velocity) const;
+  bool Sticks(std::size_t n) const { return colliders_[n].contact.stick; }
+  /// From a point in the solid the way to its surface, mm.
+  Eigen::Vector3d ToSurface(std::size_t n, const Eigen::Vector3d& point) const;
 
 private:
   std::vector<GelCollider> colliders_;

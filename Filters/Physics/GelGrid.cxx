@@ -33,8 +33,9 @@ void GelDomain::Check() const
     blocks *= std::ceil(cells[axis] / static_cast<double>(GelGrid::BlockSize));
   }
   if (blocks > mostGelBlocks)
-    throw Error(Error::Kind::TooLarge, "the domain of the gel has " + NumberText(blocks) +
-                                           " blocks of 4 x 4 x 4 cells; it may have 16777216. Make it smaller, or its cells larger");
+    throw Error(Error::Kind::TooLarge,
+                "the domain of the gel has " + NumberText(blocks) +
+                    " blocks of 4 x 4 x 4 cells; it may have 16777216. Make it smaller, or its cells larger");
 }
 
 GelGrid::GelGrid(const GelDomain& domain) : domain_(domain)
@@ -144,6 +145,21 @@ void GelGrid::Sort(const std::vector<GelParticle>& particles)
     }
   tiles_.resize(homes_.size() * TileNodes);
   nodes_.resize(blocks_.size() * BlockNodes);
+}
+
+GelNode* GelGrid::NodeAt(const std::array<int, 3>& place)
+{
+  std::size_t block = 0, node = 0;
+  for (std::size_t axis = 3; axis-- > 0;) {
+    const int cells = size_[axis] * BlockSize;
+    const int at = domain_.periodic[axis] ? (place[axis] % cells + cells) % cells : place[axis];
+    if (at < 0 || at >= cells)
+      return nullptr;
+    block = block * static_cast<std::size_t>(size_[axis]) + static_cast<std::size_t>(at / BlockSize);
+    node = node * BlockSize + static_cast<std::size_t>(at % BlockSize);
+  }
+  const std::int32_t number = nodesOf_[block];
+  return number < 0 ? nullptr : nodes_.data() + static_cast<std::size_t>(number) * BlockNodes + node;
 }
 
 void GelGrid::SumTiles(int block)

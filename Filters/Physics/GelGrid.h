@@ -38,8 +38,8 @@ struct alignas(32) GelNode {
 /// The grid of one step: nodes in blocks of 4^3, only where there are particles.
 ///
 /// A particle touches 3^3 nodes (quadratic B-splines). Particles are worked on by the block of the lowest of them, so that all
-/// nodes of a block's particles lie in a tile of 6^3. Each block adds into a tile of its own; a node then is the sum over the at most
-/// eight tiles that hold it, in a fixed order: no colours, no atomics, one result for any number of threads.
+/// nodes of a block's particles lie in a tile of 6^3. Each block adds into a tile of its own; a node then is the sum over the at
+/// most eight tiles that hold it, in a fixed order: no colours, no atomics, one result for any number of threads.
 class GelGrid {
 public:
   static constexpr int BlockSize = 4, BlockNodes = 64, TileSize = 6, TileNodes = 216;
@@ -69,6 +69,8 @@ public:
   int Blocks() const { return static_cast<int>(blocks_.size()); }
   std::array<int, 3> CornerOfNodes(int block) const { return CornerOfBlock(blocks_[static_cast<std::size_t>(block)]); }
   GelNode* NodesOf(int block) { return nodes_.data() + static_cast<std::size_t>(block) * BlockNodes; }
+  /// The node at a place in cells, wrapped along periodic axes; nullptr where there are no nodes.
+  GelNode* NodeAt(const std::array<int, 3>& place);
   /// Adds up the tiles: NodesOf(block) is all momenta and masses.
   void SumTiles(int block);
   /// The other way: TileOf(home) is what its nodes hold.
@@ -87,7 +89,7 @@ private:
   std::array<int, 3> size_; // in blocks
   double perCell_;
   std::vector<std::int32_t> homes_, blocks_, start_, order_;
-  std::vector<std::int32_t> count_, homeOf_, nodesOf_; // for every block of the domain
+  std::vector<std::int32_t> count_, homeOf_, nodesOf_;  // for every block of the domain
   std::vector<std::int32_t> homesAround_, nodesAround_; // eight each: of blocks, of homes
   std::vector<GelNode> tiles_, nodes_;
 };

@@ -3,9 +3,9 @@
 // the flow, b <- f b f^T with f = 1 + dt C, and gives it the determinant 1 again: changes of volume are J's. Then
 // flow takes shear from it along the deviator's own direction (Simo 1988): with T the stress in shear,
 //   T + mu dt r = T_trial,   T = yield + consistency r^exponent,
-// one equation with one unknown for each particle that yields. In x = T - yield it reads x + a x^(1/exponent) = X, which is convex
-// and rising: Newton's method comes down to the root from any place above it, and the smaller one of the roots of either term
-// alone is such a place. The deviator is scaled by T / T_trial, and the trace follows from the determinant.
+// one equation with one unknown for each particle that yields. In x = T - yield it reads x + a x^(1/exponent) = X, which is
+// convex and rising: Newton's method comes down to the root from any place above it, and the smaller one of the roots of either
+// term alone is such a place. The deviator is scaled by T / T_trial, and the trace follows from the determinant.
 //
 // Pressure: kappa (J^2 - 1) / 2.
 #include "GelMaterial.h"
@@ -61,14 +61,12 @@ ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrai
     double y = 3.0 / (2.0 + v);
     for (int round = 0; round < 6; ++round)
       y *= (4.0 - v * y * y * y) * (1.0 / 3.0);
-    y = bad ? 0.0 : y;
-    const double one = bad ? 1.0 : 0.0;
-    a = a * y + one;
-    b = b * y + one;
-    c = c * y + one;
-    d *= y;
-    e *= y;
-    g *= y;
+    a = bad ? 1.0 : a * y;
+    b = bad ? 1.0 : b * y;
+    c = bad ? 1.0 : c * y;
+    d = bad ? 0.0 : d * y;
+    e = bad ? 0.0 : e * y;
+    g = bad ? 0.0 : g * y;
     const double third = (a + b + c) * (1.0 / 3.0);
     const double a0 = a - third, b0 = b - third, c0 = c - third;
     const double square = a0 * a0 + b0 * b0 + c0 * c0 + 2.0 * (d * d + e * e + g * g);
@@ -82,7 +80,7 @@ ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrai
     lanes.b[5][l] = g;
     const double J = lanes.J[l] * (bad ? 1.0 : determinant);
     lanes.J[l] = J < 0.05 ? 0.05 : J > 20.0 ? 20.0 : J;
-    torn[l] = one;
+    torn[l] = bad ? 1.0 : 0.0;
   }
   int sum = 0;
   for (int l = 0; l < count; ++l)
@@ -96,7 +94,8 @@ ECHORAMA_HOT void RelaxGelStrain(const double* scale, GelStrainLanes& lanes)
 #pragma GCC ivdep
   for (int l = 0; l < GelLanes; ++l) {
     double third = (lanes.b[0][l] + lanes.b[1][l] + lanes.b[2][l]) * (1.0 / 3.0);
-    const double a = scale[l] * (lanes.b[0][l] - third), b = scale[l] * (lanes.b[1][l] - third), c = scale[l] * (lanes.b[2][l] - third);
+    const double a = scale[l] * (lanes.b[0][l] - third), b = scale[l] * (lanes.b[1][l] - third),
+                 c = scale[l] * (lanes.b[2][l] - third);
     const double d = scale[l] * lanes.b[3][l], e = scale[l] * lanes.b[4][l], g = scale[l] * lanes.b[5][l];
     const double half = 0.5 * (a * a + b * b + c * c) + d * d + e * e + g * g;
     const double rest = a * (b * c - g * g) - d * (d * c - g * e) + e * (d * g - b * e) - 1.0;
@@ -126,7 +125,8 @@ ParameterList Describe(GelMaterial& p)
       Parameter("YieldStress", p.yieldStress, {0, 1e6}, "Pa", "The stress in shear from which on the gel flows."),
       Parameter("Consistency", p.consistency, {0, 1e6}, "Pa s^n",
                 "The stress above the yield stress at a rate of shear of 1/s; the viscosity of a fluid whose exponent is 1."),
-      Parameter("Exponent", p.exponent, {0.1, 1}, "", "How that stress grows with the rate: below 1, gel thins as it is sheared."),
+      Parameter("Exponent", p.exponent, {0.1, 1}, "",
+                "How that stress grows with the rate: below 1, gel thins as it is sheared."),
   };
 }
 

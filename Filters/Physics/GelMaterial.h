@@ -30,7 +30,7 @@ struct GelStrain {
 struct GelLaw {
   explicit GelLaw(const GelMaterial& material);
   double shear, bulk, yield, consistency, exponent;
-  double density; ///< g/mm^3
+  double density;            ///< g/mm^3
   double SoundSpeed() const; ///< mm/s, of pressure waves
 };
 
@@ -45,8 +45,8 @@ struct alignas(64) GelStrainLanes {
 };
 
 /// Advances all lanes by \a seconds: what the velocity gradient adds to the elastic strain, and then what flow takes from it,
-/// implicitly, so that no viscosity limits the step. \returns how many of the first \a count were torn or turned inside out by the step
-/// and begin anew without shear.
+/// implicitly, so that no viscosity limits the step. \returns how many of the first \a count were torn or turned inside out by
+/// the step and begin anew without shear.
 int AdvanceGelStrain(const GelLaw& law, double seconds, int count, GelStrainLanes& lanes);
 
 /// Kirchhoff stress, Pa: symmetric.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A step: particles to tiles, tiles to nodes, nodes moved (gravity, colliders), nodes to tiles, tiles to particles, which move on and
-// flow. Each pass is parallel over blocks that write to places of their own.
+// A step: particles to tiles, tiles to nodes, nodes moved (gravity, colliders), nodes to tiles, tiles to particles, which move on
+// and flow. Each pass is parallel over blocks that write to places of their own.
 //
 // Cost: some 300 instructions per particle for each transfer and 150 for the flow; sorting by numbers is a few per cent of that.
 #include "GelSolver.h"
@@ -16,6 +16,8 @@ namespace {
 
 constexpr std::ptrdiff_t gelBlocksAtOnce = 4;
 constexpr std::int64_t gelStepsUntilOrder = 64;
+constexpr double inSolid = -1.0; // the mass of a node that a solid moves
+constexpr double mirrored = 1.6; // cells: deeper nodes touch no gel outside
 
 GelTransferFrame FrameOf(const GelGrid& grid, int home, double seconds)
 {
@@ -35,7 +37,8 @@ ParameterList Describe(GelStepping& p)
 {
   return {
       Parameter("Gravity", p.gravity, {}, "mm/s^2", "Which way gel falls, and how fast."),
-      Parameter("Courant", p.courant, {0.01, 0.6}, "", "Steps are this part of the time in which pressure crosses a cell.").Advanced(),
+      Parameter("Courant", p.courant, {0.01, 0.6}, "", "Steps are this part of the time in which pressure crosses a cell.")
+          .Advanced(),
   };
 }
 
@@ -78,7 +81,8 @@ void GelSolver::Fill(const std::function<bool(const Eigen::Vector3d&)>& inside, 
       }
 }
 
-void GelSolver::SetVelocity(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& velocity, const Eigen::Matrix3d& gradient)
+void GelSolver::SetVelocity(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& velocity,
+                            const Eigen::Matrix3d& gradient)
 {
   for (GelParticle& particle : particles_) {
     Eigen::Map<Eigen::Vector3d>(particle.velocity) = velocity(Eigen::Map<const Eigen::Vector3d>(particle.position));
@@ -118,9 +122,54 @@ void GelSolver::MoveNodes(double seconds, const GelColliders& colliders)
   const GelDomain& domain = grid_.Domain();
   const double reach = 2.7 * domain.cellMm; // from the middle of a block to its outermost nodes: 1.5 sqrt(3) cells
   const double gained[4] = {seconds * stepping_.gravity[0], seconds * stepping_.gravity[1], seconds * stepping_.gravity[2], 0.0};
+  ghosts_.resize(static_cast<std::size_t>((grid_.Blocks() + gelBlocksAtOnce - 1) / gelBlocksAtOnce));
+  const auto lowestOf = [&](int block) {
+    const std::array<int, 3> corner = grid_.CornerOfNodes(block);
+    return Eigen::Vector3d(domain.origin + domain.cellMm * Eigen::Vector3d(corner[0], corner[1], corner[2]));
+  };
+  const auto placeOf = [&domain](const Eigen::Vector3d& lowest, int n) {
+    return Eigen::Vector3d(lowest + domain.cellMm * Eigen::Vector3d(n & 3, n >> 2 & 3, n >> 4));
+  };
+  const auto reaches = [&](std::size_t c, const Eigen::Vector3d& lowest) {
+    return colliders.Reaches(c, lowest + Eigen::Vector3d::Constant(1.5 * domain.cellMm), reach);
+  };
   ParallelRanges(grid_.Blocks(), gelBlocksAtOnce, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    std::vector<Ghost>& ghosts = ghosts_[static_cast<std::size_t>(begin / gelBlocksAtOnce)];
+    ghosts.clear();
     for (int block = static_cast<int>(begin); block < end; ++block) {
       grid_.SumTiles(block);
+      GelNode* nodes = grid_.NodesOf(block);
+      const Eigen::Vector3d lowest = lowestOf(block);
+      for (std::size_t c = 0; c < colliders.Size(); ++c) {
+        if (!colliders.Sticks(c) || !reaches(c, lowest))
+          continue;
+        for (int n = 0; n < GelGrid::BlockNodes; ++n) {
+          const double* raw = nodes[n].value;
+          if (!(raw[3] > 0.0))
+            continue;
+          const Eigen::Vector3d place = placeOf(lowest, n);
+          Ghost ghost{&nodes[n], {raw[0], raw[1], raw[2], raw[3]}, Eigen::Vector3d::Zero(), {}, {}};
+          if (!colliders.Collide(c, place, ghost.velocity))
+            continue;
+          const Eigen::Vector3d toSurface = colliders.ToSurface(c, place);
+          const bool near = toSurface.norm() < mirrored * domain.cellMm;
+          const Eigen::Array3d mirror = ((place + 2.0 * toSurface - domain.origin) / domain.cellMm).array() + 1e-9;
+          const Eigen::Array3d floor = mirror.floor(), part = mirror - floor;
+          for (int axis = 0; axis < 3; ++axis)
+            ghost.place[static_cast<std::size_t>(axis)] = static_cast<int>(floor[axis]);
+          for (unsigned corner = 0; corner < 8; ++corner)
+            ghost.weight[corner] = near ? (corner & 1 ? part[0] : 1.0 - part[0]) * (corner & 2 ? part[1] : 1.0 - part[1]) *
+                                              (corner & 4 ? part[2] : 1.0 - part[2])
+                                        : 0.0;
+          ghosts.push_back(ghost);
+          nodes[n].value[3] = inSolid;
+        }
+      }
+    }
+  });
+  Mirror(seconds);
+  ParallelRanges(grid_.Blocks(), gelBlocksAtOnce, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (int block = static_cast<int>(begin); block < end; ++block) {
       GelNode* nodes = grid_.NodesOf(block);
       for (int n = 0; n < GelGrid::BlockNodes; ++n) {
         const double mass = nodes[n].value[3];
@@ -128,20 +177,57 @@ void GelSolver::MoveNodes(double seconds, const GelColliders& colliders)
           for (int axis = 0; axis < 3; ++axis)
             nodes[n].value[axis] = nodes[n].value[axis] / mass + gained[axis];
       }
-      const std::array<int, 3> corner = grid_.CornerOfNodes(block);
-      const Eigen::Vector3d lowest = domain.origin + domain.cellMm * Eigen::Vector3d(corner[0], corner[1], corner[2]);
+      const Eigen::Vector3d lowest = lowestOf(block);
       for (std::size_t c = 0; c < colliders.Size(); ++c) {
-        if (!colliders.Reaches(c, lowest + Eigen::Vector3d::Constant(1.5 * domain.cellMm), reach))
+        if (colliders.Sticks(c) || !reaches(c, lowest))
           continue;
         for (int n = 0; n < GelGrid::BlockNodes; ++n)
           if (nodes[n].value[3] > 0.0) {
             Eigen::Vector3d velocity(nodes[n].value[0], nodes[n].value[1], nodes[n].value[2]);
-            if (colliders.Collide(c, lowest + domain.cellMm * Eigen::Vector3d(n & 3, n >> 2 & 3, n >> 4), velocity))
+            if (colliders.Collide(c, placeOf(lowest, n), velocity))
               Eigen::Map<Eigen::Vector3d>(nodes[n].value) = velocity;
           }
       }
     }
   });
+  ParallelRanges(static_cast<std::ptrdiff_t>(ghosts_.size()), 1, {}, [&](std::ptrdiff_t range, std::ptrdiff_t) {
+    for (const Ghost& ghost : ghosts_[static_cast<std::size_t>(range)]) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero(); // relative to the solid, where it is 0
+      for (int corner = 0; corner < 8; ++corner) {
+        const GelNode* node = ghost.weight[static_cast<std::size_t>(corner)] > 1e-6 ? NodeOf(ghost, corner) : nullptr;
+        if (node)
+          sum += ghost.weight[static_cast<std::size_t>(corner)] *
+                 (Eigen::Vector3d(node->value[0], node->value[1], node->value[2]) - ghost.velocity);
+      }
+      Eigen::Map<Eigen::Vector3d>(ghost.node->value) = ghost.velocity - sum;
+    }
+  });
+}
+
+GelNode* GelSolver::NodeOf(const Ghost& ghost, int corner)
+{
+  GelNode* node =
+      grid_.NodeAt({ghost.place[0] + (corner & 1), ghost.place[1] + (corner >> 1 & 1), ghost.place[2] + (corner >> 2)});
+  return node && node->value[3] > 0.0 ? node : nullptr;
+}
+
+// What sticks to a wall goes on behind it, as its own image that moves the other way: its nodes beside the wall also feel the
+// image's mass, momentum and stress, which is what particles gave the nodes behind. In order, by one thread: these are few.
+void GelSolver::Mirror(double seconds)
+{
+  for (const std::vector<Ghost>& ghosts : ghosts_)
+    for (const Ghost& ghost : ghosts)
+      for (int corner = 0; corner < 8; ++corner) {
+        const double weight = ghost.weight[static_cast<std::size_t>(corner)];
+        GelNode* node = weight > 1e-6 ? NodeOf(ghost, corner) : nullptr;
+        if (!node)
+          continue;
+        const double mass = ghost.raw[3];
+        for (int axis = 0; axis < 3; ++axis)
+          node->value[axis] +=
+              weight * (2.0 * mass * (ghost.velocity[axis] - seconds * stepping_.gravity[axis]) - ghost.raw[axis]);
+        node->value[3] += weight * mass;
+      }
 }
 
 GelSolver::Extremes GelSolver::Gather(double seconds)

@@ -17,16 +17,16 @@ ParameterList Describe(GelStepping& p);
 
 /// Sums over all gel that is left.
 struct GelTotals {
-  double mass = 0.0;                                           ///< g
-  double volume = 0.0;                                         ///< mm^3, as it is compressed now
-  Eigen::Vector3d momentum = Eigen::Vector3d::Zero();          ///< g mm/s
-  Eigen::Vector3d angularMomentum = Eigen::Vector3d::Zero();   ///< g mm^2/s, about the origin of the world
+  double mass = 0.0;                                         ///< g
+  double volume = 0.0;                                       ///< mm^3, as it is compressed now
+  Eigen::Vector3d momentum = Eigen::Vector3d::Zero();        ///< g mm/s
+  Eigen::Vector3d angularMomentum = Eigen::Vector3d::Zero(); ///< g mm^2/s, about the origin of the world
 };
 
 struct GelReport {
   std::int64_t steps = 0, particleSteps = 0;
-  std::int64_t gone = 0; ///< particles that left the domain
-  std::int64_t torn = 0; ///< strains that began anew: a sign of steps that are too long
+  std::int64_t gone = 0;     ///< particles that left the domain
+  std::int64_t torn = 0;     ///< strains that began anew: a sign of steps that are too long
   double shortestStep = 0.0; ///< s
   double largestSpeed = 0.0; ///< mm/s, at the end
 };
@@ -64,6 +64,7 @@ private:
   };
   void Scatter(double seconds);
   void MoveNodes(double seconds, const GelColliders& colliders);
+  void Mirror(double seconds);
   Extremes Gather(double seconds);
 
   GelLaw law_;
@@ -71,6 +72,16 @@ private:
   GelGrid grid_;
   std::vector<GelParticle> particles_;
   Extremes extremes_;
+  /// A node in a solid to which gel sticks, and the place on the other side of the wall.
+  struct Ghost {
+    GelNode* node;
+    double raw[4];            ///< momentum and mass that particles gave it
+    Eigen::Vector3d velocity; ///< of the solid
+    std::array<int, 3> place; ///< of the lowest of the eight nodes around the mirror's image
+    std::array<double, 8> weight;
+  };
+  GelNode* NodeOf(const Ghost& ghost, int corner); ///< nullptr where there is no gel, or a solid
+  std::vector<std::vector<Ghost>> ghosts_;         ///< for every range of blocks
   std::int64_t steps_ = 0;
   std::int32_t made_ = 0;
 };

@@ -50,7 +50,8 @@ ECHORAMA_HOT void ScatterGelParticles(const GelLaw& law, const GelTransferFrame&
     const double pull = -frame.seconds * p.volume * 4.0 * perCell * perCell, shear = pull * law.shear;
     const double mean = (b[0] + b[1] + b[2]) * (1.0 / 3.0);
     const double pressure = pull * 0.5 * law.bulk * (p.strain.J * p.strain.J - 1.0);
-    const double xx = shear * (b[0] - mean) + pressure, yy = shear * (b[1] - mean) + pressure, zz = shear * (b[2] - mean) + pressure;
+    const double xx = shear * (b[0] - mean) + pressure, yy = shear * (b[1] - mean) + pressure,
+                 zz = shear * (b[2] - mean) + pressure;
     const double xy = shear * b[3], xz = shear * b[4], yz = shear * b[5];
     const double* C = p.gradient;
     const GelQuad alongX = {mass * C[0] + xx, mass * C[3] + xy, mass * C[6] + xz, 0.0};
@@ -123,8 +124,8 @@ ECHORAMA_HOT void GatherGelParticles(const GelTransferFrame& frame, GelParticle*
 
 } // namespace
 
-void ScatterGel(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles, const std::int32_t* order, int count,
-                GelNode* tile)
+void ScatterGel(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles, const std::int32_t* order,
+                int count, GelNode* tile)
 {
   std::fill(tile, tile + GelGrid::TileNodes, GelNode{});
   ScatterGelParticles(law, frame, particles, order, count, tile);

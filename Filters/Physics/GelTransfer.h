@@ -13,8 +13,8 @@ struct GelTransferFrame {
 
 /// Momenta, with what stress adds to them in a step, and masses of \a count particles, numbered by \a order, onto a tile
 /// (APIC: Jiang 2015; MLS-MPM: Hu 2018).
-void ScatterGel(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles, const std::int32_t* order, int count,
-                GelNode* tile);
+void ScatterGel(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles, const std::int32_t* order,
+                int count, GelNode* tile);
 
 /// The velocities of a tile back to its particles: their velocities, gradients, positions and strains.
 /// \returns how many strains began anew (AdvanceGelStrain).
