@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sorting is one pass that counts and one that writes numbers of particles; it costs a few per cent of a step. The
+// Sorting is one pass that counts and one that writes numbers of particles. The
 // particles themselves are put in order now and then only (GelSolver), so that those of a block lie near each other.
 #include "GelGrid.h"
 #include "Core/Base/Error.h"
