@@ -1,0 +1,431 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Nearly incompressible tissue is what makes this hard: Chebyshev polynomials of low degree over the blocks of nodes stand it,
+// and all their work is products with the matrix, which run along x. A V-cycle is symmetric, since the smoother is the same
+// before and after. Sums are taken slice by slice, in order.
+#include "LatticeMultigrid.h"
+#include "Core/Base/Multiversion.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Base/Random.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace echorama {
+namespace {
+
+constexpr int ChebyshevDegree = 3;
+constexpr double ChebyshevRange = 12.0; // errors with eigenvalues down to 1/12 of the largest are smoothed
+
+// One step of the Chebyshev recurrence in one row: step = keep * step + take * inverse * (right - product), next = value + step.
+ECHORAMA_HOT void ChebyshevRow(int count, float keep, float take, const float* product, int padded, const float* const* right,
+                               const float* const* inverse, const float* const* value, float* const* step, float* const* next)
+{
+  const float *p0 = product, *p1 = product + padded, *p2 = product + 2 * padded;
+#pragma GCC ivdep
+  for (int i = 0; i < count; ++i) {
+    const float r0 = right[0][i] - p0[i], r1 = right[1][i] - p1[i], r2 = right[2][i] - p2[i];
+    const float s0 = keep * step[0][i] + take * (inverse[0][i] * r0 + inverse[1][i] * r1 + inverse[2][i] * r2);
+    const float s1 = keep * step[1][i] + take * (inverse[1][i] * r0 + inverse[3][i] * r1 + inverse[4][i] * r2);
+    const float s2 = keep * step[2][i] + take * (inverse[2][i] * r0 + inverse[4][i] * r1 + inverse[5][i] * r2);
+    step[0][i] = s0;
+    step[1][i] = s1;
+    step[2][i] = s2;
+    next[0][i] = value[0][i] + s0;
+    next[1][i] = value[1][i] + s1;
+    next[2][i] = value[2][i] + s2;
+  }
+}
+
+double Dot(const LatticeField<float>& a, const LatticeField<float>& b)
+{
+  const LatticeShape& shape = a.Shape();
+  return ParallelSum<double>(shape.nodes[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
+    double sum = 0.0;
+    for (int c = 0; c < 3; ++c)
+      for (int j = 0; j < shape.nodes[1]; ++j) {
+        const std::ptrdiff_t at = shape.At(0, j, static_cast<int>(k));
+        const float *x = a.Component(c) + at, *y = b.Component(c) + at;
+        double lanes[LatticeShape::Lanes] = {};
+        for (int i = 0; i < shape.Padded(); i += LatticeShape::Lanes)
+          for (int l = 0; l < LatticeShape::Lanes; ++l)
+            lanes[l] += static_cast<double>(x[i + l]) * static_cast<double>(y[i + l]);
+        for (const double lane : lanes)
+          sum += lane;
+      }
+    return sum;
+  });
+}
+
+// a = a * scale + b * factor, slice by slice.
+void Combine(LatticeField<float>& a, float scale, const LatticeField<float>& b, float factor)
+{
+  const LatticeShape& shape = a.Shape();
+  ParallelFor(shape.nodes[2], [&](std::ptrdiff_t k) {
+    for (int c = 0; c < 3; ++c) {
+      float* x = a.Component(c) + (k + 1) * shape.slice;
+      const float* y = b.Component(c) + (k + 1) * shape.slice;
+      for (std::ptrdiff_t i = 0; i < shape.slice; ++i)
+        x[i] = x[i] * scale + y[i] * factor;
+    }
+  });
+}
+
+} // namespace
+
+LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen::Vector3d& spacing, std::vector<float> live)
+{
+  std::array<int, 3> size = nodes;
+  Eigen::Vector3d width = spacing;
+  while (true) {
+    const LatticeShape shape(size);
+    Level level;
+    level.right = level.value = level.other = level.step = level.mode = LatticeField<float>(shape);
+    for (auto& entries : level.inverse)
+      entries.assign(static_cast<std::size_t>(shape.size), 0.0f);
+    if (levels_.empty()) {
+      level.matrix = LatticeMatrix(shape);
+      level.live = live;
+      live_ = std::move(live);
+    } else {
+      level.live.assign(static_cast<std::size_t>(shape.size), 0.0f);
+    }
+    Random random(17, levels_.size());
+    ForNodes(size, [&](int i, int j, int k) {
+      for (int c = 0; c < 3; ++c)
+        level.mode.Component(c)[shape.At(i, j, k)] = static_cast<float>(random.Uniform(-1.0, 1.0));
+    });
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (size[axis] > 3)
+        least = std::min(least, width[static_cast<int>(axis)]);
+    const bool isCoarsest = shape.Count() <= 150 || least == std::numeric_limits<double>::infinity();
+    for (std::size_t axis = 0; axis < 3 && !isCoarsest; ++axis)
+      if (size[axis] > 3 && width[static_cast<int>(axis)] < 1.5 * least) {
+        level.halved[axis] = true;
+        size[axis] = LatticeMatrix::CoarseCount(size[axis]);
+        width[static_cast<int>(axis)] *= 2.0;
+      }
+    levels_.push_back(std::move(level));
+    if (isCoarsest)
+      break;
+  }
+  residual_ = direction_ = product_ = correction_ = LatticeField<float>(LatticeShape(nodes));
+}
+
+void LatticeMultigrid::Prepare()
+{
+  for (std::size_t n = 0; n < levels_.size(); ++n) {
+    Level& level = levels_[n];
+    Invert(level);
+    if (n + 1 == levels_.size())
+      break;
+    EstimateLargest(level);
+    const std::vector<float>* live = n == 0 ? &level.live : nullptr;
+    LatticeMatrix coarse;
+    const LatticeMatrix* from = &level.matrix;
+    for (const int axis : {2, 1, 0})
+      if (level.halved[static_cast<std::size_t>(axis)]) {
+        coarse = from->Coarsened(axis, live);
+        from = &coarse;
+        live = nullptr;
+      }
+    levels_[n + 1].matrix = std::move(coarse);
+  }
+  Level& last = levels_.back();
+  const LatticeShape& shape = last.matrix.Shape();
+  unknowns_.clear();
+  std::vector<int> number(static_cast<std::size_t>(shape.size), -1);
+  ForNodes(shape.nodes, [&](int i, int j, int k) {
+    const std::ptrdiff_t at = shape.At(i, j, k);
+    if (last.live[static_cast<std::size_t>(at)] != 0.0f) {
+      number[static_cast<std::size_t>(at)] = static_cast<int>(unknowns_.size());
+      unknowns_.push_back(at);
+    }
+  });
+  const auto size = static_cast<Eigen::Index>(3 * unknowns_.size());
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size, size);
+  ForNodes(shape.nodes, [&](int i, int j, int k) {
+    const int own = number[static_cast<std::size_t>(shape.At(i, j, k))];
+    if (own < 0)
+      return;
+    for (int offset = 0; offset < 27; ++offset) {
+      const int other =
+          number[static_cast<std::size_t>(shape.At(i + offset % 3 - 1, j + offset / 3 % 3 - 1, k + offset / 9 - 1))];
+      for (int entry = 0; other >= 0 && entry < 9; ++entry)
+        dense(3 * own + entry / 3, 3 * other + entry % 3) =
+            static_cast<double>(last.matrix.At(i, j, k, offset, entry / 3, entry % 3));
+    }
+  });
+  // Rounding, and directions of negative curvature, must not stop the factorisation: then it is that of a stiffer matrix.
+  for (double shift = 1e-7;; shift *= 100.0) {
+    Eigen::MatrixXd shifted = dense;
+    shifted.diagonal() *= 1.0 + shift;
+    coarsest_.compute(shifted);
+    if (coarsest_.info() == Eigen::Success || shift > 1e3)
+      break;
+  }
+}
+
+void LatticeMultigrid::Invert(Level& level)
+{
+  const LatticeShape& shape = level.matrix.Shape();
+  const bool isFinest = &level == &levels_.front();
+  ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    for (int j = 0; j < shape.nodes[1]; ++j)
+      for (int i = 0; i < shape.nodes[0]; ++i) {
+        const auto at = static_cast<std::size_t>(shape.At(i, j, k));
+        Eigen::Matrix3d block;
+        for (int entry = 0; entry < 9; ++entry)
+          block(entry / 3, entry % 3) = static_cast<double>(level.matrix.At(i, j, k, 13, entry / 3, entry % 3));
+        const double determinant = block.determinant(), size = block.trace() / 3.0;
+        const bool isLive = size > 0.0 && determinant > 1e-9 * size * size * size && (!isFinest || live_[at] != 0.0f);
+        const Eigen::Matrix3d inverse = isLive ? Eigen::Matrix3d(block.inverse()) : Eigen::Matrix3d::Zero();
+        level.live[at] = isLive ? 1.0f : 0.0f;
+        const int rows[6] = {0, 0, 0, 1, 1, 2}, columns[6] = {0, 1, 2, 1, 2, 2};
+        for (int n = 0; n < 6; ++n)
+          level.inverse[n][at] = static_cast<float>(inverse(rows[n], columns[n]));
+      }
+  });
+}
+
+// The runs of a row of a field.
+#define ECHORAMA_ROWS(field)                                                                                                     \
+  {                                                                                                                              \
+    field.Component(0) + at, field.Component(1) + at, field.Component(2) + at                                                    \
+  }
+
+void LatticeMultigrid::EstimateLargest(Level& level)
+{
+  // Power iteration, from the mode that it found for the last matrix.
+  const LatticeShape& shape = level.matrix.Shape();
+  const int steps = level.largest == 0.0 ? 12 : 3;
+  double largest = 1.0;
+  level.right.Fill(0.0f);
+  for (int n = 0; n < steps; ++n) {
+    level.value.Fill(0.0f);
+    ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice);
+      for (int j = 0; j < shape.nodes[1]; ++j) {
+        const std::ptrdiff_t at = shape.At(0, j, k);
+        for (int c = 0; c < 3; ++c) // what lies at nodes that are not live does not count
+          for (int i = 0; i < shape.nodes[0]; ++i)
+            level.other.Component(c)[at + i] = level.mode.Component(c)[at + i] * level.live[static_cast<std::size_t>(at + i)];
+      }
+    });
+    ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice);
+      std::vector<float> product(static_cast<std::size_t>(3 * shape.Padded()));
+      for (int j = 0; j < shape.nodes[1]; ++j) {
+        const std::ptrdiff_t at = shape.At(0, j, k);
+        level.matrix.MultiplyRow(j, k, level.other, product.data());
+        const float* const right[3] = ECHORAMA_ROWS(level.right);
+        const float* const value[3] = ECHORAMA_ROWS(level.value);
+        float* const step[3] = ECHORAMA_ROWS(level.step);
+        float* const next[3] = ECHORAMA_ROWS(level.mode);
+        const auto begin = static_cast<std::size_t>(at);
+        const float* const inverse[6] = {&level.inverse[0][begin], &level.inverse[1][begin], &level.inverse[2][begin],
+                                         &level.inverse[3][begin], &level.inverse[4][begin], &level.inverse[5][begin]};
+        ChebyshevRow(shape.nodes[0], 0.0f, -1.0f, product.data(), shape.Padded(), right, inverse, value, step, next);
+      }
+    });
+    const double before = std::sqrt(Dot(level.other, level.other)), after = std::sqrt(Dot(level.mode, level.mode));
+    if (!(before > 0.0 && after > 0.0 && std::isfinite(after)))
+      break;
+    largest = after / before;
+    const auto scale = static_cast<float>(1.0 / after);
+    Combine(level.mode, scale, level.mode, 0.0f);
+  }
+  level.largest = largest;
+}
+
+void LatticeMultigrid::Smooth(Level& level, bool fromZero)
+{
+  const LatticeShape& shape = level.matrix.Shape();
+  const double high = 1.1 * level.largest, low = high / ChebyshevRange, middle = 0.5 * (high + low), half = 0.5 * (high - low);
+  const double sigma = middle / half;
+  double rho = 1.0 / sigma;
+  if (fromZero)
+    level.value.Fill(0.0f);
+  for (int n = 0; n < ChebyshevDegree; ++n) {
+    const double next = n == 0 ? rho : 1.0 / (2.0 * sigma - rho);
+    const auto keep = static_cast<float>(n == 0 ? 0.0 : next * rho),
+               take = static_cast<float>(n == 0 ? 1.0 / middle : 2.0 * next / half);
+    rho = next;
+    ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice);
+      std::vector<float> product(static_cast<std::size_t>(3 * shape.Padded()), 0.0f);
+      for (int j = 0; j < shape.nodes[1]; ++j) {
+        const std::ptrdiff_t at = shape.At(0, j, k);
+        if (n > 0 || !fromZero)
+          level.matrix.MultiplyRow(j, k, level.value, product.data());
+        const float* const right[3] = ECHORAMA_ROWS(level.right);
+        const float* const value[3] = ECHORAMA_ROWS(level.value);
+        float* const step[3] = ECHORAMA_ROWS(level.step);
+        float* const nextValue[3] = ECHORAMA_ROWS(level.other);
+        const auto begin = static_cast<std::size_t>(at);
+        const float* const inverse[6] = {&level.inverse[0][begin], &level.inverse[1][begin], &level.inverse[2][begin],
+                                         &level.inverse[3][begin], &level.inverse[4][begin], &level.inverse[5][begin]};
+        ChebyshevRow(shape.nodes[0], keep, take, product.data(), shape.Padded(), right, inverse, value, step, nextValue);
+      }
+    });
+    std::swap(level.value, level.other);
+  }
+}
+
+void LatticeMultigrid::Restrict(const Level& fine, Level& coarse)
+{
+  // The residual goes to fine.other's place first, then every coarse node gathers.
+  const LatticeShape &from = fine.matrix.Shape(), &to = coarse.matrix.Shape();
+  LatticeField<float>& residual = const_cast<Level&>(fine).other;
+  ParallelFor(from.nodes[2], [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    std::vector<float> product(static_cast<std::size_t>(3 * from.Padded()));
+    for (int j = 0; j < from.nodes[1]; ++j) {
+      const std::ptrdiff_t at = from.At(0, j, k);
+      fine.matrix.MultiplyRow(j, k, fine.value, product.data());
+      for (int c = 0; c < 3; ++c)
+        for (int i = 0; i < from.nodes[0]; ++i)
+          residual.Component(c)[at + i] =
+              fine.live[static_cast<std::size_t>(at + i)] *
+              (fine.right.Component(c)[at + i] - product[static_cast<std::size_t>(c * from.Padded() + i)]);
+    }
+  });
+  const std::array<int, 3> reach = {fine.halved[0] ? 1 : 0, fine.halved[1] ? 1 : 0, fine.halved[2] ? 1 : 0};
+  ParallelFor(to.nodes[2], [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    for (int j = 0; j < to.nodes[1]; ++j)
+      for (int c = 0; c < 3; ++c) {
+        float* out = coarse.right.Component(c) + to.At(0, j, k);
+        std::fill(out, out + to.nodes[0], 0.0f);
+        for (int dz = -reach[2]; dz <= reach[2]; ++dz)
+          for (int dy = -reach[1]; dy <= reach[1]; ++dy) {
+            const int fj = (reach[1] ? 2 * j : j) + dy, fk = (reach[2] ? 2 * k : k) + dz;
+            if (fj < 0 || fk < 0 || fj >= from.nodes[1] || fk >= from.nodes[2])
+              continue;
+            const float weight = (dz ? 0.5f : 1.0f) * (dy ? 0.5f : 1.0f);
+            const float* in = residual.Component(c) + from.At(0, fj, fk);
+            if (reach[0] == 0) {
+              for (int i = 0; i < to.nodes[0]; ++i)
+                out[i] += weight * in[i];
+            } else { // ghosts are zero; the last coarse node may lie one beyond the fine ones
+              for (int i = 0; i < to.nodes[0]; ++i)
+                out[i] += weight * (in[2 * i] + 0.5f * (in[2 * i - 1] + in[2 * i + 1]));
+            }
+          }
+      }
+  });
+}
+
+void LatticeMultigrid::Prolong(const Level& coarse, Level& fine)
+{
+  const LatticeShape &from = coarse.matrix.Shape(), &to = fine.matrix.Shape();
+  ParallelFor(to.nodes[2], [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    const int k0 = fine.halved[2] ? k / 2 : k, k1 = fine.halved[2] ? (k + 1) / 2 : k;
+    std::vector<float> row(static_cast<std::size_t>(from.nodes[0]) + 1);
+    for (int j = 0; j < to.nodes[1]; ++j) {
+      const int j0 = fine.halved[1] ? j / 2 : j, j1 = fine.halved[1] ? (j + 1) / 2 : j;
+      const std::ptrdiff_t at = to.At(0, j, k);
+      const float* live = fine.live.data() + at;
+      for (int c = 0; c < 3; ++c) {
+        const float* in = coarse.value.Component(c);
+        const float *a = in + from.At(0, j0, k0), *b = in + from.At(0, j1, k0), *d = in + from.At(0, j0, k1),
+                    *e = in + from.At(0, j1, k1);
+        for (int i = 0; i <= from.nodes[0]; ++i)
+          row[static_cast<std::size_t>(i)] = 0.25f * (a[i] + b[i] + d[i] + e[i]);
+        float* out = fine.value.Component(c) + at;
+        for (int i = 0; i < to.nodes[0]; ++i) {
+          const float value = fine.halved[0]
+                                  ? 0.5f * (row[static_cast<std::size_t>(i / 2)] + row[static_cast<std::size_t>((i + 1) / 2)])
+                                  : row[static_cast<std::size_t>(i)];
+          out[i] += live[i] * value;
+        }
+      }
+    }
+  });
+}
+
+void LatticeMultigrid::SolveCoarsest()
+{
+  Level& level = levels_.back();
+  Eigen::VectorXd right(static_cast<Eigen::Index>(3 * unknowns_.size()));
+  for (std::size_t n = 0; n < unknowns_.size(); ++n)
+    right.segment<3>(static_cast<Eigen::Index>(3 * n)) = level.right.Get(unknowns_[n]).cast<double>();
+  const Eigen::VectorXd solution = coarsest_.solve(right);
+  level.value.Fill(0.0f);
+  for (std::size_t n = 0; n < unknowns_.size(); ++n)
+    level.value.Set(unknowns_[n], solution.segment<3>(static_cast<Eigen::Index>(3 * n)).cast<float>());
+}
+
+void LatticeMultigrid::Cycle(std::size_t n)
+{
+  if (n + 1 == levels_.size()) {
+    SolveCoarsest();
+    return;
+  }
+  Smooth(levels_[n], true);
+  Restrict(levels_[n], levels_[n + 1]);
+  Cycle(n + 1);
+  Prolong(levels_[n + 1], levels_[n]);
+  Smooth(levels_[n], false);
+}
+
+void LatticeMultigrid::Cycle(const LatticeField<float>& in, LatticeField<float>& out)
+{
+  levels_.front().right = in;
+  Cycle(0);
+  out = levels_.front().value;
+}
+
+LatticeMultigrid::Result LatticeMultigrid::Solve(const LatticeField<float>& b, LatticeField<float>& x, double tolerance,
+                                                 int maximumSteps, const Progress& progress)
+{
+  Result result;
+  const LatticeMatrix& matrix = levels_.front().matrix;
+  const std::vector<float>& live = levels_.front().live;
+  const LatticeShape& shape = matrix.Shape();
+  x = LatticeField<float>(shape);
+  residual_ = b;
+  double before = 0.0, first = 0.0;
+  for (; result.steps < maximumSteps; ++result.steps) {
+    progress(0.0);
+    Cycle(residual_, correction_);
+    const double now = Dot(residual_, correction_);
+    if (result.steps == 0)
+      first = now;
+    if (!(first > 0.0) || !std::isfinite(now))
+      break;
+    result.reduction = std::sqrt(std::max(now, 0.0) / first);
+    if (result.reduction <= tolerance)
+      break;
+    Combine(direction_, result.steps == 0 ? 0.0f : static_cast<float>(now / before), correction_, 1.0f);
+    before = now;
+    ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice);
+      std::vector<float> product(static_cast<std::size_t>(3 * shape.Padded()));
+      for (int j = 0; j < shape.nodes[1]; ++j) {
+        matrix.MultiplyRow(j, k, direction_, product.data());
+        for (int c = 0; c < 3; ++c)
+          for (int i = 0; i < shape.nodes[0]; ++i) {
+            const std::ptrdiff_t at = shape.At(i, j, k);
+            product_.Component(c)[at] =
+                live[static_cast<std::size_t>(at)] * product[static_cast<std::size_t>(c * shape.Padded() + i)];
+          }
+      }
+    });
+    const double curvature = Dot(direction_, product_);
+    if (!(curvature > 0.0)) {
+      result.isConvex = false;
+      if (result.steps == 0)
+        x = correction_; // still a way down, since the preconditioner is positive
+      break;
+    }
+    const auto length = static_cast<float>(now / curvature);
+    Combine(x, 1.0f, direction_, length);
+    Combine(residual_, 1.0f, product_, -length);
+  }
+  return result;
+}
+
+} // namespace echorama

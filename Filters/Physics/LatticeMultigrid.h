@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Base/Progress.h"
+#include "Filters/Physics/LatticeMatrix.h"
+#include <Eigen/Cholesky>
+
+namespace echorama {
+
+/// Solves A x = b on a lattice by conjugate gradients, preconditioned by one V-cycle: Chebyshev smoothing over the blocks of the
+/// nodes, coarse matrices by the Galerkin product, the coarsest level by Cholesky. Nodes that are fixed (live = 0) or that no
+/// entry of A reaches keep x = 0. The result does not depend on the number of threads.
+class LatticeMultigrid {
+public:
+  /// \param spacing axes whose spacing is well above the least are coarsened later than the others
+  LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen::Vector3d& spacing, std::vector<float> live);
+
+  /// To be filled; then Prepare().
+  LatticeMatrix& Matrix() { return levels_.front().matrix; }
+  /// Builds the coarse levels from the matrix.
+  void Prepare();
+
+  struct Result {
+    int steps = 0;
+    bool isConvex = true;   ///< false: a direction of negative curvature was met, and x is what was found before it
+    double reduction = 1.0; ///< of the residual, in the norm of the preconditioner
+  };
+  /// x = about A^-1 b, to a residual that is \a tolerance of the first one.
+  Result Solve(const LatticeField<float>& b, LatticeField<float>& x, double tolerance, int maximumSteps,
+               const Progress& progress = {});
+
+  /// out = one V-cycle for in: the preconditioner.
+  void Cycle(const LatticeField<float>& in, LatticeField<float>& out);
+
+private:
+  struct Level {
+    LatticeMatrix matrix;
+    std::array<bool, 3> halved{};  ///< axes along which the next level is coarser
+    std::vector<float> live;       ///< 1 or 0, like a component of a field
+    std::vector<float> inverse[6]; ///< of the diagonal blocks: xx, xy, xz, yy, yz, zz; 0 where not live
+    double largest = 0.0;          ///< eigenvalue of inverse * A, estimated from above
+    LatticeField<float> right, value, other, step, mode;
+  };
+  void Invert(Level& level);
+  void EstimateLargest(Level& level);
+  void Smooth(Level& level, bool fromZero);
+  void Restrict(const Level& fine, Level& coarse);
+  void Prolong(const Level& coarse, Level& fine);
+  void SolveCoarsest();
+  void Cycle(std::size_t level);
+
+  std::vector<float> live_; ///< as given
+  std::vector<Level> levels_;
+  Eigen::LLT<Eigen::MatrixXd> coarsest_;
+  std::vector<std::ptrdiff_t> unknowns_; ///< nodes of the coarsest level
+  LatticeField<float> residual_, direction_, product_, correction_;
+};
+
+} // namespace echorama
