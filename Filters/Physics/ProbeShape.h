@@ -10,7 +10,7 @@ class ProbeShape {
 public:
   /// \param marginMm how far the head reaches beyond the face, \param edgeMm the radius of its edges, \param lengthMm how far
   /// back \throws Error(InvalidParameter)
-  explicit ProbeShape(const ProbeGeometry& geometry, double marginMm = 3.0, double edgeMm = 2.0, double lengthMm = 80.0);
+  explicit ProbeShape(const ProbeGeometry& geometry, double marginMm = 5.0, double edgeMm = 4.0, double lengthMm = 80.0);
 
   /// mm to the surface, negative inside. Exact in front of the face; never too long elsewhere.
   double Distance(const Eigen::Vector3d& point) const;

@@ -70,7 +70,7 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
     LatticeMultigrid::Result solved;
     do {
       TissueStiffness(cells_, spacing_, displacement_, multigrid_.Matrix(), tame);
-      contact_.AddStiffness(displacement_, multigrid_.Matrix(), tame);
+      contact_.AddStiffness(displacement_, multigrid_.Matrix(), tame || last > 0.03 * spacing_.minCoeff());
       multigrid_.Prepare();
       solved = multigrid_.Solve(right, step, tolerance, 100);
       work.linearSteps += solved.steps;
@@ -100,9 +100,9 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
     std::swap(displacement_, trial);
     last = part * longest;
     tame = tame && last > 0.2 * spacing_.minCoeff();
-    if (last < 0.2 * spacing_.minCoeff()) {
+    if (part == 1.0 && last < 0.2 * spacing_.minCoeff()) {
       const double open = contact_.Update(displacement_);
-      isFound = part == 1.0 && last < toleranceMm && open < toleranceMm;
+      isFound = last < toleranceMm && open < toleranceMm;
     }
   }
   if (!isFound || !(LeastVolume() > 0.0)) {
