@@ -40,8 +40,9 @@ constexpr int MostCandidates = 1000;
 constexpr double FinalStop = 2e-5; // voxels: where the answer stops should tell little of the CPU
 constexpr double Slack = 1.5;      // how much further from the start than was said an answer may be
 constexpr double TrackedDegrees = 12.0, TrackedMm = 20.0, HandMadeDegrees = 35.0;
-constexpr int ManyCandidates = 4; // times as many
-constexpr int FewPoints = 4;      // candidates are compared by this many times fewer points than the answer
+constexpr int ManyCandidates = 4;   // times as many
+constexpr int FewPoints = 4;        // candidates are compared by this many times fewer points than the answer,
+constexpr int EnoughPoints = 20000; // but not by fewer than these, if it has as many
 constexpr std::size_t Rivals = 3;
 constexpr std::size_t Finalists = 5; // of the coarse level
 // Less similarity needs a pose that is better determined. Where two bodies have nothing in common but layers that run alike, the
@@ -162,7 +163,7 @@ public:
     // tracker's start alone, where it keeps a rig that can turn about an axis nearer to where the tracker has it.
     start = Clock::now();
     std::vector<LocalAlignResult> found = Refine(poses, 0.0, coarseMm_, progress.Part(0.6, 0.65));
-    if (p_.start == AlignStart::Tracked && !found.empty())
+    if (p_.start == AlignStart::Tracked)
       poses.clear();
     for (std::size_t i = 0; i < std::min<std::size_t>(Finalists, found.size()); ++i)
       poses.push_back(found[i].volumeToWorld);
@@ -307,7 +308,7 @@ private:
   {
     std::vector<LocalAlignResult> all, different;
     const double count = static_cast<double>(poses.size());
-    const int points = std::max(p_.points / FewPoints, static_cast<int>(ComparedPoints.low));
+    const int points = std::min(p_.points, std::max(p_.points / FewPoints, EnoughPoints));
     for (std::size_t i = 0; i < poses.size(); ++i)
       all.push_back(Local(poses[i], coarsestMm, finestMm, points, 0,
                           progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count)));
