@@ -375,6 +375,19 @@ class Synthesizer(Phantom):
         return filter
 
 
+class TissuePress(Phantom):
+    """A displacement of tissue, which is no volume."""
+
+    output = "points"
+
+    def filter(self, images=()):
+        filter = self.make()
+        filter.tissue = echorama.vtkUltrasoundAnatomySource()
+        filter.SetInputConnection(filter.tissue.GetOutputPort())
+        filter.SetSpacingMm(15.0)
+        return filter
+
+
 class TissueMeshes(TissueSource):
     """From meshes, which its own test feeds."""
 
@@ -564,6 +577,7 @@ Special = {
     "vtkUltrasoundProbeSource": TissueSource,
     "vtkUltrasoundRigFit": RigFit,
     "vtkUltrasoundTissueMeshes": TissueMeshes,
+    "vtkUltrasoundTissuePress": TissuePress,
     "vtkUltrasoundTissueSource": TissueSource,
     "vtkUltrasoundSynthesizer": Synthesizer,
     "vtkUltrasoundTrackerPlacement": TrackerPlacement,

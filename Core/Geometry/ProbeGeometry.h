@@ -3,6 +3,7 @@
 #include "Core/Geometry/RigidTransform.h"
 #include <optional>
 #include <string>
+#include <tuple>
 
 namespace echorama {
 
@@ -89,6 +90,14 @@ struct ProbeGeometry {
   /// sweep axis, so that the inverse has no single answer: that takes a sweep of half a turn or more whose fan reaches behind the
   /// axis.
   void Check() const;
+
+  bool operator==(const ProbeGeometry& other) const
+  {
+    const auto tie = [](const ProbeGeometry& p) {
+      return std::tie(p.fanAngle, p.fanWidth, p.sweepAngle, p.sweepWidth, p.depthMin, p.depthMax, p.fanOffset);
+    };
+    return tie(*this) == tie(other);
+  }
 };
 
 /// A probe and where it was.

@@ -32,17 +32,26 @@ std::pair<double, double> Extent(const ProbeArc& arc, double from, double to)
 
 } // namespace
 
-ProbeShape::ProbeShape(const ProbeGeometry& geometry, double marginMm, double edgeMm, double lengthMm)
-  : geometry_(geometry), edge_(edgeMm), length_(lengthMm)
+ParameterList Describe(ProbeHead& head)
+{
+  return {
+      Parameter("HeadMarginMm", head.marginMm, {0.1, 1000.0}, "mm",
+                "How far the head of the probe reaches beyond its outermost beams."),
+      Parameter("HeadEdgeMm", head.edgeMm, {0.0, 1000.0}, "mm", "Radius of the head's edges, at most HeadMarginMm."),
+      Parameter("HeadLengthMm", head.lengthMm, {1.0, 1000.0}, "mm", "How far the head reaches back.").Advanced(),
+  };
+}
+
+ProbeShape::ProbeShape(const ProbeGeometry& geometry, const ProbeHead& head)
+  : geometry_(geometry), edge_(head.edgeMm), length_(head.lengthMm)
 {
   geometry_.Check();
-  CheckRange("the margin of the probe", marginMm, 0.1, 1000.0);
-  CheckRange("the edge radius of the probe", edgeMm, 0.0, marginMm);
-  CheckRange("the length of the probe", lengthMm, 1.0, 1000.0);
+  CheckRanges(head);
+  CheckRange("HeadEdgeMm", head.edgeMm, 0.0, head.marginMm);
   const auto [left, right] = Extent(geometry_.Fan(), geometry_.fanOffset - 0.5, geometry_.fanOffset + 0.5);
   const auto [low, high] = Extent(geometry_.Sweep(), -0.5, 0.5);
-  low_ = Eigen::Vector2d(left - marginMm, low - marginMm);
-  high_ = Eigen::Vector2d(right + marginMm, high + marginMm);
+  low_ = Eigen::Vector2d(left, low).array() - head.marginMm;
+  high_ = Eigen::Vector2d(right, high).array() + head.marginMm;
 }
 
 double ProbeShape::Distance(const Eigen::Vector3d& point) const

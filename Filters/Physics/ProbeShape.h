@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Parameters.h"
 #include "Core/Geometry/ProbeGeometry.h"
 
 namespace echorama {
+
+/// What holds the face of a probe.
+struct ProbeHead {
+  double marginMm = 5.0, edgeMm = 4.0, lengthMm = 80.0;
+};
+ParameterList Describe(ProbeHead& head);
 
 /// The head of a probe as a solid: what lies behind its face, up to a margin around the outermost beams, with rounded edges.
 /// The frame is that of ProbeGeometry. A face that is a point (phased beams) is taken to be flat.
 class ProbeShape {
 public:
-  /// \param marginMm how far the head reaches beyond the face, \param edgeMm the radius of its edges, \param lengthMm how far
-  /// back \throws Error(InvalidParameter)
-  explicit ProbeShape(const ProbeGeometry& geometry, double marginMm = 5.0, double edgeMm = 4.0, double lengthMm = 80.0);
+  /// \throws Error(InvalidParameter)
+  explicit ProbeShape(const ProbeGeometry& geometry, const ProbeHead& head = {});
 
   /// mm to the surface, negative inside. Exact in front of the face; never too long elsewhere.
   double Distance(const Eigen::Vector3d& point) const;

@@ -1,0 +1,190 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""vtkUltrasoundTissuePress: bodies with materials become cells, a probe presses them, and what comes out moves surfaces. (How well the
+solver solves: TestTissuePress.cxx.)"""
+import unittest
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkCommand
+from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+from vtkmodules.vtkFiltersSources import vtkCubeSource, vtkSphereSource
+
+import echorama
+
+acquisition = echorama.vtkUltrasoundAcquisition
+TOP, BACK = 20.0, 55.0  # of the block, which is 60 mm wide
+
+
+def block():
+    source = vtkCubeSource()
+    source.SetBounds(-30.0, 30.0, -30.0, 30.0, TOP, BACK)
+    return source
+
+
+def ball(radius, x, y, z):
+    source = vtkSphereSource()
+    source.SetRadius(radius)
+    source.SetCenter(x, y, z)
+    source.SetThetaResolution(24)
+    source.SetPhiResolution(24)
+    return source
+
+
+def tissue(**bodies):
+    """Sources by the names of their materials, the outermost first."""
+    made = echorama.vtkUltrasoundTissueMeshes()
+    made.SetMaterials(", ".join(name.replace("_", "-") for name in bodies))
+    for source in bodies.values():
+        triangles = vtkTriangleFilter()
+        triangles.SetInputConnection(source.GetOutputPort())
+        triangles.Update()
+        made.AddInputDataObject(triangles.GetOutput())
+    made.Update()
+    return made.GetOutput()
+
+
+def add_field(data, name, values):
+    array = numpy_to_vtk(np.array([values], float), deep=True)
+    array.SetName(name)
+    data.GetFieldData().AddArray(array)
+
+
+def probe(depth, x=0.0):
+    """A convex one, the middle of whose face is so deep below the skin."""
+    data = vtkPolyData()
+    pose = np.eye(4)
+    pose[:3, 3] = (x, 0.0, TOP + depth)
+    add_field(data, acquisition.ProbeGeometryName(), [57.0, 25.0, 30.0, 12.0, 0.0, 100.0])
+    add_field(data, acquisition.ProbeToWorldName(), pose.ravel())
+    return data
+
+
+def press(body, *probes, **properties):
+    filter = echorama.vtkUltrasoundTissuePress()
+    filter.SetInputData(body)
+    for each in probes:
+        filter.AddProbeData(each)
+    filter.SetSpacingMm(5.0)
+    for name, value in properties.items():
+        getattr(filter, "Set" + name)(value)
+    return filter
+
+
+def run(*arguments, **properties):
+    filter = press(*arguments, **properties)
+    filter.Update()
+    return filter.GetOutput()
+
+
+def values(image, name):
+    return vtk_to_numpy(image.GetPointData().GetArray(name))
+
+
+def at(image, name, *place):
+    return values(image, name)[image.FindPoint(place)]
+
+
+def field(image, name):
+    return vtk_to_numpy(image.GetFieldData().GetArray(name)).ravel()
+
+
+class Press(unittest.TestCase):
+    def refused(self, filter, *words):
+        errors = []
+        observe = lambda caller, event, text="": errors.append(text)
+        observe.CallDataType = "string0"
+        for one in (filter, filter.GetExecutive()):
+            one.AddObserver(vtkCommand.ErrorEvent, observe)
+        filter.Update()
+        self.assertTrue(errors, "nothing was refused")
+        for word in words:
+            self.assertIn(word, errors[0])
+        self.assertEqual(filter.GetOutput().GetNumberOfPoints(), 0)
+
+    def test_the_skin_follows_the_face(self):
+        body = tissue(muscle=block())
+        filter = press(body, probe(6.0))
+        filter.UpdateInformation()
+        promised = filter.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT())
+        filter.Update()
+        pressed = filter.GetOutput()
+        self.assertEqual((tuple(promised), pressed.GetExtent()), ((0, 12, 0, 12, 0, 7),) * 2)
+        np.testing.assert_allclose(pressed.GetOrigin(), (-30.0, -30.0, TOP))
+        self.assertEqual(pressed.GetPointData().GetVectors().GetName(), "Displacement")
+        below = at(pressed, "Displacement", 0.0, 0.0, TOP)
+        np.testing.assert_allclose(below, (0.0, 0.0, 6.0), atol=0.05)
+        self.assertEqual((at(pressed, "Contact", 0.0, 0.0, TOP), at(pressed, "Contact", 30.0, 30.0, TOP)), (1, 0))
+        self.assertTrue(values(pressed, "Tissue").all())
+        points = np.array([pressed.GetPoint(n) for n in range(pressed.GetNumberOfPoints())])
+        self.assertEqual(np.abs(values(pressed, "Displacement")[points[:, 2] == BACK]).max(), 0.0)
+        force = field(pressed, "ProbeForce")
+        self.assertGreater(force[2], 1.0)
+        self.assertLess(np.abs(force[:2]).max(), 0.01 * force[2])
+        now, least = field(pressed, "RelativeVolume")
+        self.assertTrue(0.95 < now < 1.0 and 0.3 < least < now, (now, least))
+
+        deform = echorama.vtkUltrasoundDeformGeometry()
+        deform.SetInputData(body)
+        deform.SetDisplacementData(pressed)
+        deform.SetOutsideToNearest()
+        deform.Update()
+        self.assertAlmostEqual(deform.GetOutput().GetBounds()[5], BACK, 5)
+
+    def test_force_is_in_proportion_to_stiffness(self):
+        forces, shapes = [], []
+        for material in ("liver", "muscle"):  # 5 and 15 kPa
+            pressed = run(tissue(**{material: block()}), probe(6.0))
+            forces.append(field(pressed, "ProbeForce")[2])
+            shapes.append(values(pressed, "Displacement").copy())
+        self.assertAlmostEqual(forces[1] / forces[0], 3.0, delta=0.03)
+        self.assertLess(np.abs(shapes[1] - shapes[0]).max(), 0.05)
+
+    def test_materials_differ_from_cell_to_cell(self):
+        inside = (0.0, 0.0, 40.0)
+        plain = run(tissue(muscle=block()), probe(6.0))
+        moved = at(plain, "Displacement", *inside)[2]
+        self.assertGreater(moved, 0.5)
+        bone = run(tissue(muscle=block(), bone=ball(8.0, *inside)), probe(6.0))
+        self.assertEqual(np.abs(at(bone, "Displacement", *inside)).max(), 0.0)
+        self.assertGreater(field(bone, "ProbeForce")[2], 1.1 * field(plain, "ProbeForce")[2])
+        free = run(tissue(muscle=block(), bone=ball(8.0, *inside)), probe(6.0), HeldMaterials="")  # stiff, but tied to nothing
+        self.assertGreater(at(free, "Displacement", *inside)[2], 0.3)
+        fluid = run(tissue(muscle=block(), cyst=ball(8.0, *inside)), probe(6.0))
+        gas = run(tissue(muscle=block(), air=ball(8.0, *inside)), probe(6.0))
+        self.assertEqual([at(image, "Tissue", *inside) for image in (fluid, gas)], [1, 0])
+        self.assertLess(field(fluid, "ProbeForce")[2], field(plain, "ProbeForce")[2])
+        self.assertGreater(np.abs(at(gas, "Displacement", *inside)).max(), 0.0)  # what lies around it has
+
+    def test_probe_comes_and_goes(self):
+        body = tissue(muscle=block())
+        rest = run(body)
+        self.assertEqual(np.abs(values(rest, "Displacement")).max(), 0.0)
+        lifted = run(body, probe(6.0), probe(-5.0))
+        self.assertLess(np.abs(values(lifted, "Displacement")).max(), 6e-3)
+        self.assertEqual((np.abs(field(lifted, "ProbeForce")).max(), values(lifted, "Contact").max()), (0.0, 0))
+        dragged = run(body, probe(4.0), probe(4.0, 5.0), Friction=1.0)
+        direct = run(body, probe(4.0, 5.0), Friction=1.0)
+        self.assertGreater(at(dragged, "Displacement", 5.0, 0.0, TOP)[0], at(direct, "Displacement", 5.0, 0.0, TOP)[0] + 1.0)
+
+    def test_gravity_runs_along_the_world(self):
+        sagged = run(tissue(muscle=block()), Gravity=(0.0, 9.81, 0.0))
+        self.assertGreater(at(sagged, "Displacement", 0.0, 0.0, TOP)[1], 0.1)
+
+    def test_what_is_refused(self):
+        body = tissue(muscle=block())
+        bony = tissue(muscle=block(), bone=ball(8.0, 0.0, 0.0, 32.0))
+        self.refused(press(bony, probe(15.0)), "probe 1", "rigid", "mm far")
+        self.refused(press(body, vtkPolyData()), "probe 1", "ProbeGeometry")
+        self.refused(press(vtkPolyData(), probe(5.0)), "no field data MaterialName")
+        self.refused(press(body, probe(5.0), FixZMax=False), "holds the tissue")
+        self.refused(press(body, probe(5.0), HeldMaterials="bone ivory"), "ivory")
+        self.refused(press(body, probe(5.0), SpacingMm=0.1), "SpacingMm", "too many")
+        self.refused(press(body, probe(5.0), Poisson=0.5), "Poisson", "0.499")
+        self.refused(press(body, probe(5.0), HeadEdgeMm=7.0), "HeadEdgeMm")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Filters/Tissue/Icosphere.h"
+#include "Filters/Tissue/TissueLabels.h"
+#include <algorithm>
+#include <gtest/gtest.h>
+
+using namespace echorama;
+
+namespace {
+
+// A box whose corners lie in the world; a face is cut along one of its diagonals.
+void AddBox(TissueSurface& surface, const Eigen::Vector3f& low, const Eigen::Vector3f& high, int material,
+            bool isInsideOut = false)
+{
+  const auto first = static_cast<std::uint32_t>(surface.points.size());
+  for (int corner = 0; corner < 8; ++corner)
+    surface.points.emplace_back(corner & 1 ? high.x() : low.x(), corner & 2 ? high.y() : low.y(),
+                                corner & 4 ? high.z() : low.z());
+  const std::uint32_t faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  for (const auto& face : faces) {
+    surface.triangles.push_back({first + face[0], first + face[isInsideOut ? 2 : 1], first + face[isInsideOut ? 1 : 2]});
+    surface.bodyOfTriangle.push_back(static_cast<std::int32_t>(surface.bodies.size()));
+  }
+  surface.bodies.push_back({"", material});
+}
+
+TissueSurface Nothing()
+{
+  TissueSurface surface;
+  surface.materials = {StandardMaterial("water"), StandardMaterial("liver"), StandardMaterial("bone")};
+  return surface;
+}
+
+ImageGeometry Grid(int size, double spacing, const Eigen::Vector3d& origin)
+{
+  ImageGeometry grid;
+  grid.dimensions = {size, size, size};
+  grid.spacing.setConstant(spacing);
+  grid.origin = origin;
+  return grid;
+}
+
+} // namespace
+
+// All points lie right above edges and diagonals of the boxes: none may be missed, none counted twice.
+TEST(TissueLabels, NoColumnSlipsThroughAnEdge)
+{
+  for (const bool isInsideOut : {false, true}) {
+    TissueSurface surface = Nothing();
+    AddBox(surface, {0.0f, 0.0f, -0.5f}, {6.0f, 6.0f, 5.5f}, 1, isInsideOut);
+    const auto labels = BodiesOn(surface, Grid(9, 1.0, {-1.0, -1.0, -1.0}));
+    int inside = 0;
+    for (int k = 0; k < 9; ++k)
+      for (int j = 0; j < 9; ++j)
+        for (int i = 0; i < 9; ++i) {
+          const std::int32_t label = labels[static_cast<std::size_t>((k * 9 + j) * 9 + i)];
+          inside += label == 0;
+          if (i > 1 && i < 7 && j > 1 && j < 7 && k > 0 && k < 7) {
+            EXPECT_EQ(label, 0) << i << " " << j << " " << k;
+          }
+          if (i < 1 || i > 7 || j < 1 || j > 7 || k < 1 || k > 6) {
+            EXPECT_EQ(label, -1) << i << " " << j << " " << k;
+          }
+        }
+    EXPECT_EQ(inside, 6 * 6 * 6); // of two opposite sides that hold points one counts
+  }
+}
+
+TEST(TissueLabels, TheLastBodyCounts)
+{
+  TissueSurface surface = Nothing();
+  AddBox(surface, {-10.0f, -10.0f, -10.0f}, {10.0f, 10.0f, 10.0f}, 1);
+  AddBox(surface, {-3.0f, -3.0f, -3.0f}, {3.0f, 3.0f, 3.0f}, 2);
+  const auto labels = BodiesOn(surface, Grid(3, 2.0, {-0.1, 0.2, 1.1})); // z: 1.1, 3.1, 5.1
+  EXPECT_EQ(labels[0], 1);
+  EXPECT_EQ(labels[9], 0);
+}
+
+// The share of points in a ball is its volume; in a turned grid, too.
+TEST(TissueLabels, VolumeOfABall)
+{
+  const TissueSurface ball = [] {
+    TissueSurface surface = Nothing();
+    const Icosphere sphere = Icosphere::Make(4);
+    for (const Eigen::Vector3d& point : sphere.points)
+      surface.points.emplace_back((10.0 * point + Eigen::Vector3d(1, 2, 3)).cast<float>());
+    surface.triangles.assign(sphere.triangles.begin(), sphere.triangles.end());
+    surface.bodyOfTriangle.assign(surface.triangles.size(), 0);
+    surface.bodies.push_back({"ball", 1});
+    return surface;
+  }();
+  ImageGeometry grid = Grid(60, 0.5, Eigen::Vector3d::Zero());
+  grid.direction = ExpRotation(Eigen::Vector3d(0.3, -0.5, 0.7));
+  grid.origin = Eigen::Vector3d(1, 2, 3) - grid.direction * Eigen::Vector3d::Constant(14.75);
+  const auto labels = BodiesOn(ball, grid);
+  const double volume = 0.125 * static_cast<double>(std::count(labels.begin(), labels.end(), 0));
+  EXPECT_NEAR(volume / (4.0 / 3.0 * 3.14159265358979 * 1000.0), 1.0, 0.01);
+}
