@@ -16,18 +16,6 @@
 namespace echorama {
 namespace {
 
-void WriteDisplacement(vtkImageData* image, const std::string& path)
-{
-  FileReplacement files;
-  const vtkNew<vtkXMLImageDataWriter> writer;
-  writer->SetInputData(image);
-  writer->SetFileName(files.Stage(path).c_str());
-  writer->SetDataModeToBinary();
-  if (!writer->Write())
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
-  files.Commit();
-}
-
 vtkSmartPointer<vtkImageData> ReadDisplacement(Session& session, const std::string& path)
 {
   if (!std::filesystem::exists(path))
@@ -40,6 +28,18 @@ vtkSmartPointer<vtkImageData> ReadDisplacement(Session& session, const std::stri
 }
 
 } // namespace
+
+void WriteDisplacement(vtkImageData* image, const std::string& path)
+{
+  FileReplacement files;
+  const vtkNew<vtkXMLImageDataWriter> writer;
+  writer->SetInputData(image);
+  writer->SetFileName(files.Stage(path).c_str());
+  writer->SetDataModeToBinary();
+  if (!writer->Write())
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
+  files.Commit();
+}
 
 std::string DisplacementPath(const std::string& poses, std::size_t number)
 {

@@ -9,6 +9,9 @@ namespace echorama {
 /// Where the displacement of the volume \a number (from 0) belongs that a pose file names: POSES.displacement-NUMBER.vti, from 1.
 std::string DisplacementPath(const std::string& poses, std::size_t number);
 
+/// Writes a displacement image; a file that is there is replaced once it is whole.
+void WriteDisplacement(vtkImageData* image, const std::string& path);
+
 /// Finds what the poses of those volumes leave over that have an \a aligned beside them, and writes it for the pose file
 /// \a output: each displacement is named in its pose. Tells what was found, as "deformation" in the results of each volume.
 /// \param fixed the volume (from 0) that is not bent

@@ -13,12 +13,18 @@
 #include <CLI/Validators.hpp>
 #include <filesystem>
 #include <memory>
+#include <vtkFieldData.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkUltrasoundAcquisition.h>
+#include <vtkUltrasoundDeformGeometry.h>
+#include <vtkUltrasoundDisplacement.h>
 #include <vtkUltrasoundSynthesizer.h>
 #include <vtkUltrasoundTissue.h>
+#include <vtkUltrasoundTissuePress.h>
+#include <vtkUltrasoundVolume.h>
 #include <vtkXMLPolyDataWriter.h>
 
 namespace echorama {
@@ -105,6 +111,42 @@ std::vector<Landmark> PlacesOf(const SynthesisScene& scene, int count, const Pro
   return places;
 }
 
+// Tissue under the probe of a view: where it went, and its surfaces there.
+struct PressedTissue {
+  vtkNew<vtkImageData> displacement;
+  vtkNew<vtkPolyData> tissue;
+  nlohmann::ordered_json told;
+};
+
+void Press(Session& session, ScenePress press, vtkPolyData* tissue, vtkPolyData* probe, const std::string& name,
+           PressedTissue& pressed)
+{
+  vtkNew<vtkUltrasoundTissuePress> filter;
+  for (const Parameter& parameter : Describe(press))
+    filter->SetParameterAsText(parameter.name.c_str(), parameter.Text().c_str());
+  filter->SetInputData(tissue);
+  filter->AddProbeData(probe);
+  session.Update(filter, "press", name);
+  pressed.displacement->ShallowCopy(filter->GetOutput());
+  vtkNew<vtkUltrasoundDeformGeometry> surfaces;
+  surfaces->SetInputData(tissue);
+  surfaces->SetDisplacementData(pressed.displacement);
+  surfaces->SetOutsideToNearest(); // a surface ends beside its cells
+  surfaces->SetMaskFolds(true);    // where there is no tissue
+  session.Update(surfaces, "deform", name);
+  pressed.tissue->ShallowCopy(surfaces->GetOutput());
+  pressed.tissue->GetPointData()->RemoveArray(vtkUltrasoundVolume::ValidRegionName());
+  const auto numbers = [&pressed](const char* field) {
+    vtkDataArray* array = pressed.displacement->GetFieldData()->GetArray(field);
+    nlohmann::ordered_json list;
+    for (int i = 0; i < array->GetNumberOfComponents(); ++i)
+      list.push_back(array->GetComponent(0, i));
+    return list;
+  };
+  pressed.told = {{"force_n", numbers(vtkUltrasoundTissuePress::ProbeForceName())},
+                  {"relative_volume", numbers(vtkUltrasoundTissuePress::RelativeVolumeName())}};
+}
+
 void Synthesize(Session& session, const SynthesizeOptions& options)
 {
   SynthesisScene scene = ReadScene(options.scene, options.seed);
@@ -155,21 +197,34 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
     vtkUltrasoundAcquisition::SetProbeGeometry(probe, parameters.probe);
     vtkUltrasoundAcquisition::SetProbeToWorld(probe, views[i].probeToWorld);
     synthesizer->SetInputData(1, probe);
+    const std::string number = std::to_string(i + 1);
+    nlohmann::ordered_json told;
+    DisplacementField moved;
+    PressedTissue pressed;
+    if (scene.press) {
+      Press(session, *scene.press, tissue, probe, "volume_" + number, pressed);
+      synthesizer->SetInputData(pressed.tissue);
+      synthesizer->SetInputData(2, pressed.displacement);
+      moved = vtkUltrasoundDisplacement::FieldOf(pressed.displacement, "the displacement of the tissue");
+      told["press"] = pressed.told;
+    }
     parameters.stepPoses = views[i].steps;
     parameters.receiver.noiseSeed = scene.receiver.noiseSeed + i;
     synthesizer->SetParameters(parameters);
-    const std::string number = std::to_string(i + 1);
     session.Update(synthesizer, "synthesize", "volume_" + number);
     vtkNew<vtkImageData> image, beams;
     image->ShallowCopy(synthesizer->GetOutput(0));
     beams->ShallowCopy(synthesizer->GetOutput(1));
     const std::string name = "beams_" + number + "." + options.format;
-    const Pose knock = set.Add(image, {{"beams", folder.Final(name)}, {"cost", JsonOf(synthesizer->Cost())}}, places,
-                               [&](const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
-                                 if (!BeamPointAt(parameters.probe, views[i].probeToWorld.inverse() * place))
-                                   return {};
-                                 return place;
-                               });
+    told["beams"] = folder.Final(name);
+    told["cost"] = JsonOf(synthesizer->Cost());
+    const auto seenAt = [&](const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
+      const Eigen::Vector3d now = place + moved.At(place);
+      if (!BeamPointAt(parameters.probe, views[i].probeToWorld.inverse() * now))
+        return {};
+      return now;
+    };
+    const Pose knock = set.Add(image, told, places, seenAt, scene.press ? pressed.displacement.Get() : nullptr);
     // The beams say where the probe was as the volume does.
     vtkUltrasoundAcquisition::SetProbeToWorld(beams, knock * views[i].probeToWorld);
     SaveVolume(session, beams, folder.Stage(name));

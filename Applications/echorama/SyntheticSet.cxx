@@ -4,6 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Core/Base/TextFile.h"
 #include "Core/Imaging/ValidPoints.h"
+#include "Displacements.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Volumes.h"
@@ -51,7 +52,7 @@ SyntheticSet::SyntheticSet(Session& session, OutputFolder& folder, const std::st
 }
 
 Pose SyntheticSet::Add(vtkImageData* image, const nlohmann::ordered_json& more, const std::vector<Landmark>& places,
-                       const SeenAt& seenAt)
+                       const SeenAt& seenAt, vtkImageData* displacement)
 {
   const std::string number = std::to_string(truth_.size() + 1), name = "volume_" + number + "." + format_;
   const Pose knock =
@@ -63,6 +64,12 @@ Pose SyntheticSet::Add(vtkImageData* image, const nlohmann::ordered_json& more, 
   nlohmann::ordered_json told{{"file", folder_.Final(name)}};
   told.update(more);
   told["VolumeToWorld"] = JsonOf(knock.inverse());
+  if (displacement) {
+    const std::string field = "displacement_" + number + ".vti";
+    truth_.back().displacement = folder_.Stage(field);
+    WriteDisplacement(displacement, truth_.back().displacement);
+    told["displacement"] = folder_.Final(field);
+  }
   session_.Say("wrote " + folder_.Final(name));
   if (!places.empty()) {
     const std::string list = "landmarks_" + number + ".csv";

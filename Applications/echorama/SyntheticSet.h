@@ -32,8 +32,9 @@ public:
   using SeenAt = std::function<std::optional<Eigen::Vector3d>(const Eigen::Vector3d& place)>;
 
   /// Knocks the next volume, writes it, and adds it to the results with the numbers of \a more. Returns the knock.
+  /// \param displacement how the tissue lay when it was scanned, from rest; the truth names it as that of the volume
   Pose Add(vtkImageData* image, const nlohmann::ordered_json& more, const std::vector<Landmark>& places = {},
-           const SeenAt& seenAt = {});
+           const SeenAt& seenAt = {}, vtkImageData* displacement = nullptr);
 
   /// Writes the truth and commits the folder.
   void Finish();

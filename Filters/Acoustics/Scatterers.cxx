@@ -2,7 +2,7 @@
 // The lattice is cut into blocks of blockEdge^3 cells, and each block becomes a brick.
 //
 // 1. Which blocks: those whose box, moved by the displacement at its centre and widened by how much the displacement can
-//    change within the block (a bound on its derivative from the differences of its coefficients), meets the region and is
+//    change within the block (a bound on its derivative there), meets the region and is
 //    wanted. So only what is near a beam is ever hashed.
 // 2. Scatterers: tasks of a fixed number of blocks. One hash (Philox) per cell gives place, rank and sign; where it lies is asked
 // for the whole task at once. What is kept goes to the memory of the task, so that nothing is copied
@@ -18,7 +18,9 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 namespace echorama {
 namespace {
@@ -71,30 +73,92 @@ Scatterers::Brick Store(const Gathered& gathered, std::uint32_t partIndex, std::
   return brick;
 }
 
-// How much the displacement changes at most per mm: the derivative of a B-spline is one of the differences of neighbouring
-// coefficients, and no larger than the largest of them.
-double LipschitzBound(const DisplacementField& field)
-{
-  const std::vector<Eigen::Vector3d> values = field.Coefficients();
-  const auto& size = field.Lattice().dimensions;
-  const auto at = [&](int i, int j, int k) -> Eigen::Vector3d {
-    if (i < 0 || j < 0 || k < 0 || i >= size[0] || j >= size[1] || k >= size[2])
-      return Eigen::Vector3d::Zero();
-    return values[(static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
-                      static_cast<std::size_t>(size[0]) +
-                  static_cast<std::size_t>(i)];
-  };
-  double sum = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    double largest = 0.0;
-    for (int k = -1; k <= size[2]; ++k)
-      for (int j = -1; j <= size[1]; ++j)
-        for (int i = -1; i <= size[0]; ++i)
-          largest = std::max(largest, (at(i + (axis == 0), j + (axis == 1), k + (axis == 2)) - at(i, j, k)).norm());
-    sum += std::pow(largest / field.Lattice().spacing[axis], 2);
+// How much a displacement changes at most per mm, cell by cell of its lattice: the derivative of a B-spline is a mean of the
+// differences of neighbouring coefficients, and no larger than the largest of those that count in the cell. Compressed tissue
+// beside a probe does not make the rest of the body as uncertain.
+class Slopes {
+public:
+  explicit Slopes(const DisplacementField& field) : toIndex_(field.Lattice().WorldToIndex())
+  {
+    const std::vector<Eigen::Vector3d> values = field.Coefficients();
+    const auto& lattice = field.Lattice().dimensions;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      size_[axis] = lattice[axis] + 2 * margin;
+    const auto at = [&](std::array<int, 3> index) -> Eigen::Vector3d {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if ((index[axis] -= margin) < 0 || index[axis] >= lattice[axis])
+          return Eigen::Vector3d::Zero();
+      return values[(static_cast<std::size_t>(index[2]) * static_cast<std::size_t>(lattice[1]) +
+                     static_cast<std::size_t>(index[1])) *
+                        static_cast<std::size_t>(lattice[0]) +
+                    static_cast<std::size_t>(index[0])];
+    };
+    squares_.assign(Place({0, 0, size_[2]}), 0.0);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::vector<double> largest(squares_.size());
+      ForAll([&](const std::array<int, 3>& index) {
+        std::array<int, 3> next = index;
+        ++next[axis];
+        largest[Place(index)] = ((at(next) - at(index)) / field.Lattice().spacing[static_cast<Eigen::Index>(axis)]).squaredNorm();
+      });
+      // In cell c the coefficients c - 1 to c + 2 count.
+      for (std::size_t along = 0; along < 3; ++along) {
+        std::vector<double> wider(largest.size());
+        ForAll([&](const std::array<int, 3>& index) {
+          std::array<int, 3> there = index;
+          for (int offset = -1; offset <= (along == axis ? 1 : 2); ++offset) {
+            there[along] = std::clamp(index[along] + offset, 0, size_[along] - 1);
+            wider[Place(index)] = std::max(wider[Place(index)], largest[Place(there)]);
+          }
+        });
+        largest = std::move(wider);
+      }
+      for (std::size_t n = 0; n < squares_.size(); ++n)
+        squares_[n] += largest[n];
+    }
   }
-  return std::sqrt(sum);
-}
+
+  double Within(const Eigen::AlignedBox3d& box) const
+  {
+    const Eigen::Vector3d middle = toIndex_ * box.center(), half = toIndex_.linear().cwiseAbs() * (0.5 * box.sizes());
+    std::array<int, 3> first, last;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<Eigen::Index>(axis);
+      const double end = size_[axis] - 1.0;
+      first[axis] = static_cast<int>(std::clamp(std::floor(middle[i] - half[i]) + margin, 0.0, end));
+      last[axis] = static_cast<int>(std::clamp(std::floor(middle[i] + half[i]) + margin, 0.0, end));
+    }
+    double square = 0.0;
+    for (int k = first[2]; k <= last[2]; ++k)
+      for (int j = first[1]; j <= last[1]; ++j)
+        for (int i = first[0]; i <= last[0]; ++i)
+          square = std::max(square, squares_[Place({i, j, k})]);
+    return std::sqrt(square);
+  }
+
+private:
+  static constexpr int margin = 4; // beyond it nothing changes
+
+  std::size_t Place(const std::array<int, 3>& index) const
+  {
+    return (static_cast<std::size_t>(index[2]) * static_cast<std::size_t>(size_[1]) + static_cast<std::size_t>(index[1])) *
+               static_cast<std::size_t>(size_[0]) +
+           static_cast<std::size_t>(index[0]);
+  }
+  template <class Use>
+  void ForAll(const Use& use) const
+  {
+    ParallelFor(size_[2], [&](std::ptrdiff_t k) {
+      for (int j = 0; j < size_[1]; ++j)
+        for (int i = 0; i < size_[0]; ++i)
+          use({i, j, static_cast<int>(k)});
+    });
+  }
+
+  Eigen::Affine3d toIndex_;
+  std::array<int, 3> size_;
+  std::vector<double> squares_;
+};
 
 // What is hashed from a cell.
 struct CellHash {
@@ -127,7 +191,7 @@ public:
   {
     if (parameters.displacement && !parameters.displacement->IsZero()) {
       displacement_ = parameters.displacement;
-      slope_ = LipschitzBound(*displacement_);
+      slopes_.emplace(*displacement_);
     }
     const double block = BlockMm(), bound = displacement_ ? displacement_->Bound() : 0.0;
     const Eigen::Array3d first = ((region.min().array() - bound) / block).floor(),
@@ -188,7 +252,7 @@ private:
     Eigen::AlignedBox3d box((size * block.cast<double>()).matrix(), (size * (block + 1).cast<double>()).matrix());
     if (displacement_) {
       const Eigen::Vector3d shift = displacement_->At(box.center());
-      const double slack = std::min(slope_ * 0.5 * std::sqrt(3.0) * size, 2.0 * displacement_->Bound());
+      const double slack = std::min(slopes_->Within(box) * 0.5 * std::sqrt(3.0) * size, 2.0 * displacement_->Bound());
       box.translate(shift);
       box.min().array() -= slack;
       box.max().array() += slack;
@@ -202,7 +266,7 @@ private:
   const Eigen::AlignedBox3d& region_;
   const BoxPredicate& wanted_;
   const DisplacementField* displacement_ = nullptr;
-  double slope_ = 0.0;
+  std::optional<Slopes> slopes_;
   Eigen::Array3i first_, count_; // blocks
 };
 

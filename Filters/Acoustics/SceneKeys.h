@@ -267,6 +267,7 @@ void Describe(A& a, SynthesisScene& scene)
   a.List("tissue", scene.tissue, "What lies in the world; where several hold a point the later counts.");
   a.Views("views", scene.views, "From where the probe looks.");
   a.Object("sweep", scene.sweep, "The time a sweep takes, and the motion meanwhile.");
+  a.MaybeObject("press", scene.press, "Tissue gives way to the probe; if it is not said, it does not.");
   a.Object("volume", scene.volume, "The volumes that are made.");
 }
 

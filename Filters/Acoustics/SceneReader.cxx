@@ -167,6 +167,13 @@ public:
   }
 
   template <class T>
+  void MaybeObject(const char* key, std::optional<T>& value, const char*)
+  {
+    if (const Json* found = Find(key))
+      Read(text_, *found, At(key), value.emplace());
+  }
+
+  template <class T>
   void List(const char* key, std::vector<T>& values, const char*, Presence presence = {})
   {
     const Json* found = FindNeeded(key, presence);

@@ -64,6 +64,11 @@ public:
     Add(key, presence == Presence::FromPreset ? WithoutDefaults(Make(value)) : Make(value), help, presence);
   }
   template <class T>
+  void MaybeObject(const char* key, std::optional<T>&, const char* help)
+  {
+    Add(key, Make(T()), help);
+  }
+  template <class T>
   void List(const char* key, std::vector<T>&, const char* help, Presence presence = {})
   {
     Add(key, {{"type", "array"}, {"items", Make(T())}, {"maxItems", longestList}}, help, presence);

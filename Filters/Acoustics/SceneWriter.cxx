@@ -32,7 +32,8 @@ public:
   void Value(const Parameter& parameter, Presence presence = {})
   {
     const auto* text = std::get_if<std::string*>(&parameter.value);
-    if (!text || presence == Presence::Needed || !(*text)->empty())
+    const bool isRemark = text && presence != Presence::Needed && (parameter.name == "Name" || parameter.name == "About");
+    if (!isRemark || !(*text)->empty())
       object_[parameter.Key()] = JsonOf(parameter);
   }
   bool Maybe(const Parameter& parameter, bool there)
@@ -46,6 +47,12 @@ public:
   void Object(const char* key, T& value, const char*, Presence = {})
   {
     object_[key] = Write(value);
+  }
+  template <class T>
+  void MaybeObject(const char* key, std::optional<T>& value, const char*)
+  {
+    if (value)
+      object_[key] = Write(*value);
   }
   template <class T>
   void List(const char* key, std::vector<T>& values, const char*, Presence = {})

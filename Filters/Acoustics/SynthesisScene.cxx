@@ -6,6 +6,11 @@
 
 namespace echorama {
 
+ParameterList Describe(ScenePress& press)
+{
+  return Join({Describe(press.lattice), Describe(press.tissue), Describe(press.head)});
+}
+
 ParameterList Describe(SceneVolume& volume)
 {
   return {Parameter("SpacingMm", volume.spacingMm, {0.05, 20}, "mm", "Edge of the cubic voxels."),

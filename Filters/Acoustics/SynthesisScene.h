@@ -4,6 +4,8 @@
 #include "Core/Geometry/ProbePresets.h"
 #include "Filters/Phantoms/Anatomy.h"
 #include "Filters/Phantoms/CalibrationRig.h"
+#include "Filters/Physics/ProbeShape.h"
+#include "Filters/Physics/TissueLattice.h"
 #include "Filters/Tissue/Material.h"
 #include "Filters/Tissue/PackedTissue.h"
 #include "Receiver.h"
@@ -150,6 +152,14 @@ struct SceneVolume {
 
 ParameterList Describe(SceneVolume& volume);
 
+/// How tissue gives way to the probe: each view presses it from rest.
+struct ScenePress {
+  TissueLatticeParameters lattice;
+  TissuePressParameters tissue;
+  ProbeHead head;
+};
+ParameterList Describe(ScenePress& press);
+
 struct SynthesisScene {
   std::string name = "scene";
   std::string about;      ///< for people; may be empty
@@ -163,6 +173,7 @@ struct SynthesisScene {
   std::vector<SceneItem> tissue;
   std::variant<SceneRow, SceneViews, SceneRecording> views;
   SceneSweep sweep;
+  std::optional<ScenePress> press; ///< none: tissue is where it is, whatever the probe does
   SceneVolume volume;
 
   // Where files are looked for; not part of the JSON.
