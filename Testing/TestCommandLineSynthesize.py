@@ -10,7 +10,7 @@ import unittest
 import echorama
 import numpy
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLPolyDataReader
 
 from program_under_test import read_mha, run, run_json, write_sequence
 
@@ -182,6 +182,75 @@ class OtherScenes(unittest.TestCase):
         header, voxels = read_mha(work / "plane/volume_1.mha")
         self.assertEqual(voxels.shape[0], 1)
         self.assertEqual([float(number) for number in header["ElementSpacing"].split()[:2]], [0.8, 0.8])
+
+
+class Pressed(unittest.TestCase):
+    """A ball in a block, without and with a probe that presses 6 mm deep into it."""
+
+    BALL = numpy.array([0.0, 0.0, 28.0])
+
+    @classmethod
+    def setUpClass(cls):
+        tissue = [{"name": "block", "box": {"centre": [0, 0, 30], "size": [90, 90, 60], "material": "muscle"}},
+                  {"name": "ball", "sphere": {"centre": cls.BALL.tolist(), "radius": 7, "material": "cyst"}}]
+        cls.common = {"background": "gel", "tissue": tissue, "volume": {"spacingMm": 1.2, "knockMm": 8, "knockDegrees": 6},
+                      "probe": {**SCENE["probe"], "elements": 40, "sweepSteps": 24}}
+        views = lambda *depths: {"poses": [{"face": [0, 0, depth], "target": [0, 0, 50]} for depth in depths]}
+        path = scene("pressed.json", views=views(0.0, 6.0), press={"spacingMm": 5}, **cls.common)
+        cls.told = run_json("synthesize", path, "-o", work / "pressed", "--landmarks", 8)
+        cls.truth = json.loads((work / "pressed/truth.json").read_text())["volumes"]
+        cls.views = staticmethod(views)
+
+    def ball(self, path, to_world=numpy.eye(4)):
+        """Where the middle of the dark ball is shown."""
+        header, voxels = read_mha(path)
+        k, j, i = numpy.nonzero(numpy.ones(voxels.shape))
+        points = (to_world @ affine(header) @ [i, j, k, numpy.ones(len(i))])[:3].T
+        near = numpy.linalg.norm(points - self.BALL - [0, 0, 2], axis=1) < 11
+        dark = near & (voxels[k, j, i] < 25)
+        self.assertGreater(dark.sum(), 300)
+        return points[dark].mean(axis=0)
+
+    def moved(self, number, place):
+        reader, result = vtkXMLImageDataReader(), [0.0, 0.0, 0.0]
+        reader.SetFileName(str(work / "pressed" / self.truth[number]["displacement"]))
+        reader.Update()
+        self.assertTrue(echorama.vtkUltrasoundDisplacement.Evaluate(reader.GetOutput(), place, result))
+        return numpy.array(result)
+
+    def test_tissue_gives_way_and_the_truth_says_how_far(self):
+        numpy.testing.assert_allclose(self.moved(0, self.BALL), 0, atol=0.1)  # that probe only touches
+        went = self.moved(1, self.BALL)
+        self.assertTrue(1.0 < went[2] < 5.0 and abs(went[:2]).max() < 0.2, went)
+        shown = [self.ball(work / f"pressed/volume_{n + 1}.mha", numpy.array(self.truth[n]["VolumeToWorld"])) for n in (0, 1)]
+        numpy.testing.assert_allclose(shown[1] - shown[0], went, atol=0.5)
+        self.assertGreater(self.told["volumes"][1]["press"]["force_n"][2], 1.0)
+
+    def test_landmarks_go_along(self):
+        places = []
+        for number in (0, 1):
+            rows = csv.DictReader((work / f"pressed/landmarks_{number + 1}.csv").read_text().splitlines())
+            to_world = numpy.array(self.truth[number]["VolumeToWorld"])
+            places.append({row["label"]: (to_world @ [float(row["x"]), float(row["y"]), float(row["z"]), 1])[:3] for row in rows})
+        both = places[0].keys() & places[1].keys()
+        self.assertGreater(len(both), 4)
+        for label in both:  # the first probe hardly moves anything
+            numpy.testing.assert_allclose(places[1][label] - places[0][label], self.moved(1, places[0][label]), atol=0.3)
+
+    def test_stitching_by_the_truth_takes_it_back(self):
+        volumes = [work / f"pressed/volume_{n}.mha" for n in (1, 2)]
+        run_json("stitch", *volumes, "--poses", work / "pressed/truth.json", "--method", "average", "-o", work / "pressed_back.mha")
+        back = self.ball(work / "pressed_back.mha")
+        rest = self.ball(volumes[0])
+        numpy.testing.assert_allclose(back, rest, atol=0.4)
+
+    def test_what_cannot_be_pressed_is_told(self):
+        bone = {"sphere": {"centre": [0, 0, 12], "radius": 8, "material": "bone"}}
+        path = scene("bony.json", views=self.views(9.0), press={"spacingMm": 5}, **{**self.common, "tissue": self.common["tissue"] + [bone]})
+        done = run("synthesize", path, "-o", work / "bony")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("something rigid is in it", done.stderr)
+        self.assertFalse((work / "bony").exists())
 
 
 def pose(x, degrees):

@@ -307,6 +307,7 @@ TEST(SynthesisScene, SaysWhichKeyIsWrong)
   ExpectComplaint(R"("materials": {"": {}})", "scene.json: materials: the name of a material");
   ExpectComplaint(R"("volume": {"spacingMm": 1e9})",
                   "scene.json: volume.spacingMm: 1000000000.0 is out of range; it must be in [0.05, 20]");
+  ExpectComplaint(R"("press": {"poisson": 0.5})", "scene.json: press.poisson: 0.5 is out of range; it must be in [0, 0.499]");
   ExpectComplaint(R"("sede": 3)", "scene.json: sede: there is no such key; there are schema, name, ");
   ExpectComplaint(R"("seed": 1, "seed": 2)", "scene.json: the key \"seed\" is there twice");
   ExpectComplaint(R"("seed": )", "scene.json: it is not JSON");
@@ -364,6 +365,10 @@ TEST(SynthesisScene, ComesBackBitByBit)
   recording.smoothSeconds = 0.1 + 0.7;
   scene.views = recording;
   scene.sweep = {1.0 / 3.0, {0.1, 0.2, 0.3}, {1, 2, 3}, true};
+  scene.press.emplace();
+  scene.press->lattice.heldMaterials = ""; // none, which is not the default
+  scene.press->tissue.friction = 1.0 / 3.0;
+  scene.press->head.edgeMm = 0.1 + 0.2;
   scene.volume = {0.7, 0.1, 179.99999999999997};
   const std::string text = SceneToJson(scene);
   const SynthesisScene back = SceneFromJson(text, "back");
@@ -387,6 +392,10 @@ TEST(SynthesisScene, ComesBackBitByBit)
   EXPECT_EQ(back.transducer.bandwidth, scene.transducer.bandwidth);
   EXPECT_EQ(back.receiver.tgcPoints[1].depthMm, scene.receiver.tgcPoints[1].depthMm);
   EXPECT_EQ(std::get<SceneRecording>(back.views).smoothSeconds, recording.smoothSeconds);
+  ASSERT_TRUE(back.press.has_value());
+  EXPECT_EQ(back.press->lattice.heldMaterials, "");
+  EXPECT_EQ(back.press->tissue.friction, scene.press->tissue.friction);
+  EXPECT_EQ(back.press->head.edgeMm, scene.press->head.edgeMm);
   EXPECT_EQ(back.volume.knockDegrees, scene.volume.knockDegrees);
   // Views of other kinds.
   scene.sweep.alongRecording = false;
