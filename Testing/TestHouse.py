@@ -79,6 +79,14 @@ for room in [room for room in built if room in uses]:
         for other in re.findall(rf"\b(?:Echorama::)?({'|'.join(named)})(?:Kernels)?\b", text):
             check_use(f"{room}/{file}", room, named[other])
 
+# A build of some rooms has what their kernels link: run builds such a one, for any CPU.
+for some in re.findall(r'-DECHORAMA_ROOMS="([^"]*)"', (source / "run").read_text()):
+    for room in some.split(";"):
+        linked = re.search(r"KERNEL_DEPENDS ([\w ]*)", (source / room / "CMakeLists.txt").read_text())
+        for other in linked[1].split() if linked else ():
+            if named[other] not in some.split(";"):
+                complaints.append(f"run: it builds {room} without {named[other]}, which its kernels link")
+
 # Sizes. What is too large as yet; whoever mends one takes it off the list.
 too_large = set()
 GENERATED = re.compile(r"(?<=// BEGIN parameters\n).*?(?=  // END parameters\n)", re.S)  # nobody reads or writes these
