@@ -2,7 +2,6 @@
 // Solids act on the nodes of the grid that lie inside them: there gel has the velocity that contact leaves it. A node further
 // from a solid than its distance says is never asked, block by block, since no distance falls faster than one moves.
 #include "GelColliders.h"
-#include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <cmath>
@@ -29,35 +28,6 @@ double GelPlane::Distance(const Eigen::Vector3d& point, double) const
 Eigen::Vector3d GelPlane::Normal(const Eigen::Vector3d&, double) const
 {
   return Eigen::Vector3d::UnitZ();
-}
-
-GelProbe::GelProbe(const ProbeGeometry& geometry, double marginMm, double lengthMm)
-  : geometry_(geometry), marginMm_(marginMm), lengthMm_(lengthMm)
-{
-  geometry_.Check();
-  CheckRange("the margin of the probe", marginMm, 0.0, 1000.0);
-  CheckRange("the length of the probe", lengthMm, 1e-3, 1000.0);
-}
-
-double GelProbe::Distance(const Eigen::Vector3d& point, double) const
-{
-  // How far beyond the face, and beyond its edge along fan and sweep. Behind the centre of a bend, and further back than the
-  // housing, the head is straight.
-  const auto beyond = [this](const ProbeArc& arc, double across, double outward, double offset, double& depth) {
-    const ProbeArc::Place place = arc.PlaceOf(across, outward);
-    depth = place.depth;
-    const double edge = arc.PointOf({offset + 0.5, 0.0}).x(), other = arc.PointOf({offset - 0.5, 0.0}).x();
-    const double straight = std::max(across - edge, other - across);
-    if (depth < 0.0)
-      return straight - marginMm_;
-    return (std::abs(place.along - offset) - 0.5) * arc.Span(depth) - marginMm_;
-  };
-  double inSweep = 0.0, depth = 0.0;
-  const double overSweep = beyond(geometry_.Sweep(), point.y(), point.z(), 0.0, inSweep);
-  const double overFan = beyond(geometry_.Fan(), point.x(), inSweep, geometry_.fanOffset, depth);
-  const double front = depth, back = -point.z() - lengthMm_;
-  const Eigen::Vector3d over(overFan, overSweep, std::max(front, back));
-  return over.cwiseMax(0.0).norm() + std::min(0.0, over.maxCoeff());
 }
 
 GelDistanceGrid::GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> distances)

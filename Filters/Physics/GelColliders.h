@@ -2,7 +2,7 @@
 #pragma once
 #include "Core/Base/Parameters.h"
 #include "Core/Geometry/ImageGeometry.h"
-#include "Core/Geometry/ProbeGeometry.h"
+#include "Filters/Physics/ProbeShape.h"
 #include <memory>
 #include <vector>
 
@@ -27,18 +27,14 @@ public:
   Eigen::Vector3d Normal(const Eigen::Vector3d& point, double when) const override;
 };
 
-/// The head of a probe, in the probe's frame: its curved face (ProbeGeometry) and what lies behind it.
-/// Distances are exact over the face, and near the edges of a bent one too short by what it bends.
+/// The head of a probe, in the probe's frame.
 class GelProbe : public GelShape {
 public:
-  /// \a marginMm: how far the housing reaches beyond the outermost beams, \a lengthMm: how far back.
-  /// \throws Error(InvalidParameter)
-  explicit GelProbe(const ProbeGeometry& geometry, double marginMm = 2.0, double lengthMm = 40.0);
-  double Distance(const Eigen::Vector3d& point, double when) const override;
+  explicit GelProbe(ProbeShape shape) : shape_(std::move(shape)) {}
+  double Distance(const Eigen::Vector3d& point, double /*when*/) const override { return shape_.Distance(point); }
 
 private:
-  ProbeGeometry geometry_;
-  double marginMm_, lengthMm_;
+  ProbeShape shape_;
 };
 
 /// Anything sampled on a grid, for instance the skin: distances are interpolated linearly, and beyond the grid

@@ -25,10 +25,13 @@ public:
   Eigen::Vector3d Slope(const Eigen::Vector3d& point) const;
   /// Its second derivative: how the probe bends.
   Eigen::Matrix3d Bend(const Eigen::Vector3d& point) const;
+  /// Its sides along x and y, mm.
+  const Eigen::Vector2d& Low() const { return low_; }
+  const Eigen::Vector2d& High() const { return high_; }
 
 private:
   ProbeGeometry geometry_;
-  Eigen::Vector2d low_, high_; ///< of the head across
+  Eigen::Vector2d low_, high_;
   double edge_, length_;
 };
 

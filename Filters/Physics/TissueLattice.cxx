@@ -12,8 +12,7 @@ namespace echorama {
 namespace {
 
 constexpr double SoftestKPa = 0.5, StiffestKPa = 1e4;
-constexpr double HeaviestGas = 100.0; // kg/m^3
-constexpr double MostNodes = 2e7;     // of some 1.5 KB each
+constexpr double MostNodes = 2e7; // of some 1.5 KB each
 
 std::set<std::string> HeldMaterials(const TissueSurface& surface, const std::string& names)
 {
@@ -83,7 +82,7 @@ TissueBody TissueBodyOf(const TissueSurface& surface, const TissueLatticeParamet
   body.cells.reserve(bodies.size());
   for (const std::int32_t at : bodies) {
     const int material = at < 0 ? -1 : surface.bodies[static_cast<std::size_t>(at)].material;
-    const bool isNone = material < 0 || surface.materials[static_cast<std::size_t>(material)].density < HeaviestGas;
+    const bool isNone = material < 0 || surface.materials[static_cast<std::size_t>(material)].IsGas();
     body.cells.push_back(isNone ? -1 : material);
   }
   return body;

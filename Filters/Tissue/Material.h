@@ -21,6 +21,8 @@ struct Material {
 
   /// Acoustic impedance: sound speed times density, MRayl.
   double Impedance() const { return 1e-6 * soundSpeed * density; }
+  /// Whether it is so light that sound and pressure do not get into it.
+  bool IsGas() const { return density < 100.0; }
   /// dB/mm, one way, at a frequency.
   double AttenuationDbPerMm(double frequencyMHz) const;
 

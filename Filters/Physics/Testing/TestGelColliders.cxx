@@ -9,7 +9,7 @@ using Eigen::Vector3d;
 TEST(GelColliders, ProbeFollowsItsFace)
 {
   const ProbeGeometry geometry = ProbeGeometry::Convex(1.2, 40.0, 1.0, 25.0, 0.0, 100.0);
-  const GelProbe probe(geometry, 2.0, 30.0);
+  const GelProbe probe(ProbeShape(geometry, {5.0, 1.0, 30.0}));
   for (const double fan : {-0.5, -0.2, 0.0, 0.4})
     for (const double sweep : {-0.4, 0.0, 0.5})
       for (const double depth : {0.0, 1.0, 5.0}) {
@@ -27,7 +27,7 @@ TEST(GelColliders, ProbeFollowsItsFace)
 
 TEST(GelColliders, ProbeDistanceNeverFallsFasterThanOneMoves)
 {
-  const GelProbe probe(ProbeGeometry::Linear(40.0, 20.0, 0.0, 80.0));
+  const GelProbe probe(ProbeShape(ProbeGeometry::Linear(40.0, 20.0, 0.0, 80.0)));
   double last = probe.Distance({-60, 3, 20}, 0.0);
   for (int n = 1; n <= 1200; ++n) {
     const double next = probe.Distance({-60 + 0.1 * n, 3, 20 - 0.05 * n}, 0.0);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Filters/Tissue/Icosphere.h"
+#include "Filters/Tissue/TissueDistance.h"
 #include "Filters/Tissue/TissueLabels.h"
 #include <algorithm>
+#include <cmath>
 #include <gtest/gtest.h>
 
 using namespace echorama;
@@ -29,6 +31,19 @@ TissueSurface Nothing()
 {
   TissueSurface surface;
   surface.materials = {StandardMaterial("water"), StandardMaterial("liver"), StandardMaterial("bone")};
+  return surface;
+}
+
+// Of radius 10 about (1, 2, 3); its triangles lie up to 0.03 mm within it.
+TissueSurface Ball()
+{
+  TissueSurface surface = Nothing();
+  const Icosphere sphere = Icosphere::Make(4);
+  for (const Eigen::Vector3d& point : sphere.points)
+    surface.points.emplace_back((10.0 * point + Eigen::Vector3d(1, 2, 3)).cast<float>());
+  surface.triangles.assign(sphere.triangles.begin(), sphere.triangles.end());
+  surface.bodyOfTriangle.assign(surface.triangles.size(), 0);
+  surface.bodies.push_back({"ball", 1});
   return surface;
 }
 
@@ -80,20 +95,45 @@ TEST(TissueLabels, TheLastBodyCounts)
 // The share of points in a ball is its volume; in a turned grid, too.
 TEST(TissueLabels, VolumeOfABall)
 {
-  const TissueSurface ball = [] {
-    TissueSurface surface = Nothing();
-    const Icosphere sphere = Icosphere::Make(4);
-    for (const Eigen::Vector3d& point : sphere.points)
-      surface.points.emplace_back((10.0 * point + Eigen::Vector3d(1, 2, 3)).cast<float>());
-    surface.triangles.assign(sphere.triangles.begin(), sphere.triangles.end());
-    surface.bodyOfTriangle.assign(surface.triangles.size(), 0);
-    surface.bodies.push_back({"ball", 1});
-    return surface;
-  }();
   ImageGeometry grid = Grid(60, 0.5, Eigen::Vector3d::Zero());
   grid.direction = ExpRotation(Eigen::Vector3d(0.3, -0.5, 0.7));
   grid.origin = Eigen::Vector3d(1, 2, 3) - grid.direction * Eigen::Vector3d::Constant(14.75);
-  const auto labels = BodiesOn(ball, grid);
+  const auto labels = BodiesOn(Ball(), grid);
   const double volume = 0.125 * static_cast<double>(std::count(labels.begin(), labels.end(), 0));
   EXPECT_NEAR(volume / (4.0 / 3.0 * 3.14159265358979 * 1000.0), 1.0, 0.01);
+}
+
+// With a ball inside that bounds nothing outside of tissue; in a turned grid of unequal spacings.
+TEST(TissueDistance, OfABall)
+{
+  TissueSurface ball = Ball();
+  AddBox(ball, {-1.0f, 0.0f, 1.0f}, {3.0f, 4.0f, 5.0f}, 2);
+  ImageGeometry grid = Grid(32, 1.0, Eigen::Vector3d::Zero());
+  grid.spacing = Eigen::Vector3d(0.9, 1.0, 0.8);
+  grid.direction = ExpRotation(Eigen::Vector3d(0.3, -0.5, 0.7));
+  grid.origin = Eigen::Vector3d(1, 2, 3) - grid.direction * (15.3 * grid.spacing);
+  const auto distances = DistancesOn(ball, grid, 4.0);
+  const Eigen::Affine3d toWorld = grid.IndexToWorld();
+  double worst = 0.0;
+  for (int n = 0; n < 32 * 32 * 32; ++n) {
+    const Eigen::Vector3d place = toWorld * Eigen::Vector3d(n % 32, n / 32 % 32, n / 1024);
+    const double exact = std::clamp((place - Eigen::Vector3d(1, 2, 3)).norm() - 10.0, -4.0, 4.0);
+    worst = std::max(worst, std::abs(distances[static_cast<std::size_t>(n)] - exact));
+  }
+  EXPECT_LT(worst, 0.05);
+  EXPECT_THROW(DistancesOn(ball, grid, 0.0), Error);
+}
+
+// In front of a face, an edge and a corner.
+TEST(TissueDistance, OfABox)
+{
+  TissueSurface box = Nothing();
+  AddBox(box, {0.0f, 0.0f, 0.0f}, {4.0f, 4.0f, 4.0f}, 1);
+  const auto distances = DistancesOn(box, Grid(10, 1.0, {-2.5, -2.5, -2.5}), 3.0);
+  const auto at = [&distances](int i, int j, int k) { return distances[static_cast<std::size_t>((k * 10 + j) * 10 + i)]; };
+  EXPECT_FLOAT_EQ(at(4, 4, 1), 1.5f);
+  EXPECT_FLOAT_EQ(at(4, 1, 1), std::sqrt(4.5f));
+  EXPECT_FLOAT_EQ(at(1, 1, 1), std::sqrt(6.75f));
+  EXPECT_FLOAT_EQ(at(4, 4, 3), -0.5f);
+  EXPECT_FLOAT_EQ(at(0, 0, 0), 3.0f);
 }

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Every triangle that has space outside of all bodies beside it tells its distance to the points of the grid around it; the sign
+// is whether a body holds the point. Slabs of the grid are worked on side by side. Cost: triangles times the points in the band.
+#include "TissueDistance.h"
+#include "Core/Base/CheckRange.h"
+#include "Core/Base/Parallel.h"
+#include "TissueLabels.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+namespace {
+
+using Eigen::Vector3d;
+
+struct NearTriangle {
+  std::array<Vector3d, 3> point; // mm, in the frame of the grid
+  std::array<int, 3> low, high;  // points of the grid within the band
+};
+
+double SquaredToSegment(const Vector3d& p, const Vector3d& a, const Vector3d& b)
+{
+  const Vector3d along = b - a;
+  const double length = along.squaredNorm();
+  const double part = length > 0.0 ? std::clamp((p - a).dot(along) / length, 0.0, 1.0) : 0.0;
+  return (p - a - part * along).squaredNorm();
+}
+
+double SquaredToTriangle(const Vector3d& p, const std::array<Vector3d, 3>& t)
+{
+  const Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  bool within = true;
+  for (std::size_t n = 0; n < 3 && within; ++n)
+    within = (t[(n + 1) % 3] - t[n]).cross(p - t[n]).dot(normal) >= 0.0;
+  if (within && normal.squaredNorm() > 0.0) {
+    const double height = (p - t[0]).dot(normal);
+    return height * height / normal.squaredNorm();
+  }
+  return std::min({SquaredToSegment(p, t[0], t[1]), SquaredToSegment(p, t[1], t[2]), SquaredToSegment(p, t[2], t[0])});
+}
+
+// The points of the grid within a distance of a triangle's box. \returns whether there are any.
+bool SetBox(NearTriangle& corners, const ImageGeometry& grid, double distance)
+{
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<std::size_t>(axis);
+    const auto& p = corners.point;
+    const double low = std::min({p[0][axis], p[1][axis], p[2][axis]}) - distance;
+    const double high = std::max({p[0][axis], p[1][axis], p[2][axis]}) + distance;
+    const double last = grid.dimensions[n] - 1.0;
+    corners.low[n] = static_cast<int>(std::clamp(std::ceil(low / grid.spacing[axis]), 0.0, last + 1.0));
+    corners.high[n] = static_cast<int>(std::clamp(std::floor(high / grid.spacing[axis]), -1.0, last));
+    if (corners.low[n] > corners.high[n])
+      return false;
+  }
+  return true;
+}
+
+} // namespace
+
+std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry& grid, double band, const Progress& progress)
+{
+  CheckRange("the band of distances", band, 1e-9, 1e9);
+  const std::vector<std::int32_t> bodies = BodiesOn(surface, grid, progress.Part(0.0, 0.3));
+  const auto at = [&grid](int i, int j, int k) {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(grid.dimensions[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(grid.dimensions[0]) +
+           static_cast<std::size_t>(i);
+  };
+  const auto anyOutside = [&](const NearTriangle& box) {
+    for (int k = box.low[2]; k <= box.high[2]; ++k)
+      for (int j = box.low[1]; j <= box.high[1]; ++j)
+        for (int i = box.low[0]; i <= box.high[0]; ++i)
+          if (bodies[at(i, j, k)] < 0)
+            return true;
+    return false;
+  };
+
+  const Eigen::Affine3d toIndex = grid.WorldToIndex();
+  std::vector<NearTriangle> triangles;
+  for (const auto& indices : surface.triangles) {
+    NearTriangle corners;
+    for (std::size_t n = 0; n < 3; ++n)
+      corners.point[n] = (toIndex * surface.points[indices[n]].cast<double>()).cwiseProduct(grid.spacing);
+    if (SetBox(corners, grid, grid.spacing.maxCoeff()) && anyOutside(corners) && SetBox(corners, grid, band))
+      triangles.push_back(corners);
+  }
+
+  std::vector<float> distances(bodies.size());
+  ParallelFor(grid.dimensions[2], progress.Part(0.3, 1.0), [&](std::ptrdiff_t slab) {
+    const int k = static_cast<int>(slab);
+    const std::size_t count = at(0, 0, 1);
+    std::vector<double> squared(count, band * band);
+    for (const NearTriangle& corners : triangles) {
+      if (k < corners.low[2] || k > corners.high[2])
+        continue;
+      for (int j = corners.low[1]; j <= corners.high[1]; ++j)
+        for (int i = corners.low[0]; i <= corners.high[0]; ++i) {
+          double& least = squared[at(i, j, 0)];
+          least = std::min(least, SquaredToTriangle(Vector3d(i, j, k).cwiseProduct(grid.spacing), corners.point));
+        }
+    }
+    for (std::size_t n = 0; n < count; ++n) {
+      const double distance = std::sqrt(squared[n]);
+      distances[at(0, 0, k) + n] = static_cast<float>(bodies[at(0, 0, k) + n] < 0 ? distance : -distance);
+    }
+  });
+  return distances;
+}
+
+} // namespace echorama

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Core/Geometry/ImageGeometry.h"
+#include "TissueSurface.h"
+#include <vector>
+
+namespace echorama {
+
+/// How far each point of a grid lies from all bodies together, mm, x fastest: negative inside, and no further than \a band
+/// either way. Outside of them distances are exact. Inside, surfaces between two bodies do not count, but where such a surface
+/// runs within a spacing of the outermost it may pass for it.
+/// \throws Error(InvalidParameter) for a band that is not positive, and as BodiesOn
+std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry& grid, double band,
+                               const Progress& progress = {});
+
+} // namespace echorama
