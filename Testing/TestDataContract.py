@@ -388,6 +388,20 @@ class TissuePress(Phantom):
         return filter
 
 
+class Gel(TissueSource):
+    """Tissue with gel, of a probe above it."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        filter.tissue, filter.probe = echorama.vtkUltrasoundAnatomySource(), echorama.vtkUltrasoundProbeSource()
+        filter.probe.SetPosition(0.0, 0.0, -4.0)
+        filter.SetInputConnection(filter.tissue.GetOutputPort())
+        filter.AddProbeConnection(filter.probe.GetOutputPort())
+        filter.SetCellMm(6.0)
+        filter.SetSettleS(0.0)
+        return filter
+
+
 class TissueMeshes(TissueSource):
     """From meshes, which its own test feeds."""
 
@@ -564,6 +578,7 @@ Special = {
     "vtkUltrasoundEmbedder": Embedder,
     "vtkUltrasoundEmbedQuality": EmbedQuality,
     "vtkUltrasoundFeather": Feather,
+    "vtkUltrasoundGel": Gel,
     "vtkUltrasoundHandEyeCalibration": HandEye,
     "vtkUltrasoundPivotCalibration": Pivot,
     "vtkUltrasoundTemporalCalibration": Temporal,

@@ -2,12 +2,14 @@
 #include "vtkUltrasoundAcquisition.h"
 
 #include "Core/Base/Angles.h"
+#include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Geometry/MatrixRows.h"
 
 #include "vtkDataObject.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
+#include "vtkInformationVector.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
@@ -162,6 +164,22 @@ bool vtkUltrasoundAcquisition::GetProbeToWorld(vtkDataObject* data, vtkMatrix4x4
 void vtkUltrasoundAcquisition::SetProbeToWorld(vtkDataObject* data, const echorama::Pose& pose)
 {
   SetMatrix(data, ProbeToWorldName(), pose.matrix());
+}
+
+//----------------------------------------------------------------------------
+std::vector<echorama::PlacedProbe> vtkUltrasoundAcquisition::ProbesOf(vtkInformationVector* port)
+{
+  std::vector<echorama::PlacedProbe> probes;
+  for (int number = 0; number < port->GetNumberOfInformationObjects(); ++number) {
+    vtkDataObject* data = vtkDataObject::GetData(port, number);
+    const auto geometry = data ? ProbeGeometryOf(data) : std::nullopt;
+    if (!geometry) {
+      throw echorama::Error(echorama::Error::Kind::BadInput, "probe " + std::to_string(number + 1) + " has no field data " +
+                                                                 ProbeGeometryName() + " of 6 or 7 finite numbers");
+    }
+    probes.push_back({*geometry, ProbeToWorldOf(data).value_or(echorama::Pose::Identity())});
+  }
+  return probes;
 }
 
 //----------------------------------------------------------------------------

@@ -35,6 +35,7 @@
 #endif
 
 class vtkDataObject;
+class vtkInformationVector;
 class vtkMatrix4x4;
 
 class ECHORAMACORE_EXPORT vtkUltrasoundAcquisition : public vtkObject {
@@ -63,6 +64,9 @@ public:
   static void SetProbeGeometry(vtkDataObject* data, const echorama::ProbeGeometry& geometry);
   static std::optional<echorama::Pose> ProbeToWorldOf(vtkDataObject* data);
   static void SetProbeToWorld(vtkDataObject* data, const echorama::Pose& pose);
+  /** The probes of a repeatable input; without ProbeToWorld one lies at the origin. Throws Error(BadInput) that names the number
+   * of the one without geometry. */
+  static std::vector<echorama::PlacedProbe> ProbesOf(vtkInformationVector* port);
   static std::optional<Eigen::Affine3d> ImageToWorldOf(vtkDataObject* data);
   static void SetImageToWorld(vtkDataObject* data, const Eigen::Affine3d& imageToWorld);
   static std::optional<double> TimeStampOf(vtkDataObject* data);

@@ -76,11 +76,14 @@ SoundTracer::SoundTracer(const AcousticScene& scene, const SoundTransport& trans
   CheckRanges(transport);
   CheckRanges(conditions);
   const double neperPerDb = std::log(10.0) / 20.0;
+  const Fluid lens{1.5, 1000.0}; // about that of silicone rubber
   for (const Material& material : scene.Materials())
-    media_.push_back({{material.Impedance(), material.soundSpeed},
-                      2.0 * neperPerDb * material.AttenuationDbPerMm(conditions.frequencyMHz),
-                      conditions.assumedSoundSpeed / material.soundSpeed,
-                      material.roughness});
+    media_.push_back(
+        {{material.Impedance(), material.soundSpeed},
+         2.0 * neperPerDb * material.AttenuationDbPerMm(conditions.frequencyMHz),
+         conditions.assumedSoundSpeed / material.soundSpeed,
+         material.roughness,
+         material.IsGas() ? MeetInterface(lens, {material.Impedance(), lens.soundSpeed}, 1.0).transmittedEnergy : 1.0});
   leastAmplitude_ = std::pow(10.0, -transport.dynamicRangeDb / 20.0);
   const double acceptance = transport.acceptanceDegrees * Pi / 180.0;
   mirrorFactor_ = 0.5 / (acceptance * acceptance);
@@ -121,7 +124,7 @@ void SoundTracer::Trace(const RayStart& start, SoundPath& path, RaySamples* samp
   direct.ray.inside = start.inside;
   direct.across = start.across;
   direct.scanDepth = start.scanDepth;
-  direct.amplitude = start.amplitude;
+  direct.amplitude = start.amplitude * media_[static_cast<std::size_t>(scene_.MediumOf(start.inside))].taken;
   while (!waiting.empty() && path.segments.size() < static_cast<std::size_t>(transport_.maxSegments)) {
     Way next = std::move(waiting.back());
     waiting.pop_back();

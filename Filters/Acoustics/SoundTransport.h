@@ -65,6 +65,7 @@ private:
     double attenuation; ///< nepers per mm, there and back
     double depthPerMm;
     double roughness;
+    double taken; ///< of what the face gives off: all, but for gas, which takes next to nothing
   };
   double Returned(double cosine, double roughness) const;
   double WayToFace(const RayStart& start, const Eigen::Vector3d& place, const Eigen::Vector3d& direction) const;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All happens in the frame of the probe's last pose, where the space between probe and skin fits a box. Skin is a grid of
 // distances, at rest and pressed. Afterwards a particle counts for the points around it with the spline that it had in the
-// solver; a point lies in gel where they fill half of what solids leave free there, so that a thin film counts as much as a
-// thick one, and gel reaches a little way into the solids that it touches.
+// solver; a point lies in gel where they fill three tenths of what solids leave free there, so that a thin film counts as
+// much as a thick one, cracks between particles are no air, and gel reaches a little way into the solids that it touches.
 #include "GelCoat.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/NumberText.h"
@@ -245,7 +245,7 @@ GelReport Run(GelSolver& solver, const std::vector<Leg>& legs, const GelShape& h
 // From what particles fill to what is positive in gel.
 void MakeLevels(const ImageGeometry& grid, double cell, const GelShape& skin, const ProbeShape& head, std::vector<float>& levels)
 {
-  constexpr double least = 0.02; // of a cell that solids leave free
+  constexpr double share = 0.3, least = 0.02; // of what solids leave free, of a cell
   const Eigen::Affine3d toPoint = grid.IndexToWorld();
   const std::ptrdiff_t row = grid.dimensions[0], rows = grid.dimensions[1];
   ParallelFor(grid.dimensions[2], [&](std::ptrdiff_t k) {
@@ -254,7 +254,8 @@ void MakeLevels(const ImageGeometry& grid, double cell, const GelShape& skin, co
         const Vector3d point = toPoint * Vector3d(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
         const double open = SplineBelow(skin.Distance(point, 0.0) / cell) + SplineBelow(head.Distance(point) / cell) - 1.0;
         float& level = levels[static_cast<std::size_t>((k * rows + j) * row + i)];
-        level = static_cast<float>(level - 0.5 * std::max(open, 0.0) - least);
+        const bool isBorder = i == 0 || j == 0 || k == 0 || i == row - 1 || j == rows - 1 || k == grid.dimensions[2] - 1;
+        level = isBorder ? -1.0f : static_cast<float>(level - share * std::max(open, 0.0) - least); // surfaces are closed
       }
   });
 }

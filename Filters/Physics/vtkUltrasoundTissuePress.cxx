@@ -26,21 +26,6 @@ vtkUltrasoundParametersMacro(vtkUltrasoundTissuePress);
 
 namespace {
 
-std::vector<echorama::PlacedProbe> ProbesOf(vtkInformationVector* port)
-{
-  std::vector<echorama::PlacedProbe> probes;
-  for (int number = 0; number < port->GetNumberOfInformationObjects(); ++number) {
-    vtkDataObject* data = vtkDataObject::GetData(port, number);
-    const auto geometry = data ? vtkUltrasoundAcquisition::ProbeGeometryOf(data) : std::nullopt;
-    if (!geometry) {
-      throw Error(Error::Kind::BadInput, "probe " + std::to_string(number + 1) + " has no field data " +
-                                             vtkUltrasoundAcquisition::ProbeGeometryName() + " of 6 or 7 finite numbers");
-    }
-    probes.push_back({*geometry, vtkUltrasoundAcquisition::ProbeToWorldOf(data).value_or(echorama::Pose::Identity())});
-  }
-  return probes;
-}
-
 void AddMarks(vtkImageData* image, const char* name, const std::vector<unsigned char>& values)
 {
   vtkNew<vtkUnsignedCharArray> array;
@@ -94,7 +79,7 @@ void vtkUltrasoundTissuePress::Execute(vtkInformationVector** inputs, vtkImageDa
 {
   // 1. what came in
   echorama::CheckRanges(this->Parameters());
-  const std::vector<echorama::PlacedProbe> probes = ProbesOf(inputs[1]);
+  const std::vector<echorama::PlacedProbe> probes = vtkUltrasoundAcquisition::ProbesOf(inputs[1]);
   echorama::TissueBody body =
       echorama::TissueBodyOf(vtkUltrasoundTissue::Of(vtkPolyData::GetData(inputs[0])), this->Lattice, progress.Part(0.0, 0.05));
   const echorama::ImageGeometry nodes = body.nodes;

@@ -306,6 +306,17 @@ TEST(SoundTransport, ReverberationBetweenPlateAndFace)
   EXPECT_EQ(Trace(scene, {0, 0, 0}, {0, 0, 1}).echoes.size(), 1u); // without a face there is but one
 }
 
+// A face in air is all but mute: what little gets out must get back in as well.
+TEST(SoundTransport, FaceInAirSendsNothing)
+{
+  TissueSurface surface = Background(air);
+  AddBox(surface, dense, {-90, -90, 2}, {90, 90, 3000});
+  const SoundPath path = Trace(AcousticScene(surface), {0, 0, 0}, {0, 0, 1});
+  ASSERT_EQ(path.echoes.size(), 1u);
+  const double lens = 1.5, ratio = air.Impedance() / lens;
+  EXPECT_NEAR(path.echoes.front().amplitude, 4.0 * ratio / ((1.0 + ratio) * (1.0 + ratio)), 1e-5);
+}
+
 TEST(SoundTransport, EnergyNeverGrows)
 {
   // Every way that leaves an interface: what went in equals what comes out, and all ways end with less than there was.

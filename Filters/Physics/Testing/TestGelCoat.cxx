@@ -71,7 +71,9 @@ TEST(GelCoat, FillsTheGap)
   }
   EXPECT_NEAR(coat.volumeMm3, 3000.0, 120.0);
   EXPECT_EQ(coat.report.gone, 0);
-  EXPECT_NEAR(LevelVolume(coat, -60.0, 3.0), 3000.0, 300.0);
+  // Its surface lies up to a quarter of a cell outside, so that cracks between particles are no air.
+  EXPECT_GT(LevelVolume(coat, -60.0, 3.0), 3000.0);
+  EXPECT_LT(LevelVolume(coat, -60.0, 3.0), 1.2 * 3000.0);
 }
 
 TEST(GelCoat, LeavesAirWhereItDoesNotReach)
@@ -105,7 +107,8 @@ TEST(GelCoat, IsSqueezedOutByTheProbe)
   const GelCoat coat = SpreadGel(rest, &pressed, {LinearProbe()}, {}, {}, Amount(2.5));
   EXPECT_GT(coat.coupled, 0.8);
   EXPECT_NEAR(coat.volumeMm3, 2500.0, 100.0);
-  EXPECT_NEAR(LevelVolume(coat, -60.0, 2.0), 2500.0, 250.0);
+  EXPECT_GT(LevelVolume(coat, -60.0, 2.0), 2500.0);
+  EXPECT_LT(LevelVolume(coat, -60.0, 2.0), 1.2 * 2500.0);
   EXPECT_GT(LevelVolume(coat, -60.0, 0.0), 2500.0 - 1.2 * 26.0 * 22.0 * 2.0);
   for (const GelBeam& beam : coat.face)
     EXPECT_NEAR(beam.gelMm + beam.airMm, 2.0, 0.3);
