@@ -244,6 +244,25 @@ class Pressed(unittest.TestCase):
         rest = self.ball(volumes[0])
         numpy.testing.assert_allclose(back, rest, atol=0.4)
 
+    def test_gel_couples_and_air_does_not(self):
+        bright = {}
+        for amount in (0, 15):  # ml, between skin and a face whose middle is 3 mm away, and one that presses
+            gel = {"amountMl": amount, "cellMm": 3, "settleS": 0}
+            path = scene("gel.json", views=self.views(-3.0, 4.0), press={"spacingMm": 9}, gel=gel, **{**self.common, "background": "air"})
+            told = run_json("synthesize", path, "-o", work / f"gel_{amount}")["volumes"]
+            bright[amount] = [read_mha(work / f"gel_{amount}/volume_{n}.mha")[1].mean() for n in (1, 2)]
+            for number, one in enumerate(told):
+                surface, face = (vtkXMLPolyDataReader() for _ in range(2))
+                for reader, key in ((surface, "surface"), (face, "face")):
+                    reader.SetFileName(one["gel"][key])
+                    reader.Update()
+                self.assertEqual(surface.GetOutput().GetNumberOfPolys() > 0, amount > 0)
+                self.assertAlmostEqual(face.GetOutput().GetFieldData().GetArray("Coupled").GetValue(0), one["gel"]["coupled"])
+                if number == 0:
+                    self.assertEqual((one["gel"]["coupled"] > 0.6, one["gel"]["coupled"] == 0.0), (amount > 0, amount == 0))
+        self.assertGreater(bright[15][0], 5 * bright[0][0])
+        self.assertGreater(bright[15][1], bright[0][1])  # where the dry face touches the skin sound passes all the same
+
     def test_what_cannot_be_pressed_is_told(self):
         bone = {"sphere": {"centre": [0, 0, 12], "radius": 8, "material": "bone"}}
         path = scene("bony.json", views=self.views(9.0), press={"spacingMm": 5}, **{**self.common, "tissue": self.common["tissue"] + [bone]})

@@ -21,6 +21,7 @@
 #include <vtkUltrasoundAcquisition.h>
 #include <vtkUltrasoundDeformGeometry.h>
 #include <vtkUltrasoundDisplacement.h>
+#include <vtkUltrasoundGel.h>
 #include <vtkUltrasoundSynthesizer.h>
 #include <vtkUltrasoundTissue.h>
 #include <vtkUltrasoundTissuePress.h>
@@ -147,6 +148,32 @@ void Press(Session& session, ScenePress press, vtkPolyData* tissue, vtkPolyData*
                   {"relative_volume", numbers(vtkUltrasoundTissuePress::RelativeVolumeName())}};
 }
 
+// Gel between the probe and tissue, which is pressed or not: what sound meets, gel alone, and the face.
+struct SpreadGelOn {
+  vtkNew<vtkPolyData> tissue, gel, face;
+  nlohmann::ordered_json told;
+};
+
+void Spread(Session& session, const SynthesisScene& scene, vtkPolyData* rest, vtkPolyData* pressed, vtkPolyData* probe,
+            const std::string& name, SpreadGelOn& spread)
+{
+  vtkNew<vtkUltrasoundGel> filter;
+  SceneGel gel = *scene.gel;
+  ProbeHead head = scene.press ? scene.press->head : ProbeHead();
+  for (const Parameter& parameter : Join({Describe(gel), Describe(head)}))
+    filter->SetParameterAsText(parameter.name.c_str(), parameter.Text().c_str());
+  filter->SetInputData(rest);
+  filter->AddProbeData(probe);
+  filter->SetPressedData(pressed);
+  session.Update(filter, "gel", name);
+  spread.tissue->ShallowCopy(filter->GetOutput(0));
+  spread.face->ShallowCopy(filter->GetOutput(1));
+  const TissueSurface all = vtkUltrasoundTissue::Of(spread.tissue);
+  vtkUltrasoundTissue::Set(spread.gel, all.Only(all.bodies.front().name == "gel" ? 0 : -1));
+  const auto number = [&spread](const char* field) { return spread.face->GetFieldData()->GetArray(field)->GetComponent(0, 0); };
+  spread.told = {{"coupled", number(vtkUltrasoundGel::CoupledName())}, {"volume_mm3", number(vtkUltrasoundGel::GelVolumeName())}};
+}
+
 void Synthesize(Session& session, const SynthesizeOptions& options)
 {
   SynthesisScene scene = ReadScene(options.scene, options.seed);
@@ -207,6 +234,17 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
       synthesizer->SetInputData(2, pressed.displacement);
       moved = vtkUltrasoundDisplacement::FieldOf(pressed.displacement, "the displacement of the tissue");
       told["press"] = pressed.told;
+    }
+    if (scene.gel) {
+      SpreadGelOn spread;
+      Spread(session, scene, tissue, scene.press ? pressed.tissue.Get() : nullptr, probe, "volume_" + number, spread);
+      synthesizer->SetInputData(spread.tissue);
+      told["gel"] = spread.told;
+      for (const auto& [key, data] : {std::pair<std::string, vtkPolyData*>{"surface", spread.gel}, {"face", spread.face}}) {
+        const std::string file = (key == "face" ? "face_" : "gel_") + number + ".vtp";
+        WriteTissue(session, data, folder.Stage(file));
+        told["gel"][key] = folder.Final(file);
+      }
     }
     parameters.stepPoses = views[i].steps;
     parameters.receiver.noiseSeed = scene.receiver.noiseSeed + i;

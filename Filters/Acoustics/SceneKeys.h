@@ -268,6 +268,7 @@ void Describe(A& a, SynthesisScene& scene)
   a.Views("views", scene.views, "From where the probe looks.");
   a.Object("sweep", scene.sweep, "The time a sweep takes, and the motion meanwhile.");
   a.MaybeObject("press", scene.press, "Tissue gives way to the probe; if it is not said, it does not.");
+  a.MaybeObject("gel", scene.gel, "Gel on the face of the probe, in air; if it is not said, the background couples.");
   a.Object("volume", scene.volume, "The volumes that are made.");
 }
 

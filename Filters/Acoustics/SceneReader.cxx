@@ -419,6 +419,8 @@ SynthesisScene SceneFromJson(const std::string& text, const std::string& name, c
   scene::Reader::Read(place, json, "", scene);
   if (scene.sweep.alongRecording && !std::holds_alternative<SceneRecording>(scene.views))
     throw Error(Error::Kind::BadFile, name + ": sweep.alongRecording: the views are not those of a recording");
+  if (scene.gel && !scene.MaterialOf(scene.background).IsGas())
+    throw Error(Error::Kind::BadFile, name + ": background: around gel there is air, not \"" + scene.background + "\"");
   return scene;
 }
 

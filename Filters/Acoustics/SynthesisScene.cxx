@@ -11,6 +11,11 @@ ParameterList Describe(ScenePress& press)
   return Join({Describe(press.lattice), Describe(press.tissue), Describe(press.head)});
 }
 
+ParameterList Describe(SceneGel& gel)
+{
+  return Join({Describe(gel.coat), Describe(gel.material)});
+}
+
 ParameterList Describe(SceneVolume& volume)
 {
   return {Parameter("SpacingMm", volume.spacingMm, {0.05, 20}, "mm", "Edge of the cubic voxels."),

@@ -4,6 +4,7 @@
 #include "Core/Geometry/ProbePresets.h"
 #include "Filters/Phantoms/Anatomy.h"
 #include "Filters/Phantoms/CalibrationRig.h"
+#include "Filters/Physics/GelCoat.h"
 #include "Filters/Physics/ProbeShape.h"
 #include "Filters/Physics/TissueLattice.h"
 #include "Filters/Tissue/Material.h"
@@ -160,6 +161,13 @@ struct ScenePress {
 };
 ParameterList Describe(ScenePress& press);
 
+/// Gel on the face of the probe, pressed by each view; all around is air.
+struct SceneGel {
+  GelCoatParameters coat;
+  GelMaterial material;
+};
+ParameterList Describe(SceneGel& gel);
+
 struct SynthesisScene {
   std::string name = "scene";
   std::string about;      ///< for people; may be empty
@@ -174,6 +182,7 @@ struct SynthesisScene {
   std::variant<SceneRow, SceneViews, SceneRecording> views;
   SceneSweep sweep;
   std::optional<ScenePress> press; ///< none: tissue is where it is, whatever the probe does
+  std::optional<SceneGel> gel;     ///< none: the background couples wherever it is no gas
   SceneVolume volume;
 
   // Where files are looked for; not part of the JSON.

@@ -70,4 +70,28 @@ void TissueSurface::Append(const TissueSurface& other)
     bodies.push_back({body.name, MaterialIndex(other.materials[static_cast<std::size_t>(body.material)])});
 }
 
+TissueSurface TissueSurface::Only(int body) const
+{
+  TissueSurface only;
+  only.materials = materials;
+  if (body < 0)
+    return only;
+  only.bodies = {bodies[static_cast<std::size_t>(body)]};
+  std::vector<std::uint32_t> place(points.size(), 0); // and 0 before it is taken
+  for (std::size_t n = 0; n < triangles.size(); ++n) {
+    if (bodyOfTriangle[n] != body)
+      continue;
+    auto& triangle = only.triangles.emplace_back(triangles[n]);
+    for (std::uint32_t& corner : triangle) {
+      if (place[corner] == 0) {
+        only.points.push_back(points[corner]);
+        place[corner] = static_cast<std::uint32_t>(only.points.size());
+      }
+      corner = place[corner] - 1;
+    }
+  }
+  only.bodyOfTriangle.assign(only.triangles.size(), 0);
+  return only;
+}
+
 } // namespace echorama

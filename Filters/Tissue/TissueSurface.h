@@ -37,6 +37,9 @@ struct TissueSurface {
 
   /// Adds another's bodies after ours; its background is left out.
   void Append(const TissueSurface& other);
+
+  /// One body alone, with all materials; -1 is none.
+  TissueSurface Only(int body) const;
 };
 
 } // namespace echorama

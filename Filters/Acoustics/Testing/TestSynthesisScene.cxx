@@ -308,6 +308,9 @@ TEST(SynthesisScene, SaysWhichKeyIsWrong)
   ExpectComplaint(R"("volume": {"spacingMm": 1e9})",
                   "scene.json: volume.spacingMm: 1000000000.0 is out of range; it must be in [0.05, 20]");
   ExpectComplaint(R"("press": {"poisson": 0.5})", "scene.json: press.poisson: 0.5 is out of range; it must be in [0, 0.499]");
+  ExpectComplaint(R"("background": "air", "gel": {"cellMm": 0})",
+                  "scene.json: gel.cellMm: 0 is out of range; it must be in [0.1, 20]");
+  ExpectComplaint(R"("background": "water", "gel": {})", "scene.json: background: around gel there is air, not \"water\"");
   ExpectComplaint(R"("sede": 3)", "scene.json: sede: there is no such key; there are schema, name, ");
   ExpectComplaint(R"("seed": 1, "seed": 2)", "scene.json: the key \"seed\" is there twice");
   ExpectComplaint(R"("seed": )", "scene.json: it is not JSON");
@@ -369,6 +372,10 @@ TEST(SynthesisScene, ComesBackBitByBit)
   scene.press->lattice.heldMaterials = ""; // none, which is not the default
   scene.press->tissue.friction = 1.0 / 3.0;
   scene.press->head.edgeMm = 0.1 + 0.2;
+  scene.background = "air";
+  scene.gel.emplace();
+  scene.gel->coat.amountMl = 1.0 / 3.0;
+  scene.gel->material.exponent = 0.3 + 0.4;
   scene.volume = {0.7, 0.1, 179.99999999999997};
   const std::string text = SceneToJson(scene);
   const SynthesisScene back = SceneFromJson(text, "back");
@@ -396,6 +403,9 @@ TEST(SynthesisScene, ComesBackBitByBit)
   EXPECT_EQ(back.press->lattice.heldMaterials, "");
   EXPECT_EQ(back.press->tissue.friction, scene.press->tissue.friction);
   EXPECT_EQ(back.press->head.edgeMm, scene.press->head.edgeMm);
+  ASSERT_TRUE(back.gel.has_value());
+  EXPECT_EQ(back.gel->coat.amountMl, scene.gel->coat.amountMl);
+  EXPECT_EQ(back.gel->material.exponent, scene.gel->material.exponent);
   EXPECT_EQ(back.volume.knockDegrees, scene.volume.knockDegrees);
   // Views of other kinds.
   scene.sweep.alongRecording = false;

@@ -70,6 +70,24 @@ TEST(TissueSurface, AppendKeepsBodiesAndShiftsIndices)
   EXPECT_EQ(surface.bodies[2].material, 1);
 }
 
+TEST(TissueSurface, OneBodyAloneHasItsPointsOnly)
+{
+  TissueSurface surface = Tetrahedron("liver");
+  TissueSurface bone = Tetrahedron("bone");
+  bone.points[3] = {0, 0, 5};
+  surface.Append(bone);
+  const TissueSurface only = surface.Only(1);
+  only.Check();
+  ASSERT_EQ(only.points.size(), 4u);
+  ASSERT_EQ(only.triangles.size(), 4u);
+  for (std::size_t n = 0; n < 4; ++n)
+    for (std::size_t corner = 0; corner < 3; ++corner)
+      EXPECT_EQ(only.points[only.triangles[n][corner]], surface.points[surface.triangles[n + 4][corner]]);
+  EXPECT_EQ(only.bodies.front().name, "bone");
+  EXPECT_EQ(only.materials.size(), surface.materials.size());
+  EXPECT_TRUE(surface.Only(-1).triangles.empty());
+}
+
 TEST(TissueSurface, NothingButABackgroundIsSound)
 {
   TissueSurface surface;
