@@ -42,6 +42,7 @@ with tempfile.TemporaryDirectory() as folder:
                               (["noise_figures.py", pictures], ["NoiseSource"]),
                               (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity"]),
                               (["synthesis_tissue_figures.py", pictures], ["TissueSource", "TissueSourceLevels"]),
+                              (["pressing_figures.py", "--quick", pictures], ["Gel", "TissuePress"]),
                               (["embedding_figures.py", "--spacing", "3", pictures],
                                ["embedding_coverage", "embedding_background", "embedding_ways"])):
         answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / arguments[0], *arguments[1:]], cwd=folder,
