@@ -237,6 +237,18 @@ class Pressed(unittest.TestCase):
         for label in both:  # the first probe hardly moves anything
             numpy.testing.assert_allclose(places[1][label] - places[0][label], self.moved(1, places[0][label]), atol=0.3)
 
+    def test_landmarks_agree_where_the_truth_takes_them_back(self):
+        lists = [work / f"pressed/landmarks_{n}.csv" for n in (1, 2)]
+        rigid = json.loads((work / "pressed/truth.json").read_text())
+        for volume in rigid["volumes"]:
+            del volume["displacement"]
+        (work / "pressed/rigid.json").write_text(json.dumps(rigid))
+        by = {name: run_json("score", work / f"pressed/{name}.json", "--landmarks", *lists)["landmarks"] for name in ("truth", "rigid")}
+        self.assertGreater(by["truth"]["pairs"], 4)
+        self.assertEqual(by["truth"]["pairs"], by["rigid"]["pairs"])
+        self.assertLess(by["truth"]["max_mm"], 0.01)
+        self.assertGreater(by["rigid"]["mean_mm"], 0.5)
+
     def test_stitching_by_the_truth_takes_it_back(self):
         volumes = [work / f"pressed/volume_{n}.mha" for n in (1, 2)]
         run_json("stitch", *volumes, "--poses", work / "pressed/truth.json", "--method", "average", "-o", work / "pressed_back.mha")

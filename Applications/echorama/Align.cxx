@@ -155,11 +155,6 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
                            "; turned by " + Fixed(degrees, 2) + " degrees, its middle moved by " + Fixed(mm, 2) +
                            " mm, overlap " + Fixed(100.0 * found.overlap, 0) + "%"));
   }
-  if (!landmarks.empty()) {
-    for (std::size_t i = 0; i < volumes.size(); ++i)
-      landmarks[i].volumeToWorld = volumes[i].volumeToWorld;
-    TellLandmarkError(session, landmarks, options.files);
-  }
   session.result["pairs"] = report["pairs"];
   session.result["align_seconds"] = report["seconds"];
   session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
@@ -170,6 +165,13 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
 
   if (options.deformable)
     DeformVolumes(session, deformer, volumes, isPlaced, options.fixed - 1, options.output, poses);
+  if (!landmarks.empty()) {
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
+      landmarks[i].volumeToWorld = volumes[i].volumeToWorld;
+      landmarks[i].displacement = DisplacementOf(session, poses[i]);
+    }
+    TellLandmarkError(session, landmarks, options.files);
+  }
   for (std::size_t i = 0; i < places.size(); ++i)
     SaveVolume(session, volumes[i].image, places[i]);
   WritePoses(options.output, poses);

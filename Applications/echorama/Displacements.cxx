@@ -29,6 +29,13 @@ vtkSmartPointer<vtkImageData> ReadDisplacement(Session& session, const std::stri
 
 } // namespace
 
+std::optional<DisplacementField> DisplacementOf(Session& session, const VolumePose& pose)
+{
+  if (pose.displacement.empty())
+    return {};
+  return vtkUltrasoundDisplacement::FieldOf(ReadDisplacement(session, pose.displacement), pose.displacement);
+}
+
 void WriteDisplacement(vtkImageData* image, const std::string& path)
 {
   FileReplacement files;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Imaging/DisplacementField.h"
 #include "Volumes.h"
+#include <optional>
 
 class vtkUltrasoundDeformableAligner;
 
@@ -8,6 +10,9 @@ namespace echorama {
 
 /// Where the displacement of the volume \a number (from 0) belongs that a pose file names: POSES.displacement-NUMBER.vti, from 1.
 std::string DisplacementPath(const std::string& poses, std::size_t number);
+
+/// That which the pose of a volume names, or nothing. Throws Error that names the file.
+std::optional<DisplacementField> DisplacementOf(Session&, const VolumePose&);
 
 /// Writes a displacement image; a file that is there is replaced once it is whole.
 void WriteDisplacement(vtkImageData* image, const std::string& path);

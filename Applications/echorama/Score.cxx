@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama score: how far poses are from the truth, and landmarks from each other.
 #include "Commands.h"
+#include "Displacements.h"
 #include "Landmarks.h"
 #include "ParameterOptions.h"
 #include "Volumes.h"
@@ -75,6 +76,7 @@ void ScoreWithLandmarks(Session& session, const ScoreOptions& options, const std
   std::vector<std::string> files;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     lists[i].volumeToWorld = poses[i].volumeToWorld;
+    lists[i].displacement = DisplacementOf(session, poses[i]);
     files.push_back(poses[i].file);
   }
   TellLandmarkError(session, lists, files);

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundDisplacement.h"
 
+#include "vtkCompositeDataSet.h"
+#include "vtkDataObjectTree.h"
+#include "vtkDataObjectTreeIterator.h"
 #include "vtkDoubleArray.h"
 #include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
+#include "vtkSmartPointer.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -33,6 +39,40 @@ echorama::DisplacementField vtkUltrasoundDisplacement::FieldOf(vtkImageData* dis
   } catch (const Error& error) {
     throw Error(error.GetKind(), name + ": " + error.what());
   }
+}
+
+//----------------------------------------------------------------------------
+std::vector<echorama::DisplacementField> vtkUltrasoundDisplacement::FieldsOf(vtkInformationVector* port,
+                                                                             const std::vector<std::string>& volumes)
+{
+  std::vector<echorama::DisplacementField> fields;
+  const auto add = [&fields, &volumes](vtkImageData* image, const char* name) {
+    const std::size_t number = fields.size();
+    const std::string of = number < volumes.size() ? volumes[number] : "a volume too many";
+    if (name && *name && number < volumes.size() && !of.empty() && of != name) {
+      throw Error(Error::Kind::BadInput, "displacement " + std::to_string(number + 1) + " is that of " + name +
+                                             ", but the volume in its place is " + of);
+    }
+    fields.push_back(FieldOf(image, "the displacement of " + of));
+  };
+  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection) {
+    vtkDataObject* data = vtkDataObject::GetData(port, connection);
+    if (vtkImageData* image = vtkImageData::SafeDownCast(data)) {
+      add(image, nullptr);
+    } else if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data)) {
+      const auto leaf = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
+      leaf->VisitOnlyLeavesOn();
+      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
+        vtkInformation* meta = leaf->HasCurrentMetaData() ? leaf->GetCurrentMetaData() : nullptr;
+        add(vtkImageData::SafeDownCast(leaf->GetCurrentDataObject()), meta ? meta->Get(vtkCompositeDataSet::NAME()) : nullptr);
+      }
+    }
+  }
+  if (!fields.empty() && fields.size() != volumes.size()) {
+    throw Error(Error::Kind::BadInput, std::to_string(fields.size()) + " displacements came in for " +
+                                           std::to_string(volumes.size()) + " volumes; there must be one for each, or none");
+  }
+  return fields;
 }
 
 //----------------------------------------------------------------------------

@@ -23,9 +23,11 @@
 #ifndef __VTK_WRAP__
 #include "Core/Imaging/DisplacementField.h"
 #include <string>
+#include <vector>
 #endif
 
 class vtkImageData;
+class vtkInformationVector;
 
 class ECHORAMACORE_EXPORT vtkUltrasoundDisplacement : public vtkObject {
 public:
@@ -47,6 +49,13 @@ public:
 #ifndef __VTK_WRAP__
   /** Throws echorama::Error(BadInput) that begins with \a name for an image that is no displacement. */
   static echorama::DisplacementField FieldOf(vtkImageData* displacement, const std::string& name);
+
+  /**
+   * The fields of a repeatable input: images, or blocks of them, one for each of the volumes of these names, in their order; or
+   * none at all. Throws echorama::Error(BadInput) for another number, and for a block
+   * with the name of another than its volume, unless that is "".
+   */
+  static std::vector<echorama::DisplacementField> FieldsOf(vtkInformationVector* port, const std::vector<std::string>& volumes);
 
   /** Makes \a image the lattice of a field, with the values that it takes there. */
   static void ImageOf(const echorama::DisplacementField& field, vtkImageData* image);

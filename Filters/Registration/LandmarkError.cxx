@@ -7,6 +7,18 @@
 
 namespace echorama {
 
+Eigen::Vector3d LandmarkList::Place(const Eigen::Vector3d& point) const
+{
+  const Eigen::Vector3d moved = volumeToWorld * point;
+  if (!displacement)
+    return moved;
+  try {
+    return displacement->Inverse(moved);
+  } catch (const Error& error) {
+    throw Error(error.GetKind(), name + ": " + error.what());
+  }
+}
+
 LandmarkError MeasureLandmarkError(const std::vector<LandmarkList>& lists)
 {
   if (lists.size() < 2)
@@ -22,7 +34,7 @@ LandmarkError MeasureLandmarkError(const std::vector<LandmarkList>& lists)
   for (std::size_t i = 0; i < lists.size(); ++i)
     for (std::size_t j = i + 1; j < lists.size(); ++j)
       for (const LandmarkPair& pair : PairLandmarks(lists[i].landmarks, lists[i].name, lists[j].landmarks, lists[j].name)) {
-        const Eigen::Vector3d place = lists[i].volumeToWorld * pair.fixed, error = lists[j].volumeToWorld * pair.moving - place;
+        const Eigen::Vector3d place = lists[i].Place(pair.fixed), error = lists[j].Place(pair.moving) - place;
         result.distances.push_back({pair.label, static_cast<int>(i), static_cast<int>(j), place, error});
         matched.insert(pair.label);
         lengths.push_back(error.norm());

@@ -2,6 +2,8 @@
 #pragma once
 #include "Core/Geometry/Landmark.h"
 #include "Core/Geometry/RigidTransform.h"
+#include "Core/Imaging/DisplacementField.h"
+#include <optional>
 #include <vector>
 
 namespace echorama {
@@ -11,6 +13,11 @@ struct LandmarkList {
   Pose volumeToWorld = Pose::Identity(); ///< the motion that the alignment gives the volume as its file stands
   std::vector<Landmark> landmarks;
   std::string name; ///< for messages
+  /// What the pose leaves over: what belongs at x is at x + u(x) when the pose alone has moved it.
+  std::optional<DisplacementField> displacement{};
+
+  /// Where a point of the volume belongs. \throws Error(NotPossible) where the displacement folds
+  Eigen::Vector3d Place(const Eigen::Vector3d& point) const;
 };
 
 /// One place that was found in two volumes.
@@ -36,7 +43,7 @@ struct LandmarkError {
 /// The target registration error (TRE): how far landmarks of one label lie apart once the volumes are aligned. Landmarks with a
 /// label that no other list has do not count; they are named. What is measured includes how exactly the landmarks were found.
 /// \throws Error(BadInput) for fewer than two lists, an empty label, a label that one list holds twice (the message names
-/// both), numbers that are not finite, and when no label is in two lists.
+/// both), numbers that are not finite, and when no label is in two lists; as LandmarkList::Place.
 LandmarkError MeasureLandmarkError(const std::vector<LandmarkList>& lists);
 
 } // namespace echorama

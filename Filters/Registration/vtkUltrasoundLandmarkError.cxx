@@ -18,6 +18,7 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAligner.h"
+#include "vtkUltrasoundDisplacement.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -27,7 +28,10 @@ using echorama::Error;
 vtkStandardNewMacro(vtkUltrasoundLandmarkError);
 
 //----------------------------------------------------------------------------
-vtkUltrasoundLandmarkError::vtkUltrasoundLandmarkError() = default;
+vtkUltrasoundLandmarkError::vtkUltrasoundLandmarkError()
+{
+  this->SetNumberOfInputPorts(2);
+}
 
 //----------------------------------------------------------------------------
 vtkUltrasoundLandmarkError::~vtkUltrasoundLandmarkError() = default;
@@ -81,7 +85,7 @@ void vtkUltrasoundLandmarkError::ClearPoses()
 }
 
 //----------------------------------------------------------------------------
-int vtkUltrasoundLandmarkError::FillInputPortInformation(int, vtkInformation* info)
+int vtkUltrasoundLandmarkError::FillInputPortInformation(int /*port*/, vtkInformation* info)
 {
   vtkUltrasoundVolume::AcceptVolumes(info);
   info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
@@ -92,12 +96,14 @@ int vtkUltrasoundLandmarkError::FillInputPortInformation(int, vtkInformation* in
 int vtkUltrasoundLandmarkError::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
 {
   vtkUltrasoundVolume::RequestWhole(inputs[0]);
+  vtkUltrasoundVolume::RequestWhole(inputs[1]);
   return 1;
 }
 
 //----------------------------------------------------------------------------
-std::vector<echorama::LandmarkList> vtkUltrasoundLandmarkError::Lists(vtkInformationVector* volumes)
+std::vector<echorama::LandmarkList> vtkUltrasoundLandmarkError::Lists(vtkInformationVector** inputs)
 {
+  vtkInformationVector* volumes = inputs[0];
   std::vector<vtkUltrasoundVolume::Input> aligned;
   if (volumes->GetNumberOfInformationObjects() > 0) {
     aligned = vtkUltrasoundVolume::CollectInputs(this, volumes);
@@ -123,6 +129,14 @@ std::vector<echorama::LandmarkList> vtkUltrasoundLandmarkError::Lists(vtkInforma
     }
     lists.push_back(std::move(list));
   }
+  std::vector<std::string> names;
+  for (const echorama::LandmarkList& list : lists) {
+    names.push_back(aligned.empty() ? "" : list.name);
+  }
+  const auto fields = vtkUltrasoundDisplacement::FieldsOf(inputs[1], names);
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    lists[i].displacement = fields[i];
+  }
   return lists;
 }
 
@@ -132,7 +146,7 @@ int vtkUltrasoundLandmarkError::RequestData(vtkInformation*, vtkInformationVecto
   this->Found = {};
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
     progress(0.0);
-    this->Found = echorama::MeasureLandmarkError(this->Lists(inputs[0]));
+    this->Found = echorama::MeasureLandmarkError(this->Lists(inputs));
     this->PutOut(outputs->GetInformationObject(0));
   });
 }

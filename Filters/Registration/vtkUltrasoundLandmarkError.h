@@ -7,7 +7,9 @@
  * one (AddLandmark), each in the frame of its volume's file. Landmarks of one label in two lists are one place. The poses of the
  * volumes come from input 0 (optional, repeatable: the volumes as aligned, vtkImageData or the image leaves of
  * vtkDataObjectTree, with the field VolumeToWorld that vtkUltrasoundAligner gives them; without that field they are where their
- * files have them), or from SetPose, which goes before.
+ * files have them), or from SetPose, which goes before. Input 1 (optional, repeatable): displacement images
+ * (vtkUltrasoundDisplacement) of what these poses leave over, one per volume in the same order; blocks with a name must be that
+ * volume's. Landmarks are then compared where they belong at rest.
  *
  * Output: vtkPolyData with a vertex for each label and pair of volumes, where the alignment put it in the first of them.
  *
@@ -25,7 +27,7 @@
  * | UnmatchedVolume            | int, one for each of them: whose they are                                           |
  *
  * Fails with a message for fewer than two lists, a label that one list has twice or that is empty, when no label is in two
- * lists, and for files that cannot be read. Under MPI the first rank puts out the points.
+ * lists, for files that cannot be read, and where a displacement folds. Under MPI the first rank puts out the points.
  *
  * @sa vtkUltrasoundAligner, vtkUltrasoundAlignmentScore
  */
@@ -72,6 +74,13 @@ public:
   void ClearPoses();
   ///@}
 
+  ///@{
+  /** Displacements go to input 1, in the order of the volumes. */
+  void AddDisplacementConnection(vtkAlgorithmOutput* output) { this->AddInputConnection(1, output); }
+  void AddDisplacementData(vtkDataObject* data) { this->AddInputDataObject(1, data); }
+  void RemoveAllDisplacements() { this->RemoveAllInputConnections(1); }
+  ///@}
+
   /** How many pairs of landmarks the last update compared; 0 when it failed. */
   int GetNumberOfPairs() const { return static_cast<int>(this->Found.distances.size()); }
 
@@ -100,7 +109,7 @@ private:
   void operator=(const vtkUltrasoundLandmarkError&) = delete;
 
 #ifndef __VTK_WRAP__
-  std::vector<echorama::LandmarkList> Lists(vtkInformationVector* volumes);
+  std::vector<echorama::LandmarkList> Lists(vtkInformationVector** inputs);
   void PutOut(vtkInformation* out) const;
 
   echorama::LandmarkInput Landmarks;

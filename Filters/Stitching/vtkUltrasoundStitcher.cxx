@@ -182,45 +182,15 @@ echorama::VolumeView<const float> vtkUltrasoundStitcher::ReliabilityOf(const vtk
 }
 
 //----------------------------------------------------------------------------
-std::vector<echorama::DisplacementField>
-vtkUltrasoundStitcher::DisplacementsOf(vtkInformationVector* port, const std::vector<vtkUltrasoundVolume::Input>& volumes) const
-{
-  std::vector<echorama::DisplacementField> fields;
-  const auto add = [&fields, &volumes](vtkImageData* image, const char* name) {
-    const std::size_t number = fields.size();
-    const std::string of = number < volumes.size() ? volumes[number].Name : "a volume too many";
-    if (name && *name && number < volumes.size() && of != name) {
-      throw Error(Error::Kind::BadInput, "displacement " + std::to_string(number + 1) + " is that of " + name +
-                                             ", but the volume in its place is " + of);
-    }
-    fields.push_back(vtkUltrasoundDisplacement::FieldOf(image, "the displacement of " + of));
-  };
-  for (int connection = 0; connection < port->GetNumberOfInformationObjects(); ++connection) {
-    vtkDataObject* data = vtkDataObject::GetData(port, connection);
-    if (vtkImageData* image = vtkImageData::SafeDownCast(data)) {
-      add(image, nullptr);
-    } else if (vtkDataObjectTree* tree = vtkDataObjectTree::SafeDownCast(data)) {
-      const auto leaf = vtkSmartPointer<vtkDataObjectTreeIterator>::Take(tree->NewTreeIterator());
-      leaf->VisitOnlyLeavesOn();
-      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
-        vtkInformation* meta = leaf->HasCurrentMetaData() ? leaf->GetCurrentMetaData() : nullptr;
-        add(vtkImageData::SafeDownCast(leaf->GetCurrentDataObject()), meta ? meta->Get(vtkCompositeDataSet::NAME()) : nullptr);
-      }
-    }
-  }
-  if (!fields.empty() && fields.size() != volumes.size()) {
-    throw Error(Error::Kind::BadInput, std::to_string(fields.size()) + " displacements came in for " +
-                                           std::to_string(volumes.size()) + " volumes; there must be one for each, or none");
-  }
-  return fields;
-}
-
-//----------------------------------------------------------------------------
 std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtkInformationVector** inputs)
 {
   auto scene = std::make_unique<Scene>();
   scene->Volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-  scene->Fields = this->DisplacementsOf(inputs[1], scene->Volumes);
+  std::vector<std::string> names;
+  for (const vtkUltrasoundVolume::Input& volume : scene->Volumes) {
+    names.push_back(volume.Name);
+  }
+  scene->Fields = vtkUltrasoundDisplacement::FieldsOf(inputs[1], names);
   scene->Made = this->GetMTime();
   for (int port = 0; port < 2; ++port) {
     for (int connection = 0; connection < inputs[port]->GetNumberOfInformationObjects(); ++connection) {

@@ -212,8 +212,6 @@ private:
 #ifndef __VTK_WRAP__
   struct Scene; // what came in, and the plan for it
   std::unique_ptr<Scene> Collect(vtkInformationVector** inputs);
-  std::vector<echorama::DisplacementField> DisplacementsOf(vtkInformationVector* port,
-                                                           const std::vector<vtkUltrasoundVolume::Input>& volumes) const;
 
   std::unique_ptr<Scene> Kept; // between pieces of one output
 #endif

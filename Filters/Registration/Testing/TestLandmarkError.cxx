@@ -51,6 +51,29 @@ TEST(LandmarkError, OfTheTruthIsZeroAndOfAMoveItsLength)
   EXPECT_TRUE(wrong.distances[7].error.isApprox(Vector3d(1, -2, 2), 1e-9));
 }
 
+TEST(LandmarkError, DisplacementsAreTakenBack)
+{
+  ImageGeometry lattice;
+  lattice.dimensions = {6, 6, 6};
+  lattice.origin.setConstant(-50.0);
+  lattice.spacing.setConstant(20.0);
+  std::vector<Vector3d> coefficients;
+  Random random(5);
+  for (int n = 0; n < 216; ++n)
+    coefficients.push_back(4.0 * random.Uniform() * random.Direction());
+  const DisplacementField field(lattice, coefficients);
+  const Pose pose = MotionAbout({10, 20, 30}, {0.3, -0.2, 0.5}, {4, 5, -6});
+  LandmarkList first = List("a", {}), second = List("b", {}, pose);
+  for (int i = 0; i < 20; ++i) {
+    const Vector3d place = 30.0 * random.Direction();
+    first.landmarks.push_back({std::to_string(i), place});
+    second.landmarks.push_back({std::to_string(i), pose.inverse() * (place + field.At(place))}); // where the volume shows it
+  }
+  EXPECT_GT(MeasureLandmarkError({first, second}).mean, 0.3);
+  second.displacement = field;
+  EXPECT_LT(MeasureLandmarkError({first, second}).max, 1e-5);
+}
+
 TEST(LandmarkError, FiguresOfKnownLengths)
 {
   std::vector<Landmark> first, second;

@@ -103,7 +103,33 @@ filter.SetPose(1, shifted(0, 1, 0))
 filter.Update()
 assert abs(filter.GetMean() - 1) < 1e-12
 
-# 4. messages
+# 4. displacements: what they say is taken back where the pose has put the landmarks
+def displacement(x, y, z):
+    image = vtkImageData()
+    image.SetDimensions(24, 24, 24)  # so wide that its border, where it fades, is far
+    image.SetOrigin(-345.0, -345.0, -345.0)
+    image.SetSpacing(30.0, 30.0, 30.0)
+    array = numpy_to_vtk(np.tile([float(x), float(y), float(z)], (24**3, 1)), deep=True)
+    array.SetName("Displacement")
+    image.GetPointData().AddArray(array)
+    return image
+
+
+bent = vtkUltrasoundLandmarkError()
+for file in (first, second):
+    bent.AddLandmarkFile(file)
+bent.SetPose(1, shifted(1, -2, 2))
+bent.AddDisplacementData(displacement(0, 0, 0))
+bent.AddDisplacementData(displacement(1, -2, 2))
+bent.Update()
+assert bent.GetNumberOfPairs() == 3 and bent.GetMax() < 1e-4, bent.GetMax()
+bent.AddDisplacementData(displacement(0, 0, 0))
+assert "3 displacements came in for 2 volumes" in errors_of(bent)
+bent.RemoveAllDisplacements()
+bent.Update()
+assert abs(bent.GetMean() - 3) < 1e-12
+
+# 5. messages
 filter.AddLandmark(2, "apex", 0, 0, 0)
 assert "landmarks of volume 2, counted from 0, and there are 2 volumes" in errors_of(filter)
 assert filter.GetNumberOfPairs() == 0 and filter.GetOutput().GetNumberOfPoints() == 0
