@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Blocks of tissue, and probes above and in their skin, for tests of what a probe presses."""
+import unittest
+
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 from vtkmodules.vtkFiltersSources import vtkCubeSource, vtkSphereSource
@@ -54,3 +57,17 @@ def probe(depth, x=0.0):
     add_field(data, acquisition.ProbeGeometryName(), [57.0, 25.0, 30.0, 12.0, 0.0, 100.0])
     add_field(data, acquisition.ProbeToWorldName(), pose.ravel())
     return data
+
+
+class Refusing(unittest.TestCase):
+    def refused(self, filter, *words):
+        errors = []
+        observe = lambda caller, event, text="": errors.append(text)
+        observe.CallDataType = "string0"
+        for one in (filter, filter.GetExecutive()):
+            one.AddObserver(vtkCommand.ErrorEvent, observe)
+        filter.Update()
+        self.assertTrue(errors, "nothing was refused")
+        for word in words:
+            self.assertIn(word, errors[0])
+        self.assertEqual(filter.GetOutput().GetNumberOfPoints(), 0)

@@ -168,8 +168,11 @@ void Spread(Session& session, const SynthesisScene& scene, vtkPolyData* rest, vt
   session.Update(filter, "gel", name);
   spread.tissue->ShallowCopy(filter->GetOutput(0));
   spread.face->ShallowCopy(filter->GetOutput(1));
+  // Gel is one body more, the first.
   const TissueSurface all = vtkUltrasoundTissue::Of(spread.tissue);
-  vtkUltrasoundTissue::Set(spread.gel, all.Only(all.bodies.front().name == "gel" ? 0 : -1));
+  const auto bodies = static_cast<std::size_t>(
+      rest->GetFieldData()->GetAbstractArray(vtkUltrasoundTissue::BodyMaterialName())->GetNumberOfTuples());
+  vtkUltrasoundTissue::Set(spread.gel, all.Only(all.bodies.size() > bodies ? 0 : -1));
   const auto number = [&spread](const char* field) { return spread.face->GetFieldData()->GetArray(field)->GetComponent(0, 0); };
   spread.told = {{"coupled", number(vtkUltrasoundGel::CoupledName())}, {"volume_mm3", number(vtkUltrasoundGel::GelVolumeName())}};
 }

@@ -4,6 +4,7 @@
 // solver; a point lies in gel where they fill three tenths of what solids leave free there, so that a thin film counts as
 // much as a thick one, cracks between particles are no air, and gel reaches a little way into the solids that it touches.
 #include "GelCoat.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
@@ -29,7 +30,7 @@ public:
   Cap(const ProbeShape& shape, const GelCoatParameters& p)
     : shape_(shape), middle_(0.5 * (shape.Low() + shape.High())), radii_(0.5 * p.coverage * (shape.High() - shape.Low()))
   {
-    height_ = 2.0 * 1000.0 * p.amountMl / (3.14159265358979323846 * radii_.prod());
+    height_ = 2.0 * 1000.0 * p.amountMl / (Pi * radii_.prod());
     if (height_ > highestCapMm)
       throw Error(Error::Kind::InvalidParameter, "AmountMl: " + NumberText(p.amountMl) + " ml would stand " +
                                                      NumberText(std::round(height_)) + " mm high on the face; no more than " +
@@ -75,7 +76,10 @@ double WayFrom(const TissueSurface& tissue, const PlacedProbe& probe, const Prob
         box.max().y() > shape.Low().y())
       nearest = std::min(nearest, box.min().z());
   }
-  return std::min(before - nearest, longestWayMm);
+  if (before - nearest > longestWayMm)
+    throw Error(Error::Kind::NotPossible, "the probe has no clear way to its first pose: tissue lies " +
+                                              NumberText(std::round(-nearest)) + " mm behind the middle of its face");
+  return before - nearest;
 }
 
 ImageGeometry GridOf(const GelDomain& domain, double spacing)
@@ -216,14 +220,15 @@ std::vector<Leg> LegsOf(const std::vector<Pose>& way, const ProbeGeometry& geome
   return legs;
 }
 
-GelReport Run(GelSolver& solver, const std::vector<Leg>& legs, const GelShape& head, const Progress& progress)
+GelReport Run(GelSolver& solver, const std::vector<Leg>& legs, const std::shared_ptr<const GelShape>& head,
+              const Progress& progress)
 {
   GelReport sum;
   double all = 0.0, passed = 0.0;
   for (const Leg& leg : legs)
     all += leg.seconds;
   GelCollider skin, face;
-  face.shape = std::shared_ptr<const GelShape>(&head, [](const GelShape*) {}); // the caller keeps it
+  face.shape = head;
   for (const Leg& leg : legs) {
     if (solver.Particles().empty())
       break;
@@ -344,7 +349,8 @@ GelCoat SpreadGel(const TissueSurface& rest, const TissueSurface* pressed, const
   const Pose fromStart = way.front().inverse();
   solver.Fill([&](const Vector3d& point) { return cap.Holds(fromStart * point); });
   GelCoat coat;
-  coat.report = Run(solver, LegsOf(way, geometry, headBox, skin, parameters), GelProbe(shape), progress.Part(0.06, 0.97));
+  coat.report = Run(solver, LegsOf(way, geometry, headBox, skin, parameters), std::make_shared<const GelProbe>(shape),
+                    progress.Part(0.06, 0.97));
   coat.volumeMm3 = solver.Totals().volume;
 
   // What came of it.

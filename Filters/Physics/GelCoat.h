@@ -43,7 +43,8 @@ struct GelCoat {
 /// Puts a cap of gel on the face of a probe that is clear of tissue, moves it along its axis to the first pose and on from each
 /// to the next, and lets the gel flow. \param rest tissue before the probe came \param pressed the same with the probe at its
 /// last pose; none: it does not yield. On the way it yields evenly from when the probe first meets it. \throws
-/// Error(InvalidParameter), Error(BadInput) for tissue that is none, Error(NotPossible) where the gel gets unstable,
+/// Error(InvalidParameter), Error(BadInput) for tissue that is none, Error(NotPossible) where the gel gets unstable
+/// and where the probe has no clear way to its first pose,
 /// Error(TooLarge), Error(Cancelled)
 GelCoat SpreadGel(const TissueSurface& rest, const TissueSurface* pressed, const std::vector<PlacedProbe>& probes,
                   const ProbeHead& head, const GelMaterial& material, const GelCoatParameters& parameters,

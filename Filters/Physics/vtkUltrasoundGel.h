@@ -8,7 +8,7 @@
  * probe comes along its axis, out of clear space, to the first of these poses, and goes on from each to the next. Input 2,
  * optional: the same tissue when the probe has come to the last pose (vtkUltrasoundTissuePress, vtkUltrasoundDeformGeometry).
  *
- * Output 0: the tissue as it is then, in air, and with gel as its first body, if any is left that touches something or not: what
+ * Output 0: the tissue as it is then, in air, and with gel, if there is any, as its first body: what
  * vtkUltrasoundSynthesizer takes. Where gel touches skin or the head, its surface lies a little within them.
  *
  * Output 1: the face of the probe, a rectangle of quadrilaterals with these point arrays.
@@ -22,10 +22,10 @@
  * | field data | values                                                                                     |
  * | ---------- | ------------------------------------------------------------------------------------------ |
  * | Coupled    | double: the share of the face that couples                                                  |
- * | GelVolume  | double: of the gel that is left, mm^3; less than what was put on by what is compressed      |
+ * | GelVolume  | double: of the gel that is left, mm^3; some percent beside what was put on, as gel yields        |
  *
  * Fails, with a message, for what is no tissue, for probes without geometry or of several kinds, for more gel than a face holds,
- * and when gel becomes unstable. Under MPI each rank computes the whole.
+ * where the probe has no clear way to its first pose, and when gel becomes unstable. Under MPI each rank computes the whole.
  *
  * @sa echorama::SpreadGel, echorama::GelSolver
  */

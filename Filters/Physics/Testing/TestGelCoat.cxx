@@ -149,6 +149,9 @@ TEST(GelCoat, RefusesWhatItCannotPutOn)
   PlacedProbe wider = LinearProbe();
   wider.geometry.fanWidth = 35.0;
   EXPECT_THROW(SpreadGel(skin, nullptr, {LinearProbe(), wider}, {}, {}, Amount(1.0)), Error);
+  TissueSurface behind = Block(3.0);
+  behind.Append(Block(-400.0));
+  EXPECT_THROW(SpreadGel(behind, nullptr, {LinearProbe()}, {}, {}, Amount(1.0)), Error) << "no clear way";
   const Progress stop([](double fraction) { return fraction < 0.3; });
   EXPECT_THROW(SpreadGel(skin, nullptr, {LinearProbe()}, {}, {}, Amount(1.0), stop), Error);
 }

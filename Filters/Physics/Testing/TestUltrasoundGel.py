@@ -6,13 +6,12 @@ import unittest
 
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkMassProperties, vtkThreshold
 from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
 
 import echorama
-from pressing import TOP, block, probe, tissue
+from pressing import TOP, Refusing, block, probe, tissue
 
 
 def gel(body, *probes, **properties):
@@ -69,19 +68,7 @@ def scan(body, at):
     return filter.GetOutput(1)
 
 
-class Gel(unittest.TestCase):
-    def refused(self, filter, *words):
-        errors = []
-        observe = lambda caller, event, text="": errors.append(text)
-        observe.CallDataType = "string0"
-        for one in (filter, filter.GetExecutive()):
-            one.AddObserver(vtkCommand.ErrorEvent, observe)
-        filter.Update()
-        self.assertTrue(errors, "nothing was refused")
-        for word in words:
-            self.assertIn(word, errors[0])
-        self.assertEqual(filter.GetOutput(0).GetNumberOfPoints(), 0)
-
+class Gel(Refusing):
     def test_gel_is_a_closed_body_of_its_volume(self):
         body = tissue(muscle=block())
         coated, face = run(body, probe(-4.0), AmountMl=3.0)

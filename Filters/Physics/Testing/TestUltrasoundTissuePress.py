@@ -6,12 +6,11 @@ import unittest
 
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 import echorama
-from pressing import BACK, TOP, ball, block, probe, tissue
+from pressing import BACK, TOP, Refusing, ball, block, probe, tissue
 
 
 def press(body, *probes, **properties):
@@ -43,19 +42,7 @@ def field(image, name):
     return vtk_to_numpy(image.GetFieldData().GetArray(name)).ravel()
 
 
-class Press(unittest.TestCase):
-    def refused(self, filter, *words):
-        errors = []
-        observe = lambda caller, event, text="": errors.append(text)
-        observe.CallDataType = "string0"
-        for one in (filter, filter.GetExecutive()):
-            one.AddObserver(vtkCommand.ErrorEvent, observe)
-        filter.Update()
-        self.assertTrue(errors, "nothing was refused")
-        for word in words:
-            self.assertIn(word, errors[0])
-        self.assertEqual(filter.GetOutput().GetNumberOfPoints(), 0)
-
+class Press(Refusing):
     def test_the_skin_follows_the_face(self):
         body = tissue(muscle=block())
         filter = press(body, probe(6.0))
