@@ -5,7 +5,6 @@
 #include "Core/Geometry/ImageGeometry.h"
 #include "Filters/Physics/GelSolver.h"
 #include "Filters/Physics/ProbeShape.h"
-#include "Filters/Tissue/TissueSurface.h"
 #include <vector>
 
 namespace echorama {
@@ -28,26 +27,33 @@ struct GelBeam {
   bool couples = false;                            ///< it does, and there is no air before
 };
 
-/// Gel after all motion.
+/// Gel at one time of a motion.
 struct GelCoat {
-  ImageGeometry grid;        ///< along the axes of the probe's last pose
+  ImageGeometry grid;        ///< along the axes of the probe's first pose, around all gel
   std::vector<float> level;  ///< positive in gel, x fastest; solids that gel touches have a little of it on their inside
   std::vector<GelBeam> face; ///< of the probe, the fan fastest
   int beams = 0;             ///< along the fan, and along the sweep (1 where there is none)
   int planes = 0;
   double coupled = 0.0;   ///< share of the beams that couple
-  double volumeMm3 = 0.0; ///< of the gel that is left
-  GelReport report;
+  double volumeMm3 = 0.0; ///< of the gel that is left, as it is compressed
+  double putOnMm3 = 0.0;  ///< at first, without pressure
+  double leftMm3 = 0.0;   ///< of that: what is left
+  double goneMm3 = 0.0;   ///< and what left the space that is computed
+  double seconds = 0.0;   ///< simulated
+  GelReport report;       ///< of all that
 };
 
-/// Puts a cap of gel on the face of a probe that is clear of tissue, moves it along its axis to the first pose and on from each
-/// to the next, and lets the gel flow. \param rest tissue before the probe came \param pressed the same with the probe at its
-/// last pose; none: it does not yield. On the way it yields evenly from when the probe first meets it. \throws
-/// Error(InvalidParameter), Error(BadInput) for tissue that is none, Error(NotPossible) where the gel gets unstable
-/// and where the probe has no clear way to its first pose,
-/// Error(TooLarge), Error(Cancelled)
-GelCoat SpreadGel(const TissueSurface& rest, const TissueSurface* pressed, const std::vector<PlacedProbe>& probes,
-                  const ProbeHead& head, const GelMaterial& material, const GelCoatParameters& parameters,
-                  const Progress& progress = {});
+/// Gel, solids and a face in the frame of a motion.
+struct GelSight {
+  const GelSolver& solver;
+  const GelShape& skin;
+  const ProbeShape& head;
+  const ProbeGeometry& geometry;
+  Pose headToFrame;
+  Eigen::AlignedBox3d reach; ///< of beams, in the probe's frame
+};
+
+/// The surface of the gel and what lies before the face; grid and beams in the frame of the motion. The rest is left as it is.
+GelCoat CoatOf(const GelSight& sight);
 
 } // namespace echorama

@@ -35,12 +35,14 @@ GelDistanceGrid::GelDistanceGrid(const ImageGeometry& geometry, std::vector<floa
 {
 }
 
-GelDistanceGrid::GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> atBegin, std::vector<float> atEnd)
-  : geometry_(geometry), begin_(std::move(atBegin)), end_(std::move(atEnd))
+GelDistanceGrid::GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> atBegin, std::vector<float> atEnd,
+                                 std::vector<Eigen::Vector3f> shifts)
+  : geometry_(geometry), begin_(std::move(atBegin)), end_(std::move(atEnd)), shifts_(std::move(shifts))
 {
   geometry_.Check("the grid of distances");
   toIndex_ = geometry_.WorldToIndex();
-  if (begin_.size() != geometry_.VoxelCount() || (!end_.empty() && end_.size() != begin_.size()))
+  if (begin_.size() != geometry_.VoxelCount() || (!end_.empty() && end_.size() != begin_.size()) ||
+      (!shifts_.empty() && shifts_.size() != begin_.size()))
     throw Error(Error::Kind::BadInput, "the grid of distances has " + std::to_string(geometry_.VoxelCount()) + " points, but " +
                                            std::to_string(begin_.size()) + " distances");
   for (const std::vector<float>* values : {&begin_, &end_})
@@ -48,10 +50,10 @@ GelDistanceGrid::GelDistanceGrid(const ImageGeometry& geometry, std::vector<floa
       throw Error(Error::Kind::BadInput, "the grid of distances: a distance is not finite");
 }
 
-double GelDistanceGrid::Interpolate(const std::vector<float>& values, const Eigen::Vector3d& point) const
+GelDistanceGrid::Corners GelDistanceGrid::CornersOf(const Eigen::Vector3d& point) const
 {
   const Eigen::Vector3d index = toIndex_ * point;
-  std::size_t low[3], step[3];
+  std::size_t base = 0, step[3];
   double part[3];
   std::size_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -59,12 +61,11 @@ double GelDistanceGrid::Interpolate(const std::vector<float>& values, const Eige
     const double at = std::min(std::max(index[axis], 0.0), static_cast<double>(last));
     const int cell = std::min(static_cast<int>(at), std::max(last - 1, 0));
     part[axis] = at - cell;
-    low[axis] = static_cast<std::size_t>(cell) * stride;
+    base += static_cast<std::size_t>(cell) * stride;
     step[axis] = last > 0 ? stride : 0;
     stride *= static_cast<std::size_t>(last + 1);
   }
-  const std::size_t base = low[0] + low[1] + low[2];
-  double sum = 0.0;
+  Corners corners{};
   for (unsigned corner = 0; corner < 8; ++corner) {
     double weight = 1.0;
     std::size_t at = base;
@@ -73,20 +74,30 @@ double GelDistanceGrid::Interpolate(const std::vector<float>& values, const Eige
       weight *= upper ? part[axis] : 1.0 - part[axis];
       at += upper ? step[axis] : 0;
     }
-    sum += weight * static_cast<double>(values[at]);
+    corners.at[corner] = at;
+    corners.weight[corner] = weight;
   }
-  return sum;
+  return corners;
 }
 
 double GelDistanceGrid::Distance(const Eigen::Vector3d& point, double when) const
 {
-  const double first = Interpolate(begin_, point);
-  return end_.empty() ? first : first + when * (Interpolate(end_, point) - first);
+  const Corners corners = CornersOf(point);
+  const double first = ValueAt(begin_, corners);
+  return end_.empty() ? first : first + when * (ValueAt(end_, corners) - first);
 }
 
-double GelDistanceGrid::Change(const Eigen::Vector3d& point) const
+// Along the normal distances have the last word, or gel would be pressed into the solid, or torn off.
+Eigen::Vector3d GelDistanceGrid::Shift(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const
 {
-  return end_.empty() ? 0.0 : Interpolate(end_, point) - Interpolate(begin_, point);
+  if (end_.empty())
+    return Eigen::Vector3d::Zero();
+  const Corners corners = CornersOf(point);
+  Eigen::Vector3d along = Eigen::Vector3d::Zero();
+  if (!shifts_.empty())
+    for (std::size_t n = 0; n < 8; ++n)
+      along += corners.weight[n] * shifts_[corners.at[n]].cast<double>();
+  return along + (ValueAt(begin_, corners) - ValueAt(end_, corners) - along.dot(normal)) * normal;
 }
 
 ParameterList Describe(GelContact& p)
@@ -125,41 +136,36 @@ void GelColliders::SetStep(double from, double to)
   }
 }
 
-bool GelColliders::Reaches(std::size_t n, const Eigen::Vector3d& centre, double radius) const
+double GelColliders::Distance(std::size_t n, const Eigen::Vector3d& point) const
 {
-  return colliders_[n].shape->Distance(toShape_[n] * centre, when_) <= radius;
+  return colliders_[n].shape->Distance(toShape_[n] * point, when_);
 }
 
-Eigen::Vector3d GelColliders::ToSurface(std::size_t n, const Eigen::Vector3d& point) const
+Eigen::Vector3d GelColliders::Normal(std::size_t n, const Eigen::Vector3d& point) const
 {
-  const GelShape& shape = *colliders_[n].shape;
-  const Eigen::Vector3d inShape = toShape_[n] * point;
-  return toShape_[n].linear().transpose() * (-shape.Distance(inShape, when_) * shape.Normal(inShape, when_));
+  return toShape_[n].linear().transpose() * colliders_[n].shape->Normal(toShape_[n] * point, when_);
 }
 
-bool GelColliders::Collide(std::size_t n, const Eigen::Vector3d& point, Eigen::Vector3d& velocity) const
+Eigen::Vector3d GelColliders::Velocity(std::size_t n, const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const
 {
-  const GelCollider& collider = colliders_[n];
-  const Eigen::Vector3d inShape = toShape_[n] * point;
-  if (collider.shape->Distance(inShape, when_) > 0.0)
-    return false;
-  Eigen::Vector3d solid = (motion_[n] * point - point) / step_;
-  const Eigen::Vector3d normal = toShape_[n].linear().transpose() * collider.shape->Normal(inShape, when_);
-  solid -= collider.shape->Change(inShape) / seconds_ * normal;
-  if (collider.contact.stick) {
-    velocity = solid;
-    return true;
-  }
+  const Pose& toShape = toShape_[n];
+  const Eigen::Vector3d shift = colliders_[n].shape->Shift(toShape * point, toShape.linear() * normal);
+  return (motion_[n] * point - point) / step_ + toShape.linear().transpose() * shift / seconds_;
+}
+
+Eigen::Vector3d GelColliders::Collide(std::size_t n, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity) const
+{
+  const GelContact& contact = colliders_[n].contact;
+  const Eigen::Vector3d normal = Normal(n, point), solid = Velocity(n, point, normal);
+  if (contact.stick)
+    return solid;
   const Eigen::Vector3d relative = velocity - solid;
   const double into = relative.dot(normal);
   if (into >= 0.0)
-    return true;
+    return velocity;
   const Eigen::Vector3d along = relative - into * normal;
-  const double slide = along.norm(), held = -collider.contact.friction * into;
-  velocity = solid;
-  if (slide > held)
-    velocity += (1.0 - held / slide) * along;
-  return true;
+  const double slide = along.norm(), held = -contact.friction * into;
+  return slide > held ? Eigen::Vector3d(solid + (1.0 - held / slide) * along) : solid;
 }
 
 } // namespace echorama

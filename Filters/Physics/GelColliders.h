@@ -3,6 +3,7 @@
 #include "Core/Base/Parameters.h"
 #include "Core/Geometry/ImageGeometry.h"
 #include "Filters/Physics/ProbeShape.h"
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -16,8 +17,11 @@ public:
   virtual double Distance(const Eigen::Vector3d& point, double when) const = 0;
   /// Unit vector that points out of the solid.
   virtual Eigen::Vector3d Normal(const Eigen::Vector3d& point, double when) const;
-  /// How fast Distance changes at a point during a motion, mm: the value at its end less that at its begin.
-  virtual double Change(const Eigen::Vector3d& /*point*/) const { return 0.0; }
+  /// How far what the solid is made of goes during a motion, mm, near a point whose Normal is known.
+  virtual Eigen::Vector3d Shift(const Eigen::Vector3d& /*point*/, const Eigen::Vector3d& /*normal*/) const
+  {
+    return Eigen::Vector3d::Zero();
+  }
 };
 
 /// What lies below z = 0.
@@ -43,16 +47,29 @@ class GelDistanceGrid : public GelShape {
 public:
   /// A solid at rest. \throws Error(BadInput) when sizes differ or a distance is not finite
   GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> distances);
-  /// One that deforms during a motion.
-  GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> atBegin, std::vector<float> atEnd);
+  /// One that deforms during a motion. \a shifts: how far it goes; none: no further than distances tell, along its normals.
+  GelDistanceGrid(const ImageGeometry& geometry, std::vector<float> atBegin, std::vector<float> atEnd,
+                  std::vector<Eigen::Vector3f> shifts = {});
   double Distance(const Eigen::Vector3d& point, double when) const override;
-  double Change(const Eigen::Vector3d& point) const override;
+  Eigen::Vector3d Shift(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const override;
 
 private:
-  double Interpolate(const std::vector<float>& values, const Eigen::Vector3d& point) const;
+  struct Corners { // of the cell that holds a point
+    std::array<std::size_t, 8> at;
+    std::array<double, 8> weight;
+  };
+  Corners CornersOf(const Eigen::Vector3d& point) const;
+  static double ValueAt(const std::vector<float>& values, const Corners& corners)
+  {
+    double sum = 0.0;
+    for (std::size_t n = 0; n < 8; ++n)
+      sum += corners.weight[n] * static_cast<double>(values[corners.at[n]]);
+    return sum;
+  }
   ImageGeometry geometry_;
   Eigen::Affine3d toIndex_;
   std::vector<float> begin_, end_;
+  std::vector<Eigen::Vector3f> shifts_;
 };
 
 /// What happens where gel touches a solid.
@@ -78,13 +95,15 @@ public:
   /// The step from \a from to \a to, in parts of the motion.
   void SetStep(double from, double to);
   std::size_t Size() const { return colliders_.size(); }
-  /// Whether collider \a n has anything within \a radius of \a centre.
-  bool Reaches(std::size_t n, const Eigen::Vector3d& centre, double radius) const;
-  /// What collider \a n makes of the velocity of gel at \a point. \returns whether the point lies in the solid.
-  bool Collide(std::size_t n, const Eigen::Vector3d& point, Eigen::Vector3d& velocity) const;
   bool Sticks(std::size_t n) const { return colliders_[n].contact.stick; }
-  /// From a point in the solid the way to its surface, mm.
-  Eigen::Vector3d ToSurface(std::size_t n, const Eigen::Vector3d& point) const;
+  /// mm from collider \a n, negative inside.
+  double Distance(std::size_t n, const Eigen::Vector3d& point) const;
+  /// Unit vector that points out of it.
+  Eigen::Vector3d Normal(std::size_t n, const Eigen::Vector3d& point) const;
+  /// mm/s, of what it is made of. \param normal Normal() there
+  Eigen::Vector3d Velocity(std::size_t n, const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
+  /// What contact with collider \a n leaves of the velocity of gel in it.
+  Eigen::Vector3d Collide(std::size_t n, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity) const;
 
 private:
   std::vector<GelCollider> colliders_;

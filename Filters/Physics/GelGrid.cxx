@@ -28,6 +28,9 @@ void GelDomain::Check() const
     const std::string name = std::string("along ") + "xyz"[axis];
     if (cells[axis] < GelGrid::BlockSize)
       fail("it has " + std::to_string(cells[axis]) + " cells " + name + "; it needs 4");
+    if (from[axis] % GelGrid::BlockSize != 0 || (periodic[axis] && from[axis] != 0))
+      fail("its first cell " + name + " is " + std::to_string(from[axis]) +
+           "; it must be a multiple of 4, and 0 along a periodic axis");
     if (periodic[axis] && cells[axis] % GelGrid::BlockSize != 0)
       fail("it has " + std::to_string(cells[axis]) + " cells " + name + "; along a periodic axis it must be a multiple of 4");
     blocks *= std::ceil(cells[axis] / static_cast<double>(GelGrid::BlockSize));
@@ -36,6 +39,26 @@ void GelDomain::Check() const
     throw Error(Error::Kind::TooLarge,
                 "the domain of the gel has " + NumberText(blocks) +
                     " blocks of 4 x 4 x 4 cells; it may have 16777216. Make it smaller, or its cells larger");
+}
+
+GelDomain GelDomain::With(const Eigen::AlignedBox3d& box) const
+{
+  GelDomain domain = *this;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (periodic[axis] || box.isEmpty())
+      continue;
+    const int n = static_cast<int>(axis);
+    const double block = GelGrid::BlockSize * cellMm;
+    const double low = std::floor((box.min()[n] - origin[n]) / block), high = std::ceil((box.max()[n] - origin[n]) / block);
+    if (!(std::max(std::abs(low), std::abs(high)) < mostGelBlocks))
+      throw Error(Error::Kind::TooLarge,
+                  "the domain of the gel would reach further than it can be counted; make its cells larger");
+    const int first = std::min(from[axis], static_cast<int>(low) * GelGrid::BlockSize);
+    const int end = std::max(from[axis] + cells[axis], static_cast<int>(high) * GelGrid::BlockSize);
+    domain.from[axis] = first;
+    domain.cells[axis] = end - first;
+  }
+  return domain;
 }
 
 GelGrid::GelGrid(const GelDomain& domain) : domain_(domain)
@@ -65,7 +88,7 @@ std::int32_t GelGrid::BlockOf(double* position) const
       at = std::min(std::max(at, 0.5), std::nextafter(cells + 0.5, 0.0));
     }
     const int highest = domain_.periodic[axis] ? cells - 1 : cells - 3;
-    const double lowest = std::floor(at - 0.5);
+    const double lowest = std::floor(at - 0.5) - domain_.from[axis];
     if (!(lowest >= 0.0 && lowest <= highest)) // also what is not finite
       return -1;
     block[axis] = static_cast<int>(lowest) / BlockSize;
@@ -76,7 +99,7 @@ std::int32_t GelGrid::BlockOf(double* position) const
 std::array<int, 3> GelGrid::CornerOfBlock(std::int32_t block) const
 {
   const int x = block % size_[0], y = block / size_[0] % size_[1], z = block / size_[0] / size_[1];
-  return {x * BlockSize, y * BlockSize, z * BlockSize};
+  return {domain_.from[0] + x * BlockSize, domain_.from[1] + y * BlockSize, domain_.from[2] + z * BlockSize};
 }
 
 std::int32_t GelGrid::Beside(std::int32_t block, const std::array<int, 3>& by) const
@@ -152,7 +175,7 @@ GelNode* GelGrid::NodeAt(const std::array<int, 3>& place)
   std::size_t block = 0, node = 0;
   for (std::size_t axis = 3; axis-- > 0;) {
     const int cells = size_[axis] * BlockSize;
-    const int at = domain_.periodic[axis] ? (place[axis] % cells + cells) % cells : place[axis];
+    const int at = domain_.periodic[axis] ? (place[axis] % cells + cells) % cells : place[axis] - domain_.from[axis];
     if (at < 0 || at >= cells)
       return nullptr;
     block = block * static_cast<std::size_t>(size_[axis]) + static_cast<std::size_t>(at / BlockSize);
@@ -197,6 +220,25 @@ void GelGrid::FillTile(int home)
           std::copy_n(NodesOf(block) + (k * BlockSize + j) * BlockSize, x ? 2 : 4, to);
       }
   }
+}
+
+bool GelGrid::FillTileOf(int home, const std::vector<double>& values, double limit, double* tile) const
+{
+  double least = limit;
+  for (int n = 0; n < 8; ++n) {
+    const std::int32_t block = nodesAround_[static_cast<std::size_t>(home) * 8 + static_cast<std::size_t>(n)];
+    const int x = n & 1, y = n >> 1 & 1, z = n >> 2;
+    for (int k = 0; k < (z ? 2 : 4); ++k)
+      for (int j = 0; j < (y ? 2 : 4); ++j) {
+        double* to = tile + ((k + 4 * z) * TileSize + j + 4 * y) * TileSize + 4 * x;
+        const double* from = block < 0 ? nullptr : values.data() + block * BlockNodes + (k * BlockSize + j) * BlockSize;
+        for (int i = 0; i < (x ? 2 : 4); ++i) {
+          to[i] = from ? from[i] : limit;
+          least = std::min(least, to[i]);
+        }
+      }
+  }
+  return least < limit;
 }
 
 std::vector<GelParticle> GelGrid::InOrder(const std::vector<GelParticle>& particles) const

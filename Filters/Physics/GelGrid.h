@@ -4,6 +4,7 @@
 #include "Filters/Physics/GelMaterial.h"
 #include <array>
 #include <cstdint>
+#include <Eigen/Geometry>
 #include <memory>
 #include <vector>
 
@@ -11,12 +12,15 @@ namespace echorama {
 
 /// Where gel may be: a box of cubic cells. Gel that leaves it is gone, except across a periodic face.
 struct GelDomain {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero(); ///< mm, the lowest corner
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(); ///< mm, the lowest corner of cell 0
   std::array<int, 3> cells{0, 0, 0};                ///< a multiple of 4 along periodic axes
+  std::array<int, 3> from{0, 0, 0};                 ///< the lowest cell: a multiple of 4, 0 along periodic axes
   double cellMm = 1.0;
   std::array<bool, 3> periodic{false, false, false};
   /// \throws Error(InvalidParameter), Error(TooLarge) beyond some 16 million blocks of 4^3 cells
   void Check() const;
+  /// This one and, by whole blocks along axes that are not periodic, what more a box needs. Cells stay where they are.
+  GelDomain With(const Eigen::AlignedBox3d& box) const;
 };
 
 /// A piece of gel. Its size is that of three cache lines.
@@ -75,6 +79,8 @@ public:
   void SumTiles(int block);
   /// The other way: TileOf(home) is what its nodes hold.
   void FillTile(int home);
+  /// The same of other values of nodes, GelGrid::BlockNodes for each block. \returns whether any is below \a limit
+  bool FillTileOf(int home, const std::vector<double>& values, double limit, double* tile) const;
   ///@}
 
   /// The particles in the order in which their blocks lie in memory; those that are gone are left out.

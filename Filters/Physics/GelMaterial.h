@@ -12,7 +12,7 @@ struct GelMaterial {
   double density = 1000.0;     ///< kg/m^3
   double shearModulus = 400.0; ///< Pa
   /// Pa. Far below water's, or steps would be nanoseconds: some hundred times the pressures that occur.
-  double bulkModulus = 20000.0;
+  double bulkModulus = 60000.0;
   double yieldStress = 60.0; ///< Pa, in shear
   double consistency = 30.0; ///< Pa s^exponent
   double exponent = 0.4;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Filters/Physics/GelCoat.h"
+#include "Filters/Tissue/TissueSurface.h"
 #include <memory>
+#include <vector>
 
 namespace echorama {
 
@@ -40,5 +42,12 @@ private:
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// The short way: gel on the face of a probe that comes to the first pose and goes on from each to the next, where it settles.
+/// \param rest tissue before the probe came \param pressed the same with the probe at its last pose; none: it does not yield
+/// \throws what GelMotion throws, and Error(BadInput) for poses of several probes
+GelCoat SpreadGel(const TissueSurface& rest, const TissueSurface* pressed, const std::vector<PlacedProbe>& probes,
+                  const ProbeHead& head, const GelMaterial& material, const GelCoatParameters& parameters,
+                  const Progress& progress = {});
 
 } // namespace echorama

@@ -16,6 +16,7 @@ constexpr std::ptrdiff_t gelBlocksAtOnce = 4;
 constexpr std::int64_t gelStepsUntilOrder = 64;
 constexpr double inSolid = -1.0; // the mass of a node that a solid moves
 constexpr double mirrored = 1.6; // cells: deeper nodes touch no gel outside
+constexpr double farCells = 2.0; // from a solid: the nodes of a particle that it holds are nearer
 
 GelTransferFrame FrameOf(const GelGrid& grid, int home, double seconds)
 {
@@ -50,6 +51,20 @@ GelSolver::Extremes& GelSolver::Extremes::operator+=(const Extremes& other)
   return *this;
 }
 
+GelReport& GelReport::operator+=(const GelReport& later)
+{
+  if (later.steps > 0) {
+    shortestStep = steps == 0 ? later.shortestStep : std::min(shortestStep, later.shortestStep);
+    largestSpeed = later.largestSpeed;
+  }
+  steps += later.steps;
+  particleSteps += later.particleSteps;
+  gone += later.gone;
+  goneMm3 += later.goneMm3;
+  torn += later.torn;
+  return *this;
+}
+
 GelSolver::GelSolver(const GelDomain& domain, const GelMaterial& material, const GelStepping& stepping)
   : law_(material), stepping_(stepping), grid_(domain)
 {
@@ -62,9 +77,10 @@ void GelSolver::Fill(const std::function<bool(const Eigen::Vector3d&)>& inside, 
     CheckRange(std::string("particles per cell along ") + "xyz"[axis], perCell[axis], 1, 8);
   const GelDomain& domain = grid_.Domain();
   const Eigen::Array3d apart(domain.cellMm / perCell[0], domain.cellMm / perCell[1], domain.cellMm / perCell[2]);
-  for (int k = 0; k < domain.cells[2] * perCell[2]; ++k)
-    for (int j = 0; j < domain.cells[1] * perCell[1]; ++j)
-      for (int i = 0; i < domain.cells[0] * perCell[0]; ++i) {
+  const auto& [x, y, z] = domain.from;
+  for (int k = z * perCell[2]; k < (z + domain.cells[2]) * perCell[2]; ++k)
+    for (int j = y * perCell[1]; j < (y + domain.cells[1]) * perCell[1]; ++j)
+      for (int i = x * perCell[0]; i < (x + domain.cells[0]) * perCell[0]; ++i) {
         const Eigen::Vector3d at = domain.origin.array() + (Eigen::Array3d(i, j, k) + 0.5) * apart;
         if (!inside(at))
           continue;
@@ -77,6 +93,16 @@ void GelSolver::Fill(const std::function<bool(const Eigen::Vector3d&)>& inside, 
         particle.id = made_++;
         particles_.push_back(particle);
       }
+}
+
+void GelSolver::Include(const Eigen::AlignedBox3d& box)
+{
+  const GelDomain domain = Domain().With(box);
+  if (domain.from == Domain().from && domain.cells == Domain().cells)
+    return;
+  grid_ = GelGrid(domain);
+  for (GelParticle& particle : particles_)
+    particle.block = grid_.BlockOf(particle.position);
 }
 
 void GelSolver::SetVelocity(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& velocity,
@@ -100,6 +126,7 @@ GelTotals GelSolver::Totals() const
     const double* C = particle.gradient;
     totals.mass += mass;
     totals.volume += particle.volume * particle.strain.J;
+    totals.restVolume += particle.volume;
     totals.momentum += mass * velocity;
     totals.angularMomentum += mass * (position.cross(velocity) + spread * Eigen::Vector3d(C[7] - C[5], C[2] - C[6], C[3] - C[1]));
   }
@@ -115,21 +142,24 @@ void GelSolver::Scatter(double seconds)
   });
 }
 
+// In the end nodes hold which part of their cell is filled in place of their mass.
 void GelSolver::MoveNodes(double seconds, const GelColliders& colliders)
 {
   const GelDomain& domain = grid_.Domain();
-  const double reach = 2.7 * domain.cellMm; // from the middle of a block to its outermost nodes: 1.5 sqrt(3) cells
+  const double cell = domain.cellMm, far = farCells * cell, reach = 2.6 * cell; // half of a block's diagonal
+  const double perFullCell = 1.0 / (law_.density * cell * cell * cell);
   const double gained[4] = {seconds * stepping_.gravity[0], seconds * stepping_.gravity[1], seconds * stepping_.gravity[2], 0.0};
   ghosts_.resize(static_cast<std::size_t>((grid_.Blocks() + gelBlocksAtOnce - 1) / gelBlocksAtOnce));
+  walls_.resize(static_cast<std::size_t>(grid_.Blocks()) * GelGrid::BlockNodes);
   const auto lowestOf = [&](int block) {
     const std::array<int, 3> corner = grid_.CornerOfNodes(block);
-    return Eigen::Vector3d(domain.origin + domain.cellMm * Eigen::Vector3d(corner[0], corner[1], corner[2]));
+    return Eigen::Vector3d(domain.origin + cell * Eigen::Vector3d(corner[0], corner[1], corner[2]));
   };
-  const auto placeOf = [&domain](const Eigen::Vector3d& lowest, int n) {
-    return Eigen::Vector3d(lowest + domain.cellMm * Eigen::Vector3d(n & 3, n >> 2 & 3, n >> 4));
+  const auto placeOf = [cell](const Eigen::Vector3d& lowest, int n) {
+    return Eigen::Vector3d(lowest + cell * Eigen::Vector3d(n & 3, n >> 2 & 3, n >> 4));
   };
-  const auto reaches = [&](std::size_t c, const Eigen::Vector3d& lowest) {
-    return colliders.Reaches(c, lowest + Eigen::Vector3d::Constant(1.5 * domain.cellMm), reach);
+  const auto distanceOfBlock = [&](std::size_t c, const Eigen::Vector3d& lowest) { // no distance falls faster than one moves
+    return colliders.Distance(c, lowest + Eigen::Vector3d::Constant(1.5 * cell)) - reach;
   };
   ParallelRanges(grid_.Blocks(), gelBlocksAtOnce, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     std::vector<Ghost>& ghosts = ghosts_[static_cast<std::size_t>(begin / gelBlocksAtOnce)];
@@ -137,28 +167,32 @@ void GelSolver::MoveNodes(double seconds, const GelColliders& colliders)
     for (int block = static_cast<int>(begin); block < end; ++block) {
       grid_.SumTiles(block);
       GelNode* nodes = grid_.NodesOf(block);
+      double* walls = walls_.data() + static_cast<std::size_t>(block) * GelGrid::BlockNodes;
+      std::fill(walls, walls + GelGrid::BlockNodes, far);
       const Eigen::Vector3d lowest = lowestOf(block);
       for (std::size_t c = 0; c < colliders.Size(); ++c) {
-        if (!colliders.Sticks(c) || !reaches(c, lowest))
+        if (!colliders.Sticks(c) || distanceOfBlock(c, lowest) > far)
           continue;
         for (int n = 0; n < GelGrid::BlockNodes; ++n) {
           const double* raw = nodes[n].value;
           if (!(raw[3] > 0.0))
             continue;
           const Eigen::Vector3d place = placeOf(lowest, n);
-          Ghost ghost{&nodes[n], {raw[0], raw[1], raw[2], raw[3]}, Eigen::Vector3d::Zero(), {}, {}};
-          if (!colliders.Collide(c, place, ghost.velocity))
+          const double distance = colliders.Distance(c, place);
+          walls[n] = std::min(walls[n], distance);
+          if (distance > 0.0)
             continue;
-          const Eigen::Vector3d toSurface = colliders.ToSurface(c, place);
-          const bool near = toSurface.norm() < mirrored * domain.cellMm;
-          const Eigen::Array3d mirror = ((place + 2.0 * toSurface - domain.origin) / domain.cellMm).array() + 1e-9;
+          const Eigen::Vector3d normal = colliders.Normal(c, place);
+          Ghost ghost{&nodes[n], {raw[0], raw[1], raw[2], raw[3]}, colliders.Velocity(c, place, normal), {}, {}, 0.0};
+          const Eigen::Array3d mirror = ((place - 2.0 * distance * normal - domain.origin) / cell).array() + 1e-9;
           const Eigen::Array3d floor = mirror.floor(), part = mirror - floor;
           for (int axis = 0; axis < 3; ++axis)
             ghost.place[static_cast<std::size_t>(axis)] = static_cast<int>(floor[axis]);
+          const bool isNear = distance > -mirrored * cell;
           for (unsigned corner = 0; corner < 8; ++corner)
-            ghost.weight[corner] = near ? (corner & 1 ? part[0] : 1.0 - part[0]) * (corner & 2 ? part[1] : 1.0 - part[1]) *
-                                              (corner & 4 ? part[2] : 1.0 - part[2])
-                                        : 0.0;
+            ghost.weight[corner] = isNear ? (corner & 1 ? part[0] : 1.0 - part[0]) * (corner & 2 ? part[1] : 1.0 - part[1]) *
+                                                (corner & 4 ? part[2] : 1.0 - part[2])
+                                          : 0.0;
           ghosts.push_back(ghost);
           nodes[n].value[3] = inSolid;
         }
@@ -171,34 +205,48 @@ void GelSolver::MoveNodes(double seconds, const GelColliders& colliders)
       GelNode* nodes = grid_.NodesOf(block);
       for (int n = 0; n < GelGrid::BlockNodes; ++n) {
         const double mass = nodes[n].value[3];
-        if (mass > 0.0)
+        if (mass > 0.0) {
           for (int axis = 0; axis < 3; ++axis)
             nodes[n].value[axis] = nodes[n].value[axis] / mass + gained[axis];
+          nodes[n].value[3] = mass * perFullCell;
+        }
       }
       const Eigen::Vector3d lowest = lowestOf(block);
       for (std::size_t c = 0; c < colliders.Size(); ++c) {
-        if (colliders.Sticks(c) || !reaches(c, lowest))
+        if (colliders.Sticks(c) || distanceOfBlock(c, lowest) > cell)
           continue;
-        for (int n = 0; n < GelGrid::BlockNodes; ++n)
-          if (nodes[n].value[3] > 0.0) {
-            Eigen::Vector3d velocity(nodes[n].value[0], nodes[n].value[1], nodes[n].value[2]);
-            if (colliders.Collide(c, placeOf(lowest, n), velocity))
-              Eigen::Map<Eigen::Vector3d>(nodes[n].value) = velocity;
-          }
+        for (int n = 0; n < GelGrid::BlockNodes; ++n) {
+          if (!(nodes[n].value[3] > 0.0))
+            continue;
+          const Eigen::Vector3d place = placeOf(lowest, n);
+          const double distance = colliders.Distance(c, place);
+          if (distance < cell)
+            nodes[n].value[3] = 1.0; // along this wall gel has no image that would fill what lies behind
+          if (distance <= 0.0)
+            Eigen::Map<Eigen::Vector3d>(nodes[n].value) =
+                colliders.Collide(c, place, Eigen::Map<Eigen::Vector3d>(nodes[n].value));
+        }
       }
     }
   });
   ParallelRanges(static_cast<std::ptrdiff_t>(ghosts_.size()), 1, {}, [&](std::ptrdiff_t range, std::ptrdiff_t) {
-    for (const Ghost& ghost : ghosts_[static_cast<std::size_t>(range)]) {
+    for (Ghost& ghost : ghosts_[static_cast<std::size_t>(range)]) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero(); // relative to the solid, where it is 0
+      ghost.fill = 0.0;
       for (int corner = 0; corner < 8; ++corner) {
-        const GelNode* node = ghost.weight[static_cast<std::size_t>(corner)] > 1e-6 ? NodeOf(ghost, corner) : nullptr;
-        if (node)
-          sum += ghost.weight[static_cast<std::size_t>(corner)] *
-                 (Eigen::Vector3d(node->value[0], node->value[1], node->value[2]) - ghost.velocity);
+        const double weight = ghost.weight[static_cast<std::size_t>(corner)];
+        const GelNode* node = weight > 1e-6 ? NodeOf(ghost, corner) : nullptr;
+        if (!node)
+          continue;
+        sum += weight * (Eigen::Vector3d(node->value[0], node->value[1], node->value[2]) - ghost.velocity);
+        ghost.fill += weight * node->value[3];
       }
       Eigen::Map<Eigen::Vector3d>(ghost.node->value) = ghost.velocity - sum;
     }
+  });
+  ParallelRanges(static_cast<std::ptrdiff_t>(ghosts_.size()), 1, {}, [&](std::ptrdiff_t range, std::ptrdiff_t) {
+    for (const Ghost& ghost : ghosts_[static_cast<std::size_t>(range)])
+      ghost.node->value[3] = ghost.fill;
   });
 }
 
@@ -232,11 +280,15 @@ GelSolver::Extremes GelSolver::Gather(double seconds)
 {
   return ParallelSum<Extremes>(grid_.Homes(), gelBlocksAtOnce, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     Extremes extremes;
+    std::array<double, GelGrid::TileNodes> walls;
+    const double far = farCells * grid_.Domain().cellMm;
     for (int home = static_cast<int>(begin); home < end; ++home) {
       grid_.FillTile(home);
       const std::int32_t* order = grid_.ParticlesOf(home);
       const int count = grid_.CountOf(home);
-      extremes.torn += GatherGel(law_, FrameOf(grid_, home, seconds), particles_.data(), order, count, grid_.TileOf(home));
+      GelTransferFrame frame = FrameOf(grid_, home, seconds);
+      frame.walls = grid_.FillTileOf(home, walls_, far, walls.data()) ? walls.data() : nullptr;
+      extremes.torn += GatherGel(law_, frame, particles_.data(), order, count, grid_.TileOf(home));
       double square = 0.0, gradient = 0.0;
       for (int n = 0; n < count; ++n) {
         GelParticle& p = particles_[static_cast<std::size_t>(order[n])];
@@ -283,9 +335,13 @@ GelReport GelSolver::Advance(double seconds, const std::vector<GelCollider>& col
       throw Error(Error::Kind::NotPossible, "the gel became unstable after " + NumberText(done) +
                                                 " s; shorter steps (Courant) or a lower bulk modulus may help");
     report.particleSteps += static_cast<std::int64_t>(particles_.size());
-    if (extremes_.gone > 0)
-      particles_.erase(std::remove_if(particles_.begin(), particles_.end(), [](const GelParticle& p) { return p.block < 0; }),
-                       particles_.end());
+    if (extremes_.gone > 0) {
+      const auto isLeft = [](const GelParticle& p) { return p.block >= 0; };
+      const auto end = std::stable_partition(particles_.begin(), particles_.end(), isLeft);
+      for (auto particle = end; particle != particles_.end(); ++particle)
+        report.goneMm3 += particle->volume;
+      particles_.erase(end, particles_.end());
+    }
     report.gone += extremes_.gone;
     report.torn += extremes_.torn;
     report.shortestStep = report.steps == 0 ? step : std::min(report.shortestStep, step);

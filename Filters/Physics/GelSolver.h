@@ -19,6 +19,7 @@ ParameterList Describe(GelStepping& p);
 struct GelTotals {
   double mass = 0.0;                                         ///< g
   double volume = 0.0;                                       ///< mm^3, as it is compressed now
+  double restVolume = 0.0;                                   ///< mm^3, without pressure
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();        ///< g mm/s
   Eigen::Vector3d angularMomentum = Eigen::Vector3d::Zero(); ///< g mm^2/s, about the origin of the world
 };
@@ -26,9 +27,11 @@ struct GelTotals {
 struct GelReport {
   std::int64_t steps = 0, particleSteps = 0;
   std::int64_t gone = 0;     ///< particles that left the domain
+  double goneMm3 = 0.0;      ///< their volume at rest
   std::int64_t torn = 0;     ///< strains that began anew: a sign of steps that are too long
   double shortestStep = 0.0; ///< s
   double largestSpeed = 0.0; ///< mm/s, at the end
+  GelReport& operator+=(const GelReport& later);
 };
 
 /// Gel by the material point method (MLS-MPM with APIC, Herschel-Bulkley after Yue 2015 and Ram 2015), as METHODS 4 says why.
@@ -42,6 +45,8 @@ public:
 
   /// Fills what is \a inside with gel at rest: \a perCell particles along each axis of a cell, at even places.
   void Fill(const std::function<bool(const Eigen::Vector3d&)>& inside, const std::array<int, 3>& perCell = {2, 2, 2});
+  /// Makes the domain larger where a box needs it (GelDomain::With). What gel does does not depend on it, but for what leaves.
+  void Include(const Eigen::AlignedBox3d& box);
   /// Gives every particle a velocity (and its gradient), by place.
   void SetVelocity(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& velocity, const Eigen::Matrix3d& gradient);
 
@@ -79,9 +84,11 @@ private:
     Eigen::Vector3d velocity; ///< of the solid
     std::array<int, 3> place; ///< of the lowest of the eight nodes around the mirror's image
     std::array<double, 8> weight;
+    double fill;
   };
   GelNode* NodeOf(const Ghost& ghost, int corner); ///< nullptr where there is no gel, or a solid
   std::vector<std::vector<Ghost>> ghosts_;         ///< for every range of blocks
+  std::vector<double> walls_;                      ///< mm, of every node from what gel sticks to
   std::int64_t steps_ = 0;
   std::int32_t made_ = 0;
 };

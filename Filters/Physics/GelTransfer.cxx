@@ -8,11 +8,17 @@
 #include "GelTransfer.h"
 #include "Core/Base/Multiversion.h"
 #include <algorithm>
+#include <array>
 
 namespace echorama {
 namespace {
 
 using GelQuad = double __attribute__((vector_size(32)));
+
+// A wall keeps this much of the gel that it has touched, in cells: gel parts within itself, not from what it wets.
+constexpr double filmCells = 0.35;
+constexpr double roomy = 0.6, crowded = 1.15; // the part of space that is filled, beyond what particles' places make of it
+constexpr double trust = 0.1;                 // in that, a step
 
 // The lowest node of a particle, its weights along one axis, and the distance to that node.
 struct GelSpline {
@@ -79,9 +85,38 @@ ECHORAMA_HOT void ScatterGelParticles(const GelLaw& law, const GelTransferFrame&
   }
 }
 
+// Holds back what would leave the film. \param corner the distances of the particle's 27 nodes; \param at its place in cells
+[[gnu::always_inline]] inline void KeepGelFilm(const GelTransferFrame& frame, const double* corner, std::array<double, 3> at,
+                                               GelQuad& velocity)
+{
+  static constexpr std::ptrdiff_t stride[3] = {1, GelGrid::TileSize, GelGrid::TileSize * GelGrid::TileSize};
+  for (std::size_t axis = 0; axis < 3; ++axis) // to the cell that holds it
+    if (at[axis] >= 1.0) {
+      at[axis] -= 1.0;
+      corner += stride[axis];
+    }
+  const double fx = at[0], fy = at[1], fz = at[2];
+  const auto d = [corner](int x, int y, int z) { return corner[x + y * stride[1] + z * stride[2]]; };
+  const double x00 = d(1, 0, 0) - d(0, 0, 0), x10 = d(1, 1, 0) - d(0, 1, 0);
+  const double x01 = d(1, 0, 1) - d(0, 0, 1), x11 = d(1, 1, 1) - d(0, 1, 1);
+  const double a00 = d(0, 0, 0) + fx * x00, a10 = d(0, 1, 0) + fx * x10;
+  const double a01 = d(0, 0, 1) + fx * x01, a11 = d(0, 1, 1) + fx * x11;
+  const double low = a00 + fy * (a10 - a00), high = a01 + fy * (a11 - a01), wall = low + fz * (high - low);
+  const double film = filmCells * frame.cellMm;
+  if (wall > 1.15 * film)
+    return;
+  const double perCell = 1.0 / frame.cellMm;
+  const double nx = perCell * ((1.0 - fz) * ((1.0 - fy) * x00 + fy * x10) + fz * ((1.0 - fy) * x01 + fy * x11));
+  const double ny = perCell * ((1.0 - fz) * (a10 - a00) + fz * (a11 - a01)), nz = perCell * (high - low);
+  const double square = nx * nx + ny * ny + nz * nz;
+  const double over = wall + frame.seconds * (nx * velocity[0] + ny * velocity[1] + nz * velocity[2]) - film;
+  if (over > 0.0 && square > 0.25)
+    velocity -= GelQuad{nx, ny, nz, 0.0} * (over / (frame.seconds * square));
+}
+
 // Velocity and gradient of up to GelLanes particles.
 ECHORAMA_HOT void GatherGelParticles(const GelTransferFrame& frame, GelParticle* particles, const std::int32_t* order, int count,
-                                     const GelNode* tile, GelStrainLanes& lanes)
+                                     const GelNode* tile, GelStrainLanes& lanes, double* fill)
 {
   const double cell = frame.cellMm, perCell = 1.0 / cell, spread = 4.0 * perCell * perCell;
   for (int n = 0; n < count; ++n) {
@@ -109,6 +144,10 @@ ECHORAMA_HOT void GatherGelParticles(const GelTransferFrame& frame, GelParticle*
       alongY += sliceY * z.weight[k];
       alongZ += slice * (z.weight[k] * (z.toLowest + k * cell));
     }
+    fill[n] = velocity[3];
+    if (frame.walls)
+      KeepGelFilm(frame, frame.walls + (z.lowest * GelGrid::TileSize + y.lowest) * GelGrid::TileSize + x.lowest,
+                  {-x.toLowest * perCell, -y.toLowest * perCell, -z.toLowest * perCell}, velocity);
     for (int axis = 0; axis < 3; ++axis) {
       p.velocity[axis] = velocity[axis];
       p.position[axis] += frame.seconds * velocity[axis];
@@ -136,6 +175,7 @@ int GatherGel(const GelLaw& law, const GelTransferFrame& frame, GelParticle* par
 {
   int torn = 0;
   GelStrainLanes lanes{};
+  double fill[GelLanes];
   for (int begin = 0; begin < count; begin += GelLanes) {
     const int some = std::min(GelLanes, count - begin);
     for (int l = some; l < GelLanes; ++l) { // at rest
@@ -145,13 +185,17 @@ int GatherGel(const GelLaw& law, const GelTransferFrame& frame, GelParticle* par
         lanes.b[c][l] = c < 3 ? 1.0 : 0.0;
       lanes.J[l] = 1.0;
     }
-    GatherGelParticles(frame, particles, order + begin, some, tile, lanes);
+    GatherGelParticles(frame, particles, order + begin, some, tile, lanes, fill);
     torn += AdvanceGelStrain(law, frame.seconds, some, lanes);
     for (int l = 0; l < some; ++l) {
       GelStrain& strain = particles[order[begin + l]].strain;
       for (int c = 0; c < 6; ++c)
         strain.b[c] = lanes.b[c][l];
       strain.J = lanes.J[l];
+      // Compressed where there is room, or stretched where there is none: the flow did not tell J the truth, as before a wall
+      // that gel has not touched yet.
+      if (strain.J < 1.0 ? fill[l] < roomy : fill[l] > crowded)
+        strain.J += trust * (1.0 - strain.J);
     }
   }
   return torn;

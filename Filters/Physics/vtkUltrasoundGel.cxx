@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundGel.h"
 
-#include "Filters/Tissue/TissueSurface.h"
+#include "Core/Base/NumberText.h"
+#include "Filters/Physics/GelMotion.h"
 #include "vtkCellArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFloatArray.h"
@@ -20,20 +21,97 @@
 #include "vtkUltrasoundVolume.h"
 #include "vtkUnsignedCharArray.h"
 
-#include <optional>
+#include <algorithm>
+#include <limits>
+#include <sstream>
+#include <utility>
+#include <vector>
 
 using echorama::GelBeam;
 using echorama::GelCoat;
+using echorama::GelMotion;
+using echorama::Material;
 using echorama::TissueSurface;
 
 vtkStandardNewMacro(vtkUltrasoundGel);
 
 vtkUltrasoundParametersMacro(vtkUltrasoundGel);
 
+// What a probe does next, and the tissue that it presses then.
+struct GelStep {
+  echorama::PlacedProbe probe;
+  double seconds = 0.0; // 0: by its speed
+  vtkPolyData* pressed = nullptr;
+  vtkMTimeType pressedTime = 0;
+
+  bool operator==(const GelStep& other) const
+  {
+    return probe.geometry == other.probe.geometry && probe.probeToWorld.matrix() == other.probe.probeToWorld.matrix() &&
+           seconds == other.seconds && pressed == other.pressed && pressedTime == other.pressedTime;
+  }
+};
+
+struct vtkUltrasoundGel::Kept {
+  GelMotion Motion;
+  vtkPolyData* Tissue;
+  vtkMTimeType TissueTime;
+  std::string Parameters;
+  std::vector<GelStep> Steps;
+};
+
 namespace {
 
+std::vector<GelStep> StepsOf(vtkInformationVector* probes, vtkInformationVector* pressed)
+{
+  using echorama::Error;
+  using echorama::NumberText;
+  std::vector<GelStep> steps;
+  std::optional<double> before;
+  for (const echorama::PlacedProbe& probe : vtkUltrasoundAcquisition::ProbesOf(probes)) {
+    GelStep step{probe};
+    const std::size_t number = steps.size() + 1;
+    if (!(probe.geometry == (steps.empty() ? probe : steps.front().probe).geometry)) {
+      throw Error(Error::Kind::BadInput, "probe " + NumberText(number) + " is another one than probe 1: gel goes with one face");
+    }
+    const std::optional<double> now =
+        vtkUltrasoundAcquisition::TimeStampOf(vtkDataObject::GetData(probes, static_cast<int>(number) - 1));
+    if (before && now) {
+      step.seconds = *now - *before;
+      if (!(step.seconds > 0.0)) {
+        throw Error(Error::Kind::BadInput, "the time stamp of probe " + NumberText(number) + " (" + NumberText(*now) +
+                                               " s) does not come after that of probe " + NumberText(number - 1) + " (" +
+                                               NumberText(*before) + " s)");
+      }
+    }
+    before = now;
+    steps.push_back(step);
+  }
+  if (steps.empty()) {
+    throw Error(Error::Kind::BadInput, "there is no probe that gel could be put on");
+  }
+  const auto count = static_cast<std::size_t>(pressed->GetNumberOfInformationObjects());
+  if (count > 1 && count != steps.size()) {
+    throw Error(Error::Kind::BadInput, "there are " + NumberText(steps.size()) + " probes, but " + NumberText(count) +
+                                           " states of the tissue that they press; give one for each, or one for the last");
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    GelStep& step = steps[steps.size() - count + n];
+    step.pressed = vtkPolyData::GetData(pressed, static_cast<int>(n));
+    step.pressedTime = step.pressed ? step.pressed->GetMTime() : 0;
+  }
+  return steps;
+}
+
+// The tissue's own material of a name, or the standard one.
+const Material& MaterialIn(const TissueSurface& tissue, const std::string& name)
+{
+  const auto own = std::find_if(tissue.materials.begin(), tissue.materials.end(),
+                                [&name](const Material& material) { return material.name == name; });
+  return own == tissue.materials.end() ? echorama::StandardMaterial(name) : *own;
+}
+
 // Where the level is 0, as a body of gel in air; no body where there is no gel.
-TissueSurface SurfaceOf(GelCoat& coat)
+TissueSurface SurfaceOf(GelCoat& coat, const TissueSurface& tissue)
 {
   // Contours are made along the axes of the grid; the world comes after.
   vtkNew<vtkImageData> image;
@@ -50,7 +128,7 @@ TissueSurface SurfaceOf(GelCoat& coat)
   vtkPolyData* made = contour->GetOutput();
 
   TissueSurface surface;
-  surface.materials = {echorama::StandardMaterial("air"), echorama::StandardMaterial("gel")};
+  surface.materials = {MaterialIn(tissue, "air"), MaterialIn(tissue, "gel")};
   if (made->GetNumberOfPolys() == 0) {
     return surface;
   }
@@ -115,6 +193,8 @@ void SetFace(vtkPolyData* face, const GelCoat& coat)
   face->GetPointData()->AddArray(couples);
   vtkUltrasoundVolume::AddField(face, vtkUltrasoundGel::CoupledName(), &coat.coupled, 1);
   vtkUltrasoundVolume::AddField(face, vtkUltrasoundGel::GelVolumeName(), &coat.volumeMm3, 1);
+  vtkUltrasoundVolume::AddField(face, vtkUltrasoundGel::GelGoneName(), &coat.goneMm3, 1);
+  vtkUltrasoundVolume::AddField(face, vtkUltrasoundGel::SecondsName(), &coat.seconds, 1);
 }
 
 } // namespace
@@ -127,6 +207,9 @@ vtkUltrasoundGel::vtkUltrasoundGel()
 }
 
 //----------------------------------------------------------------------------
+vtkUltrasoundGel::~vtkUltrasoundGel() = default;
+
+//----------------------------------------------------------------------------
 echorama::ParameterList vtkUltrasoundGel::Parameters()
 {
   return echorama::Join({Describe(this->Coat), Describe(this->Material), Describe(this->Head)});
@@ -136,7 +219,7 @@ echorama::ParameterList vtkUltrasoundGel::Parameters()
 int vtkUltrasoundGel::FillInputPortInformation(int port, vtkInformation* info)
 {
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), port == 1 ? "vtkDataObject" : "vtkPolyData");
-  if (port == 1) {
+  if (port > 0) {
     info->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
   }
   if (port == 2) {
@@ -149,25 +232,51 @@ int vtkUltrasoundGel::FillInputPortInformation(int port, vtkInformation* info)
 int vtkUltrasoundGel::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
-    // 1. what came in
+    // 1. what came in, and how much of it is done already
     echorama::CheckRanges(this->Parameters());
-    const std::vector<echorama::PlacedProbe> probes = vtkUltrasoundAcquisition::ProbesOf(inputs[1]);
-    const TissueSurface rest = vtkUltrasoundTissue::Of(vtkPolyData::GetData(inputs[0]));
-    vtkPolyData* under = vtkPolyData::GetData(inputs[2]);
-    std::optional<TissueSurface> pressed;
-    if (under) {
-      pressed = vtkUltrasoundTissue::Of(under);
+    vtkPolyData* body = vtkPolyData::GetData(inputs[0]);
+    const vtkMTimeType time = body ? body->GetMTime() : 0;
+    std::vector<GelStep> steps = StepsOf(inputs[1], inputs[2]);
+    std::ostringstream parameters;
+    vtkUltrasoundParameters::Print(parameters, vtkIndent(), this->Parameters());
+    std::unique_ptr<Kept> kept = std::move(this->Last); // gone when anything fails
+    if (kept && !(kept->Tissue == body && kept->TissueTime == time && kept->Parameters == parameters.str() &&
+                  kept->Steps.size() <= steps.size() && std::equal(kept->Steps.begin(), kept->Steps.end(), steps.begin()))) {
+      kept = nullptr;
     }
 
     // 2. the kernel
-    GelCoat coat =
-        echorama::SpreadGel(rest, pressed ? &*pressed : nullptr, probes, this->Head, this->Material, this->Coat, progress);
+    if (!kept) {
+      const TissueSurface tissue = vtkUltrasoundTissue::Of(body);
+      kept.reset(
+          new Kept{GelMotion(tissue, steps.front().probe, this->Head, this->Material, this->Coat, progress.Part(0.0, 0.05)),
+                   body,
+                   time,
+                   parameters.str(),
+                   {}});
+    }
+    const std::size_t known = kept->Steps.size();
+    const double more = static_cast<double>(steps.size() - known);
+    for (std::size_t n = known; n < steps.size(); ++n) {
+      TissueSurface pressed;
+      if (steps[n].pressed) {
+        pressed = vtkUltrasoundTissue::Of(steps[n].pressed);
+      }
+      const auto part = [&](std::size_t at) { return 0.05 + 0.75 * static_cast<double>(at - known) / more; };
+      kept->Motion.Move(steps[n].probe.probeToWorld, steps[n].seconds, steps[n].pressed ? &pressed : nullptr,
+                        progress.Part(part(n), part(n + 1)));
+    }
+    GelMotion settled = kept->Motion; // the motion itself goes on without a stop
+    GelCoat coat = settled.Look(true, progress.Part(0.8, 1.0));
 
     // 3. what goes out
-    TissueSurface all = SurfaceOf(coat);
-    all.Append(pressed ? *pressed : rest);
+    TissueSurface all = SurfaceOf(coat, settled.Tissue());
+    all.Append(settled.Tissue());
     vtkUltrasoundTissue::Set(vtkPolyData::GetData(outputs, 0), all);
     SetFace(vtkPolyData::GetData(outputs, 1), coat);
+    this->PosesComputed = static_cast<int>(steps.size() - known);
+    kept->Steps = std::move(steps);
+    this->Last = std::move(kept);
   });
 }
 

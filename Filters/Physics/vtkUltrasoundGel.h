@@ -5,11 +5,17 @@
  *
  * Input 0: tissue (see vtkUltrasoundTissue) before the probe came. Input 1, repeatable: data with the field data `ProbeGeometry`
  * and, unless the probe lies at the origin, `ProbeToWorld` (see vtkUltrasoundAcquisition). A cap of gel is put on the face; the
- * probe comes along its axis, out of clear space, to the first of these poses, and goes on from each to the next. Input 2,
- * optional: the same tissue when the probe has come to the last pose (vtkUltrasoundTissuePress, vtkUltrasoundDeformGeometry).
+ * probe comes along its axis, out of clear space, to the first of these poses, and goes on from each to the next: in the time
+ * between their `TimeStamp`s where both have one, else at SpeedMmPerS. Input 2, optional and repeatable: the same tissue when the
+ * probe has come to each pose, in their order, or one for the last pose alone (vtkUltrasoundTissuePress,
+ * vtkUltrasoundDeformGeometry).
+ *
+ * When nothing but poses, with their tissue, was added since the last update, gel goes on from where it was; the result
+ * is that of all at once.
  *
  * Output 0: the tissue as it is then, in air, and with gel, if there is any, as its first body: what
- * vtkUltrasoundSynthesizer takes. Where gel touches skin or the head, its surface lies a little within them.
+ * vtkUltrasoundSynthesizer takes. Where gel touches skin or the head, its surface lies a little within them. Materials of the
+ * names "gel" and "air" that the tissue brings are theirs; else the standard ones.
  *
  * Output 1: the face of the probe, a rectangle of quadrilaterals with these point arrays.
  *
@@ -22,12 +28,15 @@
  * | field data | values                                                                                     |
  * | ---------- | ------------------------------------------------------------------------------------------ |
  * | Coupled    | double: the share of the face that couples                                                  |
- * | GelVolume  | double: of the gel that is left, mm^3; some percent beside what was put on, as gel yields        |
+ * | GelVolume  | double: of the gel that is left, mm^3, as it is compressed                                  |
+ * | GelGone    | double: of the gel that left the space that is computed, mm^3                               |
+ * | Seconds    | double: simulated, settling included                                                       |
  *
  * Fails, with a message, for what is no tissue, for probes without geometry or of several kinds, for more gel than a face holds,
- * where the probe has no clear way to its first pose, and when gel becomes unstable. Under MPI each rank computes the whole.
+ * where the probe has no clear way to its first pose, for time stamps that do not rise, and when gel becomes unstable. Under MPI
+ * each rank computes the whole.
  *
- * @sa echorama::SpreadGel, echorama::GelSolver
+ * @sa echorama::GelMotion, echorama::GelSolver
  */
 #ifndef vtkUltrasoundGel_h
 #define vtkUltrasoundGel_h
@@ -38,6 +47,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Physics/GelCoat.h"
+#include <memory>
 #endif
 
 class vtkDataObject;
@@ -55,6 +65,8 @@ public:
   static const char* CouplesName() { return "Couples"; }
   static const char* CoupledName() { return "Coupled"; }
   static const char* GelVolumeName() { return "GelVolume"; }
+  static const char* GelGoneName() { return "GelGone"; }
+  static const char* SecondsName() { return "Seconds"; }
   ///@}
 
   ///@{
@@ -65,10 +77,16 @@ public:
   ///@}
 
   ///@{
-  /** The tissue under the probe; none: it does not yield. */
+  /** The tissue under the probe at its last pose, or (Add) at one pose more; none: it does not yield. */
   void SetPressedConnection(vtkAlgorithmOutput* pressed) { this->SetInputConnection(2, pressed); }
   void SetPressedData(vtkDataObject* pressed) { this->SetInputDataObject(2, pressed); }
+  void AddPressedConnection(vtkAlgorithmOutput* pressed) { this->AddInputConnection(2, pressed); }
+  void AddPressedData(vtkDataObject* pressed) { this->AddInputDataObject(2, pressed); }
+  void RemoveAllPressed() { this->RemoveAllInputConnections(2); }
   ///@}
+
+  /** How many poses the last update still had to go to: the others were known from the one before. */
+  vtkGetMacro(PosesComputed, int);
 
   // BEGIN parameters
   /** How much gel is put on the face of the probe. In [0, 1000] ml; default 10. */
@@ -136,7 +154,7 @@ public:
 
 protected:
   vtkUltrasoundGel();
-  ~vtkUltrasoundGel() override = default;
+  ~vtkUltrasoundGel() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
@@ -149,7 +167,10 @@ private:
   echorama::GelCoatParameters Coat;
   echorama::GelMaterial Material;
   echorama::ProbeHead Head;
+  struct Kept; ///< a motion, and what it was made of
+  std::unique_ptr<Kept> Last;
 #endif
+  int PosesComputed = 0;
 };
 
 #endif

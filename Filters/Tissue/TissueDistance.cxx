@@ -16,6 +16,7 @@ using Eigen::Vector3d;
 struct NearTriangle {
   std::array<Vector3d, 3> point; // mm, in the frame of the grid
   std::array<int, 3> low, high;  // points of the grid within the band
+  std::int32_t index;
 };
 
 double SquaredToSegment(const Vector3d& p, const Vector3d& a, const Vector3d& b)
@@ -58,7 +59,8 @@ bool SetBox(NearTriangle& corners, const ImageGeometry& grid, double distance)
 
 } // namespace
 
-std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry& grid, double band, const Progress& progress)
+std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry& grid, double band, const Progress& progress,
+                               std::vector<std::int32_t>* nearest)
 {
   CheckRange("the band of distances", band, 1e-9, 1e9);
   const std::vector<std::int32_t> bodies = BodiesOn(surface, grid, progress.Part(0.0, 0.3));
@@ -78,15 +80,18 @@ std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry
 
   const Eigen::Affine3d toIndex = grid.WorldToIndex();
   std::vector<NearTriangle> triangles;
-  for (const auto& indices : surface.triangles) {
+  for (std::size_t triangle = 0; triangle < surface.triangles.size(); ++triangle) {
     NearTriangle corners;
+    corners.index = static_cast<std::int32_t>(triangle);
     for (std::size_t n = 0; n < 3; ++n)
-      corners.point[n] = (toIndex * surface.points[indices[n]].cast<double>()).cwiseProduct(grid.spacing);
+      corners.point[n] = (toIndex * surface.points[surface.triangles[triangle][n]].cast<double>()).cwiseProduct(grid.spacing);
     if (SetBox(corners, grid, grid.spacing.maxCoeff()) && anyOutside(corners) && SetBox(corners, grid, band))
       triangles.push_back(corners);
   }
 
   std::vector<float> distances(bodies.size());
+  if (nearest)
+    nearest->assign(bodies.size(), -1);
   ParallelFor(grid.dimensions[2], progress.Part(0.3, 1.0), [&](std::ptrdiff_t slab) {
     const int k = static_cast<int>(slab);
     const std::size_t count = at(0, 0, 1);
@@ -96,8 +101,13 @@ std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry
         continue;
       for (int j = corners.low[1]; j <= corners.high[1]; ++j)
         for (int i = corners.low[0]; i <= corners.high[0]; ++i) {
+          const double own = SquaredToTriangle(Vector3d(i, j, k).cwiseProduct(grid.spacing), corners.point);
           double& least = squared[at(i, j, 0)];
-          least = std::min(least, SquaredToTriangle(Vector3d(i, j, k).cwiseProduct(grid.spacing), corners.point));
+          if (own >= least)
+            continue;
+          least = own;
+          if (nearest)
+            (*nearest)[at(i, j, k)] = corners.index;
         }
     }
     for (std::size_t n = 0; n < count; ++n) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Geometry/ProbeGeometry.h"
 #include "Filters/Physics/GelSolver.h"
+#include "Filters/Tissue/TissueSurface.h"
 
 namespace echorama::testing {
 
@@ -56,5 +58,25 @@ struct GelChannel {
     return {Wall({0, 0, 4}, {0, 0, 1}, true), Wall({0, 0, 4.0 + cells}, {0, 0, -1}, true)};
   }
 };
+
+/// A block whose skin is at \a skinZ, in the frame of \a pose.
+inline TissueSurface SkinBlock(double skinZ, const Pose& pose = Pose::Identity())
+{
+  TissueSurface surface;
+  surface.materials = {StandardMaterial("air"), StandardMaterial("muscle")};
+  surface.bodies = {{"block", 1}};
+  for (int corner = 0; corner < 8; ++corner)
+    surface.points.push_back(
+        (pose * Vector3d(corner & 1 ? 90 : -90, corner & 2 ? 80 : -80, corner & 4 ? 90 : skinZ)).cast<float>());
+  surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  surface.bodyOfTriangle.assign(surface.triangles.size(), 0);
+  return surface;
+}
+
+inline PlacedProbe LinearProbe(const Pose& pose = Pose::Identity())
+{
+  return {ProbeGeometry::Linear(16.0, 12.0, 0.0, 80.0), pose};
+}
 
 } // namespace echorama::testing

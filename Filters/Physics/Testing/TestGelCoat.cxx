@@ -1,35 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
-#include "Filters/Physics/GelCoat.h"
+#include "Filters/Physics/GelMotion.h"
+#include "GelScene.h"
 #include "Testing/Sanitized.h"
 #include <algorithm>
 #include <gtest/gtest.h>
 
 using namespace echorama;
-using Eigen::Vector3d;
+using namespace echorama::testing;
 
 namespace {
-
-// A block whose skin is at \a skinZ, in the frame of \a pose.
-TissueSurface Block(double skinZ, const Pose& pose = Pose::Identity())
-{
-  TissueSurface surface;
-  surface.materials = {StandardMaterial("air"), StandardMaterial("muscle")};
-  surface.bodies = {{"block", 1}};
-  for (int corner = 0; corner < 8; ++corner)
-    surface.points.push_back(
-        (pose * Vector3d(corner & 1 ? 90 : -90, corner & 2 ? 80 : -80, corner & 4 ? 90 : skinZ)).cast<float>());
-  surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  surface.bodyOfTriangle.assign(surface.triangles.size(), 0);
-  return surface;
-}
-
-PlacedProbe LinearProbe(const Pose& pose = Pose::Identity())
-{
-  return {ProbeGeometry::Linear(16.0, 12.0, 0.0, 80.0), pose};
-}
 
 GelCoatParameters Amount(double ml, double coverage = 0.9)
 {
@@ -62,7 +43,7 @@ double LevelVolume(const GelCoat& coat, double fromZ, double toZ)
 TEST(GelCoat, FillsTheGap)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const GelCoat coat = SpreadGel(Block(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(3.0));
+  const GelCoat coat = SpreadGel(SkinBlock(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(3.0));
   EXPECT_EQ(coat.coupled, 1.0);
   for (const GelBeam& beam : coat.face) {
     EXPECT_NEAR(beam.gelMm, 3.0, 0.3);
@@ -78,7 +59,7 @@ TEST(GelCoat, FillsTheGap)
 
 TEST(GelCoat, LeavesAirWhereItDoesNotReach)
 {
-  const GelCoat coat = SpreadGel(Block(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.3, 0.5));
+  const GelCoat coat = SpreadGel(SkinBlock(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.3, 0.5));
   const double share = 300.0 / 3.0 / (16.0 * 12.0); // of the face, were its sides straight
   EXPECT_NEAR(coat.coupled, share, 0.25 * share);
   const GelBeam &middle = coat.face[24 * 48 + 24], &corner = coat.face[0];
@@ -91,7 +72,7 @@ TEST(GelCoat, LeavesAirWhereItDoesNotReach)
 
 TEST(GelCoat, WithoutGelThereIsAir)
 {
-  const GelCoat coat = SpreadGel(Block(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.0));
+  const GelCoat coat = SpreadGel(SkinBlock(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.0));
   EXPECT_EQ(coat.coupled, 0.0);
   EXPECT_EQ(coat.volumeMm3, 0.0);
   EXPECT_NEAR(coat.face[100].airMm, 3.0, 0.3);
@@ -103,7 +84,7 @@ TEST(GelCoat, WithoutGelThereIsAir)
 TEST(GelCoat, IsSqueezedOutByTheProbe)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const TissueSurface rest = Block(-6.0), pressed = Block(2.0);
+  const TissueSurface rest = SkinBlock(-6.0), pressed = SkinBlock(2.0);
   const GelCoat coat = SpreadGel(rest, &pressed, {LinearProbe()}, {}, {}, Amount(2.5));
   EXPECT_GT(coat.coupled, 0.8);
   EXPECT_NEAR(coat.volumeMm3, 2500.0, 100.0);
@@ -120,8 +101,8 @@ TEST(GelCoat, TurnsWithTheWorld)
   Pose pose = Pose::Identity();
   pose.linear() = ExpRotation(Vector3d(0.8, -1.3, 0.4));
   pose.translation() = Vector3d(100, -250, 30);
-  const GelCoat here = SpreadGel(Block(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.3, 0.5));
-  const GelCoat there = SpreadGel(Block(3.0, pose), nullptr, {LinearProbe(pose)}, {}, {}, Amount(0.3, 0.5));
+  const GelCoat here = SpreadGel(SkinBlock(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.3, 0.5));
+  const GelCoat there = SpreadGel(SkinBlock(3.0, pose), nullptr, {LinearProbe(pose)}, {}, {}, Amount(0.3, 0.5));
   EXPECT_NEAR(there.coupled, here.coupled, 0.02);
   EXPECT_NEAR(there.volumeMm3, here.volumeMm3, 1.0);
   EXPECT_LT((there.face[7].start - pose * here.face[7].start).norm(), 1e-9);
@@ -132,14 +113,14 @@ TEST(GelCoat, DoesNotDependOnThreads)
 {
   const auto levels = [](int threads) {
     const ThreadLimit limit(threads);
-    return SpreadGel(Block(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.3, 0.5)).level;
+    return SpreadGel(SkinBlock(3.0), nullptr, {LinearProbe()}, {}, {}, Amount(0.3, 0.5)).level;
   };
   EXPECT_EQ(levels(1), levels(2));
 }
 
 TEST(GelCoat, RefusesWhatItCannotPutOn)
 {
-  const TissueSurface skin = Block(3.0);
+  const TissueSurface skin = SkinBlock(3.0);
   EXPECT_THROW(SpreadGel(skin, nullptr, {}, {}, {}, Amount(1.0)), Error);
   TissueSurface other = skin;
   other.points.pop_back();
@@ -149,8 +130,8 @@ TEST(GelCoat, RefusesWhatItCannotPutOn)
   PlacedProbe wider = LinearProbe();
   wider.geometry.fanWidth = 35.0;
   EXPECT_THROW(SpreadGel(skin, nullptr, {LinearProbe(), wider}, {}, {}, Amount(1.0)), Error);
-  TissueSurface behind = Block(3.0);
-  behind.Append(Block(-400.0));
+  TissueSurface behind = SkinBlock(3.0);
+  behind.Append(SkinBlock(-400.0));
   EXPECT_THROW(SpreadGel(behind, nullptr, {LinearProbe()}, {}, {}, Amount(1.0)), Error) << "no clear way";
   const Progress stop([](double fraction) { return fraction < 0.3; });
   EXPECT_THROW(SpreadGel(skin, nullptr, {LinearProbe()}, {}, {}, Amount(1.0), stop), Error);

@@ -41,11 +41,10 @@ TEST(GelColliders, ContactSticksSlidesAndLetsGo)
   GelCollider floor;
   floor.shape = std::make_shared<GelPlane>();
   floor.end.translation() = Vector3d(3, 0, 0); // moves at 3 mm/s
-  const auto after = [&floor](Vector3d velocity) {
+  const auto after = [&floor](const Vector3d& velocity) {
     GelColliders colliders({floor}, 1.0);
     colliders.SetStep(0.0, 0.001);
-    EXPECT_TRUE(colliders.Collide(0, {0, 0, -0.1}, velocity));
-    return velocity;
+    return colliders.Collide(0, {0, 0, -0.1}, velocity);
   };
   EXPECT_LT((after({10, 0, -4}) - Vector3d(3, 0, 0)).norm(), 1e-9);
   EXPECT_LT((after({10, 0, 4}) - Vector3d(3, 0, 0)).norm(), 1e-9);
@@ -75,10 +74,14 @@ TEST(GelColliders, SkinOnAGridRises)
   EXPECT_NEAR(skin.shape->Distance({0.3, -0.7, 1.5}, 0.5), 1.0, 1e-6);
   GelColliders colliders({skin}, 0.5);
   colliders.SetStep(0.5, 0.51);
-  Vector3d velocity(1, 1, 0);
-  EXPECT_TRUE(colliders.Collide(0, {0, 0, 0.4}, velocity));
-  EXPECT_LT((velocity - Vector3d(0, 0, 2)).norm(), 1e-5);
-  EXPECT_FALSE(colliders.Collide(0, {0, 0, 0.6}, velocity));
+  EXPECT_LT((colliders.Collide(0, {0, 0, 0.4}, {1, 1, 0}) - Vector3d(0, 0, 2)).norm(), 1e-5);
+  EXPECT_NEAR(colliders.Distance(0, {0, 0, 0.6}), 0.1, 1e-6);
+  // It is drawn along too; how far it rises is what distances say.
+  skin.shape =
+      std::make_shared<GelDistanceGrid>(geometry, begin, end, std::vector<Eigen::Vector3f>(45, Eigen::Vector3f(3, -1, 9)));
+  GelColliders drawn({skin}, 0.5);
+  drawn.SetStep(0.5, 0.51);
+  EXPECT_LT((drawn.Collide(0, {0, 0, 0.4}, {1, 1, 0}) - Vector3d(6, -2, 2)).norm(), 1e-5);
   end.pop_back();
   EXPECT_THROW(GelDistanceGrid(geometry, begin, end), Error);
 }

@@ -112,13 +112,21 @@ TEST(TissueDistance, OfABall)
   grid.spacing = Eigen::Vector3d(0.9, 1.0, 0.8);
   grid.direction = ExpRotation(Eigen::Vector3d(0.3, -0.5, 0.7));
   grid.origin = Eigen::Vector3d(1, 2, 3) - grid.direction * (15.3 * grid.spacing);
-  const auto distances = DistancesOn(ball, grid, 4.0);
+  std::vector<std::int32_t> nearest;
+  const auto distances = DistancesOn(ball, grid, 4.0, {}, &nearest);
   const Eigen::Affine3d toWorld = grid.IndexToWorld();
   double worst = 0.0;
   for (int n = 0; n < 32 * 32 * 32; ++n) {
     const Eigen::Vector3d place = toWorld * Eigen::Vector3d(n % 32, n / 32 % 32, n / 1024);
     const double exact = std::clamp((place - Eigen::Vector3d(1, 2, 3)).norm() - 10.0, -4.0, 4.0);
     worst = std::max(worst, std::abs(distances[static_cast<std::size_t>(n)] - exact));
+    const std::int32_t triangle = nearest[static_cast<std::size_t>(n)];
+    ASSERT_EQ(triangle >= 0, std::abs(distances[static_cast<std::size_t>(n)]) < 4.0f);
+    if (triangle >= 0) { // its corners lie around the point that is nearest, not on the ball's other side
+      const Eigen::Vector3d foot = Eigen::Vector3d(1, 2, 3) + 10.0 * (place - Eigen::Vector3d(1, 2, 3)).normalized();
+      for (const std::uint32_t corner : ball.triangles[static_cast<std::size_t>(triangle)])
+        EXPECT_LT((ball.points[corner].cast<double>() - foot).norm(), 3.0);
+    }
   }
   EXPECT_LT(worst, 0.05);
   EXPECT_THROW(DistancesOn(ball, grid, 0.0), Error);
