@@ -231,10 +231,10 @@ def main():
                 path.write_text(new)
     import echorama
     schema = root / "Examples/scenes/echorama-scene-1.schema.json"
-    if schema.read_text() != echorama.vtkUltrasoundSynthesizer.GetSceneSchema():
+    if schema.read_text() != echorama.vtkUltrasoundSceneSource.GetSceneSchema():
         stale.append(str(schema.relative_to(root)))
         if not check:
-            schema.write_text(echorama.vtkUltrasoundSynthesizer.GetSceneSchema())
+            schema.write_text(echorama.vtkUltrasoundSceneSource.GetSceneSchema())
     for line in complaints:
         print(line)
     for name in stale:

@@ -10,6 +10,7 @@
 #include <vtkNew.h>
 #include <vtkSmartPointer.h>
 #include <vtkUltrasoundPhantomSource.h>
+#include <vtkUltrasoundSceneSource.h>
 
 namespace echorama {
 namespace {
@@ -33,7 +34,7 @@ void Phantom(Session& session, const PhantomOptions& options, vtkUltrasoundPhant
   OutputFolder folder(options.folder, {});
   session.ShowAs(folder.StageFolder(), options.folder);
   session.result["folder"] = options.folder;
-  SyntheticSet set(session, folder, options.format, {options.knockMm, options.knockDegrees, wanted.seed});
+  SyntheticSet set(session, folder, options.format, options.knockMm, options.knockDegrees);
   for (std::size_t i = 0; i < views.size(); ++i) {
     source->SetView(views[i].probeToWorld, views[i].gainDb);
     source->SetChangeSeed(static_cast<vtkTypeInt64>(i + 1));
@@ -44,12 +45,14 @@ void Phantom(Session& session, const PhantomOptions& options, vtkUltrasoundPhant
     vtkNew<vtkImageData> image;
     image->ShallowCopy(source->GetOutput());
     const PhantomParameters parameters = source->Phantom();
-    set.Add(image, {{"gain_db", views[i].gainDb}}, places, [&](const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
-      const Eigen::Vector3d seen = parameters.press.Seen(parameters.probeToWorld.inverse() * place);
-      if (!BeamPointAt(parameters.probe, seen))
-        return {};
-      return parameters.probeToWorld * seen;
-    });
+    const Pose knock = vtkUltrasoundSceneSource::Knock(image, i, wanted.seed, options.knockMm, options.knockDegrees);
+    std::vector<Landmark> seen;
+    for (const Landmark& place : places) {
+      const Eigen::Vector3d inProbe = parameters.press.Seen(parameters.probeToWorld.inverse() * place.position);
+      if (BeamPointAt(parameters.probe, inProbe))
+        seen.push_back({place.label, knock * parameters.probeToWorld * inProbe});
+    }
+    set.Add(image, knock, {{"gain_db", views[i].gainDb}}, seen);
   }
   set.Finish();
 }

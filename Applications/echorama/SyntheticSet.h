@@ -7,8 +7,6 @@
 #include "Session.h"
 #include <CLI/App.hpp>
 #include <cstdint>
-#include <functional>
-#include <optional>
 #include <vector>
 
 class vtkImageData;
@@ -20,21 +18,14 @@ namespace echorama {
 /// stays where it is, so that poses found with it held fixed lie in the frame of the truth.
 class SyntheticSet {
 public:
-  /// How far every volume but the first is put out of place.
-  struct Knock {
-    double mm = 8.0, degrees = 6.0;
-    std::uint64_t seed = 1;
-  };
+  /// \param knockMm, knockDegrees how far every volume but the first is put out of place
+  SyntheticSet(Session& session, OutputFolder& folder, const std::string& format, double knockMm, double knockDegrees);
 
-  SyntheticSet(Session& session, OutputFolder& folder, const std::string& format, const Knock& knock);
-
-  /// Where a place of the tissue (mm, world) is seen in the volume before the knock; nothing where it is not seen.
-  using SeenAt = std::function<std::optional<Eigen::Vector3d>(const Eigen::Vector3d& place)>;
-
-  /// Knocks the next volume, writes it, and adds it to the results with the numbers of \a more. Returns the knock.
+  /// Writes the next volume, which the knock has moved already, and adds it to the results with the numbers of \a more.
+  /// \param landmarks as the volume has them
   /// \param displacement how the tissue lay when it was scanned, from rest; the truth names it as that of the volume
-  Pose Add(vtkImageData* image, const nlohmann::ordered_json& more, const std::vector<Landmark>& places = {},
-           const SeenAt& seenAt = {}, vtkImageData* displacement = nullptr);
+  void Add(vtkImageData* image, const Pose& knock, const nlohmann::ordered_json& more,
+           const std::vector<Landmark>& landmarks = {}, vtkImageData* displacement = nullptr);
 
   /// Writes the truth and commits the folder.
   void Finish();
@@ -43,14 +34,11 @@ private:
   Session& session_;
   OutputFolder& folder_;
   std::string format_;
-  Knock knock_;
+  double knockMm_, knockDegrees_;
   std::vector<VolumePose> truth_;
 };
 
 /// The options --landmarks and --format.
 void AddSetOptions(CLI::App& options, int& landmarks, std::string& format);
-
-/// Places of the tissue that two views at least see, at random: \a count of them, or fewer when they are hard to find.
-std::vector<Landmark> SharedPlaces(std::uint64_t seed, int count, const ProbeGeometry& probe, const std::vector<Pose>& views);
 
 } // namespace echorama

@@ -181,11 +181,35 @@ CellHash HashOf(const Eigen::Array3i& cell, const std::array<std::uint32_t, 2>& 
   return hash;
 }
 
+// Which scatterers have changed, and the signs that they then have.
+class Change {
+public:
+  explicit Change(const ScattererParameters& p)
+    : key_{static_cast<std::uint32_t>(p.changeSeed), static_cast<std::uint32_t>(p.changeSeed >> 32)},
+      share_(1.0 - std::sqrt(1.0 - p.decorrelation))
+  {
+  }
+  void Apply(const Eigen::Array3i& cell, CellHash& hash) const
+  {
+    if (share_ == 0.0)
+      return;
+    const auto bits = Random::Block({static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y()),
+                                     static_cast<std::uint32_t>(cell.z()), 0xc4a6u},
+                                    key_);
+    if ((bits[0] + 0.5) / 4294967296.0 < share_)
+      hash.sign = (bits[1] & 1u) != 0 ? 1.0f : -1.0f;
+  }
+
+private:
+  std::array<std::uint32_t, 2> key_;
+  double share_;
+};
+
 // The lattice, its blocks and where they go.
 class Lattice {
 public:
   Lattice(const ScattererParameters& parameters, double density, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted)
-    : key_{static_cast<std::uint32_t>(parameters.seed), static_cast<std::uint32_t>(parameters.seed >> 32)},
+    : key_{static_cast<std::uint32_t>(parameters.seed), static_cast<std::uint32_t>(parameters.seed >> 32)}, change_(parameters),
       cell_(std::cbrt(1.0 / density)), edge_(std::clamp(static_cast<int>(std::lround(1.6 / cell_)), 4, 16)), region_(region),
       wanted_(wanted)
   {
@@ -236,7 +260,8 @@ public:
       for (int j = 0; j < edge_; ++j)
         for (int i = 0; i < edge_; ++i) {
           const Eigen::Array3i cell = edge_ * block + Eigen::Array3i(i, j, k);
-          const CellHash hash = HashOf(cell, key_);
+          CellHash hash = HashOf(cell, key_);
+          change_.Apply(cell, hash);
           Eigen::Vector3d point = (cell_ * (cell.cast<double>() + hash.place)).matrix();
           if (displacement_)
             point += displacement_->At(point);
@@ -261,6 +286,7 @@ private:
   }
 
   std::array<std::uint32_t, 2> key_;
+  Change change_;
   double cell_; // mm
   int edge_;    // cells along a block
   const Eigen::AlignedBox3d& region_;
@@ -298,6 +324,8 @@ ParameterList Describe(ScattererParameters& p)
       Parameter("DensityPerMm3", p.densityPerMm3, {0, 1000}, "per mm^3",
                 "Scatterers of the lattice; 0: those of the densest material. Materials that have more get this many, as loud as "
                 "before."),
+      Parameter("Decorrelation", p.decorrelation, {0, 1}, "", "How far the tissue has changed."),
+      Parameter("ChangeSeed", p.changeSeed, {0, 9223372036854775807.0}, "", "Seed of the change."),
       Parameter("MaxBytes", p.maxBytes, {0, Unlimited, true}, "bytes", "No more memory than this is taken."),
   };
 }

@@ -26,6 +26,8 @@ struct ScattererParameters {
   /// until the scatterers are made.
   const DisplacementField* displacement = nullptr;
   double maxBytes = 8.0e9;
+  double decorrelation = 0.0;
+  std::uint64_t changeSeed = 1;
 };
 
 ParameterList Describe(ScattererParameters& p);
@@ -38,6 +40,10 @@ ParameterList Describe(ScattererParameters& p);
 /// sparser ones are subsets of denser ones. The amplitude of a scatterer is its sign times
 /// sqrt(backscattered power of its material / density of its material), so that the speckle of a material has the same level
 /// however many there are.
+///
+/// Tissue that has changed (decorrelation d) has the same scatterers, but some of them, 1 - sqrt(1 - d), have a sign of their
+/// own, hashed with changeSeed. So echoes of two changes that are seen alike correlate by 1 - d, and by sqrt(1 - d) with those of
+/// tissue that has not changed.
 ///
 /// All of a material are equally strong: with n in the resolution cell (BeamWidth::ResolutionCellMm3) the intensity I of the
 /// speckle has <I^2> / <I>^2 = 2 + (1 - 2 c) / n, where c in [0, 1] tells how evenly they lie: nearly 0 where a cell of the

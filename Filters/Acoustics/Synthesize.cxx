@@ -347,6 +347,14 @@ ParameterList Describe(SynthesisParameters& p)
             "Seed", p.seed, {0, 9223372036854775807.0}, "",
             "Seed of the scatterers of the tissue, and of all else that is random but the noise. Volumes of one seed see the "
             "same."),
+        Parameter(
+            "Decorrelation", p.decorrelation, {0, 1}, "",
+            "How far the speckle has changed: complex echoes of volumes of one Seed and different ChangeSeeds that are seen "
+            "alike correlate by 1 less this. Bodies stay where and as loud as they are.")
+            .When("Mode", "coherent"),
+        Parameter("ChangeSeed", p.changeSeed, {0, 9223372036854775807.0}, "",
+                  "Seed of the change: volumes with the same one have changed alike.")
+            .When("Mode", "coherent"),
         Parameter("Elements", p.elements, {2, 4096}, "", "Beams of a plane."),
         Parameter("Steps", p.steps, {1, 4096}, "", "Planes of the sweep, at least 2 of a probe that sweeps."),
         Parameter("Samples", p.samples, {2, 16384}, "", "Samples along a beam.")},
@@ -384,9 +392,26 @@ void SynthesisParameters::Check() const
   for (std::size_t i = 0; i < stepPoses.size(); ++i)
     checkPose(stepPoses[i], "stepPoses[" + std::to_string(i) + "]");
   const auto planes = static_cast<std::size_t>(BeamDimensions()[2]);
+  if (firstStep < 0 || lastStep < -1 || firstStep > LastStep() || LastStep() >= BeamDimensions()[2])
+    throw Error(Error::Kind::InvalidParameter, "the steps " + std::to_string(firstStep) + " to " + std::to_string(lastStep) +
+                                                   " are not among the " + std::to_string(planes) + " of the sweep");
   if (!stepPoses.empty() && stepPoses.size() != planes)
     throw Error(Error::Kind::InvalidParameter, "stepPoses has " + std::to_string(stepPoses.size()) + " poses for " +
                                                    std::to_string(planes) + " steps of the sweep");
+}
+
+SynthesisCost& SynthesisCost::operator+=(const SynthesisCost& other)
+{
+  raysSeconds += other.raysSeconds;
+  scatterersSeconds += other.scatterersSeconds;
+  echoesSeconds += other.echoesSeconds;
+  detectionSeconds += other.detectionSeconds;
+  rays += other.rays;
+  segments += other.segments;
+  surfaceEchoes += other.surfaceEchoes;
+  scatterers += other.scatterers;
+  bytes = std::max(bytes, other.bytes);
+  return *this;
 }
 
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& p, const Progress& progress,
@@ -403,12 +428,14 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
                     " samples of a pulse this short, beyond 2^29; choose fewer elements, steps or samples, a "
                     "smaller depth or a lower frequency or bandwidth");
 
+  const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(n[1]) * p.firstStep,
+                       wanted = static_cast<std::ptrdiff_t>(n[1]) * (p.LastStep() + 1) - first;
   std::vector<BeamWays> ways(static_cast<std::size_t>(beams.Count()));
   {
     const Stopwatch watch(&spent.raysSeconds);
     std::vector<std::int64_t> rays(ways.size(), 0);
-    ParallelRanges(beams.Count(), beamsPerRange, progress.Part(0.0, 0.2), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t i = begin; i < end; ++i)
+    ParallelRanges(wanted, beamsPerRange, progress.Part(0.0, 0.2), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t i = first + begin; i < first + end; ++i)
         ways[static_cast<std::size_t>(i)] = beams.Trace(i, rays[static_cast<std::size_t>(i)]);
     });
     for (const std::int64_t each : rays)
@@ -428,6 +455,8 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
     parameters.seed = p.seed;
     parameters.densityPerMm3 = p.ScatterersPerMm3();
     parameters.displacement = &p.displacement;
+    parameters.decorrelation = p.decorrelation;
+    parameters.changeSeed = p.changeSeed;
     return Scatterers::Make(
         parameters, scene.Materials(),
         [&scene](const Eigen::Vector3f* points, std::size_t count, std::int32_t* media) { scene.MediumAt(points, count, media); },
@@ -440,8 +469,8 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
   {
     const Stopwatch watch(&spent.echoesSeconds);
     const VolumeView<Complex> rows = echoes.baseband.View();
-    ParallelRanges(beams.Count(), beamsPerRange, progress.Part(0.4, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t i = begin; i < end; ++i)
+    ParallelRanges(wanted, beamsPerRange, progress.Part(0.4, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t i = first + begin; i < first + end; ++i)
         beams.Sum(ways[static_cast<std::size_t>(i)], scatterers,
                   rows.Row(static_cast<int>(i % n[1]), static_cast<int>(i / n[1])));
     });
@@ -546,6 +575,10 @@ std::string DescribeSynthesis(const SynthesisParameters& parameters)
             {"transducer", JsonOf(Describe(p.transducer))},
             {"receiver", JsonOf(Describe(p.receiver))}};
   text["receiver"]["tgcPoints"] = tgc;
+  if (p.decorrelation > 0.0) {
+    text["decorrelation"] = p.decorrelation;
+    text["changeSeed"] = p.changeSeed;
+  }
   if (!stepPoses.empty())
     text["stepPoses"] = stepPoses;
   if (p.mode == SynthesisParameters::Mode::Coherent) {

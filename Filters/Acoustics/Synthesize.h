@@ -38,6 +38,8 @@ struct SynthesisParameters : EchoModel {
   /// Where the probe was at each step of the sweep, first to last, when it moved during the sweep; empty: at probeToWorld all
   /// the time. The scanner does not know: it places every plane as if the probe had rested at probeToWorld. Coherent only.
   std::vector<Pose> stepPoses;
+  /// The steps whose beams are made; the others have no echoes. -1: to the last one.
+  int firstStep = 0, lastStep = -1;
 
   int elements = 128, samples = 512;
   int steps = 96; ///< 1, whatever is given, of a probe that does not sweep
@@ -45,6 +47,8 @@ struct SynthesisParameters : EchoModel {
   Transducer transducer;
   Receiver receiver = DefaultReceiver();
   std::uint64_t seed = 1;
+  double decorrelation = 0.0; ///< of the speckle; coherent only
+  std::uint64_t changeSeed = 1;
   double scatterersPerMm3 = 0.0, invisibleDb = 12.0;
   static constexpr double scatterersPerCell = 10.0; ///< enough for speckle that is all but fully developed
   /// Where the tissue has gone: a scatterer at m in the material lies at m + u(m) in the world. The surfaces of the scene are
@@ -60,6 +64,8 @@ struct SynthesisParameters : EchoModel {
 
   /// Samples, elements and steps of the beam volume.
   std::array<int, 3> BeamDimensions() const;
+  /// The last of the steps whose beams are made.
+  int LastStep() const { return lastStep < 0 ? BeamDimensions()[2] - 1 : lastStep; }
 
   /// All ranges, the probe and poses, and what goes together. \throws Error(InvalidParameter)
   void Check() const;
@@ -88,6 +94,8 @@ struct SynthesisCost {
   std::int64_t surfaceEchoes = 0;
   std::int64_t scatterers = 0;
   std::size_t bytes = 0; ///< the largest of what was held at once: scene, ways, scatterers and samples
+
+  SynthesisCost& operator+=(const SynthesisCost& other);
 };
 
 /// The echoes of a scene before detection, complex baseband: mode Coherent. The depth axis is finer than the volume's when its

@@ -6,7 +6,6 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "SeenTissue.h"
-#include "SynthesisScene.h"
 #include "vtkAlgorithmOutput.h"
 #include "vtkExecutive.h"
 #include "vtkFieldData.h"
@@ -33,12 +32,6 @@ using echorama::SynthesisParameters;
 vtkStandardNewMacro(vtkUltrasoundSynthesizer);
 
 vtkUltrasoundParametersMacro(vtkUltrasoundSynthesizer);
-
-//----------------------------------------------------------------------------
-std::string vtkUltrasoundSynthesizer::GetSceneSchema()
-{
-  return echorama::SceneSchema();
-}
 
 namespace {
 constexpr std::size_t MaximumVoxels = 536870912; // 2^29
@@ -325,28 +318,39 @@ void vtkUltrasoundSynthesizer::Execute(vtkInformationVector** inputs, vtkImageDa
   const auto made = echorama::SynthesizeBeams(scene, p, progress.Part(0.1, 0.95), &this->LastCost);
   this->Notes = NotesOn(scene, this->LastCost);
 
-  vtkImageData* beams = vtkImageData::SafeDownCast(this->GetOutputDataObject(1));
-  beams->Initialize();
-  echorama::ImageGeometry beamGrid;
-  beamGrid.dimensions = p.BeamDimensions();
-  vtkUltrasoundVolume::SetGeometry(beams, beamGrid);
-  vtkDataArray* samples = AddArray(beams, vtkUltrasoundVolume::IntensityName(), VTK_UNSIGNED_CHAR);
-  beams->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
-  std::copy(made.View().begin(), made.View().end(), vtkUltrasoundVolume::ViewOf<unsigned char>(samples, beams).begin());
+  SetOutputs(p, made.View(), job.Grid, output, vtkImageData::SafeDownCast(this->GetOutputDataObject(1)),
+             progress.Part(0.95, 1.0));
+}
 
+//----------------------------------------------------------------------------
+void vtkUltrasoundSynthesizer::SetOutputs(const SynthesisParameters& p, echorama::VolumeView<const unsigned char> made,
+                                          const echorama::ImageGeometry& grid, vtkImageData* output, vtkImageData* beams,
+                                          const echorama::Progress& progress)
+{
+  if (beams) {
+    beams->Initialize();
+    echorama::ImageGeometry beamGrid;
+    beamGrid.dimensions = p.BeamDimensions();
+    vtkUltrasoundVolume::SetGeometry(beams, beamGrid);
+    vtkDataArray* samples = AddArray(beams, vtkUltrasoundVolume::IntensityName(), VTK_UNSIGNED_CHAR);
+    beams->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+    std::copy(made.begin(), made.end(), vtkUltrasoundVolume::ViewOf<unsigned char>(samples, beams).begin());
+  }
   output->Initialize(); // the pipeline has passed on what the tissue says of itself
-  vtkUltrasoundVolume::SetGeometry(output, job.Grid);
+  vtkUltrasoundVolume::SetGeometry(output, grid);
   vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), VTK_UNSIGNED_CHAR);
   vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
   output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
-  echorama::ScanConvert<unsigned char>(made.View(), p.probe, p.probeToWorld, job.Grid,
+  echorama::ScanConvert<unsigned char>(made, p.probe, p.probeToWorld, grid,
                                        vtkUltrasoundVolume::ViewOf<unsigned char>(intensity, output),
-                                       vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output), progress.Part(0.95, 1.0));
+                                       vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output), progress);
   for (vtkImageData* each : {output, beams}) {
-    vtkUltrasoundAcquisition::SetProbeGeometry(each, p.probe);
-    vtkUltrasoundAcquisition::SetProbeToWorld(each, p.probeToWorld);
-    vtkUltrasoundAcquisition::SetSeed(each, p.seed);
-    vtkUltrasoundAcquisition::SetScene(each, echorama::DescribeSynthesis(p));
+    if (each) {
+      vtkUltrasoundAcquisition::SetProbeGeometry(each, p.probe);
+      vtkUltrasoundAcquisition::SetProbeToWorld(each, p.probeToWorld);
+      vtkUltrasoundAcquisition::SetSeed(each, p.seed);
+      vtkUltrasoundAcquisition::SetScene(each, echorama::DescribeSynthesis(p));
+    }
   }
 }
 

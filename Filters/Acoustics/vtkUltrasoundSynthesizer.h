@@ -103,6 +103,15 @@ public:
    */
   vtkUltrasoundInteger64Macro(Seed);
 
+  /**
+   * How far the speckle has changed: complex echoes of volumes of one Seed and different ChangeSeeds that are seen alike
+   * correlate by 1 less this. Bodies stay where and as loud as they are. Used when Mode is coherent. In [0, 1]; default 0.
+   */
+  vtkUltrasoundNumberMacro(Decorrelation);
+
+  /** Seed of the change: volumes with the same one have changed alike. Used when Mode is coherent. At least 0; default 1. */
+  vtkUltrasoundInteger64Macro(ChangeSeed);
+
   /** Beams of a plane. In [2, 4096]; default 128. */
   vtkUltrasoundIntegerMacro(Elements);
 
@@ -265,9 +274,6 @@ public:
    */
   void TissueToSeen(vtkPoints* from, vtkPoints* to);
 
-  /** The JSON schema of scenes, the text of Examples/scenes/echorama-scene-1.schema.json. */
-  static std::string GetSceneSchema();
-
   /** What the last run noticed about the tissue (open or inverted surfaces) and what it cost, a line each; never fatal. */
   std::string GetNotes() const { return this->Notes; }
 
@@ -275,6 +281,13 @@ public:
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
   /** Sets all of them but for probe geometry and pose, and what has no setter of its own. */
   void SetParameters(const echorama::SynthesisParameters& parameters);
+  /**
+   * Makes \a output the scan conversion of \a made, on \a grid (the pose of the volume), and \a beams (may be nullptr) the
+   * samples on the beams, both with what is known of the acquisition.
+   */
+  static void SetOutputs(const echorama::SynthesisParameters& parameters, echorama::VolumeView<const unsigned char> made,
+                         const echorama::ImageGeometry& grid, vtkImageData* output, vtkImageData* beams,
+                         const echorama::Progress& progress = {});
   /** What the last run cost. */
   const echorama::SynthesisCost& Cost() const
   {

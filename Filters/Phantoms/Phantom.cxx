@@ -533,7 +533,8 @@ void MakePhantom(const PhantomParameters& p, VolumeView<unsigned char> intensity
 
 std::string DescribePhantom(const PhantomParameters& p)
 {
-  nlohmann::ordered_json text = nlohmann::ordered_json::parse(SceneToJson(p.scene)); // without rib and jets: they are parameters
+  nlohmann::ordered_json text =
+      nlohmann::ordered_json::parse(PhantomToJson(p.scene)); // without rib and jets: they are parameters
   PhantomParameters readable = p;
   text["parameters"] = JsonOf(Without(Describe(readable), {"Seed"})); // which has its own array
   return text.dump();

@@ -82,7 +82,7 @@ ImageGeometry PhantomGeometry(const PhantomParameters& parameters);
 void MakePhantom(const PhantomParameters& parameters, VolumeView<unsigned char> intensity, VolumeView<unsigned char> valid,
                  const Progress& progress = {});
 
-/// The scene and every parameter as one JSON text: SceneFromJson reads the scene back from it.
+/// The scene and every parameter as one JSON text: PhantomFromJson reads the scene back from it.
 std::string DescribePhantom(const PhantomParameters& parameters);
 
 } // namespace echorama

@@ -2,8 +2,7 @@
 // The scene is a short list, so a look-up is a loop from the last body (which counts most) to the first, with a test
 // against the body's box before the distance to it: some 20 comparisons for most points.
 #include "PhantomScene.h"
-#include "Core/Base/Error.h"
-#include "Core/Base/ParameterJson.h"
+#include "PhantomSceneKeys.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,7 +10,7 @@
 namespace echorama {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using described::Json;
 using Eigen::Vector3d;
 
 constexpr const char* phantomSchema = "echorama-phantom-1";
@@ -49,11 +48,6 @@ Inclusion Vessel(const char* name, const std::vector<Vector3d>& through, double 
   return {name, Tube{Curve(through), radius}, Inclusion::anechoicDb, wallMm, wallDb, 0.0};
 }
 
-Json ToJson(const Vector3d& v)
-{
-  return Json::array({v.x(), v.y(), v.z()});
-}
-
 // The value of |scaled| - 1 over its own gradient; the centre has none.
 double DistanceFromAxes(const Vector3d& radii, const Vector3d& local)
 {
@@ -62,103 +56,54 @@ double DistanceFromAxes(const Vector3d& radii, const Vector3d& local)
   return slope > 0.0 ? scaled.norm() * (scaled.norm() - 1.0) / slope : -radii.minCoeff();
 }
 
-// The reader: every failure names the place.
-[[noreturn]] void RefusePhantom(const std::string& place, const std::string& reason)
+// The bodies alone, or the whole text.
+struct PhantomText {
+  PhantomScene scene;
+};
+
+template <class A>
+void Describe(A& a, PhantomText& text)
 {
-  throw Error(Error::Kind::BadInput, "phantom scene: " + place + " " + reason);
+  a.Constant("schema", phantomSchema);
+  echorama::Describe(a, text.scene);
 }
 
-const Json& Field(const Json& parent, const char* key, const std::string& place)
-{
-  const auto found = parent.find(key);
-  if (found == parent.end())
-    RefusePhantom(place, std::string("has no \"") + key + "\"");
-  return *found;
-}
+struct NoContext {};
 
-double NumberFrom(const Json& value, const std::string& place)
-{
-  if (!value.is_number())
-    RefusePhantom(place, "is not a number");
-  return value.get<double>();
-}
-
-Vector3d VectorFrom(const Json& value, const std::string& place)
-{
-  if (!value.is_array() || value.size() != 3)
-    RefusePhantom(place, "is not a list of three numbers");
-  return {NumberFrom(value[0], place), NumberFrom(value[1], place), NumberFrom(value[2], place)};
-}
-
-// Reads the parameters that are there; those named must be.
-void Read(const Json& object, const ParameterList& parameters, std::initializer_list<std::string_view> needed,
-          const std::string& place)
-{
-  for (const Parameter& parameter : parameters) {
-    const std::string key = parameter.Key();
-    if (std::find(needed.begin(), needed.end(), key) != needed.end())
-      Field(object, key.c_str(), place);
-    const auto found = object.find(key);
-    if (found == object.end())
-      continue;
-    if (auto* const* vector = std::get_if<Vector3d*>(&parameter.value))
-      **vector = VectorFrom(*found, place + ", " + key);
-    else
-      *std::get<double*>(parameter.value) = NumberFrom(*found, place + ", " + key);
+class PhantomReader : public described::Reader<PhantomReader, NoContext> {
+public:
+  using Reader::Reader;
+  template <class T>
+  static void Validate(const T&)
+  {
   }
-}
+  template <class T>
+  static void Inherit(NoContext&, T&)
+  {
+  }
+};
 
-Inclusion InclusionFrom(const Json& value, const std::string& place)
-{
-  if (!value.is_object())
-    RefusePhantom(place, "is not an object");
-  Inclusion inclusion;
-  if (const auto name = value.find("name"); name != value.end()) {
-    if (!name->is_string())
-      RefusePhantom(place, "has a name that is not a string");
-    inclusion.name = name->get<std::string>();
-  }
-  const auto ellipsoid = value.find("ellipsoid"), tube = value.find("tube");
-  if ((ellipsoid != value.end()) == (tube != value.end()))
-    RefusePhantom(place, "must have either \"ellipsoid\" or \"tube\"");
-  if (ellipsoid != value.end()) {
-    if (!ellipsoid->is_object())
-      RefusePhantom(place + ", ellipsoid", "is not an object");
-    Read(*ellipsoid, Describe(inclusion.shape.emplace<Ellipsoid>()), {"centre", "radii"}, place);
-  } else {
-    if (!tube->is_object())
-      RefusePhantom(place + ", tube", "is not an object");
-    const Json& path = Field(*tube, "path", place);
-    if (!path.is_array())
-      RefusePhantom(place + ", path", "is not a list of points");
-    Tube& shape = inclusion.shape.emplace<Tube>();
-    for (const Json& point : path)
-      shape.path.push_back(VectorFrom(point, place + ", path"));
-    Read(*tube, Describe(shape), {"radius"}, place);
-  }
-  Read(value, Describe(inclusion), {}, place);
-  return inclusion;
-}
+class PhantomWriter : public described::Writer<PhantomWriter> {};
 
 } // namespace
 
 ParameterList Describe(Ellipsoid& ellipsoid)
 {
   return {Parameter("Centre", ellipsoid.centre, {}, "mm", "In the world."),
-          Parameter("Radii", ellipsoid.radii, {0, Unlimited, true}, "mm", "Along its own axes."),
+          Parameter("Radii", ellipsoid.radii, {0, 1e6, true}, "mm", "Along its own axes."),
           Parameter("Rotation", ellipsoid.rotation, {}, "radians", "How its axes are turned: axis times angle.")};
 }
 
 ParameterList Describe(Tube& tube)
 {
-  return {Parameter("Radius", tube.radius, {0, Unlimited, true}, "mm", "Of the tube, its wall included.")};
+  return {Parameter("Radius", tube.radius, {0, 1e6, true}, "mm", "Of the tube, its wall included.")};
 }
 
 ParameterList Describe(Inclusion& inclusion)
 {
   const ParameterRange levels{Inclusion::anechoicDb, 60};
   return {Parameter("EchogenicityDb", inclusion.echogenicityDb, levels, "dB", "How loud it echoes; -120: clear fluid."),
-          Parameter("WallMm", inclusion.wallMm, {0, Unlimited}, "mm", "Thickness of the wall, its outermost part; 0: none."),
+          Parameter("WallMm", inclusion.wallMm, {0, 1e6}, "mm", "Thickness of the wall, its outermost part; 0: none."),
           Parameter("WallDb", inclusion.wallDb, levels, "dB", "Echogenicity of the wall."),
           Parameter("AttenuationDbPerMm", inclusion.attenuationDbPerMm, {0, 1000}, "dB/mm",
                     "How much of the echo a mm of the body on its way takes, there and back; of ellipsoids alone.")};
@@ -227,43 +172,28 @@ std::vector<Inclusion> Jets()
           Body("shallow puff", {{-24, 16, 44}, {6, 8, 4}, {0, 0.3, 0.4}}, 12.0)};
 }
 
-std::string SceneToJson(const PhantomScene& scene)
+std::string PhantomToJson(const PhantomScene& scene)
 {
-  Json list = Json::array();
-  for (Inclusion inclusion : scene.inclusions) {
-    Json item{{"name", inclusion.name}};
-    if (auto* ellipsoid = std::get_if<Ellipsoid>(&inclusion.shape))
-      item["ellipsoid"] = JsonOf(Describe(*ellipsoid));
-    else {
-      Tube& tube = std::get<Tube>(inclusion.shape);
-      Json path = Json::array();
-      for (const Vector3d& point : tube.path)
-        path.push_back(ToJson(point));
-      item["tube"] = {{"path", path}};
-      item["tube"].update(JsonOf(Describe(tube)));
-    }
-    item.update(JsonOf(Describe(inclusion)));
-    list.push_back(std::move(item));
-  }
-  return Json{{"schema", phantomSchema}, {"inclusions", std::move(list)}}.dump();
+  PhantomText text{scene};
+  return PhantomWriter::Write(text).dump();
 }
 
-PhantomScene SceneFromJson(const std::string& text)
+PhantomScene PhantomFromJson(const std::string& text)
 {
-  const Json root = Json::parse(text, nullptr, false);
-  if (!root.is_object())
-    RefusePhantom("the text", "is not a JSON object");
-  const Json& schema = Field(root, "schema", "the text");
-  if (schema != phantomSchema)
-    RefusePhantom("the text", std::string("has a schema other than \"") + phantomSchema + "\"");
-  const Json& list = Field(root, "inclusions", "the text");
-  if (!list.is_array())
-    RefusePhantom("\"inclusions\"", "is not a list");
-  PhantomScene scene;
-  for (const Json& item : list)
-    scene.inclusions.push_back(InclusionFrom(item, "inclusion " + std::to_string(scene.inclusions.size() + 1)));
-  scene.Check();
-  return scene;
+  const std::string name = "phantom scene";
+  const Json whole = described::Parse(name, text);
+  // What describes a phantom says more than its bodies.
+  Json bodies = Json::object();
+  for (const char* key : {"schema", "inclusions"})
+    if (whole.is_object() && whole.contains(key))
+      bodies[key] = whole[key];
+  if (bodies.contains("schema") && !bodies.contains("inclusions"))
+    throw Error(Error::Kind::BadFile, name + ": \"inclusions\" is missing");
+  PhantomText read;
+  NoContext none;
+  PhantomReader::Read(name, none, whole.is_object() ? bodies : whole, "", read);
+  read.scene.Check();
+  return read.scene;
 }
 
 double SignedDistance(const Ellipsoid& ellipsoid, const Vector3d& point)

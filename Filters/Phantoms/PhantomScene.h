@@ -65,11 +65,11 @@ inline PhantomScene UniformScene()
 /// {"schema": "echorama-phantom-1", "inclusions": [{"name": .., "ellipsoid": {"centre": [3], "radii": [3], "rotation": [3]}
 /// or "tube": {"path": [[3], ...], "radius": ..}, "echogenicityDb": .., "wallMm": .., "wallDb": .., "attenuationDbPerMm":
 /// ..}, ...]}; millimetres, rotation in radians. Numbers are written so that they come back bit by bit.
-std::string SceneToJson(const PhantomScene& scene);
+std::string PhantomToJson(const PhantomScene& scene);
 
-/// Reads it back; the numbers besides the shape may be missing (0), other keys are ignored.
-/// \throws Error(BadInput) that names the inclusion and the field when it is not such a text, and what Check() throws.
-PhantomScene SceneFromJson(const std::string& text);
+/// Reads it back, also from what DescribePhantom() says; the numbers besides the shape may be missing (0).
+/// \throws Error(BadFile) with the way to the key that is wrong, and what Check() throws.
+PhantomScene PhantomFromJson(const std::string& text);
 
 /// Distance in mm from \a point to the surface, negative inside. Exact for tubes; for ellipsoids exact on the surface and
 /// good to first order near it.

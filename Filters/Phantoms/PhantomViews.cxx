@@ -79,4 +79,20 @@ Pose KnockedPose(std::uint64_t seed, std::uint64_t item, double mm, double degre
   return MotionAbout(centre, axis * (degrees * radiansPerDegree), direction * mm);
 }
 
+std::vector<Landmark> SharedPlaces(std::uint64_t seed, int count, const ProbeGeometry& probe, const std::vector<Pose>& views)
+{
+  std::vector<Landmark> places;
+  Random random(seed, 0x1a4d);
+  const Eigen::AlignedBox3d box = BoxAround(probe);
+  for (int attempt = 0; attempt < 1000 * count && static_cast<int>(places.size()) < count; ++attempt) {
+    const Pose& view = views[random.Below(views.size())];
+    const Eigen::Vector3d share(random.Uniform(), random.Uniform(), random.Uniform());
+    const Eigen::Vector3d place = view * (box.min() + share.cwiseProduct(box.sizes()));
+    const auto sees = [&](const Pose& other) { return BeamPointAt(probe, other.inverse() * place).has_value(); };
+    if (sees(view) && std::count_if(views.begin(), views.end(), sees) > 1)
+      places.push_back({"L" + std::to_string(places.size() + 1), place});
+  }
+  return places;
+}
+
 } // namespace echorama

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Geometry/Landmark.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Geometry/RigidTransform.h"
 #include <cstdint>
@@ -29,5 +30,8 @@ double OverlapFraction(const ProbeGeometry& probe, const Pose& pose);
 /// through \a centre, the same for the same \a seed and \a item. Multiply it from the left: knocked * VolumeToWorld.
 /// \throws Error(InvalidParameter) when a number is not finite or a size is negative.
 Pose KnockedPose(std::uint64_t seed, std::uint64_t item, double mm, double degrees, const Eigen::Vector3d& centre);
+
+/// Places of the tissue that two views at least see, at random: \a count of them, or fewer when they are hard to find.
+std::vector<Landmark> SharedPlaces(std::uint64_t seed, int count, const ProbeGeometry& probe, const std::vector<Pose>& views);
 
 } // namespace echorama

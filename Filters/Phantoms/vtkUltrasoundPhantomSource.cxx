@@ -77,7 +77,7 @@ echorama::PhantomParameters vtkUltrasoundPhantomSource::Phantom() const
 {
   echorama::PhantomParameters phantom = this->Values->phantom;
   if (!this->Values->scene.empty()) {
-    phantom.scene = echorama::SceneFromJson(this->Values->scene);
+    phantom.scene = echorama::PhantomFromJson(this->Values->scene);
   }
   const echorama::PlacedProbe placed = this->Values->probe.Place();
   phantom.probe = placed.geometry;
@@ -134,7 +134,7 @@ void vtkUltrasoundPhantomSource::Add(echorama::Inclusion inclusion)
     echorama::PhantomScene scene = this->Phantom().scene;
     scene.inclusions.push_back(std::move(inclusion));
     scene.Check();
-    this->SetParameterAsText("Scene", echorama::SceneToJson(scene).c_str());
+    this->SetParameterAsText("Scene", echorama::PhantomToJson(scene).c_str());
   } catch (const Error& error) {
     vtkErrorMacro(<< error.what());
   }
@@ -161,7 +161,7 @@ void vtkUltrasoundPhantomSource::AddTube(const double from[3], const double to[3
 //----------------------------------------------------------------------------
 void vtkUltrasoundPhantomSource::ClearScene()
 {
-  this->SetParameterAsText("Scene", echorama::SceneToJson(echorama::UniformScene()).c_str());
+  this->SetParameterAsText("Scene", echorama::PhantomToJson(echorama::UniformScene()).c_str());
 }
 
 //----------------------------------------------------------------------------

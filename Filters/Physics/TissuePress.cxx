@@ -537,4 +537,9 @@ double TissuePress::LeastVolume() const
   return levels_.front()->solver.LeastVolume();
 }
 
+PressedTissue TissuePress::Now() const
+{
+  return {body_.nodes, Displacements(), TissueNodes(), ContactNodes(), Force(), RelativeVolume(), LeastVolume()};
+}
+
 } // namespace echorama

@@ -30,6 +30,15 @@ struct TissuePressParameters {
 };
 ParameterList Describe(TissuePressParameters& p);
 
+/// Where tissue is under a probe; TissuePress says what each is.
+struct PressedTissue {
+  ImageGeometry nodes;
+  std::vector<Eigen::Vector3d> displacements;
+  std::vector<unsigned char> tissueNodes, contactNodes;
+  Eigen::Vector3d forceN = Eigen::Vector3d::Zero();
+  double relativeVolume = 1.0, leastVolume = 1.0;
+};
+
 /// Tissue that a probe presses, at rest at every moment. The body is given as it is without the probe and without gravity.
 ///
 /// Lattices of half, a quarter ... of the resolution find a first guess; each step is solved on the coarsest one first, in as
@@ -60,6 +69,7 @@ public:
   /// The volume of all tissue now over that at rest, and the least of any cell's part.
   double RelativeVolume() const;
   double LeastVolume() const;
+  PressedTissue Now() const;
   const TissueWork& Work() const { return work_; }
   /// The steps on the finest lattice alone.
   const TissueWork& FinestWork() const { return finestWork_; }

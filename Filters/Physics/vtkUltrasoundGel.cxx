@@ -110,14 +110,16 @@ const Material& MaterialIn(const TissueSurface& tissue, const std::string& name)
   return own == tissue.materials.end() ? echorama::StandardMaterial(name) : *own;
 }
 
-// Where the level is 0, as a body of gel in air; no body where there is no gel.
-TissueSurface SurfaceOf(GelCoat& coat, const TissueSurface& tissue)
+} // namespace
+
+//----------------------------------------------------------------------------
+TissueSurface vtkUltrasoundGel::SurfaceOf(const GelCoat& coat, const echorama::Material& gel, const echorama::Material& air)
 {
   // Contours are made along the axes of the grid; the world comes after.
   vtkNew<vtkImageData> image;
   image->SetDimensions(coat.grid.dimensions.data());
   vtkNew<vtkFloatArray> level;
-  level->SetArray(coat.level.data(), static_cast<vtkIdType>(coat.level.size()), 1);
+  level->SetArray(const_cast<float*>(coat.level.data()), static_cast<vtkIdType>(coat.level.size()), 1); // which only reads
   image->GetPointData()->SetScalars(level);
   vtkNew<vtkFlyingEdges3D> contour;
   contour->SetInputData(image);
@@ -128,7 +130,7 @@ TissueSurface SurfaceOf(GelCoat& coat, const TissueSurface& tissue)
   vtkPolyData* made = contour->GetOutput();
 
   TissueSurface surface;
-  surface.materials = {MaterialIn(tissue, "air"), MaterialIn(tissue, "gel")};
+  surface.materials = {air, gel};
   if (made->GetNumberOfPolys() == 0) {
     return surface;
   }
@@ -155,9 +157,10 @@ TissueSurface SurfaceOf(GelCoat& coat, const TissueSurface& tissue)
   return surface;
 }
 
-// The face as a rectangle of the beams' starts.
-void SetFace(vtkPolyData* face, const GelCoat& coat)
+//----------------------------------------------------------------------------
+void vtkUltrasoundGel::SetFace(const GelCoat& coat, vtkPolyData* face)
 {
+  // A rectangle of the beams' starts.
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   vtkNew<vtkDoubleArray> gel, air;
@@ -196,8 +199,6 @@ void SetFace(vtkPolyData* face, const GelCoat& coat)
   vtkUltrasoundVolume::AddField(face, vtkUltrasoundGel::GelGoneName(), &coat.goneMm3, 1);
   vtkUltrasoundVolume::AddField(face, vtkUltrasoundGel::SecondsName(), &coat.seconds, 1);
 }
-
-} // namespace
 
 //----------------------------------------------------------------------------
 vtkUltrasoundGel::vtkUltrasoundGel()
@@ -270,10 +271,11 @@ int vtkUltrasoundGel::RequestData(vtkInformation*, vtkInformationVector** inputs
     GelCoat coat = settled.Look(true, progress.Part(0.8, 1.0));
 
     // 3. what goes out
-    TissueSurface all = SurfaceOf(coat, settled.Tissue());
-    all.Append(settled.Tissue());
+    const TissueSurface& now = settled.Tissue();
+    TissueSurface all = SurfaceOf(coat, MaterialIn(now, "gel"), MaterialIn(now, "air"));
+    all.Append(now);
     vtkUltrasoundTissue::Set(vtkPolyData::GetData(outputs, 0), all);
-    SetFace(vtkPolyData::GetData(outputs, 1), coat);
+    SetFace(coat, vtkPolyData::GetData(outputs, 1));
     this->PosesComputed = static_cast<int>(steps.size() - known);
     kept->Steps = std::move(steps);
     this->Last = std::move(kept);

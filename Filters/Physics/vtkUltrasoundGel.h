@@ -51,6 +51,7 @@
 #endif
 
 class vtkDataObject;
+class vtkPolyData;
 
 class ECHORAMAFILTERSPHYSICS_EXPORT vtkUltrasoundGel : public vtkPolyDataAlgorithm {
 public:
@@ -150,6 +151,11 @@ public:
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
+  /** The surface of gel, as a body of it in air; no body where there is none. */
+  static echorama::TissueSurface SurfaceOf(const echorama::GelCoat& coat, const echorama::Material& gel,
+                                           const echorama::Material& air);
+  /** Makes \a face output 1. */
+  static void SetFace(const echorama::GelCoat& coat, vtkPolyData* face);
 #endif
 
 protected:

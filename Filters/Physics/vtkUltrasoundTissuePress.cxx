@@ -82,7 +82,6 @@ void vtkUltrasoundTissuePress::Execute(vtkInformationVector** inputs, vtkImageDa
   const std::vector<echorama::PlacedProbe> probes = vtkUltrasoundAcquisition::ProbesOf(inputs[1]);
   echorama::TissueBody body =
       echorama::TissueBodyOf(vtkUltrasoundTissue::Of(vtkPolyData::GetData(inputs[0])), this->Lattice, progress.Part(0.0, 0.05));
-  const echorama::ImageGeometry nodes = body.nodes;
 
   // 2. the kernel
   const double start = probes.empty() ? 1.0 : 0.1;
@@ -103,22 +102,26 @@ void vtkUltrasoundTissuePress::Execute(vtkInformationVector** inputs, vtkImageDa
   }
 
   // 3. what goes out
+  SetOutput(press.Now(), output);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTissuePress::SetOutput(const echorama::PressedTissue& pressed, vtkImageData* output)
+{
   output->Initialize(); // the pipeline has passed on what the tissue says of itself
-  vtkUltrasoundVolume::SetGeometry(output, nodes);
-  const std::vector<Eigen::Vector3d> displacements = press.Displacements();
+  vtkUltrasoundVolume::SetGeometry(output, pressed.nodes);
   vtkNew<vtkDoubleArray> displacement;
   displacement->SetName(vtkUltrasoundDisplacement::DisplacementName());
   displacement->SetNumberOfComponents(3);
-  displacement->SetNumberOfTuples(static_cast<vtkIdType>(displacements.size()));
-  for (std::size_t n = 0; n < displacements.size(); ++n) {
-    displacement->SetTuple(static_cast<vtkIdType>(n), displacements[n].data());
+  displacement->SetNumberOfTuples(static_cast<vtkIdType>(pressed.displacements.size()));
+  for (std::size_t n = 0; n < pressed.displacements.size(); ++n) {
+    displacement->SetTuple(static_cast<vtkIdType>(n), pressed.displacements[n].data());
   }
   output->GetPointData()->SetVectors(displacement);
-  AddMarks(output, TissueName(), press.TissueNodes());
-  AddMarks(output, ContactName(), press.ContactNodes());
-  const Eigen::Vector3d force = press.Force();
-  const double volumes[2] = {press.RelativeVolume(), press.LeastVolume()};
-  vtkUltrasoundVolume::AddField(output, ProbeForceName(), force.data(), 3);
+  AddMarks(output, TissueName(), pressed.tissueNodes);
+  AddMarks(output, ContactName(), pressed.contactNodes);
+  const double volumes[2] = {pressed.relativeVolume, pressed.leastVolume};
+  vtkUltrasoundVolume::AddField(output, ProbeForceName(), pressed.forceN.data(), 3);
   vtkUltrasoundVolume::AddField(output, RelativeVolumeName(), volumes, 2);
 }
 

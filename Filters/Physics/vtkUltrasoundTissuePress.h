@@ -120,6 +120,8 @@ public:
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
+  /** Makes \a output what a run puts out. */
+  static void SetOutput(const echorama::PressedTissue& pressed, vtkImageData* output);
 #endif
 
 protected:

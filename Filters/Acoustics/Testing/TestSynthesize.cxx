@@ -186,6 +186,53 @@ TEST(Synthesize, ViewsOfOneSeedSeeTheSameSpeckle)
   EXPECT_GT(LargestDifference(moved, SynthesizeEchoes(scene, p)), 0.5);
 }
 
+TEST(Synthesize, ChangedTissueCorrelatesByWhatItKeeps)
+{
+  const AcousticScene scene(Background(Speckled()));
+  SynthesisParameters p = Small();
+  p.probe = ProbeGeometry::Linear(30.0, 30.0, 5.0, 40.0);
+  p.elements = p.steps = 16;
+  const auto correlation = [](const BeamEchoes& one, const BeamEchoes& other) {
+    std::complex<double> product = 0.0;
+    for (std::ptrdiff_t i = 0; i < one.baseband.View().Size(); ++i)
+      product += std::complex<double>(one.baseband.View()[i]) * std::conj(std::complex<double>(other.baseband.View()[i]));
+    return std::abs(product) / std::sqrt(Power(one) * Power(other)) / static_cast<double>(one.baseband.View().Size());
+  };
+  const BeamEchoes before = SynthesizeEchoes(scene, p);
+  for (const double decorrelation : {0.1, 0.4, 1.0}) {
+    p.decorrelation = decorrelation;
+    p.changeSeed = 1;
+    const BeamEchoes one = SynthesizeEchoes(scene, p);
+    EXPECT_EQ(LargestDifference(one, SynthesizeEchoes(scene, p)), 0.0);
+    p.changeSeed = 2;
+    const BeamEchoes two = SynthesizeEchoes(scene, p);
+    EXPECT_NEAR(correlation(one, two), 1.0 - decorrelation, 0.06) << decorrelation;
+    EXPECT_NEAR(correlation(before, one), std::sqrt(1.0 - decorrelation), 0.06) << decorrelation;
+    EXPECT_NEAR(Power(one), Power(before), 0.12);
+  }
+}
+
+TEST(Synthesize, APartOfTheSweepIsThatPartOfTheWhole)
+{
+  TissueSurface surface = Background(Speckled());
+  AddBox(surface, Vector3d(-5, -5, 15), Vector3d(5, 5, 25), StandardMaterial("cyst"));
+  const AcousticScene scene(surface);
+  SynthesisParameters p = Small();
+  const BeamEchoes whole = SynthesizeEchoes(scene, p);
+  p.firstStep = 1;
+  p.lastStep = 2;
+  ASSERT_GT(p.steps, 3);
+  const BeamEchoes part = SynthesizeEchoes(scene, p);
+  for (int step = 0; step < p.steps; ++step)
+    for (int beam = 0; beam < p.elements; ++beam)
+      for (int i = 0; i < whole.baseband.View().Dimensions()[0]; ++i)
+        ASSERT_NEAR(std::abs(part.baseband.View().Row(beam, step)[i] -
+                             (step == 1 || step == 2 ? whole.baseband.View().Row(beam, step)[i] : std::complex<float>(0.0f))),
+                    0.0, 1e-5); // scatterers are added up in another order
+  p.lastStep = p.steps;
+  EXPECT_THROW(p.Check(), Error);
+}
+
 TEST(Synthesize, SpeckleGoesAlongWithDisplacedTissue)
 {
   const AcousticScene scene(Background(Speckled()));

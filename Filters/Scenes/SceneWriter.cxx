@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Check() writes a scene and reads it again, and so says the same as the reader.
-#include "Core/Base/Error.h"
-#include "Core/Base/ParameterJson.h"
 #include "SceneKeys.h"
 
 namespace echorama {
 namespace scene {
-namespace {
 
-using Json = nlohmann::ordered_json;
+using described::Json;
 
-class Writer {
+// Not in a nameless namespace: the keys are found beside it.
+class Writer : public described::Writer<Writer> {
 public:
-  static constexpr bool reads = false;
+  using Base = described::Writer<Writer>;
+
   template <class T>
   static Json Write(T& value)
   {
@@ -23,54 +22,17 @@ public:
           rows.push_back({row[0], row[1], row[2], row[3]});
         return rows;
       }
-    Writer writer;
-    Describe(writer, value);
-    return std::move(writer.object_);
+    return Base::Write(value);
   }
 
-  void Constant(const char* key, const char* text) { object_[key] = text; }
   void Value(const Parameter& parameter, Presence presence = {})
   {
     const auto* text = std::get_if<std::string*>(&parameter.value);
     const bool isRemark = text && presence != Presence::Needed && (parameter.name == "Name" || parameter.name == "About");
     if (!isRemark || !(*text)->empty())
-      object_[parameter.Key()] = JsonOf(parameter);
-  }
-  bool Maybe(const Parameter& parameter, bool there)
-  {
-    if (there)
-      Value(parameter);
-    return there;
+      Base::Value(parameter);
   }
   void MaterialName(const char* key, const std::string& value, Presence = {}) { object_[key] = value; }
-  template <class T>
-  void Object(const char* key, T& value, const char*, Presence = {})
-  {
-    object_[key] = Write(value);
-  }
-  template <class T>
-  void MaybeObject(const char* key, std::optional<T>& value, const char*)
-  {
-    if (value)
-      object_[key] = Write(*value);
-  }
-  template <class T>
-  void List(const char* key, std::vector<T>& values, const char*, Presence = {})
-  {
-    Json list = Json::array();
-    for (T& value : values)
-      list.push_back(Write(value));
-    object_[key] = std::move(list);
-  }
-  template <class Variant, class... T>
-  void OneOf(Variant& value, const Form<T>&... forms)
-  {
-    const auto write = [this](const auto& form, auto* held) {
-      if (held)
-        object_[form.key] = Write(*held);
-    };
-    (write(forms, std::get_if<T>(&value)), ...);
-  }
   template <class Variant>
   void Views(const char* key, Variant& value, const char*)
   {
@@ -79,6 +41,8 @@ public:
       object_[key] = Write(under);
     } else if (auto* views = std::get_if<SceneViews>(&value))
       object_[key] = Write(*views);
+    else if (auto* motion = std::get_if<SceneMotion>(&value))
+      object_[key] = Write(*motion);
     else
       object_[key] = Write(std::get<SceneRow>(value));
   }
@@ -96,12 +60,8 @@ public:
       object[material.name] = Write(material);
     object_[key] = std::move(object);
   }
-
-private:
-  Json object_ = Json::object();
 };
 
-} // namespace
 } // namespace scene
 
 void SynthesisScene::Check(const std::string& title) const

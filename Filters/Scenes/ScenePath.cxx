@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "RecordedMotion.h"
+#include "ScenePath.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
 #include "Core/Geometry/TransformGraph.h"
 #include "Readers/SequencePoses.h"
 #include <algorithm>
@@ -54,42 +55,67 @@ auto Named(const std::string& path, const Function& function)
   }
 }
 
+std::vector<TimedPose> PosesOf(const SceneMotion& motion)
+{
+  std::vector<TimedPose> poses;
+  for (const SceneMotion::Key& key : motion.keys)
+    poses.push_back({key.seconds, key.pose.ProbeToWorld()});
+  return poses;
+}
+
 } // namespace
 
-RecordedMotion::RecordedMotion(const std::string& path, const SceneRecording& recording)
-  : path_(path), trackerToWorld_(recording.trackerToWorld.Matrix().matrix()), motion_(Named(path, [&] {
+ScenePath::ScenePath(const std::string& path, const SceneRecording& recording)
+  : name_(path), pathToWorld_(recording.trackerToWorld.Matrix().matrix()), motion_(Named(path, [&] {
       return MotionPath(PosesOf(path, recording.transform), {recording.smoothSeconds, recording.longestGapSeconds});
     }))
 {
 }
 
-std::vector<double> RecordedMotion::Times(int count, double sweepSeconds) const
+ScenePath::ScenePath(const SceneMotion& motion)
+  : name_("views.keys"), motion_(Named(name_, [&] {
+      constexpr double noSmoothing = 0.0, longest = 600.0; // s, the most there is
+      return MotionPath(PosesOf(motion), {noSmoothing, longest});
+    }))
+{
+}
+
+std::optional<ScenePath> ScenePath::Of(const SynthesisScene& scene)
+{
+  if (const auto* recording = std::get_if<SceneRecording>(&scene.views))
+    return ScenePath(scene.PathOf(recording->file), *recording);
+  if (const auto* motion = std::get_if<SceneMotion>(&scene.views))
+    return ScenePath(*motion);
+  return {};
+}
+
+std::vector<double> ScenePath::Times(const ScenePathViews& views, double sweepSeconds) const
 {
   const double first = motion_.FirstTime() + 0.5 * sweepSeconds, last = motion_.LastTime() - 0.5 * sweepSeconds;
   if (!(last >= first))
-    throw Error(Error::Kind::NotPossible, path_ + ": the recording is shorter than one sweep");
+    throw Error(Error::Kind::NotPossible, name_ + ": the path is shorter than one sweep");
+  if (!views.times.empty()) {
+    for (const double time : views.times)
+      if (!(time >= first && time <= last))
+        throw Error(Error::Kind::NotPossible, name_ + ": the sweep around " + NumberText(time) +
+                                                  " s is not within the path, from " + NumberText(motion_.FirstTime()) + " to " +
+                                                  NumberText(motion_.LastTime()) + " s");
+    return views.times;
+  }
   std::vector<double> times;
-  for (int i = 0; i < count; ++i)
-    times.push_back(count == 1 ? 0.5 * (first + last) : first + (last - first) * i / (count - 1));
+  for (int i = 0; i < views.count; ++i)
+    times.push_back(views.count == 1 ? 0.5 * (first + last) : first + (last - first) * i / (views.count - 1));
   return times;
 }
 
-Pose RecordedMotion::At(double time) const
+Pose ScenePath::At(double time) const
 {
   // The ends of sums of times are off by rounding.
   constexpr double rounding = 1e-9; // s
   const double first = motion_.FirstTime(), last = motion_.LastTime();
   if (time > first - rounding && time < last + rounding)
     time = std::clamp(time, first, last);
-  return Named(path_, [&] { return Pose(trackerToWorld_ * motion_.At(time)); });
-}
-
-std::vector<Pose> RecordedMotion::Around(double time, double seconds, int steps) const
-{
-  std::vector<Pose> poses;
-  for (int step = 0; step < steps; ++step)
-    poses.push_back(At(steps == 1 ? time : time + seconds * (static_cast<double>(step) / (steps - 1) - 0.5)));
-  return poses;
+  return Named(name_, [&] { return Pose(pathToWorld_ * motion_.At(time)); });
 }
 
 } // namespace echorama

@@ -16,6 +16,35 @@ ParameterList Describe(SceneGel& gel)
   return Join({Describe(gel.coat), Describe(gel.material)});
 }
 
+ParameterList Describe(ScenePathViews& views)
+{
+  return {Parameter("Count", views.count, {1, SceneItem::mostViews}, "", "Views, evenly from the first pose to the last."),
+          Parameter("StepMm", views.stepMm, {0.1, 1000}, "mm",
+                    "The farthest that any part of the probe's head goes between two states of tissue and gel.")};
+}
+
+ParameterList Describe(SceneChange& change)
+{
+  return {
+      Parameter("Decorrelation", change.decorrelation, {0, 1}, "",
+                "How far the speckle has changed between any two views: echoes that are seen alike correlate by 1 less this."),
+      Parameter("RibShare", change.ribShare, {0, 0.6}, "",
+                "Share of the fan in the shadow of a rib close below the face, in every view but the first; 0: no rib."),
+      Parameter("GainDb", change.gainDb, {-40, 40}, "dB", "Gain of every second view, beside the others.")};
+}
+
+PhantomScene ScenePhantom::Scene() const
+{
+  if (!listed.inclusions.empty())
+    return listed;
+  PhantomScene scene;
+  if (bodies == Bodies::Jets)
+    scene.inclusions = Jets();
+  else
+    scene = DefaultScene();
+  return scene;
+}
+
 ParameterList Describe(SceneVolume& volume)
 {
   return {Parameter("SpacingMm", volume.spacingMm, {0.05, 20}, "mm", "Edge of the cubic voxels."),
@@ -112,7 +141,14 @@ const Material& SynthesisScene::MaterialOf(const std::string& wanted) const
         return material;
       names += (names.empty() ? "" : ", ") + material.name;
     }
-  throw Error(Error::Kind::InvalidParameter, "there is no material " + scene::Quoted(wanted) + "; there are " + names);
+  throw Error(Error::Kind::InvalidParameter, "there is no material " + described::Shown(wanted) + "; there are " + names);
+}
+
+const ScenePathViews* SynthesisScene::PathViews() const
+{
+  if (const auto* recording = std::get_if<SceneRecording>(&views))
+    return recording;
+  return std::get_if<SceneMotion>(&views);
 }
 
 SynthesisParameters SynthesisScene::Parameters() const
@@ -148,6 +184,35 @@ std::string SynthesisScene::PathOf(const std::string& file) const
   if (!dataFolder.empty())
     return (std::filesystem::path(dataFolder) / path.filename()).string();
   return path.is_absolute() || folder.empty() ? file : (std::filesystem::path(folder) / path).lexically_normal().string();
+}
+
+std::vector<std::string> SynthesisScene::MakeFilesAbsolute()
+{
+  std::vector<std::string> files;
+  const auto resolve = [this, &files](std::string& file) {
+    file = std::filesystem::absolute(PathOf(file)).lexically_normal().string();
+    files.push_back(file);
+  };
+  for (SceneItem& item : tissue)
+    if (auto* mesh = std::get_if<SceneMesh>(&item.what))
+      resolve(mesh->file);
+  if (auto* recording = std::get_if<SceneRecording>(&views))
+    resolve(recording->file);
+  dataFolder.clear();
+  return files;
+}
+
+std::string SynthesisScene::TimesOfFiles() const
+{
+  SynthesisScene copy = *this;
+  std::string text;
+  for (const std::string& file : copy.MakeFilesAbsolute()) {
+    std::error_code unknown;
+    const auto time = std::filesystem::last_write_time(file, unknown);
+    if (!unknown)
+      text += file + " " + std::to_string(time.time_since_epoch().count()) + "\n";
+  }
+  return text;
 }
 
 } // namespace echorama

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Core/Base/ParameterJson.h"
 #include "SceneKeys.h"
 #include <cmath>
 
@@ -7,7 +6,7 @@ namespace echorama {
 namespace scene {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using described::Json;
 
 class SchemaMaker {
 public:
@@ -41,10 +40,10 @@ public:
   {
     const std::string key = parameter.Key(), unit = parameter.unit.empty() ? "" : " Unit: " + parameter.unit + ".";
     Add(key, SchemaOf(parameter), parameter.help + unit, presence);
-    if (presence == Presence::Needed)
-      properties_[key]["minLength"] = 1; // it is a text
-    else
+    if (presence != Presence::Needed)
       properties_[key]["default"] = JsonOf(parameter);
+    else if (std::holds_alternative<std::string*>(parameter.value))
+      properties_[key]["minLength"] = 1;
   }
   bool Maybe(const Parameter& parameter, bool there)
   {
@@ -75,6 +74,18 @@ public:
     if (presence == Presence::Needed)
       properties_[key]["minItems"] = 1;
   }
+  template <class T>
+  void Numbers(const char* key, std::vector<T>&, const ParameterRange& range, const char* unit, const char* help,
+               Presence presence = {})
+  {
+    T value{};
+    Add(key, {{"type", "array"}, {"items", SchemaOf(Parameter(key, value, range, unit, help))}, {"maxItems", longestList}},
+        help + std::string(" Unit: ") + unit + ".", presence);
+    if (presence == Presence::Needed)
+      properties_[key]["minItems"] = 1;
+    else
+      properties_[key]["default"] = Json::array();
+  }
   template <class Variant, class... T>
   void OneOf(Variant&, const Form<T>&... forms)
   {
@@ -86,7 +97,8 @@ public:
   void Views(const char* key, Variant&, const char* help)
   {
     SceneRecording recording;
-    Add(key, {{"oneOf", Json::array({Make(SceneRow()), Make(SceneViews()), Make(RecordingKey{recording})})}}, help);
+    Add(key, {{"oneOf", Json::array({Make(SceneRow()), Make(SceneViews()), Make(SceneMotion()), Make(RecordingKey{recording})})}},
+        help);
   }
   void Materials(const char* key, std::vector<Material>&, const char* help)
   {

@@ -3,7 +3,8 @@
 // Each struct of a scene lists its keys once, in Describe(): values by the descriptions of their parameters, and what is nested.
 // Three visitors walk that list: SceneReader.cxx (JSON to struct, with every check), SceneWriter.cxx (back) and SceneSchema.cxx
 // (the JSON Schema). So the reader, the text that is written and the schema cannot drift apart.
-#include "Core/Base/Error.h"
+#include "Core/Base/DescribedJson.h"
+#include "Filters/Phantoms/PhantomSceneKeys.h"
 #include "SynthesisScene.h"
 #include <type_traits>
 #include <utility>
@@ -15,36 +16,16 @@ namespace echorama::scene {
   throw Error(Error::Kind::InvalidParameter, reason);
 }
 
-/// As JSON, and shortened.
-std::string Quoted(const std::string& text);
+using described::largestSeed, described::longestList, described::longestText;
 
 inline constexpr const char* schemaName = "echorama-scene-1";
-inline constexpr std::size_t longestText = 4096, longestList = 100000;
-inline constexpr std::uint64_t largestSeed = 9223372036854775807u; // VTK's seeds have a sign
 
 inline constexpr ParameterRange anywhere{-1e5, 1e5}; // mm; a hundred metres
 inline constexpr ParameterRange turns{-3600, 3600}, weights{0, 1e9};
 
-/// Whether a key must be there. What comes from a preset has no default of its own.
-enum class Presence { Optional, Needed, FromPreset };
-
-/// One form that an item of the list of tissue may have.
-template <class T>
-struct Form {
-  const char* key;
-  const char* help;
-};
-
 /// Things that are given as the rows of a matrix, too.
 template <class T>
 inline constexpr bool mayBeRows = std::is_same_v<T, ScenePlace> || std::is_same_v<T, ScenePose>;
-
-template <class A>
-void Each(A& a, const ParameterList& parameters)
-{
-  for (const Parameter& parameter : parameters)
-    a.Value(parameter);
-}
 
 /// What has values alone.
 template <class A, class T>
@@ -191,14 +172,26 @@ void Describe(A& a, EchoModel& echoes)
 }
 
 template <class A>
+void Describe(A& a, ScenePhantom& phantom)
+{
+  a.Value(
+      Parameter("Bodies", Choice(phantom.bodies, {"body", "jets"}), "The phantom's own, or the clouds that come and go in it."));
+  a.MaterialName("background", phantom.background);
+  echorama::Describe(a, phantom.listed);
+}
+
+template <class A>
 void Describe(A& a, SceneItem& item)
 {
   a.Value(Parameter("Name", item.name, "Of the body."));
+  const ParameterRange views{1, SceneItem::mostViews};
+  Each(a, {Parameter("FirstView", item.firstView, views, "", "The first view in which it is there."),
+           Parameter("LastView", item.lastView, views, "", "The last one.")});
   a.OneOf(item.what, Form<ScenePacking>{"packing", "Packed spheres."}, Form<SceneMesh>{"mesh", "Triangles from a file."},
           Form<AnatomyParameters>{"anatomy", "An invented abdomen."},
           Form<CalibrationRigParameters>{"rig", "Balls in a water bath, to calibrate by."},
-          Form<SceneSphere>{"sphere", "A ball."}, Form<SceneBox>{"box", "A block."},
-          Form<SceneCylinder>{"cylinder", "A rod or a straight vessel."});
+          Form<ScenePhantom>{"phantom", "Bodies of the phantom."}, Form<SceneSphere>{"sphere", "A ball."},
+          Form<SceneBox>{"box", "A block."}, Form<SceneCylinder>{"cylinder", "A rod or a straight vessel."});
 }
 
 template <class A>
@@ -216,14 +209,36 @@ void Describe(A& a, SceneViews& views)
 }
 
 template <class A>
+void EachOfPath(A& a, ScenePathViews& views)
+{
+  Each(a, Describe(views));
+  a.Numbers("times", views.times, {-1e6, 1e6}, "s", "When volumes are taken, in rising order, instead of a count.");
+}
+
+template <class A>
 void Describe(A& a, SceneRecording& recording)
 {
   a.Value(Parameter("File", recording.file, "A tracked sequence, as a path from the scene's folder."), Presence::Needed);
   a.Value(Parameter("Transform", recording.transform, "From the probe to the tracker or a reference, by its name in the file."));
   a.Object("trackerToWorld", recording.trackerToWorld, "Where the tracker is in the world; rigid.");
-  Each(a, {Parameter("SmoothSeconds", recording.smoothSeconds, {0, 60}, "s", "Sigma of the smoothing; 0: none."),
-           Parameter("LongestGapSeconds", recording.longestGapSeconds, {0, 600, true}, "s", "Drop-outs up to this are bridged."),
-           Parameter("Count", recording.count, {1, 1000}, "", "Views, evenly from the first pose to the last.")});
+  Each(a,
+       {Parameter("SmoothSeconds", recording.smoothSeconds, {0, 60}, "s", "Sigma of the smoothing; 0: none."),
+        Parameter("LongestGapSeconds", recording.longestGapSeconds, {0, 600, true}, "s", "Drop-outs up to this are bridged.")});
+  EachOfPath(a, recording);
+}
+
+template <class A>
+void Describe(A& a, SceneMotion::Key& key)
+{
+  Each(a, {Parameter("Seconds", key.seconds, {-1e6, 1e6}, "s", "When the probe is there; later than at the key before.")});
+  a.Object("pose", key.pose, "Where the probe is held.");
+}
+
+template <class A>
+void Describe(A& a, SceneMotion& motion)
+{
+  a.List("keys", motion.keys, "A path, straight from each pose to the next.", Presence::Needed);
+  EachOfPath(a, motion);
 }
 
 /// {"recording": {...}}
@@ -245,7 +260,10 @@ void Describe(A& a, SceneSweep& sweep)
                      "Of the probe during the sweep, in its own frame."),
            Parameter("TurnDegreesPerSecond", sweep.turnDegreesPerSecond, turns, "degrees/s",
                      "Axis times angle, in the probe's frame, about its face."),
-           Parameter("AlongRecording", sweep.alongRecording, "The motion is that of the recording; the views need one.")});
+           Parameter("AlongRecording", sweep.alongRecording,
+                     "The motion is that of the recording, or of the keys; the views need such a path."),
+           Parameter("States", sweep.states, {1, 64}, "",
+                     "Over how many states of tissue and gel a sweep that moves is divided; each plane sees that of its part.")});
 }
 
 template <class A>
@@ -267,6 +285,7 @@ void Describe(A& a, SynthesisScene& scene)
   a.List("tissue", scene.tissue, "What lies in the world; where several hold a point the later counts.");
   a.Views("views", scene.views, "From where the probe looks.");
   a.Object("sweep", scene.sweep, "The time a sweep takes, and the motion meanwhile.");
+  a.Object("change", scene.change, "What sets views of one body apart, beside where the probe is.");
   a.MaybeObject("press", scene.press, "Tissue gives way to the probe; if it is not said, it does not.");
   a.MaybeObject("gel", scene.gel, "Gel on the face of the probe, in air; if it is not said, the background couples.");
   a.Object("volume", scene.volume, "The volumes that are made.");

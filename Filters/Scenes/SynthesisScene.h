@@ -2,15 +2,15 @@
 #pragma once
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Geometry/ProbePresets.h"
+#include "Filters/Acoustics/Synthesize.h"
 #include "Filters/Phantoms/Anatomy.h"
 #include "Filters/Phantoms/CalibrationRig.h"
+#include "Filters/Phantoms/PhantomScene.h"
 #include "Filters/Physics/GelCoat.h"
 #include "Filters/Physics/ProbeShape.h"
 #include "Filters/Physics/TissueLattice.h"
 #include "Filters/Tissue/Material.h"
 #include "Filters/Tissue/PackedTissue.h"
-#include "Receiver.h"
-#include "Synthesize.h"
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -107,10 +107,28 @@ struct ScenePacking {
   std::vector<Share> materials = {{"lesion-dark", 2.0}, {"liver", 2.0}, {"lesion-bright", 2.0}, {"cyst", 1.0}};
 };
 
+/// Bodies of the phantom, by how loud they echo beside a background. As surfaces: a wall is a body around another.
+struct ScenePhantom {
+  enum class Bodies {
+    Body, ///< DefaultScene()
+    Jets, ///< Jets(), which come and go
+  };
+  Bodies bodies = Bodies::Body;
+  PhantomScene listed;               ///< if not empty, these instead
+  std::string background = "tissue"; ///< the material of 0 dB
+
+  PhantomScene Scene() const;
+};
+
 /// One entry of the list of tissue; it may stand for many bodies. Where several hold a point the later counts.
 struct SceneItem {
+  static constexpr int mostViews = 1000;
+
   std::string name; ///< may be empty
-  std::variant<ScenePacking, SceneMesh, AnatomyParameters, CalibrationRigParameters, SceneSphere, SceneBox, SceneCylinder> what;
+  std::variant<ScenePacking, SceneMesh, AnatomyParameters, CalibrationRigParameters, ScenePhantom, SceneSphere, SceneBox,
+               SceneCylinder>
+      what;
+  int firstView = 1, lastView = mostViews; ///< it is there in these alone, counted from 1: a body that comes and goes
 };
 
 /// Views side by side along a convex body, as PhantomViews() places them.
@@ -125,14 +143,30 @@ struct SceneViews {
   std::vector<ScenePose> poses;
 };
 
+/// When volumes are taken along a path, and how finely what the probe moves is followed.
+struct ScenePathViews {
+  int count = 3;             ///< evenly from the first pose to the last
+  std::vector<double> times; ///< s; if not empty, these instead, in rising order
+  double stepMm = 4.0;       ///< the farthest that any part of the probe's head goes between two states of tissue and gel
+};
+ParameterList Describe(ScenePathViews& views);
+
 /// Views along the path of a tracked probe that was recorded.
-struct SceneRecording {
+struct SceneRecording : ScenePathViews {
   std::string file;                         ///< a sequence file; PathOf() resolves it
   std::string transform = "ProbeToTracker"; ///< which of its transforms; "ProbeToReference" may be composed
   ScenePlace trackerToWorld;                ///< rigid
   double smoothSeconds = 0.1;               ///< sigma of the smoothing
   double longestGapSeconds = 0.5;           ///< drop-outs up to this are bridged
-  int count = 3;                            ///< evenly from the first pose to the last
+};
+
+/// Views along a path of poses that the scene states, straight from each to the next.
+struct SceneMotion : ScenePathViews {
+  struct Key {
+    double seconds = 0.0; ///< in rising order
+    ScenePose pose;
+  };
+  std::vector<Key> keys;
 };
 
 /// The time a sweep takes and how the probe moves meanwhile; each plane is then imaged at its own pose.
@@ -140,11 +174,21 @@ struct SceneSweep {
   double seconds = 0.0;                                           ///< 0: all planes at once
   Eigen::Vector3d velocityMmPerSecond = Eigen::Vector3d::Zero();  ///< in the probe's frame
   Eigen::Vector3d turnDegreesPerSecond = Eigen::Vector3d::Zero(); ///< axis times angle in the probe's frame, about its face
-  bool alongRecording = false; ///< the motion is that of the recording around the moment of the view; views need one
+  bool alongRecording = false; ///< the motion is that of the recording or the keys around the moment of the view
+  /// Over how many states of tissue and gel a sweep that moves is divided; each plane sees the state of its part.
+  int states = 3;
 
-  /// Where the probe is at \a seconds from the middle of the sweep, when the recording does not say it.
+  /// Where the probe is at \a seconds from the middle of the sweep, when no path says it.
   Pose ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) const;
 };
+
+/// What sets views of one body apart, beside where the probe is.
+struct SceneChange {
+  double decorrelation = 0.0; ///< of the speckle, between any two views
+  double ribShare = 0.0;      ///< of the fan, in the shadow of a rib before every view but the first
+  double gainDb = 0.0;        ///< of every second view, beside the others
+};
+ParameterList Describe(SceneChange& change);
 
 struct SceneVolume {
   double spacingMm = 1.0;                   ///< of the cubic voxels
@@ -153,7 +197,7 @@ struct SceneVolume {
 
 ParameterList Describe(SceneVolume& volume);
 
-/// How tissue gives way to the probe: each view presses it from rest.
+/// How tissue gives way to the probe. Views along a path press it on the way; others press it from rest.
 struct ScenePress {
   TissueLatticeParameters lattice;
   TissuePressParameters tissue;
@@ -161,7 +205,7 @@ struct ScenePress {
 };
 ParameterList Describe(ScenePress& press);
 
-/// Gel on the face of the probe, pressed by each view; all around is air.
+/// Gel on the face of the probe; all around is air. It is put on once for views along a path, else anew for each view.
 struct SceneGel {
   GelCoatParameters coat;
   GelMaterial material;
@@ -179,8 +223,9 @@ struct SynthesisScene {
   std::vector<Material> materials; ///< the scene's own, which come before the standard ones
   std::string background = "water";
   std::vector<SceneItem> tissue;
-  std::variant<SceneRow, SceneViews, SceneRecording> views;
+  std::variant<SceneRow, SceneViews, SceneRecording, SceneMotion> views;
   SceneSweep sweep;
+  SceneChange change;
   std::optional<ScenePress> press; ///< none: tissue is where it is, whatever the probe does
   std::optional<SceneGel> gel;     ///< none: the background couples wherever it is no gas
   SceneVolume volume;
@@ -192,6 +237,9 @@ struct SynthesisScene {
   /// The scene's material of that name, or the standard one. \throws Error(InvalidParameter) that lists the names.
   const Material& MaterialOf(const std::string& name) const;
 
+  /// Those of a path, or nullptr.
+  const ScenePathViews* PathViews() const;
+
   /// What one volume is made with, the probe's pose apart. \throws Error(InvalidParameter) as SceneProbe::Resolve().
   SynthesisParameters Parameters() const;
 
@@ -200,6 +248,11 @@ struct SynthesisScene {
 
   /// A file as it can be opened.
   std::string PathOf(const std::string& file) const;
+
+  /// Names all files by their full paths, so that they stay what they are in a scene that is written. \returns them.
+  std::vector<std::string> MakeFilesAbsolute();
+  /// When they were last changed, as a text; files that cannot be found are left out.
+  std::string TimesOfFiles() const;
 
   /// \throws Error(BadFile) as SceneFromJson does, with \a name in the place of the file.
   void Check(const std::string& name = "scene") const;

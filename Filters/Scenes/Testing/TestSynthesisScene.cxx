@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/TextFile.h"
-#include "Filters/Acoustics/SynthesisScene.h"
+#include "Filters/Scenes/SynthesisScene.h"
 #include <cmath>
 #include <filesystem>
 #include <gtest/gtest.h>
@@ -238,7 +238,7 @@ TEST(SynthesisScene, ReadsViews)
   EXPECT_TRUE(recorded.sweep.alongRecording);
 
   ExpectComplaint(R"("sweep": {"alongRecording": true})",
-                  "scene.json: sweep.alongRecording: the views are not those of a recording");
+                  "scene.json: sweep.alongRecording: the views are neither those of a recording nor of keys");
   ExpectComplaint(R"("views": {"count": 0})", "scene.json: views.count: 0 is out of range; it must be in [1, 1000]");
   ExpectComplaint(R"("views": {"count": 2.5})", "scene.json: views.count: a whole number is needed, not 2.5");
   ExpectComplaint(R"("views": {"poses": []})", "scene.json: views.poses: a list");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Any bytes as a scene; what is accepted comes back from its own text, and its parameters can be had.
-#include "Filters/Acoustics/SynthesisScene.h"
+#include "Filters/Scenes/SynthesisScene.h"
 #include "Testing/Fuzzing.h"
 #include <string>
 

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundMeshFile.h"
+
+#include "Core/Base/Error.h"
+#include "Core/Base/VtkMessage.h"
+#include "vtkCallbackCommand.h"
+#include "vtkCellArray.h"
+#include "vtkCellArrayIterator.h"
+#include "vtkCommand.h"
+#include "vtkCompositeDataIterator.h"
+#include "vtkCompositeDataSet.h"
+#include "vtkExecutive.h"
+#include "vtkGLTFReader.h"
+#include "vtkNew.h"
+#include "vtkOBJReader.h"
+#include "vtkPLYReader.h"
+#include "vtkPolyData.h"
+#include "vtkSTLReader.h"
+#include "vtkSmartPointer.h"
+#include "vtkTriangleFilter.h"
+#include "vtkXMLPolyDataReader.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <type_traits>
+#include <vector>
+
+using echorama::Error;
+
+namespace {
+
+void Append(echorama::TriangleSurface& surface, vtkPolyData* part)
+{
+  vtkNew<vtkTriangleFilter> triangles;
+  triangles->SetInputData(part);
+  triangles->PassLinesOff();
+  triangles->PassVertsOff();
+  triangles->Update();
+  vtkPolyData* mesh = triangles->GetOutput();
+  const auto first = static_cast<std::uint32_t>(surface.points.size());
+  for (vtkIdType i = 0; i < mesh->GetNumberOfPoints(); ++i) {
+    surface.points.push_back(Eigen::Vector3d(mesh->GetPoint(i)).cast<float>());
+  }
+  vtkIdType count = 0;
+  const vtkIdType* ids = nullptr;
+  for (auto cells = vtk::TakeSmartPointer(mesh->GetPolys()->NewIterator()); !cells->IsDoneWithTraversal();
+       cells->GoToNextCell()) {
+    cells->GetCurrentCell(count, ids);
+    if (count == 3) {
+      surface.triangles.push_back({first + static_cast<std::uint32_t>(ids[0]), first + static_cast<std::uint32_t>(ids[1]),
+                                   first + static_cast<std::uint32_t>(ids[2])});
+    }
+  }
+}
+
+// What a reader complains of becomes the reason of an error.
+template <class Reader>
+vtkSmartPointer<vtkDataObject> Read(const std::string& path)
+{
+  std::vector<std::string> complaints;
+  vtkNew<vtkCallbackCommand> listener;
+  listener->SetClientData(&complaints);
+  listener->SetCallback([](vtkObject*, unsigned long, void* list, void* text) {
+    static_cast<std::vector<std::string>*>(list)->push_back(
+        echorama::SentenceOfVtkMessage(text ? static_cast<const char*>(text) : ""));
+  });
+  vtkNew<Reader> reader;
+  reader->AddObserver(vtkCommand::ErrorEvent, listener);
+  reader->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, listener);
+  if constexpr (std::is_same_v<Reader, vtkXMLPolyDataReader>) {
+    reader->SetParserErrorObserver(listener); // an object of its own
+  }
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  const std::string problem = echorama::ReasonAmong(complaints);
+  if (!problem.empty()) {
+    throw Error(Error::Kind::BadFile, path + ": " + problem);
+  }
+  return reader->GetOutputDataObject(0);
+}
+
+} // namespace
+
+//----------------------------------------------------------------------------
+echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
+{
+  if (!std::filesystem::is_regular_file(path)) {
+    throw Error(Error::Kind::FileSystem, path + ": there is no such file");
+  }
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  vtkSmartPointer<vtkDataObject> data;
+  if (extension == ".glb" || extension == ".gltf") {
+    data = Read<vtkGLTFReader>(path);
+  } else if (extension == ".ply") {
+    data = Read<vtkPLYReader>(path);
+  } else if (extension == ".stl") {
+    data = Read<vtkSTLReader>(path);
+  } else if (extension == ".obj") {
+    data = Read<vtkOBJReader>(path);
+  } else if (extension == ".vtp") {
+    data = Read<vtkXMLPolyDataReader>(path);
+  } else {
+    throw Error(Error::Kind::BadFile, path + ": its extension is none of a mesh (.glb, .gltf, .ply, .stl, .obj, .vtp)");
+  }
+
+  echorama::TriangleSurface surface;
+  if (auto* parts = vtkCompositeDataSet::SafeDownCast(data)) {
+    const auto leaf = vtk::TakeSmartPointer(parts->NewIterator());
+    for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
+      if (auto* part = vtkPolyData::SafeDownCast(leaf->GetCurrentDataObject())) {
+        Append(surface, part);
+      }
+    }
+  } else if (auto* part = vtkPolyData::SafeDownCast(data)) {
+    Append(surface, part);
+  }
+  if (surface.triangles.empty()) {
+    throw Error(Error::Kind::BadFile, path + ": there are no triangles in it");
+  }
+  return surface;
+}

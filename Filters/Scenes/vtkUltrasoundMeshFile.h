@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#ifndef vtkUltrasoundMeshFile_h
+#define vtkUltrasoundMeshFile_h
+
+#include "Filters/Tissue/SurfaceCheck.h"
+#include <string>
+
+namespace echorama {
+
+/** The triangles of a mesh file that VTK reads, as they stand there. Throws Error that names the file. */
+TriangleSurface ReadMesh(const std::string& path);
+
+} // namespace echorama
+
+#endif
