@@ -14,6 +14,7 @@ namespace echorama {
 namespace {
 
 constexpr int ChebyshevDegree = 3;
+constexpr int NodesOfATask = 512;       // much more than it costs to start one
 constexpr double ChebyshevRange = 12.0; // errors with eigenvalues down to 1/12 of the largest are smoothed
 
 // One step of the Chebyshev recurrence in one row: step = keep * step + take * inverse * (right - product), next = value + step.
@@ -70,6 +71,17 @@ void Combine(LatticeField<float>& a, float scale, const LatticeField<float>& b, 
   });
 }
 
+// out = in with every node times its scale.
+void Scaled(const LatticeField<float>& in, const std::vector<float>& scale, LatticeField<float>& out)
+{
+  const LatticeShape& shape = in.Shape();
+  ParallelFor(shape.nodes[2], [&](std::ptrdiff_t k) {
+    for (int c = 0; c < 3; ++c)
+      for (std::ptrdiff_t at = (k + 1) * shape.slice; at < (k + 2) * shape.slice; ++at)
+        out.Component(c)[at] = in.Component(c)[at] * scale[static_cast<std::size_t>(at)];
+  });
+}
+
 } // namespace
 
 LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen::Vector3d& spacing, std::vector<float> live)
@@ -80,14 +92,10 @@ LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen:
     const LatticeShape shape(size);
     Level level;
     level.right = level.value = level.other = level.step = level.mode = LatticeField<float>(shape);
-    for (auto& entries : level.inverse)
-      entries.assign(static_cast<std::size_t>(shape.size), 0.0f);
+    level.packed = PackedLatticeMatrix(shape);
     if (levels_.empty()) {
       level.matrix = LatticeMatrix(shape);
-      level.live = live;
       live_ = std::move(live);
-    } else {
-      level.live.assign(static_cast<std::size_t>(shape.size), 0.0f);
     }
     Random random(17, levels_.size());
     ForNodes(size, [&](int i, int j, int k) {
@@ -114,30 +122,29 @@ LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen:
 
 void LatticeMultigrid::Prepare()
 {
+  levels_.front().matrix.KeepOnly(live_);
   for (std::size_t n = 0; n < levels_.size(); ++n) {
     Level& level = levels_[n];
-    Invert(level);
+    level.packed.Pack(level.matrix);
     if (n + 1 == levels_.size())
       break;
     EstimateLargest(level);
-    const std::vector<float>* live = n == 0 ? &level.live : nullptr;
     LatticeMatrix coarse;
     const LatticeMatrix* from = &level.matrix;
     for (const int axis : {2, 1, 0})
       if (level.halved[static_cast<std::size_t>(axis)]) {
-        coarse = from->Coarsened(axis, live);
+        coarse = from->Coarsened(axis);
         from = &coarse;
-        live = nullptr;
       }
     levels_[n + 1].matrix = std::move(coarse);
   }
-  Level& last = levels_.back();
+  const Level& last = levels_.back();
   const LatticeShape& shape = last.matrix.Shape();
   unknowns_.clear();
   std::vector<int> number(static_cast<std::size_t>(shape.size), -1);
   ForNodes(shape.nodes, [&](int i, int j, int k) {
     const std::ptrdiff_t at = shape.At(i, j, k);
-    if (last.live[static_cast<std::size_t>(at)] != 0.0f) {
+    if (last.packed.Scale()[static_cast<std::size_t>(at)] > 0.0f) {
       number[static_cast<std::size_t>(at)] = static_cast<int>(unknowns_.size());
       unknowns_.push_back(at);
     }
@@ -148,11 +155,11 @@ void LatticeMultigrid::Prepare()
     const int own = number[static_cast<std::size_t>(shape.At(i, j, k))];
     if (own < 0)
       return;
-    for (int offset = 0; offset < 27; ++offset) {
+    for (int offset = LatticeMatrix::Own; offset < 27; ++offset) {
       const int other =
           number[static_cast<std::size_t>(shape.At(i + offset % 3 - 1, j + offset / 3 % 3 - 1, k + offset / 9 - 1))];
       for (int entry = 0; other >= 0 && entry < 9; ++entry)
-        dense(3 * own + entry / 3, 3 * other + entry % 3) =
+        dense(3 * other + entry % 3, 3 * own + entry / 3) = // the lower triangle, which is all that counts
             static_cast<double>(last.matrix.At(i, j, k, offset, entry / 3, entry % 3));
     }
   });
@@ -166,33 +173,15 @@ void LatticeMultigrid::Prepare()
   }
 }
 
-void LatticeMultigrid::Invert(Level& level)
-{
-  const LatticeShape& shape = level.matrix.Shape();
-  const bool isFinest = &level == &levels_.front();
-  ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
-    const int k = static_cast<int>(slice);
-    for (int j = 0; j < shape.nodes[1]; ++j)
-      for (int i = 0; i < shape.nodes[0]; ++i) {
-        const auto at = static_cast<std::size_t>(shape.At(i, j, k));
-        Eigen::Matrix3d block;
-        for (int entry = 0; entry < 9; ++entry)
-          block(entry / 3, entry % 3) = static_cast<double>(level.matrix.At(i, j, k, 13, entry / 3, entry % 3));
-        const double determinant = block.determinant(), size = block.trace() / 3.0;
-        const bool isLive = size > 0.0 && determinant > 1e-9 * size * size * size && (!isFinest || live_[at] != 0.0f);
-        const Eigen::Matrix3d inverse = isLive ? Eigen::Matrix3d(block.inverse()) : Eigen::Matrix3d::Zero();
-        level.live[at] = isLive ? 1.0f : 0.0f;
-        const int rows[6] = {0, 0, 0, 1, 1, 2}, columns[6] = {0, 1, 2, 1, 2, 2};
-        for (int n = 0; n < 6; ++n)
-          level.inverse[n][at] = static_cast<float>(inverse(rows[n], columns[n]));
-      }
-  });
-}
-
 // The runs of a row of a field.
 #define ECHORAMA_ROWS(field)                                                                                                     \
   {                                                                                                                              \
     field.Component(0) + at, field.Component(1) + at, field.Component(2) + at                                                    \
+  }
+#define ECHORAMA_INVERSES(matrix)                                                                                                \
+  {                                                                                                                              \
+    matrix.Inverse(0).data() + at, matrix.Inverse(1).data() + at, matrix.Inverse(2).data() + at, matrix.Inverse(3).data() + at,  \
+        matrix.Inverse(4).data() + at, matrix.Inverse(5).data() + at                                                             \
   }
 
 void LatticeMultigrid::EstimateLargest(Level& level)
@@ -208,9 +197,10 @@ void LatticeMultigrid::EstimateLargest(Level& level)
       const int k = static_cast<int>(slice);
       for (int j = 0; j < shape.nodes[1]; ++j) {
         const std::ptrdiff_t at = shape.At(0, j, k);
-        for (int c = 0; c < 3; ++c) // what lies at nodes that are not live does not count
+        const float* scale = level.packed.Scale().data() + at;
+        for (int c = 0; c < 3; ++c) // what lies at nodes that are left out does not count
           for (int i = 0; i < shape.nodes[0]; ++i)
-            level.other.Component(c)[at + i] = level.mode.Component(c)[at + i] * level.live[static_cast<std::size_t>(at + i)];
+            level.other.Component(c)[at + i] = scale[i] > 0.0f ? level.mode.Component(c)[at + i] : 0.0f;
       }
     });
     ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
@@ -218,14 +208,12 @@ void LatticeMultigrid::EstimateLargest(Level& level)
       std::vector<float> product(static_cast<std::size_t>(3 * shape.Padded()));
       for (int j = 0; j < shape.nodes[1]; ++j) {
         const std::ptrdiff_t at = shape.At(0, j, k);
-        level.matrix.MultiplyRow(j, k, level.other, product.data());
+        level.packed.MultiplyRow(j, k, level.other, product.data());
         const float* const right[3] = ECHORAMA_ROWS(level.right);
         const float* const value[3] = ECHORAMA_ROWS(level.value);
         float* const step[3] = ECHORAMA_ROWS(level.step);
         float* const next[3] = ECHORAMA_ROWS(level.mode);
-        const auto begin = static_cast<std::size_t>(at);
-        const float* const inverse[6] = {&level.inverse[0][begin], &level.inverse[1][begin], &level.inverse[2][begin],
-                                         &level.inverse[3][begin], &level.inverse[4][begin], &level.inverse[5][begin]};
+        const float* const inverse[6] = ECHORAMA_INVERSES(level.packed);
         ChebyshevRow(shape.nodes[0], 0.0f, -1.0f, product.data(), shape.Padded(), right, inverse, value, step, next);
       }
     });
@@ -239,58 +227,69 @@ void LatticeMultigrid::EstimateLargest(Level& level)
   level.largest = largest;
 }
 
+// Passes over a lattice of which each takes what the one before made of a slice and of its neighbours: body(pass, j, k). They
+// follow each other one slice apart, so that the matrix comes from memory once for all of them.
+template <class Body>
+void Sweep(const LatticeShape& shape, int passes, const Body& body)
+{
+  const std::ptrdiff_t grain = std::max(1, NodesOfATask / shape.nodes[0]);
+  for (int front = 0; front < shape.nodes[2] + passes - 1; ++front)
+    for (int pass = std::max(0, front - shape.nodes[2] + 1); pass < std::min(passes, front + 1); ++pass)
+      ParallelRanges(shape.nodes[1], grain, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+        for (std::ptrdiff_t j = begin; j < end; ++j)
+          body(pass, static_cast<int>(j), front - pass);
+      });
+}
+
 void LatticeMultigrid::Smooth(Level& level, bool fromZero)
 {
   const LatticeShape& shape = level.matrix.Shape();
   const double high = 1.1 * level.largest, low = high / ChebyshevRange, middle = 0.5 * (high + low), half = 0.5 * (high - low);
   const double sigma = middle / half;
+  float keep[ChebyshevDegree] = {0.0f}, take[ChebyshevDegree] = {static_cast<float>(1.0 / middle)};
   double rho = 1.0 / sigma;
-  if (fromZero)
-    level.value.Fill(0.0f);
-  for (int n = 0; n < ChebyshevDegree; ++n) {
-    const double next = n == 0 ? rho : 1.0 / (2.0 * sigma - rho);
-    const auto keep = static_cast<float>(n == 0 ? 0.0 : next * rho),
-               take = static_cast<float>(n == 0 ? 1.0 / middle : 2.0 * next / half);
+  for (int n = 1; n < ChebyshevDegree; ++n) {
+    const double next = 1.0 / (2.0 * sigma - rho);
+    keep[n] = static_cast<float>(next * rho);
+    take[n] = static_cast<float>(2.0 * next / half);
     rho = next;
-    ParallelFor(shape.nodes[2], [&](std::ptrdiff_t slice) {
-      const int k = static_cast<int>(slice);
-      std::vector<float> product(static_cast<std::size_t>(3 * shape.Padded()), 0.0f);
-      for (int j = 0; j < shape.nodes[1]; ++j) {
-        const std::ptrdiff_t at = shape.At(0, j, k);
-        if (n > 0 || !fromZero)
-          level.matrix.MultiplyRow(j, k, level.value, product.data());
-        const float* const right[3] = ECHORAMA_ROWS(level.right);
-        const float* const value[3] = ECHORAMA_ROWS(level.value);
-        float* const step[3] = ECHORAMA_ROWS(level.step);
-        float* const nextValue[3] = ECHORAMA_ROWS(level.other);
-        const auto begin = static_cast<std::size_t>(at);
-        const float* const inverse[6] = {&level.inverse[0][begin], &level.inverse[1][begin], &level.inverse[2][begin],
-                                         &level.inverse[3][begin], &level.inverse[4][begin], &level.inverse[5][begin]};
-        ChebyshevRow(shape.nodes[0], keep, take, product.data(), shape.Padded(), right, inverse, value, step, nextValue);
-      }
-    });
-    std::swap(level.value, level.other);
   }
+  // The passes write by turns to other and to value; the one after them, before the next level is asked, makes the residual.
+  const std::vector<float> zeros(static_cast<std::size_t>(3 * shape.Padded()), 0.0f);
+  LatticeField<float>* const fields[2] = {&level.value, &level.other};
+  Sweep(shape, ChebyshevDegree + (fromZero ? 1 : 0), [&](int n, int j, int k) {
+    const std::ptrdiff_t at = shape.At(0, j, k);
+    LatticeField<float>&from = *fields[n % 2], &to = *fields[1 - n % 2];
+    const bool isZero = n == 0 && fromZero;
+    std::vector<float> product;
+    if (!isZero) {
+      product.resize(static_cast<std::size_t>(3 * shape.Padded()));
+      level.packed.MultiplyRow(j, k, from, product.data());
+    }
+    const float* const right[3] = ECHORAMA_ROWS(level.right);
+    float* const next[3] = ECHORAMA_ROWS(to);
+    if (n == ChebyshevDegree) {
+      const float* scale = level.packed.Scale().data() + at;
+      for (int c = 0; c < 3; ++c)
+        for (int i = 0; i < shape.nodes[0]; ++i)
+          next[c][i] = scale[i] * (right[c][i] - product[static_cast<std::size_t>(c * shape.Padded() + i)]);
+      return;
+    }
+    const float* const some[3] = ECHORAMA_ROWS(from);
+    const float* const none[3] = {zeros.data(), zeros.data(), zeros.data()};
+    float* const step[3] = ECHORAMA_ROWS(level.step);
+    const float* const inverse[6] = ECHORAMA_INVERSES(level.packed);
+    ChebyshevRow(shape.nodes[0], keep[n], take[n], isZero ? zeros.data() : product.data(), shape.Padded(), right, inverse,
+                 isZero ? none : some, step, next);
+  });
+  static_assert(ChebyshevDegree % 2 == 1);
+  std::swap(level.value, level.other);
 }
 
 void LatticeMultigrid::Restrict(const Level& fine, Level& coarse)
 {
-  // The residual goes to fine.other's place first, then every coarse node gathers.
   const LatticeShape &from = fine.matrix.Shape(), &to = coarse.matrix.Shape();
-  LatticeField<float>& residual = const_cast<Level&>(fine).other;
-  ParallelFor(from.nodes[2], [&](std::ptrdiff_t slice) {
-    const int k = static_cast<int>(slice);
-    std::vector<float> product(static_cast<std::size_t>(3 * from.Padded()));
-    for (int j = 0; j < from.nodes[1]; ++j) {
-      const std::ptrdiff_t at = from.At(0, j, k);
-      fine.matrix.MultiplyRow(j, k, fine.value, product.data());
-      for (int c = 0; c < 3; ++c)
-        for (int i = 0; i < from.nodes[0]; ++i)
-          residual.Component(c)[at + i] =
-              fine.live[static_cast<std::size_t>(at + i)] *
-              (fine.right.Component(c)[at + i] - product[static_cast<std::size_t>(c * from.Padded() + i)]);
-    }
-  });
+  const LatticeField<float>& residual = fine.other;
   const std::array<int, 3> reach = {fine.halved[0] ? 1 : 0, fine.halved[1] ? 1 : 0, fine.halved[2] ? 1 : 0};
   ParallelFor(to.nodes[2], [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
@@ -313,6 +312,9 @@ void LatticeMultigrid::Restrict(const Level& fine, Level& coarse)
                 out[i] += weight * (in[2 * i] + 0.5f * (in[2 * i - 1] + in[2 * i + 1]));
             }
           }
+        const float* unscale = coarse.packed.Unscale().data() + to.At(0, j, k);
+        for (int i = 0; i < to.nodes[0]; ++i)
+          out[i] *= unscale[i];
       }
   });
 }
@@ -327,19 +329,20 @@ void LatticeMultigrid::Prolong(const Level& coarse, Level& fine)
     for (int j = 0; j < to.nodes[1]; ++j) {
       const int j0 = fine.halved[1] ? j / 2 : j, j1 = fine.halved[1] ? (j + 1) / 2 : j;
       const std::ptrdiff_t at = to.At(0, j, k);
-      const float* live = fine.live.data() + at;
+      const float *scale = fine.packed.Scale().data() + at, *unscale = coarse.packed.Unscale().data();
+      const std::ptrdiff_t rows[4] = {from.At(0, j0, k0), from.At(0, j1, k0), from.At(0, j0, k1), from.At(0, j1, k1)};
       for (int c = 0; c < 3; ++c) {
         const float* in = coarse.value.Component(c);
-        const float *a = in + from.At(0, j0, k0), *b = in + from.At(0, j1, k0), *d = in + from.At(0, j0, k1),
-                    *e = in + from.At(0, j1, k1);
         for (int i = 0; i <= from.nodes[0]; ++i)
-          row[static_cast<std::size_t>(i)] = 0.25f * (a[i] + b[i] + d[i] + e[i]);
+          row[static_cast<std::size_t>(i)] =
+              0.25f * (in[rows[0] + i] * unscale[rows[0] + i] + in[rows[1] + i] * unscale[rows[1] + i] +
+                       in[rows[2] + i] * unscale[rows[2] + i] + in[rows[3] + i] * unscale[rows[3] + i]);
         float* out = fine.value.Component(c) + at;
         for (int i = 0; i < to.nodes[0]; ++i) {
           const float value = fine.halved[0]
                                   ? 0.5f * (row[static_cast<std::size_t>(i / 2)] + row[static_cast<std::size_t>((i + 1) / 2)])
                                   : row[static_cast<std::size_t>(i)];
-          out[i] += live[i] * value;
+          out[i] += scale[i] * value;
         }
       }
     }
@@ -350,12 +353,13 @@ void LatticeMultigrid::SolveCoarsest()
 {
   Level& level = levels_.back();
   Eigen::VectorXd right(static_cast<Eigen::Index>(3 * unknowns_.size()));
+  const auto scale = [&level](std::ptrdiff_t at) { return level.packed.Scale()[static_cast<std::size_t>(at)]; };
   for (std::size_t n = 0; n < unknowns_.size(); ++n)
-    right.segment<3>(static_cast<Eigen::Index>(3 * n)) = level.right.Get(unknowns_[n]).cast<double>();
+    right.segment<3>(static_cast<Eigen::Index>(3 * n)) = (scale(unknowns_[n]) * level.right.Get(unknowns_[n])).cast<double>();
   const Eigen::VectorXd solution = coarsest_.solve(right);
   level.value.Fill(0.0f);
   for (std::size_t n = 0; n < unknowns_.size(); ++n)
-    level.value.Set(unknowns_[n], solution.segment<3>(static_cast<Eigen::Index>(3 * n)).cast<float>());
+    level.value.Set(unknowns_[n], scale(unknowns_[n]) * solution.segment<3>(static_cast<Eigen::Index>(3 * n)).cast<float>());
 }
 
 void LatticeMultigrid::Cycle(std::size_t n)
@@ -371,11 +375,12 @@ void LatticeMultigrid::Cycle(std::size_t n)
   Smooth(levels_[n], false);
 }
 
-void LatticeMultigrid::Cycle(const LatticeField<float>& in, LatticeField<float>& out)
+void LatticeMultigrid::Cycle()
 {
-  levels_.front().right = in;
+  Level& finest = levels_.front();
+  Scaled(residual_, finest.packed.Unscale(), finest.right);
   Cycle(0);
-  out = levels_.front().value;
+  Scaled(finest.value, finest.packed.Unscale(), correction_);
 }
 
 LatticeMultigrid::Result LatticeMultigrid::Solve(const LatticeField<float>& b, LatticeField<float>& x, double tolerance,
@@ -383,14 +388,13 @@ LatticeMultigrid::Result LatticeMultigrid::Solve(const LatticeField<float>& b, L
 {
   Result result;
   const LatticeMatrix& matrix = levels_.front().matrix;
-  const std::vector<float>& live = levels_.front().live;
   const LatticeShape& shape = matrix.Shape();
   x = LatticeField<float>(shape);
   residual_ = b;
   double before = 0.0, first = 0.0;
   for (; result.steps < maximumSteps; ++result.steps) {
     progress(0.0);
-    Cycle(residual_, correction_);
+    Cycle();
     const double now = Dot(residual_, correction_);
     if (result.steps == 0)
       first = now;
@@ -407,11 +411,7 @@ LatticeMultigrid::Result LatticeMultigrid::Solve(const LatticeField<float>& b, L
       for (int j = 0; j < shape.nodes[1]; ++j) {
         matrix.MultiplyRow(j, k, direction_, product.data());
         for (int c = 0; c < 3; ++c)
-          for (int i = 0; i < shape.nodes[0]; ++i) {
-            const std::ptrdiff_t at = shape.At(i, j, k);
-            product_.Component(c)[at] =
-                live[static_cast<std::size_t>(at)] * product[static_cast<std::size_t>(c * shape.Padded() + i)];
-          }
+          std::copy_n(product.data() + c * shape.Padded(), shape.nodes[0], product_.Component(c) + shape.At(0, j, k));
       }
     });
     const double curvature = Dot(direction_, product_);

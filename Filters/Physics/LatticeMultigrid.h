@@ -28,27 +28,23 @@ public:
   Result Solve(const LatticeField<float>& b, LatticeField<float>& x, double tolerance, int maximumSteps,
                const Progress& progress = {});
 
-  /// out = one V-cycle for in: the preconditioner.
-  void Cycle(const LatticeField<float>& in, LatticeField<float>& out);
-
 private:
   struct Level {
     LatticeMatrix matrix;
-    std::array<bool, 3> halved{};  ///< axes along which the next level is coarser
-    std::vector<float> live;       ///< 1 or 0, like a component of a field
-    std::vector<float> inverse[6]; ///< of the diagonal blocks: xx, xy, xz, yy, yz, zz; 0 where not live
-    double largest = 0.0;          ///< eigenvalue of inverse * A, estimated from above
-    LatticeField<float> right, value, other, step, mode;
+    PackedLatticeMatrix packed;
+    std::array<bool, 3> halved{};                        ///< axes along which the next level is coarser
+    double largest = 0.0;                                ///< eigenvalue of inverse * A, estimated from above
+    LatticeField<float> right, value, other, step, mode; ///< scaled, as the packed matrix has it
   };
-  void Invert(Level& level);
   void EstimateLargest(Level& level);
   void Smooth(Level& level, bool fromZero);
   void Restrict(const Level& fine, Level& coarse);
   void Prolong(const Level& coarse, Level& fine);
   void SolveCoarsest();
   void Cycle(std::size_t level);
+  void Cycle(); ///< correction = one V-cycle for the residual: the preconditioner, with packed matrices
 
-  std::vector<float> live_; ///< as given
+  std::vector<float> live_;
   std::vector<Level> levels_;
   Eigen::LLT<Eigen::MatrixXd> coarsest_;
   std::vector<std::ptrdiff_t> unknowns_; ///< nodes of the coarsest level

@@ -13,6 +13,7 @@
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Geometry>
 
 namespace echorama {
 namespace {
@@ -257,18 +258,13 @@ ECHORAMA_HOT void CellStiffness(const CellRow& row, float* const* rows, int padd
       block[7] -= turn[0];
       block[6] += turn[1];
       block[2] -= turn[1];
+      // The block of the corner that comes first; of its own, all of it.
       const int dx = (b & 1) - (a & 1), dy = (b >> 1 & 1) - (a >> 1 & 1), dz = (b >> 2 & 1) - (a >> 2 & 1);
-      float* to = rows[a >> 1] + (a & 1) + static_cast<std::ptrdiff_t>(LatticeMatrix::Offset(dx, dy, dz) * 9) * padded;
-      float* back = rows[b >> 1] + (b & 1) + static_cast<std::ptrdiff_t>(LatticeMatrix::Offset(-dx, -dy, -dz) * 9) * padded;
-      for (int c = 0; c < 3; ++c)
-        for (int d = 0; d < 3; ++d) {
-          float* first = to + static_cast<std::ptrdiff_t>(3 * c + d) * padded;
-          for (int l = 0; l < Lanes; ++l)
-            first[l] += block[3 * c + d][l];
-          float* second = back + static_cast<std::ptrdiff_t>(3 * d + c) * padded;
-          for (int l = 0; a != b && l < Lanes; ++l)
-            second[l] += block[3 * c + d][l];
-        }
+      float* to = rows[a >> 1] + (a & 1) +
+                  static_cast<std::ptrdiff_t>((LatticeMatrix::Offset(dx, dy, dz) - LatticeMatrix::Own) * 9) * padded;
+      for (int entry = 0; entry < 9; ++entry, to += padded)
+        for (int l = 0; l < Lanes; ++l)
+          to[l] += block[entry][l];
     }
 }
 
