@@ -195,16 +195,15 @@ void LatticeMatrix::MultiplyRow(int j, int k, const LatticeField<float>& x, floa
   MultiplyFloatRow(row, product);
 }
 
-LatticeMatrix LatticeMatrix::Coarsened(int axis) const
+void LatticeMatrix::Coarsen(int axis, LatticeMatrix& coarse) const
 {
-  std::array<int, 3> nodes = shape_.nodes;
-  nodes[static_cast<std::size_t>(axis)] = CoarseCount(nodes[static_cast<std::size_t>(axis)]);
-  LatticeMatrix coarse{LatticeShape(nodes)};
+  const std::array<int, 3>& nodes = coarse.shape_.nodes;
   const int stride = axis == 0 ? 1 : axis == 1 ? 3 : 9, padded = shape_.Padded(), coarsePadded = coarse.shape_.Padded();
   ParallelFor(nodes[2], [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     for (int j = 0; j < nodes[1]; ++j) {
       float* to = coarse.Row(j, k);
+      std::fill(to, to + coarse.rowSize_, 0.0f);
       for (int other = 0; other < 9; ++other) // the offsets along the other two axes
         for (const Share& share : shares) {
           const int base = axis == 0 ? other * 3 + 1 : axis == 1 ? other / 3 * 9 + 3 + other % 3 : 9 + other;
@@ -242,7 +241,6 @@ LatticeMatrix LatticeMatrix::Coarsened(int axis) const
         }
     }
   });
-  return coarse;
 }
 
 PackedLatticeMatrix::PackedLatticeMatrix(const LatticeShape& shape)
@@ -303,19 +301,34 @@ void PackedLatticeMatrix::Pack(const LatticeMatrix& matrix)
         }
       }
     for (int i = 0; i < shape_.nodes[0]; ++i) {
-      const bool isLive = unscale[i] > 0.0f;
       Eigen::Matrix3f block = OwnBlock(matrix, i, j, k) * (unscale[i] * unscale[i]);
-      for (int n = 0; n < 6; ++n) {
+      for (int n = 0; n < 6; ++n)
         block(ownRows[n], ownColumns[n]) += lost[static_cast<std::size_t>(n * padded + i)];
-        block(ownColumns[n], ownRows[n]) = block(ownRows[n], ownColumns[n]);
-      }
-      const Eigen::Matrix3f inverse = isLive ? Eigen::Matrix3f(block.inverse()) : Eigen::Matrix3f::Zero();
-      for (int n = 0; n < 6; ++n) {
-        own_[n][static_cast<std::size_t>(at + i)] = isLive ? block(ownRows[n], ownColumns[n]) : 0.0f;
-        inverse_[n][static_cast<std::size_t>(at + i)] = inverse(ownRows[n], ownColumns[n]);
-      }
+      SetOwn(at + i, block);
     }
   });
+}
+
+// Of a symmetric block the upper triangle counts.
+void PackedLatticeMatrix::SetOwn(std::ptrdiff_t at, const Eigen::Matrix3f& block)
+{
+  const auto node = static_cast<std::size_t>(at);
+  const bool isLive = unscale_[node] > 0.0f;
+  const Eigen::Matrix3f inverse =
+      isLive ? Eigen::Matrix3f(Eigen::Matrix3f(block.selfadjointView<Eigen::Upper>()).inverse()) : Eigen::Matrix3f::Zero();
+  for (int n = 0; n < 6; ++n) {
+    own_[n][node] = isLive ? block(ownRows[n], ownColumns[n]) : 0.0f;
+    inverse_[n][node] = inverse(ownRows[n], ownColumns[n]);
+  }
+}
+
+void PackedLatticeMatrix::ChangeOwn(int i, int j, int k, const Eigen::Matrix3f& change)
+{
+  const auto at = static_cast<std::size_t>(shape_.At(i, j, k));
+  Eigen::Matrix3f block = change * (unscale_[at] * unscale_[at]);
+  for (int n = 0; n < 6; ++n)
+    block(ownRows[n], ownColumns[n]) += own_[n][at];
+  SetOwn(shape_.At(i, j, k), block);
 }
 
 void PackedLatticeMatrix::MultiplyRow(int j, int k, const LatticeField<float>& x, float* product) const

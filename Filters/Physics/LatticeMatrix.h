@@ -42,8 +42,9 @@ public:
   /// product (3 runs of Padded() numbers) = the rows (j, k) of A x.
   void MultiplyRow(int j, int k, const LatticeField<float>& x, float* product) const;
 
-  /// The Galerkin product P^T A P where P interpolates linearly from every second node along \a axis.
-  LatticeMatrix Coarsened(int axis) const;
+  /// coarse (of a lattice with CoarseCount() nodes along \a axis) = the Galerkin product P^T A P, where P interpolates linearly
+  /// from every second node along the axis.
+  void Coarsen(int axis, LatticeMatrix& coarse) const;
   /// How many nodes remain of \a nodes along an axis.
   static int CoarseCount(int nodes) { return nodes / 2 + 1; }
 
@@ -68,6 +69,9 @@ public:
   /// Nodes whose own block is not positive are left out: they have no rows and columns, and scale and inverse 0.
   void Pack(const LatticeMatrix& matrix);
 
+  /// Adds D^-1 change D^-1 to the own block of a node.
+  void ChangeOwn(int i, int j, int k, const Eigen::Matrix3f& change);
+
   /// product (3 runs of Padded() numbers) = the rows (j, k) of this x.
   void MultiplyRow(int j, int k, const LatticeField<float>& x, float* product) const;
 
@@ -83,6 +87,8 @@ private:
   {
     return LatticeShape::Lanes + (static_cast<std::ptrdiff_t>(k) * shape_.nodes[1] + j) * Entries * shape_.Padded();
   }
+
+  void SetOwn(std::ptrdiff_t at, const Eigen::Matrix3f& block);
 
   LatticeShape shape_;
   std::vector<std::int16_t> data_;

@@ -93,10 +93,9 @@ LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen:
     Level level;
     level.right = level.value = level.other = level.step = level.mode = LatticeField<float>(shape);
     level.packed = PackedLatticeMatrix(shape);
-    if (levels_.empty()) {
-      level.matrix = LatticeMatrix(shape);
+    level.matrix = LatticeMatrix(shape);
+    if (levels_.empty())
       live_ = std::move(live);
-    }
     Random random(17, levels_.size());
     ForNodes(size, [&](int i, int j, int k) {
       for (int c = 0; c < 3; ++c)
@@ -107,12 +106,15 @@ LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen:
       if (size[axis] > 3)
         least = std::min(least, width[static_cast<int>(axis)]);
     const bool isCoarsest = shape.Count() <= 150 || least == std::numeric_limits<double>::infinity();
-    for (std::size_t axis = 0; axis < 3 && !isCoarsest; ++axis)
-      if (size[axis] > 3 && width[static_cast<int>(axis)] < 1.5 * least) {
+    for (const std::size_t axis : {2, 1, 0})
+      if (!isCoarsest && size[axis] > 3 && width[static_cast<int>(axis)] < 1.5 * least) {
         level.halved[axis] = true;
         size[axis] = LatticeMatrix::CoarseCount(size[axis]);
         width[static_cast<int>(axis)] *= 2.0;
+        level.between.emplace_back(LatticeShape(size));
       }
+    if (!isCoarsest)
+      level.between.pop_back(); // that is the next level
     levels_.push_back(std::move(level));
     if (isCoarsest)
       break;
@@ -129,14 +131,14 @@ void LatticeMultigrid::Prepare()
     if (n + 1 == levels_.size())
       break;
     EstimateLargest(level);
-    LatticeMatrix coarse;
     const LatticeMatrix* from = &level.matrix;
+    auto next = level.between.begin();
     for (const int axis : {2, 1, 0})
       if (level.halved[static_cast<std::size_t>(axis)]) {
-        coarse = from->Coarsened(axis);
-        from = &coarse;
+        LatticeMatrix& to = next == level.between.end() ? levels_[n + 1].matrix : *next++;
+        from->Coarsen(axis, to);
+        from = &to;
       }
-    levels_[n + 1].matrix = std::move(coarse);
   }
   const Level& last = levels_.back();
   const LatticeShape& shape = last.matrix.Shape();
@@ -171,6 +173,14 @@ void LatticeMultigrid::Prepare()
     if (coarsest_.info() == Eigen::Success || shift > 1e3)
       break;
   }
+}
+
+void LatticeMultigrid::ChangeOwn(const std::array<int, 3>& node, const Eigen::Matrix3f& change)
+{
+  Level& finest = levels_.front();
+  for (int entry = 0; entry < 9; ++entry)
+    finest.matrix.At(node[0], node[1], node[2], LatticeMatrix::Own, entry / 3, entry % 3) += change(entry / 3, entry % 3);
+  finest.packed.ChangeOwn(node[0], node[1], node[2], change);
 }
 
 // The runs of a row of a field.

@@ -18,6 +18,8 @@ public:
   LatticeMatrix& Matrix() { return levels_.front().matrix; }
   /// Builds the coarse levels from the matrix.
   void Prepare();
+  /// Adds to the own block of a node; coarse levels stay as they are, which costs steps when much is changed.
+  void ChangeOwn(const std::array<int, 3>& node, const Eigen::Matrix3f& change);
 
   struct Result {
     int steps = 0;
@@ -32,6 +34,7 @@ private:
   struct Level {
     LatticeMatrix matrix;
     PackedLatticeMatrix packed;
+    std::vector<LatticeMatrix> between;                  ///< coarser along some of the axes, on the way to the next level
     std::array<bool, 3> halved{};                        ///< axes along which the next level is coarser
     double largest = 0.0;                                ///< eigenvalue of inverse * A, estimated from above
     LatticeField<float> right, value, other, step, mode; ///< scaled, as the packed matrix has it

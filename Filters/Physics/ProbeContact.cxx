@@ -120,9 +120,12 @@ double ProbeContact::AddForce(const LatticeField<double>& displacement, LatticeF
   return energy;
 }
 
-void ProbeContact::AddStiffness(const LatticeField<double>& displacement, LatticeMatrix& matrix, bool tame)
+std::vector<Eigen::Matrix3f> ProbeContact::Stiffness(const LatticeField<double>& displacement,
+                                                     const std::vector<Eigen::Matrix3f>& own, bool tame)
 {
-  for (Node& node : nodes_) {
+  std::vector<Eigen::Matrix3f> blocks(nodes_.size(), Eigen::Matrix3f::Zero());
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    Node& node = nodes_[n];
     const auto push = PushOf(node, displacement);
     node.pushed = push && push->force > 0.0;
     if (!push)
@@ -133,18 +136,15 @@ void ProbeContact::AddStiffness(const LatticeField<double>& displacement, Lattic
     // The bend counts at the surface; deep inside, where slopes jump, there is none. It must leave the block positive.
     const Eigen::Vector3d local = toProbe_ * (node.rest + displacement.Get(node.at));
     if (push->force > 0.0 && !tame && std::abs(shape_->Distance(local)) < 0.3) {
-      double least = std::numeric_limits<double>::infinity();
-      for (int c = 0; c < 3; ++c)
-        least = std::min(least, static_cast<double>(matrix.At(node.index[0], node.index[1], node.index[2], 13, c, c)));
+      const auto least = static_cast<double>(own[n].diagonal().minCoeff());
       block -= toLattice_.linear() * Limited(push->force * shape_->Bend(local), 0.4 * std::max(least, 0.0)) *
                toLattice_.linear().transpose();
     }
     if (push->dragStiffness > 0.0)
       block += push->dragStiffness * (Eigen::Matrix3d::Identity() - node.normal * node.normal.transpose());
-    for (int entry = 0; entry < 9; ++entry)
-      matrix.At(node.index[0], node.index[1], node.index[2], 13, entry / 3, entry % 3) +=
-          static_cast<float>(block(entry / 3, entry % 3));
+    blocks[n] = block.cast<float>();
   }
+  return blocks;
 }
 
 double ProbeContact::Update(const LatticeField<double>& displacement)

@@ -25,7 +25,7 @@ public:
     Eigen::Vector3d drag = Eigen::Vector3d::Zero();   ///< of friction, mN
     Eigen::Vector3d anchor = Eigen::Vector3d::Zero(); ///< where it touched the probe when the step began, in the probe's frame
     Eigen::Vector3d normal = Eigen::Vector3d::Zero(); ///< of the probe there, at the last Update()
-    bool pushed = false;                              ///< at the last AddStiffness()
+    bool pushed = false;                              ///< at the last Stiffness()
   };
 
   ProbeContact() = default;
@@ -39,9 +39,11 @@ public:
   double Energy(const LatticeField<double>& displacement) const;
   /// Adds the derivative of the energy, and returns the energy.
   double AddForce(const LatticeField<double>& displacement, LatticeField<double>& force) const;
-  /// \a tame: without the bends of the probe, which make it easier to slip off.
-  void AddStiffness(const LatticeField<double>& displacement, LatticeMatrix& matrix, bool tame);
-  /// Takes over the forces at \a displacement, but not those of nodes that were not pushed at the last AddStiffness(): how far
+  /// The second derivative of the energy, node by node of the skin. \a own: what the tissue has at each, of which bends of the
+  /// probe may take away a part. \a tame: without bends, which make it easier to slip off.
+  std::vector<Eigen::Matrix3f> Stiffness(const LatticeField<double>& displacement, const std::vector<Eigen::Matrix3f>& own,
+                                         bool tame);
+  /// Takes over the forces at \a displacement, but not those of nodes that were not pushed at the last Stiffness(): how far
   /// these went into the probe says nothing of how much it takes to keep them out. \returns by how many mm the constraints were
   /// still violated: depth in the probe, or distance of nodes with a force
   double Update(const LatticeField<double>& displacement);

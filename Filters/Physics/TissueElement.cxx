@@ -268,6 +268,17 @@ ECHORAMA_HOT void CellStiffness(const CellRow& row, float* const* rows, int padd
     }
 }
 
+// J - 1 at the integration points.
+ECHORAMA_HOT void CellSwellings(const CellRow& row, double (*swellings)[Lanes])
+{
+  DoublePack h[8][9];
+  Gradients<DoublePack, double>(row, h);
+  for (int g = 0; g < 8; ++g) {
+    const DoublePack swelling = Swelling(h[g]);
+    std::memcpy(swellings[g], &swelling, sizeof(swelling));
+  }
+}
+
 bool AnyTissue(const float* shear)
 {
   return std::any_of(shear, shear + Lanes, [](float value) { return value > 0.0f; });
@@ -358,15 +369,13 @@ double LeastTissueVolume(const TissueCells& cells, const Eigen::Vector3d& spacin
   const Shapes shapes(spacing);
   std::vector<double> layers(static_cast<std::size_t>(cells.cells[2]), 1.0);
   ForCells(cells, shapes, displacement, nullptr, [&](const CellRow& row, int, int, int k) {
-    DoublePack h[8][9];
-    Gradients<DoublePack, double>(row, h);
+    double swellings[8][Lanes];
+    CellSwellings(row, swellings);
     double& least = layers[static_cast<std::size_t>(k)];
-    for (int g = 0; g < 8; ++g) {
-      const DoublePack swelling = Swelling(h[g]);
+    for (const auto& swelling : swellings)
       for (int l = 0; l < Lanes; ++l)
         if (row.shear[l] > 0.0f)
           least = std::min(least, 1.0 + swelling[l]);
-    }
   });
   return layers.empty() ? 1.0 : *std::min_element(layers.begin(), layers.end());
 }
@@ -376,16 +385,14 @@ double TissueVolumeRatio(const TissueCells& cells, const Eigen::Vector3d& spacin
   const Shapes shapes(spacing);
   std::vector<double> layers(static_cast<std::size_t>(cells.cells[2]), 0.0), counts = layers;
   ForCells(cells, shapes, displacement, nullptr, [&](const CellRow& row, int, int, int k) {
-    DoublePack h[8][9];
-    Gradients<DoublePack, double>(row, h);
-    for (int g = 0; g < 8; ++g) {
-      const DoublePack swelling = Swelling(h[g]);
+    double swellings[8][Lanes];
+    CellSwellings(row, swellings);
+    for (const auto& swelling : swellings)
       for (int l = 0; l < Lanes; ++l)
         if (row.shear[l] > 0.0f) {
           layers[static_cast<std::size_t>(k)] += swelling[l];
           counts[static_cast<std::size_t>(k)] += 1.0;
         }
-    }
   });
   double sum = 0.0, count = 0.0;
   for (std::size_t k = 0; k < layers.size(); ++k) {

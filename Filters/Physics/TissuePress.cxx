@@ -12,7 +12,8 @@
 namespace echorama {
 namespace {
 
-constexpr int FewestNodes = 6; // along each axis of the coarsest lattice
+constexpr int FewestNodes = 6;          // along each axis of the coarsest lattice
+constexpr double CoarseTolerance = 0.1; // of a cell, where only a first guess is wanted
 constexpr double LeastStep = 1.0 / 128.0;
 constexpr int MostNewtonSteps = 30;
 
@@ -314,8 +315,9 @@ bool TissuePress::Step(std::size_t n, const Pose& from, const Pose& to, const Pr
     level.solver.Contact().Place(shape_, to, parameters_.friction);
     level.solver.Contact().BeginStep(level.solver.Displacement());
     TissueWork work;
-    const bool isFound = level.solver.Solve(true, n == 0 ? parameters_.toleranceMm : 0.02 * level.solver.Spacing().minCoeff(),
-                                            MostNewtonSteps, work, progress.Part(0.3, 1.0));
+    const bool isFound =
+        level.solver.Solve(true, n == 0 ? parameters_.toleranceMm : CoarseTolerance * level.solver.Spacing().minCoeff(),
+                           MostNewtonSteps, work, progress.Part(0.3, 1.0));
     work_ += work;
     if (n == 0)
       finestWork_ += work;
@@ -335,7 +337,7 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
   Level& level = *levels_[n];
   TissueSolver& solver = level.solver;
   const auto nodes = solver.Contact().Nodes();
-  const double tolerance = n == 0 ? parameters_.toleranceMm : 0.02 * solver.Spacing().minCoeff();
+  const double tolerance = n == 0 ? parameters_.toleranceMm : CoarseTolerance * solver.Spacing().minCoeff();
   // Until it touches the probe may go as far as it likes.
   double at = 0.0, size = 1.0, travel = Travel(from, to);
   if (shape_ && travel > 0.0) {

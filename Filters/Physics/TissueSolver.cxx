@@ -9,6 +9,34 @@
 #include <utility>
 
 namespace echorama {
+namespace {
+
+// Contact changes from step to step: more digits of the steps on the way would not bring the end nearer.
+constexpr double LinearTolerance = 0.1, LastLinearTolerance = 0.02;
+constexpr double KeepMatrix = 0.1; // in cells: as long as nothing moved farther, the matrix of the tissue is still good
+
+// What a step promises.
+struct Advance {
+  double slope = 0.0, longest = 0.0;
+  Advance& operator+=(const Advance& other)
+  {
+    slope += other.slope;
+    longest = std::max(longest, other.longest);
+    return *this;
+  }
+};
+
+// Calls body(at) for all numbers of a field.
+template <class Body>
+void ForSlices(const LatticeShape& shape, const Body& body)
+{
+  ParallelFor(3 * (shape.nodes[2] + 2), [&](std::ptrdiff_t n) {
+    for (std::ptrdiff_t at = n * shape.slice; at < (n + 1) * shape.slice; ++at)
+      body(static_cast<std::size_t>(at));
+  });
+}
+
+} // namespace
 
 TissueWork& TissueWork::operator+=(const TissueWork& other)
 {
@@ -36,73 +64,120 @@ TissueSolver::TissueSolver(TissueCells cells, const LatticeShape& shape, const E
         }
 }
 
-double TissueSolver::Energy(const LatticeField<double>& displacement) const
+// The energy of tissue and weight, and its derivative.
+double TissueSolver::TissueTerms(const LatticeField<double>& displacement, LatticeField<double>& force) const
 {
+  const double stored = TissueForce(cells_, spacing_, displacement, force);
   const double lifted = ParallelSum<double>(shape_.nodes[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
     double sum = 0.0;
     for (int c = 0; c < 3; ++c)
-      for (std::ptrdiff_t at = (k + 1) * shape_.slice; at < (k + 2) * shape_.slice; ++at)
+      for (std::ptrdiff_t at = (k + 1) * shape_.slice; at < (k + 2) * shape_.slice; ++at) {
         sum += weight_.Component(c)[at] * displacement.Component(c)[at];
+        force.Component(c)[at] -= weight_.Component(c)[at];
+      }
     return sum;
   });
-  return TissueEnergy(cells_, spacing_, displacement) - lifted + contact_.Energy(displacement);
+  return stored - lifted;
+}
+
+// The matrix at the present state; if it is not new, that of the tissue remains as it was.
+void TissueSolver::MakeMatrix(bool isNew, bool tame, bool withBends)
+{
+  const std::vector<ProbeContact::Node>& nodes = contact_.Nodes();
+  LatticeMatrix& matrix = multigrid_.Matrix();
+  if (isNew) {
+    TissueStiffness(cells_, spacing_, displacement_, matrix, tame);
+    own_.resize(nodes.size());
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+      for (int entry = 0; entry < 9; ++entry)
+        own_[n](entry / 3, entry % 3) =
+            matrix.At(nodes[n].index[0], nodes[n].index[1], nodes[n].index[2], LatticeMatrix::Own, entry / 3, entry % 3);
+  }
+  std::vector<Eigen::Matrix3f> pushed = contact_.Stiffness(displacement_, own_, !withBends);
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const std::array<int, 3>& at = nodes[n].index;
+    if (isNew) {
+      for (int entry = 0; entry < 9; ++entry)
+        matrix.At(at[0], at[1], at[2], LatticeMatrix::Own, entry / 3, entry % 3) += pushed[n](entry / 3, entry % 3);
+    } else if (pushed[n] != pushed_[n]) {
+      multigrid_.ChangeOwn(at, pushed[n] - pushed_[n]);
+    }
+  }
+  pushed_ = std::move(pushed);
+  if (isNew)
+    multigrid_.Prepare();
 }
 
 bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, TissueWork& work, const Progress& progress)
 {
   const LatticeField<double> start = displacement_;
   const std::vector<ProbeContact::Node> nodes = contact_.Nodes();
-  LatticeField<double> force(shape_), trial(shape_);
+  const double width = spacing_.minCoeff();
+  LatticeField<double> force(shape_), trial(shape_), trialForce(shape_);
   LatticeField<float> right(shape_), step(shape_);
-  double last = std::numeric_limits<double>::infinity();
+  double last = std::numeric_limits<double>::infinity(), moved = last, stored = TissueTerms(displacement_, force);
   bool isFound = false, tame = isGuess;
   for (int n = 0; n < maximumSteps && !isFound; ++n) {
     progress(static_cast<double>(n) / maximumSteps);
-    TissueForce(cells_, spacing_, displacement_, force);
-    contact_.AddForce(displacement_, force);
-    for (int c = 0; c < 3; ++c)
-      ForNodes(shape_.nodes, [&](int i, int j, int k) {
-        const std::ptrdiff_t at = shape_.At(i, j, k);
-        right.Component(c)[at] =
-            live_[static_cast<std::size_t>(at)] * static_cast<float>(weight_.Component(c)[at] - force.Component(c)[at]);
-      });
-    const double tolerance = std::min(0.1, std::max(0.02, 0.1 * last / spacing_.minCoeff()));
+    ForSlices(shape_, [&](std::size_t at) { trialForce.Data()[at] = force.Data()[at]; });
+    contact_.AddForce(displacement_, trialForce);
+    ForSlices(shape_, [&](std::size_t at) {
+      right.Data()[at] = -live_[at % static_cast<std::size_t>(shape_.size)] * static_cast<float>(trialForce.Data()[at]);
+    });
+    const bool isNear = last < 0.03 * width;
     LatticeMultigrid::Result solved;
     do {
-      TissueStiffness(cells_, spacing_, displacement_, multigrid_.Matrix(), tame);
-      contact_.AddStiffness(displacement_, multigrid_.Matrix(), tame || last > 0.03 * spacing_.minCoeff());
-      multigrid_.Prepare();
-      solved = multigrid_.Solve(right, step, tolerance, 100);
+      const bool isNew = tame || !(moved < KeepMatrix * width);
+      MakeMatrix(isNew, tame, !tame && isNear);
+      moved = isNew ? 0.0 : moved;
+      solved = multigrid_.Solve(right, step, isNear ? LastLinearTolerance : LinearTolerance, 100);
       work.linearSteps += solved.steps;
     } while (!solved.isConvex && !std::exchange(tame, true));
     ++work.newtonSteps;
-    double slope = 0.0, longest = 0.0;
-    for (std::size_t at = 0; at < step.Data().size(); ++at) {
-      slope -= static_cast<double>(step.Data()[at]) * static_cast<double>(right.Data()[at]);
-      longest = std::max(longest, std::abs(static_cast<double>(step.Data()[at])));
-    }
-    if (!std::isfinite(slope) || !std::isfinite(longest))
+    const Advance advance = ParallelSum<Advance>(shape_.nodes[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
+      Advance sum;
+      for (int c = 0; c < 3; ++c)
+        for (std::ptrdiff_t at = (k + 1) * shape_.slice; at < (k + 2) * shape_.slice; ++at) {
+          const auto moves = static_cast<double>(step.Component(c)[at]);
+          sum.slope -= moves * static_cast<double>(right.Component(c)[at]);
+          sum.longest = std::max(sum.longest, std::abs(moves));
+        }
+      return sum;
+    });
+    if (!std::isfinite(advance.slope) || !std::isfinite(advance.longest))
       break;
     // Along the step, half as far each time that the energy falls by less than a straight line promises.
-    const double before = Energy(displacement_);
-    const double rounding = 1e-11 * std::abs(before) + 1e-9 * std::abs(slope);
-    double part = std::min(1.0, 2.0 * spacing_.maxCoeff() / std::max(longest, 1e-300)), after = before;
+    const double before = stored + contact_.Energy(displacement_);
+    const double rounding = 1e-11 * std::abs(before) + 1e-9 * std::abs(advance.slope);
+    double part = std::min(1.0, 2.0 * spacing_.maxCoeff() / std::max(advance.longest, 1e-300)), after = before, kept = stored;
     bool falls = false;
     for (int halving = 0; halving < 12 && !falls; ++halving, part *= falls ? 1.0 : 0.5) {
-      for (std::size_t at = 0; at < step.Data().size(); ++at)
+      ForSlices(shape_, [&](std::size_t at) {
         trial.Data()[at] = displacement_.Data()[at] + part * static_cast<double>(step.Data()[at]);
-      after = Energy(trial);
-      falls = after <= before + 1e-4 * part * slope + rounding;
+      });
+      kept = TissueTerms(trial, trialForce);
+      after = kept + contact_.Energy(trial);
+      falls = after <= before + 1e-4 * part * advance.slope + rounding;
     }
-    if (!falls)
+    if (!falls && moved == 0.0)
       break;
+    if (!falls) { // perhaps because the matrix is an old one
+      moved = std::numeric_limits<double>::infinity();
+      continue;
+    }
     work.energyGrew = work.energyGrew || after > before + rounding;
     std::swap(displacement_, trial);
-    last = part * longest;
-    tame = tame && last > 0.2 * spacing_.minCoeff();
-    if (part == 1.0 && last < 0.2 * spacing_.minCoeff()) {
+    std::swap(force, trialForce);
+    stored = kept;
+    const double shrinks = part * advance.longest / last;
+    last = part * advance.longest;
+    moved += last;
+    tame = tame && last > 0.2 * width;
+    if (part == 1.0 && last < 0.2 * width) {
       const double open = contact_.Update(displacement_);
-      isFound = last < toleranceMm && open < toleranceMm;
+      // Steps that get slowly shorter have farther to go than the last one was long; first guesses may stop earlier.
+      const bool mayHaveFarToGo = shrinks > 0.5 && toleranceMm < 0.03 * width;
+      isFound = last < (mayHaveFarToGo ? 0.1 : 1.0) * toleranceMm && open < toleranceMm;
     }
   }
   if (!isFound || !(LeastVolume() > 0.0)) {

@@ -36,7 +36,8 @@ public:
   double LeastVolume() const { return LeastTissueVolume(cells_, spacing_, displacement_); }
 
 private:
-  double Energy(const LatticeField<double>& displacement) const;
+  double TissueTerms(const LatticeField<double>& displacement, LatticeField<double>& force) const;
+  void MakeMatrix(bool isNew, bool tame, bool withBends);
 
   TissueCells cells_;
   LatticeShape shape_;
@@ -46,6 +47,7 @@ private:
   LatticeField<double> displacement_;
   ProbeContact contact_;
   LatticeMultigrid multigrid_;
+  std::vector<Eigen::Matrix3f> own_, pushed_; ///< in the matrix, at the nodes of the skin: of the tissue, and of the contact
 };
 
 } // namespace echorama

@@ -156,7 +156,10 @@ TEST(LatticeMatrix, CoarseMatrixIsTheGalerkinProduct)
       std::vector<float> live(static_cast<std::size_t>(shape.size), 1.0f);
       live[static_cast<std::size_t>(shape.At(1, 2, 1))] = live[static_cast<std::size_t>(shape.At(2, 1, 3))] = 0.0f;
       fine.KeepOnly(live);
-      const LatticeMatrix coarse = fine.Coarsened(axis);
+      std::array<int, 3> coarseNodes = nodes;
+      coarseNodes[static_cast<std::size_t>(axis)] = LatticeMatrix::CoarseCount(nodes[static_cast<std::size_t>(axis)]);
+      LatticeMatrix coarse{LatticeShape(coarseNodes)};
+      fine.Coarsen(axis, coarse);
       // a . P^T M A M P b, with P written out.
       const auto a = RandomField<float>(coarse.Shape(), 1.0, 6), b = RandomField<float>(coarse.Shape(), 1.0, 7);
       const auto prolong = [&](const LatticeField<float>& x) {
