@@ -124,7 +124,7 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
     ForSlices(shape_, [&](std::size_t at) {
       right.Data()[at] = -live_[at % static_cast<std::size_t>(shape_.size)] * static_cast<float>(trialForce.Data()[at]);
     });
-    const bool isNear = last < 0.03 * width;
+    const bool isNear = last < 0.06 * width;
     LatticeMultigrid::Result solved;
     do {
       const bool isNew = tame || !(moved < KeepMatrix * width);
@@ -177,7 +177,7 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
       const double open = contact_.Update(displacement_);
       // Steps that get slowly shorter have farther to go than the last one was long; first guesses may stop earlier.
       const bool mayHaveFarToGo = shrinks > 0.5 && toleranceMm < 0.03 * width;
-      isFound = last < (mayHaveFarToGo ? 0.1 : 1.0) * toleranceMm && open < toleranceMm;
+      isFound = last < (mayHaveFarToGo ? 0.1 : 1.0) * toleranceMm && open < 0.2 * toleranceMm;
     }
   }
   if (!isFound || !(LeastVolume() > 0.0)) {
