@@ -14,8 +14,8 @@ namespace {
 
 constexpr int FewestNodes = 6;          // along each axis of the coarsest lattice
 constexpr double CoarseTolerance = 0.1; // of a cell, where only a first guess is wanted
-constexpr double LeastStep = 1.0 / 128.0;
-constexpr int MostNewtonSteps = 30;
+constexpr double LeastStep = 0.1; // of a cell, between what can be reached and what can not
+constexpr int MostNewtonSteps = 30, MostNewtonStepsOfAPart = 20;
 
 std::array<int, 3> CoarseNodes(const std::array<int, 3>& nodes)
 {
@@ -89,6 +89,7 @@ struct TissuePress::Level {
   }
   TissueSolver solver;
   LatticeField<double> before;       ///< the displacement when the step began
+  std::vector<double> forcesBefore;  ///< of the contact, by node of the skin
   std::vector<Eigen::Vector3d> held; ///< places of nodes that do not move, mm
 };
 
@@ -243,11 +244,15 @@ void TissuePress::Predict(std::size_t n)
 {
   Level &fine = *levels_[n], &coarse = *levels_[n + 1];
   const LatticeShape &to = fine.solver.Shape(), &from = coarse.solver.Shape();
-  std::vector<float> pressure(static_cast<std::size_t>(from.size), -1.0f); // kPa
+  std::vector<double> pressure(static_cast<std::size_t>(from.size)); // kPa, by how much it changed
+  std::vector<unsigned char> isSkin(static_cast<std::size_t>(from.size), 0);
   LatticeField<double> drag(from);
-  for (const auto& node : coarse.solver.Contact().Nodes()) {
-    pressure[static_cast<std::size_t>(node.at)] = static_cast<float>(node.force / node.area);
-    drag.Set(node.at, node.drag / node.area);
+  const auto& skin = coarse.solver.Contact().Nodes();
+  for (std::size_t m = 0; m < skin.size(); ++m) {
+    const auto at = static_cast<std::size_t>(skin[m].at);
+    isSkin[at] = 1;
+    pressure[at] = (skin[m].force - coarse.forcesBefore[m]) / skin[m].area;
+    drag.Set(skin[m].at, skin[m].drag / skin[m].area);
   }
   LatticeField<double>& u = fine.solver.Displacement();
   const std::vector<float>& live = fine.solver.Live();
@@ -289,14 +294,14 @@ void TissuePress::Predict(std::size_t n)
     double force = 0.0, weights = 0.0;
     Eigen::Vector3d dragged = Eigen::Vector3d::Zero();
     corners(node.index[0], node.index[1], node.index[2], [&](std::ptrdiff_t at, double weight) {
-      if (pressure[static_cast<std::size_t>(at)] >= 0.0f) {
-        force += weight * static_cast<double>(pressure[static_cast<std::size_t>(at)]);
+      if (isSkin[static_cast<std::size_t>(at)]) {
+        force += weight * pressure[static_cast<std::size_t>(at)];
         dragged += weight * drag.Get(at);
         weights += weight;
       }
     });
     if (weights > 0.0) {
-      node.force = force / weights * node.area;
+      node.force = std::max(0.0, node.force + force / weights * node.area);
       node.drag = dragged / weights * node.area;
     }
   }
@@ -308,6 +313,9 @@ bool TissuePress::Step(std::size_t n, const Pose& from, const Pose& to, const Pr
   Level& level = *levels_[n];
   level.before = level.solver.Displacement();
   const auto nodes = level.solver.Contact().Nodes();
+  level.forcesBefore.clear();
+  for (const auto& node : nodes)
+    level.forcesBefore.push_back(node.force);
   const bool isCoarsest = n + 1 == levels_.size();
   double ignored = 0.0;
   if (!isCoarsest && Step(n + 1, from, to, progress.Part(0.0, 0.3), ignored)) {
@@ -346,7 +354,9 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     size = std::min(1.0, 2.0 * solver.Spacing().maxCoeff() / travel);
   }
   LatticeField<double> last = solver.Displacement();
+  const double least = std::min(0.1, LeastStep * solver.Spacing().minCoeff() / std::max(travel, 1e-9));
   double lastSize = 0.0;
+  bool mayGrow = true;
   while (at < 1.0) {
     size = std::min(size, 1.0 - at);
     const double next = at + size > 1.0 - 1e-9 ? 1.0 : at + size;
@@ -359,7 +369,7 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     solver.Contact().Place(shape_, Interpolate(from, to, next), parameters_.friction);
     TissueWork work;
     work.loadSteps = 1;
-    const bool isFound = solver.Solve(false, tolerance, MostNewtonSteps, work, progress.Part(at, next));
+    const bool isFound = solver.Solve(false, tolerance, MostNewtonStepsOfAPart, work, progress.Part(at, next));
     work_ += work;
     if (n == 0)
       finestWork_ += work;
@@ -367,7 +377,7 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
       last = now;
       lastSize = next - at;
       at = next;
-      size *= work.newtonSteps < 8 ? 2.0 : 1.0;
+      size *= mayGrow && work.newtonSteps < 8 ? 2.0 : 1.0;
     } else {
       solver.Displacement() = now;
       solver.Contact().Nodes() = contacts;
@@ -375,7 +385,8 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
         lastSize = 0.0; // perhaps the guess was bad
       else
         size *= 0.5;
-      if (size < LeastStep) {
+      mayGrow = false; // what was too far is close to what is impossible
+      if (size < least) {
         solver.Displacement() = level.before;
         solver.Contact().Nodes() = nodes;
         reached = at;
