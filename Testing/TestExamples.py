@@ -9,6 +9,7 @@ import sys
 import tempfile
 
 source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
+build = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"])
 
 with tempfile.TemporaryDirectory() as folder:
     answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / "stitch_phantom.py"], cwd=folder, capture_output=True, text=True)
@@ -42,7 +43,8 @@ with tempfile.TemporaryDirectory() as folder:
                               (["noise_figures.py", pictures], ["NoiseSource"]),
                               (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity"]),
                               (["synthesis_tissue_figures.py", pictures], ["TissueSource", "TissueSourceLevels"]),
-                              (["pressing_figures.py", "--quick", pictures], ["Gel", "TissuePress"]),
+                              (["pressing_figures.py", "--quick", "--sph", build / "benchmarks" / "BenchmarkSph", pictures],
+                               ["Gel", "TissuePress", "sph_block", "sph_bodies", "sph_gel"]),
                               (["embedding_figures.py", "--spacing", "3", pictures],
                                ["embedding_coverage", "embedding_background", "embedding_ways"])):
         answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / arguments[0], *arguments[1:]], cwd=folder,

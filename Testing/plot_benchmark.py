@@ -6,8 +6,9 @@ IN.jsonl holds one JSON object per line, as Testing/Benchmark.h writes them. Eac
 seconds, both logarithmic: the nearer to the lower left corner, the better. Lines that count successes over a minimum
 overlap (keys "t" and "within_1mm") become one more panel of success against t. A case without errors becomes bars of
 seconds; one with a number of "levels" per line, seconds and error against the levels; lines with an "accuracy" are joined and
-labelled with it; lines with a number of "rays" become curves of error against rays, with their slopes; and lines of "energy"
-at times "t" for some numbers of levels two panels of curves, linear and logarithmic.
+labelled with it; lines with a number of "rays" become curves of error against rays, with their slopes; lines of "energy"
+at times "t" for some numbers of levels two panels of curves, linear and logarithmic; and lines with a "step" for a "viscosity" curves
+of the one against the other, among them the "rule" that foretells it, with what gel has for a "viscosity" at some rates of shear.
 """
 import json
 import math
@@ -24,7 +25,7 @@ OURS = "#0b5e8a"
 PEERS = ["#8a8a8a", "#b0763b", "#6f8f5f", "#9a6f9a", "#5f6f8f"]
 MARKERS = "osD^vP*X<>hp"
 # What ours is compared with: other libraries, and the simpler ways of stitching.
-PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer", "average", "feather", "maximum", "cascadic", "descent")
+PEER_WORDS = ("vtk", "itk", "scipy", "opencv", "elastix", "brute", "peer", "average", "feather", "maximum", "cascadic", "descent", "sph")
 
 
 def is_ours(method):
@@ -189,14 +190,42 @@ def draw_energy(axes, lines, logarithmic):
     axes.legend(title="levels", fontsize=8, title_fontsize=8, frameon=False, ncol=2)
 
 
+def is_step(line):
+    return number(line, "viscosity") is not None and (number(line, "step") is not None or number(line, "shear_rate") is not None)
+
+
+def draw_steps(axes, lines):
+    curves = grouped([line for line in lines if number(line, "step") is not None], "method")
+    for index, (method, of_method) in enumerate(sorted(curves.items(), key=lambda item: is_ours(item[0]))):
+        viscosities = [line["viscosity"] for line in of_method]
+        colour = OURS if is_ours(method) else PEERS[1]
+        axes.plot(viscosities, [line["step"] for line in of_method], marker=MARKERS[index], color=colour,
+                  label=method if is_ours(method) else f"{method}, longest stable")
+        if number(of_method[0], "rule") is not None:
+            axes.plot(viscosities, [line["rule"] for line in of_method], color=colour, linestyle=":", label=f"{method}, step taken")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for line in lines:
+        if number(line, "shear_rate") is not None:
+            axes.axvline(line["viscosity"], color="#999999", linewidth=0.8, linestyle="--", zorder=1)
+            axes.text(line["viscosity"], 0.98, f"gel at {line['shear_rate']:g}/s", transform=axes.get_xaxis_transform(), rotation=90,
+                      fontsize=7, color="#666666", ha="right", va="top")
+    axes.set_xlabel("viscosity (Pa s)")
+    axes.set_ylabel("step (s)")
+    axes.set_ylim(top=axes.get_ylim()[1] * 10)  # room for the names of rates
+    axes.set_title("step against viscosity", fontsize=10)
+    axes.legend(fontsize=8, frameon=False, loc="lower left")
+
+
 def main():
     if len(sys.argv) != 3:
         sys.exit("usage: plot_benchmark.py IN.jsonl OUT.png")
     lines = read(sys.argv[1])
     success = [line for line in lines if is_success(line)]
     energy = [line for line in lines if number(line, "t") is not None and number(line, "energy") is not None]
-    cases = grouped([line for line in lines if line not in success and line not in energy], "case")
-    panels = len(cases) + bool(success) + 2 * bool(energy)
+    cases = grouped([line for line in lines if line not in success and line not in energy and not is_step(line)], "case")
+    steps = [line for line in lines if is_step(line)]
+    panels = len(cases) + bool(success) + 2 * bool(energy) + bool(steps)
     columns = min(panels, 3)
     rows = math.ceil(panels / columns)
     figure, axes = plt.subplots(rows, columns, figsize=(max(6.0, 4.5 * columns), 3.6 * rows + 0.6), squeeze=False)
@@ -227,8 +256,10 @@ def main():
     if success:
         draw_success(axes[len(cases)], success)
     if energy:
-        draw_energy(axes[panels - 2], energy, False)
-        draw_energy(axes[panels - 1], energy, True)
+        draw_energy(axes[len(cases) + bool(success)], energy, False)
+        draw_energy(axes[len(cases) + bool(success) + 1], energy, True)
+    if steps:
+        draw_steps(axes[panels - 1], steps)
     for panel in axes[:panels]:
         panel.grid(True, which="major", color="#e6e6e6", linewidth=0.8)
         panel.set_axisbelow(True)

@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""pressing_figures.py [--quick] [FOLDER]: a probe, gel and the invented abdomen as pictures in FOLDER.
+"""pressing_figures.py [--quick] [--sph PROGRAM] [FOLDER]: a probe, gel and the invented abdomen as pictures in FOLDER.
 
 Gel.png: what a scan shows without and with gel, in air and on the skin (after figure 6.4 of the dissertation), above where the gel went.
 TissuePress.png: gel and tissue under a probe that presses (after figures 3.8 to 3.10), with squares that were drawn on it at rest.
+With the benchmark that computes them, build/release/benchmarks/BenchmarkSph, also the pictures of sph_figures.py (figures 3.6 to 3.8).
 """
 import argparse
 import pathlib
@@ -19,6 +20,7 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkCutter
 
+import sph_figures
 from echorama import (
     vtkUltrasoundAnatomySource, vtkUltrasoundDeformGeometry, vtkUltrasoundGel, vtkUltrasoundProbeSource,
     vtkUltrasoundSynthesizer, vtkUltrasoundTissuePress)
@@ -143,12 +145,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", default=".", type=pathlib.Path)
     parser.add_argument("--quick", action="store_true", help="coarse: to see that it works")
+    parser.add_argument("--sph", type=pathlib.Path, metavar="PROGRAM", help="the benchmark sph: its pictures too")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     body = vtkUltrasoundAnatomySource()
     body.Update()
     gel_picture(body.GetOutput(), options.folder / "Gel.png", options.quick)
     press_picture(body.GetOutput(), options.folder / "TissuePress.png", options.quick)
+    if options.sph:
+        sph_figures.pictures(options.sph, options.folder, options.quick)
 
 
 if __name__ == "__main__":

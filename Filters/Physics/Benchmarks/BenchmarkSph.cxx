@@ -72,6 +72,13 @@ std::string ParticlesAcross(const char* what, int count)
   return what + (", " + std::to_string(count)) + " particles across";
 }
 
+void SettleBehindGate(SphContestant& fluid, double place)
+{
+  const int gate = fluid.AddBody([place](const Vector3d& at) { return place - at.x(); }, false);
+  fluid.Settle(0.02);
+  fluid.RemoveBody(gate);
+}
+
 // Half a millimetre from particle to particle, so that the width of the column tells how finely it is resolved.
 void BreakSph(int across)
 {
@@ -80,7 +87,7 @@ void BreakSph(int across)
   const double spacing = water.spacingMm, width = (across + 0.5) * spacing; // a half lies between the wall and the first
   water.low = Vector3d::Constant(-2.5 * spacing);
   water.high = {5.0 * width, 0.0, 2.5 * width};
-  water.high.y() = water.low.y() + 6.0 * spacing;
+  water.high.y() = water.low.y() + 8.0 * spacing; // as many as ours has
   water.periodic = {false, true, false};
   water.soundSpeed = 10.0 * std::sqrt(2.0 * gravity * 2.0 * width);
   SphContestant fluid(water);
@@ -88,9 +95,7 @@ void BreakSph(int across)
   fluid.Fill([&](const Vector3d& at) {
     return std::min(at.x(), at.z()) > 1e-6 && at.x() < width && at.z() < 2.0 * width - 0.25 * spacing;
   });
-  const int gate = fluid.AddBody([width, spacing](const Vector3d& at) { return width + 0.5 * spacing - at.x(); }, false);
-  fluid.Settle(0.02);
-  fluid.RemoveBody(gate);
+  SettleBehindGate(fluid, width + 0.5 * spacing);
   DamBreak front;
   Work work;
   const double unit = DamBreak::TimeUnit(width);
@@ -155,7 +160,7 @@ SphContestant Plates(SphParameters parameters, double height)
 {
   const double spacing = parameters.spacingMm;
   parameters.low = Vector3d::Constant(-2.5 * spacing);
-  parameters.high = {3.5 * spacing, 3.5 * spacing, height + 2.5 * spacing};
+  parameters.high = {5.5 * spacing, 5.5 * spacing, height + 2.5 * spacing};
   parameters.periodic = {true, true, false};
   SphContestant fluid(parameters);
   fluid.AddBody([](const Vector3d& at) { return at.z(); }, true);
@@ -391,20 +396,24 @@ void WriteScenes(const std::string& folder, bool quick)
   {
     SphParameters water;
     water.spacingMm = 1.0 * coarser;
+    water.artificial = 0.08;
     water.soundSpeed = 10.0 * std::sqrt(2.0 * gravity * 36.0);
     SphContestant fluid = Tank(water, {72.0, 24.0, 50.0}, false);
-    fluid.Fill(Box(Vector3d::Constant(1e-6), {24.0, 24.0 - 1e-6, 36.0}));
-    Frames(folder + "/block", fluid, {0.04, 0.12, 0.24});
+    fluid.Fill(Box(Vector3d::Constant(1e-6), {24.0 - 1e-6, 24.0 - 1e-6, 36.0}));
+    SettleBehindGate(fluid, 24.0);
+    Frames(folder + "/block", fluid, {0.06, 0.12, 0.24});
   }
   {
     SphParameters water;
     water.spacingMm = 1.25 * coarser;
+    water.artificial = 0.08;
     water.soundSpeed = 10.0 * std::sqrt(2.0 * gravity * 45.0);
     SphContestant fluid = Tank(water, {110.0, 50.0, 60.0}, false);
     fluid.AddBody([](const Vector3d& at) { return Rounded(at, {70.0, 25.0, 2.0}, {28.0, 16.0, 10.0}, 5.0); }, true);
     fluid.AddBody(Head({70.0, 25.0, 18.0}), true);
-    fluid.Fill(Box(Vector3d::Constant(1e-6), {25.0, 50.0 - 1e-6, 45.0}));
-    Frames(folder + "/bodies", fluid, {0.05, 0.13, 0.25});
+    fluid.Fill(Box(Vector3d::Constant(1e-6), {25.0 - 1e-6, 50.0 - 1e-6, 45.0}));
+    SettleBehindGate(fluid, 25.0);
+    Frames(folder + "/bodies", fluid, {0.08, 0.14, 0.26});
   }
   {
     SphParameters gel;
