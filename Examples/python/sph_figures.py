@@ -22,6 +22,8 @@ from vtkmodules.vtkFiltersSources import vtkCubeSource, vtkSphereSource
 from vtkmodules.vtkIOImage import vtkPNGWriter
 from vtkmodules.vtkRenderingCore import vtkActor, vtkLight, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow, vtkWindowToImageFilter
 
+# As the program has them: mm between particles, what to look at, and from where on (y) it is shown.
+SCENES = {"block": (1.0, (0, 72, 0, 24, 0, 50), None), "bodies": (1.25, (0, 110, 0, 50, 0, 60), None), "gel": (1.25, (14, 76, 30, 50, 2, 50), 30)}
 TISSUE, PROBE = (0.83, 0.62, 0.55), (0.42, 0.46, 0.52)
 
 
@@ -127,12 +129,10 @@ def picture(frames, path, spacing, bounds, cut_at=None):
 
 
 def pictures(program, folder, quick):
-    spacing = 2.5 if quick else 1.0
     with tempfile.TemporaryDirectory() as frames:
         subprocess.run([program, "--frames", frames, *["--quick"] * quick], check=True)
-        for name, apart, bounds, cut_at in (("block", 1.0, (0, 72, 0, 24, 0, 50), None), ("bodies", 1.25, (0, 110, 0, 50, 0, 60), None),
-                                            ("gel", 1.25, (14, 76, 30, 50, 2, 50), 30)):
-            picture([f"{frames}/{name}_{n}.csv" for n in (1, 2, 3)], folder / f"sph_{name}.png", apart * spacing, bounds, cut_at)
+        for name, (spacing, bounds, cut_at) in SCENES.items():
+            picture([f"{frames}/{name}_{n}.csv" for n in (1, 2, 3)], folder / f"sph_{name}.png", spacing * (2.5 if quick else 1), bounds, cut_at)
 
 
 def main():

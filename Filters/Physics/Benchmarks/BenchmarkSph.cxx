@@ -419,7 +419,7 @@ void WriteScenes(const std::string& folder, bool quick)
     SphParameters gel;
     gel.spacingMm = 1.25 * coarser;
     gel.viscosity = 20.0;
-    gel.soundSpeed = 2000.0; // it is pressed out at up to 200 mm/s
+    gel.soundSpeed = 1e4; // so that it does not yield to the pressure under the probe; viscosity limits the step far below
     SphContestant fluid = Tank(gel, {90.0, 60.0, 60.0}, true);
     const Vector3d middle(45.0, 30.0, 0.0);
     fluid.AddBody([&](const Vector3d& at) { return at.z() - 6.0; }, true);
