@@ -117,7 +117,7 @@ def picture(frames, path, spacing, bounds, cut_at=None):
         camera.SetPosition(middle[0] + 0.35, middle[1] - 2, middle[2] + 0.75)
         camera.SetViewUp(0, 0, 1)
         renderer.ResetCamera(*bounds)
-        camera.Zoom(1.3)
+        camera.Zoom(1.2)
         window.AddRenderer(renderer)
     window.Render()
     grab, writer = vtkWindowToImageFilter(), vtkPNGWriter()
