@@ -232,6 +232,9 @@ def main():
     axes = list(axes.flat)
     for spare in axes[panels:]:
         spare.set_visible(False)
+    shown = axes[:panels]
+    if steps:
+        draw_steps(axes.pop(0), steps)
     def with_levels(of_case):
         return all(number(line, "levels") is not None for line in of_case)
 
@@ -258,9 +261,7 @@ def main():
     if energy:
         draw_energy(axes[len(cases) + bool(success)], energy, False)
         draw_energy(axes[len(cases) + bool(success) + 1], energy, True)
-    if steps:
-        draw_steps(axes[panels - 1], steps)
-    for panel in axes[:panels]:
+    for panel in shown:
         panel.grid(True, which="major", color="#e6e6e6", linewidth=0.8)
         panel.set_axisbelow(True)
         for side in ("top", "right"):
