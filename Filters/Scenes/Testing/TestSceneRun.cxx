@@ -219,6 +219,37 @@ TEST(SceneRun, PlanesOfASweepThatMovesSeeTheTissueOfTheirMoment)
   EXPECT_NEAR(depthMm(eight, 4), depthMm(one, 4), 0.4);
 }
 
+TEST(SceneRun, OnAPathGelGoesWithTheProbeAndStaysOnTheSkin)
+{
+  // Down to 1 mm above the skin, up again, 45 mm on, and down again.
+  const std::string members = R"("background": "air", "gel": {"amountMl": 8, "cellMm": 4}, "tissue": [
+      {"name": "block", "box": {"centre": [20, 0, 32], "size": [150, 70, 60], "material": "muscle"}}],
+    "views": {"times": [0.4, 1.6], "stepMm": 20, "keys": [
+      {"seconds": 0, "pose": {"face": [0, 0, -10], "target": [0, 0, 50]}}, {"seconds": 0.4, "pose": {"face": [0, 0, 1], "target": [0, 0, 50]}},
+      {"seconds": 0.8, "pose": {"face": [0, 0, -20], "target": [0, 0, 50]}}, {"seconds": 1.2, "pose": {"face": [45, 0, -20], "target": [45, 0, 50]}},
+      {"seconds": 1.6, "pose": {"face": [45, 0, 1], "target": [45, 0, 50]}}]})";
+  SceneRun run = RunOf(members);
+  const SceneScan first = run.Make(0), second = run.Make(1);
+  ASSERT_TRUE(first.gel && second.gel);
+  EXPECT_GT(first.gel->coupled, 0.5);
+  // What stayed on the skin is missing at the next site, but it is still gel.
+  EXPECT_LT(second.gel->coupled, 0.9 * first.gel->coupled);
+  EXPECT_NEAR(second.gel->volumeMm3, first.gel->volumeMm3, 0.05 * first.gel->volumeMm3);
+
+  // The second view alone is the same, and so is the first again.
+  SceneRun other = RunOf(members);
+  const SceneScan alone = other.Make(1), again = other.Make(0);
+  EXPECT_EQ(alone.gel->coupled, second.gel->coupled);
+  EXPECT_EQ(alone.gel->level, second.gel->level);
+  EXPECT_EQ(again.gel->level, first.gel->level);
+
+  // Fresh gel at the second site couples as at the first: listed views have gel of their own.
+  SceneRun fresh = RunOf(R"("background": "air", "gel": {"amountMl": 8, "cellMm": 4}, "tissue": [
+      {"name": "block", "box": {"centre": [20, 0, 32], "size": [150, 70, 60], "material": "muscle"}}],
+    "views": {"poses": [{"face": [45, 0, 1], "target": [45, 0, 50]}]})");
+  EXPECT_GT(fresh.Make(0).gel->coupled, 1.05 * second.gel->coupled);
+}
+
 TEST(SceneRun, RefusesWithTheNumberOfTheView)
 {
   SceneRun run = RunOf(still);
