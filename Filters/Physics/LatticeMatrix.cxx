@@ -15,7 +15,6 @@
 namespace echorama {
 namespace {
 
-constexpr int Lanes = LatticeShape::Lanes;
 constexpr float PackedOne = 32767.0f;
 
 // y += blocks * x along a row. Entries of a block are \a across apart from row to row, \a along from column to column.
@@ -245,7 +244,7 @@ void LatticeMatrix::Coarsen(int axis, LatticeMatrix& coarse) const
 
 PackedLatticeMatrix::PackedLatticeMatrix(const LatticeShape& shape)
   : shape_(shape), data_(static_cast<std::size_t>(
-                       Entries * static_cast<std::ptrdiff_t>(shape.Padded()) * shape.nodes[1] * shape.nodes[2] + 2 * Lanes)),
+                       Entries * static_cast<std::ptrdiff_t>(shape.Padded()) * shape.nodes[1] * shape.nodes[2] + 2 * LatticeShape::Lanes)),
     scale_(static_cast<std::size_t>(shape.size), 0.0f), unscale_(scale_)
 {
   for (int n = 0; n < 6; ++n)

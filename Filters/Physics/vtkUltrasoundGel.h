@@ -47,6 +47,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Physics/GelCoat.h"
+#include "Filters/Tissue/TissueSurface.h"
 #include <memory>
 #endif
 
