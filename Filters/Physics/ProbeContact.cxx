@@ -60,6 +60,25 @@ ProbeContact::ProbeContact(const TissueCells& cells, const LatticeShape& shape, 
     node.stiffness = ContactStiffness * stiffest * node.area / spacing.minCoeff();
     nodes_.push_back(node);
   });
+  const std::ptrdiff_t strides[3] = {1, shape.row, shape.slice};
+  ForNodes(cells.cells, [&](int i, int j, int k) {
+    for (std::size_t axis = 0; axis < 3 && cells.IsTissue(i, j, k); ++axis)
+      for (const int side : {0, 1}) {
+        std::array<int, 3> beyond{i, j, k};
+        beyond[axis] += side ? 1 : -1;
+        if (cells.IsTissue(beyond[0], beyond[1], beyond[2]))
+          continue;
+        Eigen::Vector3d middle(i + 0.5, j + 0.5, k + 0.5);
+        middle[static_cast<int>(axis)] += side - 0.5;
+        Face face;
+        face.middle = spacing.cwiseProduct(middle);
+        for (int corner = 0; corner < 4; ++corner)
+          face.at[static_cast<std::size_t>(corner)] = shape.At(i, j, k) + side * strides[axis] +
+                                                      (corner & 1) * strides[(axis + 1) % 3] +
+                                                      (corner >> 1) * strides[(axis + 2) % 3];
+        faces_.push_back(face);
+      }
+  });
 }
 
 void ProbeContact::Place(std::shared_ptr<const ProbeShape> shape, const Pose& probeToLattice, double friction)
@@ -177,6 +196,18 @@ double ProbeContact::Clearance(const ProbeShape& shape, const Pose& probeToLatti
   for (const Node& node : nodes_)
     least = std::min(least, shape.Distance(toProbe * (node.rest + displacement.Get(node.at))));
   return least;
+}
+
+double ProbeContact::DeepestFace(const LatticeField<double>& displacement) const
+{
+  double deepest = 0.0;
+  for (std::size_t n = 0; shape_ && n < faces_.size(); ++n) {
+    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+    for (const std::ptrdiff_t at : faces_[n].at)
+      moved += 0.25 * displacement.Get(at);
+    deepest = std::max(deepest, -shape_->Distance(toProbe_ * (faces_[n].middle + moved)));
+  }
+  return deepest;
 }
 
 Eigen::Vector3d ProbeContact::Total() const

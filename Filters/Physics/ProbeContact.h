@@ -50,6 +50,8 @@ public:
 
   /// The least distance of any node of the skin from a probe.
   double Clearance(const ProbeShape& shape, const Pose& probeToLattice, const LatticeField<double>& displacement) const;
+  /// How deep the middle of any face of the skin lies in the probe: where nodes gave way to both sides of it, deep.
+  double DeepestFace(const LatticeField<double>& displacement) const;
   Eigen::Vector3d Total() const; ///< of the forces on the tissue, mN
 
   std::vector<Node>& Nodes() { return nodes_; }
@@ -59,7 +61,12 @@ private:
   struct Push;
   std::optional<Push> PushOf(const Node& node, const LatticeField<double>& displacement) const;
 
+  struct Face {
+    std::array<std::ptrdiff_t, 4> at; ///< its corners, in fields
+    Eigen::Vector3d middle;           ///< at rest, mm
+  };
   std::vector<Node> nodes_;
+  std::vector<Face> faces_;
   std::shared_ptr<const ProbeShape> shape_;
   Pose toLattice_ = Pose::Identity(), toProbe_ = Pose::Identity();
   double friction_ = 0.0;

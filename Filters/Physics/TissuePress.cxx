@@ -14,7 +14,7 @@ namespace {
 
 constexpr int FewestNodes = 6;          // along each axis of the coarsest lattice
 constexpr double CoarseTolerance = 0.1; // of a cell, where only a first guess is wanted
-constexpr double LeastStep = 0.1; // of a cell, between what can be reached and what can not
+constexpr double LeastStep = 0.1;       // of a cell, between what can be reached and what can not
 constexpr int MostNewtonSteps = 30, MostNewtonStepsOfAPart = 20;
 
 std::array<int, 3> CoarseNodes(const std::array<int, 3>& nodes)
@@ -472,7 +472,46 @@ void TissuePress::Move(const std::shared_ptr<const ProbeShape>& shape, const Pos
                                               (free < 1.0 ? " because something rigid is in it" : "") + "; it came " +
                                               NumberText(std::round(10.0 * reached * depth) / 10.0) + " mm far");
   }
+  if (const auto cell = EnteredCell()) {
+    restore();
+    throw Error(Error::Kind::NotPossible, "two pieces of tissue would enter each other at the empty cell (" +
+                                              std::to_string((*cell)[0]) + ", " + std::to_string((*cell)[1]) + ", " +
+                                              std::to_string((*cell)[2]) +
+                                              ") between them: contact is computed with the probe alone");
+  }
   pose_ = to;
+}
+
+// The first empty cell, if there is one, across which tissue on one side passed that on the other: along the lines of the lattice
+// they have changed their order.
+std::optional<std::array<int, 3>> TissuePress::EnteredCell() const
+{
+  const TissueSolver& finest = levels_.front()->solver;
+  const TissueCells& cells = finest.Cells();
+  const LatticeShape& shape = finest.Shape();
+  const std::ptrdiff_t strides[3] = {1, shape.row, shape.slice};
+  std::optional<std::array<int, 3>> found;
+  for (std::size_t axis = 0; axis < 3 && !found; ++axis)
+    ForNodes(cells.cells, [&](int i, int j, int k) {
+      const std::array<int, 3> cell{i, j, k};
+      std::array<int, 3> before = cell;
+      --before[axis];
+      if (found || cells.IsTissue(i, j, k) || !cells.IsTissue(before[0], before[1], before[2]))
+        return;
+      std::array<int, 3> end = cell; // the next tissue along the axis
+      while (end[axis] < cells.cells[axis] && !cells.IsTissue(end[0], end[1], end[2]))
+        ++end[axis];
+      if (end[axis] == cells.cells[axis])
+        return;
+      const double gap = finest.Spacing()[static_cast<int>(axis)] * (end[axis] - cell[axis]);
+      const double* along = finest.Displacement().Component(static_cast<int>(axis));
+      for (int corner = 0; corner < 4; ++corner) { // of the faces that look at each other
+        const std::ptrdiff_t offset = (corner & 1) * strides[(axis + 1) % 3] + (corner >> 1) * strides[(axis + 2) % 3];
+        if (gap + along[shape.At(end[0], end[1], end[2]) + offset] - along[shape.At(i, j, k) + offset] < 0.0)
+          found = cell;
+      }
+    });
+  return found;
 }
 
 std::vector<unsigned char> TissuePress::TissueNodes() const

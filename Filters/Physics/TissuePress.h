@@ -53,8 +53,8 @@ public:
   TissuePress& operator=(const TissuePress&) = delete;
 
   /// Moves the probe, which must be clear of the tissue at first, straight to \a probeToWorld.
-  /// \throws Error(NotPossible) when this state cannot be reached, with the part of the way in mm that can; the tissue is then
-  /// in the state before
+  /// \throws Error(NotPossible) when this state cannot be reached, with the part of the way in mm that can, and when two pieces
+  /// of tissue would enter each other across empty cells; the tissue is then in the state before
   void Move(const std::shared_ptr<const ProbeShape>& shape, const Pose& probeToWorld, const Progress& progress = {});
 
   /// Where every node went, mm along the axes of the world: what was at x is now at x + u. Where there is no tissue, what the
@@ -80,6 +80,7 @@ private:
   bool Walk(std::size_t level, const Pose& from, const Pose& to, const Progress& progress, double& reached);
   void Predict(std::size_t level);
   void CheckTied() const;
+  std::optional<std::array<int, 3>> EnteredCell() const;
 
   TissueBody body_;
   TissuePressParameters parameters_;

@@ -15,6 +15,8 @@ namespace {
 constexpr double LinearTolerance = 0.1, LastLinearTolerance = 0.02;
 constexpr double KeepMatrix = 0.1; // in cells: as long as nothing moved farther, the matrix of the tissue is still good
 
+constexpr double MostInside = 1.2; // cells; faces over a rounded edge are up to one deep, where a head went through more than two
+
 // What a step promises.
 struct Advance {
   double slope = 0.0, longest = 0.0;
@@ -180,7 +182,7 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
       isFound = last < (mayHaveFarToGo ? 0.1 : 1.0) * toleranceMm && open < 0.2 * toleranceMm;
     }
   }
-  if (!isFound || !(LeastVolume() > 0.0)) {
+  if (!isFound || !(LeastVolume() > 0.0) || contact_.DeepestFace(displacement_) > MostInside * spacing_.maxCoeff()) {
     displacement_ = start;
     contact_.Nodes() = nodes;
     return false;

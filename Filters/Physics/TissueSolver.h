@@ -21,8 +21,8 @@ public:
                const Eigen::Vector3d& gravity);
 
   /// Looks for the state of rest from the present one (\a isGuess: which is far from any, in its pressures above all). \returns
-  /// false, and the present state as it was, when there is none that turns no cell inside out, or when it is not found in \a
-  /// maximumSteps
+  /// false, and the present state as it was, when there is none that turns no cell inside out and has no probe between its nodes,
+  /// or when it is not found in \a maximumSteps
   bool Solve(bool isGuess, double toleranceMm, int maximumSteps, TissueWork& work, const Progress& progress);
 
   const TissueCells& Cells() const { return cells_; }

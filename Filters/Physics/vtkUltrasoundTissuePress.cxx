@@ -17,6 +17,8 @@
 
 #include <algorithm>
 #include <memory>
+#include <string>
+#include <vector>
 
 using echorama::Error;
 
@@ -37,11 +39,34 @@ void AddMarks(vtkImageData* image, const char* name, const std::vector<unsigned 
 
 } // namespace
 
+// Where the tissue came to rest, and all that it depends on.
+struct vtkUltrasoundTissuePress::State {
+  const vtkPolyData* Tissue = nullptr;
+  vtkMTimeType TissueTime = 0;
+  std::string Parameters;
+  std::vector<echorama::PlacedProbe> Probes; ///< where it has been
+  std::shared_ptr<const echorama::ProbeShape> Shape;
+  std::unique_ptr<echorama::TissuePress> Press;
+
+  bool LeadsTo(const State& other) const
+  {
+    return this->Tissue == other.Tissue && this->TissueTime == other.TissueTime && this->Parameters == other.Parameters &&
+           this->Probes.size() <= other.Probes.size() &&
+           std::equal(this->Probes.begin(), this->Probes.end(), other.Probes.begin(),
+                      [](const echorama::PlacedProbe& a, const echorama::PlacedProbe& b) {
+                        return a.geometry == b.geometry && a.probeToWorld.matrix() == b.probeToWorld.matrix();
+                      });
+  }
+};
+
 //----------------------------------------------------------------------------
 vtkUltrasoundTissuePress::vtkUltrasoundTissuePress()
 {
   this->SetNumberOfInputPorts(2);
 }
+
+//----------------------------------------------------------------------------
+vtkUltrasoundTissuePress::~vtkUltrasoundTissuePress() = default;
 
 //----------------------------------------------------------------------------
 echorama::ParameterList vtkUltrasoundTissuePress::Parameters()
@@ -79,27 +104,41 @@ void vtkUltrasoundTissuePress::Execute(vtkInformationVector** inputs, vtkImageDa
 {
   // 1. what came in
   echorama::CheckRanges(this->Parameters());
-  const std::vector<echorama::PlacedProbe> probes = vtkUltrasoundAcquisition::ProbesOf(inputs[1]);
-  echorama::TissueBody body =
-      echorama::TissueBodyOf(vtkUltrasoundTissue::Of(vtkPolyData::GetData(inputs[0])), this->Lattice, progress.Part(0.0, 0.05));
+  auto state = std::make_unique<State>();
+  state->Tissue = vtkPolyData::GetData(inputs[0]);
+  state->TissueTime = vtkPolyData::GetData(inputs[0])->GetMTime();
+  state->Parameters = echorama::DescriptionText(this->Parameters());
+  state->Probes = vtkUltrasoundAcquisition::ProbesOf(inputs[1]);
 
-  // 2. the kernel
+  // 2. the kernel, from where it was if it can go on from there; after a failure it cannot
+  const std::vector<echorama::PlacedProbe>& probes = state->Probes;
+  const std::unique_ptr<State> kept = std::move(this->Kept);
   const double start = probes.empty() ? 1.0 : 0.1;
-  echorama::TissuePress press(std::move(body), this->Values, progress.Part(0.05, start));
-  std::shared_ptr<const echorama::ProbeShape> shape;
-  for (std::size_t n = 0; n < probes.size(); ++n) {
+  std::size_t first = 0;
+  if (kept && kept->LeadsTo(*state)) {
+    state->Shape = kept->Shape;
+    state->Press = std::move(kept->Press);
+    first = kept->Probes.size();
+  } else {
+    echorama::TissueBody body =
+        echorama::TissueBodyOf(vtkUltrasoundTissue::Of(vtkPolyData::GetData(inputs[0])), this->Lattice, progress.Part(0.0, 0.05));
+    state->Press = std::make_unique<echorama::TissuePress>(std::move(body), this->Values, progress.Part(0.05, start));
+  }
+  echorama::TissuePress& press = *state->Press;
+  for (std::size_t n = first; n < probes.size(); ++n) {
     if (n == 0 || !(probes[n].geometry == probes[n - 1].geometry)) {
-      shape = std::make_shared<const echorama::ProbeShape>(probes[n].geometry, this->Head);
+      state->Shape = std::make_shared<const echorama::ProbeShape>(probes[n].geometry, this->Head);
     }
     const auto at = [&](std::size_t number) {
-      return start + (1.0 - start) * static_cast<double>(number) / static_cast<double>(probes.size());
+      return start + (1.0 - start) * static_cast<double>(number - first) / static_cast<double>(probes.size() - first);
     };
     try {
-      press.Move(shape, probes[n].probeToWorld, progress.Part(at(n), at(n + 1)));
+      press.Move(state->Shape, probes[n].probeToWorld, progress.Part(at(n), at(n + 1)));
     } catch (const Error& error) {
       throw Error(error.GetKind(), "probe " + std::to_string(n + 1) + ": " + error.what());
     }
   }
+  this->Kept = std::move(state);
 
   // 3. what goes out
   SetOutput(press.Now(), output);

@@ -23,6 +23,11 @@
  * | ProbeForce     | 3 doubles: of the probe on the tissue, N, in the world                                             |
  * | RelativeVolume | 2 doubles: of all tissue now and at rest, and the least of any cell                                |
  *
+ * Poses may be appended one after the other, each followed by an Update(): the filter keeps where the tissue came to rest, and as
+ * long as the tissue is the same data, unchanged, all parameters and the poses so far are the same, it goes on from there. What
+ * comes out is the same to the last digit as with all poses at once. What is kept takes some 1.5 KB a node until the filter is
+ * deleted, an Update() fails, or one starts anew.
+ *
  * Fails, with a message, for tissue that nothing holds, for a probe without geometry, and where the probe cannot go, with the
  * part of the way that it came. Under MPI each rank computes the whole.
  *
@@ -38,6 +43,7 @@
 #ifndef __VTK_WRAP__
 #include "Filters/Physics/ProbeShape.h"
 #include "Filters/Physics/TissueLattice.h"
+#include <memory>
 #endif
 
 class vtkDataObject;
@@ -126,7 +132,7 @@ public:
 
 protected:
   vtkUltrasoundTissuePress();
-  ~vtkUltrasoundTissuePress() override = default;
+  ~vtkUltrasoundTissuePress() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
@@ -142,6 +148,8 @@ private:
   echorama::TissueLatticeParameters Lattice;
   echorama::TissuePressParameters Values;
   echorama::ProbeHead Head;
+  struct State;
+  std::unique_ptr<State> Kept; ///< after the last pose
 #endif
 };
 

@@ -108,6 +108,48 @@ class Press(Refusing):
         direct = run(body, probe(4.0, 5.0), Friction=1.0)
         self.assertGreater(at(dragged, "Displacement", 5.0, 0.0, TOP)[0], at(direct, "Displacement", 5.0, 0.0, TOP)[0] + 1.0)
 
+    def test_appended_poses_go_on_from_where_the_tissue_is(self):
+        body, poses = tissue(muscle=block()), [probe(3.0), probe(6.0), probe(6.0, 2.0)]
+
+        def at_once(*poses, **properties):
+            return values(run(body, *poses, Friction=0.3, **properties), "Displacement").copy()
+
+        filter = press(body, Friction=0.3)
+        for pose in poses:
+            filter.AddProbeData(pose)
+            filter.Update()
+        grown = values(filter.GetOutput(), "Displacement").copy()
+        np.testing.assert_array_equal(grown, at_once(*poses))
+        # What is not only appended starts anew: other parameters, other poses, other tissue.
+        filter.SetFriction(0.0)
+        filter.Update()
+        self.assertGreater(np.abs(values(filter.GetOutput(), "Displacement") - grown).max(), 1e-3)
+        filter.SetFriction(0.3)
+        filter.RemoveAllProbes()
+        filter.AddProbeData(poses[1])
+        filter.Update()
+        np.testing.assert_array_equal(values(filter.GetOutput(), "Displacement"), at_once(poses[1]))
+        moved = probe(6.0)
+        filter.AddProbeData(moved)
+        filter.Update()
+        moved.DeepCopy(probe(3.0))  # a pose that was used already is another one now
+        filter.Update()
+        np.testing.assert_array_equal(values(filter.GetOutput(), "Displacement"), at_once(poses[1], poses[0]))
+        softer = tissue(liver=block())
+        filter.SetInputData(softer)
+        filter.Update()
+        self.assertLess(field(filter.GetOutput(), "ProbeForce")[2], 0.5 * field(run(body, poses[1], poses[0]), "ProbeForce")[2])
+        # After a pose that cannot be, too.
+        bony = press(tissue(muscle=block(), bone=ball(8.0, 0.0, 0.0, 32.0)), probe(2.0))
+        bony.Update()
+        before = values(bony.GetOutput(), "Displacement").copy()
+        bony.AddProbeData(probe(15.0))
+        self.refused(bony, "probe 2", "rigid")
+        bony.RemoveAllProbes()
+        bony.AddProbeData(probe(2.0))
+        bony.Update()
+        np.testing.assert_array_equal(values(bony.GetOutput(), "Displacement"), before)
+
     def test_gravity_runs_along_the_world(self):
         sagged = run(tissue(muscle=block()), Gravity=(0.0, 9.81, 0.0))
         self.assertGreater(at(sagged, "Displacement", 0.0, 0.0, TOP)[1], 0.1)
