@@ -12,7 +12,7 @@ namespace echorama {
 namespace {
 
 constexpr double SoftestKPa = 0.5, StiffestKPa = 1e4;
-constexpr double MostNodes = 2e7; // of some 1.5 KB each
+constexpr double MostNodes = 2e7; // of some 2 KB each
 
 std::set<std::string> HeldMaterials(const TissueSurface& surface, const std::string& names)
 {

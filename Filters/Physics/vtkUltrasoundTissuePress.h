@@ -25,7 +25,7 @@
  *
  * Poses may be appended one after the other, each followed by an Update(): the filter keeps where the tissue came to rest, and as
  * long as the tissue is the same data, unchanged, all parameters and the poses so far are the same, it goes on from there. What
- * comes out is the same to the last digit as with all poses at once. What is kept takes some 1.5 KB a node until the filter is
+ * comes out is the same to the last digit as with all poses at once. What is kept takes some 2 KB a node until the filter is
  * deleted, an Update() fails, or one starts anew.
  *
  * Fails, with a message, for tissue that nothing holds, for a probe without geometry, and where the probe cannot go, with the
