@@ -11,7 +11,7 @@ from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkMassProperties, vtkThr
 from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
 
 import echorama
-from pressing import TOP, Refusing, block, probe, tissue
+from pressing import BACK, TOP, Refusing, acquisition, add_field, block, probe, tissue
 
 
 def gel(body, *probes, **properties):
@@ -137,6 +137,60 @@ class Gel(Refusing):
         self.assertEqual(coated.GetBounds()[5], deform.GetOutput().GetBounds()[5])
         self.assertGreater(field(face, "Coupled"), 0.2)
 
+    def test_goes_on_where_it_was(self):
+        """Poses that are added, with the tissue that they press, give what all of them at once give."""
+        sunk = block()
+        sunk.SetBounds(-30.0, 30.0, -30.0, 30.0, TOP + 3.0, BACK)
+        rest, deep = tissue(muscle=block()), tissue(muscle=sunk)
+        poses = [probe(-4.0), probe(2.0), probe(-15.0), probe(-4.0, x=6.0)]
+        states = [rest, deep, rest, rest]
+        for n, each in enumerate(poses):
+            add_field(each, acquisition.TimeStampName(), [10.0 + 0.4 * n])
+        small = {"AmountMl": 0.5, "Coverage": 0.5, "CellMm": 4.0}
+        grown = gel(rest, poses[0], **small)
+        grown.AddPressedData(states[0])
+        grown.Update()
+        self.assertEqual(grown.GetPosesComputed(), 1)
+        for n, count in ((1, 1), (2, 1), (3, 1)):
+            grown.AddProbeData(poses[n])
+            grown.AddPressedData(states[n])
+            grown.Update()
+            self.assertEqual(grown.GetPosesComputed(), count)
+        whole = gel(rest, *poses, **small)
+        for state in states:
+            whole.AddPressedData(state)
+        whole.Update()
+        self.assertEqual(whole.GetPosesComputed(), 4)
+        for port in (0, 1):
+            one, all = (filter.GetOutput(port) for filter in (grown, whole))
+            np.testing.assert_array_equal(vtk_to_numpy(one.GetPoints().GetData()), vtk_to_numpy(all.GetPoints().GetData()))
+        for name in ("Gel", "Air", "Couples"):
+            np.testing.assert_array_equal(values(grown.GetOutput(1), name), values(whole.GetOutput(1), name))
+        for name in ("Coupled", "GelVolume", "GelGone", "Seconds"):
+            self.assertEqual(field(grown.GetOutput(1), name), field(whole.GetOutput(1), name))
+        self.assertGreater(field(whole.GetOutput(1), "Seconds"), 3 * 0.4 + 0.02)
+        # Anything else begins anew.
+        grown.SetAmountMl(0.4)
+        grown.Update()
+        self.assertEqual(grown.GetPosesComputed(), 4)
+        grown.RemoveAllProbes()
+        grown.RemoveAllPressed()
+        grown.AddProbeData(poses[1])
+        grown.Update()
+        self.assertEqual(grown.GetPosesComputed(), 1)
+
+    def test_materials_that_the_tissue_brings(self):
+        own = tissue(gel=block(), muscle=block())
+        def speed(data, place):
+            return data.GetFieldData().GetArray("MaterialProperty").GetComponent(place, 0)
+
+        self.assertNotEqual(speed(own, 1), 1234.0)
+        own.GetFieldData().GetArray("MaterialProperty").SetComponent(1, 0, 1234.0)
+        coated, _ = run(own, probe(-4.0), AmountMl=0.5, CellMm=4.0)
+        names_of = coated.GetFieldData().GetAbstractArray("MaterialName")
+        self.assertEqual([names_of.GetValue(n) for n in range(2)], ["air", "gel"])
+        self.assertEqual(speed(coated, 1), 1234.0)
+
     def test_what_is_refused(self):
         body = tissue(muscle=block())
         self.refused(gel(body, vtkPolyData()), "probe 1", "ProbeGeometry")
@@ -147,6 +201,14 @@ class Gel(Refusing):
         other = gel(body, probe(-4.0))
         other.SetPressedData(tissue(muscle=block(), liver=block()))
         self.refused(other, "points")
+        states = gel(body, probe(-4.0), probe(-3.0), probe(-4.0))
+        states.AddPressedData(body)
+        states.AddPressedData(body)
+        self.refused(states, "3 probes", "2 states")
+        times = [probe(-4.0), probe(-3.0)]
+        for each in times:
+            add_field(each, acquisition.TimeStampName(), [7.0])
+        self.refused(gel(body, *times), "time stamp of probe 2")
 
 
 if __name__ == "__main__":
