@@ -16,24 +16,64 @@
 namespace echorama {
 namespace {
 
-// What x = T - yield is, of X = T_trial - yield > 0, where flow at the rate r takes away stiffness * r.
-double StressAboveYield(const GelLaw& law, double stiffness, double X)
+using GelOct = double __attribute__((vector_size(64)));
+using GelOctBits = long long __attribute__((vector_size(64)));
+static_assert(sizeof(GelOct) == GelLanes * sizeof(double));
+
+constexpr double toInteger = 0x1.8p52; // its last bits count ones
+constexpr long long toIntegerBits = 0x4338000000000000;
+
+// v^power of positive numbers, to some 1e-12: 2^(power log2(v)).
+[[gnu::always_inline]] inline GelOct Power(const GelOct& v, double power)
 {
-  if (law.consistency <= 0.0)
-    return 0.0;
-  if (law.exponent == 1.0)
-    return X / (1.0 + stiffness / law.consistency);
-  const double power = 1.0 / law.exponent;
-  double x = std::min(X, law.consistency * std::pow(X / stiffness, law.exponent));
-  for (int round = 0; round < 30; ++round) {
-    const double flow = stiffness * std::pow(x / law.consistency, power);
-    const double next = x - (x + flow - X) / (1.0 + power * flow / x);
-    const bool done = std::abs(next - x) <= 1e-6 * x; // the error of the next one is its square
-    x = next;
-    if (done)
-      break;
+  const GelOctBits bits = reinterpret_cast<GelOctBits>(v);
+  const GelOctBits exponent = (bits - 0x3fe6a09e667f3bcd) >> 52, mantissa = bits - (exponent << 52); // from sqrt(1/2) on
+  const GelOctBits counted = exponent + toIntegerBits;
+  const GelOct whole = reinterpret_cast<GelOct>(counted) - toInteger, m = reinterpret_cast<GelOct>(mantissa);
+  const GelOct t = (m - 1.0) / (m + 1.0), q = t * t;
+  const GelOct series = 1.0 + q * (1.0 / 3 + q * (1.0 / 5 + q * (1.0 / 7 + q * (1.0 / 9 + q * (1.0 / 11 + q * (1.0 / 13))))));
+  GelOct two = power * (whole + 2.8853900817779268 * t * series); // 2 / ln 2
+  two = two < -1000.0 ? GelOct{} - 1000.0 : two > 1000.0 ? GelOct{} + 1000.0 : two;
+  const GelOct rounded = two + toInteger, x = 0.6931471805599453 * (two - (rounded - toInteger));
+  const GelOct e =
+      1.0 +
+      x * (1.0 +
+           x * (1.0 / 2 +
+                x * (1.0 / 6 +
+                     x * (1.0 / 24 + x * (1.0 / 120 +
+                                          x * (1.0 / 720 + x * (1.0 / 5040 + x * (1.0 / 40320 + x * (1.0 / 362880 +
+                                                                                                     x * (1.0 / 3628800))))))))));
+  const GelOctBits scaled = reinterpret_cast<GelOctBits>(e) + (reinterpret_cast<GelOctBits>(rounded) << 52);
+  return reinterpret_cast<GelOct>(scaled);
+}
+
+// From the stress T_trial of each lane to T / T_trial, which is 1 up to the yield stress. Flow at the rate r takes away
+// stiffness * r.
+ECHORAMA_HOT void FindGelFlow(const GelLaw& law, const double* trial, const double* stiffnesses, double* scale)
+{
+  const GelOct stress = *reinterpret_cast<const GelOct*>(trial), stiffness = *reinterpret_cast<const GelOct*>(stiffnesses);
+  const GelOctBits flows = stress > law.yield;
+  const GelOct X = flows ? stress - law.yield : GelOct{} + 1.0;
+  GelOct x = {};
+  if (law.consistency > 0.0 && law.exponent == 1.0)
+    x = X / (1.0 + stiffness / law.consistency);
+  else if (law.consistency > 0.0) {
+    const double power = 1.0 / law.exponent;
+    const GelOct other = law.consistency * Power(X / stiffness, law.exponent);
+    x = X < other ? X : other;
+    for (int round = 0; round < 30; ++round) {
+      const GelOct flow = stiffness * Power(x / law.consistency, power);
+      const GelOct change = (x + flow - X) / (1.0 + power * flow / x);
+      x -= change;
+      const GelOctBits open = (change < 0.0 ? -change : change) > 1e-6 * x; // the error of the next one is its square
+      long long any = 0;
+      for (int l = 0; l < GelLanes; ++l)
+        any |= open[l];
+      if (any == 0)
+        break;
+    }
   }
-  return x;
+  *reinterpret_cast<GelOct*>(scale) = flows ? (law.yield + x) / stress : GelOct{} + 1.0;
 }
 
 ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrainLanes& lanes, double* stress, double* stiffness)
@@ -144,16 +184,15 @@ double GelLaw::SoundSpeed() const
 
 int AdvanceGelStrain(const GelLaw& law, double seconds, int count, GelStrainLanes& lanes)
 {
-  double stress[GelLanes], stiffness[GelLanes], scale[GelLanes];
+  alignas(64) double stress[GelLanes], stiffness[GelLanes], scale[GelLanes];
   const int torn = MoveGelStrain(law.shear, seconds, count, lanes, stress, stiffness);
   bool flows = false;
   for (int l = 0; l < GelLanes; ++l) {
-    scale[l] = 1.0;
-    if (l < count && stress[l] > law.yield) {
-      scale[l] = (law.yield + StressAboveYield(law, stiffness[l], stress[l] - law.yield)) / stress[l];
-      flows = true;
-    }
+    stress[l] = l < count ? stress[l] : 0.0;
+    flows = flows || stress[l] > law.yield;
   }
+  if (flows)
+    FindGelFlow(law, stress, stiffness, scale);
   if (flows)
     RelaxGelStrain(scale, lanes);
   return torn;

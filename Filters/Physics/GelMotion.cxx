@@ -129,9 +129,9 @@ struct GelMotion::State {
   ProbeGeometry geometry;
   std::shared_ptr<const GelProbe> head;
   ProbeShape shape;
-  Eigen::AlignedBox3d headBox;     // in the probe's frame
-  Pose frame = Pose::Identity();   // to world
-  Pose probe = Pose::Identity();   // to world
+  Eigen::AlignedBox3d headBox;   // in the probe's frame
+  Pose frame = Pose::Identity(); // to world
+  Pose probe = Pose::Identity(); // to world
   std::optional<GelSolver> solver;
   std::optional<GelSkin> skin;
   double putOn = 0.0, seconds = 0.0;
@@ -298,7 +298,8 @@ GelCoat SpreadGel(const TissueSurface& rest, const TissueSurface* pressed, const
   GelMotion motion(rest, probes.front(), head, material, parameters, progress.Part(0.0, 0.05));
   const double count = static_cast<double>(probes.size());
   for (std::size_t n = 0; n < probes.size(); ++n) {
-    const Progress part = progress.Part(0.05 + 0.75 * static_cast<double>(n) / count, 0.05 + 0.75 * static_cast<double>(n + 1) / count);
+    const Progress part =
+        progress.Part(0.05 + 0.75 * static_cast<double>(n) / count, 0.05 + 0.75 * static_cast<double>(n + 1) / count);
     motion.Move(probes[n].probeToWorld, 0.0, n + 1 == probes.size() ? pressed : nullptr, part);
   }
   return motion.Look(true, progress.Part(0.8, 1.0));
