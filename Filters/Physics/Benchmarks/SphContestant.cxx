@@ -63,13 +63,14 @@ SphContestant::Cells::Cells(const SphParameters& parameters) : low_(parameters.l
   }
 }
 
-// Places beyond the box count as its outermost cells: what is near stays in the same cell, or in one beside it.
+// Places beyond the box count as its outermost cells: what is near stays in the same cell, or in one beside it. (And what is no
+// number, of a fluid that has become unstable, as the lowest.)
 std::array<int, 3> SphContestant::Cells::CellOf(const Eigen::Vector3d& place) const
 {
   std::array<int, 3> cell;
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = static_cast<std::size_t>(axis);
-    cell[at] = static_cast<int>(std::clamp((place[axis] - low_[axis]) * perMm_[axis], 0.0, size_[at] - 1.0));
+    cell[at] = static_cast<int>(std::fmin(std::fmax((place[axis] - low_[axis]) * perMm_[axis], 0.0), size_[at] - 1.0));
   }
   return cell;
 }
