@@ -47,9 +47,10 @@ struct SphBoundaryParticle {
 
 /// Weakly compressible smoothed particle hydrodynamics of a Newtonian fluid, as the dissertation tried it for gel (3.3.1):
 /// kernels of Mueller et al. 2003, pressure by the equation of state of Batchelor (2000) with the constants and the pairwise form
-/// of Monaghan 2005, rigid bodies as particles after Akinci et al. 2012, which move fluid and are not moved by it.
+/// of Monaghan 2005, rigid bodies as particles after Akinci et al. 2012, which move fluid and are not moved by it. Pressure is
+/// never negative, and a body's particle has that of the fluid before it.
 ///
-/// Every particle gathers from its neighbours in an order that depends on places alone: one result for any number of threads.
+/// Every particle gathers from its neighbours in the order of cells: one result for any number of threads.
 class SphContestant {
 public:
   /// \throws Error(InvalidParameter)
@@ -74,7 +75,6 @@ public:
   /// Lets all come to rest, as thick as it may well be without shorter steps: particles beside bodies begin too close to these.
   void Settle(double seconds);
 
-  const SphParameters& Parameters() const { return parameters_; }
   const std::vector<SphParticle>& Particles() const { return particles_; }
   const std::vector<SphBoundaryParticle>& Boundary() const { return boundary_; }
   double ParticleMass() const { return mass_; } ///< g
