@@ -44,7 +44,7 @@ with tempfile.TemporaryDirectory() as folder:
                               (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity"]),
                               (["synthesis_tissue_figures.py", pictures], ["TissueSource", "TissueSourceLevels"]),
                               (["pressing_figures.py", "--quick", "--sph", build / "benchmarks" / "BenchmarkSph", pictures],
-                               ["Gel", "TissuePress", "sph_block", "sph_bodies", "sph_gel"]),
+                               ["Gel", "TissuePress", "Moving", "sph_block", "sph_bodies", "sph_gel"]),
                               (["embedding_figures.py", "--spacing", "3", pictures],
                                ["embedding_coverage", "embedding_background", "embedding_ways"])):
         answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / arguments[0], *arguments[1:]], cwd=folder,

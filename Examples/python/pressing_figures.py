@@ -4,9 +4,11 @@
 
 Gel.png: what a scan shows without and with gel, in air and on the skin (after figure 6.4 of the dissertation), above where the gel went.
 TissuePress.png: gel and tissue under a probe that presses (after figures 3.8 to 3.10), with squares that were drawn on it at rest.
+Moving.png: a probe with gel that scans on its way, of the scene moving.json, with what gel it has and left.
 With the benchmark that computes them, build/release/benchmarks/BenchmarkSph, also the pictures of sph_figures.py (figures 3.6 to 3.8).
 """
 import argparse
+import json
 import pathlib
 
 import matplotlib
@@ -22,7 +24,7 @@ from vtkmodules.vtkFiltersCore import vtkCutter
 
 import sph_figures
 from echorama import (
-    vtkUltrasoundAnatomySource, vtkUltrasoundDeformGeometry, vtkUltrasoundGel, vtkUltrasoundProbeSource,
+    vtkUltrasoundAnatomySource, vtkUltrasoundDeformGeometry, vtkUltrasoundGel, vtkUltrasoundProbeSource, vtkUltrasoundSceneSource,
     vtkUltrasoundSynthesizer, vtkUltrasoundTissuePress)
 
 GEL, TISSUE = (0.20, 0.45, 0.80), (0.65, 0.35, 0.25)
@@ -141,6 +143,34 @@ def press_picture(body, path, quick):
     figure.savefig(path, dpi=80)
 
 
+def moving_picture(path, quick):
+    scene = json.loads((pathlib.Path(__file__).resolve().parents[1] / "scenes" / "moving.json").read_text())
+    scene["volume"] = {"spacingMm": 2 if quick else 0.5, "knockMm": 0, "knockDegrees": 0}
+    if quick:
+        scene["probe"].update(elements=24, sweepSteps=8, samples=80)
+        scene["press"]["spacingMm"], scene["gel"]["cellMm"], scene["views"]["stepMm"] = 12, 6, 20
+    source = vtkUltrasoundSceneSource()
+    source.SetScene(json.dumps(scene))
+    source.Update()
+    volumes, truth = source.GetOutputDataObject(0), source.GetOutputDataObject(3)
+    figure, axes = plt.subplots(2, 3, figsize=(12, 6.4), gridspec_kw={"height_ratios": [1.35, 1]})
+    for view, (above, below) in enumerate(axes.T):
+        image = volumes.GetBlock(view)
+        bounds, size = image.GetBounds(), image.GetDimensions()
+        grey = vtk_to_numpy(image.GetPointData().GetArray("Intensity")).reshape(size[::-1])[:, size[1] // 2]
+        above.imshow(grey, cmap="gray", vmin=0, vmax=180, extent=(bounds[0], bounds[1], bounds[5], bounds[4]))
+        segments, body = outlines(truth.GetBlock(view).GetBlock(0))
+        below.add_collection(LineCollection(segments[body > 0], colors=[TISSUE], linewidths=0.6))
+        below.add_collection(LineCollection(segments[body == 0], colors=[GEL], linewidths=1.4))
+        below.set_xlim(-60, 110)
+        below.set_ylim(75, -25)
+        below.set_aspect("equal")
+        for axis in (above, below):
+            axis.axis("off")
+    figure.subplots_adjust(0, 0, 1, 1, 0.02, 0.02)
+    figure.savefig(path, dpi=80)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", default=".", type=pathlib.Path)
@@ -152,6 +182,7 @@ def main():
     body.Update()
     gel_picture(body.GetOutput(), options.folder / "Gel.png", options.quick)
     press_picture(body.GetOutput(), options.folder / "TissuePress.png", options.quick)
+    moving_picture(options.folder / "Moving.png", options.quick)
     if options.sph:
         sph_figures.pictures(options.sph, options.folder, options.quick)
 
