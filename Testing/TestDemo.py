@@ -1,12 +1,17 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The demo from end to end at a coarse size: what it makes, what its report says, and how it fails."""
+import json
 import os
 import pathlib
 import re
 import subprocess
 import sys
 import tempfile
+
+import numpy as np
+
+import echorama
 
 source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
 program = pathlib.Path(os.environ["ECHORAMA_BUILD_DIR"]) / "bin" / "echorama"
@@ -22,14 +27,18 @@ def check(truth, what):
         sys.exit(f"TestDemo: {what}")
 
 
-def check_report(out):
+sys.path.insert(0, str(source / "Applications" / "demo"))
+from volumes import Displacement, xml_image  # noqa: E402
+
+
+def check_report(out, count=5):
     for name in ("stitched.mha", "poses.json", "slices.png", "overlays.png", "edges.png", "embedded.png", "rendering.png",
                  "embedded.mha", "embedded.Embedding.mha"):
         check((out / name).stat().st_size > 500, f"{name} is missing or empty")
     report = (out / "report.html").read_text()
     outside = re.findall(r"""(?:src|href)\s*=\s*["'](?!data:)[^"']*|url\([^)]*\)|@import[^;]*|<script[^>]*|<link[^>]*""", report)
     check(not outside, f"the report needs more than itself: {outside}")
-    check(report.count('src="data:image/png;base64,') == 5, "the report does not hold its five pictures")
+    check(report.count('src="data:image/png;base64,') == count, f"the report does not hold its {count} pictures")
     check("$" not in re.sub(r"base64,[^\"]*", "", report), "a place of the template was not filled")
     return report
 
@@ -51,10 +60,28 @@ with tempfile.TemporaryDirectory() as folder:
 
     made = demo(folder / "synthetic", "--synthetic")
     check(made.returncode == 0, f"the demo of a synthesised scene failed:\n{made.stderr}")
-    report = check_report(folder / "synthetic")
+    report = check_report(folder / "synthetic", 7)
     check("did not succeed" not in report, "the report itself calls the alignment a failure")
     off = re.search(r"off +([\d.]+) mm before, ([\d.]+) mm after", made.stdout)
     check(off and float(off[1]) > 5.0 and float(off[2]) < 4.0, f"synthetic volumes: {made.stdout!r}")
+
+    # The probe that presses: how far landmarks lie apart is told, and the report tells the same.
+    apart = re.search(r"landmarks ([\d.]+) mm apart after rigid, ([\d.]+) mm after deformable", made.stdout)
+    check(apart and float(apart[1]) < 6.0 and float(apart[2]) < 1.2 * float(apart[1]), f"pressed volumes: {made.stdout!r}")
+    rows = dict(re.findall(r'<tr><td>([a-z ]+)</td><td class="n">([\d.]+)</td>', report.split("Under a probe that presses")[1]))
+    check(float(rows["where they lay"]) > float(rows["aligned rigidly"]) and rows["aligned rigidly"] == apart[1]
+          and rows["aligned deformably"] == apart[2] and float(rows["the truth"]) < float(rows["where they lay"]), f"landmarks in the report: {rows}")
+    poses = {name: json.loads((folder / "synthetic" / f"pressed{name}.json").read_text())["volumes"] for name in ("", ".rigid")}
+    check(all("displacement" not in volume for volume in poses[".rigid"]), "the rigid poses name displacements")
+    check([v["VolumeToWorld"] for v in poses[""]] == [v["VolumeToWorld"] for v in poses[".rigid"]], "the rigid poses are others")
+
+    # The pictures read volumes through the displacement that the program means.
+    path = folder / "synthetic" / "pressed" / "displacement_2.vti"
+    image, field, value = xml_image(path), Displacement(path), [0.0, 0.0, 0.0]
+    bounds = np.reshape(image.GetBounds(), (3, 2))
+    for point in np.random.default_rng(1).uniform(bounds[:, 0] - 15, bounds[:, 1] + 15, (50, 3)):
+        echorama.vtkUltrasoundDisplacement.Evaluate(image, point.tolist(), value)
+        check(np.allclose(field.at(point), value, atol=1e-5), f"the displacement at {point} is {field.at(point)}, not {value}")
 
     volumes = [folder / "phantom volumes" / "phantom" / f"volume_{number}.mha" for number in (1, 2)]
     own = demo(folder / "own", "--", *volumes)

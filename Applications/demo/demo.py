@@ -5,7 +5,7 @@
 demo.py --program ECHORAMA --out FOLDER [-- VOLUME...]
 
 Without volumes it makes three of a phantom, or (--synthetic) of an invented abdomen by simulating ultrasound, knocked out of place
-by a known amount, so that the alignment can be scored.
+by a known amount, so that the alignment can be scored; then three more of an abdomen that the probe presses, to be aligned deformably.
 ./run demo calls it. It needs the Python package echorama, and a screen (xvfb-run provides one).
 """
 import argparse
@@ -18,6 +18,8 @@ import subprocess
 import sys
 
 import numpy as np
+
+from pressed import press
 
 
 RESULTS = ["report.html", "stitched.mha", "stitched.ValidRegion.mha", "embedded.mha", "embedded.ValidRegion.mha",
@@ -152,11 +154,13 @@ def demo(options):
     steps.run("stitching", "stitch", *files, "--poses", out / "poses.json", "-o", out / "stitched.mha")
     steps.run("embedding", "embed", out / "stitched.mha", "-o", out / "embedded.mha")
 
+    pressed = press(Steps(options.program), out, options.quick, files_of, write_identities) if options.synthetic else None
+
     print("  drawing ...", file=sys.stderr, flush=True)
     try:
         from report import write_report
 
-        report = write_report(out, steps, files, truth_file, before, after, options.quick)
+        report = write_report(out, steps, files, truth_file, before, after, options.quick, pressed)
     except (ImportError, OSError, ValueError, RuntimeError, MemoryError) as problem:
         raise StepFailed(f"drawing: {problem}") from problem
     print(report.summary)

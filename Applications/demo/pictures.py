@@ -127,10 +127,11 @@ def _save(figure, path, dither=Image.Dither.NONE):
     Image.open(path).convert("RGB").quantize(256, dither=dither).save(path, optimize=True)
 
 
-def draw_slices(path, before, after, stitched, views, window, step):
-    """Three planes (rows), before and after the alignment and stitched (columns)."""
+def draw_slices(path, before, after, stitched, views, window, step,
+                titles=("before alignment, averaged", "after alignment, averaged", "stitched")):
+    """Planes (rows), before and after the alignment and stitched (columns)."""
     figure, axes = _grid_of_axes(views, 3, 12)
-    for column, title in enumerate(("before alignment, averaged", "after alignment, averaged", "stitched")):
+    for column, title in enumerate(titles):
         axes[0][column].set_title(title, fontsize=10, color="#333333")
     for view, row in zip(views, axes):
         points = view.points(step)
@@ -181,7 +182,7 @@ def draw_embedded(path, stitched, embedded, views, window, step):
     _save(figure, path)
 
 
-def draw_overlays(path, before, after, pairs, down, low, high, window, step):
+def draw_overlays(path, before, after, pairs, down, low, high, window, step, titles=("before alignment", "after alignment")):
     """Each overlapping pair laid over each other in two colours, before and after: where they agree, the colours are grey."""
     views = []
     for pair in pairs:
@@ -190,8 +191,8 @@ def draw_overlays(path, before, after, pairs, down, low, high, window, step):
                 for view in both]
         views.append(both[int(real[1].sum() > real[0].sum())])
     figure, axes = _grid_of_axes(views, 2, 12)
-    axes[0][0].set_title("before alignment", fontsize=10, color="#333333")
-    axes[0][1].set_title("after alignment", fontsize=10, color="#333333")
+    for panel, title in zip(axes[0], titles):
+        panel.set_title(title, fontsize=10, color="#333333")
     for pair, view, row in zip(pairs, views, axes):
         points = view.points(step)
         for panel, volumes in zip(row, (before, after)):

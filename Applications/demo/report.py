@@ -16,7 +16,7 @@ import echorama
 import numpy as np
 
 import pictures
-from volumes import Lattice, Volume, box_around, overlaps, way_down
+from volumes import Displacement, Lattice, Volume, box_around, overlaps, way_down
 
 WORDS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six", 7: "Seven", 8: "Eight", 9: "Nine", 10: "Ten"}
 
@@ -128,7 +128,7 @@ def verdict(pairs_before, pairs_after, count):
     return f"The volumes hardly agree. {now} The alignment is probably wrong, or they do not show the same tissue.", True
 
 
-def overlap_table(names, pairs_before, pairs_after):
+def overlap_table(names, pairs_before, pairs_after, what="before → after"):
     known = {(pair.first, pair.second): pair for pair in pairs_before}
     rows = []
     for pair in pairs_after:
@@ -136,8 +136,8 @@ def overlap_table(names, pairs_before, pairs_after):
         rows.append(row(f"{names[pair.first]} and {names[pair.second]}", (f"{pair.percent:.0f}%",),
                         ((signed(old.correlation) if old else "–") + f" → <strong>{signed(pair.correlation)}</strong>",),
                         ((f"{old.difference:.1f}" if old else "–") + f" → <strong>{pair.difference:.1f}</strong>",)))
-    return ('<table><tr><th>pair</th><th class="n">overlap, of the smaller</th><th class="n">correlation, before → after</th>'
-            '<th class="n">mean difference in grey, before → after</th></tr>' + "".join(rows) + "</table>")
+    return (f'<table><tr><th>pair</th><th class="n">overlap, of the smaller</th><th class="n">correlation, {what}</th>'
+            f'<th class="n">mean difference in grey, {what}</th></tr>' + "".join(rows) + "</table>")
 
 
 def embedding_section(stitched_file, embedded_file):
@@ -176,6 +176,80 @@ def embedding_section(stitched_file, embedded_file):
     return text + "<table>" + "".join(rows) + "</table>", wrong
 
 
+def what_bending_did(rigid_mm, deformable_mm):
+    """A sentence about the mean distance of landmarks."""
+    change = f"from {mm(rigid_mm)} to {mm(deformable_mm)}&nbsp;mm"
+    if deformable_mm < 0.95 * rigid_mm:
+        return f"Taking the deformation back as far as the images show it brought landmarks nearer to each other, {change} on average."
+    if deformable_mm <= 1.05 * rigid_mm:
+        return f"What the images show of the deformation hardly changed the distances of landmarks, {change} on average."
+    return f"What was taken for deformation moved landmarks apart, {change} on average: here the rigid result is the better one."
+
+
+def steps_table(steps):
+    done = "".join(row(html.escape(what), f"<code>{html.escape(command)}</code>", (f"{took:.2f}",)) for what, command, took in steps.done)
+    return f'<table><tr><th>step</th><th>command</th><th class="n">seconds</th></tr>{done}</table>'
+
+
+def pressed_section(out, pressed, quick):
+    """The volumes of a probe that pressed: aligned rigidly and deformably, in numbers and pictures. Returns HTML and a line."""
+    files = [file.resolve() for file in pressed.files]
+    written = json.loads(pressed.deformable.read_text())["volumes"]
+    fields = {(out / volume["file"]).resolve(): Displacement(out / volume["displacement"]) for volume in written if "displacement" in volume}
+    poses = poses_of(pressed.rigid)
+    rigid = [Volume.read(file).moved(poses[file]) for file in files]
+    bent = [dataclasses.replace(volume, displacement=fields.get(file)) for volume, file in zip(rigid, files)]
+    stitched = Volume.read(out / "pressed.stitched.mha")
+    names = [html.escape(volume.name) for volume in rigid]
+
+    grid_rigid, grid_bent = Lattice.over(rigid), Lattice.over(bent)
+    pairs_rigid, pairs_bent = overlaps(grid_rigid), overlaps(grid_bent)
+    shared = grid_rigid.real.sum(axis=0) > 1
+    centre = grid_rigid.points[shared if shared.any() else grid_rigid.real.any(axis=0)].mean(axis=0)
+    down = way_down(grid_rigid.points, grid_rigid.real[0])
+    low, high = box_around(rigid)
+    window = pictures.window_of(stitched)
+    step = max(float((high - low).max()) / (200 if quick else 520), 0.5 * float(stitched.spacing.min()))
+    pictures.draw_slices(out / "pressed.png", rigid, bent, stitched, pictures.views_through(centre, down, low, high)[:2], window, step,
+                         ("aligned rigidly, averaged", "deformation taken back, averaged", "deformation taken back, stitched"))
+    figures = (f'<figure><img src="{data_uri(out / "pressed.png")}" alt="Two planes of the pressed volumes">'
+               "<figcaption>Two planes through one point of the overlap. Left: the volumes averaged where a rigid alignment puts them. Middle: "
+               "averaged, each read through the displacement that was found for it. Right: stitched in the same way.</figcaption></figure>")
+    shown = sorted(sorted(pairs_bent, key=lambda pair: -pair.percent)[:2], key=lambda pair: pair.first)
+    if shown:
+        pictures.draw_overlays(out / "pressed_pairs.png", rigid, bent, shown, down, low, high, window, step,
+                               ("aligned rigidly", "deformation taken back"))
+        figures += (f'<figure><img src="{data_uri(out / "pressed_pairs.png")}" alt="Pairs of pressed volumes in two colours">'
+                    "<figcaption>The pairs in green and magenta: grey where both show the same.</figcaption></figure>")
+
+    rows = "".join(row(html.escape(name), *((mm(error[key]),) for key in ("mean_mm", "median_mm", "percentile95_mm", "max_mm")))
+                   for name, error in pressed.errors.items())
+    told = []
+    for name, verdict_of, found in zip(names, pressed.verdicts, pressed.deformations):
+        if found is not None:
+            told.append(f"{name} is {verdict_of}, and " + (f"was bent by up to {mm(found['largest_mm'])}&nbsp;mm" if found["applied"] else
+                        f"was not bent: {html.escape(found['reason'])}"))
+        elif verdict_of == "failed":
+            told.append(f"{name} could not be aligned, and was not bent")
+    rigid_mm, deformable_mm = (pressed.errors[name]["mean_mm"] for name in ("aligned rigidly", "aligned deformably"))
+    sentence = what_bending_did(rigid_mm, deformable_mm)
+    took = sum(seconds for _, _, seconds in pressed.steps.done)
+    text = (
+        "<h2>Under a probe that presses</h2>"
+        "<p>A probe is pressed on skin, and tissue gives way. Here the face lies 5&nbsp;mm below the skin of an abdomen of the same kind, behind a cap of gel, in "
+        "three views; each deforms the tissue in its own way, so no rigid motion is right everywhere. Gel or skin touches at least "
+        f"{100 * min(pressed.coupled):.0f}% of the face in each view.</p>"
+        "<p>Where places of the tissue are in every volume is known; <em>the truth</em> below is the poses and displacements that the volumes were made with. Images "
+        "alone do not lead there: sound is bent on its way, so that each volume shows tissue some 2&nbsp;mm from where it is, and from each side elsewhere. "
+        f"How far {pressed.errors['aligned rigidly']['pairs']} pairs of places lie apart:</p>"
+        '<table><tr><th></th><th class="n">mean, mm</th><th class="n">median, mm</th><th class="n">95% within, mm</th><th class="n">at most, mm</th></tr>'
+        f"{rows}</table><p class=\"verdict{' doubt' if deformable_mm > 0.95 * rigid_mm else ''}\">{sentence}</p>"
+        f"<p>{'. '.join(told)}.</p><p>How alike the volumes are where they overlap, aligned rigidly and with the deformation taken back:</p>"
+        f"{overlap_table(names, pairs_rigid, pairs_bent, 'rigid → deformable')}{figures}"
+        f"<p>It took {took:.0f} seconds of computing beside what is above:</p>{steps_table(pressed.steps)}")
+    return text, f"pressed   landmarks {mm(rigid_mm)} mm apart after rigid, {mm(deformable_mm)} mm after deformable alignment ({took:.0f} s computing)"
+
+
 def machine():
     threads = len(os.sched_getaffinity(0))
     return f"{platform.machine()} with {threads} core{'s' if threads > 1 else ''}"
@@ -186,9 +260,9 @@ def version_of(program):
     return answer.stdout.strip() or "echorama"
 
 
-def write_report(out, steps, files, truth_file, before, after, quick):
+def write_report(out, steps, files, truth_file, before, after, quick, pressed=None):
     """Draws the pictures and writes report.html into the folder \a out. The scores (mm per volume, in the order of files) are
-    None where there is no truth."""
+    None where there is no truth. \a pressed: what was found of pressed volumes, if there are any."""
     at_first = [Volume.read(file) for file in files]
     poses = [poses_of(out / "poses.json")[file.resolve()] for file in files]
     now = [volume.moved(pose) for volume, pose in zip(at_first, poses)]
@@ -262,7 +336,7 @@ def write_report(out, steps, files, truth_file, before, after, quick):
 
     rows = [row(name, (times(volume.dimensions, "{}"),), (spacing_text(volume.spacing),), (times(volume.extent_mm),),
                 (f"{volume.real_percent:.0f}%",), (motion_text(volume, pose),)) for name, volume, pose in zip(names, at_first, moved_poses)]
-    done = "".join(row(html.escape(what), f"<code>{html.escape(command)}</code>", (f"{took:.2f}",)) for what, command, took in steps.done)
+    pressed_text, pressed_line = pressed_section(out, pressed, quick) if pressed else ("", None)
     listing = {
         "stitched.mha": "the stitched volume; its valid region lies beside it",
         "embedded.mha": "the same in the fan of a machine; <code>embedded.Embedding.mha</code> beside it says what was invented",
@@ -273,11 +347,15 @@ def write_report(out, steps, files, truth_file, before, after, quick):
     if truth_file:
         listing[truth_file.parent.name] = "the three volumes as they went in, and <code>truth.json</code>, the poses that put them back"
         listing["start.json"] = "poses that leave every volume where it lay, to score the start"
+    if pressed:
+        listing["pressed"] = "the volumes of the probe that presses, with their truth and landmarks"
+        listing["pressed.json, pressed.rigid.json"] = "where they belong, with and without the displacements (<code>pressed.displacement-N.vti</code>)"
+        listing["pressed.stitched.mha"] = "the three, stitched"
 
     page = string.Template((pathlib.Path(__file__).parent / "report.html").read_text()).substitute(
         title=title, lead=lead, facts="".join(f"<li><strong>{value}</strong>{name}</li>" for name, value in facts),
         input_text=input_text, input_rows="".join(rows), moved_heading=moved_heading,
-        steps=f'<table><tr><th>step</th><th>command</th><th class="n">seconds</th></tr>{done}</table>',
+        steps=steps_table(steps), pressed=pressed_text,
         score=score, verdict=sentence, verdict_class="doubt" if doubt else "",
         overlap_table=overlap_table(names, pairs_before, pairs_after), resolution=f"{2 * grid_after.step:.0f}",
         rendering=data_uri(out / "rendering.png"), slices=data_uri(out / "slices.png"), edges=data_uri(out / "edges.png"),
@@ -292,5 +370,7 @@ def write_report(out, steps, files, truth_file, before, after, quick):
         lines.append(f"off       {mm(worst_before)} mm before, {mm(worst_after)} mm after (the worst volume)")
     lines.append("overlap   " + sentence)
     lines.append("embedded  " + ("no voxel of the data is altered" if wrong == 0 else f"{wrong} voxels are not what their labels say"))
+    if pressed_line:
+        lines.append(pressed_line)
     lines.append(f"seconds   {total:.1f} computing")
     return Report(path, "\n".join(lines))

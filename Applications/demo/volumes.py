@@ -10,8 +10,54 @@ import pathlib
 
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
 import echorama
+
+
+def xml_image(path):
+    reader = vtkXMLImageDataReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    return reader.GetOutput()
+
+
+class Displacement:
+    """A displacement image: the cubic spline through its vectors, which fades to zero beyond it (vtkUltrasoundDisplacement)."""
+
+    def __init__(self, path):
+        image = xml_image(path)
+        array = image.GetPointData().GetArray(echorama.vtkUltrasoundDisplacement.DisplacementName())
+        if array is None:
+            raise OSError(f"{path}: it holds no displacement")
+        self.world_to_index = np.linalg.inv(index_to_world(image))
+        self.coefficients = vtk_to_numpy(array).astype(float).reshape(*image.GetDimensions()[::-1], 3)
+        for axis, count in enumerate(self.coefficients.shape[:3]):
+            through = (4 * np.eye(count) + np.eye(count, k=1) + np.eye(count, k=-1)) / 6
+            self.coefficients = np.moveaxis(np.linalg.solve(through, np.moveaxis(self.coefficients, axis, 0).reshape(count, -1))
+                                            .reshape(count, *np.delete(self.coefficients.shape, axis)), 0, axis)
+
+    def at(self, points):
+        """u at world points [..., 3], mm."""
+        index = (points.reshape(-1, 3) @ self.world_to_index[:3, :3].T + self.world_to_index[:3, 3])[:, ::-1]
+        first = np.floor(index).astype(int) - 1
+        t = index - first - 1
+        weights = np.stack([(1 - t) ** 3, 4 - 6 * t ** 2 + 3 * t ** 3, 1 + 3 * t + 3 * t ** 2 - 3 * t ** 3, t ** 3]) / 6
+        count = np.array(self.coefficients.shape[:3])
+        total = np.zeros((len(index), 3))
+        for offset in np.ndindex(4, 4, 4):
+            node = first + offset
+            inside = ((node >= 0) & (node < count)).all(axis=1)
+            weight = np.prod([weights[o, :, axis] for axis, o in enumerate(offset)], axis=0)
+            total[inside] += weight[inside, np.newaxis] * self.coefficients[tuple(node[inside].T)]
+        return total.reshape(points.shape)
+
+
+def index_to_world(image):
+    direction, matrix = image.GetDirectionMatrix(), np.eye(4)
+    matrix[:3, :3] = [[direction.GetElement(row, column) * image.GetSpacing()[column] for column in range(3)] for row in range(3)]
+    matrix[:3, 3] = image.GetOrigin()
+    return matrix
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,6 +68,7 @@ class Volume:
     spacing: np.ndarray  # mm
     index_to_world: np.ndarray  # 4 x 4
     labels: np.ndarray = None  # what the voxels of an embedded volume are: 0 nothing, 1 data, 2 blend, 3 invented
+    displacement: object = None  # a Displacement: what belongs at x is shown at x + u(x)
 
     @staticmethod
     def read(path):
@@ -35,14 +82,9 @@ class Volume:
             raise OSError(f"{path}: cannot be read")
         valid = echorama.vtkUltrasoundVolume.GetValidRegion(image)
         labels = image.GetPointData().GetArray(echorama.vtkUltrasoundVolume.EmbeddingName())
-        direction = image.GetDirectionMatrix()
-        index_to_world = np.eye(4)
-        index_to_world[:3, :3] = [[direction.GetElement(row, column) * image.GetSpacing()[column] for column in range(3)]
-                                  for row in range(3)]
-        index_to_world[:3, 3] = image.GetOrigin()
         return Volume(pathlib.Path(path).name, vtk_to_numpy(intensity).reshape(shape),
                       vtk_to_numpy(valid).reshape(shape) != 0 if valid is not None else np.ones(shape, bool),
-                      np.array(image.GetSpacing()), index_to_world,
+                      np.array(image.GetSpacing()), index_to_world(image),
                       vtk_to_numpy(labels).reshape(shape) if labels else None)
 
     def moved(self, pose):
@@ -88,6 +130,8 @@ class Volume:
 
     def at(self, points):
         """Trilinear values at world points [..., 3]; NaN where less than half of the weight falls on real voxels."""
+        if self.displacement is not None:
+            points = points + self.displacement.at(points)
         world_to_index = np.linalg.inv(self.index_to_world)
         index = points.reshape(-1, 3) @ world_to_index[:3, :3].T + world_to_index[:3, 3]
         size = np.array(self.dimensions)
