@@ -67,6 +67,7 @@ def press(steps, out, quick, files_of, write_identities):
               for name, file in poses.items()}
     steps.run("stitching, with the deformation taken back", "stitch", *files, "--poses", poses["aligned deformably"], "-o",
               out / "pressed.stitched.mha")
-    return Pressed(steps, files, poses["aligned rigidly"], poses["aligned deformably"], errors, [volume["verdict"] for volume in found["volumes"]],
+    return Pressed(steps, files, poses["aligned rigidly"], poses["aligned deformably"], errors,
+                   [volume["verdict"] for volume in found["volumes"]],
                    [volume.get("deformation") for volume in found["volumes"]],
                    [volume["gel"]["coupled"] for volume in made["volumes"]])

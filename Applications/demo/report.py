@@ -239,8 +239,8 @@ def pressed_section(out, pressed, quick):
         "<p>A probe is pressed on skin, and tissue gives way. Here the face lies 5&nbsp;mm below the skin of an abdomen of the same kind, behind a cap of gel, in "
         "three views; each deforms the tissue in its own way, so no rigid motion is right everywhere. Gel or skin touches at least "
         f"{100 * min(pressed.coupled):.0f}% of the face in each view.</p>"
-        "<p>Where places of the tissue are in every volume is known; <em>the truth</em> below is the poses and displacements that the volumes were made with. Images "
-        "alone do not lead there: sound is bent on its way, so that each volume shows tissue some 2&nbsp;mm from where it is, and from each side elsewhere. "
+        "<p>Where places of the tissue are in every volume is known; <em>the truth</em> below is the poses and displacements that the volumes "
+        "were made with. Images alone do not lead there: sound is bent on its way, so that each volume shows tissue some 2&nbsp;mm from where it is. "
         f"How far {pressed.errors['aligned rigidly']['pairs']} pairs of places lie apart:</p>"
         '<table><tr><th></th><th class="n">mean, mm</th><th class="n">median, mm</th><th class="n">95% within, mm</th><th class="n">at most, mm</th></tr>'
         f"{rows}</table><p class=\"verdict{' doubt' if deformable_mm > 0.95 * rigid_mm else ''}\">{sentence}</p>"
