@@ -369,7 +369,8 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     solver.Contact().Place(shape_, Interpolate(from, to, next), parameters_.friction);
     TissueWork work;
     work.loadSteps = 1;
-    const bool isFound = solver.Solve(false, tolerance, MostNewtonStepsOfAPart, work, progress.Part(at, next));
+    const int most = travel > 0.0 ? MostNewtonStepsOfAPart : MostNewtonSteps; // weight comes all at once
+    const bool isFound = solver.Solve(false, tolerance, most, work, progress.Part(at, next));
     work_ += work;
     if (n == 0)
       finestWork_ += work;
@@ -381,10 +382,9 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     } else {
       solver.Displacement() = now;
       solver.Contact().Nodes() = contacts;
-      if (lastSize > 0.0)
-        lastSize = 0.0; // perhaps the guess was bad
-      else
+      if (lastSize == 0.0 || size * travel < 0.5 * solver.Spacing().minCoeff())
         size *= 0.5;
+      lastSize = 0.0; // perhaps the guess was bad, of a long part above all
       mayGrow = false; // what was too far is close to what is impossible
       if (size < least) {
         solver.Displacement() = level.before;
