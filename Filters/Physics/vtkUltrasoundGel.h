@@ -117,7 +117,7 @@ public:
 
   /**
    * How much the gel resists a change of its volume: some hundred times the pressures that occur. Steps become shorter with its
-   * root. In [1, 1000000000] Pa; default 20000.
+   * root. In [1, 1000000000] Pa; default 60000.
    */
   vtkUltrasoundNumberMacro(BulkModulus);
 
