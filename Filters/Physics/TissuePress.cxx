@@ -384,7 +384,7 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
       solver.Contact().Nodes() = contacts;
       if (lastSize == 0.0 || size * travel < 0.5 * solver.Spacing().minCoeff())
         size *= 0.5;
-      lastSize = 0.0; // perhaps the guess was bad, of a long part above all
+      lastSize = 0.0;  // perhaps the guess was bad, of a long part above all
       mayGrow = false; // what was too far is close to what is impossible
       if (size < least) {
         solver.Displacement() = level.before;

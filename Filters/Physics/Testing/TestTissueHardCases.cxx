@@ -190,6 +190,22 @@ TEST(TissueHardCases, ManySmallMovesEndWhereOneLongMoveDoes)
   EXPECT_LT(little.FinestWork().newtonSteps, 6 * moves);
 }
 
+// A soft plate, held all around, and a head that comes 12 mm in one move: the coarser lattice
+// that is asked first lets it through between two nodes.
+TEST(TissueHardCases, HeadDoesNotPassBetweenNodes)
+{
+  TissueBody body = Block({17, 17, 11}, 4.0, 0.4);
+  std::fill(body.cells.begin() + 3 * 16 * 16, body.cells.end(), -1);
+  TissuePressParameters parameters;
+  parameters.fixXMin = parameters.fixXMax = parameters.fixYMin = parameters.fixYMax = true;
+  TissuePress press(body, parameters);
+  press.Move(Convex(), At(32.0, 32.0, 2.0));
+  press.Move(Convex(), At(32.0, 32.0, 12.0));
+  const Eigen::Vector3d middle = press.Displacements()[8 * 17 + 8];
+  EXPECT_NEAR(middle.z(), 12.0, 0.05);
+  EXPECT_LT(middle.head<2>().norm(), 0.1);
+}
+
 // A plate that hangs over a block with a gap of one or of two cells, held all around: before it would pass into the block, the
 // probe is refused.
 TEST(TissueHardCases, BodiesThatWouldEnterEachOtherAreRefused)
