@@ -54,8 +54,8 @@ inline constexpr std::uint64_t largestSeed = 9223372036854775807u; // VTK's seed
 /// As JSON, and shortened.
 std::string Shown(const Json& value);
 
-/// The whole of \a text, which messages call \a name. \throws Error(BadFile) for what is no JSON, for a key that is there twice, and
-/// for nesting of more than 32 levels, which would be an attack on the stack
+/// The whole of \a text, which messages call \a name. \throws Error(BadFile) for what is no JSON, for a key that is there twice,
+/// and for nesting of more than 32 levels, which would be an attack on the stack
 Json Parse(const std::string& name, const std::string& text);
 
 /// One object of a text, key by key. \a Derived says how structs are checked beyond their ranges, Validate(value), and what they

@@ -243,8 +243,9 @@ void LatticeMatrix::Coarsen(int axis, LatticeMatrix& coarse) const
 }
 
 PackedLatticeMatrix::PackedLatticeMatrix(const LatticeShape& shape)
-  : shape_(shape), data_(static_cast<std::size_t>(
-                       Entries * static_cast<std::ptrdiff_t>(shape.Padded()) * shape.nodes[1] * shape.nodes[2] + 2 * LatticeShape::Lanes)),
+  : shape_(shape),
+    data_(static_cast<std::size_t>(Entries * static_cast<std::ptrdiff_t>(shape.Padded()) * shape.nodes[1] * shape.nodes[2] +
+                                   2 * LatticeShape::Lanes)),
     scale_(static_cast<std::size_t>(shape.size), 0.0f), unscale_(scale_)
 {
   for (int n = 0; n < 6; ++n)

@@ -7,8 +7,8 @@ namespace echorama {
 
 /// Classes of VTK take the text: in ParaView their JSON library is another copy. A heavy header, for .cxx files only.
 
-/// {"press": {"force_n", "relative_volume", "seconds"}, "gel": {"coupled", "volume_mm3", "seconds"}, "cost": {...}}; without press
-/// or gel where the scene has none.
+/// {"press": {"force_n", "relative_volume", "seconds"}, "gel": {"coupled", "volume_mm3", "seconds"}, "cost": {...}}; without
+/// press or gel where the scene has none.
 nlohmann::ordered_json ToJson(const SceneScan& scan);
 
 /// {"volumes": [...]} of several.

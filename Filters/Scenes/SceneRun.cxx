@@ -42,8 +42,7 @@ SceneRun::SceneRun(SynthesisScene scene, int landmarks, const MeshReader& readMe
         places_.push_back(ball);
   const std::vector<Landmark> shared = SharedPlaces(scene_.seed, landmarks, parameters_.probe, poses);
   places_.insert(places_.end(), shared.begin(), shared.end());
-  if (!places_.empty() &&
-      std::any_of(views_.begin(), views_.end(), [](const SceneView& view) { return !view.steps.empty(); })) {
+  if (!places_.empty() && std::any_of(views_.begin(), views_.end(), [](const SceneView& view) { return !view.steps.empty(); })) {
     notes_.push_back("no landmarks are listed: the probe moves while it sweeps, so that a place is not seen where it lies");
     places_.clear();
   }
@@ -200,8 +199,8 @@ void SceneRun::Scan(std::size_t number, std::size_t index, SceneScan& scan, cons
 SceneScan SceneRun::Make(std::size_t number, const Progress& progress)
 {
   if (number >= views_.size())
-    throw Error(Error::Kind::InvalidParameter, "there is no view " + std::to_string(number + 1) + "; the scene has " +
-                                                   std::to_string(views_.size()));
+    throw Error(Error::Kind::InvalidParameter,
+                "there is no view " + std::to_string(number + 1) + "; the scene has " + std::to_string(views_.size()));
   try {
     const bool changes = scene_.press || scene_.gel || scene_.change.ribShare > 0.0 ||
                          std::any_of(scene_.tissue.begin(), scene_.tissue.end(), [this](const SceneItem& item) {

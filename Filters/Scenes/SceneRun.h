@@ -17,7 +17,7 @@ using GelSurfacer = std::function<TissueSurface(const GelCoat& coat, const Mater
 struct SceneScan {
   SynthesisParameters parameters; ///< probe and pose among them
   Volume<unsigned char> beams;
-  TissueSurface tissue;          ///< what sound met in the middle of the sweep, gel with it
+  TissueSurface tissue;                 ///< what sound met in the middle of the sweep, gel with it
   std::optional<PressedTissue> pressed; ///< in the middle of the sweep
   std::optional<GelCoat> gel;           ///< likewise
   TissueSurface gelSurface;
@@ -34,9 +34,8 @@ struct SceneScan {
 /// around them.
 class SceneRun {
 public:
-  /// \param landmarks how many places that two views see are listed, besides the balls of a rig; none where the probe moves during
-  /// a sweep, as a place is then not seen where it lies
-  /// \throws as SceneTissue and ViewsOf
+  /// \param landmarks how many places that two views see are listed, besides the balls of a rig; none where the probe moves
+  /// during a sweep, as a place is then not seen where it lies \throws as SceneTissue and ViewsOf
   SceneRun(SynthesisScene scene, int landmarks, const MeshReader& readMesh, GelSurfacer surfacer, const Progress& progress = {});
   ~SceneRun();
   SceneRun(const SceneRun&) = delete;

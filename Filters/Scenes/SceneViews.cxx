@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A sweep that moves is divided into parts of about as many planes each, and every part has the tissue and the gel of the moment in
-// its middle. Between the parts of all views a path is cut by halves until no corner of the head goes too far in one piece.
+// A sweep that moves is divided into parts of about as many planes each, and every part has the tissue and the gel of the moment
+// in its middle. Between the parts of all views a path is cut by halves until no corner of the head goes too far in one piece.
 #include "SceneViews.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "ScenePath.h"
@@ -87,8 +87,9 @@ void AddWays(const SynthesisScene& scene, const ScenePath& path, double stepMm, 
     for (const SceneState& state : view.states) {
       const bool isFirst = view.way.size() == 1 && state.probe.time == last.time;
       if (!isFirst && !(state.probe.time > last.time))
-        throw Error(Error::Kind::NotPossible, "views: the sweep of view " + std::to_string(number) +
-                                                  " begins before the one before it has ended; tissue and gel go on in time only");
+        throw Error(Error::Kind::NotPossible,
+                    "views: the sweep of view " + std::to_string(number) +
+                        " begins before the one before it has ended; tissue and gel go on in time only");
       if (!isFirst)
         Follow(path, head, stepMm, last, state.probe, view.way);
       last = state.probe;

@@ -15,8 +15,8 @@
 #include "vtkOBJReader.h"
 #include "vtkPLYReader.h"
 #include "vtkPolyData.h"
-#include "vtkSTLReader.h"
 #include "vtkSmartPointer.h"
+#include "vtkSTLReader.h"
 #include "vtkTriangleFilter.h"
 #include "vtkXMLPolyDataReader.h"
 

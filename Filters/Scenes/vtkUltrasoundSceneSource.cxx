@@ -84,10 +84,10 @@ echorama::ParameterList vtkUltrasoundSceneSource::Parameters()
   Settings& v = this->Values;
   return {
       Parameter("FileName", v.fileName, "The scene, JSON; files that it names are looked for in its folder."),
-      Parameter("Scene", v.scene, "The scene as a text, instead of a file; files that it names are looked for in the working folder.")
+      Parameter("Scene", v.scene,
+                "The scene as a text, instead of a file; files that it names are looked for in the working folder.")
           .Advanced(),
-      Parameter("DataFolder", v.dataFolder,
-                "Folder of the meshes and recordings that the scene names, whatever folder it says."),
+      Parameter("DataFolder", v.dataFolder, "Folder of the meshes and recordings that the scene names, whatever folder it says."),
       Parameter("View", v.view, {0, echorama::SceneItem::mostViews}, "", "The number of the only view that is made; 0: all."),
       Parameter("Seed", v.seed, {-1, 9223372036854775807.0}, "", "Instead of the scene's seed; -1: the scene's."),
       Parameter("SpacingMm", v.spacingMm, {0, 20}, "mm", "Edge of the cubic voxels; 0: as the scene says."),
@@ -154,8 +154,7 @@ int vtkUltrasoundSceneSource::RequestData(vtkInformation*, vtkInformationVector*
     const int first = only > 0 ? only : 1, last = only > 0 ? only : views;
     for (int number = first; number <= last; ++number) {
       const auto at = [&](double part) { return 0.1 + 0.9 * (number - first + part) / (last - first + 1); };
-      echorama::SceneScan scan =
-          run.Make(static_cast<std::size_t>(number) - 1, progress.Part(at(0.0), at(0.95)));
+      echorama::SceneScan scan = run.Make(static_cast<std::size_t>(number) - 1, progress.Part(at(0.0), at(0.95)));
       this->Put(scan, number, static_cast<unsigned int>(number - first), outputs, progress.Part(at(0.95), at(1.0)));
       scan.beams = {};
       scan.tissue = scan.gelSurface = {};
@@ -182,9 +181,7 @@ void vtkUltrasoundSceneSource::Put(echorama::SceneScan& scan, int number, unsign
   PutBlock(vtkMultiBlockDataSet::GetData(outputs, Beams), block, beams, "beams_" + suffix);
 
   vtkNew<vtkMultiBlockDataSet> truth;
-  const auto put = [&truth](vtkDataObject* data, const char* name) {
-    PutBlock(truth, truth->GetNumberOfBlocks(), data, name);
-  };
+  const auto put = [&truth](vtkDataObject* data, const char* name) { PutBlock(truth, truth->GetNumberOfBlocks(), data, name); };
   const auto putTissue = [&put](const echorama::TissueSurface& surface, const char* name) {
     vtkNew<vtkPolyData> data;
     vtkUltrasoundTissue::Set(data, surface);

@@ -9,17 +9,17 @@
  *
  * | output | data |
  * | ------ | ---- |
- * | 0 Volumes | vtkMultiBlockDataSet: `volume_1` ..., as vtkUltrasoundSynthesizer makes them; all but the first are out of place by as much as the scene says |
- * | 1 Beams   | vtkMultiBlockDataSet: `beams_1` ..., the same on the beams |
- * | 2 Tissue  | vtkPolyData: all bodies at rest (see vtkUltrasoundTissue) |
- * | 3 Truth   | vtkMultiBlockDataSet: `view_1` ..., blocks of what there is for each: |
+ * | 0 Volumes | vtkMultiBlockDataSet: `volume_1` ..., as vtkUltrasoundSynthesizer makes them; all but the first are out of place
+ * by as much as the scene says | | 1 Beams   | vtkMultiBlockDataSet: `beams_1` ..., the same on the beams | | 2 Tissue  |
+ * vtkPolyData: all bodies at rest (see vtkUltrasoundTissue) | | 3 Truth   | vtkMultiBlockDataSet: `view_1` ..., blocks of what
+ * there is for each: |
  *
  * | block of the truth | data |
  * | ------------------ | ---- |
  * | `tissue`       | vtkPolyData: what sound met, gel with it |
- * | `displacement` | vtkImageData: where tissue has gone, as vtkUltrasoundTissuePress puts it out; what vtkUltrasoundStitcher takes back |
- * | `gel`, `face`  | vtkPolyData: the surface of the gel, and what lies before each beam (see vtkUltrasoundGel) |
- * | `landmarks`    | vtkPolyData: places as the volume has them, with the point array `Label` |
+ * | `displacement` | vtkImageData: where tissue has gone, as vtkUltrasoundTissuePress puts it out; what vtkUltrasoundStitcher
+ * takes back | | `gel`, `face`  | vtkPolyData: the surface of the gel, and what lies before each beam (see vtkUltrasoundGel) | |
+ * `landmarks`    | vtkPolyData: places as the volume has them, with the point array `Label` |
  *
  * The scene is kept, so that one view after another costs no more than all at once; a file that has changed is read again.
  *
@@ -112,7 +112,10 @@ public:
     echorama::Pose Knock = echorama::Pose::Identity();
     echorama::SceneScan Scan;
   };
-  const std::vector<MadeView>& Views() const { return this->Made; }
+  const std::vector<MadeView>& Views() const
+  {
+    return this->Made;
+  }
 
   /** Puts volume \a number (from 0) of a set out of place by a known amount, but for the first; returns how. */
   static echorama::Pose Knock(vtkImageData* volume, std::size_t number, std::uint64_t seed, double mm, double degrees);

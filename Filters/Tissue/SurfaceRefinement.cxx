@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Passes over the triangles, each of which halves what is too long. A triangle with one, two or three such edges becomes two, three
-// or four; the pass after it sees to what is still too long, so there are about as many as the logarithm of the longest edge.
+// Passes over the triangles, each of which halves what is too long. A triangle with one, two or three such edges becomes two,
+// three or four; the pass after it sees to what is still too long, so there are about as many as the logarithm of the longest
+// edge.
 #include "SurfaceRefinement.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"

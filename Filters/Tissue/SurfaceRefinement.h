@@ -4,9 +4,9 @@
 
 namespace echorama {
 
-/// Divides triangles until no edge is longer than \a longestMm: a surface that is to be bent has points as dense as what bends it.
-/// Its shape stays what it is, and a closed surface stays closed: whether and where an edge is divided follows from its two ends
-/// alone. \throws Error(InvalidParameter) for a length that is not above 0, Error(TooLarge) beyond 2^31 points or triangles
+/// Divides triangles until no edge is longer than \a longestMm: a surface that is to be bent has points as dense as what bends
+/// it. Its shape stays what it is, and a closed surface stays closed: whether and where an edge is divided follows from its two
+/// ends alone. \throws Error(InvalidParameter) for a length that is not above 0, Error(TooLarge) beyond 2^31 points or triangles
 void RefineSurface(TissueSurface& surface, double longestMm);
 
 } // namespace echorama

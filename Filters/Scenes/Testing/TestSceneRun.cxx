@@ -58,7 +58,8 @@ double MeanOf(VolumeView<const unsigned char> beams, int firstElement, int lastE
   return sum / count;
 }
 
-const std::string still = R"("views": {"poses": [{"face": [0, 0, 0], "target": [0, 0, 50]}, {"face": [0, 0, 0], "target": [0, 0, 50]},
+const std::string still =
+    R"("views": {"poses": [{"face": [0, 0, 0], "target": [0, 0, 50]}, {"face": [0, 0, 0], "target": [0, 0, 50]},
                                         {"face": [0, 0, 0], "target": [0, 0, 50]}]})";
 
 } // namespace
@@ -139,7 +140,8 @@ TEST(SceneRun, ThePhantomIsABodyToo)
       {"name": "cyst", "ellipsoid": {"centre": [1, 2, 25], "radii": [6, 5, 4], "rotation": [0, 0, 1.5707963267948966]},
        "echogenicityDb": -120, "wallMm": 1, "wallDb": 9},
       {"name": "vessel", "tube": {"path": [[-20, 0, 12], [0, 1, 12], [20, 0, 13]], "radius": 2}, "echogenicityDb": -20}]}},
-    {"phantom": {"bodies": "jets"}, "firstView": 2}], )" + still);
+    {"phantom": {"bodies": "jets"}, "firstView": 2}], )" +
+                       still);
   const TissueSurface tissue = run.Make(0).tissue;
   EXPECT_EQ(NamesOf(tissue), (std::vector<std::string>{"cyst", "cyst", "vessel"}));
   const auto box = [&tissue](int body) {
@@ -212,7 +214,8 @@ TEST(SceneRun, PlanesOfASweepThatMovesSeeTheTissueOfTheirMoment)
     const auto peak = std::max_element(mean.begin() + 40, mean.begin() + 150);
     return 2.0 + static_cast<double>(peak - mean.begin()) * 48.0 / 239.0;
   };
-  // From a probe that comes 6 mm nearer a plate that rests is seen to come as much nearer, one that yields by less: here some 3 mm.
+  // From a probe that comes 6 mm nearer a plate that rests is seen to come as much nearer, one that yields by less: here some 3
+  // mm.
   const double resting = depthMm(one, 0) - depthMm(one, 7), yielding = depthMm(eight, 0) - depthMm(eight, 7);
   EXPECT_NEAR(resting, 6.0 * 1540.0 / 1580.0, 0.4);
   EXPECT_NEAR(yielding, 3.0, 0.8);

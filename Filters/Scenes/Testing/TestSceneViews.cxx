@@ -10,9 +10,10 @@ namespace {
 
 SynthesisScene Parse(const std::string& members)
 {
-  return SceneFromJson(R"({"schema": "echorama-scene-1", "background": "air", "probe": {"elements": 8, "sweepSteps": 6, "samples": 30}, )" +
-                         members + "}",
-                       "scene.json");
+  return SceneFromJson(
+      R"({"schema": "echorama-scene-1", "background": "air", "probe": {"elements": 8, "sweepSteps": 6, "samples": 30}, )" +
+          members + "}",
+      "scene.json");
 }
 
 // Down to the skin in a second, then 30 mm along it in three.
@@ -89,7 +90,8 @@ TEST(SceneViews, AMoveThereAndBackIsNotMissed)
 
 TEST(SceneViews, ASweepThatMovesHasSeveralStates)
 {
-  const std::string sweep = R"("sweep": {"seconds": 0.6, "velocityMmPerSecond": [10, 0, 0], "states": 3}, "views": {"count": 1}, )";
+  const std::string sweep =
+      R"("sweep": {"seconds": 0.6, "velocityMmPerSecond": [10, 0, 0], "states": 3}, "views": {"count": 1}, )";
   const auto views = ViewsOf(Parse(sweep + R"("press": {})"));
   ASSERT_EQ(views.at(0).states.size(), 3u);
   ASSERT_EQ(views[0].steps.size(), 6u);
@@ -105,15 +107,15 @@ TEST(SceneViews, ASweepThatMovesHasSeveralStates)
   }
   EXPECT_EQ(ViewsOf(Parse(sweep + R"("name": "no press")")).at(0).states.size(), 1u) << "nothing gives way";
   EXPECT_EQ(ViewsOf(Parse(R"("press": {}, "sweep": {"seconds": 0.6}, "views": {"count": 1})")).at(0).states.size(), 1u)
-    << "the probe rests";
+      << "the probe rests";
 }
 
 TEST(SceneViews, RefusesWhatATimeCannotBe)
 {
   EXPECT_NE(MessageOf(Parse(R"("gel": {}, "sweep": {"seconds": 1, "alongRecording": true}, )" + keys + R"("times": [1, 1.5]})"))
-              .find("view 2 begins before the one before it has ended"),
+                .find("view 2 begins before the one before it has ended"),
             std::string::npos);
   EXPECT_NE(MessageOf(Parse(R"("sweep": {"seconds": 1, "alongRecording": true}, )" + keys + R"("times": [0.2]})"))
-              .find("the sweep around 0.2 s is not within the path, from 0 to 4 s"),
+                .find("the sweep around 0.2 s is not within the path, from 0 to 4 s"),
             std::string::npos);
 }

@@ -19,7 +19,8 @@ TissueSurface BoxAndTetrahedron()
   surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                        {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   surface.bodyOfTriangle.assign(12, 0);
-  for (const auto& point : {Eigen::Vector3f(50, 0, 0), Eigen::Vector3f(51, 0, 0), Eigen::Vector3f(50, 1, 0), Eigen::Vector3f(50, 0, 1)})
+  for (const auto& point :
+       {Eigen::Vector3f(50, 0, 0), Eigen::Vector3f(51, 0, 0), Eigen::Vector3f(50, 1, 0), Eigen::Vector3f(50, 0, 1)})
     surface.points.push_back(point);
   for (const auto& triangle : {std::array<std::uint32_t, 3>{8, 10, 9}, {8, 9, 11}, {8, 11, 10}, {9, 10, 11}}) {
     surface.triangles.push_back(triangle);
