@@ -36,6 +36,7 @@ public:
                                                      NumberText(highestCapMm) + " mm hold");
   }
   double Height() const { return height_; }
+  void Stretch(double factor) { height_ *= factor; }
   bool Holds(const Vector3d& point) const
   {
     const double rim = 1.0 - (point.head<2>() - middle_).cwiseQuotient(radii_).squaredNorm();
@@ -145,7 +146,7 @@ GelMotion::State::State(const TissueSurface& tissue, const PlacedProbe& first, c
   CheckRanges(parameters);
   tissue.Check();
   head = std::make_shared<const GelProbe>(shape);
-  const Cap cap(shape, parameters);
+  Cap cap(shape, parameters);
   const double before = cap.Height() + 2.0 * parameters.cellMm;
   headBox = BoxOf(geometry, probeHead, shape, before + aroundMm);
   probe = first.probeToWorld;
@@ -155,9 +156,15 @@ GelMotion::State::State(const TissueSurface& tissue, const PlacedProbe& first, c
   GelDomain domain;
   domain.cellMm = parameters.cellMm;
   domain.cells.fill(GelGrid::BlockSize);
-  solver.emplace(domain.With(headBox), material);
-  solver->Fill([&cap](const Vector3d& point) { return cap.Holds(point); });
-  putOn = solver->Totals().restVolume;
+  domain = domain.With(headBox);
+  for (int round = 0; round < 5; ++round) { // on a bent face, and as cells see it, the cap is not quite a paraboloid
+    solver.emplace(domain, material);
+    solver->Fill([&cap](const Vector3d& point) { return cap.Holds(point); });
+    putOn = solver->Totals().restVolume;
+    if (putOn <= 0.0 || std::abs(putOn - 1000.0 * parameters.amountMl) < 0.005 * putOn)
+      break;
+    cap.Stretch(1000.0 * parameters.amountMl / putOn);
+  }
   skin.emplace(tissue, frame, parameters.cellMm);
   skin->Move(nullptr, SkinBox(headBox), progress);
 }
