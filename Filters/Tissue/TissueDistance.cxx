@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Every triangle that has space outside of all bodies beside it tells its distance to the points of the grid around it; the sign
-// is whether a body holds the point. Slabs of the grid are worked on side by side. Cost: triangles times the points in the band.
+// is whether a body holds the point. Of the triangles near the outside, those count of which some place bounds it: for that,
+// lines along z from both of its sides are followed to the outside. Slabs of the grid are worked on side by side. Cost: triangles
+// times the points in the band.
 #include "TissueDistance.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Parallel.h"
@@ -57,6 +59,102 @@ bool SetBox(NearTriangle& corners, const ImageGeometry& grid, double distance)
   return true;
 }
 
+// All triangles by the column of the grid, a spacing wide, that they lie in.
+class Columns {
+public:
+  Columns(const TissueSurface& surface, const ImageGeometry& grid) : surface_(surface), grid_(grid)
+  {
+    const Eigen::Affine3d toIndex = grid.WorldToIndex();
+    points_.reserve(surface.points.size());
+    for (const Eigen::Vector3f& point : surface.points)
+      points_.emplace_back(toIndex * point.cast<double>());
+    start_.assign(static_cast<std::size_t>(grid.dimensions[0]) * static_cast<std::size_t>(grid.dimensions[1]) + 1, 0);
+    ForAll([this](std::size_t column, std::int32_t) { ++start_[column + 1]; });
+    for (std::size_t column = 1; column < start_.size(); ++column)
+      start_[column] += start_[column - 1];
+    triangles_.resize(start_.back());
+    std::vector<std::size_t> next = start_;
+    ForAll([&](std::size_t column, std::int32_t triangle) { triangles_[next[column]++] = triangle; });
+  }
+
+  /// Whether a triangle has space outside of all bodies on either side, somewhere above the grid.
+  bool BoundsOutside(std::int32_t triangle) const
+  {
+    const Vector3d &a = At(triangle, 0), &b = At(triangle, 1), &c = At(triangle, 2);
+    const Vector3d across = (b - a).cross(c - a);
+    if (!(across.norm() > 0.0))
+      return false;
+    const Vector3d aside = 1e-3 * across.normalized();
+    const int parts = std::clamp(static_cast<int>(std::ceil(std::max((b - a).norm(), (c - a).norm()))), 2, 256);
+    bool isAbove = false;
+    for (int i = 0; i < parts; ++i)
+      for (int j = 0; i + j < parts; ++j) {
+        const Vector3d place = a + (i + 0.31) / parts * (b - a) + (j + 0.36) / parts * (c - a);
+        for (const double side : {1.0, -1.0}) {
+          const Vector3d point = place + side * aside;
+          const std::ptrdiff_t column = ColumnOf(std::floor(point.x()), std::floor(point.y()));
+          if (column < 0)
+            continue;
+          isAbove = true;
+          if (!IsInside(point, static_cast<std::size_t>(column)))
+            return true;
+        }
+      }
+    return !isAbove; // nobody knows
+  }
+
+private:
+  const Vector3d& At(std::int32_t triangle, std::size_t corner) const
+  {
+    return points_[surface_.triangles[static_cast<std::size_t>(triangle)][corner]];
+  }
+  std::ptrdiff_t ColumnOf(double x, double y) const
+  {
+    const bool isThere = x >= 0.0 && y >= 0.0 && x < grid_.dimensions[0] && y < grid_.dimensions[1];
+    return isThere ? static_cast<std::ptrdiff_t>(y) * grid_.dimensions[0] + static_cast<std::ptrdiff_t>(x) : -1;
+  }
+  template <class Function>
+  void ForAll(const Function& function) const
+  {
+    for (std::int32_t triangle = 0; triangle < static_cast<std::int32_t>(surface_.triangles.size()); ++triangle) {
+      Eigen::Vector2d low = At(triangle, 0).head<2>(), high = low;
+      for (const std::size_t corner : {1, 2}) {
+        low = low.cwiseMin(At(triangle, corner).head<2>());
+        high = high.cwiseMax(At(triangle, corner).head<2>());
+      }
+      low = low.array().floor().max(0.0);
+      high = high.array().floor().min(Eigen::Array2d(grid_.dimensions[0] - 1.0, grid_.dimensions[1] - 1.0));
+      for (double y = low.y(); y <= high.y(); y += 1.0)
+        for (double x = low.x(); x <= high.x(); x += 1.0)
+          function(static_cast<std::size_t>(ColumnOf(x, y)), triangle);
+    }
+  }
+  bool IsInside(const Vector3d& point, std::size_t column) const
+  {
+    std::vector<int> turns; // of bodies around the point, from there on
+    for (std::size_t n = start_[column]; n < start_[column + 1]; ++n) {
+      const Vector3d &a = At(triangles_[n], 0), &b = At(triangles_[n], 1), &c = At(triangles_[n], 2);
+      const auto area = [&point](const Vector3d& p, const Vector3d& q) {
+        return (q.x() - p.x()) * (point.y() - p.y()) - (q.y() - p.y()) * (point.x() - p.x());
+      };
+      const double u = area(b, c), v = area(c, a), w = area(a, b), all = u + v + w;
+      if ((u > 0.0) != (v > 0.0) || (v > 0.0) != (w > 0.0) || all == 0.0 ||
+          (u * a.z() + v * b.z() + w * c.z()) / all <= point.z())
+        continue;
+      const auto body = static_cast<std::size_t>(surface_.bodyOfTriangle[static_cast<std::size_t>(triangles_[n])]);
+      turns.resize(std::max(turns.size(), body + 1));
+      turns[body] += all > 0.0 ? 1 : -1;
+    }
+    return std::any_of(turns.begin(), turns.end(), [](int turn) { return turn != 0; });
+  }
+
+  const TissueSurface& surface_;
+  const ImageGeometry& grid_;
+  std::vector<Vector3d> points_; // in spacings
+  std::vector<std::size_t> start_;
+  std::vector<std::int32_t> triangles_;
+};
+
 } // namespace
 
 std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry& grid, double band, const Progress& progress,
@@ -79,13 +177,15 @@ std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry
   };
 
   const Eigen::Affine3d toIndex = grid.WorldToIndex();
+  const Columns columns(surface, grid);
   std::vector<NearTriangle> triangles;
   for (std::size_t triangle = 0; triangle < surface.triangles.size(); ++triangle) {
     NearTriangle corners;
     corners.index = static_cast<std::int32_t>(triangle);
     for (std::size_t n = 0; n < 3; ++n)
       corners.point[n] = (toIndex * surface.points[surface.triangles[triangle][n]].cast<double>()).cwiseProduct(grid.spacing);
-    if (SetBox(corners, grid, grid.spacing.maxCoeff()) && anyOutside(corners) && SetBox(corners, grid, band))
+    if (SetBox(corners, grid, grid.spacing.maxCoeff()) && anyOutside(corners) && columns.BoundsOutside(corners.index) &&
+        SetBox(corners, grid, band))
       triangles.push_back(corners);
   }
 

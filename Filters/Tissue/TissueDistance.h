@@ -7,8 +7,8 @@
 namespace echorama {
 
 /// How far each point of a grid lies from all bodies together, mm, x fastest: negative inside, and no further than \a band
-/// either way. Outside of them distances are exact. Inside, surfaces between two bodies do not count, but where such a surface
-/// runs within a spacing of the outermost it may pass for it.
+/// either way. Outside of them distances are exact. Inside, surfaces between two bodies do not count, however near the outermost
+/// they run.
 /// \param nearest becomes the triangle that each point is nearest to, -1 beyond the band
 /// \throws Error(InvalidParameter) for a band that is not positive, and as BodiesOn
 std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry& grid, double band,

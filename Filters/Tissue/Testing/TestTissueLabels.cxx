@@ -145,3 +145,19 @@ TEST(TissueDistance, OfABox)
   EXPECT_FLOAT_EQ(at(4, 4, 3), -0.5f);
   EXPECT_FLOAT_EQ(at(0, 0, 0), 3.0f);
 }
+
+// A layer of a third of a spacing over a block: inside of both, the surface is the layer's outer one.
+TEST(TissueDistance, OfAThinLayer)
+{
+  TissueSurface box = Nothing();
+  AddBox(box, {-6.0f, -6.0f, -6.0f}, {6.0f, 6.0f, 6.0f}, 1);
+  AddBox(box, {-5.7f, -5.7f, -5.7f}, {5.7f, 5.7f, 5.7f}, 2);
+  const auto distances = DistancesOn(box, Grid(16, 1.0, {-7.5, -7.5, -7.5}), 4.0);
+  const auto at = [&distances](int i, int j, int k) { return distances[static_cast<std::size_t>((k * 16 + j) * 16 + i)]; };
+  for (int k = 1; k < 15; ++k)
+    for (int j = 2; j < 14; ++j)
+      for (int i = 2; i < 14; ++i) {
+        const double outside = std::max({std::abs(i - 7.5), std::abs(j - 7.5), std::abs(k - 7.5)}) - 6.0;
+        EXPECT_NEAR(at(i, j, k), std::max(outside, -4.0), 1e-5) << i << " " << j << " " << k;
+      }
+}
