@@ -14,8 +14,8 @@ namespace {
 
 constexpr int FewestNodes = 6;          // along each axis of the coarsest lattice
 constexpr double CoarseTolerance = 0.1; // of a cell, where only a first guess is wanted
-constexpr double LeastStep = 0.1;       // of a cell, between what can be reached and what can not
-constexpr int MostNewtonSteps = 30, MostNewtonStepsOfAPart = 20;
+constexpr double LeastStep = 0.02;      // of a cell, between what can be reached and what can not
+constexpr int MostNewtonSteps = 30;
 
 std::array<int, 3> CoarseNodes(const std::array<int, 3>& nodes)
 {
@@ -369,8 +369,7 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     solver.Contact().Place(shape_, Interpolate(from, to, next), parameters_.friction);
     TissueWork work;
     work.loadSteps = 1;
-    const int most = travel > 0.0 ? MostNewtonStepsOfAPart : MostNewtonSteps; // weight comes all at once
-    const bool isFound = solver.Solve(false, tolerance, most, work, progress.Part(at, next));
+    const bool isFound = solver.Solve(false, tolerance, MostNewtonSteps, work, progress.Part(at, next));
     work_ += work;
     if (n == 0)
       finestWork_ += work;
