@@ -22,12 +22,41 @@ struct SceneRun::Moved {
   double pressSeconds = 0.0, gelSeconds = 0.0;
 };
 
+namespace {
+
+// Where probes press, with as much around as moves noticeably: some two widths of a face.
+Eigen::AlignedBox3d PressedRegion(const SynthesisScene& scene, const ProbeGeometry& probe, const std::vector<SceneView>& views)
+{
+  Eigen::AlignedBox3d region;
+  if (!scene.press)
+    return region;
+  const ProbeShape shape(probe, scene.press->head);
+  const Eigen::Vector2d low = shape.Low(), high = shape.High();
+  const double around = std::max(high.x() - low.x(), high.y() - low.y());
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(low.x() - around, low.y() - around, -around),
+                                Eigen::Vector3d(high.x() + around, high.y() + around, 2.0 * around));
+  const auto add = [&](const Pose& pose) {
+    for (int corner = 0; corner < 8; ++corner)
+      region.extend(pose * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)));
+  };
+  for (const SceneView& view : views) {
+    for (const SceneState& state : view.states)
+      add(state.probe.pose);
+    for (const TimedPose& moment : view.way)
+      add(moment.pose);
+  }
+  return region;
+}
+
+} // namespace
+
 SceneRun::~SceneRun() = default;
 
 SceneRun::SceneRun(SynthesisScene scene, int landmarks, const MeshReader& readMesh, GelSurfacer surfacer,
                    const Progress& progress)
   : scene_(std::move(scene)), surfacer_(std::move(surfacer)), views_(ViewsOf(scene_)), parameters_(scene_.Parameters()),
-    tissue_(std::make_unique<SceneTissue>(scene_, readMesh, notes_, progress.Part(0.0, 0.9)))
+    tissue_(std::make_unique<SceneTissue>(scene_, PressedRegion(scene_, parameters_.probe, views_), readMesh, notes_,
+                                          progress.Part(0.0, 0.9)))
 {
   if (scene_.press || scene_.gel)
     pressed_ = tissue_->InAll(static_cast<int>(views_.size()));

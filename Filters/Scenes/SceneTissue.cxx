@@ -176,8 +176,8 @@ private:
 
 } // namespace
 
-SceneTissue::SceneTissue(const SynthesisScene& scene, const MeshReader& readMesh, std::vector<std::string>& notes,
-                         const Progress& progress)
+SceneTissue::SceneTissue(const SynthesisScene& scene, const Eigen::AlignedBox3d& pressed, const MeshReader& readMesh,
+                         std::vector<std::string>& notes, const Progress& progress)
 {
   SceneTissueMaker maker(scene, readMesh, notes);
   const double count = static_cast<double>(scene.tissue.size());
@@ -185,7 +185,7 @@ SceneTissue::SceneTissue(const SynthesisScene& scene, const MeshReader& readMesh
     const SceneItem& item = scene.tissue[i];
     TissueSurface surface = maker.Make(item, progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count));
     if (scene.press)
-      RefineSurface(surface, scene.press->lattice.spacingMm); // a box of twelve triangles could not be bent
+      RefineSurface(surface, scene.press->lattice.spacingMm, pressed); // a box of twelve triangles could not be bent
     items_.push_back({std::move(surface), item.firstView, item.lastView});
   }
   background_ = maker.Background();

@@ -14,10 +14,11 @@ using MeshReader = std::function<TriangleSurface(const std::string& path)>;
 /// All bodies of a scene. A calibration rig brings its own water, which becomes the background where the scene's is water.
 class SceneTissue {
 public:
+  /// \param pressed where a scene that presses bends surfaces, which are divided as finely as its lattice there
   /// \param notes gets a sentence for each mesh that has faults, and for each packing that was saturated
   /// \throws Error(InvalidParameter) of an item's own check, what \a readMesh throws, Error(Cancelled).
-  SceneTissue(const SynthesisScene& scene, const MeshReader& readMesh, std::vector<std::string>& notes,
-              const Progress& progress = {});
+  SceneTissue(const SynthesisScene& scene, const Eigen::AlignedBox3d& pressed, const MeshReader& readMesh,
+              std::vector<std::string>& notes, const Progress& progress = {});
 
   /// All of it, whenever it is there.
   TissueSurface All() const;

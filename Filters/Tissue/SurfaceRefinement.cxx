@@ -12,7 +12,10 @@ namespace {
 
 class Refinement {
 public:
-  Refinement(TissueSurface& surface, double longestMm) : surface_(surface), longestSquared_(longestMm * longestMm) {}
+  Refinement(TissueSurface& surface, double longestMm, const Eigen::AlignedBox3d& region)
+    : surface_(surface), longestSquared_(longestMm * longestMm), region_(region)
+  {
+  }
 
   // Whether anything was too long.
   bool Pass()
@@ -40,6 +43,8 @@ private:
   {
     const Eigen::Vector3d from = surface_.points[a].cast<double>(), to = surface_.points[b].cast<double>();
     if ((to - from).squaredNorm() <= longestSquared_)
+      return whole;
+    if (!region_.isEmpty() && !Eigen::AlignedBox3d(from.cwiseMin(to), from.cwiseMax(to)).intersects(region_))
       return whole;
     const std::uint64_t key = static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b);
     const auto [place, isNew] = middles_.try_emplace(key, static_cast<std::uint32_t>(surface_.points.size()));
@@ -86,6 +91,7 @@ private:
 
   TissueSurface& surface_;
   double longestSquared_;
+  Eigen::AlignedBox3d region_;
   std::unordered_map<std::uint64_t, std::uint32_t> middles_;
   std::vector<Triangle> triangles_;
   std::vector<std::int32_t> bodies_;
@@ -93,10 +99,10 @@ private:
 
 } // namespace
 
-void RefineSurface(TissueSurface& surface, double longestMm)
+void RefineSurface(TissueSurface& surface, double longestMm, const Eigen::AlignedBox3d& region)
 {
   CheckRange("the longest edge (mm)", longestMm, 1e-3, 1e9);
-  Refinement refinement(surface, longestMm);
+  Refinement refinement(surface, longestMm, region);
   while (refinement.Pass())
     ;
 }

@@ -75,6 +75,25 @@ TEST(SurfaceRefinement, AClosedSurfaceStaysClosed)
   EXPECT_EQ(CheckSurface(box).Faults(), "");
 }
 
+TEST(SurfaceRefinement, LeavesWhatLiesOutsideOfTheRegion)
+{
+  TissueSurface part = BoxAndTetrahedron(), whole = part;
+  const Eigen::AlignedBox3d region(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(10, 10, 10));
+  RefineSurface(part, 1.0, region);
+  RefineSurface(whole, 1.0);
+  EXPECT_LT(part.triangles.size(), 0.6 * static_cast<double>(whole.triangles.size()));
+  double longest = 0.0;
+  for (const auto& corners : part.triangles)
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const Eigen::Vector3d from = part.points[corners[corner]].cast<double>(),
+                            to = part.points[corners[(corner + 1) % 3]].cast<double>();
+      if (region.contains(from) || region.contains(to))
+        longest = std::max(longest, (to - from).norm());
+    }
+  EXPECT_LE(longest, 1.0);
+  EXPECT_NEAR(VolumeOf(part, 0), 40.0 * 7.0 * 3.0, 1e-3); // no gap between what is fine and what is coarse
+}
+
 TEST(SurfaceRefinement, RefusesALengthOfNothing)
 {
   TissueSurface surface = BoxAndTetrahedron();
