@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Filters/Scenes/SceneRun.h"
+#include "Testing/Sanitized.h"
 #include <gtest/gtest.h>
 #include <numeric>
 
@@ -195,6 +196,7 @@ TEST(SceneRun, PressedBodiesThatComeAndGoMoveWithTheTissue)
 
 TEST(SceneRun, PlanesOfASweepThatMovesSeeTheTissueOfTheirMoment)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const auto scene = [](int states) {
     return R"("background": "gel", "press": {"spacingMm": 5}, "materials": {"dense": {"like": "muscle", "density": 2500}}, "probe": {"preset": "linear", "elements": 24, "sweepSteps": 8,
         "sweepWidthMm": 20, "samples": 240, "depthMinMm": 2, "depthMaxMm": 50}, "tissue": [
@@ -224,6 +226,7 @@ TEST(SceneRun, PlanesOfASweepThatMovesSeeTheTissueOfTheirMoment)
 
 TEST(SceneRun, OnAPathGelGoesWithTheProbeAndStaysOnTheSkin)
 {
+  ECHORAMA_SKIP_SANITIZED();
   // Down to 1 mm above the skin, up again, 45 mm on, and down again.
   const std::string members = R"("background": "air", "gel": {"amountMl": 8, "cellMm": 4}, "tissue": [
       {"name": "block", "box": {"centre": [20, 0, 32], "size": [150, 70, 60], "material": "muscle"}}],
