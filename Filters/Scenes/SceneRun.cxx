@@ -83,6 +83,13 @@ bool SceneRun::Continues() const
   return scene_.PathViews() && (scene_.gel || (scene_.press && scene_.press->tissue.friction > 0.0));
 }
 
+bool SceneRun::BodiesComeAndGo() const
+{
+  return std::any_of(scene_.tissue.begin(), scene_.tissue.end(), [this](const SceneItem& item) {
+    return item.firstView > 1 || item.lastView < static_cast<int>(views_.size());
+  });
+}
+
 void SceneRun::Begin()
 {
   moved_ = std::make_unique<Moved>();
@@ -128,7 +135,7 @@ void SceneRun::Move(const TimedPose& probe, const Progress& progress)
   start = Clock::now();
   if (scene_.gel) {
     const ProbeHead head = scene_.press ? scene_.press->head : ProbeHead();
-    double seconds = moved.probe ? probe.time - moved.probe->time : 0.0;
+    const double seconds = moved.probe ? probe.time - moved.probe->time : 0.0;
     if (!moved.gel)
       moved.gel = std::make_unique<GelMotion>(pressed_, PlacedProbe{parameters_.probe, probe.pose}, head, scene_.gel->material,
                                               scene_.gel->coat, progress.Part(after, after + 0.1 * (1.0 - after)));
@@ -178,11 +185,16 @@ void SceneRun::Scan(std::size_t number, std::size_t index, SceneScan& scan, cons
   std::optional<AcousticScene> ownScene;
   const AcousticScene* acoustic = acoustic_.get();
   if (!acoustic) {
-    TissueSurface tissue = tissue_->In(static_cast<int>(number) + 1);
-    if (moved_ && moved_->press) {
-      tissue = Deformed(std::move(tissue));
-      p.displacement = DisplacementField::Interpolating(body_.nodes, moved_->press->Displacements());
+    TissueSurface tissue;
+    if (moved_ && moved_->tissue && !BodiesComeAndGo())
+      tissue = *moved_->tissue; // the gel has met it already
+    else {
+      tissue = tissue_->In(static_cast<int>(number) + 1);
+      if (moved_ && moved_->press)
+        tissue = Deformed(std::move(tissue));
     }
+    if (moved_ && moved_->press)
+      p.displacement = DisplacementField::Interpolating(body_.nodes, moved_->press->Displacements());
     if (moved_ && moved_->gel) {
       const Clock::time_point start = Clock::now();
       GelCoat coat = moved_->gel->Look(view.states.size() == 1 && view.steps.empty() && !Continues(), progress.Part(0.0, 0.1));
@@ -231,10 +243,7 @@ SceneScan SceneRun::Make(std::size_t number, const Progress& progress)
     throw Error(Error::Kind::InvalidParameter,
                 "there is no view " + std::to_string(number + 1) + "; the scene has " + std::to_string(views_.size()));
   try {
-    const bool changes = scene_.press || scene_.gel || scene_.change.ribShare > 0.0 ||
-                         std::any_of(scene_.tissue.begin(), scene_.tissue.end(), [this](const SceneItem& item) {
-                           return item.firstView > 1 || item.lastView < static_cast<int>(views_.size());
-                         });
+    const bool changes = scene_.press || scene_.gel || scene_.change.ribShare > 0.0 || BodiesComeAndGo();
     if (!changes && !acoustic_)
       acoustic_ = std::make_unique<const AcousticScene>(tissue_->All(), progress.Part(0.0, 0.05));
     const bool continues = Continues();
@@ -243,11 +252,12 @@ SceneScan SceneRun::Make(std::size_t number, const Progress& progress)
     // Views that were left out are passed all the same.
     std::size_t first = continues ? moved_->next : number;
     const double count = static_cast<double>(number - first + 1);
-    for (; continues && first < number; ++first) {
-      for (const TimedPose& probe : views_[first].way)
-        Move(probe, progress);
-      moved_->next = first + 1;
-    }
+    std::vector<TimedPose> passed;
+    for (; continues && first < number; ++first)
+      passed.insert(passed.end(), views_[first].way.begin(), views_[first].way.end());
+    const double begin = std::max(0.05, 1.0 - 1.0 / count), moments = static_cast<double>(passed.size());
+    for (std::size_t n = 0; n < passed.size(); ++n)
+      Move(passed[n], progress.Part(begin * static_cast<double>(n) / moments, begin * static_cast<double>(n + 1) / moments));
     SceneScan scan;
     scan.parameters = parameters_;
     SynthesisParameters& p = scan.parameters;
@@ -260,7 +270,7 @@ SceneScan SceneRun::Make(std::size_t number, const Progress& progress)
     p.changeSeed = number + 1;
     if (moved_)
       moved_->pressSeconds = moved_->gelSeconds = 0.0;
-    Drive(number, scan, progress.Part(std::max(0.05, 1.0 - 1.0 / count), 1.0));
+    Drive(number, scan, progress.Part(begin, 1.0));
     if (moved_) {
       moved_->next = number + 1;
       scan.pressSeconds = moved_->pressSeconds;

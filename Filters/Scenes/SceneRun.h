@@ -55,6 +55,7 @@ public:
 private:
   struct Moved;
   bool Continues() const;
+  bool BodiesComeAndGo() const;
   void Begin();
   void Move(const TimedPose& probe, const Progress& progress);
   void Drive(std::size_t view, SceneScan& scan, const Progress& progress);
