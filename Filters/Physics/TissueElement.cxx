@@ -3,8 +3,10 @@
 //   W = m/2 (|F|^2 - 3) - m/2 log((|F|^2 + 1) / 4) + l/2 (J - 1)^2 - 3/4 m (J - 1),   m = 4/3 mu,  l + l' = lambda + 5/6 mu
 // with the changes of volume paid for twice: l = min(m, ...) at every integration point, which keeps each of them from
 // collapsing, and the rest, l'/2 (mean J - 1)^2, by the volume of the cell as a whole. Charging everything to the points would
-// lock: trilinear cells cannot bend and keep the volume of all eight points. Nothing is singular, not even in cells that
-// are turned inside out, so that any guess may be a start.
+// lock: trilinear cells cannot bend and keep the volume of all eight points. That law lets a cell vanish for a finite force, and
+// one of soft fat between stiff skin and a head would; a point that has lost half of its volume therefore resists more and more:
+//   W += 100/3 m (1/2 - J)^3
+// Nothing is singular, not even in cells that are turned inside out, so that any guess may be a start.
 //
 // Eight cells of a row are computed at once, a lane each. Rows of cells write to the nodes on both of their sides: layers are
 // therefore done in two turns, even ones and odd ones, and within a layer in order.
@@ -19,6 +21,7 @@ namespace echorama {
 namespace {
 
 constexpr int Lanes = LatticeShape::Lanes;
+constexpr double CollapseStarts = 0.5, CollapseStiffness = 100.0; // J, and in m
 
 using FloatPack [[gnu::vector_size(Lanes * sizeof(float))]] = float;
 using DoublePack [[gnu::vector_size(Lanes * sizeof(double))]] = double;
@@ -113,6 +116,16 @@ template <class Pack>
          h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) + h[2] * (h[3] * h[7] - h[4] * h[6]);
 }
 
+// How far J lies below where collapse starts, or 0.
+template <class Pack>
+[[gnu::always_inline]] inline Pack Collapse(const Pack& swelling)
+{
+  Pack collapse = static_cast<std::decay_t<decltype(Pack{}[0])>>(CollapseStarts - 1.0) - swelling;
+  for (int l = 0; l < Lanes; ++l)
+    collapse[l] = collapse[l] > 0 ? collapse[l] : 0;
+  return collapse;
+}
+
 template <class Pack>
 [[gnu::always_inline]] inline void Cofactor(const Pack (&f)[9], Pack (&c)[9])
 {
@@ -148,7 +161,9 @@ ECHORAMA_HOT void CellForces(const CellRow& row, double* energies)
     DoublePack logarithm;
     for (int l = 0; l < Lanes; ++l)
       logarithm[l] = std::log1p(0.25 * stretch[l]);
-    energy += 0.5 * moduli.m * (stretch - logarithm) + swelling[g] * (0.5 * moduli.local * swelling[g] - 0.75 * moduli.m);
+    const DoublePack collapse = Collapse(swelling[g]);
+    energy += 0.5 * moduli.m * (stretch - logarithm) + swelling[g] * (0.5 * moduli.local * swelling[g] - 0.75 * moduli.m) +
+              CollapseStiffness / 3.0 * moduli.m * collapse * collapse * collapse;
     if (!row.force[0])
       continue;
     f[0] += 1.0;
@@ -156,7 +171,8 @@ ECHORAMA_HOT void CellForces(const CellRow& row, double* energies)
     f[8] += 1.0;
     Cofactor(f, cofactor);
     const DoublePack stiff = moduli.m * (1.0 - 1.0 / (stretch + 4.0));
-    const DoublePack pressure = moduli.local * swelling[g] - 0.75 * moduli.m + moduli.shared * mean;
+    const DoublePack pressure =
+        moduli.local * swelling[g] - 0.75 * moduli.m + moduli.shared * mean - CollapseStiffness * moduli.m * collapse * collapse;
     for (int a = 0; a < 8; ++a) {
       const double* slope = row.shapes->gradient[g][a];
       for (int c = 0; c < 3; ++c)
@@ -206,14 +222,17 @@ ECHORAMA_HOT void CellStiffness(const CellRow& row, float* const* rows, int padd
     Cofactor(f, cofactor);
     const FloatPack inverse = 1.0f / (size + 1.0f);
     stiff[g] = weight * moduli.m * (1.0f - inverse);
-    FloatPack pressure = moduli.local * swelling[g] - 0.75f * moduli.m + moduli.shared * mean;
+    const FloatPack collapse = Collapse(swelling[g]);
+    constexpr auto collapseStiffness = static_cast<float>(CollapseStiffness);
+    FloatPack pressure =
+        moduli.local * swelling[g] - 0.75f * moduli.m + moduli.shared * mean - collapseStiffness * moduli.m * collapse * collapse;
     for (int l = 0; tame && l < Lanes; ++l)
       pressure[l] = std::min(std::max(pressure[l], -0.75f * moduli.m[l]), 0.25f * moduli.m[l]);
     pressure *= weight;
     FloatPack stretching, bulging;
     for (int l = 0; l < Lanes; ++l) {
       stretching[l] = std::sqrt(2.0f * weight * moduli.m[l]) * inverse[l];
-      bulging[l] = std::sqrt(weight * moduli.local[l]);
+      bulging[l] = std::sqrt(weight * (moduli.local[l] + 2.0f * collapseStiffness * moduli.m[l] * collapse[l]));
     }
     for (int n = 0; n < 9; ++n)
       turned[g][n] = pressure * f[n];

@@ -71,11 +71,14 @@ LatticeField<float> Times(const LatticeMatrix& matrix, const LatticeField<float>
   return rounded;
 }
 
-TEST(TissueElement, ForceIsTheDerivativeOfTheEnergyAndStiffnessThatOfTheForce)
+// squeezed: by which part along z.
+void ExpectDerivatives(double squeezed)
 {
   const LatticeShape shape(Nodes);
   const TissueCells cells = Block(Nodes, 7.0f, 300.0f);
-  const LatticeField<double> u = RandomField<double>(shape, 0.1, 1), v = RandomField<double>(shape, 1.0, 2);
+  LatticeField<double> u = RandomField<double>(shape, 0.1 * (1.0 - squeezed), 1);
+  const LatticeField<double> v = RandomField<double>(shape, 1.0, 2);
+  ForNodes(Nodes, [&](int i, int j, int k) { u.Component(2)[shape.At(i, j, k)] -= squeezed * Spacing.z() * k; });
   const auto moved = [&](double by) {
     LatticeField<double> field = u;
     for (std::size_t n = 0; n < field.Data().size(); ++n)
@@ -102,6 +105,36 @@ TEST(TissueElement, ForceIsTheDerivativeOfTheEnergyAndStiffnessThatOfTheForce)
     size = std::max(size, std::abs(exact));
   }
   EXPECT_LT(worst, 1e-5 * size);
+}
+
+TEST(TissueElement, ForceIsTheDerivativeOfTheEnergyAndStiffnessThatOfTheForce)
+{
+  ExpectDerivatives(0.0);
+}
+
+TEST(TissueElement, SoItIsOfCellsThatHaveLostMostOfTheirVolume)
+{
+  ExpectDerivatives(0.7);
+}
+
+// Of a cube whose height shrinks by a part: the pressure on it must grow without an end that a finite load reaches. The law
+// without its resistance to collapse bears at most some m (here 4/3 of 7 kPa and 0.3 of it) before the cell vanishes.
+TEST(TissueElement, ACellThatVanishesResistsMoreAndMore)
+{
+  const LatticeShape shape({2, 2, 2});
+  const TissueCells cells = Block(shape.nodes, 7.0f, 7.0f);
+  const auto pressure = [&](double height) {
+    LatticeField<double> u(shape), force(shape);
+    ForNodes(shape.nodes, [&](int i, int j, int k) { u.Component(2)[shape.At(i, j, k)] = (height - 1.0) * k; });
+    TissueForce(cells, Eigen::Vector3d::Ones(), u, force);
+    double sum = 0.0;
+    ForNodes(shape.nodes, [&](int i, int j, int k) { sum -= k * force.Component(2)[shape.At(i, j, k)]; });
+    return sum; // kPa: the face is 1 mm^2
+  };
+  const double m = 4.0 / 3.0 * 7.0;
+  EXPECT_GT(pressure(0.25), 5.0 * m);
+  EXPECT_GT(pressure(0.01), 20.0 * m);
+  EXPECT_GT(pressure(-0.1), pressure(0.01));
 }
 
 // A uniform strain: energy of linear elasticity, no force on inner nodes. Rotations cost nothing.

@@ -38,15 +38,21 @@ double Farthest(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::
   return farthest;
 }
 
-// Of all nodes, how deep the deepest lies in the probe.
+// Of the nodes of the skin, how deep the deepest lies in the probe. (Contact is theirs alone: where a face bends sharply over the
+// rim of a head, the node below it can lie a tenth of a cell inside.)
 double Depth(const TissueBody& body, const TissuePress& press, const ProbeShape& probe, const Pose& pose)
 {
+  const auto& size = body.nodes.dimensions;
+  const auto isSkin = [&size](int i, int j, int k) {
+    return i == 0 || j == 0 || k == 0 || i + 1 == size[0] || j + 1 == size[1] || k + 1 == size[2];
+  };
   const std::vector<Eigen::Vector3d> u = press.Displacements();
   double depth = 0.0;
   std::size_t n = 0;
   ForNodes(body.nodes.dimensions, [&](int i, int j, int k) {
     const Eigen::Vector3d place = body.nodes.origin + body.nodes.spacing.cwiseProduct(Eigen::Vector3d(i, j, k)) + u[n++];
-    depth = std::max(depth, -probe.Distance(pose.inverse() * place));
+    if (isSkin(i, j, k))
+      depth = std::max(depth, -probe.Distance(pose.inverse() * place));
   });
   return depth;
 }
