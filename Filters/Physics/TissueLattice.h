@@ -17,10 +17,12 @@ ParameterList Describe(TissueLatticeParameters& p);
 /// \throws Error(BadInput) when there is no body, Error(InvalidParameter) when it takes too many nodes
 ImageGeometry TissueLatticeOf(const TissueSurface& surface, const TissueLatticeParameters& parameters);
 
-/// Cells are of what lies in their middle. The background is none, nor is gas. Fluids, which have no stiffness, are taken as the
-/// softest tissue, since they keep their volume; very stiff bodies that nothing holds, as stones, are taken as stiff as the
-/// solver bears well. \throws as TissueLatticeOf and BodiesOn; Error(InvalidParameter) for a held material that is none of the
-/// surface's or of the standard ones
+/// A cell is of the mean of what lies in 64 of its points, and empty where fewer than half of these are in tissue; what they have
+/// goes to the fullest cell beside it, so that no layer is lost that is thinner than a cell: stiffness along a layer and weight
+/// are kept. The background is none, nor is gas. Fluids, which have no stiffness, are taken as the softest tissue, since they
+/// keep their volume; very stiff bodies that nothing holds, as stones, are taken as stiff as the solver bears well. Cells are
+/// held where half of their points are. \throws as TissueLatticeOf and BodiesOn; Error(InvalidParameter) for a held material that
+/// is none of the surface's or of the standard ones
 TissueBody TissueBodyOf(const TissueSurface& surface, const TissueLatticeParameters& parameters, const Progress& progress = {});
 
 } // namespace echorama
