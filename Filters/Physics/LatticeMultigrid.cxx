@@ -2,6 +2,10 @@
 // Nearly incompressible tissue is what makes this hard: Chebyshev polynomials of low degree over the blocks of nodes stand it,
 // and all their work is products with the matrix, which run along x. A V-cycle is symmetric, since the smoother is the same
 // before and after. Sums are taken slice by slice, in order.
+//
+// Links are exact in the products of conjugate gradients. Each level of the preconditioner has its own image of them (a Galerkin
+// product also), so that bodies that touch move as one on coarse levels at little energy; only what lies between nodes that
+// are no neighbours there is replaced by something diagonal that is stiffer.
 #include "LatticeMultigrid.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -9,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace echorama {
 namespace {
@@ -37,26 +42,6 @@ ECHORAMA_HOT void ChebyshevRow(int count, float keep, float take, const float* p
   }
 }
 
-double Dot(const LatticeField<float>& a, const LatticeField<float>& b)
-{
-  const LatticeShape& shape = a.Shape();
-  return ParallelSum<double>(shape.nodes[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
-    double sum = 0.0;
-    for (int c = 0; c < 3; ++c)
-      for (int j = 0; j < shape.nodes[1]; ++j) {
-        const std::ptrdiff_t at = shape.At(0, j, static_cast<int>(k));
-        const float *x = a.Component(c) + at, *y = b.Component(c) + at;
-        double lanes[LatticeShape::Lanes] = {};
-        for (int i = 0; i < shape.Padded(); i += LatticeShape::Lanes)
-          for (int l = 0; l < LatticeShape::Lanes; ++l)
-            lanes[l] += static_cast<double>(x[i + l]) * static_cast<double>(y[i + l]);
-        for (const double lane : lanes)
-          sum += lane;
-      }
-    return sum;
-  });
-}
-
 // a = a * scale + b * factor, slice by slice.
 void Combine(LatticeField<float>& a, float scale, const LatticeField<float>& b, float factor)
 {
@@ -83,6 +68,26 @@ void Scaled(const LatticeField<float>& in, const std::vector<float>& scale, Latt
 }
 
 } // namespace
+
+double SumOfProducts(const LatticeField<float>& a, const LatticeField<float>& b)
+{
+  const LatticeShape& shape = a.Shape();
+  return ParallelSum<double>(shape.nodes[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
+    double sum = 0.0;
+    for (int c = 0; c < 3; ++c)
+      for (int j = 0; j < shape.nodes[1]; ++j) {
+        const std::ptrdiff_t at = shape.At(0, j, static_cast<int>(k));
+        const float *x = a.Component(c) + at, *y = b.Component(c) + at;
+        double lanes[LatticeShape::Lanes] = {};
+        for (int i = 0; i < shape.Padded(); i += LatticeShape::Lanes)
+          for (int l = 0; l < LatticeShape::Lanes; ++l)
+            lanes[l] += static_cast<double>(x[i + l]) * static_cast<double>(y[i + l]);
+        for (const double lane : lanes)
+          sum += lane;
+      }
+    return sum;
+  });
+}
 
 LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen::Vector3d& spacing, std::vector<float> live)
 {
@@ -125,12 +130,8 @@ LatticeMultigrid::LatticeMultigrid(const std::array<int, 3>& nodes, const Eigen:
 void LatticeMultigrid::Prepare()
 {
   levels_.front().matrix.KeepOnly(live_);
-  for (std::size_t n = 0; n < levels_.size(); ++n) {
+  for (std::size_t n = 0; n + 1 < levels_.size(); ++n) {
     Level& level = levels_[n];
-    level.packed.Pack(level.matrix);
-    if (n + 1 == levels_.size())
-      break;
-    EstimateLargest(level);
     const LatticeMatrix* from = &level.matrix;
     auto next = level.between.begin();
     for (const int axis : {2, 1, 0})
@@ -139,6 +140,12 @@ void LatticeMultigrid::Prepare()
         from->Coarsen(axis, to);
         from = &to;
       }
+  }
+  AddLinks();
+  for (std::size_t n = 0; n < levels_.size(); ++n) {
+    levels_[n].packed.Pack(levels_[n].matrix);
+    if (n + 1 < levels_.size())
+      EstimateLargest(levels_[n]);
   }
   const Level& last = levels_.back();
   const LatticeShape& shape = last.matrix.Shape();
@@ -172,6 +179,59 @@ void LatticeMultigrid::Prepare()
     coarsest_.compute(shifted);
     if (coarsest_.info() == Eigen::Success || shift > 1e3)
       break;
+  }
+}
+
+void LatticeMultigrid::AddLinks()
+{
+  apart_.clear();
+  for (LatticeLink link : links_) {
+    const LatticeShape& finest = levels_.front().matrix.Shape();
+    const auto isHeld = [&](const auto& node) {
+      return live_[static_cast<std::size_t>(finest.At(node.first[0], node.first[1], node.first[2]))] == 0.0f;
+    };
+    link.nodes.erase(std::remove_if(link.nodes.begin(), link.nodes.end(), isHeld), link.nodes.end());
+    for (std::size_t n = 0; n < levels_.size(); ++n) {
+      LatticeMatrix& matrix = levels_[n].matrix;
+      const auto add = [&](const std::array<int, 3>& node, int offset, double factor) {
+        for (int entry = 0; entry < 9; ++entry)
+          matrix.At(node[0], node[1], node[2], offset, entry / 3, entry % 3) +=
+              static_cast<float>(factor * link.stiffness(entry / 3, entry % 3));
+      };
+      for (std::size_t a = 0; a < link.nodes.size(); ++a)
+        for (std::size_t b = a; b < link.nodes.size(); ++b) {
+          const auto& [first, weight] = link.nodes[a];
+          const auto& [second, other] = link.nodes[b];
+          const int d[3] = {second[0] - first[0], second[1] - first[1], second[2] - first[2]};
+          const double factor = weight * other;
+          if (std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])}) <= 1) {
+            const int offset = LatticeMatrix::Offset(d[0], d[1], d[2]);
+            add(offset < LatticeMatrix::Own ? second : first, std::max(offset, 26 - offset), factor);
+            continue;
+          }
+          add(first, LatticeMatrix::Own, std::abs(factor));
+          add(second, LatticeMatrix::Own, std::abs(factor));
+          if (n == 0)
+            apart_.push_back({{finest.At(first[0], first[1], first[2]), finest.At(second[0], second[1], second[2])},
+                              factor < 0.0 ? -1.0f : 1.0f,
+                              (std::abs(factor) * link.stiffness).cast<float>()});
+        }
+      // To the nodes of the next level.
+      std::map<std::array<int, 3>, double> nodes;
+      for (const auto& [node, weight] : link.nodes)
+        for (int corner = 0; corner < 8; ++corner) {
+          std::array<int, 3> to = node;
+          double part = weight;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            const bool isHigh = (corner >> axis & 1) != 0, isBetween = levels_[n].halved[axis] && node[axis] % 2 == 1;
+            to[axis] = (levels_[n].halved[axis] ? node[axis] / 2 : node[axis]) + (isHigh ? 1 : 0);
+            part *= isBetween ? 0.5 : isHigh ? 0.0 : 1.0;
+          }
+          if (part != 0.0)
+            nodes[to] += part;
+        }
+      link.nodes.assign(nodes.begin(), nodes.end());
+    }
   }
 }
 
@@ -227,7 +287,8 @@ void LatticeMultigrid::EstimateLargest(Level& level)
         ChebyshevRow(shape.nodes[0], 0.0f, -1.0f, product.data(), shape.Padded(), right, inverse, value, step, next);
       }
     });
-    const double before = std::sqrt(Dot(level.other, level.other)), after = std::sqrt(Dot(level.mode, level.mode));
+    const double before = std::sqrt(SumOfProducts(level.other, level.other)),
+                 after = std::sqrt(SumOfProducts(level.mode, level.mode));
     if (!(before > 0.0 && after > 0.0 && std::isfinite(after)))
       break;
     largest = after / before;
@@ -405,7 +466,7 @@ LatticeMultigrid::Result LatticeMultigrid::Solve(const LatticeField<float>& b, L
   for (; result.steps < maximumSteps; ++result.steps) {
     progress(0.0);
     Cycle();
-    const double now = Dot(residual_, correction_);
+    const double now = SumOfProducts(residual_, correction_);
     if (result.steps == 0)
       first = now;
     if (!(first > 0.0) || !std::isfinite(now))
@@ -424,7 +485,12 @@ LatticeMultigrid::Result LatticeMultigrid::Solve(const LatticeField<float>& b, L
           std::copy_n(product.data() + c * shape.Padded(), shape.nodes[0], product_.Component(c) + shape.At(0, j, k));
       }
     });
-    const double curvature = Dot(direction_, product_);
+    for (const Apart& apart : apart_) {
+      const Eigen::Vector3f push = apart.stiffness * (direction_.Get(apart.at[0]) - apart.sign * direction_.Get(apart.at[1]));
+      product_.Set(apart.at[0], product_.Get(apart.at[0]) - push);
+      product_.Set(apart.at[1], product_.Get(apart.at[1]) + apart.sign * push);
+    }
+    const double curvature = SumOfProducts(direction_, product_);
     if (!(curvature > 0.0)) {
       result.isConvex = false;
       if (result.steps == 0)

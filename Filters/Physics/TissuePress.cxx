@@ -84,12 +84,11 @@ ParameterList Describe(TissuePressParameters& p)
 struct TissuePress::Level {
   Level(TissueCells cells, const LatticeShape& shape, const Eigen::Vector3d& spacing, std::vector<float> live,
         const Eigen::Vector3d& gravity)
-    : solver(std::move(cells), shape, spacing, std::move(live), gravity), before(shape)
+    : solver(std::move(cells), shape, spacing, std::move(live), gravity), before(solver.Now())
   {
   }
   TissueSolver solver;
-  LatticeField<double> before;       ///< the displacement when the step began
-  std::vector<double> forcesBefore;  ///< of the contact, by node of the skin
+  TissueSolver::State before;        ///< when the step began
   std::vector<Eigen::Vector3d> held; ///< places of nodes that do not move, mm
 };
 
@@ -251,7 +250,7 @@ void TissuePress::Predict(std::size_t n)
   for (std::size_t m = 0; m < skin.size(); ++m) {
     const auto at = static_cast<std::size_t>(skin[m].at);
     isSkin[at] = 1;
-    pressure[at] = (skin[m].force - coarse.forcesBefore[m]) / skin[m].area;
+    pressure[at] = (skin[m].force - coarse.before.contact[m].force) / skin[m].area;
     drag.Set(skin[m].at, skin[m].drag / skin[m].area);
   }
   LatticeField<double>& u = fine.solver.Displacement();
@@ -283,7 +282,7 @@ void TissuePress::Predict(std::size_t n)
           if (!HasCell(coarseCells, ci, cj, ck)) // nothing is known there
             continue;
           const std::ptrdiff_t there = from.At(ci, cj, ck);
-          change += coarse.solver.Displacement().Get(there) - coarse.before.Get(there);
+          change += coarse.solver.Displacement().Get(there) - coarse.before.displacement.Get(there);
           weights += 1.0;
         }
         if (weights > 0.0)
@@ -311,11 +310,7 @@ void TissuePress::Predict(std::size_t n)
 bool TissuePress::Step(std::size_t n, const Pose& from, const Pose& to, const Progress& progress, double& reached)
 {
   Level& level = *levels_[n];
-  level.before = level.solver.Displacement();
-  const auto nodes = level.solver.Contact().Nodes();
-  level.forcesBefore.clear();
-  for (const auto& node : nodes)
-    level.forcesBefore.push_back(node.force);
+  level.before = level.solver.Now();
   const bool isCoarsest = n + 1 == levels_.size();
   double ignored = 0.0;
   if (!isCoarsest && Step(n + 1, from, to, progress.Part(0.0, 0.3), ignored)) {
@@ -331,8 +326,7 @@ bool TissuePress::Step(std::size_t n, const Pose& from, const Pose& to, const Pr
       finestWork_ += work;
     if (isFound)
       return true;
-    level.solver.Displacement() = level.before;
-    level.solver.Contact().Nodes() = nodes;
+    level.solver.Return(level.before);
   }
   // The last resort on the finest lattice, the rule on the coarsest.
   if (isCoarsest || n == 0)
@@ -344,7 +338,6 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
 {
   Level& level = *levels_[n];
   TissueSolver& solver = level.solver;
-  const auto nodes = solver.Contact().Nodes();
   const double tolerance = n == 0 ? parameters_.toleranceMm : CoarseTolerance * solver.Spacing().minCoeff();
   // Until it touches the probe may go as far as it likes.
   double at = 0.0, size = 1.0, travel = Travel(from, to);
@@ -360,12 +353,11 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
   while (at < 1.0) {
     size = std::min(size, 1.0 - at);
     const double next = at + size > 1.0 - 1e-9 ? 1.0 : at + size;
-    const LatticeField<double> now = solver.Displacement();
-    const auto contacts = solver.Contact().Nodes();
+    const TissueSolver::State now = solver.Now();
     if (lastSize > 0.0) // it goes on as it went
-      for (std::size_t m = 0; m < now.Data().size(); ++m)
-        solver.Displacement().Data()[m] += size / lastSize * (now.Data()[m] - last.Data()[m]);
-    solver.Contact().BeginStep(now); // where the probe was
+      for (std::size_t m = 0; m < last.Data().size(); ++m)
+        solver.Displacement().Data()[m] += size / lastSize * (now.displacement.Data()[m] - last.Data()[m]);
+    solver.Contact().BeginStep(now.displacement); // where the probe was
     solver.Contact().Place(shape_, Interpolate(from, to, next), parameters_.friction);
     TissueWork work;
     work.loadSteps = 1;
@@ -374,20 +366,18 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     if (n == 0)
       finestWork_ += work;
     if (isFound) {
-      last = now;
+      last = now.displacement;
       lastSize = next - at;
       at = next;
       size *= mayGrow && work.newtonSteps < 8 ? 2.0 : 1.0;
     } else {
-      solver.Displacement() = now;
-      solver.Contact().Nodes() = contacts;
+      solver.Return(now);
       if (lastSize == 0.0 || size * travel < 0.5 * solver.Spacing().minCoeff())
         size *= 0.5;
       lastSize = 0.0;  // perhaps the guess was bad, of a long part above all
       mayGrow = false; // what was too far is close to what is impossible
       if (size < least) {
-        solver.Displacement() = level.before;
-        solver.Contact().Nodes() = nodes;
+        solver.Return(level.before);
         reached = at;
         return false;
       }
@@ -419,15 +409,11 @@ void TissuePress::Move(const std::shared_ptr<const ProbeShape>& shape, const Pos
     }
   }
   const std::shared_ptr<const ProbeShape> shapeBefore = shape_;
-  std::vector<std::vector<ProbeContact::Node>> contacts;
-  for (auto& level : levels_) {
-    level->before = level->solver.Displacement();
-    contacts.push_back(level->solver.Contact().Nodes());
-  }
+  for (auto& level : levels_)
+    level->before = level->solver.Now();
   const auto restore = [&] {
     for (std::size_t n = 0; n < levels_.size(); ++n) {
-      levels_[n]->solver.Displacement() = levels_[n]->before;
-      levels_[n]->solver.Contact().Nodes() = contacts[n];
+      levels_[n]->solver.Return(levels_[n]->before);
       levels_[n]->solver.Contact().Place(shapeBefore, pose_, parameters_.friction);
     }
     shape_ = shapeBefore;
@@ -471,46 +457,13 @@ void TissuePress::Move(const std::shared_ptr<const ProbeShape>& shape, const Pos
                                               (free < 1.0 ? " because something rigid is in it" : "") + "; it came " +
                                               NumberText(std::round(10.0 * reached * depth) / 10.0) + " mm far");
   }
-  if (const auto cell = EnteredCell()) {
+  if (const auto cell = finest.Bodies().EnteredCell(finest.Cells(), finest.Displacement())) {
     restore();
     throw Error(Error::Kind::NotPossible, "two pieces of tissue would enter each other at the empty cell (" +
                                               std::to_string((*cell)[0]) + ", " + std::to_string((*cell)[1]) + ", " +
-                                              std::to_string((*cell)[2]) +
-                                              ") between them: contact is computed with the probe alone");
+                                              std::to_string((*cell)[2]) + ") between them");
   }
   pose_ = to;
-}
-
-// The first empty cell, if there is one, across which tissue on one side passed that on the other: along the lines of the lattice
-// they have changed their order.
-std::optional<std::array<int, 3>> TissuePress::EnteredCell() const
-{
-  const TissueSolver& finest = levels_.front()->solver;
-  const TissueCells& cells = finest.Cells();
-  const LatticeShape& shape = finest.Shape();
-  const std::ptrdiff_t strides[3] = {1, shape.row, shape.slice};
-  std::optional<std::array<int, 3>> found;
-  for (std::size_t axis = 0; axis < 3 && !found; ++axis)
-    ForNodes(cells.cells, [&](int i, int j, int k) {
-      const std::array<int, 3> cell{i, j, k};
-      std::array<int, 3> before = cell;
-      --before[axis];
-      if (found || cells.IsTissue(i, j, k) || !cells.IsTissue(before[0], before[1], before[2]))
-        return;
-      std::array<int, 3> end = cell; // the next tissue along the axis
-      while (end[axis] < cells.cells[axis] && !cells.IsTissue(end[0], end[1], end[2]))
-        ++end[axis];
-      if (end[axis] == cells.cells[axis])
-        return;
-      const double gap = finest.Spacing()[static_cast<int>(axis)] * (end[axis] - cell[axis]);
-      const double* along = finest.Displacement().Component(static_cast<int>(axis));
-      for (int corner = 0; corner < 4; ++corner) { // of the faces that look at each other
-        const std::ptrdiff_t offset = (corner & 1) * strides[(axis + 1) % 3] + (corner >> 1) * strides[(axis + 2) % 3];
-        if (gap + along[shape.At(end[0], end[1], end[2]) + offset] - along[shape.At(i, j, k) + offset] < 0.0)
-          found = cell;
-      }
-    });
-  return found;
 }
 
 std::vector<unsigned char> TissuePress::TissueNodes() const

@@ -42,7 +42,8 @@ struct PressedTissue {
 /// Tissue that a probe presses, at rest at every moment. The body is given as it is without the probe and without gravity.
 ///
 /// Lattices of half, a quarter ... of the resolution find a first guess; each step is solved on the coarsest one first, in as
-/// many parts as it takes, and what changes there starts the next finer one.
+/// many parts as it takes, and what changes there starts the next finer one. Pieces of tissue with empty cells between them may
+/// meet, without friction (BodyContact).
 class TissuePress {
 public:
   /// \throws Error(InvalidParameter, BadInput) for materials and bodies that are none, Error(NotPossible) where a piece of tissue
@@ -53,8 +54,8 @@ public:
   TissuePress& operator=(const TissuePress&) = delete;
 
   /// Moves the probe, which must be clear of the tissue at first, straight to \a probeToWorld.
-  /// \throws Error(NotPossible) when this state cannot be reached, with the part of the way in mm that can, and when two pieces
-  /// of tissue would enter each other across empty cells; the tissue is then in the state before
+  /// \throws Error(NotPossible) when this state cannot be reached, with the part of the way in mm that can, and when one piece of
+  /// tissue would enter another by more than a twentieth of a cell; the tissue is then in the state before
   void Move(const std::shared_ptr<const ProbeShape>& shape, const Pose& probeToWorld, const Progress& progress = {});
 
   /// Where every node went, mm along the axes of the world: what was at x is now at x + u. Where there is no tissue, what the
@@ -80,7 +81,6 @@ private:
   bool Walk(std::size_t level, const Pose& from, const Pose& to, const Progress& progress, double& reached);
   void Predict(std::size_t level);
   void CheckTied() const;
-  std::optional<std::array<int, 3>> EnteredCell() const;
 
   TissueBody body_;
   TissuePressParameters parameters_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Newton's method on the energy with a line search. Linear systems are solved roughly while Newton is far off. Contact forces are
-// updated inside of the loop, as soon as steps are short: each update then costs no Newton step of its own.
+// updated inside of the loop, as soon as steps are short: each update then costs no Newton step of its own. What meets what is
+// looked up anew before each step, and stays as it is while the energy is searched along it.
 #include "TissueSolver.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
@@ -38,6 +39,14 @@ void ForSlices(const LatticeShape& shape, const Body& body)
   });
 }
 
+bool TieTheSame(const std::vector<LatticeLink>& a, const std::vector<LatticeLink>& b)
+{
+  const auto isSameNode = [](const auto& x, const auto& y) { return x.first == y.first; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const LatticeLink& x, const LatticeLink& y) {
+    return std::equal(x.nodes.begin(), x.nodes.end(), y.nodes.begin(), y.nodes.end(), isSameNode);
+  });
+}
+
 } // namespace
 
 TissueWork& TissueWork::operator+=(const TissueWork& other)
@@ -52,7 +61,7 @@ TissueWork& TissueWork::operator+=(const TissueWork& other)
 TissueSolver::TissueSolver(TissueCells cells, const LatticeShape& shape, const Eigen::Vector3d& spacing, std::vector<float> live,
                            const Eigen::Vector3d& gravity)
   : cells_(std::move(cells)), shape_(shape), spacing_(spacing), live_(std::move(live)), weight_(shape), displacement_(shape),
-    contact_(cells_, shape, spacing, live_), multigrid_(shape.nodes, spacing, live_)
+    contact_(cells_, shape, spacing, live_), bodies_(cells_, shape, spacing), multigrid_(shape.nodes, spacing, live_)
 {
   // 1 g/cm^3 times 1 m/s^2 is 1e-3 mN/mm^3; a cell gives each corner an eighth.
   const double part = 1e-3 * spacing.prod() / 8.0;
@@ -106,27 +115,47 @@ void TissueSolver::MakeMatrix(bool isNew, bool tame, bool withBends)
     }
   }
   pushed_ = std::move(pushed);
-  if (isNew)
+  if (isNew) {
+    multigrid_.SetLinks(links_);
     multigrid_.Prepare();
+  }
+}
+
+void TissueSolver::Return(const State& state)
+{
+  displacement_ = state.displacement;
+  contact_.Nodes() = state.contact;
+  bodies_.Forces() = state.bodies;
 }
 
 bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, TissueWork& work, const Progress& progress)
 {
-  const LatticeField<double> start = displacement_;
-  const std::vector<ProbeContact::Node> nodes = contact_.Nodes();
+  const State start = Now();
   const double width = spacing_.minCoeff();
   LatticeField<double> force(shape_), trial(shape_), trialForce(shape_);
-  LatticeField<float> right(shape_), step(shape_);
+  LatticeField<float> right(shape_), step(shape_), lastStep(shape_);
   double last = std::numeric_limits<double>::infinity(), moved = last, stored = TissueTerms(displacement_, force);
   bool isFound = false, tame = isGuess;
+  double grip = 1.0, gripOfMatrix = 0.0;
   for (int n = 0; n < maximumSteps && !isFound; ++n) {
     progress(static_cast<double>(n) / maximumSteps);
     ForSlices(shape_, [&](std::size_t at) { trialForce.Data()[at] = force.Data()[at]; });
     contact_.AddForce(displacement_, trialForce);
+    const bool isNear = last < 0.06 * width;
+    if (bodies_.IsPossible()) {
+      bodies_.Find(displacement_);
+      bodies_.AddForce(displacement_, trialForce);
+      grip = isNear ? grip : 1.0;
+      std::vector<LatticeLink> links = bodies_.Stiffness(displacement_, grip);
+      if (!TieTheSame(links, links_) || grip != gripOfMatrix) // the matrix has others
+        moved = std::numeric_limits<double>::infinity();
+      links_ = std::move(links);
+      gripOfMatrix = grip;
+      lastStep = step;
+    }
     ForSlices(shape_, [&](std::size_t at) {
       right.Data()[at] = -live_[at % static_cast<std::size_t>(shape_.size)] * static_cast<float>(trialForce.Data()[at]);
     });
-    const bool isNear = last < 0.06 * width;
     LatticeMultigrid::Result solved;
     do {
       const bool isNew = tame || !(moved < KeepMatrix * width);
@@ -136,6 +165,8 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
       work.linearSteps += solved.steps;
     } while (!solved.isConvex && !std::exchange(tame, true));
     ++work.newtonSteps;
+    if (!links_.empty() && isNear) // to and fro: it took too little; on and on: too much
+      grip = std::clamp(grip * (SumOfProducts(step, lastStep) < 0.0 ? 3.0 : 0.4), 0.02, 1.0);
     const Advance advance = ParallelSum<Advance>(shape_.nodes[2], 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
       Advance sum;
       for (int c = 0; c < 3; ++c)
@@ -149,7 +180,7 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
     if (!std::isfinite(advance.slope) || !std::isfinite(advance.longest))
       break;
     // Along the step, half as far each time that the energy falls by less than a straight line promises.
-    const double before = stored + contact_.Energy(displacement_);
+    const double before = stored + ContactEnergy(displacement_);
     const double rounding = 1e-11 * std::abs(before) + 1e-9 * std::abs(advance.slope);
     double part = std::min(1.0, 2.0 * spacing_.maxCoeff() / std::max(advance.longest, 1e-300)), after = before, kept = stored;
     bool falls = false;
@@ -158,7 +189,7 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
         trial.Data()[at] = displacement_.Data()[at] + part * static_cast<double>(step.Data()[at]);
       });
       kept = TissueTerms(trial, trialForce);
-      after = kept + contact_.Energy(trial);
+      after = kept + ContactEnergy(trial);
       falls = after <= before + 1e-4 * part * advance.slope + rounding;
     }
     if (!falls && moved == 0.0)
@@ -177,14 +208,19 @@ bool TissueSolver::Solve(bool isGuess, double toleranceMm, int maximumSteps, Tis
     tame = tame && last > 0.2 * width;
     if (part == 1.0 && last < 0.2 * width) {
       const double open = contact_.Update(displacement_);
+      const BodyContact::Open bodies = bodies_.Update(displacement_);
       // Steps that get slowly shorter have farther to go than the last one was long; first guesses may stop earlier.
       const bool mayHaveFarToGo = shrinks > 0.5 && toleranceMm < 0.03 * width;
-      isFound = last < (mayHaveFarToGo ? 0.1 : 1.0) * toleranceMm && open < 0.2 * toleranceMm;
+      // Of nodes of two bodies that hold a place from either side one may take over all force from the other, which takes long
+      // and moves little.
+      const double share = !mayHaveFarToGo ? 1.0 : links_.empty() ? 0.1 : 0.3;
+      isFound = last < share * toleranceMm && open < 0.2 * toleranceMm;
+      // What other tissue alone holds goes far along the errors of a rough solution.
+      isFound = isFound && (isNear || !bodies_.IsPossible()) && bodies.entered < toleranceMm && bodies.apart < 4.0 * toleranceMm;
     }
   }
   if (!isFound || !(LeastVolume() > 0.0) || contact_.DeepestFace(displacement_) > MostInside * spacing_.maxCoeff()) {
-    displacement_ = start;
-    contact_.Nodes() = nodes;
+    Return(start);
     return false;
   }
   return true;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Filters/Physics/LatticeMultigrid.h"
+#include "Filters/Physics/BodyContact.h"
 #include "Filters/Physics/ProbeContact.h"
 
 namespace echorama {
@@ -33,10 +33,23 @@ public:
   const LatticeField<double>& Displacement() const { return displacement_; }
   ProbeContact& Contact() { return contact_; }
   const ProbeContact& Contact() const { return contact_; }
+  const BodyContact& Bodies() const { return bodies_; }
+  /// Where it is, and what pushes it.
+  struct State {
+    LatticeField<double> displacement;
+    std::vector<ProbeContact::Node> contact;
+    std::vector<double> bodies;
+  };
+  State Now() const { return {displacement_, contact_.Nodes(), bodies_.Forces()}; }
+  void Return(const State& state);
   double LeastVolume() const { return LeastTissueVolume(cells_, spacing_, displacement_); }
 
 private:
   double TissueTerms(const LatticeField<double>& displacement, LatticeField<double>& force) const;
+  double ContactEnergy(const LatticeField<double>& displacement) const
+  {
+    return contact_.Energy(displacement) + bodies_.Energy(displacement);
+  }
   void MakeMatrix(bool isNew, bool tame, bool withBends);
 
   TissueCells cells_;
@@ -46,7 +59,9 @@ private:
   LatticeField<double> weight_; ///< mN
   LatticeField<double> displacement_;
   ProbeContact contact_;
+  BodyContact bodies_;
   LatticeMultigrid multigrid_;
+  std::vector<LatticeLink> links_;            ///< between pieces of tissue, in the matrix
   std::vector<Eigen::Matrix3f> own_, pushed_; ///< in the matrix, at the nodes of the skin: of the tissue, and of the contact
 };
 

@@ -28,6 +28,8 @@
  * comes out is the same to the last digit as with all poses at once. What is kept takes some 2 KB a node until the filter is
  * deleted, an Update() fails, or one starts anew.
  *
+ * Pieces of tissue with empty cells between them may meet, without friction.
+ *
  * Fails, with a message, for tissue that nothing holds, for a probe without geometry, and where the probe cannot go, with the
  * part of the way that it came. Under MPI each rank computes the whole.
  *

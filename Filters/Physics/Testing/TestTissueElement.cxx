@@ -311,4 +311,62 @@ TEST(LatticeMultigrid, SolvesHardSystemsInFewSteps)
   EXPECT_EQ(solutions[0].Data(), solutions[1].Data());
 }
 
+// Two plates that only links hold together, some of them between neighbours, most of them not.
+TEST(LatticeMultigrid, LinksCountInSolutions)
+{
+  const std::array<int, 3> nodes{14, 13, 12};
+  const LatticeShape shape(nodes);
+  TissueCells cells = Block(nodes, 7.0f, 60.0f);
+  const auto isEmpty = [](int k) { return k >= 5 && k < 7; };
+  for (int k = 0; k < cells.cells[2]; ++k)
+    for (int j = 0; j < cells.cells[1]; ++j)
+      for (int i = 0; i < cells.cells[0]; ++i)
+        if (isEmpty(k))
+          cells.shear[cells.At(i, j, k)] = cells.bulk[cells.At(i, j, k)] = 0.0f;
+  std::vector<float> live(static_cast<std::size_t>(shape.size), 0.0f);
+  ForNodes(nodes, [&](int i, int j, int k) { live[static_cast<std::size_t>(shape.At(i, j, k))] = k == 11 ? 0.0f : 1.0f; });
+  LatticeField<float> right = RandomField<float>(shape, 1.0, 8);
+  ForNodes(nodes, [&](int i, int j, int k) {
+    if (k == 6 || k == 11)
+      right.Set(shape.At(i, j, k), Eigen::Vector3f::Zero());
+  });
+  std::vector<LatticeLink> links;
+  for (int j = 0; j + 1 < nodes[1]; ++j)
+    for (int i = 0; i + 1 < nodes[0]; ++i) {
+      LatticeLink link;
+      link.nodes = {{{i, j, 5}, 1.0}, {{i, j, 7}, -0.4}, {{i + 1, j, 7}, -0.3}, {{i, j + 1, 7}, -0.3}};
+      const Eigen::Vector3d normal = Eigen::Vector3d(0.1, -0.2, 1.0).normalized();
+      link.stiffness = 500.0 * normal * normal.transpose() + 5.0 * Eigen::Matrix3d::Identity();
+      links.push_back(link);
+    }
+  LatticeMultigrid multigrid(nodes, Eigen::Vector3d::Constant(2.0), live);
+  TissueStiffness(cells, Eigen::Vector3d::Constant(2.0), LatticeField<double>(shape), multigrid.Matrix(), false);
+  LatticeMatrix plain = multigrid.Matrix();
+  multigrid.SetLinks(links);
+  multigrid.Prepare();
+  LatticeField<float> x;
+  const auto result = multigrid.Solve(right, x, 1e-4, 200);
+  EXPECT_TRUE(result.isConvex);
+  EXPECT_LE(result.reduction, 1e-4);
+  EXPECT_LE(result.steps, 80);
+  plain.KeepOnly(live);
+  LatticeField<float> product = Times(plain, x);
+  for (const LatticeLink& link : links) {
+    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+    for (const auto& [node, weight] : link.nodes)
+      moved += weight * x.Get(shape.At(node[0], node[1], node[2])).cast<double>();
+    for (const auto& [node, weight] : link.nodes) {
+      const std::ptrdiff_t at = shape.At(node[0], node[1], node[2]);
+      product.Set(at, product.Get(at) + (weight * link.stiffness * moved).cast<float>());
+    }
+  }
+  double left = 0.0;
+  ForNodes(nodes, [&](int i, int j, int k) {
+    const auto at = shape.At(i, j, k);
+    if (live[static_cast<std::size_t>(at)] != 0.0f)
+      left += static_cast<double>((product.Get(at) - right.Get(at)).squaredNorm());
+  });
+  EXPECT_LT(std::sqrt(left / Dot(right, right)), 2e-3);
+}
+
 } // namespace
