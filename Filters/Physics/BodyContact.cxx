@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Faces are sorted into bins of the space where they are now, so that a node finds those around it in a few steps. One that lies
-// behind a node of its own body at rest does not count: so nothing meets its own back, however thin it is. Normals run evenly over faces
-// that were in a plane at rest, so that a node which slides from face to face is pushed evenly also; steps of the staircase stay
-// sharp.
+// behind a node of its own body at rest does not count: so nothing meets its own back, however thin it is. Normals run evenly
+// over faces that were in a plane at rest, so that a node which slides from face to face is pushed evenly also; steps of the
+// staircase stay sharp.
 #include "BodyContact.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
@@ -211,8 +211,7 @@ void BodyContact::Find(const LatticeField<double>& displacement)
     for (std::size_t corner = 0; corner < 4; ++corner)
       corners[corner] = Place(faces_[n].corners[corner], faces_[n].at[corner], displacement);
     middles[n] = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
-    const Eigen::Vector3d area =
-        (faces_[n].side % 2 ? 0.5 : -0.5) * (corners[3] - corners[0]).cross(corners[2] - corners[1]);
+    const Eigen::Vector3d area = (faces_[n].side % 2 ? 0.5 : -0.5) * (corners[3] - corners[0]).cross(corners[2] - corners[1]);
     for (const std::ptrdiff_t point : pointsOf_[n])
       normals[static_cast<std::size_t>(point)] += area;
   }
@@ -260,7 +259,8 @@ void BodyContact::Find(const LatticeField<double>& displacement)
         }
         point.normal.normalize();
         point.isSoft = point.shear < face.shear || (point.shear == face.shear && point.side < face.side);
-        point.stiffness = BodyStiffness * std::min(point.shear, face.shear) * point.area / spacing_.minCoeff();
+        point.stiffness =
+            (point.isSoft ? 1.0 : 4.0) * BodyStiffness * std::min(point.shear, face.shear) * point.area / spacing_.minCoeff();
       });
     }
   });
@@ -327,8 +327,7 @@ BodyContact::Open BodyContact::Update(const LatticeField<double>& displacement)
   Open open;
   for (std::size_t n = 0; n < points_.size(); ++n) {
     const Point& point = points_[n];
-    const double push =
-        point.face < 0 ? 0.0 : std::max(0.0, forces_[n] - point.stiffness * Distance(point, displacement));
+    const double push = point.face < 0 ? 0.0 : std::max(0.0, forces_[n] - point.stiffness * Distance(point, displacement));
     if (push == forces_[n])
       continue;
     if (!point.isSoft) {

@@ -10,9 +10,9 @@ namespace echorama {
 /// skin may not enter faces of the skin that looked at them at rest, from either side.
 ///
 /// Nodes of the softer side are kept out by an augmented Lagrangian, as that of ProbeContact; of the stiffer one by a stiffness
-/// alone, so that no two forces hold the same place. Which face a node is before is looked up where the tissue is now, and then is
-/// left alone, with its normal, until the next Find(): so a distance is linear in the displacements, and what pushes derives from
-/// a convex energy. Forces are in balance to the last digit. All in the frame of the lattice.
+/// alone, so that no two forces hold the same place. Which face a node is before is looked up where the tissue is now, and then
+/// is left alone, with its normal, until the next Find(): so a distance is linear in the displacements, and what pushes derives
+/// from a convex energy. Forces are in balance to the last digit. All in the frame of the lattice.
 class BodyContact {
 public:
   BodyContact() = default;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bodies that a probe presses against each other across empty cells: beside one block of both, beside a probe of the shape of one of
-// them, folded, turned, lifted off; forces in balance; nothing in anything.
+// Bodies that a probe presses against each other across empty cells: beside one block of both, beside a probe of the shape of one
+// of them, folded, turned, lifted off; forces in balance; nothing in anything.
 #include "Core/Base/Parallel.h"
 #include "Filters/Physics/TissuePress.h"
 #include <gtest/gtest.h>
@@ -12,7 +12,8 @@ namespace {
 constexpr double Width = 4.0; // of a cell, mm
 constexpr int Upper = 0, Lower = 1, Thread = 2;
 
-// Blocks of cells that stand on the back, with threads of nearly nothing from upper ones to the fixed side, so that they are held.
+// Blocks of cells that stand on the back, with threads of nearly nothing from upper ones to the fixed side, so that they are
+// held.
 TissueBody Scene(const std::array<int, 3>& cells, const TissueMaterial& upper, const TissueMaterial& lower,
                  const std::function<int(int, int, int)>& material)
 {
@@ -78,8 +79,7 @@ Eigen::Vector3d Reaction(const TissueBody& body, const TissuePress& press)
       return;
     const TissueMaterial& m = body.materials[static_cast<std::size_t>(label)];
     cells.shear[cells.At(i, j, k)] = static_cast<float>(m.youngKPa / (2.0 * (1.0 + m.poisson)));
-    cells.bulk[cells.At(i, j, k)] =
-        static_cast<float>(m.youngKPa * m.poisson / ((1.0 + m.poisson) * (1.0 - 2.0 * m.poisson)));
+    cells.bulk[cells.At(i, j, k)] = static_cast<float>(m.youngKPa * m.poisson / ((1.0 + m.poisson) * (1.0 - 2.0 * m.poisson)));
   });
   LatticeField<double> displacement(shape), force(shape);
   const std::vector<Eigen::Vector3d> u = press.Displacements();
@@ -194,15 +194,15 @@ TEST(TissueContact, StiffBlockPressesAsAProbeOfItsShape)
     direct.Move(probe, At(48.0, 40.0, 28.0 + depth));
   EXPECT_NEAR(Reaction(body, press).z() / press.Force().z(), 1.0, 0.005);
   EXPECT_NEAR(press.Force().z() / direct.Force().z(), 1.0, 0.03);
-  EXPECT_LT(Deepest(body, press), 0.03);
+  EXPECT_LT(Deepest(body, press), 0.02);
   EXPECT_FALSE(press.Work().energyGrew);
 }
 
 // A notch of one cell, open on one side, that closes.
 TEST(TissueContact, FoldedBodyDoesNotEnterItself)
 {
-  const TissueBody body = Scene({12, 10, 10}, Tissue(20.0, 0.4), Tissue(20.0, 0.4),
-                                [](int i, int, int k) { return k == 3 && i < 9 ? -1 : Upper; });
+  const TissueBody body =
+      Scene({12, 10, 10}, Tissue(20.0, 0.4), Tissue(20.0, 0.4), [](int i, int, int k) { return k == 3 && i < 9 ? -1 : Upper; });
   TissuePressParameters parameters;
   parameters.fixXMax = true;
   TissuePress press(body, parameters);
@@ -212,7 +212,7 @@ TEST(TissueContact, FoldedBodyDoesNotEnterItself)
   const auto z = [&](int i, int j, int k) { return u[static_cast<std::size_t>((k * 11 + j) * 13 + i)].z(); };
   EXPECT_GT(z(4, 5, 4), 1.0); // what lies below the notch gives way
   EXPECT_NEAR(z(4, 5, 3) - z(4, 5, 4), Width, 0.1);
-  EXPECT_LT(Deepest(body, press), 0.03);
+  EXPECT_LT(Deepest(body, press), 0.02);
   EXPECT_FALSE(press.Work().energyGrew);
 }
 
