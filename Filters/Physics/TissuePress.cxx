@@ -22,33 +22,73 @@ std::array<int, 3> CoarseNodes(const std::array<int, 3>& nodes)
   return {nodes[0] / 2 + 1, nodes[1] / 2 + 1, nodes[2] / 2 + 1};
 }
 
-// Two cells per axis become one: their mean, or nothing if most of it is empty.
+// A coarse lattice covers the same box as the fine one: cells of a body without symmetry would move it to a side. With an odd
+// number of cells along an axis these are somewhat less than twice as long. What part of a coarse cell fine ones are, along an
+// axis:
+std::vector<std::vector<std::pair<int, float>>> PartsOfCells(int fine, int coarse)
+{
+  std::vector<std::vector<std::pair<int, float>>> parts(static_cast<std::size_t>(coarse));
+  for (int i = 0; i < coarse; ++i)
+    for (int n = i * fine / coarse; n < fine && n * coarse < (i + 1) * fine; ++n) {
+      const int overlap = std::min((n + 1) * coarse, (i + 1) * fine) - std::max(n * coarse, i * fine);
+      parts[static_cast<std::size_t>(i)].emplace_back(n, static_cast<float>(overlap) / static_cast<float>(fine));
+    }
+  return parts;
+}
+
+// The mean of what lies in a coarse cell, or nothing if most of it is empty.
 TissueCells Coarsen(const TissueCells& fine, const std::array<int, 3>& nodes)
 {
   TissueCells coarse(nodes);
-  for (int k = 0; k < coarse.cells[2]; ++k)
-    for (int j = 0; j < coarse.cells[1]; ++j)
-      for (int i = 0; i < coarse.cells[0]; ++i) {
-        float shear = 0.0f, bulk = 0.0f, density = 0.0f;
-        int filled = 0;
-        for (int child = 0; child < 8; ++child) {
-          const int fi = 2 * i + (child & 1), fj = 2 * j + (child >> 1 & 1), fk = 2 * k + (child >> 2);
+  std::vector<std::vector<std::pair<int, float>>> parts[3];
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    parts[axis] = PartsOfCells(fine.cells[axis], coarse.cells[axis]);
+  ForNodes(coarse.cells, [&](int i, int j, int k) {
+    float shear = 0.0f, bulk = 0.0f, density = 0.0f, filled = 0.0f;
+    for (const auto& [fk, partZ] : parts[2][static_cast<std::size_t>(k)])
+      for (const auto& [fj, partY] : parts[1][static_cast<std::size_t>(j)])
+        for (const auto& [fi, partX] : parts[0][static_cast<std::size_t>(i)]) {
           if (!fine.IsTissue(fi, fj, fk))
             continue;
           const std::size_t at = fine.At(fi, fj, fk);
-          ++filled;
-          shear += fine.shear[at] / 8.0f;
-          bulk += fine.bulk[at] / 8.0f;
-          density += fine.density[at] / 8.0f;
+          const float part = partX * partY * partZ;
+          filled += part;
+          shear += part * fine.shear[at];
+          bulk += part * fine.bulk[at];
+          density += part * fine.density[at];
         }
-        if (filled >= 4) {
-          const std::size_t at = coarse.At(i, j, k);
-          coarse.shear[at] = shear;
-          coarse.bulk[at] = bulk;
-          coarse.density[at] = density;
-        }
-      }
+    if (filled > 0.4999f) {
+      const std::size_t at = coarse.At(i, j, k);
+      coarse.shear[at] = shear;
+      coarse.bulk[at] = bulk;
+      coarse.density[at] = density;
+    }
+  });
   return coarse;
+}
+
+// Calls body(coarse node, weight) for those that a fine node lies between.
+template <class Body>
+void ForCorners(const std::array<int, 3>& index, const LatticeShape& fine, const LatticeShape& coarse, const Body& body)
+{
+  std::array<int, 3> low{};
+  double fraction[3];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int scaled = index[axis] * (coarse.nodes[axis] - 1), all = fine.nodes[axis] - 1;
+    low[axis] = scaled / all;
+    fraction[axis] = static_cast<double>(scaled % all) / all;
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    std::array<int, 3> at = low;
+    double weight = 1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const bool isHigh = (corner >> axis & 1) != 0;
+      at[axis] += isHigh ? 1 : 0;
+      weight *= isHigh ? fraction[axis] : 1.0 - fraction[axis];
+    }
+    if (weight > 0.0)
+      body(at, weight);
+  }
 }
 
 bool HasCell(const TissueCells& cells, int i, int j, int k)
@@ -172,9 +212,12 @@ TissuePress::TissuePress(TissueBody body, const TissuePressParameters& parameter
     std::vector<float> coarseLive(static_cast<std::size_t>(coarseShape.size), 0.0f);
     bool isTied = false;
     ForNodes(nodes, [&](int i, int j, int k) {
-      // A coarse node is held where the fine one is; beyond the last one, where that is.
-      const int fi = std::min(2 * i, shape.nodes[0] - 1), fj = std::min(2 * j, shape.nodes[1] - 1),
-                fk = std::min(2 * k, shape.nodes[2] - 1);
+      // A coarse node is held where the nearest fine one is.
+      const auto nearest = [&](int n, std::size_t axis) {
+        const int all = nodes[axis] - 1;
+        return (n * (shape.nodes[axis] - 1) + all / 2) / all;
+      };
+      const int fi = nearest(i, 0), fj = nearest(j, 1), fk = nearest(k, 2);
       if (!HasCell(coarse, i, j, k))
         return;
       const bool isHeld = live[static_cast<std::size_t>(shape.At(fi, fj, fk))] == 0.0f && HasCell(cells, fi, fj, fk);
@@ -183,10 +226,11 @@ TissuePress::TissuePress(TissueBody body, const TissuePressParameters& parameter
     });
     if (!isTied)
       break;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      spacing[static_cast<int>(axis)] *= static_cast<double>(shape.nodes[axis] - 1) / (nodes[axis] - 1);
     cells = std::move(coarse);
     shape = coarseShape;
     live = std::move(coarseLive);
-    spacing *= 2.0;
   }
 
   if (!gravity.isZero()) {
@@ -255,16 +299,6 @@ void TissuePress::Predict(std::size_t n)
   }
   LatticeField<double>& u = fine.solver.Displacement();
   const std::vector<float>& live = fine.solver.Live();
-  const auto corners = [&](int i, int j, int k, const auto& body) {
-    for (int corner = 0; corner < 8; ++corner) {
-      const bool odd[3] = {i % 2 == 1, j % 2 == 1, k % 2 == 1},
-                 high[3] = {(corner & 1) != 0, (corner & 2) != 0, (corner & 4) != 0};
-      if ((high[0] && !odd[0]) || (high[1] && !odd[1]) || (high[2] && !odd[2]))
-        continue;
-      const double weight = (odd[0] ? 0.5 : 1.0) * (odd[1] ? 0.5 : 1.0) * (odd[2] ? 0.5 : 1.0);
-      body(from.At(i / 2 + high[0], j / 2 + high[1], k / 2 + high[2]), weight);
-    }
-  };
   const TissueCells& coarseCells = coarse.solver.Cells();
   ParallelFor(to.nodes[2], [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
@@ -275,16 +309,13 @@ void TissuePress::Predict(std::size_t n)
           continue;
         Eigen::Vector3d change = Eigen::Vector3d::Zero();
         double weights = 0.0;
-        for (int corner = 0; corner < 8; ++corner) {
-          const int ci = i / 2 + (corner & 1), cj = j / 2 + (corner >> 1 & 1), ck = k / 2 + (corner >> 2);
-          if (((corner & 1) && i % 2 == 0) || ((corner & 2) && j % 2 == 0) || ((corner & 4) && k % 2 == 0))
-            continue;
-          if (!HasCell(coarseCells, ci, cj, ck)) // nothing is known there
-            continue;
-          const std::ptrdiff_t there = from.At(ci, cj, ck);
-          change += coarse.solver.Displacement().Get(there) - coarse.before.displacement.Get(there);
-          weights += 1.0;
-        }
+        ForCorners({i, j, k}, to, from, [&](const std::array<int, 3>& corner, double weight) {
+          if (!HasCell(coarseCells, corner[0], corner[1], corner[2])) // nothing is known there
+            return;
+          const std::ptrdiff_t there = from.At(corner[0], corner[1], corner[2]);
+          change += weight * (coarse.solver.Displacement().Get(there) - coarse.before.displacement.Get(there));
+          weights += weight;
+        });
         if (weights > 0.0)
           u.Set(at, u.Get(at) + change / weights);
       }
@@ -292,7 +323,8 @@ void TissuePress::Predict(std::size_t n)
   for (auto& node : fine.solver.Contact().Nodes()) {
     double force = 0.0, weights = 0.0;
     Eigen::Vector3d dragged = Eigen::Vector3d::Zero();
-    corners(node.index[0], node.index[1], node.index[2], [&](std::ptrdiff_t at, double weight) {
+    ForCorners(node.index, to, from, [&](const std::array<int, 3>& corner, double weight) {
+      const std::ptrdiff_t at = from.At(corner[0], corner[1], corner[2]);
       if (isSkin[static_cast<std::size_t>(at)]) {
         force += weight * pressure[static_cast<std::size_t>(at)];
         dragged += weight * drag.Get(at);
