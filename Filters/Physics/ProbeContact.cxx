@@ -173,6 +173,7 @@ double ProbeContact::Update(const LatticeField<double>& displacement)
     const auto push = PushOf(node, displacement);
     if (!push) {
       node.force = 0.0;
+      node.push.setZero();
       node.drag.setZero();
       continue;
     }
@@ -182,6 +183,7 @@ double ProbeContact::Update(const LatticeField<double>& displacement)
     if (node.force <= 0.0 && push->force > 0.0) // it touches the probe for the first time: here it sticks
       node.anchor = toProbe_ * (node.rest + displacement.Get(node.at));
     node.force = push->force;
+    node.push = push->force * push->normal;
     node.normal = push->normal.normalized();
     node.drag = push->force > 0.0 ? push->drag : Eigen::Vector3d::Zero();
   }
@@ -214,7 +216,7 @@ Eigen::Vector3d ProbeContact::Total() const
 {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Node& node : nodes_)
-    sum += node.force * node.normal + node.drag;
+    sum += node.push + node.drag;
   return sum;
 }
 

@@ -25,6 +25,7 @@ public:
     Eigen::Vector3d drag = Eigen::Vector3d::Zero();   ///< of friction, mN
     Eigen::Vector3d anchor = Eigen::Vector3d::Zero(); ///< where it touched the probe when the step began, in the probe's frame
     Eigen::Vector3d normal = Eigen::Vector3d::Zero(); ///< of the probe there, at the last Update()
+    Eigen::Vector3d push = Eigen::Vector3d::Zero();   ///< what f does to the tissue, mN: at rounded edges not of the size of f
     bool pushed = false;                              ///< at the last Stiffness()
   };
 

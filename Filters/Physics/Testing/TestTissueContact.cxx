@@ -210,6 +210,7 @@ TEST(TissueContact, FoldedBodyDoesNotEnterItself)
   press.Move(probe, At(16.0, 20.0, 10.0));
   const std::vector<Eigen::Vector3d> u = press.Displacements();
   const auto z = [&](int i, int j, int k) { return u[static_cast<std::size_t>((k * 11 + j) * 13 + i)].z(); };
+  EXPECT_NEAR(Reaction(body, press).z() / press.Force().z(), 1.0, 0.005);
   EXPECT_GT(z(4, 5, 4), 1.0); // what lies below the notch gives way
   EXPECT_NEAR(z(4, 5, 3) - z(4, 5, 4), Width, 0.1);
   EXPECT_LT(Deepest(body, press), 0.02);
