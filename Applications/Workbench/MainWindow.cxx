@@ -9,7 +9,6 @@
 #include "Focus.h"
 #include "HistoryPanel.h"
 #include "JobBar.h"
-#include "KeysPage.h"
 #include "LandmarkBox.h"
 #include "MessageBar.h"
 #include "Messages.h"
@@ -29,6 +28,7 @@
 #include "VolumePanel.h"
 #include "vtkUltrasoundAlignmentWidget.h"
 #include "Workbench.h"
+#include "WorkbenchKeys.h"
 #include <QCloseEvent>
 #include <QDockWidget>
 #include <QFileInfo>
@@ -124,7 +124,7 @@ void MainWindow::MakeMenus()
   (new ExportActions(bench_->Shared(), this))->AddTo(Menu(Place::File), this);
   Menu(Place::Help)
       ->addAction(MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"),
-                             [this] { ShowKeysPage(this); }));
+                             [this] { ShowKeysPage(this, WorkbenchKeys()); }));
 }
 
 void MainWindow::MakePanels()

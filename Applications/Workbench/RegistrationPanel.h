@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "JobBar.h"
+#include "JobPanel.h"
 #include <vector>
 
 class QCheckBox;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Message.h"
 #include "Settings.h"
 #include "Workspace.h"
 #include <functional>
@@ -8,18 +9,6 @@
 #include <QVector>
 
 namespace echorama {
-
-/// A sentence for the user, with what can be done about it.
-struct Message {
-  enum Kind { Note, Warning, Question };
-  Kind kind = Note;
-  QString text;
-  struct Answer {
-    QString label;
-    std::function<void()> action;
-  };
-  QVector<Answer> answers; ///< one button each; a message without is closed by its cross, a note by itself
-};
 
 /// What the panels, views and actions of one window share: the session, the tool in hand, and how things are shown. It turns the
 /// session's VTK events into Qt signals. It knows no widget.

@@ -1,39 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "WindowUnderTest.h"
 #include "FileActions.h"
-#include "JobBar.h"
-#include "MessageBar.h"
 #include "SliceCanvas.h"
 #include "SlicePane.h"
-#include "Theme.h"
 #include "ViewGrid.h"
 #include "VolumePane.h"
 #include <cmath>
-#include <QApplication>
-#include <QDropEvent>
 #include <QFile>
-#include <QMimeData>
-#include <QPushButton>
-#include <QSettings>
-#include <QSurfaceFormat>
 #include <QtTest>
-#include <QUrl>
-#include <QVTKOpenGLNativeWidget.h>
-#include <QWheelEvent>
-#include <QWindow>
 #include <vtkMatrix4x4.h>
 
 using namespace echorama;
 
 WindowUnderTest::WindowUnderTest() : window_(std::make_unique<MainWindow>(workspace_))
 {
-  window_->resize(1280, 800);
-  window_->move(0, 0);
-  window_->show();
-  if (!QTest::qWaitForWindowExposed(window_.get()))
-    qFatal("the window does not come");
-  QApplication::setActiveWindow(window_.get());
-  Settle();
+  ShowWindow(window_.get());
 }
 
 WindowUnderTest::~WindowUnderTest() = default;
@@ -43,119 +24,10 @@ SliceCanvas* WindowUnderTest::Slice(int i)
   return window_->Views()->Slices()[static_cast<std::size_t>(i)]->Canvas();
 }
 
-void WindowUnderTest::Drop(const QStringList& paths)
-{
-  QMimeData data;
-  QList<QUrl> urls;
-  for (const QString& path : paths)
-    urls.append(QUrl::fromLocalFile(path));
-  data.setUrls(urls);
-  QDragEnterEvent enter({100, 100}, Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
-  QApplication::sendEvent(window_.get(), &enter);
-  QVERIFY(enter.isAccepted());
-  QDropEvent drop(QPointF(100, 100), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
-  QApplication::sendEvent(window_.get(), &drop);
-}
-
-void WindowUnderTest::Press(QWidget* widget, const QPoint& at, Qt::MouseButton button, Qt::KeyboardModifiers keys)
-{
-  Move(widget, at, keys);
-  QTest::mousePress(window_->windowHandle(), button, keys, widget->mapTo(window_.get(), at));
-}
-
-void WindowUnderTest::Move(QWidget* widget, const QPoint& to, Qt::KeyboardModifiers)
-{
-  QTest::mouseMove(window_->windowHandle(), widget->mapTo(window_.get(), to));
-  QCoreApplication::processEvents();
-}
-
-void WindowUnderTest::Release(QWidget* widget, const QPoint& at, Qt::MouseButton button, Qt::KeyboardModifiers keys)
-{
-  QTest::mouseRelease(window_->windowHandle(), button, keys, widget->mapTo(window_.get(), at));
-}
-
-void WindowUnderTest::Drag(QWidget* widget, const QPoint& from, const QPoint& to, Qt::MouseButton button,
-                           Qt::KeyboardModifiers keys)
-{
-  constexpr int steps = 10;
-  Press(widget, from, button, keys);
-  for (int i = 1; i <= steps; i++)
-    Move(widget, from + (to - from) * i / steps, keys);
-  Release(widget, to, button, keys);
-  Settle();
-}
-
-void WindowUnderTest::Click(QWidget* widget, const QPoint& at)
-{
-  QTest::mouseClick(widget, Qt::LeftButton, {}, at);
-  Settle();
-}
-
-void WindowUnderTest::Wheel(QWidget* widget, int steps, Qt::KeyboardModifiers keys)
-{
-  const QPointF at = widget->rect().center();
-  QWheelEvent event(at, widget->mapToGlobal(at.toPoint()), {}, {0, 120 * steps}, Qt::NoButton, keys, Qt::NoScrollPhase, false);
-  QApplication::sendEvent(widget, &event);
-  Settle();
-}
-
-void WindowUnderTest::Key(Qt::Key key, Qt::KeyboardModifiers keys)
-{
-  QWidget* focused = QApplication::focusWidget();
-  QTest::keyClick(focused ? focused : window_.get(), key, keys);
-  Settle();
-}
-
-void WindowUnderTest::Type(QWidget* field, const QString& text)
-{
-  field->setFocus();
-  QTest::keyClick(field, Qt::Key_A, Qt::ControlModifier);
-  QTest::keyClicks(field, text);
-  QTest::keyClick(field, Qt::Key_Return);
-  Settle();
-}
-
-bool WindowUnderTest::Answer(const QString& label)
-{
-  for (auto* button : window_->Said()->findChildren<QPushButton*>())
-    if (button->text() == label && button->isVisible()) {
-      QTest::mouseClick(button, Qt::LeftButton);
-      Settle();
-      return true;
-    }
-  return false;
-}
-
 bool WindowUnderTest::Open(const QStringList& paths)
 {
   window_->Files()->Open(paths);
   return Wait(30000);
-}
-
-bool WindowUnderTest::Wait(int milliseconds)
-{
-  const bool done = QTest::qWaitFor([this] { return window_->Jobs()->Count() == 0; }, milliseconds);
-  Settle();
-  return done;
-}
-
-void WindowUnderTest::Settle()
-{
-  for (int i = 0; i < 3; i++)
-    QCoreApplication::processEvents(QEventLoop::AllEvents, 50);
-}
-
-QStringList WindowUnderTest::Messages()
-{
-  return window_->Said()->Texts();
-}
-
-bool WindowUnderTest::HasMessage(const QString& part)
-{
-  for (const QString& text : Messages())
-    if (text.contains(part, Qt::CaseInsensitive))
-      return true;
-  return false;
 }
 
 std::array<double, 16> WindowUnderTest::Pose(int id) const
@@ -174,31 +46,7 @@ QImage WindowUnderTest::Screenshot(const QString& name)
     pane->Canvas()->DrawNow();
   window_->Views()->Volume()->DrawNow();
   Settle();
-  const QDir folder(QString::fromLocal8Bit(qgetenv("ECHORAMA_BUILD_DIR")) + "/screenshots");
-  folder.mkpath(".");
-  const QImage picture = window_->grab().toImage();
-  picture.save(folder.filePath(name + ".png"));
-  return picture;
-}
-
-int WindowTest::Run(int argc, char** argv, const std::function<int()>& test)
-{
-  qputenv("QT_FONT_DPI", "96"); // whatever the screen claims, of which Qt's versions think differently: texts have one size
-  QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
-  format.setSamples(0);
-  QSurfaceFormat::setDefaultFormat(format);
-  QApplication application(argc, argv);
-  QApplication::setOrganizationName("Echorama");
-  QApplication::setApplicationName("WorkbenchTest");
-  ApplyTheme(application);
-  return test();
-}
-
-void WindowTest::init()
-{
-  folder_ = std::make_unique<QTemporaryDir>();
-  qputenv("XDG_DATA_HOME", folder_->filePath("data").toLocal8Bit());
-  QSettings::setPath(QSettings::NativeFormat, QSettings::UserScope, folder_->filePath("settings"));
+  return Grab(name);
 }
 
 QString WindowTest::WriteVolume(const QString& name, int seed, std::array<double, 3> middle, int side, bool repeats)

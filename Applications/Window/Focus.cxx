@@ -20,7 +20,7 @@ namespace {
 
 bool IsView(const QWidget* widget)
 {
-  return widget->inherits("QVTKOpenGLNativeWidget");
+  return widget->inherits("QVTKOpenGLNativeWidget") || widget->property("isView").toBool();
 }
 
 bool IsText(const QWidget* widget) // in which Return is a new line

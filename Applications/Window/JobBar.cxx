@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "JobBar.h"
-#include "Workspace.h"
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QProgressBar>
@@ -13,31 +12,6 @@ JobBar::JobBar(QWidget* parent) : QWidget(parent)
   setObjectName("jobBar");
   auto* layout = new QHBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
-}
-
-Job* Workspace::Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done)
-{
-  Job* job = Job::Start(owner, label, std::move(work), std::move(done),
-                        [this, label](const QString& error) { say(QString("%1: %2").arg(label, error), true); });
-  jobs->Watch(job);
-  return job;
-}
-
-JobPanel::JobPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace) {}
-
-JobPanel::~JobPanel()
-{
-  delete job_; // before the buttons
-}
-
-void JobPanel::Start(const QString& label, Job::Work work, std::function<void()> done)
-{
-  job_ = workspace_.Run(this, label, std::move(work), std::move(done));
-  connect(job_, &Job::Ended, this, [this] {
-    job_ = nullptr;
-    ShowState();
-  });
-  ShowState();
 }
 
 void JobBar::Watch(Job* job)

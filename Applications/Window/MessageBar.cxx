@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "MessageBar.h"
-#include "Workbench.h"
+#include "Message.h"
 #include <exception>
 #include <QHBoxLayout>
 #include <QLabel>
