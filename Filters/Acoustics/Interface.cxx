@@ -37,6 +37,13 @@ InterfaceResponse MeetInterface(const Fluid& from, const Fluid& to, double cosIn
   return response;
 }
 
+double TurnedBack(double cosIncidence, double roughness, double acceptance)
+{
+  const double angle = std::acos(std::min(1.0, cosIncidence)), square = acceptance * acceptance;
+  const double mirror = std::exp(-(1.0 / square) * angle * angle); // energies
+  return std::sqrt((1.0 - roughness) * mirror + roughness * std::min(1.0, square) * cosIncidence);
+}
+
 Eigen::Vector3d Mirrored(const Eigen::Vector3d& direction, const Eigen::Vector3d& normal)
 {
   return (direction - 2.0 * direction.dot(normal) * normal).normalized();

@@ -27,6 +27,11 @@ struct InterfaceResponse {
 /// Source: the reflection of plane waves at the plane interface of two fluids, e.g. Kinsler, Fundamentals of Acoustics, 6.4.
 InterfaceResponse MeetInterface(const Fluid& from, const Fluid& to, double cosIncidence);
 
+/// How much of the pressure that a surface reflects turns back to where it came from, in [0, 1]: a Gaussian in the angle to the
+/// normal (of standard deviation \a acceptance, radians) and, by the roughness, a Lambert lobe of which the aperture catches a
+/// part.
+double TurnedBack(double cosIncidence, double roughness, double acceptance);
+
 /// The mirrored direction. \a normal is a unit vector, on either side.
 Eigen::Vector3d Mirrored(const Eigen::Vector3d& direction, const Eigen::Vector3d& normal);
 

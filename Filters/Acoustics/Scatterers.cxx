@@ -9,6 +9,8 @@
 //    and the order does not depend on the threads.
 // 3. A grid of the centres of the bricks answers which lie near a line.
 //
+// A block gives the same brick whoever asks for it: see ScattererCache.
+//
 // Cost: a hash per cell (some 50 ns with all that follows), 64 control points per cell where it is displaced; 16 bytes per
 // scatterer.
 #include "Scatterers.h"
@@ -17,9 +19,11 @@
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "ScattererCache.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 namespace echorama {
@@ -315,6 +319,89 @@ std::vector<Share> Shares(const std::vector<Material>& materials, double density
   return shares;
 }
 
+// What scatterers depend on besides where materials lie: numbers, bit by bit, of a displacement a hash.
+std::vector<std::uint64_t> KeyOf(const ScattererParameters& p, double density, const std::vector<Share>& shares)
+{
+  const auto bitsOf = [](double number) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &number, sizeof bits);
+    return bits;
+  };
+  std::vector<std::uint64_t> key{p.seed, p.changeSeed, bitsOf(p.decorrelation), bitsOf(density)};
+  for (const Share& share : shares) {
+    key.push_back(bitsOf(share.keep));
+    key.push_back(bitsOf(share.amplitude));
+  }
+  if (p.displacement && !p.displacement->IsZero()) {
+    std::uint64_t hash = 14695981039346656037u; // FNV-1a, a number at a time
+    const auto add = [&](const double* numbers, std::size_t count) {
+      for (std::size_t i = 0; i < count; ++i)
+        hash = (hash ^ bitsOf(numbers[i])) * 1099511628211u, hash ^= hash >> 32;
+    };
+    const ImageGeometry& lattice = p.displacement->Lattice();
+    const Eigen::Matrix4d place = lattice.IndexToWorld().matrix();
+    add(place.data(), 16);
+    for (const Eigen::Vector3d& coefficient : p.displacement->Coefficients())
+      add(coefficient.data(), 3);
+    key.push_back(hash);
+    for (const int count : lattice.dimensions)
+      key.push_back(static_cast<std::uint64_t>(count));
+  }
+  return key;
+}
+
+// The bricks of consecutive blocks, and the memory that holds them.
+struct Made {
+  std::shared_ptr<const std::vector<float>> memory;
+  std::vector<Scatterers::Brick> bricks; // one of every block, without scatterers (count 0) where there are none
+};
+
+std::vector<Made> MakeBlocks(const Lattice& lattice, const std::vector<Eigen::Array3i>& blocks, const std::vector<Share>& shares,
+                             const MediumLookup& mediumAt, const Progress& progress)
+{
+  const auto perTask =
+      std::max<std::size_t>(1, static_cast<std::size_t>(cellsPerTask) / static_cast<std::size_t>(lattice.CellsPerBlock()));
+  const std::size_t tasks = (blocks.size() + perTask - 1) / perTask;
+  std::vector<Made> all(tasks);
+  ParallelFor(static_cast<std::ptrdiff_t>(tasks), progress, [&](std::ptrdiff_t task) {
+    const std::size_t begin = static_cast<std::size_t>(task) * perTask, end = std::min(blocks.size(), begin + perTask);
+    std::vector<Eigen::Vector3d> places;
+    std::vector<Eigen::Vector3f> points;
+    std::vector<float> ranks, signs;
+    for (std::size_t block = begin; block < end; ++block)
+      lattice.ForEach(blocks[block], [&](const Eigen::Vector3d& place, const CellHash& hash) {
+        places.push_back(place);
+        points.push_back(place.cast<float>());
+        ranks.push_back(static_cast<float>(hash.rank));
+        signs.push_back(hash.sign);
+      });
+    std::vector<std::int32_t> media(points.size(), -1);
+    mediumAt(points.data(), points.size(), media.data());
+
+    Gathered gathered;
+    std::vector<float> part;
+    Made& made = all[static_cast<std::size_t>(task)];
+    std::size_t i = 0;
+    for (std::size_t block = begin; block < end; ++block) {
+      gathered.Clear();
+      for (const std::size_t next = i + static_cast<std::size_t>(lattice.CellsPerBlock()); i < next; ++i) {
+        const std::int32_t medium = media[i];
+        if (medium < 0 || static_cast<std::size_t>(medium) >= shares.size())
+          continue;
+        const Share& share = shares[static_cast<std::size_t>(medium)];
+        if (!(ranks[i] < share.keep))
+          continue;
+        gathered.points.push_back(places[i]);
+        gathered.amplitudes.push_back(static_cast<float>(share.amplitude) * signs[i]);
+      }
+      made.bricks.push_back(gathered.points.empty() ? Scatterers::Brick() : Store(gathered, 0, part));
+    }
+    part.shrink_to_fit();
+    made.memory = std::make_shared<const std::vector<float>>(std::move(part));
+  });
+  return all;
+}
+
 } // namespace
 
 ParameterList Describe(ScattererParameters& p)
@@ -332,7 +419,7 @@ ParameterList Describe(ScattererParameters& p)
 
 Scatterers Scatterers::Make(const ScattererParameters& parameters, const std::vector<Material>& materials,
                             const MediumLookup& mediumAt, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted,
-                            const Progress& progress)
+                            const Progress& progress, ScattererCache* cache)
 {
   CheckRanges(parameters);
   double density = 0.0;
@@ -346,7 +433,8 @@ Scatterers Scatterers::Make(const ScattererParameters& parameters, const std::ve
   Scatterers all;
   if (density == 0.0 || region.isEmpty())
     return all;
-  if (!(region.min().cwiseAbs().maxCoeff() <= farthest && region.max().cwiseAbs().maxCoeff() <= farthest))
+  const auto isNear = [](const Eigen::Vector3d& point) { return (point.array().abs() <= farthest).all(); }; // nor NaN
+  if (!isNear(region.min()) || !isNear(region.max()))
     throw Error(Error::Kind::InvalidParameter, "scatterers: the region is not finite or lies more than 1e7 mm away");
 
   const Lattice lattice(parameters, density, region, wanted);
@@ -359,48 +447,27 @@ Scatterers Scatterers::Make(const ScattererParameters& parameters, const std::ve
                                            "scattererDensity of the materials) or fewer and shorter beams");
 
   const std::vector<Share> shares = Shares(materials, density);
-  const auto perTask =
-      std::max<std::size_t>(1, static_cast<std::size_t>(cellsPerTask) / static_cast<std::size_t>(lattice.CellsPerBlock()));
-  const std::size_t tasks = (blocks.size() + perTask - 1) / perTask;
-  all.parts_.resize(tasks);
-  std::vector<std::vector<Brick>> bricks(tasks);
-  ParallelFor(static_cast<std::ptrdiff_t>(tasks), progress.Part(0.1, 1.0), [&](std::ptrdiff_t task) {
-    const std::size_t begin = static_cast<std::size_t>(task) * perTask, end = std::min(blocks.size(), begin + perTask);
-    std::vector<Eigen::Vector3d> places;
-    std::vector<Eigen::Vector3f> points;
-    std::vector<float> ranks, signs;
-    for (std::size_t block = begin; block < end; ++block)
-      lattice.ForEach(blocks[block], [&](const Eigen::Vector3d& place, const CellHash& hash) {
-        places.push_back(place);
-        points.push_back(place.cast<float>());
-        ranks.push_back(static_cast<float>(hash.rank));
-        signs.push_back(hash.sign);
-      });
-    std::vector<std::int32_t> media(points.size(), -1);
-    mediumAt(points.data(), points.size(), media.data());
-
-    Gathered gathered;
-    std::vector<float>& part = all.parts_[static_cast<std::size_t>(task)];
-    std::size_t i = 0;
-    for (std::size_t block = begin; block < end; ++block) {
-      gathered.Clear();
-      for (const std::size_t next = i + static_cast<std::size_t>(lattice.CellsPerBlock()); i < next; ++i) {
-        const std::int32_t medium = media[i];
-        if (medium < 0 || static_cast<std::size_t>(medium) >= shares.size())
-          continue;
-        const Share& share = shares[static_cast<std::size_t>(medium)];
-        if (!(ranks[i] < share.keep))
-          continue;
-        gathered.points.push_back(places[i]);
-        gathered.amplitudes.push_back(static_cast<float>(share.amplitude) * signs[i]);
-      }
-      if (!gathered.points.empty())
-        bricks[static_cast<std::size_t>(task)].push_back(Store(gathered, static_cast<std::uint32_t>(task), part));
+  if (!cache) {
+    std::uint32_t part = 0;
+    for (Made& made : MakeBlocks(lattice, blocks, shares, mediumAt, progress.Part(0.1, 1.0))) {
+      for (Brick& brick : made.bricks)
+        if (brick.count > 0) {
+          brick.part = part;
+          all.bricks_.push_back(brick);
+        }
+      all.parts_.push_back(std::move(made.memory));
+      ++part;
     }
-    part.shrink_to_fit();
-  });
-  for (const auto& some : bricks)
-    all.bricks_.insert(all.bricks_.end(), some.begin(), some.end());
+  } else {
+    cache->Begin(KeyOf(parameters, density, shares));
+    const std::vector<Eigen::Array3i> missing = cache->Missing(blocks);
+    auto block = missing.begin();
+    for (const Made& made : MakeBlocks(lattice, missing, shares, mediumAt, progress.Part(0.1, 1.0))) {
+      cache->Add(&*block, made.bricks, made.memory);
+      block += static_cast<std::ptrdiff_t>(made.bricks.size());
+    }
+    cache->Use(blocks, all.bricks_, all.parts_);
+  }
   all.MakeGrid(lattice.BlockMm());
   return all;
 }
@@ -414,7 +481,7 @@ Scatterers Scatterers::At(const std::vector<Eigen::Vector3d>& points, const std:
   // By cell, then in the order given.
   std::vector<std::pair<std::array<double, 3>, std::size_t>> order;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!(points[i].cwiseAbs().maxCoeff() <= farthest) || !std::isfinite(amplitudes[i]))
+    if (!(points[i].array().abs() <= farthest).all() || !std::isfinite(amplitudes[i]))
       throw Error(Error::Kind::BadInput,
                   "scatterers: point " + std::to_string(i) + " or its amplitude is not finite or lies more than 1e7 mm away");
     const Eigen::Array3d place = (points[i].array() / cell).floor();
@@ -423,16 +490,17 @@ Scatterers Scatterers::At(const std::vector<Eigen::Vector3d>& points, const std:
   std::sort(order.begin(), order.end());
 
   Scatterers all;
-  all.parts_.resize(1);
+  std::vector<float> part;
   Gathered gathered;
   for (std::size_t i = 0; i < order.size(); ++i) {
     gathered.points.push_back(points[order[i].second]);
     gathered.amplitudes.push_back(amplitudes[order[i].second]);
     if (i + 1 == order.size() || order[i + 1].first != order[i].first) {
-      all.bricks_.push_back(Store(gathered, 0, all.parts_[0]));
+      all.bricks_.push_back(Store(gathered, 0, part));
       gathered.Clear();
     }
   }
+  all.parts_.push_back(std::make_shared<const std::vector<float>>(std::move(part)));
   all.MakeGrid(cell);
   return all;
 }
@@ -441,8 +509,8 @@ std::size_t Scatterers::MemoryBytes() const
 {
   std::size_t bytes = bricks_.capacity() * sizeof(Brick) + (starts_.capacity() + list_.capacity()) * sizeof(std::uint32_t) +
                       listCentres_.capacity() * sizeof(Eigen::Vector3f);
-  for (const std::vector<float>& part : parts_)
-    bytes += part.capacity() * sizeof(float) + sizeof(part);
+  for (const auto& part : parts_)
+    bytes += part->capacity() * sizeof(float) + sizeof(*part);
   return bytes;
 }
 

@@ -7,9 +7,12 @@
 #include <cstdint>
 #include <Eigen/Geometry>
 #include <functional>
+#include <memory>
 #include <vector>
 
 namespace echorama {
+
+class ScattererCache;
 
 /// Which material there is at many points of the world (mm): an index per point; a negative one stands for none. Called from
 /// several threads at once.
@@ -65,13 +68,13 @@ public:
   Scatterers() = default;
 
   /// All scatterers of the bricks that \a wanted wants (an empty function: all) and that may reach into \a region (world, mm).
-  /// Same result for any number of threads.
+  /// Same result for any number of threads, and with a \a cache or without.
   /// \throws Error(InvalidParameter) for a parameter out of range, for a region that is not finite or further away than 1e7 mm,
   /// and for materials that are wrong; Error(TooLarge) when they would need more than maxBytes or the memory that is free;
   /// Error(Cancelled).
   static Scatterers Make(const ScattererParameters& parameters, const std::vector<Material>& materials,
                          const MediumLookup& mediumAt, const Eigen::AlignedBox3d& region, const BoxPredicate& wanted = {},
-                         const Progress& progress = {});
+                         const Progress& progress = {}, ScattererCache* cache = nullptr);
 
   /// Given ones, such as wires: points of the world (mm) and an amplitude each.
   /// \throws Error(BadInput) for lists of different lengths and numbers that are not finite.
@@ -81,7 +84,7 @@ public:
   std::size_t MemoryBytes() const;
   const std::vector<Brick>& Bricks() const { return bricks_; }
 
-  const float* X(const Brick& brick) const { return parts_[brick.part].data() + brick.first; }
+  const float* X(const Brick& brick) const { return parts_[brick.part]->data() + brick.first; }
   const float* Y(const Brick& brick) const { return X(brick) + brick.stride; }
   const float* Z(const Brick& brick) const { return X(brick) + 2 * static_cast<std::size_t>(brick.stride); }
   const float* Amplitude(const Brick& brick) const { return X(brick) + 3 * static_cast<std::size_t>(brick.stride); }
@@ -95,9 +98,12 @@ public:
                 std::vector<std::uint32_t>& found) const;
 
 private:
+  friend class ScattererCache;
+  using Memory = std::shared_ptr<const std::vector<float>>; // shared with a cache
+
   void MakeGrid(double cell);
 
-  std::vector<std::vector<float>> parts_;
+  std::vector<Memory> parts_;
   std::vector<Brick> bricks_;
   std::size_t count_ = 0;
 

@@ -85,17 +85,8 @@ SoundTracer::SoundTracer(const AcousticScene& scene, const SoundTransport& trans
          material.roughness,
          material.IsGas() ? MeetInterface(lens, {material.Impedance(), lens.soundSpeed}, 1.0).transmittedEnergy : 1.0});
   leastAmplitude_ = std::pow(10.0, -transport.dynamicRangeDb / 20.0);
-  const double acceptance = transport.acceptanceDegrees * Pi / 180.0;
-  mirrorFactor_ = 0.5 / (acceptance * acceptance);
-  caught_ = std::min(1.0, acceptance * acceptance);
-}
-
-// How much of the pressure that a surface reflects turns back to where it came from.
-double SoundTracer::Returned(double cosine, double roughness) const
-{
-  const double angle = std::acos(std::min(1.0, cosine));
-  const double mirror = std::exp(-2.0 * mirrorFactor_ * angle * angle); // energies
-  return std::sqrt((1.0 - roughness) * mirror + roughness * caught_ * cosine);
+  acceptance_ = transport.acceptanceDegrees * Pi / 180.0;
+  caught_ = std::min(1.0, acceptance_ * acceptance_);
 }
 
 // How far along the ray, from a place on it, the probe's face is met from its front.
@@ -203,7 +194,7 @@ void SoundTracer::Follow(Way& way, const RayStart& start, SoundPath& path, RaySa
     if (!meets) {
       if (length == toFace) { // a mirror that lets nothing pass
         const double reflected = transport_.faceReflection;
-        echo(reflected * Returned(-ray.direction.dot(start.direction), 0.0));
+        echo(reflected * TurnedBack(-ray.direction.dot(start.direction), 0.0, acceptance_));
         reflect(from + length * ray.direction, Mirrored(ray.direction, start.direction),
                 MirroredAcross(way.across, start.direction), ray.inside, way.amplitude * reflected * reflected, false);
       }
@@ -232,7 +223,7 @@ void SoundTracer::Follow(Way& way, const RayStart& start, SoundPath& path, RaySa
 
     if (response.reflected != 0.0) {
       const double roughness = std::max(medium.roughness, behind.roughness);
-      echo(response.reflected * Returned(cosine, roughness));
+      echo(response.reflected * TurnedBack(cosine, roughness, acceptance_));
       const double reflected = way.amplitude * response.reflectedEnergy;
       const Eigen::Vector3d place = ray.origin + crossing.distance * ray.direction;
       const Eigen::Vector3d mirrored = Mirrored(ray.direction, normal), across = MirroredAcross(way.across, normal);

@@ -67,7 +67,6 @@ private:
     double roughness;
     double taken; ///< of what the face gives off: all, but for gas, which takes next to nothing
   };
-  double Returned(double cosine, double roughness) const;
   double WayToFace(const RayStart& start, const Eigen::Vector3d& place, const Eigen::Vector3d& direction) const;
   void Follow(Way& way, const RayStart& start, SoundPath& path, RaySamples* samples, std::vector<Way>& reflections) const;
 
@@ -76,8 +75,8 @@ private:
   SoundConditions conditions_;
   std::vector<Medium> media_;
   double leastAmplitude_;
-  double mirrorFactor_; ///< 1 / (2 sigma^2)
-  double caught_;       ///< share of a Lambert lobe's energy that the aperture catches, seen head-on
+  double acceptance_; ///< radians
+  double caught_;     ///< share of a Lambert lobe's energy that the aperture catches, seen head-on
 };
 
 /// The way of one ray: see SoundTracer, which is faster for many.

@@ -385,7 +385,7 @@ void SynthesisParameters::Check() const
     throw Error(Error::Kind::InvalidParameter, "Steps is " + std::to_string(steps) + "; a probe that sweeps needs at least 2");
   probe.Check();
   const auto checkPose = [](const Pose& pose, const std::string& name) {
-    if (!IsRotation(pose.linear()) || !(pose.translation().cwiseAbs().maxCoeff() <= 1e6))
+    if (!IsRotation(pose.linear()) || !(pose.translation().array().abs() <= 1e6).all()) // maxCoeff may pass over NaN
       throw Error(Error::Kind::InvalidParameter, name + " is not a rigid transform of at most 1e6 mm");
   };
   checkPose(probeToWorld, "probeToWorld");
@@ -415,7 +415,7 @@ SynthesisCost& SynthesisCost::operator+=(const SynthesisCost& other)
 }
 
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& p, const Progress& progress,
-                            SynthesisCost* cost)
+                            SynthesisCost* cost, ScattererCache* cache)
 {
   p.Check();
   SynthesisCost spent;
@@ -460,7 +460,7 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
     return Scatterers::Make(
         parameters, scene.Materials(),
         [&scene](const Eigen::Vector3f* points, std::size_t count, std::int32_t* media) { scene.MediumAt(points, count, media); },
-        space.Box(), [&space](const Eigen::AlignedBox3d& box) { return space.Touches(box); }, progress.Part(0.22, 0.4));
+        space.Box(), [&space](const Eigen::AlignedBox3d& box) { return space.Touches(box); }, progress.Part(0.22, 0.4), cache);
   }();
   spent.scatterers = static_cast<std::int64_t>(scatterers.Count());
   bytes += scatterers.MemoryBytes();
@@ -503,13 +503,13 @@ SynthesisParameters SliceOf(const SynthesisParameters& p, double sweep)
 }
 
 Volume<unsigned char> SynthesizeBeams(const AcousticScene& scene, const SynthesisParameters& p, const Progress& progress,
-                                      SynthesisCost* cost)
+                                      SynthesisCost* cost, ScattererCache* cache)
 {
   p.Check();
   SynthesisCost spent;
   BeamEchoes echoes;
   if (p.mode == SynthesisParameters::Mode::Coherent) {
-    echoes = SynthesizeEchoes(scene, p, progress.Part(0.0, 0.95), &spent);
+    echoes = SynthesizeEchoes(scene, p, progress.Part(0.0, 0.95), &spent, cache);
   } else {
     const Stopwatch watch(&spent.raysSeconds);
     ScatterCounting counting = p.counting;

@@ -15,6 +15,8 @@
 
 namespace echorama {
 
+class ScattererCache;
+
 /// How echoes are made.
 struct EchoModel {
   enum class Mode {
@@ -107,15 +109,17 @@ struct SynthesisCost {
 /// the beam, the direct one with the mean amplitude of all rays at each depth: the edge of a shadow is as soft as the aperture is
 /// wide. Surfaces echo to every ray, by its share.
 /// The result does not depend on the number of threads.
+/// \param cache of scatterers from earlier calls for this scene, if any; it changes nothing but the time
 /// \throws as Check(); Error(TooLarge) when samples or scatterers would not fit; Error(Cancelled).
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& parameters, const Progress& progress = {},
-                            SynthesisCost* cost = nullptr);
+                            SynthesisCost* cost = nullptr, ScattererCache* cache = nullptr);
 
 /// B-mode on the beams, of either mode: unsigned char, depth fastest, then fan, then sweep. Counted events are detected with the
 /// same receiver: their number per sample stands for the power.
 /// \throws as above.
 Volume<unsigned char> SynthesizeBeams(const AcousticScene& scene, const SynthesisParameters& parameters,
-                                      const Progress& progress = {}, SynthesisCost* cost = nullptr);
+                                      const Progress& progress = {}, SynthesisCost* cost = nullptr,
+                                      ScattererCache* cache = nullptr);
 
 /// One plane of a sweep: the same with a probe that does not sweep, held where the plane at \a sweep (-0.5 ... 0.5) lies.
 /// \throws Error(InvalidParameter) for a place outside of the sweep.
