@@ -6,7 +6,7 @@ set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks 
   RenderingVolume RenderingVolumeOpenGL2 RenderingImage)
 find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} FiltersHybrid ImagingFourier ImagingHybrid # the last three: peers in benchmarks
   Python WrappingPythonCore WrappingTools
-  OPTIONAL_COMPONENTS GUISupportQt) # the workbench's alone: other projects need no Qt
+  OPTIONAL_COMPONENTS GUISupportQt) # the windows' alone: other projects need no Qt
 find_package(Qt5 QUIET COMPONENTS OpenGL Widgets Test) # here, where VTK's targets look for it
 include(EchoramaDependencies)
 set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH

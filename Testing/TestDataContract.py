@@ -131,6 +131,7 @@ class Feed:
     keeps_fields = True # and its field data
     output = "image" # or "blocks", "points", "file", None
     is_source = False
+    needs_input = True
     works_on_blocks = True
     accepts = () # words of what others refuse (Spoils)
 
@@ -329,6 +330,23 @@ class ProbeFit(Feed):
         filter = super().filter(images)
         filter.SetMinimumOverlap(0.0) # the regions in here are no fans
         filter.SetMaximumDistance(10.0)
+        return filter
+
+
+class LiveImage(ToOtherGrid):
+    """A slice of a volume, under a probe of its own."""
+
+    works_on_blocks = False # they become one image
+    keeps_fields = False # the probe is its own
+    needs_input = False # without a volume it is empty, and says so
+
+    def filter(self, images=()):
+        filter = super().filter(images)
+        filter.SetDepthMm(30.0)
+        filter.SetBeams(32)
+        filter.SetSamples(64)
+        filter.SetWidth(64)
+        filter.SetHeight(48)
         return filter
 
 
@@ -585,6 +603,7 @@ Special = {
     "vtkUltrasoundDeformableAligner": DeformableAligner,
     "vtkUltrasoundDeformGeometry": DeformGeometry,
     "vtkUltrasoundLandmarkError": LandmarkError,
+    "vtkUltrasoundLiveImage": LiveImage,
     "vtkUltrasoundPoseEditor": PoseEditor,
     "vtkUltrasoundStitcher": Stitcher,
     "vtkUltrasoundEmbedder": Embedder,
@@ -794,7 +813,7 @@ def check_piece(feed, images):
     whole.Update()
     whole = whole.GetOutputDataObject(0)
     extent = list(whole.GetExtent())
-    wanted = [extent[0] + 1, extent[1], extent[2], (extent[2] + extent[3]) // 2, (extent[4] + extent[5]) // 2, extent[5] - 1]
+    wanted = [extent[0] + 1, extent[1], extent[2], (extent[2] + extent[3]) // 2, (extent[4] + extent[5]) // 2, max(extent[4], extent[5] - 1)]
     filter = feed.filter(images)
     filter.UpdateInformation()
     filter.UpdateExtent(wanted)
@@ -943,7 +962,7 @@ for name, kind in algorithms():
             check_composite(feed, images)
         if not feed.is_source:
             check_refusals(feed)
-        if not (feed.is_source and feed.volumes == 0):
+        if feed.needs_input and not (feed.is_source and feed.volumes == 0):
             check_missing_input(feed)
         check_abort(feed, images)
     print(f"{name}: {'kept' if len(complaints) == found else 'BROKEN'}")

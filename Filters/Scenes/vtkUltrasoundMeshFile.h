@@ -2,13 +2,14 @@
 #ifndef vtkUltrasoundMeshFile_h
 #define vtkUltrasoundMeshFile_h
 
+#include "EchoramaFiltersScenesModule.h"
 #include "Filters/Tissue/SurfaceCheck.h"
 #include <string>
 
 namespace echorama {
 
 /** The triangles of a mesh file that VTK reads, as they stand there. Throws Error that names the file. */
-TriangleSurface ReadMesh(const std::string& path);
+ECHORAMAFILTERSSCENES_EXPORT TriangleSurface ReadMesh(const std::string& path);
 
 } // namespace echorama
 

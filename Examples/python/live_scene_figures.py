@@ -1,0 +1,55 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""live_scene_figures.py [--detail MM] [FOLDER]: live images of the invented abdomen, as live_scene.png in FOLDER.
+
+Left: drawn, right: by the acoustic model. Above: liver and kidney; in the middle: ribs; below: without speckle, and the coarsest step
+of the acoustic image.
+"""
+import argparse
+import pathlib
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from vtkmodules.util.numpy_support import vtk_to_numpy
+
+from echorama import vtkUltrasoundAnatomySource, vtkUltrasoundLiveImage
+
+
+def picture(anatomy, source, place, turn, **controls):
+    live = vtkUltrasoundLiveImage()
+    live.SetInputConnection(1, anatomy.GetOutputPort())
+    live.SetParameterAsText("Source", source)
+    live.SetPosition(*place)
+    live.SetOrientation(*turn)
+    for name, value in controls.items():
+        live.SetParameter(name, value)
+    live.Update()
+    image = live.GetOutput()
+    return vtk_to_numpy(image.GetPointData().GetArray("Intensity")).reshape(image.GetDimensions()[1::-1])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", default=".", type=pathlib.Path)
+    parser.add_argument("--detail", type=float, default=1.5, help="edge of the anatomy's triangles, mm")
+    arguments = parser.parse_args()
+    anatomy = vtkUltrasoundAnatomySource()
+    anatomy.SetDetailMm(arguments.detail)
+    organs, ribs = ((0, 0, 0), (0, 0, 0)), ((-50, -60, 1), (20, -15, 0))
+    shown = [("drawn", "scene", organs, {}), ("acoustic", "acoustic", organs, {}),
+             ("drawn", "scene", ribs, {}), ("acoustic", "acoustic", ribs, {}),
+             ("drawn, without speckle", "scene", organs, {"Speckle": 0}),
+             ("acoustic, a quarter of the beams, no reflections", "acoustic", organs, {"Refinement": 0})]
+    figure, axes = plt.subplots(3, 2, figsize=(10, 11.2), facecolor="black")
+    for axis, (title, source, (place, turn), controls) in zip(axes.flat, shown):
+        axis.imshow(picture(anatomy, source, place, turn, **controls), cmap="gray", vmin=0, vmax=255)
+        axis.set_title(title, fontsize=9, color="white", pad=3)
+        axis.axis("off")
+    figure.subplots_adjust(0.005, 0.005, 0.995, 0.97, 0.02, 0.06)
+    figure.savefig(arguments.folder / "live_scene.png", dpi=85, facecolor="black")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkUltrasoundLiveImage.h"
+
+#include "Core/Base/Angles.h"
+#include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundTissue.h"
+
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMatrix4x4.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+
+#include <algorithm>
+
+using echorama::Error;
+
+vtkStandardNewMacro(vtkUltrasoundLiveImage);
+
+vtkUltrasoundParametersMacro(vtkUltrasoundLiveImage);
+
+struct vtkUltrasoundLiveImage::KeptVolumes {
+  std::vector<std::pair<vtkImageData*, vtkMTimeType>> Sources;
+  std::string ArrayName; // of the intensities that were chosen
+  echorama::BeamVolumes Volumes;
+  bool HasLabels = false;
+};
+
+struct vtkUltrasoundLiveImage::KeptScene {
+  KeptScene(vtkPolyData* tissue) : Tissue(tissue), Time(tissue->GetMTime()), Scene(vtkUltrasoundTissue::Of(tissue)) {}
+  vtkPolyData* Tissue;
+  vtkMTimeType Time;
+  echorama::LiveScene Scene;
+};
+
+//----------------------------------------------------------------------------
+vtkUltrasoundLiveImage::vtkUltrasoundLiveImage()
+{
+  this->SetNumberOfInputPorts(2);
+  this->SetNumberOfOutputPorts(2);
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundLiveImage::~vtkUltrasoundLiveImage() = default;
+
+//----------------------------------------------------------------------------
+echorama::ParameterList vtkUltrasoundLiveImage::Parameters()
+{
+  using echorama::Parameter;
+  return echorama::Join(
+      {{Parameter("Position", this->Place, {}, "mm", "Where the middle of the probe's face lies in the world."),
+        Parameter("Orientation", this->Turn, {}, "degrees",
+                  "How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x.")},
+       Describe(this->SceneValues),
+       Describe(this->Values),
+       {Parameter("Frame", this->FrameNumber, {0, 9223372036854775807.0}, "", "The number of the frame, which chooses its noise.")
+            .When("NoiseMoves", "on")
+            .Advanced(),
+        Parameter("BeamsOutput", this->PutsOutBeams, "Whether the beams are put out, too.").Advanced()}});
+}
+
+//----------------------------------------------------------------------------
+echorama::Pose vtkUltrasoundLiveImage::OwnPose() const
+{
+  echorama::Pose pose = echorama::Pose::Identity();
+  pose.linear() = echorama::ExpRotation(this->Turn * echorama::RadiansPerDegree);
+  pose.translation() = this->Place;
+  return pose;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundLiveImage::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
+{
+  const auto pose = probeToWorld ? vtkUltrasoundVolume::RigidPoseOf(probeToWorld) : std::nullopt;
+  if (!pose || !pose->matrix().allFinite()) {
+    vtkErrorMacro("ProbeToWorld is not a rigid transform of finite numbers; the pose was not changed");
+    return false;
+  }
+  this->Turn = echorama::LogRotation(pose->linear()) * echorama::DegreesPerRadian;
+  this->Place = pose->translation();
+  this->Modified();
+  return true;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundLiveImage::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
+{
+  vtkUltrasoundVolume::SetMatrix(probeToWorld, this->OwnPose());
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundLiveImage::SetProbeFrom(vtkDataObject* data)
+{
+  const auto probe = vtkUltrasoundAcquisition::ProbeGeometryOf(data);
+  if (!probe || probe->fanOffset != 0.0) {
+    vtkErrorMacro("the data has no field data " << vtkUltrasoundAcquisition::ProbeGeometryName()
+                                                << " of 6 finite numbers (a fan that is not centred cannot be taken)");
+    return false;
+  }
+  this->Values.probe = {echorama::LiveProbe::Custom, probe->fanAngle * echorama::DegreesPerRadian, probe->fanWidth,
+                        probe->depthMin, probe->depthMax};
+  this->Modified();
+  return true;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundLiveImage::GetStateText() const
+{
+  switch (this->State) {
+  case SEES_VOLUME:
+    return "";
+  case NO_VOLUME:
+    return this->SceneValues.source == echorama::LiveSource::Volumes ? "there is no volume" : "there is no tissue";
+  case OUTSIDE:
+    return this->SceneValues.source == echorama::LiveSource::Volumes ? "no volume lies under the probe"
+                                                                     : "no body lies under the probe";
+  default:
+    return "the image could not be made";
+  }
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundLiveImage::FillInputPortInformation(int port, vtkInformation* info)
+{
+  if (port == 1) {
+    info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  } else {
+    vtkUltrasoundVolume::AcceptVolumes(info);
+  }
+  info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundLiveImage::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  const int done = vtkUltrasoundVolume::Run(this, nullptr, [this, outputs](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
+    this->Image.Set(this->Values);
+    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Image.Grid(this->OwnPose()));
+    echorama::ImageGeometry beams;
+    if (this->PutsOutBeams) {
+      beams.dimensions = this->Image.BeamValue().Dimensions();
+    }
+    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(1), beams);
+    vtkDataObject::SetPointDataActiveScalarInfo(outputs->GetInformationObject(0), VTK_UNSIGNED_CHAR, 1);
+    vtkDataObject::SetPointDataActiveScalarInfo(outputs->GetInformationObject(1), VTK_FLOAT, 1);
+  });
+  if (!done) {
+    this->State = FAILED;
+  }
+  return done;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundLiveImage::RequestData(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  this->State = FAILED;
+  this->SeenShare = 0.0;
+  this->ContactShare = 1.0;
+  return this->Superclass::RequestData(request, inputs, outputs);
+}
+
+//----------------------------------------------------------------------------
+const echorama::BeamVolumes& vtkUltrasoundLiveImage::VolumesOf(vtkInformationVector* port, bool& hasLabels)
+{
+  const auto inputs = vtkUltrasoundVolume::CollectInputs(this, port);
+  auto now = std::make_unique<KeptVolumes>();
+  for (const auto& input : inputs) {
+    now->Sources.emplace_back(input.Image, input.Image->GetMTime());
+    now->ArrayName += std::string(input.Intensity->GetName() ? input.Intensity->GetName() : "") + "\n";
+  }
+  if (!this->Kept || this->Kept->Sources != now->Sources || this->Kept->ArrayName != now->ArrayName) {
+    this->Kept.reset();
+    for (const auto& input : inputs) {
+      vtkDataArray* labels = input.Image->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName());
+      if (labels && (labels->GetDataType() != VTK_UNSIGNED_CHAR || labels->GetNumberOfComponents() != 1 ||
+                     labels->GetNumberOfTuples() != input.Image->GetNumberOfPoints())) {
+        throw Error(Error::Kind::BadInput, input.Name + ": its Embedding is not one unsigned char per voxel");
+      }
+      now->HasLabels = now->HasLabels || labels;
+      vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+        using T = decltype(type);
+        now->Volumes.Add<T>(vtkUltrasoundVolume::PosedVolumeOf<T>(input),
+                            vtkUltrasoundVolume::ViewOf<const unsigned char>(labels, input.Image));
+      });
+    }
+    this->Kept = std::move(now);
+  }
+  hasLabels = this->Kept->HasLabels;
+  return this->Kept->Volumes;
+}
+
+//----------------------------------------------------------------------------
+echorama::LiveScene* vtkUltrasoundLiveImage::SceneOf(vtkInformationVector* port)
+{
+  vtkPolyData* tissue = vtkPolyData::GetData(port);
+  if (!tissue) {
+    return nullptr;
+  }
+  if (!this->Scene || this->Scene->Tissue != tissue || this->Scene->Time != tissue->GetMTime()) {
+    this->Scene.reset();
+    this->Scene = std::make_unique<KeptScene>(tissue);
+  }
+  return &this->Scene->Scene;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundLiveImage::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+{
+  this->Image.Set(this->Values);
+  const echorama::Pose pose = this->OwnPose();
+  bool hasLabels = false, isEmpty = true;
+  progress(0.0); // one frame of volumes is no work to be stopped within, but before
+  if (this->SceneValues.source == echorama::LiveSource::Volumes) {
+    const echorama::BeamVolumes& volumes = this->VolumesOf(inputs[0], hasLabels);
+    this->Image.MakeBeams(volumes, pose, this->FrameNumber);
+    this->SeenShare = this->Image.RealShare();
+    isEmpty = volumes.Empty();
+  } else if (echorama::LiveScene* scene = this->SceneOf(inputs[1])) {
+    this->Image.SetBeams(scene->MakeBeams(echorama::SceneSettings(this->Values, pose, this->FrameNumber), this->SceneValues,
+                                          progress.Part(0.0, 0.5)));
+    this->SeenShare = scene->SeenShare();
+    this->ContactShare = scene->ContactShare();
+    isEmpty = false;
+  } else {
+    this->Image.MakeBeams(echorama::BeamVolumes(), pose); // of nothing
+  }
+  progress(0.5);
+
+  output->Initialize(); // the pipeline has passed on what the first volume says of itself
+  vtkUltrasoundVolume::SetGeometry(output, this->Image.Grid(pose));
+  vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), VTK_UNSIGNED_CHAR);
+  vtkDataArray* valid = AddArray(output, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
+  vtkDataArray* labels = hasLabels ? AddArray(output, vtkUltrasoundVolume::EmbeddingName(), VTK_UNSIGNED_CHAR) : nullptr;
+  output->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+  this->Image.MakePixels(vtkUltrasoundVolume::ViewOf<unsigned char>(intensity, output),
+                         vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output),
+                         vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output));
+
+  vtkImageData* beams = vtkImageData::SafeDownCast(this->GetOutputDataObject(1));
+  beams->Initialize();
+  if (this->PutsOutBeams) {
+    echorama::ImageGeometry grid;
+    grid.dimensions = this->Image.BeamValue().Dimensions();
+    vtkUltrasoundVolume::SetGeometry(beams, grid);
+    vtkDataArray* values = AddArray(beams, vtkUltrasoundVolume::IntensityName(), VTK_FLOAT);
+    vtkDataArray* real = AddArray(beams, vtkUltrasoundVolume::ValidRegionName(), VTK_UNSIGNED_CHAR);
+    const auto value = this->Image.BeamValue();
+    const auto content = this->Image.BeamContents();
+    std::copy(value.begin(), value.end(), vtkUltrasoundVolume::ViewOf<float>(values, beams).begin());
+    std::transform(content.begin(), content.end(), vtkUltrasoundVolume::ViewOf<unsigned char>(real, beams).begin(),
+                   [](unsigned char each) { return static_cast<unsigned char>(each != 0); });
+    if (hasLabels) {
+      vtkDataArray* marks = AddArray(beams, vtkUltrasoundVolume::EmbeddingName(), VTK_UNSIGNED_CHAR);
+      std::transform(content.begin(), content.end(), vtkUltrasoundVolume::ViewOf<unsigned char>(marks, beams).begin(),
+                     echorama::LabelOfContent);
+    }
+    beams->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+  }
+  for (vtkImageData* each : {output, beams}) {
+    vtkUltrasoundAcquisition::SetProbeGeometry(each, this->Image.Probe());
+    vtkUltrasoundAcquisition::SetProbeToWorld(each, pose);
+  }
+  this->State = isEmpty ? NO_VOLUME : this->SeenShare > 0.0 ? SEES_VOLUME : OUTSIDE;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundLiveImage::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  vtkUltrasoundParameters::Print(os, indent, this->Parameters());
+  os << indent << "State: " << this->State << "\n" << indent << "SeenShare: " << this->SeenShare << "\n";
+  os << indent << "ContactShare: " << this->ContactShare << "\n";
+}
