@@ -5,6 +5,7 @@
 #include "MessageBar.h"
 #include <QAbstractButton>
 #include <QAbstractItemView>
+#include <QAbstractSlider>
 #include <QAbstractSpinBox>
 #include <QApplication>
 #include <QComboBox>
@@ -39,6 +40,17 @@ bool IsPressedByKeys(const QWidget* widget)
 {
   return qobject_cast<const QAbstractButton*>(widget) || qobject_cast<const QAbstractItemView*>(widget) ||
          qobject_cast<const QComboBox*>(widget);
+}
+
+bool IsSetByArrows(const QWidget* widget)
+{
+  return qobject_cast<const QAbstractSlider*>(widget) || qobject_cast<const QComboBox*>(widget);
+}
+
+bool IsArrow(const QKeyEvent* event)
+{
+  const int key = event->key();
+  return key == Qt::Key_Left || key == Qt::Key_Right || key == Qt::Key_Up || key == Qt::Key_Down;
 }
 
 bool IsInMessage(const QWidget* widget)
@@ -116,7 +128,8 @@ bool Focus::eventFilter(QObject* object, QEvent* event)
     break;
   case QEvent::ShortcutOverride:
     if (auto* key = static_cast<QKeyEvent*>(event);
-        key->key() == Qt::Key_Space && key->modifiers() == Qt::NoModifier && IsHere(widget) && IsPressedByKeys(widget)) {
+        key->modifiers() == Qt::NoModifier && IsHere(widget) &&
+        ((key->key() == Qt::Key_Space && IsPressedByKeys(widget)) || (IsArrow(key) && IsSetByArrows(widget)))) {
       event->accept();
       return true;
     }

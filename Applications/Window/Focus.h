@@ -9,8 +9,9 @@ namespace echorama {
 
 /// Keys belong to the views: arrows move volumes, letters choose tools. A click on a button, a row of a table or a panel does not
 /// take them away, nor does a number that was typed and ended by Return; only a field in which somebody types has them, and what
-/// was reached by Tab. Space and Return press the button that has the focus, rather than be a shortcut. And the wheel turns a
-/// number or a choice only where a person works in it: over any other it scrolls the panel.
+/// was reached by Tab. Space and Return press the button that has the focus, and arrows move the slider or the choice that has
+/// it, rather than be shortcuts. And the wheel turns a number or a choice only where a person works in it: over any other it
+/// scrolls the panel.
 class Focus : public QObject {
 public:
   /// \a view: which has keys at first, a view of \a window. Watches the whole window as long as it lives.

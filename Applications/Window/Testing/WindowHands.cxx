@@ -71,8 +71,7 @@ void WindowHands::Release(QWidget* widget, const QPoint& at, Qt::MouseButton but
   QTest::mouseRelease(window_->windowHandle(), button, keys, widget->mapTo(window_, at));
 }
 
-void WindowHands::Drag(QWidget* widget, const QPoint& from, const QPoint& to, Qt::MouseButton button,
-                           Qt::KeyboardModifiers keys)
+void WindowHands::Drag(QWidget* widget, const QPoint& from, const QPoint& to, Qt::MouseButton button, Qt::KeyboardModifiers keys)
 {
   constexpr int steps = 10;
   Press(widget, from, button, keys);

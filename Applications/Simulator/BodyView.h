@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <QPoint>
+#include <QWidget>
+#include <vtkNew.h>
+#include <vtkSmartPointer.h>
+
+class QVTKOpenGLNativeWidget;
+class vtkActor;
+class vtkImageSlice;
+class vtkImageSliceMapper;
+class vtkPolyDataMapper;
+class vtkRenderer;
+
+namespace echorama {
+
+class Redraw;
+class Scan;
+
+/// The body with the probe on its skin, and the image in its place. The left button slides the probe (with Shift it tilts and
+/// rocks, with Ctrl it rotates), a double click puts it there; the right one turns the view, the middle one moves it, the wheel
+/// zooms.
+class BodyView : public QWidget {
+  Q_OBJECT
+
+public:
+  explicit BodyView(Scan* scan, QWidget* parent = nullptr);
+  ~BodyView() override;
+
+  QVTKOpenGLNativeWidget* Canvas() const { return canvas_; }
+  void Fit();
+  void DrawNow();
+  /// Where a point of the world is on the canvas, in pixels of the window system.
+  QPointF ToCanvas(const double world[3]) const;
+
+protected:
+  bool eventFilter(QObject* object, QEvent* event) override;
+
+private:
+  void ShowSubject();
+  void ShowProbe();
+  void ShowImage();
+  void Drag(const QPoint& to);
+  void RayAt(const QPointF& at, double origin[3], double direction[3]) const;
+
+  Scan* scan_;
+  QVTKOpenGLNativeWidget* canvas_;
+  vtkNew<vtkRenderer> renderer_;
+  vtkNew<vtkPolyDataMapper> skinMapper_, probeMapper_;
+  vtkNew<vtkActor> skin_, probe_;
+  vtkNew<vtkImageSliceMapper> imageMapper_;
+  vtkNew<vtkImageSlice> image_;
+  Redraw* redraw_;
+  QString shownProbe_; ///< what the probe's surface was made for
+  QPoint last_;
+  QPointF grabbed_; ///< from the probe to where it was taken
+  Qt::KeyboardModifiers dragKeys_;
+  bool isDragging_ = false;
+};
+
+} // namespace echorama

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ImageView.h"
+#include <cmath>
+#include <QMouseEvent>
+#include <QPainter>
+#include <QWheelEvent>
+
+namespace echorama {
+
+namespace {
+
+constexpr int Margin = 44;         ///< for ruler and mark
+constexpr double GripPixels = 9.0; ///< how near to an end of a line a press takes it
+
+} // namespace
+
+ImageView::ImageView(QWidget* parent) : QWidget(parent)
+{
+  setObjectName("imageView");
+  setProperty("isView", true);
+  setAccessibleName(tr("Live image"));
+  setFocusPolicy(Qt::StrongFocus);
+  setMinimumSize(240, 200);
+  setAutoFillBackground(true);
+  QPalette black = palette();
+  black.setColor(QPalette::Window, Qt::black);
+  setPalette(black);
+}
+
+void ImageView::SetPicture(const PlanePicture& picture)
+{
+  picture_ = picture;
+  update();
+}
+
+void ImageView::SetState(const QString& sentence, bool stale)
+{
+  if (state_ == sentence && isStale_ == stale)
+    return;
+  state_ = sentence;
+  isStale_ = stale;
+  update();
+}
+
+void ImageView::SetCorner(const QString& text)
+{
+  if (corner_ == text)
+    return;
+  corner_ = text;
+  update();
+}
+
+void ImageView::SetFocusDepth(double mm)
+{
+  focusMm_ = mm;
+  update();
+}
+
+void ImageView::SetFlipped(bool flipped)
+{
+  isFlipped_ = flipped;
+  update();
+}
+
+void ImageView::SetMeasuring(bool measuring)
+{
+  isMeasuring_ = measuring;
+  if (!measuring && isOpen_) {
+    callipers_.removeLast(); // it never got its other end
+    isOpen_ = false;
+    emit CallipersChanged();
+  }
+  setCursor(measuring ? Qt::CrossCursor : Qt::ArrowCursor);
+  update();
+}
+
+void ImageView::ClearCallipers()
+{
+  callipers_.clear();
+  isOpen_ = false;
+  draggedLine_ = -1;
+  emit CallipersChanged();
+  update();
+}
+
+QRectF ImageView::Frame() const
+{
+  const QRectF room = QRectF(rect()).adjusted(Margin, Margin / 2.0, -Margin, -Margin / 2.0);
+  const QRectF mm = picture_.Rect();
+  if (mm.isEmpty() || room.isEmpty())
+    return room;
+  const double scale = std::min(room.width() / mm.width(), room.height() / mm.height());
+  QRectF frame(QPointF(), mm.size() * scale);
+  frame.moveCenter(room.center());
+  frame.moveTop(room.top());
+  return frame;
+}
+
+QPointF ImageView::ToWidget(const QPointF& mm) const
+{
+  const QRectF plane = picture_.Rect(), frame = Frame();
+  if (plane.isEmpty())
+    return frame.center();
+  const double across = (mm.x() - plane.left()) / plane.width(), down = (mm.y() - plane.top()) / plane.height();
+  return {frame.left() + (isFlipped_ ? 1.0 - across : across) * frame.width(), frame.top() + down * frame.height()};
+}
+
+QPointF ImageView::ToPlane(const QPointF& at) const
+{
+  const QRectF plane = picture_.Rect(), frame = Frame();
+  if (plane.isEmpty())
+    return {};
+  const double across = (at.x() - frame.left()) / frame.width(), down = (at.y() - frame.top()) / frame.height();
+  return {plane.left() + (isFlipped_ ? 1.0 - across : across) * plane.width(), plane.top() + down * plane.height()};
+}
+
+void ImageView::paintEvent(QPaintEvent*)
+{
+  QPainter painter(this);
+  painter.setRenderHints(QPainter::Antialiasing | QPainter::SmoothPixmapTransform);
+  const QRectF frame = Frame();
+  if (!picture_.image.isNull()) {
+    painter.setOpacity(isStale_ ? 0.3 : 1.0);
+    painter.drawImage(frame, isFlipped_ ? picture_.image.mirrored(true, false) : picture_.image);
+    painter.setOpacity(1.0);
+    QPolygonF fan; // where it is dark inside, nothing is known
+    for (const QPointF& mm : picture_.fan)
+      fan.append(ToWidget(mm));
+    painter.setPen(QColor(70, 70, 74));
+    painter.setBrush(Qt::NoBrush);
+    painter.drawPolygon(fan);
+    PaintRuler(painter, frame);
+    PaintCallipers(painter);
+  }
+  PaintState(painter);
+}
+
+void ImageView::PaintRuler(QPainter& painter, const QRectF& frame) const
+{
+  painter.setPen(QColor(150, 150, 150));
+  const double right = frame.right() + 6.0;
+  const QRectF plane = picture_.Rect();
+  for (int mm = 0; mm <= plane.bottom(); mm += 10) {
+    const double y = ToWidget({0.0, static_cast<double>(mm)}).y();
+    const bool isLong = mm % 50 == 0;
+    painter.drawLine(QPointF(right, y), QPointF(right + (isLong ? 8.0 : 4.0), y));
+    if (isLong)
+      painter.drawText(QPointF(right + 10.0, y + 4.0), QString::number(mm));
+  }
+  if (focusMm_ > 0.0 && focusMm_ < plane.bottom()) {
+    const double y = ToWidget({0.0, focusMm_}).y();
+    painter.setBrush(QColor(220, 190, 90));
+    painter.drawPolygon(QPolygonF({{right, y}, {right + 8.0, y - 4.0}, {right + 8.0, y + 4.0}}));
+  }
+  // The side of the probe that carries its mark: +x of its frame.
+  painter.setBrush(QColor(90, 160, 220));
+  painter.setPen(Qt::NoPen);
+  painter.drawEllipse(QPointF(isFlipped_ ? frame.left() - 14.0 : frame.right() + 14.0, frame.top() - 6.0), 5.0, 5.0);
+}
+
+void ImageView::PaintCallipers(QPainter& painter) const
+{
+  painter.setPen(QPen(QColor(250, 220, 90), 1.5));
+  for (int i = 0; i < callipers_.size(); i++) {
+    const QPointF a = ToWidget(callipers_[i].p1()), b = ToWidget(callipers_[i].p2());
+    const bool isOpen = isOpen_ && i + 1 == callipers_.size();
+    for (const QPointF& at : isOpen ? QVector<QPointF>{a} : QVector<QPointF>{a, b}) {
+      painter.drawLine(at - QPointF(6.0, 0.0), at + QPointF(6.0, 0.0));
+      painter.drawLine(at - QPointF(0.0, 6.0), at + QPointF(0.0, 6.0));
+    }
+    if (isOpen)
+      continue;
+    QPen dotted = painter.pen();
+    dotted.setStyle(Qt::DotLine);
+    painter.save();
+    painter.setPen(dotted);
+    painter.drawLine(a, b);
+    painter.restore();
+    painter.drawText((a.x() > b.x() ? a : b) + QPointF(9.0, -6.0), tr("%1 mm").arg(callipers_[i].length(), 0, 'f', 1));
+  }
+}
+
+void ImageView::PaintState(QPainter& painter) const
+{
+  painter.setPen(QColor(220, 190, 90));
+  painter.drawText(QPointF(10.0, 20.0), corner_);
+  if (state_.isEmpty())
+    return;
+  QFont font = painter.font();
+  font.setPointSizeF(1.25 * font.pointSizeF());
+  painter.setFont(font);
+  const QRectF room = QRectF(rect()).adjusted(30, 30, -30, -30);
+  QRectF text = painter.boundingRect(room, Qt::AlignCenter | Qt::TextWordWrap, state_);
+  painter.setPen(Qt::NoPen);
+  painter.setBrush(QColor(60, 40, 36, 225));
+  painter.drawRoundedRect(text.adjusted(-12, -8, 12, 8), 4, 4);
+  painter.setPen(QColor(240, 225, 215));
+  painter.drawText(room, Qt::AlignCenter | Qt::TextWordWrap, state_);
+}
+
+bool ImageView::TakeEndAt(const QPointF& at)
+{
+  for (int i = callipers_.size() - 1; i >= 0; i--)
+    for (int end : {0, 1}) {
+      const QPointF there = ToWidget(end == 0 ? callipers_[i].p1() : callipers_[i].p2());
+      if (QLineF(there, at).length() <= GripPixels && !(isOpen_ && i + 1 == callipers_.size())) {
+        draggedLine_ = i;
+        draggedEnd_ = end;
+        return true;
+      }
+    }
+  return false;
+}
+
+void ImageView::mousePressEvent(QMouseEvent* event)
+{
+  if (!isMeasuring_ || event->button() != Qt::LeftButton || picture_.image.isNull() || TakeEndAt(event->localPos()))
+    return;
+  const QPointF mm = ToPlane(event->localPos());
+  if (isOpen_)
+    callipers_.last().setP2(mm);
+  else
+    callipers_.append(QLineF(mm, mm));
+  isOpen_ = !isOpen_;
+  emit CallipersChanged();
+  update();
+}
+
+void ImageView::mouseMoveEvent(QMouseEvent* event)
+{
+  if (draggedLine_ < 0 || draggedLine_ >= callipers_.size())
+    return;
+  const QPointF mm = ToPlane(event->localPos());
+  draggedEnd_ == 0 ? callipers_[draggedLine_].setP1(mm) : callipers_[draggedLine_].setP2(mm);
+  emit CallipersChanged();
+  update();
+}
+
+void ImageView::mouseReleaseEvent(QMouseEvent*)
+{
+  draggedLine_ = -1;
+}
+
+void ImageView::wheelEvent(QWheelEvent* event)
+{
+  // With Alt the wheel counts across.
+  const QPoint delta = event->angleDelta();
+  emit WheelTurned((delta.y() != 0 ? delta.y() : delta.x()) / 120.0, event->modifiers());
+  event->accept();
+}
+
+} // namespace echorama

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Filters/Live/SkinWalk.h"
+#include "LiveScanner.h"
+#include "Message.h"
+#include <memory>
+#include <optional>
+#include <QElapsedTimer>
+#include <QObject>
+#include <QStringList>
+#include <vtkImageData.h>
+#include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
+
+namespace echorama {
+
+class Redraw;
+
+/// What is scanned: volumes or the tissue of a scene, and the skin that the probe is on.
+struct Subject {
+  QStringList files;
+  std::vector<vtkSmartPointer<vtkImageData>> volumes; ///< where several are real, the first counts
+  vtkSmartPointer<vtkPolyData> tissue;                ///< nullptr: volumes
+  vtkSmartPointer<vtkPolyData> skin;                  ///< nullptr: there is none
+  std::shared_ptr<const SkinMesh> mesh;               ///< of the skin, to walk on
+  QString whyNoSkin;
+  std::optional<Pose> start;                    ///< where it was scanned from, if that is known
+  Eigen::Vector3d up = Eigen::Vector3d::Zero(); ///< from where it is scanned instead; zero: nobody says
+
+  bool IsEmpty() const { return volumes.empty() && !tissue; }
+};
+
+/// Reads volumes, or one scene (.json), and makes the skin of the first volume or takes the outermost body; or reads \a skin when
+/// it names a mesh. For a Job. A volume without a skin can be scanned by a tracker all the same. \throws Error that names file
+/// and reason; Error(Cancelled).
+Subject ReadSubject(const QStringList& files, const QString& skin, const Progress& progress);
+
+/// A probe on a body: where it is, what it sees, and what is the matter. The window's parts share one; it knows no widget.
+class Scan : public QObject {
+  Q_OBJECT
+
+public:
+  explicit Scan(QObject* parent = nullptr);
+  ~Scan() override;
+
+  void SetSubject(Subject subject);
+  const Subject& Body() const { return subject_; }
+  bool HasSkin() const { return walk_ != nullptr; }
+
+  ///@{ The probe on the skin. Keys and mouse; nothing while a tracker leads.
+  void Slide(double alongMm, double acrossMm);
+  void SlideInWorld(const Eigen::Vector3d& by);
+  void PlaceWhereHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
+  void Hold(double tiltDegrees, double rockDegrees); ///< adds
+  void Rotate(double degrees);
+  void Press(double mm); ///< adds; below 0 the probe is lifted off
+  /// Upright, without pressure.
+  void Straighten();
+  /// Back to the middle of the top.
+  void PlaceAtTop();
+  /// As it was at first: nothing is left of where the probe has been.
+  void Restart();
+  const ProbeHold& Held() const { return hold_; }
+  ///@}
+
+  ///@{ A pose that comes from outside. What is not a finite rigid pose is refused, and shown as a state.
+  void Follow(const Eigen::Matrix4d& probeToWorld);
+  void StopFollowing();
+  bool IsFollowing() const { return isFollowing_; }
+  /// No pose has come for so many seconds: the image is of then. Below 0: poses come.
+  void SetStopped(double seconds);
+  ///@}
+
+  const Pose& ProbeToWorld() const { return probeToWorld_; }
+  /// Where keys and mouse have, or had, the probe.
+  Pose PoseOnSkin() const { return walk_ ? walk_->PoseOf(hold_) : probeToWorld_; }
+  /// Unit, out of the body, at the top of the skin.
+  Eigen::Vector3d Up() const { return up_; }
+  /// Unit, out of the body, where the probe is.
+  Eigen::Vector3d SkinNormal() const { return walk_ ? walk_->Normal() : up_; }
+
+  ///@{ Controls.
+  LiveScanner& Scanner() { return scanner_; }
+  void SetControl(const char* name, const std::string& text);
+  void SetShowInvented(bool shown);
+  bool ShowsInvented() const { return showsInvented_; }
+  ///@}
+
+  ///@{ Freeze, and what was seen in the last seconds.
+  void SetFrozen(bool frozen);
+  bool IsFrozen() const { return isFrozen_; }
+  const CineLoop& Cine() const { return cine_; }
+  /// Frozen: shows this one.
+  void ShowCine(int index);
+  int CineIndex() const { return cineIndex_; }
+  /// Puts other frames of this body in place of what was seen, and freezes.
+  void Replay(const std::vector<ScanFrame>& frames);
+  ///@}
+
+  /// The frame that is shown.
+  const ScanFrame& Frame() const { return frame_; }
+  const PlanePicture& Picture() const { return picture_; }
+  /// What is the matter, a sentence; "" when nothing is.
+  QString State() const;
+  bool IsStale() const;
+  double FramesPerSecond() const;
+  /// From the newest motion to the image, ms. NaN before the first.
+  double LatencyMs() const { return latencyMs_; }
+  /// Makes what waits to be made, now.
+  void MakeNow();
+
+signals:
+  void SubjectChanged();
+  void ProbeMoved();
+  void ControlsChanged();
+  void FrameMade(); ///< whoever shows it does so at once: the time until then is the latency
+  void StateChanged();
+  void FrozenChanged(bool frozen);
+  void Said(const Message& message);
+
+private:
+  void Moved();
+  void TakePose(const Pose& pose);
+  void Ask();
+  void Refine();
+  void Make(ScanFrame frame, bool isNew);
+  bool IsInAir() const;
+  bool CanWalk() const { return walk_ && !isFollowing_; }
+
+  Subject subject_;
+  LiveScanner scanner_;
+  std::unique_ptr<SkinWalk> walk_;
+  ProbeHold hold_;
+  Pose probeToWorld_ = Pose::Identity();
+  Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
+  bool isFollowing_ = false, isFrozen_ = false, showsInvented_ = true;
+  double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;
+  QString badPose_, failure_;
+
+  Redraw* redraw_;
+  QElapsedTimer clock_;
+  double askedAt_ = 0.0, latencyMs_;
+  ScanFrame frame_;
+  std::int64_t number_ = 0;
+  PlanePicture picture_;
+  CineLoop cine_;
+  int cineIndex_ = -1;
+  std::shared_ptr<const ScanSettings> settingsBefore_; ///< the freeze
+  bool isReplay_ = false;
+  int refinement_ = 0; ///< of the next picture by the acoustic model
+  std::deque<double> madeAt_;
+};
+
+} // namespace echorama

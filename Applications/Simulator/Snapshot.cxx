@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Snapshot.h"
+#include "Core/Base/Error.h"
+#include "ImageView.h"
+#include "ScanFrame.h"
+#include <QDateTime>
+#include <QJsonArray>
+#include <QJsonDocument>
+#include <QJsonObject>
+#include <QPainter>
+#include <QSaveFile>
+
+namespace echorama {
+
+namespace {
+
+QJsonArray Rows(const Pose& pose)
+{
+  QJsonArray rows;
+  for (int i = 0; i < 4; i++)
+    rows.append(QJsonArray{pose.matrix()(i, 0), pose.matrix()(i, 1), pose.matrix()(i, 2), pose.matrix()(i, 3)});
+  return rows;
+}
+
+[[noreturn]] void Fail(const QString& path, const QString& reason)
+{
+  throw Error(Error::Kind::FileSystem, QString("%1: %2").arg(path, reason).toStdString());
+}
+
+} // namespace
+
+QString WriteSnapshot(const QDir& folder, const QStringList& volumes, const PlanePicture& picture, const ScanFrame& frame,
+                      const QVector<QLineF>& callipers)
+{
+  if (!folder.mkpath("."))
+    Fail(folder.path(), "the folder cannot be made");
+  const QString name = "echorama-" + QDateTime::currentDateTime().toString("yyyyMMdd-HHmmss-zzz");
+  QJsonObject controls;
+  for (const auto& [key, text] : *frame.settings)
+    controls[QString::fromStdString(key)] = QString::fromStdString(text);
+  QJsonArray lines;
+  for (const QLineF& line : callipers)
+    lines.append(QJsonObject{
+        {"from", QJsonArray{line.x1(), line.y1()}}, {"to", QJsonArray{line.x2(), line.y2()}}, {"lengthMm", line.length()}});
+  const QJsonObject all{{"schema", "echorama-snapshot-1"},
+                        {"unit", "mm"},
+                        {"volumes", QJsonArray::fromStringList(volumes)},
+                        {"ProbeToWorld", Rows(frame.probeToWorld)},
+                        {"frame", static_cast<double>(frame.number)},
+                        {"controls", controls},
+                        {"topLeft", QJsonArray{picture.topLeft.x(), picture.topLeft.y()}},
+                        {"pixel", QJsonArray{picture.pixel.width(), picture.pixel.height()}},
+                        {"callipers", lines}};
+  const QString image = folder.filePath(name + ".png"), text = folder.filePath(name + ".json");
+  QImage opaque(picture.image.size(), QImage::Format_RGB32);
+  opaque.fill(Qt::black);
+  QPainter(&opaque).drawImage(0, 0, picture.image);
+  QSaveFile png(image), json(text);
+  if (!png.open(QIODevice::WriteOnly) || !opaque.save(&png, "PNG") || !png.commit())
+    Fail(image, png.errorString());
+  const QByteArray bytes = QJsonDocument(all).toJson();
+  if (!json.open(QIODevice::WriteOnly) || json.write(bytes) != bytes.size() || !json.commit())
+    Fail(text, json.errorString());
+  return image;
+}
+
+} // namespace echorama

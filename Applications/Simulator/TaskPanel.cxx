@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "TaskPanel.h"
+#include "Controls.h"
+#include "Core/Base/Error.h"
+#include "ImageView.h"
+#include "Scan.h"
+#include "Widgets/Session/LiveScore.h"
+#include <QCheckBox>
+#include <QDateTime>
+#include <QFile>
+#include <QFileDialog>
+#include <QFileInfo>
+#include <QFormLayout>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPushButton>
+#include <QSettings>
+#include <QStandardPaths>
+#include <QTimer>
+#include <vtkDataArray.h>
+#include <vtkImageData.h>
+#include <vtkUltrasoundVolume.h>
+
+namespace echorama {
+
+namespace {
+
+TaskBody BodyOf(const Subject& subject)
+{
+  if (subject.IsEmpty())
+    throw Error(Error::Kind::BadInput, "tasks are about a body, and nothing is open");
+  TaskBody body;
+  body.file = QFileInfo(subject.files.first()).fileName().toStdString();
+  if (subject.volumes.empty()) {
+    QFile scene(subject.files.first());
+    if (!scene.open(QIODevice::ReadOnly))
+      throw Error(Error::Kind::FileSystem, QString("%1: %2").arg(scene.fileName(), scene.errorString()).toStdString());
+    const QByteArray text = scene.readAll();
+    body.checksum = TaskChecksum(text.constData(), static_cast<std::size_t>(text.size()));
+  } else {
+    vtkImageData* volume = subject.volumes.front();
+    vtkDataArray* voxels = vtkUltrasoundVolume::GetIntensity(volume);
+    body.checksum = TaskChecksum(voxels->GetVoidPointer(0), static_cast<std::size_t>(voxels->GetNumberOfValues()) *
+                                                                static_cast<std::size_t>(voxels->GetDataTypeSize()));
+    body.geometry = vtkUltrasoundVolume::GeometryOf(volume);
+  }
+  return body;
+}
+
+QLineEdit* LineField(QWidget* parent, const char* name, const QString& help)
+{
+  auto* field = new QLineEdit(parent);
+  field->setObjectName(name);
+  field->setToolTip(help);
+  return field;
+}
+
+} // namespace
+
+TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
+  : QWidget(parent), scan_(scan), image_(image),
+    folder_(QStandardPaths::writableLocation(QStandardPaths::PicturesLocation) + "/Echorama")
+{
+  setObjectName("taskPanel");
+  clock_.start();
+  auto* open = Button(this, "openTask", tr("&Open a task..."), tr("Opens a task that was saved for this body"), [this] {
+    const QString path = QFileDialog::getOpenFileName(this, tr("A task"), folder_.path(), "*.task.json");
+    if (!path.isEmpty())
+      OpenTask(path);
+  });
+  task_ = TextField(this, "task");
+  trainee_ = LineField(this, "trainee", tr("Goes into the table of attempts"));
+  trainee_->setText(QSettings().value("task/trainee").toString());
+  start_ = Button(this, "startTask", {},
+                  tr("Puts the probe at the top, forgets what was seen, and starts the clock; or ends without an answer"),
+                  [this] { StartOrCancel(); });
+  submit_ = Button(this, "submitTask", tr("S&ubmit"), tr("The image as it is, or the last line of the callipers, is the answer"),
+                   [this] { Submit(); });
+  state_ = TextField(this, "taskState");
+  score_ = TextField(this, "taskScore");
+  name_ = LineField(this, "taskName", tr("What the task is called, and its file"));
+  hint_ = CheckField(this, "taskHint", tr("Tell how far it is"), tr("Whether the distance is shown during the attempt"));
+  auto* plane = Button(this, "savePlane", tr("Save: find this &plane"), tr("Makes a task of the image that is shown"),
+                       [this] { SavePlane(); });
+  auto* length = Button(this, "saveLength", tr("Save: &measure this"), tr("Makes a task of the last line of the callipers"),
+                        [this] { SaveLength(); });
+  auto* form = new QFormLayout(this);
+  form->addRow(new QLabel("<b>" + tr("Learn") + "</b>", this));
+  form->addRow(open);
+  form->addRow(tr("Task"), task_);
+  form->addRow(tr("Your name"), trainee_);
+  form->addRow(start_);
+  form->addRow(submit_);
+  form->addRow(tr("State"), state_);
+  form->addRow(tr("Score"), score_);
+  form->addRow(new QLabel("<b>" + tr("Teach") + "</b>", this));
+  form->addRow(tr("Name"), name_);
+  form->addRow(hint_);
+  form->addRow(plane);
+  form->addRow(length);
+  connect(this, &TaskPanel::RunningChanged, plane, &QWidget::setDisabled);
+  connect(this, &TaskPanel::RunningChanged, length, &QWidget::setDisabled);
+  connect(this, &TaskPanel::RunningChanged, open, &QWidget::setDisabled);
+  connect(scan, &Scan::SubjectChanged, this, &TaskPanel::Forget);
+  timer_ = new QTimer(this);
+  connect(timer_, &QTimer::timeout, this, &TaskPanel::ShowState);
+  timer_->setInterval(200);
+  ShowState();
+}
+
+void TaskPanel::Try(const std::function<void()>& action)
+{
+  try {
+    action();
+  } catch (const Error& error) {
+    emit scan_->Said({Message::Warning, QString::fromUtf8(error.what()), {}});
+  }
+  ShowState();
+}
+
+void TaskPanel::Save(std::variant<FindPlane, MeasureLength, ReachTarget> goal)
+{
+  Try([&] {
+    ScanTask task;
+    task.name = name_->text().trimmed().toStdString();
+    if (task.name.empty())
+      throw Error(Error::Kind::InvalidParameter, "a task needs a name");
+    const bool isPlane = std::holds_alternative<FindPlane>(goal);
+    task.instruction =
+        (isPlane ? tr("Find the plane \"%1\".") : tr("Measure \"%1\".")).arg(name_->text().trimmed()).toStdString();
+    task.hint = hint_->isChecked();
+    task.body = BodyOf(scan_->Body());
+    task.goal = std::move(goal);
+    const QString file = name_->text().trimmed().replace("/", "-");
+    const QString path = folder_.filePath(file + ".task.json");
+    if (QFileInfo::exists(path))
+      throw Error(Error::Kind::FileSystem, tr("%1 is there already: take another name").arg(path).toStdString());
+    if (!folder_.mkpath("."))
+      throw Error(Error::Kind::FileSystem, folder_.path().toStdString() + ": the folder cannot be made");
+    WriteScanTask(path.toStdString(), task);
+    emit scan_->Said({Message::Note, tr("Saved as %1").arg(path), {}});
+  });
+}
+
+void TaskPanel::SavePlane()
+{
+  FindPlane plane;
+  plane.probeToWorld = scan_->Frame().probeToWorld;
+  plane.depthMm = 0.5 * scan_->Scanner().Probe().depthMax;
+  Save(plane);
+}
+
+void TaskPanel::SaveLength()
+{
+  if (image_->Callipers().isEmpty()) {
+    emit scan_->Said({Message::Note, tr("Measure first what is to be measured: key C"), {}});
+    return;
+  }
+  const QLineF line = image_->Callipers().last();
+  const Pose& pose = scan_->Frame().probeToWorld;
+  MeasureLength length;
+  length.lengthMm = line.length();
+  length.from = pose * Eigen::Vector3d(line.x1(), 0.0, line.y1());
+  length.to = pose * Eigen::Vector3d(line.x2(), 0.0, line.y2());
+  length.toleranceMm = std::max(1.0, 0.1 * length.lengthMm);
+  Save(length);
+}
+
+void TaskPanel::OpenTask(const QString& path)
+{
+  Try([&] {
+    attempt_ = ScanAttempt::Open(path.toStdString(), BodyOf(scan_->Body()));
+    score_->clear();
+  });
+}
+
+void TaskPanel::Forget()
+{
+  const bool wasRunning = IsRunning();
+  attempt_.reset();
+  if (wasRunning)
+    emit RunningChanged(false);
+  ShowState();
+}
+
+void TaskPanel::StartOrCancel()
+{
+  Try([&] {
+    if (IsRunning()) {
+      attempt_->Cancel();
+    } else {
+      scan_->Restart();
+      image_->ClearCallipers();
+      score_->clear();
+      started_ = Seconds();
+      attempt_->Start(started_, scan_->ProbeToWorld());
+    }
+  });
+  emit RunningChanged(IsRunning());
+}
+
+void TaskPanel::Submit()
+{
+  Try([&] {
+    const bool isLength = attempt_->What() == ScanAttempt::Kind::MeasureLength;
+    if (isLength && image_->Callipers().isEmpty())
+      throw Error(Error::Kind::BadInput, "measure first: key C, then a click on both ends");
+    const ScanScore score = isLength ? attempt_->SubmitLength(Seconds(), image_->Callipers().last().length())
+                                     : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
+    score_->setText(tr("%1: %2 mm off%3, after %4 s")
+                        .arg(score.passed ? tr("Passed") : tr("Not passed"))
+                        .arg(score.distanceMm, 0, 'f', 1)
+                        .arg(isLength ? QString() : tr(" and %1\u00b0").arg(score.degrees, 0, 'f', 1))
+                        .arg(score.seconds, 0, 'f', 0));
+    emit RunningChanged(false);
+    QSettings().setValue("task/trainee", trainee_->text());
+    if (!folder_.mkpath("."))
+      throw Error(Error::Kind::FileSystem, folder_.path().toStdString() + ": the folder cannot be made");
+    AppendAttempt(folder_.filePath("attempts.csv").toStdString(),
+                  attempt_->HistoryLine(QDateTime::currentDateTimeUtc().toString(Qt::ISODate).toStdString(),
+                                        trainee_->text().toStdString()));
+  });
+}
+
+void TaskPanel::ShowState()
+{
+  const bool running = IsRunning();
+  start_->setEnabled(attempt_.has_value());
+  start_->setText(running ? tr("Give up") : tr("&Start"));
+  submit_->setEnabled(running);
+  task_->setText(attempt_ ? QString::fromStdString(attempt_->Instruction()) : tr("none"));
+  running ? timer_->start() : timer_->stop();
+  if (!running) {
+    state_->clear();
+    return;
+  }
+  QString text = tr("%1 s").arg(Seconds() - started_, 0, 'f', 0);
+  if (const auto hint = attempt_->Hint(Seconds(), scan_->ProbeToWorld()))
+    text += tr(", %1 mm and %2\u00b0 from it").arg(hint->distanceMm, 0, 'f', 1).arg(hint->degrees, 0, 'f', 0);
+  state_->setText(text);
+}
+
+} // namespace echorama

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What comes into the simulator and what leaves it: trackers, recordings, replays, OpenIGTLink.
+#include "Core/Base/Error.h"
+#include "OutputPanel.h"
+#include "Readers/SequenceRecorder.h"
+#include "ScanLog.h"
+#include "SimulatorUnderTest.h"
+#include <QCheckBox>
+#include <QDoubleSpinBox>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPushButton>
+#include <QSlider>
+#include <QtTest>
+#include <vtkDataArray.h>
+#include <vtkImageData.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkUltrasoundSequenceReader.h>
+#include <vtkUltrasoundTrackerSource.h>
+#include <vtkUltrasoundVolume.h>
+#include <vtkUltrasoundVolumeReconstructor.h>
+
+using namespace echorama;
+
+class TestScanStreams : public FolderTest {
+  Q_OBJECT
+
+private slots:
+  void aTrackedToolIsTheProbeUntilItStops();
+  void aRecordedScanReplaysToTheLastBit();
+  void closingEndsARecording();
+  void aRecordingOfAnotherBodyIsRefused();
+  void aDamagedRecordingIsNamed();
+  void aRecordedSweepGivesTheVolumeBack();
+  void imageAndPoseAreSent();
+
+private:
+  static double Field(const Eigen::Vector3d& at)
+  {
+    return 120.0 + 50.0 * std::sin(0.12 * at[0]) * std::cos(0.1 * at[1]) + 0.8 * at[2];
+  }
+};
+
+void TestScanStreams::aTrackedToolIsTheProbeUntilItStops()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  const Pose start = window.Scan().ProbeToWorld();
+  Pose last = start;
+  const QString log = Folder().filePath("log.igs.mha");
+  {
+    SequenceRecorder recorder(log.toStdString());
+    for (int i = 0; i < 60; i++) { // 60 Hz for a second: 6 mm into the body
+      SequenceFrame frame;
+      frame.time = 10.0 + i / 60.0;
+      last.translation() = start.translation() + start.linear().col(2) * 0.1 * i;
+      frame.transforms.push_back({"ProbeToTracker", Eigen::Affine3d(last.matrix())});
+      recorder.Append(frame);
+    }
+    recorder.Finish();
+  }
+  window.Type(window.Part<QLineEdit>("trackerAddress"), "replay:" + log);
+  auto* connect = window.Part<QPushButton>("trackerConnect");
+  connect->click();
+  QTRY_VERIFY(window.Scan().IsFollowing());
+  QTRY_VERIFY((window.Place() - last.translation()).norm() < 1e-6);
+  QVERIFY(window.Scan().Cine().Count() > 5); // it was seen on its way
+  // Then nothing comes any more, and the image says since when.
+  QTRY_VERIFY_WITH_TIMEOUT(window.Image().IsStale(), 5000);
+  QVERIFY2(window.Image().State().contains("stopped"), qPrintable(window.Image().State()));
+  const QString before = window.Image().State();
+  QTRY_VERIFY(window.Image().State() != before); // the seconds go on
+  window.Grab("simulator-tracker");
+  connect->click();
+  window.Frame();
+  QVERIFY(!window.Image().IsStale());
+  QVERIFY(!window.Scan().IsFollowing());
+  // A device that is not there is an error with its name.
+  window.Type(window.Part<QLineEdit>("trackerAddress"), "replay:" + Folder().filePath("nowhere.igs.mha"));
+  connect->click();
+  QTRY_VERIFY(window.HasMessage("nowhere.igs.mha"));
+  QCOMPARE(connect->text().remove('&'), QString("Connect"));
+}
+
+void TestScanStreams::aRecordedScanReplaysToTheLastBit()
+{
+  const QString file = body::Write(Folder(), "body.mha", Field);
+  {
+    SimulatorUnderTest window;
+    QVERIFY(window.Open({file}));
+    auto* output = window.Part<OutputPanel>("outputPanel");
+    output->SetFolder(Folder());
+    window.Scan().SetControl("NoiseDb", "-25");
+    window.Scan().SetControl("NoiseMoves", "on");
+    window.Frame();
+    window.Part<QPushButton>("record")->click();
+    QVERIFY(output->IsRecording());
+    for (int i = 0; i < 30; i++) {
+      if (i == 10)
+        window.Scan().SetControl("GainDb", "4.3");
+      if (i == 20)
+        window.Key(Qt::Key_PageUp);
+      if (i == 25)
+        window.Key(Qt::Key_PageDown);
+      window.Move(i % 2 ? Qt::Key_Right : Qt::Key_Up);
+    }
+    window.Part<QPushButton>("record")->click();
+    QVERIFY(window.HasMessage("Recorded as"));
+  }
+  const QStringList logs = Folder().entryList({"*.scan.jsonl"});
+  QCOMPARE(logs.size(), 1);
+  const QString path = Folder().filePath(logs[0]);
+  const ScanLog log = ScanLog::Read(path);
+  QVERIFY(log.entries.size() >= 30);
+  QVERIFY(log.entries.front().sum != log.entries.back().sum);
+  SimulatorUnderTest window; // another day
+  QVERIFY(window.Open({file}));
+  window.Part<OutputPanel>("outputPanel")->Replay(path);
+  const QString count = QString::number(log.entries.size());
+  QVERIFY2(window.HasMessage(count + " of " + count), qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.Scan().IsFrozen());
+  QCOMPARE(window.Scan().Cine().Count(), static_cast<int>(log.entries.size()));
+  window.Part<QSlider>("cineSlider")->setValue(7);
+  window.Settle();
+  QCOMPARE(SumOf(window.Scan().Scanner().Output()), log.entries[7].sum);
+  window.Key(Qt::Key_Space);
+  window.Frame();
+  QVERIFY(!window.Scan().IsFrozen());
+  QCOMPARE(window.Part<QDoubleSpinBox>("GainDb")->value(), 0.0); // as it was before the replay
+  QVERIFY(window.Scan().Cine().Count() < 10);
+}
+
+void TestScanStreams::closingEndsARecording()
+{
+  {
+    SimulatorUnderTest window;
+    QVERIFY(window.Open({body::Write(Folder(), "body.mha", Field)}));
+    window.Part<OutputPanel>("outputPanel")->SetFolder(Folder());
+    window.Part<QPushButton>("record")->click();
+    window.Move(Qt::Key_Right, Qt::NoModifier, 3);
+  }
+  const QStringList sequences = Folder().entryList({"*.igs.mhd"}), logs = Folder().entryList({"*.scan.jsonl"});
+  QCOMPARE(sequences.size(), 1);
+  SequenceFile sequence(Folder().filePath(sequences[0]).toStdString());
+  QVERIFY(sequence.Content().frames >= 2);
+  QCOMPARE(sequence.Content().frames, static_cast<int>(ScanLog::Read(Folder().filePath(logs[0])).entries.size()));
+}
+
+void TestScanStreams::aRecordingOfAnotherBodyIsRefused()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::Write(Folder(), "body.mha", Field)}));
+  window.Part<OutputPanel>("outputPanel")->SetFolder(Folder());
+  window.Part<QPushButton>("record")->click();
+  window.Move(Qt::Key_Right);
+  window.Part<QPushButton>("record")->click();
+  QVERIFY(window.Open({body::WriteWithBall(Folder(), "other.mha")}));
+  window.Part<OutputPanel>("outputPanel")->Replay(Folder().filePath(Folder().entryList({"*.scan.jsonl"})[0]));
+  QVERIFY2(window.HasMessage("another body"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.HasMessage("body.mha"));
+  QVERIFY(!window.Scan().IsFrozen());
+}
+
+void TestScanStreams::aDamagedRecordingIsNamed()
+{
+  const QString path = Folder().filePath("a.scan.jsonl");
+  const QByteArray head = "{\"schema\":\"echorama-scan-1\",\"volumes\":[\"a.mha\"],\"body\":\"0\"}\n";
+  const QByteArray frame =
+      "{\"ProbeToWorld\":[1,0,0,0,0,1,0,0,0,0,1,0],\"seconds\":1,\"number\":1,\"sum\":\"0\",\"controls\":{}}\n";
+  const auto read = [&](const QByteArray& text) -> QString {
+    QFile file(path);
+    if (!file.open(QIODevice::WriteOnly))
+      return "it cannot be written";
+    file.write(text);
+    file.close();
+    try {
+      return QString::number(ScanLog::Read(path).entries.size());
+    } catch (const Error& error) {
+      return QString::fromUtf8(error.what());
+    }
+  };
+  QCOMPARE(read(head + frame), QString("1"));
+  QCOMPARE(read(head + frame + frame.left(30)), QString("1")); // cut off by a crash
+  QVERIFY(read(head).contains("no frame"));
+  QVERIFY(read(frame).contains("not a recorded scan"));
+  QVERIFY(read(head + frame + "{\n").contains("line 3"));
+  QByteArray sheared = frame;
+  sheared.replace("[1,0,0,0", "[1,1,0,0");
+  QVERIFY(read(head + sheared).contains("no rigid pose"));
+  QByteArray without = frame;
+  without.replace("controls", "control");
+  QVERIFY(read(head + without).contains("no controls"));
+}
+
+void TestScanStreams::aRecordedSweepGivesTheVolumeBack()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::Write(Folder(), "body.mha", Field)}));
+  window.Part<OutputPanel>("outputPanel")->SetFolder(Folder());
+  window.Scan().SetControl("DepthMm", "80");
+  for (const auto& [thickness, rms] : {std::pair<const char*, double>{"0", 0.8}, {"3", 0.8}}) {
+    window.Scan().SetControl("ThicknessMm", thickness);
+    window.Scan().PlaceAtTop();
+    window.Move(Qt::Key_Down, Qt::ShiftModifier, 2);
+    window.Part<QPushButton>("record")->click();
+    for (int i = 0; i < 40; i++) {
+      window.Scan().Slide(0.0, -1.0);
+      window.Frame();
+    }
+    window.Part<QPushButton>("record")->click();
+    const QStringList sweeps = Folder().entryList({"*.igs.mhd"}, QDir::Files, QDir::Name);
+    vtkNew<vtkUltrasoundSequenceReader> reader;
+    reader->SetFileName(Folder().filePath(sweeps.last()).toUtf8());
+    vtkNew<vtkUltrasoundVolumeReconstructor> reconstructor;
+    reconstructor->SetInputConnection(reader->GetOutputPort());
+    reconstructor->SetSectorToDetected();
+    reconstructor->SetParameter("SpacingMm", 1.0);
+    reconstructor->Update();
+    vtkImageData* volume = reconstructor->GetOutput();
+    QVERIFY(volume->GetNumberOfPoints() > 10000);
+    vtkDataArray* grey = vtkUltrasoundVolume::GetIntensity(volume);
+    vtkDataArray* valid = vtkUltrasoundVolume::GetValidRegion(volume);
+    const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(volume);
+    double squares = 0.0;
+    int count = 0, inside = 0;
+    vtkIdType i = 0;
+    for (int z = 0; z < geometry.dimensions[2]; z++)
+      for (int y = 0; y < geometry.dimensions[1]; y++)
+        for (int x = 0; x < geometry.dimensions[0]; x++, i++) {
+          const Eigen::Vector3d at = geometry.IndexToWorld() * Eigen::Vector3d(x, y, z);
+          if (body::Level(at) > 0.8 || std::abs(at[2]) > 8.0 || std::abs(at[0]) > 12.0)
+            continue;
+          inside++;
+          if (valid->GetComponent(i, 0) == 0.0)
+            continue;
+          const double off = grey->GetComponent(i, 0) - Field(at);
+          squares += off * off;
+          count++;
+        }
+    const double error = std::sqrt(squares / count), share = static_cast<double>(count) / inside;
+    qInfo("thickness %s mm: RMS error %.2f grey levels over %d voxels, %.1f %% of the middle", thickness, error, count,
+          100 * share);
+    QVERIFY(share > 0.98);
+    QVERIFY(error < rms);
+  }
+}
+
+void TestScanStreams::imageAndPoseAreSent()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::Write(Folder(), "body.mha", Field)}));
+  window.Part<QDoubleSpinBox>("sendPort")->setValue(0);
+  window.Part<QCheckBox>("send")->click();
+  const int port = window.Part<OutputPanel>("outputPanel")->Sender()->GetListeningPort();
+  QVERIFY(port > 0);
+  vtkNew<vtkUltrasoundTrackerSource> client;
+  client->SetDevice(QString("igtl://localhost:%1").arg(port).toUtf8());
+  QVERIFY(client->Start());
+  QTRY_COMPARE(window.Part<OutputPanel>("outputPanel")->Sender()->GetNumberOfClients(), 1);
+  window.Move(Qt::Key_Right, Qt::ShiftModifier);
+  vtkNew<vtkMatrix4x4> pose;
+  const auto hasCome = [&] {
+    client->Modified();
+    client->Update();
+    auto* image = vtkImageData::SafeDownCast(client->GetOutputDataObject(1));
+    return client->GetTransform("ProbeToReference", pose) == 0 && image && image->GetNumberOfPoints() == 640 * 480 &&
+           SumOf(image) == SumOf(window.Scan().Scanner().Output());
+  };
+  QTRY_VERIFY(hasCome());
+  // Sent in R, A, S, as OpenIGTLink has it: x and y are negative there.
+  const Eigen::Vector3d place = window.Place();
+  const Eigen::Vector3d came(pose->GetElement(0, 3), pose->GetElement(1, 3), pose->GetElement(2, 3));
+  QVERIFY2((came - Eigen::Vector3d(-place[0], -place[1], place[2])).norm() < 1e-3,
+           qPrintable(QString("%1 %2 %3").arg(came[0]).arg(came[1]).arg(came[2])));
+  window.Part<QCheckBox>("send")->click();
+  QCOMPARE(window.Part<OutputPanel>("outputPanel")->Sender()->GetListeningPort(), 0);
+}
+
+int main(int argc, char** argv)
+{
+  return RunWindowTest("SimulatorTest", argc, argv, [argc, argv] {
+    TestScanStreams test;
+    return QTest::qExec(&test, argc, argv);
+  });
+}
+
+#include "TestScanStreams.moc"
