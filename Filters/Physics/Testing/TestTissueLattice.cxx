@@ -75,9 +75,8 @@ TEST(TissueLattice, SkinThatIsThinnerThanACellIsNotLost)
 {
   for (const float shift : {0.0f, 0.6f, 1.3f, 2.2f, 3.1f, 4.4f}) {
     // A post beside the layers moves the lattice, which covers all.
-    const TissueSurface surface = SurfaceOf({{"fat", {0, 0, 0}, {20, 20, 30}},
-                                             {"skin", {0, 0, 0}, {20, 20, 2}},
-                                             {"muscle", {25, 0, -shift}, {35, 20, 30}}});
+    const TissueSurface surface = SurfaceOf(
+        {{"fat", {0, 0, 0}, {20, 20, 30}}, {"skin", {0, 0, 0}, {20, 20, 2}}, {"muscle", {25, 0, -shift}, {35, 20, 30}}});
     const TissueBody body = TissueBodyOf(surface, CellsOf(5.0));
     const Column column = ColumnOf(body, 1, 1);
     constexpr double apart = 1.25; // mm, of the points
@@ -94,7 +93,8 @@ TEST(TissueLattice, WholeCellsAreOfTheirMaterialAlone)
   for (int k = 0; k < 4; ++k)
     for (int j = 0; j < 4; ++j)
       for (int i = 0; i < 4; ++i) {
-        const auto& tissue = body.materials.at(static_cast<std::size_t>(body.cells[static_cast<std::size_t>((k * 4 + j) * 4 + i)]));
+        const auto& tissue =
+            body.materials.at(static_cast<std::size_t>(body.cells[static_cast<std::size_t>((k * 4 + j) * 4 + i)]));
         const bool isBone = i % 3 && j % 3 && k % 3;
         EXPECT_EQ(tissue.rigid, isBone);
         EXPECT_DOUBLE_EQ(tissue.youngKPa, isBone ? 1e4 : 3.0);
