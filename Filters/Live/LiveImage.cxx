@@ -37,7 +37,7 @@ ParameterList Describe(LiveImageParameters& p)
 
 BeamThickness ThicknessOf(const LiveImageParameters& p)
 {
-  const double focus = p.thickness.focusMm > 0.0 ? std::max(1.0, p.thickness.focusMm) : FocusOf(p.probe);
+  const double focus = std::max(1.0, p.thickness.focusMm > 0.0 ? p.thickness.focusMm : FocusOf(p.probe));
   const BeamThickness usual = ThicknessOf(p.probe, focus);
   BeamThickness thickness = p.thickness;
   const bool isUsual = thickness.thicknessMm < 0.0;

@@ -36,14 +36,14 @@ SynthesisParameters SceneSettings(const LiveImageParameters& p, const Pose& prob
 
   Receiver& receiver = s.receiver;
   receiver.gainDb = c.gainDb;
-  receiver.tgcDbPerCm = std::min(2.0 * c.attenuation * c.frequencyMHz, 100.0);
+  receiver.tgcDbPerCm = std::min(2.0 * c.attenuation * s.transducer.frequencyMHz, 100.0);
   receiver.dynamicRangeDb = c.dynamicRangeDb;
   const double step = (s.probe.depthMax - s.probe.depthMin) / static_cast<double>(c.tgcDb.size() - 1);
   for (std::size_t slider = 0; slider < c.tgcDb.size(); ++slider)
     receiver.tgcPoints.push_back({s.probe.depthMin + step * static_cast<double>(slider), c.tgcDb[slider]});
   // Of the image it is told beside white.
   const double whiteDb = (255.0 - receiver.referenceGrey) * c.dynamicRangeDb / 255.0;
-  receiver.noiseDb = c.noiseDb > -200.0 ? c.noiseDb + whiteDb : Receiver::noNoiseDb;
+  receiver.noiseDb = c.noiseDb > -200.0 ? std::min(c.noiseDb + whiteDb, 100.0) : Receiver::noNoiseDb;
   receiver.noiseSeed = static_cast<std::uint64_t>(c.seed) + (c.noiseMoves ? static_cast<std::uint64_t>(frame) : 0);
   receiver.noiseSeed &= 0x7FFFFFFFFFFFFFFFu;
   s.seed = static_cast<std::uint64_t>(c.seed);
@@ -56,7 +56,7 @@ Volume<float> LiveScene::MakeBeams(const SynthesisParameters& settings, const Li
   const bool isAcoustic = p.source == LiveSource::Acoustic;
   SliceLook look = p.look;
   if (isAcoustic)
-    look.speckle = look.pressMm = 0.0; // which it knows nothing of
+    look.speckle = look.pressMm = look.gelMm = 0.0; // which it knows nothing of
   std::vector<SliceBeam> beams;
   Volume<float> picture = tracer_.Trace(settings, look, &beams);
   if (isAcoustic) {

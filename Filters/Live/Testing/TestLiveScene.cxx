@@ -54,6 +54,22 @@ double Mean(const Volume<float>& beams, int beam, double from, double to)
 
 } // namespace
 
+// The drawn picture fills a thin gap with gel; the acoustic model has none, and what it shows is black.
+TEST(LiveScene, GelFillsThinGapsOfTheDrawnPictureAlone)
+{
+  LiveScene scene(Body());
+  const LiveImageParameters p = Small();
+  Pose pose = Pose::Identity();
+  pose.translation().z() = -0.5;
+  LiveSceneParameters how;
+  scene.MakeBeams(SceneSettings(p, pose), how);
+  EXPECT_GT(scene.ContactShare(), 0.0);
+  how.source = LiveSource::Acoustic;
+  const Volume<float> beams = scene.MakeBeams(SceneSettings(p, pose), how);
+  EXPECT_EQ(scene.ContactShare(), 0.0);
+  EXPECT_LT(Mean(beams, 24, 10.0, 20.0), 20.0);
+}
+
 TEST(LiveScene, ShowsTheSameByBothModels)
 {
   LiveScene scene(Body());
