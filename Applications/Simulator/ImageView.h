@@ -36,9 +36,9 @@ public:
   void SetFocusDepth(double mm);
   bool Flipped() const { return isFlipped_; }
 
-  ///@{ Callipers: each click ends or begins a line; an end can be dragged. mm in the probe's plane.
+  ///@{ Callipers: each click ends or begins a line; an end can be dragged. mm in the probe's plane; those that have both ends.
   bool Measuring() const { return isMeasuring_; }
-  const QVector<QLineF>& Callipers() const { return callipers_; }
+  QVector<QLineF> Callipers() const { return isOpen_ ? callipers_.mid(0, callipers_.size() - 1) : callipers_; }
   void ClearCallipers();
   ///@}
 

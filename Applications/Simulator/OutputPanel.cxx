@@ -111,7 +111,7 @@ void OutputPanel::SendOrNot(bool send)
 void OutputPanel::Take()
 {
   vtkImageData* image = scan_->Scanner().Output();
-  if (scan_->IsFrozen() || image->GetNumberOfPoints() == 0)
+  if (scan_->IsFrozen() || scan_->HasFailed() || image->GetNumberOfPoints() == 0)
     return;
   if (recorder_)
     try {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ParameterPanel.h"
 #include "Controls.h"
+#include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
 #include <QCheckBox>
@@ -107,12 +108,12 @@ QWidget* ParameterPanel::MakeNumber(const Parameter& parameter, const Control& c
   const QString unit = parameter.unit.empty() ? QString() : " " + QString::fromStdString(parameter.unit);
   auto* number = NumberField(
       both, {key.c_str(), help, std::max(parameter.range.low, -1e9), std::min(parameter.range.high, 1e9), digits, step, unit},
-      [this, parameter](double typed) { Set(parameter, std::to_string(typed)); });
+      [this, parameter](double typed) { Set(parameter, NumberText(typed)); });
   number->setSpecialValueText(control.least);
   row->addWidget(slider, 1);
   row->addWidget(number);
   connect(slider, &QSlider::valueChanged, this,
-          [this, parameter, low, perStep](int at) { Set(parameter, std::to_string(low + at * perStep)); });
+          [this, parameter, low, perStep](int at) { Set(parameter, NumberText(low + at * perStep)); });
   shows_.push_back([slider, number, key, low, perStep](ParameterList& all) {
     const double now = Named(all, key).Number();
     Show(number, now);

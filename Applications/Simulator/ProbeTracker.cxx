@@ -117,6 +117,8 @@ void ProbeTracker::Step()
     sinceSeen_.start();
     scan_->Follow((trackerToBody_.matrix() * toTracker).eval());
     state += tr("; %1 poses a second").arg(tracker_->GetRate(tool.c_str()), 0, 'f', 0);
+  } else if (!hasSeen_) {
+    state += tr("; the tool has not been seen yet");
   } else if (1e-3 * static_cast<double>(sinceSeen_.elapsed()) > StoppedSeconds) {
     scan_->SetStopped(1e-3 * static_cast<double>(sinceSeen_.elapsed()));
     state += tr("; the tool is not seen");

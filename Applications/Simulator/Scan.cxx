@@ -32,6 +32,7 @@ Scan::~Scan() = default;
 
 void Scan::SetSubject(Subject subject)
 {
+  SetFrozen(false); // while the controls are still those of the body that was there
   subject_ = std::move(subject);
   scanner_.SetInputs(subject_.volumes, subject_.tissue);
   cine_.Clear();
@@ -40,7 +41,6 @@ void Scan::SetSubject(Subject subject)
   failure_.clear();
   badPose_.clear();
   walk_ = subject_.mesh ? std::make_unique<SkinWalk>(subject_.mesh) : nullptr;
-  SetFrozen(false);
   emit SubjectChanged();
   emit ControlsChanged(); // what an image is made from goes with it
   if (!subject_.IsEmpty())
@@ -181,6 +181,8 @@ void Scan::Follow(const Eigen::Matrix4d& matrix)
 
 void Scan::StopFollowing()
 {
+  if (!isFollowing_)
+    return;
   isFollowing_ = false;
   stoppedSeconds_ = -1.0;
   badPose_.clear();
@@ -325,7 +327,8 @@ void Scan::Make(ScanFrame frame, bool isNew)
   }
   frame_ = frame;
   if (isNew) {
-    cine_.Add(frame);
+    if (!HasFailed())
+      cine_.Add(frame);
     madeAt_.push_back(frame.seconds);
     while (madeAt_.front() < frame.seconds - 1.0)
       madeAt_.pop_front();

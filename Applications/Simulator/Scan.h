@@ -89,6 +89,8 @@ public:
   ///@{ Freeze, and what was seen in the last seconds.
   void SetFrozen(bool frozen);
   bool IsFrozen() const { return isFrozen_; }
+  /// Whether the newest image could not be made: what is shown is the one before.
+  bool HasFailed() const { return !failure_.isEmpty(); }
   const CineLoop& Cine() const { return cine_; }
   /// Frozen: shows this one.
   void ShowCine(int index);

@@ -5,6 +5,7 @@
 #include "Controls.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
 #include "Focus.h"
 #include "ImageView.h"
 #include "Job.h"
@@ -388,13 +389,13 @@ void SimulatorWindow::ChangeDepth(double byMm)
 {
   const double depth = scan_->Scanner().Probe().depthMax + byMm;
   if (depth >= DepthStepMm)
-    scan_->SetControl("DepthMm", std::to_string(depth));
+    scan_->SetControl("DepthMm", NumberText(depth));
 }
 
 void SimulatorWindow::ChangeGain(double byDb)
 {
   ParameterList parameters = scan_->Scanner().Parameters();
-  scan_->SetControl("GainDb", std::to_string(Named(parameters, "GainDb").Number() + byDb));
+  scan_->SetControl("GainDb", NumberText(Named(parameters, "GainDb").Number() + byDb));
 }
 
 void SimulatorWindow::dragEnterEvent(QDragEnterEvent* event)

@@ -152,11 +152,12 @@ void TaskPanel::SavePlane()
 
 void TaskPanel::SaveLength()
 {
-  if (image_->Callipers().isEmpty()) {
+  const QVector<QLineF> lines = image_->Callipers();
+  if (lines.isEmpty()) {
     emit scan_->Said({Message::Note, tr("Measure first what is to be measured: key C"), {}});
     return;
   }
-  const QLineF line = image_->Callipers().last();
+  const QLineF line = lines.last();
   const Pose& pose = scan_->Frame().probeToWorld;
   MeasureLength length;
   length.lengthMm = line.length();
@@ -169,7 +170,11 @@ void TaskPanel::SaveLength()
 void TaskPanel::OpenTask(const QString& path)
 {
   Try([&] {
-    attempt_ = ScanAttempt::Open(path.toStdString(), BodyOf(scan_->Body()));
+    attempt_.reset();
+    ScanAttempt attempt = ScanAttempt::Open(path.toStdString(), BodyOf(scan_->Body()));
+    if (attempt.What() == ScanAttempt::Kind::ReachTarget)
+      throw Error(Error::Kind::NotPossible, path.toStdString() + ": a task for a needle, which this window has not");
+    attempt_ = std::move(attempt);
     score_->clear();
   });
 }
@@ -203,9 +208,10 @@ void TaskPanel::Submit()
 {
   Try([&] {
     const bool isLength = attempt_->What() == ScanAttempt::Kind::MeasureLength;
-    if (isLength && image_->Callipers().isEmpty())
+    const QVector<QLineF> lines = image_->Callipers();
+    if (isLength && lines.isEmpty())
       throw Error(Error::Kind::BadInput, "measure first: key C, then a click on both ends");
-    const ScanScore score = isLength ? attempt_->SubmitLength(Seconds(), image_->Callipers().last().length())
+    const ScanScore score = isLength ? attempt_->SubmitLength(Seconds(), lines.last().length())
                                      : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
     score_->setText(tr("%1: %2 mm off%3, after %4 s")
                         .arg(score.passed ? tr("Passed") : tr("Not passed"))
