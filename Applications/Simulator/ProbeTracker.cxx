@@ -2,7 +2,7 @@
 #include "ProbeTracker.h"
 #include "Controls.h"
 #include "Scan.h"
-#include <algorithm>
+#include "TrackerState.h"
 #include <QComboBox>
 #include <QFormLayout>
 #include <QLabel>
@@ -95,18 +95,8 @@ void ProbeTracker::Step()
     return;
   }
   tracker_->Update();
-  if (tool_->count() != tracker_->GetNumberOfTools()) {
-    const QString chosen = tool_->currentText();
-    tool_->clear();
-    for (int i = 0; i < tracker_->GetNumberOfTools(); ++i)
-      tool_->addItem(QString::fromStdString(tracker_->GetToolName(i)));
-    tool_->setCurrentIndex(std::max(0, tool_->findText(chosen)));
-  }
-  const std::string tool = tool_->currentText().toStdString();
-  QString state = QString::fromStdString(tracker_->GetState());
-  const QString message = QString::fromStdString(tracker_->GetMessage());
-  if (!message.isEmpty())
-    state += ": " + message;
+  const std::string tool = ChosenTool(tool_, tracker_);
+  QString state = StateOf(tracker_);
   const vtkNew<vtkMatrix4x4> matrix;
   const bool isSeen = !tool.empty() && tracker_->GetTransform(tool.c_str(), matrix) == 0;
   const Eigen::Matrix4d toTracker = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());

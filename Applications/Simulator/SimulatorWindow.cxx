@@ -6,6 +6,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "DroppedFiles.h"
 #include "Focus.h"
 #include "ImageView.h"
 #include "Job.h"
@@ -27,7 +28,6 @@
 #include <QFileInfo>
 #include <QLabel>
 #include <QMenuBar>
-#include <QMimeData>
 #include <QPointer>
 #include <QScrollArea>
 #include <QSettings>
@@ -35,7 +35,6 @@
 #include <QStandardPaths>
 #include <QStatusBar>
 #include <QTimer>
-#include <QUrl>
 #include <QVBoxLayout>
 #include <QVTKOpenGLNativeWidget.h>
 
@@ -400,19 +399,14 @@ void SimulatorWindow::ChangeGain(double byDb)
 
 void SimulatorWindow::dragEnterEvent(QDragEnterEvent* event)
 {
-  if (event->mimeData()->hasUrls())
-    event->acceptProposedAction();
+  LetDrop(event);
 }
 
 void SimulatorWindow::dropEvent(QDropEvent* event)
 {
-  QStringList paths;
-  for (const QUrl& url : event->mimeData()->urls())
-    if (url.isLocalFile())
-      paths.append(url.toLocalFile());
+  const QStringList paths = DroppedFiles(event);
   if (paths.isEmpty())
     return;
-  event->acceptProposedAction();
   activateWindow();
   Open(paths);
 }

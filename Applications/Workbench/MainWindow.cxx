@@ -3,6 +3,7 @@
 #include "AlignmentHandles.h"
 #include "BrushPanel.h"
 #include "Controls.h"
+#include "DroppedFiles.h"
 #include "EditActions.h"
 #include "ExportActions.h"
 #include "FileActions.h"
@@ -34,14 +35,12 @@
 #include <QFileInfo>
 #include <QLabel>
 #include <QMenuBar>
-#include <QMimeData>
 #include <QPointer>
 #include <QScrollArea>
 #include <QSettings>
 #include <QStatusBar>
 #include <QTimer>
 #include <QToolBar>
-#include <QUrl>
 #include <QVBoxLayout>
 
 namespace echorama {
@@ -285,19 +284,14 @@ void MainWindow::closeEvent(QCloseEvent* event)
 
 void MainWindow::dragEnterEvent(QDragEnterEvent* event)
 {
-  if (event->mimeData()->hasUrls())
-    event->acceptProposedAction();
+  LetDrop(event);
 }
 
 void MainWindow::dropEvent(QDropEvent* event)
 {
-  QStringList paths;
-  for (const QUrl& url : event->mimeData()->urls())
-    if (url.isLocalFile())
-      paths.append(url.toLocalFile());
+  const QStringList paths = DroppedFiles(event);
   if (paths.isEmpty())
     return;
-  event->acceptProposedAction();
   activateWindow();
   files_->Open(paths);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrackerPanel.h"
 #include "Controls.h"
+#include "TrackerState.h"
 #include <QComboBox>
 #include <QFormLayout>
 #include <QLabel>
@@ -81,18 +82,8 @@ void TrackerPanel::Step()
     return;
   }
   tracker_->Update();
-  if (tool_->count() != tracker_->GetNumberOfTools()) {
-    const QString chosen = tool_->currentText();
-    tool_->clear();
-    for (int i = 0; i < tracker_->GetNumberOfTools(); ++i)
-      tool_->addItem(QString::fromStdString(tracker_->GetToolName(i)));
-    tool_->setCurrentIndex(std::max(0, tool_->findText(chosen)));
-  }
-  const std::string tool = tool_->currentText().toStdString();
-  QString state = QString::fromStdString(tracker_->GetState());
-  const QString message = QString::fromStdString(tracker_->GetMessage());
-  if (!message.isEmpty())
-    state += ": " + message;
+  const std::string tool = ChosenTool(tool_, tracker_);
+  QString state = StateOf(tracker_);
   if (!tool.empty()) {
     const vtkNew<vtkMatrix4x4> toolToTracker;
     // 0 is valid: a tool that is out of sight must not fling volumes about.

@@ -40,7 +40,7 @@ ParameterList Describe(MachineControls& c);
 /// The controls for beams of one kind, worked out once: turns what was read into greys, beam by beam.
 class BeamDevelopment {
 public:
-  /// \param noise a plane of noise (powers, mean 1, of the dimensions of the beams), or empty for none
+  /// \param samples along a beam, the first at \a depthMin and the last at \a depthMax (mm)
   BeamDevelopment(const MachineControls& controls, double depthMin, double depthMax, int samples);
 
   /// Turns the values of one beam into greys, 0 to 255, in place. Samples without content become 0.

@@ -16,7 +16,7 @@ namespace echorama {
 class BodyContact {
 public:
   BodyContact() = default;
-  /// Where no line of the lattice leads from tissue to tissue across empty cells nothing can meet, and nothing is computed.
+  /// Where no line of the lattice leads from tissue to tissue across empty cells nothing is computed, and nothing watched.
   BodyContact(const TissueCells&, const LatticeShape&, const Eigen::Vector3d& spacing);
 
   bool IsPossible() const { return !points_.empty(); }
