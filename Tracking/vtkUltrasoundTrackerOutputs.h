@@ -19,6 +19,7 @@
 #include "vtkSmartPointer.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundNewDataArray.h"
 #include "vtkUltrasoundVolume.h"
 #include "vtkUltrasoundVoxelTypes.h"
 #include "vtkUnsignedCharArray.h"
@@ -30,16 +31,6 @@
 
 namespace echorama {
 
-template <class Array>
-vtkSmartPointer<Array> NewTrackerArray(vtkFieldData* data, const char* name, int components = 1)
-{
-  auto array = vtkSmartPointer<Array>::New();
-  array->SetName(name);
-  array->SetNumberOfComponents(components);
-  data->AddArray(array);
-  return array;
-}
-
 /// A point per tool, with a vertex where it is valid; of those the axes, as lines of that length.
 inline void PutTools(const std::vector<ShownTool>& shown, const std::string& world, double axisLengthMm, vtkPolyData* output,
                      vtkPolyData* axesOutput)
@@ -49,16 +40,16 @@ inline void PutTools(const std::vector<ShownTool>& shown, const std::string& wor
   ends->SetDataTypeToDouble();
   const vtkNew<vtkCellArray> vertices, lines;
   vtkPointData* arrays = output->GetPointData();
-  const auto tools = NewTrackerArray<vtkIntArray>(arrays, "Tool");
-  const auto times = NewTrackerArray<vtkDoubleArray>(arrays, "TimeStamp");
-  const auto toWorld = NewTrackerArray<vtkDoubleArray>(arrays, "ToolToWorld", 16);
-  const auto statuses = NewTrackerArray<vtkUnsignedCharArray>(arrays, "Status");
-  const vtkSmartPointer<vtkDoubleArray> axes[3] = {NewTrackerArray<vtkDoubleArray>(arrays, "XAxis", 3),
-                                                   NewTrackerArray<vtkDoubleArray>(arrays, "YAxis", 3),
-                                                   NewTrackerArray<vtkDoubleArray>(arrays, "ZAxis", 3)};
-  const auto toolOfLine = NewTrackerArray<vtkIntArray>(axesOutput->GetCellData(), "Tool");
-  const auto axisOfLine = NewTrackerArray<vtkIntArray>(axesOutput->GetCellData(), "Axis");
-  const auto names = NewTrackerArray<vtkStringArray>(output->GetFieldData(), "ToolNames");
+  const auto tools = NewDataArray<vtkIntArray>(arrays, "Tool");
+  const auto times = NewDataArray<vtkDoubleArray>(arrays, "TimeStamp");
+  const auto toWorld = NewDataArray<vtkDoubleArray>(arrays, "ToolToWorld", 16);
+  const auto statuses = NewDataArray<vtkUnsignedCharArray>(arrays, "Status");
+  const vtkSmartPointer<vtkDoubleArray> axes[3] = {NewDataArray<vtkDoubleArray>(arrays, "XAxis", 3),
+                                                   NewDataArray<vtkDoubleArray>(arrays, "YAxis", 3),
+                                                   NewDataArray<vtkDoubleArray>(arrays, "ZAxis", 3)};
+  const auto toolOfLine = NewDataArray<vtkIntArray>(axesOutput->GetCellData(), "Tool");
+  const auto axisOfLine = NewDataArray<vtkIntArray>(axesOutput->GetCellData(), "Axis");
+  const auto names = NewDataArray<vtkStringArray>(output->GetFieldData(), "ToolNames");
   for (const ShownTool& tool : shown) {
     const Eigen::Vector3d origin = tool.toWorld.translation();
     const bool valid = tool.status == TransformStatus::Valid;
@@ -111,7 +102,7 @@ inline void PutImage(const ShownImage& shown, vtkImageData* output)
     });
   }
   output->GetPointData()->SetScalars(intensity);
-  const auto valid = NewTrackerArray<vtkUnsignedCharArray>(output->GetPointData(), vtkUltrasoundVolume::ValidRegionName());
+  const auto valid = NewDataArray<vtkUnsignedCharArray>(output->GetPointData(), vtkUltrasoundVolume::ValidRegionName());
   valid->SetNumberOfTuples(output->GetNumberOfPoints());
   valid->Fill(1.0);
   if (shown.imageToWorld) {

@@ -7,9 +7,9 @@
 #include "Core/Base/JsonPlace.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "Core/Geometry/TransformFile.h"
+#include "Filters/Calibration/CalibrationJson.h"
 #include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
-#include "Tracking/Calibration/CalibrationJson.h"
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <filesystem>

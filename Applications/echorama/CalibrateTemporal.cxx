@@ -3,10 +3,10 @@
 #include "Calibrate.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/TextFile.h"
+#include "Filters/Calibration/CalibrationJson.h"
 #include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "TrackedVolumes.h"
-#include "Tracking/Calibration/CalibrationJson.h"
 #include <memory>
 
 namespace echorama {

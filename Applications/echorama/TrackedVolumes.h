@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Tracking/Placement/TrackerPlacement.h"
+#include "Filters/Calibration/TrackerPlacement.h"
 #include "Volumes.h"
 #include <CLI/App.hpp>
 #include <string>
