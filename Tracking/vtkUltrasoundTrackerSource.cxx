@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundTrackerSource.h"
 
+#include "Core/Base/Angles.h"
 #include "Core/Base/JoinedText.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "Core/Geometry/TransformFile.h"
@@ -14,6 +15,7 @@
 #include "vtkMatrix4x4.h"
 #include "vtkObjectFactory.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkUltrasoundSkinNormals.h"
 #include "vtkUltrasoundTrackerOutputs.h"
 #include "vtkUltrasoundVolume.h"
 
@@ -198,6 +200,9 @@ void vtkUltrasoundTrackerSource::Open(std::shared_ptr<echorama::PoseSubscription
       if (subscription) {
         *subscription = session->Poses.Subscribe();
       }
+      if (auto* fused = dynamic_cast<echorama::FusedTracker*>(session->Device.get())) {
+        fused->SetNormals(this->Normals);
+      }
       session->Device->Start(session->Poses, &session->Images);
     }
     this->Opened = std::move(session);
@@ -379,6 +384,82 @@ int vtkUltrasoundTrackerSource::GetTransform(const char* name, vtkMatrix4x4* mat
     matrix->DeepCopy(rows.data());
   }
   return static_cast<int>(found.Status());
+}
+
+//----------------------------------------------------------------------------
+echorama::FusedTracker* vtkUltrasoundTrackerSource::Fused() const
+{
+  return this->Opened ? dynamic_cast<echorama::FusedTracker*>(this->Opened->Device.get()) : nullptr;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::Tell(const std::function<void(echorama::FusedTracker&)>& what)
+{
+  return vtkUltrasoundVolume::Run(this, nullptr, [&](const echorama::Progress&) {
+           this->Open();
+           echorama::FusedTracker* fused = this->Fused();
+           if (!fused) {
+             throw Error(Error::Kind::NotPossible,
+                         this->Device + (this->Active
+                                             ? ": only fused trackers, fused:POSITION-LINE|ORIENTATION-LINE, are told this"
+                                             : ": it is not open"));
+           }
+           what(*fused);
+         }) != 0;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::Align(double x, double y, double z, double sigmaDegrees)
+{
+  return this->Tell([&](echorama::FusedTracker& fused) { fused.Align({x, y, z}, sigmaDegrees); });
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::AlignBySlide(double seconds, double sigmaDegrees)
+{
+  return this->Tell([&](echorama::FusedTracker& fused) { fused.AlignBySlide(seconds, sigmaDegrees); });
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundTrackerSource::GetHeadingSigma() const
+{
+  const echorama::FusedTracker* fused = this->Fused();
+  return fused ? fused->HeadingSigma() * echorama::DegreesPerRadian : NaN;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundTrackerSource::SetPlace(double x, double y, double z, double normalX, double normalY, double normalZ)
+{
+  const Eigen::Vector3d normal(normalX, normalY, normalZ);
+  return this->Tell([&](echorama::FusedTracker& fused) {
+    fused.SetPlace({x, y, z}, normal.isZero(0.0) ? std::nullopt : std::optional<Eigen::Vector3d>(normal));
+  });
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetNormals(echorama::FusedTracker::NormalOf normals)
+{
+  this->Normals = std::move(normals);
+  if (echorama::FusedTracker* fused = this->Fused()) {
+    fused->SetNormals(this->Normals);
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundTrackerSource::SetSkin(vtkPolyData* skin)
+{
+  if (skin == this->Skin) {
+    return;
+  }
+  this->Skin = skin;
+  this->SetNormals(skin && skin->GetNumberOfCells() > 0 ? echorama::NormalsOf(skin) : nullptr);
+  this->Modified();
+}
+
+//----------------------------------------------------------------------------
+vtkPolyData* vtkUltrasoundTrackerSource::GetSkin() const
+{
+  return this->Skin;
 }
 
 //----------------------------------------------------------------------------

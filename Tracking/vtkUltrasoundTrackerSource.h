@@ -42,16 +42,20 @@
 #include "vtkPolyDataAlgorithm.h"
 #include "vtkUltrasoundParameters.h"
 
+#include "vtkSmartPointer.h"
+
 #include <memory> // for what is open
 #include <string> // for texts
 
 #ifndef __VTK_WRAP__
+#include "Tracking/Devices/FusedTracker.h"
 #include "Tracking/Stream/LiveTransforms.h"
 #include "Tracking/Stream/StreamRecorder.h"
 #include <functional>
 #endif
 
 class vtkMatrix4x4;
+class vtkPolyData;
 
 class ECHORAMATRACKING_EXPORT vtkUltrasoundTrackerSource : public vtkPolyDataAlgorithm {
 public:
@@ -199,6 +203,43 @@ public:
   std::string GetTransformMessage(const char* name) { return this->Found(name).message; }
   ///@}
 
+  ///@{
+  /**
+   * A fused tracker ("fused:POSITION-LINE|ORIENTATION-LINE") knows its heading by what somebody says. Align: the array, x of the
+   * tool, points along a direction of the positions' world now, known to so many degrees (standard deviation). AlignBySlide: it
+   * was slid along its array, towards x, in the last seconds. Both return false, with an error that names the reason, when that
+   * tells nothing, or the device is none of that kind. See echorama::SurfacePoseFilter.
+   */
+  bool Align(double x, double y, double z, double sigmaDegrees);
+  bool Align(double x, double y, double z) { return this->Align(x, y, z, 3.0); }
+  bool AlignBySlide(double seconds, double sigmaDegrees);
+  bool AlignBySlide(double seconds) { return this->AlignBySlide(seconds, 5.0); }
+  ///@}
+
+  /** Standard deviation of that heading, degrees; 180 before any alignment, NaN of other devices. */
+  double GetHeadingSigma() const;
+
+  ///@{
+  /**
+   * Of a fused tracker without a line of positions ("fused:|ORIENTATION-LINE"): where the probe is from now on, and the normal of
+   * the surface there, outwards. Returns false, after an error, as Align.
+   */
+  bool SetPlace(double x, double y, double z, double normalX, double normalY, double normalZ);
+  bool SetPlace(double x, double y, double z) { return this->SetPlace(x, y, z, 0.0, 0.0, 0.0); }
+  ///@}
+
+  ///@{
+  /**
+   * The surface that positions of a fused tracker lie on, triangles that are turned outwards (as by vtkUltrasoundSkin): its
+   * normals correct the heading. Of its points' normals where it has them. Default: none.
+   */
+  void SetSkin(vtkPolyData* skin);
+  vtkPolyData* GetSkin() const;
+  ///@}
+#ifndef __VTK_WRAP__
+  void SetNormals(echorama::FusedTracker::NormalOf normals); ///< the same, for C++ that has a faster way
+#endif
+
   // BEGIN parameters
   /**
    * The frame of coordinates that is the world. Tools that no transforms lead from to it are missing. Empty takes the frame that
@@ -259,12 +300,16 @@ private:
   void ReadImage(double time);
   void ChooseImage(double time);
   void ShowTools(vtkPolyData* tools, vtkPolyData* axes, double time);
+  echorama::FusedTracker* Fused() const;
+  bool Tell(const std::function<void(echorama::FusedTracker&)>& what);
 
   std::string Device, TransformFile, WorldFrame, ImageFrame = "Image";
   echorama::StreamLimits Limits;
   double FreshSeconds = echorama::LiveTransforms::defaultFreshSeconds, AxisLengthMm = 50.0;
   std::unique_ptr<Session> Opened;
   std::string Failure; // why it could not be opened
+  vtkSmartPointer<vtkPolyData> Skin;
+  echorama::FusedTracker::NormalOf Normals;
 #endif
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/JoinedText.h"
+#include "Tracking/Devices/FusedTracker.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkListener.h"
 #include "Tracking/Devices/PolhemusTracker.h"
@@ -34,7 +35,7 @@ const std::vector<Kind>& Kinds()
   static const std::vector<Kind> kinds = {
       {"replay", MakeBy<ReplayTracker, ReplayParameters>},  {"simulated", MakeBy<SimulatedTracker, SimulatedTrackerParameters>},
       {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>}, {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
-      {PolhemusTracker::Scheme, Make<PolhemusTracker>},
+      {PolhemusTracker::Scheme, Make<PolhemusTracker>},     {FusedTracker::Scheme, MakeBy<FusedTracker, FusedTrackerParameters>},
   };
   return kinds;
 }

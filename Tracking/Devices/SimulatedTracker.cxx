@@ -103,6 +103,8 @@ ParameterList Describe(SimulatedTrackerParameters& p)
           "grows with the square of that distance; tools are turned as the field is (half the curl of the displacement)."),
       Parameter("RangeMm", p.rangeMm, {0, 100000}, "mm",
                 "Tools further from the transmitter are out of range; 0: there is no border."),
+      Parameter("DriftDegreesPerMinute", p.driftDegreesPerMinute, {-1000, 1000}, "degrees/min",
+                "How fast orientations turn about z, as the heading of an IMU does; 0 at the time 0 of the sender's clock."),
       Parameter("Seed", p.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same noise."),
       Parameter("UnplugAfter", p.unplugAfter, {0, 1e9}, "s", "After so long the device is lost; 0: never."),
       Parameter("Start", p.start, {-1, 1e10}, "s",
@@ -179,6 +181,10 @@ ToolPose SimulatedMeasurement(const SimulatedTrackerParameters& p, int tool, std
   measured.pose = SimulatedDistortion(p, truth);
   measured.pose.translation() += p.noiseMm * move;
   measured.pose.linear() = measured.pose.linear() * ExpRotation(p.noiseDegrees * Radians * turn);
+  if (p.driftDegreesPerMinute != 0.0)
+    measured.pose.linear() =
+        ExpRotation({0.0, 0.0, std::remainder(p.driftDegreesPerMinute * measured.time / 60.0 * Radians, Tau)}) *
+        measured.pose.linear();
   if (p.rangeMm > 0.0 && truth.translation().norm() > p.rangeMm)
     measured.status = TransformStatus::OutOfRange;
   return measured;

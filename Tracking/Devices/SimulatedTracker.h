@@ -28,11 +28,13 @@ struct SimulatedTrackerParameters {
   int tools = 2;
   SimulatedMotion motion = SimulatedMotion::Freehand;
   double noiseMm = 0.0, noiseDegrees = 0.0, dropout = 0.0, latencyMs = 0.0, jitterMs = 0.0, distortionMm = 0.0, rangeMm = 0.0;
+  double driftDegreesPerMinute = 0.0;
   std::uint64_t seed = 1;
   double unplugAfter = 0.0, start = -1.0;
 
   /// From the options of "simulated:?rate=100&tools=3&motion=sweep&noiseMm=0.7&noiseDegrees=0.25&dropout=0.1&latencyMs=20&
-  /// jitterMs=5&distortionMm=2&rangeMm=400&seed=1&unplugAfter=10&start=0". \throws Error(InvalidParameter)
+  /// jitterMs=5&distortionMm=2&rangeMm=400&driftDegreesPerMinute=10&seed=1&unplugAfter=10&start=0". \throws
+  /// Error(InvalidParameter)
   static SimulatedTrackerParameters Of(const TrackerAddress& address);
 };
 ParameterList Describe(SimulatedTrackerParameters& p);

@@ -21,7 +21,11 @@ TrackerAddress TrackerAddress::Parse(const std::string& text)
   if (colon == std::string::npos || colon == 0)
     RefuseAddress(text, "a tracker is named as SCHEME:PLACE, such as igtl://localhost:18944");
   address.scheme = text.substr(0, colon);
-  const std::size_t question = text.find('?', colon);
+  std::size_t question = text.find('?', colon);
+  if (address.scheme == "fused") {
+    const std::size_t bar = text.find('|', colon);
+    question = bar == std::string::npos ? bar : text.find('|', bar + 1);
+  }
   address.place = text.substr(colon + 1, question == std::string::npos ? std::string::npos : question - colon - 1);
   if (question == std::string::npos)
     return address;

@@ -16,6 +16,9 @@ namespace echorama {
 /// | polhemus    | /dev/ttyUSB0              | Polhemus Patriot or Liberty on a serial line           |
 /// | replay      | FILE                      | a recording                                            |
 /// | simulated   | (none)                    | a tracker that does not exist, with its faults         |
+/// | fused       | LINE|LINE                 | place by one tracker, orientation by another           |
+///
+/// Lines within a line have options of their own: those of the whole follow another bar, fused:LINE|LINE|OPTION=VALUE.
 struct TrackerAddress {
   std::string text; ///< as given
   std::string scheme, place;

@@ -11,7 +11,7 @@
 // direction of what points up is noise.
 //
 // Samples of the surface wait until the IMU has passed their time, so that both are of one moment.
-#include "Filters/Live/SurfacePoseFilter.h"
+#include "Tracking/Stream/SurfacePoseFilter.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
@@ -24,7 +24,8 @@ namespace {
 using Eigen::Quaterniond, Eigen::Vector3d;
 
 constexpr double keptSeconds = 10.0, velocitySeconds = 0.05, shortestSlideMm = 10.0;
-constexpr double leastLying = 0.5; // sine of the angle to the vertical
+constexpr double leastJumpSeconds = 1.0; // of a clock
+constexpr double leastLying = 0.5;       // sine of the angle to the vertical
 
 double Squared(double x)
 {
@@ -52,15 +53,6 @@ bool FindSamples(const Samples& samples, double time, double gap, double predict
   }
   part = a == b ? 0.0 : (time - samples[a].time) / (samples[b].time - samples[a].time);
   return true;
-}
-
-template <class Samples>
-void CheckStamp(const Samples& samples, double time, const std::string& stream)
-{
-  if (!std::isfinite(time))
-    throw Error(Error::Kind::BadInput, stream + ": the time stamp is not finite");
-  if (!samples.empty() && !(time > samples.back().time))
-    throw Error(Error::Kind::BadInput, stream + ": the time stamp is not later than the last");
 }
 
 template <class Samples>
@@ -106,29 +98,64 @@ SurfacePoseFilter::SurfacePoseFilter(const SurfacePoseParameters& parameters, co
   covariance_.diagonal() << Squared(Pi), Squared(drift), 0.0;
 }
 
-void SurfacePoseFilter::AddSurface(double stamp, const Vector3d& point, const Vector3d& normal)
+// Puts what can be believed to the end of what has come. \returns how many samples that are
+template <class Sample>
+std::size_t SurfacePoseFilter::Take(std::deque<Sample>& samples, std::optional<Sample>& odd, const Sample& sample,
+                                    const char* stream)
 {
-  const double time = stamp - parameters_.surfaceDelay;
-  CheckStamp(surface_, time, "the surface tracker");
-  if (!point.allFinite() || !normal.allFinite() || !(normal.norm() > 1e-9))
+  const auto refuse = [stream](const char* why) {
+    throw Error(Error::Kind::BadInput, std::string(stream) + ": the time stamp is " + why);
+  };
+  if (!std::isfinite(sample.time))
+    refuse("not finite");
+  const double far = std::max(leastJumpSeconds, 2.0 * parameters_.longestGap);
+  std::size_t taken = 1;
+  if (!samples.empty() && std::abs(sample.time - samples.back().time) > far) {
+    if (!odd || !(sample.time > odd->time) || sample.time - odd->time > far) {
+      odd = sample;
+      ++statistics_.odd;
+      return 0;
+    }
+    if (odd->time < samples.back().time) {
+      // How long it is since then, nobody knows: the state goes on from here.
+      samples.clear();
+      time_.reset();
+      ++statistics_.jumps;
+    }
+    samples.push_back(*odd);
+    taken = 2;
+  } else if (!samples.empty() && !(sample.time > samples.back().time)) {
+    refuse("not later than the last");
+  }
+  odd.reset();
+  samples.push_back(sample);
+  Forget(samples);
+  return std::min(taken, samples.size());
+}
+
+void SurfacePoseFilter::AddSurface(double stamp, const Vector3d& point, const std::optional<Vector3d>& normal)
+{
+  if (!point.allFinite() || (normal && (!normal->allFinite() || !(normal->norm() > 1e-9))))
     throw Error(Error::Kind::BadInput, "the surface tracker: the place or the normal is not finite, or the normal has no length");
-  surface_.push_back({time, point, normal.normalized()});
-  waiting_.push_back(surface_.back());
-  Forget(surface_);
+  const SurfaceSample sample{stamp - parameters_.surfaceDelay, point, normal ? normal->normalized() : Vector3d(Vector3d::Zero())};
+  const std::uint64_t jumps = statistics_.jumps;
+  const std::size_t taken = Take(surface_, oddSurface_, sample, "the surface tracker");
+  if (taken == 0)
+    return;
+  if (statistics_.jumps != jumps)
+    waiting_.clear();
+  waiting_.insert(waiting_.end(), surface_.end() - static_cast<std::ptrdiff_t>(taken), surface_.end());
   Forget(waiting_); // when the IMU has died
-  ++statistics_.surface;
+  statistics_.surface += taken;
   Update();
 }
 
 void SurfacePoseFilter::AddImu(double stamp, const Quaterniond& sensorToImuWorld)
 {
-  const double time = stamp - parameters_.imuDelay;
-  CheckStamp(imu_, time, "the IMU");
   if (!sensorToImuWorld.coeffs().allFinite() || std::abs(sensorToImuWorld.norm() - 1.0) > 1e-3)
     throw Error(Error::Kind::BadInput, "the IMU: the quaternion is not finite, or not of length 1");
-  imu_.push_back({time, imuWorldToLevel_ * sensorToImuWorld.normalized() * probeToSensor_});
-  Forget(imu_);
-  ++statistics_.imu;
+  const ImuSample sample{stamp - parameters_.imuDelay, imuWorldToLevel_ * sensorToImuWorld.normalized() * probeToSensor_};
+  statistics_.imu += Take(imu_, oddImu_, sample, "the IMU");
   Update();
 }
 
@@ -236,11 +263,12 @@ bool SurfacePoseFilter::Align(double time, const Vector3d& direction, double sig
   const auto turned = ImuAt(time, false);
   if (!turned)
     return false;
-  Propagate(time);
-  const Vector3d array = WithHeading(*turned, state_[0]) * Vector3d::UnitX();
-  const Vector3d is = array - array.dot(up_) * up_, wanted = direction - direction.dot(up_) * up_;
-  if (!(is.norm() > 0.2) || !(wanted.norm() > 0.2 * direction.norm()))
+  const Vector3d wanted = direction - direction.dot(up_) * up_;
+  const auto lying = [this](const Vector3d& array) -> Vector3d { return array - array.dot(up_) * up_; };
+  if (!(lying(*turned * Vector3d::UnitX()).norm() > 0.2) || !(wanted.norm() > 0.2 * direction.norm()))
     return false;
+  Propagate(time);
+  const Vector3d is = lying(WithHeading(*turned, state_[0]) * Vector3d::UnitX());
   const double error = std::atan2(is.cross(wanted).dot(up_), is.dot(wanted));
   const double noise = Squared(sigmaDegrees * RadiansPerDegree);
   if (!aligned_) {

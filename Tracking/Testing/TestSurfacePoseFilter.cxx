@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
-#include "Core/Base/Random.h"
-#include "Filters/Live/SurfacePoseFilter.h"
-#include <cmath>
+#include "Tracking/Testing/SurfaceSimulation.h"
 #include <gtest/gtest.h>
 #include <limits>
-#include <vector>
 
 using namespace echorama;
 using Eigen::Quaterniond, Eigen::Vector3d;
@@ -15,105 +11,6 @@ using Eigen::Quaterniond, Eigen::Vector3d;
 namespace {
 
 constexpr double notANumber = std::numeric_limits<double>::quiet_NaN();
-
-// A probe that a hand moves over a ball of 150 mm, and both of its streams. The world's z is up.
-struct Simulation {
-  double seconds = 120.0;
-  double latitudeDegrees = 30.0; // of the place, about which it wanders by +-20 degrees: 90 is the top
-  double surfaceHz = 90.0, imuHz = 100.0, surfaceDelay = 0.04, imuDelay = 0.015;
-  double noiseMm = 0.3, normalDegrees = 2.0, imuDegrees = 0.3;
-  double driftDegreesPerMinute = 10.0, driftChange = 5.0, headingNoise = 0.1;
-  double heldDegrees = 12.0, heldSeconds = 3.0;
-  double dropped = 0.0;
-  std::uint64_t seed = 1;
-  Eigen::Matrix3d sensorToProbe = ExpRotation({0.3, -0.2, 1.0});
-
-  struct Moment {
-    Pose probeToWorld;
-    Vector3d normal;
-    double drift; // of the heading, radians
-  };
-  std::vector<Moment> truth; // every millisecond
-
-  Moment At(double time) const { return truth[static_cast<std::size_t>(std::lround(time * 1000.0))]; }
-
-  void Run()
-  {
-    Random random(seed, 1);
-    double rate = driftDegreesPerMinute * RadiansPerDegree / 60.0 * random.Normal(), drift = 0.0;
-    const double held = heldDegrees * RadiansPerDegree, dt = 1e-3, kept = std::exp(-dt / heldSeconds);
-    double a = held * random.Normal(), b = held * random.Normal();
-    for (int n = 0; n <= static_cast<int>(seconds * 1000.0); ++n) {
-      const double t = n * dt;
-      const double latitude = (latitudeDegrees + 12.0 * std::sin(0.9 * t) + 8.0 * std::sin(0.37 * t + 1.0)) * RadiansPerDegree;
-      const double longitude = 0.5 * std::sin(0.6 * t) + 0.3 * std::sin(0.23 * t + 2.0);
-      Moment m;
-      m.normal = {std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude), std::sin(latitude)};
-      const double turned = 0.8 * std::sin(0.5 * t + 0.4);
-      const Vector3d east(-std::sin(longitude), std::cos(longitude), 0), z = -m.normal;
-      Eigen::Matrix3d upright;
-      const Vector3d x = Eigen::AngleAxisd(turned, z) * east;
-      upright << x, z.cross(x), z;
-      // The inner normal is (a, b, .) as the probe sees it.
-      const Vector3d seen(a, b, std::sqrt(1.0 - a * a - b * b));
-      m.probeToWorld.linear() = upright * Quaterniond::FromTwoVectors(seen, Vector3d::UnitZ()).toRotationMatrix();
-      m.probeToWorld.translation() = 150.0 * m.normal;
-      m.drift = drift;
-      truth.push_back(m);
-      drift += rate * dt + headingNoise * RadiansPerDegree * std::sqrt(dt) * random.Normal();
-      rate += driftChange * RadiansPerDegree / 60.0 / std::sqrt(60.0) * std::sqrt(dt) * random.Normal();
-      a = kept * a + held * std::sqrt(1 - kept * kept) * random.Normal();
-      b = kept * b + held * std::sqrt(1 - kept * kept) * random.Normal();
-      a = std::clamp(a, -0.6, 0.6);
-      b = std::clamp(b, -0.6, 0.6);
-    }
-  }
-
-  // What comes, in the order in which it comes; at(stamp, surface's or IMU's).
-  template <class Surface, class Imu>
-  void Send(Surface&& onSurface, Imu&& onImu) const
-  {
-    Random random(seed, 2);
-    const auto vector = [&random](double sigma) -> Vector3d {
-      const double x = random.Normal(), y = random.Normal(), z = random.Normal();
-      return sigma * Vector3d(x, y, z);
-    };
-    double nextSurface = 0.0, nextImu = 0.0;
-    while (std::max(nextSurface, nextImu) < seconds - 0.1) {
-      const bool surface = nextSurface + surfaceDelay <= nextImu + imuDelay;
-      const bool lost = random.Uniform() < dropped;
-      if (surface) {
-        const Moment m = At(nextSurface);
-        const Vector3d normal = ExpRotation(vector(normalDegrees * RadiansPerDegree)) * m.normal;
-        const Vector3d point = m.probeToWorld.translation() + vector(noiseMm);
-        if (!lost)
-          onSurface(nextSurface + surfaceDelay, point, normal);
-        nextSurface = std::lround((nextSurface + 1.0 / surfaceHz) * 1000.0) / 1000.0;
-      } else {
-        const Moment m = At(nextImu);
-        const Eigen::Matrix3d rotation = Eigen::AngleAxisd(m.drift, Vector3d::UnitZ()) * m.probeToWorld.linear() * sensorToProbe *
-                                         ExpRotation(vector(imuDegrees * RadiansPerDegree));
-        if (!lost)
-          onImu(nextImu + imuDelay, Quaterniond(rotation));
-        nextImu = std::lround((nextImu + 1.0 / imuHz) * 1000.0) / 1000.0;
-      }
-    }
-  }
-
-  SurfacePoseParameters Parameters() const
-  {
-    SurfacePoseParameters p;
-    p.surfaceDelay = surfaceDelay;
-    p.imuDelay = imuDelay;
-    p.driftDegreesPerMinute = driftDegreesPerMinute;
-    p.driftChange = driftChange;
-    p.headingNoise = headingNoise;
-    p.normalDegrees = normalDegrees;
-    p.heldDegrees = heldDegrees;
-    p.heldSeconds = heldSeconds;
-    return p;
-  }
-};
 
 struct Errors {
   double degrees = 0.0, mm = 0.0;           // RMS of the filter, at its newest moment
@@ -124,7 +21,7 @@ struct Errors {
   std::uint64_t count = 0;
 };
 
-Errors Compare(Simulation s)
+Errors Compare(SurfaceSimulation s)
 {
   s.Run();
   SurfacePoseFilter filter(s.Parameters(), s.sensorToProbe);
@@ -183,7 +80,7 @@ Errors Compare(Simulation s)
 }
 
 // Of several seeds.
-Errors Mean(Simulation s, int trials)
+Errors Mean(SurfaceSimulation s, int trials)
 {
   Errors mean;
   for (int t = 1; t <= trials; ++t) {
@@ -221,7 +118,7 @@ void Record(const std::string& name, const Errors& e)
 TEST(SurfacePoseFilter, OnAFlankItHoldsTheHeading)
 {
   for (const double latitude : {0.0, 30.0}) {
-    Simulation flank;
+    SurfaceSimulation flank;
     flank.latitudeDegrees = latitude;
     const Errors e = Mean(flank, 8);
     Record(latitude == 0.0 ? "side" : "flank", e);
@@ -240,7 +137,7 @@ TEST(SurfacePoseFilter, OnAFlankItHoldsTheHeading)
 
 TEST(SurfacePoseFilter, OnTopItSaysThatItDoesNot)
 {
-  Simulation top;
+  SurfaceSimulation top;
   top.latitudeDegrees = 90.0;
   const Errors e = Mean(top, 8);
   Record("top", e);
@@ -254,7 +151,7 @@ TEST(SurfacePoseFilter, TheDriftIsFound)
 {
   double largest = 0.0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    Simulation s;
+    SurfaceSimulation s;
     s.seed = seed;
     s.latitudeDegrees = 0.0;
     s.driftDegreesPerMinute = 30.0;
@@ -278,7 +175,7 @@ TEST(SurfacePoseFilter, TheDriftIsFound)
 
 TEST(SurfacePoseFilter, LivesWithLostSamples)
 {
-  Simulation s;
+  SurfaceSimulation s;
   s.latitudeDegrees = 0.0;
   s.dropped = 0.3;
   const Errors e = Mean(s, 4);
@@ -290,7 +187,7 @@ TEST(SurfacePoseFilter, LivesWithLostSamples)
 TEST(SurfacePoseFilter, DelaysAreTakenOut)
 {
   // Without noise, at the same moment on both clocks.
-  Simulation s;
+  SurfaceSimulation s;
   s.seconds = 5.0;
   s.noiseMm = s.imuDegrees = s.driftDegreesPerMinute = s.driftChange = s.headingNoise = 0.0;
   s.surfaceDelay = 0.13;
@@ -331,7 +228,7 @@ TEST(SurfacePoseFilter, AlignsByASlide)
   const Eigen::Matrix3d truth = (Eigen::Matrix3d() << 1, 0, 0, 0, -1, 0, 0, 0, -1).finished(); // z down
   for (int n = 0; n <= 100; ++n) {
     filter.AddImu(0.01 * n, Quaterniond(Eigen::Matrix3d(Eigen::AngleAxisd(70.0 * RadiansPerDegree, Vector3d::UnitZ()) * truth)));
-    filter.AddSurface(0.01 * n, {0.4 * n, 0, 0}, {0, 0, 1});
+    filter.AddSurface(0.01 * n, {0.4 * n, 0, 0}, Vector3d(0, 0, 1));
   }
   EXPECT_FALSE(filter.IsAligned());
   EXPECT_NEAR(filter.HeadingSigma(), Pi, 1e-9);
@@ -358,7 +255,7 @@ TEST(SurfacePoseFilter, TakesAnyDirectionForUp)
   const Quaterniond imu = level.inverse() * Quaterniond(Eigen::Matrix3d(Eigen::AngleAxisd(1.0, Vector3d(0, -1, 0)) * truth));
   for (int n = 0; n < 3; ++n) {
     filter.AddImu(0.1 * n, imu);
-    filter.AddSurface(0.1 * n, {1, 2, 3}, {0, -1, 0});
+    filter.AddSurface(0.1 * n, {1, 2, 3}, Vector3d(0, -1, 0));
   }
   EXPECT_TRUE(filter.Align(0.2, {1, 0, 0}));
   EXPECT_LT((filter.Newest()->probeToWorld.linear() - truth).norm(), 1e-9);
@@ -373,7 +270,7 @@ TEST(SurfacePoseFilter, PredictsAndBridgesNoFurtherThanItMay)
   for (int n = 0; n <= 20; ++n) {
     const double t = 0.02 * n + (n > 10 ? 1.0 : 0.0); // silent from 0.2 to 1.22
     filter.AddImu(t, turned(t));
-    filter.AddSurface(t, {100 * t, 0, 0}, {0, 0, 1});
+    filter.AddSurface(t, {100 * t, 0, 0}, Vector3d(0, 0, 1));
   }
   EXPECT_FALSE(filter.At(-0.01));
   EXPECT_TRUE(filter.At(0.15));
@@ -400,14 +297,14 @@ TEST(SurfacePoseFilter, RefusesWhatCannotBe)
   };
   SurfacePoseFilter filter({});
   filter.AddImu(1.0, Quaterniond::Identity());
-  filter.AddSurface(1.0, {0, 0, 0}, {0, 0, 1});
+  filter.AddSurface(1.0, {0, 0, 0}, Vector3d(0, 0, 1));
   EXPECT_EQ(reason([&] { filter.AddImu(1.0, Quaterniond::Identity()); }), "the IMU: the time stamp is not later than the last");
   EXPECT_EQ(reason([&] {
-              filter.AddSurface(0.9, {0, 0, 0}, {0, 0, 1});
+              filter.AddSurface(0.9, {0, 0, 0}, Vector3d(0, 0, 1));
             }),
             "the surface tracker: the time stamp is not later than the last");
   EXPECT_EQ(reason([&] {
-              filter.AddSurface(notANumber, {0, 0, 0}, {0, 0, 1});
+              filter.AddSurface(notANumber, {0, 0, 0}, Vector3d(0, 0, 1));
             }),
             "the surface tracker: the time stamp is not finite");
   for (const Vector3d& normal : {Vector3d(0, 0, 0), Vector3d(notANumber, 0, 1)})
@@ -424,4 +321,101 @@ TEST(SurfacePoseFilter, RefusesWhatCannotBe)
   p.up.setZero();
   EXPECT_EQ(reason([&] { SurfacePoseFilter bad(p); }), "Up has no length");
   EXPECT_EQ(reason([&] { SurfacePoseFilter bad({}, Eigen::Matrix3d::Zero()); }), "how the IMU is mounted is no rotation");
+}
+
+namespace {
+
+// Both streams of a probe that moves at 100 mm/s along x, at times from \a from on.
+void Feed(SurfacePoseFilter& filter, double from, int count)
+{
+  for (int n = 0; n < count; ++n) {
+    filter.AddImu(from + 0.02 * n, Quaterniond::Identity());
+    filter.AddSurface(from + 0.02 * n, {2.0 * n, 0, 0}, Vector3d(0, 0, 1));
+  }
+}
+
+} // namespace
+
+TEST(SurfacePoseFilter, OneOddStampDoesNotStopIt)
+{
+  SurfacePoseFilter filter({});
+  Feed(filter, 100.0, 20);
+  for (const double odd : {1e9, 102.0, -7.0}) {
+    filter.AddImu(odd, Quaterniond::Identity());
+    filter.AddSurface(odd, {5e3, 0, 0}, Vector3d(0, 0, 1));
+  }
+  EXPECT_EQ(filter.Newest()->time, 100.38);
+  filter.AddImu(100.40, Quaterniond::Identity());
+  filter.AddSurface(100.40, {40, 0, 0}, Vector3d(0, 0, 1));
+  EXPECT_EQ(filter.Newest()->time, 100.40);
+  EXPECT_EQ(filter.Newest()->probeToWorld.translation(), Vector3d(40, 0, 0));
+  EXPECT_EQ(filter.Counted().odd, 6u);
+  EXPECT_EQ(filter.Counted().surface, 21u);
+  EXPECT_EQ(filter.Counted().jumps, 0u);
+  // Nor does one that comes first of all.
+  SurfacePoseFilter other({});
+  other.AddImu(1e9, Quaterniond::Identity());
+  Feed(other, 0.0, 5);
+  ASSERT_TRUE(other.Newest());
+  EXPECT_NEAR(other.Newest()->time, 0.08, 1e-12);
+  EXPECT_EQ(other.Counted().jumps, 1u);
+}
+
+TEST(SurfacePoseFilter, GoesOnAfterASilenceAndAfterAClockThatJumped)
+{
+  SurfacePoseFilter filter({});
+  Feed(filter, 100.0, 20);
+  EXPECT_TRUE(filter.Align(100.2, {1, 0, 0}, 3.0));
+  const double before = filter.HeadingSigma();
+  Feed(filter, 160.0, 10); // silent for a minute
+  EXPECT_NEAR(filter.Newest()->time, 160.18, 1e-9);
+  EXPECT_EQ(filter.Counted().imu, 30u);
+  // Nothing is known of what the heading did meanwhile but by how much it may have drifted: 10 degrees.
+  EXPECT_NEAR(filter.HeadingSigma(), std::hypot(before, 10.0 * RadiansPerDegree), 1.5 * RadiansPerDegree);
+  const double heading = filter.Heading();
+  Feed(filter, 5.0, 10); // back
+  EXPECT_EQ(filter.Counted().jumps, 2u);
+  EXPECT_NEAR(filter.Newest()->time, 5.18, 1e-9);
+  EXPECT_FALSE(filter.At(160.1));
+  EXPECT_NEAR(filter.Heading(), heading, 1e-6); // what was aligned stays
+  EXPECT_TRUE(filter.IsAligned());
+}
+
+TEST(SurfacePoseFilter, AnAlignmentThatIsRefusedChangesNothing)
+{
+  // Beside a twin that was not asked. The refused one is of a later moment than the last update.
+  SurfacePoseFilter filter({}), twin({});
+  for (SurfacePoseFilter* one : {&filter, &twin}) {
+    Feed(*one, 0.0, 20);
+    EXPECT_TRUE(one->Align(0.1, {1, 0, 0}, 3.0));
+    one->AddImu(0.55, Quaterniond::Identity());
+  }
+  const double sigma = filter.HeadingSigma();
+  EXPECT_FALSE(filter.Align(0.55, {0, 0, 1}));
+  EXPECT_EQ(filter.HeadingSigma(), sigma);
+  for (SurfacePoseFilter* one : {&filter, &twin}) {
+    one->AddImu(0.7, Quaterniond::Identity());
+    one->AddSurface(0.6, {1, 0, 0}, Vector3d(0, 0, 1));
+  }
+  EXPECT_EQ(filter.HeadingSigma(), twin.HeadingSigma());
+}
+
+TEST(SurfacePoseFilter, WithoutNormalsThePlaceIsTakenAndTheHeadingLeftAlone)
+{
+  SurfacePoseParameters p;
+  SurfacePoseFilter with(p), without(p);
+  const Quaterniond flank(Eigen::AngleAxisd(0.5 * Pi, Vector3d::UnitX())); // z lies level
+  for (int n = 0; n < 100; ++n)
+    for (SurfacePoseFilter* one : {&with, &without}) {
+      one->AddImu(0.02 * n, flank);
+      const Vector3d normal = Eigen::AngleAxisd(0.3, Vector3d::UnitZ()) * -(flank * Vector3d::UnitZ());
+      one->AddSurface(0.02 * n, {1.0 * n, 0, 0}, one == &with ? std::optional<Vector3d>(normal) : std::nullopt);
+      if (n == 1) {
+        EXPECT_TRUE(one->Align(0.02, {1, 0, 0}, 10.0));
+      }
+    }
+  EXPECT_GT(with.Heading(), 0.05);
+  EXPECT_EQ(without.Heading(), 0.0);
+  EXPECT_EQ(without.Counted().updates, 0u);
+  EXPECT_EQ(without.Newest()->probeToWorld.translation(), Vector3d(99, 0, 0));
 }

@@ -47,13 +47,18 @@ struct SurfacePose {
 /// Not observable: a probe that is always held to the same side looks like a heading that is wrong, for longer than heldSeconds;
 /// and before an alignment nothing is known of the heading. The tilt is the IMU's own, as it is.
 ///
-/// Time stamps are corrected by the delay of each stream, and poses interpolated to a common moment.
+/// Time stamps are corrected by the delay of each stream, and poses interpolated to a common moment. A sample whose stamp is far
+/// from the last of its stream (twice LongestGap, at least a second) waits for the next one. When that agrees with it, the stream
+/// was silent, or its clock has jumped, and both are taken; if it went back, all that came of the stream before is forgotten.
+/// When the next one goes on from where the stream was, the odd one was a mistake, and is dropped.
 class SurfacePoseFilter {
 public:
   struct Statistics {
     std::uint64_t surface = 0, imu = 0; ///< samples taken
     std::uint64_t updates = 0;          ///< of the heading by a normal
     std::uint64_t gaps = 0;             ///< samples of the surface at which the IMU was silent
+    std::uint64_t odd = 0;              ///< samples whose stamp was far from the last one's
+    std::uint64_t jumps = 0;            ///< of the clock of a stream, back
     double meanNis = 0.0;               ///< of the updates: mean of the squared, normalised innovations. 1 when all is as the
                                         ///< parameters say; far above, when they are too sure
   };
@@ -63,9 +68,10 @@ public:
   explicit SurfacePoseFilter(const SurfacePoseParameters& parameters,
                              const Eigen::Matrix3d& sensorToProbe = Eigen::Matrix3d::Identity());
 
-  /// A place on the surface, mm, and its normal there, outwards, of any length. \throws Error(BadInput), and forgets it, when it
-  /// is not finite, the normal has no length, or the time is not later than the last of this stream
-  void AddSurface(double stamp, const Eigen::Vector3d& point, const Eigen::Vector3d& normal);
+  /// A place on the surface, mm, and its normal there, outwards, of any length; without a normal it does not correct the heading.
+  /// \throws Error(BadInput), and forgets it, when it is not finite, the normal has no length, or the time is not later than the
+  /// last of this stream
+  void AddSurface(double stamp, const Eigen::Vector3d& point, const std::optional<Eigen::Vector3d>& normal = std::nullopt);
   /// A rotation of the sensor into a frame whose z axis is up. \throws Error(BadInput) likewise
   void AddImu(double stamp, const Eigen::Quaterniond& sensorToImuWorld);
 
@@ -90,7 +96,7 @@ public:
 private:
   struct SurfaceSample {
     double time;
-    Eigen::Vector3d point, normal;
+    Eigen::Vector3d point, normal; ///< of length 0: none
   };
   struct ImuSample {
     double time;
@@ -101,6 +107,8 @@ private:
   std::optional<Eigen::Quaterniond> ImuAt(double time, bool predict) const;
   std::optional<Eigen::Vector3d> PointAt(double time, bool predict) const;
   Eigen::Quaterniond WithHeading(const Eigen::Quaterniond& probeToLevel, double heading) const;
+  template <class Sample>
+  std::size_t Take(std::deque<Sample>& samples, std::optional<Sample>& odd, const Sample& sample, const char* stream);
   void Update();
   void Propagate(double time);
   void UseNormal(const Eigen::Quaterniond& probeToLevel, const Eigen::Vector3d& normal);
@@ -111,6 +119,8 @@ private:
   Eigen::Vector3d up_;
   std::deque<SurfaceSample> surface_;
   std::deque<ImuSample> imu_;
+  std::optional<SurfaceSample> oddSurface_; // whose stamp the next one has to confirm
+  std::optional<ImuSample> oddImu_;
   std::deque<SurfaceSample> waiting_; // for the IMU
   State state_ = State::Zero();
   Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Zero();
