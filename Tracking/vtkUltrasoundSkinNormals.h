@@ -29,8 +29,8 @@ inline FusedTracker::NormalOf NormalsOf(vtkPolyData* surface)
   auto locator = vtkSmartPointer<vtkStaticCellLocator>::New();
   locator->SetDataSet(copy);
   locator->BuildLocator();
-  return [copy, locator, cell = vtkSmartPointer<vtkGenericCell>::New()](
-           const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
+  return [copy, locator,
+          cell = vtkSmartPointer<vtkGenericCell>::New()](const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
     double at[3], distance2 = 0.0;
     vtkIdType id = -1;
     int part = 0;

@@ -59,8 +59,8 @@ struct FusedTracker::Line {
   std::shared_ptr<PoseSubscription> all;
   std::unique_ptr<TrackerDevice> device;
   std::deque<ToolPose> waiting;
-  double heard = 0.0;                                        // our clock
-  double stamp = std::numeric_limits<double>::quiet_NaN();   // of the last pose that was used
+  double heard = 0.0;                                      // our clock
+  double stamp = std::numeric_limits<double>::quiet_NaN(); // of the last pose that was used
   std::pair<DeviceState, std::string> state;
 
   Line(const char* name, const std::string& address, std::string wanted)
@@ -84,10 +84,7 @@ struct FusedTracker::Line {
       for (ToolPose& pose : all->Take(seconds))
         waiting.push_back(std::move(pose));
   }
-  bool IsOver() const
-  {
-    return waiting.empty() && (state.first == DeviceState::Ended || state.first == DeviceState::Failed);
-  }
+  bool IsOver() const { return waiting.empty() && (state.first == DeviceState::Ended || state.first == DeviceState::Failed); }
   bool Wants(const ToolPose& pose)
   {
     if (tool.empty())
@@ -249,9 +246,10 @@ std::pair<DeviceState, std::string> FusedTracker::StateNow() const
   if (silent.empty() && !hasEnded && position_ && std::abs(position_->stamp - orientation_->stamp) > agreeSeconds)
     silent = Format("the clocks of both lines are %.3g s apart: clock=arrival takes when poses come",
                     std::abs(position_->stamp - orientation_->stamp));
-  const std::string heading = filter_.IsAligned()
-                                  ? Format("the heading is known to %.0f degrees", DegreesPerRadian * filter_.HeadingSigma())
-                                  : std::string("the heading is not known: somebody has to say where the array points");
+  const std::string heading =
+      filter_.IsAligned() ? Format("the heading is known to %.0f degrees", DegreesPerRadian * filter_.HeadingSigma())
+      : std::isnan(sent_) ? std::string("both lines have not reached one moment yet")
+                          : std::string("the heading is not known: somebody has to say where the array points");
   return {hasEnded ? DeviceState::Ended : DeviceState::Running, silent.empty() ? heading : silent};
 }
 
@@ -285,8 +283,9 @@ void FusedTracker::AlignBySlide(double seconds, double sigmaDegrees)
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto newest = filter_.Newest();
   if (!newest || !(seconds > 0.0) || !filter_.AlignBySlide(newest->time - seconds, newest->time, sigmaDegrees))
-    throw Error(Error::Kind::NotPossible, "the heading cannot be aligned: the probe was not slid by 10 mm or more along its array, "
-                                          "within the last 10 s");
+    throw Error(Error::Kind::NotPossible,
+                "the heading cannot be aligned: the probe was not slid by 10 mm or more along its array, "
+                "within the last 10 s");
 }
 
 double FusedTracker::HeadingSigma() const

@@ -17,7 +17,7 @@ struct FusedTrackerParameters {
   enum class Clock { Sender, Arrival };
   Clock clock = Clock::Sender; ///< what the poses of both lines are put in order by
   enum class Normals { None, Tool };
-  Normals normals = Normals::None; ///< Tool: z of the tool of the position looks into the surface
+  Normals normals = Normals::None;                    ///< Tool: z of the tool of the position looks into the surface
   Eigen::Vector3d mounting = Eigen::Vector3d::Zero(); ///< how the IMU is turned in the probe: axis times angle, degrees
   Eigen::Vector3d alignTo = Eigen::Vector3d::Zero();  ///< where the array points at first; of length 0: nobody says
   double alignDegrees = 3.0;                          ///< how well that is known

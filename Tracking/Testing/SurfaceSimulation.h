@@ -84,8 +84,8 @@ struct SurfaceSimulation {
         nextSurface = std::lround((nextSurface + 1.0 / surfaceHz) * 1000.0) / 1000.0;
       } else {
         const Moment m = At(nextImu);
-        const Eigen::Matrix3d rotation = Eigen::AngleAxisd(m.drift, Eigen::Vector3d::UnitZ()) * m.probeToWorld.linear() * sensorToProbe *
-                                         ExpRotation(vector(imuDegrees * RadiansPerDegree));
+        const Eigen::Matrix3d rotation = Eigen::AngleAxisd(m.drift, Eigen::Vector3d::UnitZ()) * m.probeToWorld.linear() *
+                                         sensorToProbe * ExpRotation(vector(imuDegrees * RadiansPerDegree));
         if (!lost)
           onImu(nextImu + imuDelay, Eigen::Quaterniond(rotation));
         nextImu = std::lround((nextImu + 1.0 / imuHz) * 1000.0) / 1000.0;
