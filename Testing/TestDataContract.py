@@ -459,6 +459,17 @@ class RigFit(TissueSource):
         return filter
 
 
+class Skin(TissueSource):
+    """A surface of a volume; which volumes are refused is a matter of its own test."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        phantom = echorama.vtkUltrasoundPhantomSource()
+        phantom.SetSpacingMm(3.0)
+        filter.SetInputConnection(phantom.GetOutputPort())
+        return filter
+
+
 class HandEye(TissueSource):
     """From poses, which are no volumes."""
 
@@ -622,6 +633,7 @@ Special = {
     "vtkUltrasoundPrintableSource": TissueSource,
     "vtkUltrasoundProbeSource": TissueSource,
     "vtkUltrasoundRigFit": RigFit,
+    "vtkUltrasoundSkin": Skin,
     "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissuePress": TissuePress,
     "vtkUltrasoundTissueSource": TissueSource,

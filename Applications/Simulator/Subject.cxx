@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "AlgorithmRun.h"
 #include "Core/Base/Error.h"
 #include "Filters/Scenes/SceneRun.h"
 #include "Scan.h"
-#include "SkinSurface.h"
 #include "VolumeReading.h"
 #include <algorithm>
 #include <vtkCellArray.h>
@@ -13,6 +13,7 @@
 #include <vtkUltrasoundAcquisition.h>
 #include <vtkUltrasoundGel.h>
 #include <vtkUltrasoundMeshFile.h>
+#include <vtkUltrasoundSkin.h>
 #include <vtkUltrasoundTissue.h>
 
 namespace echorama {
@@ -39,69 +40,51 @@ std::shared_ptr<const SkinMesh> MeshOf(vtkPolyData* skin, const std::string& nam
   return std::make_shared<const SkinMesh>(points, triangles, name);
 }
 
-template <class Points, class Triangles>
-vtkSmartPointer<vtkPolyData> SkinOf(const Points& points, const Triangles& triangles)
+vtkSmartPointer<vtkPolyData> SkinOf(vtkDataObject* body, const Progress& progress)
 {
-  vtkNew<vtkPoints> places;
-  for (const auto& point : points)
-    places->InsertNextPoint(point[0], point[1], point[2]);
-  vtkNew<vtkCellArray> cells;
-  for (const auto& triangle : triangles)
-    cells->InsertNextCell({triangle[0], triangle[1], triangle[2]});
-  vtkNew<vtkPolyData> surface;
-  surface->SetPoints(places);
-  surface->SetPolys(cells);
-  return WithNormals(surface);
+  vtkNew<vtkUltrasoundSkin> skin;
+  skin->SetInputDataObject(body);
+  Update(skin, progress);
+  return skin->GetOutput();
+}
+
+// A body without a skin can be scanned by a tracker all the same.
+void TakeSkin(Subject& subject, vtkDataObject* body, const Progress& progress)
+{
+  try {
+    subject.skin = SkinOf(body, progress);
+  } catch (const Error& error) {
+    if (error.GetKind() == Error::Kind::Cancelled)
+      throw;
+    subject.whyNoSkin = QString::fromUtf8(error.what());
+  }
 }
 
 // The tissue of a scene, and the body that holds all others as its skin. It is scanned from where its first view is.
 Subject SubjectOfScene(const QString& file, const Progress& progress)
 {
-  SceneRun run(ReadScene(file.toStdString()), 0, ReadMesh, vtkUltrasoundGel::SurfaceOf, progress);
-  const TissueSurface tissue = run.Tissue();
-  int outermost = -1;
-  double largest = 0.0;
-  for (int body = 0; body < static_cast<int>(tissue.bodies.size()); body++) {
-    Eigen::AlignedBox3f box;
-    for (std::size_t i = 0; i < tissue.triangles.size(); i++)
-      if (tissue.bodyOfTriangle[i] == body)
-        for (std::uint32_t corner : tissue.triangles[i])
-          box.extend(tissue.points[corner]);
-    if (!box.isEmpty() && box.diagonal().norm() > largest) {
-      outermost = body;
-      largest = box.diagonal().norm();
-    }
-  }
+  SceneRun run(ReadScene(file.toStdString()), 0, ReadMesh, vtkUltrasoundGel::SurfaceOf, progress.Part(0.0, 0.7));
   Subject subject;
   subject.files.append(file);
   subject.tissue = vtkSmartPointer<vtkPolyData>::New();
-  vtkUltrasoundTissue::Set(subject.tissue, tissue);
+  vtkUltrasoundTissue::Set(subject.tissue, run.Tissue());
   if (!run.Views().empty())
     subject.start = run.Views().front().probeToWorld;
-  if (outermost < 0) {
-    subject.whyNoSkin = QObject::tr("the scene has no body");
-    return subject;
-  }
-  const TissueSurface outer = tissue.Only(outermost);
-  subject.skin = SkinOf(outer.points, outer.triangles);
+  TakeSkin(subject, subject.tissue, progress.Part(0.7, 1.0));
   return subject;
 }
 
 Subject SubjectOfVolumes(const QStringList& files, const Progress& progress)
 {
   Subject subject;
-  for (const ReadVolume& read : ReadVolumes(WithoutCompanions(files), progress)) {
+  for (const ReadVolume& read : ReadVolumes(WithoutCompanions(files), progress.Part(0.0, 0.7))) {
     if (!read.image)
       throw Error(Error::Kind::BadFile, read.error.toStdString());
     subject.files.append(read.file);
     subject.volumes.push_back(read.image);
   }
   subject.start = vtkUltrasoundAcquisition::ProbeToWorldOf(subject.volumes.front());
-  try {
-    subject.skin = SkinOfVolume(subject.volumes.front());
-  } catch (const Error& error) {
-    subject.whyNoSkin = QString::fromUtf8(error.what());
-  }
+  TakeSkin(subject, subject.volumes.front(), progress.Part(0.7, 1.0));
   return subject;
 }
 
@@ -116,7 +99,16 @@ Subject ReadSubject(const QStringList& files, const QString& skin, const Progres
                                            : SubjectOfVolumes(files, progress.Part(0.0, 0.8));
   if (!skin.isEmpty()) {
     const TriangleSurface mesh = ReadMesh(skin.toStdString());
-    subject.skin = SkinOf(mesh.points, mesh.triangles);
+    vtkNew<vtkPoints> points;
+    for (const auto& point : mesh.points)
+      points->InsertNextPoint(point[0], point[1], point[2]);
+    vtkNew<vtkCellArray> triangles;
+    for (const auto& triangle : mesh.triangles)
+      triangles->InsertNextCell({triangle[0], triangle[1], triangle[2]});
+    vtkNew<vtkPolyData> surface;
+    surface->SetPoints(points);
+    surface->SetPolys(triangles);
+    subject.skin = SkinOf(surface, progress.Part(0.8, 1.0));
   }
   if (subject.skin)
     subject.mesh = MeshOf(subject.skin, skin.isEmpty() ? "the skin of " + files.first().toStdString() : skin.toStdString());
