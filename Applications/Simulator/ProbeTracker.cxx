@@ -3,6 +3,7 @@
 #include "Controls.h"
 #include "Scan.h"
 #include "TrackerState.h"
+#include <cmath>
 #include <QComboBox>
 #include <QFormLayout>
 #include <QLabel>
@@ -17,7 +18,9 @@ namespace echorama {
 namespace {
 
 constexpr int PollMs = 8;
-constexpr double StoppedSeconds = 0.5; ///< without a pose: what is shown is not what is
+constexpr double NearMm = 10.0;                          ///< of the skin whose normal is that of a place
+constexpr double AlignDegrees = 3.0, SlideDegrees = 5.0; ///< by eye and hand
+constexpr double StoppedSeconds = 0.5;                   ///< without a pose: what is shown is not what is
 
 } // namespace
 
@@ -29,6 +32,16 @@ ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_
   address_ = new QLineEdit(QSettings().value("tracker/address", "igtl://localhost:18944").toString(), this);
   address_->setObjectName("trackerAddress");
   address_->setToolTip(tr("The tracker in one line: igtl://HOST:PORT, polhemus:/dev/ttyUSB0, replay:FILE or simulated:"));
+  orientation_ = new QLineEdit(QSettings().value("tracker/orientation").toString(), this);
+  orientation_->setObjectName("trackerOrientation");
+  orientation_->setPlaceholderText(tr("of the same tracker"));
+  orientation_->setToolTip(
+      tr("An IMU, in one line as above, when the tracker knows no more than a place. With no tracker above, it turns the "
+         "probe where keys and mouse put it"));
+  options_ = new QLineEdit(QSettings().value("tracker/options").toString(), this);
+  options_->setObjectName("trackerOptions");
+  options_->setPlaceholderText("imuDelay=0.015&surfaceDelay=0.04");
+  options_->setToolTip(tr("Of both together: OPTION=VALUE&OPTION=VALUE, as of the tracker fused:LINE|LINE|OPTIONS"));
   connect_ = Button(this, "trackerConnect", {}, tr("Begins to follow the tracker, and ends it"), [this] { ConnectOrNot(); });
   tool_ = ChoiceField(this, "trackerTool",
                       tr("The tool that is the probe: its origin is the middle of the face, z looks into the body"),
@@ -36,23 +49,53 @@ ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_
   here_ = Button(this, "trackerHere", tr("It is &here"),
                  tr("Says that the tool is now where the probe was before it was connected, and moves all that follows likewise"),
                  [this] { PlaceHere(); });
+  align_ = Button(this, "trackerAlign", tr("&Align"),
+                  tr("Says that the array points now as that of the probe on the skin, where keys and mouse had it: what an IMU "
+                     "does not know"),
+                  [this] { Align(); });
+  slideButton_ = Button(
+      this, "trackerSlide", {},
+      tr("The same by a slide along the array, towards the probe's mark, by 10 mm or more and within 10 s: press, slide, press"),
+      [this] { Slide(); });
+  heading_ = TextField(this, "trackerHeading", tr("How well it is known where the array points, standard deviation"));
   state_ = TextField(this, "trackerState");
   auto* form = new QFormLayout(this);
   form->addRow(tr("Tracker"), address_);
+  form->addRow(tr("Orientation"), orientation_);
+  form->addRow(tr("Options"), options_);
   form->addRow(connect_);
   form->addRow(tr("Tool"), tool_);
   form->addRow(here_);
+  form->addRow(align_, slideButton_);
+  form->addRow(tr("Heading"), heading_);
   form->addRow(tr("State"), state_);
   timer_ = new QTimer(this);
   timer_->setTimerType(Qt::PreciseTimer);
   timer_->setInterval(PollMs);
   connect(timer_, &QTimer::timeout, this, &ProbeTracker::Step);
+  connect(scan_, &Scan::SubjectChanged, this, &ProbeTracker::GiveNormals);
   Step();
 }
 
 ProbeTracker::~ProbeTracker()
 {
   tracker_->Stop();
+}
+
+// What the two lines say together.
+QString ProbeTracker::Device() const
+{
+  const QString place = address_->text().trimmed(), orientation = orientation_->text().trimmed();
+  QString options = options_->text().trimmed();
+  if (orientation.isEmpty())
+    return place;
+  if (!("&" + options).contains("&up=")) {
+    // A patient lies on the back, unless it was said where the top is.
+    const Eigen::Vector3d& said = scan_->Body().up;
+    const Eigen::Vector3d up = said.isZero() ? Eigen::Vector3d(-Eigen::Vector3d::UnitY()) : said;
+    options += QString("%1up=%2 %3 %4").arg(options.isEmpty() ? "" : "&").arg(up[0]).arg(up[1]).arg(up[2]);
+  }
+  return "fused:" + place + "|" + orientation + "|" + options;
 }
 
 void ProbeTracker::ConnectOrNot()
@@ -63,12 +106,18 @@ void ProbeTracker::ConnectOrNot()
     tool_->clear();
     scan_->StopFollowing();
   } else {
-    tracker_->SetDevice(address_->text().trimmed().toUtf8());
+    tracker_->SetDevice(Device().toUtf8());
     hasSeen_ = false;
     trackerToBody_ = Pose::Identity();
+    slide_.invalidate();
     sinceSeen_.start();
     if (tracker_->Start()) { // else it has said why
+      isFused_ = !std::isnan(tracker_->GetHeadingSigma());
+      isAlone_ = isFused_ && Device().startsWith("fused:|");
+      GiveNormals();
       QSettings().setValue("tracker/address", address_->text());
+      QSettings().setValue("tracker/orientation", orientation_->text());
+      QSettings().setValue("tracker/options", options_->text());
       timer_->start();
     } else {
       tracker_->Stop();
@@ -80,8 +129,62 @@ void ProbeTracker::ConnectOrNot()
 // The place on the skin that keys and mouse left the probe at is where a person points to.
 void ProbeTracker::PlaceHere()
 {
-  if (hasSeen_)
+  if (!hasSeen_)
+    return;
+  if (isFused_) // how it is turned, Align says
+    trackerToBody_ = Eigen::Translation3d(scan_->PoseOnSkin().translation() - seen_.translation());
+  else
     trackerToBody_ = scan_->PoseOnSkin() * seen_.inverse();
+  GiveNormals();
+}
+
+// With an orientation alone the probe is where keys and mouse have it, and shown as it is; else they had it there before.
+void ProbeTracker::Align()
+{
+  const Pose shown = isAlone_ ? scan_->ProbeToWorld() : scan_->PoseOnSkin();
+  const Eigen::Vector3d array = trackerToBody_.linear().transpose() * shown.linear().col(0);
+  tracker_->Align(array[0], array[1], array[2], AlignDegrees);
+}
+
+void ProbeTracker::Slide()
+{
+  if (slide_.isValid()) {
+    tracker_->AlignBySlide(1e-3 * static_cast<double>(slide_.elapsed()), SlideDegrees);
+    slide_.invalidate();
+  } else {
+    slide_.start();
+  }
+}
+
+// A tracker without normals gets those of the skin.
+void ProbeTracker::GiveNormals()
+{
+  const std::shared_ptr<const SkinMesh> mesh = scan_->Body().mesh;
+  if (!mesh) {
+    tracker_->SetNormals(nullptr);
+    return;
+  }
+  tracker_->SetNormals([mesh, toBody = trackerToBody_](const Eigen::Vector3d& place) -> std::optional<Eigen::Vector3d> {
+    const auto nearest = mesh->NearestTo(toBody * place);
+    if (!nearest || nearest->distanceMm > NearMm)
+      return std::nullopt;
+    return toBody.linear().transpose() * mesh->NormalAt(nearest->place);
+  });
+}
+
+void ProbeTracker::ShowHeading()
+{
+  const bool can = tracker_->GetActive() && isFused_;
+  const bool hasCome = can && tracker_->GetNumberOfTools() > 0;
+  align_->setEnabled(hasCome);
+  slideButton_->setEnabled(hasCome && !isAlone_);
+  slideButton_->setText(slide_.isValid() ? tr("It was &slid") : tr("Align by a &slide"));
+  const double sigma = tracker_->GetHeadingSigma();
+  const QString text = !can           ? tr("of the tracker")
+                       : sigma > 90.0 ? tr("not known: Align")
+                                      : tr("known to %1 degrees").arg(sigma, 0, 'f', sigma < 9.95 ? 1 : 0);
+  if (heading_->text() != text)
+    heading_->setText(text);
 }
 
 void ProbeTracker::Step()
@@ -89,10 +192,17 @@ void ProbeTracker::Step()
   const bool active = tracker_->GetActive();
   connect_->setText(active ? tr("Disconnect") : tr("&Connect"));
   address_->setEnabled(!active);
-  here_->setEnabled(active && hasSeen_);
+  orientation_->setEnabled(!active);
+  options_->setEnabled(!active);
+  here_->setEnabled(active && hasSeen_ && !isAlone_);
+  ShowHeading();
   if (!active) {
     state_->setText(tr("not connected"));
     return;
+  }
+  if (isAlone_) {
+    const Eigen::Vector3d at = scan_->ProbeToWorld().translation(), normal = scan_->SkinNormal();
+    tracker_->SetPlace(at[0], at[1], at[2], normal[0], normal[1], normal[2]);
   }
   tracker_->Update();
   const std::string tool = ChosenTool(tool_, tracker_);
@@ -105,10 +215,14 @@ void ProbeTracker::Step()
     seen_.matrix() = toTracker;
     hasSeen_ = true;
     sinceSeen_.start();
-    scan_->Follow((trackerToBody_.matrix() * toTracker).eval());
+    if (isAlone_)
+      scan_->Turn(seen_.linear());
+    else
+      scan_->Follow((trackerToBody_.matrix() * toTracker).eval());
     state += tr("; %1 poses a second").arg(tracker_->GetRate(tool.c_str()), 0, 'f', 0);
   } else if (!hasSeen_) {
-    state += tr("; the tool has not been seen yet");
+    if (!isFused_)
+      state += tr("; the tool has not been seen yet");
   } else if (1e-3 * static_cast<double>(sinceSeen_.elapsed()) > StoppedSeconds) {
     scan_->SetStopped(1e-3 * static_cast<double>(sinceSeen_.elapsed()));
     state += tr("; the tool is not seen");

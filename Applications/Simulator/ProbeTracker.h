@@ -16,7 +16,7 @@ namespace echorama {
 
 class Scan;
 
-/// A tracked tool as the probe.
+/// A tracked tool as the probe: by one tracker, by one for its place and one for its orientation, or by an orientation alone.
 class ProbeTracker : public QWidget {
   Q_OBJECT
 
@@ -26,7 +26,12 @@ public:
 
 private:
   void ConnectOrNot();
+  QString Device() const;
   void PlaceHere();
+  void Align();
+  void Slide();
+  void GiveNormals();
+  void ShowHeading();
   void Step();
 
   Scan* scan_;
@@ -35,10 +40,12 @@ private:
   Pose seen_ = Pose::Identity();
   bool hasSeen_ = false;
   QElapsedTimer sinceSeen_;
-  QLineEdit* address_;
+  bool isFused_ = false, isAlone_ = false; ///< with an orientation of its own; with no more than that
+  QElapsedTimer slide_;
+  QLineEdit *address_, *orientation_, *options_;
   QComboBox* tool_;
-  QPushButton *connect_, *here_;
-  QLabel* state_;
+  QPushButton *connect_, *here_, *align_, *slideButton_;
+  QLabel *heading_, *state_;
   QTimer* timer_;
 };
 

@@ -85,7 +85,10 @@ void Scan::Restart()
 
 void Scan::Moved()
 {
-  TakePose(walk_->PoseOf(hold_));
+  Pose pose = walk_->PoseOf(hold_);
+  if (turned_)
+    pose.linear() = *turned_;
+  TakePose(pose);
 }
 
 void Scan::TakePose(const Pose& pose)
@@ -179,11 +182,24 @@ void Scan::Follow(const Eigen::Matrix4d& matrix)
     TakePose(pose);
 }
 
+void Scan::Turn(const Eigen::Matrix3d& probeToWorld)
+{
+  if (!CanWalk() || !probeToWorld.allFinite() || !IsRotation(probeToWorld))
+    return;
+  SetStopped(-1.0);
+  if (turned_ == probeToWorld)
+    return;
+  turned_ = probeToWorld;
+  walk_->Put(walk_->Place(), probeToWorld.col(0)); // so that it slides along its array
+  Moved();
+}
+
 void Scan::StopFollowing()
 {
-  if (!isFollowing_)
+  if (!isFollowing_ && !turned_)
     return;
   isFollowing_ = false;
+  turned_.reset();
   stoppedSeconds_ = -1.0;
   badPose_.clear();
   followedAt_ = jumpAt_ = -1e9;

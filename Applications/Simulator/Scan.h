@@ -65,8 +65,12 @@ public:
 
   ///@{ A pose that comes from outside. What is not a finite rigid pose is refused, and shown as a state.
   void Follow(const Eigen::Matrix4d& probeToWorld);
+  /// An orientation that comes from outside: the probe stays where keys and mouse put it on the skin, and is turned like this.
+  void Turn(const Eigen::Matrix3d& probeToWorld);
+  /// Neither pose nor orientation comes any more.
   void StopFollowing();
   bool IsFollowing() const { return isFollowing_; }
+  bool IsTurned() const { return turned_.has_value(); }
   /// No pose has come for so many seconds: the image is of then. Below 0: poses come.
   void SetStopped(double seconds);
   ///@}
@@ -134,6 +138,7 @@ private:
   std::unique_ptr<SkinWalk> walk_;
   ProbeHold hold_;
   Pose probeToWorld_ = Pose::Identity();
+  std::optional<Eigen::Matrix3d> turned_; ///< from outside
   Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
   bool isFollowing_ = false, isFrozen_ = false, showsInvented_ = true;
   double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A probe whose place comes from one tracker and whose orientation comes from an IMU, or from an IMU alone.
+#include "Core/Base/Angles.h"
+#include "Core/Base/Random.h"
+#include "Readers/SequenceRecorder.h"
+#include "SimulatorUnderTest.h"
+#include <QDockWidget>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPushButton>
+#include <QtTest>
+
+using namespace echorama;
+
+class TestScanFusion : public FolderTest {
+  Q_OBJECT
+
+private slots:
+  void placeAndOrientationMakeOneProbe();
+  void anImuAloneTurnsTheProbeWhereKeysPutIt();
+  void whatStopsIsSaidWithTheSeconds();
+  void linesThatAreNoneAreNamed();
+
+private:
+  static void Connect(SimulatorUnderTest& window, const QString& place, const QString& orientation, const QString& options = {})
+  {
+    for (const auto& [name, text] : {std::pair<const char*, QString>{"trackerAddress", place},
+                                     {"trackerOrientation", orientation},
+                                     {"trackerOptions", options}}) {
+      window.Part<QLineEdit>(name)->clear();
+      window.Type(window.Part<QLineEdit>(name), text);
+    }
+    window.Part<QPushButton>("trackerConnect")->click();
+  }
+  static double DegreesBetween(const Pose& a, const Pose& b) { return RotationAngle(a.inverse() * b) * DegreesPerRadian; }
+};
+
+// A probe that rests, slides from the front of a patient to its side, and rests. The surface tracker has noise and is late, the
+// IMU has noise, is late, drifts, and knows nothing of where north is.
+void TestScanFusion::placeAndOrientationMakeOneProbe()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  SkinWalk walk(window.Scan().Body().mesh);
+  const Pose start = window.Scan().ProbeToWorld();
+  walk.PutNearest(start.translation());
+  walk.Put(walk.Place(), start.linear().col(0));
+  constexpr double restS = 2.5, moveS = 2.0, endS = 4.0 + restS, driftDegreesPerS = 0.5, surfaceLate = 0.04, imuLate = 0.015;
+  const Eigen::Vector3d up(0, -1, 0);
+  const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up);
+  Random random(1);
+  SequenceRecorder places(Folder().filePath("places.igs.mha").toStdString()),
+      turns(Folder().filePath("turns.igs.mha").toStdString());
+  const auto noise = [&random](double sigma) -> Eigen::Vector3d {
+    const double x = random.Normal(), y = random.Normal(), z = random.Normal();
+    return sigma * Eigen::Vector3d(x, y, z);
+  };
+  Pose last = start;
+  for (int i = 0; i < static_cast<int>(endS * 100.0); i++) {
+    const double time = 0.01 * i;
+    if (time > restS && time <= restS + moveS)
+      walk.Step(35.0 / (moveS * 100.0), 0.0);
+    last = walk.PoseOf();
+    const auto append = [](SequenceRecorder& recorder, double at, const Pose& pose, const char* name) {
+      SequenceFrame frame;
+      frame.time = at;
+      frame.transforms.push_back({name, Eigen::Affine3d(pose.matrix())});
+      recorder.Append(frame);
+    };
+    Pose place = Pose::Identity();
+    place.translation() = last.translation() + noise(0.2);
+    append(places, time + surfaceLate, place, "ProbeToSkin");
+    const Eigen::AngleAxisd bias((70.0 + driftDegreesPerS * time) * RadiansPerDegree, up);
+    append(turns, time + imuLate, Pose(level.inverse() * (bias * last.linear()) * ExpRotation(noise(0.3 * RadiansPerDegree))),
+           "ImuToLevel");
+  }
+  places.Finish();
+  turns.Finish();
+  Connect(window, "replay:" + Folder().filePath("places.igs.mha"), "replay:" + Folder().filePath("turns.igs.mha"),
+          "imuDelay=0.015&surfaceDelay=0.04&driftDegreesPerMinute=30");
+  // Nothing moves until somebody has said where the array points: it is now as on the screen.
+  QTRY_COMPARE(window.Part<QLabel>("trackerHeading")->text(), QString("not known: Align"));
+  QTRY_VERIFY(window.Part<QLabel>("trackerState")->text().contains("heading is not known"));
+  QVERIFY(!window.Scan().IsFollowing());
+  QTRY_VERIFY(window.Part<QPushButton>("trackerAlign")->isEnabled());
+  window.Part<QPushButton>("trackerAlign")->click();
+  QTRY_VERIFY(window.Scan().IsFollowing());
+  QTRY_VERIFY(window.Part<QLabel>("trackerHeading")->text().startsWith("known to 3"));
+  QTRY_VERIFY(DegreesBetween(window.Scan().ProbeToWorld(), start) < 2.0);
+  window.Grab("simulator-fusion");
+  QTRY_VERIFY_WITH_TIMEOUT(window.Part<QLabel>("trackerState")->text().startsWith("ended"), 20000);
+  const Pose pose = window.Scan().ProbeToWorld();
+  const double mm = (pose.translation() - last.translation()).norm(), degrees = DegreesBetween(pose, last);
+  qInfo("at the end: %.2f mm, %.2f degrees from the truth; %s", mm, degrees,
+        qPrintable(window.Part<QLabel>("trackerHeading")->text()));
+  QVERIFY((last.translation() - start.translation()).norm() > 25.0);
+  QVERIFY(mm < 1.0);
+  QVERIFY(degrees < 5.0);
+  QVERIFY(window.Scan().Cine().Count() > 20);
+}
+
+void TestScanFusion::anImuAloneTurnsTheProbeWhereKeysPutIt()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  const Eigen::Vector3d place = window.Place();
+  Connect(window, "", "simulated:?tools=1&rate=100&motion=sweep");
+  QTRY_VERIFY(window.Part<QPushButton>("trackerAlign")->isEnabled());
+  QVERIFY(!window.Part<QPushButton>("trackerHere")->isEnabled());
+  QVERIFY(!window.Scan().IsTurned());
+  window.Part<QPushButton>("trackerAlign")->click();
+  QTRY_VERIFY(window.Scan().IsTurned());
+  QVERIFY(!window.Scan().IsFollowing());
+  // It turns as the IMU does, about its place.
+  const Pose before = window.Scan().ProbeToWorld();
+  QTRY_VERIFY(DegreesBetween(before, window.Scan().ProbeToWorld()) > 8.0);
+  QCOMPARE((window.Place() - place).norm(), 0.0);
+  // Keys slide it along the skin all the while, as far as they say; it keeps the skin under it.
+  window.Move(Qt::Key_Right, Qt::ShiftModifier);
+  QVERIFY(std::abs((window.Place() - place).norm() - 10.0) < 0.5);
+  QVERIFY(std::abs(body::Level(window.Place()) - 1.0) < 0.06);
+  window.Part<QPushButton>("trackerConnect")->click();
+  QVERIFY(!window.Scan().IsTurned());
+  QVERIFY(window.Axis(2).dot(-window.Scan().SkinNormal()) > 0.999); // upright again
+}
+
+void TestScanFusion::whatStopsIsSaidWithTheSeconds()
+{
+  for (const bool alone : {true, false}) {
+    SimulatorUnderTest window;
+    QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+    Connect(window, alone ? "" : "simulated:?tools=1", "simulated:?tools=1&unplugAfter=1", "alignTo=1 0 0");
+    QTRY_VERIFY(alone ? window.Scan().IsTurned() : window.Scan().IsFollowing());
+    QTRY_VERIFY_WITH_TIMEOUT(window.Image().IsStale(), 20000);
+    QVERIFY2(window.Image().State().contains("The tracker has stopped: this was"), qPrintable(window.Image().State()));
+    const auto state = [&] { return window.Part<QLabel>("trackerState")->text(); };
+    QTRY_VERIFY2(state().contains("the orientation: simulated: unplugged after 1 s, silent for "), qPrintable(state()));
+    const QString before = state();
+    QTRY_VERIFY(state() != before); // the seconds go on
+    window.Part<QPushButton>("trackerConnect")->click();
+    window.Frame();
+    QVERIFY(!window.Image().IsStale());
+  }
+}
+
+void TestScanFusion::linesThatAreNoneAreNamed()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  const auto* connect = window.Part<QPushButton>("trackerConnect");
+  for (const auto& [place, orientation, options, reason] : std::vector<std::array<QString, 4>>{
+           {"simulated:", "replay:" + Folder().filePath("nowhere.igs.mha"), "", "nowhere.igs.mha"},
+           {"nothing", "simulated:", "", "nothing: a tracker is named as SCHEME:PLACE"},
+           {"simulated:", "imu", "", "imu: a tracker is named as SCHEME:PLACE"},
+           {"simulated:", "simulated:", "imuDelays=1", "there is no option imuDelays"},
+           {"simulated:", "simulated:", "up=0 0 0", "Up has no length"}}) {
+    Connect(window, place, orientation, options);
+    const QString why = reason;
+    QTRY_VERIFY2(window.HasMessage(why), qPrintable(window.Messages().join('\n')));
+    QCOMPARE(connect->text().remove('&'), QString("Connect"));
+  }
+  // What only a pair can be told is not offered for one.
+  Connect(window, "simulated:", "");
+  QVERIFY(!window.Part<QPushButton>("trackerAlign")->isEnabled());
+  QVERIFY(!window.Part<QPushButton>("trackerSlide")->isEnabled());
+  window.Part<QPushButton>("trackerConnect")->click();
+  // A slide that was none is an error, and changes nothing.
+  Connect(window, "simulated:?motion=still", "simulated:?motion=still", "alignTo=1 0 0");
+  QTRY_VERIFY(window.Scan().IsFollowing());
+  auto* slide = window.Part<QPushButton>("trackerSlide");
+  slide->click();
+  QTRY_COMPARE(slide->text().remove('&'), QString("It was slid"));
+  slide->click();
+  QTRY_VERIFY(window.HasMessage("was not slid by 10 mm"));
+  QTRY_COMPARE(slide->text().remove('&'), QString("Align by a slide"));
+}
+
+int main(int argc, char** argv)
+{
+  return RunWindowTest("SimulatorTest", argc, argv, [argc, argv] {
+    TestScanFusion test;
+    return QTest::qExec(&test, argc, argv);
+  });
+}
+
+#include "TestScanFusion.moc"
