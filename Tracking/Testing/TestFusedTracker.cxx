@@ -157,6 +157,35 @@ TEST_F(FusedTrackerTest, LiveItIsNotTrustedUntilItsHeadingIsSaid)
   EXPECT_EQ(poses.State().first, DeviceState::Idle);
 }
 
+TEST_F(FusedTrackerTest, ASlideAlongTheArraySaysTheHeading)
+{
+  PoseStream poses;
+  const auto fused = Make(BothSimulated);
+  fused->Start(poses, nullptr);
+  const auto latest = [&] { return poses.Latest("ProbeToTracker"); };
+  // The sweep goes to and fro in 5 s: by 20 mm in the middle of the way to, and back half a round later.
+  const auto waitForRound = [&](double part) {
+    return WaitUntil([&] {
+      const double at = latest().time / 5.0 - part;
+      return at - std::floor(at) < 0.04;
+    });
+  };
+  SimulatedTrackerParameters p;
+  p.motion = SimulatedMotion::Sweep;
+  const auto off = [&] {
+    const ToolPose pose = latest();
+    return DegreesBetween(pose.pose, SimulatedTruth(p, 0, pose.time));
+  };
+  ASSERT_TRUE(WaitUntil([&] { return !poses.Tools().empty(); }));
+  const double begun = latest().time;
+  ASSERT_TRUE(WaitUntil([&] { return latest().time > begun + 0.5; }));
+  ASSERT_TRUE(waitForRound(0.02));
+  fused->AlignBySlide(0.4, 5.0);
+  ASSERT_TRUE(WaitUntil([&] { return latest().status == TransformStatus::Valid; }));
+  EXPECT_LT(off(), 6.0);
+  EXPECT_NEAR(fused->HeadingSigma() * DegreesPerRadian, 5.0, 0.5);
+}
+
 TEST_F(FusedTrackerTest, WhatStopsIsNamedWithTheSeconds)
 {
   for (const bool imu : {true, false}) {
