@@ -24,6 +24,7 @@ private slots:
 private:
   static void Connect(SimulatorUnderTest& window, const QString& place, const QString& orientation, const QString& options = {})
   {
+    window.Part<QDockWidget>("trackerPanelDock")->raise();
     for (const auto& [name, text] : {std::pair<const char*, QString>{"trackerAddress", place},
                                      {"trackerOrientation", orientation},
                                      {"trackerOptions", options}}) {
