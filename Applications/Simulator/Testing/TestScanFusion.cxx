@@ -37,7 +37,8 @@ private:
 };
 
 // A probe that rests, slides from the front of a patient to its side, and rests. The surface tracker has noise and is late, the
-// IMU has noise, is late, drifts, and knows nothing of where north is.
+// IMU has noise, is late, knows nothing of where north is, and drifts by 12 degrees from the alignment to the end: only the
+// normals of the skin can take that away.
 void TestScanFusion::placeAndOrientationMakeOneProbe()
 {
   SimulatorUnderTest window;
@@ -46,7 +47,7 @@ void TestScanFusion::placeAndOrientationMakeOneProbe()
   const Pose start = window.Scan().ProbeToWorld();
   walk.PutNearest(start.translation());
   walk.Put(walk.Place(), start.linear().col(0));
-  constexpr double restS = 2.5, moveS = 2.0, endS = 4.0 + restS, driftDegreesPerS = 0.5, surfaceLate = 0.04, imuLate = 0.015;
+  constexpr double restS = 2.5, moveS = 2.0, endS = 4.0 + restS, driftDegreesPerS = 3.0, surfaceLate = 0.04, imuLate = 0.015;
   const Eigen::Vector3d up(0, -1, 0);
   const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up);
   Random random(1);
@@ -78,7 +79,7 @@ void TestScanFusion::placeAndOrientationMakeOneProbe()
   places.Finish();
   turns.Finish();
   Connect(window, "replay:" + Folder().filePath("places.igs.mha"), "replay:" + Folder().filePath("turns.igs.mha"),
-          "imuDelay=0.015&surfaceDelay=0.04&driftDegreesPerMinute=30");
+          "imuDelay=0.015&surfaceDelay=0.04&driftDegreesPerMinute=180&heldDegrees=3");
   // Nothing moves until somebody has said where the array points: it is now as on the screen.
   QTRY_COMPARE(window.Part<QLabel>("trackerHeading")->text(), QString("not known: Align"));
   QTRY_VERIFY(window.Part<QLabel>("trackerState")->text().contains("heading is not known"));
@@ -86,8 +87,8 @@ void TestScanFusion::placeAndOrientationMakeOneProbe()
   QTRY_VERIFY(window.Part<QPushButton>("trackerAlign")->isEnabled());
   window.Part<QPushButton>("trackerAlign")->click();
   QTRY_VERIFY(window.Scan().IsFollowing());
-  QTRY_VERIFY(window.Part<QLabel>("trackerHeading")->text().startsWith("known to 3"));
-  QTRY_VERIFY(DegreesBetween(window.Scan().ProbeToWorld(), start) < 2.0);
+  QTRY_VERIFY(window.Part<QLabel>("trackerHeading")->text().startsWith("known to "));
+  QTRY_VERIFY(DegreesBetween(window.Scan().ProbeToWorld(), start) < 8.0); // and not 70
   window.Grab("simulator-fusion");
   QTRY_VERIFY_WITH_TIMEOUT(window.Part<QLabel>("trackerState")->text().startsWith("ended"), 20000);
   const Pose pose = window.Scan().ProbeToWorld();
