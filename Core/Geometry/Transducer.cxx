@@ -36,7 +36,7 @@ double Transducer::PulseSigmaMm() const
 ParameterList Describe(Transducer& t)
 {
   return {
-      Parameter("FrequencyMHz", t.frequencyMHz, {0.5, 50}, "MHz", "Centre frequency of the pulse."),
+      Parameter("FrequencyMHz", t.frequencyMHz, {0.5, 60}, "MHz", "Centre frequency of the pulse."),
       Parameter("Bandwidth", t.bandwidth, {0.05, 1.5}, "",
                 "Width of the two-way spectrum at -6 dB, as a share of the centre frequency."),
       Parameter("LateralApertureMm", t.lateralApertureMm, {0.1, 100}, "mm", "Width of the active aperture along the fan."),

@@ -79,34 +79,45 @@ Eigen::Matrix3d SpeckleTexture::Axes()
   return Eigen::AngleAxisd(0.9, Eigen::Vector3d(0.48, 0.62, 0.3).normalized()).toRotationMatrix();
 }
 
+inline __attribute__((always_inline)) std::complex<float> SpeckleTexture::NumberAt(const Eigen::Vector3d& voxel) const
+{
+  constexpr std::int64_t n = textureEdge, mask = n - 1;
+  const std::complex<float>* const cube = numbers_.data();
+  std::int64_t low[3], high[3];
+  float part[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const double place = voxel[axis], whole = std::floor(place);
+    const auto cell = static_cast<std::int64_t>(whole);
+    low[axis] = cell & mask;
+    high[axis] = (cell + 1) & mask;
+    part[axis] = static_cast<float>(place - whole);
+  }
+  const auto line = [&](std::int64_t j, std::int64_t k) {
+    const std::complex<float>* row = cube + (k * n + j) * n;
+    return row[low[0]] + part[0] * (row[high[0]] - row[low[0]]);
+  };
+  const auto plane = [&](std::int64_t k) {
+    const std::complex<float> a = line(low[1], k), b = line(high[1], k);
+    return a + part[1] * (b - a);
+  };
+  const std::complex<float> a = plane(low[2]), b = plane(high[2]);
+  return a + part[2] * (b - a);
+}
+
 void SpeckleTexture::Along(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const std::vector<double>& along,
                            std::complex<float>* numbers) const
 {
-  constexpr std::int64_t n = textureEdge, mask = n - 1;
   const Eigen::Matrix3d toVoxels = (voxelsPerGrain / grain_) * Axes().transpose();
   const Eigen::Vector3d start = toVoxels * origin, step = toVoxels * direction;
-  const std::complex<float>* const cube = numbers_.data();
-  for (std::size_t s = 0; s < along.size(); ++s) {
-    std::int64_t low[3], high[3];
-    float part[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const double place = start[axis] + along[s] * step[axis], whole = std::floor(place);
-      const auto cell = static_cast<std::int64_t>(whole);
-      low[axis] = cell & mask;
-      high[axis] = (cell + 1) & mask;
-      part[axis] = static_cast<float>(place - whole);
-    }
-    const auto line = [&](std::int64_t j, std::int64_t k) {
-      const std::complex<float>* row = cube + (k * n + j) * n;
-      return row[low[0]] + part[0] * (row[high[0]] - row[low[0]]);
-    };
-    const auto plane = [&](std::int64_t k) {
-      const std::complex<float> a = line(low[1], k), b = line(high[1], k);
-      return a + part[1] * (b - a);
-    };
-    const std::complex<float> a = plane(low[2]), b = plane(high[2]);
-    numbers[s] = a + part[2] * (b - a);
-  }
+  for (std::size_t s = 0; s < along.size(); ++s)
+    numbers[s] = NumberAt(start + along[s] * step);
+}
+
+void SpeckleTexture::At(const std::vector<Eigen::Vector3d>& points, std::complex<float>* numbers) const
+{
+  const Eigen::Matrix3d toVoxels = (voxelsPerGrain / grain_) * Axes().transpose();
+  for (std::size_t s = 0; s < points.size(); ++s)
+    numbers[s] = NumberAt(toVoxels * points[s]);
 }
 
 } // namespace echorama

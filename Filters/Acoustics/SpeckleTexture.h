@@ -26,10 +26,14 @@ public:
   /// The numbers at points origin + along[i] * direction (mm, world; at most 1e7 mm away). Thread safe.
   void Along(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const std::vector<double>& along,
              std::complex<float>* numbers) const;
+  /// The same at points as they come.
+  void At(const std::vector<Eigen::Vector3d>& points, std::complex<float>* numbers) const;
 
   std::size_t MemoryBytes() const { return numbers_.capacity() * sizeof(numbers_[0]); }
 
 private:
+  std::complex<float> NumberAt(const Eigen::Vector3d& voxel) const;
+
   double grain_;
   std::vector<std::complex<float>> numbers_;
 };

@@ -121,7 +121,7 @@ public:
   /** Samples along a beam. In [2, 16384]; default 512. */
   vtkUltrasoundIntegerMacro(Samples);
 
-  /** Centre frequency of the pulse. In [0.5, 50] MHz; default 3.5. */
+  /** Centre frequency of the pulse. In [0.5, 60] MHz; default 3.5. */
   vtkUltrasoundNumberMacro(FrequencyMHz);
 
   /** Width of the two-way spectrum at -6 dB, as a share of the centre frequency. In [0.05, 1.5]; default 0.6. */

@@ -110,14 +110,26 @@ int main()
   benchmark::ReportTime("live_scene", "abdomen, 192 x 512", "acoustic, full, nothing kept", seconds, more);
 
   SliceTracer tracer(scene);
-  for (const bool darkens : {true, false}) {
-    SliceLook look;
-    look.darkeningDb *= darkens;
-    const double alike = Rms(Smoothed(tracer.Trace(p, look)), Smoothed(full));
-    Slide(darkens ? "drawn" : "drawn, DarkeningDb 0", p, benchmark::Trials(60), known, alike,
-          "grey, RMS of smoothed pictures to the full acoustic one",
-          [&](const SynthesisParameters& now) { tracer.Trace(now, look); });
-  }
+  const Transducer& t = p.transducer;
+  const double faceSigma = t.elevationApertureMm / Transducer::sigmasPerAperture / std::sqrt(2.0);
+  const SliceThickness thickness{WidthAt(t, t.elevationFocusMm).elevationSigma, faceSigma / t.elevationFocusMm,
+                                 t.elevationFocusMm};
+  for (const bool darkens : {true, false})
+    for (const int rays : {1, 5, 9}) {
+      SliceLook look;
+      look.darkeningDb *= darkens;
+      look.rays = rays;
+      const double alike = Rms(Smoothed(tracer.Trace(p, look, nullptr, thickness)), Smoothed(full));
+      Slide("drawn, " + std::to_string(rays) + (rays > 1 ? " rays" : " ray") + (darkens ? "" : ", DarkeningDb 0"), p,
+            benchmark::Trials(60), known, alike, "grey, RMS of smoothed pictures to the full acoustic one",
+            [&](const SynthesisParameters& now) { tracer.Trace(now, look, nullptr, thickness); });
+    }
+  // As pressed by states: its error is that of another body.
+  BeamBend bend(p.probe, 97, 33, 10.0);
+  for (std::size_t node = 0; node < bend.Count(); ++node)
+    bend.SetMove(node, {0.0, 0.0, -5.0 * std::exp(-std::max(0.0, bend.NodePoint(node).z()) / 25.0)});
+  Slide("drawn, 5 rays, pressed", p, benchmark::Trials(60), known, std::nullopt, "",
+        [&](const SynthesisParameters& now) { tracer.Trace(now, SliceLook(), nullptr, thickness, &bend); });
 
   SynthesisParameters other = p;
   other.seed = 2;

@@ -393,6 +393,137 @@ TEST(SliceTracer, PressureMovesSurfacesAndSpeckleAlike)
   EXPECT_LT(unmoved.Value(), 0.2);
 }
 
+TEST(SliceTracer, RaysHaveTheMomentsOfTheThickness)
+{
+  const SliceThickness thickness{1.2, 0.08, 55.0};
+  for (const int count : {5, 7, 9, 33}) {
+    const std::vector<SkewRay> rays = RaysOf(thickness, count);
+    ASSERT_EQ(rays.size(), static_cast<std::size_t>(count));
+    EXPECT_EQ(rays[0].shiftMm, 0.0);
+    EXPECT_EQ(rays[0].slope, 0.0);
+    for (const double depth : {0.0, 20.0, 55.0, 130.0}) {
+      double sum = 0.0, squares = 0.0;
+      for (const SkewRay& ray : rays) {
+        const double away = ray.shiftMm + ray.slope * depth;
+        sum += away;
+        squares += away * away;
+      }
+      EXPECT_NEAR(sum / count, 0.0, 1e-9);
+      EXPECT_NEAR(squares / count, 1.2 * 1.2 + std::pow(0.08 * (depth - 55.0), 2), 1e-9) << count << " " << depth;
+    }
+  }
+  EXPECT_EQ(RaysOf({}, 9).size(), 1u);
+  EXPECT_EQ(RaysOf(thickness, 1).size(), 1u);
+  for (const int count : {2, 3, 4, 6})
+    EXPECT_THROW(RaysOf(thickness, count), Error);
+}
+
+// A wall beside the plane, parallel to it: as much of the power is its own as rays run in it.
+TEST(SliceTracer, AThickPlaneSeesWhatLiesBesideIt)
+{
+  TissueSurface surface = Background(Grey("tissue", 0.0));
+  const SynthesisParameters p = Flat();
+  const SliceThickness thickness{2.0, 0.0, 30.0};
+  AddBox(surface, Grey("wall", -15.0), Vector3f(-100, 1, -10), Vector3f(100, 50, 100));
+  const AcousticScene scene(surface);
+  SliceTracer tracer(scene);
+  for (const int count : {1, 5, 9}) {
+    SliceLook look = Bare();
+    look.rays = count;
+    int inWall = 0;
+    for (const SkewRay& ray : RaysOf(thickness, count))
+      inWall += ray.shiftMm > 1.0;
+    const double power = (count - inWall + inWall * std::pow(10.0, -1.5)) / count;
+    const Volume<float> picture = tracer.Trace(p, look, nullptr, thickness);
+    for (const int i : {5, 300, 595})
+      EXPECT_NEAR(picture.View()(i, 40, 0), GreyOf(p, 10.0 * std::log10(power)), 0.01) << count << " " << i;
+    if (count > 1) {
+      EXPECT_GT(inWall, 0);
+    }
+    look.speckle = 1.0; // fully developed about the same mean power
+    const Volume<float> speckled = tracer.Trace(p, look, nullptr, thickness);
+    double mean = 0.0;
+    for (const float grey : speckled.View())
+      mean += std::pow(10.0, 0.1 * (grey - p.receiver.referenceGrey) * p.receiver.dynamicRangeDb / 255.0);
+    // Grey is cut at black and white, far from here; the mean of what is left has some error.
+    EXPECT_NEAR(10.0 * std::log10(mean / static_cast<double>(speckled.View().Size())), 10.0 * std::log10(power) + 2.5, 0.5);
+  }
+}
+
+// Where tissue lay is where the picture is taken from: surfaces, materials and speckle.
+TEST(SliceTracer, BentBeamsSeeWhereTissueLay)
+{
+  TissueSurface surface = Background(Grey("tissue", 0.0));
+  AddBox(surface, Grey("plate", -20.0), Vector3f(-100, -100, 20), Vector3f(100, 100, 30));
+  AddSphere(surface, Grey("ball", -8.0), Vector3d(4, 0, 42), 6.0);
+  const AcousticScene scene(surface);
+  SliceTracer tracer(scene);
+  const SynthesisParameters p = Flat();
+  SliceLook look = Bare();
+  BeamBend bend(p.probe, 61, 11, 5.0);
+  // Everywhere alike: as if the probe had gone there.
+  const Vector3d move(2.3, -0.4, 3.1);
+  for (std::size_t node = 0; node < bend.Count(); ++node)
+    bend.SetMove(node, move);
+  SynthesisParameters moved = p;
+  moved.probeToWorld.translation() = move;
+  look.speckle = 1.0;
+  const SliceThickness thickness{1.0, 0.05, 30.0};
+  const Volume<float> bent = tracer.Trace(p, look, nullptr, thickness, &bend),
+                      there = tracer.Trace(moved, look, nullptr, thickness);
+  int different = 0;
+  for (std::ptrdiff_t i = 0; i < bent.View().Size(); ++i)
+    different += std::abs(bent.View()[i] - there.View()[i]) > 0.5f;
+  EXPECT_LT(different, 200); // of 48681: samples at surfaces
+
+  // Tissue that is squeezed along the beams, the more the deeper: depth d lay at 1.25 d, and aside on a curve.
+  look.speckle = 0.0;
+  for (std::size_t node = 0; node < bend.Count(); ++node) {
+    const Vector3d at = bend.NodePoint(node);
+    bend.SetMove(node, {0.002 * at.z() * at.z(), 0.0, 0.25 * at.z()});
+  }
+  std::vector<SliceBeam> beams;
+  const Volume<float> squeezed = tracer.Trace(p, look, &beams, {}, &bend);
+  for (int i = 0; i < p.samples; ++i)
+    for (const int beam : {20, 40, 44, 70}) {
+      const double depth = 0.1 * i, x = 0.5 * beam - 20.0 + 0.002 * depth * depth, z = 1.25 * depth;
+      const double toBall = std::hypot(x - 4.0, z - 42.0);
+      if (std::abs(z - 20.0) < 0.1 || std::abs(z - 30.0) < 0.1 || std::abs(toBall - 6.0) < 0.15)
+        continue;
+      ASSERT_NEAR(squeezed.View()(i, beam, 0),
+                  GreyOf(p, z > 20.0 && z < 30.0 ? -20.0
+                            : toBall < 6.0       ? -8.0
+                                                 : 0.0),
+                  1e-3)
+          << i << " " << beam;
+    }
+  EXPECT_NEAR(beams[40].toBodyMm, 16.0, 0.02);
+}
+
+// A plate that was slanted at rest, and that pressure has brought to lie across the beams, shines as one that always did.
+TEST(SliceTracer, SurfacesShineByTheirAngleUnderPressure)
+{
+  const auto shine = [](double slant, bool isBent) {
+    TissueSurface surface = Background(Clear("soft", 1540.0, 1000.0));
+    AddBox(surface, Clear("hard", 1540.0, 1100.0), Vector3f(-100, -100, 20), Vector3f(100, 100, 60));
+    for (Vector3f& point : surface.points)
+      point.z() += static_cast<float>(slant) * point.x();
+    const SynthesisParameters p = Flat();
+    BeamBend bend(p.probe, 61, 3, 5.0);
+    for (std::size_t node = 0; node < bend.Count(); ++node)
+      bend.SetMove(node, {0.0, 0.0, slant * bend.NodePoint(node).x()}); // what is at z now lay at z + slant x
+    SliceLook look = Bare();
+    look.surfaceLines = true;
+    const AcousticScene scene(surface);
+    const Volume<float> picture = SliceTracer(scene).Trace(p, look, nullptr, {}, isBent ? &bend : nullptr);
+    return *std::max_element(picture.View().Row(50, 0), picture.View().Row(50, 0) + p.samples);
+  };
+  const float flat = shine(0.0, false);
+  EXPECT_GT(flat, 50.0f);
+  EXPECT_NEAR(shine(0.2, true), flat, 0.1f);
+  EXPECT_LT(shine(0.2, false), flat - 20.0f);
+}
+
 TEST(SliceTracer, DoesNotDependOnThreads)
 {
   TissueSurface surface = Background(StandardMaterial("liver"));

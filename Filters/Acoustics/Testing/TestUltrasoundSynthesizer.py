@@ -293,7 +293,7 @@ class Refusals(unittest.TestCase):
         self.refuses(lambda s: s.SetElements(1), "Elements", "[2, 4096]")
         self.refuses(lambda s: s.SetSamples(100000), "Samples", "16384")
         self.refuses(lambda s: s.SetSteps(1), "Steps", "at least 2")
-        self.refuses(lambda s: s.SetFrequencyMHz(0), "FrequencyMHz", "[0.5, 50]")
+        self.refuses(lambda s: s.SetFrequencyMHz(0), "FrequencyMHz", "[0.5, 60]")
         self.refuses(lambda s: s.SetSubRays(0), "SubRays")
         self.refuses(lambda s: s.SetDynamicRangeDb(1), "DynamicRangeDb")
         self.refuses(lambda s: s.SetFanAngle(-5), "FanAngle")

@@ -136,7 +136,7 @@ TEST(SynthesisScene, ReadsTheScanner)
   EXPECT_EQ(scene.receiver.GainDbAt(25.0), 5.0);
   EXPECT_EQ(scene.receiver.noiseDb, -30.0);
   ExpectComplaint(R"("transducer": {"frequencyMHz": 200})",
-                  "scene.json: transducer.frequencyMHz: 200 is out of range; it must be in [0.5, 50]");
+                  "scene.json: transducer.frequencyMHz: 200 is out of range; it must be in [0.5, 60]");
   ExpectComplaint(R"("receiver": {"tgcDbPerCm": 0, "tgcPoints": [{"depthMm": 5}, {"depthMm": 5}]})", "scene.json: receiver: ");
 }
 
