@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """live_scene_figures.py [--detail MM] [FOLDER]: live images of the invented abdomen, as live_scene.png in FOLDER.
 
-Left: drawn, right: by the acoustic model. Above: liver and kidney; in the middle: ribs; below: without speckle, and the coarsest step
-of the acoustic image.
+Left: drawn, right: by the acoustic model. Above: liver and kidney; then ribs; then without speckle, and the coarsest step of the
+acoustic image. Below: the plane as thin as a razor, and tissue that the probe presses by 15 mm, by a state of its mechanics.
 """
 import argparse
 import pathlib

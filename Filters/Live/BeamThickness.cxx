@@ -3,6 +3,7 @@
 // even nodes follows the Gaussian for all structure that is larger than two distances between them. Five planes are one standard
 // deviation apart, nine a little more than half of one.
 #include "Filters/Live/BeamThickness.h"
+#include <algorithm>
 #include <cmath>
 
 namespace echorama {
@@ -16,6 +17,11 @@ constexpr double reach = 2.5;                         // where the Gaussian is c
 double BeamThickness::SigmaMm(double depthMm) const
 {
   return thicknessMm > 0.0 ? sigmaPerWidth * std::hypot(thicknessMm, divergence * (depthMm - focusMm)) : 0.0;
+}
+
+double BeamThickness::ReachMm(double depthMin, double depthMax) const
+{
+  return reach * std::max(SigmaMm(depthMin), SigmaMm(depthMax));
 }
 
 ParameterList Describe(BeamThickness& t)

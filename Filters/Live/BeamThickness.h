@@ -17,6 +17,8 @@ struct BeamThickness {
 
   /// Standard deviation of the Gaussian at a depth, mm.
   double SigmaMm(double depthMm) const;
+  /// How far from the middle the outermost planes may be between two depths, mm.
+  double ReachMm(double depthMin, double depthMax) const;
 };
 
 ParameterList Describe(BeamThickness& t);

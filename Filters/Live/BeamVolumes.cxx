@@ -1,22 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // In index coordinates of a volume a beam is a straight line with even steps, and a plane of the thickness runs beside it at a
-// distance that varies with the depth: position = start + i step + distance(i) across. Runs of 128 samples go through three
-// passes over short buffers, all planes one after the other, because they read nearly the same cache lines:
+// distance that varies with the depth: position = start + i step + distance(i) across (+ bend(i) where tissue is pressed). Runs
+// of 128 samples go through three passes over short buffers, all planes one after the other, because they read nearly the same
+// cache lines:
 //
 // 1. Locate (vector units): cell and fractions of each sample, and whether all corners of the cell exist.
 // 2. Fetch: the four pairs of voxels along x around each sample. A sample whose brick of 8^3 cells is not real throughout, or
 // that
 //    lies in the half voxel of rim, is left to the Sampler, which looks at each corner.
 // 3. Blend and accumulate (vector units): seven linear interpolations, and the sum over planes.
+//
+// Of several volumes, the next one is read only where those before have left something (the first counts), or all are (the mean;
+// how far a place is from where each ends is then looked up only where there are two).
 #include "Filters/Live/BeamVolumes.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/VoxelTypes.h"
+#include "Filters/Live/BorderDistance.h"
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 namespace echorama {
 namespace {
@@ -29,6 +35,19 @@ constexpr unsigned char lookCloser = 128, nothingReal = 0; // else the content o
 // One plane of one beam, in index coordinates.
 struct IndexLine {
   float start[3], step[3], across[3];
+};
+
+// Samples of one plane of one beam that are worked on together, in index coordinates.
+struct IndexRun {
+  IndexLine line;
+  int first, count;
+  const float* distance; // of each sample
+  const float* bend[3];  // of each sample, along the axes
+
+  float At(int axis, int i) const
+  {
+    return line.start[axis] + line.step[axis] * static_cast<float>(first + i) + line.across[axis] * distance[i] + bend[axis][i];
+  }
 };
 
 enum Whereabouts { Outside = 0, InRim = 1, InCell = 2 };
@@ -46,6 +65,7 @@ struct GridCounts {
 };
 
 ECHORAMA_HOT void Locate(const IndexLine line, const GridCounts grid, int first, int count, const float* __restrict distance,
+                         const float* __restrict bendX, const float* __restrict bendY, const float* __restrict bendZ,
                          RunPlaces* __restrict places)
 {
   const float lastX = static_cast<float>(grid.n[0] - 1), lastY = static_cast<float>(grid.n[1] - 1),
@@ -57,9 +77,9 @@ ECHORAMA_HOT void Locate(const IndexLine line, const GridCounts grid, int first,
   };
   for (int i = 0; i < count; ++i) {
     const float s = static_cast<float>(first + i), d = distance[i];
-    const float x = line.start[0] + line.step[0] * s + line.across[0] * d;
-    const float y = line.start[1] + line.step[1] * s + line.across[1] * d;
-    const float z = line.start[2] + line.step[2] * s + line.across[2] * d;
+    const float x = line.start[0] + line.step[0] * s + line.across[0] * d + bendX[i];
+    const float y = line.start[1] + line.step[1] * s + line.across[1] * d + bendY[i];
+    const float z = line.start[2] + line.step[2] * s + line.across[2] * d + bendZ[i];
     const float cx = clamped(x, lastX), cy = clamped(y, lastY), cz = clamped(z, lastZ);
     const int in = (cx == x) & (cy == y) & (cz == z);
     const int near = (x >= -0.5f) & (y >= -0.5f) & (z >= -0.5f) & (x < lastX + 0.5f) & (y < lastY + 0.5f) & (z < lastZ + 0.5f);
@@ -140,10 +160,14 @@ class BeamVolumes::Reader {
 public:
   virtual ~Reader() = default;
   /// Fills value and content of \a count samples from \a first on; outside content is 0 and the value is of no meaning.
-  virtual void Read(const IndexLine& line, int first, int count, const float* distance, float* value,
-                    unsigned char* content) const = 0;
+  virtual void Read(const IndexRun& run, float* value, unsigned char* content) const = 0;
+  virtual bool HasDataAt(const Eigen::Vector3d& index) const = 0;
+  /// Whether all voxels at the corners of cubes of cells are there, and data. \a cells divides the edge of a brick.
+  virtual bool IsWhole(const std::array<int, 3>& first, int cells) const = 0;
 
+  ImageGeometry geometry;
   Eigen::Affine3d worldToIndex;
+  std::optional<BorderDistance> weight; // in a mean
 };
 
 namespace {
@@ -154,6 +178,7 @@ public:
   ReaderOf(const PosedVolume<T>& volume, VolumeView<const unsigned char> embedding)
     : intensity_(volume.intensity), embedding_(embedding), sampler_(volume.intensity, volume.valid)
   {
+    geometry = volume.geometry;
     worldToIndex = volume.geometry.WorldToIndex();
     const auto& n = volume.intensity.Dimensions();
     for (int axis = 0; axis < 3; ++axis)
@@ -167,12 +192,12 @@ public:
       MakeBricks(bricks(grid_.n[2]));
   }
 
-  void Read(const IndexLine& line, int first, int count, const float* distance, float* value,
-            unsigned char* content) const override
+  void Read(const IndexRun& run, float* value, unsigned char* content) const override
   {
     RunPlaces places;
     RunCorners<T> corners;
-    Locate(line, grid_, first, count, distance, &places);
+    const int count = run.count;
+    Locate(run.line, grid_, run.first, count, run.distance, run.bend[0], run.bend[1], run.bend[2], &places);
     int slow[runLength], slowCount = 0;
     const std::ptrdiff_t nextRow = intensity_.RowStride(), nextSlice = intensity_.SliceStride();
     for (int i = 0; i < count; ++i) {
@@ -197,7 +222,36 @@ public:
     }
     BlendCorners(&corners, &places, count, value);
     for (int s = 0; s < slowCount; ++s)
-      ReadClosely(line, first, slow[s], distance, value, content);
+      ReadClosely(run, slow[s], value, content);
+  }
+
+  bool HasDataAt(const Eigen::Vector3d& index) const override
+  {
+    const std::ptrdiff_t nearest = sampler_.NearestIndex(index[0], index[1], index[2]);
+    return nearest >= 0 && (ContentAt(nearest) & ContentData) != 0;
+  }
+
+  bool IsWhole(const std::array<int, 3>& first, int cells) const override
+  {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (first[axis] < 0 || first[axis] + cells > grid_.n[axis] - 1)
+        return false;
+    unsigned char brick = lookCloser;
+    if (hasCells_)
+      brick = bricks_.empty()
+                  ? static_cast<unsigned char>(ContentData)
+                  : bricks_[static_cast<std::size_t>(
+                        (static_cast<std::ptrdiff_t>(first[2] >> brickShift) * grid_.bricks[1] + (first[1] >> brickShift)) *
+                            grid_.bricks[0] +
+                        (first[0] >> brickShift))];
+    if (brick != lookCloser)
+      return (brick & ContentData) != 0;
+    for (int k = first[2]; k <= first[2] + cells; ++k)
+      for (int j = first[1]; j <= first[1] + cells; ++j)
+        for (int i = first[0]; i <= first[0] + cells; ++i)
+          if (!(ContentAt(intensity_.SliceStride() * k + intensity_.RowStride() * j + i) & ContentData))
+            return false;
+    return true;
   }
 
 private:
@@ -209,11 +263,11 @@ private:
   }
 
   // As the fast way, by the corners that are real alone.
-  void ReadClosely(const IndexLine& line, int first, int i, const float* distance, float* value, unsigned char* content) const
+  void ReadClosely(const IndexRun& run, int i, float* value, unsigned char* content) const
   {
     double at[3], read = 0.0;
     for (int axis = 0; axis < 3; ++axis)
-      at[axis] = line.start[axis] + line.step[axis] * static_cast<float>(first + i) + line.across[axis] * distance[i];
+      at[axis] = run.At(axis, i);
     const std::ptrdiff_t nearest = sampler_.NearestIndex(at[0], at[1], at[2]);
     if (nearest >= 0 && sampler_.Linear(at[0], at[1], at[2], read)) {
       value[i] = static_cast<float>(read);
@@ -263,10 +317,17 @@ struct BeamSet {
   std::vector<float> distances; // of each plane in turn, at each sample, mm
   int samples, beams;
 
+  double FanOf(int beam) const { return static_cast<double>(beam) / (beams - 1) - 0.5; }
+  double DepthOf(int sample) const
+  {
+    const ProbeGeometry& g = probe.geometry;
+    return g.depthMin + (g.depthMax - g.depthMin) * sample / (samples - 1);
+  }
+
   IndexLine Line(const BeamVolumes::Reader& reader, int beam) const
   {
     const ProbeGeometry& g = probe.geometry;
-    const double fan = static_cast<double>(beam) / (beams - 1) - 0.5;
+    const double fan = FanOf(beam);
     const double step = (g.depthMax - g.depthMin) / (samples - 1);
     const Eigen::Affine3d toIndex = reader.worldToIndex * probe.probeToWorld;
     const Eigen::Vector3f start = (toIndex * PointOf(g, {g.depthMin, fan, 0.0})).cast<float>();
@@ -276,7 +337,77 @@ struct BeamSet {
   }
 };
 
+// How far the samples of a run are moved, in index coordinates of a volume.
+struct RunBend {
+  float along[3][runLength] = {};
+
+  void Set(const BeamBend::Line& line, const BeamSet& set, const Eigen::Matrix3f& toIndex, int first, int count,
+           const float* distance)
+  {
+    for (int i = 0; i < count; ++i) {
+      const Eigen::Vector3f move = toIndex * line.At(static_cast<float>(set.DepthOf(first + i)), distance[i]);
+      for (int axis = 0; axis < 3; ++axis)
+        along[axis][i] = move[axis];
+    }
+  }
+};
+
+// What one volume has of a run.
+struct RunRead {
+  float value[runLength];
+  unsigned char content[runLength] = {};
+};
+
+// The mean of several volumes, by how far the place is from where each ends.
+void TakeMean(const std::vector<std::unique_ptr<BeamVolumes::Reader>>& readers, const std::vector<IndexRun>& runs,
+              const std::vector<RunRead>& reads, RunRead& mean)
+{
+  for (int i = 0; i < runs.front().count; ++i) {
+    std::size_t only = 0;
+    int real = 0;
+    for (std::size_t r = 0; r < reads.size(); ++r)
+      if (reads[r].content[i]) {
+        ++real;
+        only = r;
+      }
+    mean.value[i] = reads[only].value[i];
+    mean.content[i] = reads[only].content[i];
+    if (real < 2)
+      continue;
+    float sum = 0.0f, weights = 0.0f;
+    int content = 0;
+    for (const bool isWeighted : {true, false}) {
+      for (std::size_t r = 0; r < reads.size(); ++r) {
+        if (!reads[r].content[i])
+          continue;
+        const IndexRun& run = runs[r];
+        const float weight = isWeighted ? readers[r]->weight->At(run.At(0, i), run.At(1, i), run.At(2, i)) : 1.0f;
+        if (!(weight > 0.0f))
+          continue;
+        sum += weight * reads[r].value[i];
+        weights += weight;
+        content |= reads[r].content[i];
+      }
+      if (weights > 0.0f)
+        break; // else all end there
+    }
+    mean.value[i] = sum / weights;
+    mean.content[i] = static_cast<unsigned char>(content);
+  }
+}
+
 } // namespace
+
+ParameterList Describe(VolumeMix& m)
+{
+  return {
+      Parameter(
+          "Overlap", Choice(m.overlap, {"first", "mean"}),
+          "Where several volumes are real: the first counts, or the mean, each by how far the place is from where it ends and "
+          "others go on: no seams."),
+      Parameter("ShowInvented", m.showInvented,
+                "Whether background that embedding invented is shown; else it is as where no volume reaches.")};
+}
 
 BeamVolumes::BeamVolumes() = default;
 BeamVolumes::~BeamVolumes() = default;
@@ -293,10 +424,27 @@ void BeamVolumes::Add(const PosedVolume<T>& volume, VolumeView<const unsigned ch
     throw Error(Error::Kind::BadInput,
                 name + ": intensities, valid region and labels do not have the dimensions of its geometry");
   readers_.push_back(std::make_unique<ReaderOf<T>>(volume, embedding));
+  for (const auto& reader : readers_)
+    reader->weight.reset();
+}
+
+void BeamVolumes::PrepareMean()
+{
+  for (const auto& reader : readers_) {
+    const Eigen::Affine3d indexToWorld = reader->geometry.IndexToWorld();
+    reader->weight.emplace(reader->geometry, [&](int i, int j, int k) {
+      constexpr int edge = BorderDistance::blockEdge;
+      if (reader->IsWhole({i * edge, j * edge, k * edge}, edge))
+        return false;
+      const Eigen::Vector3d middle = indexToWorld * (edge * Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5));
+      return std::any_of(readers_.begin(), readers_.end(),
+                         [&](const auto& other) { return other != reader && other->HasDataAt(other->worldToIndex * middle); });
+    });
+  }
 }
 
 void BeamVolumes::Read(const PlacedProbe& probe, const BeamThickness& thickness, VolumeView<float> value,
-                       VolumeView<unsigned char> content) const
+                       VolumeView<unsigned char> content, const VolumeMix& mix, const BeamBend* bend) const
 {
   const ProbeGeometry& g = probe.geometry;
   g.Check();
@@ -310,37 +458,66 @@ void BeamVolumes::Read(const PlacedProbe& probe, const BeamThickness& thickness,
 
   BeamSet set{probe, PlanesOf(thickness), {}, n[0], n[1]};
   for (const ThicknessPlane& plane : set.planes)
-    for (int i = 0; i < set.samples; ++i) {
-      const double depth = g.depthMin + (g.depthMax - g.depthMin) * i / (set.samples - 1);
-      set.distances.push_back(plane.offset == 0.0f ? 0.0f : static_cast<float>(plane.offset * thickness.SigmaMm(depth)));
-    }
+    for (int i = 0; i < set.samples; ++i)
+      set.distances.push_back(plane.offset == 0.0f ? 0.0f : static_cast<float>(plane.offset * thickness.SigmaMm(set.DepthOf(i))));
+  const bool isMean = mix.overlap == VolumeMix::Overlap::Mean && readers_.size() > 1;
+  if (isMean && !readers_.front()->weight)
+    throw Error(Error::Kind::InvalidParameter, "live image: Overlap is mean, and PrepareMean() was not called");
+  std::vector<Eigen::Matrix3f> toIndex;
+  for (const auto& reader : readers_)
+    toIndex.push_back((reader->worldToIndex.linear() * probe.probeToWorld.linear()).cast<float>());
 
   ParallelRanges(set.beams, beamsPerRange, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    std::vector<IndexLine> lines(readers_.size());
-    float read[runLength], other[runLength];
-    unsigned char readContent[runLength], otherContent[runLength];
+    std::vector<IndexRun> runs(readers_.size());
+    std::vector<RunBend> bends(bend ? readers_.size() : 1);
+    std::vector<RunRead> reads(isMean ? readers_.size() : 2);
+    BeamBend::Line bendLine;
+    RunRead mean;
     for (int beam = static_cast<int>(begin); beam < end; ++beam) {
-      std::transform(readers_.begin(), readers_.end(), lines.begin(),
-                     [&](const auto& reader) { return set.Line(*reader, beam); });
+      if (bend)
+        bendLine = bend->Along(set.FanOf(beam));
+      for (std::size_t r = 0; r < readers_.size(); ++r) {
+        runs[r].line = set.Line(*readers_[r], beam);
+        for (int axis = 0; axis < 3; ++axis)
+          runs[r].bend[axis] = bends[bend ? r : 0].along[axis];
+      }
       for (int first = 0; first < set.samples; first += runLength) {
         const int count = std::min(runLength, set.samples - first);
         RunSums sums{};
         for (std::size_t p = 0; p < set.planes.size(); ++p) {
           const float* distance = set.distances.data() + p * static_cast<std::size_t>(set.samples) + first;
-          std::memset(readContent, 0, sizeof readContent);
+          const auto readOf = [&](std::size_t r, RunRead& into) {
+            runs[r].first = first;
+            runs[r].count = count;
+            runs[r].distance = distance;
+            if (bend)
+              bends[r].Set(bendLine, set, toIndex[r], first, count, distance);
+            readers_[r]->Read(runs[r], into.value, into.content);
+            for (int i = 0; i < count && !mix.showInvented; ++i)
+              if (into.content[i] == ContentInvented)
+                into.content[i] = ContentNothing;
+          };
+          if (isMean) {
+            for (std::size_t r = 0; r < readers_.size(); ++r)
+              readOf(r, reads[r]);
+            TakeMean(readers_, runs, reads, mean);
+            Accumulate(mean.value, mean.content, set.planes[p].weight, count, &sums);
+            continue;
+          }
+          RunRead &read = reads[0], &other = reads[1];
           for (std::size_t r = 0; r < readers_.size(); ++r) {
             const bool isFirst = r == 0;
-            if (!isFirst && std::find(readContent, readContent + count, ContentNothing) == readContent + count)
+            if (!isFirst && std::find(read.content, read.content + count, ContentNothing) == read.content + count)
               break; // all is there
-            readers_[r]->Read(lines[r], first, count, distance, isFirst ? read : other, isFirst ? readContent : otherContent);
+            readOf(r, isFirst ? read : other);
             for (int i = 0; i < count && !isFirst; ++i)
-              if (!readContent[i]) {
-                read[i] = other[i];
-                readContent[i] = otherContent[i];
+              if (!read.content[i]) {
+                read.value[i] = other.value[i];
+                read.content[i] = other.content[i];
               }
           }
           if (!readers_.empty())
-            Accumulate(read, readContent, set.planes[p].weight, count, &sums);
+            Accumulate(read.value, read.content, set.planes[p].weight, count, &sums);
         }
         Finish(&sums, count, value.Row(beam, 0) + first, content.Row(beam, 0) + first);
       }

@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
+#include "Filters/Acoustics/BeamBend.h"
 #include "Filters/Live/BeamThickness.h"
 #include <memory>
 #include <vector>
@@ -25,10 +26,23 @@ inline unsigned char LabelOfContent(unsigned char content)
   return content == ContentInvented ? 3 : content == (ContentData | ContentInvented) ? 2 : content;
 }
 
+/// What is taken of volumes.
+struct VolumeMix {
+  /// Where several are real.
+  enum class Overlap {
+    First, ///< the one that was added first
+    /// The mean, each by how far the place is from where it ends and others go on (BorderDistance): without a seam, but where
+    /// two such borders cross. It needs PrepareMean().
+    Mean,
+  } overlap = Overlap::First;
+  bool showInvented = true; ///< else what is invented is not there; samples that are partly data stay
+};
+
+ParameterList Describe(VolumeMix& m);
+
 /// Volumes that lie in the world, ready to be read along beams again and again.
 ///
-/// Only views are kept: the voxels must stay where they are, and as they are. Where several volumes are real the one that was
-/// added first counts.
+/// Only views are kept: the voxels must stay where they are, and as they are.
 class BeamVolumes {
 public:
   BeamVolumes();
@@ -41,6 +55,8 @@ public:
   /// that are real throughout. Instantiated for the types in VoxelTypes.h. \throws Error(BadInput)
   template <class T>
   void Add(const PosedVolume<T>& volume, VolumeView<const unsigned char> embedding = {});
+  /// Once all are there: where each counts how much in a mean. What is invented counts nothing where others have data.
+  void PrepareMean();
   bool Empty() const { return readers_.empty(); }
 
   /// Fills \a value and \a content (samples x beams x 1) of a probe that does not sweep: trilinear along the beams, averaged over
@@ -50,9 +66,11 @@ public:
   /// region). The content is that of all planes together.
   ///
   /// Positions are in single precision: 1e-4 voxels or better. The same numbers on any number of threads.
-  /// \throws Error(InvalidParameter), also for a probe that sweeps; Error(BadInput) for a pose that is not rigid
-  void Read(const PlacedProbe& probe, const BeamThickness& thickness, VolumeView<float> value,
-            VolumeView<unsigned char> content) const;
+  /// \param bend where what is under the probe lay when the volumes were recorded; nullptr: there
+  /// \throws Error(InvalidParameter), also for a probe that sweeps, and for a mean that is not prepared; Error(BadInput) for a
+  /// pose that is not rigid
+  void Read(const PlacedProbe& probe, const BeamThickness& thickness, VolumeView<float> value, VolumeView<unsigned char> content,
+            const VolumeMix& mix = {}, const BeamBend* bend = nullptr) const;
 
   class Reader; ///< of one volume
 private:

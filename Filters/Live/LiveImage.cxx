@@ -17,6 +17,7 @@ ParameterList Describe(LiveImageParameters& p)
   return Join(
       {Describe(p.probe),
        Describe(p.controls),
+       Describe(p.mix),
        {Parameter("ThicknessMm", p.thickness.thicknessMm, {-1, 100}, "mm",
                   "How thick the plane is that is seen, at the focus: full width at half of its sensitivity. 0: a slice as "
                   "thin as a razor; -1: that of the probe."),
@@ -57,7 +58,11 @@ void LiveImage::Set(const LiveImageParameters& p)
   const FanImage image{geometry_, p.beams, p.samples, p.width, p.height, p.flip};
   if (!table_ || !(table_->Image() == image))
     table_.emplace(image);
-  development_.emplace(p.controls, geometry_.depthMin, geometry_.depthMax, p.samples);
+  const auto key = std::make_tuple(p.controls, geometry_.depthMin, geometry_.depthMax, p.samples);
+  if (!development_ || !(developmentKey_ == key)) {
+    development_.emplace(p.controls, geometry_.depthMin, geometry_.depthMax, p.samples);
+    developmentKey_ = key;
+  }
   parameters_ = p;
   const std::array<int, 3> plane{p.samples, p.beams, 1};
   if (value_.Dimensions() != plane) {
@@ -90,9 +95,9 @@ void LiveImage::MakeNoise()
   noiseKey_ = key;
 }
 
-void LiveImage::MakeBeams(const BeamVolumes& volumes, const Pose& probeToWorld, std::int64_t frame)
+void LiveImage::MakeBeams(const BeamVolumes& volumes, const Pose& probeToWorld, std::int64_t frame, const BeamBend* bend)
 {
-  volumes.Read({geometry_, probeToWorld}, thickness_, value_.View(), content_.View());
+  volumes.Read({geometry_, probeToWorld}, thickness_, value_.View(), content_.View(), parameters_.mix, bend);
   const MachineControls& c = parameters_.controls;
   const bool hasNoise = c.noiseDb > -200.0;
   std::ptrdiff_t beamShift = 0, depthShift = 0;

@@ -7,6 +7,7 @@
 #include "Filters/Live/MachineControls.h"
 #include <memory>
 #include <optional>
+#include <tuple>
 
 namespace echorama {
 
@@ -16,6 +17,7 @@ struct LiveImageParameters {
   /// As stated, but that a thickness and a divergence of -1, and a focus of 0, are those of the probe.
   BeamThickness thickness{-1.0, 0.0, -1.0, 9};
   MachineControls controls;
+  VolumeMix mix;
   int beams = 192, samples = 512;
   int width = 640, height = 480;
   bool flip = false;
@@ -41,7 +43,8 @@ public:
 
   /// Reads and develops the beams. \a frame counts only when the noise moves.
   /// \throws Error(BadInput) for a pose that is not rigid and finite
-  void MakeBeams(const BeamVolumes& volumes, const Pose& probeToWorld, std::int64_t frame = 0);
+  /// \param bend of tissue that the probe presses: see BeamVolumes::Read()
+  void MakeBeams(const BeamVolumes& volumes, const Pose& probeToWorld, std::int64_t frame = 0, const BeamBend* bend = nullptr);
 
   /// Takes greys from elsewhere, 0 to 255, all of them data; nothing is developed. \throws Error(BadInput) for another plane
   void SetBeams(const Volume<float>& value);
@@ -64,6 +67,7 @@ private:
   BeamThickness thickness_;
   std::optional<FanTable> table_;
   std::optional<BeamDevelopment> development_;
+  std::optional<std::tuple<MachineControls, double, double, int>> developmentKey_;
   Volume<float> noise_; // dB about its mean power; no samples: none
   std::optional<std::tuple<ProbeGeometry, int, int, std::int64_t, double>> noiseKey_;
   Volume<float> value_;

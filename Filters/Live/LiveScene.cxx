@@ -11,6 +11,7 @@ ParameterList Describe(LiveSceneParameters& p)
   ParameterList look = Describe(p.look);
   for (Parameter& parameter : look)
     parameter.When("Source", "scene");
+  Find(look, "PressMm")->When("Source", "volumes"); // by states
   return Join({{Parameter("Source", Choice(p.source, {"volumes", "scene", "acoustic"}),
                           "What the image is made of. Volumes: input 0. Scene: tissue of input 1, drawn fast. Acoustic: the same "
                           "by the acoustic model.")},
@@ -30,7 +31,7 @@ SynthesisParameters SceneSettings(const LiveImageParameters& p, const Pose& prob
   s.samples = p.samples;
   s.transducer = TransducerOf(p.probe);
   const MachineControls& c = p.controls;
-  s.transducer.frequencyMHz = std::clamp(c.frequencyMHz, 0.5, 50.0);
+  s.transducer.frequencyMHz = FrequencyOf(c, s.transducer.frequencyMHz);
   if (p.thickness.focusMm > 0.0)
     s.transducer.lateralFocusMm = s.transducer.elevationFocusMm = std::max(1.0, p.thickness.focusMm);
 
@@ -50,7 +51,15 @@ SynthesisParameters SceneSettings(const LiveImageParameters& p, const Pose& prob
   return s;
 }
 
-Volume<float> LiveScene::MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress)
+SliceThickness SceneThickness(const LiveImageParameters& p)
+{
+  const BeamThickness thickness = ThicknessOf(p);
+  const double waist = thickness.SigmaMm(thickness.focusMm);
+  return {waist, waist > 0.0 ? thickness.divergence * waist / thickness.thicknessMm : 0.0, thickness.focusMm};
+}
+
+Volume<float> LiveScene::MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress,
+                                   const SliceThickness& thickness, const BeamBend* bend)
 {
   CheckRanges(p);
   const bool isAcoustic = p.source == LiveSource::Acoustic;
@@ -58,7 +67,8 @@ Volume<float> LiveScene::MakeBeams(const SynthesisParameters& settings, const Li
   if (isAcoustic)
     look.speckle = look.pressMm = look.gelMm = 0.0; // which it knows nothing of
   std::vector<SliceBeam> beams;
-  Volume<float> picture = tracer_.Trace(settings, look, &beams);
+  Volume<float> picture =
+      isAcoustic ? tracer_.Trace(settings, look, &beams) : tracer_.Trace(settings, look, &beams, thickness, bend);
   if (isAcoustic) {
     const Volume<unsigned char> greys = slice_.Make(settings, p.refinement, progress);
     std::copy(greys.View().begin(), greys.View().end(), picture.View().begin());

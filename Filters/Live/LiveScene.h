@@ -27,6 +27,9 @@ ParameterList Describe(LiveSceneParameters& p);
 /// and the sliders and the knob add to it. Noise of electronics is that of the acoustic model.
 SynthesisParameters SceneSettings(const LiveImageParameters& p, const Pose& probeToWorld, std::int64_t frame = 0);
 
+/// The thickness of a live image, for SliceTracer.
+SliceThickness SceneThickness(const LiveImageParameters& p);
+
 /// A scene under a probe that moves: what does not depend on the pose is kept.
 class LiveScene {
 public:
@@ -36,8 +39,10 @@ public:
   LiveScene& operator=(const LiveScene&) = delete;
 
   /// Greys on the beams, 0 to 255, samples x beams x 1.
+  /// \param thickness and \param bend are of a scene that is drawn
   /// \throws as SliceTracer::Trace and ProgressiveSlice::Make
-  Volume<float> MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress = {});
+  Volume<float> MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress = {},
+                          const SliceThickness& thickness = {}, const BeamBend* bend = nullptr);
 
   /// Of the last picture: how much of the beams has contact, and how much meets a body; 0 to 1.
   double ContactShare() const { return contactShare_; }

@@ -2,10 +2,12 @@
 // All is addition in dB but for the noise, whose power adds to that of the signal: 10 lg(10^(s/10) + 10^(n/10)) is the greater of
 // both, and up to 3 dB that a table of their difference gives.
 #include "Filters/Live/MachineControls.h"
+#include "Core/Base/CheckRange.h"
 #include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 
 namespace echorama {
 namespace {
@@ -62,8 +64,10 @@ ParameterList Describe(MachineControls& c)
       Parameter("GainDb", c.gainDb, {-100, 100}, "dB", "Gain of everything."),
       Parameter("DynamicRangeDb", c.dynamicRangeDb, {10, 200}, "dB",
                 "How much the 255 steps of grey span: less gives more contrast."),
-      Parameter("FrequencyMHz", c.frequencyMHz, {0.5, 60}, "MHz",
-                "Deeper tissue is darker the higher it is above the frequency of the recording, and brighter below."),
+      Parameter(
+          "FrequencyMHz", c.frequencyMHz, {0, 60}, "MHz",
+          "Frequency of the probe, from 0.5 on. 0: the usual one of the probe for scenes, that of the recording for volumes, "
+          "which are then as they were recorded; above it deeper tissue is darker, below it brighter."),
   };
   for (std::size_t slider = 0; slider < c.tgcDb.size(); ++slider)
     list.push_back(
@@ -98,6 +102,32 @@ ParameterList Describe(MachineControls& c)
   return list;
 }
 
+bool operator==(const MachineControls& a, const MachineControls& b)
+{
+  const auto tie = [](const MachineControls& c) {
+    return std::tie(c.gainDb, c.tgcDb, c.dynamicRangeDb, c.frequencyMHz, c.black, c.white, c.recordedDynamicRangeDb,
+                    c.recordedFrequencyMHz, c.attenuation, c.noiseDb, c.noiseMoves, c.noiseGrainMm, c.seed, c.shadowDbPerCm,
+                    c.enhancementDbPerCm, c.brightLevel, c.darkLevel);
+  };
+  return tie(a) == tie(b);
+}
+
+double FrequencyOf(const MachineControls& c, double usualMHz)
+{
+  if (c.frequencyMHz == 0.0)
+    return usualMHz;
+  CheckRange("FrequencyMHz, which is not 0,", c.frequencyMHz, 0.5, 60.0);
+  return c.frequencyMHz;
+}
+
+double GainDbAt(const MachineControls& c, double share)
+{
+  const double place = std::clamp(share, 0.0, 1.0) * static_cast<double>(c.tgcDb.size() - 1);
+  const auto before = std::min(static_cast<std::size_t>(place), c.tgcDb.size() - 2);
+  const double low = c.tgcDb[before], high = c.tgcDb[before + 1];
+  return c.gainDb + low + (place - static_cast<double>(before)) * (high - low);
+}
+
 BeamDevelopment::BeamDevelopment(const MachineControls& c, double depthMin, double depthMax, int samples)
 {
   CheckRanges(c);
@@ -113,14 +143,11 @@ BeamDevelopment::BeamDevelopment(const MachineControls& c, double depthMin, doub
   enhancementPerSample_ = static_cast<float>(c.enhancementDbPerCm * stepCm);
   bright_ = static_cast<float>(c.brightLevel);
   dark_ = static_cast<float>(c.darkLevel);
-  const int last = static_cast<int>(c.tgcDb.size()) - 1;
+  const double aboveMHz = FrequencyOf(c, c.recordedFrequencyMHz) - c.recordedFrequencyMHz;
   for (int i = 0; i < samples; ++i) {
-    const double place = static_cast<double>(i) * last / (samples - 1);
-    const int before = std::min(static_cast<int>(place), last - 1);
-    const double low = c.tgcDb[static_cast<std::size_t>(before)], high = c.tgcDb[static_cast<std::size_t>(before + 1)];
-    gain_.push_back(static_cast<float>(c.gainDb + low + (place - before) * (high - low)));
+    gain_.push_back(static_cast<float>(GainDbAt(c, static_cast<double>(i) / (samples - 1))));
     const double wayCm = std::max(0.0, 0.1 * depthMin + i * stepCm); // there, and as long back
-    lossDb_.push_back(static_cast<float>(2.0 * wayCm * c.attenuation * (c.frequencyMHz - c.recordedFrequencyMHz)));
+    lossDb_.push_back(static_cast<float>(2.0 * wayCm * c.attenuation * aboveMHz));
   }
 }
 

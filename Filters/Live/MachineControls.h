@@ -20,7 +20,7 @@ struct MachineControls {
   double gainDb = 0.0;
   std::array<double, 8> tgcDb{}; ///< at evenly spaced depths, the first and the last included; linear between
   double dynamicRangeDb = 60.0;
-  double frequencyMHz = 3.5;
+  double frequencyMHz = 0.0; ///< 0: as usual for the probe, and of volumes as recorded
 
   double black = 0.0, white = 255.0;
   double recordedDynamicRangeDb = 60.0, recordedFrequencyMHz = 3.5;
@@ -36,6 +36,13 @@ struct MachineControls {
 };
 
 ParameterList Describe(MachineControls& c);
+bool operator==(const MachineControls& a, const MachineControls& b);
+
+/// The frequency, or where it is 0 the usual one. \throws Error(InvalidParameter) for one between 0 and 0.5 MHz
+double FrequencyOf(const MachineControls& controls, double usualMHz);
+
+/// Gain and time-gain curve at a share of the depths: 0 is the first, 1 the last; beyond, as at the ends.
+double GainDbAt(const MachineControls& controls, double share);
 
 /// The controls for beams of one kind, worked out once: turns what was read into greys, beam by beam.
 class BeamDevelopment {

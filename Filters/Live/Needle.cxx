@@ -78,14 +78,6 @@ std::vector<NeedleStep> StepsOf(const NeedleLook& look, const Needle& needle, co
   return steps;
 }
 
-double GainDbAt(const MachineControls& controls, double share)
-{
-  const double place = std::clamp(share, 0.0, 1.0) * static_cast<double>(controls.tgcDb.size() - 1);
-  const auto knob = std::min(static_cast<std::size_t>(place), controls.tgcDb.size() - 2);
-  const double part = place - static_cast<double>(knob);
-  return controls.gainDb + (1.0 - part) * controls.tgcDb[knob] + part * controls.tgcDb[knob + 1];
-}
-
 // Echoes and covers of all samples, in dB; the strongest counts.
 class NeedlePlane {
 public:

@@ -2,9 +2,13 @@
 #include "vtkUltrasoundLiveImage.h"
 
 #include "Core/Base/Angles.h"
+#include "Filters/Live/PressStates.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundDeformGeometry.h"
 #include "vtkUltrasoundTissue.h"
 
+#include "vtkDataArray.h"
+#include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -26,7 +30,7 @@ struct vtkUltrasoundLiveImage::KeptVolumes {
   std::vector<std::pair<vtkImageData*, vtkMTimeType>> Sources;
   std::string ArrayName; // of the intensities that were chosen
   echorama::BeamVolumes Volumes;
-  bool HasLabels = false;
+  bool HasLabels = false, IsPrepared = false;
 };
 
 struct vtkUltrasoundLiveImage::KeptScene {
@@ -36,10 +40,15 @@ struct vtkUltrasoundLiveImage::KeptScene {
   echorama::LiveScene Scene;
 };
 
+struct vtkUltrasoundLiveImage::KeptPress {
+  std::vector<std::pair<vtkImageData*, vtkMTimeType>> Sources;
+  echorama::PressStates States;
+};
+
 //----------------------------------------------------------------------------
 vtkUltrasoundLiveImage::vtkUltrasoundLiveImage()
 {
-  this->SetNumberOfInputPorts(2);
+  this->SetNumberOfInputPorts(3);
   this->SetNumberOfOutputPorts(2);
 }
 
@@ -127,6 +136,9 @@ int vtkUltrasoundLiveImage::FillInputPortInformation(int port, vtkInformation* i
 {
   if (port == 1) {
     info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  } else if (port == 2) {
+    info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+    info->Set(vtkAlgorithm::INPUT_IS_REPEATABLE(), 1);
   } else {
     vtkUltrasoundVolume::AcceptVolumes(info);
   }
@@ -190,6 +202,10 @@ const echorama::BeamVolumes& vtkUltrasoundLiveImage::VolumesOf(vtkInformationVec
     }
     this->Kept = std::move(now);
   }
+  if (this->Values.mix.overlap == echorama::VolumeMix::Overlap::Mean && !this->Kept->IsPrepared) {
+    this->Kept->Volumes.PrepareMean();
+    this->Kept->IsPrepared = true;
+  }
   hasLabels = this->Kept->HasLabels;
   return this->Kept->Volumes;
 }
@@ -209,6 +225,47 @@ echorama::LiveScene* vtkUltrasoundLiveImage::SceneOf(vtkInformationVector* port)
 }
 
 //----------------------------------------------------------------------------
+bool vtkUltrasoundLiveImage::SetPressState(vtkDataObject* displacement, double pressMm, vtkMatrix4x4* probeToWorld)
+{
+  const auto pose = probeToWorld ? vtkUltrasoundVolume::RigidPoseOf(probeToWorld) : std::nullopt;
+  if (!displacement || !pose || !pose->matrix().allFinite()) {
+    vtkGenericWarningMacro("the state of pressed tissue needs data, and a rigid transform of finite numbers");
+    return false;
+  }
+  vtkUltrasoundVolume::AddField(displacement, PressMmName(), &pressMm, 1);
+  vtkUltrasoundAcquisition::SetProbeToWorld(displacement, *pose);
+  return true;
+}
+
+//----------------------------------------------------------------------------
+const echorama::BeamBend* vtkUltrasoundLiveImage::BendOf(vtkInformationVector* port)
+{
+  auto now = std::make_unique<KeptPress>();
+  for (int i = 0; i < port->GetNumberOfInformationObjects(); ++i) {
+    vtkImageData* image = vtkImageData::GetData(port, i);
+    now->Sources.emplace_back(image, image ? image->GetMTime() : 0);
+  }
+  if (!this->Press || this->Press->Sources != now->Sources) {
+    this->Press.reset();
+    for (std::size_t i = 0; i < now->Sources.size(); ++i) {
+      vtkImageData* image = now->Sources[i].first;
+      const std::string name = "pressed state " + std::to_string(i + 1);
+      vtkDataArray* press = image ? image->GetFieldData()->GetArray(PressMmName()) : nullptr;
+      const auto pose = image ? vtkUltrasoundAcquisition::ProbeToWorldOf(image) : std::nullopt;
+      if (!press || press->GetNumberOfValues() != 1 || !pose) {
+        throw Error(Error::Kind::BadInput,
+                    name + ": its field data have no PressMm of one number or no ProbeToWorld (SetPressState)");
+      }
+      now->States.Add(press->GetTuple1(0), *pose, vtkUltrasoundDeformGeometry::MapOf(image, name));
+    }
+    this->Press = std::move(now);
+  }
+  const echorama::ProbeGeometry& probe = this->Image.Probe();
+  const double reach = echorama::ThicknessOf(this->Values).ReachMm(probe.depthMin, probe.depthMax);
+  return this->Press->States.At(probe, reach, this->SceneValues.look.pressMm);
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundLiveImage::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   this->Image.Set(this->Values);
@@ -217,12 +274,14 @@ void vtkUltrasoundLiveImage::Execute(vtkInformationVector** inputs, vtkImageData
   progress(0.0); // one frame of volumes is no work to be stopped within, but before
   if (this->SceneValues.source == echorama::LiveSource::Volumes) {
     const echorama::BeamVolumes& volumes = this->VolumesOf(inputs[0], hasLabels);
-    this->Image.MakeBeams(volumes, pose, this->FrameNumber);
+    this->Image.MakeBeams(volumes, pose, this->FrameNumber, this->BendOf(inputs[2]));
     this->SeenShare = this->Image.RealShare();
     isEmpty = volumes.Empty();
   } else if (echorama::LiveScene* scene = this->SceneOf(inputs[1])) {
+    const bool isDrawn = this->SceneValues.source == echorama::LiveSource::Scene;
     this->Image.SetBeams(scene->MakeBeams(echorama::SceneSettings(this->Values, pose, this->FrameNumber), this->SceneValues,
-                                          progress.Part(0.0, 0.5)));
+                                          progress.Part(0.0, 0.5), echorama::SceneThickness(this->Values),
+                                          isDrawn ? this->BendOf(inputs[2]) : nullptr));
     this->SeenShare = scene->SeenShare();
     this->ContactShare = scene->ContactShare();
     isEmpty = false;

@@ -4,14 +4,18 @@
  * @brief the 2D image that a probe would make of volumes or of a scene, live
  *
  * Input 0, optional and repeatable: volumes (vtkImageData, or data object trees of them) with `Intensity`, optionally
- * `ValidRegion`, optionally `Embedding` (see vtkUltrasoundVolume). Where several are real the first counts.
+ * `ValidRegion`, optionally `Embedding` (see vtkUltrasoundVolume). Overlap says what counts where several are real.
  *
  * Input 1, optional: tissue (vtkPolyData, see vtkUltrasoundTissue). Source says what the image is made of: the volumes; or the
  * tissue, as a *scene*, drawn for the eye at the rate of a display (the live view of dissertation 7.7, echorama::SliceTracer), or
  * by the *acoustic* model, slower, and better the higher Refinement is (echorama::ProgressiveSlice; the last level is what
- * vtkUltrasoundSynthesizer makes). What only counts for volumes (thickness, Black, White, what was recorded, shadow and
+ * vtkUltrasoundSynthesizer makes). What only counts for volumes (Overlap, Black, White, what was recorded, shadow and
  * enhancement) does nothing then; Attenuation is what the gain makes up for, and only the acoustic model has noise of
  * electronics.
+ *
+ * Input 2, optional and repeatable: states of tissue that a probe presses: displacement images (of vtkUltrasoundTissuePress)
+ * that SetPressState told how deep the probe was pressed in, and where it then was. With them volumes and drawn scenes, which are
+ * the tissue at rest, are seen as tissue that is pressed by PressMm: exactly at the states, in between by interpolation.
  *
  * Output 0: a 2D vtkImageData of Width x Height square pixels, the fan centred in it, with `Intensity` (unsigned char),
  * `ValidRegion`, `Embedding` where an input has it, and the field data `ProbeGeometry` and `ProbeToWorld`. Its geometry is the
@@ -65,6 +69,16 @@ public:
    */
   bool SetProbeFrom(vtkDataObject* data);
 
+  ///@{
+  /** States of pressed tissue: see input 2. SetPressState writes what it needs into the field data of a displacement image:
+   * `PressMm`, above 0, and `ProbeToWorld`; it returns false for a matrix that is not rigid. */
+  void AddPressStateConnection(vtkAlgorithmOutput* state) { this->AddInputConnection(2, state); }
+  void AddPressStateData(vtkDataObject* state) { this->AddInputDataObject(2, state); }
+  void RemoveAllPressStates() { this->RemoveAllInputConnections(2); }
+  static bool SetPressState(vtkDataObject* displacement, double pressMm, vtkMatrix4x4* probeToWorld);
+  static const char* PressMmName() { return "PressMm"; }
+  ///@}
+
   // BEGIN parameters
   /** Where the middle of the probe's face lies in the world. In mm; default (0, 0, 0). */
   vtkUltrasoundVectorMacro(Position);
@@ -110,8 +124,8 @@ public:
   vtkUltrasoundNumberMacro(Speckle);
 
   /**
-   * How deep the probe is pressed into the body: the picture is warped along the beams. Used when Source is scene. In [0, 100]
-   * mm; default 0.
+   * How deep the probe is pressed into the body: a drawn scene is warped along the beams; with pressed states volumes and drawn
+   * scenes are as those say. Used when Source is scene or volumes. In [0, 100] mm; default 0.
    */
   vtkUltrasoundNumberMacro(PressMm);
 
@@ -123,6 +137,12 @@ public:
    * Source is scene. In [0, 100] mm; default 1.
    */
   vtkUltrasoundNumberMacro(GelMm);
+
+  /**
+   * Rays of each element, spread over the thickness of the plane: the time of a frame rises with them. 1: a plane as thin as a
+   * razor; else an odd number of at least 5. Used when Source is scene. In [1, 65]; default 5.
+   */
+  vtkUltrasoundIntegerMacro(SceneRays);
 
   /**
    * Level of the echo of the face itself where it has no contact, beside the reference tissue; 0: none. Used when Source is
@@ -171,8 +191,8 @@ public:
   vtkUltrasoundNumberMacro(DynamicRangeDb);
 
   /**
-   * Deeper tissue is darker the higher it is above the frequency of the recording, and brighter below. In [0.5, 60] MHz; default
-   * 3.5.
+   * Frequency of the probe, from 0.5 on. 0: the usual one of the probe for scenes, that of the recording for volumes, which are
+   * then as they were recorded; above it deeper tissue is darker, below it brighter. In [0, 60] MHz; default 0.
    */
   vtkUltrasoundNumberMacro(FrequencyMHz);
 
@@ -262,6 +282,21 @@ public:
 
   /** The intensity of the volume that is white; above Black. Default 255. */
   vtkUltrasoundNumberMacro(White);
+
+  enum Overlaps { FIRST = 0, MEAN = 1 };
+
+  ///@{
+  /**
+   * Where several volumes are real: the first counts, or the mean, each by how far the place is from where it ends and others go
+   * on: no seams. Default first. There are FIRST, MEAN.
+   */
+  vtkUltrasoundChoiceMacro(Overlap);
+  void SetOverlapToFirst() { this->SetOverlap(FIRST); }
+  void SetOverlapToMean() { this->SetOverlap(MEAN); }
+  ///@}
+
+  /** Whether background that embedding invented is shown; else it is as where no volume reaches. Default on. */
+  vtkUltrasoundSwitchMacro(ShowInvented);
 
   /**
    * How thick the plane is that is seen, at the focus: full width at half of its sensitivity. 0: a slice as thin as a razor; -1:
@@ -353,7 +388,8 @@ private:
 #ifndef __VTK_WRAP__
   echorama::Pose OwnPose() const;
   const echorama::BeamVolumes& VolumesOf(vtkInformationVector* port, bool& hasLabels);
-  echorama::LiveScene* SceneOf(vtkInformationVector* port); ///< nullptr without tissue
+  echorama::LiveScene* SceneOf(vtkInformationVector* port);     ///< nullptr without tissue
+  const echorama::BeamBend* BendOf(vtkInformationVector* port); ///< nullptr where nothing is pressed
 
   echorama::LiveImageParameters Values;
   echorama::LiveSceneParameters SceneValues;
@@ -364,6 +400,8 @@ private:
   std::unique_ptr<KeptVolumes> Kept;
   struct KeptScene; // of the tissue that came in last
   std::unique_ptr<KeptScene> Scene;
+  struct KeptPress; // of the displacement images that came in last
+  std::unique_ptr<KeptPress> Press;
   echorama::LiveImage Image;
 #endif
   int State = NO_VOLUME;

@@ -40,29 +40,6 @@ vtkSmartPointer<vtkDataArray> InOneBlock(vtkDataArray* array)
   return copy;
 }
 
-echorama::LatticeMap MapOf(vtkImageData* image)
-{
-  const std::string name = "the displacement";
-  const auto fail = [&name](const std::string& reason) { throw Error(Error::Kind::BadInput, name + ": " + reason); };
-  vtkDataArray* array = image ? image->GetPointData()->GetArray(vtkUltrasoundDisplacement::DisplacementName()) : nullptr;
-  if (!array || array->GetNumberOfComponents() != 3 || array->GetNumberOfTuples() != image->GetNumberOfPoints()) {
-    fail("it is no displacement image, which has a point array Displacement of three components");
-  }
-  const echorama::ImageGeometry lattice = vtkUltrasoundVolume::GeometryOf(image);
-  lattice.Check(name);
-  std::vector<Eigen::Vector3d> displacements(lattice.VoxelCount());
-  for (std::size_t i = 0; i < displacements.size(); ++i) {
-    array->GetTuple(static_cast<vtkIdType>(i), displacements[i].data());
-  }
-  std::vector<unsigned char> exists;
-  if (vtkDataArray* valid = vtkUltrasoundVolume::CheckValidRegion(image, name)) {
-    const auto block = InOneBlock(valid);
-    const auto* first = static_cast<const unsigned char*>(block->GetVoidPointer(0));
-    exists.assign(first, first + displacements.size());
-  }
-  return {lattice, std::move(displacements), std::move(exists)};
-}
-
 vtkSmartPointer<vtkUnsignedCharArray> NewValidRegion(vtkIdType count)
 {
   auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
@@ -142,6 +119,29 @@ echorama::ParameterList vtkUltrasoundDeformGeometry::Parameters()
         Parameter("MoveVectors", this->MovesVectors,
                   "Whether the active vectors of points turn and stretch with what they lie in.")
             .Advanced()}});
+}
+
+//----------------------------------------------------------------------------
+echorama::LatticeMap vtkUltrasoundDeformGeometry::MapOf(vtkImageData* image, const std::string& name)
+{
+  const auto fail = [&name](const std::string& reason) { throw Error(Error::Kind::BadInput, name + ": " + reason); };
+  vtkDataArray* array = image ? image->GetPointData()->GetArray(vtkUltrasoundDisplacement::DisplacementName()) : nullptr;
+  if (!array || array->GetNumberOfComponents() != 3 || array->GetNumberOfTuples() != image->GetNumberOfPoints()) {
+    fail("it is no displacement image, which has a point array Displacement of three components");
+  }
+  const echorama::ImageGeometry lattice = vtkUltrasoundVolume::GeometryOf(image);
+  lattice.Check(name);
+  std::vector<Eigen::Vector3d> displacements(lattice.VoxelCount());
+  for (std::size_t i = 0; i < displacements.size(); ++i) {
+    array->GetTuple(static_cast<vtkIdType>(i), displacements[i].data());
+  }
+  std::vector<unsigned char> exists;
+  if (vtkDataArray* valid = vtkUltrasoundVolume::CheckValidRegion(image, name)) {
+    const auto block = InOneBlock(valid);
+    const auto* first = static_cast<const unsigned char*>(block->GetVoidPointer(0));
+    exists.assign(first, first + displacements.size());
+  }
+  return {lattice, std::move(displacements), std::move(exists)};
 }
 
 //----------------------------------------------------------------------------

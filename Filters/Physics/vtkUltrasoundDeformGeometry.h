@@ -42,6 +42,7 @@
 
 #ifndef __VTK_WRAP__
 #include "Filters/Physics/DeformGeometry.h"
+#include <string>
 #endif
 
 class vtkImageData;
@@ -123,6 +124,8 @@ public:
   // END parameters
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
+  /** The map that a displacement image says. Throws Error(BadInput) for one that is none; \a name is for the message. */
+  static echorama::LatticeMap MapOf(vtkImageData* image, const std::string& name = "the displacement");
 #endif
 
 protected:

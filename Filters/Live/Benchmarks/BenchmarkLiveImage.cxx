@@ -3,7 +3,8 @@
 // is that of the pixels, rounded to bytes, beside a dense reference: at the exact place of each pixel on its beam, 65 planes of
 // the thickness, in double precision. That of the samples on the beams is given as well: it has all but what lies between the
 // beams, which deep down are further apart than the voxels. The peer is vtkImageReslice with as many planes as ours, averaged
-// with our weights; as it knows no planes that diverge, it gets a case in which they do not.
+// with our weights; as it knows no planes that diverge, it gets a case in which they do not. Two volumes are overlapping parts of
+// the same one, so that it is the reference for both ways to take them. Of pressed tissue it is a layer that is squeezed evenly.
 #include "Core/Base/Parallel.h"
 #include "Filters/Live/LiveImage.h"
 #include "Testing/Benchmark.h"
@@ -69,11 +70,19 @@ Pose PoseAt(int step)
   return MotionAbout({0, 0, 40}, {0.2 * std::sin(t), 0.15 * std::cos(1.3 * t), 0.4 + 0.3 * t}, {5.0 * std::sin(t), 4.0 * t, 0.0});
 }
 
+// A layer of tissue under a probe that is pressed in, in the probe's frame: what is at z lay at z / (1 - press / thick) - press.
+constexpr double pressMm = 8.0, thickMm = 120.0;
+
+double RestOf(double z)
+{
+  return z / (1.0 - pressMm / thickMm) - pressMm;
+}
+
 // The dense reference at points of the probe's plane; -1 where not all planes lie in the volume.
 class Dense {
 public:
-  Dense(const VolumeView<const unsigned char>& body, BeamThickness thickness, const Pose& pose)
-    : body_(body), thickness_(thickness), toIndex_(BodyGrid().WorldToIndex() * pose)
+  Dense(const VolumeView<const unsigned char>& body, BeamThickness thickness, const Pose& pose, bool isPressed = false)
+    : body_(body), thickness_(thickness), toIndex_(BodyGrid().WorldToIndex() * pose), isPressed_(isPressed)
   {
     thickness_.planes = thickness.planes == 1 ? 1 : 65;
     planes_ = PlanesOf(thickness_);
@@ -83,7 +92,8 @@ public:
   {
     double sum = 0.0;
     for (const ThicknessPlane& plane : planes_) {
-      const Eigen::Vector3d at = toIndex_ * Eigen::Vector3d(point.x(), plane.offset * thickness_.SigmaMm(depth), point.z());
+      const double z = isPressed_ ? RestOf(point.z()) : point.z();
+      const Eigen::Vector3d at = toIndex_ * Eigen::Vector3d(point.x(), plane.offset * thickness_.SigmaMm(depth), z);
       const Eigen::Vector3i below = at.array().floor().cast<int>();
       if (below.minCoeff() < 0 || (Eigen::Vector3i(dimensions[0], dimensions[1], dimensions[2]) - below).minCoeff() < 2)
         return -1.0;
@@ -99,6 +109,7 @@ private:
   VolumeView<const unsigned char> body_;
   BeamThickness thickness_;
   Eigen::Affine3d toIndex_;
+  bool isPressed_;
   std::vector<ThicknessPlane> planes_;
 };
 
@@ -235,12 +246,13 @@ int main()
   const Pose still = PoseAt(7);
 
   int step = 0;
-  const auto measure = [&](const std::string& testCase, const LiveImageParameters& p, const BeamVolumes& read) {
+  const auto measure = [&](const std::string& testCase, const LiveImageParameters& p, const BeamVolumes& read,
+                           const BeamBend* bend = nullptr) {
     LiveImage live;
     live.Set(p);
     Images images(live);
     const auto frame = [&](const Pose& pose) {
-      live.MakeBeams(read, pose);
+      live.MakeBeams(read, pose, 0, bend);
       live.MakePixels(images.intensity.View(), images.valid.View(), {});
     };
     const auto moving = [&] { frame(PoseAt(++step)); };
@@ -248,7 +260,7 @@ int main()
     const double pixelSeconds =
         benchmark::MedianSeconds([&] { live.MakePixels(images.intensity.View(), images.valid.View(), {}); }, 21);
     frame(still);
-    const Dense dense(body.View(), ThicknessOf(p), still);
+    const Dense dense(body.View(), ThicknessOf(p), still, bend);
     const Difference d = Compare(images.intensity.View().Data(), Reference(dense, live.Probe(), still, live.Grid(still)));
     const Difference ofBeams = Compare(live.BeamValue().Data(), BeamReference(dense, live.Probe(), p.samples, p.beams));
     benchmark::Report("live_image", testCase, "echorama", seconds, d.Rms(), "grey (rms)",
@@ -329,6 +341,26 @@ int main()
       21);
   benchmark::ReportTime("live_image", "convex, 5 planes, with noise, shadow and enhancement", "echorama", seconds,
                         {{"frames_per_second", 1.0 / seconds}, {"threads", threads}});
+
+  BeamBend bend(GeometryOf(usual.probe, usual.beams), 97, 33, 10.0);
+  for (std::size_t node = 0; node < bend.Count(); ++node)
+    bend.SetMove(node, Eigen::Vector3d(0, 0, RestOf(bend.NodePoint(node).z()) - bend.NodePoint(node).z()));
+  measure("convex, 5 planes, pressed tissue", usual, volumes, &bend);
+
+  // The first 240 slices and the last 240.
+  BeamVolumes two;
+  for (const int first : {0, dimensions[2] - 240}) {
+    ImageGeometry grid = BodyGrid();
+    grid.dimensions[2] = 240;
+    grid.origin.z() += first * grid.spacing.z();
+    two.Add<unsigned char>({{body.View().Row(0, first), grid.dimensions}, {}, grid});
+  }
+  LiveImageParameters overlap = usual;
+  measure("convex, 5 planes, two volumes, the first counts", overlap, two);
+  overlap.mix.overlap = VolumeMix::Overlap::Mean;
+  benchmark::ReportTime("live_image", "set-up of the mean of two volumes", "echorama",
+                        benchmark::Seconds([&] { two.PrepareMean(); }), {{"threads", threads}});
+  measure("convex, 5 planes, two volumes, mean", overlap, two);
 
   // A valid region that is all real, and labels: what bricks cost.
   const Volume<unsigned char> ones(dimensions, 1);

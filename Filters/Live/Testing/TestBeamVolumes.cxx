@@ -3,9 +3,12 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Filters/Live/BeamVolumes.h"
+#include "Filters/Live/BorderDistance.h"
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
+#include <map>
 #include <optional>
 
 namespace {
@@ -20,10 +23,11 @@ struct Reading {
   Volume<unsigned char> content{{samples, beams, 1}};
 };
 
-Reading Read(const BeamVolumes& volumes, const PlacedProbe& probe, const BeamThickness& thickness)
+Reading Read(const BeamVolumes& volumes, const PlacedProbe& probe, const BeamThickness& thickness, const VolumeMix& mix = {},
+             const BeamBend* bend = nullptr)
 {
   Reading reading;
-  volumes.Read(probe, thickness, reading.value.View(), reading.content.View());
+  volumes.Read(probe, thickness, reading.value.View(), reading.content.View(), mix, bend);
   return reading;
 }
 
@@ -275,6 +279,164 @@ TEST(BeamVolumes, InventedBackgroundIsToldFromDataAndFromBoth)
   EXPECT_EQ(labelAt(6.5, 0.0), 3); // as thin as a razor it is all invented
   EXPECT_EQ(labelAt(6.5, 3.0), 2); // but a thick plane reaches back
   EXPECT_EQ(labelAt(-6.5, 3.0), 2);
+}
+
+TEST(BeamVolumes, WhatIsInventedIsHiddenOnRequest)
+{
+  const Slices slices([](double y) { return y < 0.0 ? 50.0 : 90.0; }, [](double y) { return y < 0.0 ? 1 : 3; });
+  BeamVolumes volumes;
+  volumes.Add<float>({slices.value.View(), {}, slices.grid}, slices.label.View());
+  const BeamThickness thickness{4.0, 40.0, 0.0, 9};
+  const auto at = [&](double y, bool shown) {
+    Pose pose = Pose::Identity();
+    pose.translation().y() = y;
+    VolumeMix mix;
+    mix.showInvented = shown;
+    const Reading reading = Read(volumes, Convex(pose), thickness, mix);
+    return std::make_pair(reading.value.View()(75, beams / 2, 0), reading.content.View()(75, beams / 2, 0));
+  };
+  const unsigned char both = ContentData | ContentInvented;
+  EXPECT_EQ(at(-8.0, false), at(-8.0, true));
+  EXPECT_EQ(at(8.0, true), std::make_pair(90.0f, static_cast<unsigned char>(ContentInvented)));
+  EXPECT_EQ(at(8.0, false), std::make_pair(0.0f, static_cast<unsigned char>(ContentNothing)));
+  // A thick plane that reaches into what is invented is made of the data alone, if half of it is data.
+  EXPECT_EQ(at(-1.5, true).second, both);
+  EXPECT_GT(at(-1.5, true).first, 51.0f);
+  EXPECT_EQ(at(-1.5, false).second, ContentData);
+  EXPECT_NEAR(at(-1.5, false).first, 50.0f, 1e-4f);
+  EXPECT_EQ(at(1.5, false).second, ContentNothing);
+
+  // Where the first volume is invented the next one is seen.
+  const Slices other([](double) { return 20.0; }, [](double) { return 1; });
+  volumes.Add<float>({other.value.View(), {}, other.grid}, other.label.View());
+  EXPECT_NEAR(at(8.0, false).first, 20.0f, 1e-4f);
+  EXPECT_NEAR(at(8.0, true).first, 90.0f, 1e-4f);
+}
+
+// Two volumes that overlap from z = 30 to 60: what each weighs at a depth follows from where it ends.
+TEST(BeamVolumes, TheMeanOfSeveralHasNoSeam)
+{
+  const auto box = [](double fromZ, int slices) {
+    ImageGeometry g;
+    g.dimensions = {161, 161, slices};
+    g.origin = {-80, -80, fromZ};
+    return g;
+  };
+  const ImageGeometry upper = box(-40, 101), lower = box(30, 101); // from -40 to 60, and from 30 to 130
+  const Volume<unsigned char> dark(upper.dimensions, 100), bright(lower.dimensions, 140);
+  BeamVolumes volumes;
+  volumes.Add<unsigned char>({dark.View(), {}, upper});
+  volumes.Add<unsigned char>({bright.View(), {}, lower});
+  VolumeMix unprepared;
+  unprepared.overlap = VolumeMix::Overlap::Mean;
+  EXPECT_THROW(Read(volumes, Convex(), {}, unprepared), Error);
+  volumes.PrepareMean();
+  const BeamThickness razor{0.0, 0.0, 0.0, 1};
+  const auto along = [&](VolumeMix::Overlap overlap, int i) {
+    VolumeMix mix;
+    mix.overlap = overlap;
+    static std::map<VolumeMix::Overlap, Reading> kept;
+    if (!kept.count(overlap))
+      kept[overlap] = Read(volumes, Convex(), razor, mix);
+    return kept[overlap].value.View()(i, beams / 2, 0);
+  };
+  float largest = 0.0f, largestOfFirst = 0.0f;
+  for (int i = 0; i < samples; ++i) {
+    const Eigen::Vector3d point = PointOf(Convex().geometry, {80.0 * i / (samples - 1), (beams / 2) / (beams - 1.0) - 0.5, 0.0});
+    const double z = point.z();
+    const float mean = along(VolumeMix::Overlap::Mean, i);
+    if (z < 30.0 || z > 60.0) {
+      EXPECT_EQ(mean, z < 40.0 ? 100.0f : 140.0f);
+    } else {
+      EXPECT_NEAR(mean, 100.0 + 40.0 * (z - 30.0) / 30.0, 0.1) << z;
+    }
+    if (i > 0) {
+      largest = std::max(largest, std::abs(mean - along(VolumeMix::Overlap::Mean, i - 1)));
+      largestOfFirst =
+          std::max(largestOfFirst, std::abs(along(VolumeMix::Overlap::First, i) - along(VolumeMix::Overlap::First, i - 1)));
+    }
+  }
+  const double step = 80.0 / (samples - 1);
+  EXPECT_LT(largest, 1.3 * 40.0 * step / 30.0); // as even as a ramp over the overlap
+  EXPECT_EQ(largestOfFirst, 40.0f);
+}
+
+TEST(BeamVolumes, WhatIsInventedDoesNotOutweighDataInAMean)
+{
+  const Slices invented([](double) { return 200.0; }, [](double) { return 3; });
+  const Slices data([](double) { return 100.0; }, [](double y) { return y < 0.0 ? 1 : 3; });
+  BeamVolumes volumes;
+  volumes.Add<float>({invented.value.View(), {}, invented.grid}, invented.label.View());
+  volumes.Add<float>({data.value.View(), {}, data.grid}, data.label.View());
+  volumes.PrepareMean();
+  VolumeMix mix;
+  mix.overlap = VolumeMix::Overlap::Mean;
+  const auto at = [&](double y) {
+    Pose pose = Pose::Identity();
+    pose.translation().y() = y;
+    const Reading reading = Read(volumes, Convex(pose), {0.0, 0.0, 0.0, 1}, mix);
+    return std::make_pair(reading.value.View()(75, beams / 2, 0), reading.content.View()(75, beams / 2, 0));
+  };
+  EXPECT_EQ(at(-9.0), std::make_pair(100.0f, static_cast<unsigned char>(ContentData)));
+  EXPECT_EQ(at(9.0).second, ContentInvented); // nobody has data there
+}
+
+TEST(BeamVolumes, PressedTissueIsReadWhereItLay)
+{
+  const std::array<int, 3> dimensions{60, 50, 70};
+  const Volume<float> voxels = Noise<float>(dimensions);
+  const Volume<unsigned char> valid(dimensions, 1);
+  for (const bool masked : {false, true}) { // bricks or none
+    BeamVolumes volumes;
+    volumes.Add<float>({voxels.View(), masked ? valid.View() : VolumeView<const unsigned char>(), Oblique(dimensions, 0.8)});
+    const PlacedProbe probe = Convex(MotionAbout({0, 0, 40}, {0.2, 0.1, -0.4}, {3, -2, 1}));
+    const BeamThickness thickness{3.0, 40.0, 0.1, 5};
+    // All that has moved alike is seen as by a probe that has moved on.
+    const Eigen::Vector3d move(1.3, -0.7, 2.1);
+    BeamBend bend(probe.geometry, 5, 3, 10.0);
+    for (std::size_t node = 0; node < bend.Count(); ++node)
+      bend.SetMove(node, move);
+    PlacedProbe moved = probe;
+    moved.probeToWorld.translation() += probe.probeToWorld.linear() * move;
+    const Reading pressed = Read(volumes, probe, thickness, {}, &bend), expected = Read(volumes, moved, thickness);
+    int different = 0, real = 0;
+    for (std::ptrdiff_t i = 0; i < pressed.value.View().Size(); ++i) {
+      real += expected.content.View()[i] != ContentNothing;
+      different += pressed.content.View()[i] != expected.content.View()[i] ||
+                   std::abs(pressed.value.View()[i] - expected.value.View()[i]) > 0.02f;
+    }
+    EXPECT_GT(real, 500);
+    EXPECT_LE(different, 3) << masked; // rounding where something ends
+  }
+}
+
+TEST(BorderDistance, FallsToNothingWhereOthersGoOn)
+{
+  ImageGeometry g;
+  g.dimensions = {101, 81, 63}; // 25 and 20 blocks, and 15 and a half
+  g.spacing = {0.5, 1.0, 1.5};
+  const int hole[3] = {12, 10, 8};
+  // Others have the hole, and all that is beyond the volume but for x < 0.
+  const BorderDistance depth(g, [&](int i, int j, int k) {
+    return (i == hole[0] && j == hole[1] && k == hole[2]) || i > 24 || j < 0 || j > 19 || k < 0 || k > 14;
+  });
+  Random random(5);
+  for (int n = 0; n < 3000; ++n) {
+    const Eigen::Vector3d at(random.Uniform(-0.5, 100.5), random.Uniform(-0.5, 80.5), random.Uniform(-0.5, 62.5));
+    double toRim = g.spacing[0] * (100.0 - at[0]), toHole = 0.0;
+    toRim = std::min({toRim, g.spacing[1] * std::min(at[1], 80.0 - at[1]), g.spacing[2] * std::min(at[2], 60.0 - at[2])});
+    for (int axis = 0; axis < 3; ++axis)
+      toHole += std::pow(g.spacing[axis] * std::max({0.0, 4.0 * hole[axis] - at[axis], at[axis] - 4.0 * hole[axis] - 4.0}), 2);
+    const double expected = std::max(0.0, std::min(toRim, std::sqrt(toHole)));
+    const double made = depth.At(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]));
+    if (expected == 0.0) {
+      EXPECT_EQ(made, 0.0) << at.transpose();
+    } else {
+      EXPECT_NEAR(made, expected, 3.0) << at.transpose(); // half a cell: linear where the distance has a ridge
+    }
+  }
+  g.dimensions = {50, 40, 1};
+  EXPECT_EQ(BorderDistance(g, [](int, int, int) { return false; }).At(10.0f, 10.0f, 0.0f), BorderDistance::farthestMm);
 }
 
 TEST(BeamVolumes, TheFirstOfSeveralVolumesCounts)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Core/Geometry/ProbePresets.h"
 #include "Filters/Live/LiveScene.h"
 #include "Filters/Tissue/Icosphere.h"
 #include <algorithm>
@@ -137,6 +138,31 @@ TEST(LiveScene, SettingsAreThoseOfTheMachine)
     p.probe.kind = kind;
     EXPECT_NO_THROW(SceneSettings(p, Pose::Identity()).Check());
   }
+}
+
+TEST(LiveScene, WithoutAFrequencyItIsThatOfTheProbe)
+{
+  LiveImageParameters p = Small();
+  EXPECT_EQ(SceneSettings(p, Pose::Identity()).transducer.frequencyMHz, ProbePresetOf("curvilinear").transducer.frequencyMHz);
+  p.probe.kind = LiveProbe::Radial;
+  EXPECT_EQ(SceneSettings(p, Pose::Identity()).transducer.frequencyMHz, 20.0);
+  EXPECT_NEAR(SceneSettings(p, Pose::Identity()).receiver.tgcDbPerCm, 2.0 * 0.5 * 20.0, 1e-12); // and gain for it
+  p.controls.frequencyMHz = 60.0;
+  EXPECT_NO_THROW(SceneSettings(p, Pose::Identity()).Check());
+  EXPECT_EQ(SceneSettings(p, Pose::Identity()).transducer.frequencyMHz, 60.0);
+  p.controls.frequencyMHz = 0.1;
+  EXPECT_THROW(SceneSettings(p, Pose::Identity()), Error);
+}
+
+TEST(LiveScene, HasTheThicknessOfTheImage)
+{
+  LiveImageParameters p = Small();
+  const SliceThickness scene = SceneThickness(p);
+  const BeamThickness image = ThicknessOf(p);
+  for (const double depth : {0.0, 40.0, 90.0})
+    EXPECT_NEAR(std::hypot(scene.waistMm, scene.spread * (depth - scene.focusMm)), image.SigmaMm(depth), 1e-9);
+  p.thickness.thicknessMm = 0.0;
+  EXPECT_EQ(SceneThickness(p).waistMm, 0.0);
 }
 
 TEST(LiveScene, ParametersHaveNamesOfTheirOwn)

@@ -34,6 +34,22 @@ TEST(MachineControls, LeaveGreysAloneByDefault)
     EXPECT_NEAR(made[i], ramp[i], 1e-3);
 }
 
+TEST(MachineControls, NoFrequencyIsThatOfTheRecording)
+{
+  MachineControls usual;
+  usual.recordedFrequencyMHz = 7.0;
+  const std::vector<float> made = Developed(usual, 100.0f);
+  for (const float grey : made)
+    EXPECT_NEAR(grey, 100.0f, 1e-3);
+  usual.frequencyMHz = 3.0;
+  EXPECT_GT(Developed(usual, 100.0f)[100], 110.0f);
+  EXPECT_EQ(FrequencyOf(usual, 20.0), 3.0);
+  usual.frequencyMHz = 0.0;
+  EXPECT_EQ(FrequencyOf(usual, 20.0), 20.0);
+  usual.frequencyMHz = 0.2;
+  EXPECT_THROW(Developed(usual, 100.0f), Error);
+}
+
 TEST(MachineControls, GainShiftsGreysByTheDynamicRange)
 {
   MachineControls c;

@@ -215,3 +215,58 @@ for name in ("convex", "linear", "phased", "endocavity", "radial"):
     live.SetPosition(0, 0, 75 if name == "radial" else 10)
     live.Update()
     assert live.GetState() == live.SEES_VOLUME, name
+
+# What is invented can be hidden: it is then as where no volume reaches.
+live = live_of(labelled)
+live.SetProbe(live.LINEAR)
+live.SetPosition(0, 0, 20)
+live.Update()
+shown = {name: array(live.GetOutput(), name) for name in ("Intensity", "ValidRegion", "Embedding")}
+share = live.GetSeenShare()
+live.ShowInventedOff()
+live.Update()
+hidden = {name: array(live.GetOutput(), name) for name in shown}
+assert (hidden["Embedding"][:, 60:95] == shown["Embedding"][:, 60:95]).all() and (hidden["Embedding"] != 3).all()
+assert (shown["ValidRegion"][:, 105:140] == 1).mean() > 0.5
+for name in hidden:
+    assert (hidden[name][:, 105:140] == 0).all(), name
+assert 0.4 * share < live.GetSeenShare() < 0.6 * share
+live.SetPosition(60, 0, 20) # over what is invented alone
+live.Update()
+assert live.GetState() == live.OUTSIDE and array(live.GetOutput(), "Intensity").max() == 0
+
+# Overlapping volumes of other gains: the mean has no seam, and is close to the stitched volume.
+from echorama.EchoramaFiltersStitching import vtkUltrasoundStitcher
+
+
+def part(low, high, gain):
+    made = vtkImageData()
+    made.SetDimensions(high - low + 1, 81, 101)
+    made.SetOrigin(low, -40, 0)
+    z, y, x = np.meshgrid(np.arange(101.0), np.arange(81.0) - 40, np.arange(low, high + 1.0), indexing="ij")
+    values = numpy_to_vtk((100 + gain + 20 * np.sin(x / 9) * np.cos(z / 11) + 0.2 * y).astype(np.float32).ravel(), deep=True)
+    values.SetName("Intensity")
+    made.GetPointData().SetScalars(values)
+    return made
+
+
+parts = part(-60, 20, 15), part(-20, 60, -15)
+stitcher = vtkUltrasoundStitcher()
+for each in parts:
+    stitcher.AddInputData(each)
+stitcher.Update()
+images, steps = {}, {}
+for name, inputs, overlap in (("stitched", (stitcher.GetOutput(),), "first"), ("first", parts, "first"), ("mean", parts, "mean")):
+    live = live_of(*inputs)
+    assert live.SetParameterAsText("Overlap", overlap)
+    live.SetProbe(live.CONVEX)
+    live.SetPosition(0, 0, 5)
+    live.SetDepthMm(80)
+    live.Update()
+    images[name] = array(live.GetOutput(), "Intensity").astype(float)
+    valid = array(live.GetOutput(), "ValidRegion")
+    both = (valid[:, 1:] == 1) & (valid[:, :-1] == 1)
+    steps[name] = np.abs(np.diff(images[name], axis=1))[both].max()
+errors = {name: np.sqrt(np.mean((images[name] - images["stitched"])[valid == 1] ** 2)) for name in ("first", "mean")}
+assert errors["mean"] < 1.5 and errors["first"] > 8, errors
+assert steps["mean"] <= steps["stitched"] + 1 and steps["first"] > 20, steps
