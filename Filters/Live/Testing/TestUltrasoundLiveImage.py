@@ -2,6 +2,7 @@
 """The wrapped live image: where it lies, what it carries, states, what is refused, beams on request, and that a new pose alone redoes
 nothing."""
 import math
+import tempfile
 import time
 
 import numpy as np
@@ -12,6 +13,8 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from echorama.EchoramaCore import vtkUltrasoundAcquisition, vtkUltrasoundScanConverter
 from echorama.EchoramaFiltersLive import vtkUltrasoundLiveImage
+from echorama.EchoramaFiltersStitching import vtkUltrasoundStitcher
+from echorama.EchoramaReaders import vtkUltrasoundSequenceReader, vtkUltrasoundSequenceWriter
 
 
 def volume(value=None, labels=None, dtype=np.uint8, size=(80, 60, 80), spacing=2.0):
@@ -216,6 +219,30 @@ for name in ("convex", "linear", "phased", "endocavity", "radial"):
     live.Update()
     assert live.GetState() == live.SEES_VOLUME, name
 
+# A recording says of each frame where it lies: flipped or not, its pixels are at the same places of the world, and no mirror image.
+with tempfile.TemporaryDirectory() as folder:
+    for flip in (0, 1):
+        live = live_of(volume(lambda x, y, z: 100 + 50 * np.tanh(x / 20) + 0.3 * z, dtype=np.float32))
+        live.SetProbe(live.LINEAR)
+        live.SetProbeToWorld(pose_of(0.7, (5, -3, 20)))
+        live.SetFlip(flip)
+        writer = vtkUltrasoundSequenceWriter()
+        writer.SetInputConnection(live.GetOutputPort())
+        writer.SetFileName(f"{folder}/frame{flip}.igs.mha")
+        assert writer.Write() == 1
+        reader = vtkUltrasoundSequenceReader()
+        reader.SetFileName(writer.GetFileName())
+        reader.Update()
+        frame = reader.GetOutput()
+        grey, made = array(frame, "Intensity"), array(live.GetOutput(), "Intensity")
+        assert frame.GetDimensions() == (200, 160, 1) and (grey == made).all()
+        at = np.array([frame.GetPoint(i) for i in range(frame.GetNumberOfPoints())]).reshape(160, 200, 3)
+        valid = array(live.GetOutput(), "ValidRegion") == 1
+        assert valid.mean() > 0.4 and np.abs(grey - (100 + 50 * np.tanh(at[..., 0] / 20) + 0.3 * at[..., 2]))[valid].max() < 1.5
+        axes = np.array([[frame.GetDirectionMatrix().GetElement(i, j) for j in range(3)] for i in range(3)])
+        side = axes[:, 0] @ elements(pose_of(0.7, (0, 0, 0)))[:3, 0]
+        assert np.isclose(np.linalg.det(axes), 1) and np.isclose(side, 1 - 2 * flip)
+
 # What is invented can be hidden: it is then as where no volume reaches.
 live = live_of(labelled)
 live.SetProbe(live.LINEAR)
@@ -236,9 +263,6 @@ live.Update()
 assert live.GetState() == live.OUTSIDE and array(live.GetOutput(), "Intensity").max() == 0
 
 # Overlapping volumes of other gains: the mean has no seam, and is close to the stitched volume.
-from echorama.EchoramaFiltersStitching import vtkUltrasoundStitcher
-
-
 def part(low, high, gain):
     made = vtkImageData()
     made.SetDimensions(high - low + 1, 81, 101)
