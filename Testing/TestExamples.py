@@ -42,7 +42,7 @@ with tempfile.TemporaryDirectory() as folder:
     for arguments, wanted in ((["noise_tiling_figures.py", "--spacing", "2", pictures], ["NoiseTiler"]),
                               (["noise_figures.py", pictures], ["NoiseSource"]),
                               (["live_image_figures.py", "--spacing", "1.5", pictures], ["live_image"]),
-                              (["live_scene_figures.py", "--detail", "5", pictures], ["live_scene"]),
+                              (["live_scene_figures.py", "--detail", "5", "--cells", "10", pictures], ["live_scene"]),
                               (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity"]),
                               (["synthesis_tissue_figures.py", pictures], ["TissueSource", "TissueSourceLevels"]),
                               (["pressing_figures.py", "--quick", "--sph", build / "benchmarks" / "BenchmarkSph", pictures],

@@ -3,7 +3,7 @@
 """live_scene_figures.py [--detail MM] [FOLDER]: live images of the invented abdomen, as live_scene.png in FOLDER.
 
 Left: drawn, right: by the acoustic model. Above: liver and kidney; then ribs; then without speckle, and the coarsest step of the
-acoustic image. Below: the plane as thin as a razor, and tissue that the probe presses by 15 mm, by a state of its mechanics.
+acoustic image. Below: without speckle, the plane as thin as a razor, and tissue that the probe has pressed by 12 mm, by a state of its mechanics.
 """
 import argparse
 import pathlib
@@ -13,13 +13,31 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
-from echorama import vtkUltrasoundAnatomySource, vtkUltrasoundLiveImage
+from echorama import vtkUltrasoundAnatomySource, vtkUltrasoundLiveImage, vtkUltrasoundProbeSource, vtkUltrasoundTissuePress
 
 
-def picture(anatomy, source, place, turn, **controls):
+def pressed(anatomy, depth, spacing):
+    """The state of the body under the probe so deep in it."""
+    probe, pose = vtkUltrasoundProbeSource(), vtkMatrix4x4()
+    probe.SetPreset("curvilinear")
+    probe.SetPosition(0, 0, depth)
+    pose.SetElement(2, 3, depth)
+    press = vtkUltrasoundTissuePress()
+    press.SetInputConnection(anatomy.GetOutputPort())
+    press.AddProbeConnection(probe.GetOutputPort())
+    press.SetSpacingMm(spacing)
+    press.Update()
+    vtkUltrasoundLiveImage.SetPressState(press.GetOutput(), depth, pose)
+    return press.GetOutput()
+
+
+def picture(anatomy, source, place, turn, state=None, **controls):
     live = vtkUltrasoundLiveImage()
     live.SetInputConnection(1, anatomy.GetOutputPort())
+    if state:
+        live.AddPressStateData(state)
     live.SetParameterAsText("Source", source)
     live.SetPosition(*place)
     live.SetOrientation(*turn)
@@ -34,6 +52,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", default=".", type=pathlib.Path)
     parser.add_argument("--detail", type=float, default=1.5, help="edge of the anatomy's triangles, mm")
+    parser.add_argument("--cells", type=float, default=4.0, help="edge of the cells that are pressed, mm")
     arguments = parser.parse_args()
     anatomy = vtkUltrasoundAnatomySource()
     anatomy.SetDetailMm(arguments.detail)
@@ -41,8 +60,10 @@ def main():
     shown = [("drawn", "scene", organs, {}), ("acoustic", "acoustic", organs, {}),
              ("drawn", "scene", ribs, {}), ("acoustic", "acoustic", ribs, {}),
              ("drawn, without speckle", "scene", organs, {"Speckle": 0}),
-             ("acoustic, a quarter of the beams, no reflections", "acoustic", organs, {"Refinement": 0})]
-    figure, axes = plt.subplots(3, 2, figsize=(10, 11.2), facecolor="black")
+             ("acoustic, a quarter of the beams, no reflections", "acoustic", organs, {"Refinement": 0}),
+             ("drawn, without speckle, as thin as a razor", "scene", organs, {"Speckle": 0, "SceneRays": 1}),
+             ("drawn, pressed by 12 mm", "scene", ((0, 0, 12), (0, 0, 0)), {"PressMm": 12, "state": pressed(anatomy, 12, arguments.cells)})]
+    figure, axes = plt.subplots(4, 2, figsize=(10, 14.8), facecolor="black")
     for axis, (title, source, (place, turn), controls) in zip(axes.flat, shown):
         axis.imshow(picture(anatomy, source, place, turn, **controls), cmap="gray", vmin=0, vmax=255)
         axis.set_title(title, fontsize=9, color="white", pad=3)

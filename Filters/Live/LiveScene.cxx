@@ -35,13 +35,9 @@ SynthesisParameters SceneSettings(const LiveImageParameters& p, const Pose& prob
   if (p.thickness.focusMm > 0.0)
     s.transducer.lateralFocusMm = s.transducer.elevationFocusMm = std::max(1.0, p.thickness.focusMm);
 
-  Receiver& receiver = s.receiver;
-  receiver.gainDb = c.gainDb;
+  Receiver& receiver = s.receiver = GainOf(c, s.probe.depthMin, s.probe.depthMax);
   receiver.tgcDbPerCm = std::min(2.0 * c.attenuation * s.transducer.frequencyMHz, 100.0);
   receiver.dynamicRangeDb = c.dynamicRangeDb;
-  const double step = (s.probe.depthMax - s.probe.depthMin) / static_cast<double>(c.tgcDb.size() - 1);
-  for (std::size_t slider = 0; slider < c.tgcDb.size(); ++slider)
-    receiver.tgcPoints.push_back({s.probe.depthMin + step * static_cast<double>(slider), c.tgcDb[slider]});
   // Of the image it is told beside white.
   const double whiteDb = (255.0 - receiver.referenceGrey) * c.dynamicRangeDb / 255.0;
   receiver.noiseDb = c.noiseDb > -200.0 ? std::min(c.noiseDb + whiteDb, 100.0) : Receiver::noNoiseDb;

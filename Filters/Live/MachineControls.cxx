@@ -120,12 +120,19 @@ double FrequencyOf(const MachineControls& c, double usualMHz)
   return c.frequencyMHz;
 }
 
+Receiver GainOf(const MachineControls& c, double firstDepth, double lastDepth)
+{
+  Receiver receiver;
+  receiver.gainDb = c.gainDb;
+  const double step = (lastDepth - firstDepth) / static_cast<double>(c.tgcDb.size() - 1);
+  for (std::size_t slider = 0; slider < c.tgcDb.size(); ++slider)
+    receiver.tgcPoints.push_back({firstDepth + step * static_cast<double>(slider), c.tgcDb[slider]});
+  return receiver;
+}
+
 double GainDbAt(const MachineControls& c, double share)
 {
-  const double place = std::clamp(share, 0.0, 1.0) * static_cast<double>(c.tgcDb.size() - 1);
-  const auto before = std::min(static_cast<std::size_t>(place), c.tgcDb.size() - 2);
-  const double low = c.tgcDb[before], high = c.tgcDb[before + 1];
-  return c.gainDb + low + (place - static_cast<double>(before)) * (high - low);
+  return GainOf(c, 0.0, 1.0).GainDbAt(share);
 }
 
 BeamDevelopment::BeamDevelopment(const MachineControls& c, double depthMin, double depthMax, int samples)
@@ -144,8 +151,9 @@ BeamDevelopment::BeamDevelopment(const MachineControls& c, double depthMin, doub
   bright_ = static_cast<float>(c.brightLevel);
   dark_ = static_cast<float>(c.darkLevel);
   const double aboveMHz = FrequencyOf(c, c.recordedFrequencyMHz) - c.recordedFrequencyMHz;
+  const Receiver curve = GainOf(c, 0.0, samples - 1.0);
   for (int i = 0; i < samples; ++i) {
-    gain_.push_back(static_cast<float>(GainDbAt(c, static_cast<double>(i) / (samples - 1))));
+    gain_.push_back(static_cast<float>(curve.GainDbAt(i)));
     const double wayCm = std::max(0.0, 0.1 * depthMin + i * stepCm); // there, and as long back
     lossDb_.push_back(static_cast<float>(2.0 * wayCm * c.attenuation * aboveMHz));
   }

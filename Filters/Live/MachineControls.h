@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Base/Parameters.h"
 #include "Core/Imaging/VolumeView.h"
+#include "Filters/Acoustics/Receiver.h"
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -41,7 +42,9 @@ bool operator==(const MachineControls& a, const MachineControls& b);
 /// The frequency, or where it is 0 the usual one. \throws Error(InvalidParameter) for one between 0 and 0.5 MHz
 double FrequencyOf(const MachineControls& controls, double usualMHz);
 
-/// Gain and time-gain curve at a share of the depths: 0 is the first, 1 the last; beyond, as at the ends.
+/// A receiver with the gain and the time-gain curve of the controls, whose sliders lie evenly between two depths.
+Receiver GainOf(const MachineControls& controls, double firstDepth, double lastDepth);
+/// The gain at a share of the depths: 0 is the first, 1 the last; beyond, as at the ends.
 double GainDbAt(const MachineControls& controls, double share);
 
 /// The controls for beams of one kind, worked out once: turns what was read into greys, beam by beam.

@@ -3,6 +3,7 @@
 // known which can be read.
 #include "Widgets/Session/Backups.h"
 #include "Core/Base/Error.h"
+#include "Widgets/Session/Checksum.h"
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -123,12 +124,7 @@ fs::path Beside(const std::string& project)
 fs::path Away(const std::string& project)
 {
   const fs::path whole = fs::absolute(project).lexically_normal();
-  std::uint64_t hash = 14695981039346656037u; // FNV-1a
-  for (const char byte : whole.string())
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211u;
-  char digits[18];
-  std::snprintf(digits, sizeof digits, "-%016llx", static_cast<unsigned long long>(hash));
-  return DataRoot() / "projects" / (whole.stem().string() + digits);
+  return DataRoot() / "projects" / (whole.stem().string() + "-" + TextChecksum(whole.string()));
 }
 
 bool CanHold(const fs::path& folder)

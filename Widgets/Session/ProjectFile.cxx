@@ -8,6 +8,7 @@
 #include "Core/Base/FileReplacement.h"
 #include "Core/Base/TextFile.h"
 #include "Core/Geometry/PoseJson.h"
+#include "Widgets/Session/Checksum.h"
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -44,17 +45,6 @@ bool IsThere(const fs::path& path)
 {
   std::error_code error;
   return fs::exists(path, error) && !error;
-}
-
-// FNV-1a, 64 bits: against accidents, not against attacks.
-std::string Checksum(const std::string& text)
-{
-  std::uint64_t hash = 14695981039346656037u;
-  for (const char byte : text)
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211u;
-  char digits[17];
-  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
-  return digits;
 }
 
 Json JsonOf(const Stroke& stroke)
@@ -207,7 +197,7 @@ void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
   stamp.label = place.In("label").Text(place.Member(backup, "label"));
   const std::string checksum = place.In("checksum").Text(place.Member(backup, "checksum"));
   backup.erase("checksum");
-  if (Checksum(root.dump()) != checksum)
+  if (TextChecksum(root.dump()) != checksum)
     file.Fail("it is damaged: it is not as it was written");
 }
 
@@ -334,7 +324,7 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
   try {
     if (stamp) {
       root["backup"] = {{"number", stamp->number}, {"time", stamp->time}, {"label", stamp->label}};
-      root["backup"]["checksum"] = Checksum(root.dump());
+      root["backup"]["checksum"] = TextChecksum(root.dump());
     }
     text = root.dump(stamp ? -1 : 1) + '\n';
   } catch (const nlohmann::json::exception&) {
