@@ -21,7 +21,7 @@ from echorama import vtkUltrasoundAnatomySource, vtkUltrasoundLiveImage, vtkUltr
 def pressed(anatomy, depth, spacing):
     """The state of the body under the probe so deep in it."""
     probe, pose = vtkUltrasoundProbeSource(), vtkMatrix4x4()
-    probe.SetPreset("curvilinear")
+    probe.SetParameterAsText("Preset", "curvilinear")
     probe.SetPosition(0, 0, depth)
     pose.SetElement(2, 3, depth)
     press = vtkUltrasoundTissuePress()

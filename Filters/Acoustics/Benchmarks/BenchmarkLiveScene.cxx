@@ -4,7 +4,8 @@
 //
 // The full acoustic picture, made from nothing, is the reference. The probe moves by half a millimetre from image to image, so
 // that what is kept counts for what it is worth. The drawn picture (SliceTracer) is another model: its difference to the full
-// one tells how alike they look, with its speckle and that of the reference smoothed away.
+// one tells how alike they look, with its speckle and that of the reference smoothed away; that of the pressed one is to the drawn
+// picture of the scene deformed.
 #include "Core/Geometry/ProbePresets.h"
 #include "Filters/Acoustics/ProgressiveSlice.h"
 #include "Filters/Acoustics/SliceTracer.h"
@@ -124,11 +125,22 @@ int main()
             benchmark::Trials(60), known, alike, "grey, RMS of smoothed pictures to the full acoustic one",
             [&](const SynthesisParameters& now) { tracer.Trace(now, look, nullptr, thickness); });
     }
-  // As pressed by states: its error is that of another body.
+  // Pressed tissue, beside the scene whose points went where they then are, both without speckle.
+  const PressWarp warp{5.0, 25.0};
   BeamBend bend(p.probe, 97, 33, 10.0);
-  for (std::size_t node = 0; node < bend.Count(); ++node)
-    bend.SetMove(node, {0.0, 0.0, -5.0 * std::exp(-std::max(0.0, bend.NodePoint(node).z()) / 25.0)});
-  Slide("drawn, 5 rays, pressed", p, benchmark::Trials(60), known, std::nullopt, "",
+  for (std::size_t node = 0; node < bend.Count(); ++node) {
+    const double z = bend.NodePoint(node).z();
+    bend.SetMove(node, {0.0, 0.0, warp.RestDepth(z) - z});
+  }
+  TissueSurface moved = surface;
+  for (Eigen::Vector3f& point : moved.points)
+    point.z() = static_cast<float>(warp.PressedDepth(point.z()));
+  const AcousticScene movedScene(moved);
+  SliceLook bare;
+  bare.speckle = 0.0;
+  const double different =
+      Rms(tracer.Trace(p, bare, nullptr, thickness, &bend), SliceTracer(movedScene).Trace(p, bare, nullptr, thickness));
+  Slide("drawn, 5 rays, pressed", p, benchmark::Trials(60), known, different, "grey, RMS to the deformed scene, without speckle",
         [&](const SynthesisParameters& now) { tracer.Trace(now, SliceLook(), nullptr, thickness, &bend); });
 
   SynthesisParameters other = p;

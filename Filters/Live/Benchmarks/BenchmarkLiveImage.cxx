@@ -358,8 +358,9 @@ int main()
   LiveImageParameters overlap = usual;
   measure("convex, 5 planes, two volumes, the first counts", overlap, two);
   overlap.mix.overlap = VolumeMix::Overlap::Mean;
+  const double prepareCpu = CpuSeconds([&] { two.PrepareMean(); }, 1);
   benchmark::ReportTime("live_image", "set-up of the mean of two volumes", "echorama",
-                        benchmark::Seconds([&] { two.PrepareMean(); }), {{"threads", threads}});
+                        benchmark::Seconds([&] { two.PrepareMean(); }), {{"cpu_seconds", prepareCpu}, {"threads", threads}});
   measure("convex, 5 planes, two volumes, mean", overlap, two);
 
   // A valid region that is all real, and labels: what bricks cost.
