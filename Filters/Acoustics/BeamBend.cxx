@@ -45,7 +45,8 @@ Eigen::Vector3d BeamBend::At(double depthMm, double fan, double acrossMm) const
   };
   double ofBeam, ofDepth, ofAcross;
   const std::size_t beam = split((fan + 0.5) * (beams_ - 1), beams_, ofBeam);
-  const std::size_t depth = split((depthMm - probe_.depthMin) / (probe_.depthMax - probe_.depthMin) * (depths_ - 1), depths_, ofDepth);
+  const std::size_t depth =
+      split((depthMm - probe_.depthMin) / (probe_.depthMax - probe_.depthMin) * (depths_ - 1), depths_, ofDepth);
   const std::size_t across = split(acrossMm / acrossMm_ + 1.0, 3, ofAcross);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t corner = 0; corner < 8; ++corner) {

@@ -10,7 +10,8 @@ namespace echorama {
 /// beside it (along y); what lies beyond has what the nearest node has.
 class BeamBend {
 public:
-  /// All rests. \throws Error(InvalidParameter) for a geometry that is none, or sweeps; fewer than 2 depths or beams; acrossMm <= 0
+  /// All rests. \throws Error(InvalidParameter) for a geometry that is none, or sweeps; fewer than 2 depths or beams; acrossMm <=
+  /// 0
   BeamBend(const ProbeGeometry& probe, int depths, int beams, double acrossMm);
 
   std::size_t Count() const { return moves_.size(); }

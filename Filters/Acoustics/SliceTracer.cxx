@@ -46,7 +46,7 @@ struct PictureLine {
   double depth, db;
 };
 
-// 10^(db / 10) of levels, two to the power of their whole and of their broken part: 3e-6 of it off.
+// 10^(db / 10) of levels, two to the power of their whole and of their broken part: less than 1e-5 of it off.
 ECHORAMA_HOT void AddPowers(const float* __restrict level, const float* __restrict share, int count, float* __restrict power,
                             float* __restrict scattered)
 {

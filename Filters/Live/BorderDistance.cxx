@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A node lies where eight blocks meet; the depth of one that touches a block that is taken is 0, that of another its exact distance
-// to the nearest such node. So a block that is taken has eight nodes of depth 0, and is 0 all over.
+// A node lies where eight blocks meet; the depth of one that touches a block that is taken is 0, that of another its exact
+// distance to the nearest such node. So a block that is taken has eight nodes of depth 0, and is 0 all over.
 //
 // Cost: once a distance map of the nodes, a 64th of the voxels; then eight nodes for a place.
 #include "Filters/Live/BorderDistance.h"

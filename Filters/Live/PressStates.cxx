@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Interpolated in the world, a place just before the face would be tissue in one state and within the probe in the next. Seen from
-// the probe the face is always at depth 0, and what lies before it is tissue in all states.
+// Interpolated in the world, a place just before the face would be tissue in one state and within the probe in the next. Seen
+// from the probe the face is always at depth 0, and what lies before it is tissue in all states.
 //
 // Cost: for a state, once for a probe, some 9000 points that go back through its displacement; for another press one pass over as
 // many nodes; for another pose nothing.
@@ -23,8 +23,8 @@ void PressStates::Add(double pressMm, const Pose& probeToWorld, LatticeMap displ
   if (!(pressMm > 0.0 && std::isfinite(pressMm)))
     throw Error(Error::Kind::BadInput, "PressMm of a state is " + NumberText(pressMm) + "; it must be above 0 and finite");
   if (!IsRotation(probeToWorld.linear()) || !probeToWorld.translation().allFinite())
-    throw Error(Error::Kind::BadInput, "ProbeToWorld of the state with PressMm " + NumberText(pressMm) +
-                                           " is not rigid and finite");
+    throw Error(Error::Kind::BadInput,
+                "ProbeToWorld of the state with PressMm " + NumberText(pressMm) + " is not rigid and finite");
   if (!states_.emplace(pressMm, State{probeToWorld, std::move(displacement), std::nullopt}).second)
     throw Error(Error::Kind::BadInput, "two states have the same PressMm, " + NumberText(pressMm));
 }

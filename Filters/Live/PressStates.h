@@ -7,8 +7,8 @@
 
 namespace echorama {
 
-/// Tissue at rest under a probe that pressed it more and more, at one place: states that were worked out before (TissuePress), and
-/// what lies between them.
+/// Tissue at rest under a probe that pressed it more and more, at one place: states that were worked out before (TissuePress),
+/// and what lies between them.
 ///
 /// Beside the probe everything moves with it: where a sample of a beam lay before, seen from the probe, is known for each state
 /// (exactly, as DeformPoints inverts the displacement) and linear in PressMm between two of them; at 0 it is where it is. A probe

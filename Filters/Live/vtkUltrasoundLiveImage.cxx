@@ -124,6 +124,9 @@ std::string vtkUltrasoundLiveImage::GetStateText() const
   case NO_VOLUME:
     return this->SceneValues.source == echorama::LiveSource::Volumes ? "there is no volume" : "there is no tissue";
   case OUTSIDE:
+    if (this->SceneValues.source == echorama::LiveSource::Volumes && !this->Values.mix.showInvented) {
+      return "nothing that was measured lies under the probe";
+    }
     return this->SceneValues.source == echorama::LiveSource::Volumes ? "no volume lies under the probe"
                                                                      : "no body lies under the probe";
   default:

@@ -4,8 +4,8 @@
 //
 // The full acoustic picture, made from nothing, is the reference. The probe moves by half a millimetre from image to image, so
 // that what is kept counts for what it is worth. The drawn picture (SliceTracer) is another model: its difference to the full
-// one tells how alike they look, with its speckle and that of the reference smoothed away; that of the pressed one is to the drawn
-// picture of the scene deformed.
+// one tells how alike they look, with its speckle and that of the reference smoothed away; that of the pressed one is to the
+// drawn picture of the scene deformed.
 #include "Core/Geometry/ProbePresets.h"
 #include "Filters/Acoustics/ProgressiveSlice.h"
 #include "Filters/Acoustics/SliceTracer.h"

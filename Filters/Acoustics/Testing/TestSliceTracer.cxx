@@ -524,6 +524,43 @@ TEST(SliceTracer, SurfacesShineByTheirAngleUnderPressure)
   EXPECT_LT(shine(0.2, false), flat - 20.0f);
 }
 
+// What is kept from picture to picture is made anew when anything that it depends on changes.
+TEST(SliceTracer, KeepsNothingThatIsOld)
+{
+  const TissueSurface surface = Background(Grey("tissue", 0.0));
+  const AcousticScene scene(surface);
+  SliceTracer kept(scene);
+  SynthesisParameters p = Flat();
+  p.elements = 40;
+  p.samples = 150;
+  const auto matches = [&] {
+    const Volume<float> picture = kept.Trace(p, SliceLook()), fresh = SliceTracer(scene).Trace(p, SliceLook());
+    return std::equal(picture.View().begin(), picture.View().end(), fresh.View().begin());
+  };
+  EXPECT_TRUE(matches());
+  Transducer& t = p.transducer;
+  const std::function<void()> changes[] = {
+      [&] { t.frequencyMHz = 5.0; },
+      [&] { t.bandwidth = 0.8; },
+      [&] { t.lateralApertureMm = 12.0; },
+      [&] { t.lateralFocusMm = 33.0; },
+      [&] { t.dynamicReceive = false; },
+      [&] { t.dynamicReceive = true, t.smallestFNumber = 4.0; },
+      [&] { t.assumedSoundSpeed = 1450; },
+      [&] { p.probe.fanWidth = 30.0; },
+      [&] { p.probe.fanAngle = 0.5; },
+      [&] { p.probe.depthMin = 5.0; },
+      [&] { p.probe.depthMax = 50.0; },
+      [&] { p.seed = 9; },
+      [&] { p.elements = 41; },
+      [&] { p.samples = 151; },
+  };
+  for (const auto& change : changes) {
+    change();
+    EXPECT_TRUE(matches()) << &change - changes;
+  }
+}
+
 TEST(SliceTracer, DoesNotDependOnThreads)
 {
   TissueSurface surface = Background(StandardMaterial("liver"));

@@ -98,6 +98,46 @@ TEST(LiveImage, ABallIsSeenWhereItLiesInTheWorld)
     }
 }
 
+// Each control that changes reaches an image whose tables were made for other ones.
+TEST(LiveImage, KeepsNothingThatIsOld)
+{
+  const Scene scene(Eigen::Vector3d(6, 1, 40));
+  LiveImageParameters p = Small();
+  p.controls.noiseDb = -45.0;
+  p.controls.shadowDbPerCm = 5.0;
+  p.controls.enhancementDbPerCm = 1.0;
+  p.controls.darkLevel = 0.5; // lighter than what is there
+  p.controls.noiseMoves = true;
+  LiveImage kept;
+  kept.Set(p);
+  Frame before = Make(kept, scene.volumes, Turned(), 3);
+  const auto check = [&](const std::string& name, bool shows) {
+    kept.Set(p);
+    LiveImage fresh;
+    fresh.Set(p);
+    const Frame now = Make(kept, scene.volumes, Turned(), 3);
+    EXPECT_TRUE(now == Make(fresh, scene.volumes, Turned(), 3)) << name;
+    EXPECT_EQ(now == before, !shows) << name;
+    before = now;
+  };
+  const ParameterList controls = Describe(p.controls);
+  for (Parameter control : controls) {
+    if (control.name == "Seed" || control.name == "NoiseMoves") {
+      control.SetNumber(control.name == "Seed" ? 5.0 : 0.0);
+    } else {
+      const double high = std::min(control.range.high, control.Number() + 30.0);
+      control.SetNumber(control.name == "FrequencyMHz" ? 5.0
+                        : control.name == "DarkLevel"  ? 0.9
+                                                       : 0.7 * control.Number() + 0.3 * high);
+    }
+    check(control.name, true);
+  }
+  p.probe.depthMm = 55.0;
+  check("depth", true);
+  p.samples = 170;
+  check("samples", true);
+}
+
 TEST(LiveImage, NoiseStaysWithTheBeamsAndIsTheSameForTheSameSeed)
 {
   const Scene scene;

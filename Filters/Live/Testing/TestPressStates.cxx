@@ -67,7 +67,8 @@ TEST(PressStates, LieEvenlyBetweenTwo)
   states.Add(4.0, PressedIn(4.0), Squeezed(4.0));
   states.Add(12.0, PressedIn(12.0), Squeezed(12.0));
   for (const float depth : {0.0f, 20.0f, 45.0f}) {
-    EXPECT_NEAR(states.At(Flat, 5.0, 7.0)->Along(0.0).At(depth, 0.0f).z(), 0.625 * Expected(depth, 4.0) + 0.375 * Expected(depth, 12.0), 1e-4);
+    EXPECT_NEAR(states.At(Flat, 5.0, 7.0)->Along(0.0).At(depth, 0.0f).z(),
+                0.625 * Expected(depth, 4.0) + 0.375 * Expected(depth, 12.0), 1e-4);
     EXPECT_NEAR(states.At(Flat, 5.0, 1.0)->Along(0.0).At(depth, 0.0f).z(), 0.25 * Expected(depth, 4.0), 1e-4);
   }
   // At the face it is exact whatever the press: what touches the probe lay as deep as it is pressed in.

@@ -260,7 +260,7 @@ for name in hidden:
 assert 0.4 * share < live.GetSeenShare() < 0.6 * share
 live.SetPosition(60, 0, 20) # over what is invented alone
 live.Update()
-assert live.GetState() == live.OUTSIDE and array(live.GetOutput(), "Intensity").max() == 0
+assert live.GetState() == live.OUTSIDE and array(live.GetOutput(), "Intensity").max() == 0 and "measured" in live.GetStateText()
 
 # Overlapping volumes of other gains: the mean has no seam, and is close to the stitched volume.
 def part(low, high, gain):
