@@ -137,7 +137,10 @@ TEST_F(PoseLogFile, WhatIsNoMeasurementIsMissing)
     std::string row, note;
   };
   for (const Case& c : {Case{"1,Probe,0,0,0,0,0,0,0,OK", ""}, Case{"1,Probe,,,,,,,,OK", ""},
+                        Case{"1,Probe,nan,2,3,1,0,0,0,OK", "line 2: a number is not finite"},
+                        Case{"1,Probe,1,nan,3,1,0,0,0,OK", "line 2: a number is not finite"},
                         Case{"1,Probe,1,2,nan,1,0,0,0,OK", "line 2: a number is not finite"},
+                        Case{"1,Probe,1,2,3,1,nan,0,0,OK", "line 2: a number is not finite"},
                         Case{"1,Probe,1,2,MISSING,1,0,0,0,OK", "line 2: a number is not finite"},
                         Case{"1,Probe,1,2,inf,1,0,0,0,OK", "line 2: a number is not finite"},
                         Case{"1,Probe,1,2,3,0.5,0,0,0,OK", "the length of the quaternion is not 1"},

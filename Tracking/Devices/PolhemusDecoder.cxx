@@ -400,14 +400,14 @@ std::string PolhemusDecoder::Understand(const Fields& f, PolhemusRecord& record)
   const Eigen::Quaterniond turn = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
 
   const double tolerance = speech_.format == PolhemusFormat::Binary ? BinaryCopyTolerance : AsciiCopyTolerance;
-  if (longer && shorter && !((*shorter - *longer).cwiseAbs().maxCoeff() <= tolerance)) // not >, for NaN
+  if (longer && shorter && !((*shorter - *longer).array().abs() <= tolerance).all()) // maxCoeff may pass over NaN
     return "a position that differs from its copy";
   if (const auto& euler = f[Item::EulerExtended]) {
     using Axis = Eigen::AngleAxisd;
     const Eigen::Quaterniond copy = Axis((*euler)[0] * RadiansPerDegree, Eigen::Vector3d::UnitZ()) *
                                     Axis((*euler)[1] * RadiansPerDegree, Eigen::Vector3d::UnitY()) *
                                     Axis((*euler)[2] * RadiansPerDegree, Eigen::Vector3d::UnitX());
-    if (!(euler->cwiseAbs().maxCoeff() <= 360.0) || !(copy.angularDistance(turn) <= OrientationTolerance))
+    if (!(euler->array().abs() <= 360.0).all() || !(copy.angularDistance(turn) <= OrientationTolerance))
       return "an orientation that differs from its copy";
   }
   record.pose.linear() = turn.toRotationMatrix();

@@ -186,6 +186,29 @@ TEST(PolhemusDecoder, WhatIsImplausibleIsNoPose)
   }
 }
 
+TEST(PolhemusDecoder, ACopyThatIsNoNumberIsNoCopy)
+{
+  PolhemusSpeech speech = Speech(PolhemusFormat::Binary, PolhemusTwofold(false));
+  speech.stations = 1;
+  const std::string good = EncodePolhemus(speech, 1, EmulatedPose(1, 0), MomentOf(0));
+  PolhemusDecoder whole(speech);
+  Decode(whole, good);
+  EXPECT_EQ(whole.Malformed(), 0u) << whole.LastComplaint();
+  const float nan = NAN;
+  // Header, time, frame, position and quaternion come before the copy of the position, three angles after it.
+  constexpr std::size_t position = 8 + 4 + 4 + 12 + 16, angles = position + 12;
+  for (const auto& [first, words] : {std::pair(position, "a position that differs from its copy"),
+                                     std::pair(angles, "an orientation that differs from its copy")})
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::string changed = good;
+      std::memcpy(changed.data() + first + 4 * axis, &nan, 4);
+      PolhemusDecoder decoder(speech);
+      Decode(decoder, changed);
+      EXPECT_EQ(decoder.Malformed(), 1u) << words << ", number " << axis + 1;
+      EXPECT_NE(decoder.LastComplaint().find(words), std::string::npos) << decoder.LastComplaint();
+    }
+}
+
 TEST(PolhemusDecoder, GarbageBeforeBetweenAndInPlaceOfRecords)
 {
   Random random(5);

@@ -585,7 +585,8 @@ TEST(Phantom, RefusesWhatItCannotMake)
   EXPECT_NE(with([&](auto& p) { p.spacingMm = nan; }).find("SpacingMm is "), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-3; }).find("larger spacing"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.spacingMm = 1e-300; }).find("larger spacing"), std::string::npos);
-  EXPECT_NE(with([&](auto& p) { p.probeToWorld.translation().x() = nan; }).find("ProbeToWorld"), std::string::npos);
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NE(with([&](auto& p) { p.probeToWorld.translation()[axis] = nan; }).find("ProbeToWorld"), std::string::npos) << axis;
   EXPECT_NE(with([](auto& p) { p.probeToWorld.translation().x() = 1e7; }).find("ProbeToWorld"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probeToWorld.linear() *= 2.0; }).find("ProbeToWorld"), std::string::npos);
   EXPECT_NE(with([](auto& p) { p.probe.depthMax = p.probe.depthMin; }).find("probe geometry"), std::string::npos);
