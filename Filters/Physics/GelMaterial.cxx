@@ -9,6 +9,7 @@
 //
 // Pressure: kappa (J^2 - 1) / 2.
 #include "GelMaterial.h"
+#include "Core/Base/IndependentLoop.h"
 #include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
@@ -79,7 +80,7 @@ ECHORAMA_HOT void FindGelFlow(const GelLaw& law, const double* trial, const doub
 ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrainLanes& lanes, double* stress, double* stiffness)
 {
   double torn[GelLanes];
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int l = 0; l < GelLanes; ++l) {
     const double f0 = 1.0 + seconds * lanes.C[0][l], f1 = seconds * lanes.C[1][l], f2 = seconds * lanes.C[2][l];
     const double f3 = seconds * lanes.C[3][l], f4 = 1.0 + seconds * lanes.C[4][l], f5 = seconds * lanes.C[5][l];
@@ -131,7 +132,7 @@ ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrai
 // Deviators scaled, and the trace that gives the determinant 1: the largest root of t^3 - |dev|^2 t / 2 + det(dev) - 1.
 ECHORAMA_HOT void RelaxGelStrain(const double* scale, GelStrainLanes& lanes)
 {
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int l = 0; l < GelLanes; ++l) {
     double third = (lanes.b[0][l] + lanes.b[1][l] + lanes.b[2][l]) * (1.0 / 3.0);
     const double a = scale[l] * (lanes.b[0][l] - third), b = scale[l] * (lanes.b[1][l] - third),

@@ -6,6 +6,7 @@
 // neighbours, and in the stencil the same holds for the columns, so that each coarse entry is a sum of at most seven fine ones.
 // Axis z comes first: it halves what is left to do with loops along x.
 #include "LatticeMatrix.h"
+#include "Core/Base/IndependentLoop.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
@@ -25,7 +26,7 @@ template <class Entry>
   const Entry *b = a + across, *c = b + across;
   const float *x0 = x[0] + shift, *x1 = x[1] + shift, *x2 = x[2] + shift;
   float *y0 = y, *y1 = y + count, *y2 = y1 + count;
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int i = 0; i < count; ++i) {
     y0[i] += static_cast<float>(a[i]) * x0[i] + static_cast<float>(a[along + i]) * x1[i] +
              static_cast<float>(a[2 * along + i]) * x2[i];
@@ -80,7 +81,7 @@ ECHORAMA_HOT void MultiplyPackedRow(const ProductRow<std::int16_t>& row, const f
   const float *x0 = row.x[0], *x1 = row.x[1], *x2 = row.x[2];
   const float *xx = own[0], *xy = own[1], *xz = own[2], *yy = own[3], *yz = own[4], *zz = own[5];
   constexpr float part = 1.0f / PackedOne;
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int i = 0; i < padded; ++i) {
     y0[i] = y0[i] * part + (xx[i] * x0[i] + xy[i] * x1[i] + xz[i] * x2[i]);
     y1[i] = y1[i] * part + (xy[i] * x0[i] + yy[i] * x1[i] + yz[i] * x2[i]);
@@ -100,7 +101,7 @@ constexpr Share shares[] = {{-1, -1, -1, 0.5f}, {-1, 0, -1, 0.25f}, {0, -1, -1, 
 // sum[i] += weight * fine[i], or, along x, of every second one.
 ECHORAMA_HOT void AddRun(float* sum, const float* fine, float weight, int begin, int end)
 {
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int i = begin; i < end; ++i)
     sum[i] += weight * fine[i];
 }
@@ -108,7 +109,7 @@ ECHORAMA_HOT void AddRun(float* sum, const float* fine, float weight, int begin,
 // to = from, scaled at both ends.
 ECHORAMA_HOT void PackRun(const float* from, const float* unscale, const float* other, std::int16_t* to, int count)
 {
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int i = 0; i < count; ++i) {
     const float value = from[i] * unscale[i] * other[i] * PackedOne;
     to[i] = static_cast<std::int16_t>(std::min(std::max(value + (value < 0.0f ? -0.5f : 0.5f), -PackedOne), PackedOne));
@@ -119,7 +120,7 @@ ECHORAMA_HOT void PackRun(const float* from, const float* unscale, const float* 
 ECHORAMA_HOT void LostRun(const float* from, const std::int16_t* packed, const float* unscale, const float* other,
                           const float* otherScale, float part, float* lost, int begin, int end)
 {
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int i = begin; i < end; ++i)
     lost[i] += part * (from[i] * unscale[i] * other[i] - static_cast<float>(packed[i]) * (1.0f / PackedOne)) *
                (otherScale[i] * unscale[i]);

@@ -7,6 +7,7 @@
 // product also), so that bodies that touch move as one on coarse levels at little energy; only what lies between nodes that
 // are no neighbours there is replaced by something diagonal that is stiffer.
 #include "LatticeMultigrid.h"
+#include "Core/Base/IndependentLoop.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -27,7 +28,7 @@ ECHORAMA_HOT void ChebyshevRow(int count, float keep, float take, const float* p
                                const float* const* inverse, const float* const* value, float* const* step, float* const* next)
 {
   const float *p0 = product, *p1 = product + padded, *p2 = product + 2 * padded;
-#pragma GCC ivdep
+  ECHORAMA_INDEPENDENT
   for (int i = 0; i < count; ++i) {
     const float r0 = right[0][i] - p0[i], r1 = right[1][i] - p1[i], r2 = right[2][i] - p2[i];
     const float s0 = keep * step[0][i] + take * (inverse[0][i] * r0 + inverse[1][i] * r1 + inverse[2][i] * r2);
