@@ -119,7 +119,7 @@ double Meeting(const ProbeGeometry& geometry, const GelShape& skin, const Pose& 
 
 struct GelMotion::State {
   State(const TissueSurface& tissue, const PlacedProbe& first, const ProbeHead& head, const GelMaterial& material,
-        const GelCoatParameters& p, const Progress& progress);
+        const GelCoatParameters& p);
 
   Eigen::AlignedBox3d SkinBox(const Eigen::AlignedBox3d& swept) const;
   void Advance(double seconds, const std::shared_ptr<const GelShape>& skin, const Pose& from, const Pose& to,
@@ -140,7 +140,7 @@ struct GelMotion::State {
 };
 
 GelMotion::State::State(const TissueSurface& tissue, const PlacedProbe& first, const ProbeHead& probeHead,
-                        const GelMaterial& material, const GelCoatParameters& p, const Progress& progress)
+                        const GelMaterial& material, const GelCoatParameters& p)
   : parameters(p), geometry(first.geometry), shape(first.geometry, probeHead)
 {
   CheckRanges(parameters);
@@ -166,7 +166,6 @@ GelMotion::State::State(const TissueSurface& tissue, const PlacedProbe& first, c
     cap.Stretch(1000.0 * parameters.amountMl / putOn);
   }
   skin.emplace(tissue, frame, parameters.cellMm);
-  skin->Move(nullptr, SkinBox(headBox), progress);
 }
 
 Eigen::AlignedBox3d GelMotion::State::SkinBox(const Eigen::AlignedBox3d& swept) const
@@ -236,8 +235,9 @@ void GelMotion::State::Move(const Pose& probeToWorld, double time, const TissueS
 
 GelMotion::GelMotion(const TissueSurface& tissue, const PlacedProbe& first, const ProbeHead& head, const GelMaterial& material,
                      const GelCoatParameters& parameters, const Progress& progress)
-  : state_(std::make_unique<State>(tissue, first, head, material, parameters, progress))
+  : state_(std::make_unique<State>(tissue, first, head, material, parameters))
 {
+  progress(1.0);
 }
 
 GelMotion::GelMotion(const GelMotion& other) : state_(std::make_unique<State>(*other.state_)) {}
@@ -262,6 +262,8 @@ GelCoat GelMotion::Look(bool settle, const Progress& progress)
   State& state = *state_;
   if (settle && state.parameters.settleS > 0.0)
     state.Move(state.probe, state.parameters.settleS, nullptr, progress.Part(0.0, 0.9));
+  if (!state.skin->Now()) // it has not moved yet
+    state.skin->Move(nullptr, state.SkinBox(state.headBox), progress.Part(0.0, 0.9));
   const Pose headToFrame = state.frame.inverse() * state.probe;
   GelCoat coat = CoatOf({*state.solver, *state.skin->Now(), state.shape, state.geometry, headToFrame, state.headBox});
   coat.grid = coat.grid.Moved(state.frame);

@@ -36,7 +36,7 @@ ParameterList Describe(GelStepping& p)
 {
   return {
       Parameter("Gravity", p.gravity, {}, "mm/s^2", "Which way gel falls, and how fast."),
-      Parameter("Courant", p.courant, {0.01, 0.6}, "", "Steps are this part of the time in which pressure crosses a cell.")
+      Parameter("Courant", p.courant, {0.01, 0.9}, "", "Steps are this part of the time in which pressure crosses a cell.")
           .Advanced(),
   };
 }

@@ -14,8 +14,11 @@ double DepthOf(const ProbeArc& arc, double across, double outward)
 {
   if (arc.angle <= 0.0 || arc.width < 1e-3)
     return outward;
-  const double radius = arc.width / arc.angle;
-  return outward < -radius ? std::abs(across) - radius : arc.PlaceOf(across, outward).depth;
+  const double radius = arc.width / arc.angle, fromCentre = radius + outward;
+  if (fromCentre < 0.0)
+    return std::abs(across) - radius;
+  // What ProbeArc::PlaceOf has as depth, without the angle: solvers ask at every node of every step.
+  return (across * across + (radius + fromCentre) * outward) / (std::sqrt(across * across + fromCentre * fromCentre) + radius);
 }
 
 // The extent of a bend from \a from to \a to of its length.

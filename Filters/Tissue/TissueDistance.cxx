@@ -178,21 +178,30 @@ std::vector<float> DistancesOn(const TissueSurface& surface, const ImageGeometry
 
   const Eigen::Affine3d toIndex = grid.WorldToIndex();
   const Columns columns(surface, grid);
-  std::vector<NearTriangle> triangles;
-  for (std::size_t triangle = 0; triangle < surface.triangles.size(); ++triangle) {
-    NearTriangle corners;
-    corners.index = static_cast<std::int32_t>(triangle);
-    for (std::size_t n = 0; n < 3; ++n)
-      corners.point[n] = (toIndex * surface.points[surface.triangles[triangle][n]].cast<double>()).cwiseProduct(grid.spacing);
-    if (SetBox(corners, grid, grid.spacing.maxCoeff()) && anyOutside(corners) && columns.BoundsOutside(corners.index) &&
-        SetBox(corners, grid, band))
-      triangles.push_back(corners);
-  }
+  constexpr std::ptrdiff_t atOnce = 1024;
+  const auto all = static_cast<std::ptrdiff_t>(surface.triangles.size());
+  std::vector<std::vector<NearTriangle>> parts(static_cast<std::size_t>((all + atOnce - 1) / atOnce));
+  ParallelRanges(all, atOnce, progress.Part(0.3, 0.5), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t triangle = begin; triangle < end; ++triangle) {
+      NearTriangle corners;
+      corners.index = static_cast<std::int32_t>(triangle);
+      for (std::size_t n = 0; n < 3; ++n) {
+        const std::uint32_t point = surface.triangles[static_cast<std::size_t>(triangle)][n];
+        corners.point[n] = (toIndex * surface.points[point].cast<double>()).cwiseProduct(grid.spacing);
+      }
+      if (SetBox(corners, grid, grid.spacing.maxCoeff()) && anyOutside(corners) && columns.BoundsOutside(corners.index) &&
+          SetBox(corners, grid, band))
+        parts[static_cast<std::size_t>(begin / atOnce)].push_back(corners);
+    }
+  });
+  std::vector<NearTriangle> triangles; // in their order
+  for (const std::vector<NearTriangle>& part : parts)
+    triangles.insert(triangles.end(), part.begin(), part.end());
 
   std::vector<float> distances(bodies.size());
   if (nearest)
     nearest->assign(bodies.size(), -1);
-  ParallelFor(grid.dimensions[2], progress.Part(0.3, 1.0), [&](std::ptrdiff_t slab) {
+  ParallelFor(grid.dimensions[2], progress.Part(0.5, 1.0), [&](std::ptrdiff_t slab) {
     const int k = static_cast<int>(slab);
     const std::size_t count = at(0, 0, 1);
     std::vector<double> squared(count, band * band);
