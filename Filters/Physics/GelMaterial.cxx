@@ -9,8 +9,8 @@
 //
 // Pressure: kappa (J^2 - 1) / 2.
 #include "GelMaterial.h"
-#include "Core/Base/IndependentLoop.h"
 #include "Core/Base/Multiversion.h"
+#include "IndependentLoop.h"
 #include <algorithm>
 #include <cmath>
 

@@ -6,9 +6,9 @@
 // neighbours, and in the stencil the same holds for the columns, so that each coarse entry is a sum of at most seven fine ones.
 // Axis z comes first: it halves what is left to do with loops along x.
 #include "LatticeMatrix.h"
-#include "Core/Base/IndependentLoop.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
+#include "IndependentLoop.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/LU>

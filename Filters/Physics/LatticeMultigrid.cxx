@@ -7,10 +7,10 @@
 // product also), so that bodies that touch move as one on coarse levels at little energy; only what lies between nodes that
 // are no neighbours there is replaced by something diagonal that is stiffer.
 #include "LatticeMultigrid.h"
-#include "Core/Base/IndependentLoop.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "IndependentLoop.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
