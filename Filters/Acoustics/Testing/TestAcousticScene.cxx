@@ -3,7 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Filters/Acoustics/AcousticScene.h"
-#include "SurfacesForTests.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include <cmath>
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Filters/Acoustics/ScatterCounting.h"
-#include "SurfacesForTests.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Filters/Acoustics/SeenTissue.h"
-#include "SurfacesForTests.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>

@@ -2,7 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Filters/Acoustics/SliceTracer.h"
-#include "SurfacesForTests.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include <algorithm>
 #include <cmath>
 #include <functional>

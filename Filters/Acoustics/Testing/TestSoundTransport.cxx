@@ -2,7 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Filters/Acoustics/SoundTransport.h"
-#include "SurfacesForTests.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>

@@ -3,7 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Filters/Acoustics/Synthesize.h"
-#include "Filters/Tissue/Icosphere.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include "Testing/Sanitized.h"
 #include <algorithm>
 #include <cmath>
@@ -20,42 +20,12 @@ using echorama::ProbeGeometry;
 using echorama::StandardMaterial;
 using echorama::SynthesisParameters;
 using echorama::TissueSurface;
+using echorama::testing::AddBox;
+using echorama::testing::Background;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
 namespace {
-
-TissueSurface Background(const Material& material)
-{
-  TissueSurface surface;
-  surface.materials = {material};
-  return surface;
-}
-
-// A closed box, outward.
-void AddBox(TissueSurface& surface, const Vector3d& from, const Vector3d& to, const Material& material)
-{
-  const auto first = static_cast<std::uint32_t>(surface.points.size());
-  for (int i = 0; i < 8; ++i)
-    surface.points.emplace_back(static_cast<float>(i & 1 ? to.x() : from.x()), static_cast<float>(i & 2 ? to.y() : from.y()),
-                                static_cast<float>(i & 4 ? to.z() : from.z()));
-  surface.bodies.push_back({"box", surface.MaterialIndex(material)});
-  for (const auto& [a, b, c] : std::initializer_list<std::array<std::uint32_t, 3>>{{0, 2, 1},
-                                                                                   {1, 2, 3},
-                                                                                   {4, 5, 6},
-                                                                                   {5, 7, 6},
-                                                                                   {0, 1, 4},
-                                                                                   {1, 5, 4},
-                                                                                   {2, 6, 3},
-                                                                                   {3, 6, 7},
-                                                                                   {0, 4, 2},
-                                                                                   {2, 4, 6},
-                                                                                   {1, 3, 5},
-                                                                                   {3, 7, 5}}) {
-    surface.triangles.push_back({first + a, first + b, first + c});
-    surface.bodyOfTriangle.push_back(static_cast<std::int32_t>(surface.bodies.size()) - 1);
-  }
-}
 
 Material Clear(double soundSpeed = 1540.0, double density = 1000.0)
 {
@@ -134,7 +104,7 @@ TEST(Synthesize, APlaneIsSeenWhereTheScannerThinksItIs)
   for (const double soundSpeed : {1540.0, 1450.0, 1620.0}) {
     TissueSurface surface = Background(Clear(soundSpeed));
     const double depth = 23.37;
-    AddBox(surface, Vector3d(-50, -50, depth), Vector3d(50, 50, 60), Clear(1540.0, 1600.0));
+    AddBox(surface, Clear(1540.0, 1600.0), Vector3f(-50, -50, depth), Vector3f(50, 50, 60));
     SynthesisParameters p = Small();
     p.transport.faceReflection = 0.0;
     const BeamEchoes echoes = SynthesizeEchoes(AcousticScene(surface), p);
@@ -152,7 +122,7 @@ TEST(Synthesize, APlaneIsSeenWhereTheScannerThinksItIs)
 TEST(Synthesize, DoesNotDependOnThreads)
 {
   TissueSurface surface = Background(Speckled());
-  AddBox(surface, Vector3d(-5, -5, 15), Vector3d(5, 5, 25), StandardMaterial("bone"));
+  AddBox(surface, StandardMaterial("bone"), Vector3f(-5, -5, 15), Vector3f(5, 5, 25));
   const AcousticScene scene(surface);
   for (const int subRays : {1, 7}) {
     SynthesisParameters p = Small();
@@ -215,7 +185,7 @@ TEST(Synthesize, ChangedTissueCorrelatesByWhatItKeeps)
 TEST(Synthesize, APartOfTheSweepIsThatPartOfTheWhole)
 {
   TissueSurface surface = Background(Speckled());
-  AddBox(surface, Vector3d(-5, -5, 15), Vector3d(5, 5, 25), StandardMaterial("cyst"));
+  AddBox(surface, StandardMaterial("cyst"), Vector3f(-5, -5, 15), Vector3f(5, 5, 25));
   const AcousticScene scene(surface);
   SynthesisParameters p = Small();
   const BeamEchoes whole = SynthesizeEchoes(scene, p);
@@ -253,7 +223,7 @@ TEST(Synthesize, SpeckleGoesAlongWithDisplacedTissue)
 TEST(Synthesize, ASliceIsAPlaneOfTheVolume)
 {
   TissueSurface surface = Background(Speckled());
-  AddBox(surface, Vector3d(-5, -5, 15), Vector3d(5, 5, 25), StandardMaterial("cyst"));
+  AddBox(surface, StandardMaterial("cyst"), Vector3f(-5, -5, 15), Vector3f(5, 5, 25));
   const AcousticScene scene(surface);
   SynthesisParameters p = Small();
   for (const bool swept : {false, true}) {
@@ -297,7 +267,7 @@ TEST(Synthesize, AMovingProbeImagesEachPlaneWhereItWas)
 TEST(Synthesize, ShadowsAreAsSoftAsTheApertureIsWide)
 {
   TissueSurface surface = Background(Speckled());
-  AddBox(surface, Vector3d(0.5, -50, 8), Vector3d(50, 50, 10), StandardMaterial("bone"));
+  AddBox(surface, StandardMaterial("bone"), Vector3f(0.5, -50, 8), Vector3f(50, 50, 10));
   const AcousticScene scene(surface);
   SynthesisParameters p = Small();
   p.subRays = 1;
@@ -348,9 +318,9 @@ TEST(Synthesize, EachDirectionHasItsOwnAperture)
     const BeamEchoes open = SynthesizeEchoes(AcousticScene(Background(Speckled())), p);
     for (const int axis : {0, 1}) {
       TissueSurface surface = Background(Speckled());
-      Vector3d from(-50.0, -50.0, depth - 0.5 * thickness);
-      from[axis] = edge;
-      AddBox(surface, from, Vector3d(50.0, 50.0, depth + 0.5 * thickness), absorber);
+      Vector3f from(-50.0, -50.0, depth - 0.5 * thickness);
+      from[axis] = static_cast<float>(edge);
+      AddBox(surface, absorber, from, Vector3f(50.0, 50.0, depth + 0.5 * thickness));
       const BeamEchoes shaded = SynthesizeEchoes(AcousticScene(surface), p);
       const double sigma =
           (axis == 0 ? lateral : 18.0 - lateral) / echorama::Transducer::sigmasPerAperture * (1.0 - depth / focus);
@@ -406,7 +376,7 @@ TEST(Synthesize, SpeckleIsAsWideAsTheBeamInEachDirection)
 TEST(Synthesize, WhatStaysBlackIsNotSummed)
 {
   TissueSurface surface = Background(Speckled());
-  AddBox(surface, Vector3d(-50, -50, 8), Vector3d(50, 50, 18), StandardMaterial("bone"));
+  AddBox(surface, StandardMaterial("bone"), Vector3f(-50, -50, 8), Vector3f(50, 50, 18));
   const AcousticScene scene(surface);
   SynthesisParameters p = Small();
   echorama::SynthesisCost cost, full;
@@ -431,7 +401,7 @@ TEST(Synthesize, ManyRaysOfAnOpenBeamAreAsGoodAsOne)
 TEST(Synthesize, LooksAwayFromTheTissue)
 {
   TissueSurface surface = Background(Clear());
-  AddBox(surface, Vector3d(-50, -50, 5), Vector3d(50, 50, 60), Speckled());
+  AddBox(surface, Speckled(), Vector3f(-50, -50, 5), Vector3f(50, 50, 60));
   SynthesisParameters p = Small();
   p.probeToWorld = Pose(Eigen::AngleAxisd(3.14159265358979, Vector3d::UnitX()));
   echorama::SynthesisCost cost;
@@ -465,7 +435,7 @@ TEST(Synthesize, FarFromTheOriginNothingChanges)
 TEST(Synthesize, CountedEventsMakeAPictureToo)
 {
   TissueSurface surface = Background(StandardMaterial("liver"));
-  AddBox(surface, Vector3d(-4, -50, 15), Vector3d(4, 50, 25), StandardMaterial("cyst"));
+  AddBox(surface, StandardMaterial("cyst"), Vector3f(-4, -50, 15), Vector3f(4, 50, 25));
   const AcousticScene scene(surface);
   SynthesisParameters p = Small();
   p.mode = SynthesisParameters::Mode::Counting;

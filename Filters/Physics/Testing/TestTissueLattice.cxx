@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Filters/Physics/TissueLattice.h"
+#include "Filters/Tissue/Testing/SurfacesForTests.h"
 #include <algorithm>
 #include <gtest/gtest.h>
 
@@ -15,31 +16,9 @@ struct Box {
 
 TissueSurface SurfaceOf(const std::vector<Box>& boxes)
 {
-  TissueSurface surface;
-  surface.materials = {StandardMaterial("air")};
-  for (const Box& box : boxes) {
-    const auto first = static_cast<std::uint32_t>(surface.points.size());
-    const auto body = static_cast<std::int32_t>(surface.bodies.size());
-    surface.bodies.push_back({box.material, surface.MaterialIndex(StandardMaterial(box.material))});
-    for (int corner = 0; corner < 8; ++corner)
-      surface.points.emplace_back(corner & 1 ? box.high.x() : box.low.x(), corner & 2 ? box.high.y() : box.low.y(),
-                                  corner & 4 ? box.high.z() : box.low.z());
-    for (const auto& [a, b, c] : std::initializer_list<std::array<std::uint32_t, 3>>{{0, 2, 1},
-                                                                                     {1, 2, 3},
-                                                                                     {4, 5, 6},
-                                                                                     {5, 7, 6},
-                                                                                     {0, 1, 4},
-                                                                                     {1, 5, 4},
-                                                                                     {2, 6, 3},
-                                                                                     {3, 6, 7},
-                                                                                     {0, 4, 2},
-                                                                                     {2, 4, 6},
-                                                                                     {1, 3, 5},
-                                                                                     {3, 7, 5}}) {
-      surface.triangles.push_back({first + a, first + b, first + c});
-      surface.bodyOfTriangle.push_back(body);
-    }
-  }
+  TissueSurface surface = echorama::testing::Background(StandardMaterial("air"));
+  for (const Box& box : boxes)
+    echorama::testing::AddBox(surface, StandardMaterial(box.material), box.low, box.high);
   return surface;
 }
 
