@@ -12,9 +12,13 @@ include(EchoramaDependencies)
 include(${ECHORAMA_KERNELS_DIR}/EchoramaKernels-targets.cmake)
 set(ECHORAMA_PYTHON_PACKAGES python3/paraview-packages)
 
-set(modules ${ECHORAMA_ROOMS})
-list(TRANSFORM modules REPLACE "/" "")
-list(TRANSFORM modules PREPEND "Echorama::")
+set(modules)
+foreach(room IN LISTS ECHORAMA_ROOMS)
+  if(EXISTS ${PROJECT_SOURCE_DIR}/${room}/vtk.module) # else it is a room of kernels alone
+    string(REPLACE "/" "" module ${room})
+    list(APPEND modules Echorama::${module})
+  endif()
+endforeach()
 
 paraview_plugin_scan(PLUGIN_FILES ${PROJECT_SOURCE_DIR}/Plugin/paraview.plugin
   PROVIDES_PLUGINS plugins ENABLE_BY_DEFAULT ON HIDE_PLUGINS_FROM_CACHE ON)

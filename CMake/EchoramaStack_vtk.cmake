@@ -13,9 +13,15 @@ set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Pyt
 set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages)
 set(ECHORAMA_PYTHON_PATH ${CMAKE_BINARY_DIR}/${ECHORAMA_PYTHON_PACKAGES})
 
-set(module_files ${ECHORAMA_ROOMS})
-list(TRANSFORM module_files PREPEND ${PROJECT_SOURCE_DIR}/)
-list(TRANSFORM module_files APPEND /vtk.module)
+# Rooms of kernels alone are no modules of VTK.
+set(module_files)
+foreach(room IN LISTS ECHORAMA_ROOMS)
+  if(EXISTS ${PROJECT_SOURCE_DIR}/${room}/vtk.module)
+    list(APPEND module_files ${PROJECT_SOURCE_DIR}/${room}/vtk.module)
+  else()
+    add_subdirectory(${room})
+  endif()
+endforeach()
 vtk_module_scan(MODULE_FILES ${module_files} PROVIDES_MODULES modules WANT_BY_DEFAULT ON HIDE_MODULES_FROM_CACHE ON
   ENABLE_TESTS OFF)
 vtk_module_build(MODULES ${modules} PACKAGE Echorama INSTALL_EXPORT Echorama
