@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include "Tracking/Optical/BlinkCode.h"
+#include "Tracking/Optical/SpotDetector.h"
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace echorama {
+
+struct SpotTracksParameters {
+  double frameMs = 1000.0 / 90.0, exposureMs = 8.0, rowUs = 0.0;
+  double slotMs = 1000.0 / 90.0;
+  double latencyMs = 22.0;
+  double acceleration = 8000.0;
+  double maximumSpeed = 2000.0;
+  bool triggered = false;
+};
+ParameterList Describe(SpotTracksParameters& p);
+
+/// Where a light is, or was last.
+struct TrackedLight {
+  enum class Status {
+    Seen,      ///< in the newest frame
+    Predicted, ///< not in the newest frame or two: it is off, hidden, or has gone
+    Lost,      ///< in none of the last three
+  };
+  int light = -1; ///< of the code
+  Status status = Status::Lost;
+  double time = 0.0; ///< of position: for one that is seen the middle of its exposure, on the camera's clock
+  Eigen::Vector2d position = Eigen::Vector2d::Zero(), velocity = Eigen::Vector2d::Zero(); ///< px, px/s
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();                                    ///< of the position, px^2
+  Eigen::Vector2d predicted = Eigen::Vector2d::Zero(); ///< latencyMs after the exposure of the newest frame
+  Eigen::Matrix2d predictedCovariance = Eigen::Matrix2d::Zero();
+  Spot spot; ///< as last seen
+};
+
+struct SpotTracksStatistics {
+  std::int64_t frames = 0, blindFrames = 0;
+  std::int64_t identified = 0; ///< times that a track was found to be a light's
+  std::int64_t revoked = 0;    ///< times that its blinking spoke against it later
+  std::int64_t doubted = 0;    ///< times that two came so near each other that they had to be told apart anew
+  std::int64_t predictions = 0;
+  double predictionRms = 0.0;  ///< px, of where a light was said to be latencyMs ahead
+  double holdRms = 0.0;        ///< px, the same without prediction: the last position
+};
+
+/// Whose spots they are, over time. Positions are followed by constant velocity; who is who is told by the code alone, never by
+/// brightness or place, and is doubted when two come so near each other that they might have been exchanged.
+class SpotTracks {
+public:
+  /// \throws Error(InvalidParameter): out of range, or a code that needs a trigger without one
+  SpotTracks(const SpotTracksParameters& parameters, BlinkCode code);
+
+  /// One frame whose first row began to be exposed at \a time, on the camera's clock. Frames that were lost are those that do not
+  /// come. \a isBlind: the frame says nothing of where lights are not (too bright, or changed).
+  /// \throws Error(BadInput) when time does not go on
+  const std::vector<TrackedLight>& Update(double time, const std::vector<Spot>& spots, bool isBlind = false);
+
+  /// One entry per light of the code.
+  const std::vector<TrackedLight>& Lights() const { return lights_; }
+  /// Where \a light will be at \a time, if it goes on as it does.
+  std::optional<Eigen::Vector2d> Predict(int light, double time) const;
+
+  /// When slot 0 began, once it is known. With a trigger: with the exposure of frames whose time is a multiple of all slots.
+  std::optional<double> Phase() const { return phase_; }
+  /// Rows [begin, end) of a frame in which all lights were off, by the phase. None while it is not known.
+  std::vector<std::pair<int, int>> DarkRows(double time, int height) const;
+  const SpotTracksStatistics& Statistics() const { return statistics_; }
+
+private:
+  using State = Eigen::Vector4d; // x, y, and their velocities
+  struct Track {
+    State state = State::Zero();
+    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+    double time = 0.0, firstSeen = 0.0, lastSeen = 0.0;
+    int unseen = 0; // frames on end
+    int light = -1;
+    Spot spot;
+    std::vector<BlinkObservation> seen;
+    std::deque<std::pair<double, State>> past; // after each time that it was seen
+  };
+
+  double RowTime(double time, double row) const { return time + row * rowSeconds_; }
+  void Move(Track& track, double time) const;
+  void Correct(Track& track, const Spot& spot, double time);
+  void Assign(double time, const std::vector<Spot>& spots);
+  void Identify(Track& track);
+  void RefinePhase();
+  void Report(double time);
+  double ExpectedShare(const Track& track, double time, double row) const;
+
+  SpotTracksParameters parameters_;
+  BlinkCode code_;
+  BlinkTiming timing_;
+  double rowSeconds_;
+  std::size_t window_;
+  std::optional<double> phase_;
+  int phaseVotes_ = 0;
+  double phaseCandidate_ = 0.0;
+  std::optional<double> lastTime_;
+  std::vector<Track> tracks_;
+  std::vector<TrackedLight> lights_;
+  SpotTracksStatistics statistics_;
+  double predictionSquares_ = 0.0, holdSquares_ = 0.0;
+};
+
+} // namespace echorama
