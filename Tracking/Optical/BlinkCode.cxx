@@ -2,9 +2,10 @@
 // Codes are found by trying: words of few off slots first, each beside those that are taken, with a step back when none fits, for
 // lengths from the shortest. That takes milliseconds, once.
 //
-// A match needs no threshold on single frames. With a rolling shutter, or slots out of step with frames, a frame may see the end of one
-// slot and the beginning of the next; so the expected brightness is the share of its exposure in which the light is on, times an
-// unknown amplitude, which least squares give in closed form. One frame that is wrong by a third of it is an error. Phases are tried at quarters of a slot, all lights at each.
+// A match needs no threshold on single frames. With a rolling shutter, or slots out of step with frames, a frame may see the end
+// of one slot and the beginning of the next; so the expected brightness is the share of its exposure in which the light is on,
+// times an unknown amplitude, which least squares give in closed form. One frame that is wrong by a third of it is an error.
+// Phases are tried at quarters of a slot, all lights at each.
 #include "BlinkCode.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
@@ -157,11 +158,12 @@ namespace {
 
 // What was seen of a light beside what its code says.
 struct Explained {
-  double residual = 1.0;  // of the squared brightness
-  double largest = 1.0;   // difference in one frame, over the brightness of the light
+  double residual = 1.0; // of the squared brightness
+  double largest = 1.0;  // difference in one frame, over the brightness of the light
 };
 
-Explained Explain(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light, double phase)
+Explained Explain(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                  double phase)
 {
   const auto shareIn = [&](const BlinkObservation& o) {
     const double from = (o.begin - phase) / timing.slot;

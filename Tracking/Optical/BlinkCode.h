@@ -10,13 +10,13 @@ namespace echorama {
 /// lights, so that they share their phase, which a camera need not know.
 class BlinkCode {
 public:
-  /// The shortest words for 1 to 4 lights of which any two, shifted against each other in any way, differ in 3 slots at least: then
-  /// one frame may be lost and one more error is still noticed; also by a camera out of step, which sees half of two slots. In the first \a offSlots (1 or 2) all are off, so that the
-  /// background is seen; a rolling shutter needs 2. No light is off in more than 2 slots on end, and none is mistaken for a lamp
-  /// that is always on. \throws Error(InvalidParameter)
+  /// The shortest words for 1 to 4 lights of which any two, shifted against each other in any way, differ in 3 slots at least:
+  /// then one frame may be lost and one more error is still noticed; also by a camera out of step, which sees half of two slots.
+  /// In the first \a offSlots (1 or 2) all are off, so that the background is seen; a rolling shutter needs 2. No light is off in
+  /// more than 2 slots on end, and none is mistaken for a lamp that is always on. \throws Error(InvalidParameter)
   static BlinkCode Make(int lights, int offSlots = 1);
-  /// Two lights in turn, as in dissertation 7.1. It says whose light it is only to a camera that is triggered by the driver: its phase
-  /// cannot be seen.
+  /// Two lights in turn, as in dissertation 7.1. It says whose light it is only to a camera that is triggered by the driver: its
+  /// phase cannot be seen.
   static BlinkCode Alternating();
 
   int Lights() const { return static_cast<int>(words_.size()); }

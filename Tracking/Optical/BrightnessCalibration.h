@@ -11,16 +11,17 @@ struct ContactSample {
   double peak = 0.0, size = 0.0;
 };
 
-/// How bright and how large a touching light looks everywhere in the picture (dissertation 7.3): lenses darken towards the border, and
-/// what is far or seen aslant is smaller. Nodes lie on a grid over the picture, bilinear between them.
+/// How bright and how large a touching light looks everywhere in the picture (dissertation 7.3): lenses darken towards the
+/// border, and what is far or seen aslant is smaller. Nodes lie on a grid over the picture, bilinear between them.
 struct BrightnessCalibration {
-  int columns = 0, rows = 0;     ///< nodes; none: nothing is calibrated
-  int width = 0, height = 0;     ///< of the picture, pixels
+  int columns = 0, rows = 0;      ///< nodes; none: nothing is calibrated
+  int width = 0, height = 0;      ///< of the picture, pixels
   std::vector<double> peak, size; ///< of the nodes, rows of columns
 
-  /// From lights that touched: local means of the logarithms, by Gaussian weights as wide as a cell of the grid or as the nearest sample
-  /// is far. \throws Error(BadInput) without samples, or with one that is not above 0
-  static BrightnessCalibration Fit(const std::vector<ContactSample>& samples, int width, int height, int columns = 9, int rows = 7);
+  /// From lights that touched: local means of the logarithms, by Gaussian weights as wide as a cell of the grid or as the nearest
+  /// sample is far. \throws Error(BadInput) without samples, or with one that is not above 0
+  static BrightnessCalibration Fit(const std::vector<ContactSample>& samples, int width, int height, int columns = 9,
+                                   int rows = 7);
 
   bool Empty() const { return peak.empty(); }
   /// What a touching light would be there.
@@ -33,8 +34,8 @@ enum class Touch {
   Hover, ///< its light reaches the skin, it does not
 };
 
-/// Below lowPeak of a touching light's brightness, or above highSize of its size, it hovers; it touches again above highPeak and below
-/// lowSize, so that noise does not make it blink between both.
+/// Below lowPeak of a touching light's brightness, or above highSize of its size, it hovers; it touches again above highPeak and
+/// below lowSize, so that noise does not make it blink between both.
 struct TouchRule {
   double lowPeak = 0.55, highPeak = 0.7;
   double lowSize = 1.25, highSize = 1.4;

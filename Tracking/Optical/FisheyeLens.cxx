@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Radius and angle are one-dimensional: Newton's method from the angle that no distortion would give, kept within the range in which
-// the radius grows.
+// Radius and angle are one-dimensional: Newton's method from the angle that no distortion would give, kept within the range in
+// which the radius grows.
 #include "FisheyeLens.h"
 #include "Core/Base/Angles.h"
 #include <algorithm>

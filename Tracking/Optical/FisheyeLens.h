@@ -7,11 +7,11 @@
 
 namespace echorama {
 
-/// A wide-angle lens by Kannala and Brandt (2006), as OpenCV's fisheye module has it: a ray at the angle t to the axis +z meets the
-/// sensor at the radius focal * (t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9).
+/// A wide-angle lens by Kannala and Brandt (2006), as OpenCV's fisheye module has it: a ray at the angle t to the axis +z meets
+/// the sensor at the radius focal * (t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9).
 struct FisheyeLens {
   int width = 640, height = 480;
-  double focal = 190.0;                  ///< pixels per radian, at the axis
+  double focal = 190.0;                    ///< pixels per radian, at the axis
   double centreX = 319.5, centreY = 239.5; ///< pixels
   double k1 = -0.02, k2 = 0.0, k3 = 0.0, k4 = 0.0;
   double maximumAngle = 100.0; ///< degrees from the axis

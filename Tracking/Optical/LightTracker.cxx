@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Until the phase of the lights is known there is no background, and spots are what stands out of its surroundings. Then every
-// frame, or every part of it, in which all lights are off goes into the background. When most of the picture differs from it, a lamp
-// was switched on or a shade drawn: the background is made anew.
+// frame, or every part of it, in which all lights are off goes into the background. When most of the picture differs from it, a
+// lamp was switched on or a shade drawn: the background is made anew.
 #include "LightTracker.h"
 
 namespace echorama {

@@ -5,15 +5,15 @@
 
 namespace echorama {
 
-/// What a camera sees while all lights are off: a running mean, row by row, because with a rolling shutter not all rows of a frame
-/// see the same moment.
+/// What a camera sees while all lights are off: a running mean, row by row, because with a rolling shutter not all rows of a
+/// frame see the same moment.
 class LightsOffBackground {
 public:
   /// A new frame counts for \a newest once there are 1 / newest of them: 1 keeps the last alone. \throws Error(InvalidParameter)
   explicit LightsOffBackground(double newest = 0.2);
 
-  /// Takes the rows [\a beginRow, \a endRow) of a frame. One of another size starts anew. \throws Error(InvalidParameter) for rows
-  /// that it does not have
+  /// Takes the rows [\a beginRow, \a endRow) of a frame. One of another size starts anew. \throws Error(InvalidParameter) for
+  /// rows that it does not have
   void Add(const GreyFrame& frame, int beginRow, int endRow);
   void Add(const GreyFrame& frame) { Add(frame, 0, frame.height); }
   void Clear();

@@ -75,10 +75,10 @@ MeshSurface::MeshSurface(const std::vector<Eigen::Vector3f>& points, const std::
   tree_->scene = rtcNewScene(tree_->device);
   rtcSetSceneFlags(tree_->scene, RTC_SCENE_FLAG_ROBUST); // no ray slips between two triangles
   RTCGeometry geometry = rtcNewGeometry(tree_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* const coordinates = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                        3 * sizeof(float), points.size()));
-  auto* const corners = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size()));
+  auto* const coordinates = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points.size()));
+  auto* const corners = static_cast<std::uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size()));
   if (coordinates && corners) {
     for (std::size_t i = 0; i < points.size(); ++i)
       std::copy_n(points[i].data(), 3, coordinates + 3 * i);
@@ -119,8 +119,7 @@ std::optional<SeenSurface::Hit> MeshSurface::FirstHit(const Eigen::Vector3d& ori
 #endif
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID)
     return std::nullopt;
-  Eigen::Vector3d normal =
-      Eigen::Vector3f(ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z).cast<double>().normalized();
+  Eigen::Vector3d normal = Eigen::Vector3f(ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z).cast<double>().normalized();
   if (normal.dot(direction) > 0.0)
     normal = -normal;
   return Hit{origin + static_cast<double>(ray.ray.tfar) * direction, normal};

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What does not change is made once: the place of the skin behind every pixel (a ray each), the lens's falloff, the light of the room.
-// A frame then is that light, plus the lights in boxes about their places, plus noise.
+// What does not change is made once: the place of the skin behind every pixel (a ray each), the lens's falloff, the light of the
+// room. A frame then is that light, plus the lights in boxes about their places, plus noise.
 //
-// A light in a slab of diffusing plastic makes a bell of light on the inner side. Its width grows with the distance from the skin,
-// and its peak falls with the square of the width and, since ever less of the light meets the skin, with 1 / (1 + (distance /
-// fadeMm)^2). A weak wide bell about it stands for what the plastic scatters more than once. Skin has the same brightness from all
-// sides, so a pixel shows the bell at its own place of the skin, whatever the angle.
+// A light in a slab of diffusing plastic makes a bell of light on the inner side. Its width grows with the distance from the
+// skin, and its peak falls with the square of the width and, since ever less of the light meets the skin, with 1 / (1 + (distance
+// / fadeMm)^2). A weak wide bell about it stands for what the plastic scatters more than once. Skin has the same brightness from
+// all sides, so a pixel shows the bell at its own place of the skin, whatever the angle.
 //
 // Noise: each pixel takes 32 random bits of its own, named by seed, frame, row and column, through a table of the normal
 // distribution's quantiles, the outermost of which are tables themselves: 6 standard deviations of tail, 7 ns per pixel.
@@ -39,7 +39,8 @@ ParameterList Describe(SimulatedCameraParameters& p)
         Parameter("SunShare", p.sunShare, {0, 1}, "", "Share of the picture that sunlight saturates."),
         Parameter("SunEdge", p.sunEdge, {0.001, 1}, "", "How soft the border of the sunlight is, in cosines of its angle."),
         Parameter("HotPixels", p.hotPixels, {0, 100000}, "", "Half of them blink."),
-        Parameter("Vignetting", p.vignetting, {0, 4}, "", "The lens darkens with this power of the angle's cosine (halved angle)."),
+        Parameter("Vignetting", p.vignetting, {0, 4}, "",
+                  "The lens darkens with this power of the angle's cosine (halved angle)."),
         Parameter("SpotMm", p.spotMm, {0.1, 50}, "mm", "Standard deviation of a touching light on the skin."),
         Parameter("SpreadPerMm", p.spreadPerMm, {0, 10}, "", "How fast that grows with the distance from the skin."),
         Parameter("FadeMm", p.fadeMm, {0.1, 1000}, "mm", "Distance at which half of the light meets the skin."),
@@ -155,12 +156,14 @@ SimulatedCamera::SimulatedCamera(const SimulatedCameraParameters& parameters, co
     // 255 grey levels where that share begins, twice as many far within.
     for (std::size_t i = 0; i < size; ++i)
       if (falloff_[i] > 0.0f)
-        ambient_[i] += static_cast<float>(510.0 / (1.0 + std::exp(-(static_cast<double>(towardsSun[i]) - edge) / parameters.sunEdge)));
+        ambient_[i] +=
+            static_cast<float>(510.0 / (1.0 + std::exp(-(static_cast<double>(towardsSun[i]) - edge) / parameters.sunEdge)));
   }
 
   Random random(parameters.seed ^ OtherStreams, HotPixelItem);
   for (int i = 0; i < parameters.hotPixels; ++i)
-    hotPixels_.push_back({static_cast<std::size_t>(random.Below(size)), static_cast<float>(random.Uniform(30.0, 300.0)), i % 2 == 1});
+    hotPixels_.push_back(
+        {static_cast<std::size_t>(random.Below(size)), static_cast<float>(random.Uniform(30.0, 300.0)), i % 2 == 1});
 }
 
 double SimulatedCamera::RowBegin(std::int64_t number, double row) const
@@ -197,8 +200,7 @@ LightTruth SimulatedCamera::TruthOf(std::int64_t number, const SimulatedLight& l
     row = pixel->y();
   }
   const auto x = static_cast<int>(std::lround(truth.pixel.x())), y = static_cast<int>(std::lround(truth.pixel.y()));
-  const std::size_t index =
-      Index(std::clamp(x, 0, parameters_.lens.width - 1), std::clamp(y, 0, parameters_.lens.height - 1));
+  const std::size_t index = Index(std::clamp(x, 0, parameters_.lens.width - 1), std::clamp(y, 0, parameters_.lens.height - 1));
   // Behind other skin it would not be seen.
   const Eigen::Vector3d seen = points_[index].cast<double>();
   const double distance = (shellToCamera_ * truth.light.point).norm();
@@ -219,12 +221,15 @@ void SimulatedCamera::AddLight(std::int64_t number, const SimulatedLight& light,
   const double bound = parameters_.halo > 0.0 ? peak * parameters_.halo : peak;
   if (!(peak > 0.01))
     return;
-  const double reachMm = std::max(width * std::sqrt(2.0 * std::log(std::max(peak / 0.01, 1.0))),
-                                  parameters_.halo > 0.0 ? haloWidth * std::sqrt(2.0 * std::log(std::max(bound / 0.01, 1.0))) : 0.0);
+  const double reachMm =
+      std::max(width * std::sqrt(2.0 * std::log(std::max(peak / 0.01, 1.0))),
+               parameters_.halo > 0.0 ? haloWidth * std::sqrt(2.0 * std::log(std::max(bound / 0.01, 1.0))) : 0.0);
   const double distance = (shellToCamera_ * truth.light.point).norm();
-  const int reach = static_cast<int>(std::ceil(1.5 * parameters_.lens.focal * reachMm / std::max(distance - reachMm, 0.3 * distance)));
+  const int reach =
+      static_cast<int>(std::ceil(1.5 * parameters_.lens.focal * reachMm / std::max(distance - reachMm, 0.3 * distance)));
   const int middleX = static_cast<int>(std::lround(truth.pixel.x())), middleY = static_cast<int>(std::lround(truth.pixel.y()));
   const double exposure = parameters_.exposureMs * 1e-3;
+  const auto reachSquared = static_cast<float>(reachMm * reachMm), narrowSquared = static_cast<float>(40.0 * width * width);
   const auto ofNarrow = static_cast<float>(-0.5 / (width * width)), ofWide = static_cast<float>(-0.5 / (haloWidth * haloWidth));
   for (int y = std::max(0, middleY - reach); y <= std::min(parameters_.lens.height - 1, middleY + reach); ++y) {
     double share = truth.onShare;
@@ -242,7 +247,10 @@ void SimulatedCamera::AddLight(std::int64_t number, const SimulatedLight& light,
       if (!(falloff_[index] > 0.0f))
         continue;
       const float squared = (points_[index] - centre).squaredNorm();
-      grey[index] += scale * falloff_[index] * (std::exp(ofNarrow * squared) + halo * std::exp(ofWide * squared));
+      if (squared > reachSquared)
+        continue;
+      const float narrow = squared < narrowSquared ? std::exp(ofNarrow * squared) : 0.0f; // beyond, exp takes its slow way to 0
+      grey[index] += scale * falloff_[index] * (narrow + halo * std::exp(ofWide * squared));
     }
   }
 }
@@ -273,16 +281,18 @@ void SimulatedCamera::Render(std::int64_t number, const std::vector<SimulatedLig
   }
 
   const NormalTable& normals = NormalTable::Get();
-  const std::array<std::uint32_t, 2> key{static_cast<std::uint32_t>(parameters_.seed), static_cast<std::uint32_t>(parameters_.seed >> 32)};
+  const std::array<std::uint32_t, 2> key{static_cast<std::uint32_t>(parameters_.seed),
+                                         static_cast<std::uint32_t>(parameters_.seed >> 32)};
   const auto unsignedNumber = static_cast<std::uint64_t>(number);
   const auto readVariance = static_cast<float>(parameters_.readNoise * parameters_.readNoise);
   ParallelRanges(height, 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     std::vector<float> normal(static_cast<std::size_t>(width) + 4);
     for (std::ptrdiff_t y = begin; y < end; ++y) {
       for (int x = 0; x < width; x += 4) {
-        const auto words = Random::Block({static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
-                                          static_cast<std::uint32_t>(unsignedNumber), static_cast<std::uint32_t>(unsignedNumber >> 32)},
-                                         key);
+        const auto words =
+            Random::Block({static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
+                           static_cast<std::uint32_t>(unsignedNumber), static_cast<std::uint32_t>(unsignedNumber >> 32)},
+                          key);
         for (std::size_t k = 0; k < 4; ++k)
           normal[static_cast<std::size_t>(x) + k] = normals(words[k]);
       }

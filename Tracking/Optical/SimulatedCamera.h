@@ -32,7 +32,8 @@ ParameterList Describe(SimulatedCameraParameters& p);
 struct LightOnSkin {
   Eigen::Vector3d point = Eigen::Vector3d::Zero(); ///< of the skin, that it touches or is nearest to, mm
   double hoverMm = 0.0;                            ///< how far it is from the skin
-  double peak = 150.0; ///< grey levels at the middle of its spot when it touches, seen along the axis, on for the whole exposure; 0: away
+  double peak =
+      150.0; ///< grey levels at the middle of its spot when it touches, seen along the axis, on for the whole exposure; 0: away
 };
 
 /// A light that moves and blinks; both functions must answer the same to the same question.
@@ -43,11 +44,11 @@ struct SimulatedLight {
 
 /// What is true of one light in one frame.
 struct LightTruth {
-  bool isVisible = false;                        ///< the camera sees that part of the skin
+  bool isVisible = false;                          ///< the camera sees that part of the skin
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero(); ///< where the middle of its spot is
-  double onShare = 0.0;                          ///< of the exposure of its row
-  double time = 0.0;                             ///< the middle of that exposure, s
-  LightOnSkin light;                             ///< then
+  double onShare = 0.0;                            ///< of the exposure of its row
+  double time = 0.0;                               ///< the middle of that exposure, s
+  LightOnSkin light;                               ///< then
 };
 
 struct SimulatedFrame {
@@ -62,8 +63,8 @@ struct SimulatedFrame {
   GreyFrame Grey() const { return GreyFrame::Mono(pixels.data(), width, height); }
 };
 
-/// Renders what it sees: skin in the light of the room and of the sun, and lights through the skin, which diffuses them the more the
-/// further they are from it. A frame depends on parameters, lights and its number alone, not on the number of threads.
+/// Renders what it sees: skin in the light of the room and of the sun, and lights through the skin, which diffuses them the more
+/// the further they are from it. A frame depends on parameters, lights and its number alone, not on the number of threads.
 class SimulatedCamera {
 public:
   /// The camera looks along +z of its own frame; the skin is where \a cameraToShell has it.

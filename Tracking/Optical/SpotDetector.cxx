@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // 1. What the threshold is measured from: the background, or, without one, medians of squares of 32 pixels, interpolated.
-// 2. One pass over the bytes of the frame: pieces of rows in which nothing exceeds the threshold are passed over by vector instructions;
+// 2. One pass over the bytes of the frame: pieces of rows in which nothing exceeds the threshold are passed over by vector
+// instructions;
 //    the others become runs of lit pixels. The threshold grows with the noise that the background's brightness brings.
 // 3. Runs that touch, also at corners, are joined (union-find) to candidates; one with two maxima and a dip between them is two.
-// 4. Candidates near each other are fitted together, over one plane (SpotFit). A long spot that one Gaussian does not explain is tried
+// 4. Candidates near each other are fitted together, over one plane (SpotFit). A long spot that one Gaussian does not explain is
+// tried
 //    as two. Large ones are fitted to means of squares of pixels: their place is as well known, and time stays bounded.
 //
 // Nothing that is smaller than the lens can draw is a spot: hot pixels are refused by their size.
@@ -24,9 +26,11 @@ ParameterList Describe(SpotDetectorParameters& p)
       Parameter("Method", Choice(p.method, {"gaussian", "centroid"}),
                 "How a spot's place is found: by a fit that knows background slopes and saturation, or as the centre of mass."),
       Parameter("Threshold", p.threshold, {1, 250}, "grey levels", "What exceeds the background by this is lit."),
-      Parameter("Significance", p.significance, {0, 20}, "sigma", "And by this many standard deviations of the noise.").Advanced(),
+      Parameter("Significance", p.significance, {0, 20}, "sigma", "And by this many standard deviations of the noise.")
+          .Advanced(),
       Parameter("MinimumPixels", p.minimumPixels, {1, 1000}, "pixels", "Fewer lit ones that touch are noise.").Advanced(),
-      Parameter("MinimumSize", p.minimumSize, {0, 10}, "pixels", "Standard deviation of the smallest spot; a hot pixel is smaller.")
+      Parameter("MinimumSize", p.minimumSize, {0, 10}, "pixels",
+                "Standard deviation of the smallest spot; a hot pixel is smaller.")
           .Advanced(),
       Parameter("MaximumSize", p.maximumSize, {1, 100}, "pixels", "Standard deviation of the largest spot.").Advanced(),
       Parameter("ReadNoise", p.readNoise, {0, 50}, "grey levels", "Noise of the camera in the dark."),
@@ -133,8 +137,7 @@ SpotDetector::SpotDetector(const SpotDetectorParameters& parameters)
   CheckRanges(parameters);
   for (int floor = 0; floor < 256; ++floor) // a background is noisy, too
     thresholds_[floor] = static_cast<std::uint8_t>(std::min(
-        255.0,
-        std::ceil(std::max(parameters.threshold, parameters.significance * std::sqrt(1.2 * noise_.Variance(floor))))));
+        255.0, std::ceil(std::max(parameters.threshold, parameters.significance * std::sqrt(1.2 * noise_.Variance(floor))))));
 }
 
 SpotFrame SpotDetector::Detect(const GreyFrame& frame, const LightsOffBackground* background)
@@ -176,8 +179,7 @@ SpotFrame SpotDetector::Detect(const GreyFrame& frame, const LightsOffBackground
   if (parameters_.method == SpotMethod::Centroid) {
     for (const Candidate& candidate : candidates)
       AddCentroid(source, candidate, out);
-  }
-  else {
+  } else {
     std::vector<bool> done(candidates.size(), false);
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       if (done[i])
@@ -287,11 +289,11 @@ void SpotDetector::FindRuns(const Source& source, SpotFrame& out)
     out.state = FrameState::TooBright;
     out.message = percent(out.saturatedShare) + " of the picture is saturated: too much light falls on the shell; "
                                                 "shade it, or shorten the exposure";
-  }
-  else if (out.changedShare > parameters_.maximumChange) {
+  } else if (out.changedShare > parameters_.maximumChange) {
     out.state = FrameState::Changed;
-    out.message = percent(out.changedShare) + " of the picture is brighter than its background: the light in the room has changed, "
-                                              "or the camera has moved";
+    out.message = percent(out.changedShare) +
+                  " of the picture is brighter than its background: the light in the room has changed, "
+                  "or the camera has moved";
   }
 }
 
@@ -300,7 +302,8 @@ std::vector<SpotDetector::Candidate> SpotDetector::Join(const Source& source)
   parents_.clear();
   const auto root = [this](int label) {
     while (parents_[static_cast<std::size_t>(label)] != label)
-      label = parents_[static_cast<std::size_t>(label)] = parents_[static_cast<std::size_t>(parents_[static_cast<std::size_t>(label)])];
+      label = parents_[static_cast<std::size_t>(label)] =
+          parents_[static_cast<std::size_t>(parents_[static_cast<std::size_t>(label)])];
     return label;
   };
   std::size_t above = 0; // the first run of the row above that may still touch
@@ -331,9 +334,9 @@ std::vector<SpotDetector::Candidate> SpotDetector::Join(const Source& source)
     c.runs.push_back(run);
     c.pixels += run.end - run.begin;
   }
-  joined.erase(std::remove_if(joined.begin(), joined.end(),
-                              [this](const Candidate& c) { return c.pixels < parameters_.minimumPixels; }),
-               joined.end());
+  joined.erase(
+      std::remove_if(joined.begin(), joined.end(), [this](const Candidate& c) { return c.pixels < parameters_.minimumPixels; }),
+      joined.end());
 
   for (Candidate& c : joined) {
     // Of an ellipse of even brightness, whose border is where a Gaussian crosses the threshold.
@@ -354,8 +357,7 @@ std::vector<SpotDetector::Candidate> SpotDetector::Join(const Source& source)
         }
       }
     const Eigen::Vector2d mean = sum / c.pixels;
-    const Eigen::Matrix2d moments =
-        squares / c.pixels - mean * mean.transpose() + Eigen::Matrix2d::Identity() / 12.0;
+    const Eigen::Matrix2d moments = squares / c.pixels - mean * mean.transpose() + Eigen::Matrix2d::Identity() / 12.0;
     const double peak = c.highest * (c.saturated > 0 ? 1.5 : 1.0);
     GaussianSpot start;
     start.centre = mean + Eigen::Vector2d(c.left, c.top);
@@ -402,8 +404,8 @@ std::vector<SpotDetector::Candidate> SpotDetector::Join(const Source& source)
     std::sort(maxima.begin(), maxima.end(), [](const Maximum& a, const Maximum& b) { return a.value > b.value; });
     std::vector<Maximum> kept;
     for (const Maximum& m : maxima) {
-      const double needed = m.value - std::max(0.1 * static_cast<double>(m.value),
-                                               1.5 * std::sqrt(noise_.Variance(static_cast<double>(m.value))));
+      const double needed =
+          m.value - std::max(0.1 * static_cast<double>(m.value), 1.5 * std::sqrt(noise_.Variance(static_cast<double>(m.value))));
       bool apart = true;
       for (const Maximum& k : kept) {
         float lowest = m.value;
@@ -497,7 +499,8 @@ std::vector<SpotSample> SpotDetector::Samples(const Source& source, const std::v
       bool isSaturated = false;
       for (int py = y; py < y + bin; ++py)
         for (int px = x; px < x + bin; ++px) {
-          isSaturated = isSaturated || source.frame[static_cast<std::ptrdiff_t>(py) * source.width + px] >= parameters_.saturation;
+          isSaturated =
+              isSaturated || source.frame[static_cast<std::ptrdiff_t>(py) * source.width + px] >= parameters_.saturation;
           s.value += source.Value(px, py) / pixels;
           s.background += source.Background(px, py) / pixels;
         }
@@ -604,10 +607,10 @@ bool SpotDetector::Accept(const Source& source, const SpotFitResult& fit, SpotFr
     spot.chiSquared = fit.chiSquared;
     spot.touching = static_cast<int>(fit.spots.size()) - 1;
     const int x = static_cast<int>(std::lround(spot.position.x())), y = static_cast<int>(std::lround(spot.position.y()));
-    const bool isSpot = source.Covers(x, y) && ShortRadius(covariance) >= parameters_.minimumSize &&
-                        spot.size <= parameters_.maximumSize && spot.elongation < 6.0 && spot.peak >= 0.6 * parameters_.threshold &&
-                        spot.peak >= 4.0 * spot.peakSigma && spot.peak < 100.0 * parameters_.saturation &&
-                        LongRadius(spot.covariance) < std::max(1.0, 0.3 * spot.size);
+    const bool isSpot =
+        source.Covers(x, y) && ShortRadius(covariance) >= parameters_.minimumSize && spot.size <= parameters_.maximumSize &&
+        spot.elongation < 6.0 && spot.peak >= 0.6 * parameters_.threshold && spot.peak >= 4.0 * spot.peakSigma &&
+        spot.peak < 100.0 * parameters_.saturation && LongRadius(spot.covariance) < std::max(1.0, 0.3 * spot.size);
     if (!isSpot)
       return false;
     const int reach = static_cast<int>(std::ceil(3.0 * LongRadius(covariance)));

@@ -18,9 +18,9 @@ enum class SpotMethod {
 
 struct SpotDetectorParameters {
   SpotMethod method = SpotMethod::Gaussian;
-  double threshold = 10.0;       ///< grey levels above the background
-  double significance = 6.0;     ///< and this many standard deviations of the noise
-  int minimumPixels = 3;         ///< above the threshold, connected
+  double threshold = 10.0;   ///< grey levels above the background
+  double significance = 6.0; ///< and this many standard deviations of the noise
+  int minimumPixels = 3;     ///< above the threshold, connected
   double minimumSize = 0.7, maximumSize = 20.0;
   double readNoise = 1.0, greyPerElectron = 0.05;
   int saturation = 255;
@@ -31,15 +31,15 @@ ParameterList Describe(SpotDetectorParameters& p);
 
 /// A light, as a camera sees it.
 struct Spot {
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();     ///< pixels; (0, 0) is the centre of the first
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();   ///< of the position, px^2
-  double peak = 0.0;                                      ///< grey levels above the background, of saturated ones as fitted
-  double peakSigma = 0.0;                                 ///< its standard deviation
-  double size = 0.0;                                      ///< standard deviation of the light, px: geometric mean of both axes
-  double elongation = 1.0;                                ///< long over short axis
-  double chiSquared = 0.0;                                ///< of the fit, per degree of freedom; 0 for centroids
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();   ///< pixels; (0, 0) is the centre of the first
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero(); ///< of the position, px^2
+  double peak = 0.0;                                    ///< grey levels above the background, of saturated ones as fitted
+  double peakSigma = 0.0;                               ///< its standard deviation
+  double size = 0.0;                                    ///< standard deviation of the light, px: geometric mean of both axes
+  double elongation = 1.0;                              ///< long over short axis
+  double chiSquared = 0.0;                              ///< of the fit, per degree of freedom; 0 for centroids
   int saturatedPixels = 0;
-  int touching = 0;                                       ///< others that were fitted with it
+  int touching = 0; ///< others that were fitted with it
 
   double Brightness() const { return 6.283185307179586 * peak * size * size; } ///< grey levels, summed over all pixels
 };
@@ -93,7 +93,8 @@ private:
   void AddCentroid(const Source& source, const Candidate& candidate, SpotFrame& out) const;
   void FitGroup(const Source& source, const std::vector<const Candidate*>& group, SpotFrame& out);
   bool Accept(const Source& source, const SpotFitResult& fit, SpotFrame& out) const;
-  std::vector<SpotSample> Samples(const Source& source, const std::vector<GaussianSpot>& spots, int bin, double& noiseShare) const;
+  std::vector<SpotSample> Samples(const Source& source, const std::vector<GaussianSpot>& spots, int bin,
+                                  double& noiseShare) const;
 
   SpotDetectorParameters parameters_;
   PixelNoise noise_;

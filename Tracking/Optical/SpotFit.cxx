@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Levenberg-Marquardt on six numbers per spot (peak, centre, precision of its ellipse) and up to three of the plane. Twice: the weights
-// of the first pass come from where it starts, those of the second from where the first ended, which is Fisher scoring, as good as
-// maximum likelihood here. Weights that come from the values themselves would pull every spot to its dark pixels.
+// Levenberg-Marquardt on six numbers per spot (peak, centre, precision of its ellipse) and up to three of the plane. Twice: the
+// weights of the first pass come from where it starts, those of the second from where the first ended, which is Fisher scoring,
+// as good as maximum likelihood here. Weights that come from the values themselves would pull every spot to its dark pixels.
 //
 // Saturated pixels are left out, and so are those of which the model expects that noise may saturate them: were that left to
 // the values, the dark half of the noise would stay and the bright half go, on one side of the spot more than on the other
@@ -60,8 +60,9 @@ public:
       value += p[first + 1] * (x - middle_.x()) + p[first + 2] * (y - middle_.y());
     for (int k = 0; k < spots_; ++k) {
       const double dx = x - p[PerSpot * k + 1], dy = y - p[PerSpot * k + 2];
-      value += p[PerSpot * k] *
-               std::exp(-0.5 * (p[PerSpot * k + 3] * dx * dx + 2.0 * p[PerSpot * k + 4] * dx * dy + p[PerSpot * k + 5] * dy * dy));
+      value +=
+          p[PerSpot * k] *
+          std::exp(-0.5 * (p[PerSpot * k + 3] * dx * dx + 2.0 * p[PerSpot * k + 4] * dx * dy + p[PerSpot * k + 5] * dy * dy));
     }
     return value;
   }
@@ -198,7 +199,8 @@ SpotFitResult FitSpots(const std::vector<SpotSample>& samples, const std::vector
   Eigen::VectorXd p = Eigen::VectorXd::Zero(problem.Parameters());
   for (int k = 0; k < spots; ++k) {
     const GaussianSpot& s = start[static_cast<std::size_t>(k)];
-    p.segment<PerSpot>(PerSpot * k) << s.peak, s.centre.x(), s.centre.y(), s.precision(0, 0), s.precision(0, 1), s.precision(1, 1);
+    p.segment<PerSpot>(PerSpot * k) << s.peak, s.centre.x(), s.centre.y(), s.precision(0, 0), s.precision(0, 1),
+        s.precision(1, 1);
   }
   if (spots == 0 || !p.allFinite() || !IsPossible(p, spots))
     return result;

@@ -9,10 +9,7 @@ namespace echorama {
 struct PixelNoise {
   double readNoise = 1.0;        ///< grey levels
   double greyPerElectron = 0.05; ///< the camera's conversion gain
-  double Variance(double grey) const
-  {
-    return readNoise * readNoise + 1.0 / 12.0 + greyPerElectron * (grey > 0.0 ? grey : 0.0);
-  }
+  double Variance(double grey) const { return readNoise * readNoise + 1.0 / 12.0 + greyPerElectron * (grey > 0.0 ? grey : 0.0); }
 };
 
 /// One value to be fitted: a pixel, or the mean of a square of them.

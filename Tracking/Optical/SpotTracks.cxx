@@ -3,9 +3,9 @@
 // if it is near at all. A light that is off where its code says so is still followed.
 //
 // Identity: a track remembers the brightness of one and a half periods, 0 where it was not seen. While the phase is unknown all
-// phases are tried; it is taken when two tracks, or one track twice, agree on it, and followed from then on (clocks drift). With it
-// only as many hypotheses as lights are left. What goes on speaking against an identity revokes it. When a spot could
-// belong to two tracks, neither is anybody's until its blinking since then has told them apart: their memories are emptied.
+// phases are tried; it is taken when two tracks, or one track twice, agree on it, and followed from then on (clocks drift). With
+// it only as many hypotheses as lights are left. What goes on speaking against an identity revokes it. When a spot could belong
+// to two tracks, neither is anybody's until its blinking since then has told them apart: their memories are emptied.
 //
 // No light is off for more than two frames, so one that was not seen in three has gone. Frames that never came do not count.
 #include "SpotTracks.h"
@@ -24,7 +24,8 @@ ParameterList Describe(SpotTracksParameters& p)
       Parameter("RowUs", p.rowUs, {0, 1000}, "us", "How much later each row begins: 0 is a global shutter."),
       Parameter("SlotMs", p.slotMs, {0.1, 1000}, "ms", "How long a light stays on or off at least."),
       Parameter("LatencyMs", p.latencyMs, {0, 1000}, "ms", "How far ahead positions are predicted."),
-      Parameter("Acceleration", p.acceleration, {1, 1e7}, "px/s^2", "Of a hand, as the camera sees it: its standard deviation.").Advanced(),
+      Parameter("Acceleration", p.acceleration, {1, 1e7}, "px/s^2", "Of a hand, as the camera sees it: its standard deviation.")
+          .Advanced(),
       Parameter("MaximumSpeed", p.maximumSpeed, {1, 1e6}, "px/s", "Nothing that is faster is followed.").Advanced(),
       Parameter("Triggered", p.triggered, "The lights' driver triggers the camera: slot 0 begins with the exposure at time 0.")
           .Advanced(),
@@ -33,17 +34,17 @@ ParameterList Describe(SpotTracksParameters& p)
 
 namespace {
 
-constexpr double Gate = 20.0;            // squared standard deviations
-constexpr double Doubt = 16.0;           // the same: a second track that is as near as this, and no more further than the first
-constexpr double ModelSigma = 0.05;      // px: what positions lack beyond their own noise
+constexpr double Gate = 20.0;       // squared standard deviations
+constexpr double Doubt = 16.0;      // the same: a second track that is as near as this, and no more further than the first
+constexpr double ModelSigma = 0.05; // px: what positions lack beyond their own noise
 constexpr double IdentifyLimit = 0.15;
 constexpr double RevokeLimit = 0.4;
-constexpr double DarkShare = 0.1;        // less than this of the exposure is off
-constexpr double Unexpected = 9.0;       // what it costs a track to be given a spot while its light is off
-constexpr std::size_t LeastSeen = 5;     // frames before an identity, with the phase known
-constexpr std::size_t Established = 3;   // times seen
-constexpr int LostAfter = 3;             // frames
-constexpr std::size_t Remembered = 32;   // states, for the statistics
+constexpr double DarkShare = 0.1;      // less than this of the exposure is off
+constexpr double Unexpected = 9.0;     // what it costs a track to be given a spot while its light is off
+constexpr std::size_t LeastSeen = 5;   // frames before an identity, with the phase known
+constexpr std::size_t Established = 3; // times seen
+constexpr int LostAfter = 3;           // frames
+constexpr std::size_t Remembered = 32; // states, for the statistics
 constexpr std::size_t TrackLimit = 64;
 
 double Wrapped(double phase, double period)
@@ -164,9 +165,8 @@ void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
       const bool isOff = ExpectedShare(tracks_[t], time, spots[s].position.y()) < DarkShare;
       pairs.push_back({distance + (isOff ? Unexpected : 0.0), distance, t, s});
     }
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
-    return std::tie(a.cost, a.track, a.spot) < std::tie(b.cost, b.track, b.spot);
-  });
+  std::sort(pairs.begin(), pairs.end(),
+            [](const Pair& a, const Pair& b) { return std::tie(a.cost, a.track, a.spot) < std::tie(b.cost, b.track, b.spot); });
 
   std::vector<int> spotOf(tracks_.size(), -1), trackOf(spots.size(), -1);
   for (const Pair& pair : pairs)
@@ -180,9 +180,8 @@ void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
     const int taker = trackOf[other.spot];
     if (taker < 0 || taker == static_cast<int>(other.track))
       continue;
-    const auto taken = std::find_if(pairs.begin(), pairs.end(), [&](const Pair& p) {
-      return p.spot == other.spot && static_cast<int>(p.track) == taker;
-    });
+    const auto taken = std::find_if(pairs.begin(), pairs.end(),
+                                    [&](const Pair& p) { return p.spot == other.spot && static_cast<int>(p.track) == taker; });
     if (tracks_[other.track].light < 0 && tracks_[other.track].past.size() < Established)
       continue; // a sparkle that was here a moment ago
     if (other.distance < taken->distance + Doubt)
@@ -202,8 +201,7 @@ void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
       track.unseen = 0;
       if (!doubted[t])
         track.seen.push_back({RowTime(time, spot.position.y()), spot.Brightness()});
-    }
-    else {
+    } else {
       ++track.unseen;
       const double row = track.state.y();
       Move(track, RowTime(time, row) + half);
@@ -290,7 +288,8 @@ void SpotTracks::RefinePhase()
 {
   if (!phase_ || parameters_.triggered)
     return;
-  // Where exposures lie within slots, phases that differ by what is left of a slot explain the same: so one looks further than that, too.
+  // Where exposures lie within slots, phases that differ by what is left of a slot explain the same: so one looks further than
+  // that, too.
   const double period = code_.Length() * timing_.slot;
   const auto residualAt = [&](double phase) {
     double sum = 0.0;
@@ -313,8 +312,7 @@ void SpotTracks::RefinePhase()
 void SpotTracks::Report(double time)
 {
   for (TrackedLight& light : lights_) {
-    if (light.status != TrackedLight::Status::Lost)
-      light.status = TrackedLight::Status::Lost;
+    light.status = TrackedLight::Status::Lost;
     for (const Track& track : tracks_) {
       if (track.light != light.light)
         continue;
@@ -347,8 +345,7 @@ const std::vector<TrackedLight>& SpotTracks::Update(double time, const std::vect
       ++track.unseen;
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), [](const Track& t) { return t.unseen >= LostAfter; }),
                   tracks_.end());
-  }
-  else {
+  } else {
     Assign(time, spots);
     for (Track& track : tracks_)
       Identify(track);

@@ -31,7 +31,7 @@ struct TrackedLight {
   Status status = Status::Lost;
   double time = 0.0; ///< of position: for one that is seen the middle of its exposure, on the camera's clock
   Eigen::Vector2d position = Eigen::Vector2d::Zero(), velocity = Eigen::Vector2d::Zero(); ///< px, px/s
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();                                    ///< of the position, px^2
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();                                   ///< of the position, px^2
   Eigen::Vector2d predicted = Eigen::Vector2d::Zero(); ///< latencyMs after the exposure of the newest frame
   Eigen::Matrix2d predictedCovariance = Eigen::Matrix2d::Zero();
   Spot spot; ///< as last seen
@@ -43,8 +43,8 @@ struct SpotTracksStatistics {
   std::int64_t revoked = 0;    ///< times that its blinking spoke against it later
   std::int64_t doubted = 0;    ///< times that two came so near each other that they had to be told apart anew
   std::int64_t predictions = 0;
-  double predictionRms = 0.0;  ///< px, of where a light was said to be latencyMs ahead
-  double holdRms = 0.0;        ///< px, the same without prediction: the last position
+  double predictionRms = 0.0; ///< px, of where a light was said to be latencyMs ahead
+  double holdRms = 0.0;       ///< px, the same without prediction: the last position
 };
 
 /// Whose spots they are, over time. Positions are followed by constant velocity; who is who is told by the code alone, never by

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Lights in the pictures of a camera inside a shell: how well places are found beside the Cramer-Rao bound, eq. 7.1 of the
-// dissertation and OpenCV; what slopes and sunlight do to each; time per frame; and the whole chain against the truth of the simulated
-// camera: whose light it is, what is claimed without a light, and how far off positions are that are predicted.
+// dissertation and OpenCV; what slopes and sunlight do to each; time per frame; and the whole chain against the truth of the
+// simulated camera: whose light it is, what is claimed without a light, and how far off positions are that are predicted.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Percentile.h"
 #include "Testing/Benchmark.h"
@@ -145,8 +145,12 @@ void Places(const std::string& name, int width, int height, const std::function<
     bias /= found;
     const double error = std::sqrt(0.5 * squares / found);
     benchmark::Report("spots", name, method.name, seconds / trials, error, "px",
-                      {{"group", "places"}, {"bound", bound}, {"ratio", error / bound}, {"bias", bias.norm()},
-                       {"found", found / static_cast<double>(trials)}, {"others", others / static_cast<double>(trials)}});
+                      {{"group", "places"},
+                       {"bound", bound},
+                       {"ratio", error / bound},
+                       {"bias", bias.norm()},
+                       {"found", found / static_cast<double>(trials)},
+                       {"others", others / static_cast<double>(trials)}});
   }
 }
 
@@ -206,16 +210,19 @@ struct Tally {
   double seconds = 0.0;
 };
 
-// Lights that meet and part, are lifted off now and then, and lost frames; half of the sensor's rows, so that 10^5 frames take minutes.
+// Lights that meet and part, are lifted off now and then, and lost frames; half of the sensor's rows, so that 10^5 frames take
+// minutes.
 Tally Identities(Rig& rig, int frames, bool withLights)
 {
   const SimulatedCamera camera(rig.camera, rig.dome, Pose::Identity());
   std::vector<SimulatedLight> lights;
   if (withLights) {
-    lights.push_back(rig.Light(0, [](double t) { return Vector2d(35.0 * std::sin(1.9 * t), 30.0 * std::sin(1.31 * t + 1.0)); },
-                               [](double t) { return std::fmod(t, 7.0) < 0.5 ? 0.0 : 160.0; }));
-    lights.push_back(rig.Light(1, [](double t) { return Vector2d(35.0 * std::sin(1.13 * t + 2.0), 30.0 * std::cos(1.73 * t)); },
-                               [](double t) { return std::fmod(t, 11.0) < 0.5 ? 0.0 : 140.0; }));
+    lights.push_back(rig.Light(
+        0, [](double t) { return Vector2d(35.0 * std::sin(1.9 * t), 30.0 * std::sin(1.31 * t + 1.0)); },
+        [](double t) { return std::fmod(t, 7.0) < 0.5 ? 0.0 : 160.0; }));
+    lights.push_back(rig.Light(
+        1, [](double t) { return Vector2d(35.0 * std::sin(1.13 * t + 2.0), 30.0 * std::cos(1.73 * t)); },
+        [](double t) { return std::fmod(t, 11.0) < 0.5 ? 0.0 : 140.0; }));
   }
   LightTracker tracker({}, rig.tracks, rig.code);
   SimulatedFrame frame;
@@ -256,8 +263,10 @@ void Latency()
   for (const double radius : {25.0, 50.0}) {
     const double rate = 200.0 / radius;
     const std::vector<SimulatedLight> lights{
-        rig.Light(0, [=](double t) { return Vector2d(radius * std::cos(rate * t), radius * std::sin(rate * t)); }, always),
-        rig.Light(1, [=](double t) { return Vector2d(15.0 * std::cos(1.5 * t) + 60.0, -50.0 + 15.0 * std::sin(1.5 * t)); }, always)};
+        rig.Light(
+            0, [=](double t) { return Vector2d(radius * std::cos(rate * t), radius * std::sin(rate * t)); }, always),
+        rig.Light(
+            1, [=](double t) { return Vector2d(15.0 * std::cos(1.5 * t) + 60.0, -50.0 + 15.0 * std::sin(1.5 * t)); }, always)};
     LightTracker tracker({}, rig.tracks, rig.code);
     SimulatedFrame frame;
     std::vector<double> predicted, held, measured;
@@ -310,8 +319,8 @@ int main()
   Places("slope 1.5 per pixel, background", 96, 96, slope, {45, 45, 90.0, 2.5}, 15.0, true, 87.5);
   const auto sun = [](int x, int) { return 15.0 + 330.0 / (1.0 + std::exp(-(x - 110.0) / 9.0)); };
   for (const double x : {84.0, 96.0, 104.0})
-    Places("sunlight, " + std::to_string(static_cast<int>(118.5 - x)) + " px from where it saturates", 160, 96, sun, {x, 48, 150.0, 2.5}, 20.0,
-           true, sun(static_cast<int>(x), 0));
+    Places("sunlight, " + std::to_string(static_cast<int>(118.5 - x)) + " px from where it saturates", 160, 96, sun,
+           {x, 48, 150.0, 2.5}, 20.0, true, sun(static_cast<int>(x), 0));
   Times();
   Latency();
 
@@ -320,8 +329,12 @@ int main()
     Rig rig(640, 480);
     const Tally tally = Identities(rig, benchmark::Trials(1500), true);
     benchmark::ReportTime("spots", "chain, two lights, 640 x 480", "chain", tally.seconds / std::max(tally.frames, 1),
-                          {{"group", "chain"}, {"frames", tally.frames}, {"wrong", tally.wrong}, {"claims", tally.claims},
-                           {"reported", tally.reported}, {"lost", tally.lost}});
+                          {{"group", "chain"},
+                           {"frames", tally.frames},
+                           {"wrong", tally.wrong},
+                           {"claims", tally.claims},
+                           {"reported", tally.reported},
+                           {"lost", tally.lost}});
   }
   for (const bool rolling : {false, true}) {
     Rig rig(320, 240);
@@ -332,14 +345,23 @@ int main()
       rig.camera.exposureMs = rig.tracks.exposureMs = 5.0;
     }
     const Tally tally = Identities(rig, benchmark::Trials(100000), true);
-    benchmark::ReportTime("spots", rolling ? "10^5 frames, rolling shutter" : "10^5 frames", "chain", tally.seconds / std::max(tally.frames, 1),
-                          {{"group", "chain"}, {"frames", tally.frames}, {"wrong", tally.wrong}, {"claims", tally.claims},
-                           {"reported", tally.reported}, {"lost", tally.lost}});
+    benchmark::ReportTime("spots", rolling ? "10^5 frames, rolling shutter" : "10^5 frames", "chain",
+                          tally.seconds / std::max(tally.frames, 1),
+                          {{"group", "chain"},
+                           {"frames", tally.frames},
+                           {"wrong", tally.wrong},
+                           {"claims", tally.claims},
+                           {"reported", tally.reported},
+                           {"lost", tally.lost}});
   }
   Rig dark(320, 240);
   dark.camera.hotPixels = 100;
   const Tally tally = Identities(dark, benchmark::Trials(100000), false);
   benchmark::ReportTime("spots", "10^5 frames without a light", "chain", tally.seconds / std::max(tally.frames, 1),
-                        {{"group", "chain"}, {"frames", tally.frames}, {"wrong", tally.wrong}, {"claims", tally.claims},
-                         {"reported", tally.reported}, {"lost", tally.lost}});
+                        {{"group", "chain"},
+                         {"frames", tally.frames},
+                         {"wrong", tally.wrong},
+                         {"claims", tally.claims},
+                         {"reported", tally.reported},
+                         {"lost", tally.lost}});
 }

@@ -27,8 +27,8 @@ struct PaintedSpot {
   }
 };
 
-inline Picture Paint(int width, int height, const std::function<double(int, int)>& background, const std::vector<PaintedSpot>& spots,
-                     std::uint64_t seed, const PixelNoise& noise = {})
+inline Picture Paint(int width, int height, const std::function<double(int, int)>& background,
+                     const std::vector<PaintedSpot>& spots, std::uint64_t seed, const PixelNoise& noise = {})
 {
   Picture picture{width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
   for (int y = 0; y < height; ++y) {

@@ -59,8 +59,8 @@ TEST(BlinkCode, ShareIsTheIntegralOfTheWord)
 }
 
 // What a camera would see of one light: whole windows of the code, with noise, at any phase.
-std::vector<BlinkObservation> Seen(const BlinkCode& code, const BlinkTiming& timing, int light, double phase, int frames, Random& random,
-                                   double noise = 0.05, double frameSeconds = 1.0 / 90.0)
+std::vector<BlinkObservation> Seen(const BlinkCode& code, const BlinkTiming& timing, int light, double phase, int frames,
+                                   Random& random, double noise = 0.05, double frameSeconds = 1.0 / 90.0)
 {
   std::vector<BlinkObservation> seen;
   for (int frame = 0; frame < frames; ++frame) {

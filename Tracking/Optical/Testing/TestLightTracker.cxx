@@ -73,9 +73,7 @@ Outcome Follow(SpotTracks& tracks, const Flat& flat, int frames, int from, const
 
 std::function<std::optional<Vector2d>(double)> Circle(Vector2d centre, double radius, double rate, double start)
 {
-  return [=](double t) {
-    return Vector2d(centre + radius * Vector2d(std::cos(rate * t + start), std::sin(rate * t + start)));
-  };
+  return [=](double t) { return Vector2d(centre + radius * Vector2d(std::cos(rate * t + start), std::sin(rate * t + start))); };
 }
 
 TEST(SpotTracks, TwoToFourLightsAreToldApartAtAnyPhase)
@@ -106,7 +104,8 @@ TEST(SpotTracks, LostFramesChangeNothing)
   flat.phase = 0.0123;
   flat.paths = {Circle({200, 200}, 60, 4.0, 0.0), Circle({400, 200}, 60, -3.0, 1.0)};
   SpotTracks tracks({}, code);
-  const Outcome outcome = Follow(tracks, flat, 1500, 60, [](int n) { return Random(8, static_cast<std::uint64_t>(n)).Uniform() < 0.05; });
+  const Outcome outcome =
+      Follow(tracks, flat, 1500, 60, [](int n) { return Random(8, static_cast<std::uint64_t>(n)).Uniform() < 0.05; });
   EXPECT_EQ(outcome.wrong, 0);
   EXPECT_LT(outcome.lost, 30);
 }
@@ -121,14 +120,16 @@ TEST(SpotTracks, WhatCrossesIsNeverTakenForTheOther)
     const double speed = random.Uniform(60.0, 300.0), miss = random.Uniform(-3.0, 3.0);
     // One crosses the other, or turns back where they meet, which looks the same.
     const bool turns = trial % 2 == 1;
-    flat.paths = {[=](double t) { return Vector2d(300.0 + (turns ? -std::abs(speed * (t - 1.5)) : speed * (t - 1.5)), 200.0); },
-                  [=](double t) { return Vector2d(300.0 + (turns ? std::abs(speed * (t - 1.5)) : -speed * (t - 1.5)), 200.0 + miss); }};
+    flat.paths = {
+        [=](double t) { return Vector2d(300.0 + (turns ? -std::abs(speed * (t - 1.5)) : speed * (t - 1.5)), 200.0); },
+        [=](double t) { return Vector2d(300.0 + (turns ? std::abs(speed * (t - 1.5)) : -speed * (t - 1.5)), 200.0 + miss); }};
     SpotTracks tracks({}, code);
     const Outcome outcome = Follow(tracks, flat, 270, 60);
     EXPECT_EQ(outcome.wrong, 0) << trial;
     EXPECT_GT(tracks.Statistics().doubted, 0) << trial;
     EXPECT_GT(outcome.right, 300) << trial;
-    EXPECT_EQ(tracks.Lights()[0].status == Status::Lost || tracks.Lights()[1].status == Status::Lost, false) << trial; // found again
+    EXPECT_EQ(tracks.Lights()[0].status == Status::Lost || tracks.Lights()[1].status == Status::Lost, false)
+        << trial; // found again
   }
 }
 
@@ -139,7 +140,9 @@ TEST(SpotTracks, ALightThatGoesIsLostWithinThreeFramesAndFoundAgain)
     Flat flat(code);
     flat.phase = 0.4 * Frame;
     const double gone = (100 + start) * Frame, back = gone + 1.0;
-    flat.paths = {[=](double t) { return t > gone && t < back ? std::nullopt : std::optional<Vector2d>({200.0, 100.0 + 50.0 * t}); },
+    flat.paths = {[=](double t) {
+                    return t > gone && t < back ? std::nullopt : std::optional<Vector2d>({200.0, 100.0 + 50.0 * t});
+                  },
                   Circle({400, 200}, 60, -3.0, 1.0)};
     SpotTracks tracks({}, code);
     for (int n = 0; n < 240; ++n) {
@@ -279,7 +282,9 @@ struct Rig {
   }
   SimulatedLight Walker(int index, double x, double radius, double rate) const
   {
-    return {[=](double t) { return LightOnSkin{*dome.Above(x + radius * std::cos(rate * t), radius * std::sin(rate * t)), 0.0, 160.0}; },
+    return {[=](double t) {
+              return LightOnSkin{*dome.Above(x + radius * std::cos(rate * t), radius * std::sin(rate * t)), 0.0, 160.0};
+            },
             [=](double from, double to) { return code.OnShare(index, (from - phase) / Frame, (to - phase) / Frame); }};
   }
   Outcome Play(int frames, int settle, LightTracker& tracker, double* rms = nullptr) const
@@ -302,8 +307,7 @@ struct Rig {
           ++outcome.right;
           if (light.status == Status::Seen)
             squares += (light.spot.position - truth.pixel).squaredNorm();
-        }
-        else
+        } else
           ++outcome.wrong;
       }
     }

@@ -244,7 +244,10 @@ TEST(SimulatedCamera, ARollingShutterShowsRowsAtTheirOwnTimes)
   p.exposureMs = 1.0;
   const SimulatedCamera camera(p, Dome(), Pose::Identity());
   // It moves along the picture's x at 2 m/s.
-  const SimulatedLight light{[](double time) { return LightOnSkin{*Dome().Above(2000.0 * (time - 0.5) - 10.0, 40.0), 0.0, 200.0}; }, {}};
+  const SimulatedLight light{[](double time) {
+                               return LightOnSkin{*Dome().Above(2000.0 * (time - 0.5) - 10.0, 40.0), 0.0, 200.0};
+                             },
+                             {}};
   SimulatedFrame frame;
   camera.Render(45, {light}, frame);
   ASSERT_TRUE(frame.truth[0].isVisible);
@@ -256,8 +259,9 @@ TEST(SimulatedCamera, ARollingShutterShowsRowsAtTheirOwnTimes)
   ASSERT_EQ(spots.spots.size(), 1u);
   EXPECT_LT((spots.spots[0].position - frame.truth[0].pixel).norm(), 0.1);
   // A light that goes out halfway is seen in the rows before only.
-  const SimulatedLight half{Still({0.0, 0.0, 90.0}).place,
-                            [](double from, double to) { return std::clamp((119.5 * 40e-6 + 0.5e-3 - from) / (to - from), 0.0, 1.0); }};
+  const SimulatedLight half{Still({0.0, 0.0, 90.0}).place, [](double from, double to) {
+                              return std::clamp((119.5 * 40e-6 + 0.5e-3 - from) / (to - from), 0.0, 1.0);
+                            }};
   SimulatedFrame whole;
   camera.Render(0, {{half.place, {}}}, whole);
   camera.Render(0, {half}, frame);

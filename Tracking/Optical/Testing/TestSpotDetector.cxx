@@ -14,8 +14,8 @@ double Flat(int, int)
 }
 
 struct Errors {
-  double rms = 0.0;       // px, per axis
-  Vector2d bias{0, 0};    // px
+  double rms = 0.0;        // px, per axis
+  Vector2d bias{0, 0};     // px
   double normalised = 0.0; // mean of e^T C^-1 e / 2, 1 when the covariance is right
   int found = 0;
 };
@@ -80,7 +80,8 @@ TEST(SpotDetector, ASlopeDoesNotMoveTheFitButTheCentreOfMass)
   // The centre of mass is drawn uphill. All of the background is above 0, so that it needs a threshold that high.
   Errors massed;
   for (int trial = 0; trial < 100; ++trial) {
-    const Picture picture = Paint(80, 80, [](int x, int) { return 20.0 + 1.5 * std::min(x, 55); }, {spot}, 5000 + static_cast<std::uint64_t>(trial));
+    const Picture picture = Paint(
+        80, 80, [](int x, int) { return 20.0 + 1.5 * std::min(x, 55); }, {spot}, 5000 + static_cast<std::uint64_t>(trial));
     for (const Spot& s : centroid.Detect(picture.Frame()).spots) {
       massed.bias += s.position - Vector2d(spot.x, spot.y);
       ++massed.found;
@@ -233,12 +234,16 @@ TEST(SpotDetector, TakesTheGreenChannelAndSaysWhatIsTooBright)
   ASSERT_EQ(green.spots.size(), 1u);
   EXPECT_EQ(mono.spots[0].position, green.spots[0].position);
 
-  const Picture bright = Paint(64, 48, [](int x, int) { return x < 40 ? 400.0 : 20.0; }, {}, 3);
+  const Picture bright = Paint(
+      64, 48, [](int x, int) { return x < 40 ? 400.0 : 20.0; }, {}, 3);
   const SpotFrame tooBright = detector.Detect(bright.Frame());
   EXPECT_EQ(tooBright.state, FrameState::TooBright);
   EXPECT_NE(tooBright.message.find("62.5%"), std::string::npos) << tooBright.message;
   const LightsOffBackground dark = Background(64, 48, Flat, 3, 1);
-  const SpotFrame changed = detector.Detect(Paint(64, 48, [](int, int) { return 60.0; }, {}, 3).Frame(), &dark);
+  const SpotFrame changed = detector.Detect(Paint(
+                                                64, 48, [](int, int) { return 60.0; }, {}, 3)
+                                                .Frame(),
+                                            &dark);
   EXPECT_EQ(changed.state, FrameState::Changed);
   EXPECT_TRUE(changed.spots.empty());
   EXPECT_FALSE(changed.message.empty());
