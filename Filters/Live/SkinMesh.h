@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Filters/Live/TriangleTree.h"
+#include "Filters/Tissue/TriangleTree.h"
 #include <cstdint>
 #include <string>
 

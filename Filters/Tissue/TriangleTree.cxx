@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Boxes are halved at the median of their triangles' middles, so the tree is as deep as it must be and no deeper, whatever the
 // mesh. Both questions go to the nearer child first and leave out boxes that are further than the best found.
-#include "Filters/Live/TriangleTree.h"
+#include "Filters/Tissue/TriangleTree.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
