@@ -443,6 +443,22 @@ class TissueMeshes(TissueSource):
         return filter
 
 
+class Shell(TissueSource):
+    """From the surface of a body; its own test looks at what comes out."""
+
+    def filter(self, images=()):
+        filter = self.make()
+        ball = vtkSphereSource()
+        ball.SetRadius(30)
+        ball.SetThetaResolution(32)
+        ball.SetPhiResolution(32)
+        ball.Update()
+        filter.SetInputDataObject(ball.GetOutput())
+        filter.SetResolutionMm(1)
+        filter.SetPoints(30)
+        return filter
+
+
 class RigFit(TissueSource):
     """From a scan of the rig, which its own test makes as well; other volumes show none."""
 
@@ -634,6 +650,7 @@ Special = {
     "vtkUltrasoundProbeSource": TissueSource,
     "vtkUltrasoundRigFit": RigFit,
     "vtkUltrasoundSkin": Skin,
+    "vtkUltrasoundShell": Shell,
     "vtkUltrasoundTissueMeshes": TissueMeshes,
     "vtkUltrasoundTissuePress": TissuePress,
     "vtkUltrasoundTissueSource": TissueSource,

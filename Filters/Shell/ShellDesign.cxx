@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The skin is what lies between the body's surface and the same moved inwards, above the plane of the opening. A flange around
+// its foot is screwed to the base: a plate with the camera's hole and, from below, a pocket for its board. A lip on the base
+// follows the skin's inside: no straight way is left for light under the skin.
+#include "ShellDesign.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include <algorithm>
+#include <cmath>
+
+namespace echorama {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double turn = 6.283185307179586;
+
+[[noreturn]] void RefuseShell(const std::string& reason)
+{
+  throw Error(Error::Kind::InvalidParameter, reason);
+}
+
+std::string Mm(double number)
+{
+  return NumberText(std::round(1000.0 * number) / 1000.0) + " mm";
+}
+
+// Along an axis through a place, from \a low to \a high.
+double Rod(const Vector3d& p, const ShellMark& mark, double radius, double low, double high)
+{
+  const Vector3d from = p - mark.place;
+  const double along = from.dot(mark.normal);
+  return std::max({(from - along * mark.normal).norm() - radius, along - high, low - along});
+}
+
+} // namespace
+
+ParameterList Describe(ShellParameters& p)
+{
+  return {
+      Parameter("ThicknessMm", p.thicknessMm, {0.4, 20}, "mm", "Thickness of the skin."),
+      Parameter("Measured", Choice(p.measured, {"surface", "camera"}),
+                "How thickness is measured: to the nearest place of the surface, or along the ray to the camera."),
+      Parameter("ResolutionMm", p.resolutionMm, {0.1, 5}, "mm",
+                "Edge of the cells of the level set, at most half of ThicknessMm. Sharp edges are broken by up to half of it."),
+      Parameter("Up", p.up, {-1e6, 1e6}, "", "The direction from the opening to the skin."),
+      Parameter("OpeningMm", p.openingMm, {0, 1e4, true}, "mm",
+                "Height of the plane of the opening above the body's lowest point. What lies below is not printed."),
+      Parameter("FlangeMm", p.flangeMm, {0, 100}, "mm", "How far the flange and the base reach beyond the skin. 0: no flange."),
+      Parameter("FlangeThicknessMm", p.flangeThicknessMm, {0.5, 30}, "mm", "Thickness of the flange."),
+      Parameter("Screws", p.screws, {0, 64}, "", "Number of screw holes in flange and base."),
+      Parameter("ScrewMm", p.screwMm, {1, 20}, "mm", "Diameter of the screw holes."),
+      Parameter("BaseMm", p.baseMm, {1, 50}, "mm", "Thickness of the base."),
+      Parameter("BaffleMm", p.baffleMm, {0, 100}, "mm",
+                "Height of the base's lip along the skin's inside, which keeps light out. 0: none."),
+      Parameter("ClearanceMm", p.clearanceMm, {0, 3}, "mm", "Between parts that fit into each other."),
+      Parameter("LensHoleMm", p.lensHoleMm, {1, 100}, "mm", "Diameter of the camera's hole, in the middle of the base."),
+      Parameter("BoardMm", p.boardMm, {1, 100}, "mm",
+                "The camera's board: its edges, with the lens in its middle, and the depth of its pocket in the base."),
+      Parameter("LensMm", p.lensMm, {0, 100}, "mm", "How far the lens's optical centre lies above the board."),
+      Parameter("Marks", Choice(p.marks, {"none", "holes", "bumps"}),
+                "What is made of calibration points: holes that an LED fits in, or bumps that are removed later."),
+      Parameter("MarkMm", p.markMm, {0.5, 20}, "mm", "Diameter of holes or bumps."),
+      Parameter("PrinterMm", p.printerMm, {1, 1e4}, "mm", "What the printer can make: its width, depth and height."),
+  };
+}
+
+void ShellParameters::Check() const
+{
+  CheckRanges(*this);
+  if (resolutionMm > 0.5 * thicknessMm)
+    RefuseShell("ResolutionMm is " + Mm(resolutionMm) + "; it must be at most half of ThicknessMm, which is " + Mm(thicknessMm));
+  if (!(up.norm() > 1e-9))
+    RefuseShell("Up has no length");
+  if (flangeMm > 0.0 && screws > 0 && screwMm > 0.7 * flangeMm)
+    RefuseShell("ScrewMm is " + Mm(screwMm) + "; it must be at most 0.7 of FlangeMm, which is " + Mm(flangeMm));
+  if (boardMm.z() > baseMm - 1.0)
+    RefuseShell("BoardMm's pocket is " + Mm(boardMm.z()) + " deep; it must leave at least 1 mm of BaseMm, which is " +
+                Mm(baseMm));
+  if (lensHoleMm > boardMm.head<2>().minCoeff() - 2.0)
+    RefuseShell("LensHoleMm is " + Mm(lensHoleMm) + "; the board would fall through: BoardMm is " + Mm(boardMm.x()) + " by " +
+                Mm(boardMm.y()));
+  if (marks == MarkKind::Bumps && markMm > 2.0 * thicknessMm)
+    RefuseShell("MarkMm is " + Mm(markMm) + "; bumps must be at most twice as wide as ThicknessMm, which is " + Mm(thicknessMm));
+}
+
+Pose BodyToShell(const ShellParameters& p, const TriangleSurface& body)
+{
+  const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(p.up, Vector3d::UnitZ());
+  Eigen::AlignedBox3d bounds;
+  for (const Eigen::Vector3f& point : body.points)
+    bounds.extend(upright * point.cast<double>());
+  if (bounds.isEmpty())
+    throw Error(Error::Kind::BadInput, "the body has no points");
+  const double level = bounds.min().z() + p.openingMm;
+  if (level > bounds.max().z() - p.thicknessMm)
+    RefuseShell("OpeningMm is " + Mm(p.openingMm) + "; the body is only " + Mm(bounds.sizes().z()) + " high along Up");
+  Eigen::AlignedBox2d section;
+  for (const auto& triangle : body.triangles)
+    for (std::size_t n = 0; n < 3; ++n) {
+      const Vector3d a = upright * body.points[triangle[n]].cast<double>(),
+                     b = upright * body.points[triangle[(n + 1) % 3]].cast<double>();
+      if ((a.z() < level) != (b.z() < level))
+        section.extend((a + (level - a.z()) / (b.z() - a.z()) * (b - a)).head<2>());
+    }
+  if (section.isEmpty())
+    throw Error(Error::Kind::NotPossible, "the body has a gap where the plane of the opening is");
+  return Pose(Eigen::Translation3d(-section.center().x(), -section.center().y(), -level) * upright);
+}
+
+double LowestMark(const ShellParameters& p)
+{
+  return (p.flangeMm > 0.0 ? p.flangeThicknessMm : 0.0) + 0.5 * p.markMm + 1.0;
+}
+
+ShellDesign::ShellDesign(const ShellParameters& parameters, const BodySurface& body, std::vector<ShellMark> marks)
+  : p_(parameters), body_(body), marks_(p_.marks == ShellParameters::MarkKind::None ? std::vector<ShellMark>() : std::move(marks))
+{
+  // In the middle of the flange, from outside: distances tell how far it is at least.
+  if (p_.flangeMm > 0.0)
+    for (int i = 0; i < p_.screws; ++i) {
+      const double angle = turn * i / p_.screws;
+      const Vector3d away(std::cos(angle), std::sin(angle), 0.0);
+      double radius = body_.Bounds().sizes().norm() + body_.Bounds().center().norm() + p_.flangeMm;
+      for (int step = 0; step < 200; ++step)
+        radius -= body_.Distance(radius * away) - 0.5 * p_.flangeMm;
+      screws_.emplace_back(radius * away.head<2>());
+    }
+}
+
+Vector3d ShellDesign::Camera() const
+{
+  return {0.0, 0.0, -p_.baseMm + p_.boardMm.z() + p_.lensMm};
+}
+
+Eigen::AlignedBox3d ShellDesign::Bounds(Part part) const
+{
+  Eigen::AlignedBox3d box = body_.Bounds();
+  const double bump = p_.marks == ShellParameters::MarkKind::Bumps ? 0.5 * p_.markMm : 0.0;
+  const double wider = std::max(p_.flangeMm, bump);
+  box.min() -= Vector3d(wider, wider, 0.0);
+  box.max() += Vector3d(wider, wider, bump);
+  box.min().z() = part == Part::Skin ? 0.0 : -p_.baseMm;
+  if (part == Part::Base)
+    box.max().z() = std::max(p_.baffleMm, 0.0);
+  return box;
+}
+
+std::vector<std::uint32_t> ShellDesign::MarksNear(const Vector3d& middle, double distanceMm) const
+{
+  const double reach = distanceMm + p_.markMm + 2.0 * p_.thicknessMm + 4.0;
+  std::vector<std::uint32_t> near;
+  for (std::uint32_t i = 0; i < marks_.size(); ++i)
+    if ((marks_[i].place - middle).squaredNorm() < reach * reach)
+      near.push_back(i);
+  return near;
+}
+
+double ShellDesign::Depth(const Vector3d& place, double distance) const
+{
+  // Beyond the wall the way along a ray is longer still, and nobody asks how long.
+  if (p_.measured == ShellParameters::Thickness::Surface || distance >= 0.0 || -distance > p_.thicknessMm + 2.0 * p_.resolutionMm)
+    return -distance;
+  return body_.Along(place, place - Camera()).value_or(-distance);
+}
+
+double ShellDesign::Screws(const Vector3d& place) const
+{
+  double nearest = 1e9;
+  for (const Vector2d& screw : screws_)
+    nearest = std::min(nearest, (place.head<2>() - screw).norm() - 0.5 * p_.screwMm);
+  return nearest;
+}
+
+double ShellDesign::Skin(const Vector3d& place, double distance, const std::vector<std::uint32_t>& marks) const
+{
+  const double inner = Depth(place, distance) - p_.thicknessMm;
+  double skin = std::max({distance, inner, -place.z()});
+  if (p_.flangeMm > 0.0) {
+    const double flange = std::max({distance - p_.flangeMm, inner, place.z() - p_.flangeThicknessMm, -place.z()});
+    skin = std::min(skin, flange);
+    skin = std::max(skin, -std::max(Screws(place), place.z() - p_.flangeThicknessMm - 4.0));
+  }
+  for (const std::uint32_t i : marks)
+    skin = p_.marks == ShellParameters::MarkKind::Holes
+               ? std::max(skin, -Rod(place, marks_[i], 0.5 * p_.markMm, -p_.thicknessMm - 2.0, 2.0))
+               : std::min(skin, std::max((place - marks_[i].place).norm() - 0.5 * p_.markMm, inner));
+  return skin;
+}
+
+double ShellDesign::Base(const Vector3d& place, double distance, double foot) const
+{
+  double base = std::max({foot - p_.flangeMm, place.z(), -place.z() - p_.baseMm});
+  if (p_.baffleMm > 0.0) {
+    const double inside = distance + p_.thicknessMm + p_.clearanceMm;
+    base = std::min(base, std::max({inside, -inside - p_.thicknessMm, place.z() - p_.baffleMm, -place.z() - 0.5}));
+  }
+  const Vector2d aside = place.head<2>().cwiseAbs() - 0.5 * p_.boardMm.head<2>();
+  const double pocket = std::max(aside.maxCoeff() - p_.clearanceMm, place.z() + p_.baseMm - p_.boardMm.z());
+  const double lens = place.head<2>().norm() - 0.5 * p_.lensHoleMm;
+  return std::max({base, -pocket, -lens, -Screws(place)});
+}
+
+Vector3d ShellDesign::Refined(const Vector3d& place) const
+{
+  const bool isPlain = IsPlainWall(place, p_.resolutionMm);
+  const double limit = (isPlain ? 0.5 : 0.12) * p_.resolutionMm; // elsewhere it may belong on a plane or in a hole
+  const bool isOnPlane = std::min(std::abs(place.z()), std::abs(place.z() - p_.flangeThicknessMm)) < 0.021 * p_.resolutionMm;
+  if (isOnPlane)
+    return place;
+  Vector3d moved = place;
+  for (int step = 0; step < 3; ++step) {
+    const BodySurface::Place at = body_.PlaceOf(moved);
+    if (std::abs(at.distanceMm) < limit) {
+      moved = at.nearest;
+      break;
+    }
+    const double beyond = Depth(moved, at.distanceMm) - p_.thicknessMm;
+    if (at.distanceMm > 0.0 || std::abs(beyond) > limit)
+      break;
+    if (p_.measured == ShellParameters::Thickness::Camera)
+      moved += beyond * (moved - Camera()).normalized();
+    else
+      moved += beyond * at.away;
+    if (std::abs(beyond) < 1e-5)
+      break;
+  }
+  return (moved - place).norm() <= limit ? moved : place;
+}
+
+bool ShellDesign::IsPlainWall(const Vector3d& place, double distanceMm) const
+{
+  const double rim = p_.flangeMm > 0.0 ? p_.flangeThicknessMm : 0.0;
+  if (place.z() < rim + distanceMm + p_.resolutionMm)
+    return false;
+  return std::none_of(marks_.begin(), marks_.end(), [&](const ShellMark& mark) {
+    const double reach = 0.5 * p_.markMm + p_.thicknessMm + p_.resolutionMm + distanceMm;
+    return (mark.place - place).squaredNorm() < reach * reach;
+  });
+}
+
+} // namespace echorama
