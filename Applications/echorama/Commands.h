@@ -36,6 +36,7 @@ Command NoiseCommand(CLI::App& program);
 Command ProbeFitCommand(CLI::App& program);
 Command PhantomCommand(CLI::App& program);
 Command SynthesizeCommand(CLI::App& program);
+Command ShellCommand(CLI::App& program);
 Command ViewCommand(CLI::App& program);
 
 } // namespace echorama

@@ -46,11 +46,11 @@ int main(int argc, char** argv)
 
   bool json = false;
   int threads = 0;
-  const Command commands[] = {InfoCommand(program),      ConvertCommand(program),    ReconstructCommand(program),
-                              AlignCommand(program),     ScoreCommand(program),      StitchCommand(program),
-                              EmbedCommand(program),     NoiseCommand(program),      ProbeFitCommand(program),
-                              PhantomCommand(program),   SynthesizeCommand(program), ViewCommand(program),
-                              CalibrateCommand(program), TrackCommand(program),      MotionCommand(program)};
+  const Command commands[] = {
+      InfoCommand(program),      ConvertCommand(program), ReconstructCommand(program), AlignCommand(program),
+      ScoreCommand(program),     StitchCommand(program),  EmbedCommand(program),       NoiseCommand(program),
+      ProbeFitCommand(program),  PhantomCommand(program), SynthesizeCommand(program),  ViewCommand(program),
+      CalibrateCommand(program), TrackCommand(program),   MotionCommand(program),      ShellCommand(program)};
   for (const Command& command : commands) {
     command.options->add_flag("--json", json, "Print one JSON object of results and seconds on standard output");
     command.options->add_option("--threads", threads, "Number of threads (0: as many as there are cores)")

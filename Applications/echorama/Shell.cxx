@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// echorama shell: a body's surface as a printed skin for the optical surface tracker, with its base and its calibration points.
+#include "Commands.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/TextFile.h"
+#include "ParameterOptions.h"
+#include "Readers/OutputFiles.h"
+#include "Volumes.h"
+#include <memory>
+#include <vtkCellArray.h>
+#include <vtkFieldData.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkSTLWriter.h>
+#include <vtkUltrasoundMeshFile.h>
+#include <vtkUltrasoundShell.h>
+
+namespace echorama {
+namespace {
+
+struct ShellOptions {
+  std::string body, folder;
+};
+
+vtkSmartPointer<vtkPolyData> DataOf(const TriangleSurface& surface)
+{
+  vtkNew<vtkPoints> points;
+  for (const Eigen::Vector3f& point : surface.points)
+    points->InsertNextPoint(point.data());
+  vtkNew<vtkCellArray> triangles;
+  for (const auto& triangle : surface.triangles) {
+    const vtkIdType corners[3] = {triangle[0], triangle[1], triangle[2]};
+    triangles->InsertNextCell(3, corners);
+  }
+  const auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(triangles);
+  return data;
+}
+
+void MakeShellFiles(Session& session, const ShellOptions& options, vtkUltrasoundShell* filter)
+{
+  TriangleSurface surface;
+  session.Time("read", [&] { surface = ReadMesh(options.body); });
+  filter->SetInputData(DataOf(surface));
+  try {
+    session.Update(filter, "make", options.body);
+  } catch (const Error& error) { // the filter knows no files
+    if (error.GetKind() == Error::Kind::Cancelled)
+      throw;
+    throw Error(error.GetKind(), options.body + ": " + error.what());
+  }
+  OutputFolder folder(options.folder, {options.body});
+  session.ShowAs(folder.StageFolder(), options.folder);
+  const char* names[] = {"skin", "base"};
+  for (int part = 0; part < 2; ++part) {
+    const std::string name = std::string(names[part]) + ".stl";
+    vtkNew<vtkSTLWriter> writer;
+    writer->SetInputData(filter->GetOutput(part));
+    writer->SetFileName(folder.Stage(name).c_str());
+    writer->SetFileTypeToBinary();
+    session.Watch(writer, "write", name, [&] { writer->Write(); });
+    session.result[names[part]] = name;
+  }
+  const std::string both = folder.Stage("shell.3mf");
+  session.Watch(filter, "write", "shell.3mf", [&] { filter->Write3mf(both.c_str()); });
+  session.result["both"] = "shell.3mf";
+  vtkPolyData* marks = filter->GetOutput(2);
+  if (marks->GetNumberOfPoints() > 0) {
+    std::string table = "label,x,y,z\n";
+    for (vtkIdType i = 0; i < marks->GetNumberOfPoints(); ++i) {
+      const double* p = marks->GetPoint(i);
+      table += std::to_string(i + 1) + "," + NumberText(p[0]) + "," + NumberText(p[1]) + "," + NumberText(p[2]) + "\n";
+    }
+    WriteTextFile(folder.Stage("points.csv"), table);
+    WriteTextFile(folder.Stage("points.html"), filter->GetGuide());
+    session.result["points"] = "points.csv";
+    session.result["guide"] = "points.html";
+  }
+  session.result["wall_mm"] = {filter->GetLeastThickness(), filter->GetMostThickness()};
+  double camera[3];
+  filter->GetOutput(0)->GetFieldData()->GetArray("CameraPosition")->GetTuple(0, camera);
+  session.result["camera"] = {camera[0], camera[1], camera[2]};
+  folder.Commit();
+  for (const std::string& line : LinesOf(filter->GetReport()))
+    session.Say(line);
+  session.Say("wrote them to " + options.folder);
+}
+
+} // namespace
+
+Command ShellCommand(CLI::App& program)
+{
+  auto values = std::make_shared<ShellOptions>();
+  const auto filter = vtkSmartPointer<vtkUltrasoundShell>::New();
+  CLI::App* options =
+      program.add_subcommand("shell", "Make a body's surface into a skin to print, with a base for a camera (STL, 3MF)");
+  options->add_option("body", values->body, "A closed surface in mm (.stl, .ply, .obj, .vtp, .glb)")->required();
+  options->add_option("-o,--output", values->folder, "Folder for the files")->required();
+  AddParametersBut(options, filter, {});
+  return {options, [values, filter](Session& session) { MakeShellFiles(session, *values, filter); }};
+}
+
+} // namespace echorama
