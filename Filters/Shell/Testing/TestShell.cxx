@@ -5,9 +5,9 @@
 #include "Filters/Shell/Shell.h"
 #include "Filters/Shell/ShellMarks.h"
 #include "Filters/Tissue/Icosphere.h"
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
-#include <numeric>
 #include <set>
 
 using namespace echorama;
