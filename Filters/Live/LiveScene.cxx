@@ -54,6 +54,13 @@ SliceThickness SceneThickness(const LiveImageParameters& p)
   return {waist, waist > 0.0 ? thickness.divergence * waist / thickness.thicknessMm : 0.0, thickness.focusMm};
 }
 
+const Material* LiveScene::HardMaterialAt(const Eigen::Vector3d& point) const
+{
+  constexpr double hardest = 4e6; // Rayl: of soft tissue and plastics at most 3e6, of bone and stones above 6e6
+  const Material& material = scene_.Materials()[static_cast<std::size_t>(scene_.MediumOf(scene_.BodiesAt(point)))];
+  return material.soundSpeed * material.density > hardest ? &material : nullptr;
+}
+
 Volume<float> LiveScene::MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress,
                                    const SliceThickness& thickness, const BeamBend* bend)
 {

@@ -48,6 +48,10 @@ public:
   double ContactShare() const { return contactShare_; }
   double SeenShare() const { return seenShare_; }
 
+  /// The material at a point of the world, if it is as hard as bone (impedance above 4 MRayl): no probe can be there. nullptr:
+  /// it is soft.
+  const Material* HardMaterialAt(const Eigen::Vector3d& point) const;
+
 private:
   AcousticScene scene_;
   SliceTracer tracer_;

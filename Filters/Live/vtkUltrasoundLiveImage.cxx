@@ -176,6 +176,7 @@ int vtkUltrasoundLiveImage::RequestData(vtkInformation* request, vtkInformationV
   this->State = FAILED;
   this->SeenShare = 0.0;
   this->ContactShare = 1.0;
+  this->HardMaterial.clear();
   return this->Superclass::RequestData(request, inputs, outputs);
 }
 
@@ -287,6 +288,9 @@ void vtkUltrasoundLiveImage::Execute(vtkInformationVector** inputs, vtkImageData
                                           isDrawn ? this->BendOf(inputs[2]) : nullptr));
     this->SeenShare = scene->SeenShare();
     this->ContactShare = scene->ContactShare();
+    // Behind the face: a probe that lies on the bone is not within it.
+    const echorama::Material* hard = scene->HardMaterialAt(pose * Eigen::Vector3d(0.0, 0.0, -1.0));
+    this->HardMaterial = hard ? hard->name : "";
     isEmpty = false;
   } else {
     this->Image.MakeBeams(echorama::BeamVolumes(), pose); // of nothing

@@ -371,6 +371,11 @@ public:
   {
     return this->ContactShare;
   }
+  /** Of a scene: the material that the probe stands in, where that is as hard as bone and no probe can be; else empty. */
+  std::string GetHardMaterial() const
+  {
+    return this->HardMaterial;
+  }
   ///@}
 
 protected:
@@ -406,6 +411,7 @@ private:
 #endif
   int State = NO_VOLUME;
   double SeenShare = 0.0, ContactShare = 1.0;
+  std::string HardMaterial;
 
   vtkUltrasoundLiveImage(const vtkUltrasoundLiveImage&) = delete;
   void operator=(const vtkUltrasoundLiveImage&) = delete;

@@ -195,3 +195,25 @@ TEST(LiveImage, TakesBeamsFromElsewhere)
   EXPECT_GT(count, 50000);
   EXPECT_THROW(image.SetBeams(Volume<float>({200, 47, 1})), Error);
 }
+
+// Bone and its like are hard, whatever they are called; soft tissue, air and plastics are not.
+TEST(LiveScene, TellsWhereNoProbeCanBe)
+{
+  TissueSurface body = Body();
+  const LiveScene soft(body);
+  for (const Vector3d& at : {Vector3d(0, 0, -5), Vector3d(0, 0, 5), Vector3d(0, 0, 40)})
+    EXPECT_EQ(soft.HardMaterialAt(at), nullptr) << at.transpose();
+  for (const char* hard : {"bone", "stone", "steel"}) {
+    Material material = StandardMaterial(hard);
+    material.name = "thing";
+    body.materials[static_cast<std::size_t>(body.bodies.back().material)] = material;
+    const LiveScene scene(body);
+    ASSERT_NE(scene.HardMaterialAt({0, 0, 40}), nullptr) << hard;
+    EXPECT_EQ(scene.HardMaterialAt({0, 0, 40})->name, "thing");
+    EXPECT_EQ(scene.HardMaterialAt({0, 0, 20}), nullptr);
+  }
+  for (const char* other : {"plastic", "nylon", "skin", "air"}) {
+    body.materials[static_cast<std::size_t>(body.bodies.back().material)] = StandardMaterial(other);
+    EXPECT_EQ(LiveScene(body).HardMaterialAt({0, 0, 40}), nullptr) << other;
+  }
+}
