@@ -56,17 +56,11 @@ void ImageView::SetFocusDepth(double mm)
   update();
 }
 
-void ImageView::SetFlipped(bool flipped)
-{
-  isFlipped_ = flipped;
-  update();
-}
-
 void ImageView::SetMeasuring(bool measuring)
 {
   isMeasuring_ = measuring;
   if (!measuring && isOpen_) {
-    callipers_.removeLast(); // it never got its other end
+    callipers_.pop_back(); // it never got its other end
     isOpen_ = false;
     emit CallipersChanged();
   }
@@ -102,7 +96,7 @@ QPointF ImageView::ToWidget(const QPointF& mm) const
   if (plane.isEmpty())
     return frame.center();
   const double across = (mm.x() - plane.left()) / plane.width(), down = (mm.y() - plane.top()) / plane.height();
-  return {frame.left() + (isFlipped_ ? 1.0 - across : across) * frame.width(), frame.top() + down * frame.height()};
+  return {frame.left() + (picture_.isFlipped ? 1.0 - across : across) * frame.width(), frame.top() + down * frame.height()};
 }
 
 QPointF ImageView::ToPlane(const QPointF& at) const
@@ -111,7 +105,7 @@ QPointF ImageView::ToPlane(const QPointF& at) const
   if (plane.isEmpty())
     return {};
   const double across = (at.x() - frame.left()) / frame.width(), down = (at.y() - frame.top()) / frame.height();
-  return {plane.left() + (isFlipped_ ? 1.0 - across : across) * plane.width(), plane.top() + down * plane.height()};
+  return {plane.left() + (picture_.isFlipped ? 1.0 - across : across) * plane.width(), plane.top() + down * plane.height()};
 }
 
 void ImageView::paintEvent(QPaintEvent*)
@@ -121,7 +115,7 @@ void ImageView::paintEvent(QPaintEvent*)
   const QRectF frame = Frame();
   if (!picture_.image.isNull()) {
     painter.setOpacity(isStale_ ? 0.3 : 1.0);
-    painter.drawImage(frame, isFlipped_ ? picture_.image.mirrored(true, false) : picture_.image);
+    painter.drawImage(frame, picture_.image);
     painter.setOpacity(1.0);
     QPolygonF fan; // where it is dark inside, nothing is known
     for (const QPointF& mm : picture_.fan)
@@ -155,14 +149,15 @@ void ImageView::PaintRuler(QPainter& painter, const QRectF& frame) const
   // The side of the probe that carries its mark: +x of its frame.
   painter.setBrush(QColor(90, 160, 220));
   painter.setPen(Qt::NoPen);
-  painter.drawEllipse(QPointF(isFlipped_ ? frame.left() - 14.0 : frame.right() + 14.0, frame.top() - 6.0), 5.0, 5.0);
+  painter.drawEllipse(QPointF(picture_.isFlipped ? frame.left() - 14.0 : frame.right() + 14.0, frame.top() - 6.0), 5.0, 5.0);
 }
 
 void ImageView::PaintCallipers(QPainter& painter) const
 {
   painter.setPen(QPen(QColor(250, 220, 90), 1.5));
-  for (int i = 0; i < callipers_.size(); i++) {
-    const QPointF a = ToWidget(callipers_[i].p1()), b = ToWidget(callipers_[i].p2());
+  for (std::size_t i = 0; i < callipers_.size(); i++) {
+    const QLineF& line = callipers_[i].line;
+    const QPointF a = ToWidget(line.p1()), b = ToWidget(line.p2());
     const bool isOpen = isOpen_ && i + 1 == callipers_.size();
     for (const QPointF& at : isOpen ? QVector<QPointF>{a} : QVector<QPointF>{a, b}) {
       painter.drawLine(at - QPointF(6.0, 0.0), at + QPointF(6.0, 0.0));
@@ -176,7 +171,7 @@ void ImageView::PaintCallipers(QPainter& painter) const
     painter.setPen(dotted);
     painter.drawLine(a, b);
     painter.restore();
-    painter.drawText((a.x() > b.x() ? a : b) + QPointF(9.0, -6.0), tr("%1 mm").arg(callipers_[i].length(), 0, 'f', 1));
+    painter.drawText((a.x() > b.x() ? a : b) + QPointF(9.0, -6.0), tr("%1 mm").arg(line.length(), 0, 'f', 1));
   }
 }
 
@@ -200,10 +195,11 @@ void ImageView::PaintState(QPainter& painter) const
 
 bool ImageView::TakeEndAt(const QPointF& at)
 {
-  for (int i = callipers_.size() - 1; i >= 0; i--)
+  const auto count = static_cast<int>(callipers_.size());
+  for (int i = count - 1; i >= 0; i--)
     for (int end : {0, 1}) {
-      const QPointF there = ToWidget(end == 0 ? callipers_[i].p1() : callipers_[i].p2());
-      if (QLineF(there, at).length() <= GripPixels && !(isOpen_ && i + 1 == callipers_.size())) {
+      const QLineF& line = callipers_[static_cast<std::size_t>(i)].line;
+      if (QLineF(ToWidget(end == 0 ? line.p1() : line.p2()), at).length() <= GripPixels && !(isOpen_ && i + 1 == count)) {
         draggedLine_ = i;
         draggedEnd_ = end;
         return true;
@@ -212,15 +208,22 @@ bool ImageView::TakeEndAt(const QPointF& at)
   return false;
 }
 
+void ImageView::SetEnd(CalliperLine& calliper, int end, const QPointF& mm) const
+{
+  end == 0 ? calliper.line.setP1(mm) : calliper.line.setP2(mm);
+  (end == 0 ? calliper.from : calliper.to) = picture_.probeToWorld;
+}
+
 void ImageView::mousePressEvent(QMouseEvent* event)
 {
   if (!isMeasuring_ || event->button() != Qt::LeftButton || picture_.image.isNull() || TakeEndAt(event->localPos()))
     return;
   const QPointF mm = ToPlane(event->localPos());
-  if (isOpen_)
-    callipers_.last().setP2(mm);
-  else
-    callipers_.append(QLineF(mm, mm));
+  if (!isOpen_) {
+    callipers_.emplace_back();
+    SetEnd(callipers_.back(), 0, mm);
+  }
+  SetEnd(callipers_.back(), 1, mm);
   isOpen_ = !isOpen_;
   emit CallipersChanged();
   update();
@@ -228,10 +231,9 @@ void ImageView::mousePressEvent(QMouseEvent* event)
 
 void ImageView::mouseMoveEvent(QMouseEvent* event)
 {
-  if (draggedLine_ < 0 || draggedLine_ >= callipers_.size())
+  if (draggedLine_ < 0 || draggedLine_ >= static_cast<int>(callipers_.size()))
     return;
-  const QPointF mm = ToPlane(event->localPos());
-  draggedEnd_ == 0 ? callipers_[draggedLine_].setP1(mm) : callipers_[draggedLine_].setP2(mm);
+  SetEnd(callipers_[static_cast<std::size_t>(draggedLine_)], draggedEnd_, ToPlane(event->localPos()));
   emit CallipersChanged();
   update();
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "LiveScanner.h"
+#include "AlgorithmRun.h"
 #include "Core/Base/Error.h"
 #include "Messages.h"
 #include <set>
@@ -66,7 +67,7 @@ std::shared_ptr<const ScanSettings> LiveScanner::Settings()
   return settings_;
 }
 
-void LiveScanner::Make(const ScanFrame& frame)
+void LiveScanner::Prepare(const ScanFrame& frame)
 {
   const Messages::OfThread messages;
   if (frame.settings && frame.settings != Settings()) {
@@ -77,14 +78,33 @@ void LiveScanner::Make(const ScanFrame& frame)
   vtkUltrasoundVolume::SetMatrix(pose, frame.probeToWorld);
   live_->SetProbeToWorld(pose);
   live_->SetFrame(frame.number);
+  live_->SetFlip(frame.isFlipped);
   messages.ThrowErrors();
-  live_->Update();
-  messages.ThrowErrors();
+}
+
+void LiveScanner::Work(const Progress& progress)
+{
+  Update(live_, progress);
+}
+
+void LiveScanner::Keep()
+{
+  image_->ShallowCopy(live_->GetOutput()); // whose arrays are new with each image
+  state_ = live_->GetState();
+  contactShare_ = live_->GetContactShare();
+  hardMaterial_ = live_->GetHardMaterial();
+}
+
+void LiveScanner::Make(const ScanFrame& frame)
+{
+  Prepare(frame);
+  Work({});
+  Keep();
 }
 
 ProbeGeometry LiveScanner::Probe() const
 {
-  return vtkUltrasoundAcquisition::ProbeGeometryOf(live_->GetOutput()).value_or(ProbeGeometry());
+  return vtkUltrasoundAcquisition::ProbeGeometryOf(image_).value_or(ProbeGeometry());
 }
 
 QPolygonF LiveScanner::Fan() const
@@ -105,18 +125,20 @@ QPolygonF LiveScanner::Fan() const
 
 PlanePicture LiveScanner::Picture(bool showInvented) const
 {
-  vtkImageData* image = live_->GetOutput();
   PlanePicture picture;
-  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image);
-  const unsigned char *grey = BytesOf(image, vtkUltrasoundVolume::IntensityName()),
-                      *valid = BytesOf(image, vtkUltrasoundVolume::ValidRegionName()),
-                      *label = BytesOf(image, vtkUltrasoundVolume::EmbeddingName());
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image_);
+  const unsigned char *grey = BytesOf(image_, vtkUltrasoundVolume::IntensityName()),
+                      *valid = BytesOf(image_, vtkUltrasoundVolume::ValidRegionName()),
+                      *label = BytesOf(image_, vtkUltrasoundVolume::EmbeddingName());
   if (!grey || !valid || !pose)
     return picture;
-  const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(image);
+  const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(image_);
   const Eigen::Vector3d first = pose->inverse() * geometry.origin;
+  picture.probeToWorld = *pose;
+  picture.isFlipped = geometry.direction.col(0).dot(pose->linear().col(0)) < 0.0;
   picture.pixel = {geometry.spacing[0], geometry.spacing[1]};
-  picture.topLeft = {first[0] - 0.5 * geometry.spacing[0], first[2] - 0.5 * geometry.spacing[1]};
+  const double before = picture.isFlipped ? geometry.dimensions[0] - 0.5 : 0.5; // pixels from the left corner to the first
+  picture.topLeft = {first[0] - before * geometry.spacing[0], first[2] - 0.5 * geometry.spacing[1]};
   picture.fan = Fan();
   picture.image = QImage(geometry.dimensions[0], geometry.dimensions[1], QImage::Format_ARGB32);
   std::ptrdiff_t i = 0;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/Progress.h"
 #include "ImageView.h"
 #include "ScanFrame.h"
+#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkSmartPointer.h>
 #include <vtkUltrasoundLiveImage.h>
 
-class vtkImageData;
 class vtkPolyData;
 
 namespace echorama {
@@ -32,10 +33,20 @@ public:
   /// \throws Error(InvalidParameter) for a pose that is not rigid and finite, Error(BadInput) for a volume that cannot be used
   void Make(const ScanFrame& frame);
 
+  ///@{ The same in three steps, for an image that takes longer than a window may wait. The second may run on another thread;
+  /// until it has ended nothing may be set or made, and all below still tells of the image before.
+  void Prepare(const ScanFrame& frame);
+  /// \throws also Error(Cancelled)
+  void Work(const Progress& progress);
+  void Keep();
+  ///@}
+
   ///@{ Of the last one.
-  vtkImageData* Output() const { return live_->GetOutput(); }
-  int State() const { return live_->GetState(); }
-  double ContactShare() const { return live_->GetContactShare(); }
+  vtkImageData* Output() const { return image_; }
+  int State() const { return state_; }
+  double ContactShare() const { return contactShare_; }
+  /// What the probe stands in, if no probe can be there: bone and its like.
+  const std::string& HardMaterial() const { return hardMaterial_; }
   /// Grey, with the labels of what embedding invented in colour if \a showInvented; transparent where nothing is seen.
   PlanePicture Picture(bool showInvented) const;
   ///@}
@@ -47,6 +58,10 @@ private:
   QPolygonF Fan() const;
 
   vtkNew<vtkUltrasoundLiveImage> live_;
+  vtkNew<vtkImageData> image_;
+  int state_ = vtkUltrasoundLiveImage::NO_VOLUME;
+  double contactShare_ = 1.0;
+  std::string hardMaterial_;
   std::shared_ptr<const ScanSettings> settings_;
 };
 

@@ -3,10 +3,12 @@
 #include "Scan.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Job.h"
 #include "Redraw.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vtkPolyData.h>
 
 namespace echorama {
@@ -28,10 +30,14 @@ Scan::Scan(QObject* parent) : QObject(parent), latencyMs_(std::numeric_limits<do
   clock_.start();
 }
 
-Scan::~Scan() = default;
+Scan::~Scan()
+{
+  StopSlow(); // before the scanner that it works with
+}
 
 void Scan::SetSubject(Subject subject)
 {
+  StopSlow();
   SetFrozen(false); // while the controls are still those of the body that was there
   subject_ = std::move(subject);
   scanner_.SetInputs(subject_.volumes, subject_.tissue);
@@ -43,13 +49,15 @@ void Scan::SetSubject(Subject subject)
   walk_ = subject_.mesh ? std::make_unique<SkinWalk>(subject_.mesh) : nullptr;
   emit SubjectChanged();
   emit ControlsChanged(); // what an image is made from goes with it
-  if (!subject_.IsEmpty())
-    PlaceAtTop();
+  if (subject_.IsEmpty())
+    return;
+  PutAtTop();
+  TakePose(isFollowing_ ? probeToWorld_ : StartPose());
 }
 
 // Where it was scanned from, if that is known; else in the middle of the side that is asked for, of a patient who lies on the
 // back the front.
-void Scan::PlaceAtTop()
+void Scan::PutAtTop()
 {
   const bool isKnown = subject_.start && subject_.up.isZero();
   up_ = isKnown                 ? Eigen::Vector3d(-subject_.start->linear().col(2))
@@ -59,11 +67,7 @@ void Scan::PlaceAtTop()
                                  : std::fabs(up_[0]) > 0.9 ? Eigen::Vector3d::UnitY()
                                                            : Eigen::Vector3d::UnitX();
   hold_ = {};
-  if (!walk_) {
-    TakePose(subject_.start.value_or(Pose::Identity()));
-    return;
-  }
-  if (isFollowing_)
+  if (!walk_)
     return;
   double box[6];
   subject_.skin->GetBounds(box);
@@ -72,14 +76,27 @@ void Scan::PlaceAtTop()
   const auto hit = isKnown ? std::nullopt : subject_.mesh->FirstHit(middle + away * up_, -up_);
   walk_->PutNearest(isKnown ? subject_.start->translation() : (middle + away * up_).eval());
   walk_->Put(hit ? hit->place : walk_->Place(), across);
-  Moved();
+}
+
+Pose Scan::StartPose() const
+{
+  return walk_ ? walk_->PoseOf({}) : subject_.start.value_or(Pose::Identity());
+}
+
+void Scan::PlaceAtTop()
+{
+  if (isFollowing_)
+    return;
+  PutAtTop();
+  TakePose(StartPose());
 }
 
 void Scan::Restart()
 {
   SetFrozen(false);
   cine_.Clear();
-  PlaceAtTop();
+  PutAtTop(); // also under a probe that a tracker moves, for StartPose()
+  TakePose(isFollowing_ ? probeToWorld_ : StartPose());
   MakeNow();
 }
 
@@ -158,7 +175,7 @@ void Scan::Straighten()
 
 void Scan::Follow(const Eigen::Matrix4d& matrix)
 {
-  const double now = 1e-9 * static_cast<double>(clock_.nsecsElapsed());
+  const double now = Now();
   isFollowing_ = true;
   Pose pose;
   pose.matrix() = matrix;
@@ -225,6 +242,7 @@ void Scan::SetControl(const char* name, const std::string& text)
 {
   if (isFrozen_)
     return; // the image is of then
+  StopSlow();
   try {
     scanner_.Set(name, text);
   } catch (const Error& error) {
@@ -234,6 +252,13 @@ void Scan::SetControl(const char* name, const std::string& text)
   emit ControlsChanged();
   refinement_ = 0;
   Ask();
+}
+
+void Scan::SetFlipped(bool flipped)
+{
+  isFlipped_ = flipped;
+  refinement_ = 0;
+  isFrozen_ ? ShowCine(cineIndex_) : MakeNow();
 }
 
 void Scan::SetShowInvented(bool shown)
@@ -246,6 +271,7 @@ void Scan::SetFrozen(bool frozen)
 {
   if (frozen == isFrozen_)
     return;
+  StopSlow();
   isFrozen_ = frozen;
   if (frozen && !isReplay_)
     settingsBefore_ = scanner_.Settings();
@@ -266,7 +292,21 @@ void Scan::ShowCine(int index)
   if (!isFrozen_ || index < 0 || index >= cine_.Count())
     return;
   cineIndex_ = index;
-  Make(cine_.At(index), false);
+  ScanFrame frame = cine_.At(index);
+  frame.isFlipped = isFlipped_;
+  Make(frame, false);
+}
+
+PlanePicture Scan::PictureFrom(const Pose& probeToWorld)
+{
+  StopSlow();
+  ScanFrame frame = frame_;
+  frame.probeToWorld = probeToWorld;
+  frame.isInAir = false;
+  scanner_.Make(frame);
+  PlanePicture picture = scanner_.Picture(showsInvented_);
+  scanner_.Make(frame_); // what is shown is what is recorded and sent
+  return picture;
 }
 
 void Scan::Replay(const std::vector<ScanFrame>& frames)
@@ -297,7 +337,7 @@ void Scan::Ask()
 {
   if (subject_.IsEmpty())
     return;
-  const double now = 1e-9 * static_cast<double>(clock_.nsecsElapsed());
+  const double now = Now();
   if (askedAt_ == 0.0)
     askedAt_ = now;
   redraw_->Ask(static_cast<int>(1000.0 * std::max(0.0, frame_.seconds + FrameSeconds - now)));
@@ -308,40 +348,91 @@ void Scan::MakeNow()
   redraw_->Stop();
   if (subject_.IsEmpty() || isFrozen_)
     return;
+  if (slow_) {
+    if (refinement_ == 0) { // it is of what was: given up, but for the first, lest one that moves all the time sees nothing
+      isAskedAgain_ = true;
+      if (!slowIsCoarse_)
+        slow_->Cancel();
+    }
+    return;
+  }
   ScanFrame frame;
-  frame.seconds = 1e-9 * static_cast<double>(clock_.nsecsElapsed());
+  frame.seconds = Now();
   frame.probeToWorld = probeToWorld_;
   frame.number = ++number_;
   frame.isInAir = IsInAir();
+  frame.isFlipped = isFlipped_;
   if (scanner_.IsAcoustic())
-    Refine();
+    return MakeSlowly(frame);
   frame.settings = scanner_.Settings();
   Make(frame, true);
 }
 
-// The acoustic model is slow: while the probe moves its picture is coarse, and gets better from frame to frame when it rests.
-void Scan::Refine()
+// The acoustic model is slow. Its pictures are made in the background; while the probe moves they are coarse, and they get better
+// from one to the next when it rests. None waits in a line: the next one is of the pose that is then the newest.
+void Scan::MakeSlowly(ScanFrame frame)
 {
-  scanner_.Set("Refinement", std::to_string(refinement_));
-  if (refinement_ + 1 < LiveScanner::Refinements) {
-    refinement_++;
-    redraw_->Ask(RestMs);
+  const int level = std::min(refinement_, LiveScanner::Refinements - 1);
+  refinement_ = level + 1;
+  slowIsCoarse_ = level == 0;
+  isAskedAgain_ = false;
+  const double askedAt = std::exchange(askedAt_, 0.0);
+  try {
+    scanner_.Set("Refinement", std::to_string(level));
+    frame.settings = scanner_.Settings();
+    scanner_.Prepare(frame);
+  } catch (const Error& error) {
+    Show(frame, true, QString::fromUtf8(error.what()), askedAt);
+    return;
   }
+  const auto finish = [this, frame, askedAt](const QString& failure) {
+    slow_ = nullptr; // its work has ended: the scanner is free
+    if (failure.isEmpty())
+      scanner_.Keep();
+    Show(frame, true, failure, askedAt);
+  };
+  slow_ = Job::Start(
+      this, tr("Acoustic picture"), [this](const Progress& progress) { scanner_.Work(progress); }, [finish] { finish({}); },
+      finish);
+  connect(slow_, &Job::Ended, this, [this, job = slow_.data()] {
+    if (slow_ == job) // cancelled
+      slow_ = nullptr;
+    if (slow_ || isFrozen_)
+      return; // it is on its way already
+    if (std::exchange(isAskedAgain_, false))
+      MakeNow();
+    else if (refinement_ < LiveScanner::Refinements && scanner_.IsAcoustic())
+      redraw_->Ask(RestMs);
+  });
 }
 
-void Scan::Make(ScanFrame frame, bool isNew)
+void Scan::StopSlow()
 {
-  const QString before = State();
-  failure_.clear();
+  delete slow_; // waits until it has noticed
+  isAskedAgain_ = false;
+}
+
+void Scan::Make(const ScanFrame& frame, bool isNew)
+{
+  QString failure;
   try {
     scanner_.Make(frame);
+  } catch (const Error& error) {
+    failure = QString::fromUtf8(error.what());
+  }
+  Show(frame, isNew, failure, std::exchange(askedAt_, 0.0));
+}
+
+void Scan::Show(const ScanFrame& frame, bool isNew, const QString& failure, double askedAt)
+{
+  const QString before = shownState_;
+  failure_ = failure;
+  frame_ = frame;
+  if (!HasFailed()) {
     picture_ = scanner_.Picture(showsInvented_);
     if (frame.isInAir)
       picture_.image.fill(Qt::black); // all of the sound comes back from the air
-  } catch (const Error& error) {
-    failure_ = QString::fromUtf8(error.what());
   }
-  frame_ = frame;
   if (isNew) {
     if (!HasFailed())
       cine_.Add(frame);
@@ -350,16 +441,16 @@ void Scan::Make(ScanFrame frame, bool isNew)
       madeAt_.pop_front();
   }
   emit FrameMade();
-  if (isNew && askedAt_ > 0.0)
-    latencyMs_ = 1e3 * (1e-9 * static_cast<double>(clock_.nsecsElapsed()) - askedAt_);
-  askedAt_ = 0.0;
-  if (State() != before)
+  if (isNew && askedAt > 0.0)
+    latencyMs_ = 1e3 * (Now() - askedAt);
+  shownState_ = State();
+  if (shownState_ != before)
     emit StateChanged();
 }
 
 double Scan::FramesPerSecond() const
 {
-  const double now = 1e-9 * static_cast<double>(clock_.nsecsElapsed());
+  const double now = Now();
   int count = 0;
   for (double at : madeAt_)
     count += at > now - 1.0;
@@ -382,11 +473,13 @@ QString Scan::State() const
       return tr("The tracker has stopped: this was %1 s ago").arg(stoppedSeconds_, 0, 'f', 1);
     if (!badPose_.isEmpty())
       return badPose_;
-    if (1e-9 * static_cast<double>(clock_.nsecsElapsed()) - jumpAt_ < JumpShownSeconds)
+    if (Now() - jumpAt_ < JumpShownSeconds)
       return tr("The pose jumped by %1 mm: faster than a hand").arg(jumpMm_, 0, 'f', 0);
     if (!walk_ && !isFollowing_)
       return tr("There is no skin to scan on: %1").arg(subject_.whyNoSkin);
   }
+  if (!scanner_.HardMaterial().empty())
+    return tr("The probe is inside %1, where none can be").arg(QString::fromStdString(scanner_.HardMaterial()));
   if (frame_.isInAir || scanner_.ContactShare() < LeastContact)
     return tr("No contact: air between probe and skin");
   if (scanner_.State() == vtkUltrasoundLiveImage::NO_VOLUME)

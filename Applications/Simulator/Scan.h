@@ -7,6 +7,7 @@
 #include <optional>
 #include <QElapsedTimer>
 #include <QObject>
+#include <QPointer>
 #include <QStringList>
 #include <vtkImageData.h>
 #include <vtkPolyData.h>
@@ -14,6 +15,7 @@
 
 namespace echorama {
 
+class Job;
 class Redraw;
 
 /// What is scanned: volumes or the tissue of a scene, and the skin that the probe is on.
@@ -58,8 +60,10 @@ public:
   void Straighten();
   /// Back to the middle of the top.
   void PlaceAtTop();
-  /// As it was at first: nothing is left of where the probe has been.
+  /// As it was at first: nothing is left of where the probe has been. One that a tracker moves stays where it is held.
   void Restart();
+  /// Where Restart() puts the probe, or where a tracked one had to be.
+  Pose StartPose() const;
   const ProbeHold& Held() const { return hold_; }
   ///@}
 
@@ -86,6 +90,9 @@ public:
   ///@{ Controls.
   LiveScanner& Scanner() { return scanner_; }
   void SetControl(const char* name, const std::string& text);
+  /// Exchanges left and right, also of an image that is frozen.
+  void SetFlipped(bool flipped);
+  bool IsFlipped() const { return isFlipped_; }
   void SetShowInvented(bool shown);
   bool ShowsInvented() const { return showsInvented_; }
   ///@}
@@ -106,13 +113,16 @@ public:
   /// The frame that is shown.
   const ScanFrame& Frame() const { return frame_; }
   const PlanePicture& Picture() const { return picture_; }
+  /// What would be seen from elsewhere, with the controls of the frame that is shown.
+  /// \throws as LiveScanner::Make
+  PlanePicture PictureFrom(const Pose& probeToWorld);
   /// What is the matter, a sentence; "" when nothing is.
   QString State() const;
   bool IsStale() const;
   double FramesPerSecond() const;
   /// From the newest motion to the image, ms. NaN before the first.
   double LatencyMs() const { return latencyMs_; }
-  /// Makes what waits to be made, now.
+  /// Makes what waits to be made, now; a picture by the acoustic model is begun.
   void MakeNow();
 
 signals:
@@ -125,11 +135,15 @@ signals:
   void Said(const Message& message);
 
 private:
+  void PutAtTop();
   void Moved();
   void TakePose(const Pose& pose);
   void Ask();
-  void Refine();
-  void Make(ScanFrame frame, bool isNew);
+  void MakeSlowly(ScanFrame frame);
+  void StopSlow();
+  void Make(const ScanFrame& frame, bool isNew);
+  void Show(const ScanFrame& frame, bool isNew, const QString& failure, double askedAt);
+  double Now() const { return 1e-9 * static_cast<double>(clock_.nsecsElapsed()); } ///< seconds
   bool IsInAir() const;
   bool CanWalk() const { return walk_ && !isFollowing_; }
 
@@ -140,9 +154,9 @@ private:
   Pose probeToWorld_ = Pose::Identity();
   std::optional<Eigen::Matrix3d> turned_; ///< from outside
   Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
-  bool isFollowing_ = false, isFrozen_ = false, showsInvented_ = true;
+  bool isFollowing_ = false, isFrozen_ = false, isFlipped_ = false, showsInvented_ = true;
   double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;
-  QString badPose_, failure_;
+  QString badPose_, failure_, shownState_;
 
   Redraw* redraw_;
   QElapsedTimer clock_;
@@ -154,7 +168,13 @@ private:
   int cineIndex_ = -1;
   std::shared_ptr<const ScanSettings> settingsBefore_; ///< the freeze
   bool isReplay_ = false;
-  int refinement_ = 0; ///< of the next picture by the acoustic model
+
+  // The acoustic model: a picture that is made in the background.
+  QPointer<Job> slow_;
+  int refinement_ = 0;       ///< of the next one; 0 since something changed
+  bool slowIsCoarse_ = true; ///< the first since then
+  bool isAskedAgain_ = false;
+
   std::deque<double> madeAt_;
 };
 

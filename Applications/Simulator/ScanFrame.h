@@ -20,6 +20,7 @@ struct ScanFrame {
   Pose probeToWorld = Pose::Identity();
   std::int64_t number = 0; ///< chooses the noise, where that moves
   bool isInAir = false;
+  bool isFlipped = false; ///< left and right are exchanged
   std::shared_ptr<const ScanSettings> settings;
 };
 

@@ -225,6 +225,11 @@ void SimulatorWindow::MakeMenus()
                              [this] { ShowKeysPage(this, SimulatorKeys()); }));
 }
 
+double SimulatorWindow::Across(double toTheRight) const
+{
+  return scan_->IsFlipped() ? -toTheRight : toTheRight;
+}
+
 void SimulatorWindow::MakeProbeMenu(QMenu* menu)
 {
   const auto add = [&](const char* name, const QString& label, const char* key, const QString& help,
@@ -242,8 +247,7 @@ void SimulatorWindow::MakeProbeMenu(QMenu* menu)
         Way{"Up", "Up", tr("away from you, across the image"), 0, -1},
         Way{"Down", "Down", tr("towards you, across the image"), 0, 1}}) {
     const QString key(way.key);
-    // As the image is shown: with left and right exchanged the hand goes the other way.
-    const auto slide = [this, way](double mm) { scan_->Slide((image_->Flipped() ? -mm : mm) * way.along, mm * way.across); };
+    const auto slide = [this, way](double mm) { scan_->Slide(Across(mm) * way.along, mm * way.across); };
     add(QString("slide%1").arg(way.name).toLatin1(), tr("Slide: %1").arg(way.where), way.key,
         tr("Slide the probe 2 mm, %1").arg(way.where), [slide] { slide(StepMm); });
     add(QString("slideFar%1").arg(way.name).toLatin1(), tr("Slide far: %1").arg(way.where), ("Shift+" + key).toLatin1(),
@@ -255,9 +259,9 @@ void SimulatorWindow::MakeProbeMenu(QMenu* menu)
   add("tiltDown", tr("Tilt towards you"), "Ctrl+Down", tr("Tilt the probe by 2 degrees: the image looks towards you"),
       [this] { scan_->Hold(-StepDegrees, 0.0); });
   add("rockRight", tr("Rock to the right"), "Ctrl+Right", tr("Rock the probe by 2 degrees: it looks more to the right"),
-      [this] { scan_->Hold(0.0, StepDegrees); });
+      [this] { scan_->Hold(0.0, Across(StepDegrees)); });
   add("rockLeft", tr("Rock to the left"), "Ctrl+Left", tr("Rock the probe by 2 degrees: it looks more to the left"),
-      [this] { scan_->Hold(0.0, -StepDegrees); });
+      [this] { scan_->Hold(0.0, Across(-StepDegrees)); });
   add("rotateRight", tr("Rotate one way"), "E", tr("Rotate the probe about its axis by 5 degrees"),
       [this] { scan_->Rotate(RotateDegrees); });
   add("rotateLeft", tr("Rotate the other way"), "Q", tr("Rotate the probe about its axis by 5 degrees, the other way"),
@@ -291,7 +295,7 @@ void SimulatorWindow::MakeImageMenu(QMenu* menu)
   add("lessGain", tr("Less gain"), "-", tr("Make the image 2 dB darker"), [this] { ChangeGain(-GainStepDb); });
   QAction* flip = add("flip", tr("Left and &right exchanged"), "F", tr("Exchange left and right in the image"), [] {});
   flip->setCheckable(true);
-  connect(flip, &QAction::toggled, image_, &ImageView::SetFlipped);
+  connect(flip, &QAction::toggled, scan_, &Scan::SetFlipped);
   QAction* invented =
       add("invented", tr("Mark what is &invented"), "I", tr("Colour what embedding invented, where the volume says so"), [] {});
   invented->setCheckable(true);
@@ -381,7 +385,7 @@ void SimulatorWindow::Turn(double notches, Qt::KeyboardModifiers keys)
   else if (keys & Qt::ShiftModifier)
     scan_->Hold(StepDegrees * notches, 0.0);
   else if (keys & Qt::AltModifier)
-    scan_->Hold(0.0, StepDegrees * notches);
+    scan_->Hold(0.0, Across(StepDegrees * notches));
   else
     scan_->Rotate(RotateDegrees * notches);
 }

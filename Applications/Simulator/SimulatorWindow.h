@@ -49,6 +49,8 @@ private:
   void AddPanel(QWidget* panel, const QString& title);
   void ShowFrame();
   void ShowState();
+  /// What is to the right in the image, on the probe: with left and right exchanged the hand goes the other way.
+  double Across(double toTheRight) const;
   void Turn(double notches, Qt::KeyboardModifiers keys);
   void ChangeDepth(double byMm);
   void ChangeGain(double byDb);

@@ -22,6 +22,11 @@ QJsonArray Rows(const Pose& pose)
   return rows;
 }
 
+QJsonArray Triple(const Eigen::Vector3d& at)
+{
+  return {at[0], at[1], at[2]};
+}
+
 [[noreturn]] void Fail(const QString& path, const QString& reason)
 {
   throw Error(Error::Kind::FileSystem, QString("%1: %2").arg(path, reason).toStdString());
@@ -30,7 +35,7 @@ QJsonArray Rows(const Pose& pose)
 } // namespace
 
 QString WriteSnapshot(const QDir& folder, const QStringList& volumes, const PlanePicture& picture, const ScanFrame& frame,
-                      const QVector<QLineF>& callipers)
+                      const std::vector<CalliperLine>& callipers)
 {
   if (!folder.mkpath("."))
     Fail(folder.path(), "the folder cannot be made");
@@ -39,15 +44,21 @@ QString WriteSnapshot(const QDir& folder, const QStringList& volumes, const Plan
   for (const auto& [key, text] : *frame.settings)
     controls[QString::fromStdString(key)] = QString::fromStdString(text);
   QJsonArray lines;
-  for (const QLineF& line : callipers)
-    lines.append(QJsonObject{
-        {"from", QJsonArray{line.x1(), line.y1()}}, {"to", QJsonArray{line.x2(), line.y2()}}, {"lengthMm", line.length()}});
+  for (const CalliperLine& calliper : callipers) {
+    const QLineF& line = calliper.line;
+    lines.append(QJsonObject{{"from", QJsonArray{line.x1(), line.y1()}},
+                             {"to", QJsonArray{line.x2(), line.y2()}},
+                             {"fromInWorld", Triple(calliper.From())},
+                             {"toInWorld", Triple(calliper.To())},
+                             {"lengthMm", line.length()}});
+  }
   const QJsonObject all{{"schema", "echorama-snapshot-1"},
                         {"unit", "mm"},
                         {"volumes", QJsonArray::fromStringList(volumes)},
                         {"ProbeToWorld", Rows(frame.probeToWorld)},
                         {"frame", static_cast<double>(frame.number)},
                         {"controls", controls},
+                        {"flipped", picture.isFlipped},
                         {"topLeft", QJsonArray{picture.topLeft.x(), picture.topLeft.y()}},
                         {"pixel", QJsonArray{picture.pixel.width(), picture.pixel.height()}},
                         {"callipers", lines}};

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <QDir>
-#include <QLineF>
 #include <QStringList>
-#include <QVector>
+#include <vector>
 
 namespace echorama {
 
+struct CalliperLine;
 struct PlanePicture;
 struct ScanFrame;
 
@@ -14,6 +14,6 @@ struct ScanFrame;
 /// pose, the controls, what was measured. \returns the path of the PNG.
 /// \throws Error(FileSystem) that names the file.
 QString WriteSnapshot(const QDir& folder, const QStringList& volumes, const PlanePicture& picture, const ScanFrame& frame,
-                      const QVector<QLineF>& callipers);
+                      const std::vector<CalliperLine>& callipers);
 
 } // namespace echorama

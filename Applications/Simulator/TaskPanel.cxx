@@ -25,6 +25,8 @@ namespace echorama {
 
 namespace {
 
+constexpr double MostApartMm = 0.5; ///< of the planes that the ends of a line were set in
+
 TaskBody BodyOf(const Subject& subject)
 {
   if (subject.IsEmpty())
@@ -152,17 +154,19 @@ void TaskPanel::SavePlane()
 
 void TaskPanel::SaveLength()
 {
-  const QVector<QLineF> lines = image_->Callipers();
-  if (lines.isEmpty()) {
+  const std::vector<CalliperLine> lines = image_->Callipers();
+  if (lines.empty()) {
     emit scan_->Said({Message::Note, tr("Measure first what is to be measured: key C"), {}});
     return;
   }
-  const QLineF line = lines.last();
-  const Pose& pose = scan_->Frame().probeToWorld;
+  if (lines.back().Apart() > MostApartMm) {
+    emit scan_->Said({Message::Note, tr("The probe moved between the ends of the line: freeze the image, then measure"), {}});
+    return;
+  }
   MeasureLength length;
-  length.lengthMm = line.length();
-  length.from = pose * Eigen::Vector3d(line.x1(), 0.0, line.y1());
-  length.to = pose * Eigen::Vector3d(line.x2(), 0.0, line.y2());
+  length.lengthMm = lines.back().line.length();
+  length.from = lines.back().From(); // where the line was drawn, wherever the probe is now
+  length.to = lines.back().To();
   length.toleranceMm = std::max(1.0, 0.1 * length.lengthMm);
   Save(length);
 }
@@ -208,10 +212,10 @@ void TaskPanel::Submit()
 {
   Try([&] {
     const bool isLength = attempt_->What() == ScanAttempt::Kind::MeasureLength;
-    const QVector<QLineF> lines = image_->Callipers();
-    if (isLength && lines.isEmpty())
+    const std::vector<CalliperLine> lines = image_->Callipers();
+    if (isLength && lines.empty())
       throw Error(Error::Kind::BadInput, "measure first: key C, then a click on both ends");
-    const ScanScore score = isLength ? attempt_->SubmitLength(Seconds(), lines.last().length())
+    const ScanScore score = isLength ? attempt_->SubmitLength(Seconds(), lines.back().line.length())
                                      : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
     score_->setText(tr("%1: %2 mm off%3, after %4 s")
                         .arg(score.passed ? tr("Passed") : tr("Not passed"))

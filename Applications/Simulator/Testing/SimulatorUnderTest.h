@@ -45,9 +45,7 @@ public:
   int GreyAt(double across, double depth)
   {
     const echorama::PlanePicture& picture = Scan().Picture();
-    const QPointF at = QPointF(across, depth) - picture.topLeft;
-    const QPoint pixel(static_cast<int>(std::floor(at.x() / picture.pixel.width())),
-                       static_cast<int>(std::floor(at.y() / picture.pixel.height())));
+    const QPoint pixel = picture.PixelAt({across, depth});
     if (!picture.image.rect().contains(pixel) || qAlpha(picture.image.pixel(pixel)) == 0)
       return -1;
     return qGray(picture.image.pixel(pixel));

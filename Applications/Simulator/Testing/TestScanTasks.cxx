@@ -99,7 +99,7 @@ void TestScanTasks::aLengthIsMeasuredAndScored()
   Press(window, "saveLength");
   panel->OpenTask(Folder().filePath("ball.task.json"));
   Press(window, "startTask");
-  QVERIFY(window.Image().Callipers().isEmpty()); // the teacher's line is gone
+  QVERIFY(window.Image().Callipers().empty()); // the teacher's line is gone
   Press(window, "submitTask");
   QVERIFY(window.HasMessage("measure first"));
   QVERIFY(panel->IsRunning());

@@ -267,15 +267,15 @@ void TestSimulator::callipersMeasure()
   window.Key(Qt::Key_C);
   const QPoint from = window.Image().ToWidget({-10.0, 30.0}).toPoint(), to = window.Image().ToWidget({10.0, 30.0}).toPoint();
   window.Click(&window.Image(), from);
-  QVERIFY(window.Image().Callipers().isEmpty()); // it has one end
+  QVERIFY(window.Image().Callipers().empty()); // it has one end
   window.Click(&window.Image(), to);
-  QCOMPARE(window.Image().Callipers().size(), 1);
+  QCOMPARE(window.Image().Callipers().size(), std::size_t(1));
   const double pixelMm = std::abs(window.Image().ToPlane({1, 0}).x() - window.Image().ToPlane({0, 0}).x());
-  QVERIFY(std::abs(window.Image().Callipers()[0].length() - 20.0) <= 1.5 * pixelMm);
+  QVERIFY(std::abs(window.Image().Callipers()[0].line.length() - 20.0) <= 1.5 * pixelMm);
   window.Drag(&window.Image(), to, window.Image().ToWidget({-10.0, 45.0}).toPoint());
-  QVERIFY(std::abs(window.Image().Callipers()[0].length() - 15.0) <= 1.5 * pixelMm);
+  QVERIFY(std::abs(window.Image().Callipers()[0].line.length() - 15.0) <= 1.5 * pixelMm);
   window.Key(Qt::Key_C, Qt::ShiftModifier);
-  QVERIFY(window.Image().Callipers().isEmpty());
+  QVERIFY(window.Image().Callipers().empty());
 }
 
 void TestSimulator::leftAndRightAreExchanged()
