@@ -2,19 +2,42 @@
 #include "OutputPanel.h"
 #include "Controls.h"
 #include "Core/Base/Error.h"
+#include "Job.h"
 #include "Scan.h"
 #include "ScanRecorder.h"
+#include <atomic>
 #include <QCheckBox>
 #include <QDoubleSpinBox>
 #include <QFileDialog>
+#include <QFileInfo>
 #include <QFormLayout>
 #include <QLabel>
 #include <QStandardPaths>
+#include <QTimer>
 #include <vtkImageData.h>
 #include <vtkMatrix4x4.h>
 #include <vtkUltrasoundVolume.h>
 
 namespace echorama {
+
+namespace {
+
+// For another thread: pipelines write into the objects that they hand on, though not into what these hold.
+Subject OwnCopy(const Subject& subject)
+{
+  Subject copy;
+  for (const auto& volume : subject.volumes) {
+    copy.volumes.push_back(vtkSmartPointer<vtkImageData>::New());
+    copy.volumes.back()->ShallowCopy(volume);
+  }
+  if (subject.tissue) {
+    copy.tissue = vtkSmartPointer<vtkPolyData>::New();
+    copy.tissue->ShallowCopy(subject.tissue);
+  }
+  return copy;
+}
+
+} // namespace
 
 OutputPanel::OutputPanel(Scan* scan, QWidget* parent)
   : QWidget(parent), scan_(scan), folder_(QStandardPaths::writableLocation(QStandardPaths::PicturesLocation) + "/Echorama")
@@ -41,21 +64,26 @@ OutputPanel::OutputPanel(Scan* scan, QWidget* parent)
   form->addRow(tr("State"), state_);
   connect(scan, &Scan::FrameMade, this, &OutputPanel::Take);
   connect(scan, &Scan::SubjectChanged, this, &OutputPanel::Finish); // a recording is of one body
+  connect(scan, &Scan::SubjectChanged, this, [this] { delete replaying_; });
+  auto* timer = new QTimer(this); // a probe that rests makes no frames
+  connect(timer, &QTimer::timeout, this, [this] {
+    if (recorder_)
+      TryRecording([this] { recorder_->FlushWhenDue(); });
+  });
+  timer->start(250);
   ShowState();
 }
 
 OutputPanel::~OutputPanel()
 {
-  Finish();
+  End();
   sender_->Stop();
 }
 
 void OutputPanel::RecordOrNot()
 {
   if (IsRecording()) {
-    const QString path = Finish();
-    if (!path.isEmpty())
-      emit scan_->Said({Message::Note, tr("Recorded as %1").arg(path), {}});
+    Finish();
     return;
   }
   vtkImageData* image = scan_->Scanner().Output();
@@ -75,7 +103,18 @@ void OutputPanel::RecordOrNot()
   ShowState();
 }
 
-QString OutputPanel::Finish()
+void OutputPanel::TryRecording(const std::function<void()>& step)
+{
+  try {
+    step();
+  } catch (const Error& error) {
+    emit scan_->Said({Message::Warning, QString::fromUtf8(error.what()), {}});
+    End();
+  }
+}
+
+// \returns the path of the sequence; empty when there is none.
+QString OutputPanel::End()
 {
   QString path;
   if (recorder_)
@@ -89,6 +128,24 @@ QString OutputPanel::Finish()
   recorder_.reset();
   ShowState();
   return path;
+}
+
+void OutputPanel::Finish()
+{
+  const QString path = End();
+  if (path.isEmpty())
+    return;
+  const auto joined = std::make_shared<QString>();
+  Job* job = Job::Start(
+      this, tr("Putting the recording into one file"),
+      [path, joined](const Progress& progress) { *joined = ScanRecorder::Join(path, progress); }, [] {},
+      [this](const QString& error) {
+        emit scan_->Said({Message::Warning, error, {}});
+      });
+  connect(job, &Job::Ended, this, [this, path, joined](bool done) {
+    emit scan_->Said({Message::Note, tr("Recorded as %1").arg(done ? *joined : path), {}});
+  });
+  emit JobStarted(job);
 }
 
 void OutputPanel::SendOrNot(bool send)
@@ -114,12 +171,7 @@ void OutputPanel::Take()
   if (scan_->IsFrozen() || scan_->HasFailed() || image->GetNumberOfPoints() == 0)
     return;
   if (recorder_)
-    try {
-      recorder_->Append(scan_->Frame(), image);
-    } catch (const Error& error) {
-      emit scan_->Said({Message::Warning, QString::fromUtf8(error.what()), {}});
-      Finish();
-    }
+    TryRecording([&] { recorder_->Append(scan_->Frame(), image); });
   if (isSending_ && !scan_->Frame().isInAir) {
     vtkNew<vtkMatrix4x4> pose;
     vtkUltrasoundVolume::SetMatrix(pose, scan_->Frame().probeToWorld);
@@ -142,30 +194,79 @@ void OutputPanel::ShowState()
     state_->setText(text);
 }
 
+void OutputPanel::ForbidReplay(bool forbidden)
+{
+  replay_->setDisabled(forbidden);
+  if (forbidden)
+    delete replaying_;
+}
+
+void OutputPanel::Begin(Job* job)
+{
+  replaying_ = job;
+  emit JobStarted(job);
+}
+
 void OutputPanel::Replay(const QString& path)
 {
-  try {
-    const ScanLog log = ScanLog::Read(path);
-    if (scan_->Body().IsEmpty() || log.body != SumOf(scan_->Body()))
-      throw Error(Error::Kind::BadInput,
-                  tr("%1 is of another body: open %2 first").arg(path, log.volumes.join(", ")).toStdString());
-    std::vector<ScanFrame> frames;
-    for (const ScanLog::Entry& entry : log.entries)
-      frames.push_back(entry.frame);
-    scan_->Replay(frames);
-    int same = 0;
-    for (const ScanLog::Entry& entry : log.entries) {
-      scan_->Scanner().Make(entry.frame);
-      same += SumOf(scan_->Scanner().Output()) == entry.sum;
-    }
-    scan_->ShowCine(0);
-    const auto count = static_cast<int>(log.entries.size());
-    emit scan_->Said({same == count ? Message::Note : Message::Warning,
-                      tr("%1 of %2 images are the same to the last bit as when they were recorded").arg(same).arg(count),
-                      {}});
-  } catch (const Error& error) {
-    emit scan_->Said({Message::Warning, QString::fromUtf8(error.what()), {}});
-  }
+  delete replaying_;
+  const auto log = std::make_shared<ScanLog>();
+  const auto fail = [this](const QString& error) { emit scan_->Said({Message::Warning, error, {}}); };
+  Begin(Job::Start(
+      this, tr("Reading the recording"),
+      [log, path, body = OwnCopy(scan_->Body())](const Progress& progress) {
+        *log = ScanLog::Read(path);
+        progress(0.5);
+        if (body.IsEmpty() || log->body != SumOf(body, log->version))
+          throw Error(Error::Kind::BadInput,
+                      tr("%1 is of another body: open %2 first").arg(path, log->volumes.join(", ")).toStdString());
+      },
+      [this, log, path] {
+        std::vector<ScanFrame> frames;
+        for (const ScanLog::Entry& entry : log->entries)
+          frames.push_back(entry.frame);
+        scan_->Replay(frames);
+        scan_->ShowCine(0);
+        Compare(*log, QFileInfo(path).fileName());
+      },
+      fail));
+}
+
+// With a scanner of its own, so that what is shown can be gone through meanwhile.
+void OutputPanel::Compare(const ScanLog& log, const QString& name)
+{
+  struct Count {
+    std::atomic<int> made{0}, same{0};
+  };
+  const auto count = std::make_shared<Count>();
+  const auto all = static_cast<int>(log.entries.size());
+  Job* job = Job::Start(
+      this, tr("Comparing the images of %1").arg(name),
+      [count, entries = log.entries, body = OwnCopy(scan_->Body())](const Progress& progress) {
+        LiveScanner scanner;
+        scanner.SetInputs(body.volumes, body.tissue);
+        for (std::size_t i = 0; i < entries.size(); i++) {
+          const auto size = static_cast<double>(entries.size());
+          const auto at = static_cast<double>(i);
+          scanner.Prepare(entries[i].frame);
+          scanner.Work(progress.Part(at / size, (at + 1.0) / size));
+          scanner.Keep();
+          count->same += SumOf(scanner.Output()) == entries[i].sum;
+          count->made++;
+        }
+      },
+      [] {},
+      [this](const QString& error) {
+        emit scan_->Said({Message::Warning, error, {}});
+      });
+  connect(job, &Job::Ended, this, [this, count, all](bool done) {
+    const int made = count->made, same = count->same;
+    QString text = tr("%1 of %2 images are the same to the last bit as when they were recorded").arg(same).arg(made);
+    if (!done)
+      text += tr("; %1 were not compared").arg(all - made);
+    emit scan_->Said({same == made ? Message::Note : Message::Warning, text, {}});
+  });
+  Begin(job);
 }
 
 } // namespace echorama

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <functional>
 #include <memory>
 #include <QDir>
+#include <QPointer>
 #include <QPushButton>
 #include <QWidget>
 #include <vtkNew.h>
@@ -13,8 +15,10 @@ class QLabel;
 
 namespace echorama {
 
+class Job;
 class Scan;
 class ScanRecorder;
+struct ScanLog;
 
 /// What becomes of the image: a recording, which can be replayed, and live images and poses for 3D Slicer and its like.
 class OutputPanel : public QWidget {
@@ -26,15 +30,23 @@ public:
 
   void SetFolder(const QDir& folder) { folder_ = folder; }
   bool IsRecording() const { return recorder_ != nullptr; }
-  /// Ends what is being recorded. \returns its path; empty when there was none, or nothing came.
-  QString Finish();
-  /// Shows a recorded scan in place of the last seconds, frozen, and tells whether its images are still the same.
+  /// Ends what is being recorded, and puts it into one file in the background.
+  void Finish();
+  /// Shows a recorded scan in place of the last seconds, frozen. Both, reading it and comparing its images with those that are
+  /// made now, are done in the background; then it tells how many are the same.
   void Replay(const QString& path);
   /// While somebody is looking for what a recording may show.
-  void ForbidReplay(bool forbidden) { replay_->setDisabled(forbidden); }
+  void ForbidReplay(bool forbidden);
   vtkUltrasoundOpenIGTLinkSender* Sender() { return sender_; }
 
+signals:
+  void JobStarted(Job* job);
+
 private:
+  QString End();
+  void TryRecording(const std::function<void()>& step);
+  void Begin(Job* job);
+  void Compare(const ScanLog& log, const QString& name);
   void RecordOrNot();
   void SendOrNot(bool send);
   void Take();
@@ -44,6 +56,7 @@ private:
   QDir folder_;
   std::unique_ptr<ScanRecorder> recorder_;
   vtkNew<vtkUltrasoundOpenIGTLinkSender> sender_;
+  QPointer<Job> replaying_;
   bool isSending_ = false;
   QPushButton *record_, *replay_;
   QCheckBox* send_;

@@ -6,26 +6,70 @@
 #include <QJsonArray>
 #include <QJsonDocument>
 #include <QJsonObject>
+#include <vtkCellArray.h>
+#include <vtkCellArrayIterator.h>
+#include <vtkCellData.h>
 #include <vtkDataArray.h>
+#include <vtkFieldData.h>
 #include <vtkImageData.h>
+#include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkStringArray.h>
 #include <vtkUltrasoundVolume.h>
 
 namespace echorama {
 
 namespace {
 
-const QString Schema = "echorama-scan-1";
+const QString SchemaStem = "echorama-scan-"; ///< the version follows
 
-void AddVoxels(QCryptographicHash& hash, vtkImageData* image)
+void AddBytes(QCryptographicHash& hash, const void* bytes, vtkIdType size)
 {
-  vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(image);
   constexpr vtkIdType block = 1 << 24; // Qt counts bytes with an int
-  const auto* bytes = static_cast<const char*>(intensity->GetVoidPointer(0));
-  const vtkIdType size = intensity->GetNumberOfValues() * intensity->GetDataTypeSize();
   for (vtkIdType at = 0; at < size; at += block)
-    hash.addData(bytes + at, static_cast<int>(std::min(block, size - at)));
+    hash.addData(static_cast<const char*>(bytes) + at, static_cast<int>(std::min(block, size - at)));
+}
+
+void AddValues(QCryptographicHash& hash, vtkDataArray* array)
+{
+  AddBytes(hash, array->GetVoidPointer(0), array->GetNumberOfValues() * array->GetDataTypeSize());
+}
+
+void AddText(QCryptographicHash& hash, const std::string& text)
+{
+  AddBytes(hash, text.c_str(), static_cast<vtkIdType>(text.size() + 1)); // with its end: "ab", "c" is not "a", "bc"
+}
+
+void AddArrays(QCryptographicHash& hash, vtkFieldData* data)
+{
+  for (int i = 0; i < data->GetNumberOfArrays(); i++) {
+    vtkAbstractArray* array = data->GetAbstractArray(i);
+    AddText(hash, array->GetName() ? array->GetName() : "");
+    if (auto* numbers = vtkDataArray::SafeDownCast(array))
+      AddValues(hash, numbers);
+    else if (auto* texts = vtkStringArray::SafeDownCast(array))
+      for (vtkIdType at = 0; at < texts->GetNumberOfValues(); at++)
+        AddText(hash, texts->GetValue(at));
+  }
+}
+
+// However the cells are kept.
+void AddCells(QCryptographicHash& hash, vtkCellArray* cells)
+{
+  const auto all = vtk::TakeSmartPointer(cells->NewIterator());
+  for (all->GoToFirstCell(); !all->IsDoneWithTraversal(); all->GoToNextCell()) {
+    vtkIdType count = 0;
+    const vtkIdType* corners = nullptr;
+    all->GetCurrentCell(count, corners);
+    AddBytes(hash, &count, sizeof(count));
+    AddBytes(hash, corners, count * static_cast<vtkIdType>(sizeof(*corners)));
+  }
+}
+
+QString SchemaOf(int version)
+{
+  return SchemaStem + QString::number(version);
 }
 
 QByteArray LineOf(const QJsonObject& object)
@@ -43,22 +87,30 @@ QByteArray LineOf(const QJsonObject& object)
 QByteArray SumOf(vtkImageData* image)
 {
   QCryptographicHash hash(QCryptographicHash::Md5);
-  AddVoxels(hash, image);
+  AddValues(hash, vtkUltrasoundVolume::GetIntensity(image));
   return hash.result().toHex();
 }
 
-QByteArray SumOf(const Subject& subject)
+QByteArray SumOf(const Subject& subject, int version)
 {
   QCryptographicHash hash(QCryptographicHash::Md5);
   for (const auto& volume : subject.volumes) {
     const Eigen::Matrix4d toWorld = vtkUltrasoundVolume::GeometryOf(volume).IndexToWorld().matrix();
-    hash.addData(reinterpret_cast<const char*>(toWorld.data()), 16 * sizeof(double));
-    AddVoxels(hash, volume);
+    AddBytes(hash, toWorld.data(), 16 * sizeof(double));
+    if (version == 1)
+      AddValues(hash, vtkUltrasoundVolume::GetIntensity(volume));
+    else
+      AddArrays(hash, volume->GetPointData());
   }
-  if (subject.tissue) {
-    vtkDataArray* points = subject.tissue->GetPoints()->GetData();
-    hash.addData(static_cast<const char*>(points->GetVoidPointer(0)),
-                 static_cast<int>(points->GetNumberOfValues() * points->GetDataTypeSize()));
+  if (vtkPolyData* tissue = subject.tissue) {
+    AddValues(hash, tissue->GetPoints()->GetData());
+    if (version > 1) {
+      for (vtkCellArray* cells : {tissue->GetVerts(), tissue->GetLines(), tissue->GetPolys(), tissue->GetStrips()})
+        AddCells(hash, cells);
+      for (vtkFieldData* data : {static_cast<vtkFieldData*>(tissue->GetPointData()),
+                                 static_cast<vtkFieldData*>(tissue->GetCellData()), tissue->GetFieldData()})
+        AddArrays(hash, data);
+    }
   }
   return hash.result().toHex();
 }
@@ -67,7 +119,9 @@ ScanLogWriter::ScanLogWriter(const QString& path, const Subject& subject) : file
 {
   if (!file_.open(QIODevice::WriteOnly | QIODevice::NewOnly))
     throw Error(Error::Kind::FileSystem, QString("%1: %2").arg(path, file_.errorString()).toStdString());
-  Write(LineOf({{"schema", Schema}, {"volumes", QJsonArray::fromStringList(subject.files)}, {"body", QString(SumOf(subject))}}));
+  Write(LineOf({{"schema", SchemaOf(ScanLog::Version)},
+                {"volumes", QJsonArray::fromStringList(subject.files)},
+                {"body", QString(SumOf(subject))}}));
 }
 
 void ScanLogWriter::Write(const QByteArray& line)
@@ -85,6 +139,8 @@ void ScanLogWriter::Append(const ScanFrame& frame, vtkImageData* image)
   object["ProbeToWorld"] = pose; // row by row, without the last
   if (frame.isInAir)
     object["air"] = true;
+  if (frame.isFlipped)
+    object["flipped"] = true;
   if (frame.settings != settings_) {
     QJsonObject controls;
     for (const auto& [name, text] : *frame.settings)
@@ -92,7 +148,13 @@ void ScanLogWriter::Append(const ScanFrame& frame, vtkImageData* image)
     object["controls"] = controls;
     settings_ = frame.settings;
   }
-  Write(LineOf(object));
+  waiting_.push_back(LineOf(object));
+}
+
+void ScanLogWriter::Release(int frames)
+{
+  for (; released_ < frames && !waiting_.empty(); released_++, waiting_.pop_front())
+    Write(waiting_.front());
 }
 
 ScanLog ScanLog::Read(const QString& path)
@@ -111,8 +173,11 @@ ScanLog ScanLog::Read(const QString& path)
     if (problem.error != QJsonParseError::NoError)
       FailLine(path, line, "it is no JSON: " + problem.errorString());
     if (line == 1) {
-      if (object["schema"].toString() != Schema)
-        FailLine(path, line, "it is not a recorded scan (\"schema\": \"" + Schema + "\")");
+      const QString schema = object["schema"].toString();
+      while (log.version > 0 && schema != SchemaOf(log.version))
+        log.version--;
+      if (log.version == 0)
+        FailLine(path, line, "it is not a recorded scan that is known (\"schema\": \"" + SchemaOf(ScanLog::Version) + "\")");
       for (const auto& volume : object["volumes"].toArray())
         log.volumes.append(volume.toString());
       log.body = object["body"].toString().toLatin1();
@@ -129,6 +194,7 @@ ScanLog ScanLog::Read(const QString& path)
     entry.frame.seconds = object["seconds"].toDouble();
     entry.frame.number = static_cast<std::int64_t>(object["number"].toDouble());
     entry.frame.isInAir = object["air"].toBool();
+    entry.frame.isFlipped = object["flipped"].toBool();
     entry.sum = object["sum"].toString().toLatin1();
     if (object.contains("controls")) {
       ScanSettings controls;

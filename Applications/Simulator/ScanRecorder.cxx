@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ScanRecorder.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
 #include "Readers/SequenceRecorder.h"
+#include "Readers/SequenceText.h"
+#include "Readers/SequenceWriter.h"
 #include "Scan.h"
+#include <algorithm>
 #include <QDateTime>
 #include <vtkDataArray.h>
 #include <vtkImageData.h>
@@ -34,21 +38,52 @@ ScanRecorder::ScanRecorder(const QDir& folder, const Subject& subject, const std
   log_ = std::make_unique<ScanLogWriter>(name + ".scan.jsonl", subject);
 }
 
-ScanRecorder::~ScanRecorder() = default;
+ScanRecorder::~ScanRecorder() = default; // without Finish() it is as after a crash
 
 void ScanRecorder::Append(const ScanFrame& frame, vtkImageData* image)
 {
-  log_->Append(frame, image);
   SequenceFrame written;
   written.time = frame.seconds;
   written.transforms.push_back({"ImageToReference", vtkUltrasoundVolume::GeometryOf(image).IndexToWorld()});
   written.transforms.push_back({"ProbeToReference", Eigen::Affine3d(frame.probeToWorld.matrix())});
   sequence_->Append(written, frame.isInAir ? nullptr : vtkUltrasoundVolume::GetIntensity(image)->GetVoidPointer(0));
+  log_->Append(frame, image);
+  log_->Release(sequence_->SafeFrames());
+}
+
+void ScanRecorder::FlushWhenDue()
+{
+  sequence_->FlushWhenDue();
+  log_->Release(sequence_->SafeFrames());
 }
 
 void ScanRecorder::Finish()
 {
   sequence_->Finish();
+  log_->Release(sequence_->SafeFrames());
+}
+
+QString ScanRecorder::Join(const QString& path, const Progress& progress)
+{
+  const QString joined = path.left(path.size() - 1) + "a"; // .mhd, .mha
+  {
+    SequenceFile parts(path.toStdString());
+    SequenceContent content = parts.Content();
+    content.fields.erase(std::remove(content.fields.begin(), content.fields.end(), RecorderField), content.fields.end());
+    FileReplacement files;
+    SequenceWriter writer(joined.toStdString(), content, false, files);
+    std::vector<char> pixels(content.FrameBytes());
+    for (int i = 0; i < content.frames; i++) {
+      progress(static_cast<double>(i) / content.frames);
+      parts.ReadFrame(i, pixels.data());
+      writer.Append(parts.Frame(i), pixels.data());
+    }
+    writer.Finish();
+    files.Commit();
+  }
+  QFile::remove(path);
+  QFile::remove(path.left(path.size() - 3) + "raw");
+  return joined;
 }
 
 int ScanRecorder::Frames() const

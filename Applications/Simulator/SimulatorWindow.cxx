@@ -161,6 +161,7 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
   AddPanel(controls, tr("Image"));
   AddPanel(new ProbeTracker(scan_, this), tr("Tracker"));
   outputs_ = new OutputPanel(scan_, this);
+  connect(outputs_, &OutputPanel::JobStarted, jobs_, &JobBar::Watch);
   AddPanel(outputs_, tr("Record"));
   auto* tasks = new TaskPanel(scan_, image_, this);
   connect(tasks, &TaskPanel::RunningChanged, outputs_, &OutputPanel::ForbidReplay);

@@ -94,4 +94,18 @@ inline QString WriteWithBall(const QDir& folder, const QString& name = "body.mha
 {
   return Write(folder, name, [](const Eigen::Vector3d& at) { return at.norm() < 5.0 ? 250.0 : 100.0; });
 }
+
+/// A ball of liver in air, with one of another material 30 mm below its top, which is at the origin.
+inline QString WriteScene(const QDir& folder, const QString& name = "scene.json", const QByteArray& stone = "bone")
+{
+  QFile file(folder.filePath(name));
+  if (!file.open(QIODevice::WriteOnly))
+    qFatal("cannot write %s", qPrintable(file.fileName()));
+  file.write(R"({"schema": "echorama-scene-1", "name": "ball", "background": "air", "tissue": [
+    {"name": "body", "sphere": {"centre": [0, 0, 60], "radius": 60, "material": "liver"}},
+    {"name": "stone", "sphere": {"centre": [0, 0, 30], "radius": 6, "material": ")" +
+             stone + R"("}}],
+    "views": {"poses": [{"face": [0, 0, 0], "target": [0, 0, 50], "fan": [1, 0, 0]}]}})");
+  return file.fileName();
+}
 } // namespace body
