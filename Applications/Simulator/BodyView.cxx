@@ -113,7 +113,13 @@ BodyView::BodyView(Scan* scan, QWidget* parent) : QWidget(parent), scan_(scan), 
   image_->SetMapper(imageMapper_);
   image_->GetProperty()->SetInterpolationTypeToLinear();
   image_->SetVisibility(false);
-  for (vtkProp* prop : {static_cast<vtkProp*>(image_), static_cast<vtkProp*>(probe_), static_cast<vtkProp*>(skin_)})
+  marks_->SetMapper(marksMapper_);
+  marks_->GetProperty()->SetColor(0.98, 0.86, 0.35);
+  marks_->GetProperty()->SetLineWidth(3.0);
+  marks_->GetProperty()->LightingOff();
+  marks_->SetVisibility(false);
+  for (vtkProp* prop : {static_cast<vtkProp*>(image_), static_cast<vtkProp*>(probe_), static_cast<vtkProp*>(marks_),
+                        static_cast<vtkProp*>(skin_)})
     renderer_->AddViewProp(prop);
 
   auto* layout = new QVBoxLayout(this);
@@ -137,6 +143,14 @@ void BodyView::ShowSubject()
   if (skin)
     skinMapper_->SetInputData(skin);
   QMetaObject::invokeMethod(this, &BodyView::Fit, Qt::QueuedConnection); // once the probe is in its place
+}
+
+void BodyView::ShowMarks(vtkPolyData* lines)
+{
+  marks_->SetVisibility(lines != nullptr);
+  if (lines)
+    marksMapper_->SetInputData(lines);
+  redraw_->Ask();
 }
 
 // The probe from the side and a little from above, in front of the body.

@@ -9,6 +9,7 @@ class QVTKOpenGLNativeWidget;
 class vtkActor;
 class vtkImageSlice;
 class vtkImageSliceMapper;
+class vtkPolyData;
 class vtkPolyDataMapper;
 class vtkRenderer;
 
@@ -30,6 +31,8 @@ public:
   QVTKOpenGLNativeWidget* Canvas() const { return canvas_; }
   void Fit();
   void DrawNow();
+  /// Lines that are seen through the body; nullptr: none.
+  void ShowMarks(vtkPolyData* lines);
   /// Where a point of the world is on the canvas, in pixels of the window system.
   QPointF ToCanvas(const double world[3]) const;
 
@@ -46,8 +49,8 @@ private:
   Scan* scan_;
   QVTKOpenGLNativeWidget* canvas_;
   vtkNew<vtkRenderer> renderer_;
-  vtkNew<vtkPolyDataMapper> skinMapper_, probeMapper_;
-  vtkNew<vtkActor> skin_, probe_;
+  vtkNew<vtkPolyDataMapper> skinMapper_, probeMapper_, marksMapper_;
+  vtkNew<vtkActor> skin_, probe_, marks_;
   vtkNew<vtkImageSliceMapper> imageMapper_;
   vtkNew<vtkImageSlice> image_;
   Redraw* redraw_;

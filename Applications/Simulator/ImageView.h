@@ -31,8 +31,8 @@ struct PlanePicture {
 
 /// A line that somebody measured, and in which plane.
 struct CalliperLine {
-  QLineF line;                                                          ///< mm
-  Pose from = Pose::Identity(), to = Pose::Identity();                  ///< of the probe, in the pictures that its ends were set in
+  QLineF line;                                         ///< mm
+  Pose from = Pose::Identity(), to = Pose::Identity(); ///< of the probe, in the pictures that its ends were set in
   Eigen::Vector3d From() const { return from * Eigen::Vector3d(line.x1(), 0.0, line.y1()); } ///< in the world
   Eigen::Vector3d To() const { return to * Eigen::Vector3d(line.x2(), 0.0, line.y2()); }
   /// How far the one plane's ends are from where the other has them, mm: 0 for a line of one picture.

@@ -26,6 +26,7 @@
 #include <QDockWidget>
 #include <QFileDialog>
 #include <QFileInfo>
+#include <QHBoxLayout>
 #include <QLabel>
 #include <QMenuBar>
 #include <QPointer>
@@ -67,8 +68,8 @@ QVector<KeysOf> SimulatorKeys()
 
 SimulatorWindow::SimulatorWindow(QWidget* parent)
   : QMainWindow(parent), scan_(new Scan(this)), messages_(new MessageBar(this)), jobs_(new JobBar(this)),
-    body_(new BodyView(scan_, this)), image_(new ImageView(this)), cine_(new CineBar(scan_, this)), views_(new QSplitter(this)),
-    readout_(new QLabel(this))
+    body_(new BodyView(scan_, this)), image_(new ImageView(this)), solution_(new ImageView(this)),
+    cine_(new CineBar(scan_, this)), views_(new QSplitter(this)), readout_(new QLabel(this))
 {
   setObjectName("simulator");
   setWindowTitle("Echorama simulator");
@@ -78,7 +79,15 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
   auto* rightLayout = new QVBoxLayout(right);
   rightLayout->setContentsMargins(0, 0, 0, 0);
   rightLayout->setSpacing(1);
-  rightLayout->addWidget(image_, 1);
+  auto* images = new QHBoxLayout;
+  images->setSpacing(1);
+  images->addWidget(image_, 1);
+  images->addWidget(solution_, 1);
+  solution_->setObjectName("solutionView");
+  solution_->setAccessibleName(tr("Solution"));
+  solution_->SetCorner(tr("SOLUTION"));
+  solution_->hide();
+  rightLayout->addLayout(images, 1);
   rightLayout->addWidget(cine_);
   views_->addWidget(body_);
   views_->addWidget(right);
@@ -159,13 +168,17 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
   column->addStretch(1);
   connect(scan_, &Scan::FrozenChanged, controls, &QWidget::setDisabled);
   AddPanel(controls, tr("Image"));
-  AddPanel(new ProbeTracker(scan_, this), tr("Tracker"));
+  auto* tracker = new ProbeTracker(scan_, this);
+  AddPanel(tracker, tr("Tracker"));
   outputs_ = new OutputPanel(scan_, this);
   connect(outputs_, &OutputPanel::JobStarted, jobs_, &JobBar::Watch);
   AddPanel(outputs_, tr("Record"));
-  auto* tasks = new TaskPanel(scan_, image_, this);
-  connect(tasks, &TaskPanel::RunningChanged, outputs_, &OutputPanel::ForbidReplay);
-  AddPanel(tasks, tr("Tasks"));
+  tasks_ = new TaskPanel(scan_, image_, this);
+  connect(tasks_, &TaskPanel::RunningChanged, outputs_, &OutputPanel::ForbidReplay);
+  connect(tasks_, &TaskPanel::RunningChanged, tracker, &QWidget::setDisabled); // a tool that comes later may be anywhere
+  connect(tasks_, &TaskPanel::MarksChanged, body_, &BodyView::ShowMarks);
+  connect(tasks_, &TaskPanel::SolutionChanged, this, &SimulatorWindow::ShowSolution);
+  AddPanel(tasks_, tr("Tasks"));
   ShowState();
   resize(1280, 800);
   QSettings settings;
@@ -418,8 +431,49 @@ void SimulatorWindow::dropEvent(QDropEvent* event)
   Open(paths);
 }
 
+void SimulatorWindow::ShowSolution(const PlanePicture* picture)
+{
+  solution_->setVisible(picture != nullptr);
+  solution_->SetPicture(picture ? *picture : PlanePicture());
+}
+
+bool SimulatorWindow::AsksBeforeClosing()
+{
+  QStringList running;
+  if (tasks_->IsRunning())
+    running.append(tr("An attempt is running, and has no answer yet."));
+  if (outputs_->IsRecording())
+    running.append(tr("A recording is running."));
+  if (running.isEmpty())
+    return false;
+  const QString text = running.join(" ");
+  if (!messages_->Texts().contains(text)) // it is asked already
+    messages_->Show({Message::Question, text, {{tr("Stay"), {}}, {tr("End it and close"), [this] {
+                                                                    tasks_->GiveUp();
+                                                                    outputs_->ForbidReplay(true);
+                                                                    outputs_->Finish();
+                                                                    connect(jobs_, &JobBar::CountChanged, this,
+                                                                            &SimulatorWindow::CloseWhenDone,
+                                                                            Qt::UniqueConnection);
+                                                                    CloseWhenDone(jobs_->Count());
+                                                                  }}}});
+  return true;
+}
+
+void SimulatorWindow::CloseWhenDone(int running)
+{
+  if (running > 0)
+    return;
+  disconnect(jobs_, &JobBar::CountChanged, this, &SimulatorWindow::CloseWhenDone);
+  QTimer::singleShot(0, this, &QWidget::close); // the job that ended is not quite gone
+}
+
 void SimulatorWindow::closeEvent(QCloseEvent* event)
 {
+  if (AsksBeforeClosing()) {
+    event->ignore();
+    return;
+  }
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState(LayoutVersion));

@@ -18,6 +18,8 @@ class MessageBar;
 class OutputPanel;
 class ParameterPanel;
 class Scan;
+class TaskPanel;
+struct PlanePicture;
 
 /// The window of the simulator: it makes the parts and puts them together. What parts share is the Scan.
 class SimulatorWindow : public QMainWindow {
@@ -47,6 +49,9 @@ private:
   void MakeProbeMenu(QMenu* menu);
   void MakeImageMenu(QMenu* menu);
   void AddPanel(QWidget* panel, const QString& title);
+  bool AsksBeforeClosing();
+  void CloseWhenDone(int running);
+  void ShowSolution(const PlanePicture* picture);
   void ShowFrame();
   void ShowState();
   /// What is to the right in the image, on the probe: with left and right exchanged the hand goes the other way.
@@ -59,10 +64,11 @@ private:
   MessageBar* messages_;
   JobBar* jobs_;
   BodyView* body_;
-  ImageView* image_;
+  ImageView *image_, *solution_;
   CineBar* cine_;
   QSplitter* views_;
   OutputPanel* outputs_ = nullptr;
+  TaskPanel* tasks_ = nullptr;
   QLabel* readout_;
   QMenu* viewMenu_ = nullptr;
   QWidget* lastPanel_ = nullptr;

@@ -4,6 +4,7 @@
 #include "Core/Base/Error.h"
 #include "ImageView.h"
 #include "Scan.h"
+#include "Solution.h"
 #include "Widgets/Session/LiveScore.h"
 #include <QCheckBox>
 #include <QDateTime>
@@ -25,6 +26,7 @@ namespace echorama {
 
 namespace {
 
+constexpr double AtStartMm = 10.0;  ///< that near to it a tracked tool has been at the start
 constexpr double MostApartMm = 0.5; ///< of the planes that the ends of a line were set in
 
 TaskBody BodyOf(const Subject& subject)
@@ -74,10 +76,15 @@ TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
   trainee_ = LineField(this, "trainee", tr("Goes into the table of attempts"));
   trainee_->setText(QSettings().value("task/trainee").toString());
   start_ = Button(this, "startTask", {},
-                  tr("Puts the probe at the top, forgets what was seen, and starts the clock; or ends without an answer"),
+                  tr("Puts the probe at the top, forgets what was seen, and starts the clock; a tool that a tracker follows "
+                     "has to be brought there first. Or ends without an answer"),
                   [this] { StartOrCancel(); });
   submit_ = Button(this, "submitTask", tr("S&ubmit"), tr("The image as it is, or the last line of the callipers, is the answer"),
                    [this] { Submit(); });
+  solution_ =
+      Button(this, "showSolution", tr("Show the so&lution"), tr("After the answer: what was asked for, beside what was found"),
+             [this] { ShowSolution(solution_->isChecked()); });
+  solution_->setCheckable(true);
   state_ = TextField(this, "taskState");
   score_ = TextField(this, "taskScore");
   name_ = LineField(this, "taskName", tr("What the task is called, and its file"));
@@ -95,6 +102,7 @@ TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
   form->addRow(submit_);
   form->addRow(tr("State"), state_);
   form->addRow(tr("Score"), score_);
+  form->addRow(solution_);
   form->addRow(new QLabel("<b>" + tr("Teach") + "</b>", this));
   form->addRow(tr("Name"), name_);
   form->addRow(hint_);
@@ -104,6 +112,7 @@ TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
   connect(this, &TaskPanel::RunningChanged, length, &QWidget::setDisabled);
   connect(this, &TaskPanel::RunningChanged, open, &QWidget::setDisabled);
   connect(scan, &Scan::SubjectChanged, this, &TaskPanel::Forget);
+  connect(scan, &Scan::ProbeMoved, this, &TaskPanel::BeginWhenAtStart);
   timer_ = new QTimer(this);
   connect(timer_, &QTimer::timeout, this, &TaskPanel::ShowState);
   timer_->setInterval(200);
@@ -173,6 +182,7 @@ void TaskPanel::SaveLength()
 
 void TaskPanel::OpenTask(const QString& path)
 {
+  ShowSolution(false);
   Try([&] {
     attempt_.reset();
     ScanAttempt attempt = ScanAttempt::Open(path.toStdString(), BodyOf(scan_->Body()));
@@ -185,8 +195,10 @@ void TaskPanel::OpenTask(const QString& path)
 
 void TaskPanel::Forget()
 {
-  const bool wasRunning = IsRunning();
+  const bool wasRunning = IsRunning() || IsWaiting();
+  isWaiting_ = false;
   attempt_.reset();
+  ShowSolution(false);
   if (wasRunning)
     emit RunningChanged(false);
   ShowState();
@@ -194,18 +206,65 @@ void TaskPanel::Forget()
 
 void TaskPanel::StartOrCancel()
 {
+  if (IsRunning() || IsWaiting()) {
+    GiveUp();
+    return;
+  }
+  ShowSolution(false);
+  image_->ClearCallipers();
+  score_->clear();
+  scan_->Restart();
+  isWaiting_ = true;
+  emit RunningChanged(true);
+  BeginWhenAtStart();
+  if (isWaiting_)
+    emit MarksChanged(RingAt(scan_->StartPose(), AtStartMm));
+  ShowState();
+}
+
+// Keys and mouse have the probe at the start. A tracked tool may be held anywhere, also at the solution: it has to be brought
+// there first. How far it is from the start tells nothing of where the solution is.
+void TaskPanel::BeginWhenAtStart()
+{
+  if (!isWaiting_ || (scan_->ProbeToWorld().translation() - scan_->StartPose().translation()).norm() > AtStartMm)
+    return;
+  isWaiting_ = false;
+  emit MarksChanged(nullptr);
   Try([&] {
-    if (IsRunning()) {
-      attempt_->Cancel();
-    } else {
-      scan_->Restart();
-      image_->ClearCallipers();
-      score_->clear();
-      started_ = Seconds();
-      attempt_->Start(started_, scan_->ProbeToWorld());
-    }
+    started_ = Seconds();
+    attempt_->Start(started_, scan_->ProbeToWorld());
   });
-  emit RunningChanged(IsRunning());
+  if (!IsRunning())
+    emit RunningChanged(false);
+}
+
+void TaskPanel::GiveUp()
+{
+  isWaiting_ = false;
+  if (attempt_)
+    attempt_->Cancel();
+  emit MarksChanged(nullptr);
+  emit RunningChanged(false);
+  ShowState();
+}
+
+void TaskPanel::ShowSolution(bool shown)
+{
+  solution_->setChecked(shown);
+  if (!shown) {
+    emit MarksChanged(nullptr);
+    emit SolutionChanged(nullptr);
+    return;
+  }
+  Try([&] {
+    const ScanTask* task = attempt_ ? attempt_->Solution() : nullptr;
+    if (!task)
+      throw Error(Error::Kind::InvalidParameter, "the solution is shown after the answer");
+    const ShownSolution solution = SolutionOf(*task, *scan_);
+    emit MarksChanged(solution.marks);
+    emit SolutionChanged(solution.picture.image.isNull() ? nullptr : &solution.picture);
+    emit scan_->Said({Message::Note, solution.text, {}});
+  });
 }
 
 void TaskPanel::Submit()
@@ -222,6 +281,7 @@ void TaskPanel::Submit()
                         .arg(score.distanceMm, 0, 'f', 1)
                         .arg(isLength ? QString() : tr(" and %1\u00b0").arg(score.degrees, 0, 'f', 1))
                         .arg(score.seconds, 0, 'f', 0));
+    scan_->SetFrozen(true); // the image is the answer, and stays for comparison
     emit RunningChanged(false);
     QSettings().setValue("task/trainee", trainee_->text());
     if (!folder_.mkpath("."))
@@ -234,14 +294,20 @@ void TaskPanel::Submit()
 
 void TaskPanel::ShowState()
 {
-  const bool running = IsRunning();
+  const bool running = IsRunning(), busy = running || IsWaiting();
   start_->setEnabled(attempt_.has_value());
-  start_->setText(running ? tr("Give up") : tr("&Start"));
+  start_->setText(busy ? tr("Give up") : tr("&Start"));
   submit_->setEnabled(running);
+  solution_->setEnabled(attempt_ && attempt_->Solution());
   task_->setText(attempt_ ? QString::fromStdString(attempt_->Instruction()) : tr("none"));
-  running ? timer_->start() : timer_->stop();
-  if (!running) {
+  busy ? timer_->start() : timer_->stop();
+  if (!busy) {
     state_->clear();
+    return;
+  }
+  if (!running) {
+    const double away = (scan_->ProbeToWorld().translation() - scan_->StartPose().translation()).norm();
+    state_->setText(tr("bring the tool to the start, the ring on the body: %1 mm away").arg(away, 0, 'f', 0));
     return;
   }
   QString text = tr("%1 s").arg(Seconds() - started_, 0, 'f', 0);

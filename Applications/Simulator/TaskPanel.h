@@ -11,11 +11,13 @@ class QLabel;
 class QLineEdit;
 class QPushButton;
 class QTimer;
+class vtkPolyData;
 
 namespace echorama {
 
 class ImageView;
 class Scan;
+struct PlanePicture;
 
 /// Tasks: a teacher saves what is seen as one, a learner opens it and is scored.
 class TaskPanel : public QWidget {
@@ -27,17 +29,27 @@ public:
   void SetFolder(const QDir& folder) { folder_ = folder; }
   void OpenTask(const QString& path);
   bool IsRunning() const { return attempt_ && attempt_->IsRunning(); }
+  /// It has been started, but the tool that leads the probe has not been at the start yet.
+  bool IsWaiting() const { return isWaiting_; }
+  /// Ends an attempt without an answer.
+  void GiveUp();
 
 signals:
-  /// While an attempt runs, nothing may be shown that leads to the solution.
+  /// While an attempt runs or waits, nothing may be shown that leads to the solution.
   void RunningChanged(bool running);
+  ///@{ To be shown on the body, and beside the image; nullptr: nothing.
+  void MarksChanged(vtkPolyData* lines);
+  void SolutionChanged(const PlanePicture* picture);
+  ///@}
 
 private:
   void Save(std::variant<FindPlane, MeasureLength, ReachTarget> goal);
   void SavePlane();
   void SaveLength();
   void StartOrCancel();
+  void BeginWhenAtStart();
   void Submit();
+  void ShowSolution(bool shown);
   void Forget();
   void ShowState();
   double Seconds() const { return 1e-3 * static_cast<double>(clock_.elapsed()); }
@@ -50,9 +62,10 @@ private:
   std::optional<ScanAttempt> attempt_;
   QElapsedTimer clock_;
   double started_ = 0.0;
+  bool isWaiting_ = false;
   QLineEdit *name_, *trainee_;
   QCheckBox* hint_;
-  QPushButton *start_, *submit_;
+  QPushButton *start_, *submit_, *solution_;
   QLabel *task_, *state_, *score_;
   QTimer* timer_;
 };

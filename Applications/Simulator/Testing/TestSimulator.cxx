@@ -2,9 +2,11 @@
 // The simulator as a person uses it: the real window on a screen, real mouse and key events. What is asked is where the probe
 // then is and what it sees.
 #include "Core/Base/Angles.h"
+#include "OutputPanel.h"
 #include "SimulatorUnderTest.h"
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <QAction>
 #include <QApplication>
 #include <QComboBox>
@@ -13,6 +15,7 @@
 #include <QJsonDocument>
 #include <QJsonObject>
 #include <QLabel>
+#include <QPushButton>
 #include <QSlider>
 #include <QStandardPaths>
 #include <QToolButton>
@@ -22,8 +25,21 @@
 #include <vtkNew.h>
 #include <vtkSTLWriter.h>
 #include <vtkTriangleFilter.h>
+#include <vtkUltrasoundVolume.h>
 
 using namespace echorama;
+
+namespace {
+
+QString refinementOf(const ScanFrame& frame)
+{
+  for (const auto& [name, text] : *frame.settings)
+    if (name == "Refinement")
+      return QString::fromStdString(text);
+  return {};
+}
+
+} // namespace
 
 class TestSimulator : public FolderTest {
   Q_OBJECT
@@ -45,6 +61,9 @@ private slots:
   void aTrackerThatStoppedIsSeen();
   void aFileThatCannotBeReadIsNamed();
   void aSceneIsScanned();
+  void aProbeInsideBoneIsSeen();
+  void aSlowPictureIsGivenUpForANewPose();
+  void closingAsks();
   void thePicturesOfTheManual();
 };
 
@@ -147,16 +166,16 @@ void TestSimulator::tiltRockAndRotationTurnAboutTheirAxes()
     return turn;
   };
   window.Move(Qt::Key_Down, Qt::ControlModifier, 3);
-  QVERIFY((turned().cwiseAbs() - Eigen::Vector3d(6.0, 0.0, 0.0)).norm() < 1e-6);
-  QVERIFY(window.Axis(2).dot(before.col(1)) != 0.0);
+  QVERIFY((turned() - Eigen::Vector3d(-6.0, 0.0, 0.0)).norm() < 1e-6);
+  QVERIFY(window.Axis(2).dot(before.col(1)) > 0.1); // towards who looks at the image: where Down slides to
   window.Move(Qt::Key_Home);
   QVERIFY(turned().norm() < 1e-9);
   window.Move(Qt::Key_Right, Qt::ControlModifier, 2);
-  QVERIFY((turned().cwiseAbs() - Eigen::Vector3d(0.0, 4.0, 0.0)).norm() < 1e-6);
+  QVERIFY((turned() - Eigen::Vector3d(0.0, 4.0, 0.0)).norm() < 1e-6);
   QVERIFY(window.Axis(2).dot(before.col(0)) > 0.06); // to the right
   window.Move(Qt::Key_Home);
   window.Move(Qt::Key_E, Qt::NoModifier, 2);
-  QVERIFY((turned().cwiseAbs() - Eigen::Vector3d(0.0, 0.0, 10.0)).norm() < 1e-6);
+  QVERIFY((turned() - Eigen::Vector3d(0.0, 0.0, 10.0)).norm() < 1e-6);
   window.Wheel(&window.Image(), -2);
   QVERIFY(turned().norm() < 1e-6);
   QVERIFY((window.Place() - place).norm() < 1e-9);
@@ -251,13 +270,25 @@ void TestSimulator::aFrozenImageStaysAndTheCineIsWhatWasSeen()
   QVERIFY(window.Scan().Picture().image != seen[5]);
   QCOMPARE(window.Part<QDoubleSpinBox>("GainDb")->value(), 6.0);
 
+  // Ten minutes at 60 frames a second, with a control that is changed every second: of all that only the last 30 seconds are
+  // kept.
   CineLoop loop(30.0, 4000);
-  for (int i = 0; i < 36000; i++) { // ten minutes at 60 frames a second
-    ScanFrame frame;
+  std::vector<std::weak_ptr<const ScanSettings>> controls;
+  ScanFrame frame = window.Scan().Frame();
+  for (int i = 0; i < 36000; i++) {
+    if (i % 60 == 0) {
+      frame.settings = std::make_shared<const ScanSettings>(*frame.settings);
+      controls.emplace_back(frame.settings);
+    }
+    frame.number = i;
     frame.seconds = i / 60.0;
+    frame.probeToWorld.translation()[0] = 0.01 * i;
     loop.Add(frame);
   }
   QVERIFY(loop.Count() >= 1800 && loop.Count() <= 1802);
+  QCOMPARE(loop.At(loop.Count() - 1).number, std::int64_t(35999));
+  const auto kept = std::count_if(controls.begin(), controls.end(), [](const auto& each) { return !each.expired(); });
+  QVERIFY2(kept >= 30 && kept <= 32, qPrintable(QString::number(kept)));
 }
 
 void TestSimulator::callipersMeasure()
@@ -293,10 +324,39 @@ void TestSimulator::leftAndRightAreExchanged()
   window.Key(Qt::Key_F);
   QVERIFY(std::abs(window.Image().ToWidget({ball[0], ball[2]}).x() - (2.0 * middle - x)) < 1.0);
   QVERIFY(shownAt({ball[0], ball[2]}) > 200);
-  // The arrows go as the image does.
-  const Eigen::Vector3d before = window.Place();
-  window.Move(Qt::Key_Right, Qt::ShiftModifier);
-  QVERIFY(window.Place()[0] < before[0] - 9.0);
+  // So is what is recorded, sent and saved: its first column lies on the side of the mark.
+  const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(window.Scan().Scanner().Output());
+  QVERIFY(geometry.direction.col(0).dot(window.Axis(0)) < -0.999);
+  QVERIFY(geometry.direction.determinant() > 0.999);
+  QVERIFY((window.Scan().ProbeToWorld().inverse() * geometry.origin)[0] > 10.0);
+  // The arrows go as the image does, and so does rocking: the ball goes to the other side of the screen.
+  const auto ballOnScreen = [&window] {
+    const Eigen::Vector3d now = window.Scan().ProbeToWorld().inverse() * Eigen::Vector3d::Zero();
+    return window.Image().ToWidget({now[0], now[2]}).x();
+  };
+  for (const bool flipped : {true, false}) {
+    QCOMPARE(window.Scan().IsFlipped(), flipped);
+    for (Qt::KeyboardModifier key : {Qt::ShiftModifier, Qt::ControlModifier}) {
+      const double left = ballOnScreen();
+      const Eigen::Vector3d before = window.Place();
+      window.Move(Qt::Key_Right, key);
+      QVERIFY(ballOnScreen() < left - 2.0);
+      if (key == Qt::ShiftModifier)
+        QVERIFY((window.Place() - before)[0] * (flipped ? -1.0 : 1.0) > 9.0);
+    }
+    const double left = ballOnScreen();
+    window.Wheel(&window.Image(), 2, Qt::AltModifier);
+    window.Frame();
+    QVERIFY(ballOnScreen() < left - 2.0);
+    window.Key(Qt::Key_F);
+  }
+  // Also what is frozen.
+  window.Key(Qt::Key_F);
+  window.Key(Qt::Key_Space);
+  const QImage one = window.Scan().Picture().image, other = one.mirrored(true, false);
+  window.Key(Qt::Key_F);
+  QVERIFY(one != other);
+  QVERIFY(window.Scan().Picture().image == other);
 }
 
 void TestSimulator::aSnapshotHoldsImageAndPose()
@@ -326,6 +386,17 @@ void TestSimulator::aSnapshotHoldsImageAndPose()
     for (int j = 0; j < 4; j++)
       QCOMPARE(all["ProbeToWorld"].toArray()[i].toArray()[j].toDouble(), window.Scan().ProbeToWorld().matrix()(i, j));
   QCOMPARE(all["controls"].toObject()["GainDb"].toString(), QString("0"));
+  QCOMPARE(all["flipped"].toBool(), false);
+  // With left and right exchanged the picture is, and says so.
+  window.Key(Qt::Key_F);
+  window.Key(Qt::Key_S);
+  QStringList now = folder.entryList({"*.png"}, QDir::Files, QDir::Name);
+  QCOMPARE(now.size(), 2);
+  QVERIFY(QImage(folder.filePath(now[1])) != picture);
+  QVERIFY(QImage(folder.filePath(now[1])) == picture.mirrored(true, false));
+  QFile other(folder.filePath(now[1].replace(".png", ".json")));
+  QVERIFY(other.open(QIODevice::ReadOnly));
+  QCOMPARE(QJsonDocument::fromJson(other.readAll()).object()["flipped"].toBool(), true);
 }
 
 void TestSimulator::whatIsTheMatterIsShown()
@@ -431,20 +502,13 @@ void TestSimulator::aFileThatCannotBeReadIsNamed()
 
 void TestSimulator::aSceneIsScanned()
 {
-  // A ball of liver in air, with one of bone 30 mm below its top.
-  QFile file(Folder().filePath("scene.json"));
-  QVERIFY(file.open(QIODevice::WriteOnly));
-  file.write(R"({"schema": "echorama-scene-1", "name": "ball", "background": "air", "tissue": [
-    {"name": "body", "sphere": {"centre": [0, 0, 60], "radius": 60, "material": "liver"}},
-    {"name": "stone", "sphere": {"centre": [0, 0, 30], "radius": 6, "material": "bone"}}],
-    "views": {"poses": [{"face": [0, 0, 0], "target": [0, 0, 50], "fan": [1, 0, 0]}]}})");
-  file.close();
+  const QString scene = body::WriteScene(Folder());
   SimulatorUnderTest window;
   // From a frozen image of a volume, whose controls are not to come along.
   QVERIFY(window.Open({body::WriteWithBall(Folder())}));
   window.Key(Qt::Key_Space);
   QVERIFY(window.Scan().IsFrozen());
-  QVERIFY(window.Open({file.fileName()}));
+  QVERIFY(window.Open({scene}));
   QVERIFY(!window.Scan().IsFrozen());
   QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
   QCOMPARE(window.Image().State(), QString());
@@ -469,12 +533,6 @@ void TestSimulator::aSceneIsScanned()
   QVERIFY(window.Scan().Picture().image != before);
   // The acoustic model: coarse first, then better from frame to frame while the probe rests.
   std::map<std::int64_t, QImage> seen;
-  const auto refinementOf = [](const ScanFrame& frame) {
-    for (const auto& [name, text] : *frame.settings)
-      if (name == "Refinement")
-        return QString::fromStdString(text);
-    return QString();
-  };
   window.Scan().SetControl("Source", "acoustic");
   QTRY_COMPARE_WITH_TIMEOUT(refinementOf(window.Scan().Frame()), QString("3"), 30000);
   connect(&window.Scan(), &Scan::FrameMade, this, [&] { seen[window.Scan().Frame().number] = window.Scan().Picture().image; });
@@ -503,6 +561,123 @@ void TestSimulator::aSceneIsScanned()
   bad.close();
   QVERIFY(window.Open({bad.fileName()}));
   QVERIFY2(window.HasMessage("bad.json"), qPrintable(window.Messages().join('\n')));
+}
+
+void TestSimulator::aProbeInsideBoneIsSeen()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteScene(Folder())}));
+  Eigen::Matrix4d pose = window.Scan().ProbeToWorld().matrix();
+  for (const auto& [depth, inside] : {std::pair<double, bool>{1.0, false}, {20.0, false}, {30.0, true}, {40.0, false}}) {
+    pose(2, 3) = depth; // the bone is from 24 to 36 mm
+    window.Scan().Follow(pose);
+    window.Frame();
+    QVERIFY2(window.Image().State().contains("inside bone") == inside, qPrintable(window.Image().State()));
+  }
+  // The acoustic model says the same.
+  window.Scan().SetControl("Source", "acoustic");
+  pose(2, 3) = 30.0;
+  window.Scan().Follow(pose);
+  QTRY_VERIFY_WITH_TIMEOUT(window.Image().State().contains("inside bone"), 30000);
+}
+
+void TestSimulator::aSlowPictureIsGivenUpForANewPose()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteScene(Folder())}));
+  Scan& scan = window.Scan();
+  scan.SetControl("Beams", "512"); // so that the last picture takes a while
+  scan.SetControl("Samples", "4096");
+  scan.SetControl("Source", "acoustic");
+  QElapsedTimer clock;
+  qint64 third = 0, fourth = 0; // when they came
+  const auto timing = connect(&scan, &Scan::FrameMade, this, [&] {
+    const QString level = refinementOf(scan.Frame());
+    if (level == "2")
+      third = clock.elapsed();
+    else if (level == "3")
+      fourth = clock.elapsed();
+  });
+  clock.start();
+  QTRY_VERIFY_WITH_TIMEOUT(fourth > 0, 60000);
+  disconnect(timing);
+  const auto took = static_cast<int>(fourth - third);
+  qInfo("the last refinement takes %d ms", took);
+  QVERIFY(took > 100); // else there is nothing to give up
+
+  // The probe moves while the best picture of where it was is being made.
+  struct Made {
+    Eigen::Vector3d place;
+    QString level;
+  };
+  std::vector<Made> made;
+  Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+  qint64 movedAt = 0, shownAt = 0;
+  connect(&scan, &Scan::FrameMade, this, [&] {
+    made.push_back({scan.Frame().probeToWorld.translation(), refinementOf(scan.Frame())});
+    if (made.size() == 3)
+      QTimer::singleShot(40 + took / 4, this, [&] {
+        movedAt = clock.elapsed();
+        scan.Slide(4.0, 0.0);
+        moved = window.Place();
+      });
+    if (movedAt > 0 && shownAt == 0)
+      shownAt = clock.elapsed();
+  });
+  window.Key(Qt::Key_Left);
+  QTRY_VERIFY_WITH_TIMEOUT(made.size() > 3 && made.back().level == "3" && made.back().place == moved, 60000);
+  disconnect(&scan, nullptr, this, nullptr);
+  QCOMPARE(made[2].level, QString("2"));
+  // The first that comes after it is of the new pose, and coarse: none of the old one comes late.
+  for (std::size_t i = 3; i < made.size(); i++) {
+    QCOMPARE(made[i].place, moved);
+    QCOMPARE(made[i].level, QString::number(i - 3));
+  }
+  QCOMPARE(made.size(), std::size_t(7));
+  qInfo("the first picture of the new pose came after %d ms", static_cast<int>(shownAt - movedAt));
+  // One that moves all the time is seen all the same, no frame more than one behind.
+  const auto coarse = connect(&scan, &Scan::FrameMade, this, [&] { made.push_back({window.Place(), {}}); });
+  made.clear();
+  for (int i = 0; i < 400 && made.size() < 3; i++) {
+    scan.Slide(i % 2 ? 0.5 : -0.5, 0.0);
+    QTest::qWait(5);
+  }
+  disconnect(coarse);
+  QCOMPARE(made.size(), std::size_t(3));
+  // A frozen image is what was seen, and what waits is dropped.
+  scan.Slide(1.0, 0.0);
+  QTest::qWait(30);
+  window.Key(Qt::Key_Space);
+  const std::int64_t number = scan.Frame().number;
+  QTest::qWait(200);
+  QCOMPARE(scan.Frame().number, number);
+}
+
+void TestSimulator::closingAsks()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  window.Part<OutputPanel>("outputPanel")->SetFolder(Folder());
+  window.Part<QPushButton>("record")->click();
+  window.Move(Qt::Key_Right, Qt::NoModifier, 3);
+  for (int i = 0; i < 2; i++) {
+    QVERIFY(!window.Window().close());
+    QVERIFY(window.Window().isVisible());
+    QCOMPARE(window.Messages().filter("recording is running").size(), 1);
+  }
+  QVERIFY(window.Answer("Stay"));
+  QVERIFY(!window.HasMessage("recording is running"));
+  QVERIFY(window.Part<OutputPanel>("outputPanel")->IsRecording());
+  window.Move(Qt::Key_Right);
+  QVERIFY(!window.Window().close());
+  QVERIFY(window.Answer("End it and close"));
+  QTRY_VERIFY(!window.Window().isVisible());
+  QCOMPARE(Folder().entryList({"*.igs.mha"}).size(), 1); // all of it
+  QVERIFY(Folder().entryList({"*.igs.mhd", "*.igs.raw"}).isEmpty());
+  // With nothing at stake it closes at once.
+  SimulatorUnderTest other;
+  QVERIFY(other.Open({Folder().filePath("body.mha")}));
+  QVERIFY(other.Window().close());
 }
 
 void TestSimulator::thePicturesOfTheManual()
