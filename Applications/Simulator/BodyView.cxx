@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "BodyView.h"
+#include "Core/Base/ElapsedTime.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Messages.h"
 #include "Redraw.h"
 #include "Scan.h"
+#include <algorithm>
 #include <cmath>
 #include <QMouseEvent>
 #include <QVBoxLayout>
@@ -33,7 +35,8 @@ namespace echorama {
 
 namespace {
 
-constexpr int BodyMs = 40;                     ///< between pictures of the body: the image comes first
+constexpr int BodyMs = 40, MostBodyMs = 250;   ///< between pictures of the body: the image comes first
+constexpr double BodyShare = 0.2;              ///< of the time, that pictures of the body may take where drawing is slow
 constexpr double DegreesPerPixel = 0.3;        ///< of a drag
 constexpr double LeastSlope = 0.05;            ///< of the sight to the skin
 constexpr int MostSteps = 6;                   ///< for one motion of the mouse, until the probe is under it
@@ -80,7 +83,8 @@ vtkSmartPointer<vtkPolyData> SurfaceOfProbe(const ProbeGeometry& probe)
 
 } // namespace
 
-BodyView::BodyView(Scan* scan, QWidget* parent) : QWidget(parent), scan_(scan), canvas_(new QVTKOpenGLNativeWidget(this))
+BodyView::BodyView(Scan* scan, QWidget* parent)
+  : QWidget(parent), scan_(scan), canvas_(new QVTKOpenGLNativeWidget(this)), waitMs_(BodyMs)
 {
   setObjectName("bodyView");
   canvas_->setObjectName("bodyCanvas");
@@ -127,8 +131,8 @@ BodyView::BodyView(Scan* scan, QWidget* parent) : QWidget(parent), scan_(scan), 
   layout->addWidget(canvas_);
   redraw_ = new Redraw(this, [this] { DrawNow(); });
   connect(scan, &Scan::SubjectChanged, this, &BodyView::ShowSubject);
-  connect(scan, &Scan::ProbeMoved, this, [this] { redraw_->Ask(BodyMs); });
-  connect(scan, &Scan::FrameMade, this, [this] { redraw_->Ask(BodyMs); });
+  connect(scan, &Scan::ProbeMoved, this, [this] { redraw_->Ask(waitMs_); });
+  connect(scan, &Scan::FrameMade, this, [this] { redraw_->Ask(waitMs_); });
 }
 
 BodyView::~BodyView()
@@ -214,7 +218,9 @@ void BodyView::DrawNow()
   ShowProbe();
   ShowImage();
   renderer_->ResetCameraClippingRange();
+  const Clock::time_point start = Clock::now();
   canvas_->renderWindow()->Render();
+  waitMs_ = std::clamp(static_cast<int>(1e3 * SecondsSince(start) / BodyShare), BodyMs, MostBodyMs);
 }
 
 QPointF BodyView::ToCanvas(const double world[3]) const

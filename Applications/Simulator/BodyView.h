@@ -54,6 +54,7 @@ private:
   vtkNew<vtkImageSliceMapper> imageMapper_;
   vtkNew<vtkImageSlice> image_;
   Redraw* redraw_;
+  int waitMs_;         ///< until what has changed is drawn
   QString shownProbe_; ///< what the probe's surface was made for
   QPoint last_;
   QPointF grabbed_; ///< from the probe to where it was taken

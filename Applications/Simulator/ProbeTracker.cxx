@@ -74,6 +74,10 @@ ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_
   timer_->setInterval(PollMs);
   connect(timer_, &QTimer::timeout, this, &ProbeTracker::Step);
   connect(scan_, &Scan::SubjectChanged, this, &ProbeTracker::GiveNormals);
+  connect(scan, &Scan::PoseWanted, this, [this] {
+    if (timer_->isActive())
+      Step();
+  });
   Step();
 }
 

@@ -24,6 +24,8 @@ public:
   explicit ProbeTracker(Scan* scan, QWidget* parent = nullptr);
   ~ProbeTracker() override;
 
+  vtkUltrasoundTrackerSource* Tracker() { return tracker_; }
+
 private:
   void ConnectOrNot();
   QString Device() const;

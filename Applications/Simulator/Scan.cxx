@@ -345,6 +345,7 @@ void Scan::Ask()
 
 void Scan::MakeNow()
 {
+  emit PoseWanted();
   redraw_->Stop();
   if (subject_.IsEmpty() || isFrozen_)
     return;

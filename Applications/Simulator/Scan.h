@@ -127,6 +127,7 @@ public:
 
 signals:
   void SubjectChanged();
+  void PoseWanted(); ///< an image is about to be made: whoever leads the probe says where it is by now
   void ProbeMoved();
   void ControlsChanged();
   void FrameMade(); ///< whoever shows it does so at once: the time until then is the latency

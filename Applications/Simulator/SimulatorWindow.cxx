@@ -26,7 +26,6 @@
 #include <QDockWidget>
 #include <QFileDialog>
 #include <QFileInfo>
-#include <QHBoxLayout>
 #include <QLabel>
 #include <QMenuBar>
 #include <QPointer>
@@ -79,15 +78,15 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
   auto* rightLayout = new QVBoxLayout(right);
   rightLayout->setContentsMargins(0, 0, 0, 0);
   rightLayout->setSpacing(1);
-  auto* images = new QHBoxLayout;
-  images->setSpacing(1);
-  images->addWidget(image_, 1);
-  images->addWidget(solution_, 1);
+  images_ = new QBoxLayout(QBoxLayout::TopToBottom);
+  images_->setSpacing(1);
+  images_->addWidget(image_, 1);
+  images_->addWidget(solution_, 1);
   solution_->setObjectName("solutionView");
   solution_->setAccessibleName(tr("Solution"));
   solution_->SetCorner(tr("SOLUTION"));
   solution_->hide();
-  rightLayout->addLayout(images, 1);
+  rightLayout->addLayout(images_, 1);
   rightLayout->addWidget(cine_);
   views_->addWidget(body_);
   views_->addWidget(right);
@@ -433,6 +432,8 @@ void SimulatorWindow::dropEvent(QDropEvent* event)
 
 void SimulatorWindow::ShowSolution(const PlanePicture* picture)
 {
+  const QRect room = images_->geometry();
+  images_->setDirection(room.width() > 1.4 * room.height() ? QBoxLayout::LeftToRight : QBoxLayout::TopToBottom);
   solution_->setVisible(picture != nullptr);
   solution_->SetPicture(picture ? *picture : PlanePicture());
 }

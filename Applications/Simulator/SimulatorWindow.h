@@ -4,6 +4,7 @@
 #include <QMainWindow>
 #include <QStringList>
 
+class QBoxLayout;
 class QLabel;
 class QMenu;
 class QSplitter;
@@ -67,6 +68,7 @@ private:
   ImageView *image_, *solution_;
   CineBar* cine_;
   QSplitter* views_;
+  QBoxLayout* images_;
   OutputPanel* outputs_ = nullptr;
   TaskPanel* tasks_ = nullptr;
   QLabel* readout_;
