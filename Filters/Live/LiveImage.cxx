@@ -138,6 +138,12 @@ void LiveImage::SetBeams(const Volume<float>& value)
   realShare_ = 1.0;
 }
 
+NeedleSight LiveImage::DrawNeedle(const NeedleLook& look, const Needle& needle, const Pose& probeToWorld)
+{
+  return echorama::DrawNeedle(look, needle, {geometry_, probeToWorld}, thickness_, parameters_.controls, value_.View(),
+                              content_.View());
+}
+
 void LiveImage::MakePixels(VolumeView<unsigned char> intensity, VolumeView<unsigned char> valid,
                            VolumeView<unsigned char> label) const
 {

@@ -5,6 +5,7 @@
 #include "Filters/Live/FanTable.h"
 #include "Filters/Live/LiveProbe.h"
 #include "Filters/Live/MachineControls.h"
+#include "Filters/Live/Needle.h"
 #include <memory>
 #include <optional>
 #include <tuple>
@@ -48,6 +49,9 @@ public:
 
   /// Takes greys from elsewhere, 0 to 255, all of them data; nothing is developed. \throws Error(BadInput) for another plane
   void SetBeams(const Volume<float>& value);
+
+  /// Draws a needle into these beams, by the thickness and the controls of the image. \throws as echorama::DrawNeedle
+  NeedleSight DrawNeedle(const NeedleLook& look, const Needle& needle, const Pose& probeToWorld);
 
   /// The beams of the last MakeBeams() or SetBeams(), samples x beams x 1: greys from 0 to 255, and what they are made of
   /// (BeamContent).

@@ -5,6 +5,11 @@
 #include <cmath>
 
 namespace echorama {
+namespace {
+
+constexpr double hardKPa = 1e5; // cartilage and calcified walls are softer, bone and plastic stiffer
+
+} // namespace
 
 ParameterList Describe(LiveSceneParameters& p)
 {
@@ -56,9 +61,16 @@ SliceThickness SceneThickness(const LiveImageParameters& p)
 
 const Material* LiveScene::HardMaterialAt(const Eigen::Vector3d& point) const
 {
-  constexpr double hardest = 4e6; // Rayl: of soft tissue and plastics at most 3e6, of bone and stones above 6e6
-  const Material& material = scene_.Materials()[static_cast<std::size_t>(scene_.MediumOf(scene_.BodiesAt(point)))];
-  return material.soundSpeed * material.density > hardest ? &material : nullptr;
+  const Eigen::Vector3f place = point.cast<float>();
+  std::int32_t index = 0;
+  scene_.MediumAt(&place, 1, &index);
+  const Material& material = scene_.Materials()[static_cast<std::size_t>(index)];
+  return material.youngsModulusKPa > hardKPa ? &material : nullptr;
+}
+
+NeedleObstacle LiveScene::Hard() const
+{
+  return [this](const Eigen::Vector3d& point) { return HardMaterialAt(point) != nullptr; };
 }
 
 Volume<float> LiveScene::MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress,

@@ -3,6 +3,7 @@
 #include "Filters/Acoustics/ProgressiveSlice.h"
 #include "Filters/Acoustics/SliceTracer.h"
 #include "Filters/Live/LiveImage.h"
+#include "Filters/Live/NeedlePath.h"
 
 namespace echorama {
 
@@ -44,12 +45,14 @@ public:
   Volume<float> MakeBeams(const SynthesisParameters& settings, const LiveSceneParameters& p, const Progress& progress = {},
                           const SliceThickness& thickness = {}, const BeamBend* bend = nullptr);
 
+  /// What a needle cannot pass: materials stiffer than 100 MPa, as bone, stones and steel. For as long as the scene lives.
+  NeedleObstacle Hard() const;
+
   /// Of the last picture: how much of the beams has contact, and how much meets a body; 0 to 1.
   double ContactShare() const { return contactShare_; }
   double SeenShare() const { return seenShare_; }
 
-  /// The material at a point of the world, if it is as hard as bone (impedance above 4 MRayl): no probe can be there. nullptr:
-  /// it is soft.
+  /// The material at a point of the world, if it is one that Hard() is of: no probe can be there either. nullptr: it is soft.
   const Material* HardMaterialAt(const Eigen::Vector3d& point) const;
 
 private:

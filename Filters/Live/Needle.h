@@ -17,6 +17,7 @@ struct Needle {
 
   /// Of a tool's pose: the tip is its origin, the direction its z axis. \throws Error(BadInput) when it is not rigid
   static Needle Of(const Pose& toolToWorld);
+  Pose ToWorld() const; ///< such a pose
   /// \throws Error(BadInput) when it is not finite, or the direction is no unit vector
   void Check() const;
 };
@@ -46,9 +47,6 @@ struct NeedleSight {
   double tipOffPlaneMm = 0.0;      ///< along y of the probe
   std::optional<BeamPoint> tip;    ///< where a mark belongs: only when it may be shown, and is in the plane
 };
-
-/// What a plane would see of a needle. \throws as DrawNeedle
-NeedleSight SeeNeedle(const NeedleLook& look, const Needle& needle, const PlacedProbe& probe, const BeamThickness& thickness);
 
 /// Draws a needle into the beams of a plane: greys from 0 to 255 as BeamDevelopment makes them (samples x beams x 1, evenly over
 /// depths and fan). It is bright where it crosses the thickness of the plane, by the Gaussian of the image itself; fades away

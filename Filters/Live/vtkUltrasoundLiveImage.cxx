@@ -7,6 +7,7 @@
 #include "vtkUltrasoundDeformGeometry.h"
 #include "vtkUltrasoundTissue.h"
 
+#include "vtkExecutive.h"
 #include "vtkDataArray.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
@@ -19,6 +20,7 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <algorithm>
+#include <cmath>
 
 using echorama::Error;
 
@@ -59,12 +61,29 @@ vtkUltrasoundLiveImage::~vtkUltrasoundLiveImage() = default;
 echorama::ParameterList vtkUltrasoundLiveImage::Parameters()
 {
   using echorama::Parameter;
+  echorama::ParameterList look = Describe(this->Look);
+  for (Parameter& parameter : look) {
+    if (parameter.whenName.empty()) {
+      parameter.When("Needle", "on");
+    }
+  }
   return echorama::Join(
       {{Parameter("Position", this->Place, {}, "mm", "Where the middle of the probe's face lies in the world."),
         Parameter("Orientation", this->Turn, {}, "degrees",
                   "How the probe is turned: axis times angle. (0, 0, 0): it looks along +z, the fan along x.")},
        Describe(this->SceneValues),
        Describe(this->Values),
+       {Parameter("Needle", this->HasNeedle, "Whether there is a needle. It is drawn only where it crosses the plane."),
+        Parameter("NeedleTip", this->NeedlePlace, {}, "mm", "Where its tip lies in the world.").When("Needle", "on"),
+        Parameter("NeedleDirection", this->NeedleWay, {}, "",
+                  "The way it goes in, in the world; of any length but 0. The shaft lies behind the tip.")
+            .When("Needle", "on"),
+        Parameter("NeedleStops", this->NeedleIsStopped, "Whether bone stops it when it is advanced (AdvanceNeedle).")
+            .When("Needle", "on"),
+        Parameter("NeedleStopLevel", this->NeedleLevel, {0, 1}, "",
+                  "Of volumes: what is brighter than this, averaged over 1.5 mm, is bone. 0 is black, 1 white.")
+            .When("NeedleStops", "on")},
+       look,
        {Parameter("Frame", this->FrameNumber, {0, 9223372036854775807.0}, "", "The number of the frame, which chooses its noise.")
             .When("NoiseMoves", "on")
             .Advanced(),
@@ -98,6 +117,62 @@ bool vtkUltrasoundLiveImage::SetProbeToWorld(vtkMatrix4x4* probeToWorld)
 void vtkUltrasoundLiveImage::GetProbeToWorld(vtkMatrix4x4* probeToWorld)
 {
   vtkUltrasoundVolume::SetMatrix(probeToWorld, this->OwnPose());
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundLiveImage::SetNeedleToWorld(vtkMatrix4x4* needleToWorld)
+{
+  const auto pose = needleToWorld ? vtkUltrasoundVolume::RigidPoseOf(needleToWorld) : std::nullopt;
+  if (!pose || !pose->matrix().allFinite()) {
+    vtkErrorMacro("NeedleToWorld is not a rigid transform of finite numbers; the needle was not moved");
+    return false;
+  }
+  const echorama::Needle needle = echorama::Needle::Of(*pose);
+  this->NeedlePlace = needle.tip;
+  this->NeedleWay = needle.direction;
+  this->Modified();
+  return true;
+}
+
+//----------------------------------------------------------------------------
+echorama::Needle vtkUltrasoundLiveImage::NeedleNow() const
+{
+  const double length = this->NeedleWay.norm();
+  if (!(length > 0.0) || !std::isfinite(length) || !this->NeedlePlace.allFinite()) {
+    throw Error(Error::Kind::InvalidParameter, "NeedleTip must be finite, and NeedleDirection finite and not (0, 0, 0)");
+  }
+  return {this->NeedlePlace, this->NeedleWay / length};
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundLiveImage::AdvanceNeedle(double mm)
+{
+  double moved = 0.0;
+  vtkUltrasoundVolume::Run(this, nullptr, [this, mm, &moved](const echorama::Progress&) {
+    echorama::CheckRanges(this->Parameters());
+    const echorama::Needle needle = this->NeedleNow();
+    echorama::NeedleObstacle bone;
+    if (this->NeedleIsStopped && mm > 0.0) {
+      const bool isVolumes = this->SceneValues.source == echorama::LiveSource::Volumes;
+      const int port = isVolumes ? 0 : 1;
+      for (int input = 0; input < this->GetNumberOfInputConnections(port); ++input) {
+        this->GetInputAlgorithm(port, input)->Update();
+      }
+      vtkInformationVector* inputs = this->GetExecutive()->GetInputInformation(port);
+      bool hasLabels = false;
+      if (isVolumes) {
+        const echorama::MachineControls& greys = this->Values.controls;
+        bone = echorama::BrighterThan(this->VolumesOf(inputs, hasLabels),
+                                      greys.black + this->NeedleLevel * (greys.white - greys.black));
+      } else if (const echorama::LiveScene* scene = this->SceneOf(inputs)) {
+        bone = scene->Hard();
+      }
+    }
+    moved = echorama::AdvanceTip(needle.tip, needle.tip + mm * needle.direction, bone).freeMm * (mm < 0.0 ? -1.0 : 1.0);
+    this->NeedlePlace = needle.tip + moved * needle.direction;
+    this->Modified();
+  });
+  return moved;
 }
 
 //----------------------------------------------------------------------------
@@ -177,6 +252,7 @@ int vtkUltrasoundLiveImage::RequestData(vtkInformation* request, vtkInformationV
   this->SeenShare = 0.0;
   this->ContactShare = 1.0;
   this->HardMaterial.clear();
+  this->Sight = {};
   return this->Superclass::RequestData(request, inputs, outputs);
 }
 
@@ -295,6 +371,9 @@ void vtkUltrasoundLiveImage::Execute(vtkInformationVector** inputs, vtkImageData
   } else {
     this->Image.MakeBeams(echorama::BeamVolumes(), pose); // of nothing
   }
+  if (this->HasNeedle) {
+    this->Sight = this->Image.DrawNeedle(this->Look, this->NeedleNow(), pose);
+  }
   progress(0.5);
 
   output->Initialize(); // the pipeline has passed on what the first volume says of itself
@@ -340,5 +419,5 @@ void vtkUltrasoundLiveImage::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   vtkUltrasoundParameters::Print(os, indent, this->Parameters());
   os << indent << "State: " << this->State << "\n" << indent << "SeenShare: " << this->SeenShare << "\n";
-  os << indent << "ContactShare: " << this->ContactShare << "\n";
+  os << indent << "ContactShare: " << this->ContactShare << "\n" << indent << "NeedleSeenMm: " << this->Sight.seenMm << "\n";
 }

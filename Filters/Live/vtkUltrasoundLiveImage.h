@@ -23,6 +23,10 @@
  * Output 1, when BeamsOutput is on: the beams before scan conversion (samples along x, beams along y, see
  * vtkUltrasoundScanConverter), `Intensity` float from 0 to 255.
  *
+ * With Needle a straight needle is a second tool, with its own place: drawn where it crosses the thickness of the plane, and
+ * nowhere else. GetNeedleState() tells what the plane has of it, and AdvanceNeedle() moves it along its axis, until bone stops
+ * it.
+ *
  * The volumes are read along the beams, averaged over the thickness of the plane, developed into greys by the controls, and
  * scan-converted. What only the volumes, the probe or the controls change is kept, so that a new pose costs one image.
  *
@@ -62,6 +66,20 @@ public:
   bool SetProbeToWorld(vtkMatrix4x4* probeToWorld);
   void GetProbeToWorld(vtkMatrix4x4* probeToWorld);
   ///@}
+
+  /**
+   * NeedleTip and NeedleDirection as those of a tracked tool: the tip is its origin, its z axis the way the needle goes in. One
+   * that is not rigid and finite is refused with an error event, and the needle stays; setting returns whether it was taken.
+   */
+  bool SetNeedleToWorld(vtkMatrix4x4* needleToWorld);
+
+  /**
+   * Moves the needle along its axis: NeedleTip becomes another. With NeedleStops it goes in (not out) no further than to bone: of
+   * a scene to materials stiffer than 100 MPa, of volumes to what is brighter than NeedleStopLevel over 1.5 mm. The inputs are
+   * brought up to date. Returns how far it went, in mm; less than was asked for when it was stopped, and 0 after an error event
+   * when it cannot be told.
+   */
+  double AdvanceNeedle(double mm);
 
   /**
    * Takes the field data `ProbeGeometry` of \a data as the custom probe (of a probe that sweeps, its middle plane). Returns
@@ -333,6 +351,66 @@ public:
   /** Whether left and right are exchanged: the first pixel of a row then lies towards +x of the probe. Default off. */
   vtkUltrasoundSwitchMacro(Flip);
 
+  /** Whether there is a needle. It is drawn only where it crosses the plane. Default off. */
+  vtkUltrasoundSwitchMacro(Needle);
+
+  /** Where its tip lies in the world. Used when Needle is on. In mm; default (0, 0, 0). */
+  vtkUltrasoundVectorMacro(NeedleTip);
+
+  /**
+   * The way it goes in, in the world; of any length but 0. The shaft lies behind the tip. Used when Needle is on. Default (0, 0,
+   * 1).
+   */
+  vtkUltrasoundVectorMacro(NeedleDirection);
+
+  /** Whether bone stops it when it is advanced (AdvanceNeedle). Used when Needle is on. Default off. */
+  vtkUltrasoundSwitchMacro(NeedleStops);
+
+  /**
+   * Of volumes: what is brighter than this, averaged over 1.5 mm, is bone. 0 is black, 1 white. Used when NeedleStops is on. In
+   * [0, 1]; default 0.85.
+   */
+  vtkUltrasoundNumberMacro(NeedleStopLevel);
+
+  /** Length of the needle's shaft. Used when Needle is on. In [1, 1000] mm; default 150. */
+  vtkUltrasoundNumberMacro(NeedleLengthMm);
+
+  /** Echo of the needle, square to the beam, relative to white. Used when Needle is on. In [-60, 60] dB; default 6. */
+  vtkUltrasoundNumberMacro(NeedleEchoDb);
+
+  /**
+   * How far from square to the beam the needle may be until its echo has faded to 61%. Used when Needle is on. In [0.1, 90]
+   * degrees; default 12.
+   */
+  vtkUltrasoundNumberMacro(NeedleMirrorDegrees);
+
+  /** Echo of the needle at any angle, relative to white. Used when Needle is on. In [-90, 60] dB; default -28. */
+  vtkUltrasoundNumberMacro(NeedleRoughDb);
+
+  /** Width of the needle's echo across the beams. Used when Needle is on. In [0.1, 20] mm; default 1.2. */
+  vtkUltrasoundNumberMacro(NeedleWidthMm);
+
+  /** Length of the needle's echo along the beams. Used when Needle is on. In [0.05, 20] mm; default 0.6. */
+  vtkUltrasoundNumberMacro(NeedlePulseMm);
+
+  /**
+   * Distance between the echoes within the needle that ring below it; 0: it does not ring. Used when Needle is on. In [0, 20] mm;
+   * default 1.5.
+   */
+  vtkUltrasoundNumberMacro(NeedleReverberationMm);
+
+  /** From one echo within the needle to the next. Used when Needle is on. In [-60, -1] dB; default -7. */
+  vtkUltrasoundNumberMacro(NeedleReverberationDb);
+
+  /** How much darker it is below the needle. Used when Needle is on. In [0, 60] dB; default 6. */
+  vtkUltrasoundNumberMacro(NeedleShadowDb);
+
+  /** Whether the tip echoes at any angle, and is marked. Used when Needle is on. Default off. */
+  vtkUltrasoundSwitchMacro(NeedleShowTip);
+
+  /** Echo of the tip, relative to white. Used when NeedleShowTip is on. In [-60, 60] dB; default 0. */
+  vtkUltrasoundNumberMacro(NeedleTipDb);
+
   /** The number of the frame, which chooses its noise. Used when NoiseMoves is on. At least 0; default 0. */
   vtkUltrasoundInteger64Macro(Frame);
 
@@ -378,6 +456,30 @@ public:
   }
   ///@}
 
+  enum NeedleStates { NO_NEEDLE = 0, NEEDLE_OUT_OF_PLANE = 1, NEEDLE_IN_PLANE = 2 };
+
+  ///@{
+  /** After an update: whether there is a needle in the image, by at least half of the plane's sensitivity, and how much of its
+   * shaft, in mm. Nothing of it is drawn where it is out of the plane. */
+  int GetNeedleState() const
+  {
+    return !this->HasNeedle ? NO_NEEDLE : this->Sight.seenMm > 0.0 ? NEEDLE_IN_PLANE : NEEDLE_OUT_OF_PLANE;
+  }
+  double GetNeedleSeenMm() const
+  {
+    return this->Sight.seenMm;
+  }
+  /** Of its tip: whether it is in the image, and how far it is from the middle of the plane, along y of the probe. */
+  bool GetNeedleTipInPlane() const
+  {
+    return this->Sight.tipInPlane;
+  }
+  double GetNeedleTipOffPlaneMm() const
+  {
+    return this->Sight.tipOffPlaneMm;
+  }
+  ///@}
+
 protected:
   vtkUltrasoundLiveImage();
   ~vtkUltrasoundLiveImage() override;
@@ -399,6 +501,13 @@ private:
   echorama::LiveImageParameters Values;
   echorama::LiveSceneParameters SceneValues;
   Eigen::Vector3d Place = Eigen::Vector3d::Zero(), Turn = Eigen::Vector3d::Zero(); // mm; axis times angle, degrees
+  echorama::Needle NeedleNow() const;                                              ///< \throws Error(InvalidParameter)
+
+  bool HasNeedle = false, NeedleIsStopped = false;
+  Eigen::Vector3d NeedlePlace = Eigen::Vector3d::Zero(), NeedleWay = Eigen::Vector3d::UnitZ();
+  double NeedleLevel = 0.85; // of bone, from black to white
+  echorama::NeedleLook Look;
+  echorama::NeedleSight Sight;
   std::int64_t FrameNumber = 0;
   bool PutsOutBeams = false;
   struct KeptVolumes; // that came in last, ready to be read

@@ -314,6 +314,19 @@ int main()
     const double seconds = benchmark::MedianSeconds(moving, 21), cpu = CpuSeconds(moving, benchmark::Trials(21));
     benchmark::ReportTime("live_image", "convex, 5 planes, one Update() of the filter", "echorama", seconds,
                           {{"cpu_seconds", cpu}, {"frames_per_second", 1.0 / seconds}, {"threads", threads}});
+    // A needle in a guide, 40 degrees to the face, that moves with the probe.
+    live->NeedleOn();
+    const auto withNeedle = [&] {
+      const Pose pose = PoseAt(step + 1);
+      const Eigen::Vector3d tip = pose * Eigen::Vector3d(10, 0, 60), way = pose.linear() * Eigen::Vector3d(0.766, 0, 0.643);
+      live->SetNeedleTip(tip[0], tip[1], tip[2]);
+      live->SetNeedleDirection(way[0], way[1], way[2]);
+      moving();
+    };
+    const double needleSeconds = benchmark::MedianSeconds(withNeedle, 21),
+                 needleCpu = CpuSeconds(withNeedle, benchmark::Trials(21));
+    benchmark::ReportTime("live_image", "convex, 5 planes, one Update() of the filter, with a needle", "echorama", needleSeconds,
+                          {{"cpu_seconds", needleCpu}, {"frames_per_second", 1.0 / needleSeconds}, {"threads", threads}});
   }
 #endif
   LiveImageParameters dense = usual;

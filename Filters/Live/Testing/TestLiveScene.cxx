@@ -196,14 +196,14 @@ TEST(LiveImage, TakesBeamsFromElsewhere)
   EXPECT_THROW(image.SetBeams(Volume<float>({200, 47, 1})), Error);
 }
 
-// Bone and its like are hard, whatever they are called; soft tissue, air and plastics are not.
+// Bone and its like are hard, whatever they are called, and so are plastics; soft tissue and air are not.
 TEST(LiveScene, TellsWhereNoProbeCanBe)
 {
   TissueSurface body = Body();
   const LiveScene soft(body);
   for (const Vector3d& at : {Vector3d(0, 0, -5), Vector3d(0, 0, 5), Vector3d(0, 0, 40)})
     EXPECT_EQ(soft.HardMaterialAt(at), nullptr) << at.transpose();
-  for (const char* hard : {"bone", "stone", "steel"}) {
+  for (const char* hard : {"bone", "stone", "steel", "plastic"}) {
     Material material = StandardMaterial(hard);
     material.name = "thing";
     body.materials[static_cast<std::size_t>(body.bodies.back().material)] = material;
@@ -212,8 +212,20 @@ TEST(LiveScene, TellsWhereNoProbeCanBe)
     EXPECT_EQ(scene.HardMaterialAt({0, 0, 40})->name, "thing");
     EXPECT_EQ(scene.HardMaterialAt({0, 0, 20}), nullptr);
   }
-  for (const char* other : {"plastic", "nylon", "skin", "air"}) {
+  for (const char* other : {"vessel-wall", "skin", "blood", "air"}) {
     body.materials[static_cast<std::size_t>(body.bodies.back().material)] = StandardMaterial(other);
     EXPECT_EQ(LiveScene(body).HardMaterialAt({0, 0, 40}), nullptr) << other;
   }
+}
+
+TEST(LiveScene, ANeedleStopsAtBoneAndGoesThroughSoftTissue)
+{
+  TissueSurface surface = Body();
+  surface.bodies.back().material = surface.MaterialIndex(StandardMaterial("bone")); // the ball: 32 mm to 48 mm below the skin
+  const LiveScene scene(surface), soft(Body());
+  const NeedleAdvance advance = AdvanceTip({0, 0, -5}, {0, 0, 60}, scene.Hard());
+  EXPECT_TRUE(advance.stopped);
+  EXPECT_NEAR(advance.freeMm, 37.0, 0.1);
+  EXPECT_FALSE(AdvanceTip({12, 0, -5}, {12, 0, 60}, scene.Hard()).stopped);
+  EXPECT_FALSE(AdvanceTip({0, 0, -5}, {0, 0, 60}, soft.Hard()).stopped);
 }

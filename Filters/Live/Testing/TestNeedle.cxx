@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Parallel.h"
+#include "Filters/Live/LiveProbe.h"
 #include "Filters/Live/Needle.h"
 #include "Filters/Live/NeedlePath.h"
 #include <cmath>
@@ -209,6 +211,96 @@ TEST(Needle, TipIsShownOnlyWhenAllowed)
   EXPECT_FALSE(shown.Draw({0, 3, 50}, steep).tip); // out of the plane
 }
 
+TEST(Needle, IsTheStrongestOfManyFinePoints)
+{
+  // A fan, and a needle whose angle to the beams goes from nearly square to nearly along them.
+  const PlacedProbe probe{ProbeGeometry::Convex(1.2, 50.0, 0.0, 50.0, 0.0, 100.0), Pose::Identity()};
+  constexpr int samples = 401, beams = 97;
+  const double sigma = 0.42466090014400953, sampleMm = 100.0 / (samples - 1);
+  NeedleLook look;
+  look.echoDb = -4.0;
+  look.roughDb = -20.0;
+  look.reverberationMm = look.shadowDb = 0.0;
+  look.lengthMm = 120.0;
+  for (const double degrees : {3.0, 40.0, 80.0}) {
+    const double angle = degrees * RadiansPerDegree;
+    const Needle needle{{8, 0, 70}, {std::cos(angle), 0, std::sin(angle)}};
+    Volume<float> value({samples, beams, 1}, 0.0f), reference({samples, beams, 1}, -60.0f);
+    DrawNeedle(look, needle, probe, {}, {}, value.View());
+    for (double passed = 0.0; passed <= look.lengthMm; passed += 0.02) {
+      const auto at = BeamPointAt(probe.geometry, needle.tip - passed * needle.direction);
+      if (!at)
+        continue;
+      const double off = std::asin(needle.direction.dot(DirectionOf(probe.geometry, *at))) * DegreesPerRadian / 12.0;
+      const double level = std::max(-4.0 - 10.0 / std::log(10.0) * off * off, -20.0);
+      const double beamMm = probe.geometry.Fan().Span(at->depth) / (beams - 1), width = std::max(1.2 * sigma, 0.5 * beamMm);
+      for (int b = 0; b < beams; ++b) {
+        const double aside = (b - (at->fan + 0.5) * (beams - 1)) * beamMm / width;
+        for (int s = 0; s < samples && std::abs(aside) < 3.0; ++s) {
+          const double below = (s * sampleMm - at->depth) / (0.6 * sigma);
+          float& best = reference.View()(s, b, 0);
+          if (std::abs(below) < 3.0)
+            best = std::max(best, static_cast<float>(level - 10.0 / std::log(10.0) * (aside * aside + below * below)));
+        }
+      }
+    }
+    int bright = 0;
+    for (std::ptrdiff_t n = 0; n < value.View().Size(); ++n) {
+      const double expected = 255.0 * std::max(0.0, 1.0 + reference.View()[n] / 60.0);
+      if (reference.View()[n] < -30.0) // 10 dB or more below the ridge, where half a dB is less than can be seen
+        continue;
+      // To half a dB.
+      ASSERT_NEAR(value.View()[n], expected, 2.0) << degrees << " degrees, beam " << n / samples << ", sample " << n % samples;
+      ++bright;
+    }
+    EXPECT_GT(bright, 200);
+    for (std::ptrdiff_t n = 0; n < value.View().Size(); ++n)
+      ASSERT_TRUE(value.View()[n] < 100.0f || reference.View()[n] > -42.0f) << "nothing is bright where no point is";
+  }
+}
+
+TEST(Needle, CrossesTheSeamOfAFanThatLooksAllRound)
+{
+  LiveProbeSettings settings;
+  settings.kind = LiveProbe::Radial;
+  constexpr int samples = 200, beams = 64;
+  const PlacedProbe probe{GeometryOf(settings, beams), Pose::Identity()};
+  const double radius = probe.geometry.fanWidth / probe.geometry.fanAngle;
+  // The seam lies straight behind the middle of the catheter, which is at z = -radius; in front of it is the middle of the fan.
+  Volume<float> behind({samples, beams, 1}, 40.0f), before = behind;
+  const NeedleSight seen = DrawNeedle({}, {{7, 0, -radius - 12}, {1, 0, 0}}, probe, {}, {}, behind.View());
+  const NeedleSight same = DrawNeedle({}, {{-7, 0, -radius + 12}, {-1, 0, 0}}, probe, {}, {}, before.View());
+  EXPECT_NEAR(seen.seenMm, same.seenMm, 1e-9);
+  double brightest = 0.0;
+  for (int b = 0; b < beams; ++b)
+    for (int s = 0; s < samples; ++s) {
+      ASSERT_NEAR(behind.View()(s, b, 0), before.View()(s, (b + beams / 2) % beams, 0), 0.01) << b << " " << s;
+      if (b == 0 || b == beams - 1)
+        brightest = std::max<double>(brightest, behind.View()(s, b, 0));
+    }
+  EXPECT_GT(brightest, 200.0);
+  // A tip between the last beam and the first is in the plane, too.
+  NeedleLook shown;
+  shown.showTip = true;
+  EXPECT_TRUE(DrawNeedle(shown, {{0, 0, -radius - 12}, {1, 0, 0}}, probe, {}, {}, behind.View()).tip);
+  // A fan that does not close has an end there.
+  PlacedProbe open = probe;
+  open.geometry.fanAngle *= 0.9;
+  open.geometry.fanWidth *= 0.9;
+  EXPECT_FALSE(DrawNeedle(shown, {{0, 0, -radius - 12}, {1, 0, 0}}, open, {}, {}, behind.View()).tip);
+}
+
+TEST(Needle, IsTheSameOnAnyNumberOfThreads)
+{
+  Bench one, many;
+  {
+    const ThreadLimit limit(1);
+    one.Draw({10, 0.2, 40}, {1, 0.01, 0.1});
+  }
+  many.Draw({10, 0.2, 40}, {1, 0.01, 0.1});
+  EXPECT_TRUE(std::equal(one.value.View().begin(), one.value.View().end(), many.value.View().begin()));
+}
+
 TEST(Needle, IsNotDrawnWhereThereIsNoImage)
 {
   Bench bench;
@@ -272,6 +364,28 @@ TEST(NeedlePath, StopsAtBone)
   EXPECT_THROW(AdvanceTip({0, 0, notANumber}, {0, 0, 20}, bone), Error);
   EXPECT_THROW(AdvanceTip({0, 0, 0}, {0, 0, 2000}, bone), Error);
   EXPECT_THROW(AdvanceTip({0, 0, 0}, {0, 0, 20}, bone, 0.0), Error);
+}
+
+TEST(NeedlePath, StopsWhereAVolumeIsBrightButNotAtItsGrain)
+{
+  // 1 mm voxels: tissue of 90 with single white voxels, and bone of 240 from z = 30 on.
+  Volume<unsigned char> voxels({40, 40, 60}, 90);
+  for (int k = 0; k < 60; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 40; ++i)
+        if (k >= 30 || (i % 4 == 0 && j % 4 == 0 && k % 4 == 0))
+          voxels.View()(i, j, k) = k >= 30 ? 240 : 255;
+  ImageGeometry grid;
+  grid.dimensions = voxels.Dimensions();
+  BeamVolumes volumes;
+  volumes.Add<unsigned char>({voxels.View(), {}, grid});
+  const NeedleObstacle bone = BrighterThan(volumes, 200.0);
+  const NeedleAdvance advance = AdvanceTip({20, 20, -10}, {20, 20, 50}, bone); // through the white voxels, from outside
+  EXPECT_TRUE(advance.stopped);
+  EXPECT_NEAR(advance.freeMm, 39.7, 0.5); // linear from 90 at 29 mm to 240 at 30 mm: 200 at 29.7 mm
+  EXPECT_FALSE(AdvanceTip({20, 20, -10}, {20, 20, 28}, bone).stopped);
+  EXPECT_FALSE(AdvanceTip({100, 20, -10}, {100, 20, 50}, bone).stopped); // beside it
+  EXPECT_THROW(BrighterThan(volumes, 200.0, 0.0), Error);
 }
 
 TEST(NeedleTrack, CountsTurnsWithinTheBodyOnly)
