@@ -3,14 +3,18 @@
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Messages.h"
+#include "NeedleTool.h"
+#include "NeedleView.h"
 #include "Redraw.h"
 #include "Scan.h"
 #include <algorithm>
 #include <cmath>
+#include <QLineF>
 #include <QMouseEvent>
 #include <QVBoxLayout>
 #include <QVTKInteractor.h>
 #include <QVTKOpenGLNativeWidget.h>
+#include <QWheelEvent>
 #include <vtkActor.h>
 #include <vtkCamera.h>
 #include <vtkCylinderSource.h>
@@ -35,9 +39,10 @@ namespace echorama {
 
 namespace {
 
-constexpr int BodyMs = 40, MostBodyMs = 250;   ///< between pictures of the body: the image comes first
-constexpr double BodyShare = 0.2;              ///< of the time, that pictures of the body may take where drawing is slow
-constexpr double DegreesPerPixel = 0.3;        ///< of a drag
+constexpr int BodyMs = 40, MostBodyMs = 250; ///< between pictures of the body: the image comes first
+constexpr double BodyShare = 0.2;            ///< of the time, that pictures of the body may take where drawing is slow
+constexpr double DegreesPerPixel = 0.3;      ///< of a drag
+constexpr double AdvancePerPixel = 0.2, NeedlePixels = 7.0;
 constexpr double LeastSlope = 0.05;            ///< of the sight to the skin
 constexpr int MostSteps = 6;                   ///< for one motion of the mouse, until the probe is under it
 constexpr double MostMm = 20.0, CloseMm = 0.2; ///< of a step; when it is
@@ -83,8 +88,8 @@ vtkSmartPointer<vtkPolyData> SurfaceOfProbe(const ProbeGeometry& probe)
 
 } // namespace
 
-BodyView::BodyView(Scan* scan, QWidget* parent)
-  : QWidget(parent), scan_(scan), canvas_(new QVTKOpenGLNativeWidget(this)), waitMs_(BodyMs)
+BodyView::BodyView(Scan* scan, NeedleTool* needle, QWidget* parent)
+  : QWidget(parent), scan_(scan), needle_(needle), canvas_(new QVTKOpenGLNativeWidget(this)), waitMs_(BodyMs)
 {
   setObjectName("bodyView");
   canvas_->setObjectName("bodyCanvas");
@@ -117,6 +122,7 @@ BodyView::BodyView(Scan* scan, QWidget* parent)
   image_->SetMapper(imageMapper_);
   image_->GetProperty()->SetInterpolationTypeToLinear();
   image_->SetVisibility(false);
+  needleView_ = std::make_unique<NeedleView>(renderer_);
   marks_->SetMapper(marksMapper_);
   marks_->GetProperty()->SetColor(0.98, 0.86, 0.35);
   marks_->GetProperty()->SetLineWidth(3.0);
@@ -132,6 +138,7 @@ BodyView::BodyView(Scan* scan, QWidget* parent)
   redraw_ = new Redraw(this, [this] { DrawNow(); });
   connect(scan, &Scan::SubjectChanged, this, &BodyView::ShowSubject);
   connect(scan, &Scan::ProbeMoved, this, [this] { redraw_->Ask(waitMs_); });
+  connect(needle, &NeedleTool::Changed, this, [this] { redraw_->Ask(waitMs_); });
   connect(scan, &Scan::FrameMade, this, [this] { redraw_->Ask(waitMs_); });
 }
 
@@ -217,6 +224,7 @@ void BodyView::DrawNow()
     return;
   ShowProbe();
   ShowImage();
+  ShowNeedle();
   renderer_->ResetCameraClippingRange();
   const Clock::time_point start = Clock::now();
   canvas_->renderWindow()->Render();
@@ -244,6 +252,40 @@ void BodyView::RayAt(const QPointF& at, double origin[3], double direction[3]) c
   for (int a = 0; a < 3; a++) {
     origin[a] = ends[0][a] / ends[0][3];
     direction[a] = ends[1][a] / ends[1][3] - origin[a];
+  }
+}
+
+void BodyView::ShowNeedle()
+{
+  ParameterList parameters = scan_->Scanner().Parameters();
+  needleView_->Show(*needle_, Named(parameters, "NeedleLengthMm").Number());
+}
+
+bool BodyView::IsOnNeedle(const QPointF& at) const
+{
+  if (!needle_->IsShown())
+    return false;
+  // What is outside of the body can be taken.
+  const QPointF hub = ToCanvas(needleView_->Hub().data()), way = ToCanvas(needle_->Entry().data()) - hub;
+  const double length2 = QPointF::dotProduct(way, way);
+  const double along = length2 > 0.0 ? std::clamp(QPointF::dotProduct(at - hub, way) / length2, 0.0, 1.0) : 0.0;
+  return QLineF(at, hub + along * way).length() <= NeedlePixels;
+}
+
+void BodyView::DragNeedle(const QPoint& to)
+{
+  const QPoint by = to - last_;
+  last_ = to;
+  const bool both = (dragKeys_ & Qt::ShiftModifier) && (dragKeys_ & Qt::ControlModifier);
+  if (!both && dragKeys_ & Qt::ShiftModifier) {
+    needle_->Steer(DegreesPerPixel * by.x(), DegreesPerPixel * by.y());
+  } else if (!both && dragKeys_ & Qt::ControlModifier) {
+    needle_->Advance(AdvancePerPixel * by.y());
+  } else {
+    Eigen::Vector3d origin, direction;
+    RayAt(to - grabbed_, origin.data(), direction.data());
+    if (const auto hit = scan_->HasSkin() ? scan_->Body().mesh->FirstHit(origin, direction) : std::nullopt)
+      needle_->PutEntry(scan_->Body().mesh->PointAt(hit->place));
   }
 }
 
@@ -291,14 +333,20 @@ bool BodyView::eventFilter(QObject* object, QEvent* event)
     isDragging_ = true;
     dragKeys_ = mouse->modifiers(); // what is begun is gone on with
     last_ = mouse->pos();
-    grabbed_ = last_ - ToCanvas(scan_->ProbeToWorld().translation().data());
+    isDraggingNeedle_ = needle_->IsShown() && (dragKeys_ == (Qt::ShiftModifier | Qt::ControlModifier) || IsOnNeedle(last_));
+    // The needle comes to the mouse, or stays under it; so does the probe.
+    grabbed_ = !isDraggingNeedle_  ? last_ - ToCanvas(scan_->ProbeToWorld().translation().data())
+               : IsOnNeedle(last_) ? last_ - ToCanvas(needle_->Entry().data())
+                                   : QPointF();
+    if (isDraggingNeedle_ && grabbed_.isNull())
+      DragNeedle(last_);
     canvas_->setFocus();
     return true;
   case QEvent::MouseMove:
     if (!isDragging_)
       break;
     if (mouse->buttons() & Qt::LeftButton)
-      Drag(mouse->pos());
+      isDraggingNeedle_ ? DragNeedle(mouse->pos()) : Drag(mouse->pos());
     else
       isDragging_ = false; // its release was lost
     return true;
@@ -307,6 +355,13 @@ bool BodyView::eventFilter(QObject* object, QEvent* event)
       break;
     isDragging_ = false;
     return true;
+  case QEvent::Wheel: {
+    auto* wheel = static_cast<QWheelEvent*>(event);
+    if (!IsOnNeedle(wheel->position()))
+      break;
+    needle_->Advance(wheel->angleDelta().y() / -120.0);
+    return true;
+  }
   case QEvent::MouseButtonDblClick: {
     if (mouse->button() != Qt::LeftButton)
       break;

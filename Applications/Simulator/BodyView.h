@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <memory>
 #include <QPoint>
 #include <QWidget>
 #include <vtkNew.h>
@@ -15,17 +16,20 @@ class vtkRenderer;
 
 namespace echorama {
 
+class NeedleTool;
+class NeedleView;
 class Redraw;
 class Scan;
 
 /// The body with the probe on its skin, and the image in its place. The left button slides the probe (with Shift it tilts and
 /// rocks, with Ctrl it rotates), a double click puts it there; the right one turns the view, the middle one moves it, the wheel
-/// zooms.
+/// zooms. A press on the needle, or with Ctrl and Shift, takes the needle instead: drawn over the skin it enters elsewhere; with
+/// Shift it is steered, with Ctrl it goes in and out, as by the wheel over it.
 class BodyView : public QWidget {
   Q_OBJECT
 
 public:
-  explicit BodyView(Scan* scan, QWidget* parent = nullptr);
+  BodyView(Scan* scan, NeedleTool* needle, QWidget* parent = nullptr);
   ~BodyView() override;
 
   QVTKOpenGLNativeWidget* Canvas() const { return canvas_; }
@@ -43,10 +47,14 @@ private:
   void ShowSubject();
   void ShowProbe();
   void ShowImage();
+  void ShowNeedle();
   void Drag(const QPoint& to);
+  void DragNeedle(const QPoint& to);
+  bool IsOnNeedle(const QPointF& at) const;
   void RayAt(const QPointF& at, double origin[3], double direction[3]) const;
 
   Scan* scan_;
+  NeedleTool* needle_;
   QVTKOpenGLNativeWidget* canvas_;
   vtkNew<vtkRenderer> renderer_;
   vtkNew<vtkPolyDataMapper> skinMapper_, probeMapper_, marksMapper_;
@@ -59,7 +67,8 @@ private:
   QPoint last_;
   QPointF grabbed_; ///< from the probe to where it was taken
   Qt::KeyboardModifiers dragKeys_;
-  bool isDragging_ = false;
+  bool isDragging_ = false, isDraggingNeedle_ = false;
+  std::unique_ptr<NeedleView> needleView_;
 };
 
 } // namespace echorama

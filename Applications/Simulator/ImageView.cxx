@@ -56,6 +56,12 @@ void ImageView::SetFocusDepth(double mm)
   update();
 }
 
+void ImageView::SetTip(const std::optional<QPointF>& mm)
+{
+  tip_ = mm;
+  update();
+}
+
 void ImageView::SetMeasuring(bool measuring)
 {
   isMeasuring_ = measuring;
@@ -125,6 +131,7 @@ void ImageView::paintEvent(QPaintEvent*)
     painter.drawPolygon(fan);
     PaintRuler(painter, frame);
     PaintCallipers(painter);
+    PaintTip(painter);
   }
   PaintState(painter);
 }
@@ -173,6 +180,17 @@ void ImageView::PaintCallipers(QPainter& painter) const
     painter.restore();
     painter.drawText((a.x() > b.x() ? a : b) + QPointF(9.0, -6.0), tr("%1 mm").arg(line.length(), 0, 'f', 1));
   }
+}
+
+// Two strokes beside it, so that the echo itself is not covered.
+void ImageView::PaintTip(QPainter& painter) const
+{
+  if (!tip_)
+    return;
+  const QPointF at = ToWidget(*tip_);
+  painter.setPen(QPen(QColor(110, 230, 140), 1.5));
+  for (double side : {-1.0, 1.0})
+    painter.drawLine(at + QPointF(side * 7.0, 0.0), at + QPointF(side * 13.0, 0.0));
 }
 
 void ImageView::PaintState(QPainter& painter) const

@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Geometry/RigidTransform.h"
 #include <cmath>
+#include <optional>
 #include <QImage>
 #include <QLineF>
 #include <QPolygonF>
@@ -60,6 +61,8 @@ public:
   /// Named in the corner, such as "frozen".
   void SetCorner(const QString& text);
   void SetFocusDepth(double mm);
+  /// Of a needle, mm in the plane: marked.
+  void SetTip(const std::optional<QPointF>& mm);
 
   ///@{ Callipers: each click ends or begins a line; an end can be dragged. mm in the probe's plane; those that have both ends.
   bool Measuring() const { return isMeasuring_; }
@@ -92,11 +95,13 @@ private:
   void SetEnd(CalliperLine& calliper, int end, const QPointF& mm) const;
   void PaintRuler(QPainter& painter, const QRectF& frame) const;
   void PaintCallipers(QPainter& painter) const;
+  void PaintTip(QPainter& painter) const;
   void PaintState(QPainter& painter) const;
 
   PlanePicture picture_;
   QString state_, corner_;
   double focusMm_ = -1.0;
+  std::optional<QPointF> tip_;
   bool isStale_ = false, isMeasuring_ = false;
   std::vector<CalliperLine> callipers_;
   bool isOpen_ = false; ///< the last line waits for its other end

@@ -17,7 +17,8 @@ namespace echorama {
 namespace {
 
 // What belongs to the frame and not to the controls, and what is not to change under a window.
-const std::set<std::string> OfFrame = {"Position", "Orientation", "Frame", "Flip", "BeamsOutput"};
+const std::set<std::string> OfFrame = {"Position",    "Orientation", "Frame",     "Flip",
+                                       "BeamsOutput", "Needle",      "NeedleTip", "NeedleDirection"};
 
 const unsigned char* BytesOf(vtkImageData* image, const char* name)
 {
@@ -43,6 +44,8 @@ void LiveScanner::SetInputs(const std::vector<vtkSmartPointer<vtkImageData>>& vo
 
 void LiveScanner::Set(const char* name, const std::string& text)
 {
+  if (beforeUse_)
+    beforeUse_();
   const Messages::OfThread messages;
   live_->SetParameterAsText(name, text.c_str());
   messages.ThrowErrors();
@@ -79,6 +82,7 @@ void LiveScanner::Prepare(const ScanFrame& frame)
   live_->SetProbeToWorld(pose);
   live_->SetFrame(frame.number);
   live_->SetFlip(frame.isFlipped);
+  SetNeedle(frame.needle);
   messages.ThrowErrors();
 }
 
@@ -93,6 +97,15 @@ void LiveScanner::Keep()
   state_ = live_->GetState();
   contactShare_ = live_->GetContactShare();
   hardMaterial_ = live_->GetHardMaterial();
+  needleState_ = live_->GetNeedleState();
+  isTipInPlane_ = live_->GetNeedleTipInPlane();
+  tipOffPlaneMm_ = live_->GetNeedleTipOffPlaneMm();
+  markedTip_.reset();
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image_);
+  if (needleState_ != vtkUltrasoundLiveImage::NO_NEEDLE && ShowsTip() && isTipInPlane_ && pose) {
+    const Eigen::Vector3d tip = pose->inverse() * Eigen::Map<const Eigen::Vector3d>(live_->GetNeedleTip());
+    markedTip_ = QPointF(tip[0], tip[2]);
+  }
 }
 
 void LiveScanner::Make(const ScanFrame& frame)
@@ -100,6 +113,26 @@ void LiveScanner::Make(const ScanFrame& frame)
   Prepare(frame);
   Work({});
   Keep();
+}
+
+void LiveScanner::SetNeedle(const std::optional<Needle>& needle)
+{
+  live_->SetNeedle(needle.has_value());
+  if (needle) {
+    live_->SetNeedleTip(needle->tip[0], needle->tip[1], needle->tip[2]);
+    live_->SetNeedleDirection(needle->direction[0], needle->direction[1], needle->direction[2]);
+  }
+}
+
+double LiveScanner::AdvanceNeedle(const Needle& needle, double mm)
+{
+  if (beforeUse_)
+    beforeUse_();
+  const Messages::OfThread messages;
+  SetNeedle(needle);
+  const double moved = live_->AdvanceNeedle(mm);
+  messages.ThrowErrors();
+  return moved;
 }
 
 ProbeGeometry LiveScanner::Probe() const

@@ -3,6 +3,8 @@
 #include "Core/Base/Progress.h"
 #include "ImageView.h"
 #include "ScanFrame.h"
+#include <functional>
+#include <optional>
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkSmartPointer.h>
@@ -33,20 +35,32 @@ public:
   /// \throws Error(InvalidParameter) for a pose that is not rigid and finite, Error(BadInput) for a volume that cannot be used
   void Make(const ScanFrame& frame);
 
+  /// How far a needle can go on along its axis, at most \a mm, until bone stops it, if NeedleStops is on. Below 0: back out.
+  /// \throws Error(BadInput) when it cannot be told
+  double AdvanceNeedle(const Needle& needle, double mm);
+
   ///@{ The same in three steps, for an image that takes longer than a window may wait. The second may run on another thread;
   /// until it has ended nothing may be set or made, and all below still tells of the image before.
   void Prepare(const ScanFrame& frame);
   /// \throws also Error(Cancelled)
   void Work(const Progress& progress);
   void Keep();
+  /// Called before anything is set or asked that must not meet with Work().
+  void BeforeUse(std::function<void()> call) { beforeUse_ = std::move(call); }
   ///@}
 
   ///@{ Of the last one.
   vtkImageData* Output() const { return image_; }
   int State() const { return state_; }
+  int NeedleState() const { return needleState_; }
+  bool TipInPlane() const { return isTipInPlane_; }
+  double TipOffPlaneMm() const { return tipOffPlaneMm_; }
+  bool ShowsTip() const { return live_->GetNeedleShowTip(); }
   double ContactShare() const { return contactShare_; }
   /// What the probe stands in, if no probe can be there: bone and its like.
   const std::string& HardMaterial() const { return hardMaterial_; }
+  /// Where the needle's tip is marked, if it may be, and is in the image: mm in the plane.
+  const std::optional<QPointF>& MarkedTip() const { return markedTip_; }
   /// Grey, with the labels of what embedding invented in colour if \a showInvented; transparent where nothing is seen.
   PlanePicture Picture(bool showInvented) const;
   ///@}
@@ -55,6 +69,7 @@ public:
   double FocusMm() const { return live_->GetFocusMm(); }
 
 private:
+  void SetNeedle(const std::optional<Needle>& needle);
   QPolygonF Fan() const;
 
   vtkNew<vtkUltrasoundLiveImage> live_;
@@ -62,6 +77,11 @@ private:
   int state_ = vtkUltrasoundLiveImage::NO_VOLUME;
   double contactShare_ = 1.0;
   std::string hardMaterial_;
+  int needleState_ = vtkUltrasoundLiveImage::NO_NEEDLE;
+  bool isTipInPlane_ = false;
+  double tipOffPlaneMm_ = 0.0;
+  std::optional<QPointF> markedTip_;
+  std::function<void()> beforeUse_;
   std::shared_ptr<const ScanSettings> settings_;
 };
 

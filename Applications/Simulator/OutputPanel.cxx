@@ -176,6 +176,10 @@ void OutputPanel::Take()
     vtkNew<vtkMatrix4x4> pose;
     vtkUltrasoundVolume::SetMatrix(pose, scan_->Frame().probeToWorld);
     sender_->SendTransform("ProbeToReference", pose);
+    if (scan_->Frame().needle) {
+      vtkUltrasoundVolume::SetMatrix(pose, scan_->Frame().needle->ToWorld());
+      sender_->SendTransform("NeedleToReference", pose);
+    }
     vtkNew<vtkImageData> sent; // the next image is made in place
     sent->DeepCopy(image);
     sender_->SetInputData(sent);

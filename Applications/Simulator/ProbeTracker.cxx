@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ProbeTracker.h"
 #include "Controls.h"
+#include "NeedleTool.h"
 #include "Scan.h"
 #include "TrackerState.h"
 #include <cmath>
@@ -24,7 +25,7 @@ constexpr double StoppedSeconds = 0.5;                   ///< without a pose: wh
 
 } // namespace
 
-ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_(scan)
+ProbeTracker::ProbeTracker(Scan* scan, NeedleTool* needle, QWidget* parent) : QWidget(parent), scan_(scan), needle_(needle)
 {
   setObjectName("trackerPanel");
   tracker_->SetActive(false); // until Connect
@@ -46,6 +47,9 @@ ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_
   tool_ = ChoiceField(this, "trackerTool",
                       tr("The tool that is the probe: its origin is the middle of the face, z looks into the body"),
                       std::vector<std::string>());
+  needleTool_ = ChoiceField(this, "trackerNeedle",
+                            tr("The tool that is the needle, if there is one: its origin is the tip, z the way it goes in"),
+                            std::vector<std::string>());
   here_ = Button(this, "trackerHere", tr("It is &here"),
                  tr("Says that the tool is now where the probe was before it was connected, and moves all that follows likewise"),
                  [this] { PlaceHere(); });
@@ -65,6 +69,7 @@ ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_
   form->addRow(tr("Options"), options_);
   form->addRow(connect_);
   form->addRow(tr("Tool"), tool_);
+  form->addRow(tr("Needle"), needleTool_);
   form->addRow(here_);
   form->addRow(align_, slideButton_);
   form->addRow(tr("Heading"), heading_);
@@ -73,11 +78,11 @@ ProbeTracker::ProbeTracker(Scan* scan, QWidget* parent) : QWidget(parent), scan_
   timer_->setTimerType(Qt::PreciseTimer);
   timer_->setInterval(PollMs);
   connect(timer_, &QTimer::timeout, this, &ProbeTracker::Step);
-  connect(scan_, &Scan::SubjectChanged, this, &ProbeTracker::GiveNormals);
   connect(scan, &Scan::PoseWanted, this, [this] {
     if (timer_->isActive())
       Step();
   });
+  connect(scan_, &Scan::SubjectChanged, this, &ProbeTracker::GiveNormals);
   Step();
 }
 
@@ -108,6 +113,8 @@ void ProbeTracker::ConnectOrNot()
     tracker_->Stop();
     timer_->stop();
     tool_->clear();
+    needleTool_->clear();
+    needle_->StopFollowing();
     scan_->StopFollowing();
   } else {
     tracker_->SetDevice(Device().toUtf8());
@@ -210,6 +217,7 @@ void ProbeTracker::Step()
   }
   tracker_->Update();
   const std::string tool = ChosenTool(tool_, tracker_);
+  StepNeedle();
   QString state = StateOf(tracker_);
   const vtkNew<vtkMatrix4x4> matrix;
   const bool isSeen = !tool.empty() && tracker_->GetTransform(tool.c_str(), matrix) == 0;
@@ -233,6 +241,34 @@ void ProbeTracker::Step()
   }
   if (state_->text() != state)
     state_->setText(state);
+}
+
+// Another tool of the same tracker; nobody, until a person says which.
+void ProbeTracker::StepNeedle()
+{
+  QStringList tools{tr("none")};
+  for (int i = 0; i < tool_->count(); i++)
+    tools.append(tool_->itemText(i));
+  QStringList shown;
+  for (int i = 0; i < needleTool_->count(); i++)
+    shown.append(needleTool_->itemText(i));
+  if (shown != tools) {
+    const QString chosen = needleTool_->currentText();
+    needleTool_->clear();
+    needleTool_->addItems(tools);
+    needleTool_->setCurrentIndex(std::max(0, needleTool_->findText(chosen)));
+  }
+  if (needleTool_->currentIndex() <= 0) {
+    needle_->StopFollowing();
+    return;
+  }
+  const vtkNew<vtkMatrix4x4> matrix;
+  if (tracker_->GetTransform(needleTool_->currentText().toUtf8(), matrix) == 0) {
+    const Eigen::Matrix4d toTracker = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+    needle_->Follow((trackerToBody_.matrix() * toTracker).eval());
+  } else {
+    needle_->SetLost();
+  }
 }
 
 } // namespace echorama

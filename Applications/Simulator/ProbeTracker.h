@@ -14,14 +14,16 @@ class QTimer;
 
 namespace echorama {
 
+class NeedleTool;
 class Scan;
 
-/// A tracked tool as the probe: by one tracker, by one for its place and one for its orientation, or by an orientation alone.
+/// Tracked tools as the probe and, if there is one, the needle. The probe: by one tracker, by one for its place and one for its
+/// orientation, or by an orientation alone.
 class ProbeTracker : public QWidget {
   Q_OBJECT
 
 public:
-  explicit ProbeTracker(Scan* scan, QWidget* parent = nullptr);
+  ProbeTracker(Scan* scan, NeedleTool* needle, QWidget* parent = nullptr);
   ~ProbeTracker() override;
 
   vtkUltrasoundTrackerSource* Tracker() { return tracker_; }
@@ -35,8 +37,10 @@ private:
   void GiveNormals();
   void ShowHeading();
   void Step();
+  void StepNeedle();
 
   Scan* scan_;
+  NeedleTool* needle_;
   vtkNew<vtkUltrasoundTrackerSource> tracker_;
   Pose trackerToBody_ = Pose::Identity();
   Pose seen_ = Pose::Identity();
@@ -45,7 +49,7 @@ private:
   bool isFused_ = false, isAlone_ = false; ///< with an orientation of its own; with no more than that
   QElapsedTimer slide_;
   QLineEdit *address_, *orientation_, *options_;
-  QComboBox* tool_;
+  QComboBox *tool_, *needleTool_;
   QPushButton *connect_, *here_, *align_, *slideButton_;
   QLabel *heading_, *state_;
   QTimer* timer_;

@@ -28,6 +28,13 @@ Scan::Scan(QObject* parent) : QObject(parent), latencyMs_(std::numeric_limits<do
 {
   redraw_ = new Redraw(this, [this] { MakeNow(); });
   clock_.start();
+  scanner_.BeforeUse([this] {
+    if (!slow_)
+      return;
+    StopSlow(); // it is begun anew
+    refinement_ = 0;
+    Ask();
+  });
 }
 
 Scan::~Scan()
@@ -112,6 +119,18 @@ void Scan::TakePose(const Pose& pose)
 {
   probeToWorld_ = pose;
   emit ProbeMoved();
+  refinement_ = 0;
+  if (!isFrozen_)
+    Ask();
+}
+
+void Scan::SetNeedle(const std::optional<Needle>& needle)
+{
+  const bool isSame = needle && needle_ ? needle->tip == needle_->tip && needle->direction == needle_->direction
+                                        : needle.has_value() == needle_.has_value();
+  if (isSame)
+    return;
+  needle_ = needle;
   refinement_ = 0;
   if (!isFrozen_)
     Ask();
@@ -363,6 +382,7 @@ void Scan::MakeNow()
   frame.number = ++number_;
   frame.isInAir = IsInAir();
   frame.isFlipped = isFlipped_;
+  frame.needle = needle_;
   if (scanner_.IsAcoustic())
     return MakeSlowly(frame);
   frame.settings = scanner_.Settings();

@@ -79,6 +79,9 @@ public:
   void SetStopped(double seconds);
   ///@}
 
+  /// A needle in the image, from now on; none: there is none.
+  void SetNeedle(const std::optional<Needle>& needle);
+
   const Pose& ProbeToWorld() const { return probeToWorld_; }
   /// Where keys and mouse have, or had, the probe.
   Pose PoseOnSkin() const { return walk_ ? walk_->PoseOf(hold_) : probeToWorld_; }
@@ -155,6 +158,7 @@ private:
   Pose probeToWorld_ = Pose::Identity();
   std::optional<Eigen::Matrix3d> turned_; ///< from outside
   Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
+  std::optional<Needle> needle_;
   bool isFollowing_ = false, isFrozen_ = false, isFlipped_ = false, showsInvented_ = true;
   double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;
   QString badPose_, failure_, shownState_;

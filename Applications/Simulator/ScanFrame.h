@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Geometry/RigidTransform.h"
+#include "Filters/Live/Needle.h"
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +23,7 @@ struct ScanFrame {
   std::int64_t number = 0; ///< chooses the noise, where that moves
   bool isInAir = false;
   bool isFlipped = false; ///< left and right are exchanged
+  std::optional<Needle> needle;
   std::shared_ptr<const ScanSettings> settings;
 };
 

@@ -77,6 +77,30 @@ QByteArray LineOf(const QJsonObject& object)
   return QJsonDocument(object).toJson(QJsonDocument::Compact) + "\n";
 }
 
+// The tip and the direction: six numbers.
+QJsonArray JsonOf(const Needle& needle)
+{
+  QJsonArray numbers;
+  for (const Eigen::Vector3d& part : {needle.tip, needle.direction})
+    for (int a = 0; a < 3; a++)
+      numbers.append(part[a]);
+  return numbers;
+}
+
+Needle NeedleOf(const QJsonValue& value)
+{
+  const QJsonArray numbers = value.toArray();
+  if (numbers.size() != 6)
+    throw Error(Error::Kind::BadFile, "Needle needs 6 numbers");
+  Needle needle;
+  for (int a = 0; a < 3; a++) {
+    needle.tip[a] = numbers[a].toDouble(std::nan(""));
+    needle.direction[a] = numbers[a + 3].toDouble(std::nan(""));
+  }
+  needle.Check();
+  return needle;
+}
+
 [[noreturn]] void FailLine(const QString& path, int line, const QString& reason)
 {
   throw Error(Error::Kind::BadFile, QString("%1: line %2: %3").arg(path).arg(line).arg(reason).toStdString());
@@ -141,6 +165,8 @@ void ScanLogWriter::Append(const ScanFrame& frame, vtkImageData* image)
     object["air"] = true;
   if (frame.isFlipped)
     object["flipped"] = true;
+  if (frame.needle)
+    object["Needle"] = JsonOf(*frame.needle);
   if (frame.settings != settings_) {
     QJsonObject controls;
     for (const auto& [name, text] : *frame.settings)
@@ -195,6 +221,12 @@ ScanLog ScanLog::Read(const QString& path)
     entry.frame.number = static_cast<std::int64_t>(object["number"].toDouble());
     entry.frame.isInAir = object["air"].toBool();
     entry.frame.isFlipped = object["flipped"].toBool();
+    if (object.contains("Needle"))
+      try {
+        entry.frame.needle = NeedleOf(object["Needle"]);
+      } catch (const Error& error) {
+        FailLine(path, line, QString::fromUtf8(error.what()));
+      }
     entry.sum = object["sum"].toString().toLatin1();
     if (object.contains("controls")) {
       ScanSettings controls;

@@ -46,6 +46,8 @@ void ScanRecorder::Append(const ScanFrame& frame, vtkImageData* image)
   written.time = frame.seconds;
   written.transforms.push_back({"ImageToReference", vtkUltrasoundVolume::GeometryOf(image).IndexToWorld()});
   written.transforms.push_back({"ProbeToReference", Eigen::Affine3d(frame.probeToWorld.matrix())});
+  if (frame.needle)
+    written.transforms.push_back({"NeedleToReference", Eigen::Affine3d(frame.needle->ToWorld().matrix())});
   sequence_->Append(written, frame.isInAir ? nullptr : vtkUltrasoundVolume::GetIntensity(image)->GetVoidPointer(0));
   log_->Append(frame, image);
   log_->Release(sequence_->SafeFrames());

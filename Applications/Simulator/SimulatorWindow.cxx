@@ -14,6 +14,8 @@
 #include "KeysPage.h"
 #include "MessageBar.h"
 #include "Messages.h"
+#include "NeedlePanel.h"
+#include "NeedleTool.h"
 #include "OutputPanel.h"
 #include "ParameterPanel.h"
 #include "ProbeTracker.h"
@@ -54,6 +56,10 @@ QVector<KeysOf> SimulatorKeys()
             {Text::tr("Shift + left drag"), Text::tr("tilt (up and down) and rock (sideways)")},
             {Text::tr("Ctrl + left drag"), Text::tr("rotate the probe about its axis")},
             {Text::tr("Double click"), Text::tr("put the probe there")},
+            {Text::tr("Left drag on the needle"),
+             Text::tr("put it elsewhere on the skin; with Shift steer it, with Ctrl in and out")},
+            {Text::tr("Ctrl + Shift + left drag"), Text::tr("bring the needle there")},
+            {Text::tr("Wheel on the needle"), Text::tr("advance and withdraw it")},
             {Text::tr("Right drag, middle drag, wheel"), Text::tr("turn, move and zoom the view")}}},
           {Text::tr("Mouse on the image"),
            {{Text::tr("Wheel"), Text::tr("rotate the probe; while frozen: go through what was seen")},
@@ -66,9 +72,9 @@ QVector<KeysOf> SimulatorKeys()
 } // namespace
 
 SimulatorWindow::SimulatorWindow(QWidget* parent)
-  : QMainWindow(parent), scan_(new Scan(this)), messages_(new MessageBar(this)), jobs_(new JobBar(this)),
-    body_(new BodyView(scan_, this)), image_(new ImageView(this)), solution_(new ImageView(this)),
-    cine_(new CineBar(scan_, this)), views_(new QSplitter(this)), readout_(new QLabel(this))
+  : QMainWindow(parent), scan_(new Scan(this)), needle_(new NeedleTool(scan_)), messages_(new MessageBar(this)),
+    jobs_(new JobBar(this)), body_(new BodyView(scan_, needle_, this)), image_(new ImageView(this)),
+    solution_(new ImageView(this)), cine_(new CineBar(scan_, this)), views_(new QSplitter(this)), readout_(new QLabel(this))
 {
   setObjectName("simulator");
   setWindowTitle("Echorama simulator");
@@ -167,12 +173,13 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
   column->addStretch(1);
   connect(scan_, &Scan::FrozenChanged, controls, &QWidget::setDisabled);
   AddPanel(controls, tr("Image"));
-  auto* tracker = new ProbeTracker(scan_, this);
+  AddPanel(new NeedlePanel(scan_, needle_, this), tr("Needle"));
+  auto* tracker = new ProbeTracker(scan_, needle_, this);
   AddPanel(tracker, tr("Tracker"));
   outputs_ = new OutputPanel(scan_, this);
   connect(outputs_, &OutputPanel::JobStarted, jobs_, &JobBar::Watch);
   AddPanel(outputs_, tr("Record"));
-  tasks_ = new TaskPanel(scan_, image_, this);
+  tasks_ = new TaskPanel(scan_, needle_, image_, this);
   connect(tasks_, &TaskPanel::RunningChanged, outputs_, &OutputPanel::ForbidReplay);
   connect(tasks_, &TaskPanel::RunningChanged, tracker, &QWidget::setDisabled); // a tool that comes later may be anywhere
   connect(tasks_, &TaskPanel::MarksChanged, body_, &BodyView::ShowMarks);
@@ -228,6 +235,7 @@ void SimulatorWindow::MakeMenus()
   file->addAction(MakeAction(this, "quit", tr("&Quit"), "Ctrl+Q", tr("Close the window"), [this] { close(); }));
   MakeProbeMenu(menuBar()->addMenu(tr("&Probe")));
   MakeImageMenu(menuBar()->addMenu(tr("&Image")));
+  AddNeedleActions(menuBar()->addMenu(tr("&Needle")), needle_, scan_);
   viewMenu_ = menuBar()->addMenu(tr("&View"));
   viewMenu_->addAction(MakeAction(this, "fullScreen", tr("&Full screen"), "F11", tr("Fill the screen, and back"),
                                   [this] { isFullScreen() ? showNormal() : showFullScreen(); }));
@@ -362,6 +370,7 @@ QString SimulatorWindow::TakePicture()
 void SimulatorWindow::ShowFrame()
 {
   image_->SetPicture(scan_->Picture());
+  image_->SetTip(scan_->Scanner().MarkedTip());
   ShowState();
   image_->repaint();
 }
@@ -369,7 +378,7 @@ void SimulatorWindow::ShowFrame()
 void SimulatorWindow::ShowState()
 {
   image_->SetState(scan_->State(), scan_->IsStale());
-  image_->SetCorner(scan_->IsFrozen() ? tr("FROZEN") : QString());
+  image_->SetCorner(scan_->IsFrozen() ? tr("FROZEN") : needle_->State());
   image_->SetFocusDepth(scan_->Scanner().FocusMm());
   if (scan_->Body().IsEmpty())
     return;

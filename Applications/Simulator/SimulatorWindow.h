@@ -16,6 +16,7 @@ class CineBar;
 class ImageView;
 class JobBar;
 class MessageBar;
+class NeedleTool;
 class OutputPanel;
 class ParameterPanel;
 class Scan;
@@ -31,6 +32,7 @@ public:
   ~SimulatorWindow() override;
 
   Scan* TheScan() const { return scan_; }
+  NeedleTool* TheNeedle() const { return needle_; }
   ImageView* Image() const { return image_; }
   BodyView* Body() const { return body_; }
 
@@ -62,6 +64,7 @@ private:
   void ChangeGain(double byDb);
 
   Scan* scan_;
+  NeedleTool* needle_;
   MessageBar* messages_;
   JobBar* jobs_;
   BodyView* body_;

@@ -52,16 +52,20 @@ QString WriteSnapshot(const QDir& folder, const QStringList& volumes, const Plan
                              {"toInWorld", Triple(calliper.To())},
                              {"lengthMm", line.length()}});
   }
-  const QJsonObject all{{"schema", "echorama-snapshot-1"},
-                        {"unit", "mm"},
-                        {"volumes", QJsonArray::fromStringList(volumes)},
-                        {"ProbeToWorld", Rows(frame.probeToWorld)},
-                        {"frame", static_cast<double>(frame.number)},
-                        {"controls", controls},
-                        {"flipped", picture.isFlipped},
-                        {"topLeft", QJsonArray{picture.topLeft.x(), picture.topLeft.y()}},
-                        {"pixel", QJsonArray{picture.pixel.width(), picture.pixel.height()}},
-                        {"callipers", lines}};
+  QJsonObject all{{"schema", "echorama-snapshot-1"},
+                  {"unit", "mm"},
+                  {"volumes", QJsonArray::fromStringList(volumes)},
+                  {"ProbeToWorld", Rows(frame.probeToWorld)},
+                  {"frame", static_cast<double>(frame.number)},
+                  {"controls", controls},
+                  {"flipped", picture.isFlipped},
+                  {"topLeft", QJsonArray{picture.topLeft.x(), picture.topLeft.y()}},
+                  {"pixel", QJsonArray{picture.pixel.width(), picture.pixel.height()}},
+                  {"callipers", lines}};
+  if (frame.needle) {
+    const Eigen::Vector3d &tip = frame.needle->tip, &way = frame.needle->direction;
+    all["needle"] = QJsonObject{{"tip", Triple(tip)}, {"direction", Triple(way)}};
+  }
   const QString image = folder.filePath(name + ".png"), text = folder.filePath(name + ".json");
   QImage opaque(picture.image.size(), QImage::Format_RGB32);
   opaque.fill(Qt::black);

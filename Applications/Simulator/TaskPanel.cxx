@@ -3,6 +3,7 @@
 #include "Controls.h"
 #include "Core/Base/Error.h"
 #include "ImageView.h"
+#include "NeedleTool.h"
 #include "Scan.h"
 #include "Solution.h"
 #include "Widgets/Session/LiveScore.h"
@@ -61,8 +62,8 @@ QLineEdit* LineField(QWidget* parent, const char* name, const QString& help)
 
 } // namespace
 
-TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
-  : QWidget(parent), scan_(scan), image_(image),
+TaskPanel::TaskPanel(Scan* scan, NeedleTool* needle, ImageView* image, QWidget* parent)
+  : QWidget(parent), scan_(scan), needle_(needle), image_(image),
     folder_(QStandardPaths::writableLocation(QStandardPaths::PicturesLocation) + "/Echorama")
 {
   setObjectName("taskPanel");
@@ -79,8 +80,8 @@ TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
                   tr("Puts the probe at the top, forgets what was seen, and starts the clock; a tool that a tracker follows "
                      "has to be brought there first. Or ends without an answer"),
                   [this] { StartOrCancel(); });
-  submit_ = Button(this, "submitTask", tr("S&ubmit"), tr("The image as it is, or the last line of the callipers, is the answer"),
-                   [this] { Submit(); });
+  submit_ = Button(this, "submitTask", tr("S&ubmit"),
+                   tr("The image as it is, the needle, or the last line of the callipers, is the answer"), [this] { Submit(); });
   solution_ =
       Button(this, "showSolution", tr("Show the so&lution"), tr("After the answer: what was asked for, beside what was found"),
              [this] { ShowSolution(solution_->isChecked()); });
@@ -89,10 +90,15 @@ TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
   score_ = TextField(this, "taskScore");
   name_ = LineField(this, "taskName", tr("What the task is called, and its file"));
   hint_ = CheckField(this, "taskHint", tr("Tell how far it is"), tr("Whether the distance is shown during the attempt"));
+  showTip_ = CheckField(this, "taskShowTip", tr("Mark the needle's tip"),
+                        tr("Whether the tip is marked during an attempt to reach a place with the needle"));
   auto* plane = Button(this, "savePlane", tr("Save: find this &plane"), tr("Makes a task of the image that is shown"),
                        [this] { SavePlane(); });
   auto* length = Button(this, "saveLength", tr("Save: &measure this"), tr("Makes a task of the last line of the callipers"),
                         [this] { SaveLength(); });
+  auto* target =
+      Button(this, "saveTarget", tr("Save: &reach this"),
+             tr("Makes a task of the end of the last line of the callipers, or of the needle's tip"), [this] { SaveTarget(); });
   auto* form = new QFormLayout(this);
   form->addRow(new QLabel("<b>" + tr("Learn") + "</b>", this));
   form->addRow(open);
@@ -106,15 +112,27 @@ TaskPanel::TaskPanel(Scan* scan, ImageView* image, QWidget* parent)
   form->addRow(new QLabel("<b>" + tr("Teach") + "</b>", this));
   form->addRow(tr("Name"), name_);
   form->addRow(hint_);
+  form->addRow(showTip_);
   form->addRow(plane);
   form->addRow(length);
+  form->addRow(target);
+  connect(this, &TaskPanel::RunningChanged, target, &QWidget::setDisabled);
+  connect(this, &TaskPanel::RunningChanged, this, [this](bool running) {
+    if (!running) {
+      track_.reset();
+      needle_->EndAttempt();
+    }
+  });
+  connect(scan, &Scan::FrameMade, this, &TaskPanel::Watch);
   connect(this, &TaskPanel::RunningChanged, plane, &QWidget::setDisabled);
   connect(this, &TaskPanel::RunningChanged, length, &QWidget::setDisabled);
   connect(this, &TaskPanel::RunningChanged, open, &QWidget::setDisabled);
   connect(scan, &Scan::SubjectChanged, this, &TaskPanel::Forget);
   connect(scan, &Scan::ProbeMoved, this, &TaskPanel::BeginWhenAtStart);
+  connect(needle, &NeedleTool::Changed, this, &TaskPanel::BeginWhenAtStart);
   timer_ = new QTimer(this);
   connect(timer_, &QTimer::timeout, this, &TaskPanel::ShowState);
+  connect(timer_, &QTimer::timeout, this, &TaskPanel::Watch);
   timer_->setInterval(200);
   ShowState();
 }
@@ -136,9 +154,8 @@ void TaskPanel::Save(std::variant<FindPlane, MeasureLength, ReachTarget> goal)
     task.name = name_->text().trimmed().toStdString();
     if (task.name.empty())
       throw Error(Error::Kind::InvalidParameter, "a task needs a name");
-    const bool isPlane = std::holds_alternative<FindPlane>(goal);
-    task.instruction =
-        (isPlane ? tr("Find the plane \"%1\".") : tr("Measure \"%1\".")).arg(name_->text().trimmed()).toStdString();
+    const QString instructions[] = {tr("Find the plane \"%1\"."), tr("Measure \"%1\"."), tr("Reach \"%1\" with the needle.")};
+    task.instruction = instructions[goal.index()].arg(name_->text().trimmed()).toStdString();
     task.hint = hint_->isChecked();
     task.body = BodyOf(scan_->Body());
     task.goal = std::move(goal);
@@ -180,15 +197,35 @@ void TaskPanel::SaveLength()
   Save(length);
 }
 
+void TaskPanel::SaveTarget()
+{
+  ReachTarget target;
+  const std::vector<CalliperLine> lines = image_->Callipers();
+  if (!lines.empty()) {
+    target.target = lines.back().To(); // where it was drawn
+  } else if (needle_->IsShown() && needle_->InsideMm() > 0.0) {
+    target.target = needle_->Now().tip;
+  } else {
+    emit scan_->Said({Message::Note, tr("Bring the needle's tip there first, or end a line of the callipers there: key C"), {}});
+    return;
+  }
+  target.showTip = showTip_->isChecked();
+  Save(target);
+}
+
+void TaskPanel::Watch()
+{
+  if (!IsRunning() || !track_)
+    return;
+  track_->Add({Seconds(), needle_->Now(), needle_->InsideMm() > 0.0, scan_->Scanner().TipInPlane(), needle_->HasMetBone()});
+}
+
 void TaskPanel::OpenTask(const QString& path)
 {
   ShowSolution(false);
   Try([&] {
     attempt_.reset();
-    ScanAttempt attempt = ScanAttempt::Open(path.toStdString(), BodyOf(scan_->Body()));
-    if (attempt.What() == ScanAttempt::Kind::ReachTarget)
-      throw Error(Error::Kind::NotPossible, path.toStdString() + ": a task for a needle, which this window has not");
-    attempt_ = std::move(attempt);
+    attempt_ = ScanAttempt::Open(path.toStdString(), BodyOf(scan_->Body()));
     score_->clear();
   });
 }
@@ -214,6 +251,8 @@ void TaskPanel::StartOrCancel()
   image_->ClearCallipers();
   score_->clear();
   scan_->Restart();
+  if (IsForNeedle())
+    needle_->BeginAttempt(attempt_->ShowsTip());
   isWaiting_ = true;
   emit RunningChanged(true);
   BeginWhenAtStart();
@@ -223,16 +262,19 @@ void TaskPanel::StartOrCancel()
 }
 
 // Keys and mouse have the probe at the start. A tracked tool may be held anywhere, also at the solution: it has to be brought
-// there first. How far it is from the start tells nothing of where the solution is.
+// there first, and a tracked needle out of the body. How far it is from the start tells nothing of where the solution is.
 void TaskPanel::BeginWhenAtStart()
 {
-  if (!isWaiting_ || (scan_->ProbeToWorld().translation() - scan_->StartPose().translation()).norm() > AtStartMm)
+  if (!isWaiting_ || (scan_->ProbeToWorld().translation() - scan_->StartPose().translation()).norm() > AtStartMm ||
+      (IsForNeedle() && needle_->InsideMm() > 0.0))
     return;
   isWaiting_ = false;
   emit MarksChanged(nullptr);
   Try([&] {
     started_ = Seconds();
-    attempt_->Start(started_, scan_->ProbeToWorld());
+    attempt_->Start(started_, IsForNeedle() ? needle_->Now().ToWorld() : scan_->ProbeToWorld());
+    if (IsForNeedle())
+      track_.emplace(Eigen::Vector3d::Zero()); // which knows nothing of the target
   });
   if (!IsRunning())
     emit RunningChanged(false);
@@ -274,22 +316,41 @@ void TaskPanel::Submit()
     const std::vector<CalliperLine> lines = image_->Callipers();
     if (isLength && lines.empty())
       throw Error(Error::Kind::BadInput, "measure first: key C, then a click on both ends");
-    const ScanScore score = isLength ? attempt_->SubmitLength(Seconds(), lines.back().line.length())
-                                     : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
-    score_->setText(tr("%1: %2 mm off%3, after %4 s")
-                        .arg(score.passed ? tr("Passed") : tr("Not passed"))
-                        .arg(score.distanceMm, 0, 'f', 1)
-                        .arg(isLength ? QString() : tr(" and %1\u00b0").arg(score.degrees, 0, 'f', 1))
-                        .arg(score.seconds, 0, 'f', 0));
-    scan_->SetFrozen(true); // the image is the answer, and stays for comparison
+    if (IsForNeedle() && !needle_->IsShown())
+      throw Error(Error::Kind::BadInput, "there is no needle: key N");
+    Watch();
+    const ScanScore score = isLength        ? attempt_->SubmitLength(Seconds(), lines.back().line.length())
+                            : IsForNeedle() ? attempt_->SubmitPose(Seconds(), needle_->Now().ToWorld())
+                                            : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
+    score_->setText(TellSubmitted(score));
+    const int redirections = track_ ? track_->Score().redirections : 0;
     emit RunningChanged(false);
+    scan_->SetFrozen(true); // the image is the answer, and stays for comparison
     QSettings().setValue("task/trainee", trainee_->text());
     if (!folder_.mkpath("."))
       throw Error(Error::Kind::FileSystem, folder_.path().toStdString() + ": the folder cannot be made");
     AppendAttempt(folder_.filePath("attempts.csv").toStdString(),
                   attempt_->HistoryLine(QDateTime::currentDateTimeUtc().toString(Qt::ISODate).toStdString(),
-                                        trainee_->text().toStdString()));
+                                        trainee_->text().toStdString(), redirections));
   });
+}
+
+QString TaskPanel::TellSubmitted(const ScanScore& score) const
+{
+  QString more;
+  if (attempt_->What() == ScanAttempt::Kind::FindPlane)
+    more = tr(" and %1\u00b0").arg(score.degrees, 0, 'f', 1);
+  else if (track_)
+    more = tr(", %1 redirections, %2 times in, %3 s of %4 s with the tip out of the plane")
+               .arg(track_->Score().redirections)
+               .arg(track_->Score().passes)
+               .arg(track_->Score().offPlaneSeconds, 0, 'f', 1)
+               .arg(track_->Score().insideSeconds, 0, 'f', 1);
+  return tr("%1: %2 mm off%3, after %4 s")
+      .arg(score.passed ? tr("Passed") : tr("Not passed"))
+      .arg(score.distanceMm, 0, 'f', 1)
+      .arg(more)
+      .arg(score.seconds, 0, 'f', 0);
 }
 
 void TaskPanel::ShowState()
@@ -307,11 +368,15 @@ void TaskPanel::ShowState()
   }
   if (!running) {
     const double away = (scan_->ProbeToWorld().translation() - scan_->StartPose().translation()).norm();
-    state_->setText(tr("bring the tool to the start, the ring on the body: %1 mm away").arg(away, 0, 'f', 0));
+    state_->setText(tr("bring the tool to the start, the ring on the body: %1 mm away").arg(away, 0, 'f', 0) +
+                    (IsForNeedle() ? tr("; and the needle out of the body") : QString()));
     return;
   }
   QString text = tr("%1 s").arg(Seconds() - started_, 0, 'f', 0);
-  if (const auto hint = attempt_->Hint(Seconds(), scan_->ProbeToWorld()))
+  const auto hint = attempt_->Hint(Seconds(), IsForNeedle() ? needle_->Now().ToWorld() : scan_->ProbeToWorld());
+  if (hint && IsForNeedle())
+    text += tr(", the tip is %1 mm from it").arg(hint->distanceMm, 0, 'f', 1);
+  else if (hint)
     text += tr(", %1 mm and %2\u00b0 from it").arg(hint->distanceMm, 0, 'f', 1).arg(hint->degrees, 0, 'f', 0);
   state_->setText(text);
 }

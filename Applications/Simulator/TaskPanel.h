@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Filters/Live/NeedlePath.h"
 #include "Widgets/Session/ScanTask.h"
 #include <optional>
 #include <QDir>
@@ -16,6 +17,7 @@ class vtkPolyData;
 namespace echorama {
 
 class ImageView;
+class NeedleTool;
 class Scan;
 struct PlanePicture;
 
@@ -24,7 +26,7 @@ class TaskPanel : public QWidget {
   Q_OBJECT
 
 public:
-  TaskPanel(Scan* scan, ImageView* image, QWidget* parent = nullptr);
+  TaskPanel(Scan* scan, NeedleTool* needle, ImageView* image, QWidget* parent = nullptr);
 
   void SetFolder(const QDir& folder) { folder_ = folder; }
   void OpenTask(const QString& path);
@@ -46,25 +48,32 @@ private:
   void Save(std::variant<FindPlane, MeasureLength, ReachTarget> goal);
   void SavePlane();
   void SaveLength();
+  void SaveTarget();
   void StartOrCancel();
   void BeginWhenAtStart();
   void Submit();
   void ShowSolution(bool shown);
   void Forget();
+  bool IsForNeedle() const { return attempt_ && attempt_->What() == ScanAttempt::Kind::ReachTarget; }
+  /// What the needle does is counted: between images, too, as they are made only when something moves.
+  void Watch();
+  QString TellSubmitted(const ScanScore& score) const;
   void ShowState();
   double Seconds() const { return 1e-3 * static_cast<double>(clock_.elapsed()); }
   /// Says what is wrong instead of throwing it.
   void Try(const std::function<void()>& action);
 
   Scan* scan_;
+  NeedleTool* needle_;
   ImageView* image_;
   QDir folder_;
   std::optional<ScanAttempt> attempt_;
+  std::optional<NeedleTrack> track_; ///< of an attempt with a needle
   QElapsedTimer clock_;
   double started_ = 0.0;
   bool isWaiting_ = false;
   QLineEdit *name_, *trainee_;
-  QCheckBox* hint_;
+  QCheckBox *hint_, *showTip_;
   QPushButton *start_, *submit_, *solution_;
   QLabel *task_, *state_, *score_;
   QTimer* timer_;

@@ -78,6 +78,7 @@ void Describe(A& a, ReachTarget& goal)
 {
   EachNeeded(a, {Parameter("Target", goal.target, taskPlaces, "mm", "Where the tip shall be."),
                  Parameter("RadiusMm", goal.radiusMm, taskLengths, "mm", "Within this it is reached.")});
+  Each(a, {Parameter("ShowTip", goal.showTip, "Whether the tip may be marked in the image.")});
 }
 
 template <class A>
@@ -365,6 +366,11 @@ const std::string& ScanAttempt::Instruction() const
 bool ScanAttempt::GivesHints() const
 {
   return parts_->task.hint;
+}
+bool ScanAttempt::ShowsTip() const
+{
+  const auto* goal = std::get_if<ReachTarget>(&parts_->task.goal);
+  return goal && goal->showTip;
 }
 bool ScanAttempt::IsRunning() const
 {

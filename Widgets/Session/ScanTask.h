@@ -43,6 +43,7 @@ struct MeasureLength {
 struct ReachTarget {
   Eigen::Vector3d target = Eigen::Vector3d::Zero(); ///< mm, world
   double radiusMm = 5.0;
+  bool showTip = false; ///< the tip may be marked in the image
 };
 
 /// What a teacher asks for. It holds the solution: a window hands it to nobody but the editor of tasks, and opens attempts by
@@ -93,6 +94,8 @@ public:
   const std::string& Name() const;
   const std::string& Instruction() const;
   bool GivesHints() const;
+  /// Of a needle: whether its tip may be marked.
+  bool ShowsTip() const;
   bool IsRunning() const;
 
   /// \param seconds on any clock that rises. \param pose of the probe, or of the needle (its tip at the origin), by which the

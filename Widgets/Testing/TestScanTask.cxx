@@ -81,6 +81,14 @@ TEST(ScanTask, ComesBackToTheLastBit)
     EXPECT_EQ(again.goal.index(), task.goal.index());
     EXPECT_EQ(ScanTaskText(again), ScanTaskText(task));
   }
+  // Whether the tip is marked; tasks from before that was asked do not.
+  ScanTask open = NeedleTask();
+  std::get<ReachTarget>(open.goal).showTip = true;
+  EXPECT_TRUE(std::get<ReachTarget>(ScanTaskOf(ScanTaskText(open)).goal).showTip);
+  const std::string old = Replaced(ScanTaskText(NeedleTask()), "\"radiusMm\": 4.0,", "\"radiusMm\": 4.0");
+  EXPECT_FALSE(std::get<ReachTarget>(ScanTaskOf(Replaced(old, "\"showTip\": false", "")).goal).showTip);
+  EXPECT_TRUE(ScanAttempt(open, SomeBody()).ShowsTip());
+  EXPECT_FALSE(ScanAttempt(NeedleTask(true), SomeBody()).ShowsTip());
   const auto plane = std::get<FindPlane>(ScanTaskOf(ScanTaskText(PlaneTask())).goal);
   EXPECT_LT((plane.probeToWorld.matrix() - std::get<FindPlane>(PlaneTask().goal).probeToWorld.matrix()).norm(), 1e-12);
   EXPECT_EQ(plane.degrees, 6.0);

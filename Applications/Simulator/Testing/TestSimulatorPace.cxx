@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How fast the window is, from the stamp of a tracker's sample to the image on the screen, and whether its memory grows. It
 // prints what it measures, and asserts no time: machines differ. ECHORAMA_PACE_SECONDS (20) says how long, ECHORAMA_PACE_VOLUME
-// (SIDExSIDExSLICES, 160x160x160) of how large a volume. ctest runs it short; the manual tells how to make numbers.
+// (SIDExSIDExSLICES, 160x160x160) of how large a volume. ctest runs it short; how the numbers of the manual were made is told
+// there.
 #include "Core/Base/ElapsedTime.h"
 #include "ProbeTracker.h"
 #include "SimulatorUnderTest.h"

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "NeedleTool.h"
+#include "Core/Base/Angles.h"
+#include "Core/Base/Error.h"
+#include "Scan.h"
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace echorama {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double OutMm = -5.0, MostOutMm = -40.0; ///< where it waits; how far it is drawn back
+constexpr double HubMm = 10.0;                    ///< that stays outside
+constexpr double GuideMm = 8.0;                   ///< of a guide from the array
+constexpr double AimShare = 0.45, LeastAimMm = 10.0, AimMmPerDegree = 1.0;
+constexpr double MostOblique = 80.0; ///< degrees from the skin's normal
+
+Vector3d Turned(const Vector3d& direction, const Vector3d& axis, double degrees)
+{
+  return Eigen::AngleAxisd(degrees * RadiansPerDegree, axis) * direction;
+}
+
+} // namespace
+
+NeedleTool::NeedleTool(Scan* scan) : QObject(scan), scan_(scan)
+{
+  connect(scan, &Scan::SubjectChanged, this, [this] {
+    guide_ = NeedleGuide::InPlane;
+    isFollowing_ = hasMetBone_ = isLost_ = false;
+    depthMm_ = OutMm;
+    aimMm_ = 0.0;
+    SetShown(false);
+  });
+  // What a guide holds goes where the probe goes.
+  connect(scan, &Scan::ProbeMoved, this, [this] {
+    if (isShown_ && guide_ != NeedleGuide::None && !isFollowing_)
+      Give();
+  });
+  connect(scan, &Scan::FrameMade, this, [this] {
+    if (isShown_ && guide_ != NeedleGuide::None && !isFollowing_ && !(scan_->Scanner().Probe() == guided_))
+      Give(); // another probe has another end
+  });
+  connect(scan, &Scan::ControlsChanged, this, [this] {
+    if (!isScored_ && !tipBefore_.empty() && !scan_->IsFrozen())
+      EndAttempt(); // it ended while the image was frozen
+  });
+}
+
+void NeedleTool::Say(const QString& text)
+{
+  emit scan_->Said({Message::Note, text, {}});
+}
+
+bool NeedleTool::CanMove() const
+{
+  return isShown_ && !isFollowing_ && !scan_->IsFrozen();
+}
+
+bool NeedleTool::IsInBody(const QString& why)
+{
+  if (insideMm_ > 0.0)
+    Say(why);
+  return insideMm_ > 0.0;
+}
+
+void NeedleTool::SetShown(bool shown)
+{
+  if (shown && scan_->Body().IsEmpty())
+    return;
+  if (shown && !isShown_ && !isFollowing_) {
+    depthMm_ = OutMm;
+    hasMetBone_ = false;
+  }
+  isShown_ = shown;
+  Give();
+}
+
+double NeedleTool::AimMm() const
+{
+  return aimMm_ > 0.0 ? aimMm_ : AimShare * scan_->Scanner().Probe().depthMax;
+}
+
+// In the frame of the probe: from beside the array to the middle of the image.
+void NeedleTool::ToGuide()
+{
+  const ProbeGeometry& probe = guided_ = scan_->Scanner().Probe();
+  if (guide_ == NeedleGuide::InPlane) {
+    // All round there is no end of the array: as if it looked ahead.
+    entry_ = probe.fanAngle > Pi ? Vector3d::Zero() : PointOf(probe, {0.0, -0.5, 0.0});
+    entry_[0] -= GuideMm;
+  } else {
+    entry_ = Vector3d(0.0, GuideMm, 0.0);
+  }
+  direction_ = (Vector3d(0.0, 0.0, AimMm()) - entry_).normalized();
+}
+
+Eigen::Vector3d NeedleTool::Entry() const
+{
+  const Needle now = Now();
+  return now.tip - insideMm_ * now.direction;
+}
+
+Needle NeedleTool::Now() const
+{
+  const bool isHeld = guide_ != NeedleGuide::None && !isFollowing_;
+  const Pose frame = isHeld ? scan_->ProbeToWorld() : Pose::Identity();
+  return {frame * Vector3d(entry_ + depthMm_ * direction_), (frame.linear() * direction_).normalized()};
+}
+
+void NeedleTool::Give()
+{
+  if (!isShown_ || scan_->Body().IsEmpty()) {
+    scan_->SetNeedle({});
+    emit Changed();
+    return;
+  }
+  if (guide_ != NeedleGuide::None && !isFollowing_)
+    ToGuide();
+  const Needle now = Now();
+  insideMm_ = depthMm_;
+  if (scan_->HasSkin()) { // which a guide or a tracker does not touch, or not where it says
+    constexpr double far = 400.0;
+    if (const auto hit = scan_->Body().mesh->FirstHit(now.tip - far * now.direction, now.direction))
+      insideMm_ = far - hit->distanceMm;
+    else
+      insideMm_ = OutMm;
+  }
+  scan_->SetNeedle(now);
+  emit Changed();
+}
+
+void NeedleTool::SetGuide(NeedleGuide guide)
+{
+  if (guide != guide_ && (isFollowing_ || !IsInBody(tr("The needle is in the body: withdraw it first")))) {
+    if (guide == NeedleGuide::None) { // it stays where it is
+      const Needle now = Now();
+      entry_ = Entry();
+      direction_ = now.direction;
+      depthMm_ = (now.tip - entry_).dot(direction_);
+    } else {
+      depthMm_ = OutMm;
+    }
+    guide_ = guide;
+    hasMetBone_ = false;
+  }
+  Give();
+}
+
+// Into the body, not along it.
+bool NeedleTool::PointsInto(const Vector3d& place, const Vector3d& direction) const
+{
+  const auto nearest = scan_->HasSkin() ? scan_->Body().mesh->NearestTo(place) : std::nullopt;
+  const Vector3d normal = nearest ? scan_->Body().mesh->NormalAt(nearest->place) : scan_->SkinNormal();
+  return -normal.dot(direction) > std::cos(MostOblique * RadiansPerDegree);
+}
+
+void NeedleTool::PutEntry(const Vector3d& place)
+{
+  if (!CanMove() || IsInBody(tr("The needle is in the body: withdraw it first")))
+    return;
+  const Vector3d direction = Now().direction;
+  if (!PointsInto(place, direction))
+    return;
+  guide_ = NeedleGuide::None;
+  entry_ = place;
+  direction_ = direction;
+  depthMm_ = OutMm;
+  hasMetBone_ = false;
+  Give();
+}
+
+void NeedleTool::Steer(double within, double across)
+{
+  if (!CanMove())
+    return;
+  if (guide_ != NeedleGuide::None) {
+    if (IsInBody(tr("A guide does not turn while the needle is in the body: withdraw it first")))
+      return;
+    aimMm_ = std::clamp(AimMm() - AimMmPerDegree * within, LeastAimMm, scan_->Scanner().Probe().depthMax);
+  } else {
+    const Eigen::Matrix3d probe = scan_->ProbeToWorld().linear();
+    const Vector3d turned = Turned(Turned(direction_, probe.col(1), within), probe.col(0), -across).normalized();
+    if (!PointsInto(Entry(), turned))
+      return;
+    if (!IsFree(entry_ + depthMm_ * turned)) {
+      hasMetBone_ = true;
+    } else {
+      direction_ = turned;
+      hasMetBone_ = false;
+    }
+  }
+  Give();
+}
+
+// The straight way of the tip to a place.
+bool NeedleTool::IsFree(const Vector3d& place)
+{
+  const Vector3d tip = Now().tip, way = place - tip;
+  try {
+    return way.norm() == 0.0 || scan_->Scanner().AdvanceNeedle({tip, way.normalized()}, way.norm()) >= way.norm() - 1e-6;
+  } catch (const Error& error) {
+    emit scan_->Said({Message::Warning, QString::fromUtf8(error.what()), {}});
+    return false;
+  }
+}
+
+void NeedleTool::Advance(double mm)
+{
+  if (!CanMove())
+    return;
+  ParameterList parameters = scan_->Scanner().Parameters();
+  const double length = Named(parameters, "NeedleLengthMm").Number();
+  const double wanted = std::clamp(depthMm_ + mm, MostOutMm, length - HubMm) - depthMm_;
+  try {
+    const double moved = scan_->Scanner().AdvanceNeedle(Now(), wanted);
+    hasMetBone_ = wanted > 0.0 && moved < wanted - 1e-6;
+    depthMm_ += moved;
+  } catch (const Error& error) {
+    emit scan_->Said({Message::Warning, QString::fromUtf8(error.what()), {}});
+  }
+  Give();
+}
+
+void NeedleTool::Follow(const Eigen::Matrix4d& matrix)
+{
+  Pose pose;
+  pose.matrix() = matrix;
+  try {
+    const Needle needle = Needle::Of(pose);
+    isFollowing_ = isShown_ = true;
+    isLost_ = false;
+    entry_ = needle.tip;
+    direction_ = needle.direction;
+    depthMm_ = 0.0;
+    // Nobody can stop a hand: it is told.
+    hasMetBone_ = scan_->Scanner().AdvanceNeedle({needle.tip - needle.direction, needle.direction}, 1.0) < 0.999;
+  } catch (const Error&) {
+    return; // the tracker's own state says what it sends
+  }
+  Give();
+}
+
+void NeedleTool::SetLost()
+{
+  if (!isFollowing_ || isLost_)
+    return;
+  isLost_ = true;
+  emit Changed();
+}
+
+void NeedleTool::StopFollowing()
+{
+  if (!isFollowing_)
+    return;
+  const Vector3d entry = Entry();
+  const double inside = insideMm_;
+  isFollowing_ = isLost_ = false;
+  guide_ = NeedleGuide::None;
+  entry_ = entry;
+  depthMm_ = inside;
+  Give();
+}
+
+void NeedleTool::BeginAttempt(bool tipIsShown)
+{
+  ParameterList parameters = scan_->Scanner().Parameters();
+  if (tipBefore_.empty()) // else an attempt that ended while the image was frozen has left it
+    tipBefore_ = Named(parameters, "NeedleShowTip").Text();
+  isScored_ = true;
+  scan_->SetControl("NeedleShowTip", tipIsShown ? "on" : "off");
+  isBlind_ = !tipIsShown;
+  if (!isFollowing_) {
+    isShown_ = true;
+    guide_ = NeedleGuide::InPlane;
+    depthMm_ = OutMm;
+    aimMm_ = 0.0;
+    hasMetBone_ = false;
+  }
+  emit BlindChanged(isBlind_);
+  Give();
+}
+
+void NeedleTool::EndAttempt()
+{
+  if (tipBefore_.empty())
+    return;
+  isBlind_ = isScored_ = false;
+  emit BlindChanged(false);
+  if (!scan_->IsFrozen()) { // else when it goes on
+    const std::string before = std::exchange(tipBefore_, {});
+    scan_->SetControl("NeedleShowTip", before);
+  }
+  Give();
+}
+
+QString NeedleTool::State() const
+{
+  if (!isShown_)
+    return {};
+  QString text = insideMm_ > 0.0 ? tr("Needle %1 mm in the body").arg(insideMm_, 0, 'f', 0) : tr("Needle outside of the body");
+  if (isLost_)
+    text += tr("; its tracker does not see it");
+  if (hasMetBone_)
+    text += tr("; it has met bone");
+  if (!isBlind_ && insideMm_ > 0.0 && scan_->Frame().needle) {
+    const LiveScanner& scanner = scan_->Scanner();
+    if (scanner.NeedleState() == vtkUltrasoundLiveImage::NEEDLE_OUT_OF_PLANE)
+      text += tr("; out of the plane");
+    else if (!scanner.ShowsTip())
+      text += tr("; in the plane");
+    else if (scanner.TipInPlane())
+      text += tr("; the tip is in the plane");
+    else
+      text += tr("; the tip is %1 mm off the plane").arg(std::fabs(scanner.TipOffPlaneMm()), 0, 'f', 1);
+  }
+  return text;
+}
+
+} // namespace echorama
