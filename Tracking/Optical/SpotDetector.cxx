@@ -49,6 +49,7 @@ namespace {
 constexpr int Block = 32;
 constexpr double TooBrightShare = 0.5;
 constexpr int GroupLimit = 4;
+constexpr double WorstAlone = 8.0; // chi squared
 
 // The largest excess of the frame over the floor.
 ECHORAMA_HOT int LargestExcess(const std::uint8_t* frame, const std::uint8_t* floor, int count)
@@ -519,6 +520,7 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
   if (starts.size() > GroupLimit)
     starts.resize(GroupLimit);
 
+  std::vector<Eigen::Vector2d> hot; // what is smaller than any lens draws, within the light of a spot
   const auto fit = [&](const std::vector<GaussianSpot>& from) {
     double smallest = parameters_.maximumSize;
     for (const GaussianSpot& spot : from)
@@ -528,7 +530,11 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
     settings.noise = noise_;
     settings.saturation = parameters_.saturation;
     settings.pixelsPerSample = bin * bin;
-    const std::vector<SpotSample> samples = Samples(source, from, bin, settings.backgroundNoise);
+    std::vector<SpotSample> samples = Samples(source, from, bin, settings.backgroundNoise);
+    for (const Eigen::Vector2d& place : hot)
+      samples.erase(std::remove_if(samples.begin(), samples.end(),
+                                   [&](const SpotSample& s) { return (Eigen::Vector2d(s.x, s.y) - place).norm() < bin + 0.6; }),
+                    samples.end());
     SpotFitResult result = FitSpots(samples, from, settings);
     if (bin > 1) // a mean over a square is wider and lower
       for (GaussianSpot& spot : result.spots) {
@@ -555,6 +561,19 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
   };
 
   SpotFitResult result = fit(starts);
+  for (int attempt = 0; attempt < 3 && result.converged && result.spots.size() > 1; ++attempt) { // hot pixels look like maxima
+    std::vector<GaussianSpot> kept;
+    for (const GaussianSpot& spot : result.spots) {
+      if (ShortRadius(spot.precision.inverse()) >= parameters_.minimumSize)
+        kept.push_back(spot);
+      else
+        hot.push_back(spot.centre);
+    }
+    if (kept.size() == result.spots.size() || kept.empty())
+      break;
+    starts = kept;
+    result = fit(starts);
+  }
   if (starts.size() == 1 && result.converged && result.chiSquared > 1.8) {
     const Eigen::Matrix2d covariance = result.spots[0].precision.inverse();
     const double along = LongRadius(covariance), across = ShortRadius(covariance);
@@ -580,7 +599,8 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
       GaussianSpot one = candidate->starts.front();
       if (candidate->starts.size() > 1)
         one.centre = Eigen::Vector2d(0.5 * (candidate->left + candidate->right), 0.5 * (candidate->top + candidate->bottom));
-      if (!Accept(source, fit({one}), out))
+      const SpotFitResult alone = fit({one});
+      if (alone.chiSquared > WorstAlone || !Accept(source, alone, out)) // one that lies between two is worse than none
         ++out.refused;
     }
     return;
