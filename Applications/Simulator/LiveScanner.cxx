@@ -156,7 +156,7 @@ QPolygonF LiveScanner::Fan() const
   return fan;
 }
 
-PlanePicture LiveScanner::Picture(bool showInvented) const
+PlanePicture LiveScanner::Picture() const
 {
   PlanePicture picture;
   const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image_);
@@ -181,7 +181,7 @@ PlanePicture LiveScanner::Picture(bool showInvented) const
       const int level = grey[i];
       if (valid[i] == 0)
         row[x] = 0;
-      else if (showInvented && label && label[i] >= 2) // both kinds that hold what nobody measured
+      else if (label && label[i] >= 2) // both kinds that hold what nobody measured
         row[x] = qRgb(level, level * 3 / 4, level / 3);
       else
         row[x] = qRgb(level, level, level);

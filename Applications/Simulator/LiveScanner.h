@@ -61,8 +61,8 @@ public:
   const std::string& HardMaterial() const { return hardMaterial_; }
   /// Where the needle's tip is marked, if it may be, and is in the image: mm in the plane.
   const std::optional<QPointF>& MarkedTip() const { return markedTip_; }
-  /// Grey, with the labels of what embedding invented in colour if \a showInvented; transparent where nothing is seen.
-  PlanePicture Picture(bool showInvented) const;
+  /// Grey, with what embedding invented in colour; transparent where nothing is seen.
+  PlanePicture Picture() const;
   ///@}
   /// The probe as it images: of the last image.
   ProbeGeometry Probe() const;

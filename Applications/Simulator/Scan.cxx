@@ -280,12 +280,6 @@ void Scan::SetFlipped(bool flipped)
   isFrozen_ ? ShowCine(cineIndex_) : MakeNow();
 }
 
-void Scan::SetShowInvented(bool shown)
-{
-  showsInvented_ = shown;
-  isFrozen_ ? ShowCine(cineIndex_) : Ask();
-}
-
 void Scan::SetFrozen(bool frozen)
 {
   if (frozen == isFrozen_)
@@ -323,7 +317,7 @@ PlanePicture Scan::PictureFrom(const Pose& probeToWorld)
   frame.probeToWorld = probeToWorld;
   frame.isInAir = false;
   scanner_.Make(frame);
-  PlanePicture picture = scanner_.Picture(showsInvented_);
+  PlanePicture picture = scanner_.Picture();
   scanner_.Make(frame_); // what is shown is what is recorded and sent
   return picture;
 }
@@ -450,7 +444,7 @@ void Scan::Show(const ScanFrame& frame, bool isNew, const QString& failure, doub
   failure_ = failure;
   frame_ = frame;
   if (!HasFailed()) {
-    picture_ = scanner_.Picture(showsInvented_);
+    picture_ = scanner_.Picture();
     if (frame.isInAir)
       picture_.image.fill(Qt::black); // all of the sound comes back from the air
   }

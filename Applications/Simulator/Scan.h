@@ -96,8 +96,6 @@ public:
   /// Exchanges left and right, also of an image that is frozen.
   void SetFlipped(bool flipped);
   bool IsFlipped() const { return isFlipped_; }
-  void SetShowInvented(bool shown);
-  bool ShowsInvented() const { return showsInvented_; }
   ///@}
 
   ///@{ Freeze, and what was seen in the last seconds.
@@ -159,7 +157,7 @@ private:
   std::optional<Eigen::Matrix3d> turned_; ///< from outside
   Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
   std::optional<Needle> needle_;
-  bool isFollowing_ = false, isFrozen_ = false, isFlipped_ = false, showsInvented_ = true;
+  bool isFollowing_ = false, isFrozen_ = false, isFlipped_ = false;
   double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;
   QString badPose_, failure_, shownState_;
 

@@ -317,11 +317,17 @@ void SimulatorWindow::MakeImageMenu(QMenu* menu)
   QAction* flip = add("flip", tr("Left and &right exchanged"), "F", tr("Exchange left and right in the image"), [] {});
   flip->setCheckable(true);
   connect(flip, &QAction::toggled, scan_, &Scan::SetFlipped);
-  QAction* invented =
-      add("invented", tr("Mark what is &invented"), "I", tr("Colour what embedding invented, where the volume says so"), [] {});
+  QAction* invented = add("invented", tr("Show what is &invented"), "I",
+                          tr("What embedding invented, in colour; else nothing is seen there"), [] {});
   invented->setCheckable(true);
   invented->setChecked(true);
-  connect(invented, &QAction::toggled, scan_, &Scan::SetShowInvented);
+  connect(invented, &QAction::toggled, scan_, [this](bool on) { scan_->SetControl("ShowInvented", on ? "on" : "off"); });
+  connect(scan_, &Scan::ControlsChanged, invented, [this, invented] {
+    ParameterList parameters = scan_->Scanner().Parameters();
+    const QSignalBlocker same(invented);
+    invented->setChecked(Named(parameters, "ShowInvented").Number() != 0.0);
+  });
+  connect(scan_, &Scan::FrozenChanged, invented, &QAction::setDisabled);
   menu->addSeparator();
   QAction* measure = add("callipers", tr("&Callipers"), "C", tr("Measure in the image: click on both ends"), [] {});
   measure->setCheckable(true);

@@ -9,6 +9,7 @@
 #include <memory>
 #include <QAction>
 #include <QApplication>
+#include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
 #include <QJsonArray>
@@ -22,10 +23,14 @@
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkCubeSource.h>
+#include <vtkImageData.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkSTLWriter.h>
 #include <vtkTriangleFilter.h>
 #include <vtkUltrasoundVolume.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkXMLImageDataWriter.h>
 
 using namespace echorama;
 
@@ -63,6 +68,7 @@ private slots:
   void aSceneIsScanned();
   void aProbeInsideBoneIsSeen();
   void aSlowPictureIsGivenUpForANewPose();
+  void whatIsInventedIsColouredOrHidden();
   void closingAsks();
   void thePicturesOfTheManual();
 };
@@ -651,6 +657,51 @@ void TestSimulator::aSlowPictureIsGivenUpForANewPose()
   const std::int64_t number = scan.Frame().number;
   QTest::qWait(200);
   QCOMPARE(scan.Frame().number, number);
+}
+
+void TestSimulator::whatIsInventedIsColouredOrHidden()
+{
+  // A block of grey tissue, whose half towards +x was invented.
+  constexpr int side = 60;
+  const vtkNew<vtkImageData> volume;
+  volume->SetDimensions(side, side, side);
+  volume->SetOrigin(-side / 2.0, -side / 2.0, -side / 2.0);
+  for (const auto& [name, inside] : {std::pair(std::string(vtkUltrasoundVolume::IntensityName()), 120),
+                                     std::pair(std::string(vtkUltrasoundVolume::ValidRegionName()), 1),
+                                     std::pair(std::string(vtkUltrasoundVolume::EmbeddingName()), 1)}) {
+    const vtkNew<vtkUnsignedCharArray> values;
+    values->SetName(name.c_str());
+    values->SetNumberOfValues(side * side * side);
+    for (vtkIdType i = 0; i < values->GetNumberOfValues(); i++)
+      values->SetValue(
+          i, static_cast<unsigned char>(name == vtkUltrasoundVolume::EmbeddingName() && i % side >= side / 2 + 4 ? 3 : inside));
+    volume->GetPointData()->AddArray(values);
+  }
+  volume->GetPointData()->SetActiveScalars(vtkUltrasoundVolume::IntensityName());
+  const QString path = Folder().filePath("embedded.vti");
+  const vtkNew<vtkXMLImageDataWriter> writer;
+  writer->SetInputData(volume);
+  writer->SetFileName(path.toUtf8());
+  QVERIFY(writer->Write());
+
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({path}));
+  const auto colourAt = [&](double across, double depth) {
+    const PlanePicture& picture = window.Scan().Picture();
+    return picture.image.pixel(picture.PixelAt({across, depth}));
+  };
+  const double real = window.Axis(0)[0] > 0.0 ? -10.0 : 10.0;
+  QVERIFY(window.GreyAt(real, 20.0) > 100);
+  QCOMPARE(qRed(colourAt(real, 20.0)), qBlue(colourAt(real, 20.0)));
+  QVERIFY(qRed(colourAt(-real, 20.0)) > 2 * qBlue(colourAt(-real, 20.0)));
+  window.Move(Qt::Key_I);
+  QCOMPARE(window.GreyAt(-real, 20.0), -1);
+  QVERIFY(window.GreyAt(real, 20.0) > 100);
+  QVERIFY(!window.Part<QCheckBox>("ShowInvented")->isChecked()); // the panel and the menu say the same
+  window.Part<QCheckBox>("ShowInvented")->click();
+  window.Frame();
+  QVERIFY(window.GreyAt(-real, 20.0) > 0);
+  QVERIFY(window.Part<QAction>("invented")->isChecked());
 }
 
 void TestSimulator::closingAsks()
