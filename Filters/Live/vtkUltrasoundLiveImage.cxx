@@ -7,8 +7,8 @@
 #include "vtkUltrasoundDeformGeometry.h"
 #include "vtkUltrasoundTissue.h"
 
-#include "vtkExecutive.h"
 #include "vtkDataArray.h"
+#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
