@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Filters/Shell/Benchmarks/InventedAbdomen.h"
 #include "Filters/Shell/BodyLevelSet.h"
+#include "Testing/Sanitized.h"
 #include <cmath>
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@ namespace {
 
 TEST(BodyLevelSet, DistancesAreThoseOfTheBodyToHalfACell)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const BodySurface body(InventedAbdomen(40));
   const double cell = 1.0, inside = 6.0, outside = 3.0;
   const Vector3d origin = body.Bounds().min() - Vector3d::Constant(7.3);
