@@ -234,10 +234,9 @@ void GelMotion::State::Move(const Pose& probeToWorld, double time, const TissueS
 }
 
 GelMotion::GelMotion(const TissueSurface& tissue, const PlacedProbe& first, const ProbeHead& head, const GelMaterial& material,
-                     const GelCoatParameters& parameters, const Progress& progress)
+                     const GelCoatParameters& parameters)
   : state_(std::make_unique<State>(tissue, first, head, material, parameters))
 {
-  progress(1.0);
 }
 
 GelMotion::GelMotion(const GelMotion& other) : state_(std::make_unique<State>(*other.state_)) {}
@@ -304,11 +303,10 @@ GelCoat SpreadGel(const TissueSurface& rest, const TissueSurface* pressed, const
   for (const PlacedProbe& probe : probes)
     if (!(probe.geometry == probes.front().geometry))
       throw Error(Error::Kind::BadInput, "all poses must be of one probe, since the gel on its face goes with it");
-  GelMotion motion(rest, probes.front(), head, material, parameters, progress.Part(0.0, 0.05));
+  GelMotion motion(rest, probes.front(), head, material, parameters);
   const double count = static_cast<double>(probes.size());
   for (std::size_t n = 0; n < probes.size(); ++n) {
-    const Progress part =
-        progress.Part(0.05 + 0.75 * static_cast<double>(n) / count, 0.05 + 0.75 * static_cast<double>(n + 1) / count);
+    const Progress part = progress.Part(0.8 * static_cast<double>(n) / count, 0.8 * static_cast<double>(n + 1) / count);
     motion.Move(probes[n].probeToWorld, 0.0, n + 1 == probes.size() ? pressed : nullptr, part);
   }
   return motion.Look(true, progress.Part(0.8, 1.0));

@@ -15,9 +15,9 @@ class GelMotion {
 public:
   /// Puts a cap of gel on the face of a probe that is clear of \a tissue: it starts behind \a first, along its axis.
   /// \throws Error(InvalidParameter), Error(BadInput) for tissue that is none, Error(NotPossible) where the probe has no clear
-  /// way to its first pose, Error(TooLarge), Error(Cancelled)
+  /// way to its first pose, Error(TooLarge)
   GelMotion(const TissueSurface& tissue, const PlacedProbe& first, const ProbeHead& head, const GelMaterial& material,
-            const GelCoatParameters& parameters, const Progress& progress = {});
+            const GelCoatParameters& parameters);
   GelMotion(const GelMotion& other);
   GelMotion& operator=(const GelMotion& other);
   GelMotion(GelMotion&&) noexcept;

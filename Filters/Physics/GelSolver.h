@@ -10,8 +10,7 @@ namespace echorama {
 /// How gel advances.
 struct GelStepping {
   Eigen::Vector3d gravity{0.0, 0.0, -9810.0}; ///< mm/s^2
-  /// Steps are this part of the time in which pressure crosses a cell. At 0.6 gel between a probe and skin is as thick as
-  /// at 0.4, to a thousandth; at 0.9 it was still stable.
+  /// Steps are this part of the time in which pressure crosses a cell.
   double courant = 0.6;
 };
 ParameterList Describe(GelStepping& p);

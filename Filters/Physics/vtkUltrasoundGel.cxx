@@ -249,12 +249,8 @@ int vtkUltrasoundGel::RequestData(vtkInformation*, vtkInformationVector** inputs
     // 2. the kernel
     if (!kept) {
       const TissueSurface tissue = vtkUltrasoundTissue::Of(body);
-      kept.reset(
-          new Kept{GelMotion(tissue, steps.front().probe, this->Head, this->Material, this->Coat, progress.Part(0.0, 0.05)),
-                   body,
-                   time,
-                   parameters.str(),
-                   {}});
+      kept.reset(new Kept{
+          GelMotion(tissue, steps.front().probe, this->Head, this->Material, this->Coat), body, time, parameters.str(), {}});
     }
     const std::size_t known = kept->Steps.size();
     const double more = static_cast<double>(steps.size() - known);
@@ -263,7 +259,7 @@ int vtkUltrasoundGel::RequestData(vtkInformation*, vtkInformationVector** inputs
       if (steps[n].pressed) {
         pressed = vtkUltrasoundTissue::Of(steps[n].pressed);
       }
-      const auto part = [&](std::size_t at) { return 0.05 + 0.75 * static_cast<double>(at - known) / more; };
+      const auto part = [&](std::size_t at) { return 0.8 * static_cast<double>(at - known) / more; };
       kept->Motion.Move(steps[n].probe.probeToWorld, steps[n].seconds, steps[n].pressed ? &pressed : nullptr,
                         progress.Part(part(n), part(n + 1)));
     }

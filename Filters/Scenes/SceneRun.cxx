@@ -138,9 +138,8 @@ void SceneRun::Move(const TimedPose& probe, const Progress& progress)
     const double seconds = moved.probe ? probe.time - moved.probe->time : 0.0;
     if (!moved.gel)
       moved.gel = std::make_unique<GelMotion>(pressed_, PlacedProbe{parameters_.probe, probe.pose}, head, scene_.gel->material,
-                                              scene_.gel->coat, progress.Part(after, after + 0.1 * (1.0 - after)));
-    moved.gel->Move(probe.pose, seconds, moved.tissue ? &*moved.tissue : nullptr,
-                    progress.Part(after + 0.1 * (1.0 - after), 1.0));
+                                              scene_.gel->coat);
+    moved.gel->Move(probe.pose, seconds, moved.tissue ? &*moved.tissue : nullptr, progress.Part(after, 1.0));
     moved.gelSeconds += SecondsSince(start);
   }
   moved.probe = probe;
