@@ -185,8 +185,10 @@ public:
     }
   }
 
-  // The way of a ray. Of pressed tissue also where each sample lay.
-  SlicePath PathOf(int element, const SkewRay& skew, const BeamBend* bend, std::vector<Vector3d>* rest = nullptr) const
+  // The way of a ray. Of pressed tissue, of which \a line is what \a bend says of the element, also where each sample lay, and
+  // nothing else when \a isRestAlone.
+  SlicePath PathOf(int element, const SkewRay& skew, const BeamBend* bend, const BeamBend::Line& line,
+                   std::vector<Vector3d>* rest = nullptr, bool isRestAlone = false) const
   {
     const RayStart axis = AxisOf(p_, element, 0);
     const Pose& pose = PlanePose(p_);
@@ -200,7 +202,6 @@ public:
     path.warp = {look_.pressMm * std::max(0.0, DirectionOf(p_.probe, beam).z()), look_.pressReachMm};
     if (!bend)
       return path;
-    const BeamBend::Line line = bend->Along(beam.fan);
     const auto restAt = [&](double depth) -> Vector3d {
       const double beside = skew.shiftMm + skew.slope * depth;
       const Eigen::Vector3f move = line.At(static_cast<float>(depth), static_cast<float>(beside));
@@ -208,6 +209,8 @@ public:
     };
     if (rest)
       std::transform(depths_.begin(), depths_.end(), rest->begin(), restAt);
+    if (isRestAlone)
+      return path;
     // From one knot as far as the nodes between lie on the straight line.
     const double first = std::max(0.0, depths_.front()), last = depths_.back();
     std::vector<SlicePath::Knot> nodes;
@@ -308,8 +311,8 @@ public:
   }
 
   // Adds the rays but for the first, which has been painted, and makes levels and shares those of all.
-  void PaintBeside(int element, const std::vector<SkewRay>& rays, const BeamBend* bend, std::vector<float>& powers, float* level,
-                   float* share) const
+  void PaintBeside(int element, const std::vector<SkewRay>& rays, const BeamBend* bend, const BeamBend::Line& line,
+                   std::vector<float>& powers, float* level, float* share) const
   {
     const std::size_t n = depths_.size();
     const auto count = static_cast<int>(n);
@@ -318,7 +321,7 @@ public:
     AddPowers(level, share, count, power, scattered);
     SliceBeam unused;
     for (std::size_t ray = 1; ray < rays.size(); ++ray) {
-      Paint(PathOf(element, rays[ray], bend), bend, level, share, unused);
+      Paint(PathOf(element, rays[ray], bend, line), bend, level, share, unused);
       AddPowers(level, share, count, power, scattered);
     }
     const float each = 1.0f / static_cast<float>(rays.size());
@@ -529,17 +532,20 @@ Volume<float> SliceTracer::Trace(const SynthesisParameters& p, const SliceLook& 
     std::vector<double> rest(n);
     std::vector<Vector3d> restPoints(bend ? n : 0);
     std::vector<float> powers(rays.size() > 1 ? 2 * n : 0);
+    BeamBend::Line line;
     for (std::ptrdiff_t row = begin; row < end; ++row) {
       const int element = static_cast<int>(row) - margin;
       const bool isInFan = element >= 0 && element < p.elements;
-      const SlicePath path = painter.PathOf(element, rays[0], bend, bend ? &restPoints : nullptr);
+      if (bend)
+        line = bend->Along(BeamOf(p, element, 0).fan);
+      const SlicePath path = painter.PathOf(element, rays[0], bend, line, bend ? &restPoints : nullptr, !isInFan);
       if (isInFan) {
         float* const level = picture.View().Row(element, 0);
         float* const scattered = share.View().Row(element, 0);
         SliceBeam& own = about[static_cast<std::size_t>(element)];
         painter.Paint(path, bend, level, scattered, own);
         if (rays.size() > 1)
-          painter.PaintBeside(element, rays, bend, powers, level, scattered);
+          painter.PaintBeside(element, rays, bend, line, powers, level, scattered);
       }
       if (!speckled)
         continue;

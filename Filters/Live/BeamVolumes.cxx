@@ -20,6 +20,7 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include "Filters/Live/BorderDistance.h"
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -341,11 +342,10 @@ struct BeamSet {
 struct RunBend {
   float along[3][runLength] = {};
 
-  void Set(const BeamBend::Line& line, const BeamSet& set, const Eigen::Matrix3f& toIndex, int first, int count,
-           const float* distance)
+  void Set(const Eigen::Matrix3f& toIndex, const Eigen::Vector3f* moves, int count)
   {
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector3f move = toIndex * line.At(static_cast<float>(set.DepthOf(first + i)), distance[i]);
+      const Eigen::Vector3f move = toIndex * moves[i];
       for (int axis = 0; axis < 3; ++axis)
         along[axis][i] = move[axis];
     }
@@ -472,6 +472,7 @@ void BeamVolumes::Read(const PlacedProbe& probe, const BeamThickness& thickness,
     std::vector<RunBend> bends(bend ? readers_.size() : 1);
     std::vector<RunRead> reads(isMean ? readers_.size() : 2);
     BeamBend::Line bendLine;
+    std::array<Eigen::Vector3f, runLength> moves; // of a run, in the probe's frame
     RunRead mean;
     for (int beam = static_cast<int>(begin); beam < end; ++beam) {
       if (bend)
@@ -486,12 +487,14 @@ void BeamVolumes::Read(const PlacedProbe& probe, const BeamThickness& thickness,
         RunSums sums{};
         for (std::size_t p = 0; p < set.planes.size(); ++p) {
           const float* distance = set.distances.data() + p * static_cast<std::size_t>(set.samples) + first;
+          for (int i = 0; bend && i < count; ++i)
+            moves[static_cast<std::size_t>(i)] = bendLine.At(static_cast<float>(set.DepthOf(first + i)), distance[i]);
           const auto readOf = [&](std::size_t r, RunRead& into) {
             runs[r].first = first;
             runs[r].count = count;
             runs[r].distance = distance;
             if (bend)
-              bends[r].Set(bendLine, set, toIndex[r], first, count, distance);
+              bends[r].Set(toIndex[r], moves.data(), count);
             readers_[r]->Read(runs[r], into.value, into.content);
             for (int i = 0; i < count && !mix.showInvented; ++i)
               if (into.content[i] == ContentInvented)

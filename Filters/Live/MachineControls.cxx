@@ -130,11 +130,6 @@ Receiver GainOf(const MachineControls& c, double firstDepth, double lastDepth)
   return receiver;
 }
 
-double GainDbAt(const MachineControls& c, double share)
-{
-  return GainOf(c, 0.0, 1.0).GainDbAt(share);
-}
-
 BeamDevelopment::BeamDevelopment(const MachineControls& c, double depthMin, double depthMax, int samples)
 {
   CheckRanges(c);

@@ -44,8 +44,6 @@ double FrequencyOf(const MachineControls& controls, double usualMHz);
 
 /// A receiver with the gain and the time-gain curve of the controls, whose sliders lie evenly between two depths.
 Receiver GainOf(const MachineControls& controls, double firstDepth, double lastDepth);
-/// The gain at a share of the depths: 0 is the first, 1 the last; beyond, as at the ends.
-double GainDbAt(const MachineControls& controls, double share);
 
 /// The controls for beams of one kind, worked out once: turns what was read into greys, beam by beam.
 class BeamDevelopment {

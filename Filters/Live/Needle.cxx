@@ -156,8 +156,9 @@ public:
                                            *std::max_element(controls.tgcDb.begin(), controls.tgcDb.end()) - 6.0)),
       gain_(static_cast<std::size_t>(plane.samples))
   {
+    const Receiver curve = GainOf(controls, 0.0, plane.samples - 1.0);
     for (int s = 0; s < plane.samples; ++s)
-      gain_[static_cast<std::size_t>(s)] = static_cast<float>(GainDbAt(controls, s / (plane.samples - 1.0)));
+      gain_[static_cast<std::size_t>(s)] = static_cast<float>(curve.GainDbAt(s));
   }
 
   void Draw(const std::vector<NeedleBlob>& blobs, float* value, const unsigned char* content)

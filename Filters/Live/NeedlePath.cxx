@@ -48,19 +48,19 @@ NeedleAdvance AdvanceTip(const Vector3d& from, const Vector3d& to, const NeedleO
   return out ? NeedleAdvance{length, false} : NeedleAdvance{0.0, true}; // all of the way lies in the obstacle
 }
 
-NeedleObstacle BrighterThan(const BeamVolumes& volumes, double grey, double overMm)
+NeedleObstacle BrighterThan(const BeamVolumes& volumes, double grey, const VolumeMix& mix, double overMm)
 {
   CheckRange("the size of what stops a needle, in mm,", overMm, 0.1, 20.0);
   // Beams of a small plane, as thick as it is wide.
   constexpr int across = 5;
   const ProbeGeometry cube = ProbeGeometry::Linear(overMm, 0.0, -0.5 * overMm, 0.5 * overMm);
   const BeamThickness thickness{overMm, 1.0, 0.0, across};
-  return [&volumes, grey, cube, thickness](const Vector3d& point) {
+  return [&volumes, grey, mix, cube, thickness](const Vector3d& point) {
     Volume<float> value({across, across, 1});
     Volume<unsigned char> content({across, across, 1});
     Pose place = Pose::Identity();
     place.translation() = point;
-    volumes.Read({cube, place}, thickness, value.View(), content.View());
+    volumes.Read({cube, place}, thickness, value.View(), content.View(), mix);
     double sum = 0.0;
     int count = 0;
     for (std::ptrdiff_t n = 0; n < value.View().Size(); ++n)

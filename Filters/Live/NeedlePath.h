@@ -10,9 +10,10 @@ namespace echorama {
 /// Whether a needle cannot pass a point of the world, mm: bone, by material, by a surface, or by how bright a volume is there.
 using NeedleObstacle = std::function<bool(const Eigen::Vector3d&)>;
 
-/// Of volumes: what is brighter than \a grey, averaged over a cube of \a overMm, so that grain does not stop it. Where nothing is
-/// real nothing stops it. For as long as the volumes live. \throws Error(InvalidParameter) for a size that is not in [0.1, 20] mm
-NeedleObstacle BrighterThan(const BeamVolumes& volumes, double grey, double overMm = 1.5);
+/// Of volumes, as they are seen: what is brighter than \a grey, averaged over a cube of \a overMm, so that grain does not stop
+/// it. Where nothing is real nothing stops it. For as long as the volumes live. \throws Error(InvalidParameter) for a size that
+/// is not in [0.1, 20] mm
+NeedleObstacle BrighterThan(const BeamVolumes& volumes, double grey, const VolumeMix& mix = {}, double overMm = 1.5);
 
 /// How far the tip comes on the straight way between two places.
 struct NeedleAdvance {

@@ -163,7 +163,7 @@ double vtkUltrasoundLiveImage::AdvanceNeedle(double mm)
       if (isVolumes) {
         const echorama::MachineControls& greys = this->Values.controls;
         bone = echorama::BrighterThan(this->VolumesOf(inputs, hasLabels),
-                                      greys.black + this->NeedleLevel * (greys.white - greys.black));
+                                      greys.black + this->NeedleLevel * (greys.white - greys.black), this->Values.mix);
       } else if (const echorama::LiveScene* scene = this->SceneOf(inputs)) {
         bone = scene->Hard();
       }

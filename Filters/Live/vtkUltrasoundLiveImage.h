@@ -9,8 +9,8 @@
  * Input 1, optional: tissue (vtkPolyData, see vtkUltrasoundTissue). Source says what the image is made of: the volumes; or the
  * tissue, as a *scene*, drawn for the eye at the rate of a display (the live view of dissertation 7.7, echorama::SliceTracer), or
  * by the *acoustic* model, slower, and better the higher Refinement is (echorama::ProgressiveSlice; the last level is what
- * vtkUltrasoundSynthesizer makes). What only counts for volumes (Overlap, Black, White, what was recorded, shadow and
- * enhancement) does nothing then; Attenuation is what the gain makes up for, and only the acoustic model has noise of
+ * vtkUltrasoundSynthesizer makes). What only counts for volumes (Overlap, ShowInvented, Black, White, what was recorded, shadow
+ * and enhancement) does nothing then; Attenuation is what the gain makes up for, and only the acoustic model has noise of
  * electronics.
  *
  * Input 2, optional and repeatable: states of tissue that a probe presses: displacement images (of vtkUltrasoundTissuePress)

@@ -9,7 +9,6 @@
 #include "vtkUltrasoundVolume.h"
 
 #include "vtkCallbackCommand.h"
-#include "vtkCellArray.h"
 #include "vtkCleanPolyData.h"
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
@@ -20,7 +19,6 @@
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkPolyDataConnectivityFilter.h"
 #include "vtkPolyDataNormals.h"
@@ -81,26 +79,16 @@ double IndexOf(double cell, const std::vector<double>& centres)
   return centres[i] + (at - low) * (centres[i + 1] - centres[i]);
 }
 
-// Triangles of one body of tissue.
+// The body that holds the others.
 vtkSmartPointer<vtkPolyData> BodyAlone(const echorama::TissueSurface& tissue)
 {
   const int outermost = echorama::OutermostBody(tissue);
   if (outermost < 0) {
     throw Error(Error::Kind::BadInput, "the tissue has no body whose surface the skin could be");
   }
-  const echorama::TissueSurface body = tissue.Only(outermost);
-  const vtkNew<vtkPoints> points;
-  for (const Eigen::Vector3f& point : body.points) {
-    points->InsertNextPoint(point.data());
-  }
-  const vtkNew<vtkCellArray> cells;
-  for (const auto& triangle : body.triangles) {
-    cells->InsertNextCell({triangle[0], triangle[1], triangle[2]});
-  }
-  auto surface = vtkSmartPointer<vtkPolyData>::New();
-  surface->SetPoints(points);
-  surface->SetPolys(cells);
-  return surface;
+  auto body = vtkSmartPointer<vtkPolyData>::New();
+  vtkUltrasoundTissue::Set(body, tissue.Only(outermost));
+  return body;
 }
 
 vtkSmartPointer<vtkPolyData> TrianglesOf(vtkPolyData* mesh, const echorama::Progress& progress)
@@ -160,10 +148,15 @@ int vtkUltrasoundSkin::RequestData(vtkInformation*, vtkInformationVector** input
     if (!volume && !mesh) {
       throw Error(Error::Kind::BadInput, "there is no volume, tissue or surface to take the skin of");
     }
-    const vtkSmartPointer<vtkPolyData> surface = volume ? this->OutlineOf(volume, progress.Part(0.0, 0.8))
-                                                 : vtkUltrasoundTissue::IsTissue(mesh)
-                                                     ? BodyAlone(vtkUltrasoundTissue::Of(mesh))
-                                                     : TrianglesOf(mesh, progress.Part(0.0, 0.8));
+    vtkSmartPointer<vtkPolyData> surface = mesh;
+    if (volume) {
+      surface = this->OutlineOf(volume, progress.Part(0.0, 0.8));
+    } else {
+      if (vtkUltrasoundTissue::IsTissue(mesh)) {
+        surface = BodyAlone(vtkUltrasoundTissue::Of(mesh));
+      }
+      surface = TrianglesOf(surface, progress.Part(0.0, 0.8)); // without materials: skin is no tissue
+    }
     progress(0.8);
     const vtkNew<vtkPolyDataNormals> normals;
     normals->SetInputData(surface);

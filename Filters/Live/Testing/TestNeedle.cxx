@@ -385,7 +385,19 @@ TEST(NeedlePath, StopsWhereAVolumeIsBrightButNotAtItsGrain)
   EXPECT_NEAR(advance.freeMm, 39.7, 0.5); // linear from 90 at 29 mm to 240 at 30 mm: 200 at 29.7 mm
   EXPECT_FALSE(AdvanceTip({20, 20, -10}, {20, 20, 28}, bone).stopped);
   EXPECT_FALSE(AdvanceTip({100, 20, -10}, {100, 20, 50}, bone).stopped); // beside it
-  EXPECT_THROW(BrighterThan(volumes, 200.0, 0.0), Error);
+  EXPECT_THROW(BrighterThan(volumes, 200.0, {}, 0.0), Error);
+
+  // What is not seen stops nothing: bone that embedding invented.
+  Volume<unsigned char> labels(voxels.Dimensions(), 1);
+  for (int k = 29; k < 60; ++k)
+    for (int j = 0; j < 40; ++j)
+      std::fill_n(labels.View().Row(j, k), 40, static_cast<unsigned char>(3));
+  BeamVolumes embedded;
+  embedded.Add<unsigned char>({voxels.View(), {}, grid}, labels.View());
+  VolumeMix hidden;
+  hidden.showInvented = false;
+  EXPECT_TRUE(AdvanceTip({20, 20, -10}, {20, 20, 50}, BrighterThan(embedded, 200.0)).stopped);
+  EXPECT_FALSE(AdvanceTip({20, 20, -10}, {20, 20, 50}, BrighterThan(embedded, 200.0, hidden)).stopped);
 }
 
 TEST(NeedleTrack, CountsTurnsWithinTheBodyOnly)

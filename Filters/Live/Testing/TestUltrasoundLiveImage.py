@@ -292,5 +292,6 @@ for name, inputs, overlap in (("stitched", (stitcher.GetOutput(),), "first"), ("
     both = (valid[:, 1:] == 1) & (valid[:, :-1] == 1)
     steps[name] = np.abs(np.diff(images[name], axis=1))[both].max()
 errors = {name: np.sqrt(np.mean((images[name] - images["stitched"])[valid == 1] ** 2)) for name in ("first", "mean")}
+print("overlap: largest steps " + str(steps) + ", RMS to the stitched volume " + str(errors) + ", grey")
 assert errors["mean"] < 1.5 and errors["first"] > 8, errors
 assert steps["mean"] <= steps["stitched"] + 1 and steps["first"] > 20, steps
