@@ -69,7 +69,7 @@ class Shell(unittest.TestCase):
                 ((work / "open.stl",), f"{work / 'open.stl'}: the body is not closed: it has 1 hole, one of"),
                 ((work / "nowhere.stl",), "nowhere.stl: there is no such file"),
                 ((work / "ball.stl", "--printer-mm", 50, 50, 50), "does not fit the printer"),
-                ((work / "ball.stl", "--thickness-mm", 100), "100"),
+                ((work / "ball.stl", "--thickness-mm", 100), "ThicknessMm is 100 mm; it must be in [0.4, 20]"),
         ):
             done = run("shell", *arguments, "-o", work / "nothing", "--opening-mm", 20, "--resolution-mm", 1)
             self.assertNotEqual(done.returncode, 0)

@@ -8,20 +8,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <tuple>
 
 namespace echorama {
 namespace {
 
 using Eigen::Vector3d;
-
-std::vector<std::uint32_t> NumbersUpTo(std::size_t count)
-{
-  std::vector<std::uint32_t> numbers(count);
-  std::iota(numbers.begin(), numbers.end(), 0u);
-  return numbers;
-}
 
 struct SurfaceEdge {
   std::uint32_t low, high;
@@ -128,7 +120,7 @@ BodySurface::BodySurface(TriangleSurface surface, const Progress& progress) : su
     throw Error(Error::Kind::BadInput, "the surface is not that of a body: " + report.Faults());
   for (const Eigen::Vector3f& point : surface_.points)
     bounds_.extend(point.cast<double>());
-  tree_ = TriangleTree(surface_.points, surface_.triangles, NumbersUpTo(surface_.triangles.size()));
+  tree_ = TriangleTree(surface_.points, surface_.triangles);
   FindNormals();
   progress(1.0);
 }

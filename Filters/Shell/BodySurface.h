@@ -3,7 +3,6 @@
 #include "Filters/Tissue/SurfaceCheck.h"
 #include "Filters/Tissue/TriangleTree.h"
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace echorama {

@@ -3,10 +3,9 @@
 // local headers, data and the directory at the end follow APPNOTE 6.3, without dates.
 #include "PrintFile.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/FileReplacement.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Base/TextFile.h"
 #include <Eigen/Geometry>
-#include <fstream>
 #include <limits>
 #include <zlib.h>
 
@@ -130,15 +129,7 @@ void WritePrintFile(const std::string& path, const std::vector<PrintedBody>& bod
               "xmlns=\"http://schemas.openxmlformats.org/package/2006/relationships\"><Relationship Target=\"/3D/3dmodel.model\" "
               "Id=\"rel0\" Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>\n");
   archive.Add("3D/3dmodel.model", ModelOf(bodies));
-  const std::string bytes = archive.Closed();
-  FileReplacement file;
-  const std::string temporary = file.Stage(path);
-  std::ofstream stream(temporary, std::ios::binary);
-  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  if (!stream)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written: the disk may be full");
-  file.Commit();
+  WriteTextFile(path, archive.Closed());
 }
 
 } // namespace echorama

@@ -10,6 +10,7 @@
 #include "Core/Base/FormatText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "LevelSetMesh.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -37,11 +37,11 @@ struct Shell {
 /// Makes both parts. The outer surface is the body's: its points lie on it, and the triangles between them are off by
 /// about resolution^2 / (2 radius of curvature); the inner one likewise lies at the thickness below it.
 ///
-/// Cost: 45 s of a processor for an abdomen of 300 x 240 mm with cells of 0.5 mm, 20 s with 0.8 mm. The result does not depend on
-/// the number of threads. \param marks in the body's frame; they are moved onto its surface, and those below the plane of the
-/// opening are left out \throws Error(InvalidParameter) as ShellParameters::Check and BodyToShell; Error(BadInput) for a mark
-/// that is not finite; Error(NotPossible) when the body is too thin for the wall, a part falls into pieces or does not come out
-/// sound; Error(TooLarge); Error(Cancelled)
+/// Cost: grows about with the square of 1 / resolution; BenchmarkShell measures it (Documentation/shell.md). The result does not
+/// depend on the number of threads. \param marks in the body's frame; they are moved onto its surface, and those below the plane
+/// of the opening are left out \throws Error(InvalidParameter) as ShellParameters::Check and BodyToShell; Error(BadInput) for a
+/// mark that is not finite; Error(NotPossible) when the body is too thin for the wall, a part falls into pieces or does not come
+/// out sound; Error(TooLarge); Error(Cancelled)
 Shell MakeShell(const BodySurface& body, const ShellParameters& parameters = {}, const std::vector<Eigen::Vector3d>& marks = {},
                 const Progress& progress = {});
 

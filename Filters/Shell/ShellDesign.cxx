@@ -143,7 +143,7 @@ Eigen::AlignedBox3d ShellDesign::Bounds(Part part) const
   box.max() += Vector3d(wider, wider, bump);
   box.min().z() = part == Part::Skin ? 0.0 : -p_.baseMm;
   if (part == Part::Base)
-    box.max().z() = std::max(p_.baffleMm, 0.0);
+    box.max().z() = p_.baffleMm;
   return box;
 }
 

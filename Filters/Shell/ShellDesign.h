@@ -3,7 +3,6 @@
 #include "BodySurface.h"
 #include "Core/Base/Parameters.h"
 #include "Core/Geometry/RigidTransform.h"
-#include "LevelSetMesh.h"
 
 namespace echorama {
 

@@ -38,14 +38,6 @@ std::vector<MarkPlace> PlacesOf(const std::vector<Vector3d>& marks, const Vector
   return places;
 }
 
-std::string Escaped(const std::string& text)
-{
-  std::string safe;
-  for (const char c : text)
-    safe += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return safe;
-}
-
 } // namespace
 
 std::vector<Vector3d> DomeMarks(int count, double radiusMm, double horizon, double lowestDegrees)
@@ -106,19 +98,15 @@ ProxyFit MeasureProxy(const TriangleSurface& body, const TriangleSurface& proxy,
 {
   if (proxy.triangles.empty() || marks.empty())
     throw Error(Error::Kind::BadInput, "the proxy has no triangles or no marks");
-  std::vector<std::uint32_t> members(proxy.triangles.size());
-  std::iota(members.begin(), members.end(), 0u);
-  const TriangleTree tree(proxy.points, proxy.triangles, members);
+  const TriangleTree tree(proxy.points, proxy.triangles);
   std::vector<Eigen::Vector3f> places; // marks, as triangles without an extent
   std::vector<TriangleTree::Triangle> dots;
-  std::vector<std::uint32_t> numbers;
   for (const Vector3d& mark : marks) {
     const auto at = static_cast<std::uint32_t>(places.size());
-    numbers.push_back(at);
     dots.push_back({at, at, at});
     places.push_back(mark.cast<float>());
   }
-  const TriangleTree markTree(places, dots, numbers);
+  const TriangleTree markTree(places, dots);
   struct Distances {
     double toProxy = -1.0, toMark = 0.0;
   };
@@ -151,7 +139,7 @@ ProxyFit MeasureProxy(const TriangleSurface& body, const TriangleSurface& proxy,
   return fit;
 }
 
-std::string MarksGuide(const std::vector<Vector3d>& marks, const Vector3d& up, const std::string& title)
+std::string MarksGuide(const std::vector<Vector3d>& marks, const Vector3d& up)
 {
   const std::vector<MarkPlace> places = PlacesOf(marks, up);
   double widest = 1e-9;
@@ -163,9 +151,10 @@ std::string MarksGuide(const std::vector<Vector3d>& marks, const Vector3d& up, c
     return Eigen::Vector2d(half + radius * std::cos(place.angle), half - radius * std::sin(place.angle));
   };
   std::string html =
-      "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>" + Escaped(title) +
-      "</title><style>body{font-family:sans-serif}table{font-size:8pt;columns:3}</style></head><body>\n<h1>" + Escaped(title) +
-      "</h1>\n<p>" + std::to_string(marks.size()) +
+      "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>Calibration points</title>"
+      "<style>body{font-family:sans-serif}table{font-size:8pt;columns:3}</style></head><body>\n"
+      "<h1>Calibration points</h1>\n<p>" +
+      std::to_string(marks.size()) +
       " points, seen from outside against Up. Go from 1 on; the line leads to the next. Distance from the middle is the "
       "angle down from the top.</p>\n" +
       Format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%gmm\" height=\"%gmm\" viewBox=\"0 0 %g %g\">\n", 2.0 * half,

@@ -28,6 +28,6 @@ ProxyFit MeasureProxy(const TriangleSurface& body, const TriangleSurface& proxy,
 
 /// A page to print: a map of numbered marks as seen against \a up, joined in their order, and a table of their coordinates. HTML
 /// with an SVG picture; it needs no other file.
-std::string MarksGuide(const std::vector<Eigen::Vector3d>& marks, const Eigen::Vector3d& up, const std::string& title);
+std::string MarksGuide(const std::vector<Eigen::Vector3d>& marks, const Eigen::Vector3d& up);
 
 } // namespace echorama

@@ -245,7 +245,7 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
     points->GetPointData()->AddArray(numbers);
     points->GetPointData()->SetNormals(normals);
     if (!onSkin.empty()) {
-      this->Guide = echorama::MarksGuide(onSkin, up, "Calibration points");
+      this->Guide = echorama::MarksGuide(onSkin, up);
       this->Report += echorama::Format("\ncalibration points: %zu", onSkin.size());
     }
     if (!order.empty() && !onSkin.empty()) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace echorama {
 namespace {
@@ -96,6 +97,13 @@ double Enter(const Eigen::AlignedBox3f& box, const Vector3d& origin, const Vecto
   return near <= far + slack ? near : infinite;
 }
 
+std::vector<std::uint32_t> NumbersUpTo(std::size_t count)
+{
+  std::vector<std::uint32_t> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), 0u);
+  return numbers;
+}
+
 // Children to visit, with the bound that each had when it was put there; the depth of a tree halved at the median is bounded.
 struct Visit {
   std::uint32_t node;
@@ -115,6 +123,11 @@ TriangleTree::TriangleTree(const std::vector<Eigen::Vector3f>& points, const std
   nodes_.reserve(members_.size());
   if (!members_.empty())
     Build(boxes, 0, static_cast<std::uint32_t>(members_.size()));
+}
+
+TriangleTree::TriangleTree(const std::vector<Eigen::Vector3f>& points, const std::vector<Triangle>& triangles)
+  : TriangleTree(points, triangles, NumbersUpTo(triangles.size()))
+{
 }
 
 void TriangleTree::Build(const std::vector<Eigen::AlignedBox3f>& boxes, std::uint32_t begin, std::uint32_t end)

@@ -34,6 +34,8 @@ public:
   /// Of the triangles in \a members; all other arguments must be the same for every question.
   TriangleTree(const std::vector<Eigen::Vector3f>& points, const std::vector<Triangle>& triangles,
                std::vector<std::uint32_t> members);
+  /// Of all triangles.
+  TriangleTree(const std::vector<Eigen::Vector3f>& points, const std::vector<Triangle>& triangles);
 
   /// The place nearest to \a point, of equals that on the triangle that comes first in the tree. Nothing when there are no
   /// triangles, or the point is not finite.

@@ -355,10 +355,11 @@ TEST(ShellMarks, ProxyIsMeasured)
 
 TEST(ShellMarks, GuideShowsEveryMark)
 {
-  const std::string guide = MarksGuide(DomeMarks(42, 30.0), Vector3d::UnitZ(), "belly <1>");
+  const std::string guide = MarksGuide(DomeMarks(42, 30.0), Vector3d::UnitZ());
   EXPECT_NE(guide.find(">42</text>"), std::string::npos);
   EXPECT_EQ(guide.find(">43</text>"), std::string::npos);
-  EXPECT_NE(guide.find("belly &lt;1&gt;"), std::string::npos);
+  EXPECT_NE(guide.find("<h1>Calibration points</h1>"), std::string::npos);
+  EXPECT_NE(guide.find("<p>42 points"), std::string::npos);
   EXPECT_EQ(guide.find("nan"), std::string::npos);
 }
 
