@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Codes are found by trying: words of few off slots first, each beside those that are taken, with a step back when none fits, for
-// lengths from the shortest. That takes milliseconds, once.
+// lengths from the shortest.
 //
 // A match needs no threshold on single frames. With a rolling shutter, or slots out of step with frames, a frame may see the end
 // of one slot and the beginning of the next; so the expected brightness is the share of its exposure in which the light is on,
@@ -9,6 +9,7 @@
 #include "BlinkCode.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <functional>
 
@@ -32,10 +33,7 @@ std::uint32_t Turned(std::uint32_t word, int by, int length)
 
 int Bits(std::uint32_t word)
 {
-  int count = 0;
-  for (; word != 0; word &= word - 1)
-    ++count;
-  return count;
+  return static_cast<int>(std::bitset<32>(word).count());
 }
 
 // A camera out of step sees half of each of two slots: in how many of its frames two words then differ by half a light at least.
@@ -156,34 +154,42 @@ double BlinkCode::OnShare(int light, double from, double to) const
 
 namespace {
 
+double ShareIn(const BlinkCode& code, const BlinkTiming& timing, const BlinkObservation& observation, int light, double phase)
+{
+  const double from = (observation.begin - phase) / timing.slot;
+  return code.OnShare(light, from, from + timing.exposure / timing.slot);
+}
+
 // What was seen of a light beside what its code says.
-struct Explained {
-  double residual = 1.0; // of the squared brightness
-  double largest = 1.0;  // difference in one frame, over the brightness of the light
+struct BlinkSums {
+  double squares = 0.0, expected = 0.0, both = 0.0;
+  bool IsDark() const { return squares <= 0.0 || both <= 0.0; }
 };
 
-Explained Explain(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
-                  double phase)
+BlinkSums SumUp(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                double phase)
 {
-  const auto shareIn = [&](const BlinkObservation& o) {
-    const double from = (o.begin - phase) / timing.slot;
-    return code.OnShare(light, from, from + timing.exposure / timing.slot);
-  };
-  double squares = 0.0, expected = 0.0, both = 0.0;
+  BlinkSums sums;
   for (const BlinkObservation& o : seen) {
-    const double share = shareIn(o);
-    squares += o.brightness * o.brightness;
-    expected += share * share;
-    both += share * o.brightness;
+    const double share = ShareIn(code, timing, o, light, phase);
+    sums.squares += o.brightness * o.brightness;
+    sums.expected += share * share;
+    sums.both += share * o.brightness;
   }
-  Explained result;
-  if (squares <= 0.0 || both <= 0.0)
-    return result;
-  result.residual = std::clamp(1.0 - both * both / (squares * expected), 0.0, 1.0);
-  result.largest = 0.0;
+  return sums;
+}
+
+// The largest difference in one frame, over the brightness of the light.
+double LargestDifference(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                         double phase)
+{
+  const BlinkSums sums = SumUp(code, timing, seen, light, phase);
+  if (sums.IsDark())
+    return 1.0;
+  double largest = 0.0;
   for (const BlinkObservation& o : seen)
-    result.largest = std::max(result.largest, std::abs(o.brightness * expected / both - shareIn(o)));
-  return result;
+    largest = std::max(largest, std::abs(o.brightness * sums.expected / sums.both - ShareIn(code, timing, o, light, phase)));
+  return largest;
 }
 
 } // namespace
@@ -191,36 +197,36 @@ Explained Explain(const BlinkCode& code, const BlinkTiming& timing, const std::v
 double BlinkResidual(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
                      double phase)
 {
-  return Explain(code, timing, seen, light, phase).residual;
+  const BlinkSums sums = SumUp(code, timing, seen, light, phase);
+  return sums.IsDark() ? 1.0 : std::clamp(1.0 - sums.both * sums.both / (sums.squares * sums.expected), 0.0, 1.0);
 }
 
 BlinkMatch MatchBlink(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen,
                       std::optional<double> phase, double limit)
 {
   BlinkMatch best;
+  double least = 1.0, rival = 1.0; // residuals: of the best, and of the best other light
   std::vector<double> residuals(static_cast<std::size_t>(code.Lights()), 1.0);
   const int phases = phase ? 1 : PhasesPerSlot * code.Length();
   for (int light = 0; light < code.Lights(); ++light)
     for (int step = 0; step < phases; ++step) {
       const double at = phase ? *phase : step * timing.slot / PhasesPerSlot;
       const double residual = BlinkResidual(code, timing, seen, light, at);
-      double& least = residuals[static_cast<std::size_t>(light)];
+      double& ofLight = residuals[static_cast<std::size_t>(light)];
+      ofLight = std::min(ofLight, residual);
       if (residual < least) {
         least = residual;
-        if (residual < best.residual) {
-          best.residual = residual;
-          best.light = light;
-          best.phase = at;
-        }
+        best.light = light;
+        best.phase = at;
       }
     }
   for (int light = 0; light < code.Lights(); ++light)
     if (light != best.light)
-      best.rival = std::min(best.rival, residuals[static_cast<std::size_t>(light)]);
+      rival = std::min(rival, residuals[static_cast<std::size_t>(light)]);
   if (best.light < 0 || (code.NeedsTrigger() && !phase) ||
-      (limit < 1.0 && Explain(code, timing, seen, best.light, best.phase).largest > LargestError))
+      (limit < 1.0 && LargestDifference(code, timing, seen, best.light, best.phase) > LargestError))
     best.light = -1;
-  if (best.residual > limit || best.rival < std::max(best.residual + LeastMargin, LeastRatio * best.residual))
+  if (least > limit || rival < std::max(least + LeastMargin, LeastRatio * least))
     best.light = -1;
   return best;
 }

@@ -50,10 +50,8 @@ struct BlinkObservation {
 };
 
 struct BlinkMatch {
-  int light = -1;        ///< -1: none fits clearly better than all others
-  double phase = 0.0;    ///< when slot 0 begins, s, in [0, length * slot)
-  double residual = 1.0; ///< what of the brightness, squared, the best one does not explain
-  double rival = 1.0;    ///< the same of the best other light
+  int light = -1;     ///< -1: none fits clearly better than all others
+  double phase = 0.0; ///< when slot 0 begins, s, in [0, length * slot)
 };
 
 /// Whose light it is: the one whose code, of the given phase or of any, explains the brightness best, if that leaves less than
@@ -62,7 +60,7 @@ struct BlinkMatch {
 BlinkMatch MatchBlink(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen,
                       std::optional<double> phase, double limit = 0.15);
 
-/// What of the brightness one light at one phase leaves unexplained, in [0, 1].
+/// What of the brightness, squared, one light at one phase leaves unexplained, in [0, 1].
 double BlinkResidual(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
                      double phase);
 

@@ -6,6 +6,15 @@
 
 namespace echorama {
 
+namespace {
+
+// Over the brightness and size of a touching light: below the low peak or above the high size it hovers; above the high peak and
+// below the low size it touches again.
+constexpr double LowPeak = 0.55, HighPeak = 0.7;
+constexpr double LowSize = 1.25, HighSize = 1.4;
+
+} // namespace
+
 BrightnessCalibration BrightnessCalibration::Fit(const std::vector<ContactSample>& samples, int width, int height, int columns,
                                                  int rows)
 {
@@ -62,15 +71,15 @@ ContactSample BrightnessCalibration::At(const Eigen::Vector2d& position) const
   return at;
 }
 
-Touch JudgeTouch(const Spot& spot, const BrightnessCalibration& calibration, Touch before, const TouchRule& rule)
+Touch JudgeTouch(const Spot& spot, const BrightnessCalibration& calibration, Touch before)
 {
   if (calibration.Empty())
     return Touch::Unknown;
   const ContactSample touching = calibration.At(spot.position);
   const double peak = spot.peak / touching.peak, size = spot.size / touching.size;
   if (before == Touch::Contact)
-    return peak < rule.lowPeak || size > rule.highSize ? Touch::Hover : Touch::Contact;
-  return peak > rule.highPeak && size < rule.lowSize ? Touch::Contact : Touch::Hover;
+    return peak < LowPeak || size > HighSize ? Touch::Hover : Touch::Contact;
+  return peak > HighPeak && size < LowSize ? Touch::Contact : Touch::Hover;
 }
 
 } // namespace echorama

@@ -34,12 +34,8 @@ enum class Touch {
   Hover, ///< its light reaches the skin, it does not
 };
 
-/// Below lowPeak of a touching light's brightness, or above highSize of its size, it hovers; it touches again above highPeak and
-/// below lowSize, so that noise does not make it blink between both.
-struct TouchRule {
-  double lowPeak = 0.55, highPeak = 0.7;
-  double lowSize = 1.25, highSize = 1.4;
-};
-Touch JudgeTouch(const Spot& spot, const BrightnessCalibration& calibration, Touch before, const TouchRule& rule = {});
+/// Clearly darker or larger than a touching light it hovers; it touches again when it is nearer to one in both, so that noise
+/// does not make it blink between both.
+Touch JudgeTouch(const Spot& spot, const BrightnessCalibration& calibration, Touch before);
 
 } // namespace echorama

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Parameters.h"
-#include <array>
 #include <Eigen/Core>
 #include <optional>
 

@@ -2,7 +2,6 @@
 #pragma once
 #include "Tracking/Optical/BrightnessCalibration.h"
 #include "Tracking/Optical/SpotTracks.h"
-#include <string>
 #include <vector>
 
 namespace echorama {

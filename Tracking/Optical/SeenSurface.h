@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include <array>
-#include <cstdint>
 #include <Eigen/Core>
-#include <memory>
 #include <optional>
-#include <vector>
 
 namespace echorama {
 
@@ -33,22 +29,6 @@ public:
 
 private:
   Eigen::Vector3d radii_;
-};
-
-/// Triangles, in Embree's tree.
-class MeshSurface : public SeenSurface {
-public:
-  using Triangle = std::array<std::uint32_t, 3>;
-
-  /// \throws Error(BadInput) without triangles, or with one that names a point that there is not, or a point that is not finite;
-  /// Error(TooLarge), Error(NotPossible) when Embree cannot take them
-  MeshSurface(const std::vector<Eigen::Vector3f>& points, const std::vector<Triangle>& triangles);
-  ~MeshSurface() override;
-  std::optional<Hit> FirstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
-
-private:
-  struct Tree;
-  std::unique_ptr<Tree> tree_;
 };
 
 } // namespace echorama

@@ -8,7 +8,7 @@
 // all sides, so a pixel shows the bell at its own place of the skin, whatever the angle.
 //
 // Noise: each pixel takes 32 random bits of its own, named by seed, frame, row and column, through a table of the normal
-// distribution's quantiles, the outermost of which are tables themselves: 6 standard deviations of tail, 7 ns per pixel.
+// distribution's quantiles, the outermost of which are tables themselves: 6 standard deviations of tail.
 //
 // With a rolling shutter row r is exposed r row times later than the first: by the place that the light then has.
 #include "SimulatedCamera.h"
@@ -260,7 +260,6 @@ void SimulatedCamera::Render(std::int64_t number, const std::vector<SimulatedLig
   const int width = parameters_.lens.width, height = parameters_.lens.height;
   frame.width = width;
   frame.height = height;
-  frame.number = number;
   frame.begin = RowBegin(number, 0.0);
   frame.delivered = RowBegin(number, height - 1) + (parameters_.exposureMs + parameters_.latencyMs) * 1e-3;
   frame.isLost = Random(parameters_.seed ^ OtherStreams ^ static_cast<std::uint64_t>(number) << 20, LossItem).Uniform() <

@@ -54,7 +54,6 @@ struct LightTruth {
 struct SimulatedFrame {
   std::vector<std::uint8_t> pixels;
   int width = 0, height = 0;
-  std::int64_t number = 0;
   double begin = 0.0;     ///< of the exposure of its first row, on the camera's clock, s
   double delivered = 0.0; ///< when the host has it, s
   bool isLost = false;    ///< the host never gets it
@@ -73,8 +72,6 @@ public:
 
   void Render(std::int64_t number, const std::vector<SimulatedLight>& lights, SimulatedFrame& frame) const;
 
-  /// Where a point of the shell is in the picture, whether or not skin hides it.
-  std::optional<Eigen::Vector2d> PixelOf(const Eigen::Vector3d& point) const;
   /// The place of the skin that a pixel shows: what a perfect calibration would say. \a skin must be the same.
   std::optional<SeenSurface::Hit> SkinAt(const SeenSurface& skin, const Eigen::Vector2d& pixel) const;
   double FrameSeconds() const { return 1.0 / parameters_.frameRate; }
@@ -87,6 +84,8 @@ private:
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(parameters_.lens.width) + static_cast<std::size_t>(x);
   }
   double RowBegin(std::int64_t number, double row) const;
+  // Where a point of the shell is in the picture, whether or not skin hides it.
+  std::optional<Eigen::Vector2d> PixelOf(const Eigen::Vector3d& point) const;
   LightTruth TruthOf(std::int64_t number, const SimulatedLight& light) const;
   void AddLight(std::int64_t number, const SimulatedLight& light, const LightTruth& truth, std::vector<float>& grey) const;
 

@@ -160,9 +160,11 @@ SpotFrame SpotDetector::Detect(const GreyFrame& frame, const LightsOffBackground
   if (background != nullptr)
     source.floor = background->RoundedRow(0);
   else {
-    surroundings_.assign(size, 0);
-    if (parameters_.method == SpotMethod::Gaussian) // eq. 7.1 knows no surroundings
-      MakeSurroundings(source);
+    if (parameters_.method == SpotMethod::Gaussian) {
+      surroundings_.resize(size);
+      MakeSurroundings(source); // of every pixel
+    } else
+      surroundings_.assign(size, 0); // eq. 7.1 knows no surroundings
     source.floor = surroundings_.data();
   }
 
@@ -625,7 +627,6 @@ bool SpotDetector::Accept(const Source& source, const SpotFitResult& fit, SpotFr
     spot.size = std::sqrt(LongRadius(covariance) * ShortRadius(covariance));
     spot.elongation = LongRadius(covariance) / ShortRadius(covariance);
     spot.chiSquared = fit.chiSquared;
-    spot.touching = static_cast<int>(fit.spots.size()) - 1;
     const int x = static_cast<int>(std::lround(spot.position.x())), y = static_cast<int>(std::lround(spot.position.y()));
     const bool isSpot =
         source.Covers(x, y) && ShortRadius(covariance) >= parameters_.minimumSize && spot.size <= parameters_.maximumSize &&

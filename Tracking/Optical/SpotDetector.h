@@ -39,7 +39,6 @@ struct Spot {
   double elongation = 1.0;                              ///< long over short axis
   double chiSquared = 0.0;                              ///< of the fit, per degree of freedom; 0 for centroids
   int saturatedPixels = 0;
-  int touching = 0; ///< others that were fitted with it
 
   double Brightness() const { return 6.283185307179586 * peak * size * size; } ///< grey levels, summed over all pixels
 };

@@ -31,7 +31,6 @@ struct SpotFitSettings {
   double backgroundNoise = 0.0; ///< variance of the background over that of one frame: 1/n for the mean of n
   double pixelsPerSample = 1.0; ///< what each value is the mean of
   double saturation = 255.0;    ///< values that this or more is expected of are left out
-  bool slope = true;            ///< a plane below the spots, else a constant
 };
 
 struct SpotFitResult {
@@ -40,7 +39,6 @@ struct SpotFitResult {
   std::vector<Eigen::Matrix2d> covariances; ///< of the centres, px^2
   std::vector<double> peakSigmas;           ///< standard deviations of the peaks
   double chiSquared = 0.0;                  ///< per degree of freedom
-  int used = 0;                             ///< samples
 };
 
 /// Fits Gaussian spots over a common plane to samples by maximum likelihood (Gaussian noise of a variance that depends on the

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/LU>
+#include <tuple>
 
 namespace echorama {
 
@@ -82,22 +83,29 @@ SpotTracks::SpotTracks(const SpotTracksParameters& parameters, BlinkCode code)
     lights_[i].light = static_cast<int>(i);
 }
 
-void SpotTracks::Move(Track& track, double time) const
+void SpotTracks::Move(Motion& motion, double time) const
 {
-  const double t = time - track.time;
-  Eigen::Matrix4d motion = Eigen::Matrix4d::Identity();
-  motion(0, 2) = motion(1, 3) = t;
-  track.state = motion * track.state;
-  track.covariance = motion * track.covariance * motion.transpose();
+  const double t = time - motion.time;
+  Eigen::Matrix4d step = Eigen::Matrix4d::Identity();
+  step(0, 2) = step(1, 3) = t;
+  motion.state = step * motion.state;
+  motion.covariance = step * motion.covariance * step.transpose();
   const double power = parameters_.acceleration * parameters_.acceleration * parameters_.frameMs * 1e-3; // of white acceleration
   const double a = std::abs(t);
   for (int axis = 0; axis < 2; ++axis) {
-    track.covariance(axis, axis) += power * a * a * a / 3.0;
-    track.covariance(axis, axis + 2) += power * a * a / 2.0;
-    track.covariance(axis + 2, axis) += power * a * a / 2.0;
-    track.covariance(axis + 2, axis + 2) += power * a;
+    motion.covariance(axis, axis) += power * a * a * a / 3.0;
+    motion.covariance(axis, axis + 2) += power * a * a / 2.0;
+    motion.covariance(axis + 2, axis) += power * a * a / 2.0;
+    motion.covariance(axis + 2, axis + 2) += power * a;
   }
-  track.time = time;
+  motion.time = time;
+}
+
+SpotTracks::Motion SpotTracks::Moved(const Motion& motion, double time) const
+{
+  Motion moved = motion;
+  Move(moved, time);
+  return moved;
 }
 
 void SpotTracks::Correct(Track& track, const Spot& spot, double time)
@@ -148,11 +156,7 @@ void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
   for (std::size_t t = 0; t < tracks_.size(); ++t)
     for (std::size_t s = 0; s < spots.size(); ++s) {
       const double when = RowTime(time, spots[s].position.y()) + half;
-      Track moved;
-      moved.state = tracks_[t].state;
-      moved.covariance = tracks_[t].covariance;
-      moved.time = tracks_[t].time;
-      Move(moved, when);
+      const Motion moved = Moved(tracks_[t], when);
       const Eigen::Vector2d off = spots[s].position - moved.state.head<2>();
       const double reach = parameters_.maximumSpeed * (when - tracks_[t].lastSeen) + 2.0;
       if ((spots[s].position - tracks_[t].spot.position).norm() > reach)
@@ -222,7 +226,7 @@ void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
     track.covariance.topLeftCorner<2, 2>() = spots[s].covariance + Eigen::Matrix2d::Identity() * ModelSigma * ModelSigma;
     const double speed = 0.35 * parameters_.maximumSpeed;
     track.covariance(2, 2) = track.covariance(3, 3) = speed * speed;
-    track.time = track.firstSeen = track.lastSeen = RowTime(time, spots[s].position.y()) + half;
+    track.time = track.lastSeen = RowTime(time, spots[s].position.y()) + half;
     track.spot = spots[s];
     track.seen.push_back({RowTime(time, spots[s].position.y()), spots[s].Brightness()});
     track.past.emplace_back(track.time, track.state);
@@ -322,8 +326,7 @@ void SpotTracks::Report(double time)
       light.velocity = track.state.tail<2>();
       light.covariance = track.covariance.topLeftCorner<2, 2>();
       light.spot = track.spot;
-      Track ahead = track;
-      Move(ahead, RowTime(time, track.state.y()) + 0.5 * timing_.exposure + parameters_.latencyMs * 1e-3);
+      const Motion ahead = Moved(track, RowTime(time, track.state.y()) + 0.5 * timing_.exposure + parameters_.latencyMs * 1e-3);
       light.predicted = ahead.state.head<2>();
       light.predictedCovariance = ahead.covariance.topLeftCorner<2, 2>();
     }

@@ -72,10 +72,13 @@ public:
 
 private:
   using State = Eigen::Vector4d; // x, y, and their velocities
-  struct Track {
+  struct Motion {
     State state = State::Zero();
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-    double time = 0.0, firstSeen = 0.0, lastSeen = 0.0;
+    double time = 0.0;
+  };
+  struct Track : Motion {
+    double lastSeen = 0.0;
     int unseen = 0; // frames on end
     int light = -1;
     Spot spot;
@@ -84,7 +87,8 @@ private:
   };
 
   double RowTime(double time, double row) const { return time + row * rowSeconds_; }
-  void Move(Track& track, double time) const;
+  void Move(Motion& motion, double time) const;
+  Motion Moved(const Motion& motion, double time) const;
   void Correct(Track& track, const Spot& spot, double time);
   void Assign(double time, const std::vector<Spot>& spots);
   void Identify(Track& track);

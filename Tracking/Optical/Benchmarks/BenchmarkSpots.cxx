@@ -254,6 +254,17 @@ Tally Identities(Rig& rig, int frames, bool withLights)
   return tally;
 }
 
+void ReportChain(const std::string& name, const Tally& tally)
+{
+  benchmark::ReportTime("spots", name, "chain", tally.seconds / std::max(tally.frames, 1),
+                        {{"group", "chain"},
+                         {"frames", tally.frames},
+                         {"wrong", tally.wrong},
+                         {"claims", tally.claims},
+                         {"reported", tally.reported},
+                         {"lost", tally.lost}});
+}
+
 // A tool at 200 mm/s on the skin, which a perfect calibration maps: how far off it is when the position is used.
 void Latency()
 {
@@ -327,14 +338,7 @@ int main()
   {
     const ThreadLimit one(1); // the chain at full size, on one core
     Rig rig(640, 480);
-    const Tally tally = Identities(rig, benchmark::Trials(1500), true);
-    benchmark::ReportTime("spots", "chain, two lights, 640 x 480", "chain", tally.seconds / std::max(tally.frames, 1),
-                          {{"group", "chain"},
-                           {"frames", tally.frames},
-                           {"wrong", tally.wrong},
-                           {"claims", tally.claims},
-                           {"reported", tally.reported},
-                           {"lost", tally.lost}});
+    ReportChain("chain, two lights, 640 x 480", Identities(rig, benchmark::Trials(1500), true));
   }
   for (const bool rolling : {false, true}) {
     Rig rig(320, 240);
@@ -344,24 +348,9 @@ int main()
       rig.camera.rowUs = rig.tracks.rowUs = 45.0;
       rig.camera.exposureMs = rig.tracks.exposureMs = 5.0;
     }
-    const Tally tally = Identities(rig, benchmark::Trials(100000), true);
-    benchmark::ReportTime("spots", rolling ? "10^5 frames, rolling shutter" : "10^5 frames", "chain",
-                          tally.seconds / std::max(tally.frames, 1),
-                          {{"group", "chain"},
-                           {"frames", tally.frames},
-                           {"wrong", tally.wrong},
-                           {"claims", tally.claims},
-                           {"reported", tally.reported},
-                           {"lost", tally.lost}});
+    ReportChain(rolling ? "10^5 frames, rolling shutter" : "10^5 frames", Identities(rig, benchmark::Trials(100000), true));
   }
   Rig dark(320, 240);
   dark.camera.hotPixels = 100;
-  const Tally tally = Identities(dark, benchmark::Trials(100000), false);
-  benchmark::ReportTime("spots", "10^5 frames without a light", "chain", tally.seconds / std::max(tally.frames, 1),
-                        {{"group", "chain"},
-                         {"frames", tally.frames},
-                         {"wrong", tally.wrong},
-                         {"claims", tally.claims},
-                         {"reported", tally.reported},
-                         {"lost", tally.lost}});
+  ReportChain("10^5 frames without a light", Identities(dark, benchmark::Trials(100000), false));
 }

@@ -161,7 +161,7 @@ TEST(SpotTracks, ALightThatGoesIsLostWithinThreeFramesAndFoundAgain)
   }
 }
 
-TEST(SpotTracks, LampsAndMirrorImagesAreNobody)
+TEST(SpotTracks, LampsAndSparklesAreNobody)
 {
   const BlinkCode code = BlinkCode::Make(2, 2);
   Flat flat(code);
@@ -190,6 +190,48 @@ TEST(SpotTracks, LampsAndMirrorImagesAreNobody)
       EXPECT_LT((light.position - *flat.paths[static_cast<std::size_t>(light.light)](light.time)).norm(), 3.0) << n;
     }
   }
+}
+
+// A second spot that blinks the same word: nobody knows which of both is the light, so neither is.
+TEST(SpotTracks, ALightAndItsMirrorImageAreNobody)
+{
+  const BlinkCode code = BlinkCode::Make(2, 2);
+  Flat flat(code);
+  flat.phase = 0.02;
+  flat.paths = {Circle({200, 200}, 60, 4.0, 0.0), Circle({400, 200}, 60, -3.0, 1.0)};
+  SpotTracks tracks({}, code);
+  constexpr int begin = 200, end = 500; // of the image
+  int bothSeen = 0;
+  for (int n = 0; n < 600; ++n) {
+    const double time = n * Frame;
+    std::vector<Spot> spots = flat.At(time, static_cast<std::uint64_t>(n));
+    if (const auto place = flat.paths[0](time + 0.5 * flat.exposure); n >= begin && n < end)
+      for (const Spot& spot : std::vector<Spot>(spots))
+        if ((spot.position - *place).norm() < 1.0) {
+          Spot image = spot; // half as bright, in a mirror along x
+          image.position.y() = 620.0 - spot.position.y();
+          image.peak *= 0.5;
+          spots.push_back(image);
+          bothSeen += n >= begin + 60;
+        }
+    const auto& lights = tracks.Update(time, spots);
+    for (const TrackedLight& light : lights)
+      if (light.status != Status::Lost) {
+        EXPECT_LT((light.position - *flat.paths[static_cast<std::size_t>(light.light)](light.time)).norm(), 3.0) << n;
+      }
+    const bool isMirrored = n >= begin + 60 && n < end, isPlain = (n >= 60 && n < begin) || n >= end + 60;
+    if (isMirrored) {
+      EXPECT_EQ(lights[0].status, Status::Lost) << n;
+    }
+    if (isPlain) {
+      EXPECT_NE(lights[0].status, Status::Lost) << n;
+    }
+    if (isMirrored || isPlain) {
+      EXPECT_NE(lights[1].status, Status::Lost) << n;
+    }
+  }
+  EXPECT_GT(bothSeen, 60);
+  EXPECT_GT(tracks.Statistics().revoked, 0);
 }
 
 TEST(SpotTracks, ClocksThatDriftAreFollowed)
@@ -409,14 +451,19 @@ TEST(LightTracker, TellsContactFromHover)
   LightTracker tracker({}, rig.tracks, rig.code, BrightnessCalibration::Fit(samples, 320, 240));
   rig.lights[0].place = [=](double t) { return LightOnSkin{place, t < 1.5 ? 0.0 : t < 3.0 ? 2.5 : 0.0, 160.0}; };
   EXPECT_EQ(tracker.TouchOf(0), Touch::Unknown);
+  int contacts = 0, hovers = 0; // how often it was asked
   for (int n = 0; n < 400; ++n) {
     seen.Render(n, rig.lights, frame);
     const auto& lights = tracker.Update(frame.Grey(), frame.begin);
     const bool isFull = lights[0].status == Status::Seen && frame.truth[0].onShare > 0.99;
     if (n > 60 && isFull && n != 135 && n != 270) {
-      EXPECT_EQ(tracker.TouchOf(0), n < 135 || n > 275 ? Touch::Contact : Touch::Hover) << n;
+      const bool isContact = n < 135 || n > 275;
+      EXPECT_EQ(tracker.TouchOf(0), isContact ? Touch::Contact : Touch::Hover) << n;
+      ++(isContact ? contacts : hovers);
     }
   }
+  EXPECT_GT(contacts, 40);
+  EXPECT_GT(hovers, 20);
 }
 
 } // namespace
