@@ -257,8 +257,7 @@ void BodyView::RayAt(const QPointF& at, double origin[3], double direction[3]) c
 
 void BodyView::ShowNeedle()
 {
-  ParameterList parameters = scan_->Scanner().Parameters();
-  needleView_->Show(*needle_, Named(parameters, "NeedleLengthMm").Number());
+  needleView_->Show(*needle_, scan_->Scanner().NeedleLengthMm());
 }
 
 bool BodyView::IsOnNeedle(const QPointF& at) const

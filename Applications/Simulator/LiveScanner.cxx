@@ -47,6 +47,7 @@ void LiveScanner::Set(const char* name, const std::string& text)
   if (beforeUse_)
     beforeUse_();
   const Messages::OfThread messages;
+  needleControls_.reset();
   live_->SetParameterAsText(name, text.c_str());
   messages.ThrowErrors();
   settings_.reset();
@@ -115,6 +116,13 @@ void LiveScanner::Make(const ScanFrame& frame)
   Keep();
 }
 
+const LiveScanner::NeedleControls& LiveScanner::OfNeedle() const
+{
+  if (!needleControls_)
+    needleControls_ = NeedleControls{live_->GetNeedleStops(), live_->GetNeedleShowTip(), live_->GetNeedleLengthMm()};
+  return *needleControls_;
+}
+
 void LiveScanner::SetNeedle(const std::optional<Needle>& needle)
 {
   live_->SetNeedle(needle.has_value());
@@ -126,6 +134,8 @@ void LiveScanner::SetNeedle(const std::optional<Needle>& needle)
 
 double LiveScanner::AdvanceNeedle(const Needle& needle, double mm)
 {
+  if (!OfNeedle().stops)
+    return mm; // and a picture in the background goes on
   if (beforeUse_)
     beforeUse_();
   const Messages::OfThread messages;

@@ -55,7 +55,8 @@ public:
   int NeedleState() const { return needleState_; }
   bool TipInPlane() const { return isTipInPlane_; }
   double TipOffPlaneMm() const { return tipOffPlaneMm_; }
-  bool ShowsTip() const { return live_->GetNeedleShowTip(); }
+  bool ShowsTip() const { return OfNeedle().showsTip; }
+  double NeedleLengthMm() const { return OfNeedle().lengthMm; }
   double ContactShare() const { return contactShare_; }
   /// What the probe stands in, if no probe can be there: bone and its like.
   const std::string& HardMaterial() const { return hardMaterial_; }
@@ -69,6 +70,12 @@ public:
   double FocusMm() const { return live_->GetFocusMm(); }
 
 private:
+  /// Controls that are asked for with each pose, as each question to the image lists all of its parameters.
+  struct NeedleControls {
+    bool stops, showsTip;
+    double lengthMm;
+  };
+  const NeedleControls& OfNeedle() const;
   void SetNeedle(const std::optional<Needle>& needle);
   QPolygonF Fan() const;
 
@@ -83,6 +90,7 @@ private:
   std::optional<QPointF> markedTip_;
   std::function<void()> beforeUse_;
   std::shared_ptr<const ScanSettings> settings_;
+  mutable std::optional<NeedleControls> needleControls_; ///< nothing: since one was set, nobody has asked
 };
 
 } // namespace echorama

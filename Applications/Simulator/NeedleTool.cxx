@@ -30,7 +30,7 @@ NeedleTool::NeedleTool(Scan* scan) : QObject(scan), scan_(scan)
 {
   connect(scan, &Scan::SubjectChanged, this, [this] {
     guide_ = NeedleGuide::InPlane;
-    isFollowing_ = hasMetBone_ = isLost_ = false;
+    isFollowing_ = hasMetBone_ = isLost_ = isBoneKnown_ = hasSaidWhy_ = false;
     depthMm_ = OutMm;
     aimMm_ = 0.0;
     SetShown(false);
@@ -45,7 +45,8 @@ NeedleTool::NeedleTool(Scan* scan) : QObject(scan), scan_(scan)
       Give(); // another probe has another end
   });
   connect(scan, &Scan::ControlsChanged, this, [this] {
-    if (!isScored_ && !tipBefore_.empty() && !scan_->IsFrozen())
+    isBoneKnown_ = hasSaidWhy_ = false; // what stops it may be another
+    if (!isScored_ && tipBefore_ && !scan_->IsFrozen())
       EndAttempt(); // it ended while the image was frozen
   });
 }
@@ -135,7 +136,7 @@ void NeedleTool::Give()
 
 void NeedleTool::SetGuide(NeedleGuide guide)
 {
-  if (guide != guide_ && (isFollowing_ || !IsInBody(tr("The needle is in the body: withdraw it first")))) {
+  if (guide != guide_ && CanMove() && !IsInBody(tr("The needle is in the body: withdraw it first"))) {
     if (guide == NeedleGuide::None) { // it stays where it is
       const Needle now = Now();
       entry_ = Entry();
@@ -147,7 +148,7 @@ void NeedleTool::SetGuide(NeedleGuide guide)
     guide_ = guide;
     hasMetBone_ = false;
   }
-  Give();
+  Give(); // also when it was refused: whoever asked shows what is
 }
 
 // Into the body, not along it.
@@ -212,9 +213,7 @@ void NeedleTool::Advance(double mm)
 {
   if (!CanMove())
     return;
-  ParameterList parameters = scan_->Scanner().Parameters();
-  const double length = Named(parameters, "NeedleLengthMm").Number();
-  const double wanted = std::clamp(depthMm_ + mm, MostOutMm, length - HubMm) - depthMm_;
+  const double wanted = std::clamp(depthMm_ + mm, MostOutMm, scan_->Scanner().NeedleLengthMm() - HubMm) - depthMm_;
   try {
     const double moved = scan_->Scanner().AdvanceNeedle(Now(), wanted);
     hasMetBone_ = wanted > 0.0 && moved < wanted - 1e-6;
@@ -229,17 +228,25 @@ void NeedleTool::Follow(const Eigen::Matrix4d& matrix)
 {
   Pose pose;
   pose.matrix() = matrix;
+  Needle needle;
   try {
-    const Needle needle = Needle::Of(pose);
-    isFollowing_ = isShown_ = true;
-    isLost_ = false;
-    entry_ = needle.tip;
-    direction_ = needle.direction;
-    depthMm_ = 0.0;
-    // Nobody can stop a hand: it is told.
-    hasMetBone_ = scan_->Scanner().AdvanceNeedle({needle.tip - needle.direction, needle.direction}, 1.0) < 0.999;
+    needle = Needle::Of(pose);
   } catch (const Error&) {
     return; // the tracker's own state says what it sends
+  }
+  const bool isSame = needle.tip == entry_ && needle.direction == direction_;
+  if (isSame && isFollowing_ && isShown_ && !isLost_ && isBoneKnown_)
+    return;
+  isFollowing_ = isShown_ = isBoneKnown_ = true;
+  isLost_ = hasMetBone_ = false;
+  entry_ = needle.tip;
+  direction_ = needle.direction;
+  depthMm_ = 0.0;
+  try { // nobody can stop a hand: it is told
+    hasMetBone_ = scan_->Scanner().AdvanceNeedle({needle.tip - needle.direction, needle.direction}, 1.0) < 0.999;
+  } catch (const Error& error) {
+    if (!std::exchange(hasSaidWhy_, true)) // and not with each pose
+      Say(tr("Whether the needle meets bone is not known: %1").arg(QString::fromUtf8(error.what())));
   }
   Give();
 }
@@ -258,7 +265,7 @@ void NeedleTool::StopFollowing()
     return;
   const Vector3d entry = Entry();
   const double inside = insideMm_;
-  isFollowing_ = isLost_ = false;
+  isFollowing_ = isLost_ = isBoneKnown_ = hasSaidWhy_ = false;
   guide_ = NeedleGuide::None;
   entry_ = entry;
   depthMm_ = inside;
@@ -267,9 +274,8 @@ void NeedleTool::StopFollowing()
 
 void NeedleTool::BeginAttempt(bool tipIsShown)
 {
-  ParameterList parameters = scan_->Scanner().Parameters();
-  if (tipBefore_.empty()) // else an attempt that ended while the image was frozen has left it
-    tipBefore_ = Named(parameters, "NeedleShowTip").Text();
+  if (!tipBefore_) // else an attempt that ended while the image was frozen has left it
+    tipBefore_ = scan_->Scanner().ShowsTip();
   isScored_ = true;
   scan_->SetControl("NeedleShowTip", tipIsShown ? "on" : "off");
   isBlind_ = !tipIsShown;
@@ -286,13 +292,14 @@ void NeedleTool::BeginAttempt(bool tipIsShown)
 
 void NeedleTool::EndAttempt()
 {
-  if (tipBefore_.empty())
+  if (!tipBefore_)
     return;
   isBlind_ = isScored_ = false;
   emit BlindChanged(false);
   if (!scan_->IsFrozen()) { // else when it goes on
-    const std::string before = std::exchange(tipBefore_, {});
-    scan_->SetControl("NeedleShowTip", before);
+    const bool before = *tipBefore_;
+    tipBefore_.reset();
+    scan_->SetControl("NeedleShowTip", before ? "on" : "off");
   }
   Give();
 }

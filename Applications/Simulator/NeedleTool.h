@@ -5,7 +5,6 @@
 #include <optional>
 #include <QObject>
 #include <QString>
-#include <string>
 
 namespace echorama {
 
@@ -82,14 +81,16 @@ private:
 
   Scan* scan_;
   bool isShown_ = false, isFollowing_ = false, isBlind_ = false, isScored_ = false, hasMetBone_ = false, isLost_ = false;
+  bool isBoneKnown_ = false; ///< of a tracked one: hasMetBone_ is of where it is, with the controls of now
+  bool hasSaidWhy_ = false;  ///< why that cannot be told
   NeedleGuide guide_ = NeedleGuide::InPlane;
   Eigen::Vector3d entry_ = Eigen::Vector3d::Zero(),
                   direction_ = Eigen::Vector3d::UnitZ(); ///< of the world; in a guide, of the probe
   double depthMm_ = 0.0;                                 ///< of the tip, from the entry
   double aimMm_ = 0.0;                                   ///< of a guide: where it crosses the middle of the image; 0: as usual
   double insideMm_ = 0.0;
-  ProbeGeometry guided_;  ///< the probe that the guide was made for
-  std::string tipBefore_; ///< an attempt; as it shall be again
+  ProbeGeometry guided_;          ///< the probe that the guide was made for
+  std::optional<bool> tipBefore_; ///< an attempt: whether it was marked, as it shall be again
 };
 
 } // namespace echorama

@@ -180,8 +180,8 @@ void OutputPanel::Take()
       vtkUltrasoundVolume::SetMatrix(pose, scan_->Frame().needle->ToWorld());
       sender_->SendTransform("NeedleToReference", pose);
     }
-    vtkNew<vtkImageData> sent; // the next image is made in place
-    sent->DeepCopy(image);
+    vtkNew<vtkImageData> sent; // the next image has arrays of its own, but goes into the same object
+    sent->ShallowCopy(image);
     sender_->SetInputData(sent);
     sender_->Update();
   }

@@ -19,13 +19,16 @@ namespace {
 
 constexpr int SliderSteps = 200;
 
-bool Matters(const Parameter& parameter, ParameterList& all)
+bool Matters(const Parameter& parameter, const std::string& onlyWhen, ParameterList& all)
 {
   if (parameter.whenName.empty())
     return true;
   const Parameter* other = Find(all, parameter.whenName);
-  return !other ||
-         std::find(parameter.whenValues.begin(), parameter.whenValues.end(), other->Text()) != parameter.whenValues.end();
+  if (!other)
+    return true;
+  const std::string now = other->Text();
+  return (onlyWhen.empty() || now == onlyWhen) &&
+         std::find(parameter.whenValues.begin(), parameter.whenValues.end(), now) != parameter.whenValues.end();
 }
 
 } // namespace
@@ -44,8 +47,8 @@ ParameterPanel::ParameterPanel(Source source, const std::vector<Control>& contro
     auto* label = new QLabel(control.label, this);
     label->setToolTip(QString::fromStdString(parameter.help));
     form->addRow(label, field);
-    shows_.push_back([field, label, key = parameter.name](ParameterList& all) {
-      const bool matters = Matters(Named(all, key), all);
+    shows_.push_back([field, label, key = parameter.name, onlyWhen = std::string(control.onlyWhen)](ParameterList& all) {
+      const bool matters = Matters(Named(all, key), onlyWhen, all);
       field->setEnabled(matters);
       label->setEnabled(matters);
     });

@@ -21,7 +21,8 @@ public:
     const char* name;
     QString label;
     double low = 0.0, high = 0.0;
-    QString least = {}; ///< a word for the lowest value
+    QString least = {};        ///< a word for the lowest value
+    const char* onlyWhen = ""; ///< of the values that it matters with, the one that counts here; "": all
   };
 
   /// \param controls which, in this order

@@ -23,6 +23,11 @@ constexpr double NearMm = 10.0;                          ///< of the skin whose 
 constexpr double AlignDegrees = 3.0, SlideDegrees = 5.0; ///< by eye and hand
 constexpr double StoppedSeconds = 0.5;                   ///< without a pose: what is shown is not what is
 
+Eigen::Matrix4d MatrixOf(vtkMatrix4x4* matrix)
+{
+  return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+}
+
 } // namespace
 
 ProbeTracker::ProbeTracker(Scan* scan, NeedleTool* needle, QWidget* parent) : QWidget(parent), scan_(scan), needle_(needle)
@@ -221,7 +226,7 @@ void ProbeTracker::Step()
   QString state = StateOf(tracker_);
   const vtkNew<vtkMatrix4x4> matrix;
   const bool isSeen = !tool.empty() && tracker_->GetTransform(tool.c_str(), matrix) == 0;
-  const Eigen::Matrix4d toTracker = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
+  const Eigen::Matrix4d toTracker = MatrixOf(matrix);
   // Of a recording at its end the last pose stays valid: it is no news.
   if (isSeen && (tracker_->GetState() == "running" || !hasSeen_ || toTracker != seen_.matrix())) {
     seen_.matrix() = toTracker;
@@ -246,29 +251,16 @@ void ProbeTracker::Step()
 // Another tool of the same tracker; nobody, until a person says which.
 void ProbeTracker::StepNeedle()
 {
-  QStringList tools{tr("none")};
-  for (int i = 0; i < tool_->count(); i++)
-    tools.append(tool_->itemText(i));
-  QStringList shown;
-  for (int i = 0; i < needleTool_->count(); i++)
-    shown.append(needleTool_->itemText(i));
-  if (shown != tools) {
-    const QString chosen = needleTool_->currentText();
-    needleTool_->clear();
-    needleTool_->addItems(tools);
-    needleTool_->setCurrentIndex(std::max(0, needleTool_->findText(chosen)));
-  }
-  if (needleTool_->currentIndex() <= 0) {
+  const std::string tool = ChosenTool(needleTool_, tracker_, tr("none"));
+  if (tool.empty()) {
     needle_->StopFollowing();
     return;
   }
   const vtkNew<vtkMatrix4x4> matrix;
-  if (tracker_->GetTransform(needleTool_->currentText().toUtf8(), matrix) == 0) {
-    const Eigen::Matrix4d toTracker = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->GetData());
-    needle_->Follow((trackerToBody_.matrix() * toTracker).eval());
-  } else {
+  if (tracker_->GetTransform(tool.c_str(), matrix) == 0)
+    needle_->Follow((trackerToBody_.matrix() * MatrixOf(matrix)).eval());
+  else
     needle_->SetLost();
-  }
 }
 
 } // namespace echorama

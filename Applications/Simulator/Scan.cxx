@@ -59,7 +59,7 @@ void Scan::SetSubject(Subject subject)
   if (subject_.IsEmpty())
     return;
   PutAtTop();
-  TakePose(isFollowing_ ? probeToWorld_ : StartPose());
+  TakeTop();
 }
 
 // Where it was scanned from, if that is known; else in the middle of the side that is asked for, of a patient who lies on the
@@ -95,7 +95,20 @@ void Scan::PlaceAtTop()
   if (isFollowing_)
     return;
   PutAtTop();
-  TakePose(StartPose());
+  TakeTop();
+}
+
+// One that is led stays as it is led: all of its pose, or how it is turned.
+void Scan::TakeTop()
+{
+  if (isFollowing_) {
+    TakePose(probeToWorld_);
+  } else if (walk_ && turned_) {
+    walk_->Put(walk_->Place(), turned_->col(0)); // as Turn does
+    Moved();
+  } else {
+    TakePose(StartPose());
+  }
 }
 
 void Scan::Restart()
@@ -103,7 +116,7 @@ void Scan::Restart()
   SetFrozen(false);
   cine_.Clear();
   PutAtTop(); // also under a probe that a tracker moves, for StartPose()
-  TakePose(isFollowing_ ? probeToWorld_ : StartPose());
+  TakeTop();
   MakeNow();
 }
 

@@ -58,9 +58,10 @@ public:
   void Press(double mm); ///< adds; below 0 the probe is lifted off
   /// Upright, without pressure.
   void Straighten();
-  /// Back to the middle of the top.
+  /// Back to the middle of the top. One that is turned from outside stays turned.
   void PlaceAtTop();
-  /// As it was at first: nothing is left of where the probe has been. One that a tracker moves stays where it is held.
+  /// As it was at first: nothing is left of where the probe has been. One that a tracker moves stays where it is held, one that
+  /// is turned from outside as it is turned.
   void Restart();
   /// Where Restart() puts the probe, or where a tracked one had to be.
   Pose StartPose() const;
@@ -138,6 +139,7 @@ signals:
 
 private:
   void PutAtTop();
+  void TakeTop();
   void Moved();
   void TakePose(const Pose& pose);
   void Ask();

@@ -162,7 +162,7 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
             {{"Source", tr("Made from")},
              {"Speckle", tr("Speckle")},
              {"DarkeningDb", tr("Shadow a surface"), 0, 12},
-             {"PressMm", tr("Pressed"), 0, 20}}},
+             {"PressMm", tr("Pressed"), 0, 20, {}, "scene"}}}, // volumes give way by pressed states, and none are opened
            {tr("Custom probe"), {{"FanAngle", tr("Fan angle"), 0, 180}, {"FanWidth", tr("Fan width"), 0, 100}}}}) {
     auto* label = new QLabel("<b>" + title + "</b>", controls);
     auto* panel = new ParameterPanel(source, list, set, controls);

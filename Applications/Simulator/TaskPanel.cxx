@@ -52,6 +52,19 @@ TaskBody BodyOf(const Subject& subject)
   return body;
 }
 
+/// \throws Error(BadInput) for a line from one picture to another, which measures nothing
+const CalliperLine& OfOnePicture(const CalliperLine& line)
+{
+  if (line.Apart() > MostApartMm)
+    throw Error(Error::Kind::BadInput, "the probe moved between the ends of the line: freeze the image, then measure");
+  return line;
+}
+
+QString Counted(int count, const QString& one, const QString& many)
+{
+  return QString("%1 %2").arg(count).arg(count == 1 ? one : many);
+}
+
 QLineEdit* LineField(QWidget* parent, const char* name, const QString& help)
 {
   auto* field = new QLineEdit(parent);
@@ -185,16 +198,15 @@ void TaskPanel::SaveLength()
     emit scan_->Said({Message::Note, tr("Measure first what is to be measured: key C"), {}});
     return;
   }
-  if (lines.back().Apart() > MostApartMm) {
-    emit scan_->Said({Message::Note, tr("The probe moved between the ends of the line: freeze the image, then measure"), {}});
-    return;
-  }
-  MeasureLength length;
-  length.lengthMm = lines.back().line.length();
-  length.from = lines.back().From(); // where the line was drawn, wherever the probe is now
-  length.to = lines.back().To();
-  length.toleranceMm = std::max(1.0, 0.1 * length.lengthMm);
-  Save(length);
+  Try([&] {
+    const CalliperLine& line = OfOnePicture(lines.back());
+    MeasureLength length;
+    length.lengthMm = line.line.length();
+    length.from = line.From(); // where the line was drawn, wherever the probe is now
+    length.to = line.To();
+    length.toleranceMm = std::max(1.0, 0.1 * length.lengthMm);
+    Save(length);
+  });
 }
 
 void TaskPanel::SaveTarget()
@@ -319,7 +331,7 @@ void TaskPanel::Submit()
     if (IsForNeedle() && !needle_->IsShown())
       throw Error(Error::Kind::BadInput, "there is no needle: key N");
     Watch();
-    const ScanScore score = isLength        ? attempt_->SubmitLength(Seconds(), lines.back().line.length())
+    const ScanScore score = isLength        ? attempt_->SubmitLength(Seconds(), OfOnePicture(lines.back()).line.length())
                             : IsForNeedle() ? attempt_->SubmitPose(Seconds(), needle_->Now().ToWorld())
                                             : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
     score_->setText(TellSubmitted(score));
@@ -341,9 +353,9 @@ QString TaskPanel::TellSubmitted(const ScanScore& score) const
   if (attempt_->What() == ScanAttempt::Kind::FindPlane)
     more = tr(" and %1\u00b0").arg(score.degrees, 0, 'f', 1);
   else if (track_)
-    more = tr(", %1 redirections, %2 times in, %3 s of %4 s with the tip out of the plane")
-               .arg(track_->Score().redirections)
-               .arg(track_->Score().passes)
+    more = tr(", %1, %2, %3 s of %4 s with the tip out of the plane")
+               .arg(Counted(track_->Score().redirections, tr("redirection"), tr("redirections")))
+               .arg(Counted(track_->Score().passes, tr("time in"), tr("times in")))
                .arg(track_->Score().offPlaneSeconds, 0, 'f', 1)
                .arg(track_->Score().insideSeconds, 0, 'f', 1);
   return tr("%1: %2 mm off%3, after %4 s")

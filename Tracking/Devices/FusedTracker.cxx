@@ -195,10 +195,10 @@ void FusedTracker::Use(Line& line, const ToolPose& pose, PoseStream& poses)
     if (isPlace) {
       const Eigen::Vector3d at = pose.pose.translation();
       std::optional<Eigen::Vector3d> normal;
-      if (normals_)
-        normal = normals_(at);
-      else if (parameters_.normals == FusedTrackerParameters::Normals::Tool)
+      if (parameters_.normals == FusedTrackerParameters::Normals::Tool) // which somebody has written into the line
         normal = -pose.pose.linear().col(2);
+      else if (normals_)
+        normal = normals_(at);
       filter_.AddSurface(stamp, at, normal);
     } else {
       filter_.AddImu(stamp, Eigen::Quaterniond(pose.pose.linear()));

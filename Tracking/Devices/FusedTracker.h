@@ -51,7 +51,7 @@ public:
   /// Where the probe is from now on, if there is no line of positions, and the normal there, outwards.
   /// \throws Error(InvalidParameter) for what is not finite, or a normal without a length
   void SetPlace(const Eigen::Vector3d& place, const std::optional<Eigen::Vector3d>& normal);
-  /// Where normals come from, instead of Normals.
+  /// Where normals come from, unless Normals::Tool says it. nullptr: from nowhere else.
   void SetNormals(NormalOf normals);
   /// At the newest moment that both lines have reached, as SurfacePoseFilter::Align.
   /// \throws Error(NotPossible) with the reason; Error(InvalidParameter)

@@ -2,8 +2,11 @@
 // A probe whose place comes from one tracker and whose orientation comes from an IMU, or from an IMU alone.
 #include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
+#include "ProbeTracker.h"
 #include "Readers/SequenceRecorder.h"
 #include "SimulatorUnderTest.h"
+#include <atomic>
+#include <memory>
 #include <QDockWidget>
 #include <QLabel>
 #include <QLineEdit>
@@ -18,6 +21,8 @@ class TestScanFusion : public FolderTest {
 private slots:
   void placeAndOrientationMakeOneProbe();
   void anImuAloneTurnsTheProbeWhereKeysPutIt();
+  void oneThatIsTurnedStaysTurned();
+  void normalsOfTheToolAreThoseOfTheLine();
   void whatStopsIsSaidWithTheSeconds();
   void linesThatAreNoneAreNamed();
 
@@ -124,6 +129,58 @@ void TestScanFusion::anImuAloneTurnsTheProbeWhereKeysPutIt()
   window.Part<QPushButton>("trackerConnect")->click();
   QVERIFY(!window.Scan().IsTurned());
   QVERIFY(window.Axis(2).dot(-window.Scan().SkinNormal()) > 0.999); // upright again
+}
+
+// Wherever the probe is put, it is shown as it is held: an IMU that rests says nothing new.
+void TestScanFusion::oneThatIsTurnedStaysTurned()
+{
+  SimulatorUnderTest window;
+  const QString file = body::WriteWithBall(Folder());
+  QVERIFY(window.Open({file}));
+  Scan& scan = window.Scan();
+  const Eigen::Vector3d top = window.Place();
+  const Eigen::Matrix3d turned = scan.ProbeToWorld().linear() * ExpRotation(Eigen::Vector3d(0.2, -0.1, 0.7));
+  scan.Turn(turned);
+  QVERIFY(scan.IsTurned());
+  const auto isAsHeld = [&] {
+    scan.Turn(turned); // says the same again
+    window.Frame();
+    return scan.ProbeToWorld().linear() == turned && (window.Place() - top).norm() < 1e-6;
+  };
+  QVERIFY(isAsHeld());
+  window.Move(Qt::Key_Right, Qt::ShiftModifier);
+  QVERIFY(!isAsHeld()); // it is elsewhere
+  window.Move(Qt::Key_Home, Qt::ShiftModifier);
+  QVERIFY(isAsHeld());
+  const Eigen::Vector3d array = turned.col(0);
+  window.Move(Qt::Key_Right); // along its array, as far as that lies in the skin
+  QVERIFY((window.Place() - top).dot(array) > 1.8);
+  scan.Restart();
+  QVERIFY(isAsHeld());
+  QVERIFY(window.Open({file}));
+  QVERIFY(isAsHeld());
+  scan.StopFollowing();
+  QVERIFY(window.Axis(2).dot(-scan.SkinNormal()) > 0.999); // upright again
+}
+
+void TestScanFusion::normalsOfTheToolAreThoseOfTheLine()
+{
+  for (const bool byTool : {false, true}) {
+    SimulatorUnderTest window;
+    QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+    Connect(window, "simulated:?tools=1", "simulated:?tools=1", byTool ? "alignTo=1 0 0&normals=tool" : "alignTo=1 0 0");
+    const auto asked = std::make_shared<std::atomic<int>>(0); // by another thread
+    vtkUltrasoundTrackerSource* tracker = window.Part<ProbeTracker>("trackerPanel")->Tracker();
+    tracker->SetNormals([asked](const Eigen::Vector3d&) -> std::optional<Eigen::Vector3d> {
+      ++*asked;
+      return std::nullopt;
+    });
+    QTRY_VERIFY(window.Scan().IsFollowing());
+    if (!byTool)
+      QTRY_VERIFY(*asked > 0);
+    QTest::qWait(200); // of many poses
+    QCOMPARE(*asked > 0, !byTool);
+  }
 }
 
 void TestScanFusion::whatStopsIsSaidWithTheSeconds()

@@ -21,6 +21,7 @@ private slots:
   void aTaskForAnotherBodyIsRefused();
   void aTrackedToolHasToComeToTheStart();
   void aLengthIsSavedWhereItWasDrawn();
+  void aLineFromOnePictureToAnotherIsNoAnswer();
   void theSolutionIsShownAfterTheAnswer();
   void closingAsksWhileAnAttemptRuns();
 
@@ -209,6 +210,38 @@ void TestScanTasks::aLengthIsSavedWhereItWasDrawn()
   Press(window, "saveLength");
   QVERIFY2(window.HasMessage("moved between"), qPrintable(window.Messages().join('\n')));
   QVERIFY(!Folder().exists("nothing.task.json"));
+}
+
+void TestScanTasks::aLineFromOnePictureToAnotherIsNoAnswer()
+{
+  {
+    SimulatorUnderTest teacher;
+    QVERIFY(teacher.Open({body::WriteWithBall(Folder())}));
+    teacher.Part<TaskPanel>("taskPanel")->SetFolder(Folder());
+    teacher.Part<QLineEdit>("taskName")->setText("ten");
+    teacher.Key(Qt::Key_C);
+    for (double x : {-5.0, 5.0})
+      teacher.Click(&teacher.Image(), teacher.Image().ToWidget({x, 20.0}).toPoint());
+    Press(teacher, "saveLength");
+  }
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({Folder().filePath("body.mha")}));
+  auto* panel = window.Part<TaskPanel>("taskPanel");
+  panel->SetFolder(Folder());
+  panel->OpenTask(Folder().filePath("ten.task.json"));
+  Press(window, "startTask");
+  const auto click = [&window](double x, double y) { window.Click(&window.Image(), window.Image().ToWidget({x, y}).toPoint()); };
+  window.Key(Qt::Key_C);
+  click(-5.0, 20.0);
+  window.Move(Qt::Key_Left, Qt::ShiftModifier);
+  click(5.0, 20.0); // as long as what was asked for, on the screen
+  QCOMPARE(Press(window, "submitTask"), QString());
+  QVERIFY2(window.HasMessage("moved between"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(panel->IsRunning()); // it is no answer, and none was written down
+  QVERIFY(!Folder().exists("attempts.csv"));
+  for (double x : {-5.0, 5.0})
+    click(x, 32.0); // away from the ends that are there
+  QVERIFY2(Press(window, "submitTask").startsWith("Passed"), qPrintable(window.Part<QLabel>("taskScore")->text()));
 }
 
 void TestScanTasks::theSolutionIsShownAfterTheAnswer()

@@ -512,9 +512,12 @@ void TestSimulator::aSceneIsScanned()
   SimulatorUnderTest window;
   // From a frozen image of a volume, whose controls are not to come along.
   QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  const auto canPress = [&window] { return window.Part<QSlider>("PressMmSlider")->isEnabled(); };
+  QVERIFY2(!canPress(), "a volume does not give way");
   window.Key(Qt::Key_Space);
   QVERIFY(window.Scan().IsFrozen());
   QVERIFY(window.Open({scene}));
+  QVERIFY(canPress());
   QVERIFY(!window.Scan().IsFrozen());
   QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
   QCOMPARE(window.Image().State(), QString());
@@ -540,6 +543,7 @@ void TestSimulator::aSceneIsScanned()
   // The acoustic model: coarse first, then better from frame to frame while the probe rests.
   std::map<std::int64_t, QImage> seen;
   window.Scan().SetControl("Source", "acoustic");
+  QVERIFY(!canPress());
   QTRY_COMPARE_WITH_TIMEOUT(refinementOf(window.Scan().Frame()), QString("3"), 30000);
   connect(&window.Scan(), &Scan::FrameMade, this, [&] { seen[window.Scan().Frame().number] = window.Scan().Picture().image; });
   const std::int64_t last = window.Scan().Frame().number;
@@ -592,9 +596,7 @@ void TestSimulator::aSlowPictureIsGivenUpForANewPose()
   SimulatorUnderTest window;
   QVERIFY(window.Open({body::WriteScene(Folder())}));
   Scan& scan = window.Scan();
-  scan.SetControl("Beams", "512"); // so that the last picture takes a while
   scan.SetControl("Samples", "4096");
-  scan.SetControl("Source", "acoustic");
   QElapsedTimer clock;
   qint64 third = 0, fourth = 0; // when they came
   const auto timing = connect(&scan, &Scan::FrameMade, this, [&] {
@@ -605,11 +607,21 @@ void TestSimulator::aSlowPictureIsGivenUpForANewPose()
       fourth = clock.elapsed();
   });
   clock.start();
-  QTRY_VERIFY_WITH_TIMEOUT(fourth > 0, 60000);
+  constexpr int whileMs = 100; // else there is nothing to give up
+  int took = 0;
+  for (const char* beams : {"512", "1024", "2048", "4096"}) { // until the last picture takes a while
+    third = fourth = 0;
+    scan.SetControl("Beams", beams);
+    scan.SetControl("Source", "acoustic");
+    QTRY_VERIFY_WITH_TIMEOUT(fourth > 0, 60000);
+    took = static_cast<int>(fourth - third);
+    qInfo("with %s beams the last refinement takes %d ms", beams, took);
+    if (took > whileMs)
+      break;
+  }
   disconnect(timing);
-  const auto took = static_cast<int>(fourth - third);
-  qInfo("the last refinement takes %d ms", took);
-  QVERIFY(took > 100); // else there is nothing to give up
+  if (took <= whileMs)
+    QSKIP("no picture takes long enough on this machine to be given up");
 
   // The probe moves while the best picture of where it was is being made.
   struct Made {
@@ -644,7 +656,9 @@ void TestSimulator::aSlowPictureIsGivenUpForANewPose()
   // One that moves all the time is seen all the same, no frame more than one behind.
   const auto coarse = connect(&scan, &Scan::FrameMade, this, [&] { made.push_back({window.Place(), {}}); });
   made.clear();
-  for (int i = 0; i < 400 && made.size() < 3; i++) {
+  QElapsedTimer moving;
+  moving.start();
+  for (int i = 0; made.size() < 3 && moving.elapsed() < 60000; i++) {
     scan.Slide(i % 2 ? 0.5 : -0.5, 0.0);
     QTest::qWait(5);
   }
