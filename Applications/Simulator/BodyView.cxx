@@ -93,6 +93,9 @@ BodyView::BodyView(Scan* scan, NeedleTool* needle, QWidget* parent)
 {
   setObjectName("bodyView");
   canvas_->setObjectName("bodyCanvas");
+  // A window of its own: else Qt joins all of the outer one by OpenGL whenever any part of it changes, the image foremost.
+  setAttribute(Qt::WA_DontCreateNativeAncestors);
+  setAttribute(Qt::WA_NativeWindow);
   canvas_->setAccessibleName(tr("Body and probe"));
   canvas_->setFocusPolicy(Qt::StrongFocus);
   canvas_->setMinimumSize(200, 160);
@@ -113,6 +116,7 @@ BodyView::BodyView(Scan* scan, NeedleTool* needle, QWidget* parent)
   skin_->GetProperty()->SetAmbient(0.25);
   skin_->GetProperty()->BackfaceCullingOn(); // one layer: what is inside is seen
   skin_->GetProperty()->SetSpecular(0.1);
+  skin_->ForceOpaqueOn(); // blended last over all else, without the pass that averages many layers
   probeMapper_->ScalarVisibilityOff();
   probe_->SetMapper(probeMapper_);
   probe_->GetProperty()->SetColor(0.75, 0.78, 0.82);

@@ -141,7 +141,7 @@ void TestSimulatorPace::poseToPixelsAndMemory()
   Scan& scan = window.Scan();
   double stamp = NAN; // of the sample that the probe follows
   std::vector<double> ages;
-  int late = 0, bodies = 0;
+  int images = 0, late = 0, bodies = 0;
   std::optional<Pose> toWorld; // which "It is here" has set
   connect(&scan, &Scan::ProbeMoved, this, [&] {
     const Sample sample = newest();
@@ -152,6 +152,7 @@ void TestSimulatorPace::poseToPixelsAndMemory()
   });
   // The window is connected first: when this is called, the image has been drawn.
   connect(&scan, &Scan::FrameMade, this, [&] {
+    images++;
     if (!std::isfinite(stamp) || scan.Frame().probeToWorld.matrix() != scan.ProbeToWorld().matrix())
       return;
     ages.push_back(1e3 * (SystemSeconds() - stamp));
@@ -167,13 +168,13 @@ void TestSimulatorPace::poseToPixelsAndMemory()
   QTRY_COMPARE(window.Image().State(), QString()); // it is an image, with nothing the matter
   const double first = ResidentMb();
   ages.clear();
-  late = bodies = 0;
+  images = late = bodies = 0;
   runFor(seconds - warmUp);
   const double last = ResidentMb(), measured = seconds - warmUp;
-  qInfo("from the stamp of the sample to the image: %.1f ms in the median, %.1f ms in 95 %%, %.1f ms at most; %d images",
+  qInfo("from the stamp of the sample to the image: %.1f ms in the median, %.1f ms in 95 %%, %.1f ms at most; %d samples",
         Quantile(ages, 0.5), Quantile(ages, 0.95), Quantile(ages, 1.0), static_cast<int>(ages.size()));
-  qInfo("%.1f images/s and %.1f pictures of the body/s, of 60 poses/s; %d images were more than one pose old",
-        static_cast<double>(ages.size()) / measured, bodies / measured, late);
+  qInfo("%.1f images/s and %.1f pictures of the body/s, of 60 poses/s; %d of the samples were more than one pose old",
+        images / measured, bodies / measured, late);
   const double growth = 60.0 * (last - first) / measured;
   qInfo("memory: %.1f MB after %.0f s, %.1f MB after %.0f s: %.2f MB a minute", first, warmUp, last, seconds, growth);
   window.Window().Body()->Canvas()->renderWindow()->RemoveObserver(tag);
