@@ -2,6 +2,7 @@
 // What comes into the simulator and what leaves it: trackers, recordings, replays, OpenIGTLink.
 #include "Core/Base/Error.h"
 #include "JobBar.h"
+#include "NeedleTool.h"
 #include "OutputPanel.h"
 #include "Readers/SequenceRecorder.h"
 #include "ScanLog.h"
@@ -487,10 +488,20 @@ void TestScanStreams::imageAndPoseAreSent()
   };
   QTRY_VERIFY(hasCome());
   // Sent in R, A, S, as OpenIGTLink has it: x and y are negative there.
-  const Eigen::Vector3d place = window.Place();
-  const Eigen::Vector3d came(pose->GetElement(0, 3), pose->GetElement(1, 3), pose->GetElement(2, 3));
-  QVERIFY2((came - Eigen::Vector3d(-place[0], -place[1], place[2])).norm() < 1e-3,
-           qPrintable(QString("%1 %2 %3").arg(came[0]).arg(came[1]).arg(came[2])));
+  const auto isAt = [&](const Eigen::Vector3d& place) {
+    const Eigen::Vector3d came(pose->GetElement(0, 3), pose->GetElement(1, 3), pose->GetElement(2, 3));
+    return (came - Eigen::Vector3d(-place[0], -place[1], place[2])).norm() < 1e-3;
+  };
+  QVERIFY(isAt(window.Place()));
+  QVERIFY(client->GetTransform("NeedleToReference", pose) != 0); // there is none
+  NeedleTool& needle = *window.Window().TheNeedle();
+  needle.SetShown(true);
+  needle.Advance(7.0);
+  window.Scan().MakeNow();
+  const Pose held = needle.Now().ToWorld();
+  QTRY_VERIFY((client->Modified(), client->Update(), client->GetTransform("NeedleToReference", pose) == 0) &&
+              isAt(held.translation()));
+  QVERIFY(std::abs(pose->GetElement(2, 2) - held.linear()(2, 2)) < 1e-6); // and it points where it goes
   window.Part<QCheckBox>("send")->click();
   QCOMPARE(window.Part<OutputPanel>("outputPanel")->Sender()->GetListeningPort(), 0);
 }
