@@ -48,11 +48,11 @@ vtkSmartPointer<vtkPolyData> SkinOf(vtkDataObject* body, const Progress& progres
   return skin->GetOutput();
 }
 
-// A body without a skin can be scanned by a tracker all the same.
-void TakeSkin(Subject& subject, vtkDataObject* body, const Progress& progress)
+// Of what is scanned. A body without a skin can be scanned by a tracker all the same.
+void TakeSkin(Subject& subject, const Progress& progress)
 {
   try {
-    subject.skin = SkinOf(body, progress);
+    subject.skin = SkinOf(subject.tissue ? static_cast<vtkDataObject*>(subject.tissue) : subject.volumes.front(), progress);
   } catch (const Error& error) {
     if (error.GetKind() == Error::Kind::Cancelled)
       throw;
@@ -60,31 +60,29 @@ void TakeSkin(Subject& subject, vtkDataObject* body, const Progress& progress)
   }
 }
 
-// The tissue of a scene, and the body that holds all others as its skin. It is scanned from where its first view is.
+// The tissue of a scene. It is scanned from where its first view is.
 Subject SubjectOfScene(const QString& file, const Progress& progress)
 {
-  SceneRun run(ReadScene(file.toStdString()), 0, ReadMesh, vtkUltrasoundGel::SurfaceOf, progress.Part(0.0, 0.7));
+  SceneRun run(ReadScene(file.toStdString()), 0, ReadMesh, vtkUltrasoundGel::SurfaceOf, progress);
   Subject subject;
   subject.files.append(file);
   subject.tissue = vtkSmartPointer<vtkPolyData>::New();
   vtkUltrasoundTissue::Set(subject.tissue, run.Tissue());
   if (!run.Views().empty())
     subject.start = run.Views().front().probeToWorld;
-  TakeSkin(subject, subject.tissue, progress.Part(0.7, 1.0));
   return subject;
 }
 
 Subject SubjectOfVolumes(const QStringList& files, const Progress& progress)
 {
   Subject subject;
-  for (const ReadVolume& read : ReadVolumes(WithoutCompanions(files), progress.Part(0.0, 0.7))) {
+  for (const ReadVolume& read : ReadVolumes(WithoutCompanions(files), progress)) {
     if (!read.image)
       throw Error(Error::Kind::BadFile, read.error.toStdString());
     subject.files.append(read.file);
     subject.volumes.push_back(read.image);
   }
   subject.start = vtkUltrasoundAcquisition::ProbeToWorldOf(subject.volumes.front());
-  TakeSkin(subject, subject.volumes.front(), progress.Part(0.7, 1.0));
   return subject;
 }
 
@@ -95,9 +93,11 @@ Subject ReadSubject(const QStringList& files, const QString& skin, const Progres
   const auto isScene = [](const QString& file) { return file.endsWith(".json", Qt::CaseInsensitive); };
   if (files.size() > 1 && std::any_of(files.begin(), files.end(), isScene))
     throw Error(Error::Kind::BadInput, "one scene, or volumes, can be scanned at a time");
-  Subject subject = isScene(files.first()) ? SubjectOfScene(files.first(), progress.Part(0.0, 0.8))
-                                           : SubjectOfVolumes(files, progress.Part(0.0, 0.8));
-  if (!skin.isEmpty()) {
+  Subject subject = isScene(files.first()) ? SubjectOfScene(files.first(), progress.Part(0.0, 0.7))
+                                           : SubjectOfVolumes(files, progress.Part(0.0, 0.7));
+  if (skin.isEmpty()) {
+    TakeSkin(subject, progress.Part(0.7, 1.0));
+  } else {
     const TriangleSurface mesh = ReadMesh(skin.toStdString());
     vtkNew<vtkPoints> points;
     for (const auto& point : mesh.points)
@@ -108,7 +108,7 @@ Subject ReadSubject(const QStringList& files, const QString& skin, const Progres
     vtkNew<vtkPolyData> surface;
     surface->SetPoints(points);
     surface->SetPolys(triangles);
-    subject.skin = SkinOf(surface, progress.Part(0.8, 1.0));
+    subject.skin = SkinOf(surface, progress.Part(0.7, 1.0));
   }
   if (subject.skin)
     subject.mesh = MeshOf(subject.skin, skin.isEmpty() ? "the skin of " + files.first().toStdString() : skin.toStdString());
