@@ -137,6 +137,7 @@ TaskPanel::TaskPanel(Scan* scan, NeedleTool* needle, ImageView* image, QWidget* 
     }
   });
   connect(scan, &Scan::FrameMade, this, &TaskPanel::Watch);
+  connect(needle, &NeedleTool::Changed, this, &TaskPanel::Watch); // also what is too quick for an image
   connect(this, &TaskPanel::RunningChanged, plane, &QWidget::setDisabled);
   connect(this, &TaskPanel::RunningChanged, length, &QWidget::setDisabled);
   connect(this, &TaskPanel::RunningChanged, open, &QWidget::setDisabled);
