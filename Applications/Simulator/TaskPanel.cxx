@@ -336,15 +336,18 @@ void TaskPanel::Submit()
                             : IsForNeedle() ? attempt_->SubmitPose(Seconds(), needle_->Now().ToWorld())
                                             : attempt_->SubmitPose(Seconds(), scan_->Frame().probeToWorld);
     score_->setText(TellSubmitted(score));
-    const int redirections = track_ ? track_->Score().redirections : 0;
+    Attempt line = attempt_->HistoryLine(QDateTime::currentDateTimeUtc().toString(Qt::ISODate).toStdString(),
+                                         trainee_->text().toStdString());
+    if (track_) {
+      line.edits = track_->Score().redirections;
+      line.outOfPlaneSeconds = track_->Score().offPlaneSeconds;
+    }
     emit RunningChanged(false);
     scan_->SetFrozen(true); // the image is the answer, and stays for comparison
     QSettings().setValue("task/trainee", trainee_->text());
     if (!folder_.mkpath("."))
       throw Error(Error::Kind::FileSystem, folder_.path().toStdString() + ": the folder cannot be made");
-    AppendAttempt(folder_.filePath("attempts.csv").toStdString(),
-                  attempt_->HistoryLine(QDateTime::currentDateTimeUtc().toString(Qt::ISODate).toStdString(),
-                                        trainee_->text().toStdString(), redirections));
+    AppendAttempt(folder_.filePath("attempts.csv").toStdString(), line);
   });
 }
 

@@ -46,6 +46,8 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
   auto* enter = new QShortcut(Qt::Key_Return, backups_, nullptr, nullptr, Qt::WidgetShortcut);
   connect(enter, &QShortcut::activated, this, [this] { Restore(backups_->currentRow()); });
   connect(bench, &Workbench::HistoryChanged, this, &HistoryPanel::ShowHistory);
+  connect(bench, &Workbench::ScoredChanged, this,
+          [this] { backups_->setEnabled(!bench_->IsScored()); }); // one may hold the solution
   ShowHistory();
 }
 

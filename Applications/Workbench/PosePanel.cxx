@@ -130,6 +130,7 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
     connect(bench, changed, this, &PosePanel::ShowPose);
     connect(bench, changed, this, &PosePanel::ShowCentre);
   }
+  connect(bench, &Workbench::ScoredChanged, this, &PosePanel::ShowPose);
   connect(bench, &Workbench::HandChanged, this, &PosePanel::ShowHand);
   ShowPose();
   ShowCentre();
@@ -142,12 +143,13 @@ void PosePanel::ShowPose()
   double middle[3] = {0, 0, 0}, degrees[3] = {0, 0, 0};
   if (id)
     bench_->Session()->GetPlacement(id, middle, degrees);
-  for (int axis = 0; axis < 3; axis++) {
-    Show(middle_[axis], middle[axis]);
-    Show(degrees_[axis], degrees[axis]);
-    middle_[axis]->setEnabled(id != 0);
-    degrees_[axis]->setEnabled(id != 0);
-  }
+  for (int axis = 0; axis < 3; axis++)
+    for (const auto& [field, value] : {std::pair{middle_[axis], middle[axis]}, {degrees_[axis], degrees[axis]}}) {
+      Show(field, value);
+      field->setEnabled(id != 0 && !bench_->IsScored());
+      if (bench_->IsScored())
+        field->clear(); // who knows the numbers of the solution needs no eyes
+    }
   of_->setText(id == 0      ? tr("Select a volume to move it.")
                : count == 1 ? bench_->NameOf(id)
                             : tr("%1 and %2 more, which move with it").arg(bench_->NameOf(id)).arg(count - 1));

@@ -194,7 +194,7 @@ bool RegistrationPanel::MayRun(const QString& label, const std::vector<int>& ids
 {
   if (!IsRunning() && ids.size() < 2)
     workspace_.say(tr("%1: two volumes are needed; open another one").arg(label), true);
-  return !IsRunning() && ids.size() >= 2;
+  return !IsRunning() && ids.size() >= 2 && workspace_.mayHelp(label);
 }
 
 void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, const std::vector<int>& held,

@@ -82,10 +82,13 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   seed_->setObjectName("scatterSeed");
   seed_->setRange(1, 1000000);
   seed_->setToolTip(tr("The same number scatters the same volumes in the same way"));
-  auto* scatter = Button(training, "scatter", tr("Scatter volumes"),
-                         tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "
-                            "without truth, from where it is). Can be undone."),
-                         [this] { Scatter(); });
+  scatter_ = Button(training, "scatter", tr("Scatter volumes"),
+                    tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "
+                       "without truth, from where it is). Can be undone."),
+                    [this] { Scatter(); });
+  help_ = CheckField(training, "trainingHelp", tr("Alignment by the program is allowed"),
+                     tr("During an attempt, volumes may be aligned or placed by the program; how often is kept with the attempt"),
+                     {});
   start_ = Button(training, "trainingStart", {}, {}, [this] { StartOrGiveUp(); });
   submit_ = Button(training, "trainingSubmit", tr("Submit"), tr("Shows score and errors, and adds the attempt to the history"),
                    [this] { Submit(); });
@@ -101,7 +104,8 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   form->addRow(tr("Scatter by"), scatterMm_);
   form->addRow(tr("and"), scatterDegrees_);
   form->addRow(tr("Seed"), seed_);
-  form->addRow(scatter);
+  form->addRow(scatter_);
+  form->addRow(help_);
   form->addRow(start_, submit_);
   form->addRow(tr("Time"), time_);
   form->addRow(tr("Attempts"), history_);
@@ -109,7 +113,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   layout->addWidget(training);
 
   table_ = TableField(this, "attempts", tr("All attempts, the last one first"),
-                      {tr("When"), tr("Trainee"), tr("Score, mm"), tr("From, mm"), tr("Time")});
+                      {tr("When"), tr("Trainee"), tr("Score, mm"), tr("From, mm"), tr("Time"), tr("Help")});
   layout->addWidget(table_, 1);
 
   clock_ = new QTimer(this);
@@ -178,7 +182,8 @@ void TrainingPanel::ShowHistory()
     for (const Attempt& attempt : ReadAttempts(historyPath_.toStdString())) {
       InsertRow(table_, 0,
                 {QString::fromStdString(attempt.time), QString::fromStdString(attempt.trainee),
-                 QString::number(attempt.scoreMm, 'f', 2), QString::number(attempt.startMm, 'f', 2), TimeText(attempt.seconds)});
+                 QString::number(attempt.scoreMm, 'f', 2), QString::number(attempt.startMm, 'f', 2), TimeText(attempt.seconds),
+                 QString::number(attempt.help)});
     }
   } catch (const Error& error) {
     bench_->Warn(error.what());
@@ -214,8 +219,10 @@ void TrainingPanel::StartOrGiveUp()
     startScore_ = bench_->Session()->GetScore();
     taken_.start();
     clock_->start();
+    bench_->BeginAttempt(help_->isChecked());
   } else {
     clock_->stop();
+    bench_->EndAttempt();
   }
   isTraining_ = !isTraining_;
   time_->setText(isTraining_ ? TimeText(0.0) : QString());
@@ -234,6 +241,7 @@ void TrainingPanel::Submit()
   attempt.startMm = startScore_;
   attempt.scoreMm = session->GetScore();
   attempt.edits = session->GetUndoCount();
+  attempt.help = bench_->HelpTaken();
   int count = 0;
   for (int i = 0; i < session->GetNumberOfVolumes(); ++i) {
     const int id = session->GetVolumeId(i);
@@ -246,6 +254,7 @@ void TrainingPanel::Submit()
   }
   attempt.degrees /= std::max(1, count);
   isTraining_ = false;
+  bench_->EndAttempt();
   live_->setChecked(true);
   vectors_->setChecked(true);
   time_->setText(TimeText(attempt.seconds));
@@ -279,6 +288,7 @@ void TrainingPanel::ShowState()
   const bool hasTruth = bench_->Session()->HasTruth();
   if (isTraining_ && !hasTruth) { // another project was opened
     isTraining_ = false;
+    bench_->EndAttempt();
     clock_->stop();
   }
   if (!hasTruth)
@@ -292,6 +302,8 @@ void TrainingPanel::ShowState()
                          ? tr("Ends the attempt; nothing is kept")
                          : tr("Hides score and errors, and starts the clock; what was done before can no longer be undone"));
   start_->setEnabled(hasTruth);
+  scatter_->setEnabled(!isTraining_);
+  help_->setEnabled(!isTraining_);
   submit_->setEnabled(isTraining_);
   bench_->Set(&VolumeLook::errorVectors, hasTruth && !isTraining_ && vectors_->isChecked());
   ShowScore();

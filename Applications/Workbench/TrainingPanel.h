@@ -46,11 +46,11 @@ private:
 
   Workbench* bench_;
   QLabel *truth_, *score_, *time_;
-  QCheckBox *live_, *vectors_;
+  QCheckBox *live_, *vectors_, *help_;
   QLineEdit *trainee_, *history_;
   QDoubleSpinBox *scatterMm_, *scatterDegrees_;
   QSpinBox* seed_;
-  QPushButton *start_, *submit_;
+  QPushButton *scatter_, *start_, *submit_;
   QTableWidget* table_;
   QTimer* clock_;
   QElapsedTimer taken_;

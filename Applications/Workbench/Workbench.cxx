@@ -25,6 +25,7 @@ Workbench::Workbench(Workspace& workspace, QObject* parent) : QObject(parent), w
   for (const auto& [event, changed] : Signals)
     observers_.append(Session()->AddObserver(event, this, &Workbench::OnSessionEvent));
   // Either may go before the other.
+  workspace_.mayHelp = [bench = QPointer<Workbench>(this)](const QString& what) { return !bench || bench->MayHelp(what); };
   workspace_.say = [bench = QPointer<Workbench>(this)](const QString& text, bool isError) {
     if (bench)
       isError ? bench->Warn(text) : bench->Note(text);
@@ -93,6 +94,29 @@ void Workbench::SetTool(Tool tool)
 void Workbench::SetShown(const Settings& settings)
 {
   std::apply([this](const auto&... parts) { (Set(parts), ...); }, settings);
+}
+
+void Workbench::BeginAttempt(bool isHelpAllowed)
+{
+  isScored_ = true;
+  isHelpAllowed_ = isHelpAllowed;
+  helpTaken_ = 0;
+  emit ScoredChanged();
+}
+
+void Workbench::EndAttempt()
+{
+  isScored_ = false;
+  emit ScoredChanged();
+}
+
+bool Workbench::MayHelp(const QString& what)
+{
+  if (isScored_ && !isHelpAllowed_)
+    Warn(tr("%1: not during an attempt; give it up first, or allow it before the next one").arg(what));
+  else if (isScored_)
+    helpTaken_++;
+  return !isScored_ || isHelpAllowed_;
 }
 
 void Workbench::SetInteracting(bool on)

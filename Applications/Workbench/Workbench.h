@@ -66,6 +66,13 @@ public:
   bool Interacting() const { return interacting_; }
   void SetInteracting(bool on);
 
+  ///@{ An attempt that is scored: nothing that leads to the solution is shown, and help is refused, or counted.
+  void BeginAttempt(bool isHelpAllowed);
+  void EndAttempt();
+  bool IsScored() const { return isScored_; }
+  int HelpTaken() const { return helpTaken_; } ///< in this attempt or the last one
+  ///@}
+
   ///@{ To the message bar of the window.
   void Note(const QString& text);
   void Warn(const QString& text);
@@ -84,6 +91,7 @@ signals:
   void LookChanged(); ///< of the slices or the 3D view
   void HandChanged();
   void InteractingChanged(bool on);
+  void ScoredChanged();
 
   void Said(const Message& message);
 
@@ -92,6 +100,7 @@ private:
   void Tell(const SliceLook&) { emit LookChanged(); }
   void Tell(const VolumeLook&) { emit LookChanged(); }
   void Tell(const Handling&) { emit HandChanged(); }
+  bool MayHelp(const QString& what);
   void OnSessionEvent(vtkObject* session, unsigned long event, void* data);
 
   Workspace& workspace_;
@@ -99,7 +108,8 @@ private:
   QVector<unsigned long> observers_;
   Tool tool_ = Tool::Align;
   Settings settings_;
-  bool interacting_ = false;
+  bool interacting_ = false, isScored_ = false, isHelpAllowed_ = false;
+  int helpTaken_ = 0;
 };
 
 } // namespace echorama

@@ -21,6 +21,7 @@ struct Workspace {
   /// A job that the job bar shows; what keeps it from being done is said. See Job::Start.
   Job* Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done);
   std::function<void(const QString& message, bool isError)> say = [](const QString&, bool) {}; ///< in the window's message bar
+  std::function<bool(const QString& what)> mayHelp = [](const QString&) { return true; };      ///< else it has said why not
   std::function<void(vtkMatrix4x4* toolToWorld, bool grasping)> moveByTool = [](vtkMatrix4x4*, bool) {}; ///< alignment widget
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The history of attempts. Lines are added in place, under a lock and by one write: a history is never copied, so it cannot be
-// lost by a failed copy. The project is the last column and always quoted: so the end of a line that was cut off cannot be
-// taken for the end of a line.
+// lost by a failed copy, but for one of fewer columns, as older versions wrote it, which a whole copy replaces at once. The
+// project is the last column and always quoted: so the end of a line that was cut off cannot be taken for the end of a line.
 #include "Core/Base/CsvLine.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
@@ -18,7 +18,10 @@
 namespace echorama {
 namespace {
 
-constexpr std::string_view Header = "time,trainee,seconds,score_mm,worst_mm,rotation_deg,start_mm,edits,project";
+constexpr std::string_view Header =
+    "time,trainee,seconds,score_mm,worst_mm,rotation_deg,start_mm,edits,help,out_of_plane_s,project";
+constexpr std::string_view OldHeader = "time,trainee,seconds,score_mm,worst_mm,rotation_deg,start_mm,edits,project";
+constexpr std::size_t Columns = 11, OldColumns = 9;
 constexpr std::string_view Mark = "\xef\xbb\xbf"; // some programs put it before UTF-8
 
 std::string Quoted(const std::string& text)
@@ -42,17 +45,15 @@ std::string Cell(const std::string& text)
 
 std::string LineOf(const Attempt& attempt)
 {
-  std::string line = Cell(attempt.time) + ',' + Cell(attempt.trainee);
-  for (const auto& [number, what] : {std::pair{attempt.seconds, "time"},
-                                     {attempt.scoreMm, "score"},
-                                     {attempt.worstMm, "worst score"},
-                                     {attempt.degrees, "rotation"},
-                                     {attempt.startMm, "score at the start"}}) {
+  const auto cell = [](double number, const std::string& what) {
     if (!std::isfinite(number))
-      throw Error(Error::Kind::InvalidParameter, std::string("the attempt's ") + what + " is not a finite number");
-    line += ',' + NumberText(number);
-  }
-  return line + ',' + NumberText(attempt.edits) + ',' + Quoted(attempt.project) + '\n';
+      throw Error(Error::Kind::InvalidParameter, "the attempt's " + what + " is not a finite number");
+    return ',' + NumberText(number);
+  };
+  return Cell(attempt.time) + ',' + Cell(attempt.trainee) + cell(attempt.seconds, "time") + cell(attempt.scoreMm, "score") +
+         cell(attempt.worstMm, "worst score") + cell(attempt.degrees, "rotation") + cell(attempt.startMm, "score at the start") +
+         ',' + NumberText(attempt.edits) + ',' + NumberText(attempt.help) +
+         cell(attempt.outOfPlaneSeconds, "time out of the plane") + ',' + Quoted(attempt.project) + '\n';
 }
 
 // One line of the table: its text without its end, and where the next begins.
@@ -79,23 +80,26 @@ Line LineAt(std::string_view table, std::size_t begin)
   return {table.substr(begin), table.size(), false};
 }
 
-bool ParseLine(std::string_view text, Attempt& attempt)
+bool ParseLine(std::string_view text, std::size_t columns, Attempt& attempt)
 {
   std::vector<std::string> cells;
-  if (!SplitCsvLine(text, ',', cells) || cells.size() != 9)
+  if (!SplitCsvLine(text, ',', cells) || cells.size() != columns)
     return false;
   attempt.time = cells[0];
   attempt.trainee = cells[1];
-  attempt.project = cells[8];
+  attempt.project = cells.back();
   std::size_t cell = 2;
   for (double* number : {&attempt.seconds, &attempt.scoreMm, &attempt.worstMm, &attempt.degrees, &attempt.startMm})
     if (!ParseNumber(cells[cell++], *number) || !std::isfinite(*number))
       return false;
-  return ParseNumber(cells[7], attempt.edits);
+  return ParseNumber(cells[7], attempt.edits) &&
+         (columns == OldColumns || (ParseNumber(cells[8], attempt.help) && ParseNumber(cells[9], attempt.outOfPlaneSeconds) &&
+                                    std::isfinite(attempt.outOfPlaneSeconds)));
 }
 
 struct History {
   std::vector<Attempt> attempts;
+  bool isOld = false;  ///< of fewer columns
   std::size_t end = 0; ///< of what is whole, bytes; half a line may follow
   bool ended = true;   ///< the last line has its line end
 };
@@ -105,22 +109,26 @@ History Parse(const std::string& path, std::string_view table)
 {
   History history;
   // Half a header is all that a crash at the first attempt can leave.
-  if (table.size() <= Header.size() && Header.substr(0, table.size()) == table)
-    return history;
+  for (const std::string_view header : {Header, OldHeader})
+    if (table.size() <= header.size() && header.substr(0, table.size()) == table)
+      return history;
   const Line header = LineAt(table, table.substr(0, Mark.size()) == Mark ? Mark.size() : 0);
-  if (header.text != Header || !header.ended)
+  history.isOld = header.text == OldHeader;
+  if ((header.text != Header && !history.isOld) || !header.ended)
     throw Error(Error::Kind::BadFile, path + ": it is not a history of attempts; its first line must be " + std::string(Header));
   history.end = header.next;
   for (int number = 2; history.end < table.size(); ++number) {
     const Line line = LineAt(table, history.end);
     Attempt attempt;
-    const bool whole = ParseLine(line.text, attempt);
+    const bool whole = ParseLine(line.text, history.isOld ? OldColumns : Columns, attempt);
     // Half a line. One that spans lines is none: a stray quotation mark has swallowed what follows it.
     if (!line.ended && !(whole && line.text.back() == '"') && line.text.find('\n') == std::string_view::npos)
       break;
     if (!whole && !line.text.empty())
-      throw Error(Error::Kind::BadFile, path + ": line " + std::to_string(number) + " is not an attempt; " +
-                                            "nine values are needed, of which the third to the eighth are numbers");
+      throw Error(Error::Kind::BadFile,
+                  path + ": line " + std::to_string(number) + " is not an attempt; " +
+                      (history.isOld ? "nine values are needed, of which the third to the eighth are numbers"
+                                     : "eleven values are needed, of which the third to the tenth are numbers"));
     if (whole)
       history.attempts.push_back(std::move(attempt));
     history.end = line.next;
@@ -137,17 +145,22 @@ History Parse(const std::string& path, std::string_view table)
 // An open file, locked against other programs that do the same.
 class LockedFile {
 public:
-  explicit LockedFile(const std::string& path) : path_(path), file_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666))
+  explicit LockedFile(const std::string& path) : path_(path)
   {
-    if (file_ < 0)
-      Fail(path_, "the history of attempts cannot be written");
-    int result;
-    while ((result = flock(file_, LOCK_EX)) != 0 && errno == EINTR) {
-    }
-    if (result != 0) {
-      close(file_);
-      Fail(path_, "the history of attempts cannot be locked");
-    }
+    do { // another program may have put another file in its place while this one waited
+      if (file_ >= 0)
+        close(file_);
+      file_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+      if (file_ < 0)
+        Fail(path_, "the history of attempts cannot be written");
+      int result;
+      while ((result = flock(file_, LOCK_EX)) != 0 && errno == EINTR) {
+      }
+      if (result != 0) {
+        close(file_);
+        Fail(path_, "the history of attempts cannot be locked");
+      }
+    } while (!IsStillThere());
   }
   ~LockedFile() { close(file_); } // and unlocks
   LockedFile(const LockedFile&) = delete;
@@ -177,8 +190,16 @@ public:
   }
 
 private:
+  bool IsStillThere() const
+  {
+    struct stat ours {
+    }, there{};
+    return fstat(file_, &ours) == 0 && stat(path_.c_str(), &there) == 0 && ours.st_ino == there.st_ino &&
+           ours.st_dev == there.st_dev;
+  }
+
   std::string path_;
-  int file_;
+  int file_ = -1;
 };
 
 constexpr std::size_t Limit = 64 << 20; // some hundred thousand attempts
@@ -193,6 +214,12 @@ void AppendAttempt(const std::string& path, const Attempt& attempt)
     throw Error(Error::Kind::FileSystem, path + ": it is there and is not a plain file");
   LockedFile file(path);
   const History history = Parse(path, ReadTextFile(path, Limit));
+  if (history.isOld) {
+    std::string table = std::string(Header) + '\n';
+    for (const Attempt& earlier : history.attempts)
+      table += LineOf(earlier);
+    return WriteTextFile(path, table + line);
+  }
   const std::string before = history.end == 0 ? std::string(Header) + '\n' : history.ended ? "" : "\n";
   file.ReplaceEnd(history.end, before + line);
 }

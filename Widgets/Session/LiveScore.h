@@ -37,21 +37,24 @@ private:
 
 /// One attempt at an alignment, as the history across attempts holds it.
 struct Attempt {
-  std::string time;     ///< ISO 8601, UTC: 2024-05-17T09:30:00Z
-  std::string trainee;  ///< may be empty
-  std::string project;  ///< what was to be aligned
-  double seconds = 0.0; ///< from the start to the submission
-  double scoreMm = 0.0; ///< mean, dissertation 4.4.2
-  double worstMm = 0.0; ///< the largest score of a volume
-  double degrees = 0.0; ///< mean rotation left
-  double startMm = 0.0; ///< score at the start
-  int edits = 0;        ///< entries of undo between the start and the submission
+  std::string time;               ///< ISO 8601, UTC: 2024-05-17T09:30:00Z
+  std::string trainee;            ///< may be empty
+  std::string project;            ///< what was to be aligned
+  double seconds = 0.0;           ///< from the start to the submission
+  double scoreMm = 0.0;           ///< mean, dissertation 4.4.2
+  double worstMm = 0.0;           ///< the largest score of a volume
+  double degrees = 0.0;           ///< mean rotation left
+  double startMm = 0.0;           ///< score at the start
+  int edits = 0;                  ///< entries of undo between the start and the submission; of a needle, its redirections
+  int help = 0;                   ///< how often the program did what was to be done by hand
+  double outOfPlaneSeconds = 0.0; ///< of a needle: with its tip in the body and not in the image
 };
 
 /// Adds a line to the history, a table (CSV, RFC 4180, UTF-8) with the columns time, trainee, seconds, score_mm, worst_mm,
-/// rotation_deg, start_mm, edits, project; with a header line when the file is new. A line is whole or not there: what a full
-/// disk leaves of it is taken back, and half a line that a crash left at the end is removed by the next one. Programs that
-/// append at once wait for each other. It is on the disk when this returns.
+/// rotation_deg, start_mm, edits, help, out_of_plane_s, project; with a header line when the file is new. A line is whole or not
+/// there: what a full disk leaves of it is taken back, and half a line that a crash left at the end is removed by the next one.
+/// Programs that append at once wait for each other. It is on the disk when this returns. A table without the columns help and
+/// out_of_plane_s, as older versions wrote it, gets them.
 /// \throws Error(InvalidParameter) when a number is not finite, Error(FileSystem), Error(BadFile) when the file is something
 /// else; it is then left as it was.
 void AppendAttempt(const std::string& path, const Attempt& attempt);

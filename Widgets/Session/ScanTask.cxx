@@ -435,7 +435,7 @@ const ScanTask* ScanAttempt::Solution() const
   return parts_->result ? &parts_->task : nullptr;
 }
 
-Attempt ScanAttempt::HistoryLine(const std::string& time, const std::string& trainee, int edits) const
+Attempt ScanAttempt::HistoryLine(const std::string& time, const std::string& trainee) const
 {
   if (!parts_->result)
     throw Error(Error::Kind::InvalidParameter, "there is no answer yet");
@@ -448,7 +448,6 @@ Attempt ScanAttempt::HistoryLine(const std::string& time, const std::string& tra
   line.scoreMm = line.worstMm = result.distanceMm;
   line.degrees = result.degrees;
   line.startMm = result.startMm.value_or(0.0);
-  line.edits = edits;
   return line;
 }
 

@@ -117,9 +117,8 @@ public:
   const ScanTask* Solution() const;
 
   /// As a line of the history (AppendAttempt): score and worst score are the distance, the project is the task's name and file.
-  /// \param edits what counts as such, for instance the redirections of a needle. \throws Error(InvalidParameter) before an
-  /// answer
-  Attempt HistoryLine(const std::string& time, const std::string& trainee, int edits = 0) const;
+  /// \throws Error(InvalidParameter) before an answer
+  Attempt HistoryLine(const std::string& time, const std::string& trainee) const;
 
 private:
   struct Parts;

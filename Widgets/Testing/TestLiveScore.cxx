@@ -151,6 +151,8 @@ void ExpectSame(const Attempt& a, const Attempt& b)
   EXPECT_EQ(a.degrees, b.degrees);
   EXPECT_EQ(a.startMm, b.startMm);
   EXPECT_EQ(a.edits, b.edits);
+  EXPECT_EQ(a.help, b.help);
+  EXPECT_EQ(a.outOfPlaneSeconds, b.outOfPlaneSeconds);
 }
 
 TEST_F(Attempts, ComeBackWhateverTheNames)
@@ -166,7 +168,9 @@ TEST_F(Attempts, ComeBackWhateverTheNames)
     ASSERT_EQ(all.size(), i + 1);
     ExpectSame(all.back(), attempt);
   }
-  EXPECT_EQ(ReadTextFile(path).substr(0, 74), "time,trainee,seconds,score_mm,worst_mm,rotation_deg,start_mm,edits,project");
+  const std::string text = ReadTextFile(path);
+  EXPECT_EQ(text.substr(0, text.find('\n')),
+            "time,trainee,seconds,score_mm,worst_mm,rotation_deg,start_mm,edits,help,out_of_plane_s,project");
 }
 
 // A crash may leave any first part of the file: the next attempt mends it, and nothing before is lost.
@@ -202,8 +206,9 @@ TEST_F(Attempts, OtherFilesAreRefusedAndLeftAlone)
   const std::string path = Path("history.csv");
   AppendAttempt(path, Try("first"));
   const std::string good = ReadTextFile(path);
-  const std::string stray = good + "2024,\"stray,1,2,3,4,5,6,\"p\"\n" + good.substr(good.find('\n') + 1);
-  for (const std::string& text : {good + "x,y\n", good + "t,n,1,2,nan,4,5,6,p\n", good + "t,n,1,2,3,4,5,6.5,p\n", stray}) {
+  const std::string stray = good + "2024,\"stray,1,2,3,4,5,6,7,8,\"p\"\n" + good.substr(good.find('\n') + 1);
+  for (const std::string& text : {good + "x,y\n", good + "t,n,1,2,nan,4,5,6,7,8,p\n", good + "t,n,1,2,3,4,5,6.5,7,8,p\n",
+                                  good + "t,n,1,2,3,4,5,6,7,inf,p\n", good + "t,n,1,2,3,4,5,6,p\n", stray}) {
     Put("history.csv", text);
     ExpectRefused([&] { AppendAttempt(path, Try("x")); }, Error::Kind::BadFile, path, "line 3");
     EXPECT_EQ(ReadTextFile(path), text);
@@ -222,7 +227,7 @@ TEST_F(Attempts, OfASpreadsheetAreRead)
   const std::string path = Path("history.csv");
   AppendAttempt(path, Try("first"));
   std::string text = "\xef\xbb\xbf";
-  for (const char c : ReadTextFile(path) + "\n2024-05-18,\"a, b\",1,2,3,4,5,6,plain\n")
+  for (const char c : ReadTextFile(path) + "\n2024-05-18,\"a, b\",1,2,3,4,5,6,7,8,plain\n")
     text += c == '\n' ? "\r\n" : std::string(1, c);
   Put("history.csv", text);
   AppendAttempt(path, Try("third"));
@@ -232,6 +237,28 @@ TEST_F(Attempts, OfASpreadsheetAreRead)
   EXPECT_EQ(all[1].trainee, "a, b");
   EXPECT_EQ(all[1].project, "plain");
   EXPECT_EQ(all[1].edits, 6);
+}
+
+// What older versions wrote has no columns for help and for needles.
+TEST_F(Attempts, OfFewerColumnsGetTheOthers)
+{
+  const std::string header = "time,trainee,seconds,score_mm,worst_mm,rotation_deg,start_mm,edits,project";
+  const std::string path =
+      Put("old.csv", header + "\n2024-05-17,\"Doe, J\",1.5,2,3,4,5,6,\"a\"\n2024-05-18,B,2,3,4,5,6,7,\"b\"\n2024-05-19,C");
+  ASSERT_EQ(ReadAttempts(path).size(), 2u);
+  AppendAttempt(path, Try("third"));
+  const auto all = ReadAttempts(path);
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(all[0].trainee, "Doe, J");
+  EXPECT_EQ(all[0].seconds, 1.5);
+  EXPECT_EQ(all[0].edits, 6);
+  EXPECT_EQ(all[0].help, 0);
+  EXPECT_EQ(all[1].project, "b");
+  ExpectSame(all[2], Try("third"));
+  EXPECT_EQ(ReadTextFile(path).find(header), std::string::npos);
+  ASSERT_EQ(ReadAttempts(Put("empty.csv", header)).size(), 0u);
+  AppendAttempt(Path("empty.csv"), Try("first"));
+  ExpectSame(ReadAttempts(Path("empty.csv")).at(0), Try("first"));
 }
 
 TEST_F(Attempts, FullDisk)

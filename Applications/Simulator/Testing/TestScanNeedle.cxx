@@ -546,6 +546,10 @@ void TestScanNeedle::aTargetIsReachedAndScored()
   QCOMPARE(attempts.size(), std::size_t(2));
   QCOMPARE(attempts[0].edits, 1);
   QCOMPARE(attempts[1].edits, 0);
+  const auto offPlane = [](const QString& told) {
+    return told.section(", ", -2, -2).section(' ', 0, 0).toDouble();
+  }; // "1.2 s of 3.4 s"
+  QVERIFY2(std::fabs(attempts[1].outOfPlaneSeconds - offPlane(score)) < 0.051, qPrintable(score));
   QVERIFY(attempts[1].scoreMm < 1.5 && attempts[0].scoreMm > 5.0);
   QVERIFY2(start > 30.0 && std::fabs(attempts[1].startMm - start) < 1e-6, qPrintable(QString::number(attempts[1].startMm)));
   // A frozen image at the end keeps nothing from coming back.

@@ -21,6 +21,7 @@
 #include <QDoubleSpinBox>
 #include <QLabel>
 #include <QLineEdit>
+#include <QListWidget>
 #include <QPushButton>
 #include <QSpinBox>
 #include <QTableWidget>
@@ -545,6 +546,14 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   window.Session()->Select(2, true, true);
   window.Session()->TranslateSelection(1.0, 0.0, 0.0);
   QCOMPARE(window.Part<QLabel>("score")->text(), QString("hidden until you submit"));
+  // Nothing that leads to the solution: neither the numbers, nor what was there before, nor the aligner.
+  QCOMPARE(window.Part<QDoubleSpinBox>("middleX")->text(), QString());
+  QVERIFY(!window.Part<QDoubleSpinBox>("degreesZ")->isEnabled());
+  QVERIFY(!window.Part<QListWidget>("backups")->isEnabled());
+  QVERIFY(!window.Part<QPushButton>("scatter")->isEnabled());
+  QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
+  QVERIFY(window.Part<QPushButton>("refine")->isEnabled()); // nothing runs
+  QVERIFY2(window.HasMessage("not during an attempt"), qPrintable(window.Messages().join('\n')));
   QTest::qWait(300);
   QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
   QVERIFY(!panel->IsTraining());
@@ -553,11 +562,20 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QCOMPARE(attempts[0].scoreMm, window.Session()->GetScore());
   QCOMPARE(attempts[0].startMm, start);
   QCOMPARE(attempts[0].edits, 1);
+  QCOMPARE(attempts[0].help, 0);
   QVERIFY(attempts[0].seconds >= 0.3);
   QCOMPARE(attempts[0].trainee, std::string("Ada"));
   QCOMPARE(attempts[0].worstMm, window.Session()->GetVolumeScore(2));
   QCOMPARE(window.Part<QTableWidget>("attempts")->rowCount(), 1);
   QCOMPARE(window.Part<QLabel>("score")->text(), QString::number(window.Session()->GetScore(), 'f', 2) + " mm");
+  QVERIFY(window.Part<QDoubleSpinBox>("middleX")->text() != QString() && window.Part<QListWidget>("backups")->isEnabled());
+  // Help that is allowed is counted.
+  window.Part<QCheckBox>("trainingHelp")->setChecked(true);
+  QTest::mouseClick(window.Part<QPushButton>("trainingStart"), Qt::LeftButton);
+  QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
+  QCOMPARE(ReadAttempts(Folder().filePath("attempts.csv").toStdString()).at(1).help, 1);
   // A file that is something else is refused, and stays.
   QVERIFY(!panel->SetHistory(truth));
   QVERIFY(QFile(truth).size() > 0);
