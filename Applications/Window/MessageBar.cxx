@@ -64,10 +64,17 @@ void MessageBar::Clear()
 
 void MessageBar::Show(const Message& message)
 {
+  if (!message.topic.isEmpty())
+    for (auto* row : findChildren<QFrame*>("messageRow"))
+      if (row->property("topic") == message.topic) {
+        row->hide();
+        row->deleteLater();
+      }
   if (message.text.isEmpty() || RowOf(message.text))
     return; // it is there already
   auto* row = new QFrame(this);
   row->setObjectName("messageRow");
+  row->setProperty("topic", message.topic);
   row->setProperty("isNote", message.kind == Message::Note);
   row->setStyleSheet(StyleOf(message.kind));
   auto* layout = new QHBoxLayout(row);

@@ -15,6 +15,7 @@ class MessageBar : public QWidget {
 public:
   explicit MessageBar(QWidget* parent = nullptr);
 
+  /// Without a text it only takes away what was said of its topic.
   void Show(const Message& message);
   QStringList Texts() const; ///< from the oldest to the newest
   void Clear();

@@ -8,7 +8,9 @@ namespace echorama {
 Job* Workspace::Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done)
 {
   Job* job = Job::Start(owner, label, std::move(work), std::move(done),
-                        [this, label](const QString& error) { say(QString("%1: %2").arg(label, error), true); });
+                        [this, label, topic = owner->objectName()](const QString& error) {
+                          show({Message::Warning, QString("%1: %2").arg(label, error), {}, topic});
+                        });
   jobs->Watch(job);
   return job;
 }
@@ -22,6 +24,7 @@ JobPanel::~JobPanel()
 
 void JobPanel::Start(const QString& label, Job::Work work, std::function<void()> done)
 {
+  workspace_.show({Message::Note, {}, {}, objectName()}); // what the last one said is of the past
   job_ = workspace_.Run(this, label, std::move(work), std::move(done));
   connect(job_, &Job::Ended, this, [this] {
     job_ = nullptr;

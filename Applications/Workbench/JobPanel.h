@@ -17,7 +17,8 @@ public:
   ~JobPanel() override;
 
 protected:
-  /// See Workspace::Run. ShowState() is called when it begins, and when it has ended.
+  /// See Workspace::Run. What was said last of the topic of the panel's name goes. ShowState() is called when it begins, and when
+  /// it has ended.
   void Start(const QString& label, Job::Work work, std::function<void()> done);
   bool IsRunning() const { return job_; }
   virtual void ShowState() = 0;

@@ -8,6 +8,7 @@
 #include "Filters/Registration/AlignPair.h"
 #include "LandmarkBox.h"
 #include "Workspace.h"
+#include <algorithm>
 #include <QCheckBox>
 #include <QComboBox>
 #include <QFileDialog>
@@ -107,9 +108,11 @@ struct RegistrationPanel::Result {
 RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : JobPanel(workspace, parent)
 {
   setObjectName("registrationPanel");
-  refine_ = Button(this, "refine", tr("&Refine selected"),
-                   tr("Moves the selected volumes from where they are to where they agree with the others, which stay"),
-                   [this] { Refine(); });
+  refine_ =
+      Button(this, "refine", tr("&Refine selected"),
+             tr("Moves the selected volumes from where they are to where they agree with the others, which stay. Looks within "
+                "20 mm and 12 degrees, and farther when that is not enough and you say so"),
+             [this] { Refine(); });
   alignAll_ = Button(this, "alignAll", tr("&Align all"), tr("Looks for the place of every volume beside the first"),
                      [this] { AlignAll(); });
   start_ =
@@ -185,6 +188,11 @@ void RegistrationPanel::Refine()
   Run(tr("Refine"), ids, held, "tracked");
 }
 
+void RegistrationPanel::Tell(Message::Kind kind, const QString& text, const QVector<Message::Answer>& answers) const
+{
+  workspace_.show({kind, text, answers, objectName()});
+}
+
 void RegistrationPanel::AlignAll()
 {
   Run(tr("Align all"), AllIds(), {}, start_->currentText().toStdString());
@@ -193,7 +201,7 @@ void RegistrationPanel::AlignAll()
 bool RegistrationPanel::MayRun(const QString& label, const std::vector<int>& ids) const
 {
   if (!IsRunning() && ids.size() < 2)
-    workspace_.say(tr("%1: two volumes are needed; open another one").arg(label), true);
+    Tell(Message::Warning, tr("%1: two volumes are needed; open another one").arg(label));
   return !IsRunning() && ids.size() >= 2 && workspace_.mayHelp(label);
 }
 
@@ -236,7 +244,17 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
       volume.SetMotion(motion);
     }
   };
-  Start(label, work, [this, label, result] { Take(label, *result); });
+  // Refining looks near where volumes are: what is farther away takes longer, and more of it looks alike.
+  std::function<void()> farther;
+  if (start == "tracked")
+    farther = [this, ids, held] {
+      const bool areThere = std::all_of(ids.begin(), ids.end(), [this](int id) { return workspace_.session->HasVolume(id); });
+      if (areThere)
+        Run(tr("Search farther"), ids, held, "automatic");
+      else
+        Tell(Message::Warning, tr("Search farther: a volume of before has been removed"));
+    };
+  Start(label, work, [this, label, result, farther] { Take(label, *result, farther); });
 }
 
 void RegistrationPanel::PlaceByTracker()
@@ -266,10 +284,10 @@ void RegistrationPanel::PlaceByTracker()
       volume.SetMotion(volume.after * volume.before.inverse());
     }
   };
-  Start(label, work, [this, label, result] { Take(label, *result); });
+  Start(label, work, [this, label, result] { Take(label, *result, {}); });
 }
 
-void RegistrationPanel::Take(const QString& label, const Result& result)
+void RegistrationPanel::Take(const QString& label, const Result& result, const std::function<void()>& farther)
 {
   vtkUltrasoundAlignmentSession* session = workspace_.session;
   const bool takesDoubtful = doubtful_->isChecked();
@@ -277,13 +295,12 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
   for (const Result::Volume& volume : result.volumes) {
     const SessionVolume* now = session->GetKernel().State().Find(volume.id);
     if (volume.held && (!now || now->volumeToWorld.matrix() != volume.before.matrix())) {
-      workspace_.say(
-          tr("%1: result discarded, because a volume that the others were aligned with was moved in the meantime").arg(label),
-          true);
+      Tell(Message::Warning,
+           tr("%1: result discarded, because a volume that the others were aligned with was moved in the meantime").arg(label));
       return;
     }
   }
-  int moved = 0, left = 0;
+  int moved = 0, left = 0, unsure = 0;
   QString why;
   table_->setRowCount(0);
   session->BeginEdit(label.toUtf8());
@@ -299,6 +316,7 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
       const Pose now = session->GetKernel().State().Find(volume.id)->volumeToWorld;
       taken = volume.verdict == Placed || volume.verdict == NameOf(Verdict::Aligned) ||
               (takesDoubtful && volume.verdict == NameOf(Verdict::Ambiguous));
+      unsure += !taken;
       if (taken && now.matrix() != volume.before.matrix()) {
         taken = false;
         reason = tr("it was moved during the alignment and was left where it is");
@@ -320,10 +338,14 @@ void RegistrationPanel::Take(const QString& label, const Result& result)
   }
   session->EndEdit();
   if (left == 0)
-    workspace_.say(tr("%1: done, %2 moved").arg(label).arg(moved), false);
+    return Tell(Message::Note, tr("%1: done, %2 moved").arg(label).arg(moved));
+  const QString text =
+      tr("%1: %2 of %3 volumes aligned; the others were not moved. %4").arg(label).arg(moved).arg(moved + left).arg(why);
+  if (unsure > 0 && farther)
+    Tell(Message::Warning, tr("%1. Only places within %2 mm and %3\u00b0 were looked at").arg(text).arg(20).arg(12),
+         {{tr("Search farther"), farther}});
   else
-    workspace_.say(
-        tr("%1: %2 of %3 volumes aligned; the others were not moved. %4").arg(label).arg(moved).arg(moved + left).arg(why), true);
+    Tell(Message::Warning, text);
 }
 
 } // namespace echorama

@@ -35,8 +35,11 @@ private:
   std::vector<int> AllIds() const;
   /// What may begin: nothing runs, and there are two volumes; else says why not.
   bool MayRun(const QString& label, const std::vector<int>& ids) const;
+  /// In the place of what was said last.
+  void Tell(Message::Kind kind, const QString& text, const QVector<Message::Answer>& answers = {}) const;
   void Run(const QString& label, const std::vector<int>& ids, const std::vector<int>& held, const std::string& start);
-  void Take(const QString& label, const Result& result);
+  /// \param farther looks farther away, when some volumes did not find their places
+  void Take(const QString& label, const Result& result, const std::function<void()>& farther);
   void ShowState() override;
 
   QComboBox *start_, *metric_;

@@ -26,9 +26,9 @@ Workbench::Workbench(Workspace& workspace, QObject* parent) : QObject(parent), w
     observers_.append(Session()->AddObserver(event, this, &Workbench::OnSessionEvent));
   // Either may go before the other.
   workspace_.mayHelp = [bench = QPointer<Workbench>(this)](const QString& what) { return !bench || bench->MayHelp(what); };
-  workspace_.say = [bench = QPointer<Workbench>(this)](const QString& text, bool isError) {
+  workspace_.show = [bench = QPointer<Workbench>(this)](const Message& message) {
     if (bench)
-      isError ? bench->Warn(text) : bench->Note(text);
+      emit bench->Said(message);
   };
 }
 

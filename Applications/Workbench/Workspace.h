@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Progress.h"
+#include "Message.h"
 #include <functional>
 #include <QString>
 #include <vtkSmartPointer.h>
@@ -20,8 +21,9 @@ struct Workspace {
   JobBar* jobs = nullptr;
   /// A job that the job bar shows; what keeps it from being done is said. See Job::Start.
   Job* Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done);
-  std::function<void(const QString& message, bool isError)> say = [](const QString&, bool) {}; ///< in the window's message bar
-  std::function<bool(const QString& what)> mayHelp = [](const QString&) { return true; };      ///< else it has said why not
+  std::function<void(const Message& message)> show = [](const Message&) {}; ///< in the window's message bar
+  void say(const QString& text, bool isError) const { show({isError ? Message::Warning : Message::Note, text, {}}); }
+  std::function<bool(const QString& what)> mayHelp = [](const QString&) { return true; }; ///< else it has said why not
   std::function<void(vtkMatrix4x4* toolToWorld, bool grasping)> moveByTool = [](vtkMatrix4x4*, bool) {}; ///< alignment widget
 };
 

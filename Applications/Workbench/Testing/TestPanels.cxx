@@ -58,6 +58,7 @@ class TestPanels : public WindowTest {
 private slots:
   void refineBringsAVolumeBack();
   void aSureAnswerIsTakenUnasked();
+  void refiningOffersToSearchFarther();
   void landmarksTellWhatRepeatsApart();
   void aCancelledJobChangesNothing();
   void whatMovedMeanwhileStays();
@@ -145,6 +146,29 @@ void TestPanels::aSureAnswerIsTakenUnasked()
     QVERIFY2(Distance(window.Pose(2), belongs) < 0.5, button);
     QCOMPARE(window.Session()->GetUndoCount(), entries + 1);
   }
+}
+
+// Farther away than refining looks: it says so, and one click goes on. What it said does not stay beside the better answer.
+void TestPanels::refiningOffersToSearchFarther()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  const auto belongs = window.Pose(2);
+  Raise(window, "registrationPanel");
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(34.0, 0.0, 0.0);
+  const auto moved = window.Pose(2);
+  QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  QVERIFY(window.Pose(2) == moved);
+  QVERIFY2(window.HasMessage("within 20 mm and 12"), qPrintable(window.Messages().join('\n')));
+  auto* answer = window.Part<QPushButton>("messageAnswer");
+  QCOMPARE(answer->text(), QString("Search farther"));
+  QTest::mouseClick(answer, Qt::LeftButton);
+  QVERIFY(!window.HasMessage("Refine")); // as soon as it is of the past
+  QVERIFY(window.Wait());
+  QVERIFY2(Distance(window.Pose(2), belongs) < 0.5, qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.HasMessage("Search farther: done, 1 moved"));
 }
 
 // The volumes of the first test, which the images alone leave ambiguous: the same three places are clicked on in both.
