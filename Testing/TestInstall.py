@@ -58,6 +58,9 @@ with tempfile.TemporaryDirectory() as folder:
     program = prefix / "bin" / "echorama"
     check("echorama" in run(program, "--version"), "the installed program does not say its version")
 
+    lights = run(prefix / "bin" / "echorama-leds", "--line", "17", "--dry-run")
+    check("light 0" in lights, f"echorama-leds said {lights!r}")
+
     packages = next(prefix.rglob("echorama/__init__.py")).parent.parent
     where = run("/usr/bin/python3", "-c", "import echorama; print(echorama.__file__); echorama.vtkUltrasoundStitcher()",
                 environment={"PYTHONPATH": str(packages)})

@@ -39,7 +39,7 @@ std::string FlagHelp(std::string help, bool on)
 
 } // namespace
 
-CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, vtkSmartPointer<vtkObjectBase> owner)
+CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, std::any owner)
 {
   if (flag.empty())
     flag = parameter.Flag();
