@@ -41,6 +41,7 @@ with tempfile.TemporaryDirectory() as folder:
         sys.exit("TestExamples: calibration_figures.py did not make its picture")
     for arguments, wanted in ((["noise_tiling_figures.py", "--spacing", "2", pictures], ["NoiseTiler"]),
                               (["noise_figures.py", pictures], ["NoiseSource"]),
+                              (["optical_hardware_figures.py", pictures], ["optical-hardware"]),
                               (["shell_figures.py", "--resolution", "1", pictures], ["shell"]),
                               (["live_image_figures.py", "--spacing", "1.5", pictures], ["live_image"]),
                               (["live_scene_figures.py", "--detail", "5", "--cells", "10", pictures], ["live_scene"]),
