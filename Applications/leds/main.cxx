@@ -4,6 +4,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
 #include "GpioLines.h"
+#include <chrono>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
@@ -59,6 +60,11 @@ void BePunctual()
     Note("real-time priority is not permitted; when the machine is busy, lights change late (limits.conf: rtprio 50)");
 }
 
+double SecondsSince1970()
+{
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 struct NoLines : LightLines {
   void Set(std::uint32_t) override {}
 };
@@ -88,8 +94,14 @@ int Run(Options options)
   BePunctual();
   SystemLightClock clock;
   LightRun run;
-  std::int64_t toldChanges = 0, toldLate = 0;
+  std::int64_t toldBegin = 0, toldChanges = 0, toldLate = 0;
   const auto goOn = [&] {
+    if (run.begin != toldBegin) {
+      toldBegin = run.begin;
+      std::cerr << Format("slot 0 begins %.6f s after 1970 began\n",
+                          SecondsSince1970() + 1e-9 * static_cast<double>(run.begin - clock.Now()))
+                << std::flush;
+    }
     if (run.changes - toldChanges >= 1000) {
       const std::int64_t late = run.late + run.missed - toldLate;
       if (static_cast<double>(late) > MostLate * static_cast<double>(run.changes - toldChanges))

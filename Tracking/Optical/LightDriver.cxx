@@ -78,7 +78,7 @@ void Drive(const LightSchedule& schedule, LightLines& lines, LightClock& clock, 
            const std::function<bool()>& goOn, LightRun& run)
 {
   const std::int64_t limit = LateLimit(schedule);
-  const std::int64_t start = clock.Now() + 1000000;
+  const std::int64_t start = run.begin = clock.Now() + 1000000;
   const auto now = [&] { return clock.Now() - start; };
   const auto waitFor = [&](std::int64_t at) { // whether to go on then
     while (now() < at) {

@@ -37,6 +37,7 @@ struct LightRun {
   /// then as much off.
   static constexpr double LateShare = 0.1;
 
+  std::int64_t begin = 0;   ///< of slot 0, by the clock, once that is known
   std::int64_t slots = 0;   ///< whose time has come
   std::int64_t changes = 0; ///< that were made
   std::int64_t late = 0;    ///< of these
@@ -45,7 +46,7 @@ struct LightRun {
 
   /// Of what should have been done, in [0, 1].
   double ShareOfLate() const;
-  /// No more than the share \a of all changes came later than this, in seconds, to a fifth; never more than the worst.
+  /// The share \a of all changes came no later than this, in seconds; a fifth too much at most.
   double Within(double of) const;
   /// "half within 0.06 ms, 99% within 0.11 ms, the worst 0.30 ms"
   std::string Punctuality() const;
