@@ -223,11 +223,15 @@ TEST(LightDriver, ARehearsalLightsNothingAndRefusesARateThatCannotBeHeld)
     for (const FakeLines::Setting& setting : lines.settings)
       ASSERT_EQ(setting.on, 0u);
   }
-  // One of twenty may be late.
-  FakeClock clock;
-  clock.over = [](int sleep) { return sleep % 25 == 0 ? 900000 : 0; };
-  FakeLines lines(clock);
-  EXPECT_NO_THROW(RehearseLights(schedule, lines, clock, always));
+  for (const int each : {25, 17}) { // one of twenty may be late
+    FakeClock clock;
+    clock.over = [each](int sleep) { return sleep % each == 0 ? 900000 : 0; };
+    FakeLines lines(clock);
+    if (each > 20)
+      EXPECT_NO_THROW(RehearseLights(schedule, lines, clock, always));
+    else
+      EXPECT_THROW(RehearseLights(schedule, lines, clock, always), Error);
+  }
 }
 
 TEST(LightDriver, SharesOfLatenessAreThoseOfASortedList)
@@ -246,6 +250,13 @@ TEST(LightDriver, SharesOfLatenessAreThoseOfASortedList)
     EXPECT_GE(run.Within(share), exact - 1e-12);
     EXPECT_LE(run.Within(share), 1.2 * exact + 2e-6);
   }
+  double half = 0.0, most = 0.0, worst = 0.0;
+  ASSERT_EQ(
+      std::sscanf(run.Punctuality().c_str(), "half within %lf ms, 99%% within %lf ms, the worst %lf ms", &half, &most, &worst),
+      3);
+  EXPECT_NEAR(half, 1e3 * run.Within(0.5), 0.005);
+  EXPECT_NEAR(most, 1e3 * run.Within(0.99), 0.005);
+  EXPECT_NEAR(worst, 1e3 * run.Within(1.0), 0.005);
   EXPECT_EQ(run.Within(1.0), 1e-9 * static_cast<double>(all.back()));
   EXPECT_EQ(run.late, std::count_if(all.begin(), all.end(), [](std::int64_t each) { return each > 500000; }));
 }
