@@ -51,16 +51,18 @@ constexpr double TooBrightShare = 0.5;
 constexpr int GroupLimit = 4;
 constexpr double WorstAlone = 8.0; // chi squared
 
-// The largest excess of the frame over the floor.
-ECHORAMA_HOT int LargestExcess(const std::uint8_t* frame, const std::uint8_t* floor, int count)
+// The largest excess of the frame over the floor, and the largest value of the frame.
+ECHORAMA_HOT void Largest(const std::uint8_t* frame, const std::uint8_t* floor, int count, int& excess, int& value)
 {
-  std::uint8_t largest = 0;
+  std::uint8_t largest = 0, brightest = 0;
   for (int x = 0; x < count; ++x) {
     const std::uint8_t higher = frame[x] > floor[x] ? frame[x] : floor[x];
-    const auto excess = static_cast<std::uint8_t>(higher - floor[x]);
-    largest = excess > largest ? excess : largest;
+    const auto above = static_cast<std::uint8_t>(higher - floor[x]);
+    largest = above > largest ? above : largest;
+    brightest = frame[x] > brightest ? frame[x] : brightest;
   }
-  return largest;
+  excess = largest;
+  value = brightest;
 }
 
 ECHORAMA_HOT int CountFrom(const std::uint8_t* frame, int count, std::uint8_t level)
@@ -259,13 +261,17 @@ void SpotDetector::FindRuns(const Source& source, SpotFrame& out)
   for (int y = 0; y < source.height; ++y) {
     const std::uint8_t *frame = source.frame + static_cast<std::ptrdiff_t>(y) * source.width,
                        *floor = source.floor + static_cast<std::ptrdiff_t>(y) * source.width;
-    saturated += CountFrom(frame, source.width, static_cast<std::uint8_t>(parameters_.saturation));
-    if (LargestExcess(frame, floor, source.width) < least)
+    int excess = 0, brightest = 0;
+    Largest(frame, floor, source.width, excess, brightest);
+    if (brightest >= parameters_.saturation)
+      saturated += CountFrom(frame, source.width, static_cast<std::uint8_t>(parameters_.saturation));
+    if (excess < least)
       continue;
     int begin = -1; // of the run that is open
     for (int piece = 0; piece < source.width; piece += Piece) {
       const int end = std::min(piece + Piece, source.width);
-      if (LargestExcess(frame + piece, floor + piece, end - piece) < least) {
+      Largest(frame + piece, floor + piece, end - piece, excess, brightest);
+      if (excess < least) {
         if (begin >= 0)
           runs_.push_back({y, begin, piece, 0});
         begin = -1;
@@ -488,26 +494,26 @@ std::vector<SpotSample> SpotDetector::Samples(const Source& source, const std::v
             bottom = std::min(source.height - 1, static_cast<int>(high.y()));
   std::vector<SpotSample> samples;
   samples.reserve(static_cast<std::size_t>(std::max(0, (right - left + 1) * (bottom - top + 1) / (bin * bin))));
-  const double pixels = bin * bin;
+  const double perPixel = 1.0 / (bin * bin);
   for (int y = top; y + bin - 1 <= bottom; y += bin)
     for (int x = left; x + bin - 1 <= right; x += bin) {
       SpotSample s;
       s.x = x + 0.5 * (bin - 1);
       s.y = y + 0.5 * (bin - 1);
-      bool isNear = false;
-      for (std::size_t k = 0; k < spots.size(); ++k)
-        isNear = isNear || (spots[k].centre - Eigen::Vector2d(s.x, s.y)).squaredNorm() <= radii[k] * radii[k];
-      if (!isNear)
-        continue;
-      bool isSaturated = false;
-      for (int py = y; py < y + bin; ++py)
+      bool isUsed = false;
+      for (std::size_t k = 0; k < spots.size(); ++k) {
+        const double dx = s.x - spots[k].centre.x(), dy = s.y - spots[k].centre.y();
+        isUsed = isUsed || dx * dx + dy * dy <= radii[k] * radii[k];
+      }
+      for (int py = y; isUsed && py < y + bin; ++py)
         for (int px = x; px < x + bin; ++px) {
-          isSaturated =
-              isSaturated || source.frame[static_cast<std::ptrdiff_t>(py) * source.width + px] >= parameters_.saturation;
-          s.value += source.Value(px, py) / pixels;
-          s.background += source.Background(px, py) / pixels;
+          const int grey = source.frame[static_cast<std::ptrdiff_t>(py) * source.width + px];
+          const double background = source.Background(px, py);
+          isUsed = isUsed && grey < parameters_.saturation;
+          s.value += (grey - background) * perPixel;
+          s.background += background * perPixel;
         }
-      if (!isSaturated)
+      if (isUsed)
         samples.push_back(s);
     }
   noiseShare = source.background ? source.background->NoiseShare(std::clamp((top + bottom) / 2, 0, source.height - 1)) : 0.0;

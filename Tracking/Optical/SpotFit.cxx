@@ -19,7 +19,8 @@ namespace {
 
 constexpr int PerSpot = 6, PerPlane = 3;
 
-// Of one problem: parameters are (peak, x, y, a, b, c) per spot, then constant and slopes about the middle of the samples.
+// Of one problem: parameters are (peak, x, y, a, b, c) per spot, then constant and slopes about the middle of the samples. All
+// samples of a column at once: Eigen computes eight, four or two numbers, also of exp, in one step.
 class SpotProblem {
 public:
   SpotProblem(const std::vector<SpotSample>& samples, int spots, const SpotFitSettings& settings)
@@ -31,97 +32,95 @@ public:
   }
 
   int Parameters() const { return PerSpot * spots_ + PerPlane; }
-  int Used() const { return static_cast<int>(used_.size()); }
+  int Used() const { return static_cast<int>(x_.size()); }
 
   // Chooses samples and weights by what the model expects.
   void Weigh(const Eigen::VectorXd& p)
   {
-    used_.clear();
-    rootWeights_.clear();
-    const double perSample = settings_.pixelsPerSample;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const SpotSample& s = samples_[i];
-      const double total = s.background + ModelAt(p, s.x, s.y);
-      const double variance = settings_.noise.Variance(total);
-      if (std::max(total, 0.0) + 3.0 * std::sqrt(variance) >= settings_.saturation ||
-          s.value + s.background >= settings_.saturation)
+    const auto count = static_cast<Eigen::Index>(samples_.size());
+    Resize(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      x_[i] = samples_[static_cast<std::size_t>(i)].x;
+      y_[i] = samples_[static_cast<std::size_t>(i)].y;
+    }
+    Model(p);
+    Eigen::Index used = 0;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const SpotSample& s = samples_[static_cast<std::size_t>(i)];
+      const double total = s.background + model_[i];
+      const double variance = settings_.noise.Variance(total), room = settings_.saturation - std::max(total, 0.0);
+      if (room <= 0.0 || 9.0 * variance >= room * room || s.value + s.background >= settings_.saturation)
         continue;
-      const double ofBackground = settings_.backgroundNoise * settings_.noise.Variance(s.background);
-      used_.push_back(i);
-      rootWeights_.push_back(std::sqrt(perSample / (variance + ofBackground)));
+      x_[used] = s.x;
+      y_[used] = s.y;
+      values_[used] = s.value;
+      rootWeights_[used++] = variance + settings_.backgroundNoise * settings_.noise.Variance(s.background);
     }
-  }
-
-  // \a shapes: takes what each spot's peak is multiplied by.
-  double ModelAt(const Eigen::VectorXd& p, double x, double y, double* shapes = nullptr) const
-  {
-    const int first = PerSpot * spots_;
-    double value = p[first];
-    value += p[first + 1] * (x - middle_.x()) + p[first + 2] * (y - middle_.y());
-    for (int k = 0; k < spots_; ++k) {
-      const double* q = p.data() + static_cast<std::ptrdiff_t>(PerSpot) * k;
-      const double dx = x - q[1], dy = y - q[2];
-      const double shape = std::exp(-0.5 * (q[3] * dx * dx + 2.0 * q[4] * dx * dy + q[5] * dy * dy));
-      if (shapes)
-        shapes[k] = shape;
-      value += q[0] * shape;
-    }
-    return value;
+    Resize(used);
+    rootWeights_ = (settings_.pixelsPerSample / rootWeights_).sqrt();
   }
 
   // Sum of squared weighted residuals. Remembers what Differentiate(), of the parameters of the call before, needs.
   double Evaluate(const Eigen::VectorXd& p)
   {
-    const auto perRow = static_cast<std::size_t>(spots_);
-    shapes_.resize(used_.size() * perRow);
-    residuals_.resize(static_cast<Eigen::Index>(used_.size()));
-    double sum = 0.0;
-    for (std::size_t row = 0; row < used_.size(); ++row) {
-      const SpotSample& s = samples_[used_[row]];
-      const double residual = rootWeights_[row] * (s.value - ModelAt(p, s.x, s.y, shapes_.data() + perRow * row));
-      residuals_[static_cast<Eigen::Index>(row)] = residual;
-      sum += residual * residual;
-    }
-    return sum;
+    Model(p);
+    residuals_ = rootWeights_ * (values_ - model_);
+    return residuals_.matrix().squaredNorm();
   }
 
-  void Differentiate(const Eigen::VectorXd& p, Eigen::MatrixXd& jacobian, Eigen::VectorXd& residuals) const
+  // The Hessian of half of that sum, and minus its gradient.
+  void Differentiate(const Eigen::VectorXd& p, Eigen::MatrixXd& information, Eigen::VectorXd& gradient)
   {
-    const auto count = static_cast<Eigen::Index>(used_.size());
-    jacobian.resize(count, Parameters());
-    residuals = residuals_;
-    const int first = PerSpot * spots_;
-    std::size_t at = 0;
-    for (Eigen::Index row = 0; row < count; ++row) {
-      const auto index = static_cast<std::size_t>(row);
-      const SpotSample& s = samples_[used_[index]];
-      const double weight = rootWeights_[index];
-      for (int k = 0; k < spots_; ++k) {
-        const double* q = p.data() + static_cast<std::ptrdiff_t>(PerSpot) * k;
-        const double dx = s.x - q[1], dy = s.y - q[2];
-        const double shape = weight * shapes_[at++], light = q[0] * shape;
-        const int column = PerSpot * k;
-        jacobian(row, column) = shape;
-        jacobian(row, column + 1) = light * (q[3] * dx + q[4] * dy);
-        jacobian(row, column + 2) = light * (q[4] * dx + q[5] * dy);
-        jacobian(row, column + 3) = light * -0.5 * dx * dx;
-        jacobian(row, column + 4) = -light * dx * dy;
-        jacobian(row, column + 5) = light * -0.5 * dy * dy;
-      }
-      jacobian(row, first) = weight;
-      jacobian(row, first + 1) = weight * (s.x - middle_.x());
-      jacobian(row, first + 2) = weight * (s.y - middle_.y());
+    jacobian_.resize(x_.size(), Parameters());
+    const auto column = [this](int at) { return jacobian_.col(at).array(); };
+    for (int k = 0; k < spots_; ++k) {
+      const auto q = p.segment<PerSpot>(static_cast<Eigen::Index>(PerSpot) * k);
+      const int first = PerSpot * k;
+      const auto dx = x_ - q[1], dy = y_ - q[2];
+      column(first) = rootWeights_ * shapes_.col(k);
+      light_ = q[0] * column(first);
+      column(first + 1) = light_ * (q[3] * dx + q[4] * dy);
+      column(first + 2) = light_ * (q[4] * dx + q[5] * dy);
+      column(first + 3) = -0.5 * light_ * dx * dx;
+      column(first + 4) = -light_ * dx * dy;
+      column(first + 5) = -0.5 * light_ * dy * dy;
     }
+    const int first = PerSpot * spots_;
+    column(first) = rootWeights_;
+    column(first + 1) = rootWeights_ * (x_ - middle_.x());
+    column(first + 2) = rootWeights_ * (y_ - middle_.y());
+    information.noalias() = jacobian_.transpose() * jacobian_;
+    gradient.noalias() = jacobian_.transpose() * residuals_.matrix();
   }
 
 private:
+  void Resize(Eigen::Index count)
+  {
+    for (Eigen::ArrayXd* array : {&x_, &y_, &values_, &rootWeights_})
+      array->conservativeResize(count);
+  }
+
+  void Model(const Eigen::VectorXd& p)
+  {
+    shapes_.resize(x_.size(), spots_);
+    const int first = PerSpot * spots_;
+    model_ = p[first] + p[first + 1] * (x_ - middle_.x()) + p[first + 2] * (y_ - middle_.y());
+    for (int k = 0; k < spots_; ++k) {
+      const auto q = p.segment<PerSpot>(static_cast<Eigen::Index>(PerSpot) * k);
+      const auto dx = x_ - q[1], dy = y_ - q[2];
+      shapes_.col(k) = (-0.5 * (q[3] * dx * dx + 2.0 * q[4] * dx * dy + q[5] * dy * dy)).exp();
+      model_ += q[0] * shapes_.col(k);
+    }
+  }
+
   const std::vector<SpotSample>& samples_;
   int spots_;
   SpotFitSettings settings_;
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
-  std::vector<std::size_t> used_;
-  std::vector<double> rootWeights_, shapes_;
-  Eigen::VectorXd residuals_;
+  Eigen::ArrayXd x_, y_, values_, rootWeights_; // of the samples that are used
+  Eigen::ArrayXd model_, residuals_, light_;
+  Eigen::ArrayXXd shapes_; // what each spot's peak is multiplied by
+  Eigen::MatrixXd jacobian_;
 };
 
 // Peaks above 0, ellipses that are ellipses, with radii of a third of a pixel to a hundred.
@@ -139,14 +138,11 @@ bool IsPossible(const Eigen::VectorXd& p, int spots)
 // \returns whether it converged; \a information is the Hessian where it ended.
 bool Descend(SpotProblem& problem, int spots, double tolerance, Eigen::VectorXd& p, double& sum, Eigen::MatrixXd& information)
 {
-  Eigen::MatrixXd jacobian;
-  Eigen::VectorXd residuals;
+  Eigen::VectorXd gradient;
   double damping = 1e-3;
   sum = problem.Evaluate(p);
   for (int iteration = 0; iteration < 25; ++iteration) {
-    problem.Differentiate(p, jacobian, residuals);
-    information.noalias() = jacobian.transpose() * jacobian;
-    const Eigen::VectorXd gradient = jacobian.transpose() * residuals;
+    problem.Differentiate(p, information, gradient);
     bool better = false;
     Eigen::VectorXd step;
     while (!better && damping < 1e6) {
