@@ -5,7 +5,8 @@
 // A match needs no threshold on single frames. With a rolling shutter, or slots out of step with frames, a frame may see the end
 // of one slot and the beginning of the next; so the expected brightness is the share of its exposure in which the light is on,
 // times an unknown amplitude, which least squares give in closed form. One frame that is wrong by a third of it is an error.
-// Phases are tried at quarters of a slot, all lights at each.
+// Phases are tried at quarters of a slot, all lights at each. What the light of two explains, each in proportion to its own word,
+// is the light of two in one spot.
 #include "BlinkCode.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
@@ -23,7 +24,8 @@ constexpr int LongestPause = 2;
 constexpr int PhasesPerSlot = 4;
 // Words differ in three slots of about ten: one wrong slot leaves a tenth, another's word a quarter, or less between two phases.
 constexpr double LeastMargin = 0.08, LeastRatio = 3.0;
-constexpr double LargestError = 0.35; // of a light's brightness: more than this in one frame is an error
+constexpr double LargestError = 0.35;   // of a light's brightness: more than this in one frame is an error
+constexpr double LargestMixture = 0.25; // of another's light, over its own, in what is one light's
 
 std::uint32_t Turned(std::uint32_t word, int by, int length)
 {
@@ -179,6 +181,27 @@ BlinkSums SumUp(const BlinkCode& code, const BlinkTiming& timing, const std::vec
   return sums;
 }
 
+// How much of another light there is in it, over its own, if it is the light of two: the larger share of the one, or 1 where
+// the other explains more.
+double MixtureOf(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                 int other, double phase)
+{
+  double own = 0.0, others = 0.0, both = 0.0, ofOwn = 0.0, ofOther = 0.0; // products of shares, and with what was seen
+  for (const BlinkObservation& o : seen) {
+    const double a = ShareIn(code, timing, o, light, phase), b = ShareIn(code, timing, o, other, phase);
+    own += a * a;
+    others += b * b;
+    both += a * b;
+    ofOwn += a * o.brightness;
+    ofOther += b * o.brightness;
+  }
+  const double least = own * others - both * both;
+  if (least <= 1e-6 * own * others)
+    return 0.0; // nobody can tell
+  const double amplitude = ofOwn * others - ofOther * both, otherAmplitude = ofOther * own - ofOwn * both;
+  return amplitude > 0.0 ? otherAmplitude / amplitude : 1.0;
+}
+
 // The largest difference in one frame, over the brightness of the light.
 double LargestDifference(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
                          double phase)
@@ -226,6 +249,9 @@ BlinkMatch MatchBlink(const BlinkCode& code, const BlinkTiming& timing, const st
   if (best.light < 0 || (code.NeedsTrigger() && !phase) ||
       (limit < 1.0 && LargestDifference(code, timing, seen, best.light, best.phase) > LargestError))
     best.light = -1;
+  for (int other = 0; limit < 1.0 && best.light >= 0 && other < code.Lights(); ++other)
+    if (other != best.light && MixtureOf(code, timing, seen, best.light, other, best.phase) > LargestMixture)
+      best.light = -1; // two lights in one spot
   if (least > limit || rival < std::max(least + LeastMargin, LeastRatio * least))
     best.light = -1;
   return best;

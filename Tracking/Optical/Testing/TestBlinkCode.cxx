@@ -140,6 +140,34 @@ TEST(BlinkCode, WhatDoesNotBlinkLikeThatIsNobody)
   EXPECT_EQ(MatchBlink(code, timing, {}, std::nullopt).light, -1);
 }
 
+// A spot in which two lights lie is nobody's; a little of another does not matter.
+TEST(BlinkCode, TwoLightsInOneSpotAreNobody)
+{
+  const BlinkTiming timing;
+  int asOne = 0, found = 0, trials = 0;
+  for (int lights = 2; lights <= 4; ++lights) {
+    const BlinkCode code = BlinkCode::Make(lights, 2);
+    for (int trial = 0; trial < 300; ++trial) {
+      Random random(12, static_cast<std::uint64_t>(trial));
+      const double phase = random.Uniform(0.0, code.Length() * timing.slot), share = random.Uniform(0.4, 1.0);
+      const int light = static_cast<int>(random.Below(static_cast<std::uint64_t>(lights))), other = (light + 1) % lights;
+      const int frames = code.Length() * 3 / 2;
+      const auto one = Seen(code, timing, light, phase, frames, random), two = Seen(code, timing, other, phase, frames, random);
+      auto both = one, little = one;
+      for (std::size_t i = 0; i < one.size(); ++i) {
+        both[i].brightness += share * two[i].brightness;
+        little[i].brightness += 0.05 * two[i].brightness;
+      }
+      EXPECT_EQ(MatchBlink(code, timing, both, phase).light, -1) << lights << " " << trial;
+      asOne += BlinkResidual(code, timing, both, light, phase) < 0.15;
+      found += MatchBlink(code, timing, little, phase).light == light;
+      ++trials;
+    }
+  }
+  EXPECT_GT(asOne, trials / 2); // it would have passed for one
+  EXPECT_GT(found, trials * 95 / 100);
+}
+
 TEST(BlinkCode, LightsInTurnNeedTheTrigger)
 {
   const BlinkCode code = BlinkCode::Alternating();
