@@ -63,12 +63,24 @@ class Shell(unittest.TestCase):
         with zipfile.ZipFile(out / "shell.3mf") as archive:
             self.assertEqual(archive.read("3D/3dmodel.model").count(b"<triangle "), len(skin) + len(triangles(out / "base.stl")))
 
+    def test_what_is_too_large_is_cut(self):
+        out = work / "parts"
+        told = run_json("shell", work / "ball.stl", "-o", out, "--resolution-mm", 1, "--opening-mm", 20, "--flange-mm", 0, "--points", 0,
+                        "--printer-mm", 70, 100, 100)
+        names = ["base-1.stl", "base-2.stl", "shell.3mf", "skin-1.stl", "skin-2.stl"]
+        self.assertEqual(sorted(path.name for path in out.iterdir()), names)
+        self.assertEqual(told["skin"] + told["base"] + [told["all"]], ["skin-1.stl", "skin-2.stl", "base-1.stl", "base-2.stl", "shell.3mf"])
+        for name in told["skin"] + told["base"]:
+            size = numpy.ptp(triangles(out / name).reshape(-1, 3), axis=0)
+            self.assertTrue((size <= (70, 100, 100)).all() or (size <= (100, 70, 100)).all(), (name, size))
+
     def test_what_cannot_be_made_leaves_nothing(self):
         before = snapshot(work)
         for arguments, words in (
                 ((work / "open.stl",), f"{work / 'open.stl'}: the body is not closed: it has 1 hole, one of"),
                 ((work / "nowhere.stl",), "nowhere.stl: there is no such file"),
-                ((work / "ball.stl", "--printer-mm", 50, 50, 50), "does not fit the printer"),
+                ((work / "ball.stl", "--printer-mm", 50, 50, 50), "cannot be cut for a printer"),
+                ((work / "ball.stl", "--printer-mm", 50, 50, 50, "--no-cut-to-fit"), "does not fit the printer"),
                 ((work / "ball.stl", "--thickness-mm", 100), "ThicknessMm is 100 mm; it must be in [0.4, 20]"),
         ):
             done = run("shell", *arguments, "-o", work / "nothing", "--opening-mm", 20, "--resolution-mm", 1)

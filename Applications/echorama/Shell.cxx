@@ -6,6 +6,7 @@
 #include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Volumes.h"
+#include <algorithm>
 #include <memory>
 #include <vtkCellArray.h>
 #include <vtkFieldData.h>
@@ -53,19 +54,26 @@ void MakeShellFiles(Session& session, const ShellOptions& options, vtkUltrasound
   }
   OutputFolder folder(options.folder, {options.body});
   session.ShowAs(folder.StageFolder(), options.folder);
-  const char* names[] = {"skin", "base"};
-  for (int part = 0; part < 2; ++part) {
-    const std::string name = std::string(names[part]) + ".stl";
+  for (int print = 0; print < filter->GetNumberOfPrints(); ++print) {
+    std::string name = filter->GetPrintName(print); // "skin", or "skin 2"
+    const std::string part = name.substr(0, name.find(' '));
+    std::replace(name.begin(), name.end(), ' ', '-');
+    name += ".stl";
+    vtkNew<vtkPolyData> mesh;
+    filter->GetPrint(print, mesh);
     vtkNew<vtkSTLWriter> writer;
-    writer->SetInputData(filter->GetOutput(part));
+    writer->SetInputData(mesh);
     writer->SetFileName(folder.Stage(name).c_str());
     writer->SetFileTypeToBinary();
     session.Watch(writer, "write", name, [&] { writer->Write(); });
-    session.result[names[part]] = name;
+    if (part + ".stl" == name)
+      session.result[part] = name;
+    else
+      session.result[part].push_back(name);
   }
-  const std::string both = folder.Stage("shell.3mf");
-  session.Watch(filter, "write", "shell.3mf", [&] { filter->Write3mf(both.c_str()); });
-  session.result["both"] = "shell.3mf";
+  const std::string all = folder.Stage("shell.3mf");
+  session.Watch(filter, "write", "shell.3mf", [&] { filter->Write3mf(all.c_str()); });
+  session.result["all"] = "shell.3mf";
   vtkPolyData* marks = filter->GetOutput(2);
   if (marks->GetNumberOfPoints() > 0) {
     std::string table = "label,x,y,z\n";

@@ -48,7 +48,8 @@ public:
     level_ = std::make_unique<BodyLevelSet>(body, origin_, p_.resolutionMm, inside_, outside_);
   }
 
-  TriangleSurface Make(ShellPartKind part, const Progress& progress) const
+  // All of a part, or what lies of it in a cell.
+  TriangleSurface Make(ShellPartKind part, const CutCell* cell, const Progress& progress) const
   {
     LevelSet levelSet;
     const Eigen::AlignedBox3d bounds = design_.Bounds(part);
@@ -60,24 +61,30 @@ public:
                   Format("the shell would be %.0f cells long; ask for a coarser ResolutionMm", count.maxCoeff()));
     levelSet.cells = count.cast<int>();
     const bool isSkin = part == ShellPartKind::Skin;
-    levelSet.mayCross = [this, isSkin](const Eigen::Array3i& first) { return MayCross(isSkin, first); };
-    levelSet.sample = [this, isSkin](const Eigen::Array3i& first, LevelSet::Values& values) {
+    levelSet.mayCross = [this, isSkin, cell](const Eigen::Array3i& first) {
+      if (cell && !cell->Reach().intersects({NodeAt(first, -1, -1, -1), NodeAt(first, edge + 1, edge + 1, edge + 1)}))
+        return false;
+      return MayCross(isSkin, first);
+    };
+    levelSet.sample = [this, isSkin, cell](const Eigen::Array3i& first, LevelSet::Values& values) {
       if (isSkin)
-        SampleSkin(first, values);
+        SampleSkin(first, cell, values);
       else
-        SampleBase(first, values);
+        SampleBase(first, cell, values);
     };
     TriangleSurface surface = MeshLevelSet(levelSet, progress.Part(0.0, isSkin ? 0.7 : 1.0));
     if (isSkin)
       MovePoints(
-          surface, [this](const Vector3d& point) { return design_.Refined(point); }, progress.Part(0.7, 1.0));
+          surface, [this, cell](const Vector3d& point) { return design_.Refined(point, cell); }, progress.Part(0.7, 1.0));
     return surface;
   }
 
 private:
+  static constexpr int edge = LevelSet::blockCells;
+
   bool MayCross(bool isSkin, const Eigen::Array3i& first) const
   {
-    const double edge = LevelSet::blockCells * p_.resolutionMm, low = NodeAt(first, 0, 0, 0).z(), high = low + edge;
+    const double width = edge * p_.resolutionMm, low = NodeAt(first, 0, 0, 0).z(), high = low + width;
     const auto reaches = [low, high, this](double from, double to) {
       return high > from - p_.resolutionMm && low < to + p_.resolutionMm;
     };
@@ -87,8 +94,8 @@ private:
       return high > -p_.resolutionMm;
     if (p_.flangeMm <= 0.0 || !reaches(0.0, p_.flangeThicknessMm))
       return false;
-    const Vector3d middle = NodeAt(first, 0, 0, 0) + Vector3d::Constant(0.5 * edge);
-    return level_->IsOutside(first) && body_.Distance(middle) - p_.flangeMm <= 0.8661 * edge + 0.05 * p_.resolutionMm;
+    const Vector3d middle = NodeAt(first, 0, 0, 0) + Vector3d::Constant(0.5 * width);
+    return level_->IsOutside(first) && body_.Distance(middle) - p_.flangeMm <= 0.8661 * width + 0.05 * p_.resolutionMm;
   }
 
   Vector3d NodeAt(const Eigen::Array3i& first, int i, int j, int k) const
@@ -109,21 +116,21 @@ private:
                                                    static_cast<std::size_t>(i + LevelSet::blockNodes * j)));
   }
 
-  void SampleSkin(const Eigen::Array3i& first, LevelSet::Values& values) const
+  void SampleSkin(const Eigen::Array3i& first, const CutCell* cell, LevelSet::Values& values) const
   {
     const double half = 0.5 * LevelSet::blockCells * p_.resolutionMm, near = 2.0 * p_.resolutionMm,
                  above = p_.flangeThicknessMm + near;
     const auto marks = design_.MarksNear(NodeAt(first, 0, 0, 0) + Vector3d::Constant(half), 1.7321 * half);
     ForNodes(first, values, [&](const Vector3d& place, double distance, std::size_t) {
       // Beyond the wall the flange alone wants to know how far.
-      const bool isNearWall = distance > -p_.thicknessMm - near && distance < near && place.z() > -near;
+      const bool isNearWall = distance > -design_.DeepestAt(place, cell) - near && distance < near && place.z() > -near;
       if (isNearWall || (distance >= near && p_.flangeMm > 0.0 && std::abs(place.z()) < above))
         distance = body_.Distance(place);
-      return design_.Skin(place, distance, marks);
+      return design_.Skin(place, distance, marks, cell);
     });
   }
 
-  void SampleBase(const Eigen::Array3i& first, LevelSet::Values& values) const
+  void SampleBase(const Eigen::Array3i& first, const CutCell* cell, LevelSet::Values& values) const
   {
     // Distances in the plane of the opening, of each column. Where the level set says that it is far inside nobody asks how far.
     constexpr int nodes = LevelSet::blockNodes;
@@ -145,7 +152,7 @@ private:
     ForNodes(first, values, [&](const Vector3d& place, double distance, std::size_t column) {
       if (p_.baffleMm > 0.0 && place.z() > -near && distance < near - lip && distance > -near - lip - p_.thicknessMm)
         distance = body_.Distance(place);
-      return design_.Base(place, distance, feet[column]);
+      return design_.Base(place, distance, feet[column], cell);
     });
   }
 
@@ -210,10 +217,10 @@ WallThickness MeasureWall(const TriangleSurface& skin, const ShellDesign& design
   return wall;
 }
 
-void CheckPart(ShellPart& part, const char* name, const Progress& progress)
+void CheckPart(ShellPart& part, const std::string& name, const Progress& progress)
 {
   part.check = CheckSurface(part.surface, {}, progress);
-  const std::string what = std::string("the ") + name;
+  const std::string what = "the " + name;
   if (part.surface.triangles.empty())
     throw Error(Error::Kind::NotPossible, what + " is empty");
   if (!part.check.IsSound())
@@ -222,7 +229,25 @@ void CheckPart(ShellPart& part, const char* name, const Progress& progress)
   const std::int64_t pieces = part.check.components - part.check.cavities;
   if (pieces > 1)
     throw Error(Error::Kind::NotPossible, what + " falls into " + std::to_string(pieces) +
-                                              " pieces: the body is in several, or the opening cuts it into them");
+                                              " pieces: the body is in several, or the opening or the printer's size cuts it "
+                                              "into them");
+}
+
+// What lies in each cell that is not empty.
+void AddCut(Shell& shell, const ShellMaker& maker, const ShellDesign& design, ShellPartKind kind, const Progress& progress)
+{
+  const auto& cells = design.Cells(kind);
+  int number = 0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto count = static_cast<double>(cells.size());
+    PrintedPart printed;
+    printed.part.surface =
+        maker.Make(kind, &cells[i], progress.Part(static_cast<double>(i) / count, (static_cast<double>(i) + 1.0) / count));
+    if (printed.part.surface.triangles.empty())
+      continue;
+    printed.name = (kind == ShellPartKind::Skin ? "skin " : "base ") + std::to_string(++number);
+    shell.cut.push_back(std::move(printed));
+  }
 }
 
 } // namespace
@@ -242,7 +267,25 @@ std::string Shell::Text() const
   if (skin.check.cavities > 0)
     text += Format("  %lld closed rooms in it that the opening does not reach\n", static_cast<long long>(skin.check.cavities));
   text += "base: " + base.Text() + ", closed, nothing inside out\n";
+  for (const PrintedPart& printed : cut)
+    text += "  to print: " + printed.name + ", " + printed.part.Text() + "\n";
   return text + Format("camera: at (%.3f, %.3f, %.3f) mm in the body's frame", camera.x(), camera.y(), camera.z());
+}
+
+std::vector<PrintedPart> Shell::Prints() const
+{
+  std::vector<PrintedPart> prints;
+  const auto add = [&](const ShellPart& whole, const std::string& name) {
+    const std::size_t before = prints.size();
+    for (const PrintedPart& printed : cut)
+      if (printed.name.compare(0, name.size(), name) == 0)
+        prints.push_back(printed);
+    if (prints.size() == before)
+      prints.push_back({name, whole});
+  };
+  add(skin, "skin");
+  add(base, "base");
+  return prints;
 }
 
 Shell MakeShell(const BodySurface& given, const ShellParameters& parameters, const std::vector<Vector3d>& marks,
@@ -269,37 +312,45 @@ Shell MakeShell(const BodySurface& given, const ShellParameters& parameters, con
   const ShellDesign design(parameters, body, above);
   const ShellMaker maker(parameters, body, design);
   progress(0.35);
-  shell.skin.surface = maker.Make(ShellPartKind::Skin, progress.Part(0.35, 0.65));
-  shell.thickness = MeasureWall(shell.skin.surface, design, body, progress.Part(0.65, 0.7));
+  shell.skin.surface = maker.Make(ShellPartKind::Skin, nullptr, progress.Part(0.35, 0.55));
+  shell.thickness = MeasureWall(shell.skin.surface, design, body, progress.Part(0.55, 0.57));
   if (shell.thickness.places == 0)
     throw Error(Error::Kind::NotPossible,
                 Format("the body is too thin: a wall of ThicknessMm, %g mm, leaves no room inside", parameters.thicknessMm));
-  shell.base.surface = maker.Make(ShellPartKind::Base, progress.Part(0.7, 0.8));
-  Measure(shell.skin, parameters.printerMm);
-  Measure(shell.base, parameters.printerMm);
+  shell.base.surface = maker.Make(ShellPartKind::Base, nullptr, progress.Part(0.57, 0.62));
+  AddCut(shell, maker, design, ShellPartKind::Skin, progress.Part(0.62, 0.75));
+  AddCut(shell, maker, design, ShellPartKind::Base, progress.Part(0.75, 0.8));
   const Pose back = shell.bodyToShell.inverse();
-  for (TriangleSurface* surface : {&shell.skin.surface, &shell.base.surface})
-    for (Eigen::Vector3f& point : surface->points)
+  std::vector<ShellPart*> parts{&shell.skin, &shell.base};
+  for (PrintedPart& printed : shell.cut)
+    parts.push_back(&printed.part);
+  for (ShellPart* part : parts) {
+    Measure(*part, parameters.printerMm);
+    for (Eigen::Vector3f& point : part->surface.points)
       point = (back * point.cast<double>()).cast<float>();
+  }
   shell.camera = back * design.Camera();
   for (const ShellMark& mark : above)
     shell.marks.push_back({back * mark.place, back.linear() * mark.normal});
-  CheckPart(shell.skin, "skin", progress.Part(0.8, 0.95));
-  CheckPart(shell.base, "base", progress.Part(0.95, 1.0));
+  CheckPart(shell.skin, "skin", progress.Part(0.8, 0.88));
+  CheckPart(shell.base, "base", progress.Part(0.88, 0.9));
+  for (std::size_t i = 0; i < shell.cut.size(); ++i) {
+    const auto count = static_cast<double>(shell.cut.size());
+    CheckPart(shell.cut[i].part, shell.cut[i].name,
+              progress.Part(0.9 + 0.1 * static_cast<double>(i) / count, 0.9 + 0.1 * (static_cast<double>(i) + 1.0) / count));
+  }
   return shell;
 }
 
 void CheckPrinter(const Shell& shell, const ShellParameters& parameters)
 {
   const Vector3d& printer = parameters.printerMm;
-  const auto check = [&printer](const ShellPart& part, const char* name) {
+  for (const auto& [name, part] : shell.Prints())
     if (!part.fits)
       throw Error(Error::Kind::NotPossible,
                   Format("the %s is %.1f x %.1f x %.1f mm and does not fit the printer (PrinterMm), which makes %g x %g x %g mm",
-                         name, part.sizeMm.x(), part.sizeMm.y(), part.sizeMm.z(), printer.x(), printer.y(), printer.z()));
-  };
-  check(shell.skin, "skin");
-  check(shell.base, "base");
+                         name.c_str(), part.sizeMm.x(), part.sizeMm.y(), part.sizeMm.z(), printer.x(), printer.y(), printer.z()) +
+                      (parameters.cutToFit ? "" : "; CutToFit would cut it into parts"));
 }
 
 } // namespace echorama

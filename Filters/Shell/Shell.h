@@ -22,8 +22,15 @@ struct WallThickness {
   double leastWallMm = 0.0;                         ///< to the nearest place of the surface, whatever Measured says
 };
 
+/// What a printer makes at once.
+struct PrintedPart {
+  std::string name; ///< "skin", or "skin 2" of those that it is cut into
+  ShellPart part;
+};
+
 struct Shell {
   ShellPart skin, base;
+  std::vector<PrintedPart> cut; ///< what skin or base, or both, are cut into for the printer
   WallThickness thickness;
   Eigen::Vector3d camera = Eigen::Vector3d::Zero(); ///< its optical centre, in the body's frame; it looks along Up
   Pose bodyToShell = Pose::Identity();
@@ -32,6 +39,8 @@ struct Shell {
 
   /// What was made and found, line by line.
   std::string Text() const;
+  /// All that is to be printed: skin and base, or what they are cut into.
+  std::vector<PrintedPart> Prints() const;
 };
 
 /// Makes both parts. The outer surface is the body's: its points lie on it, and the triangles between them are off by
@@ -45,7 +54,7 @@ struct Shell {
 Shell MakeShell(const BodySurface& body, const ShellParameters& parameters = {}, const std::vector<Eigen::Vector3d>& marks = {},
                 const Progress& progress = {});
 
-/// \throws Error(NotPossible) that says how large the parts and the printer are, when one does not fit
+/// \throws Error(NotPossible) that says how large the parts to print and the printer are, when one does not fit
 void CheckPrinter(const Shell& shell, const ShellParameters& parameters);
 
 } // namespace echorama

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double turn = 6.283185307179586;
+constexpr double turn = 6.283185307179586, unlimitedMm = 1e9;
 
 [[noreturn]] void RefuseShell(const std::string& reason)
 {
@@ -63,6 +63,8 @@ ParameterList Describe(ShellParameters& p)
                 "What is made of calibration points: holes that an LED fits in, or bumps that are removed later."),
       Parameter("MarkMm", p.markMm, {0.5, 20}, "mm", "Diameter of holes or bumps."),
       Parameter("PrinterMm", p.printerMm, {1, 1e4}, "mm", "What the printer can make: its width, depth and height."),
+      Parameter("CutToFit", p.cutToFit, "Whether what does not fit the printer is cut into parts that do."),
+      Parameter("SeamMm", p.seamMm, {2, 50}, "mm", "How far parts that were cut reach behind, or into, the next one."),
   };
 }
 
@@ -117,16 +119,155 @@ double LowestMark(const ShellParameters& p)
 ShellDesign::ShellDesign(const ShellParameters& parameters, const BodySurface& body, std::vector<ShellMark> marks)
   : p_(parameters), body_(body), marks_(p_.marks == ShellParameters::MarkKind::None ? std::vector<ShellMark>() : std::move(marks))
 {
-  // In the middle of the flange, from outside: distances tell how far it is at least.
+  PlanSkinAndBase();
+}
+
+// The first place that far from the body on the way in from outside: distances tell how far it is at least.
+std::optional<Vector3d> ShellDesign::FromOutside(const Vector3d& place, const Vector3d& away, double distanceMm) const
+{
+  double radius = body_.Bounds().sizes().norm() + body_.Bounds().center().norm() + place.norm() + p_.flangeMm;
+  for (const double start = radius; radius > -start;) {
+    const double step = body_.Distance(place + radius * away) - distanceMm;
+    if (step < 1e-4)
+      return place + radius * away;
+    radius -= step;
+  }
+  return std::nullopt;
+}
+
+Eigen::AlignedBox3d ShellDesign::FlangeBox() const
+{
+  Eigen::AlignedBox3d box;
   if (p_.flangeMm > 0.0)
-    for (int i = 0; i < p_.screws; ++i) {
-      const double angle = turn * i / p_.screws;
-      const Vector3d away(std::cos(angle), std::sin(angle), 0.0);
-      double radius = body_.Bounds().sizes().norm() + body_.Bounds().center().norm() + p_.flangeMm;
-      for (int step = 0; step < 200; ++step)
-        radius -= body_.Distance(radius * away) - 0.5 * p_.flangeMm;
-      screws_.emplace_back(radius * away.head<2>());
+    for (const double height : {0.0, p_.flangeThicknessMm})
+      for (int i = 0; i < 720; ++i) {
+        const double angle = turn * i / 720.0;
+        if (const auto place = FromOutside({0.0, 0.0, height}, {std::cos(angle), std::sin(angle), 0.0}, p_.flangeMm))
+          box.extend(*place);
+      }
+  return box;
+}
+
+void ShellDesign::PlanSkinAndBase()
+{
+  CutPlanes skin, base;
+  const Vector3d printer = p_.printerMm - Vector3d::Constant(0.2); // what rounding, and an outline in steps, may miss
+  const auto fits = [&printer](const Vector3d& size) {
+    return (size.array() <= printer.array()).all() || (Vector3d(size.y(), size.x(), size.z()).array() <= printer.array()).all();
+  };
+  if (p_.cutToFit && !(fits(Bounds(Part::Skin).sizes()) && fits(Bounds(Part::Base).sizes()))) {
+    Eigen::AlignedBox3d box = FlangeBox();
+    const auto& surface = body_.Surface();
+    for (const auto& triangle : surface.triangles)
+      for (std::size_t n = 0; n < 3; ++n) {
+        const Vector3d a = surface.points[triangle[n]].cast<double>(), b = surface.points[triangle[(n + 1) % 3]].cast<double>();
+        if (a.z() >= 0.0)
+          box.extend(a);
+        if ((a.z() < 0.0) != (b.z() < 0.0))
+          box.extend(a - a.z() / (b.z() - a.z()) * (b - a));
+      }
+    Eigen::AlignedBox3d plate = box;
+    plate.min().z() = -p_.baseMm;
+    plate.max().z() = p_.baffleMm;
+    if (p_.marks == ShellParameters::MarkKind::Bumps) {
+      box.min().head<2>() -= Vector2d::Constant(0.5 * p_.markMm);
+      box.max() += Vector3d::Constant(0.5 * p_.markMm);
     }
+    if (!fits(box.sizes()))
+      skin = PlanCuts(box, printer, p_.seamMm);
+    // The camera's place stays in one part.
+    const Vector2d keep = (0.5 * p_.boardMm.head<2>()).array() + p_.clearanceMm + p_.seamMm + 3.0;
+    if (!fits(plate.sizes()) && plate.sizes().z() <= printer.z())
+      base = PlanCuts(plate, printer, p_.seamMm, keep);
+    const double lowest = std::max(p_.baffleMm + p_.clearanceMm, p_.flangeThicknessMm) + p_.seamMm + 2.0;
+    if (!skin.at[2].empty() && skin.at[2].front() < lowest)
+      throw Error(Error::Kind::NotPossible, "the skin would have to be cut " + Mm(skin.at[2].front()) +
+                                                " above its foot; a printer (PrinterMm) of more height is needed");
+  }
+  PlaceScrews({&skin, &base});
+  const auto makeCells = [this](const CutPlanes& planes, const std::vector<CutPeg>& pegs, std::vector<CutCell>& cells) {
+    if (planes.IsCut())
+      for (const Eigen::Array3i& which : CellsOf(planes))
+        cells.emplace_back(planes, which, pegs, p_);
+  };
+  makeCells(skin, FlangePegs(skin), skinCells_);
+  makeCells(base, BasePegs(base), baseCells_);
+}
+
+// In the middle of the flange, turned such that no plane goes through one.
+void ShellDesign::PlaceScrews(const std::vector<const CutPlanes*>& planes)
+{
+  if (p_.flangeMm <= 0.0)
+    return;
+  double best = -1.0;
+  for (int turned = 0; turned < 16 && best < p_.screwMm + p_.seamMm; ++turned) {
+    std::vector<Vector2d> screws;
+    double nearest = unlimitedMm;
+    for (int i = 0; i < p_.screws; ++i) {
+      const double angle = turn * (i + turned / 16.0) / p_.screws;
+      const auto place = FromOutside(Vector3d::Zero(), {std::cos(angle), std::sin(angle), 0.0}, 0.5 * p_.flangeMm);
+      if (!place)
+        continue;
+      screws.emplace_back(place->head<2>());
+      for (const CutPlanes* cut : planes)
+        for (int axis = 0; axis < 2; ++axis)
+          for (const double plane : cut->at[static_cast<std::size_t>(axis)])
+            nearest = std::min(nearest, std::abs((*place)[axis] - plane));
+    }
+    if (nearest > best) {
+      best = nearest;
+      screws_ = screws;
+    }
+  }
+}
+
+// Where planes cross the middle of the flange.
+std::vector<CutPeg> ShellDesign::FlangePegs(const CutPlanes& planes) const
+{
+  std::vector<CutPeg> pegs;
+  const double width = 0.4 * p_.flangeMm;
+  if (width < 2.0)
+    return pegs;
+  for (int axis = 0; axis < 2; ++axis)
+    for (std::size_t which = 0; which < planes.at[static_cast<std::size_t>(axis)].size(); ++which)
+      for (const double side : {-1.0, 1.0}) {
+        const double plane = planes.at[static_cast<std::size_t>(axis)][which];
+        if (const auto place = FromOutside(plane * Vector3d::Unit(axis), side * Vector3d::Unit(1 - axis), 0.5 * p_.flangeMm))
+          pegs.push_back(
+              {axis, plane, planes.Direction(axis, which), (*place)[1 - axis], p_.seamMm, width, p_.flangeThicknessMm});
+      }
+  return pegs;
+}
+
+// All along the seams of the base, every 40 mm, where nothing else is.
+std::vector<CutPeg> ShellDesign::BasePegs(const CutPlanes& planes) const
+{
+  std::vector<CutPeg> pegs;
+  constexpr double width = 8.0, every = 40.0;
+  for (int axis = 0; axis < 2; ++axis)
+    for (std::size_t which = 0; which < planes.at[static_cast<std::size_t>(axis)].size(); ++which) {
+      const double plane = planes.at[static_cast<std::size_t>(axis)][which];
+      const auto end = [&](double side) {
+        return FromOutside(plane * Vector3d::Unit(axis), side * Vector3d::Unit(1 - axis), p_.flangeMm);
+      };
+      const auto first = end(-1.0), last = end(1.0);
+      if (!first || !last)
+        continue;
+      const double low = (*first)[1 - axis] + width, high = (*last)[1 - axis] - width;
+      const int gaps = std::max(1, static_cast<int>((high - low) / every));
+      for (int i = 0; i <= gaps; ++i) {
+        const double beside = low + (high - low) * i / gaps;
+        Vector3d place = plane * Vector3d::Unit(axis);
+        place[1 - axis] = beside;
+        const auto& others = planes.at[static_cast<std::size_t>(1 - axis)];
+        const bool isFree = Screws(place) > width + p_.seamMm && std::none_of(others.begin(), others.end(), [&](double other) {
+                              return std::abs(other - beside) < width + p_.seamMm;
+                            });
+        if (isFree)
+          pegs.push_back({axis, plane, planes.Direction(axis, which), beside, p_.seamMm, width, 0.0});
+      }
+    }
+  return pegs;
 }
 
 Vector3d ShellDesign::Camera() const
@@ -173,7 +314,14 @@ double ShellDesign::Screws(const Vector3d& place) const
   return nearest;
 }
 
-double ShellDesign::Skin(const Vector3d& place, double distance, const std::vector<std::uint32_t>& marks) const
+double ShellDesign::DeepestAt(const Vector3d& place, const CutCell* cell) const
+{
+  const bool isNearSeam = cell && cell->PlaneDistance(place) < p_.seamMm + 4.0 * p_.resolutionMm;
+  return isNearSeam ? 2.0 * p_.thicknessMm + p_.clearanceMm : p_.thicknessMm;
+}
+
+double ShellDesign::Skin(const Vector3d& place, double distance, const std::vector<std::uint32_t>& marks,
+                         const CutCell* cell) const
 {
   const double inner = Depth(place, distance) - p_.thicknessMm;
   double skin = std::max({distance, inner, -place.z()});
@@ -182,14 +330,19 @@ double ShellDesign::Skin(const Vector3d& place, double distance, const std::vect
     skin = std::min(skin, flange);
     skin = std::max(skin, -std::max(Screws(place), place.z() - p_.flangeThicknessMm - 4.0));
   }
-  for (const std::uint32_t i : marks)
-    skin = p_.marks == ShellParameters::MarkKind::Holes
-               ? std::max(skin, -Rod(place, marks_[i], 0.5 * p_.markMm, -p_.thicknessMm - 2.0, 2.0))
-               : std::min(skin, std::max((place - marks_[i].place).norm() - 0.5 * p_.markMm, inner));
+  const bool isHoles = p_.marks == ShellParameters::MarkKind::Holes;
+  if (!isHoles)
+    for (const std::uint32_t i : marks)
+      skin = std::min(skin, std::max((place - marks_[i].place).norm() - 0.5 * p_.markMm, inner));
+  if (cell)
+    skin = std::min(std::max(skin, cell->Within(place)), cell->Laps(place, distance));
+  if (isHoles) // through laps, too
+    for (const std::uint32_t i : marks)
+      skin = std::max(skin, -Rod(place, marks_[i], 0.5 * p_.markMm, -2.0 * p_.thicknessMm - 2.0, 2.0));
   return skin;
 }
 
-double ShellDesign::Base(const Vector3d& place, double distance, double foot) const
+double ShellDesign::Base(const Vector3d& place, double distance, double foot, const CutCell* cell) const
 {
   double base = std::max({foot - p_.flangeMm, place.z(), -place.z() - p_.baseMm});
   if (p_.baffleMm > 0.0) {
@@ -199,14 +352,17 @@ double ShellDesign::Base(const Vector3d& place, double distance, double foot) co
   const Vector2d aside = place.head<2>().cwiseAbs() - 0.5 * p_.boardMm.head<2>();
   const double pocket = std::max(aside.maxCoeff() - p_.clearanceMm, place.z() + p_.baseMm - p_.boardMm.z());
   const double lens = place.head<2>().norm() - 0.5 * p_.lensHoleMm;
-  return std::max({base, -pocket, -lens, -Screws(place)});
+  const double whole = std::max({base, -pocket, -lens, -Screws(place)});
+  return cell ? std::max(whole, cell->Within(place)) : whole;
 }
 
-Vector3d ShellDesign::Refined(const Vector3d& place) const
+Vector3d ShellDesign::Refined(const Vector3d& place, const CutCell* cell) const
 {
-  const bool isPlain = IsPlainWall(place, p_.resolutionMm);
+  const bool isPlain = IsPlainWall(place, p_.resolutionMm, cell);
   const double limit = (isPlain ? 0.5 : 0.12) * p_.resolutionMm; // elsewhere it may belong on a plane or in a hole
-  const bool isOnPlane = std::min(std::abs(place.z()), std::abs(place.z() - p_.flangeThicknessMm)) < 0.021 * p_.resolutionMm;
+  const double plane = std::min(
+      {std::abs(place.z()), std::abs(place.z() - p_.flangeThicknessMm), cell ? cell->PlaneDistance(place) : unlimitedMm});
+  const bool isOnPlane = plane < 0.021 * p_.resolutionMm;
   if (isOnPlane)
     return place;
   Vector3d moved = place;
@@ -229,10 +385,12 @@ Vector3d ShellDesign::Refined(const Vector3d& place) const
   return (moved - place).norm() <= limit ? moved : place;
 }
 
-bool ShellDesign::IsPlainWall(const Vector3d& place, double distanceMm) const
+bool ShellDesign::IsPlainWall(const Vector3d& place, double distanceMm, const CutCell* cell) const
 {
   const double rim = p_.flangeMm > 0.0 ? p_.flangeThicknessMm : 0.0;
   if (place.z() < rim + distanceMm + p_.resolutionMm)
+    return false;
+  if (cell && cell->PlaneDistance(place) < p_.seamMm + distanceMm + p_.resolutionMm)
     return false;
   return std::none_of(marks_.begin(), marks_.end(), [&](const ShellMark& mark) {
     const double reach = 0.5 * p_.markMm + p_.thicknessMm + p_.resolutionMm + distanceMm;

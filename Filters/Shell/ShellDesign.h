@@ -3,6 +3,7 @@
 #include "BodySurface.h"
 #include "Core/Base/Parameters.h"
 #include "Core/Geometry/RigidTransform.h"
+#include "ShellCut.h"
 
 namespace echorama {
 
@@ -28,6 +29,8 @@ struct ShellParameters {
   MarkKind marks = MarkKind::None;
   double markMm = 5.2;
   Eigen::Vector3d printerMm{300.0, 300.0, 300.0};
+  bool cutToFit = true;
+  double seamMm = 6.0;
 
   /// \throws Error(InvalidParameter) for what is out of its range, and for what does not fit together
   void Check() const;
@@ -48,7 +51,8 @@ Pose BodyToShell(const ShellParameters& parameters, const TriangleSurface& body)
 double LowestMark(const ShellParameters& parameters);
 
 /// The two parts as functions that are negative inside: exact distances from the body, with planes, cylinders and boxes, joined
-/// and cut by minimum and maximum. In the frame of BodyToShell, mm.
+/// and cut by minimum and maximum. In the frame of BodyToShell, mm. What the printer is too small for is cut into cells, when
+/// CutToFit says so.
 class ShellDesign {
 public:
   enum class Part { Skin, Base };
@@ -62,26 +66,38 @@ public:
   /// Holds all of a part.
   Eigen::AlignedBox3d Bounds(Part part) const;
   std::vector<std::uint32_t> MarksNear(const Eigen::Vector3d& middle, double distanceMm) const;
+  /// What a part is cut into; empty when it is left whole.
+  const std::vector<CutCell>& Cells(Part part) const { return part == Part::Skin ? skinCells_ : baseCells_; }
 
-  /// The skin at a place that is \a distance from the body.
-  double Skin(const Eigen::Vector3d& place, double distance, const std::vector<std::uint32_t>& marks) const;
+  /// The skin, or what lies of it in a cell, at a place that is \a distance from the body.
+  double Skin(const Eigen::Vector3d& place, double distance, const std::vector<std::uint32_t>& marks,
+              const CutCell* cell = nullptr) const;
   /// The base; \a foot is the distance of the place below or above it in the plane of the opening.
-  double Base(const Eigen::Vector3d& place, double distance, double foot) const;
+  double Base(const Eigen::Vector3d& place, double distance, double foot, const CutCell* cell = nullptr) const;
+  /// How far below the surface there may be anything of the skin near a place: of laps behind its seams, too.
+  double DeepestAt(const Eigen::Vector3d& place, const CutCell* cell) const;
 
   /// How far a place inside lies below the surface as thickness is measured.
   double Depth(const Eigen::Vector3d& place, double distance) const;
   /// The nearest place of the outer or inner surface of the skin that one near to it belongs on.
-  Eigen::Vector3d Refined(const Eigen::Vector3d& place) const;
-  /// Whether all around, as far as \a distanceMm, there is nothing but the wall: no rim, flange, base or mark.
-  bool IsPlainWall(const Eigen::Vector3d& place, double distanceMm) const;
+  Eigen::Vector3d Refined(const Eigen::Vector3d& place, const CutCell* cell = nullptr) const;
+  /// Whether all around, as far as \a distanceMm, there is nothing but the wall: no rim, flange, base, mark or seam.
+  bool IsPlainWall(const Eigen::Vector3d& place, double distanceMm, const CutCell* cell = nullptr) const;
 
 private:
   double Screws(const Eigen::Vector3d& place) const;
+  std::optional<Eigen::Vector3d> FromOutside(const Eigen::Vector3d& place, const Eigen::Vector3d& away, double distanceMm) const;
+  Eigen::AlignedBox3d FlangeBox() const;
+  void PlanSkinAndBase();
+  void PlaceScrews(const std::vector<const CutPlanes*>& planes);
+  std::vector<CutPeg> FlangePegs(const CutPlanes& planes) const;
+  std::vector<CutPeg> BasePegs(const CutPlanes& planes) const;
 
   ShellParameters p_;
   const BodySurface& body_;
   std::vector<ShellMark> marks_;
   std::vector<Eigen::Vector2d> screws_;
+  std::vector<CutCell> skinCells_, baseCells_;
 };
 
 } // namespace echorama

@@ -7,6 +7,7 @@
 #include "Filters/Shell/Shell.h"
 #include "Filters/Shell/ShellMarks.h"
 #include "vtkCellArray.h"
+#include "vtkCellData.h"
 #include "vtkClipPolyData.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -45,7 +46,8 @@ struct vtkUltrasoundShell::Settings {
   Places places = Places::Proxy;
   int points = 350;
   bool fitPrinter = true;
-  std::vector<echorama::PrintedBody> parts; // as they stand on the printer, for Write3mf
+  std::vector<echorama::PrintedBody> prints; // in the body's frame
+  echorama::Pose bodyToShell = echorama::Pose::Identity();
 };
 
 namespace {
@@ -89,6 +91,25 @@ void Put(const TriangleSurface& surface, vtkPolyData* data)
   }
   data->SetPoints(points);
   data->SetPolys(triangles);
+}
+
+// All of them, told apart by the cells' array.
+void PutPrints(const std::vector<echorama::PrintedBody>& prints, vtkPolyData* data)
+{
+  TriangleSurface all;
+  vtkNew<vtkIntArray> numbers;
+  numbers->SetName("Print");
+  for (std::size_t n = 0; n < prints.size(); ++n) {
+    const auto first = static_cast<std::uint32_t>(all.points.size());
+    const TriangleSurface& surface = prints[n].surface;
+    all.points.insert(all.points.end(), surface.points.begin(), surface.points.end());
+    for (const auto& [a, b, c] : surface.triangles) {
+      all.triangles.push_back({a + first, b + first, c + first});
+      numbers->InsertNextValue(static_cast<int>(n));
+    }
+  }
+  Put(all, data);
+  data->GetCellData()->AddArray(numbers);
 }
 
 void PutField(vtkPolyData* data, const char* name, const Vector3d& values)
@@ -152,7 +173,7 @@ echorama::ParameterList vtkUltrasoundShell::Parameters()
 vtkUltrasoundShell::vtkUltrasoundShell() : Values(new Settings), LeastThickness(vtkMath::Nan()), MostThickness(vtkMath::Nan())
 {
   this->SetNumberOfInputPorts(2);
-  this->SetNumberOfOutputPorts(4);
+  this->SetNumberOfOutputPorts(5);
 }
 
 //----------------------------------------------------------------------------
@@ -173,7 +194,7 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
   this->Guide.clear();
   this->LeastThickness = this->MostThickness = vtkMath::Nan();
   Settings& v = *this->Values;
-  v.parts.clear();
+  v.prints.clear();
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs, &v](const echorama::Progress& progress) {
     echorama::CheckRanges(this->Parameters());
     v.shell.Check();
@@ -214,9 +235,11 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
       }
     }
     progress(0.2);
-    const Shell shell = echorama::MakeShell(body, v.shell, marks, progress.Part(0.2, 0.97));
+    echorama::ShellParameters parameters = v.shell;
+    parameters.cutToFit = parameters.cutToFit && v.fitPrinter;
+    const Shell shell = echorama::MakeShell(body, parameters, marks, progress.Part(0.2, 0.97));
     if (v.fitPrinter) {
-      CheckPrinter(shell, v.shell);
+      CheckPrinter(shell, parameters);
     }
     this->Report = shell.Text();
 
@@ -269,13 +292,37 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
     }
     this->LeastThickness = shell.thickness.leastMm;
     this->MostThickness = shell.thickness.mostMm;
-    v.parts = {{"skin", shell.skin.surface}, {"base", shell.base.surface}};
-    for (echorama::PrintedBody& part : v.parts) { // they stand on the plate
-      for (Eigen::Vector3f& point : part.surface.points) {
-        point = (shell.bodyToShell * point.cast<double>()).cast<float>();
-      }
+    for (const echorama::PrintedPart& printed : shell.Prints()) {
+      v.prints.push_back({printed.name, printed.part.surface});
     }
+    v.bodyToShell = shell.bodyToShell;
+    PutPrints(v.prints, vtkPolyData::GetData(outputs, 4));
   });
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundShell::GetNumberOfPrints() const
+{
+  return static_cast<int>(this->Values->prints.size());
+}
+
+//----------------------------------------------------------------------------
+const char* vtkUltrasoundShell::GetPrintName(int print) const
+{
+  return print >= 0 && print < this->GetNumberOfPrints() ? this->Values->prints[static_cast<std::size_t>(print)].name.c_str()
+                                                         : "";
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundShell::GetPrint(int print, vtkPolyData* data)
+{
+  if (!data || print < 0 || print >= this->GetNumberOfPrints()) {
+    vtkErrorMacro("there is no print " << print << "; there are " << this->GetNumberOfPrints());
+    return false;
+  }
+  data->Initialize();
+  Put(this->Values->prints[static_cast<std::size_t>(print)].surface, data);
+  return true;
 }
 
 //----------------------------------------------------------------------------
@@ -285,7 +332,13 @@ bool vtkUltrasoundShell::Write3mf(const char* path)
     if (!path || !*path) {
       throw Error(Error::Kind::FileSystem, "Write3mf needs the name of a file");
     }
-    echorama::WritePrintFile(path, this->Values->parts);
+    std::vector<echorama::PrintedBody> bodies = this->Values->prints;
+    for (echorama::PrintedBody& body : bodies) { // they stand on the plate
+      for (Eigen::Vector3f& point : body.surface.points) {
+        point = (this->Values->bodyToShell * point.cast<double>()).cast<float>();
+      }
+    }
+    echorama::WritePrintFile(path, bodies);
     return true;
   } catch (const Error& error) {
     vtkErrorMacro(<< error.what());

@@ -17,9 +17,12 @@
  * Output 3: the proxy: the body above the opening, simplified by quadric error (Garland and Heckbert 1997; dissertation 7.3) to
  * about Points points, with the point array `Mark`. Empty when input 1 is connected, Places is Dome or Points is 0.
  *
+ * Output 4: what is to be printed, all in one, told apart by the cell array `Print`, from 0: skin and base, or the parts that
+ * they are cut into where the printer is too small (CutToFit).
+ *
  * Fails, with the reason: for a surface with holes (their number, places and lengths), self-intersections or other faults; for a
- * body that is too thin for the wall; when the parts do not fit the printer (and FitPrinter is on); for parameters out of their
- * range.
+ * body that is too thin for the wall; when what is to be printed does not fit the printer (and FitPrinter is on); for parameters
+ * out of their range.
  *
  * @sa echorama::MakeShell, vtkUltrasoundTissueMeshes
  */
@@ -124,6 +127,12 @@ public:
   /** What the printer can make: its width, depth and height. In [1, 10000] mm; default (300, 300, 300). */
   vtkUltrasoundVectorMacro(PrinterMm);
 
+  /** Whether what does not fit the printer is cut into parts that do. Default on. */
+  vtkUltrasoundSwitchMacro(CutToFit);
+
+  /** How far parts that were cut reach behind, or into, the next one. In [2, 50] mm; default 6. */
+  vtkUltrasoundNumberMacro(SeamMm);
+
   /** Whether parts that do not fit the printer are refused. Default on. */
   vtkUltrasoundSwitchMacro(FitPrinter);
 
@@ -178,8 +187,18 @@ public:
     return this->Guide.c_str();
   }
 
+  ///@{
   /**
-   * Writes both parts of the last update as one 3MF file (compressed; most slicers read it), two objects in mm, each as it stands
+   * What the last update has to be printed: how many closed surfaces, their names ("skin", "base 2"), and each in the frame of
+   * the body. GetPrint returns false, after an error event, when there is none of that number.
+   */
+  int GetNumberOfPrints() const;
+  const char* GetPrintName(int print) const;
+  bool GetPrint(int print, vtkPolyData* data);
+  ///@}
+
+  /**
+   * Writes all prints of the last update as one 3MF file (compressed; most slicers read it), an object each, in mm, as it stands
    * on the printer. Returns false, after an error event, when there are none or the file cannot be written.
    */
   bool Write3mf(const char* path);

@@ -237,9 +237,12 @@ TEST(Shell, WhatCannotBeMadeIsRefusedWithTheReason)
   EXPECT_NE(MessageOf(ball, p).find("OpeningMm is 59 mm; the body is only 60 mm high"), std::string::npos) << MessageOf(ball, p);
   p = Plain();
   p.printerMm = Vector3d(200.0, 59.0, 59.0);
-  EXPECT_NE(MessageOf(ball, p).find(
-                "the skin is 60.0 x 60.0 x 40.0 mm and does not fit the printer (PrinterMm), which makes 200 x 59 x 59 mm"),
-            std::string::npos)
+  p.cutToFit = false;
+  EXPECT_NE(
+      MessageOf(ball, p).find(
+          "the skin is 60.0 x 60.0 x 40.0 mm and does not fit the printer (PrinterMm), which makes 200 x 59 x 59 mm; CutToFit "
+          "would cut it into parts"),
+      std::string::npos)
       << MessageOf(ball, p);
   p = Plain();
   p.openingMm = 1.0;

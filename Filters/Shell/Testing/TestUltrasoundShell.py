@@ -164,16 +164,35 @@ for made, word in (
     (shell(spoilt), "not finite"),
     (shell(vtkPolyData()), "no triangle"),
     (shell(ball(1.9), OpeningMm=1), "the body is too thin: a wall of ThicknessMm, 2 mm"),
-    (shell(ball(), PrinterMm=(70, 70, 70)), "does not fit the printer (PrinterMm), which makes 70 x 70 x 70 mm"),
+    (shell(ball(), PrinterMm=(70, 70, 70), CutToFit=False), "does not fit the printer (PrinterMm), which makes 70 x 70 x 70 mm"),
     (shell(ball(), ThicknessMm=0), "ThicknessMm is 0 mm"),
     (shell(ball(), ResolutionMm=1.5), "ResolutionMm is 1.5 mm; it must be at most half of ThicknessMm"),
 ):
     told = errors_of(made)
     assert word in told, (word, told)
-    assert all(made.GetOutput(port).GetNumberOfPoints() == 0 for port in range(4))
+    assert all(made.GetOutput(port).GetNumberOfPoints() == 0 for port in range(5))
     assert math.isnan(made.GetLeastThickness()) and made.GetReport() == ""
 made = shell(ball(), PrinterMm=(70, 70, 70), FitPrinter=False)
 assert errors_of(made) == "" and "the printer is smaller" in made.GetReport()
+
+# What is too large for the printer is cut; each part is closed, and named.
+made = shell(ball(), FlangeMm=0, PrinterMm=(70, 100, 100))
+assert errors_of(made) == ""
+names = [made.GetPrintName(i) for i in range(made.GetNumberOfPrints())]
+assert names == ["skin 1", "skin 2", "base 1", "base 2"], names
+prints = made.GetOutput(4)
+numbers = vtk_to_numpy(prints.GetCellData().GetArray("Print"))
+for i, name in enumerate(names):
+    part = vtkPolyData()
+    assert made.GetPrint(i, part) and part.GetNumberOfPolys() == (numbers == i).sum() > 1000
+    assert volume_of(part) > 500 and f"to print: {name}, " in made.GetReport()
+assert len(numbers) == prints.GetNumberOfPolys() and set(numbers) == {0, 1, 2, 3}
+assert abs(sum(volume_of(made.GetOutput(port)) for port in (0, 1)) / volume_of(prints) - 1) < 0.2
+said = []
+made.AddObserver(vtkCommand.ErrorEvent, lambda *_: said.append(1))
+assert not made.GetPrint(4, part) and said and made.GetPrintName(4) == ""
+made = shell(ball())
+assert errors_of(made) == "" and [made.GetPrintName(i) for i in range(made.GetNumberOfPrints())] == ["skin", "base"]
 
 # It can be stopped, and run again.
 made = shell(ball())
