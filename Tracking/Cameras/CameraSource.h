@@ -20,9 +20,9 @@ struct CameraFormat {
 
 /// One picture, and when it was taken.
 struct CameraFrame {
-  GreyFrame grey;          ///< lies in the source until its next call
-  double begin = 0.0;      ///< of the exposure of the first row, s: on our clock (ClockNow) if the source is live, else on its own
-  double arrival = 0.0;    ///< when the host had it, on the same clock
+  GreyFrame grey;       ///< lies in the source until its next call
+  double begin = 0.0;   ///< of the exposure of the first row, s: on our clock (ClockNow) if the source is live, else on its own
+  double arrival = 0.0; ///< when the host had it, on the same clock
   std::int64_t number = 0; ///< counts the camera's frames, also those that were lost
 };
 
@@ -38,8 +38,8 @@ public:
 
   virtual ~CameraSource() = default;
 
-  /// Begins, anew if it was open. \throws Error(FileSystem), Error(BadFile), Error(NotPossible), each of which names what cannot be
-  /// used, why, and what helps
+  /// Begins, anew if it was open. \throws Error(FileSystem), Error(BadFile), Error(NotPossible), each of which names what cannot
+  /// be used, why, and what helps
   virtual CameraFormat Open() = 0;
   /// The next frame; waits for up to \a seconds, of which implementations may take a tenth of a second more.
   /// \throws Error(FileSystem) when a camera is gone (unplugged), Error(BadFile) for a recording that is damaged

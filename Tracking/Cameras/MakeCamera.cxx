@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/JoinedText.h"
 #include "Tracking/Cameras/CameraSource.h"
+#include "Tracking/Cameras/RecordedSource.h"
 #include "Tracking/Cameras/SimulatedSource.h"
 #include "Tracking/Devices/TrackerAddress.h"
 
@@ -23,6 +24,7 @@ std::unique_ptr<CameraSource> MakeSourceBy(const TrackerAddress& address)
 const std::vector<CameraKind>& CameraKinds()
 {
   static const std::vector<CameraKind> kinds = {
+      {"recording", MakeSourceBy<RecordedSource, RecordedSourceParameters>},
       {"simulated", MakeSourceBy<SimulatedSource, SimulatedSourceParameters>},
   };
   return kinds;

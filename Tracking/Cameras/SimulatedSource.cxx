@@ -5,10 +5,9 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
-#include "Tracking/Stream/Clock.h"
+#include "Tracking/Cameras/RestUntil.h"
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 namespace echorama {
 namespace {
@@ -25,8 +24,8 @@ double Stroke(double share)
 Eigen::Vector2d PathPlace(const SimulatedSourceParameters& p, int light, double time)
 {
   const double angle = Turn * light / p.lights, r = p.radiusMm;
-  const Eigen::Vector2d centre = p.lights > 1 ? Eigen::Vector2d(35.0 * std::cos(angle), 35.0 * std::sin(angle))
-                                              : Eigen::Vector2d(0.0, 0.0);
+  const Eigen::Vector2d centre =
+      p.lights > 1 ? Eigen::Vector2d(35.0 * std::cos(angle), 35.0 * std::sin(angle)) : Eigen::Vector2d(0.0, 0.0);
   switch (p.path) {
   case SimulatedPath::Still:
     break;
@@ -77,12 +76,6 @@ std::vector<SimulatedLight> LightsOf(const SimulatedSourceParameters& p, const s
   return lights;
 }
 
-void SleepFor(double seconds)
-{
-  timespec rest{static_cast<time_t>(seconds), static_cast<long>(1e9 * (seconds - std::floor(seconds)))};
-  nanosleep(&rest, nullptr); // a signal may cut it short: callers look at the clock
-}
-
 } // namespace
 
 ParameterList Describe(SimulatedSourceParameters& p)
@@ -101,7 +94,8 @@ ParameterList Describe(SimulatedSourceParameters& p)
         Parameter("LiftEverySeconds", p.liftEverySeconds, {0, 1000}, "s",
                   "So often each light is taken away for half a second, one after the other; 0: never."),
         Parameter("ClockPpm", p.clockPpm, {-1000, 1000}, "ppm", "How much faster the lights' clock is than the camera's."),
-        Parameter("Speed", p.speed, {0, 100}, "", "Of frames; 0: whenever they are asked for. With another, frames come in our time."),
+        Parameter("Speed", p.speed, {0, 100}, "",
+                  "Of frames; 0: whenever they are asked for. With another, frames come in our time."),
         Parameter("Frames", p.frames, {0, 2000000000}, "", "After so many it ends; 0: never.")},
        Describe(p.camera)});
 }
@@ -127,8 +121,7 @@ SimulatedLight SimulatedSourceParameters::Light(int index, std::function<LightOn
 {
   const double rate = camera.frameRate * (1.0 + 1e-6 * clockPpm);
   const double phase = Random(camera.seed, 0x5068617365).Uniform(0.0, 20.0); // slots
-  return {std::move(place),
-          [index, rate, phase, code = Code()](double from, double to) {
+  return {std::move(place), [index, rate, phase, code = Code()](double from, double to) {
             return code.OnShare(index, from * rate + phase, to * rate + phase);
           }};
 }
@@ -141,7 +134,8 @@ SimulatedSource::SimulatedSource(const SimulatedSourceParameters& parameters, st
   CheckRanges(parameters_);
 }
 
-SimulatedSource::SimulatedSource(const SimulatedSourceParameters& parameters) : SimulatedSource(parameters, DomeOf(parameters), {})
+SimulatedSource::SimulatedSource(const SimulatedSourceParameters& parameters)
+  : SimulatedSource(parameters, DomeOf(parameters), {})
 {
   lights_ = LightsOf(parameters_, skin_);
 }
@@ -153,15 +147,15 @@ CameraFormat SimulatedSource::Open()
   start_ = IsLive() ? ClockNow() : 0.0;
   const SimulatedCameraParameters& c = parameters_.camera;
   const double speed = IsLive() ? parameters_.speed : 1.0;
-  return {c.lens.width,         c.lens.height,   c.frameRate * speed, c.exposureMs / speed,
-          c.rowUs / speed, "GREY", "a camera that does not exist"};
+  return {c.lens.width,    c.lens.height, c.frameRate * speed,           c.exposureMs / speed,
+          c.rowUs / speed, "GREY",        "a camera that does not exist"};
 }
 
 double SimulatedSource::Due(std::int64_t number) const
 {
   const SimulatedCameraParameters& c = parameters_.camera;
-  return start_ + (static_cast<double>(number) / c.frameRate +
-                   1e-6 * c.rowUs * (c.lens.height - 1) + 1e-3 * (c.exposureMs + c.latencyMs)) /
+  return start_ + (static_cast<double>(number) / c.frameRate + 1e-6 * c.rowUs * (c.lens.height - 1) +
+                   1e-3 * (c.exposureMs + c.latencyMs)) /
                       parameters_.speed;
 }
 
@@ -176,11 +170,8 @@ CameraSource::Outcome SimulatedSource::Next(CameraFrame& frame, double seconds)
       rendered_ = number_;
     }
     if (IsLive()) {
-      for (double now = ClockNow(); now < Due(number_); now = ClockNow()) {
-        if (now >= until)
-          return Outcome::Nothing;
-        SleepFor(std::min(Due(number_), until) - now);
-      }
+      if (!RestUntil(Due(number_), until - ClockNow()))
+        return Outcome::Nothing;
       // Whoever asks too late gets the newest, as of a camera.
       while (ClockNow() > Due(number_ + 2) && (parameters_.frames == 0 || number_ + 1 < parameters_.frames)) {
         ++number_;

@@ -57,7 +57,8 @@ public:
   const std::vector<LightTruth>& Truth() const { return frame_.truth; }
   /// The truth of any moment, seconds from the first frame on.
   LightOnSkin LightAt(int light, double time) const { return lights_[static_cast<std::size_t>(light)].place(time); }
-  /// Of the first frame, on the clock of frames. What is at the time t of theirs is the truth of (t - Start()) * speed (unless 0).
+  /// Of the first frame, on the clock of frames. What is at the time t of theirs is the truth of (t - Start()) * speed (unless
+  /// 0).
   double Start() const { return start_; }
   const SeenSurface& Skin() const { return *skin_; }
   const SimulatedCamera& Camera() const { return camera_; }
