@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TaskPanel.h"
 #include "Controls.h"
+#include "Core/Base/Checksum.h"
 #include "Core/Base/Error.h"
 #include "ImageView.h"
 #include "NeedleTool.h"
@@ -41,12 +42,12 @@ TaskBody BodyOf(const Subject& subject)
     if (!scene.open(QIODevice::ReadOnly))
       throw Error(Error::Kind::FileSystem, QString("%1: %2").arg(scene.fileName(), scene.errorString()).toStdString());
     const QByteArray text = scene.readAll();
-    body.checksum = TaskChecksum(text.constData(), static_cast<std::size_t>(text.size()));
+    body.checksum = Checksum(text.constData(), static_cast<std::size_t>(text.size()));
   } else {
     vtkImageData* volume = subject.volumes.front();
     vtkDataArray* voxels = vtkUltrasoundVolume::GetIntensity(volume);
-    body.checksum = TaskChecksum(voxels->GetVoidPointer(0), static_cast<std::size_t>(voxels->GetNumberOfValues()) *
-                                                                static_cast<std::size_t>(voxels->GetDataTypeSize()));
+    body.checksum = Checksum(voxels->GetVoidPointer(0), static_cast<std::size_t>(voxels->GetNumberOfValues()) *
+                                                            static_cast<std::size_t>(voxels->GetDataTypeSize()));
     body.geometry = vtkUltrasoundVolume::GeometryOf(volume);
   }
   return body;

@@ -2,11 +2,11 @@
 #include "Widgets/Session/ScanTask.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/CheckRange.h"
+#include "Core/Base/Checksum.h"
 #include "Core/Base/DescribedJson.h"
 #include "Core/Base/FormatText.h"
 #include "Core/Base/TextFile.h"
 #include <cmath>
-#include <cstring>
 
 namespace echorama {
 namespace {
@@ -152,7 +152,7 @@ public:
   static void Validate(const GeometryKeys& geometry) { GeometryOf(geometry).Check("the geometry"); }
   static void Validate(const BodyKeys& body)
   {
-    if (body.checksum.size() != 16 || body.checksum.find_first_not_of("0123456789abcdef") != std::string::npos)
+    if (!IsChecksum(body.checksum))
       RefuseTask("the checksum must be of 16 hexadecimal digits");
   }
   template <class T>
@@ -258,20 +258,6 @@ std::string TaskBody::Complaint(const TaskBody& shown) const
   if (geometry && !geometry->AgreesWith(*shown.geometry))
     return both + "; it lies elsewhere, or has other spacings, than when the task was made";
   return {};
-}
-
-std::string TaskChecksum(const void* bytes, std::size_t count)
-{
-  // Words are multiplied and mixed, the rest of the last one is filled with its length.
-  const auto* at = static_cast<const unsigned char*>(bytes);
-  std::uint64_t hash = 0x9E3779B97F4A7C15u ^ count;
-  for (std::size_t done = 0; done < count; done += 8) {
-    std::uint64_t word = count;
-    std::memcpy(&word, at + done, std::min<std::size_t>(8, count - done));
-    hash = (hash ^ word) * 0xD6E8FEB86659FD93u;
-    hash ^= hash >> 32;
-  }
-  return Format("%016llx", static_cast<unsigned long long>(hash));
 }
 
 void ScanTask::Check() const

@@ -3,7 +3,6 @@
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Widgets/Session/LiveScore.h"
-#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,16 +13,13 @@ namespace echorama {
 /// What a task was made for: a volume, or a scene, which has no geometry.
 struct TaskBody {
   std::string file;                      ///< without its folder
-  std::string checksum;                  ///< TaskChecksum of the voxels, or of the scene's text
+  std::string checksum;                  ///< Checksum of the voxels, or of the scene's text
   std::optional<ImageGeometry> geometry; ///< as it lies in the world
 
   /// Why a task for this body cannot be done on another one, as a sentence that names both; empty when it can. A file of another
   /// name with the same content is the same body.
   std::string Complaint(const TaskBody& shown) const;
 };
-
-/// 64 bits of a hash as 16 hexadecimal digits: against mistakes, not against attacks. Some GB/s.
-std::string TaskChecksum(const void* bytes, std::size_t count);
 
 /// Find a plane: bring the image to where it was when the task was made.
 struct FindPlane {

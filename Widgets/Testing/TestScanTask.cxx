@@ -168,23 +168,6 @@ TEST(ScanTask, IsRefusedForAnotherBody)
   EXPECT_THROW(ScanAttempt(PlaneTask(), other), Error);
 }
 
-TEST(ScanTask, ChecksumSeesEveryByte)
-{
-  std::vector<unsigned char> bytes(1003);
-  for (std::size_t n = 0; n < bytes.size(); ++n)
-    bytes[n] = static_cast<unsigned char>(n * 7);
-  const std::string whole = TaskChecksum(bytes.data(), bytes.size());
-  EXPECT_EQ(whole.size(), 16u);
-  for (std::size_t n = 0; n < bytes.size(); ++n) {
-    bytes[n] ^= 1;
-    EXPECT_NE(TaskChecksum(bytes.data(), bytes.size()), whole) << n;
-    bytes[n] ^= 1;
-  }
-  EXPECT_EQ(TaskChecksum(bytes.data(), bytes.size()), whole);
-  EXPECT_NE(TaskChecksum(bytes.data(), bytes.size() - 1), whole);
-  EXPECT_NE(TaskChecksum("\0\0", 1), TaskChecksum("\0\0", 2));
-}
-
 TEST(ScanAttempt, ScoresAPlane)
 {
   ScanAttempt attempt(PlaneTask(), SomeBody());
