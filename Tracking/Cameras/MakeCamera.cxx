@@ -2,6 +2,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/JoinedText.h"
 #include "Tracking/Cameras/CameraSource.h"
+#include "Tracking/Cameras/LiveCamera.h"
 #include "Tracking/Cameras/RecordedSource.h"
 #include "Tracking/Cameras/SimulatedSource.h"
 #include "Tracking/Devices/TrackerAddress.h"
@@ -24,6 +25,10 @@ std::unique_ptr<CameraSource> MakeSourceBy(const TrackerAddress& address)
 const std::vector<CameraKind>& CameraKinds()
 {
   static const std::vector<CameraKind> kinds = {
+      {"camera",
+       [](const TrackerAddress& address) -> std::unique_ptr<CameraSource> {
+         return std::make_unique<LiveCamera>(LiveCameraParameters::Of(address));
+       }},
       {"recording", MakeSourceBy<RecordedSource, RecordedSourceParameters>},
       {"simulated", MakeSourceBy<SimulatedSource, SimulatedSourceParameters>},
   };
