@@ -39,10 +39,47 @@ double FisheyeLens::Growth(double angle) const
 void FisheyeLens::Check() const
 {
   CheckRanges(*this);
-  for (int step = 0; step <= 200; ++step)
-    if (Growth(maximumAngle / DegreesPerRadian * step / 200.0) <= 0.0)
-      throw Error(Error::Kind::InvalidParameter,
-                  "k1 to k4 of the lens fold the picture: its radius does not grow with the angle up to MaximumAngle");
+  if (GrowsUpTo() < maximumAngle)
+    throw Error(Error::Kind::InvalidParameter,
+                "k1 to k4 of the lens fold the picture: its radius does not grow with the angle up to MaximumAngle");
+}
+
+double FisheyeLens::GrowsUpTo() const
+{
+  double reached = 0.0;
+  for (int step = 0; step <= 200; ++step) {
+    const double degrees = maximumAngle * step / 200.0;
+    if (!(Growth(degrees / DegreesPerRadian) > 0.0))
+      break;
+    reached = degrees;
+  }
+  return reached;
+}
+
+std::optional<FisheyeLens::Projection> FisheyeLens::Differentiate(const Eigen::Vector3d& direction) const
+{
+  const double x = direction.x(), y = direction.y(), z = direction.z();
+  const double across = std::hypot(x, y), squared = direction.squaredNorm();
+  if (!(squared > 0.0) || (across < 1e-12 * std::sqrt(squared) && z < 0.0))
+    return std::nullopt;
+  const double angle = std::atan2(across, z);
+  // Pixel = centre + focal * stretch * (x, y). At the axis the stretch is 1 / z; its change by the distance to the axis, over
+  // that distance, stays finite and does not matter there.
+  const bool atAxis = across < 1e-6 * std::sqrt(squared);
+  const double growth = Growth(angle), stretch = atAxis ? 1.0 / z : Radius(angle) / across;
+  const double byAcross = atAxis ? 0.0 : (growth * z / squared - stretch) / (across * across), byZ = -growth / squared;
+  Projection p;
+  p.pixel = {centreX + focal * stretch * x, centreY + focal * stretch * y};
+  p.byDirection << stretch + x * x * byAcross, x * y * byAcross, x * byZ, x * y * byAcross, stretch + y * y * byAcross, y * byZ;
+  p.byDirection *= focal;
+  p.byLens << stretch * x, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, stretch * y, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0;
+  double power = angle * angle * angle;
+  for (int k = 3; k < 7; ++k, power *= angle * angle) {
+    const double radius = atAxis ? 0.0 : focal * power / across;
+    p.byLens(0, k) = radius * x;
+    p.byLens(1, k) = radius * y;
+  }
+  return p;
 }
 
 std::optional<Eigen::Vector2d> FisheyeLens::Project(const Eigen::Vector3d& direction) const

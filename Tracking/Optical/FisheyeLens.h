@@ -21,6 +21,18 @@ struct FisheyeLens {
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& direction) const;
   /// The direction, of length 1, that a pixel looks into; nothing beyond the largest angle.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
+
+  /// As Project(), with its derivatives, for fits; goes on smoothly beyond the largest angle. Nothing for a direction of no
+  /// length or straight backwards.
+  struct Projection {
+    Eigen::Vector2d pixel;
+    Eigen::Matrix<double, 2, 3> byDirection;
+    Eigen::Matrix<double, 2, 7> byLens; ///< focal, centreX, centreY, k1 to k4
+  };
+  std::optional<Projection> Differentiate(const Eigen::Vector3d& direction) const;
+  /// Degrees up to which the radius grows with the angle, MaximumAngle at most.
+  double GrowsUpTo() const;
+
   bool Covers(const Eigen::Vector2d& pixel) const
   {
     return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < width - 0.5 && pixel.y() < height - 0.5;
