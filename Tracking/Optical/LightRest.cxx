@@ -11,9 +11,9 @@ namespace echorama {
 namespace {
 
 constexpr int TremorBlocks = 5;
-constexpr double SteadySize = 0.15;  // a light that comes down grows narrower meanwhile
-constexpr int LiftedAfter = 20;      // frames without it
-constexpr double FullyLit = 0.9;     // share of the brightnesses below that which counts
+constexpr double SteadySize = 0.15; // a light that comes down grows narrower meanwhile
+constexpr int LiftedAfter = 20;     // frames without it
+constexpr double FullyLit = 0.9;    // share of the brightnesses below that which counts
 
 } // namespace
 
@@ -23,6 +23,15 @@ ParameterList Describe(LightRestParameters& p)
                     "In so many frames a light must be seen at one place to be at rest there."),
           Parameter("StillPx", p.stillPx, {0, 100, true}, "px", "None of them may be further from their mean."),
           Parameter("LeavePx", p.leavePx, {0, 1000, true}, "px", "It has left the place once it is further from it.")};
+}
+
+Touch RestingLight::TouchBy(const BrightnessCalibration& brightness) const
+{
+  Spot spot;
+  spot.position = position;
+  spot.peak = peak;
+  spot.size = size;
+  return JudgeTouch(spot, brightness, Touch::Contact);
 }
 
 LightRest::LightRest(const LightRestParameters& parameters) : parameters_(parameters)
@@ -68,8 +77,7 @@ std::optional<RestingLight> LightRest::Update(const TrackedLight& light, Touch t
     return {};
   const RestingLight rest = Mean();
   for (const Sample& sample : samples_)
-    if ((sample.position - rest.position).norm() > parameters_.stillPx ||
-        std::abs(sample.size / rest.size - 1.0) > SteadySize)
+    if ((sample.position - rest.position).norm() > parameters_.stillPx || std::abs(sample.size / rest.size - 1.0) > SteadySize)
       return {};
   rested_ = rest.position;
   return rest;

@@ -20,6 +20,9 @@ struct RestingLight {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero(); ///< of that mean, px^2: of the spots, and of the hand's tremor
   double peak = 0.0;                                    ///< of the frames that saw it brightest: others see part of a slot
   double size = 0.0;
+
+  /// Whether it touches, as a light that is at rest; in single frames it may seem weaker.
+  Touch TouchBy(const BrightnessCalibration& brightness) const;
 };
 
 /// Says when the light of a tool is held still on the skin: once each time, until it has been moved or lifted.

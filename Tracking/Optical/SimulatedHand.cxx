@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// On its way a hand lifts the light and speeds up and down smoothly (minimum jerk); the light still shows on the skin below it. At
-// rest it trembles: two sines per axis at frequencies of the seed's between 6 and 12 Hz.
+// On its way a hand lifts the light and speeds up and down smoothly (minimum jerk); the light still shows on the skin below it.
+// At rest it trembles: two sines per axis at frequencies of the seed's between 6 and 12 Hz.
 #include "SimulatedHand.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
@@ -11,13 +11,14 @@ namespace echorama {
 
 ParameterList Describe(SimulatedHandParameters& p)
 {
-  return {Parameter("MoveSeconds", p.moveSeconds, {0.01, 60}, "s", "How long the way from mark to mark takes."),
-          Parameter("LiftMm", p.liftMm, {0, 100}, "mm", "How far the light is lifted on its way."),
-          Parameter("PlacementMm", p.placementMm, {0, 20}, "mm", "How far from a mark it is put down: standard deviation per axis."),
-          Parameter("TremorMm", p.tremorMm, {0, 20}, "mm", "How it trembles there: standard deviation per axis."),
-          Parameter("WrongMarks", p.wrongMarks, {0, 1}, "", "Share of marks that it mistakes for one of their neighbours."),
-          Parameter("Peak", p.peak, {1, 10000}, "grey levels", "Of its light, as the camera sees it straight ahead."),
-          Parameter("HandSeed", p.seed, {}, "", "Of its errors.")};
+  return {
+      Parameter("MoveSeconds", p.moveSeconds, {0.01, 60}, "s", "How long the way from mark to mark takes."),
+      Parameter("LiftMm", p.liftMm, {0, 100}, "mm", "How far the light is lifted on its way."),
+      Parameter("PlacementMm", p.placementMm, {0, 20}, "mm", "How far from a mark it is put down: standard deviation per axis."),
+      Parameter("TremorMm", p.tremorMm, {0, 20}, "mm", "How it trembles there: standard deviation per axis."),
+      Parameter("WrongMarks", p.wrongMarks, {0, 1}, "", "Share of marks that it mistakes for one of their neighbours."),
+      Parameter("Peak", p.peak, {1, 10000}, "grey levels", "Of its light, as the camera sees it straight ahead."),
+      Parameter("HandSeed", p.seed, {}, "", "Of its errors.")};
 }
 
 namespace {

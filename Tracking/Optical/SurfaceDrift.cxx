@@ -73,8 +73,8 @@ SurfaceDrift JudgeDrift(const std::vector<DriftPoint>& points, double significan
 {
   CheckRange("the significance of a drift check", significance, 1e-12, 0.5);
   if (points.size() < 4)
-    throw Error(Error::Kind::NotPossible,
-                Format("a drift check needs four marks at least, five are better; there are %d", static_cast<int>(points.size())));
+    throw Error(Error::Kind::NotPossible, Format("a drift check needs four marks at least, five are better; there are %d",
+                                                 static_cast<int>(points.size())));
   SurfaceDrift drift;
   drift.degreesOfFreedom = 2 * static_cast<int>(points.size());
   double worst = 0.0;
@@ -94,9 +94,10 @@ SurfaceDrift JudgeDrift(const std::vector<DriftPoint>& points, double significan
   drift.rmsPx = std::sqrt(drift.rmsPx);
   drift.chance = ChiSquaredChance(drift.chiSquared, drift.degreesOfFreedom);
   if (drift.chance >= significance) {
-    drift.message = Format("the calibration holds: %d marks lie %.2f px (RMS) from where they are expected, which chance alone does "
-                           "in %.0f%% of such checks",
-                           static_cast<int>(points.size()), drift.rmsPx, 100.0 * drift.chance);
+    drift.message =
+        Format("the calibration holds: %d marks lie %.2f px (RMS) from where they are expected, which chance alone does "
+               "in %.0f%% of such checks",
+               static_cast<int>(points.size()), drift.rmsPx, 100.0 * drift.chance);
     return drift;
   }
 
@@ -107,15 +108,17 @@ SurfaceDrift JudgeDrift(const std::vector<DriftPoint>& points, double significan
     drift.verdict = SurfaceDrift::Verdict::WrongMark;
     drift.mark = wrong->mark;
     drift.markPx = wrong->difference.norm();
-    drift.message = Format("mark %d is seen %.1f px from where it is expected, while the %d others are where they belong: repeat it",
-                           drift.mark, drift.markPx, static_cast<int>(points.size()) - 1);
+    drift.message =
+        Format("mark %d is seen %.1f px from where it is expected, while the %d others are where they belong: repeat it",
+               drift.mark, drift.markPx, static_cast<int>(points.size()) - 1);
     return drift;
   }
   if (ChiSquaredChance(fit.chiSquared, drift.degreesOfFreedom - 6) < significance) {
     drift.verdict = SurfaceDrift::Verdict::Changed;
-    drift.message = Format("marks lie %.1f px (RMS) from where they are expected, and no motion of the camera explains that: is it "
-                           "this shell, this lens, this picture? Calibrate again",
-                           drift.rmsPx);
+    drift.message =
+        Format("marks lie %.1f px (RMS) from where they are expected, and no motion of the camera explains that: is it "
+               "this shell, this lens, this picture? Calibrate again",
+               drift.rmsPx);
     return drift;
   }
   drift.verdict = SurfaceDrift::Verdict::Moved;
@@ -123,9 +126,9 @@ SurfaceDrift JudgeDrift(const std::vector<DriftPoint>& points, double significan
   drift.turned = fit.motion.tail<3>();
   drift.movedErrorMm = LengthError(drift.movedMm, fit.covariance.topLeftCorner<3, 3>());
   drift.turnedErrorDegrees = LengthError(drift.turned, fit.covariance.bottomRightCorner<3, 3>()) * DegreesPerRadian;
-  drift.message = Format("the camera has moved by %.2f mm (+- %.2f) and turned by %.2f degrees (+- %.2f): calibrate again",
-                         drift.movedMm.norm(), drift.movedErrorMm, drift.turned.norm() * DegreesPerRadian,
-                         drift.turnedErrorDegrees);
+  drift.message =
+      Format("the camera has moved by %.2f mm (+- %.2f) and turned by %.2f degrees (+- %.2f): calibrate again",
+             drift.movedMm.norm(), drift.movedErrorMm, drift.turned.norm() * DegreesPerRadian, drift.turnedErrorDegrees);
   return drift;
 }
 

@@ -27,16 +27,17 @@ struct SurfaceDrift {
   int degreesOfFreedom = 0; ///< 2 per mark
   double chance = 1.0;      ///< that they are as large when nothing has changed
   double rmsPx = 0.0;
-  Eigen::Vector3d movedMm = Eigen::Vector3d::Zero(), turned = Eigen::Vector3d::Zero(); ///< of Moved, in the shell's frame; radians
-  double movedErrorMm = 0.0, turnedErrorDegrees = 0.0;                                 ///< standard errors of these lengths
-  int mark = 0;                                                                        ///< of WrongMark, and its distance
+  Eigen::Vector3d movedMm = Eigen::Vector3d::Zero(),
+                  turned = Eigen::Vector3d::Zero();    ///< of Moved, in the shell's frame; radians
+  double movedErrorMm = 0.0, turnedErrorDegrees = 0.0; ///< standard errors of these lengths
+  int mark = 0;                                        ///< of WrongMark, and its distance
   double markPx = 0.0;
   std::string message; ///< the verdict as a sentence, and what to do
 };
 
 /// Whether a calibration still holds. \param significance the share of checks of an unchanged camera that may raise an alarm.
-/// What explains the differences best is told by likelihood, less ln(number of differences) per unknown (BIC): six of a motion, two
-/// of a wrong mark. \throws Error(NotPossible) for fewer than four marks, Error(BadInput), Error(InvalidParameter)
+/// What explains the differences best is told by likelihood, less ln(number of differences) per unknown (BIC): six of a motion,
+/// two of a wrong mark. \throws Error(NotPossible) for fewer than four marks, Error(BadInput), Error(InvalidParameter)
 SurfaceDrift JudgeDrift(const std::vector<DriftPoint>& points, double significance = 1e-3);
 
 /// The probability that a chi-squared of an even number of degrees of freedom exceeds \a value.

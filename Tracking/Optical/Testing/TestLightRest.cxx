@@ -74,8 +74,20 @@ TEST(LightRest, WhatMovesComesDownOrHoversDoesNotRest)
   }
   LightRest down, hovering, lamp;
   EXPECT_EQ(Rests(down, 60, [](int n) { return Seen({50.0, 100.0}, 8.0 - 0.1 * n); }), 0);
-  EXPECT_EQ(Rests(hovering, 300, [](int) { return Seen({50.0, 100.0}); }, Touch::Hover), 0);
-  EXPECT_EQ(Rests(hovering, 25, [](int) { return Seen({50.0, 100.0}); }, Touch::Contact), 1);
+  EXPECT_EQ(Rests(
+                hovering, 300,
+                [](int) {
+                  return Seen({50.0, 100.0});
+                },
+                Touch::Hover),
+            0);
+  EXPECT_EQ(Rests(
+                hovering, 25,
+                [](int) {
+                  return Seen({50.0, 100.0});
+                },
+                Touch::Contact),
+            1);
   EXPECT_EQ(Rests(lamp, 300, [](int) { return Without(Status::Lost); }), 0);
 }
 

@@ -17,8 +17,10 @@ using Verdict = SurfaceDrift::Verdict;
 
 const double Noise = 0.3; // px per axis
 
-// Five marks on a dome of 110 mm, one on top and four at 35 degrees above the horizon, seen by a camera that has moved and turned.
-std::vector<DriftPoint> Seen(std::uint64_t seed, const Vector3d& movedMm = Vector3d::Zero(), const Vector3d& turned = Vector3d::Zero())
+// Five marks on a dome of 110 mm, one on top and four at 35 degrees above the horizon, seen by a camera that has moved and
+// turned.
+std::vector<DriftPoint> Seen(std::uint64_t seed, const Vector3d& movedMm = Vector3d::Zero(),
+                             const Vector3d& turned = Vector3d::Zero())
 {
   const FisheyeLens lens;
   const auto pixel = [&](const Vector3d& point, const Vector3d& moved, const Vector3d& rotation) {
@@ -28,9 +30,9 @@ std::vector<DriftPoint> Seen(std::uint64_t seed, const Vector3d& movedMm = Vecto
   for (int i = 0; i < 5; ++i) {
     Random random(seed, static_cast<std::uint64_t>(i));
     const double up = i == 0 ? 90.0 : 35.0 + 5.0 * i, around = 80.0 * i;
-    const Vector3d point = 110.0 * Vector3d(std::cos(up * RadiansPerDegree) * std::cos(around * RadiansPerDegree),
-                                            std::cos(up * RadiansPerDegree) * std::sin(around * RadiansPerDegree),
-                                            std::sin(up * RadiansPerDegree));
+    const Vector3d point =
+        110.0 * Vector3d(std::cos(up * RadiansPerDegree) * std::cos(around * RadiansPerDegree),
+                         std::cos(up * RadiansPerDegree) * std::sin(around * RadiansPerDegree), std::sin(up * RadiansPerDegree));
     DriftPoint p;
     p.mark = 10 * i + 7;
     const Vector2d expected = pixel(point, Vector3d::Zero(), Vector3d::Zero());
