@@ -7,11 +7,12 @@ namespace echorama {
 
 Command CalibrateCommand(CLI::App& program)
 {
-  CLI::App* options =
-      program.add_subcommand("calibrate", "Find how sensor, volume, tip and clocks of a tracked probe belong together");
+  CLI::App* options = program.add_subcommand(
+      "calibrate", "Find how sensor, volume, tip and clocks of a tracked probe belong together, or a camera and a skin");
   options->require_subcommand(1);
   const std::vector<Command> kinds = {CalibrateHandEyeCommand(*options), CalibratePivotCommand(*options),
-                                      CalibrateTemporalCommand(*options), CalibrateRigCommand(*options)};
+                                      CalibrateTemporalCommand(*options), CalibrateRigCommand(*options),
+                                      CalibrateSurfaceCommand(*options)};
   for (const Command& kind : kinds)
     kind.options->fallthrough(); // --json and --threads are ours
   return {options, [kinds](Session& session) {

@@ -9,5 +9,6 @@ Command CalibrateHandEyeCommand(CLI::App& calibrate);
 Command CalibratePivotCommand(CLI::App& calibrate);
 Command CalibrateTemporalCommand(CLI::App& calibrate);
 Command CalibrateRigCommand(CLI::App& calibrate);
+Command CalibrateSurfaceCommand(CLI::App& calibrate);
 
 } // namespace echorama
