@@ -2,7 +2,7 @@
 #pragma once
 #include "Core/Geometry/Landmark.h"
 #include "Core/Geometry/RigidTransform.h"
-#include "Core/Imaging/Pyramid.h"
+#include "Filters/Registration/Pyramid.h"
 #include <string>
 #include <vector>
 

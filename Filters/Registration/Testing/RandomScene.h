@@ -3,7 +3,7 @@
 // A scene that is known everywhere, and volumes that see it, for the tests of this room.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Core/Imaging/Pyramid.h"
+#include "Filters/Registration/Pyramid.h"
 #include <cmath>
 #include <functional>
 #include <utility>

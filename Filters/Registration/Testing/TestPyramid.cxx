@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Core/Imaging/Pyramid.h"
+#include "Filters/Registration/Pyramid.h"
 #include <cstring>
 #include <gtest/gtest.h>
 #include <limits>

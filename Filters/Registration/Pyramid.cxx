@@ -2,7 +2,7 @@
 // Each level is one pass over the one before it, slice by slice: a coarse voxel gathers its one to eight children in a
 // fixed order, so the result does not depend on the threads. NaN marks what is not real from the first level on; a child
 // then counts when it equals itself, and the mask is not looked at again.
-#include "Core/Imaging/Pyramid.h"
+#include "Filters/Registration/Pyramid.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
