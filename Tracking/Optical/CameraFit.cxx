@@ -8,8 +8,9 @@
 //
 // Passes: robust without a residual (Cauchy's weights, whose scale is the median of what is left over); then, until no point
 // changes sides: choice of the residual's weight, all unknowns, outliers by what each point is off were it not in the fit. The
-// weight is that of the least generalised cross-validation with 1.4 times the freedoms, against fits of noise (Gu 2013), and
-// none at all unless that gains much more than noise would.
+// weight is that under which the observations are most likely, whatever camera and residual are (restricted maximum likelihood,
+// Wood, J. R. Stat. Soc. B 2011): unlike cross-validation it seldom takes noise for a residual, and when in doubt it leaves a
+// stiff one, whose uncertainty is then part of every answer. Where none is likeliest there is none.
 //
 // Cost: n points and m centres take n (13 + 2 m)^2 per step, some ten steps: 0.3 s for 350 and 60.
 #include "CameraFit.h"
@@ -35,8 +36,11 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index PerLens = CameraOptics::LensUnknowns, PerPose = 6;
-constexpr double MedianOfTwo = 1.17741;  // of the length of a pair of normal numbers
-constexpr double ErrorScaleOfNone = 1e4; // sigmas of a point that the camera cannot see
+constexpr double MedianOfTwo = 1.17741;               // of the length of a pair of normal numbers
+constexpr double PoseSigmaMm = 20.0, PoseSigma = 0.3; // of a rough one, for what observations leave open; radians
+constexpr double WidthBesideResidual = 0.3;           // of the lens's prior
+constexpr double ErrorScaleOfNone = 1e4;              // sigmas of a point that the camera cannot see
+constexpr double LeastScale = 0.05; // what is left over per what covariances say: not all observations are that good
 
 std::array<double*, PerLens> NumbersOf(FisheyeLens& lens)
 {
@@ -58,19 +62,36 @@ public:
       roots_(points.size()), weights_(points.size(), 1.0)
   {
     SetResidual(start.residual);
-    lensInformation_.setZero();
-    if (settings.opticsCovariance.size() == 0) {
-      // Wide enough for any lens, and tight enough that powers of angles nobody saw stay where they were.
-      const double sigmas[] = {0.3 * start.lens.focal, 0.2 * start.lens.width, 0.2 * start.lens.height, 0.2, 0.1, 0.05, 0.02};
-      for (Index i = 0; i < PerLens; ++i)
-        lensInformation_(i, i) = 1.0 / (sigmas[i] * sigmas[i]);
-    }
+    SetLensPrior(start.lens, 1.0);
   }
+
+  // Wide enough for what is known of a lens by its name, and tight enough that powers of angles nobody saw stay where they were.
+  // Beside a residual it is tighter, about what the lens is without: both can do much of the same, and where depth passes for
+  // direction, too, nothing else would hold the lens.
+  void SetLensPrior(const FisheyeLens& mean, double width)
+  {
+    start_.lens = mean;
+    const double sigmas[] = {0.1 * mean.focal, 0.05 * mean.width, 0.05 * mean.height, 0.1, 0.05, 0.02, 0.01};
+    lensInformation_.setZero();
+    for (Index i = 0; i < PerLens; ++i)
+      lensInformation_(i, i) = 1.0 / std::pow(width * sigmas[i], 2);
+  }
+
+  // What a lens cannot do is noise to a fit without residual: so many times what covariances say.
+  void SetMisfit(double scale) { misfit_ = scale; }
 
   Index BendCount() const { return freedoms_.cols(); } // per component
   Index Count() const { return PerLens + 2 * BendCount() + PerPose * static_cast<Index>(state_.poses.size()); }
   const CameraState& State() const { return state_; }
   const std::vector<Vector2d>& Errors() const { return errors_; }
+
+  double MedianError() const // the standard deviation that it is that of
+  {
+    std::vector<double> lengths;
+    for (const Vector2d& error : errors_)
+      lengths.push_back(error.norm());
+    return Median(lengths) / MedianOfTwo;
+  }
 
   // Takes another plate; its weights are where it starts.
   void SetResidual(const ThinPlate& plate)
@@ -85,12 +106,9 @@ public:
       start_.bend = BendOf(plate);
     }
     state_.bend = start_.bend;
-    if (settings_.opticsCovariance.size() > 0) {
-      MatrixXd reduced = MatrixXd::Zero(PerLens + 2 * count, CameraOptics{{}, plate_}.Unknowns());
-      reduced.topLeftCorner<PerLens, PerLens>().setIdentity();
-      for (Index k = 0; k < 2 && count > 0; ++k)
-        reduced.block(PerLens + k * count, PerLens + k * freedoms_.rows(), count, freedoms_.rows()) = Reducing();
-      opticsInformation_ = InverseOfSymmetric(reduced * settings_.opticsCovariance * reduced.transpose());
+    if (settings_.covariance.size() > 0) {
+      const MatrixXd reduced = Block(Reducing());
+      information_ = InverseOfSymmetric(reduced * settings_.covariance * reduced.transpose());
     }
   }
   void SetSmoothness(double smoothness) { smoothness_ = smoothness; }
@@ -140,18 +158,19 @@ public:
     for (std::size_t i = 0; i < points_.size(); ++i)
       weights_[i] = use[i] ? 1.0 : 0.0;
     Evaluate();
-    double damping = 1e-3;
+    double damping = 1e-3, gained = 0.0, cost = 0.0;
     MatrixXd information;
     VectorXd gradient;
     for (int iteration = 0; iteration < most; ++iteration) {
       if (isRobust)
         WeighRobustly();
       Linearise(information, gradient);
-      const double cost = Cost();
+      cost = Cost();
       const CameraState before = state_;
       const VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
       const MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-      double gained = -1.0, expected = 0.0;
+      double expected = 0.0;
+      gained = -1.0;
       while (damping < 1e8) {
         MatrixXd damped = scaled;
         damped.diagonal().array() += damping;
@@ -174,7 +193,8 @@ public:
       if (gained <= 1e-8 * (cost + 1e-8) && (!isRobust || iteration > 10))
         return true;
     }
-    return isRobust;
+    // Along a valley, as where depth passes for direction, costs hardly differ any more.
+    return isRobust || gained <= 1e-4 * cost;
   }
 
   // Information and gradient of half the cost. Rows of errors: two per point of weight above 0.
@@ -187,8 +207,8 @@ public:
     information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
     information.triangularView<Eigen::StrictlyUpper>() = information.transpose();
     gradient = jacobian.transpose() * errors;
-    const MatrixXd prior = PriorInformation();
-    information += prior;
+    const MatrixXd turned = FromStartByStep(), prior = turned.transpose() * PriorInformation();
+    information += prior * turned;
     gradient -= prior * FromStart();
   }
 
@@ -230,17 +250,23 @@ public:
 
   MatrixXd PriorInformation() const
   {
+    if (information_.size() > 0)
+      return information_;
     MatrixXd prior = MatrixXd::Zero(Count(), Count());
-    const Index optics = PerLens + 2 * BendCount();
-    if (opticsInformation_.size() > 0) {
-      prior.topLeftCorner(optics, optics) = opticsInformation_;
-    } else {
-      prior.topLeftCorner<PerLens, PerLens>() = lensInformation_;
-      prior.diagonal().segment(PerLens, 2 * BendCount()).setConstant(smoothness_);
+    prior.topLeftCorner<PerLens, PerLens>() = misfit_ * misfit_ * lensInformation_;
+    for (Index pose = PerLens + 2 * BendCount(); pose < Count(); pose += PerPose) {
+      prior.diagonal().segment<3>(pose).setConstant(std::pow(misfit_ / PoseSigmaMm, 2));
+      prior.diagonal().segment<3>(pose + 3).setConstant(std::pow(misfit_ / PoseSigma, 2));
     }
-    for (std::size_t k = 0; k < settings_.poseCovariances.size(); ++k)
-      prior.block<PerPose, PerPose>(optics + PerPose * static_cast<Index>(k), optics + PerPose * static_cast<Index>(k)) =
-          InverseOfSymmetric(settings_.poseCovariances[k]);
+    prior.diagonal().segment(PerLens, 2 * BendCount()).setConstant(smoothness_);
+    if (settings_.mount.size() > 0) {
+      const auto poses = static_cast<Index>(state_.poses.size());
+      const MatrixXd one = InverseOfSymmetric(settings_.mount);
+      for (Index a = 0; a < poses; ++a)
+        for (Index b = 0; b < poses; ++b)
+          prior.block<PerPose, PerPose>(Count() - PerPose * (poses - a), Count() - PerPose * (poses - b)) +=
+              one * ((a == b ? 1.0 : 0.0) - 1.0 / static_cast<double>(poses));
+    }
     return prior;
   }
 
@@ -266,24 +292,23 @@ public:
     const SymmetricEigen modes = EigenOfSymmetric(bending.transpose() * bending);
     const VectorXd parts = modes.vectors.transpose() * (bending.transpose() * left);
 
-    const auto number = static_cast<double>(rows), none = left.squaredNorm();
-    const auto score = [&](double sum, double freedoms) {
-      const double rest = number - 1.4 * (static_cast<double>(fixed) + freedoms);
-      return rest > 0.2 * number ? sum / (rest * rest) : std::numeric_limits<double>::infinity();
-    };
-    double best = score(none, 0.0) * std::exp(-6.0 / number), chosen = std::numeric_limits<double>::infinity();
+    const double number = static_cast<double>(rows), none = left.squaredNorm();
     effective = 0.0;
+    double chosen = std::numeric_limits<double>::infinity();
     if (none < 1e-4 * number)
       return chosen; // nothing to explain
+    double best = (number - static_cast<double>(PerPose) * static_cast<double>(state_.poses.size())) * std::log(none);
     for (double power = 8.0; power > -6.01; power -= 0.25) {
       const double weight = std::pow(10.0, power);
-      double sum = none, freedoms = 0.0;
+      double sum = none, volume = 0.0, freedoms = 0.0;
       for (Index i = 0; i < parts.size(); ++i) {
         const double value = std::max(modes.values[i], 0.0);
-        sum -= parts[i] * parts[i] * (value + 2.0 * weight) / ((value + weight) * (value + weight));
+        sum -= parts[i] * parts[i] / (value + weight);
+        volume += std::log1p(value / weight);
         freedoms += value / (value + weight);
       }
-      const double here = score(std::max(sum, 0.0), freedoms);
+      const double here = volume + (number - static_cast<double>(PerPose) * static_cast<double>(state_.poses.size())) *
+                                       std::log(std::max(sum, 1e-300));
       if (here < best) {
         best = here;
         chosen = weight;
@@ -296,13 +321,8 @@ public:
   // Of CameraOptics::Unknowns() and the poses, from that of the unknowns here.
   MatrixXd Widen(const MatrixXd& covariance) const
   {
-    const Index count = BendCount(), wide = freedoms_.rows() * (count > 0), poses = Count() - PerLens - 2 * count;
-    MatrixXd to = MatrixXd::Zero(PerLens + 2 * wide + poses, Count());
-    to.topLeftCorner<PerLens, PerLens>().setIdentity();
-    to.bottomRightCorner(poses, poses).setIdentity();
-    for (Index k = 0; k < 2 && count > 0; ++k)
-      to.block(PerLens + k * wide, PerLens + k * count, wide, count) = freedoms_;
-    return to * covariance * to.transpose();
+    const MatrixXd wide = Block(freedoms_);
+    return wide * covariance * wide.transpose();
   }
 
   Vector3d InCamera(std::size_t i) const { return state_.poses[points_[i].pose].inverse(Eigen::Isometry) * points_[i].point; }
@@ -312,6 +332,19 @@ private:
   MatrixXd Reducing() const // freedoms of given weights
   {
     return InverseOfSymmetric(freedoms_.transpose() * freedoms_) * freedoms_.transpose();
+  }
+
+  // What \a bend does to both components of the residual, and nothing to all else.
+  MatrixXd Block(const MatrixXd& bend) const
+  {
+    const Index rows = BendCount() > 0 ? bend.rows() : 0, columns = BendCount() > 0 ? bend.cols() : 0;
+    const Index poses = PerPose * static_cast<Index>(state_.poses.size());
+    MatrixXd block = MatrixXd::Zero(PerLens + 2 * rows + poses, PerLens + 2 * columns + poses);
+    block.topLeftCorner<PerLens, PerLens>().setIdentity();
+    block.bottomRightCorner(poses, poses).setIdentity();
+    if (rows > 0)
+      block.block(PerLens, PerLens, rows, columns) = block.block(PerLens + rows, PerLens + columns, rows, columns) = bend;
+    return block;
   }
 
   void Evaluate()
@@ -341,13 +374,26 @@ private:
     for (std::size_t i = 0; i < at.size(); ++i)
       from[static_cast<Index>(i)] = *at[i] - *was[i];
     const Index bends = 2 * BendCount();
-    from.segment(PerLens, bends) = state_.bend - (opticsInformation_.size() > 0 ? start_.bend : VectorXd::Zero(bends));
+    from.segment(PerLens, bends) = state_.bend - (information_.size() > 0 ? start_.bend : VectorXd::Zero(bends));
     for (std::size_t k = 0; k < state_.poses.size(); ++k) {
       const Pose motion = start_.poses[k].inverse(Eigen::Isometry) * state_.poses[k];
       from.segment<PerPose>(PerLens + bends + PerPose * static_cast<Index>(k)) << motion.translation(),
           LogRotation(motion.linear());
     }
     return from;
+  }
+
+  // How FromStart() follows a step: poses move in the camera's frame as it is now.
+  MatrixXd FromStartByStep() const
+  {
+    MatrixXd by = MatrixXd::Identity(Count(), Count());
+    for (std::size_t k = 0; k < state_.poses.size(); ++k) {
+      const Eigen::Matrix3d turn = start_.poses[k].linear().transpose() * state_.poses[k].linear(), hat = Hat(LogRotation(turn));
+      const Index first = PerLens + 2 * BendCount() + PerPose * static_cast<Index>(k);
+      by.block<3, 3>(first, first) = turn;
+      by.block<3, 3>(first + 3, first + 3) += 0.5 * hat + hat * hat / 12.0; // to the second order of the turn
+    }
+    return by;
   }
 
   bool Move(const CameraState& from, const VectorXd& step)
@@ -371,12 +417,9 @@ private:
 
   void WeighRobustly()
   {
-    std::vector<double> lengths;
-    for (const Vector2d& error : errors_)
-      lengths.push_back(error.norm());
-    const double scale = 2.385 * std::max(Median(lengths) / MedianOfTwo, 1.0);
-    for (std::size_t i = 0; i < lengths.size(); ++i)
-      weights_[i] = 1.0 / (1.0 + lengths[i] * lengths[i] / (scale * scale));
+    const double scale = 2.385 * std::max(MedianError(), LeastScale);
+    for (std::size_t i = 0; i < errors_.size(); ++i)
+      weights_[i] = 1.0 / (1.0 + errors_[i].squaredNorm() / (scale * scale));
   }
 
   const std::vector<SeenPoint>& points_;
@@ -384,9 +427,9 @@ private:
   ThinPlate plate_;
   MatrixXd freedoms_;
   CameraState start_, state_;
-  double smoothness_ = 0.0;
+  double smoothness_ = 0.0, misfit_ = 1.0;
   Eigen::Matrix<double, PerLens, PerLens> lensInformation_;
-  MatrixXd opticsInformation_;
+  MatrixXd information_;         // of all that was known before; empty: nothing was
   std::vector<Vector2d> errors_; // in standard deviations
   std::vector<Matrix2d> roots_;
   std::vector<double> weights_;
@@ -408,8 +451,8 @@ double RmsOf(const CameraProblem& problem, const std::vector<SeenPoint>& points,
 
 [[noreturn]] void FailToConverge(std::size_t points)
 {
-  throw Error(Error::Kind::NotPossible, "the fit of the camera to " + std::to_string(points) +
-                                            " points does not converge: its lens or pose starts too far from what was seen");
+  throw Error(Error::Kind::NotPossible,
+              "the fit of the camera to " + std::to_string(points) + " points does not converge. " + WhatMayBeWrong);
 }
 
 void Finish(const CameraProblem& problem, CameraFitResult& result)
@@ -470,7 +513,7 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
       FailToConverge(points.size());
   }
 
-  const bool isKnown = settings.opticsCovariance.size() > 0;
+  const bool isKnown = settings.covariance.size() > 0;
   // Wider at first: what the residual will explain must not be an outlier before.
   const auto judge = [&](double factor, const MatrixXd& covariance) {
     const CameraOptics optics = problem.Optics();
@@ -486,7 +529,7 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
       const double squared = error.dot(SolveSymmetric(spread, error).col(0));
       result.sigmas.push_back(squared >= 0.0 ? std::sqrt(squared) : ErrorScaleOfNone); // one that alone decides something
     }
-    const double scale = std::max(Median(result.sigmas) / MedianOfTwo, 1.0);
+    const double scale = std::max(Median(result.sigmas) / MedianOfTwo, LeastScale);
     bool changed = false;
     for (std::size_t i = 0; i < points.size(); ++i) {
       result.sigmas[i] /= scale;
@@ -508,12 +551,14 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
     if (!isKnown) {
       const CameraState before = problem.State();
       problem.SetResidual({});
+      problem.SetLensPrior(start.lens, 1.0);
+      problem.SetMisfit(std::max(problem.MedianError(), 1.0));
       problem.SetState({before.lens, VectorXd(), before.poses});
-      if (!problem.Descend(false, result.isInlier, 100))
+      if (!problem.Descend(false, result.isInlier, 300))
         FailToConverge(points.size());
       result.lensRms = RmsOf(problem, points, result.isInlier);
       result.smoothness = std::numeric_limits<double>::infinity();
-      const int centres = std::min(settings.residualCentres, static_cast<int>(pixels.size()) / 4);
+      const int centres = std::min(settings.residualCentres, static_cast<int>(pixels.size()) / 2);
       if (centres >= 8) {
         const CameraState alone = problem.State();
         problem.SetResidual(ThinPlate::Over(pixels, centres)); // seen pixels are near enough to those of the lens
@@ -523,12 +568,15 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
         if (std::isinf(result.smoothness)) {
           problem.SetResidual({});
           problem.SetState(alone);
-        } else
+        } else {
           problem.SetSmoothness(result.smoothness);
+          problem.SetLensPrior(alone.lens, WidthBesideResidual);
+          problem.SetMisfit(1.0);
+        }
       }
     }
     problem.Weigh();
-    if (!problem.Descend(false, result.isInlier, 100))
+    if (!problem.Descend(false, result.isInlier, 300))
       FailToConverge(points.size());
     problem.Linearise(information, gradient);
     if (!judge(1.0, InverseOfSymmetric(information)))
@@ -547,7 +595,8 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
       isKnown ? 0.0 : static_cast<double>(PerLens + PerPose * static_cast<Index>(result.poses.size())) + result.residualFreedoms;
   const double rest = 2.0 * static_cast<double>(used) - unknowns;
   result.noiseScale = rest > 4.0 ? std::sqrt(squares / rest) : 1.0;
-  const double scale = std::max(result.noiseScale, 1.0);
+  // How well a hand places lights is a guess, and many observations know better; few do not, and what is known of a lens stays.
+  const double scale = std::max(result.noiseScale, isKnown || rest < 100.0 ? 1.0 : LeastScale);
   result.covariance = problem.Widen(InverseOfSymmetric(information) * scale * scale);
   Finish(problem, result);
   return result;
@@ -557,10 +606,12 @@ CameraFitResult RefitCamera(const std::vector<SeenPoint>& points, const CameraOp
                             const std::vector<Pose>& cameraToPoints, const CameraFitSettings& settings,
                             const CameraFitResult& result, const std::vector<bool>& isLeftOut)
 {
-  const bool isKnown = settings.opticsCovariance.size() > 0;
+  const bool isKnown = settings.covariance.size() > 0;
   CameraFitResult refit = result;
   CameraProblem problem(points, {start.lens, isKnown ? start.residual : result.optics.residual}, cameraToPoints, settings);
   problem.SetSmoothness(std::isinf(result.smoothness) ? 0.0 : result.smoothness);
+  if (!isKnown && !result.optics.residual.IsNone())
+    problem.SetLensPrior(result.optics.lens, WidthBesideResidual);
   problem.SetState({result.optics.lens, problem.BendOf(result.optics.residual), result.poses});
   for (std::size_t i = 0; i < points.size(); ++i)
     refit.isInlier[i] = refit.isInlier[i] && !isLeftOut[i];

@@ -31,6 +31,9 @@ struct CameraOptics {
   std::optional<Derivatives> Differentiate(const Eigen::Vector3d& direction) const;
 };
 
+/// For messages of fits that fail.
+constexpr const char* WhatMayBeWrong = "Another mesh, another order of the marks, or a lens or pose that starts too far off?";
+
 /// A point that a camera saw.
 struct SeenPoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
@@ -43,17 +46,18 @@ struct SeenPoint {
 struct CameraFitSettings {
   int residualCentres = 60; ///< at most; 0: none
   double outlierSigmas = 5.0;
-  /// Of the start, as far as it is known: covariance of CameraOptics::Unknowns(). Empty: nearly nothing is known of the lens, and
-  /// the residual, if any, is chosen anew.
-  Eigen::MatrixXd opticsCovariance;
-  /// Of each pose: translation (mm) and rotation vector (radians) in the camera's frame. Empty: nothing is known.
-  std::vector<Eigen::Matrix<double, 6, 6>> poseCovariances;
+  /// Of the start, as far as it is known, in the order of CameraFitResult::covariance. Empty: nearly nothing is known of the lens
+  /// and nothing of the poses, and the residual is chosen anew.
+  Eigen::MatrixXd covariance;
+  /// How well each pose's mount holds the camera where it holds it in the mean of all, from where they start: the same covariance
+  /// of each, in the order of a pose's numbers. Empty: poses have nothing to do with each other. Only without \a covariance.
+  Eigen::MatrixXd mount;
 };
 
 struct CameraFitResult {
   CameraOptics optics;
   std::vector<Pose> poses;
-  /// Of CameraOptics::Unknowns(), then of each pose as above.
+  /// Of CameraOptics::Unknowns(), then of each pose its translation (mm) and rotation vector (radians) in the camera's frame.
   Eigen::MatrixXd covariance;
   std::vector<double> sigmas;      ///< of each point: how many standard deviations it is off
   std::vector<bool> isInlier;      ///< of each point

@@ -36,6 +36,10 @@ ParameterList Describe(SurfaceMapParameters& p)
       Parameter("PlacementMm", p.placementMm, {0, 10}, "mm",
                 "How well lights were put on their marks: standard deviation, per axis."),
       Parameter("FloorPx", p.floorPx, {1e-6, 10}, "pixels", "No pixel is known better: standard deviation, per axis."),
+      Parameter("MountMm", p.mountMm, {1e-4, 100}, "mm",
+                "How well shells hold the camera where they are drawn to: standard deviation, per axis.")
+          .Advanced(),
+      Parameter("MountDegrees", p.mountDegrees, {1e-4, 90}, "degrees", "The same of its direction.").Advanced(),
       Parameter("OutlierSigmas", p.outlierSigmas, {2, 100}, "", "Observations further off, in standard deviations, are left out.")
           .Advanced(),
       Parameter("MostOutliers", p.mostOutliers, {0, 0.5}, "", "With a larger share of outliers the calibration fails.")
@@ -51,15 +55,6 @@ ParameterList Describe(SurfaceMapParameters& p)
       Parameter("Folds", p.folds, {2, 100}, "", "Parts of the observations that are left out in turns, to measure errors.")
           .Advanced(),
       Parameter("Seed", p.seed, {}, "", "Of what is left out when.").Advanced(),
-  };
-}
-
-ParameterList Describe(CameraMount& p)
-{
-  return {
-      Parameter("MountMm", p.sigmaMm, {1e-6, 100}, "mm",
-                "How well the place of the camera is known: standard deviation, per axis."),
-      Parameter("MountDegrees", p.sigmaDegrees, {1e-6, 90}, "degrees", "The same of its direction."),
   };
 }
 
@@ -166,17 +161,18 @@ SurfaceMapReport Judge(const CameraFitResult& fit, const std::vector<SeenPoint>&
   report.lensPx = fit.lensRms;
   report.residualPx = fit.rms;
   report.residualFreedoms = fit.residualFreedoms;
-  if (fit.rms > p.mostResidualPx)
+  // Of the lens alone: a soft residual would explain another mesh, too.
+  if (fit.lensRms > p.mostResidualPx)
     throw Error(
         Error::Kind::NotPossible,
-        Format("the observations fit no camera inside this shell: %.3g pixels are left over (MostResidualPx is %g). Another "
-               "mesh, another order of the marks, or a start of lens or pose that is too far off?",
-               fit.rms, p.mostResidualPx));
+        Format("the observations fit no camera inside this shell: a lens leaves %.3g pixels over (MostResidualPx is %g). ",
+               fit.lensRms, p.mostResidualPx) +
+            WhatMayBeWrong);
   if (static_cast<double>(report.outliers.size()) > p.mostOutliers * static_cast<double>(points.size()))
     throw Error(Error::Kind::NotPossible,
                 std::to_string(report.outliers.size()) + " of " + std::to_string(points.size()) +
                     " observations do not fit to the others, more than MostOutliers allows; the worst is " +
-                    NameOf(report.outliers[0].observation, report.outliers[0].mark));
+                    NameOf(report.outliers[0].observation, report.outliers[0].mark) + ". " + WhatMayBeWrong);
   return report;
 }
 
@@ -237,6 +233,14 @@ void MeasureHeldOut(const std::vector<SeenPoint>& points, const std::vector<int>
   report.heldOutMostMm = *std::max_element(errors.begin(), errors.end());
 }
 
+Eigen::Matrix<double, 6, 6> MountOf(const SurfaceMapParameters& p)
+{
+  Eigen::Matrix<double, 6, 6> mount = Eigen::Matrix<double, 6, 6>::Zero();
+  mount.diagonal().head<3>().setConstant(p.mountMm * p.mountMm);
+  mount.diagonal().tail<3>().setConstant(std::pow(p.mountDegrees / DegreesPerRadian, 2));
+  return mount;
+}
+
 // Two unit vectors that span the plane across \a normal.
 Eigen::Matrix<double, 3, 2> Across(const Vector3d& normal)
 {
@@ -264,12 +268,6 @@ double ShareOfPicture(const PixelCoverage& covered, const FisheyeLens& lens)
 double MappedPoint::SigmaMm() const
 {
   return std::sqrt(std::max(EigenOfSymmetric(covariance).values[2], 0.0));
-}
-
-LensCalibration SurfaceMapState::Lens() const
-{
-  const Index count = optics.Unknowns();
-  return {optics, covered, covariance.topLeftCorner(count, count)};
 }
 
 SurfaceMap::SurfaceMap(SurfaceMapState state, std::shared_ptr<const TrackedSkin> skin)
@@ -409,7 +407,7 @@ FittedLens FitLens(const std::vector<LensObservations>& shapes, const FisheyeLen
   std::vector<int> marks;
   for (const LensObservations& shape : shapes) {
     CollectSeen(shape.observations, nullptr, lens, parameters, poses.size(), points);
-    poses.push_back(shape.cameraToShape);
+    poses.push_back(shape.housingToShape);
     const std::vector<int> more = MarksOf(shape.observations);
     marks.insert(marks.end(), more.begin(), more.end());
   }
@@ -417,34 +415,44 @@ FittedLens FitLens(const std::vector<LensObservations>& shapes, const FisheyeLen
   CameraFitSettings settings;
   settings.residualCentres = parameters.residualCentres;
   settings.outlierSigmas = parameters.outlierSigmas;
+  settings.mount = MountOf(parameters);
   const CameraOptics start{lens, {}};
   CameraFitResult fit = FitCamera(points, start, poses, settings);
   FittedLens fitted;
   fitted.report = Judge(fit, points, marks, parameters);
   LimitLens(fit, points);
+  fitted.lens = {fit.optics, PixelCoverage::Of(InlierPixels(points, fit.isInlier)), Pose::Identity(), {}};
   const Index count = fit.optics.Unknowns();
-  fitted.lens = {fit.optics, PixelCoverage::Of(InlierPixels(points, fit.isInlier)), fit.covariance.topLeftCorner(count, count)};
+  const double share = 1.0 / static_cast<double>(poses.size());
+  MatrixXd mean = MatrixXd::Zero(count + 6, fit.covariance.cols());
+  mean.topLeftCorner(count, count).setIdentity();
+  Twist twist = Twist::Zero();
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Pose inHousing = poses[k].inverse(Eigen::Isometry) * fit.poses[k];
+    twist.head<3>() += share * inHousing.translation();
+    twist.tail<3>() += share * LogRotation(inHousing.linear());
+    mean.block<6, 6>(count, count + 6 * static_cast<Index>(k)) = share * Eigen::Matrix<double, 6, 6>::Identity();
+  }
+  fitted.lens.cameraToHousing.linear() = ExpRotation(twist.tail<3>());
+  fitted.lens.cameraToHousing.translation() = twist.head<3>();
+  fitted.lens.covariance = mean * fit.covariance * mean.transpose();
+  fitted.lens.covariance.bottomRightCorner<6, 6>() += share * MountOf(parameters);
   fitted.cameraToShapes = fit.poses;
   fitted.report.coverage = ShareOfPicture(fitted.lens.covered, lens);
   MeasureHeldOut(points, marks, nullptr, start, poses, settings, fit, parameters, progress, fitted.report);
   return fitted;
 }
 
-FittedSurfaceMap PlaceSurfaceMap(const LensCalibration& lens, std::shared_ptr<const TrackedSkin> skin, const CameraMount& mount,
+FittedSurfaceMap PlaceSurfaceMap(const LensCalibration& lens, std::shared_ptr<const TrackedSkin> skin, const Pose& housingToShell,
                                  const std::vector<SurfaceObservation>& observations, const SurfaceMapParameters& parameters,
                                  const Progress& progress)
 {
   CheckRanges(parameters);
-  CheckRanges(mount);
-  Eigen::Matrix<double, 6, 6> pose = Eigen::Matrix<double, 6, 6>::Zero();
-  pose.diagonal().head<3>().setConstant(mount.sigmaMm * mount.sigmaMm);
-  pose.diagonal().tail<3>().setConstant(std::pow(mount.sigmaDegrees / DegreesPerRadian, 2));
   const Index count = lens.optics.Unknowns();
-  SurfaceMapState state{lens.optics, lens.covered, mount.cameraToShell, MatrixXd::Zero(count + 6, count + 6)};
-  if (lens.covariance.rows() != count || lens.covariance.cols() != count)
-    FailInput("the covariance of the lens is not one of " + std::to_string(count) + " unknowns");
-  state.covariance.topLeftCorner(count, count) = lens.covariance;
-  state.covariance.bottomRightCorner<6, 6>() = pose;
+  if (lens.covariance.rows() != count + 6 || lens.covariance.cols() != count + 6)
+    FailInput("the covariance of the lens is not one of " + std::to_string(count + 6) + " unknowns");
+  SurfaceMapState state{lens.optics, lens.covered, housingToShell * lens.cameraToHousing, lens.covariance};
+  state.covariance.bottomRightCorner<6, 6>() += MountOf(parameters);
   FittedSurfaceMap fitted{SurfaceMap(state, skin), {}}; // checks all of it
 
   if (!observations.empty()) {
@@ -452,14 +460,13 @@ FittedSurfaceMap PlaceSurfaceMap(const LensCalibration& lens, std::shared_ptr<co
     CollectSeen(observations, skin.get(), lens.optics.lens, parameters, 0, points);
     CameraFitSettings settings;
     settings.outlierSigmas = parameters.outlierSigmas;
-    settings.opticsCovariance = lens.covariance;
-    settings.poseCovariances = {pose};
+    settings.covariance = state.covariance;
+    const Pose start = state.cameraToShell;
     const std::vector<int> marks = MarksOf(observations);
-    CameraFitResult fit = FitCamera(points, lens.optics, {mount.cameraToShell}, settings);
+    CameraFitResult fit = FitCamera(points, lens.optics, {start}, settings);
     fitted.report = Judge(fit, points, marks, parameters);
     LimitLens(fit, points);
-    MeasureHeldOut(points, marks, skin.get(), lens.optics, {mount.cameraToShell}, settings, fit, parameters, progress,
-                   fitted.report);
+    MeasureHeldOut(points, marks, skin.get(), lens.optics, {start}, settings, fit, parameters, progress, fitted.report);
     state.optics = fit.optics;
     state.cameraToShell = fit.poses[0];
     state.covariance = fit.covariance;

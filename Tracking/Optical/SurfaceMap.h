@@ -37,11 +37,14 @@ struct MappedPoint {
   double SigmaMm() const; ///< the largest standard deviation along the skin
 };
 
-/// A camera's optics, known for some part of its picture. Plain data.
+/// A camera's optics, known for some part of its picture, and how they sit in the camera's housing. Plain data.
 struct LensCalibration {
   CameraOptics optics;
   PixelCoverage covered;
-  Eigen::MatrixXd covariance; ///< of optics.Unknowns()
+  /// The frame that the optics are known in is that which fits them best; that of the housing, in which drawings of shells have
+  /// the camera, may be a degree off.
+  Pose cameraToHousing = Pose::Identity();
+  Eigen::MatrixXd covariance; ///< of optics.Unknowns(), then of cameraToHousing, as SurfaceMapState's
 };
 
 /// All that a SurfaceMap is made of, but for the skin. Plain data.
@@ -51,8 +54,6 @@ struct SurfaceMapState {
   Pose cameraToShell = Pose::Identity(); ///< the camera looks along +z of its own frame
   /// Of optics.Unknowns(), then of the camera's translation (mm) and rotation vector (radians) in its own frame.
   Eigen::MatrixXd covariance;
-
-  LensCalibration Lens() const; ///< what of it holds in any shell
 };
 
 /// From a pixel to the skin. Questions may come from any number of threads. Copies share the skin.
@@ -78,6 +79,7 @@ private:
 struct SurfaceMapParameters {
   int residualCentres = 60;
   double placementMm = 0.1, floorPx = 0.01;
+  double mountMm = 0.2, mountDegrees = 0.2;
   double outlierSigmas = 5.0, mostOutliers = 0.3;
   double mostResidualPx = 3.0, mostFromSkinMm = 2.0;
   double leastCoverage = 0.05;
@@ -124,7 +126,7 @@ FittedSurfaceMap FitSurfaceMap(const std::vector<SurfaceObservation>& observatio
 /// Observations from one place of the camera, on a shape whose points are known: a dome with marks.
 struct LensObservations {
   std::vector<SurfaceObservation> observations;
-  Pose cameraToShape = Pose::Identity(); ///< roughly
+  Pose housingToShape = Pose::Identity(); ///< as the shape is drawn; the fit begins there
 };
 
 struct FittedLens {
@@ -133,21 +135,15 @@ struct FittedLens {
   SurfaceMapReport report;
 };
 
-/// Calibrates a camera for any shell: with shapes of different size, depth does not pass for direction. \throws as FitSurfaceMap
+/// Calibrates a camera for any shell: with shapes of different size, depth does not pass for direction. Where the optics sit in
+/// the housing is the mean of what the shapes say, which differ by their mounts (MountMm, MountDegrees). \throws as FitSurfaceMap
 FittedLens FitLens(const std::vector<LensObservations>& shapes, const FisheyeLens& lens,
                    const SurfaceMapParameters& parameters = {}, const Progress& progress = {});
 
-/// How well a shell's file knows where the camera is in it.
-struct CameraMount {
-  Pose cameraToShell = Pose::Identity();
-  double sigmaMm = 0.5, sigmaDegrees = 0.5; ///< per axis
-};
-ParameterList Describe(CameraMount& p); ///< of the accuracies
-
-/// A calibrated camera in another shell, by what is known of its mount and by some observations, or none.
+/// A calibrated camera in another shell, whose file says where it holds the housing, and by some observations, or none.
 /// \throws Error(InvalidParameter); Error(BadInput) for observations as above, but few will do; Error(NotPossible) when they do
 /// not fit
-FittedSurfaceMap PlaceSurfaceMap(const LensCalibration& lens, std::shared_ptr<const TrackedSkin> skin, const CameraMount& mount,
+FittedSurfaceMap PlaceSurfaceMap(const LensCalibration& lens, std::shared_ptr<const TrackedSkin> skin, const Pose& housingToShell,
                                  const std::vector<SurfaceObservation>& observations = {},
                                  const SurfaceMapParameters& parameters = {}, const Progress& progress = {});
 

@@ -55,7 +55,7 @@ inline TriangleSurface Ellipsoid(const Vector3d& radii, int level, double above 
 }
 
 /// Marks on the skin that the camera sees: about as many as asked for, spread over its picture up to \a mostDegrees from the
-/// axis, observed with noise. \param noisePx, placementMm standard deviations per axis: of the pixel; of the hand, along all axes
+/// axis, observed with noise. \param noisePx \param placementMm standard deviations per axis: of the pixel, and of the hand
 inline std::vector<SurfaceObservation> Observe(const TrueCamera& camera, const TrackedSkin& skin, int count, double mostDegrees,
                                                double noisePx, double placementMm, std::uint64_t seed)
 {
@@ -69,7 +69,7 @@ inline std::vector<SurfaceObservation> Observe(const TrueCamera& camera, const T
       continue;
     Random random(seed, static_cast<std::uint64_t>(i));
     const Vector3d error = placementMm * Vector3d(random.Normal(), random.Normal(), random.Normal());
-    const auto pixel = camera.PixelOf(skin.NearestTo(hit->seen + error)->seen);
+    const auto pixel = camera.PixelOf(skin.NearestTo(hit->point + error)->seen);
     if (!pixel)
       continue;
     SurfaceObservation o;
