@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// echorama calibrate surface: a camera in a printed skin, from a light that is put on numbered marks; and later whether that still
-// holds. Who puts it there is a person, who is told what comes next and what is wrong; a recording of one; or, with a simulated
-// camera, a simulated hand.
+// echorama calibrate surface: a camera in a printed skin, from a light that is put on numbered marks; and later whether that
+// still holds. Who puts it there is a person, who is told what comes next and what is wrong; a recording of one; or, with a
+// simulated camera, a simulated hand.
 #include "Calibrate.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/FormatText.h"
@@ -53,7 +53,8 @@ public:
     SimulatedHandParameters hand;
     address.Set(Join({Describe(simulation_), Describe(hand)}));
     hand.peak = simulation_.peak;
-    hand_ = std::make_shared<SimulatedHand>(hand, marks, [skin](const Eigen::Vector3d& point) { return skin->NearestTo(point)->point; });
+    hand_ = std::make_shared<SimulatedHand>(hand, marks,
+                                            [skin](const Eigen::Vector3d& point) { return skin->NearestTo(point)->point; });
     std::vector<SimulatedLight> lights;
     for (int i = 0; i < simulation_.lights; ++i)
       lights.push_back(simulation_.Light(i, [hand = hand_, isHeld = i + 1 == options.light](double time) {
@@ -202,9 +203,9 @@ Pose RoughCamera(const SurfaceOptions& options, const std::vector<Eigen::Vector3
 
 nlohmann::ordered_json JsonOf(const SurfaceAccuracy& accuracy)
 {
-  return {{"marks", accuracy.marks},          {"inliers", accuracy.inliers},       {"median_mm", accuracy.medianMm},
-          {"mm95", accuracy.mm95},            {"most_mm", accuracy.mostMm},        {"scatter_mm", accuracy.scatterMm},
-          {"own_mm95", accuracy.ownMm},       {"coverage", accuracy.coverage}};
+  return {{"marks", accuracy.marks},    {"inliers", accuracy.inliers},  {"median_mm", accuracy.medianMm},
+          {"mm95", accuracy.mm95},      {"most_mm", accuracy.mostMm},   {"scatter_mm", accuracy.scatterMm},
+          {"own_mm95", accuracy.ownMm}, {"coverage", accuracy.coverage}};
 }
 
 // What a person may type while marks are taken. \returns whether it goes on
@@ -325,9 +326,14 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
   session.Work("calibrate", options.output, [&](const Progress& progress) { result.map = calibration.Fit(progress).map; });
   const CalibrationStatus& status = calibration.Status();
   result.brightness = calibration.Brightness();
-  result.accuracy = {status.taken,          static_cast<int>(status.report.inliers), status.report.heldOutMedianMm,
-                     status.report.heldOut95Mm, status.report.heldOutMostMm,         status.scatterMm,
-                     status.ownMm,          status.coverage};
+  result.accuracy = {status.taken,
+                     static_cast<int>(status.report.inliers),
+                     status.report.heldOutMedianMm,
+                     status.report.heldOut95Mm,
+                     status.report.heldOutMostMm,
+                     status.scatterMm,
+                     status.ownMm,
+                     status.coverage};
   WriteSurface(options.output, result);
   for (const std::string& line : status.Lines(options.calibration.wantedMm))
     session.Say(line);
@@ -345,7 +351,8 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
     session.status = Session::Doubtful;
   }
   if (status.coverage < 0.9) {
-    session.Note(Format("only %.0f%% of the skin's picture is covered: elsewhere the tracker will have no answer", 100.0 * status.coverage));
+    session.Note(Format("only %.0f%% of the skin's picture is covered: elsewhere the tracker will have no answer",
+                        100.0 * status.coverage));
     session.status = Session::Doubtful;
   }
 }
@@ -368,6 +375,7 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
 
   std::vector<int> todo = DriftMarks(surface.map, surface.marks, options.checkMarks);
   std::map<int, SurfaceObservation> seen;
+  std::set<int> refused; // once: whoever insists is believed
   LightRest rest(options.calibration.rest);
   SurfaceDrift drift;
   bool isJudged = false, isRepeated = false, isFirst = true;
@@ -386,8 +394,10 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
           return true;
         isRest = true;
         const int mark = todo.front();
-        if (resting->TouchBy(surface.brightness) == Touch::Hover) {
-          Tell(Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d", mark));
+        if (resting->TouchBy(surface.brightness) == Touch::Hover && refused.insert(mark).second) {
+          Tell(Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d, or lift it and put it "
+                      "there again",
+                      mark));
           ask(frame);
           return true;
         }
@@ -433,7 +443,8 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
 Command CalibrateSurfaceCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<SurfaceOptions>();
-  CLI::App* options = calibrate.add_subcommand("surface", "A camera in a printed skin, from a light that is put on numbered marks");
+  CLI::App* options =
+      calibrate.add_subcommand("surface", "A camera in a printed skin, from a light that is put on numbered marks");
   options->add_option("camera", values->camera, "The camera, as camera:0?width=640&height=480, recording:FILE or simulated:?...")
       ->required();
   options->add_option("--mesh", values->mesh, "The surface that the skin was made of, mm");
@@ -444,7 +455,9 @@ Command CalibrateSurfaceCommand(CLI::App& calibrate)
   options->add_option("--shell", values->shell, "What the marker in the shell says; a check refuses another one");
   options->add_option("--wall-mm", values->wallMm, "From the mesh to what the camera sees of it: thickness, where that matters")
       ->check(CLI::Range(0.0, 50.0));
-  options->add_option("--camera-position", values->cameraPosition, "Roughly, in the mesh's frame, mm (default: amid the lowest marks)")
+  options
+      ->add_option("--camera-position", values->cameraPosition,
+                   "Roughly, in the mesh's frame, mm (default: amid the lowest marks)")
       ->expected(3);
   options->add_option("--up", values->up, "Where it looks, in the mesh's frame")->expected(3)->capture_default_str();
   options->add_option("--focal", values->focal, "Of the lens, roughly: pixels per radian (default: 190 for a width of 640)")
@@ -452,7 +465,9 @@ Command CalibrateSurfaceCommand(CLI::App& calibrate)
   options->add_option("--maximum-angle", values->maximumAngle, "That the lens sees, degrees from its axis")
       ->check(CLI::Range(1.0, 180.0))
       ->capture_default_str();
-  options->add_option("--lights", values->lights.lights, "Lights of the blink code")->check(CLI::Range(1, 4))->capture_default_str();
+  options->add_option("--lights", values->lights.lights, "Lights of the blink code")
+      ->check(CLI::Range(1, 4))
+      ->capture_default_str();
   options->add_option("--off-slots", values->lights.offSlots, "Slots of it in which all are off")
       ->check(CLI::Range(1, 2))
       ->capture_default_str();

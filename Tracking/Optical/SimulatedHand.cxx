@@ -17,7 +17,6 @@ ParameterList Describe(SimulatedHandParameters& p)
       Parameter("PlacementMm", p.placementMm, {0, 20}, "mm", "How far from a mark it is put down: standard deviation per axis."),
       Parameter("TremorMm", p.tremorMm, {0, 20}, "mm", "How it trembles there: standard deviation per axis."),
       Parameter("WrongMarks", p.wrongMarks, {0, 1}, "", "Share of marks that it mistakes for one of their neighbours."),
-      Parameter("Peak", p.peak, {1, 10000}, "grey levels", "Of its light, as the camera sees it straight ahead."),
       Parameter("HandSeed", p.seed, {}, "", "Of its errors.")};
 }
 

@@ -13,10 +13,10 @@ struct SimulatedHandParameters {
   double moveSeconds = 0.4, liftMm = 12.0;
   double placementMm = 0.1, tremorMm = 0.03;
   double wrongMarks = 0.0;
-  double peak = 150.0;
+  double peak = 150.0; ///< of its light, grey levels
   std::uint64_t seed = 1;
 };
-ParameterList Describe(SimulatedHandParameters& p);
+ParameterList Describe(SimulatedHandParameters& p); ///< but for the light
 
 /// Puts a light on numbered marks as it is told, with a hand's errors; now and then on another mark than it was told. What it did
 /// stays what it was, so that a frame may be rendered again.

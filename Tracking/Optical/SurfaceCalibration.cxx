@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A fit takes a fraction of a second, so it is made anew whenever a tenth more marks are there. It always begins at the nominal lens:
-// then it depends on what was taken alone, not on the way there. How the camera is turned about its axis is found by trying: the
-// turn whose marks lie nearest to where they were seen, by their median, which wrong marks do not move.
+// A fit takes a fraction of a second, so it is made anew whenever a tenth more marks are there. It always begins at the nominal
+// lens: then it depends on what was taken alone, not on the way there. How the camera is turned about its axis is found by
+// trying: the turn whose marks lie nearest to where they were seen, by their median, which wrong marks do not move.
 #include "SurfaceCalibration.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/FormatText.h"
@@ -14,13 +14,13 @@ namespace echorama {
 
 namespace {
 
-constexpr double GrowthOfFits = 1.1;                         // marks from fit to fit
-constexpr int MarksToJudgeBrightness = 20;                   // before that nobody knows how bright a touching light is
-constexpr double KnownBrightness = 0.125;                    // of the picture's width: how near one must have been
-constexpr int TriedTurns = 36;                               // of the camera about its axis
-constexpr int CoverageColumns = 40;                          // of places in the picture where a map is measured
+constexpr double GrowthOfFits = 1.1;       // marks from fit to fit
+constexpr int MarksToJudgeBrightness = 20; // before that nobody knows how bright a touching light is
+constexpr double KnownBrightness = 0.125;  // of the picture's width: how near one must have been
+constexpr int TriedTurns = 36;             // of the camera about its axis
+constexpr int CoverageColumns = 40;        // of places in the picture where a map is measured
 constexpr double EnoughCoverage = 0.9, EnoughFall = 0.95, EnoughOwn = 0.5, EarlierMarks = 0.75;
-constexpr double Radius95 = 2.4477;                          // of a plane's normal distribution, over its standard deviation
+constexpr double Radius95 = 2.4477; // of a plane's normal distribution, over its standard deviation
 
 int MarkNumber(std::size_t index)
 {
@@ -60,12 +60,13 @@ double NeighbourMm(const std::vector<Eigen::Vector3d>& marks, std::size_t mark, 
 
 ParameterList Describe(SurfaceCalibrationParameters& p)
 {
-  return Join({Describe(p.rest),
-               {Parameter("Passes", p.passes, {1, 16}, "", "Marks come thinned out, in so many passes: 1 is one after the other."),
-                Parameter("MarksForMap", p.marksForMap, {12, 1000}, "", "With so many marks the map is fitted first."),
-                Parameter("NearMm", p.nearMm, {0.1, 100}, "mm", "A light that rests within this of a mark rests on it."),
-                Parameter("WantedMm", p.wantedMm, {0.01, 100}, "mm", "The accuracy that is wanted, in 95% of places.")},
-               Describe(p.map)});
+  return Join(
+      {Describe(p.rest),
+       {Parameter("Passes", p.passes, {1, 16}, "", "Marks come thinned out, in so many passes: 1 is one after the other."),
+        Parameter("MarksForMap", p.marksForMap, {12, 1000}, "", "With so many marks the map is fitted first."),
+        Parameter("NearMm", p.nearMm, {0.1, 100}, "mm", "A light that rests within this of a mark rests on it."),
+        Parameter("WantedMm", p.wantedMm, {0.01, 100}, "mm", "The accuracy that is wanted, in 95% of places.")},
+       Describe(p.map)});
 }
 
 SurfaceCalibration::SurfaceCalibration(std::vector<Eigen::Vector3d> marks, std::shared_ptr<const TrackedSkin> skin,
@@ -126,9 +127,8 @@ bool SurfaceCalibration::LooksLifted(const RestingLight& rest) const
   if (static_cast<int>(taken_.size()) < MarksToJudgeBrightness)
     return false;
   const double known = KnownBrightness * lens_.width;
-  if (std::none_of(taken_.begin(), taken_.end(), [&](const auto& item) {
-        return (item.second.contact.position - rest.position).norm() < known;
-      }))
+  if (std::none_of(taken_.begin(), taken_.end(),
+                   [&](const auto& item) { return (item.second.contact.position - rest.position).norm() < known; }))
     return false;
   return rest.TouchBy(Brightness()) == Touch::Hover;
 }
@@ -157,9 +157,10 @@ CalibrationStep SurfaceCalibration::Update(const TrackedLight& light, Touch touc
   refused_.reset();
   if (!isInsisted && LooksLifted(*rest)) {
     step.event = CalibrationStep::Event::NotTouching;
-    step.message = Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d, or lift it "
-                          "and put it there again",
-                          asked);
+    step.message =
+        Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d, or lift it "
+               "and put it there again",
+               asked);
     refused_ = rest->position;
     return step;
   }
@@ -170,9 +171,10 @@ CalibrationStep SurfaceCalibration::Update(const TrackedLight& light, Touch touc
     step.distanceMm = (mapped.point - PlaceOf(owner > 0 ? owner : asked)).norm();
   if (owner == 0) {
     step.event = CalibrationStep::Event::Nobodys;
-    step.message = Format("the light rests %.1f mm from mark %d, and on no other: not taken. If it is on the mark, lift it and put it "
-                          "there again",
-                          *step.distanceMm, asked);
+    step.message =
+        Format("the light rests %.1f mm from mark %d, and on no other: not taken. If it is on the mark, lift it and put it "
+               "there again",
+               *step.distanceMm, asked);
     refused_ = rest->position;
     return step;
   }
@@ -180,8 +182,7 @@ CalibrationStep SurfaceCalibration::Update(const TrackedLight& light, Touch touc
   step.mark = owner;
   step.message = owner == asked ? Format("mark %d taken", owner) : Format("that is mark %d, not %d: taken for it", owner, asked);
   if (isMapped)
-    step.message +=
-        Format(", %.2f mm from where %d others put it", *step.distanceMm, static_cast<int>(fitted_.report.inliers));
+    step.message += Format(", %.2f mm from where %d others put it", *step.distanceMm, static_cast<int>(fitted_.report.inliers));
   Take(owner, *rest);
   return step;
 }
@@ -364,12 +365,12 @@ void SurfaceCalibration::JudgeEnough()
 {
   const double now = status_.report.heldOut95Mm;
   const auto count = static_cast<double>(taken_.size());
-  heldOut_.erase(std::remove_if(heldOut_.begin(), heldOut_.end(), [&](const auto& earlier) { return earlier.first >= taken_.size(); }),
-                 heldOut_.end()); // after going back
+  heldOut_.erase(
+      std::remove_if(heldOut_.begin(), heldOut_.end(), [&](const auto& earlier) { return earlier.first >= taken_.size(); }),
+      heldOut_.end()); // after going back
   heldOut_.emplace_back(taken_.size(), now);
-  const auto earlier = std::find_if(heldOut_.rbegin(), heldOut_.rend(), [&](const auto& item) {
-    return static_cast<double>(item.first) <= EarlierMarks * count;
-  });
+  const auto earlier = std::find_if(heldOut_.rbegin(), heldOut_.rend(),
+                                    [&](const auto& item) { return static_cast<double>(item.first) <= EarlierMarks * count; });
   status_.isEnough = earlier != heldOut_.rend() && status_.coverage >= EnoughCoverage && now >= EnoughFall * earlier->second &&
                      status_.ownMm <= EnoughOwn * now;
 }
@@ -381,15 +382,17 @@ std::vector<std::string> CalibrationStatus::Lines(double wantedMm) const
     lines.push_back(Format("%d of %d marks", taken, marks) + (complaint.empty() ? "" : "; no map yet: " + complaint));
     return lines;
   }
-  lines.push_back(Format("%d of %d marks, %.0f%% of the skin's picture; left out and found again they are off by %.2f mm in the median, "
-                         "%.2f mm in 95%%, %.2f mm at most",
-                         taken, marks, 100.0 * coverage, report.heldOutMedianMm, report.heldOut95Mm, report.heldOutMostMm));
-  lines.push_back(Format("the lens alone leaves %.3f px, lens and residual %.3f px (RMS per axis); the light is put down within %.2f mm; "
-                         "the map itself is within %.2f mm (95%%)",
-                         report.lensPx, report.residualPx, scatterMm, ownMm));
+  lines.push_back(
+      Format("%d of %d marks, %.0f%% of the skin's picture; left out and found again they are off by %.2f mm in the median, "
+             "%.2f mm in 95%%, %.2f mm at most",
+             taken, marks, 100.0 * coverage, report.heldOutMedianMm, report.heldOut95Mm, report.heldOutMostMm));
+  lines.push_back(
+      Format("the lens alone leaves %.3f px, lens and residual %.3f px (RMS per axis); the light is put down within %.2f mm; "
+             "the map itself is within %.2f mm (95%%)",
+             report.lensPx, report.residualPx, scatterMm, ownMm));
   for (const CalibrationOutlier& outlier : outliers) {
-    const std::string where = std::isfinite(outlier.distanceMm) ? Format("lies %.1f mm from where %d others put it", outlier.distanceMm,
-                                                                         static_cast<int>(report.inliers))
+    const std::string where = std::isfinite(outlier.distanceMm) ? Format("lies %.1f mm from where %d others put it",
+                                                                         outlier.distanceMm, static_cast<int>(report.inliers))
                                                                 : std::string("is seen where no skin is");
     lines.push_back(Format("mark %d ", outlier.mark) + where +
                     (outlier.wasRepeated ? ", again: it is left out; is it where the mesh has it?"
@@ -397,11 +400,12 @@ std::vector<std::string> CalibrationStatus::Lines(double wantedMm) const
                                          : ": repeat it"));
   }
   if (isEnough)
-    lines.push_back("more marks would not help" + (report.heldOut95Mm > wantedMm
-                                                       ? Format(", although %.2f mm are wanted: the light must be put down more exactly, "
-                                                                "or print and mesh differ",
-                                                                wantedMm)
-                                                       : std::string()));
+    lines.push_back("more marks would not help" +
+                    (report.heldOut95Mm > wantedMm
+                         ? Format(", although %.2f mm are wanted: the light must be put down more exactly, "
+                                  "or print and mesh differ",
+                                  wantedMm)
+                         : std::string()));
   else if (gapMark > 0)
     lines.push_back(Format("the largest gap, %.0f px, is about mark %d", gapPx, gapMark));
   if (!complaint.empty())
@@ -423,8 +427,8 @@ std::vector<int> DriftMarks(const SurfaceMap& map, const std::vector<Eigen::Vect
   while (chosen.size() < std::min(seen.size(), static_cast<std::size_t>(std::max(count, 0)))) {
     std::size_t next = 0;
     for (std::size_t i = 1; i < seen.size(); ++i) {
-      const bool isFurther = chosen.empty() ? (seen[i].second - centre).norm() > (seen[next].second - centre).norm()
-                                            : nearest[i] > nearest[next];
+      const bool isFurther =
+          chosen.empty() ? (seen[i].second - centre).norm() > (seen[next].second - centre).norm() : nearest[i] > nearest[next];
       if (isFurther)
         next = i;
     }

@@ -56,24 +56,25 @@ struct CalibrationStatus {
   double coverage = 0.0;                    ///< share of the picture of the skin in which the map answers
   int gapMark = 0;                          ///< in the middle of the largest gap; 0: there is none
   double gapPx = 0.0;                       ///< from there to the nearest mark that was taken
-  /// More marks would not help: the map answers in 90% of the picture of the skin, marks that were left out are as far off as they
-  /// were with three quarters of the marks (within 5%), and the map itself makes less than half of that.
+  /// More marks would not help: the map answers in 90% of the picture of the skin, marks that were left out are as far off as
+  /// they were with three quarters of the marks (within 5%), and the map itself makes less than half of that.
   bool isEnough = false;
 
   /// What to do, and how good it is: lines for people.
   std::vector<std::string> Lines(double wantedMm) const;
 };
 
-/// Calibration of a camera in a printed skin (dissertation 7.3) as a dialogue with a person who puts a light on numbered marks: it
-/// says which mark comes next, notices when the light rests, and how good the map has become.
+/// Calibration of a camera in a printed skin (dissertation 7.3) as a dialogue with a person who puts a light on numbered marks:
+/// it says which mark comes next, notices when the light rests, and how good the map has become.
 ///
-/// Marks come in their order, thinned out: with 4 passes the 1st, 5th, 9th ... first, then those halfway between, then the others;
-/// so all of the skin has been visited after a quarter of the way. The map does not depend on the order in which marks were taken.
+/// Marks come in their order, thinned out: with 4 passes the 1st, 5th, 9th ... first, then those halfway between, then the
+/// others; so all of the skin has been visited after a quarter of the way. The map does not depend on the order in which marks
+/// were taken.
 class SurfaceCalibration {
 public:
   /// \param marks in their order; the first has the number 1 \param lens nominal \param cameraToShell roughly; how the camera is
-  /// turned about its axis need not be known \throws Error(InvalidParameter), Error(BadInput) for fewer marks than a map needs, or one
-  /// that is not finite or not on the skin
+  /// turned about its axis need not be known \throws Error(InvalidParameter), Error(BadInput) for fewer marks than a map needs,
+  /// or one that is not finite or not on the skin
   SurfaceCalibration(std::vector<Eigen::Vector3d> marks, std::shared_ptr<const TrackedSkin> skin, const FisheyeLens& lens,
                      const Pose& cameraToShell, const SurfaceCalibrationParameters& parameters = {});
 
@@ -85,8 +86,8 @@ public:
   /// The number of the mark to go to; 0: all were taken.
   int Next() const { return todo_.empty() ? 0 : todo_.front(); }
   const Eigen::Vector3d& PlaceOf(int mark) const { return marks_[static_cast<std::size_t>(mark) - 1]; }
-  void Skip();  ///< the next one comes last
-  void Back();  ///< the last one that was taken is to be done again
+  void Skip();         ///< the next one comes last
+  void Back();         ///< the last one that was taken is to be done again
   void GoTo(int mark); ///< next; when it was taken it is done again. \throws Error(InvalidParameter)
 
   /// The map of all that was taken so far. Fitted anew only when marks have come since. \throws as FitSurfaceMap
@@ -131,8 +132,8 @@ private:
 /// Marks for a drift check: \a count of \a marks (numbers, of \a map's shell) that lie far from each other in the picture.
 std::vector<int> DriftMarks(const SurfaceMap& map, const std::vector<Eigen::Vector3d>& marks, int count);
 
-/// Marks that were visited again, against a map. \param scatterMm how well lights are put down, per axis. Those that the map does not
-/// see are left out.
+/// Marks that were visited again, against a map. \param scatterMm how well lights are put down, per axis. Those that the map does
+/// not see are left out.
 std::vector<DriftPoint> DriftPoints(const SurfaceMap& map, const std::vector<SurfaceObservation>& again, double scatterMm);
 
 } // namespace echorama

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The mesh lies beside the calibration as binary STL, which every program for meshes reads; its checksum is in the calibration, so
-// that a mesh which was replaced is noticed. STL repeats the points of every triangle: they are joined again by their bits.
+// The mesh lies beside the calibration as binary STL, which every program for meshes reads; its checksum is in the calibration,
+// so that a mesh which was replaced is noticed. STL repeats the points of every triangle: they are joined again by their bits.
 #include "SurfaceFile.h"
 #include "Core/Base/Checksum.h"
 #include "Core/Base/DescribedJson.h"
@@ -36,7 +36,8 @@ void EachIsNeeded(A& a, const ParameterList& parameters)
     a.Value(parameter, Presence::Needed);
 }
 
-// Structs as their keys: pixels and places as numbers, x, y (and z) in turns, symmetric matrices as their rows up to the diagonal.
+// Structs as their keys: pixels and places as numbers, x, y (and z) in turns, symmetric matrices as their rows up to the
+// diagonal.
 
 struct MeshKeys {
   std::string file, checksum;
@@ -367,9 +368,10 @@ void CalibratedSurface::CheckPicture(int width, int height, const std::string& n
   const FisheyeLens& lens = map.State().optics.lens;
   if (width != lens.width || height != lens.height)
     throw Error(Error::Kind::BadInput,
-                name + Format(": the camera was calibrated with pictures of %d x %d and now gives %d x %d: set it to that size, or "
-                              "calibrate again",
-                              lens.width, lens.height, width, height));
+                name +
+                    Format(": the camera was calibrated with pictures of %d x %d and now gives %d x %d: set it to that size, or "
+                           "calibrate again",
+                           lens.width, lens.height, width, height));
 }
 
 void CalibratedSurface::CheckShell(const std::string& mounted, const std::string& name) const

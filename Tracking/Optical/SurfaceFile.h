@@ -48,13 +48,13 @@ struct CalibratedSurface {
   void CheckShell(const std::string& mounted, const std::string& name) const;
 };
 
-/// Writes the calibration \a path (`echorama-surface-1`, JSON) and, beside it, the mesh of the skin: NAME.stl of NAME.json. Both or
-/// none. Numbers come back to the last bit, points of the mesh as floats. \throws Error(FileSystem), Error(InvalidParameter) for
-/// what a file cannot hold
+/// Writes the calibration \a path (`echorama-surface-1`, JSON) and, beside it, the mesh of the skin: NAME.stl of NAME.json. Both
+/// or none. Numbers come back to the last bit, points of the mesh as floats. \throws Error(FileSystem), Error(InvalidParameter)
+/// for what a file cannot hold
 void WriteSurface(const std::string& path, const CalibratedSurface& surface);
 
-/// \throws Error(FileSystem) for a file that is missing or cannot be read, the mesh too; Error(BadFile) that names the way to the key
-/// of what is damaged, and for a mesh that is not the one of the calibration
+/// \throws Error(FileSystem) for a file that is missing or cannot be read, the mesh too; Error(BadFile) that names the way to the
+/// key of what is damaged, and for a mesh that is not the one of the calibration
 CalibratedSurface ReadSurface(const std::string& path);
 
 } // namespace echorama

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A belly with marks, a camera in it that differs from the nominal one, and a person who puts a light on marks: what is seen, without
-// pictures.
+// A belly with marks, a camera in it that differs from the nominal one, and a person who puts a light on marks: what is seen,
+// without pictures.
 #include "Core/Base/Angles.h"
 #include "Core/Base/Percentile.h"
 #include "Core/Base/Random.h"

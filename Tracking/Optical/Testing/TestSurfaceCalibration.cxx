@@ -166,7 +166,8 @@ TEST(SurfaceCalibration, KnowsWhichMarkALightRestsOn)
   EXPECT_EQ(nobodys.event, Event::Nobodys);
   EXPECT_NEAR(*nobodys.distanceMm, (between - session.PlaceOf(asked)).norm(), 1.0);
   EXPECT_EQ(session.Status().taken, before);
-  const CalibrationStep elsewhere = stage.Visit(session, stage.skin->NearestTo(session.PlaceOf(asked) + Vector3d(-5.0, -5.0, 0.0))->point);
+  const CalibrationStep elsewhere =
+      stage.Visit(session, stage.skin->NearestTo(session.PlaceOf(asked) + Vector3d(-5.0, -5.0, 0.0))->point);
   EXPECT_EQ(elsewhere.event, Event::Nobodys) << "another place is no insisting";
   EXPECT_EQ(stage.Visit(session, between).event, Event::Nobodys);
   const CalibrationStep insisted = stage.Visit(session, between);
@@ -248,7 +249,10 @@ TEST(SurfaceDriftOfAMap, HoldsUntilTheCameraMoves)
   for (const int a : numbers) // far from each other
     for (const int b : numbers)
       if (a != b) {
-        EXPECT_GT((*stage.PixelOf(stage.marks[static_cast<std::size_t>(a) - 1]) - *stage.PixelOf(stage.marks[static_cast<std::size_t>(b) - 1])).norm(), 120.0);
+        EXPECT_GT((*stage.PixelOf(stage.marks[static_cast<std::size_t>(a) - 1]) -
+                   *stage.PixelOf(stage.marks[static_cast<std::size_t>(b) - 1]))
+                      .norm(),
+                  120.0);
       }
   const Pose place = stage.place;
   const auto check = [&](std::uint64_t day, double significance) {
@@ -256,8 +260,10 @@ TEST(SurfaceDriftOfAMap, HoldsUntilTheCameraMoves)
     for (const int number : numbers) {
       Random random(100 + day, static_cast<std::uint64_t>(number));
       const Vector3d mark = stage.marks[static_cast<std::size_t>(number) - 1];
-      const Vector3d put = stage.skin->NearestTo(mark + stage.placementMm * Vector3d(random.Normal(), random.Normal(), random.Normal()))->point;
-      again.push_back({*stage.PixelOf(put) + 0.01 * Vector2d(random.Normal(), random.Normal()), 1e-4 * Eigen::Matrix2d::Identity(), mark, number});
+      const Vector3d put =
+          stage.skin->NearestTo(mark + stage.placementMm * Vector3d(random.Normal(), random.Normal(), random.Normal()))->point;
+      again.push_back({*stage.PixelOf(put) + 0.01 * Vector2d(random.Normal(), random.Normal()),
+                       1e-4 * Eigen::Matrix2d::Identity(), mark, number});
     }
     return JudgeDrift(DriftPoints(map, again, scatter), significance);
   };

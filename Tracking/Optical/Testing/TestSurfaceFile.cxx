@@ -30,8 +30,14 @@ protected:
       made.detector.threshold = 12.5;
       made.marks = stage.marks;
       const CalibrationStatus& status = session.Status();
-      made.accuracy = {60, 59, status.report.heldOutMedianMm, status.report.heldOut95Mm, status.report.heldOutMostMm, status.scatterMm,
-                       status.ownMm, status.coverage};
+      made.accuracy = {60,
+                       59,
+                       status.report.heldOutMedianMm,
+                       status.report.heldOut95Mm,
+                       status.report.heldOutMostMm,
+                       status.scatterMm,
+                       status.ownMm,
+                       status.coverage};
       return made;
     }();
     return surface;
@@ -42,7 +48,8 @@ protected:
   {
     WriteSurface(Path("s.json"), Surface());
     const std::string text = ReadTextFile(Path("s.json"));
-    const std::string damaged = std::regex_replace(text, std::regex(pattern), replacement, std::regex_constants::format_first_only);
+    const std::string damaged =
+        std::regex_replace(text, std::regex(pattern), replacement, std::regex_constants::format_first_only);
     ASSERT_NE(damaged, text) << pattern;
     Put("s.json", damaged);
     echorama::testing::ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::BadFile, Path("s.json"), words);
@@ -61,7 +68,8 @@ TEST_F(SurfaceFile, ComesBackToTheLastBit)
   EXPECT_EQ(a.optics.lens.maximumAngle, b.optics.lens.maximumAngle);
   EXPECT_EQ(a.cameraToShell.matrix(), b.cameraToShell.matrix());
   EXPECT_EQ(a.covariance.rows(), b.covariance.rows());
-  EXPECT_EQ(Eigen::MatrixXd(a.covariance.triangularView<Eigen::Lower>()), Eigen::MatrixXd(b.covariance.triangularView<Eigen::Lower>()));
+  EXPECT_EQ(Eigen::MatrixXd(a.covariance.triangularView<Eigen::Lower>()),
+            Eigen::MatrixXd(b.covariance.triangularView<Eigen::Lower>()));
   EXPECT_EQ(b.covariance, b.covariance.transpose());
   EXPECT_EQ(a.optics.residual.weights, b.optics.residual.weights);
   EXPECT_EQ(a.covered.reach, b.covered.reach);
@@ -125,7 +133,8 @@ TEST_F(SurfaceFile, AMeshThatIsMissingOrAnotherIsRefused)
   std::string mesh = ReadTextFile(Path("s.stl"));
   mesh[1000] = static_cast<char>(mesh[1000] ^ 1);
   Put("s.stl", mesh);
-  ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::BadFile, Path("s.json"), "is not the one that it was calibrated with");
+  ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::BadFile, Path("s.json"),
+                "is not the one that it was calibrated with");
   std::filesystem::remove(Path("s.stl"));
   ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::FileSystem, Path("s.json"), Path("s.stl") + " is missing");
   ExpectRefused([&] { ReadSurface(Path("t.json")); }, Error::Kind::FileSystem, Path("t.json"), "cannot be read");
