@@ -15,6 +15,9 @@ namespace {
 
 using Eigen::Vector3d;
 
+// Under another licence than this: Modules/AlphaWrap.
+const std::string wrappingText = "the program echorama-alpha-wrap (under the GPL; Documentation/shell.md)";
+
 struct SurfaceEdge {
   std::uint32_t low, high;
   std::uint32_t triangle;
@@ -114,10 +117,12 @@ BodySurface::BodySurface(TriangleSurface surface, const Progress& progress) : su
       texts.push_back(HoleText(holes[i]));
     throw Error(Error::Kind::BadInput, "the body is not closed: it has " + std::to_string(holes.size()) +
                                            (holes.size() == 1 ? " hole, " : " holes, ") + Joined(texts) +
-                                           (holes.size() > 5 ? " ..." : "") + "; close them where the surface was made");
+                                           (holes.size() > 5 ? " ..." : "") +
+                                           "; close them where the surface was made, or with " + wrappingText);
   }
   if (!report.IsSound())
-    throw Error(Error::Kind::BadInput, "the surface is not that of a body: " + report.Faults());
+    throw Error(Error::Kind::BadInput,
+                "the surface is not that of a body: " + report.Faults() + "; mend it where it was made, or with " + wrappingText);
   for (const Eigen::Vector3f& point : surface_.points)
     bounds_.extend(point.cast<double>());
   tree_ = TriangleTree(surface_.points, surface_.triangles);
