@@ -74,6 +74,24 @@ class Shell(unittest.TestCase):
             size = numpy.ptp(triangles(out / name).reshape(-1, 3), axis=0)
             self.assertTrue((size <= (70, 100, 100)).all() or (size <= (100, 70, 100)).all(), (name, size))
 
+    def test_rig_has_two_domes_whose_marks_the_camera_sees_in_the_same_directions(self):
+        out = work / "rig"
+        told = run_json("shell", work / "ball.stl", "-o", out, "--resolution-mm", 1, "--opening-mm", 30, "--mark-mm", 2, "--points", 100,
+                        "--baffle-mm", 4, "--rig")
+        names = ["large-dome.stl", "points-large.csv", "points-small.csv", "points.html", "rig.3mf", "small-dome.stl"]
+        self.assertEqual(sorted(path.name for path in out.iterdir()), names)
+        large, small = (numpy.loadtxt(out / name, delimiter=",", skiprows=1) for name in told["points"])
+        numpy.testing.assert_array_equal(large[:, 0], small[:, 0])
+        radii = [numpy.linalg.norm(points[:, 1:], axis=1) for points in (large, small)]
+        for radius in radii:
+            self.assertLess(numpy.ptp(radius), 1e-3)
+        self.assertAlmostEqual(radii[1][0] / radii[0][0], 0.6, delta=1e-3)
+        numpy.testing.assert_allclose(small[:, 1:] / radii[1][0], large[:, 1:] / radii[0][0], atol=1e-4)
+        # Seen from the camera the dome ends at its radius.
+        top = triangles(out / "large-dome.stl").reshape(-1, 3)[:, 2].max() - told["camera"][2]
+        self.assertAlmostEqual(top, radii[0][0], delta=0.3)  # there is a hole at the top
+        self.assertNotIn("wall_mm", told)
+
     def test_what_cannot_be_made_leaves_nothing(self):
         before = snapshot(work)
         for arguments, words in (

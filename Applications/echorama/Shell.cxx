@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama shell: a body's surface as a printed skin for the optical surface tracker, with its base and its calibration points.
 #include "Commands.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
 #include "ParameterOptions.h"
@@ -11,6 +12,7 @@
 #include <vtkCellArray.h>
 #include <vtkFieldData.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkSTLWriter.h>
@@ -71,25 +73,42 @@ void MakeShellFiles(Session& session, const ShellOptions& options, vtkUltrasound
     else
       session.result[part].push_back(name);
   }
-  const std::string all = folder.Stage("shell.3mf");
-  session.Watch(filter, "write", "shell.3mf", [&] { filter->Write3mf(all.c_str()); });
-  session.result["all"] = "shell.3mf";
+  const std::string all = filter->GetRig() ? "rig.3mf" : "shell.3mf", stagedAll = folder.Stage(all);
+  session.Watch(filter, "write", all, [&] { filter->Write3mf(stagedAll.c_str()); });
+  session.result["all"] = all;
   vtkPolyData* marks = filter->GetOutput(2);
-  if (marks->GetNumberOfPoints() > 0) {
+  const auto writePoints = [&](const std::string& name, const auto& placeOf, vtkIdType first, vtkIdType end) {
     std::string table = "label,x,y,z\n";
-    for (vtkIdType i = 0; i < marks->GetNumberOfPoints(); ++i) {
-      const double* p = marks->GetPoint(i);
-      table += std::to_string(i + 1) + "," + NumberText(p[0]) + "," + NumberText(p[1]) + "," + NumberText(p[2]) + "\n";
+    for (vtkIdType i = first; i < end; ++i) {
+      const double* p = placeOf(i);
+      table += std::to_string(i - first + 1) + "," + NumberText(p[0]) + "," + NumberText(p[1]) + "," + NumberText(p[2]) + "\n";
     }
-    WriteTextFile(folder.Stage("points.csv"), table);
-    WriteTextFile(folder.Stage("points.html"), filter->GetGuide());
+    WriteTextFile(folder.Stage(name), table);
+  };
+  const vtkIdType count = marks->GetNumberOfPoints();
+  if (filter->GetRig()) { // the large dome's, then as many of the small one's, as the camera has them
+    vtkDataArray* seen = marks->GetPointData()->GetArray("InCamera");
+    writePoints(
+        "points-large.csv", [seen](vtkIdType i) { return seen->GetTuple(i); }, 0, count / 2);
+    writePoints(
+        "points-small.csv", [seen](vtkIdType i) { return seen->GetTuple(i); }, count / 2, count);
+    session.result["points"] = {"points-large.csv", "points-small.csv"};
+  } else if (count > 0) {
+    writePoints(
+        "points.csv", [marks](vtkIdType i) { return marks->GetPoint(i); }, 0, count);
     session.result["points"] = "points.csv";
+  }
+  if (count > 0) {
+    WriteTextFile(folder.Stage("points.html"), filter->GetGuide());
     session.result["guide"] = "points.html";
   }
-  session.result["wall_mm"] = {filter->GetLeastThickness(), filter->GetMostThickness()};
+  if (!filter->GetRig())
+    session.result["wall_mm"] = {filter->GetLeastThickness(), filter->GetMostThickness()};
   double camera[3];
   filter->GetOutput(0)->GetFieldData()->GetArray("CameraPosition")->GetTuple(0, camera);
   session.result["camera"] = {camera[0], camera[1], camera[2]};
+  if (vtkDataArray* marker = filter->GetOutput(0)->GetFieldData()->GetArray("MarkerId"))
+    session.result["marker"] = Format("%06X", static_cast<unsigned>(marker->GetTuple1(0)));
   folder.Commit();
   for (const std::string& line : LinesOf(filter->GetReport()))
     session.Say(line);

@@ -14,6 +14,7 @@
 #include <Eigen/Geometry>
 #include <limits>
 #include <map>
+#include <numeric>
 
 namespace echorama {
 namespace {
@@ -240,6 +241,46 @@ TriangleSurface MeshLevelSet(const LevelSet& levelSet, const Progress& progress)
       }
   });
   return surface;
+}
+
+std::size_t DropCrumbs(TriangleSurface& surface, double smallerThanMm)
+{
+  // Which points hang together: each names another of its piece, the first one itself.
+  std::vector<std::uint32_t> first(surface.points.size());
+  std::iota(first.begin(), first.end(), 0u);
+  const auto firstOf = [&first](std::uint32_t point) {
+    while (first[point] != point)
+      point = first[point] = first[first[point]];
+    return point;
+  };
+  for (const auto& [a, b, c] : surface.triangles)
+    for (const std::uint32_t other : {b, c}) {
+      const std::uint32_t one = firstOf(a), two = firstOf(other);
+      first[std::max(one, two)] = std::min(one, two);
+    }
+  std::vector<Eigen::AlignedBox3f> boxes(surface.points.size());
+  for (std::uint32_t i = 0; i < surface.points.size(); ++i)
+    boxes[firstOf(i)].extend(surface.points[i]);
+  const auto isCrumb = [&](std::uint32_t point) {
+    return static_cast<double>(boxes[firstOf(point)].sizes().maxCoeff()) < smallerThanMm;
+  };
+  std::size_t crumbs = 0;
+  std::uint32_t kept = 0;
+  std::vector<std::uint32_t> renamed(surface.points.size());
+  for (std::uint32_t i = 0; i < surface.points.size(); ++i) {
+    crumbs += firstOf(i) == i && isCrumb(i);
+    renamed[i] = kept;
+    if (!isCrumb(i))
+      surface.points[kept++] = surface.points[i];
+  }
+  surface.points.resize(kept);
+  auto& triangles = surface.triangles;
+  triangles.erase(std::remove_if(triangles.begin(), triangles.end(), [&](const auto& triangle) { return isCrumb(triangle[0]); }),
+                  triangles.end());
+  for (auto& triangle : triangles)
+    for (std::uint32_t& corner : triangle)
+      corner = renamed[corner];
+  return crumbs;
 }
 
 std::size_t MovePoints(TriangleSurface& surface, const std::function<Vector3d(const Vector3d&)>& target, const Progress& progress)

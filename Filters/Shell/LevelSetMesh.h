@@ -40,6 +40,10 @@ TriangleSurface MeshLevelSet(const LevelSet& levelSet, const Progress& progress 
 std::size_t MovePoints(TriangleSurface& surface, const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& target,
                        const Progress& progress = {});
 
+/// Takes away pieces of surface that are smaller than that along every axis: where a solid has an edge sharper than the lattice
+/// can show, a node may lie in it all alone. \returns how many
+std::size_t DropCrumbs(TriangleSurface& surface, double smallerThanMm);
+
 /// The ways in which a surface runs through a cell, by which of its corners are inside (bit x + 2 y + 4 z): triangles whose
 /// corners lie on edges of the cell. For tests.
 using CellTriangles = std::vector<std::array<std::uint8_t, 3>>;

@@ -73,6 +73,7 @@ public:
         SampleBase(first, cell, values);
     };
     TriangleSurface surface = MeshLevelSet(levelSet, progress.Part(0.0, isSkin ? 0.7 : 1.0));
+    DropCrumbs(surface, 2.0 * p_.resolutionMm);
     if (isSkin)
       MovePoints(
           surface, [this, cell](const Vector3d& point) { return design_.Refined(point, cell); }, progress.Part(0.7, 1.0));
@@ -217,22 +218,6 @@ WallThickness MeasureWall(const TriangleSurface& skin, const ShellDesign& design
   return wall;
 }
 
-void CheckPart(ShellPart& part, const std::string& name, const Progress& progress)
-{
-  part.check = CheckSurface(part.surface, {}, progress);
-  const std::string what = "the " + name;
-  if (part.surface.triangles.empty())
-    throw Error(Error::Kind::NotPossible, what + " is empty");
-  if (!part.check.IsSound())
-    throw Error(Error::Kind::NotPossible,
-                what + " did not come out sound: " + part.check.Faults() + "; try another ResolutionMm");
-  const std::int64_t pieces = part.check.components - part.check.cavities;
-  if (pieces > 1)
-    throw Error(Error::Kind::NotPossible, what + " falls into " + std::to_string(pieces) +
-                                              " pieces: the body is in several, or the opening or the printer's size cuts it "
-                                              "into them");
-}
-
 // What lies in each cell that is not empty.
 void AddCut(Shell& shell, const ShellMaker& maker, const ShellDesign& design, ShellPartKind kind, const Progress& progress)
 {
@@ -269,7 +254,36 @@ std::string Shell::Text() const
   text += "base: " + base.Text() + ", closed, nothing inside out\n";
   for (const PrintedPart& printed : cut)
     text += "  to print: " + printed.name + ", " + printed.part.Text() + "\n";
+  if (markerId)
+    text += Format("marker: %06X\n", *markerId);
   return text + Format("camera: at (%.3f, %.3f, %.3f) mm in the body's frame", camera.x(), camera.y(), camera.z());
+}
+
+BodySurface MovedBody(const BodySurface& body, const Pose& pose, const Progress& progress)
+{
+  TriangleSurface moved = body.Surface();
+  for (Eigen::Vector3f& point : moved.points)
+    point = (pose * point.cast<double>()).cast<float>();
+  return BodySurface(std::move(moved), progress);
+}
+
+void FinishPart(ShellPart& part, const std::string& name, const Pose& back, const Vector3d& printerMm, const Progress& progress)
+{
+  Measure(part, printerMm);
+  for (Eigen::Vector3f& point : part.surface.points)
+    point = (back * point.cast<double>()).cast<float>();
+  part.check = CheckSurface(part.surface, {}, progress);
+  const std::string what = "the " + name;
+  if (part.surface.triangles.empty())
+    throw Error(Error::Kind::NotPossible, what + " is empty");
+  if (!part.check.IsSound())
+    throw Error(Error::Kind::NotPossible,
+                what + " did not come out sound: " + part.check.Faults() + "; try another ResolutionMm");
+  const std::int64_t pieces = part.check.components - part.check.cavities;
+  if (pieces > 1)
+    throw Error(Error::Kind::NotPossible, what + " falls into " + std::to_string(pieces) +
+                                              " pieces: the body is in several, or the opening or the printer's size cuts it "
+                                              "into them");
 }
 
 std::vector<PrintedPart> Shell::Prints() const
@@ -294,10 +308,7 @@ Shell MakeShell(const BodySurface& given, const ShellParameters& parameters, con
   parameters.Check();
   Shell shell;
   shell.bodyToShell = BodyToShell(parameters, given.Surface());
-  TriangleSurface upright = given.Surface();
-  for (Eigen::Vector3f& point : upright.points)
-    point = (shell.bodyToShell * point.cast<double>()).cast<float>();
-  const BodySurface body(std::move(upright), progress.Part(0.0, 0.15));
+  const BodySurface body = MovedBody(given, shell.bodyToShell, progress.Part(0.0, 0.15));
 
   std::vector<ShellMark> above;
   for (std::size_t i = 0; i < marks.size(); ++i) {
@@ -309,7 +320,9 @@ Shell MakeShell(const BodySurface& given, const ShellParameters& parameters, con
     above.push_back({place.nearest, body.PlaceOf(place.nearest).away});
     shell.left.push_back(i);
   }
-  const ShellDesign design(parameters, body, above);
+  if (parameters.marker)
+    shell.markerId = MarkerIdOf(parameters, given.Surface());
+  const ShellDesign design(parameters, body, above, shell.markerId.value_or(0));
   const ShellMaker maker(parameters, body, design);
   progress(0.35);
   shell.skin.surface = maker.Make(ShellPartKind::Skin, nullptr, progress.Part(0.35, 0.55));
@@ -321,31 +334,23 @@ Shell MakeShell(const BodySurface& given, const ShellParameters& parameters, con
   AddCut(shell, maker, design, ShellPartKind::Skin, progress.Part(0.62, 0.75));
   AddCut(shell, maker, design, ShellPartKind::Base, progress.Part(0.75, 0.8));
   const Pose back = shell.bodyToShell.inverse();
-  std::vector<ShellPart*> parts{&shell.skin, &shell.base};
-  for (PrintedPart& printed : shell.cut)
-    parts.push_back(&printed.part);
-  for (ShellPart* part : parts) {
-    Measure(*part, parameters.printerMm);
-    for (Eigen::Vector3f& point : part->surface.points)
-      point = (back * point.cast<double>()).cast<float>();
-  }
   shell.camera = back * design.Camera();
   for (const ShellMark& mark : above)
     shell.marks.push_back({back * mark.place, back.linear() * mark.normal});
-  CheckPart(shell.skin, "skin", progress.Part(0.8, 0.88));
-  CheckPart(shell.base, "base", progress.Part(0.88, 0.9));
+  FinishPart(shell.skin, "skin", back, parameters.printerMm, progress.Part(0.8, 0.88));
+  FinishPart(shell.base, "base", back, parameters.printerMm, progress.Part(0.88, 0.9));
   for (std::size_t i = 0; i < shell.cut.size(); ++i) {
     const auto count = static_cast<double>(shell.cut.size());
-    CheckPart(shell.cut[i].part, shell.cut[i].name,
-              progress.Part(0.9 + 0.1 * static_cast<double>(i) / count, 0.9 + 0.1 * (static_cast<double>(i) + 1.0) / count));
+    FinishPart(shell.cut[i].part, shell.cut[i].name, back, parameters.printerMm,
+               progress.Part(0.9 + 0.1 * static_cast<double>(i) / count, 0.9 + 0.1 * (static_cast<double>(i) + 1.0) / count));
   }
   return shell;
 }
 
-void CheckPrinter(const Shell& shell, const ShellParameters& parameters)
+void CheckPrinter(const std::vector<PrintedPart>& prints, const ShellParameters& parameters)
 {
   const Vector3d& printer = parameters.printerMm;
-  for (const auto& [name, part] : shell.Prints())
+  for (const auto& [name, part] : prints)
     if (!part.fits)
       throw Error(Error::Kind::NotPossible,
                   Format("the %s is %.1f x %.1f x %.1f mm and does not fit the printer (PrinterMm), which makes %g x %g x %g mm",

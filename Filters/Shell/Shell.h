@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "ShellDesign.h"
+#include <optional>
 
 namespace echorama {
 
@@ -34,6 +35,7 @@ struct Shell {
   WallThickness thickness;
   Eigen::Vector3d camera = Eigen::Vector3d::Zero(); ///< its optical centre, in the body's frame; it looks along Up
   Pose bodyToShell = Pose::Identity();
+  std::optional<std::uint32_t> markerId;
   std::vector<ShellMark> marks;  ///< those given, on the surface, in the body's frame
   std::vector<std::size_t> left; ///< which of those given they are
 
@@ -54,7 +56,15 @@ struct Shell {
 Shell MakeShell(const BodySurface& body, const ShellParameters& parameters = {}, const std::vector<Eigen::Vector3d>& marks = {},
                 const Progress& progress = {});
 
+/// The body, moved. \throws as BodySurface
+BodySurface MovedBody(const BodySurface& body, const Pose& pose, const Progress& progress = {});
+
+/// Measures a part that stands upright, moves it back to the body's frame, and checks it. \throws Error(NotPossible) when it is
+/// empty, not sound or in pieces
+void FinishPart(ShellPart& part, const std::string& name, const Pose& back, const Eigen::Vector3d& printerMm,
+                const Progress& progress = {});
+
 /// \throws Error(NotPossible) that says how large the parts to print and the printer are, when one does not fit
-void CheckPrinter(const Shell& shell, const ShellParameters& parameters);
+void CheckPrinter(const std::vector<PrintedPart>& prints, const ShellParameters& parameters);
 
 } // namespace echorama

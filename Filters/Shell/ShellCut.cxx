@@ -4,7 +4,8 @@
 // aligns both, holds the glue, and lets no direct light through the seam. Plates (the flange and the base) get flat pegs. Outer
 // faces meet without a gap, so that the whole is as long as it was; what reaches into a neighbour has the clearance around it.
 //
-// As everything in the shell's design, cells, laps and pegs are functions that are negative inside, joined by minimum and maximum.
+// As everything in the shell's design, cells, laps and pegs are functions that are negative inside, joined by minimum and
+// maximum.
 #include "ShellCut.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"

@@ -28,9 +28,9 @@ CutPlanes PlanCuts(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& printe
 struct CutPeg {
   int axis = 0;
   double plane = 0.0, direction = 1.0;
-  double beside = 0.0;         ///< its middle along the other axis of the plate
+  double beside = 0.0; ///< its middle along the other axis of the plate
   double lengthMm = 0.0, widthMm = 0.0;
-  double topMm = 0.0;          ///< of its socket; the peg ends a clearance below
+  double topMm = 0.0; ///< of its socket; the peg ends a clearance below
 };
 
 /// What lies between planes, with what reaches across them: a function that is negative inside, to be joined with those of the
@@ -38,7 +38,8 @@ struct CutPeg {
 class CutCell {
 public:
   /// \param which the cell's number along each axis \param pegs of all planes
-  CutCell(const CutPlanes& planes, const Eigen::Array3i& which, const std::vector<CutPeg>& pegs, const ShellParameters& parameters);
+  CutCell(const CutPlanes& planes, const Eigen::Array3i& which, const std::vector<CutPeg>& pegs,
+          const ShellParameters& parameters);
 
   /// All of it lies in there.
   const Eigen::AlignedBox3d& Reach() const { return reach_; }

@@ -3,10 +3,12 @@
 // its foot is screwed to the base: a plate with the camera's hole and, from below, a pocket for its board. A lip on the base
 // follows the skin's inside: no straight way is left for light under the skin.
 #include "ShellDesign.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace echorama {
 namespace {
@@ -24,14 +26,6 @@ constexpr double turn = 6.283185307179586, unlimitedMm = 1e9;
 std::string Mm(double number)
 {
   return NumberText(std::round(1000.0 * number) / 1000.0) + " mm";
-}
-
-// Along an axis through a place, from \a low to \a high.
-double Rod(const Vector3d& p, const ShellMark& mark, double radius, double low, double high)
-{
-  const Vector3d from = p - mark.place;
-  const double along = from.dot(mark.normal);
-  return std::max({(from - along * mark.normal).norm() - radius, along - high, low - along});
 }
 
 } // namespace
@@ -62,6 +56,7 @@ ParameterList Describe(ShellParameters& p)
       Parameter("Marks", Choice(p.marks, {"none", "holes", "bumps"}),
                 "What is made of calibration points: holes that an LED fits in, or bumps that are removed later."),
       Parameter("MarkMm", p.markMm, {0.5, 20}, "mm", "Diameter of holes or bumps."),
+      Parameter("Marker", p.marker, "Whether raised cells inside the skin's foot tell the camera which shell it is in."),
       Parameter("PrinterMm", p.printerMm, {1, 1e4}, "mm", "What the printer can make: its width, depth and height."),
       Parameter("CutToFit", p.cutToFit, "Whether what does not fit the printer is cut into parts that do."),
       Parameter("SeamMm", p.seamMm, {2, 50}, "mm", "How far parts that were cut reach behind, or into, the next one."),
@@ -111,13 +106,39 @@ Pose BodyToShell(const ShellParameters& p, const TriangleSurface& body)
   return Pose(Eigen::Translation3d(-section.center().x(), -section.center().y(), -level) * upright);
 }
 
+std::uint32_t MarkerIdOf(const ShellParameters& p, const TriangleSurface& body)
+{
+  std::string bytes;
+  const auto add = [&bytes](const auto& number) {
+    char raw[sizeof number];
+    std::memcpy(raw, &number, sizeof number);
+    bytes.append(raw, sizeof number);
+  };
+  for (const Eigen::Vector3f& point : body.points)
+    for (const float coordinate : point)
+      add(coordinate);
+  for (const double number : {p.thicknessMm, p.openingMm, p.up.x(), p.up.y(), p.up.z(), static_cast<double>(p.measured)})
+    add(number);
+  return Crc24(bytes);
+}
+
+double MarkRod(const Vector3d& p, const ShellMark& mark, double radius, double low, double high)
+{
+  const Vector3d from = p - mark.place;
+  const double along = from.dot(mark.normal);
+  return std::max({(from - along * mark.normal).norm() - radius, along - high, low - along});
+}
+
 double LowestMark(const ShellParameters& p)
 {
   return (p.flangeMm > 0.0 ? p.flangeThicknessMm : 0.0) + 0.5 * p.markMm + 1.0;
 }
 
-ShellDesign::ShellDesign(const ShellParameters& parameters, const BodySurface& body, std::vector<ShellMark> marks)
-  : p_(parameters), body_(body), marks_(p_.marks == ShellParameters::MarkKind::None ? std::vector<ShellMark>() : std::move(marks))
+ShellDesign::ShellDesign(const ShellParameters& parameters, const BodySurface& body, std::vector<ShellMark> marks,
+                         std::uint32_t markerId)
+  : p_(parameters), body_(body),
+    marks_(p_.marks == ShellParameters::MarkKind::None ? std::vector<ShellMark>() : std::move(marks)),
+    marker_(MarkerPattern::Of(markerId))
 {
   PlanSkinAndBase();
 }
@@ -190,8 +211,80 @@ void ShellDesign::PlanSkinAndBase()
       for (const Eigen::Array3i& which : CellsOf(planes))
         cells.emplace_back(planes, which, pegs, p_);
   };
+  if (p_.marker)
+    PlaceMarker(skin);
   makeCells(skin, FlangePegs(skin), skinCells_);
   makeCells(base, BasePegs(base), baseCells_);
+  makeCells(base, FlangePegs(base), domeCells_);
+}
+
+// Where a sensor that is wider than high sees it, off the seams, above the lip of the base.
+void ShellDesign::PlaceMarker(const CutPlanes& skin)
+{
+  const double lowest = p_.baffleMm + p_.clearanceMm + 0.5, room = p_.seamMm + p_.clearanceMm + 1.0;
+  constexpr double width = MarkerPattern::columns * MarkerPattern::cellDegrees;
+  std::string reason;
+  double narrowest = unlimitedMm;
+  for (const double middle : {25.0, 155.0, 205.0, 335.0}) {
+    markerAzimuth_ = middle - 0.5 * width;
+    reason.clear();
+    for (int row = 0; row <= MarkerPattern::rows && reason.empty(); ++row)
+      for (int column = 0; column <= MarkerPattern::columns && reason.empty(); ++column) {
+        const double azimuth = (markerAzimuth_ + column * MarkerPattern::cellDegrees) / DegreesPerRadian,
+                     elevation = (MarkerPattern::lowestDegrees + row * MarkerPattern::cellDegrees) / DegreesPerRadian;
+        const Vector3d ray(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+        const auto way = body_.Along(Camera(), ray);
+        const Vector3d place = Camera() + way.value_or(0.0) * ray;
+        narrowest = std::min(narrowest, way.value_or(0.0) * MarkerPattern::cellDegrees / DegreesPerRadian);
+        if (place.z() < lowest + p_.thicknessMm)
+          reason = "it would lie behind the lip of the base (BaffleMm)";
+        for (int axis = 0; axis < 3; ++axis)
+          for (const double plane : skin.at[static_cast<std::size_t>(axis)])
+            if (std::abs(place[axis] - plane) < room)
+              reason = "seams go through wherever it might be";
+      }
+    if (narrowest < 3.0 * p_.resolutionMm)
+      RefuseShell("ResolutionMm is " + Mm(p_.resolutionMm) + "; it must be at most a third of the marker's cells, which are " +
+                  Mm(narrowest) + " wide");
+    if (reason.empty())
+      return;
+  }
+  throw Error(Error::Kind::NotPossible, "there is no place for the marker (Marker): " + reason);
+}
+
+bool ShellDesign::IsNearMarker(const Vector3d& place, double distanceMm) const
+{
+  if (!p_.marker)
+    return false;
+  const Vector3d from = place - Camera();
+  const double across = from.head<2>().norm(), reach = std::max(from.norm(), 1e-6) / DegreesPerRadian;
+  const double azimuth = std::remainder(std::atan2(from.y(), from.x()) * DegreesPerRadian - markerAzimuth_ -
+                                            0.5 * MarkerPattern::columns * MarkerPattern::cellDegrees,
+                                        360.0),
+               elevation = std::atan2(from.z(), across) * DegreesPerRadian - MarkerPattern::lowestDegrees -
+                           0.5 * MarkerPattern::rows * MarkerPattern::cellDegrees;
+  return (std::abs(azimuth) - 0.5 * MarkerPattern::columns * MarkerPattern::cellDegrees) * reach < distanceMm &&
+         (std::abs(elevation) - 0.5 * MarkerPattern::rows * MarkerPattern::cellDegrees) * reach < distanceMm;
+}
+
+// How far it is to the nearest border between light and dark, at most a cell; negative within dark cells.
+double ShellDesign::MarkerCells(const Vector3d& place) const
+{
+  const Vector3d from = place - Camera();
+  const double azimuth =
+      std::remainder(std::atan2(from.y(), from.x()) * DegreesPerRadian - markerAzimuth_ - 180.0, 360.0) + 180.0;
+  const double u = azimuth / MarkerPattern::cellDegrees,
+               v = (std::atan2(from.z(), from.head<2>().norm()) * DegreesPerRadian - MarkerPattern::lowestDegrees) /
+                   MarkerPattern::cellDegrees;
+  const int column = static_cast<int>(std::floor(u)), row = static_cast<int>(std::floor(v));
+  const bool isDark = marker_.IsDark(row, column);
+  double nearest = 1.0;
+  for (int r = row - 1; r <= row + 1; ++r)
+    for (int c = column - 1; c <= column + 1; ++c)
+      if (marker_.IsDark(r, c) != isDark)
+        nearest = std::min(nearest, std::hypot(std::max({c - u, u - c - 1.0, 0.0}), std::max({r - v, v - r - 1.0, 0.0})));
+  // A little larger than they are: cells that meet in a corner hang together, and corners leave no crumbs between nodes.
+  return (isDark ? -nearest : nearest) * from.norm() * MarkerPattern::cellDegrees / DegreesPerRadian - 0.6 * p_.resolutionMm;
 }
 
 // In the middle of the flange, turned such that no plane goes through one.
@@ -314,10 +407,17 @@ double ShellDesign::Screws(const Vector3d& place) const
   return nearest;
 }
 
+double ShellDesign::ScrewHoles(const Vector3d& place) const
+{
+  return std::max(Screws(place), place.z() - p_.flangeThicknessMm - 4.0); // no higher: walls may lean over them
+}
+
 double ShellDesign::DeepestAt(const Vector3d& place, const CutCell* cell) const
 {
   const bool isNearSeam = cell && cell->PlaneDistance(place) < p_.seamMm + 4.0 * p_.resolutionMm;
-  return isNearSeam ? 2.0 * p_.thicknessMm + p_.clearanceMm : p_.thicknessMm;
+  if (isNearSeam)
+    return 2.0 * p_.thicknessMm + p_.clearanceMm;
+  return IsNearMarker(place, 4.0 * p_.resolutionMm) ? 2.0 * p_.thicknessMm : p_.thicknessMm;
 }
 
 double ShellDesign::Skin(const Vector3d& place, double distance, const std::vector<std::uint32_t>& marks,
@@ -328,8 +428,10 @@ double ShellDesign::Skin(const Vector3d& place, double distance, const std::vect
   if (p_.flangeMm > 0.0) {
     const double flange = std::max({distance - p_.flangeMm, inner, place.z() - p_.flangeThicknessMm, -place.z()});
     skin = std::min(skin, flange);
-    skin = std::max(skin, -std::max(Screws(place), place.z() - p_.flangeThicknessMm - 4.0));
+    skin = std::max(skin, -ScrewHoles(place));
   }
+  if (IsNearMarker(place, 4.0 * p_.resolutionMm))
+    skin = std::min(skin, std::max({MarkerCells(place), distance, -distance - 2.0 * p_.thicknessMm, -place.z()}));
   const bool isHoles = p_.marks == ShellParameters::MarkKind::Holes;
   if (!isHoles)
     for (const std::uint32_t i : marks)
@@ -338,7 +440,7 @@ double ShellDesign::Skin(const Vector3d& place, double distance, const std::vect
     skin = std::min(std::max(skin, cell->Within(place)), cell->Laps(place, distance));
   if (isHoles) // through laps, too
     for (const std::uint32_t i : marks)
-      skin = std::max(skin, -Rod(place, marks_[i], 0.5 * p_.markMm, -2.0 * p_.thicknessMm - 2.0, 2.0));
+      skin = std::max(skin, -MarkRod(place, marks_[i], 0.5 * p_.markMm, -2.0 * p_.thicknessMm - 2.0, 2.0));
   return skin;
 }
 
@@ -363,7 +465,10 @@ Vector3d ShellDesign::Refined(const Vector3d& place, const CutCell* cell) const
   const double plane = std::min(
       {std::abs(place.z()), std::abs(place.z() - p_.flangeThicknessMm), cell ? cell->PlaneDistance(place) : unlimitedMm});
   const bool isOnPlane = plane < 0.021 * p_.resolutionMm;
-  if (isOnPlane)
+  // Cells of a marker meet in corners, and laps are a clearance off walls: a point that moves there may end in its neighbour.
+  const bool isCrowded =
+      IsNearMarker(place, 2.0 * p_.resolutionMm) || (cell && cell->PlaneDistance(place) < p_.seamMm + 2.0 * p_.resolutionMm);
+  if (isOnPlane || (isCrowded && !isPlain))
     return place;
   Vector3d moved = place;
   for (int step = 0; step < 3; ++step) {
@@ -391,6 +496,8 @@ bool ShellDesign::IsPlainWall(const Vector3d& place, double distanceMm, const Cu
   if (place.z() < rim + distanceMm + p_.resolutionMm)
     return false;
   if (cell && cell->PlaneDistance(place) < p_.seamMm + distanceMm + p_.resolutionMm)
+    return false;
+  if (IsNearMarker(place, distanceMm + p_.resolutionMm))
     return false;
   return std::none_of(marks_.begin(), marks_.end(), [&](const ShellMark& mark) {
     const double reach = 0.5 * p_.markMm + p_.thicknessMm + p_.resolutionMm + distanceMm;

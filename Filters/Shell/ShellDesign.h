@@ -4,6 +4,7 @@
 #include "Core/Base/Parameters.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "ShellCut.h"
+#include "Tracking/Optical/MarkerPattern.h"
 
 namespace echorama {
 
@@ -28,6 +29,7 @@ struct ShellParameters {
   double lensMm = 8.0;
   MarkKind marks = MarkKind::None;
   double markMm = 5.2;
+  bool marker = false;
   Eigen::Vector3d printerMm{300.0, 300.0, 300.0};
   bool cutToFit = true;
   double seamMm = 6.0;
@@ -47,6 +49,12 @@ struct ShellMark {
 /// \throws Error(InvalidParameter) for an opening that is above the body, Error(NotPossible) where the body is not
 Pose BodyToShell(const ShellParameters& parameters, const TriangleSurface& body);
 
+/// The number that a shell's marker shows: a checksum of the body and of what the skin is made with.
+std::uint32_t MarkerIdOf(const ShellParameters& parameters, const TriangleSurface& body);
+
+/// A rod along a mark's normal, negative inside, from \a low to \a high as seen from its place.
+double MarkRod(const Eigen::Vector3d& place, const ShellMark& mark, double radius, double low, double high);
+
 /// The height above the plane of the opening that marks need.
 double LowestMark(const ShellParameters& parameters);
 
@@ -57,8 +65,10 @@ class ShellDesign {
 public:
   enum class Part { Skin, Base };
 
-  /// What they are given must outlive it.
-  ShellDesign(const ShellParameters& parameters, const BodySurface& body, std::vector<ShellMark> marks);
+  /// What they are given must outlive it. \param markerId what Marker shows
+  /// \throws Error(NotPossible) when the printer is too small, or there is no place for the marker
+  ShellDesign(const ShellParameters& parameters, const BodySurface& body, std::vector<ShellMark> marks,
+              std::uint32_t markerId = 0);
 
   const ShellParameters& Parameters() const { return p_; }
   /// The optical centre: it looks up.
@@ -68,6 +78,12 @@ public:
   std::vector<std::uint32_t> MarksNear(const Eigen::Vector3d& middle, double distanceMm) const;
   /// What a part is cut into; empty when it is left whole.
   const std::vector<CutCell>& Cells(Part part) const { return part == Part::Skin ? skinCells_ : baseCells_; }
+  /// What domes that stand in the skin's place are cut into: where the base is, for their outline is the same.
+  const std::vector<CutCell>& DomeCells() const { return domeCells_; }
+  /// The upper side of a plate that covers the base's lip, a clearance above it.
+  double PlateMm() const { return p_.baffleMm + p_.clearanceMm + p_.flangeThicknessMm; }
+  /// The holes for screws, negative inside; as Skin has them.
+  double ScrewHoles(const Eigen::Vector3d& place) const;
 
   /// The skin, or what lies of it in a cell, at a place that is \a distance from the body.
   double Skin(const Eigen::Vector3d& place, double distance, const std::vector<std::uint32_t>& marks,
@@ -89,6 +105,9 @@ private:
   std::optional<Eigen::Vector3d> FromOutside(const Eigen::Vector3d& place, const Eigen::Vector3d& away, double distanceMm) const;
   Eigen::AlignedBox3d FlangeBox() const;
   void PlanSkinAndBase();
+  void PlaceMarker(const CutPlanes& skin);
+  bool IsNearMarker(const Eigen::Vector3d& place, double distanceMm) const;
+  double MarkerCells(const Eigen::Vector3d& place) const;
   void PlaceScrews(const std::vector<const CutPlanes*>& planes);
   std::vector<CutPeg> FlangePegs(const CutPlanes& planes) const;
   std::vector<CutPeg> BasePegs(const CutPlanes& planes) const;
@@ -97,7 +116,9 @@ private:
   const BodySurface& body_;
   std::vector<ShellMark> marks_;
   std::vector<Eigen::Vector2d> screws_;
-  std::vector<CutCell> skinCells_, baseCells_;
+  MarkerPattern marker_;
+  double markerAzimuth_ = 0.0; // where its first column begins, degrees
+  std::vector<CutCell> skinCells_, baseCells_, domeCells_;
 };
 
 } // namespace echorama

@@ -6,6 +6,7 @@
 #include "Filters/Shell/PrintFile.h"
 #include "Filters/Shell/Shell.h"
 #include "Filters/Shell/ShellMarks.h"
+#include "Filters/Shell/ShellRig.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkClipPolyData.h"
@@ -45,9 +46,12 @@ struct vtkUltrasoundShell::Settings {
 
   Places places = Places::Proxy;
   int points = 350;
-  bool fitPrinter = true;
+  bool fitPrinter = true, isRig = false;
+  echorama::RigParameters rig;
   std::vector<echorama::PrintedBody> prints; // in the body's frame
   echorama::Pose bodyToShell = echorama::Pose::Identity();
+
+  void Keep(const std::vector<echorama::PrintedPart>& parts, const echorama::Pose& pose, vtkPolyData* all);
 };
 
 namespace {
@@ -121,6 +125,50 @@ void PutField(vtkPolyData* data, const char* name, const Vector3d& values)
   data->GetFieldData()->AddArray(array);
 }
 
+// Both domes and their marks; returns the page that shows where these are.
+std::string PutRig(const echorama::CalibrationRig& rig, vtkInformationVector* outputs)
+{
+  vtkNew<vtkPoints> places;
+  vtkNew<vtkCellArray> vertices;
+  vtkNew<vtkIntArray> numbers, domes;
+  numbers->SetName("Mark");
+  domes->SetName("Dome");
+  vtkNew<vtkDoubleArray> seen;
+  seen->SetName("InCamera");
+  seen->SetNumberOfComponents(3);
+  vtkNew<vtkFloatArray> normals;
+  normals->SetName("Normals");
+  normals->SetNumberOfComponents(3);
+  std::vector<Vector3d> ofLarge;
+  for (std::size_t which = 0; which < rig.domes.size(); ++which) {
+    const auto& dome = rig.domes[which];
+    vtkPolyData* data = vtkPolyData::GetData(outputs, static_cast<int>(which));
+    Put(dome.part.surface, data);
+    PutField(data, "CameraPosition", rig.bodyToCamera.inverse().translation());
+    PutField(data, "CameraDirection", rig.bodyToCamera.linear().transpose() * Vector3d::UnitZ());
+    for (std::size_t i = 0; i < dome.marks.size(); ++i) {
+      const vtkIdType at = places->InsertNextPoint(dome.marks[i].place.data());
+      vertices->InsertNextCell(1, &at);
+      numbers->InsertNextValue(static_cast<int>(i) + 1);
+      domes->InsertNextValue(static_cast<int>(which));
+      seen->InsertNextTuple((rig.bodyToCamera * dome.marks[i].place).eval().data());
+      normals->InsertNextTuple(dome.marks[i].normal.data());
+      if (which == 0) {
+        ofLarge.push_back(rig.bodyToCamera * dome.marks[i].place);
+      }
+    }
+  }
+  vtkPolyData* points = vtkPolyData::GetData(outputs, 2);
+  points->SetPoints(places);
+  points->SetVerts(vertices);
+  for (vtkDataArray* array :
+       {static_cast<vtkDataArray*>(numbers), static_cast<vtkDataArray*>(domes), static_cast<vtkDataArray*>(seen)}) {
+    points->GetPointData()->AddArray(array);
+  }
+  points->GetPointData()->SetNormals(normals);
+  return echorama::MarksGuide(ofLarge, Vector3d::UnitZ());
+}
+
 // The body above a plane with about that many points.
 TriangleSurface Simplified(const TriangleSurface& body, const Vector3d& origin, const Vector3d& up, int wanted)
 {
@@ -166,7 +214,22 @@ echorama::ParameterList vtkUltrasoundShell::Parameters()
                   "Where calibration points lie when none are given: at the points of the simplified body, or in directions from "
                   "the middle of the opening that are three times denser at the horizon than at the top."),
         Parameter("Points", v.points, {0, 10000}, "",
-                  "About how many calibration points there are when none are given. 0: none.")}});
+                  "About how many calibration points there are when none are given. 0: none."),
+        Parameter("Rig", v.isRig,
+                  "Whether two domes with marks are made instead, which stand on the same base: with them a lens is calibrated "
+                  "once, for all shells of that base.")},
+       Describe(v.rig)});
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundShell::Settings::Keep(const std::vector<echorama::PrintedPart>& parts, const echorama::Pose& pose,
+                                        vtkPolyData* all)
+{
+  for (const echorama::PrintedPart& printed : parts) {
+    this->prints.push_back({printed.name, printed.part.surface});
+  }
+  this->bodyToShell = pose;
+  PutPrints(this->prints, all);
 }
 
 //----------------------------------------------------------------------------
@@ -200,6 +263,18 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
     v.shell.Check();
     const echorama::BodySurface body(SurfaceOf(vtkPolyData::GetData(inputs[0])), progress.Part(0.0, 0.1));
     const Vector3d up = v.shell.up.normalized();
+    echorama::ShellParameters parameters = v.shell;
+    parameters.cutToFit = parameters.cutToFit && v.fitPrinter;
+    if (v.isRig) {
+      const auto rig = echorama::MakeRig(body, parameters, v.rig, v.points, progress.Part(0.1, 1.0));
+      if (v.fitPrinter) {
+        CheckPrinter(rig.Prints(), parameters);
+      }
+      this->Report = rig.Text();
+      this->Guide = PutRig(rig, outputs);
+      v.Keep(rig.Prints(), rig.bodyToShell, vtkPolyData::GetData(outputs, 4));
+      return;
+    }
     const echorama::Pose shellToBody = BodyToShell(v.shell, body.Surface()).inverse();
     const Vector3d lowest = shellToBody * Vector3d(0.0, 0.0, LowestMark(v.shell));
 
@@ -235,11 +310,9 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
       }
     }
     progress(0.2);
-    echorama::ShellParameters parameters = v.shell;
-    parameters.cutToFit = parameters.cutToFit && v.fitPrinter;
     const Shell shell = echorama::MakeShell(body, parameters, marks, progress.Part(0.2, 0.97));
     if (v.fitPrinter) {
-      CheckPrinter(shell, parameters);
+      CheckPrinter(shell.Prints(), parameters);
     }
     this->Report = shell.Text();
 
@@ -247,6 +320,12 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
     Put(shell.base.surface, vtkPolyData::GetData(outputs, 1));
     PutField(vtkPolyData::GetData(outputs, 0), "CameraPosition", shell.camera);
     PutField(vtkPolyData::GetData(outputs, 0), "CameraDirection", up);
+    if (shell.markerId) {
+      vtkNew<vtkIntArray> marker;
+      marker->SetName("MarkerId");
+      marker->InsertNextValue(static_cast<int>(*shell.markerId));
+      vtkPolyData::GetData(outputs, 0)->GetFieldData()->AddArray(marker);
+    }
     vtkPolyData* points = vtkPolyData::GetData(outputs, 2);
     vtkNew<vtkPoints> places;
     vtkNew<vtkCellArray> vertices;
@@ -292,11 +371,7 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
     }
     this->LeastThickness = shell.thickness.leastMm;
     this->MostThickness = shell.thickness.mostMm;
-    for (const echorama::PrintedPart& printed : shell.Prints()) {
-      v.prints.push_back({printed.name, printed.part.surface});
-    }
-    v.bodyToShell = shell.bodyToShell;
-    PutPrints(v.prints, vtkPolyData::GetData(outputs, 4));
+    v.Keep(shell.Prints(), shell.bodyToShell, vtkPolyData::GetData(outputs, 4));
   });
 }
 

@@ -20,6 +20,13 @@
  * Output 4: what is to be printed, all in one, told apart by the cell array `Print`, from 0: skin and base, or the parts that
  * they are cut into where the printer is too small (CutToFit).
  *
+ * With Rig, output 0 is the large dome and output 1 the small one, both to be put on the base that was made without Rig. Output 2
+ * are the marks of both: vertices with the point arrays `Mark` (from 1; the same number on both domes is the same direction from
+ * the camera), `Dome` (0: large, 1: small), `InCamera` (3 doubles: the place in the camera's frame, whose origin is the optical
+ * centre and whose z is Up) and `Normals`. Output 3 is empty.
+ *
+ * With Marker the skin has the field data `MarkerId`: the number that its raised cells show (Tracking/Optical/ShellMarker.h).
+ *
  * Fails, with the reason: for a surface with holes (their number, places and lengths), self-intersections or other faults; for a
  * body that is too thin for the wall; when what is to be printed does not fit the printer (and FitPrinter is on); for parameters
  * out of their range.
@@ -124,6 +131,9 @@ public:
   /** Diameter of holes or bumps. In [0.5, 20] mm; default 5.2. */
   vtkUltrasoundNumberMacro(MarkMm);
 
+  /** Whether raised cells inside the skin's foot tell the camera which shell it is in. Default off. */
+  vtkUltrasoundSwitchMacro(Marker);
+
   /** What the printer can make: its width, depth and height. In [1, 10000] mm; default (300, 300, 300). */
   vtkUltrasoundVectorMacro(PrinterMm);
 
@@ -150,6 +160,18 @@ public:
 
   /** About how many calibration points there are when none are given. 0: none. In [0, 10000]; default 350. */
   vtkUltrasoundIntegerMacro(Points);
+
+  /**
+   * Whether two domes with marks are made instead, which stand on the same base: with them a lens is calibrated once, for all
+   * shells of that base. Default off.
+   */
+  vtkUltrasoundSwitchMacro(Rig);
+
+  /** Radius of the rig's large dome. 0: the largest that the base has room for. In [0, 1000] mm; default 0. */
+  vtkUltrasoundNumberMacro(LargeDomeMm);
+
+  /** Radius of the rig's small dome. 0: 0.6 of the large one. In [0, 1000] mm; default 0. */
+  vtkUltrasoundNumberMacro(SmallDomeMm);
 
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of

@@ -237,6 +237,60 @@ void Compare(const std::string& name, const TriangleSurface& abdomen, const std:
 #endif
 }
 
+// A printer that is too small: what the cut costs, and whether the parts make the whole. At random places near the surface of the
+// whole: how many that lie deeper in it than edges are broken (half a cell) lie in no part, and how many lie in two.
+void Cut(const std::string& name, const TriangleSurface& abdomen, double resolution)
+{
+  ShellParameters p;
+  p.openingMm = 70.0;
+  p.resolutionMm = resolution;
+  p.printerMm = Vector3d(250.0, 210.0, 210.0);
+  const BodySurface body(abdomen);
+  p.cutToFit = false;
+  const Spent whole = Timed([&] { MakeShell(body, p); });
+  p.cutToFit = true;
+  Shell shell;
+  const Spent cut = Timed([&] { shell = MakeShell(body, p); });
+  std::size_t within = 0, lost = 0, doubled = 0, parts = 0;
+  double volume = 0.0, largest = 0.0;
+  std::vector<BodySurface> skins;
+  bool isSound = true;
+  for (const PrintedPart& printed : shell.cut) {
+    isSound = isSound && printed.part.check.IsSound() && printed.part.fits;
+    ++parts;
+    largest = std::max(largest, printed.part.sizeMm.maxCoeff());
+    if (printed.name[0] == 's') {
+      skins.emplace_back(printed.part.surface);
+      volume += printed.part.check.volumeMm3;
+    }
+  }
+  const BodySurface skin(shell.skin.surface);
+  for (std::uint64_t i = 0; i < 100000; ++i) {
+    Random random(6, i);
+    const auto& corners = shell.skin.surface.points;
+    const Vector3d place =
+        corners[static_cast<std::size_t>(random.Uniform() * static_cast<double>(corners.size()))].cast<double>() +
+        4.0 * Vector3d(random.Uniform() - 0.5, random.Uniform() - 0.5, random.Uniform() - 0.5);
+    int in = 0;
+    for (const BodySurface& part : skins)
+      in += part.Bounds().contains(place) && part.Distance(place) < -0.01;
+    const bool isWithin = skin.Distance(place) < -0.5 * resolution;
+    within += isWithin;
+    lost += isWithin && in == 0;
+    doubled += in > 1;
+  }
+  nlohmann::ordered_json more;
+  more["cpu_seconds"] = cut.cpu;
+  more["cpu_seconds_whole"] = whole.cpu;
+  more["parts"] = parts;
+  more["sound"] = isSound;
+  more["largest_mm"] = largest;
+  more["doubled"] = doubled;
+  more["laps_share"] = volume / shell.skin.check.volumeMm3 - 1.0;
+  benchmark::Report("shell", name, "cut for a printer of 250 x 210 x 210 mm", cut.seconds,
+                    static_cast<double>(lost) / static_cast<double>(within), "share of the skin that is in no part", more);
+}
+
 } // namespace
 
 int main()
@@ -246,5 +300,6 @@ int main()
   Compare("abdomen, 2 mm", InventedAbdomen(divisions), isQuick ? std::vector<double>{1.0} : std::vector<double>{0.5, 0.8, 1.0});
   Compare("abdomen with a fold, 2 mm", InventedAbdomen(divisions, 6.0),
           isQuick ? std::vector<double>{1.0} : std::vector<double>{0.5});
+  Cut("abdomen, cut", InventedAbdomen(divisions), isQuick ? 1.0 : 0.5);
   return 0;
 }

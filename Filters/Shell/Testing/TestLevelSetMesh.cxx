@@ -127,4 +127,31 @@ TEST(LevelSetMesh, PointsDoNotMoveWhereTrianglesWouldTurnOver)
   EXPECT_EQ(surface.points[4], Eigen::Vector3f(6, 0, 0.1f));
 }
 
+// A ball of 10 cells, and a node that is inside all alone.
+TEST(LevelSetMesh, CrumbsAreDroppedAndNothingElse)
+{
+  LevelSet levelSet;
+  levelSet.cells = Eigen::Array3i::Constant(40);
+  levelSet.mayCross = [](const Eigen::Array3i&) { return true; };
+  levelSet.sample = [](const Eigen::Array3i& first, LevelSet::Values& values) {
+    std::size_t at = 0;
+    for (int k = 0; k < LevelSet::blockNodes; ++k)
+      for (int j = 0; j < LevelSet::blockNodes; ++j)
+        for (int i = 0; i < LevelSet::blockNodes; ++i) {
+          const Eigen::Vector3d place(first.x() + i, first.y() + j, first.z() + k);
+          const double ball = (place - Eigen::Vector3d::Constant(15.3)).norm() - 10.0,
+                       crumb = (place - Eigen::Vector3d(30.0, 31.0, 32.0)).norm() - 0.4;
+          values[at++] = static_cast<float>(std::min(ball, crumb));
+        }
+  };
+  TriangleSurface surface = MeshLevelSet(levelSet);
+  EXPECT_EQ(CheckSurface(surface).components, 2);
+  EXPECT_EQ(DropCrumbs(surface, 2.0), 1u);
+  const SurfaceReport report = CheckSurface(surface);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_TRUE(report.IsSound()) << report.Faults();
+  EXPECT_NEAR(report.volumeMm3, 4.0 / 3.0 * 3.14159265 * 1000.0, 40.0);
+  EXPECT_EQ(DropCrumbs(surface, 2.0), 0u);
+}
+
 } // namespace

@@ -6,6 +6,7 @@
 #include "Filters/Shell/ShellMarks.h"
 #include "Filters/Tissue/Icosphere.h"
 #include "Testing/Sanitized.h"
+#include "Tracking/Optical/MarkerPattern.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -49,7 +50,7 @@ std::string MessageOf(const TriangleSurface& surface, const ShellParameters& par
 {
   try {
     const Shell shell = MakeShell(BodySurface(surface), parameters, marks);
-    CheckPrinter(shell, parameters);
+    CheckPrinter(shell.Prints(), parameters);
   } catch (const Error& error) {
     return error.what();
   }
@@ -208,6 +209,69 @@ TEST(Shell, HolesGoThroughAtTheirMarksAndBumpsStandOut)
         highest = std::max(highest, (point.cast<double>() - mark.place).dot(mark.normal));
     EXPECT_NEAR(highest, 1.5, 0.07);
   }
+}
+
+// Seen from the camera, dark cells of the marker are twice as thick as the wall, and nothing else is.
+TEST(Shell, MarkerIsRaisedWhereTheCameraSeesItsCells)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  const BodySurface body(Sphere(60.0, 5));
+  ShellParameters p;
+  p.openingMm = 30.0;
+  p.marker = true;
+  p.printerMm = Vector3d(400.0, 400.0, 400.0);
+  const Shell shell = MakeShell(body, p);
+  EXPECT_NEAR(shell.thickness.leastMm, 2.0, 0.03); // it is no plain wall
+  EXPECT_NEAR(shell.thickness.mostMm, 2.0, 0.03);
+  ASSERT_TRUE(shell.markerId);
+  EXPECT_NE(shell.Text().find("marker: "), std::string::npos);
+  const MarkerPattern pattern = MarkerPattern::Of(*shell.markerId);
+  const BodySurface skin(shell.skin.surface);
+  for (int row = -1; row <= MarkerPattern::rows; ++row)
+    for (int column = -1; column <= MarkerPattern::columns; ++column) {
+      const double azimuth = (25.0 + (column + 0.5 - 0.5 * MarkerPattern::columns) * MarkerPattern::cellDegrees) * pi / 180.0,
+                   elevation = (MarkerPattern::lowestDegrees + (row + 0.5) * MarkerPattern::cellDegrees) * pi / 180.0;
+      const Vector3d ray(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      const auto way = skin.Along(shell.camera, ray);
+      ASSERT_TRUE(way);
+      EXPECT_NEAR(-body.Distance(shell.camera + *way * ray), pattern.IsDark(row, column) ? 4.0 : 2.0, 0.06)
+          << row << " " << column;
+    }
+  // Another body, or another wall, has another number; where it is cut it has the same.
+  EXPECT_NE(MarkerIdOf(p, Sphere(60.0, 4)), *shell.markerId);
+  p.printerMm = Vector3d(150.0, 150.0, 150.0);
+  EXPECT_EQ(MarkerIdOf(p, body.Surface()), *shell.markerId);
+  p.thicknessMm = 2.2;
+  EXPECT_NE(MarkerIdOf(p, body.Surface()), *shell.markerId);
+  p.resolutionMm = 1.0;
+  EXPECT_NE(MessageOf(Sphere(60.0, 4), p).find("ResolutionMm is 1 mm; it must be at most a third of the marker's cells"),
+            std::string::npos)
+      << MessageOf(Sphere(60.0, 4), p);
+  p.resolutionMm = 0.5;
+  p.baffleMm = 40.0;
+  EXPECT_NE(MessageOf(Sphere(60.0, 4), p).find("there is no place for the marker (Marker): it would lie behind the lip"),
+            std::string::npos)
+      << MessageOf(Sphere(60.0, 4), p);
+}
+
+// Where it is cut as well: the marker lies in one part, off the seams.
+TEST(Shell, MarkerKeepsOffTheSeams)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  ShellParameters p;
+  p.openingMm = 40.0;
+  p.resolutionMm = 0.8;
+  p.marker = true;
+  const BodySurface body(Sphere(80.0, 5));
+  p.printerMm = Vector3d(130.0, 130.0, 130.0);
+  const Shell cut = MakeShell(body, p);
+  p.marker = false;
+  const Shell plain = MakeShell(body, p);
+  ASSERT_EQ(cut.cut.size(), plain.cut.size());
+  int changed = 0;
+  for (std::size_t i = 0; i < cut.cut.size(); ++i)
+    changed += std::abs(cut.cut[i].part.check.volumeMm3 - plain.cut[i].part.check.volumeMm3) > 100.0;
+  EXPECT_EQ(changed, 1);
 }
 
 TEST(Shell, DoesNotDependOnThreads)

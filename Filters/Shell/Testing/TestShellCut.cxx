@@ -77,10 +77,11 @@ void ExpectPartsMakeTheWhole(const Shell& shell, const ShellParameters& p, const
   std::size_t inside = 0, lost = 0, doubled = 0, reaching = 0, near = 0;
   for (std::uint64_t i = 0; i < 20000; ++i) {
     Random random(3, i);
-    const auto& corner = whole.surface.points[static_cast<std::size_t>(random.Uniform() * 0.999999 *
-                                                                       static_cast<double>(whole.surface.points.size()))];
-    const Vector3d place = corner.cast<double>() + 8.0 * Vector3d(random.Uniform() - 0.5, random.Uniform() - 0.5,
-                                                                   random.Uniform() - 0.5);
+    const auto& corner =
+        whole.surface
+            .points[static_cast<std::size_t>(random.Uniform() * 0.999999 * static_cast<double>(whole.surface.points.size()))];
+    const Vector3d place =
+        corner.cast<double>() + 8.0 * Vector3d(random.Uniform() - 0.5, random.Uniform() - 0.5, random.Uniform() - 0.5);
     std::vector<double> distances;
     for (const BodySurface& part : parts)
       distances.push_back((part.Bounds().exteriorDistance(place) > 10.0) ? 10.0 : part.Distance(place));
@@ -113,7 +114,7 @@ TEST(ShellCut, PartsOfABallFitAndMakeTheWhole)
   p.openingMm = 30.0;
   p.printerMm = Vector3d(100.0, 100.0, 60.0);
   const Shell shell = MakeShell(BodySurface(Ball(60.0, 5)), p);
-  EXPECT_NO_THROW(CheckPrinter(shell, p));
+  EXPECT_NO_THROW(CheckPrinter(shell.Prints(), p));
   EXPECT_FALSE(shell.skin.fits);
   EXPECT_EQ(std::count_if(shell.cut.begin(), shell.cut.end(), [](const PrintedPart& part) { return part.name[0] == 's'; }), 8);
   EXPECT_EQ(std::count_if(shell.cut.begin(), shell.cut.end(), [](const PrintedPart& part) { return part.name[0] == 'b'; }), 4);
@@ -162,7 +163,7 @@ TEST(ShellCut, AbdomenIsCutIntoFourWithItsCameraInOne)
   p.resolutionMm = 1.0;
   p.printerMm = Vector3d(250.0, 210.0, 210.0);
   const Shell shell = MakeShell(BodySurface(InventedAbdomen(40)), p);
-  EXPECT_NO_THROW(CheckPrinter(shell, p));
+  EXPECT_NO_THROW(CheckPrinter(shell.Prints(), p));
   ExpectPartsMakeTheWhole(shell, p, "skin", 0.03);
   ExpectPartsMakeTheWhole(shell, p, "base", 0.03);
   // Whole, the camera's hole makes the same way through one part of the base that it makes through the base.

@@ -194,6 +194,29 @@ assert not made.GetPrint(4, part) and said and made.GetPrintName(4) == ""
 made = shell(ball())
 assert errors_of(made) == "" and [made.GetPrintName(i) for i in range(made.GetNumberOfPrints())] == ["skin", "base"]
 
+# A rig: two domes about the camera, whose marks it sees in the same directions.
+made = shell(ball(), OpeningMm=30, BaffleMm=4, MarkMm=2, Rig=True)
+assert errors_of(made) == ""
+assert [made.GetPrintName(i) for i in range(made.GetNumberOfPrints())] == ["large-dome", "small-dome"]
+marks = made.GetOutput(2).GetPointData()
+seen, numbers, domes = (vtk_to_numpy(marks.GetArray(name)) for name in ("InCamera", "Mark", "Dome"))
+radii = np.linalg.norm(seen, axis=1)
+large, small = seen[domes == 0] / radii[0], seen[domes == 1] / radii[-1]
+assert len(large) == len(small) >= 20 and np.allclose(large, small, atol=1e-6) and abs(radii[-1] / radii[0] - 0.6) < 1e-3
+assert (numbers[domes == 0] == numbers[domes == 1]).all() and numbers[0] == 1
+camera = np.array(made.GetOutput(0).GetFieldData().GetArray("CameraPosition").GetTuple(0))
+places = vtk_to_numpy(made.GetOutput(2).GetPoints().GetData())
+assert np.allclose(places - camera, seen, atol=1e-3)  # Up is z: only the origin is another
+for port in (0, 1):
+    assert volume_of(made.GetOutput(port)) > 5000
+assert made.GetOutput(3).GetNumberOfPoints() == 0 and math.isnan(made.GetLeastThickness())
+assert "has room for a dome of" in errors_of(shell(ball(), OpeningMm=30, Rig=True, LargeDomeMm=90))
+
+# A marker says which shell it is.
+made = shell(ball(), FlangeMm=0, BaffleMm=4, Marker=True, ResolutionMm=0.4)
+assert errors_of(made) == ""
+assert f"marker: {int(made.GetOutput(0).GetFieldData().GetArray('MarkerId').GetTuple1(0)):06X}" in made.GetReport()
+
 # It can be stopped, and run again.
 made = shell(ball())
 stop = made.AddObserver(vtkCommand.ProgressEvent, lambda *_: made.SetAbortExecute(1))
