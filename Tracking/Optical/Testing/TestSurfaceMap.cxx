@@ -260,8 +260,7 @@ TEST(SurfaceMap, ResidualDoesNoHarmWhereThereIsNothingToRepair)
   EXPECT_LT(with, 1.1 * without);
 }
 
-// Calibrations of other noise, asked for the same pixels: how often they scatter as far as they say. \a share: of what each says
-// of its own squared error, in units of it. One: right.
+// Calibrations of other noise, asked for the same pixels: the mean square of their errors, each in units of what it claims.
 double ClaimedSpread(const TrueCamera& camera, double queryNoise, double placementMm)
 {
   std::vector<Vector3d> places;
@@ -300,7 +299,7 @@ double ClaimedSpread(const TrueCamera& camera, double queryNoise, double placeme
 
 TEST(SurfaceMap, CovarianceIsThatOfManyCalibrations)
 {
-  // Squares: 20% of a standard deviation are 36 to 44% of it. The calibration's own part first, then mostly the pixel's.
+  // The calibration's own part first, then mostly the pixel's.
   EXPECT_NEAR(std::sqrt(ClaimedSpread(Camera(), 0.0, 0.0)), 1.0, 0.2);
   EXPECT_NEAR(std::sqrt(ClaimedSpread(Camera(), 0.0, 0.15)), 1.0, 0.2);
   EXPECT_NEAR(std::sqrt(ClaimedSpread(WarpedCamera(), 0.0, 0.0)), 1.0, 0.2);
@@ -553,6 +552,53 @@ TEST(SurfaceMap, TwoDomesCalibrateForAnyShell)
   const SurfaceMap mended = PlaceSurfaceMap(lens.lens, Dome(), off, few, loose).map;
   EXPECT_LT(Percentile(ErrorsOf(mended, camera, 70.0), 0.95), 0.2);
   EXPECT_LT(mended.Map({330.0, 240.0}).SigmaMm(), 0.1);
+}
+
+TEST(SurfaceMap, APlacedCameraKnowsHowWellItIsKnown)
+{
+  const auto dome = [](double radius) { return SkinOf(Ellipsoid(Vector3d::Constant(radius), 5)); };
+  const Skin small = dome(70.0), large = dome(130.0);
+  SurfaceMapParameters p;
+  p.folds = 2;
+  p.mountMm = p.mountDegrees = 0.05;
+  std::vector<double> relative[2]; // without marks, and with some
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const auto mounted = [&](const Pose& pose, std::uint64_t item) {
+      Random random(seed, item);
+      Twist off;
+      for (Eigen::Index k = 0; k < 6; ++k)
+        off[k] = random.Normal() * (k < 3 ? p.mountMm : p.mountDegrees / DegreesPerRadian);
+      return Pose(pose * Exp(off));
+    };
+    std::vector<LensObservations> shapes;
+    for (const Skin& skin : {small, large}) {
+      TrueCamera there = WarpedCamera();
+      const Pose drawn = PoseAt({1.0, -2.0, 6.0}, {0.0, 0.0, 15.0});
+      there.cameraToShell = mounted(drawn, 900 + shapes.size());
+      shapes.push_back({Observe(there, *skin, 150, 85.0, 0.02, 0.1, 10 * seed + shapes.size()), drawn});
+    }
+    const LensCalibration lens = FitLens(shapes, FisheyeLens(), p).lens;
+    TrueCamera here = WarpedCamera();
+    here.cameraToShell = mounted(WarpedCamera().cameraToShell, 950);
+    const auto some = Observe(here, *Dome(), 20, 70.0, 0.02, 0.1, 10 * seed + 5);
+    for (int withSome = 0; withSome < 2; ++withSome) {
+      const SurfaceMap map =
+          PlaceSurfaceMap(lens, Dome(), WarpedCamera().cameraToShell, withSome == 1 ? some : decltype(some)(), p).map;
+      for (const SurfaceObservation& o : Observe(here, *Dome(), 40, 65.0, 0.0, 0.0, 1)) {
+        const MappedPoint mapped = map.Map(o.pixel);
+        const SymmetricEigen axes = EigenOfSymmetric(mapped.covariance);
+        for (const Eigen::Index axis : {1, 2})
+          relative[withSome].push_back(std::pow(axes.vectors.col(axis).dot(mapped.point - o.point), 2) / axes.values[axis]);
+      }
+    }
+  }
+  for (const auto& squares : relative) {
+    double sum = 0.0;
+    for (const double square : squares)
+      sum += square;
+    // All places of one calibration share its error, so that twelve are not many.
+    EXPECT_NEAR(std::sqrt(sum / static_cast<double>(squares.size())), 1.0, 0.3);
+  }
 }
 
 TEST(SurfaceMap, IsItsStateAndDoesNotDependOnThreads)
