@@ -166,7 +166,8 @@ ParameterList Describe(RigParameters& p)
       Parameter("LargeDomeMm", p.largeDomeMm, {0, 1000}, "mm",
                 "Radius of the rig's large dome. 0: the largest that the base has room for.")
           .Advanced(),
-      Parameter("SmallDomeMm", p.smallDomeMm, {0, 1000}, "mm", "Radius of the rig's small dome. 0: 0.6 of the large one.").Advanced(),
+      Parameter("SmallDomeMm", p.smallDomeMm, {0, 1000}, "mm", "Radius of the rig's small dome. 0: 0.6 of the large one.")
+          .Advanced(),
   };
 }
 
@@ -225,9 +226,8 @@ CalibrationRig MakeRig(const BodySurface& given, const ShellParameters& shell, c
     throw Error(Error::Kind::InvalidParameter,
                 Format("a small dome (SmallDomeMm) of %.1f mm hardly reaches above the plate, which is %.1f mm above the camera",
                        small, design.PlateMm() - camera.z()));
-  const std::vector<Vector3d> directions =
-      Directions(points, small, std::asin(std::max(lowest, 0.0) / small) * 360.0 / wholeTurn,
-                 shell.markMm + 2.0 * shell.resolutionMm + 0.5);
+  const std::vector<Vector3d> directions = Directions(points, small, std::asin(std::max(lowest, 0.0) / small) * 360.0 / wholeTurn,
+                                                      shell.markMm + 2.0 * shell.resolutionMm + 0.5);
 
   const Pose back = made.bodyToShell.inverse();
   for (std::size_t which = 0; which < 2; ++which) {

@@ -23,15 +23,16 @@ struct CalibrationRig {
     std::vector<ShellMark> marks; ///< in the body's frame; those of both domes lie in the same directions, in the same order
   };
   std::array<Dome, 2> domes;
-  Pose bodyToShell = Pose::Identity(), bodyToCamera = Pose::Identity(); ///< of the camera's frame +z is Up, its x that of the shell
+  Pose bodyToShell = Pose::Identity(),
+       bodyToCamera = Pose::Identity(); ///< of the camera's frame +z is Up, its x that of the shell
 
   std::vector<PrintedPart> Prints() const;
   std::string Text() const;
 };
 
 /// The foot of each dome is that of the skin: its wall up to a plate over the base's lip, its flange and its screws. On the plate
-/// stands the upper part of a sphere about the camera's optical centre, as thick as the skin. Marks are holes, or bumps where Marks
-/// says so, three times denser at the horizon than at the top, and as many as \a points, or as have room on the small dome.
+/// stands the upper part of a sphere about the camera's optical centre, as thick as the skin. Marks are holes, or bumps where
+/// Marks says so, three times denser at the horizon than at the top, and as many as \a points, or as have room on the small dome.
 /// The result does not depend on the number of threads. \throws as MakeShell; Error(InvalidParameter) for domes that the base has
 /// no room for
 CalibrationRig MakeRig(const BodySurface& body, const ShellParameters& shell, const RigParameters& rig, int points,

@@ -40,14 +40,18 @@ void WriteStl(const TriangleSurface& surface, const std::string& path)
 
 int main(int argc, char* argv[])
 {
-  CLI::App program("Close a torn surface by CGAL's alpha wrapping. This program is under the GPL, version 3 or later; the rest of "
-                   "Echorama is not.");
+  CLI::App program(
+      "Close a torn surface by CGAL's alpha wrapping. This program is under the GPL, version 3 or later; the rest of "
+      "Echorama is not.");
   std::string input, output;
   AlphaWrapParameters parameters;
-  program.add_option("surface", input, "A surface in mm (.stl, .ply, .obj, .vtp, .glb), with holes or self-intersections")->required();
+  program.add_option("surface", input, "A surface in mm (.stl, .ply, .obj, .vtp, .glb), with holes or self-intersections")
+      ->required();
   program.add_option("-o,--output", output, "The closed surface (.stl)")->required();
-  program.add_option("--alpha-mm", parameters.alphaMm, "Holes narrower than a ball of this radius are closed")->capture_default_str();
-  program.add_option("--offset-mm", parameters.offsetMm, "How far outside the surface the closed one lies")->capture_default_str();
+  program.add_option("--alpha-mm", parameters.alphaMm, "Holes narrower than a ball of this radius are closed")
+      ->capture_default_str();
+  program.add_option("--offset-mm", parameters.offsetMm, "How far outside the surface the closed one lies")
+      ->capture_default_str();
   CLI11_PARSE(program, argc, argv);
   try {
     const TriangleSurface closed = AlphaWrap(ReadMesh(input), parameters);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/Random.h"
 #include "Filters/Shell/Benchmarks/InventedAbdomen.h"
 #include "Filters/Shell/Shell.h"
 #include "Filters/Shell/ShellMarks.h"
 #include "Filters/Tissue/Icosphere.h"
 #include "Testing/Sanitized.h"
 #include "Tracking/Optical/MarkerPattern.h"
+#include "Tracking/Optical/ShellMarker.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -237,6 +239,24 @@ TEST(Shell, MarkerIsRaisedWhereTheCameraSeesItsCells)
       EXPECT_NEAR(-body.Distance(shell.camera + *way * ray), pattern.IsDark(row, column) ? 4.0 : 2.0, 0.06)
           << row << " " << column;
     }
+  // And a camera reads it, in light that each millimetre of plastic dims by a quarter.
+  const FisheyeLens lens;
+  const auto width = static_cast<std::size_t>(lens.width);
+  std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(lens.height), 4);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const auto direction = lens.Unproject({static_cast<double>(i % width), static_cast<double>(i / width)});
+    const auto inner = direction ? skin.Along(shell.camera, *direction) : std::nullopt,
+               outer = direction ? body.Along(shell.camera, *direction) : std::nullopt;
+    if (inner && outer && *outer > *inner) {
+      Random random(1, i);
+      pixels[i] =
+          static_cast<std::uint8_t>(std::lround(6.0 + 60.0 * std::pow(0.75, *outer - *inner) + random.Uniform(-2.0, 2.0)));
+    }
+  }
+  const ShellMarkerReading reading = ReadShellMarker(GreyFrame::Mono(pixels.data(), lens.width, lens.height), lens);
+  ASSERT_EQ(reading.status, ShellMarkerReading::Status::Read);
+  EXPECT_EQ(reading.id, *shell.markerId);
+  EXPECT_NEAR(reading.azimuthDegrees, 6.0, 0.6);
   // Another body, or another wall, has another number; where it is cut it has the same.
   EXPECT_NE(MarkerIdOf(p, Sphere(60.0, 4)), *shell.markerId);
   p.printerMm = Vector3d(150.0, 150.0, 150.0);

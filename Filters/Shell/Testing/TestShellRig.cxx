@@ -118,7 +118,8 @@ TEST(ShellRig, WhatTheBaseHasNoRoomForIsRefused)
       << WhyNot(RigShell(), rig, 40);
   rig.largeDomeMm = 40.0;
   rig.smallDomeMm = 38.0;
-  EXPECT_NE(WhyNot(RigShell(), rig, 40).find("SmallDomeMm is 38 mm; it must be at most 0.9 of the large dome"), std::string::npos);
+  EXPECT_NE(WhyNot(RigShell(), rig, 40).find("SmallDomeMm is 38 mm; it must be at most 0.9 of the large dome"),
+            std::string::npos);
   rig.smallDomeMm = 5.0;
   EXPECT_NE(WhyNot(RigShell(), rig, 40).find("hardly reaches above the plate"), std::string::npos);
   rig.smallDomeMm = 30.0;

@@ -18,12 +18,11 @@ TriangleSurface TornAbdomen(const TriangleSurface& whole)
   TriangleSurface torn;
   torn.points = whole.points;
   const Eigen::Vector3f top = *std::max_element(whole.points.begin(), whole.points.end(),
-                                                [](const auto& a, const auto& b) { return a.z() < b.z(); }),
+                                                [](const auto&a, const auto&b) { return a.z() < b.z(); }),
                         side = *std::max_element(whole.points.begin(), whole.points.end(),
-                                                 [](const auto& a, const auto& b) { return a.x() < b.x(); });
+                                                 [](const auto&a, const auto&b) { return a.x() < b.x(); });
   for (const auto& triangle : whole.triangles) {
-    const Eigen::Vector3f middle =
-        (whole.points[triangle[0]] + whole.points[triangle[1]] + whole.points[triangle[2]]) / 3.0f;
+    const Eigen::Vector3f middle = (whole.points[triangle[0]] + whole.points[triangle[1]] + whole.points[triangle[2]]) / 3.0f;
     if ((middle - top).norm() > 6.0f && (middle - side).norm() > 5.0f)
       torn.triangles.push_back(triangle);
   }
