@@ -50,6 +50,7 @@ constexpr int Block = 32;
 constexpr double TooBrightShare = 0.5;
 constexpr int GroupLimit = 4;
 constexpr double WorstAlone = 8.0; // chi squared
+constexpr double OwnLight = 0.15;  // of a spot's peak: what is weaker beside it is no other light
 
 // The largest excess of the frame over the floor, and the largest value of the frame.
 ECHORAMA_HOT void Largest(const std::uint8_t* frame, const std::uint8_t* floor, int count, int& excess, int& value)
@@ -561,7 +562,8 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
       for (std::size_t j = i + 1; j < result.spots.size(); ++j) {
         const GaussianSpot &a = result.spots[i], &b = result.spots[j];
         const double sizeA = ShortRadius(a.precision.inverse()), sizeB = ShortRadius(b.precision.inverse());
-        if ((a.centre - b.centre).norm() < std::max(sizeA, sizeB) || std::min(a.peak, b.peak) < 0.15 * std::max(a.peak, b.peak) ||
+        if ((a.centre - b.centre).norm() < std::max(sizeA, sizeB) ||
+            std::min(a.peak, b.peak) < OwnLight * std::max(a.peak, b.peak) ||
             std::max(sizeA, sizeB) > 2.5 * std::min(sizeA, sizeB))
           return false;
       }
@@ -580,6 +582,18 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
     if (kept.size() == result.spots.size() || kept.empty())
       break;
     starts = kept;
+    result = fit(starts);
+  }
+  // What is much weaker than a spot beside it is some of that spot's own light, which the print or the lens spread.
+  const auto weaker = [](const GaussianSpot& a, const GaussianSpot& b) { return a.peak < b.peak; };
+  const double weakest = OwnLight * std::max_element(starts.begin(), starts.end(), weaker)->peak;
+  while (starts.size() > 1 && !areApart(result)) {
+    const std::vector<GaussianSpot>& spots = result.converged ? result.spots : starts;
+    const auto [low, high] = std::minmax_element(spots.begin(), spots.end(), weaker);
+    if (result.converged && low->peak >= OwnLight * high->peak)
+      break;
+    ++out.refused;
+    starts.erase(starts.begin() + (low - spots.begin()));
     result = fit(starts);
   }
   if (starts.size() == 1 && result.converged && result.chiSquared > 1.8) {
@@ -604,6 +618,8 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
     return;
   if (starts.size() > 1) { // what cannot be told together, one by one
     for (const Candidate* candidate : group) {
+      if (candidate->starts.front().peak < weakest)
+        continue;
       GaussianSpot one = candidate->starts.front();
       if (candidate->starts.size() > 1)
         one.centre = Eigen::Vector2d(0.5 * (candidate->left + candidate->right), 0.5 * (candidate->top + candidate->bottom));
