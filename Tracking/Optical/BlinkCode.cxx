@@ -25,6 +25,7 @@ constexpr int PhasesPerSlot = 4;
 // Words differ in three slots of about ten: one wrong slot leaves a tenth, another's word a quarter, or less between two phases.
 constexpr double LeastMargin = 0.08, LeastRatio = 3.0;
 constexpr double LargestError = 0.35;   // of a light's brightness: more than this in one frame is an error
+constexpr double LeastDifference = 0.3; // of the same: less in one frame tells nothing apart
 constexpr double LargestMixture = 0.25; // of another's light, over its own, in what is one light's
 
 std::uint32_t Turned(std::uint32_t word, int by, int length)
@@ -181,25 +182,13 @@ BlinkSums SumUp(const BlinkCode& code, const BlinkTiming& timing, const std::vec
   return sums;
 }
 
-// How much of another light there is in it, over its own, if it is the light of two: the larger share of the one, or 1 where
-// the other explains more.
-double MixtureOf(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
-                 int other, double phase)
+// Whether more than one frame tells two lights apart: one may be wrong.
+bool AreToldApart(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                  int other, double phase)
 {
-  double own = 0.0, others = 0.0, both = 0.0, ofOwn = 0.0, ofOther = 0.0; // products of shares, and with what was seen
-  for (const BlinkObservation& o : seen) {
-    const double a = ShareIn(code, timing, o, light, phase), b = ShareIn(code, timing, o, other, phase);
-    own += a * a;
-    others += b * b;
-    both += a * b;
-    ofOwn += a * o.brightness;
-    ofOther += b * o.brightness;
-  }
-  const double least = own * others - both * both;
-  if (least <= 1e-6 * own * others)
-    return 0.0; // nobody can tell
-  const double amplitude = ofOwn * others - ofOther * both, otherAmplitude = ofOther * own - ofOwn * both;
-  return amplitude > 0.0 ? otherAmplitude / amplitude : 1.0;
+  return std::count_if(seen.begin(), seen.end(), [&](const BlinkObservation& o) {
+           return std::abs(ShareIn(code, timing, o, light, phase) - ShareIn(code, timing, o, other, phase)) > LeastDifference;
+         }) > 1;
 }
 
 // The largest difference in one frame, over the brightness of the light.
@@ -217,11 +206,37 @@ double LargestDifference(const BlinkCode& code, const BlinkTiming& timing, const
 
 } // namespace
 
+double BlinkAmplitude(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                      double phase)
+{
+  const BlinkSums sums = SumUp(code, timing, seen, light, phase);
+  return sums.IsDark() ? 0.0 : sums.both / sums.expected;
+}
+
 double BlinkResidual(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
                      double phase)
 {
   const BlinkSums sums = SumUp(code, timing, seen, light, phase);
   return sums.IsDark() ? 1.0 : std::clamp(1.0 - sums.both * sums.both / (sums.squares * sums.expected), 0.0, 1.0);
+}
+
+double BlinkMixture(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                    int other, double phase)
+{
+  double own = 0.0, others = 0.0, both = 0.0, ofOwn = 0.0, ofOther = 0.0; // products of shares, and with what was seen
+  for (const BlinkObservation& o : seen) {
+    const double a = ShareIn(code, timing, o, light, phase), b = ShareIn(code, timing, o, other, phase);
+    own += a * a;
+    others += b * b;
+    both += a * b;
+    ofOwn += a * o.brightness;
+    ofOther += b * o.brightness;
+  }
+  const double least = own * others - both * both;
+  if (least <= 1e-6 * own * others)
+    return 0.0; // nobody can tell
+  const double amplitude = ofOwn * others - ofOther * both, otherAmplitude = ofOther * own - ofOwn * both;
+  return amplitude > 0.0 ? otherAmplitude / amplitude : 1.0;
 }
 
 BlinkMatch MatchBlink(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen,
@@ -250,7 +265,8 @@ BlinkMatch MatchBlink(const BlinkCode& code, const BlinkTiming& timing, const st
       (limit < 1.0 && LargestDifference(code, timing, seen, best.light, best.phase) > LargestError))
     best.light = -1;
   for (int other = 0; limit < 1.0 && best.light >= 0 && other < code.Lights(); ++other)
-    if (other != best.light && MixtureOf(code, timing, seen, best.light, other, best.phase) > LargestMixture)
+    if (other != best.light && (!AreToldApart(code, timing, seen, best.light, other, best.phase) ||
+                                BlinkMixture(code, timing, seen, best.light, other, best.phase) > LargestMixture))
       best.light = -1; // two lights in one spot
   if (least > limit || rival < std::max(least + LeastMargin, LeastRatio * least))
     best.light = -1;

@@ -60,8 +60,17 @@ struct BlinkMatch {
 BlinkMatch MatchBlink(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen,
                       std::optional<double> phase, double limit = 0.15);
 
+/// How bright a light is that is on for the whole exposure, by least squares; 0 when nothing was seen of it.
+double BlinkAmplitude(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                      double phase);
+
 /// What of the brightness, squared, one light at one phase leaves unexplained, in [0, 1].
 double BlinkResidual(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
                      double phase);
+
+/// How much light of \a other there is in it, over that of \a light, if it is the light of both; 1 where it is not \a light's at
+/// all, 0 where nobody can tell.
+double BlinkMixture(const BlinkCode& code, const BlinkTiming& timing, const std::vector<BlinkObservation>& seen, int light,
+                    int other, double phase);
 
 } // namespace echorama

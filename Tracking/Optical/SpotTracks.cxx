@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Each track is a Kalman filter of constant velocity; a spot goes to the track that expects it nearest, in standard deviations,
-// if it is near at all. A light that is off where its code says so is still followed.
+// Each track is a Kalman filter of a hand's motion. A spot goes to the track that expects it nearest, in standard deviations, if
+// it is near at all.
+//
+// Lights that are known explain the spots first (SpotTracksTogether.cxx); what is left goes to tracks that are nobody's as yet.
 //
 // Identity: a track remembers the brightness of one and a half periods, 0 where it was not seen. While the phase is unknown all
 // phases are tried; it is taken when two tracks, or one track twice, agree on it, and followed from then on (clocks drift). With
 // it only as many hypotheses as lights are left. What goes on speaking against an identity revokes it. When a spot could belong
-// to two tracks, neither is anybody's until its blinking since then has told them apart: their memories are emptied.
+// to two of them, or one becomes two, their memories are emptied.
 //
 // No light is off for more than two frames, so one that was not seen in three has gone. Frames that never came do not count.
 #include "SpotTracks.h"
@@ -35,15 +37,17 @@ ParameterList Describe(SpotTracksParameters& p)
 
 namespace {
 
-constexpr double Gate = 20.0;       // squared standard deviations
-constexpr double Doubt = 16.0;      // the same: a second track that is as near as this, and no more further than the first
-constexpr double ModelSigma = 0.05; // px: what positions lack beyond their own noise
 constexpr double IdentifyLimit = 0.15;
-constexpr double RevokeLimit = 0.4;
-constexpr double DarkShare = 0.1;      // less than this of the exposure is off
-constexpr double Unexpected = 9.0;     // what it costs a track to be given a spot while its light is off
+constexpr double RevokeLimit = 0.4, RevokeMixture = 0.5;
+constexpr double LongerBy = 0.08;      // a light's spot does not become longer by this in a frame or two
+constexpr double NobodysDoubt = 0.2;   // of the place of a spot that is nobody's, over its size
+constexpr double LargestDoubt = 0.5;   // standard deviation of a place that is not seen, over the size: for a claim,
+constexpr double NoPlace = 1.0;        // for an identity, which then has to be proven anew,
+constexpr double LostPlace = 3.0;      // and to be followed
+constexpr double PartReach = 5.0;      // sizes: how far from each other two may be that were one in the frame before
 constexpr std::size_t LeastSeen = 5;   // frames before an identity, with the phase known
 constexpr std::size_t Established = 3; // times seen
+constexpr int SeenForSpeed = 2;        // frames
 constexpr int LostAfter = 3;           // frames
 constexpr std::size_t Remembered = 32; // states, for the statistics
 constexpr std::size_t TrackLimit = 64;
@@ -79,35 +83,90 @@ SpotTracks::SpotTracks(const SpotTracksParameters& parameters, BlinkCode code)
   if (parameters.triggered)
     phase_ = 0.0;
   lights_.resize(static_cast<std::size_t>(code_.Lights()));
+  evidence_.assign(lights_.size() * lights_.size(), HUGE_VAL);
+  crosses_.assign(lights_.size() * lights_.size(), HandCovariance::Zero());
   for (std::size_t i = 0; i < lights_.size(); ++i)
     lights_[i].light = static_cast<int>(i);
 }
 
-void SpotTracks::Move(Motion& motion, double time) const
+HandCovariance& SpotTracks::Cross(int light, int other)
 {
-  const double t = time - motion.time;
-  Eigen::Matrix4d step = Eigen::Matrix4d::Identity();
-  step(0, 2) = step(1, 3) = t;
-  motion.state = step * motion.state;
-  motion.covariance = step * motion.covariance * step.transpose();
-  const double power = parameters_.acceleration * parameters_.acceleration * parameters_.frameMs * 1e-3; // of white acceleration
-  const double a = std::abs(t);
-  for (int axis = 0; axis < 2; ++axis) {
-    motion.covariance(axis, axis) += power * a * a * a / 3.0;
-    motion.covariance(axis, axis + 2) += power * a * a / 2.0;
-    motion.covariance(axis + 2, axis) += power * a * a / 2.0;
-    motion.covariance(axis + 2, axis + 2) += power * a;
-  }
-  motion.time = time;
+  return crosses_[static_cast<std::size_t>(light * code_.Lights() + other)];
+}
+
+HandCovariance SpotTracks::CovarianceOf(const Track& a, const Track& b) const
+{
+  if (&a == &b)
+    return a.covariance;
+  if (a.light < 0 || b.light < 0)
+    return HandCovariance::Zero();
+  return crosses_[static_cast<std::size_t>(a.light * code_.Lights() + b.light)];
 }
 
 SpotTracks::Motion SpotTracks::Moved(const Motion& motion, double time) const
 {
-  Motion moved = motion;
-  Move(moved, time);
-  return moved;
+  const HandMotion hand(time - motion.time, parameters_.acceleration);
+  return {hand.step * motion.state, hand.step * motion.covariance * hand.step.transpose() + hand.noise, time};
 }
 
+void SpotTracks::Move(Track& track, double time)
+{
+  const HandMotion hand(time - track.time, parameters_.acceleration);
+  track.state = hand.step * track.state;
+  track.covariance = hand.step * track.covariance * hand.step.transpose() + hand.noise;
+  track.time = time;
+  for (int other = 0; track.light >= 0 && other < code_.Lights(); ++other)
+    if (other != track.light) {
+      Cross(track.light, other) = hand.step * Cross(track.light, other);
+      Cross(other, track.light) = Cross(track.light, other).transpose();
+    }
+}
+
+// Of the mean of the places of parts.
+Eigen::Matrix2d SpotTracks::SpreadOf(const std::vector<Part>& parts) const
+{
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  for (const Part& a : parts)
+    for (const Part& b : parts)
+      spread += a.weight * b.weight * CovarianceOf(*a.track, *b.track).topLeftCorner<2, 2>();
+  return spread;
+}
+
+// The mean of the places of \a parts was seen at \a place: a step of the filter of all lights.
+void SpotTracks::Measure(const std::vector<Part>& parts, const Eigen::Vector2d& place, const Eigen::Matrix2d& noise)
+{
+  Eigen::Vector2d off = place;
+  for (const Part& part : parts)
+    off -= part.weight * part.track->state.head<2>();
+  const Eigen::Matrix2d precision = (SpreadOf(parts) + noise).inverse();
+  struct Gain {
+    Track* track;
+    Eigen::Matrix<double, 6, 2> shared; // covariance of its state and the mean
+  };
+  std::vector<Gain> gains;
+  for (Track& track : tracks_) {
+    const bool isPart = std::any_of(parts.begin(), parts.end(), [&](const Part& part) { return part.track == &track; });
+    if (!isPart && (track.light < 0 || parts.front().track->light < 0))
+      continue;
+    Gain gain{&track, Eigen::Matrix<double, 6, 2>::Zero()};
+    for (const Part& part : parts)
+      gain.shared += part.weight * CovarianceOf(track, *part.track).leftCols<2>();
+    gains.push_back(gain);
+  }
+  for (const Gain& gain : gains) {
+    const Eigen::Matrix<double, 6, 2> step = gain.shared * precision;
+    gain.track->state += step * off;
+    for (const Gain& other : gains) {
+      if (other.track == gain.track) {
+        const HandCovariance rest = gain.track->covariance - step * gain.shared.transpose();
+        gain.track->covariance = 0.5 * (rest + rest.transpose());
+      } else
+        Cross(gain.track->light, other.track->light) -= step * other.shared.transpose();
+    }
+  }
+}
+
+// The spot is the track's alone.
 void SpotTracks::Correct(Track& track, const Spot& spot, double time)
 {
   // How well it would have been foretold: from the newest state that the latency would have allowed.
@@ -116,61 +175,111 @@ void SpotTracks::Correct(Track& track, const Spot& spot, double time)
     if (past->first <= known) {
       if (known - past->first > 1e-3 * parameters_.frameMs)
         break; // it was not seen then
-      const Eigen::Vector2d from = past->second.head<2>(), ahead = from + (time - past->first) * past->second.tail<2>();
-      predictionSquares_ += (ahead - spot.position).squaredNorm();
-      holdSquares_ += (from - spot.position).squaredNorm();
+      const HandState ahead = HandMotion(time - past->first, parameters_.acceleration).step * past->second;
+      predictionSquares_ += (ahead.head<2>() - spot.position).squaredNorm();
+      holdSquares_ += (past->second.head<2>() - spot.position).squaredNorm();
       ++statistics_.predictions;
       break;
     }
 
   Move(track, time);
-  const Eigen::Matrix2d noise = spot.covariance + Eigen::Matrix2d::Identity() * ModelSigma * ModelSigma;
-  const Eigen::Matrix2d innovation = track.covariance.topLeftCorner<2, 2>() + noise;
-  const Eigen::Matrix<double, 4, 2> gain = track.covariance.leftCols<2>() * innovation.inverse();
-  track.state += gain * (spot.position - track.state.head<2>());
-  const Eigen::Matrix4d rest = track.covariance - gain * track.covariance.topRows<2>();
-  track.covariance = 0.5 * (rest + rest.transpose());
+  // Of what is nobody's neither is known whether it is one, nor how it was switched meanwhile.
+  const double doubt = track.light < 0 ? std::max(LongerThan(track, spot, 0.0), NobodysDoubt) * spot.size : 0.0;
+  Measure({{&track, 1.0}}, spot.position,
+          spot.covariance + Eigen::Matrix2d::Identity() * (ModelSigma * ModelSigma + doubt * doubt));
   track.spot = spot;
   track.lastSeen = time;
+  track.unseen = 0;
+  track.isMerged = false;
+  ++track.alone;
+  track.strange = 0.0;
+  track.length = std::min(LengthGrows * track.length, spot.size * std::sqrt(spot.elongation));
   track.past.emplace_back(time, track.state);
   if (track.past.size() > Remembered)
     track.past.pop_front();
 }
 
-double SpotTracks::ExpectedShare(const Track& track, double time, double row) const
+// How much longer a spot is than the track's have been of late, which two that touch are: the distance between both over the size
+// of one, or 0. As many sigmas of its noise do not count.
+double SpotTracks::LongerThan(const Track& track, const Spot& spot, double sigmas) const
+{
+  const double blur = track.state.segment<2>(2).norm() * timing_.exposure / spot.size; // of what moves meanwhile
+  const double ratio = spot.size * std::sqrt(spot.elongation) / (track.length * std::sqrt(1.0 + blur * blur / 12.0));
+  return ratio > 1.0 + LongerBy + sigmas * spot.peakSigma / spot.peak ? std::sqrt(ratio * ratio - 1.0) : 0.0;
+}
+
+// It is nobody's any more, and has to be told anew.
+void SpotTracks::Release(Track& track)
+{
+  for (int other = 0; track.light >= 0 && other < code_.Lights(); ++other) {
+    Cross(track.light, other) = Cross(other, track.light) = HandCovariance::Zero();
+    Evidence(track.light, other) = HUGE_VAL;
+  }
+  track.light = -1;
+  track.seen.clear();
+}
+
+void SpotTracks::Remember(Track& track, double begin, double brightness)
+{
+  track.seen.push_back({begin, brightness});
+  if (track.seen.size() > window_)
+    track.seen.erase(track.seen.begin());
+}
+
+// \param later how much later than the phase has it everything begins, slots
+double SpotTracks::ExpectedShare(const Track& track, double time, double row, double later) const
 {
   if (track.light < 0 || !phase_)
     return 1.0;
-  const double from = (RowTime(time, row) - *phase_) / timing_.slot;
+  const double from = (RowTime(time, row) - *phase_) / timing_.slot - later;
   return code_.OnShare(track.light, from, from + timing_.exposure / timing_.slot);
+}
+
+// Squared standard deviations of a spot from where a track expects it; HUGE_VAL when it cannot be there.
+double SpotTracks::DistanceFrom(const Track& track, const Spot& spot, double time) const
+{
+  const double when = MiddleOf(time, spot.position.y());
+  if ((spot.position - track.spot.position).norm() > parameters_.maximumSpeed * (when - track.lastSeen) + 2.0)
+    return HUGE_VAL;
+  const Motion moved = Moved(track, when);
+  const Eigen::Vector2d off = spot.position - moved.state.head<2>();
+  const Eigen::Matrix2d spread = moved.covariance.topLeftCorner<2, 2>() + spot.covariance + Eigen::Matrix2d::Identity() * 0.25;
+  const double distance = off.dot(spread.inverse() * off);
+  return distance > Gate ? HUGE_VAL : distance;
 }
 
 void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
 {
+  std::vector<bool> taken(spots.size(), false);
+  ExplainByLights(time, spots, taken);
+  TellApart();
+  for (Track& track : tracks_)
+    if (track.light >= 0 && DoubtOf(track) > LostPlace)
+      Release(track);
+    else if (track.light >= 0 && track.isProven && DoubtOf(track) > NoPlace) {
+      track.isProven = false;
+      track.seen.clear();
+    }
+
   struct Pair {
-    double cost, distance;
+    double distance;
     std::size_t track, spot;
   };
   std::vector<Pair> pairs;
-  const double half = 0.5 * timing_.exposure;
+  std::vector<bool> isHidden(tracks_.size(), false); // behind a light: what there is to see may be its own, too
   for (std::size_t t = 0; t < tracks_.size(); ++t)
-    for (std::size_t s = 0; s < spots.size(); ++s) {
-      const double when = RowTime(time, spots[s].position.y()) + half;
-      const Motion moved = Moved(tracks_[t], when);
-      const Eigen::Vector2d off = spots[s].position - moved.state.head<2>();
-      const double reach = parameters_.maximumSpeed * (when - tracks_[t].lastSeen) + 2.0;
-      if ((spots[s].position - tracks_[t].spot.position).norm() > reach)
-        continue;
-      const Eigen::Matrix2d spread =
-          moved.covariance.topLeftCorner<2, 2>() + spots[s].covariance + Eigen::Matrix2d::Identity() * 0.25;
-      const double distance = off.dot(spread.inverse() * off);
+    for (std::size_t s = 0; s < spots.size() && tracks_[t].light < 0; ++s) {
+      const double distance = DistanceFrom(tracks_[t], spots[s], time);
       if (distance > Gate)
         continue;
-      const bool isOff = ExpectedShare(tracks_[t], time, spots[s].position.y()) < DarkShare;
-      pairs.push_back({distance + (isOff ? Unexpected : 0.0), distance, t, s});
+      if (taken[s])
+        isHidden[t] = true;
+      else
+        pairs.push_back({distance, t, s});
     }
-  std::sort(pairs.begin(), pairs.end(),
-            [](const Pair& a, const Pair& b) { return std::tie(a.cost, a.track, a.spot) < std::tie(b.cost, b.track, b.spot); });
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
+    return std::tie(a.distance, a.track, a.spot) < std::tie(b.distance, b.track, b.spot);
+  });
 
   std::vector<int> spotOf(tracks_.size(), -1), trackOf(spots.size(), -1);
   for (const Pair& pair : pairs)
@@ -184,54 +293,65 @@ void SpotTracks::Assign(double time, const std::vector<Spot>& spots)
     const int taker = trackOf[other.spot];
     if (taker < 0 || taker == static_cast<int>(other.track))
       continue;
-    const auto taken = std::find_if(pairs.begin(), pairs.end(),
-                                    [&](const Pair& p) { return p.spot == other.spot && static_cast<int>(p.track) == taker; });
-    if (tracks_[other.track].light < 0 && tracks_[other.track].past.size() < Established)
+    const auto its = std::find_if(pairs.begin(), pairs.end(),
+                                  [&](const Pair& p) { return p.spot == other.spot && static_cast<int>(p.track) == taker; });
+    if (tracks_[other.track].past.size() < Established)
       continue; // a sparkle that was here a moment ago
-    if (other.distance < taken->distance + Doubt)
+    if (other.distance < its->distance + Doubt)
       doubted[other.track] = doubted[static_cast<std::size_t>(taker)] = true;
   }
 
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     Track& track = tracks_[t];
-    if (doubted[t]) {
-      statistics_.doubted += track.light >= 0;
-      track.light = -1;
+    if (track.light >= 0)
+      continue;
+    if (doubted[t])
       track.seen.clear();
-    }
     if (spotOf[t] >= 0) {
       const Spot& spot = spots[static_cast<std::size_t>(spotOf[t])];
-      Correct(track, spot, RowTime(time, spot.position.y()) + half);
-      track.unseen = 0;
-      if (!doubted[t])
-        track.seen.push_back({RowTime(time, spot.position.y()), spot.Brightness()});
+      const bool isLonger = LongerThan(track, spot, 2.0) > 0.0;
+      Correct(track, spot, MiddleOf(time, spot.position.y()));
+      if (!doubted[t] && !isLonger)
+        Remember(track, RowTime(time, spot.position.y()), spot.Brightness());
     } else {
       ++track.unseen;
       const double row = track.state.y();
-      Move(track, RowTime(time, row) + half);
-      if (!doubted[t])
-        track.seen.push_back({RowTime(time, row), 0.0});
+      Move(track, MiddleOf(time, row));
+      if (!doubted[t] && !isHidden[t])
+        Remember(track, RowTime(time, row), 0.0);
     }
-    if (track.seen.size() > window_)
-      track.seen.erase(track.seen.begin());
   }
-  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), [](const Track& t) { return t.unseen >= LostAfter; }),
-                tracks_.end());
+  RemoveLost();
 
   for (std::size_t s = 0; s < spots.size(); ++s) {
-    if (trackOf[s] >= 0 || tracks_.size() >= TrackLimit)
+    if (taken[s] || trackOf[s] >= 0 || tracks_.size() >= TrackLimit)
       continue;
     Track track;
-    track.state << spots[s].position, 0.0, 0.0;
+    track.state << spots[s].position, Eigen::Vector4d::Zero();
     track.covariance.topLeftCorner<2, 2>() = spots[s].covariance + Eigen::Matrix2d::Identity() * ModelSigma * ModelSigma;
-    const double speed = 0.35 * parameters_.maximumSpeed;
-    track.covariance(2, 2) = track.covariance(3, 3) = speed * speed;
-    track.time = track.lastSeen = RowTime(time, spots[s].position.y()) + half;
+    track.covariance.diagonal().segment<2>(2).setConstant(std::pow(0.35 * parameters_.maximumSpeed, 2));
+    track.covariance.diagonal().tail<2>().setConstant(std::pow(parameters_.acceleration, 2));
+    track.time = track.lastSeen = MiddleOf(time, spots[s].position.y());
     track.spot = spots[s];
-    track.seen.push_back({RowTime(time, spots[s].position.y()), spots[s].Brightness()});
+    track.length = spots[s].size * std::sqrt(spots[s].elongation);
+    Remember(track, RowTime(time, spots[s].position.y()), spots[s].Brightness());
     track.past.emplace_back(track.time, track.state);
+    // Where one becomes two, nobody knows which of both it was before, nor whose its light was.
+    for (Track& other : tracks_)
+      if (other.light < 0 && other.unseen == 0 &&
+          (other.spot.position - track.spot.position).norm() < PartReach * std::max(other.spot.size, track.spot.size))
+        other.seen.clear();
     tracks_.push_back(std::move(track));
   }
+}
+
+void SpotTracks::RemoveLost()
+{
+  for (Track& track : tracks_)
+    if (track.unseen >= LostAfter)
+      Release(track);
+  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), [](const Track& t) { return t.unseen >= LostAfter; }),
+                tracks_.end());
 }
 
 void SpotTracks::Identify(Track& track)
@@ -241,10 +361,15 @@ void SpotTracks::Identify(Track& track)
     // Another light explains it better, or nothing does.
     const BlinkMatch match = MatchBlink(code_, timing_, track.seen, phase_, 1.0);
     const double own = BlinkResidual(code_, timing_, track.seen, track.light, *phase_);
-    if (own > RevokeLimit || (match.light >= 0 && match.light != track.light)) {
+    bool isMixed = false;
+    for (int other = 0; other < code_.Lights(); ++other)
+      isMixed = isMixed || (other != track.light && track.seen.size() >= LeastSeen &&
+                            BlinkMixture(code_, timing_, track.seen, track.light, other, *phase_) > RevokeMixture);
+    if (!track.isProven && track.seen.size() >= LeastSeen)
+      track.isProven = MatchBlink(code_, timing_, track.seen, phase_, IdentifyLimit).light == track.light;
+    if (isMixed || own > RevokeLimit || (match.light >= 0 && match.light != track.light)) {
       ++statistics_.revoked;
-      track.light = -1;
-      track.seen.clear();
+      Release(track);
     }
     return;
   }
@@ -257,13 +382,15 @@ void SpotTracks::Identify(Track& track)
     if (match.light >= 0) {
       for (Track& other : tracks_)
         if (&other != &track && other.light == match.light) { // one of both is a mirror image, or has been exchanged
-          other.light = -1;
-          other.seen.clear();
+          Release(other);
           track.seen.clear();
           ++statistics_.revoked;
           return;
         }
       track.light = match.light;
+      track.isProven = true;
+      track.alone = 0;
+      track.amplitude = BlinkAmplitude(code_, timing_, track.seen, track.light, *phase_);
       ++statistics_.identified;
       return;
     }
@@ -313,20 +440,34 @@ void SpotTracks::RefinePhase()
   phase_ = Wrapped(*phase_ + 0.2 * best * timing_.slot, period);
 }
 
+// Of the place of a light that was last seen together with others, over the size of its spot.
+double SpotTracks::DoubtOf(const Track& track)
+{
+  const double sigma = std::sqrt(0.5 * track.covariance.topLeftCorner<2, 2>().trace());
+  return track.isMerged ? std::hypot(sigma / track.spot.size, track.strange) : 0.0;
+}
+
+// Where it is when it is not seen is only known of a light that was seen alone several times before.
+bool SpotTracks::IsSpeedUnknown(const Track& track)
+{
+  return track.unseen > 0 && !track.isMerged && track.alone < SeenForSpeed;
+}
+
 void SpotTracks::Report(double time)
 {
   for (TrackedLight& light : lights_) {
     light.status = TrackedLight::Status::Lost;
     for (const Track& track : tracks_) {
-      if (track.light != light.light)
+      if (track.light != light.light || !track.isProven || !IsToldApart(track) || IsSpeedUnknown(track) ||
+          DoubtOf(track) > LargestDoubt)
         continue;
-      light.status = track.unseen == 0 ? TrackedLight::Status::Seen : TrackedLight::Status::Predicted;
+      light.status = track.unseen == 0 && !track.isMerged ? TrackedLight::Status::Seen : TrackedLight::Status::Predicted;
       light.time = track.time;
       light.position = track.state.head<2>();
-      light.velocity = track.state.tail<2>();
+      light.velocity = track.state.segment<2>(2);
       light.covariance = track.covariance.topLeftCorner<2, 2>();
       light.spot = track.spot;
-      const Motion ahead = Moved(track, RowTime(time, track.state.y()) + 0.5 * timing_.exposure + parameters_.latencyMs * 1e-3);
+      const Motion ahead = Moved(track, MiddleOf(time, track.state.y()) + parameters_.latencyMs * 1e-3);
       light.predicted = ahead.state.head<2>();
       light.predictedCovariance = ahead.covariance.topLeftCorner<2, 2>();
     }
@@ -339,15 +480,16 @@ const std::vector<TrackedLight>& SpotTracks::Update(double time, const std::vect
     throw Error(Error::Kind::BadInput, "the time of a frame, " + NumberText(time) + " s, is not after that of the one before");
   // After a long pause nothing is where it was.
   if (lastTime_ && time - *lastTime_ > 5e-3 * parameters_.frameMs)
-    tracks_.clear();
+    for (Track& track : tracks_)
+      track.unseen = LostAfter;
+  RemoveLost();
   lastTime_ = time;
   ++statistics_.frames;
   if (isBlind) {
     ++statistics_.blindFrames;
     for (Track& track : tracks_)
       ++track.unseen;
-    tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), [](const Track& t) { return t.unseen >= LostAfter; }),
-                  tracks_.end());
+    RemoveLost();
   } else {
     Assign(time, spots);
     for (Track& track : tracks_)
@@ -366,7 +508,7 @@ std::optional<Eigen::Vector2d> SpotTracks::Predict(int light, double time) const
 {
   for (const Track& track : tracks_)
     if (track.light == light && light >= 0)
-      return Eigen::Vector2d(track.state.head<2>() + (time - track.time) * track.state.tail<2>());
+      return Eigen::Vector2d(Moved(track, time).state.head<2>());
   return std::nullopt;
 }
 
@@ -375,8 +517,7 @@ std::vector<std::pair<int, int>> SpotTracks::DarkRows(double time, int height) c
   std::vector<std::pair<int, int>> rows;
   if (!phase_ || code_.OffSlots() == 0)
     return rows;
-  // Edges of slots are only known to a tenth of a slot.
-  const double margin = parameters_.triggered ? 0.0 : 0.1;
+  const double margin = parameters_.triggered ? 0.0 : PhaseError;
   const double exposure = timing_.exposure / timing_.slot;
   const auto isDark = [&](int row) {
     const double from = (RowTime(time, row) - *phase_) / timing_.slot;

@@ -4,6 +4,7 @@
 // simulated camera: whose light it is, what is claimed without a light, and how far off positions are that are predicted.
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Percentile.h"
+#include "Core/Base/Random.h"
 #include "Testing/Benchmark.h"
 #include "Tracking/Optical/LightTracker.h"
 #include "Tracking/Optical/SimulatedCamera.h"
@@ -177,15 +178,15 @@ void Times()
   }
 }
 
-// A shell with two lights.
+// A shell with lights.
 struct Rig {
   SimulatedCameraParameters camera;
   SpotTracksParameters tracks;
   DomeSurface dome{{110.0, 95.0, 90.0}};
-  BlinkCode code = BlinkCode::Make(2, 2);
+  BlinkCode code;
   double phase = 0.0047, slot = Frame;
 
-  explicit Rig(int width, int height)
+  Rig(int width, int height, int lights = 2) : code(BlinkCode::Make(lights, 2))
   {
     const double scale = width / 640.0;
     camera.lens.width = width;
@@ -206,23 +207,34 @@ struct Rig {
 };
 
 struct Tally {
-  int frames = 0, reported = 0, wrong = 0, claims = 0, lost = 0;
+  int frames = 0, visible = 0, reported = 0, wrong = 0, claims = 0, lost = 0;
   double seconds = 0.0;
 };
 
 // Lights that meet and part, are lifted off now and then, and lost frames; half of the sensor's rows, so that 10^5 frames take
 // minutes.
-Tally Identities(Rig& rig, int frames, bool withLights)
+// \param seed of the camera, and above 1 of paths and brightness
+Tally Identities(Rig& rig, int frames, int count, std::uint64_t seed = 1)
 {
+  rig.camera.seed = seed;
   const SimulatedCamera camera(rig.camera, rig.dome, Pose::Identity());
+  struct Way {
+    double rateX, startX, rateY, startY, liftEvery, peak;
+  };
+  std::vector<Way> ways{{1.9, 0.0, 1.31, 1.0, 7.0, 160.0},
+                        {1.13, 2.0, 1.73, 0.5 * M_PI, 11.0, 140.0},
+                        {1.51, 0.3, 1.07, 2.2, 9.0, 150.0},
+                        {1.27, 4.0, 1.83, 0.7, 13.0, 120.0}};
+  Random random(99, seed);
   std::vector<SimulatedLight> lights;
-  if (withLights) {
+  for (int i = 0; i < count; ++i) {
+    Way& w = ways[static_cast<std::size_t>(i)];
+    if (seed > 1)
+      w = {random.Uniform(1.0, 2.0),  random.Uniform(0.0, 6.28), random.Uniform(1.0, 2.0),
+           random.Uniform(0.0, 6.28), random.Uniform(6.0, 14.0), random.Uniform(110.0, 170.0)};
     lights.push_back(rig.Light(
-        0, [](double t) { return Vector2d(35.0 * std::sin(1.9 * t), 30.0 * std::sin(1.31 * t + 1.0)); },
-        [](double t) { return std::fmod(t, 7.0) < 0.5 ? 0.0 : 160.0; }));
-    lights.push_back(rig.Light(
-        1, [](double t) { return Vector2d(35.0 * std::sin(1.13 * t + 2.0), 30.0 * std::cos(1.73 * t)); },
-        [](double t) { return std::fmod(t, 11.0) < 0.5 ? 0.0 : 140.0; }));
+        i, [w](double t) { return Vector2d(35.0 * std::sin(w.rateX * t + w.startX), 30.0 * std::sin(w.rateY * t + w.startY)); },
+        [w](double t) { return std::fmod(t, w.liftEvery) < 0.5 ? 0.0 : w.peak; }));
   }
   LightTracker tracker({}, rig.tracks, rig.code);
   SimulatedFrame frame;
@@ -235,12 +247,14 @@ Tally Identities(Rig& rig, int frames, bool withLights)
     ++tally.frames;
     tally.seconds += benchmark::Seconds([&] { tracker.Update(frame.Grey(), frame.begin); });
     for (const TrackedLight& light : tracker.Lights()) {
+      if (count > 0)
+        tally.visible += frame.truth[static_cast<std::size_t>(light.light)].isVisible;
       if (light.status == TrackedLight::Status::Lost) {
         ++tally.lost;
         continue;
       }
       ++tally.reported;
-      if (!withLights) {
+      if (count == 0) {
         ++tally.claims;
         continue;
       }
@@ -262,6 +276,7 @@ void ReportChain(const std::string& name, const Tally& tally)
                          {"wrong", tally.wrong},
                          {"claims", tally.claims},
                          {"reported", tally.reported},
+                         {"visible", tally.visible},
                          {"lost", tally.lost}});
 }
 
@@ -271,11 +286,36 @@ void Latency()
   Rig rig(640, 480);
   const SimulatedCamera camera(rig.camera, rig.dome, Pose::Identity());
   const auto always = [](double) { return 160.0; };
-  for (const double radius : {25.0, 50.0}) {
-    const double rate = 200.0 / radius;
+  struct Path {
+    std::string name;
+    std::function<Vector2d(double)> at;
+  };
+  const auto circle = [](double radius) {
+    return [=](double t) { return Vector2d(radius * std::cos(200.0 / radius * t), radius * std::sin(200.0 / radius * t)); };
+  };
+  // Of hands: a hand's tremor over strokes of least jerk with rests between, back and forth, braked within 30 ms, at rest.
+  const auto tremor = [](double t) { return Vector2d(0.1 * std::sin(56.5 * t), 0.1 * std::cos(60.5 * t)); };
+  const auto stroke = [](double t) {
+    const auto corner = [](double n) { return Vector2d(35.0 * std::sin(2.4 * n), 30.0 * std::sin(1.7 * n + 1.0)); };
+    const double n = std::floor(t / 0.9), s = std::min((t - 0.9 * n) / 0.65, 1.0);
+    return Vector2d(corner(n) + (corner(n + 1.0) - corner(n)) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s));
+  };
+  const auto braked = [](double t) {
+    const double n = std::floor(t), u = t - n, w = std::clamp(u - 0.5, 0.0, 0.03);
+    const double way = u < 0.1 ? 1000.0 * u * u : u < 0.5 ? 10.0 + 200.0 * (u - 0.1) : 90.0 + 200.0 * w - 3333.3 * w * w;
+    return Vector2d(-46.0 + (std::fmod(n, 2.0) == 0.0 ? way : 93.0 - way), 10.0);
+  };
+  for (const Path& path :
+       {Path{"200 mm/s on a circle of 25 mm", circle(25.0)}, Path{"200 mm/s on a circle of 50 mm", circle(50.0)},
+        Path{"strokes and rests", [=](double t) { return Vector2d(stroke(t) + tremor(t)); }},
+        Path{"back and forth, 2 Hz, 16 mm",
+             [=](double t) { return Vector2d(Vector2d(16.0 * std::sin(12.57 * t), 0.0) + tremor(t)); }},
+        Path{"back and forth, 4 Hz, 8 mm",
+             [=](double t) { return Vector2d(Vector2d(8.0 * std::sin(25.13 * t), 0.0) + tremor(t)); }},
+        Path{"200 mm/s, braked in 30 ms", [=](double t) { return Vector2d(braked(t) + tremor(t)); }},
+        Path{"at rest", [=](double t) { return tremor(t); }}}) {
     const std::vector<SimulatedLight> lights{
-        rig.Light(
-            0, [=](double t) { return Vector2d(radius * std::cos(rate * t), radius * std::sin(rate * t)); }, always),
+        rig.Light(0, path.at, always),
         rig.Light(
             1, [=](double t) { return Vector2d(15.0 * std::cos(1.5 * t) + 60.0, -50.0 + 15.0 * std::sin(1.5 * t)); }, always)};
     LightTracker tracker({}, rig.tracks, rig.code);
@@ -301,9 +341,8 @@ void Latency()
     }
     if (predicted.empty())
       continue;
-    const std::string name = "200 mm/s on a circle of " + std::to_string(static_cast<int>(radius)) + " mm";
     const auto report = [&](const char* method, const std::vector<double>& errors) {
-      benchmark::Report("spots", name, method, seconds / frames, Percentile(errors, 0.95), "mm",
+      benchmark::Report("spots", path.name, method, seconds / frames, Percentile(errors, 0.95), "mm",
                         {{"group", "latency"},
                          {"median", Percentile(errors, 0.5)},
                          {"largest", Percentile(errors, 1.0)},
@@ -338,19 +377,29 @@ int main()
   {
     const ThreadLimit one(1); // the chain at full size, on one core
     Rig rig(640, 480);
-    ReportChain("chain, two lights, 640 x 480", Identities(rig, benchmark::Trials(1500), true));
+    ReportChain("chain, two lights, 640 x 480", Identities(rig, benchmark::Trials(1500), 2));
   }
-  for (const bool rolling : {false, true}) {
-    Rig rig(320, 240);
+  struct Run {
+    std::string name;
+    int lights, frames;
+    bool rolling;
+    std::uint64_t seed;
+  };
+  for (const Run& run :
+       {Run{"10^5 frames", 2, 100000, false, 1}, Run{"10^5 frames, rolling shutter", 2, 100000, true, 1},
+        Run{"10^5 frames, other paths", 2, 100000, false, 2},
+        Run{"10^5 frames, other paths, rolling shutter", 2, 100000, true, 3}, Run{"10^4 frames, four lights", 4, 10000, false, 1},
+        Run{"10^4 frames, four lights, rolling shutter", 4, 10000, true, 2}}) {
+    Rig rig(320, 240, run.lights);
     rig.camera.lostFrames = 0.01;
     rig.slot = Frame * (1.0 + 20e-6); // clocks that differ
-    if (rolling) {
+    if (run.rolling) {
       rig.camera.rowUs = rig.tracks.rowUs = 45.0;
       rig.camera.exposureMs = rig.tracks.exposureMs = 5.0;
     }
-    ReportChain(rolling ? "10^5 frames, rolling shutter" : "10^5 frames", Identities(rig, benchmark::Trials(100000), true));
+    ReportChain(run.name, Identities(rig, benchmark::Trials(run.frames), run.lights, run.seed));
   }
   Rig dark(320, 240);
   dark.camera.hotPixels = 100;
-  ReportChain("10^5 frames without a light", Identities(dark, benchmark::Trials(100000), false));
+  ReportChain("10^5 frames without a light", Identities(dark, benchmark::Trials(100000), 0));
 }
