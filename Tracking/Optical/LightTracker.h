@@ -25,7 +25,11 @@ public:
   const SpotTracks& Tracks() const { return tracks_; }
 
 private:
+  double OnShare(const TrackedLight& light, double time) const; // of its exposure
+
   SpotDetector detector_;
+  BlinkCode code_;
+  SpotTracksParameters timing_;
   SpotTracks tracks_;
   BrightnessCalibration brightness_;
   LightsOffBackground background_;
