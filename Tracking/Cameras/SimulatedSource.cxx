@@ -6,6 +6,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Tracking/Cameras/RestUntil.h"
+#include "Tracking/Optical/SurfaceFile.h"
 #include <algorithm>
 #include <cmath>
 
@@ -50,12 +51,6 @@ Eigen::Vector2d PathPlace(const SimulatedSourceParameters& p, int light, double 
   return centre;
 }
 
-std::shared_ptr<const SeenSurface> DomeOf(const SimulatedSourceParameters& p)
-{
-  CheckRanges(p);
-  return std::make_shared<DomeSurface>(p.domeMm);
-}
-
 std::vector<SimulatedLight> LightsOf(const SimulatedSourceParameters& p, const std::shared_ptr<const SeenSurface>& skin)
 {
   std::vector<SimulatedLight> lights;
@@ -81,7 +76,11 @@ std::vector<SimulatedLight> LightsOf(const SimulatedSourceParameters& p, const s
 ParameterList Describe(SimulatedSourceParameters& p)
 {
   return Join(
-      {{Parameter("DomeMm", p.domeMm, {1, 10000}, "mm", "Radii of the skin, a half ellipsoid about the origin."),
+      {{Parameter(
+            "Surface", p.surface,
+            "A file of echorama calibrate surface, whose camera, skin, lights and times are simulated; what other options say "
+            "of these is ignored. None: a dome."),
+        Parameter("DomeMm", p.domeMm, {1, 10000}, "mm", "Radii of the skin, a half ellipsoid about the origin."),
         Parameter("CameraMm", p.cameraMm, {-10000, 10000}, "mm", "Where the camera is; it looks along z."),
         Parameter("CameraTurn", p.cameraTurn, {-360, 360}, "degrees", "How it is turned: an axis times an angle."),
         Parameter("Lights", p.lights, {1, 4}, "", "How many lights there are."),
@@ -134,10 +133,32 @@ SimulatedSource::SimulatedSource(const SimulatedSourceParameters& parameters, st
   CheckRanges(parameters_);
 }
 
-SimulatedSource::SimulatedSource(const SimulatedSourceParameters& parameters)
-  : SimulatedSource(parameters, DomeOf(parameters), {})
+SimulatedSource::SimulatedSource(const SimulatedSourceParameters& parameters) : SimulatedSource(SceneOf(parameters)) {}
+
+SimulatedSource::SimulatedSource(const Scene& scene)
+  : SimulatedSource(scene.parameters, scene.skin, LightsOf(scene.parameters, scene.skin))
 {
-  lights_ = LightsOf(parameters_, skin_);
+}
+
+// The residual of the lens is left out: a camera like that one, not that one.
+SimulatedSource::Scene SimulatedSource::SceneOf(SimulatedSourceParameters p)
+{
+  CheckRanges(p);
+  if (p.surface.empty())
+    return {p, std::make_shared<DomeSurface>(p.domeMm)};
+  const CalibratedSurface surface = ReadSurface(p.surface);
+  if (surface.lights.alternating)
+    throw Error(Error::Kind::InvalidParameter, p.surface + ": its lights take turns, which is not simulated");
+  const SurfaceMapState& state = surface.map.State();
+  p.camera.lens = state.optics.lens;
+  p.cameraMm = state.cameraToShell.translation();
+  p.cameraTurn = DegreesPerRadian * LogRotation(state.cameraToShell.linear());
+  p.lights = surface.lights.lights;
+  p.offSlots = surface.lights.offSlots;
+  p.camera.frameRate = 1000.0 / surface.tracks.slotMs;
+  p.camera.exposureMs = surface.tracks.exposureMs;
+  p.camera.rowUs = surface.tracks.rowUs;
+  return {p, surface.map.Skin()};
 }
 
 CameraFormat SimulatedSource::Open()

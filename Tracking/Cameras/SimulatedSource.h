@@ -5,6 +5,7 @@
 #include "Tracking/Optical/BlinkCode.h"
 #include "Tracking/Optical/SimulatedCamera.h"
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace echorama {
@@ -19,6 +20,7 @@ enum class SimulatedPath {
 
 struct SimulatedSourceParameters {
   SimulatedCameraParameters camera;
+  std::string surface; ///< a calibration: its camera, skin and lights, as it has them
   Eigen::Vector3d domeMm{110.0, 95.0, 90.0}, cameraMm = Eigen::Vector3d::Zero(), cameraTurn = Eigen::Vector3d::Zero();
   int lights = 2, offSlots = 2;
   double peak = 160.0;
@@ -40,7 +42,8 @@ ParameterList Describe(SimulatedSourceParameters& p);
 /// Frames of a SimulatedCamera, when a real one would deliver them, or as fast as they are asked for (speed 0).
 class SimulatedSource : public CameraSource {
 public:
-  /// Lights on paths over a dome. \throws Error(InvalidParameter), Error(NotPossible) when the camera sees none of it
+  /// Lights on paths over a dome, or over the skin of a calibration. \throws Error(InvalidParameter), Error(NotPossible) when the
+  /// camera sees none of it; as ReadSurface
   explicit SimulatedSource(const SimulatedSourceParameters& parameters);
   /// Any skin, and any lights; their times count from the first frame on. Of the parameters those of the camera, its pose, speed
   /// and the number of frames are used.
@@ -64,6 +67,12 @@ public:
   const SimulatedCamera& Camera() const { return camera_; }
 
 private:
+  struct Scene {
+    SimulatedSourceParameters parameters;
+    std::shared_ptr<const SeenSurface> skin;
+  };
+  explicit SimulatedSource(const Scene& scene);
+  static Scene SceneOf(SimulatedSourceParameters parameters);
   double Due(std::int64_t number) const; // when it is delivered, on our clock
 
   SimulatedSourceParameters parameters_;

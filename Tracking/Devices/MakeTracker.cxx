@@ -4,6 +4,7 @@
 #include "Tracking/Devices/FusedTracker.h"
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkListener.h"
+#include "Tracking/Devices/OpticalTracker.h"
 #include "Tracking/Devices/PolhemusTracker.h"
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/SimulatedTracker.h"
@@ -33,9 +34,13 @@ std::unique_ptr<TrackerDevice> MakeBy(const TrackerAddress& address)
 const std::vector<Kind>& Kinds()
 {
   static const std::vector<Kind> kinds = {
-      {"replay", MakeBy<ReplayTracker, ReplayParameters>},  {"simulated", MakeBy<SimulatedTracker, SimulatedTrackerParameters>},
-      {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>}, {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
-      {PolhemusTracker::Scheme, Make<PolhemusTracker>},     {FusedTracker::Scheme, MakeBy<FusedTracker, FusedTrackerParameters>},
+      {"replay", MakeBy<ReplayTracker, ReplayParameters>},
+      {"simulated", MakeBy<SimulatedTracker, SimulatedTrackerParameters>},
+      {OpenIgtLinkClient::Scheme, Make<OpenIgtLinkClient>},
+      {OpenIgtLinkListener::Scheme, Make<OpenIgtLinkListener>},
+      {PolhemusTracker::Scheme, Make<PolhemusTracker>},
+      {FusedTracker::Scheme, MakeBy<FusedTracker, FusedTrackerParameters>},
+      {OpticalTracker::Scheme, MakeBy<OpticalTracker, OpticalTrackerParameters>},
   };
   return kinds;
 }

@@ -17,6 +17,9 @@ namespace echorama {
 /// | replay      | FILE                      | a recording                                            |
 /// | simulated   | (none)                    | a tracker that does not exist, with its faults         |
 /// | fused       | LINE|LINE                 | place by one tracker, orientation by another           |
+/// | optical     | CAMERA                    | lights on a printed skin, seen by a camera inside it   |
+///
+/// Sources of frames (CameraSource) are named likewise: camera:0, recording:FILE, simulated:.
 ///
 /// Lines within a line have options of their own: those of the whole follow another bar, fused:LINE|LINE|OPTION=VALUE.
 struct TrackerAddress {
