@@ -7,7 +7,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
-#include "Core/Geometry/MarkerPattern.h"
+#include "Tracking/Optical/MarkerPattern.h"
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -25,7 +25,8 @@ double BrightnessAt(const GreyFrame& frame, const Eigen::Vector2d& pixel)
   const int x = std::clamp(static_cast<int>(std::floor(pixel.x())), 0, frame.width - 2),
             y = std::clamp(static_cast<int>(std::floor(pixel.y())), 0, frame.height - 2);
   const double u = std::clamp(pixel.x() - x, 0.0, 1.0), v = std::clamp(pixel.y() - y, 0.0, 1.0);
-  return (1.0 - v) * ((1.0 - u) * frame(x, y) + u * frame(x + 1, y)) + v * ((1.0 - u) * frame(x, y + 1) + u * frame(x + 1, y + 1));
+  return (1.0 - v) * ((1.0 - u) * frame(x, y) + u * frame(x + 1, y)) +
+         v * ((1.0 - u) * frame(x, y + 1) + u * frame(x + 1, y + 1));
 }
 
 // The picture by azimuth and elevation, as sums from its corner.
@@ -39,8 +40,8 @@ public:
       Sum row;
       for (int i = 0; i < width; ++i) {
         const double azimuth = (i + 0.5) / binsPerDegree / DegreesPerRadian;
-        const auto pixel = lens.Project({std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
-                                         std::sin(elevation)});
+        const auto pixel =
+            lens.Project({std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)});
         if (pixel && lens.Covers(*pixel)) {
           row.brightness += BrightnessAt(frame, *pixel);
           ++row.count;
@@ -61,8 +62,8 @@ public:
     const auto sum = [&](int x, int y) { return sums_[Index(x, y)]; };
     const Sum a = sum(i, j), b = sum(i + size, j), c = sum(i, j + size), d = sum(i + size, j + size);
     return d.count - b.count - c.count + a.count == size * size
-        ? (d.brightness - b.brightness - c.brightness + a.brightness) / (size * size)
-        : -1.0;
+               ? (d.brightness - b.brightness - c.brightness + a.brightness) / (size * size)
+               : -1.0;
   }
 
 private:
@@ -138,9 +139,12 @@ ShellMarkerReading ReadAt(const UnrolledPicture& picture, const MarkerPlace& at)
 std::string ShellMarkerReading::Text() const
 {
   switch (status) {
-  case Status::Read: return Format("shell %06X (contrast %.2f)", id, contrast);
-  case Status::Unclear: return "a marker that cannot be read";
-  default: return "no marker";
+  case Status::Read:
+    return Format("shell %06X (contrast %.2f)", id, contrast);
+  case Status::Unclear:
+    return "a marker that cannot be read";
+  default:
+    return "no marker";
   }
 }
 

@@ -24,7 +24,7 @@ struct ShellMarkerReading {
   std::string Text() const; ///< "shell 0A1B2C (contrast 0.21)"
 };
 
-/// Looks for a marker (Core/Geometry/MarkerPattern.h) all around the picture's edge, up to 3 degrees higher or lower than it
+/// Looks for a marker (Tracking/Optical/MarkerPattern.h) all around the picture's edge, up to 3 degrees higher or lower than it
 /// should be, and leaning by up to 1.2 degrees from end to end. The lights of tools should be off; the mean of several frames is
 /// better than one where it is dark. The camera's lens need be known to a few percent only.
 ///

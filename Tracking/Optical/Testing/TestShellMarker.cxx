@@ -4,7 +4,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
-#include "Core/Geometry/MarkerPattern.h"
+#include "Tracking/Optical/MarkerPattern.h"
 #include "Tracking/Optical/ShellMarker.h"
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ struct MarkedShell {
   double rollDegrees = 0.0, tiltDegrees = 0.0;
   double light = 60.0, shade = 0.6; ///< grey levels, and what is left of them behind a dark cell
   double blurPixels = 1.0, noise = 1.0;
-  double slope = 0.0; ///< of the light, from one side of the picture to the other
+  double slope = 0.0;   ///< of the light, from one side of the picture to the other
   double covered = 0.0; ///< degrees of the marker's end that something hides
   std::uint64_t seed = 1;
 };
@@ -78,8 +78,7 @@ Picture PictureOf(const MarkedShell& shell)
         if (!direction)
           continue;
         // Where the ray meets the wall, and in which direction that is from where the camera should be.
-        const Vector3d from = flatten.cwiseProduct(shell.cameraOffset),
-                       ray = flatten.cwiseProduct(cameraToShell * *direction);
+        const Vector3d from = flatten.cwiseProduct(shell.cameraOffset), ray = flatten.cwiseProduct(cameraToShell * *direction);
         const double a = ray.squaredNorm(), b = from.dot(ray), c = from.squaredNorm() - shell.wallMm * shell.wallMm;
         const Vector3d place = shell.cameraOffset + (-b + std::sqrt(b * b - a * c)) / a * (cameraToShell * *direction);
         const double azimuth = std::remainder(std::atan2(place.y(), place.x()) * DegreesPerRadian - shell.azimuthDegrees, 360.0);

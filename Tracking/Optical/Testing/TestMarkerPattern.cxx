@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
-#include "Core/Geometry/MarkerPattern.h"
+#include "Tracking/Optical/MarkerPattern.h"
 #include <gtest/gtest.h>
 
 using namespace echorama;

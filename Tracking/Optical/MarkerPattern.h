@@ -7,8 +7,8 @@
 
 namespace echorama {
 
-/// A number of 24 bits as light and dark cells that a camera inside a printed skin sees around its foot. Cells are directions, not
-/// places: azimuth about the camera's axis, and elevation above the plane across it. So a reader need not know the skin.
+/// A number of 24 bits as light and dark cells that a camera inside a printed skin sees around its foot. Cells are directions,
+/// not places: azimuth about the camera's axis, and elevation above the plane across it. So a reader need not know the skin.
 ///
 /// Two cells, one above the other, are one bit, told by which of both is darker: whatever lights the skin lights both alike.
 /// The columns at both ends are always the same; of those between, half the bits are a checksum.
