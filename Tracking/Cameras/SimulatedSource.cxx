@@ -80,6 +80,9 @@ ParameterList Describe(SimulatedSourceParameters& p)
             "Surface", p.surface,
             "A file of echorama calibrate surface, whose camera, skin, lights and times are simulated; what other options say "
             "of these is ignored. None: a dome."),
+        Parameter("Calibrated", p.calibrated,
+                  "The camera is as that file has it. Off: lens and place are those of other options, so that the calibration is "
+                  "compared with a truth that it did not make."),
         Parameter("DomeMm", p.domeMm, {1, 10000}, "mm", "Radii of the skin, a half ellipsoid about the origin."),
         Parameter("CameraMm", p.cameraMm, {-10000, 10000}, "mm", "Where the camera is; it looks along z."),
         Parameter("CameraTurn", p.cameraTurn, {-360, 360}, "degrees", "How it is turned: an axis times an angle."),
@@ -150,9 +153,11 @@ SimulatedSource::Scene SimulatedSource::SceneOf(SimulatedSourceParameters p)
   if (surface.lights.alternating)
     throw Error(Error::Kind::InvalidParameter, p.surface + ": its lights take turns, which is not simulated");
   const SurfaceMapState& state = surface.map.State();
-  p.camera.lens = state.optics.lens;
-  p.cameraMm = state.cameraToShell.translation();
-  p.cameraTurn = DegreesPerRadian * LogRotation(state.cameraToShell.linear());
+  if (p.calibrated) {
+    p.camera.lens = state.optics.lens;
+    p.cameraMm = state.cameraToShell.translation();
+    p.cameraTurn = DegreesPerRadian * LogRotation(state.cameraToShell.linear());
+  }
   p.lights = surface.lights.lights;
   p.offSlots = surface.lights.offSlots;
   p.camera.frameRate = 1000.0 / surface.tracks.slotMs;

@@ -20,7 +20,8 @@ enum class SimulatedPath {
 
 struct SimulatedSourceParameters {
   SimulatedCameraParameters camera;
-  std::string surface; ///< a calibration: its camera, skin and lights, as it has them
+  std::string surface;    ///< a calibration: its skin and lights, and its camera as it has it
+  bool calibrated = true; ///< off: the camera is as it says here, and only looks at that skin
   Eigen::Vector3d domeMm{110.0, 95.0, 90.0}, cameraMm = Eigen::Vector3d::Zero(), cameraTurn = Eigen::Vector3d::Zero();
   int lights = 2, offSlots = 2;
   double peak = 160.0;
@@ -60,6 +61,8 @@ public:
   const std::vector<LightTruth>& Truth() const { return frame_.truth; }
   /// The truth of any moment, seconds from the first frame on.
   LightOnSkin LightAt(int light, double time) const { return lights_[static_cast<std::size_t>(light)].place(time); }
+  /// The same, of a time on the clock of frames.
+  LightOnSkin TruthAt(int light, double time) const { return LightAt(light, IsLive() ? (time - start_) * parameters_.speed : time); }
   /// Of the first frame, on the clock of frames. What is at the time t of theirs is the truth of (t - Start()) * speed (unless
   /// 0).
   double Start() const { return start_; }

@@ -10,6 +10,7 @@
 #include "Core/Base/FormatText.h"
 #include "Core/Base/JoinedText.h"
 #include "Tracking/Cameras/RecordedSource.h"
+#include "Tracking/Cameras/SimulatedSource.h"
 #include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/ImageStream.h"
@@ -98,6 +99,8 @@ ParameterList Describe(OpticalTrackerParameters& p)
                 "How far beyond the middle of the exposure places are predicted; -1: to when they are told."),
       Parameter("PictureRate", p.pictureRate, {0, 1000}, "Hz",
                 "How often the picture of the (first) camera goes out as an image, to look at; 0: never."),
+      Parameter("Truth", p.truth,
+                "Of a camera that does not exist: also where the lights truly are, as tools with the names ProbeTruth, NeedleTruth ..."),
       Parameter("Film", p.film, "A new file, .igs.mhd, that frames of the camera are recorded to."),
   };
 }
@@ -218,6 +221,8 @@ void OpticalTracker::OpenViews()
     tracks.rowUs = view->format.rowUs;
     view->lights = std::make_unique<LightTracker>(given.surface.MakeTracker());
     view->heard = ClockNow();
+    if (parameters_.truth && !dynamic_cast<const SimulatedSource*>(given.camera.get()))
+      throw Error(Error::Kind::InvalidParameter, given.name + ": truth=on needs a simulated camera: nobody knows it of others");
     lights = std::max(lights, static_cast<int>(view->lights->Lights().size()));
     isLive_ = isLive_ && given.camera->IsLive();
     views_.push_back(std::move(view));
@@ -387,6 +392,26 @@ void OpticalTracker::Use(View& view, const CameraFrame& frame, PoseStream& poses
     } else {
       pose.status = TransformStatus::Missing;
     }
+    poses.Add(std::move(pose));
+  }
+  if (parameters_.truth)
+    TellTruth(view, time, poses);
+}
+
+void OpticalTracker::TellTruth(const View& view, double time, PoseStream& poses) const
+{
+  const auto& source = dynamic_cast<const SimulatedSource&>(*view.given->camera);
+  for (std::size_t i = 0; i < tools_.size(); ++i) {
+    const LightOnSkin light = source.TruthAt(static_cast<int>(i), time);
+    ToolPose pose;
+    pose.name = tools_[i].frame + "TruthToTracker";
+    pose.time = time;
+    pose.status = light.peak <= 0.0     ? TransformStatus::Missing
+                  : light.hoverMm > 0.0 ? TransformStatus::OutOfRange
+                                        : TransformStatus::Valid;
+    pose.pose.translation() = light.point;
+    if (const auto skin = view.given->surface.map.Skin()->NearestTo(light.point))
+      pose.pose.linear() = IntoSkin(skin->normal);
     poses.Add(std::move(pose));
   }
 }

@@ -15,6 +15,7 @@ struct OpticalTrackerParameters {
   std::vector<TrackerAddress> cameras;
   std::string shell, mounted, tools = "Probe,Needle", film;
   double latencyMs = -1.0, pictureRate = 0.0;
+  bool truth = false; ///< also where simulated lights truly are
 
   /// From "optical:CAMERA?shell=FILE&OPTION=VALUE", with the options of the camera among them, or "optical:CAMERA,CAMERA?shell=
   /// FILE,FILE". \throws Error(InvalidParameter)
@@ -58,6 +59,7 @@ private:
   void Run(const Worker::Signal& signal, PoseStream& poses);
   bool WaitForReaders(const Worker::Signal& signal, PoseStream& poses);
   void Use(View& view, const CameraFrame& frame, PoseStream& poses);
+  void TellTruth(const View& view, double time, PoseStream& poses) const;
   MappedPoint PlaceOf(std::size_t light, double time, Touch& touch);
   void Measure(View& view, const TrackedLight& light);
   std::pair<DeviceState, std::string> StateNow() const;

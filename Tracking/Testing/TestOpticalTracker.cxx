@@ -148,6 +148,25 @@ std::vector<double> Errors(const std::vector<ToolPose>& poses, const Rig& rig, i
 
 #define EXPECT_SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
+TEST(OpticalTracker, TruthOfASimulatedCameraIsToldBesideIt)
+{
+  Rig rig;
+  rig.source.frames = 90;
+  OpticalTrackerParameters parameters;
+  parameters.truth = true;
+  const Told told = Listen(rig, parameters);
+  const std::vector<ToolPose> truths = told.Of("NeedleTruthToTracker"), places = told.Of("NeedleToTracker");
+  ASSERT_EQ(truths.size(), places.size());
+  ASSERT_GT(truths.size(), 80u);
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    ASSERT_EQ(truths[i].time, places[i].time);
+    ASSERT_LT((truths[i].pose.translation() - rig.At(1, truths[i].time).point).norm(), 1e-9);
+    if (places[i].status == TransformStatus::Valid) {
+      EXPECT_GT(truths[i].pose.linear().col(2).dot(places[i].pose.linear().col(2)), 0.99); // into the skin
+    }
+  }
+}
+
 TEST(OpticalTracker, ToolsLieOnTheSkinWhereTheirLightsAreWhenTheyAreTold)
 {
   const Rig rig;
