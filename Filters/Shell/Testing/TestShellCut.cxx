@@ -120,10 +120,10 @@ TEST(ShellCut, PartsOfABallFitAndMakeTheWhole)
   EXPECT_EQ(std::count_if(shell.cut.begin(), shell.cut.end(), [](const PrintedPart& part) { return part.name[0] == 'b'; }), 4);
   ExpectPartsMakeTheWhole(shell, p, "skin", 0.03);
   ExpectPartsMakeTheWhole(shell, p, "base", 0.03);
-  // Their outside is that of the ball.
+  // Their outside is that of the ball; near seams points do not move, and keep 0.02 of a cell off the lattice's nodes.
   for (const PrintedPart& printed : shell.cut)
     for (const Eigen::Vector3f& point : printed.part.surface.points)
-      ASSERT_TRUE(printed.name[0] == 'b' || point.z() < -24.0f || point.norm() < 60.01f);
+      ASSERT_TRUE(printed.name[0] == 'b' || point.z() < -24.0f || point.norm() < 60.022f);
 }
 
 TEST(ShellCut, LapsHaveTheirPlaceBehindTheWall)
