@@ -54,9 +54,9 @@ void SpotTracks::ExplainByLights(double time, const std::vector<Spot>& spots, st
       Move(track, MiddleOf(time, track.state.y()));
       lights.push_back(&track);
     }
-  const auto areNear = [this](const Track& a, const Track& b) {
+  const auto areNear = [this](Track& a, Track& b) {
     const Eigen::Vector2d off = a.state.head<2>() - b.state.head<2>();
-    const double doubt = SpreadOf({{const_cast<Track*>(&a), 1.0}, {const_cast<Track*>(&b), -1.0}}).trace();
+    const double doubt = SpreadOf({{&a, 1.0}, {&b, -1.0}}).trace();
     return off.norm() < 2.5 * (a.spot.size + b.spot.size) + 3.0 * std::sqrt(0.5 * std::max(doubt, 0.0));
   };
   std::vector<bool> done(lights.size(), false);
