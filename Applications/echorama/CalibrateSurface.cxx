@@ -395,7 +395,8 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
         isRest = true;
         const int mark = todo.front();
         if (resting->TouchBy(surface.brightness) == Touch::Hover && refused.insert(mark).second) {
-          Tell(Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d, or lift it and put it "
+          Tell(Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d, or lift it "
+                      "and put it "
                       "there again",
                       mark));
           ask(frame);

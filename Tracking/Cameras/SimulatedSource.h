@@ -62,7 +62,10 @@ public:
   /// The truth of any moment, seconds from the first frame on.
   LightOnSkin LightAt(int light, double time) const { return lights_[static_cast<std::size_t>(light)].place(time); }
   /// The same, of a time on the clock of frames.
-  LightOnSkin TruthAt(int light, double time) const { return LightAt(light, IsLive() ? (time - start_) * parameters_.speed : time); }
+  LightOnSkin TruthAt(int light, double time) const
+  {
+    return LightAt(light, IsLive() ? (time - start_) * parameters_.speed : time);
+  }
   /// Of the first frame, on the clock of frames. What is at the time t of theirs is the truth of (t - Start()) * speed (unless
   /// 0).
   double Start() const { return start_; }

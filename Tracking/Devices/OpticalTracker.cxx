@@ -100,7 +100,8 @@ ParameterList Describe(OpticalTrackerParameters& p)
       Parameter("PictureRate", p.pictureRate, {0, 1000}, "Hz",
                 "How often the picture of the (first) camera goes out as an image, to look at; 0: never."),
       Parameter("Truth", p.truth,
-                "Of a camera that does not exist: also where the lights truly are, as tools with the names ProbeTruth, NeedleTruth ..."),
+                "Of a camera that does not exist: also where the lights truly are, as tools with the names ProbeTruth, "
+                "NeedleTruth ..."),
       Parameter("Film", p.film, "A new file, .igs.mhd, that frames of the camera are recorded to."),
   };
 }
