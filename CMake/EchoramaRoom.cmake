@@ -223,7 +223,7 @@ function(echorama_on_screen variable)
   math(EXPR number "${number} + 1")
   set_property(GLOBAL PROPERTY ECHORAMA_SCREEN ${number})
 endfunction()
-set(ECHORAMA_TESTS_ON_SCREEN TestCommandLine TestDemo TestExamples TestUltrasoundAlignmentWidget TestUltrasoundSliceView
+set(ECHORAMA_TESTS_ON_SCREEN TestCommandLine TestDemo TestDemoSurface TestExamples TestUltrasoundAlignmentWidget TestUltrasoundSliceView
   TestUltrasoundVolumeView BenchmarkVolumeView BenchmarkWorkbench)
 # Left to ./run test --all (and to -R, which runs what it names): a fifth of the time of all tests.
 set(ECHORAMA_SLOW_TESTS TestAlignmentVerdicts TestDemo TestExamples)

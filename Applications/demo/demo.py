@@ -6,7 +6,7 @@ demo.py --program ECHORAMA --out FOLDER [-- VOLUME...]
 
 Without volumes it makes three of a phantom, or (--synthetic) of an invented abdomen by simulating ultrasound, knocked out of place
 by a known amount, so that the alignment can be scored; then three more of an abdomen that the probe presses, to be aligned deformably.
-./run demo calls it. It needs the Python package echorama, and a screen (xvfb-run provides one).
+With --surface it prints, calibrates and tracks a skin in simulation instead (surface.py). ./run demo calls it. It needs the Python package echorama, and a screen (xvfb-run provides one).
 """
 import argparse
 import json
@@ -58,7 +58,7 @@ class Steps:
             for volume in result.get("volumes", []):
                 if volume.get("reason"):
                     print(f"  {volume['file']}: {volume['verdict']} ({volume['reason']})")
-            print("  not every volume is aligned: look at the report before you use the result")
+            print("  look at the report before you use the result: " + "; ".join(result.get("notes") or ["not every volume is aligned"]))
         self.done.append((what, shlex.join(["echorama", *arguments]), float(result.get("seconds", 0))))
         return result
 
@@ -105,26 +105,45 @@ def main():
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for the results")
     parser.add_argument("--quick", action="store_true", help="a coarse phantom and small pictures, for tests")
     parser.add_argument("--synthetic", action="store_true", help="three volumes of an invented abdomen in simulated ultrasound")
+    parser.add_argument("--surface", action="store_true", help="a skin to print, its camera and two tools on it, in simulation")
     parser.add_argument("volumes", nargs="*", help="overlapping volumes (default: three of a phantom)")
     options = parser.parse_args()
     if len(options.volumes) == 1:
         parser.error("one volume cannot be aligned: name two or more, or none for the phantom")
     if options.synthetic and options.volumes:
         parser.error("--synthetic makes volumes: name none")
+    if options.surface and (options.synthetic or options.volumes):
+        parser.error("--surface stands alone")
     try:
-        demo(options)
+        surface_demo(options) if options.surface else demo(options)
     except (StepFailed, OSError) as failure:
         print(f"demo: {failure}", file=sys.stderr)
         return 1
     return 0
 
 
-def demo(options):
+def begin(options):
     if not os.environ.get("DISPLAY"):
         raise StepFailed("there is no screen (DISPLAY is not set); start the demo under xvfb-run")
-    steps = Steps(options.program)
     out = short(options.out)
     out.mkdir(parents=True, exist_ok=True)
+    return Steps(options.program), out
+
+
+def surface_demo(options):
+    steps, out = begin(options)
+    try:
+        from surface import survey
+
+        path, summary = survey(steps, out, options.quick)
+    except (ImportError, ValueError, KeyError, RuntimeError, MemoryError) as problem:
+        raise StepFailed(f"surface tracking: {problem}") from problem
+    print(summary)
+    print(f"report    {path.resolve()}")
+
+
+def demo(options):
+    steps, out = begin(options)
     for old in RESULTS:  # a step that fails must not leave the report of an earlier run
         (out / old).unlink(missing_ok=True)
     truth_file, straight = None, []

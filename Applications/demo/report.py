@@ -250,6 +250,11 @@ def pressed_section(out, pressed, quick):
     return text, f"pressed   landmarks {mm(rigid_mm)} mm apart after rigid, {mm(deformable_mm)} mm after deformable alignment ({took:.0f} s computing)"
 
 
+def style():
+    """What all pages of the demo look like."""
+    return f"<style>\n{(pathlib.Path(__file__).parent / 'style.css').read_text()}</style>"
+
+
 def machine():
     threads = len(os.sched_getaffinity(0))
     return f"{platform.machine()} with {threads} core{'s' if threads > 1 else ''}"
@@ -353,7 +358,7 @@ def write_report(out, steps, files, truth_file, before, after, quick, pressed=No
         listing["pressed.stitched.mha"] = "the three, stitched"
 
     page = string.Template((pathlib.Path(__file__).parent / "report.html").read_text()).substitute(
-        title=title, lead=lead, facts="".join(f"<li><strong>{value}</strong>{name}</li>" for name, value in facts),
+        style=style(), title=title, lead=lead, facts="".join(f"<li><strong>{value}</strong>{name}</li>" for name, value in facts),
         input_text=input_text, input_rows="".join(rows), moved_heading=moved_heading,
         steps=steps_table(steps), pressed=pressed_text,
         score=score, verdict=sentence, verdict_class="doubt" if doubt else "",
