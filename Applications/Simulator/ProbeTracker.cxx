@@ -18,7 +18,7 @@ namespace echorama {
 
 namespace {
 
-constexpr int PollMs = 8;
+constexpr int PollMs = 4;
 constexpr double NearMm = 10.0;                          ///< of the skin whose normal is that of a place
 constexpr double AlignDegrees = 3.0, SlideDegrees = 5.0; ///< by eye and hand
 constexpr double StoppedSeconds = 0.5;                   ///< without a pose: what is shown is not what is

@@ -15,7 +15,9 @@ namespace echorama {
 
 namespace {
 
-constexpr double FrameSeconds = 1.0 / 60.0, LeastContact = 0.02;
+constexpr double FrameSeconds =
+    1.0 / 120.0; ///< from image to image, at least: half of what a tracker of 60 Hz needs, whose poses come unevenly
+constexpr double LeastContact = 0.02;
 constexpr double LiftedMm = -0.5, FarMm = 2.0;     ///< off the skin: held there, or by what a tracker says
 constexpr double JumpMm = 40.0, JumpWithin = 0.25; ///< faster than a hand
 constexpr double JumpShownSeconds = 1.5;

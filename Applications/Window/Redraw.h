@@ -12,6 +12,7 @@ public:
   Redraw(QObject* parent, std::function<void()> draw) : QObject(parent), draw_(std::move(draw))
   {
     timer_.setSingleShot(true);
+    timer_.setTimerType(Qt::PreciseTimer);
     connect(&timer_, &QTimer::timeout, this, [this] { draw_(); });
   }
   /// Within \a milliseconds; 0: as soon as the events that wait are done.
