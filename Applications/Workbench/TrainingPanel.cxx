@@ -86,7 +86,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
                     tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "
                        "without truth, from where it is). Can be undone."),
                     [this] { Scatter(); });
-  help_ = CheckField(training, "trainingHelp", tr("Alignment by the program is allowed"),
+  help_ = CheckField(training, "trainingHelp", tr("Aligner allowed"),
                      tr("During an attempt, volumes may be aligned or placed by the program; how often is kept with the attempt"),
                      {});
   start_ = Button(training, "trainingStart", {}, {}, [this] { StartOrGiveUp(); });
