@@ -83,8 +83,8 @@ class Surface(unittest.TestCase):
         written = json.loads((work / "first.json").read_text())
         self.assertEqual(written["schema"], "echorama-surface-1")
         self.assertEqual(written["shell"], "belly-1")
-        self.assertEqual(written["mesh"]["file"], "first.stl")
-        self.assertTrue((work / "first.stl").exists())
+        self.assertEqual(written["mesh"]["file"], "first.mesh.stl")
+        self.assertTrue((work / "first.mesh.stl").exists())
         numpy.testing.assert_allclose(written["cameraToShell"]["position"], (2, -3, -16), atol=0.5)
         z = numpy.cross(written["cameraToShell"]["x"], written["cameraToShell"]["y"])
         numpy.testing.assert_allclose(z, written["cameraToShell"]["z"], atol=1e-9)
@@ -136,6 +136,14 @@ class Surface(unittest.TestCase):
         done = run("calibrate", "surface", CAMERA.replace("focal=150", "focal=75&width=320&height=240"), "--check", work / "first.json")
         self.assertEqual(done.returncode, 1)
         self.assertIn(f"{work / 'first.json'}: the camera was calibrated with pictures of 640 x 480 and now gives 320 x 240", done.stderr)
+        # What is written beside the calibration replaces no input, and another extension is refused before anybody has done any work.
+        shutil.copy(work / "belly.stl", work / "body.mesh.stl")
+        for output, words in (("body.json", "inputs are never overwritten"), ("body", "a calibration is written as .json")):
+            done = run("calibrate", "surface", CAMERA, "--mesh", work / "body.mesh.stl", "--marks", work / "points.csv", "-o", work / output)
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn(words, done.stderr)
+            self.assertNotIn("please", done.stderr)
+        (work / "body.mesh.stl").unlink()
         lines = (work / "points.csv").read_text().splitlines()
         lines[7] = "7,0,0,130"
         (work / "shifted.csv").write_text("\n".join(lines))
@@ -151,7 +159,7 @@ class Surface(unittest.TestCase):
             shutil.copy(work / "first.json", lonely)
             done = run("calibrate", "surface", CAMERA, "--check", lonely)
             self.assertEqual(done.returncode, 1)
-            self.assertIn(f"{lonely}: its mesh {lonely.with_name('first.stl')} is missing", done.stderr)
+            self.assertIn(f"{lonely}: its mesh {lonely.with_name('first.mesh.stl')} is missing", done.stderr)
 
 
 if __name__ == "__main__":

@@ -28,11 +28,13 @@ with tempfile.TemporaryDirectory() as folder:
     check(made.returncode == 0, f"the demo failed:\n{made.stderr}")
     told = re.search(r"map +([\d.]+) mm off in the median at left-out points, ([\d.]+) mm in 95%\n"
                      r"tools +([\d.]+) mm off in the median, ([\d.]+) mm in 95%; at 200 mm/s ([\d.]+) mm in 95%\n"
-                     r"claims +(\d+) places", made.stdout)
+                     r"claims +(\d+) places of a light that was not there; ([\d.]+)% ", made.stdout)
     check(told, f"no figures in {made.stdout!r}")
-    map_median, map_95, median, most, fast, claims = (float(number) for number in told.groups())
+    map_median, map_95, median, most, fast, claims, missed = (float(number) for number in told.groups())
     check(map_median < 0.2 and map_95 < 0.5, f"the map: {told[0]}")
     check(median < 0.2 and most < 0.5 and fast < 1.0, f"the tools: {told[0]}")
+
+    check(missed < 15, f"{missed}% of the places are missing")
 
     # The figures are those of the recordings, and places and truth are not the same numbers.
     paths = read_paths(out / "wander.igs.mha")

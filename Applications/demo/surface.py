@@ -26,7 +26,7 @@ from report import data_uri, machine, style, steps_table, version_of
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "Examples" / "python"))
 from shell_figures import abdomen, dots, half, shown  # noqa: E402
 
-RESULTS = ["surface.html", "belly.stl", "calibrated.json", "calibrated.stl", "shell.png", "camera.png", "error.png", "path.png", "wander.igs.mha", "fast.igs.mha",
+RESULTS = ["surface.html", "belly.stl", "calibrated.json", "calibrated.mesh.stl", "shell.png", "camera.png", "error.png", "path.png", "wander.igs.mha", "fast.igs.mha",
            "camera.igs.mhd", "camera.igs.raw", "camera.igs.mha"]
 TOOLS = ("Probe", "Needle")
 RATE = 90
@@ -46,6 +46,11 @@ class Followed:
 
     def both(self):
         return np.isfinite(self.place[:, 0]) & np.isfinite(self.truth[:, 0])
+
+    def missed(self):
+        """The share of moments at which it was on the skin and nothing was told, after the half second in which its code is read."""
+        there = np.isfinite(self.truth[:, 0]) & (self.seconds > self.seconds[0] + 0.5)
+        return float(np.mean(~np.isfinite(self.place[there, 0])))
 
     def claims(self):
         """Places that were told of a light that was not there."""
@@ -219,6 +224,7 @@ def survey(steps, out, quick):
     draw_error(out / "error.png", belly, paths["wander"])
     draw_path(out / "path.png", paths["fast"]["Needle"])
     still, fast = quantiles(paths["wander"]), quantiles(paths["fast"])
+    missed = float(np.mean([followed.missed() for kind in paths.values() for followed in kind.values()]))
     claims = sum(followed.claims() for kind in paths.values() for followed in kind.values())
     accuracy = found["accuracy"]
     facts = [("off, median, all over the skin", f"{still[0]:.2f} mm"), ("off, 95%", f"{still[1]:.2f} mm"),
@@ -228,7 +234,7 @@ def survey(steps, out, quick):
         wall=f"{made['wall_mm'][0]:.2f} to {made['wall_mm'][1]:.2f}", marks=accuracy["marks"], outliers=len(found["outliers"]),
         coverage=f"{100 * accuracy['coverage']:.0f}", median=f"{accuracy['median_mm']:.2f}", mm95=f"{accuracy['mm95']:.2f}",
         wander=f"{still[3]:,}", wander_median=f"{still[0]:.2f}", wander_95=f"{still[1]:.2f}", wander_most=f"{still[2]:.2f}",
-        fast=f"{fast[3]:,}", fast_median=f"{fast[0]:.2f}", fast_95=f"{fast[1]:.2f}", fast_most=f"{fast[2]:.2f}", claims=claims,
+        fast=f"{fast[3]:,}", fast_median=f"{fast[0]:.2f}", fast_95=f"{fast[1]:.2f}", fast_most=f"{fast[2]:.2f}", claims=claims, missed=f"{100 * missed:.1f}",
         shell=data_uri(out / "shell.png"), camera=data_uri(out / "camera.png"), error=data_uri(out / "error.png"), path=data_uri(out / "path.png"),
         folder=html.escape(str(out)), version=html.escape(version_of(steps.program)), date=datetime.date.today().isoformat(),
         machine=html.escape(machine()))
@@ -237,4 +243,4 @@ def survey(steps, out, quick):
     return path, "\n".join((f"wall      {made['wall_mm'][0]:.2f} to {made['wall_mm'][1]:.2f} mm",
                             f"map       {accuracy['median_mm']:.2f} mm off in the median at left-out points, {accuracy['mm95']:.2f} mm in 95%",
                             f"tools     {still[0]:.2f} mm off in the median, {still[1]:.2f} mm in 95%; at 200 mm/s {fast[1]:.2f} mm in 95%",
-                            f"claims    {claims} places of a light that was not there"))
+                            f"claims    {claims} places of a light that was not there; {100 * missed:.1f}% of those that were there are missing"))

@@ -12,7 +12,9 @@
 #include "Tracking/Optical/SimulatedHand.h"
 #include "Tracking/Optical/SurfaceCalibration.h"
 #include "Tracking/Optical/SurfaceFile.h"
+#include "Tracking/Stream/Clock.h"
 #include "Volumes.h"
+#include <chrono>
 #include <CLI/Validators.hpp>
 #include <cmath>
 #include <ctime>
@@ -20,6 +22,7 @@
 #include <memory>
 #include <poll.h>
 #include <set>
+#include <thread>
 #include <unistd.h>
 #include <vtkUltrasoundMeshFile.h>
 
@@ -33,7 +36,7 @@ struct SurfaceOptions {
   std::vector<double> cameraPosition, up{0.0, 0.0, 1.0};
   double focal = 0.0, maximumAngle = 100.0, slotMs = 0.0, wallMm = 0.0;
   SurfaceLights lights{2, 2, false};
-  bool triggered = false, all = false;
+  bool all = false;
   int light = 1, checkMarks = 5;
   SpotDetectorParameters detector;
   SurfaceCalibrationParameters calibration;
@@ -121,15 +124,40 @@ void Watch(Session& session, Stage& stage, LightTracker& tracker, const std::str
 {
   CameraFrame frame;
   FrameState state = FrameState::Good;
-  double quietSince = -1.0;
+  double quietSince = -1.0, heard = ClockNow();
+  bool isBroken = false, isSilent = false;
   session.Work("watch", camera, [&](const Progress& progress) {
     for (;;) {
       progress(0.0);
-      const CameraSource::Outcome outcome = stage.Source().Next(frame, 0.1);
+      CameraSource::Outcome outcome = CameraSource::Outcome::Nothing;
+      try { // a plug that comes loose for a moment does not end what takes ten minutes
+        if (isBroken && ClockNow() - heard > 1.0) {
+          heard = ClockNow();
+          stage.Source().Open();
+          isBroken = false;
+          Tell("the camera is back");
+        }
+        if (isBroken)
+          std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        else
+          outcome = stage.Source().Next(frame, 0.1);
+      } catch (const Error& error) {
+        if (!stage.Source().IsLive())
+          throw;
+        if (!std::exchange(isBroken, true))
+          Tell(error.what());
+        stage.Source().Close();
+        heard = ClockNow();
+      }
       if (outcome == CameraSource::Outcome::Ended)
         return;
-      if (outcome == CameraSource::Outcome::Nothing)
+      if (outcome == CameraSource::Outcome::Nothing) {
+        if (!isBroken && ClockNow() - heard > 2.0 && !std::exchange(isSilent, true))
+          Tell("no frame has come for 2 s");
         continue;
+      }
+      isSilent = false;
+      heard = ClockNow();
       tracker.Update(frame.grey, frame.begin);
       if (tracker.Spots().state != state) {
         state = tracker.Spots().state;
@@ -235,7 +263,8 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
 {
   if (options.mesh.empty() || options.marks.empty() || options.output.empty())
     Misused("a calibration needs --mesh, --marks and --output; or --check and a calibration");
-  CheckOutput(options.output, {options.mesh, options.marks});
+  for (const std::string& written : {options.output, SurfaceMeshFile(options.output)})
+    CheckOutput(written, {options.mesh, options.marks});
   std::shared_ptr<const TrackedSkin> skin;
   std::vector<Eigen::Vector3d> marks;
   session.Time("read", [&] {
@@ -253,15 +282,11 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
   result.camera = options.camera;
   result.date = Today();
   result.lights = options.lights;
-  result.lights.alternating = options.triggered;
-  if (result.lights.alternating)
-    result.lights.lights = 2;
   result.detector = options.detector;
   result.tracks.frameMs = 1e3 / format.frameRate;
   result.tracks.exposureMs = format.exposureMs > 0.0 ? format.exposureMs : 0.7 * result.tracks.frameMs;
   result.tracks.rowUs = format.rowUs;
   result.tracks.slotMs = options.slotMs > 0.0 ? options.slotMs : result.tracks.frameMs;
-  result.tracks.triggered = options.triggered;
   const BlinkCode code = result.lights.Code();
   CheckLight(options.light, code);
   LightTracker tracker = result.MakeTracker();
@@ -323,7 +348,17 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
       });
   stage.Source().Close();
 
-  session.Work("calibrate", options.output, [&](const Progress& progress) { result.map = calibration.Fit(progress).map; });
+  session.Work("calibrate", options.output, [&](const Progress& progress) {
+    try {
+      calibration.Fit(progress);
+    } catch (const Error& error) { // what was done before is not lost by what came last
+      if (error.GetKind() == Error::Kind::Cancelled || !calibration.Status().hasMap)
+        throw;
+      session.Note(options.output + ": the map is that of before the last marks, which it does not fit: " + error.what());
+      session.status = Session::Doubtful;
+    }
+    result.map = calibration.Fitted().map;
+  });
   const CalibrationStatus& status = calibration.Status();
   result.brightness = calibration.Brightness();
   result.accuracy = {status.taken,
@@ -374,6 +409,9 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
   LightTracker tracker(surface.detector, surface.tracks, surface.lights.Code());
 
   std::vector<int> todo = DriftMarks(surface.map, surface.marks, options.checkMarks);
+  if (todo.size() < 4)
+    throw Error(Error::Kind::NotPossible, options.check + Format(": it holds %d marks that the camera sees; a check needs four",
+                                                                 static_cast<int>(todo.size())));
   std::map<int, SurfaceObservation> seen;
   std::set<int> refused; // once: whoever insists is believed
   LightRest rest(options.calibration.rest);
@@ -386,7 +424,7 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
   Watch(
       session, stage, tracker, options.camera,
       [&](const CameraFrame& frame, bool& isRest) {
-        if (isFirst && !todo.empty())
+        if (isFirst)
           ask(frame);
         isFirst = false;
         const auto resting = rest.Update(HeldLight(tracker, options.light), Touch::Unknown);
@@ -473,7 +511,6 @@ Command CalibrateSurfaceCommand(CLI::App& calibrate)
       ->check(CLI::Range(1, 2))
       ->capture_default_str();
   options->add_option("--slot-ms", values->slotMs, "Length of a slot (default: of a frame)")->check(CLI::Range(0.1, 1000.0));
-  options->add_flag("--triggered", values->triggered, "The lights' driver triggers the camera; two lights in turn");
   options->add_option("--light", values->light, "The one that is put on marks, from 1")->capture_default_str();
   options->add_flag("--all", values->all, "Ask for all marks, also when more would not help");
   AddParameter(options, Describe(values->detector), "Threshold");

@@ -15,6 +15,7 @@ const char* const ExposureField = "CameraExposureMs";
 const char* const RowField = "CameraRowUs";
 const char* const NumberField = "FrameNumber";
 const char* const ArrivalOfFrame = "Arrival";
+constexpr double LatestArrival = 10.0; // s after its exposure
 
 template <class T>
 bool ReadField(const std::vector<HeaderField>& fields, const char* name, T& value)
@@ -166,7 +167,9 @@ CameraSource::Outcome RecordedSource::Next(CameraFrame& frame, double seconds)
   frame.grey = content.components == 1 ? GreyFrame::Mono(pixels_.data(), content.dimensions[0], content.dimensions[1])
                                        : GreyFrame::Green(pixels_.data(), content.dimensions[0], content.dimensions[1]);
   frame.begin = frame.arrival = time;
-  static_cast<void>(ReadField(said.fields, ArrivalOfFrame, frame.arrival));
+  // One of another clock says nothing.
+  if (double arrival = time; ReadField(said.fields, ArrivalOfFrame, arrival) && arrival >= time && arrival < time + LatestArrival)
+    frame.arrival = arrival;
   std::int64_t number = number_ + 1;
   if (ReadField(said.fields, NumberField, number) && number > number_)
     lost_ += number_ < 0 ? 0 : number - number_ - 1;

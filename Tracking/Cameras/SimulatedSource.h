@@ -61,6 +61,7 @@ public:
   const std::vector<LightTruth>& Truth() const { return frame_.truth; }
   /// The truth of any moment, seconds from the first frame on.
   LightOnSkin LightAt(int light, double time) const { return lights_[static_cast<std::size_t>(light)].place(time); }
+  int Lights() const { return static_cast<int>(lights_.size()); }
   /// The same, of a time on the clock of frames.
   LightOnSkin TruthAt(int light, double time) const
   {

@@ -95,7 +95,7 @@ ParameterList Describe(OpticalTrackerParameters& p)
                 "The calibration of the printed skin, a file of echorama calibrate surface; one for each camera."),
       Parameter("Mounted", p.mounted, "What the marker of the mounted shell says, to be compared with that of the calibration."),
       Parameter("Tools", p.tools, "Names of the lights in the order of their codes, with commas."),
-      Parameter("LatencyMs", p.latencyMs, {-1, 1000}, "ms",
+      Parameter("PredictMs", p.predictMs, {-1, 1000}, "ms",
                 "How far beyond the middle of the exposure places are predicted; -1: to when they are told."),
       Parameter("PictureRate", p.pictureRate, {0, 1000}, "Hz",
                 "How often the picture of the (first) camera goes out as an image, to look at; 0: never."),
@@ -214,6 +214,22 @@ void OpticalTracker::OpenViews()
       given.surface.CheckShell(parameters_.mounted, given.name);
     view->format = given.camera->Open();
     given.surface.CheckPicture(view->format.width, view->format.height, given.name);
+    const double exposure = given.surface.tracks.exposureMs;
+    if (!given.surface.brightness.Empty() && view->format.exposureMs > 0.0 &&
+        std::fabs(view->format.exposureMs / exposure - 1.0) > 0.1)
+      throw Error(
+          Error::Kind::BadInput,
+          given.name +
+              Format(": it was calibrated with an exposure of %g ms, and the camera has %g ms: lights are told to touch by "
+                     "how bright they are",
+                     exposure, view->format.exposureMs));
+    if (given.surface.lights.alternating)
+      throw Error(Error::Kind::NotPossible, given.name +
+                                                ": its lights take turns; whose turn it is follows from the number of a frame's "
+                                                "slot, which no camera tells");
+    if (!views_.empty() && given.camera->IsLive() != isLive_)
+      throw Error(Error::Kind::InvalidParameter,
+                  given.name + ": cameras that are live and recordings cannot be joined: their times are not of one clock");
     // Frames are timed by the camera that there is; the slots of the code by the lights' driver, as when it was calibrated.
     SpotTracksParameters& tracks = given.surface.tracks;
     tracks.frameMs = 1000.0 / view->format.frameRate;
@@ -318,8 +334,13 @@ void OpticalTracker::Run(const Worker::Signal& signal, PoseStream& poses)
         return;
     }
     const bool isOver = std::all_of(views_.begin(), views_.end(), [](const auto& view) { return view->hasEnded; });
-    if (isOver && film_)
-      film_->recorder.Finish();
+    if (isOver && film_ && film_->problem.empty()) {
+      try {
+        film_->recorder.Finish();
+      } catch (const Error& error) {
+        film_->problem = error.what();
+      }
+    }
     if (isOver || ClockNow() - told > ToldSeconds) {
       told = ClockNow();
       const auto state = StateNow();
@@ -372,7 +393,7 @@ void OpticalTracker::Use(View& view, const CameraFrame& frame, PoseStream& poses
   const double middle = frame.begin + 0.5 * view.Exposure();
   const double now = view.given->camera->IsLive() ? ClockNow() : std::max(frame.arrival, middle);
   view.lag = now - middle;
-  const double time = parameters_.latencyMs < 0.0 ? now : middle + 1e-3 * parameters_.latencyMs;
+  const double time = parameters_.predictMs < 0.0 ? now : middle + 1e-3 * parameters_.predictMs;
   if (!(time > sent_)) // of another camera there was a later one
     return;
   sent_ = time;
@@ -402,7 +423,7 @@ void OpticalTracker::Use(View& view, const CameraFrame& frame, PoseStream& poses
 void OpticalTracker::TellTruth(const View& view, double time, PoseStream& poses) const
 {
   const auto& source = dynamic_cast<const SimulatedSource&>(*view.given->camera);
-  for (std::size_t i = 0; i < tools_.size(); ++i) {
+  for (std::size_t i = 0; i < std::min(tools_.size(), static_cast<std::size_t>(source.Lights())); ++i) {
     const LightOnSkin light = source.TruthAt(static_cast<int>(i), time);
     ToolPose pose;
     pose.name = tools_[i].frame + "TruthToTracker";
@@ -428,7 +449,7 @@ MappedPoint OpticalTracker::PlaceOf(std::size_t light, double time, Touch& touch
     const double period = 1e-3 * view->given->surface.tracks.frameMs;
     const std::vector<TrackedLight>& lights = view->lights->Lights();
     if (light >= lights.size() || lights[light].status == TrackedLight::Status::Lost || view->brokenSince >= 0.0 ||
-        time - view->newest > OldFrames * period + std::max(view->lag, 1e-3 * parameters_.latencyMs))
+        time - view->newest > OldFrames * period + std::max(view->lag, 1e-3 * parameters_.predictMs))
       continue;
     seeing.push_back(view.get());
     freshest = std::max(freshest, lights[light].time);

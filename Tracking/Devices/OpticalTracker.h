@@ -14,7 +14,7 @@ namespace echorama {
 struct OpticalTrackerParameters {
   std::vector<TrackerAddress> cameras;
   std::string shell, mounted, tools = "Probe,Needle", film;
-  double latencyMs = -1.0, pictureRate = 0.0;
+  double predictMs = -1.0, pictureRate = 0.0;
   bool truth = false; ///< also where simulated lights truly are
 
   /// From "optical:CAMERA?shell=FILE&OPTION=VALUE", with the options of the camera among them, or "optical:CAMERA,CAMERA?shell=

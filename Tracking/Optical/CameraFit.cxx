@@ -591,8 +591,9 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
   for (std::size_t i = 0; i < points.size(); ++i)
     squares += result.isInlier[i] ? problem.Errors()[i].squaredNorm() : 0.0;
   // Of what is not known before; with a prior on everything every point is one more.
-  const double unknowns =
-      isKnown ? 0.0 : static_cast<double>(PerLens + PerPose * static_cast<Index>(result.poses.size())) + result.residualFreedoms;
+  const double unknowns = isKnown ? 0.0
+                                  : static_cast<double>(PerLens + PerPose * static_cast<Index>(problem.State().poses.size())) +
+                                        result.residualFreedoms;
   const double rest = 2.0 * static_cast<double>(used) - unknowns;
   result.noiseScale = rest > 4.0 ? std::sqrt(squares / rest) : 1.0;
   // How well a hand places lights is a guess, and many observations know better; few do not, and what is known of a lens stays.

@@ -128,6 +128,7 @@ void RunLights(const LightSchedule& schedule, LightLines& lines, LightClock& clo
   };
   try {
     Drive(schedule, lines, clock, slots, goOn, run);
+    lines.Set(0);
   } catch (const Error& error) {
     if (!off())
       throw Error(error.GetKind(), std::string(error.what()) + "; nor could the lights be switched off");
@@ -136,7 +137,6 @@ void RunLights(const LightSchedule& schedule, LightLines& lines, LightClock& clo
     off();
     throw;
   }
-  lines.Set(0);
 }
 
 void RehearseLights(const LightSchedule& schedule, LightLines& lines, LightClock& clock, const std::function<bool()>& goOn)

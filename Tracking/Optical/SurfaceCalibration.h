@@ -92,6 +92,8 @@ public:
 
   /// The map of all that was taken so far. Fitted anew only when marks have come since. \throws as FitSurfaceMap
   const FittedSurfaceMap& Fit(const Progress& progress = {});
+  /// The last one that succeeded, while Status().hasMap.
+  const FittedSurfaceMap& Fitted() const { return fitted_; }
   const CalibrationStatus& Status() const { return status_; }
   /// Of all that were taken. \throws Error(BadInput) when there are none
   BrightnessCalibration Brightness() const;

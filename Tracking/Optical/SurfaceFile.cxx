@@ -381,17 +381,21 @@ void CalibratedSurface::CheckShell(const std::string& mounted, const std::string
                                            "\" is mounted: mount that one, or calibrate this one");
 }
 
-void WriteSurface(const std::string& path, const CalibratedSurface& surface)
+std::string SurfaceMeshFile(const std::string& path)
 {
-  const std::filesystem::path file(path);
+  std::filesystem::path file(path);
   if (file.extension() != ".json")
     RefuseSurface(path + ": a calibration is written as .json");
+  return file.replace_extension(".mesh.stl").string();
+}
+
+void WriteSurface(const std::string& path, const CalibratedSurface& surface)
+{
+  const std::filesystem::path meshFile = SurfaceMeshFile(path);
   if (!surface.map.Skin())
     RefuseSurface("a calibration without a map cannot be written");
   SurfaceKeys keys = KeysOf(surface);
   const std::string mesh = StlOf(surface.map.Skin()->Surface());
-  std::filesystem::path meshFile = file;
-  meshFile.replace_extension(".stl");
   keys.mesh = {meshFile.filename().string(), Checksum(mesh.data(), mesh.size()), surface.map.Skin()->WallMm()};
   const Json json = SurfaceWriter::Write(keys);
   try { // what could not be read again

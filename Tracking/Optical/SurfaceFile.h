@@ -48,7 +48,10 @@ struct CalibratedSurface {
   void CheckShell(const std::string& mounted, const std::string& name) const;
 };
 
-/// Writes the calibration \a path (`echorama-surface-1`, JSON) and, beside it, the mesh of the skin: NAME.stl of NAME.json. Both
+/// Where the mesh of a calibration is written: NAME.mesh.stl of NAME.json. \throws Error(InvalidParameter) for another extension
+std::string SurfaceMeshFile(const std::string& path);
+
+/// Writes the calibration \a path (`echorama-surface-1`, JSON) and, beside it, the mesh of the skin, SurfaceMeshFile(). Both
 /// or none. Numbers come back to the last bit, points of the mesh as floats. \throws Error(FileSystem), Error(InvalidParameter)
 /// for what a file cannot hold
 void WriteSurface(const std::string& path, const CalibratedSurface& surface);

@@ -195,7 +195,7 @@ TEST(OpticalTracker, TheErrorOfPredictionsThatIsToldIsTheirs)
 {
   const Rig rig;
   OpticalTrackerParameters parameters;
-  parameters.latencyMs = 60.0;
+  parameters.predictMs = 60.0;
   const Told told = Listen(rig, parameters);
   std::vector<double> errors = Errors(told.Of("ProbeToTracker"), rig, 0);
   double squares = 0.0;
@@ -213,7 +213,7 @@ TEST(OpticalTracker, WithoutPredictionPlacesAreThoseOfTheExposure)
 {
   const Rig rig;
   OpticalTrackerParameters parameters;
-  parameters.latencyMs = 0.0;
+  parameters.predictMs = 0.0;
   const Told told = Listen(rig, parameters);
   const std::vector<ToolPose> its = told.Of("ProbeToTracker");
   EXPECT_NEAR(its[90].time, 1.0 + 0.004, 1e-9);

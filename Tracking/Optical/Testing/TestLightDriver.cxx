@@ -161,7 +161,11 @@ TEST(LightDriver, LightsAreOffHoweverItEnds)
     EXPECT_EQ(lines.settings.back().on, 0u);
     EXPECT_EQ(lines.settings.back().at, lines.settings[lines.settings.size() - 2].at); // at once
   }
-  for (int fail = 0; fail < 40; ++fail) {
+  FakeClock whole;
+  FakeLines every(whole);
+  LightRun undisturbed;
+  RunLights(schedule, every, whole, 100, always, undisturbed);
+  for (int fail = 0; fail < every.calls; ++fail) { // the last one switches them off
     FakeClock clock;
     FakeLines lines(clock);
     lines.failsAt = fail;
@@ -182,6 +186,14 @@ TEST(LightDriver, LightsAreOffHoweverItEnds)
   LightRun run;
   try {
     RunLights(schedule, dead, clock, 100, always, run);
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "the line is gone; nor could the lights be switched off");
+  }
+  FakeLines atTheEnd(clock);
+  atTheEnd.failsFrom = every.calls - 1;
+  try {
+    RunLights(schedule, atTheEnd, clock, 100, always, run);
     ADD_FAILURE();
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(), "the line is gone; nor could the lights be switched off");

@@ -97,7 +97,8 @@ TEST_F(SurfaceFile, ComesBackToTheLastBit)
     }
   EXPECT_GT(mapped, 40);
   WriteSurface(Path("t.json"), after);
-  EXPECT_EQ(std::regex_replace(ReadTextFile(Path("t.json")), std::regex("t\\.stl"), "s.stl"), ReadTextFile(Path("s.json")));
+  EXPECT_EQ(std::regex_replace(ReadTextFile(Path("t.json")), std::regex("t\\.mesh\\.stl"), "s.mesh.stl"),
+            ReadTextFile(Path("s.json")));
   EXPECT_EQ(after.MakeTracker().Lights().size(), 3u);
 }
 
@@ -130,13 +131,14 @@ TEST_F(SurfaceFile, AMeshThatIsMissingOrAnotherIsRefused)
 {
   using echorama::testing::ExpectRefused;
   WriteSurface(Path("s.json"), Surface());
-  std::string mesh = ReadTextFile(Path("s.stl"));
+  std::string mesh = ReadTextFile(Path("s.mesh.stl"));
   mesh[1000] = static_cast<char>(mesh[1000] ^ 1);
-  Put("s.stl", mesh);
+  Put("s.mesh.stl", mesh);
   ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::BadFile, Path("s.json"),
                 "is not the one that it was calibrated with");
-  std::filesystem::remove(Path("s.stl"));
-  ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::FileSystem, Path("s.json"), Path("s.stl") + " is missing");
+  std::filesystem::remove(Path("s.mesh.stl"));
+  ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::FileSystem, Path("s.json"),
+                Path("s.mesh.stl") + " is missing");
   ExpectRefused([&] { ReadSurface(Path("t.json")); }, Error::Kind::FileSystem, Path("t.json"), "cannot be read");
 }
 
