@@ -16,6 +16,7 @@
 #include <cmath>
 #include <Eigen/LU>
 #include <tuple>
+#include <utility>
 
 namespace echorama {
 
@@ -213,7 +214,13 @@ void SpotTracks::Release(Track& track)
 {
   for (int other = 0; track.light >= 0 && other < code_.Lights(); ++other) {
     Cross(track.light, other) = Cross(other, track.light) = HandCovariance::Zero();
-    Evidence(track.light, other) = HUGE_VAL;
+    // Two that met and were not told apart may have been exchanged: that one of them is gone tells nothing of the other.
+    if (std::exchange(Evidence(track.light, other), HUGE_VAL) < HUGE_VAL)
+      for (Track& met : tracks_)
+        if (met.light == other) {
+          met.isProven = false;
+          met.seen.clear();
+        }
   }
   track.light = -1;
   track.seen.clear();
