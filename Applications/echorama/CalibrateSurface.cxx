@@ -408,18 +408,18 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
   // Whether a light touches is judged once it rests.
   LightTracker tracker(surface.detector, surface.tracks, surface.lights.Code());
 
-  std::vector<int> todo = DriftMarks(surface.map, surface.marks, options.checkMarks);
-  if (todo.size() < 4)
+  std::vector<int> remaining = DriftMarks(surface.map, surface.marks, options.checkMarks);
+  if (remaining.size() < 4)
     throw Error(Error::Kind::NotPossible, options.check + Format(": it holds %d marks that the camera sees; a check needs four",
-                                                                 static_cast<int>(todo.size())));
+                                                                 static_cast<int>(remaining.size())));
   std::map<int, SurfaceObservation> seen;
   std::set<int> refused; // once: whoever insists is believed
   LightRest rest(options.calibration.rest);
   SurfaceDrift drift;
   bool isJudged = false, isRepeated = false, isFirst = true;
   const auto ask = [&](const CameraFrame& frame) {
-    Tell(Format("mark %d, please (%d to go)", todo.front(), static_cast<int>(todo.size())));
-    stage.Ask(todo.front(), frame);
+    Tell(Format("mark %d, please (%d to go)", remaining.front(), static_cast<int>(remaining.size())));
+    stage.Ask(remaining.front(), frame);
   };
   Watch(
       session, stage, tracker, options.camera,
@@ -431,7 +431,7 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
         if (!resting)
           return true;
         isRest = true;
-        const int mark = todo.front();
+        const int mark = remaining.front();
         if (resting->TouchBy(surface.brightness) == Touch::Hover && refused.insert(mark).second) {
           Tell(Format("the light is too weak or too wide there for one that touches the skin: press it onto mark %d, or lift it "
                       "and put it "
@@ -441,8 +441,8 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
           return true;
         }
         seen[mark] = {resting->position, resting->covariance, surface.marks[static_cast<std::size_t>(mark) - 1], mark};
-        todo.erase(todo.begin());
-        if (todo.empty()) {
+        remaining.erase(remaining.begin());
+        if (remaining.empty()) {
           std::vector<SurfaceObservation> again;
           for (const auto& [number, observation] : seen)
             again.push_back(observation);
@@ -452,7 +452,7 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
             return false;
           Tell(drift.message);
           isRepeated = true;
-          todo = {drift.mark};
+          remaining = {drift.mark};
         }
         ask(frame);
         return true;

@@ -80,8 +80,6 @@ public:
 
   /// The light in the newest frame.
   CalibrationStep Update(const TrackedLight& light, Touch touch = Touch::Unknown);
-  /// How much of a rest there is, in [0, 1].
-  double RestProgress() const { return rest_.Progress(); }
 
   /// The number of the mark to go to; 0: all were taken.
   int Next() const { return todo_.empty() ? 0 : todo_.front(); }

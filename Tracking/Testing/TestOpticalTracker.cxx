@@ -266,6 +266,31 @@ TEST(OpticalTracker, LightsThatHoverAreOutOfRange)
   EXPECT_SAYS(told.message, "Needle hovers");
 }
 
+TEST(OpticalTracker, WhatCannotBeTrackedRightlyIsRefused)
+{
+  const auto refused = [](std::vector<OpticalView> views, Error::Kind kind, const std::string& words) {
+    OpticalTracker tracker({}, std::move(views));
+    PoseStream stream;
+    echorama::testing::ExpectRefused([&] { tracker.Start(stream, nullptr); }, kind, "belly.json", words);
+  };
+  const Rig rig;
+  std::vector<OpticalView> views = Views(rig.View());
+  views[0].surface.lights.alternating = true;
+  refused(std::move(views), Error::Kind::NotPossible, "take turns");
+  Rig live;
+  live.source.speed = 1.0;
+  views = Views(rig.View());
+  views.push_back(live.View());
+  refused(std::move(views), Error::Kind::InvalidParameter, "cannot be joined");
+  // Brightness tells whether a light touches, at the exposure of the calibration alone.
+  Rig bright, dim;
+  bright.brightness = Calibrated(bright);
+  dim.source.camera.exposureMs = 0.6 * bright.source.camera.exposureMs;
+  views = Views(dim.View());
+  views[0].surface = bright.Surface();
+  refused(std::move(views), Error::Kind::BadInput, "exposure of 8 ms");
+}
+
 TEST(OpticalTracker, BeyondTheCalibrationThereAreNoPoses)
 {
   Rig rig;
