@@ -3,6 +3,7 @@
 // of them, folded, turned, lifted off; forces in balance; nothing in anything.
 #include "Core/Base/Parallel.h"
 #include "Filters/Physics/TissuePress.h"
+#include "Testing/Sanitized.h"
 #include <gtest/gtest.h>
 
 using namespace echorama;
@@ -158,6 +159,7 @@ TissuePressParameters Precise()
 
 TEST(TissueContact, BlocksThatMeetAreAsStiffAsOneOfBoth)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const TissueMaterial material = Tissue(20.0, 0.45);
   const TissueBody one = Punch(0, material, material);
   TissuePress whole(one, Precise());
@@ -178,6 +180,7 @@ TEST(TissueContact, BlocksThatMeetAreAsStiffAsOneOfBoth)
 
 TEST(TissueContact, StiffBlockPressesAsAProbeOfItsShape)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const TissueMaterial soft = Tissue(20.0, 0.45);
   const TissueBody body = Punch(1, Tissue(2000.0, 0.3), soft);
   TissuePress press(body, Precise());

@@ -2,6 +2,7 @@
 // What breaks solvers of tissue: cells inside out, cells without volume, edges, a probe that moves on in small steps, bodies that
 // meet; and the patch test.
 #include "Filters/Physics/TissuePress.h"
+#include "Testing/Sanitized.h"
 #include <gtest/gtest.h>
 
 using namespace echorama;
@@ -181,6 +182,7 @@ TEST(TissueHardCases, ProbeOverAnEdgeIsNotEntered)
 // Down, and along the skin: without friction only where the probe is counts. Each move takes a handful of steps.
 TEST(TissueHardCases, ManySmallMovesEndWhereOneLongMoveDoes)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const TissueBody body = Block({20, 20, 12}, 5.0, 0.45);
   TissuePress little(body, {}), straight(body, {});
   const auto probe = Convex();

@@ -61,6 +61,7 @@ std::string MessageOf(const TriangleSurface& surface, const ShellParameters& par
 
 TEST(Shell, SkinOfASphereHasTheThicknessAndVolumeOfOne)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const double radius = 40.0, opening = 20.0;
   const TriangleSurface ball = Sphere(radius, 6);
   const ShellParameters p = Plain();

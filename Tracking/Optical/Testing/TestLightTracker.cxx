@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Whose light it is, from spots alone and through the whole chain from the simulated camera, against its truth.
 #include "Core/Base/Random.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Optical/LightTracker.h"
 #include "Tracking/Optical/SimulatedCamera.h"
 #include <cmath>
@@ -473,6 +474,7 @@ TEST(LightTracker, TwoThatStayTogetherAreNeverTakenForEachOther)
 
 TEST(LightTracker, FourLightsThatMeetAreToldApart)
 {
+  ECHORAMA_SKIP_SANITIZED();
   Rig rig;
   rig.code = BlinkCode::Make(4, 2);
   rig.camera.lostFrames = 0.01;

@@ -3,6 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Percentile.h"
 #include "Core/Base/SymmetricMatrix.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Optical/ProxyMap.h"
 #include "Tracking/Optical/Testing/SurfaceTruth.h"
 #include <algorithm>
@@ -299,6 +300,7 @@ double ClaimedSpread(const TrueCamera& camera, double queryNoise, double placeme
 
 TEST(SurfaceMap, CovarianceIsThatOfManyCalibrations)
 {
+  ECHORAMA_SKIP_SANITIZED();
   // The calibration's own part first, then mostly the pixel's.
   EXPECT_NEAR(std::sqrt(ClaimedSpread(Camera(), 0.0, 0.0)), 1.0, 0.2);
   EXPECT_NEAR(std::sqrt(ClaimedSpread(Camera(), 0.0, 0.15)), 1.0, 0.2);
