@@ -4,11 +4,13 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Parallel.h"
 #include "vtkActor.h"
+#include "vtkBoundingBox.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
 #include "vtkFloatArray.h"
 #include "vtkIdTypeArray.h"
 #include "vtkMath.h"
+#include "vtkMatrix4x4.h"
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLPolyDataMapper.h"
 #include "vtkOpenGLRenderWindow.h"
@@ -19,28 +21,59 @@
 #include "vtkProperty.h"
 #include "vtkRenderer.h"
 #include "vtkShaderProperty.h"
+#include "vtkTextureObject.h"
 #include "vtkUniforms.h"
 #include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace echorama {
 
 namespace {
-/** Points whose size in pixels the vertex shader decides, and that hide nothing. */
-class ParticleMapper : public vtkOpenGLPolyDataMapper {
-public:
-  static ParticleMapper* New();
-  vtkTypeMacro(ParticleMapper, vtkOpenGLPolyDataMapper);
+constexpr unsigned int Scissors = 0x0C11, Depths = 0x0B71, Blends = 0x0BE2; // GL_SCISSOR_TEST, GL_DEPTH_TEST, GL_BLEND
+constexpr unsigned int One = 1, OneMinusAlpha = 0x0303;                     // GL_ONE, GL_ONE_MINUS_SRC_ALPHA
 
-  void ComputeBounds() override // of all points, whether they are sorted already or not
+double PixelsPerMm(vtkRenderer* renderer) // where the clip coordinate w is 1
+{
+  const double height = renderer->GetSize()[1];
+  vtkCamera* camera = renderer->GetActiveCamera();
+  return camera->GetParallelProjection() ? height / (2.0 * camera->GetParallelScale())
+                                         : height / (2.0 * std::tan(RadiansPerDegree * camera->GetViewAngle() / 2.0));
+}
+} // namespace
+
+/** Points whose size in pixels the vertex shader decides, and that hide nothing; or a picture of them. */
+class ParticleCloud::Mapper : public vtkOpenGLPolyDataMapper {
+public:
+  static Mapper* New();
+  vtkTypeMacro(Mapper, vtkOpenGLPolyDataMapper);
+
+  const ParticleCloud* Drawn = nullptr;
+
+  void ComputeBounds() override // of all particles, whether there are points of them or not
   {
-    vtkPoints* points = this->GetInput() ? this->GetInput()->GetPoints() : nullptr;
-    if (points && points->GetNumberOfPoints() > 0) {
-      points->GetBounds(this->Bounds);
+    vtkBoundingBox box;
+    for (const Part& part : this->Drawn->Filled) {
+      for (int corner = 0; !part.box.isEmpty() && corner < 8; ++corner) {
+        const Eigen::Vector3f at = part.box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(corner));
+        box.AddPoint(Eigen::Vector3d(part.volumeToWorld * at.cast<double>()).data());
+      }
+    }
+    if (box.IsValid()) {
+      box.GetBounds(this->Bounds);
     } else {
       vtkMath::UninitializeBounds(this->Bounds);
+    }
+  }
+
+  void RenderPiece(vtkRenderer* renderer, vtkActor* actor) override
+  {
+    if (this->Drawn->IsOnProcessor) {
+      this->Drawn->DrawOnProcessor(renderer);
+    } else {
+      this->Superclass::RenderPiece(renderer, actor);
     }
   }
 
@@ -55,12 +88,20 @@ public:
     state->vtkglDisable(ProgramPointSize);
   }
 };
-vtkStandardNewMacro(ParticleMapper);
-} // namespace
+vtkStandardNewMacro(ParticleCloud::Mapper);
+
+bool DrawsInSoftware(vtkRenderWindow* window)
+{
+  const char* const told = window->ReportCapabilities();
+  const std::string capabilities = told ? told : "";
+  const auto names = {"llvmpipe", "softpipe", "swrast", "SWR", "Software Rasterizer", "GDI Generic"};
+  return std::any_of(names.begin(), names.end(), [&](const char* name) { return capabilities.find(name) != std::string::npos; });
+}
 
 ParticleCloud::ParticleCloud()
 {
-  vtkNew<ParticleMapper> mapper;
+  vtkNew<Mapper> mapper;
+  mapper->Drawn = this;
   mapper->SetInputData(this->Cloud);
   mapper->MapDataArrayToVertexAttribute("particleSize", "Size", vtkDataObject::FIELD_ASSOCIATION_POINTS);
   this->Actor->SetMapper(mapper);
@@ -76,16 +117,35 @@ ParticleCloud::ParticleCloud()
   shader->GetVertexCustomUniforms()->SetUniformf("particlePixels", 1.0f);
 }
 
-ParticleCloud::~ParticleCloud() = default;
+ParticleCloud::~ParticleCloud()
+{
+  this->Filled.clear(); // the mapper may live on in a renderer
+}
 
 int ParticleCloud::Count() const
 {
-  return this->Actor->GetVisibility() ? static_cast<int>(this->Cloud->GetNumberOfPoints()) : 0;
+  std::size_t count = 0;
+  for (const Part& part : this->Filled) {
+    count += part.particles->Count();
+  }
+  return this->Actor->GetVisibility() ? static_cast<int>(count) : 0;
 }
 
 void ParticleCloud::Fill(std::vector<Part> parts, double sides)
 {
   this->Filled = std::move(parts);
+  this->Sides = sides;
+  for (Part& part : this->Filled) {
+    const auto count = static_cast<Eigen::Index>(part.particles->Count());
+    const Eigen::Map<const Eigen::Matrix3Xf> positions(part.particles->positions.data(), 3, count);
+    part.box =
+        count > 0 ? Eigen::AlignedBox3f(positions.rowwise().minCoeff(), positions.rowwise().maxCoeff()) : Eigen::AlignedBox3f();
+  }
+  this->PointsDirty = true;
+}
+
+void ParticleCloud::FillPoints()
+{
   vtkIdType count = 0;
   for (const Part& part : this->Filled) {
     count += static_cast<vtkIdType>(part.particles->Count());
@@ -100,19 +160,12 @@ void ParticleCloud::Fill(std::vector<Part> parts, double sides)
   unsigned char* rgba = colours->GetPointer(0);
   float* size = sizes->GetPointer(0);
   for (const Part& part : this->Filled) {
-    unsigned char tints[3][256];
-    for (int value = 0; value < 256; ++value) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        tints[c][value] = static_cast<unsigned char>(std::lround(part.colour[c] * value));
-      }
-    }
+    const SplatTints tints(part);
     for (std::size_t p = 0; p < part.particles->Count(); ++p) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        *rgba++ = tints[c][part.particles->values[p]];
-      }
-      *rgba++ = static_cast<unsigned char>(std::lround(part.opacity * part.particles->alphas[p]));
+      const auto colour = tints.Of(part.particles->values[p], part.particles->alphas[p]);
+      rgba = std::copy(colour.begin(), colour.end(), rgba);
     }
-    size = std::fill_n(size, part.particles->Count(), static_cast<float>(sides * part.particles->sizeMm));
+    size = std::fill_n(size, part.particles->Count(), static_cast<float>(this->Sides * part.particles->sizeMm));
   }
   vtkNew<vtkPoints> points;
   points->SetDataTypeToFloat();
@@ -120,9 +173,17 @@ void ParticleCloud::Fill(std::vector<Part> parts, double sides)
   this->Cloud->SetPoints(points);
   this->Cloud->GetPointData()->SetScalars(colours);
   this->Cloud->GetPointData()->AddArray(sizes);
+  this->PointsDirty = false;
+  this->PlacesDirty = true;
 }
 
 void ParticleCloud::Move()
+{
+  this->PlacesDirty = true;
+  this->Actor->GetMapper()->Modified();
+}
+
+void ParticleCloud::MovePoints()
 {
   vtkPoints* points = this->Cloud->GetPoints();
   float* out = points->GetNumberOfPoints() > 0 ? static_cast<float*>(points->GetVoidPointer(0)) : nullptr;
@@ -140,25 +201,63 @@ void ParticleCloud::Move()
   }
   points->Modified();
   this->Cloud->Modified();
+  this->PlacesDirty = false;
   this->SortedAlong.setZero();
 }
 
-void ParticleCloud::Face(vtkRenderer* renderer)
+void ParticleCloud::Face(vtkRenderer* renderer, bool onProcessor)
 {
-  if (!this->Actor->GetVisibility()) {
+  this->IsOnProcessor = onProcessor;
+  if (!this->Actor->GetVisibility() || onProcessor) {
     return;
   }
-  vtkCamera* camera = renderer->GetActiveCamera();
+  if (this->PointsDirty) {
+    this->FillPoints();
+  }
+  if (this->PlacesDirty) {
+    this->MovePoints();
+  }
   Eigen::Vector3d towards;
-  camera->GetViewPlaneNormal(towards.data());
+  renderer->GetActiveCamera()->GetViewPlaneNormal(towards.data());
   if (towards != this->SortedAlong) {
     this->Sort(towards);
   }
-  const double height = renderer->GetSize()[1];
-  const double pixels = camera->GetParallelProjection()
-                            ? height / (2.0 * camera->GetParallelScale())
-                            : height / (2.0 * std::tan(RadiansPerDegree * camera->GetViewAngle() / 2.0));
-  this->Actor->GetShaderProperty()->GetVertexCustomUniforms()->SetUniformf("particlePixels", static_cast<float>(pixels));
+  this->Actor->GetShaderProperty()->GetVertexCustomUniforms()->SetUniformf("particlePixels",
+                                                                           static_cast<float>(PixelsPerMm(renderer)));
+}
+
+// Over what was drawn before, and behind what of it is nearer.
+void ParticleCloud::DrawOnProcessor(vtkRenderer* renderer) const
+{
+  int width, height, left, bottom;
+  renderer->GetTiledSizeAndOrigin(&width, &height, &left, &bottom);
+  if (width <= 0 || height <= 0) {
+    return;
+  }
+  auto* window = static_cast<vtkOpenGLRenderWindow*>(renderer->GetRenderWindow());
+  vtkOpenGLState* state = window->GetState();
+  SplatView view;
+  view.width = width;
+  view.height = height;
+  view.pixels = PixelsPerMm(renderer);
+  view.sides = this->Sides;
+  const double* toClip =
+      renderer->GetActiveCamera()->GetCompositeProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1, 1)->GetData();
+  view.worldToClip = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(toClip);
+  std::vector<float> depth(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const vtkOpenGLState::ScopedglEnableDisable scissors(state, Scissors), depths(state, Depths), blends(state, Blends);
+  const vtkOpenGLState::ScopedglBlendFuncSeparate blend(state);
+  window->GetZbufferData(left, bottom, left + width - 1, bottom + height - 1, depth.data());
+  std::vector<std::uint8_t> rgba = DrawParticles({this->Filled.begin(), this->Filled.end()}, view, depth.data());
+  vtkNew<vtkTextureObject> texture;
+  texture->SetContext(window);
+  texture->Create2DFromRaw(static_cast<unsigned int>(width), static_cast<unsigned int>(height), 4, VTK_UNSIGNED_CHAR,
+                           rgba.data());
+  state->vtkglDisable(Depths);
+  state->vtkglEnable(Blends);
+  state->vtkglBlendFuncSeparate(One, OneMinusAlpha, One, OneMinusAlpha);
+  const vtkOpenGLState::ScopedglViewport viewport(state);
+  texture->CopyToFrameBuffer(0, 0, width - 1, height - 1, left, bottom, left + width, bottom + height, nullptr, nullptr);
 }
 
 // From back to front.

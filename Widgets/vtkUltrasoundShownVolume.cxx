@@ -5,6 +5,7 @@
 #include "vtkColorTransferFunction.h"
 #include "vtkCubeSource.h"
 #include "vtkFixedPointVolumeRayCastMapper.h"
+#include "vtkGPUVolumeRayCastMapper.h"
 #include "vtkImageData.h"
 #include "vtkMatrix4x4.h"
 #include "vtkPiecewiseFunction.h"
@@ -134,16 +135,28 @@ vtkImageData* ShownVolume::BytesAt(int level, const SessionVolume& volume, vtkIm
   return bytes;
 }
 
-void ShownVolume::CastRays(int level, const SessionVolume& volume, vtkImageData* image)
+void ShownVolume::CastRays(int level, const SessionVolume& volume, vtkImageData* image, bool onProcessor)
 {
   vtkImageData* bytes = this->BytesAt(level, volume, image);
-  if (this->RayCaster->GetInput() != bytes) {
-    this->RayCaster->SetInputData(bytes);
-  }
   const auto distance = static_cast<float>(Blocks[level] * volume.geometry.spacing.minCoeff());
-  this->RayCaster->SetSampleDistance(distance);
-  this->RayCaster->SetInteractiveSampleDistance(distance);
-  this->RayCaster->SetImageSampleDistance(Rays[level]);
+  if (onProcessor) {
+    this->RayCaster->SetSampleDistance(distance);
+    this->RayCaster->SetInteractiveSampleDistance(distance);
+    this->RayCaster->SetImageSampleDistance(Rays[level]);
+    this->Volume->SetMapper(this->RayCaster);
+  } else {
+    if (!this->Graphics) {
+      this->Graphics = vtkSmartPointer<vtkGPUVolumeRayCastMapper>::New();
+      this->Graphics->AutoAdjustSampleDistancesOff();
+      this->Graphics->LockSampleDistanceToInputSpacingOff();
+    }
+    this->Graphics->SetSampleDistance(distance);
+    this->Graphics->SetImageSampleDistance(Rays[level]);
+    this->Volume->SetMapper(this->Graphics);
+  }
+  if (this->Volume->GetMapper()->GetDataSetInput() != bytes) {
+    vtkVolumeMapper::SafeDownCast(this->Volume->GetMapper())->SetInputData(bytes);
+  }
 
   vtkVolumeProperty* property = this->Volume->GetProperty();
   property->SetInterpolationTypeToLinear();

@@ -14,6 +14,7 @@
 
 class vtkCubeSource;
 class vtkFixedPointVolumeRayCastMapper;
+class vtkGPUVolumeRayCastMapper;
 class vtkImageData;
 
 namespace echorama {
@@ -40,7 +41,7 @@ public:
   /** At a level of detail. */
   const Particles& ParticlesAt(int level, const SessionVolume& volume, vtkImageData* image);
   vtkImageData* BytesAt(int level, const SessionVolume& volume, vtkImageData* image);
-  void CastRays(int level, const SessionVolume& volume, vtkImageData* image);
+  void CastRays(int level, const SessionVolume& volume, vtkImageData* image, bool onProcessor);
   ///@}
 
   void Place(const SessionVolume& volume);
@@ -50,6 +51,7 @@ private:
   std::map<int, Particles> Clouds; ///< by the block that was asked for
   std::map<int, vtkSmartPointer<vtkImageData>> Bytes;
   vtkNew<vtkFixedPointVolumeRayCastMapper> RayCaster;
+  vtkSmartPointer<vtkGPUVolumeRayCastMapper> Graphics; ///< made when it is asked for
   vtkNew<vtkCubeSource> Cube;
   double InBox = 0.0;
 };

@@ -12,6 +12,7 @@
 #include "vtkUltrasoundParticleCloud.h"
 #include "vtkUltrasoundShownVolume.h"
 #include "vtkUltrasoundViewProps.h"
+#include "vtkWeakPointer.h"
 
 #include <algorithm>
 #include <chrono>
@@ -42,6 +43,8 @@ struct vtkUltrasoundVolumeView::Internals {
   std::chrono::steady_clock::time_point Begin, DrawBegin;
 
   bool VolumesDirty = true, PosesDirty = true;
+  vtkWeakPointer<vtkRenderWindow> Window; ///< that was asked last what draws it
+  bool Software = true, OnProcessor = true;
   bool Remade = false; ///< this frame began with new particles: its time says nothing about the next
   std::map<int, ShownVolume> Volumes;
   std::map<int, echorama::FramedPicture> Planes;
@@ -105,6 +108,18 @@ struct vtkUltrasoundVolumeView::Internals {
         shown.BytesAt(level, *volume, this->Session->GetImage(id));
       }
     }
+  }
+
+  // Before it draws, for then its context is current.
+  void AskWindow()
+  {
+    if (this->Renderer->GetRenderWindow() != this->Window) {
+      this->Window = this->Renderer->GetRenderWindow();
+      this->Software = echorama::DrawsInSoftware(this->Window);
+    }
+    const bool before = this->OnProcessor;
+    this->OnProcessor = this->View->DrawnBy == "automatic" ? this->Software : this->View->DrawnBy == "processor";
+    this->VolumesDirty = this->VolumesDirty || this->OnProcessor != before;
   }
 
   void UpdateVolumes();
@@ -179,10 +194,10 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
   for (const int id : visible) {
     const SessionVolume& volume = *this->Find(id);
     if (this->View->Style == "volume") {
-      this->Volumes.at(id).CastRays(this->View->Detail.Level(), volume, this->Session->GetImage(id));
+      this->Volumes.at(id).CastRays(this->View->Detail.Level(), volume, this->Session->GetImage(id), this->OnProcessor);
     } else if (this->View->Style == "points") {
       const auto& particles = this->Volumes.at(id).ParticlesAt(this->View->Detail.Level(), volume, this->Session->GetImage(id));
-      parts.push_back({id, &particles, volume.colour, volume.opacity, volume.volumeToWorld});
+      parts.push_back({{&particles, volume.colour, volume.opacity, volume.volumeToWorld}, id, {}});
     }
   }
   if (this->View->Style == "points") {
@@ -323,9 +338,10 @@ void vtkUltrasoundVolumeView::OnStart()
 {
   Internals& parts = *this->Parts;
   parts.Begin = std::chrono::steady_clock::now();
+  parts.AskWindow();
   this->Update();
   parts.Renderer->ResetCameraClippingRange(); // planes and arrows come and go
-  parts.Cloud.Face(parts.Renderer);
+  parts.Cloud.Face(parts.Renderer, parts.OnProcessor);
   parts.Marker.Update(parts.Renderer->GetActiveCamera(), this->ShowMarker);
   parts.DrawBegin = std::chrono::steady_clock::now();
 }
@@ -437,6 +453,21 @@ bool vtkUltrasoundVolumeView::SetStyle(const char* style)
   return true;
 }
 
+bool vtkUltrasoundVolumeView::SetDrawnBy(const char* who)
+{
+  const std::string name = who ? who : "";
+  if (name != "automatic" && name != "processor" && name != "graphics") {
+    vtkErrorMacro("the view is drawn by \"" << name << "\"; it must be \"automatic\", \"processor\" or \"graphics\"");
+    return false;
+  }
+  if (name != this->DrawnBy) {
+    this->DrawnBy = name;
+    this->Parts->FullSeconds.clear();
+    this->Modified();
+  }
+  return true;
+}
+
 // Parameters are clamped to their ranges; what is not a number is left out.
 #define EchoramaParameter(Name, Type, Member, Lowest, Highest)                                                                   \
   void vtkUltrasoundVolumeView::Set##Name(Type value)                                                                            \
@@ -527,6 +558,7 @@ void vtkUltrasoundVolumeView::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Session: " << this->GetSession() << "\n";
   os << indent << "Style: " << this->Style << "\n";
+  os << indent << "DrawnBy: " << this->DrawnBy << "\n";
   os << indent << "Downsampling: " << this->Parameters.downsampling << "\n";
   os << indent << "Budget: " << this->Parameters.budget << "\n";
   os << indent << "ParticleSize: " << this->ParticleSize << "\n";

@@ -147,6 +147,13 @@ public:
   ///@}
 
   ///@{
+  /** Who draws particles and renders volumes: "automatic" (the graphics card, and the processor where OpenGL is software: it is
+   * several times as fast there), "processor" or "graphics". The pictures differ by rounding. Default "automatic". */
+  bool SetDrawnBy(const char* who);
+  std::string GetDrawnBy() const { return this->DrawnBy; }
+  ///@}
+
+  ///@{
   /** The axes L, P and S in the corner at the lower left. Default on. */
   void SetOrientationMarker(bool on);
   bool GetOrientationMarker() const { return this->ShowMarker; }
@@ -165,7 +172,7 @@ private:
   void OnStart();
   void OnEnd();
 
-  std::string Style = "points";
+  std::string Style = "points", DrawnBy = "automatic";
   echorama::ParticleParameters Parameters;
   double ParticleSize = 1.25;
   bool ShowPlanes = true, ShowErrors = false, ShowMarker = true;

@@ -6,6 +6,7 @@
 #include "Testing/Benchmark.h"
 #include "Widgets/Particles/Particles.h"
 #include "Widgets/Session/LiveScore.h"
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
@@ -147,8 +148,14 @@ void BenchFrames(const std::vector<Scene>& scenes)
   window->SetOffScreenRendering(1);
   window->SetSize(800, 600);
   window->AddRenderer(view->GetRenderer());
-  for (const char* style : {"points", "volume", "outline"}) {
+  std::vector<unsigned char> first;
+  for (const auto& [name, style, who] : {std::array{"points", "points", "automatic"},
+                                         {"points by OpenGL", "points", "graphics"},
+                                         {"volume", "volume", "automatic"},
+                                         {"volume by OpenGL", "volume", "graphics"},
+                                         {"outline", "outline", "automatic"}}) {
     view->SetStyle(style);
+    view->SetDrawnBy(who);
     window->Render();
     std::vector<double> full, drag, processor; // the last: of all cores, which other programs do not lengthen
     const auto processorSeconds = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
@@ -168,9 +175,14 @@ void BenchFrames(const std::vector<Scene>& scenes)
                    {"slowest_seconds", seconds.back()},
                    {"processor_seconds", processor[processor.size() / 2]},
                    {"level", view->GetDetailLevel()}});
-      benchmark::ReportTime("volume_view", style, how, seconds[seconds.size() / 2], more);
+      benchmark::ReportTime("volume_view", name, how, seconds[seconds.size() / 2], more);
     };
-    report("full", full, {{"particles", particles}});
+    if (first.empty())
+      first = picture;
+    report("full", full,
+           {{"particles", particles},
+            {"error", std::string(style) == "points" ? Rms(picture, first) : 0.0},
+            {"error_unit", "grey levels RMS"}});
     processor.clear();
     view->SetInteractive(true);
     for (int frame = 0; frame < 60; ++frame) {
