@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "BodyView.h"
+#include "Controls.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Messages.h"
@@ -93,9 +94,7 @@ BodyView::BodyView(Scan* scan, NeedleTool* needle, QWidget* parent)
 {
   setObjectName("bodyView");
   canvas_->setObjectName("bodyCanvas");
-  // A window of its own: else Qt joins all of the outer one by OpenGL whenever any part of it changes, the image foremost.
-  setAttribute(Qt::WA_DontCreateNativeAncestors);
-  setAttribute(Qt::WA_NativeWindow);
+  MakeOwnWindow(this); // for the image changes often
   canvas_->setAccessibleName(tr("Body and probe"));
   canvas_->setFocusPolicy(Qt::StrongFocus);
   canvas_->setMinimumSize(200, 160);

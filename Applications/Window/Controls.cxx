@@ -147,6 +147,12 @@ QPushButton* Button(QWidget* parent, const char* name, const QString& label, con
   return button;
 }
 
+void MakeOwnWindow(QWidget* widget)
+{
+  widget->setAttribute(Qt::WA_DontCreateNativeAncestors);
+  widget->setAttribute(Qt::WA_NativeWindow);
+}
+
 QAction* MakeAction(QObject* parent, const char* name, const QString& label, const QString& shortcut, const QString& help,
                     const std::function<void()>& triggered)
 {

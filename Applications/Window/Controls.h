@@ -65,6 +65,10 @@ QToolButton* SmallButton(QWidget* parent, const QString& name, const QString& la
 QPushButton* Button(QWidget* parent, const char* name, const QString& label, const QString& help,
                     const std::function<void()>& pressed);
 
+/// A widget with a view drawn by OpenGL becomes a window of the system, inside of the other. Else Qt joins all of the outer
+/// window by OpenGL whenever anything in it changes.
+void MakeOwnWindow(QWidget* widget);
+
 /// A menu entry with a shortcut ("" for none); the help is its tool tip and status tip.
 QAction* MakeAction(QObject* parent, const char* name, const QString& label, const QString& shortcut, const QString& help,
                     const std::function<void()>& triggered);

@@ -26,6 +26,7 @@ SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis,
   : QWidget(parent), canvas_(new SliceCanvas(bench, this)), slider_(new QSlider(Qt::Horizontal, this))
 {
   setObjectName(name);
+  MakeOwnWindow(this);
   canvas_->setObjectName(name + "Canvas");
   canvas_->setAccessibleName(tr("Slice"));
   axes_ = ChoiceField(this, "axis", tr("What the slice is cut across (V: the next)"),

@@ -47,6 +47,7 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
     view_(vtkSmartPointer<vtkUltrasoundVolumeView>::New())
 {
   setObjectName("volumePane");
+  MakeOwnWindow(this);
   canvas_->setObjectName("volumeCanvas");
   canvas_->setAccessibleName(tr("3D view"));
   canvas_->setFocusPolicy(Qt::StrongFocus);
