@@ -590,7 +590,7 @@ void SpotDetector::FitGroup(const Source& source, const std::vector<const Candid
   while (starts.size() > 1 && !areApart(result)) {
     const std::vector<GaussianSpot>& spots = result.converged ? result.spots : starts;
     const auto [low, high] = std::minmax_element(spots.begin(), spots.end(), weaker);
-    if (result.converged && low->peak >= OwnLight * high->peak)
+    if (low->peak >= OwnLight * high->peak)
       break;
     ++out.refused;
     starts.erase(starts.begin() + (low - spots.begin()));

@@ -159,6 +159,23 @@ TEST(SpotDetector, TwoThatTouchAreTwo)
   EXPECT_EQ(detector.Detect(one.Frame(), &background).spots.size(), 1u);
 }
 
+TEST(SpotDetector, WhatCannotBeToldApartIsLeftOutAndNothingIsPutBetween)
+{
+  // Three lights so near each other that fits of all hardly converge. Without the weakest, the others' places would be wrong.
+  SpotDetector detector;
+  const LightsOffBackground background = Background(96, 96, Flat, 8, 1);
+  const std::vector<PaintedSpot> first{{45.3, 47.8, 435, 2.6}, {52.0, 50.3, 254, 2.6}, {59.3, 54.4, 123, 2.4}},
+      second{{39.4, 44.4, 103, 3.7}, {58.1, 58.6, 379, 3.7}, {50.8, 51.0, 142, 3.6}};
+  int between = 0;
+  for (const auto& lights : {first, second})
+    for (std::uint64_t trial = 0; trial < 50; ++trial)
+      for (const Spot& s : detector.Detect(Paint(96, 96, Flat, lights, 500 + trial).Frame(), &background).spots)
+        between += std::none_of(lights.begin(), lights.end(), [&s](const PaintedSpot& light) {
+          return (s.position - Vector2d(light.x, light.y)).norm() < 0.4;
+        });
+  EXPECT_LT(between, 20); // in 100 pictures
+}
+
 TEST(SpotDetector, FindsNothingWhereNothingIs)
 {
   SpotDetector detector;
