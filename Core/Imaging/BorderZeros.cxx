@@ -3,6 +3,7 @@
 // that it touches in the row and in the slice before; runs at the border join node 0, the outside. A second pass over the
 // runs marks those of the outside. Cost: one look at every voxel, and 12 bytes per run.
 #include "Core/Imaging/BorderZeros.h"
+#include "Core/Base/JoinedSets.h"
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -23,27 +24,6 @@ struct Run {
   int begin, end; // voxels of one row
 };
 
-class Sets {
-public:
-  std::size_t Root(std::size_t i)
-  {
-    while (parent_[i] != i)
-      i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  // The smaller root wins, so that the outside stays node 0.
-  void Join(std::size_t a, std::size_t b)
-  {
-    a = Root(a);
-    b = Root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-  void Add() { parent_.push_back(parent_.size()); }
-
-private:
-  std::vector<std::size_t> parent_{0};
-};
-
 } // namespace
 
 template <class T>
@@ -53,7 +33,7 @@ std::int64_t ValidFromBorderZeros(VolumeView<const T> voxels, VolumeView<unsigne
   std::vector<Run> runs;
   std::vector<std::size_t> rows{0}; // the first run of each row, and one beyond the last
   rows.reserve(static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz) + 1);
-  Sets sets; // run r is node r + 1
+  JoinedSets sets(1); // 0, the outside, stays the name of its set; run r is node r + 1
   const auto joinWithRow = [&](std::size_t first, std::size_t row) {
     // Both rows' runs are in order: walk them together.
     std::size_t a = first, b = rows[row];
@@ -97,7 +77,7 @@ std::int64_t ValidFromBorderZeros(VolumeView<const T> voxels, VolumeView<unsigne
   for (std::size_t row = 0; row + 1 < rows.size(); ++row)
     for (std::size_t r = rows[row]; r < rows[row + 1]; ++r) {
       unsigned char* const target = valid.Data() + voxels.RowStride() * static_cast<std::ptrdiff_t>(row);
-      const bool outside = sets.Root(r + 1) == 0;
+      const bool outside = sets.Of(r + 1) == 0;
       for (int i = runs[r].begin; i < runs[r].end; ++i) {
         bool invalid = outside;
         if constexpr (std::is_floating_point_v<T>)

@@ -14,10 +14,10 @@
 // Cost: trees times edges; a solution is a few sparse Cholesky factors. Ten volumes take milliseconds.
 #include "PoseGraph.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedSets.h"
 #include "Core/Base/Random.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Index.h"
-#include "JoinedSets.h"
 #include "PlacedVolume.h"
 #include "PoseGraphSolver.h"
 #include <algorithm>
@@ -91,7 +91,7 @@ private:
     double mm, sigmas;
   };
 
-  JoinedSets Joined(const Flags& used) const;
+  JoinedSets<int> Joined(const Flags& used) const;
   Gap GapOf(std::size_t e, const MarginalCovariances& covariances) const;
   Twist ResidualOf(std::size_t e) const
   {
@@ -119,9 +119,9 @@ private:
   std::vector<std::vector<Neighbour>> neighbours_;
 };
 
-JoinedSets Graph::Joined(const Flags& used) const
+JoinedSets<int> Graph::Joined(const Flags& used) const
 {
-  JoinedSets sets(poses.size());
+  JoinedSets<int> sets(poses.size());
   for (std::size_t e = 0; e < edges_.size(); ++e)
     if (used[e])
       sets.Join(edges_[e].from, edges_[e].to);
@@ -130,7 +130,7 @@ JoinedSets Graph::Joined(const Flags& used) const
 
 std::vector<int> Graph::Roots(const Flags& used) const
 {
-  JoinedSets sets = Joined(used);
+  JoinedSets<int> sets = Joined(used);
   std::vector<int> roots(poses.size());
   const int ofFixed = sets.Of(fixed_);
   for (std::size_t v = 0; v < roots.size(); ++v) {
@@ -236,7 +236,7 @@ Graph::Tree Graph::GrowTree(const Flags& take, const Flags& isRoot, const std::v
       if (take[e])
         order.push_back(e);
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lengths[a] < lengths[b]; });
-    JoinedSets sets(volumes);
+    JoinedSets<int> sets(volumes);
     for (const std::size_t e : order)
       allowed[e] = sets.Join(edges_[e].from, edges_[e].to);
   }
@@ -418,7 +418,7 @@ void Graph::Solve(const Flags& take, const Flags& keep, const Progress& progress
       aside.push_back({ResidualSigmas(e), e});
     }
   std::sort(aside.begin(), aside.end());
-  JoinedSets sets = Joined(stands);
+  JoinedSets<int> sets = Joined(stands);
   for (const auto& [sigmas, e] : aside)
     stands[e] = sets.Join(edges_[e].from, edges_[e].to); // nothing else joins its volumes
   Settle(take, keep);

@@ -8,13 +8,13 @@
 // the points of the mesh. So it does not matter who does which block, and when.
 #include "LevelSetMesh.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedSets.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <limits>
 #include <map>
-#include <numeric>
 
 namespace echorama {
 namespace {
@@ -245,30 +245,22 @@ TriangleSurface MeshLevelSet(const LevelSet& levelSet, const Progress& progress)
 
 std::size_t DropCrumbs(TriangleSurface& surface, double smallerThanMm)
 {
-  // Which points hang together: each names another of its piece, the first one itself.
-  std::vector<std::uint32_t> first(surface.points.size());
-  std::iota(first.begin(), first.end(), 0u);
-  const auto firstOf = [&first](std::uint32_t point) {
-    while (first[point] != point)
-      point = first[point] = first[first[point]];
-    return point;
-  };
-  for (const auto& [a, b, c] : surface.triangles)
-    for (const std::uint32_t other : {b, c}) {
-      const std::uint32_t one = firstOf(a), two = firstOf(other);
-      first[std::max(one, two)] = std::min(one, two);
-    }
+  JoinedSets<std::uint32_t> pieces(surface.points.size()); // points that hang together
+  for (const auto& [a, b, c] : surface.triangles) {
+    pieces.Join(a, b);
+    pieces.Join(a, c);
+  }
   std::vector<Eigen::AlignedBox3f> boxes(surface.points.size());
   for (std::uint32_t i = 0; i < surface.points.size(); ++i)
-    boxes[firstOf(i)].extend(surface.points[i]);
+    boxes[pieces.Of(i)].extend(surface.points[i]);
   const auto isCrumb = [&](std::uint32_t point) {
-    return static_cast<double>(boxes[firstOf(point)].sizes().maxCoeff()) < smallerThanMm;
+    return static_cast<double>(boxes[pieces.Of(point)].sizes().maxCoeff()) < smallerThanMm;
   };
   std::size_t crumbs = 0;
   std::uint32_t kept = 0;
   std::vector<std::uint32_t> renamed(surface.points.size());
   for (std::uint32_t i = 0; i < surface.points.size(); ++i) {
-    crumbs += firstOf(i) == i && isCrumb(i);
+    crumbs += pieces.Of(i) == i && isCrumb(i);
     renamed[i] = kept;
     if (!isCrumb(i))
       surface.points[kept++] = surface.points[i];

@@ -10,13 +10,13 @@
 //
 // Nothing that is smaller than the lens can draw is a spot: hot pixels are refused by their size.
 #include "SpotDetector.h"
+#include "Core/Base/JoinedSets.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <Eigen/LU>
-#include <numeric>
 
 namespace echorama {
 
@@ -274,7 +274,7 @@ void SpotDetector::FindRuns(const Source& source, SpotFrame& out)
       Largest(frame + piece, floor + piece, end - piece, excess, brightest);
       if (excess < least) {
         if (begin >= 0)
-          runs_.push_back({y, begin, piece, 0});
+          runs_.push_back({y, begin, piece});
         begin = -1;
         continue;
       }
@@ -284,13 +284,13 @@ void SpotDetector::FindRuns(const Source& source, SpotFrame& out)
         if (isLit && begin < 0)
           begin = x;
         else if (!isLit && begin >= 0) {
-          runs_.push_back({y, begin, x, 0});
+          runs_.push_back({y, begin, x});
           begin = -1;
         }
       }
     }
     if (begin >= 0)
-      runs_.push_back({y, begin, source.width, 0});
+      runs_.push_back({y, begin, source.width});
   }
   out.saturatedShare = static_cast<double>(saturated) / static_cast<double>(size);
   out.changedShare = static_cast<double>(lit) / static_cast<double>(size);
@@ -309,30 +309,21 @@ void SpotDetector::FindRuns(const Source& source, SpotFrame& out)
 
 std::vector<SpotDetector::Candidate> SpotDetector::Join(const Source& source)
 {
-  parents_.clear();
-  const auto root = [this](int label) {
-    while (parents_[static_cast<std::size_t>(label)] != label)
-      label = parents_[static_cast<std::size_t>(label)] =
-          parents_[static_cast<std::size_t>(parents_[static_cast<std::size_t>(label)])];
-    return label;
-  };
+  JoinedSets labels(runs_.size());
   std::size_t above = 0; // the first run of the row above that may still touch
   for (std::size_t i = 0; i < runs_.size(); ++i) {
-    Run& run = runs_[i];
-    run.label = static_cast<int>(parents_.size());
-    parents_.push_back(run.label);
+    const Run& run = runs_[i];
     while (above < i && (runs_[above].y < run.y - 1 || (runs_[above].y == run.y - 1 && runs_[above].end < run.begin)))
       ++above;
-    for (std::size_t j = above; j < i && runs_[j].y == run.y - 1 && runs_[j].begin <= run.end; ++j) {
-      const int a = root(runs_[j].label), b = root(run.label);
-      parents_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-    }
+    for (std::size_t j = above; j < i && runs_[j].y == run.y - 1 && runs_[j].begin <= run.end; ++j)
+      labels.Join(j, i);
   }
 
   std::vector<Candidate> joined;
-  std::vector<int> place(parents_.size(), -1);
-  for (const Run& run : runs_) {
-    int& at = place[static_cast<std::size_t>(root(run.label))];
+  std::vector<int> place(runs_.size(), -1);
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    int& at = place[labels.Of(i)];
     if (at < 0) {
       at = static_cast<int>(joined.size());
       joined.push_back({run.begin, run.end - 1, run.y, run.y, {}, 0, 0, 0.0, {}});

@@ -74,7 +74,7 @@ public:
 private:
   struct Candidate;
   struct Run {
-    int y, begin, end, label;
+    int y, begin, end;
   };
   struct Source { // what is being searched
     const std::uint8_t* frame;
@@ -100,7 +100,6 @@ private:
   std::uint8_t thresholds_[256]; // by what is subtracted
   std::vector<std::uint8_t> mono_, surroundings_;
   std::vector<Run> runs_;
-  std::vector<int> parents_;
 };
 
 } // namespace echorama
