@@ -10,7 +10,8 @@
 // changes sides: choice of the residual's weight, all unknowns, outliers by what each point is off were it not in the fit. The
 // weight is that under which the observations are most likely, whatever camera and residual are (restricted maximum likelihood,
 // Wood, J. R. Stat. Soc. B 2011): unlike cross-validation it seldom takes noise for a residual, and when in doubt it leaves a
-// stiff one, whose uncertainty is then part of every answer. Where none is likeliest there is none.
+// stiff one, whose uncertainty is then part of every answer. Where none is likeliest there is none, unless there are several
+// poses: see LowOrders().
 //
 // Cost: n points and m centres take n (13 + 2 m)^2 per step, some ten steps: 0.3 s for 350 and 60.
 #include "CameraFit.h"
@@ -39,8 +40,10 @@ constexpr Index PerLens = CameraOptics::LensUnknowns, PerPose = 6;
 constexpr double MedianOfTwo = 1.17741;               // of the length of a pair of normal numbers
 constexpr double PoseSigmaMm = 20.0, PoseSigma = 0.3; // of a rough one, for what observations leave open; radians
 constexpr double WidthBesideResidual = 0.3;           // of the lens's prior
-constexpr double ErrorScaleOfNone = 1e4;              // sigmas of a point that the camera cannot see
-constexpr double LeastScale = 0.05; // what is left over per what covariances say: not all observations are that good
+constexpr double LowOrderPx = 3.0;       // of the residual's lowest orders, about: what a tilted sensor and the like come to
+constexpr double ErrorScaleOfNone = 1e4; // sigmas of a point that the camera cannot see
+constexpr double LeastKnown = 1e-5;      // of a rough standard deviation: nothing is known better
+constexpr double LeastScale = 0.05;      // what is left over per what covariances say: not all observations are that good
 
 std::array<double*, PerLens> NumbersOf(FisheyeLens& lens)
 {
@@ -65,16 +68,21 @@ public:
     SetLensPrior(start.lens, 1.0);
   }
 
+  static std::array<double, PerLens> RoughSigmas(const FisheyeLens& lens)
+  {
+    return {0.1 * lens.focal, 0.05 * lens.width, 0.05 * lens.height, 0.1, 0.05, 0.02, 0.01};
+  }
+
   // Wide enough for what is known of a lens by its name, and tight enough that powers of angles nobody saw stay where they were.
   // Beside a residual it is tighter, about what the lens is without: both can do much of the same, and where depth passes for
   // direction, too, nothing else would hold the lens.
   void SetLensPrior(const FisheyeLens& mean, double width)
   {
     start_.lens = mean;
-    const double sigmas[] = {0.1 * mean.focal, 0.05 * mean.width, 0.05 * mean.height, 0.1, 0.05, 0.02, 0.01};
+    const auto sigmas = RoughSigmas(mean);
     lensInformation_.setZero();
     for (Index i = 0; i < PerLens; ++i)
-      lensInformation_(i, i) = 1.0 / std::pow(width * sigmas[i], 2);
+      lensInformation_(i, i) = 1.0 / std::pow(width * sigmas[static_cast<std::size_t>(i)], 2);
   }
 
   // What a lens cannot do is noise to a fit without residual: so many times what covariances say.
@@ -108,7 +116,14 @@ public:
     state_.bend = start_.bend;
     if (settings_.covariance.size() > 0) {
       const MatrixXd reduced = Block(Reducing());
-      information_ = InverseOfSymmetric(reduced * settings_.covariance * reduced.transpose());
+      MatrixXd known = reduced * settings_.covariance * reduced.transpose();
+      VectorXd least = VectorXd::Ones(Count()); // of what is said to be exact there would be no inverse
+      const auto sigmas = RoughSigmas(start_.lens);
+      std::copy(sigmas.begin(), sigmas.end(), least.data());
+      for (Index pose = PerLens + 2 * count; pose < Count(); pose += PerPose)
+        least.segment<PerPose>(pose) << Vector3d::Constant(PoseSigmaMm), Vector3d::Constant(PoseSigma);
+      known.diagonal() += (LeastKnown * least).cwiseAbs2();
+      information_ = InverseOfSymmetric(known);
     }
   }
   void SetSmoothness(double smoothness) { smoothness_ = smoothness; }
@@ -259,6 +274,9 @@ public:
       prior.diagonal().segment<3>(pose + 3).setConstant(std::pow(misfit_ / PoseSigma, 2));
     }
     prior.diagonal().segment(PerLens, 2 * BendCount()).setConstant(smoothness_);
+    const Index low = LowOrders();
+    for (Index end = PerLens + BendCount(); low > 0 && end <= PerLens + 2 * BendCount(); end += BendCount())
+      prior.diagonal().segment(end - low, low).setConstant(1.0 / (LowOrderPx * LowOrderPx));
     if (settings_.mount.size() > 0) {
       const auto poses = static_cast<Index>(state_.poses.size());
       const MatrixXd one = InverseOfSymmetric(settings_.mount);
@@ -270,45 +288,57 @@ public:
     return prior;
   }
 
-  // The residual's weight; infinite: none. Takes a plate at 0 and a state that fits without.
+  // The residual's weight; infinite: none. Takes a plate at 0, a state that fits without, and the priors beside a residual.
   double ChooseSmoothness(double& effective) const
   {
     MatrixXd jacobian;
     VectorXd errors;
     Rows(jacobian, errors);
-    const Index count = BendCount(), rows = jacobian.rows(), fixed = Count() - 2 * count;
-    // What the camera itself can explain is taken out of both; its prior is further rows.
-    MatrixXd camera(rows + fixed, fixed);
-    camera << jacobian.leftCols<PerLens>(), jacobian.rightCols(fixed - PerLens), MatrixXd::Zero(fixed, fixed);
-    for (Index i = 0; i < PerLens; ++i)
-      camera(rows + i, i) = std::sqrt(lensInformation_(i, i));
-    const MatrixXd q = Eigen::HouseholderQR<MatrixXd>(camera).householderQ() * MatrixXd::Identity(rows + fixed, fixed);
-    MatrixXd bending = MatrixXd::Zero(rows + fixed, 2 * count);
-    bending.topRows(rows) = jacobian.middleCols(PerLens, 2 * count);
-    VectorXd left = VectorXd::Zero(rows + fixed);
+    const Index low = LowOrders(), high = BendCount() - low, rows = jacobian.rows();
+    const Index poses = PerPose * static_cast<Index>(state_.poses.size()), fixed = PerLens + poses, all = fixed + 2 * low;
+    // What the camera itself can explain is taken out, then what the lowest orders can; what is known before is further rows.
+    MatrixXd known = MatrixXd::Zero(rows + all, all);
+    known.topRows(rows) << jacobian.leftCols<PerLens>(), jacobian.rightCols(poses), jacobian.middleCols(PerLens + high, low),
+        jacobian.middleCols(PerLens + BendCount() + high, low);
+    VectorXd left = VectorXd::Zero(rows + all);
     left.head(rows) = errors;
+    const MatrixXd prior = PriorInformation(), turned = FromStartByStep();
+    const MatrixXd ofPoses = prior.bottomRightCorner(poses, poses).llt().matrixU();
+    known.block<PerLens, PerLens>(rows, 0) = MatrixXd(prior.topLeftCorner<PerLens, PerLens>().llt().matrixU());
+    known.block(rows + PerLens, PerLens, poses, poses) = ofPoses * turned.bottomRightCorner(poses, poses);
+    left.segment(rows + PerLens, poses) = -ofPoses * FromStart().tail(poses);
+    known.bottomRightCorner(2 * low, 2 * low).diagonal().setConstant(1.0 / LowOrderPx);
+    const Eigen::HouseholderQR<MatrixXd> qr(known);
+    const MatrixXd q = qr.householderQ() * MatrixXd::Identity(rows + all, all);
+    MatrixXd bending = MatrixXd::Zero(rows + all, 2 * high);
+    bending.topRows(rows) << jacobian.middleCols(PerLens, high), jacobian.middleCols(PerLens + BendCount(), high);
     bending -= (q * (q.transpose() * bending)).eval();
-    left -= (q * (q.transpose() * left)).eval();
-    const SymmetricEigen modes = EigenOfSymmetric(bending.transpose() * bending);
-    const VectorXd parts = modes.vectors.transpose() * (bending.transpose() * left);
+    left -= (q.leftCols(fixed) * (q.leftCols(fixed).transpose() * left)).eval();
 
-    const double number = static_cast<double>(rows), none = left.squaredNorm();
+    const double number = static_cast<double>(rows) - static_cast<double>(poses), none = left.squaredNorm();
     effective = 0.0;
     double chosen = std::numeric_limits<double>::infinity();
-    if (none < 1e-4 * number)
+    if (none < 1e-4 * static_cast<double>(rows))
       return chosen; // nothing to explain
-    double best = (number - static_cast<double>(PerPose) * static_cast<double>(state_.poses.size())) * std::log(none);
+    double best = low > 0 ? std::numeric_limits<double>::infinity() : number * std::log(none), ofLow = 0.0, freedomsOfLow = 0.0;
+    for (Index i = fixed; i < all; ++i) {
+      const double gained = std::pow(LowOrderPx * qr.matrixQR()(i, i), 2);
+      ofLow += std::log(gained);
+      freedomsOfLow += 1.0 - 1.0 / gained;
+    }
+    left -= (q.rightCols(2 * low) * (q.rightCols(2 * low).transpose() * left)).eval();
+    const SymmetricEigen modes = EigenOfSymmetric(bending.transpose() * bending);
+    const VectorXd parts = modes.vectors.transpose() * (bending.transpose() * left);
     for (double power = 8.0; power > -6.01; power -= 0.25) {
       const double weight = std::pow(10.0, power);
-      double sum = none, volume = 0.0, freedoms = 0.0;
+      double sum = left.squaredNorm(), volume = ofLow, freedoms = freedomsOfLow;
       for (Index i = 0; i < parts.size(); ++i) {
         const double value = std::max(modes.values[i], 0.0);
         sum -= parts[i] * parts[i] / (value + weight);
         volume += std::log1p(value / weight);
         freedoms += value / (value + weight);
       }
-      const double here = volume + (number - static_cast<double>(PerPose) * static_cast<double>(state_.poses.size())) *
-                                       std::log(std::max(sum, 1e-300));
+      const double here = volume + number * std::log(std::max(sum, 1e-300));
       if (here < best) {
         best = here;
         chosen = weight;
@@ -327,8 +357,22 @@ public:
 
   Vector3d InCamera(std::size_t i) const { return state_.poses[points_[i].pose].inverse(Eigen::Isometry) * points_[i].point; }
   CameraOptics Optics() const { return {state_.lens, Residual()}; }
+  // Sum of the squares of what is left over, and of how far all is from what was known of it.
+  double Cost() const
+  {
+    double cost = 0.0;
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      cost += weights_[i] * errors_[i].squaredNorm();
+    const VectorXd from = FromStart();
+    return cost + from.dot(PriorInformation() * from);
+  }
 
 private:
+  // What of the residual is not weighed by its smoothness. Under several domes a camera whose sensor is tilted a little looks
+  // much like one that is mounted elsewhere under each; a residual that has to be small rather blames the mounts, by many times
+  // what they are known to, and what it claims of the lens is wrong for any other shell.
+  Index LowOrders() const { return settings_.mount.size() > 0 ? plate_.LowOrders() : 0; }
+
   MatrixXd Reducing() const // freedoms of given weights
   {
     return InverseOfSymmetric(freedoms_.transpose() * freedoms_) * freedoms_.transpose();
@@ -355,15 +399,6 @@ private:
       errors_[i] = p ? Vector2d(roots_[i] * (points_[i].pixel - p->pixel - residual.At(p->pixel)))
                      : Vector2d(Vector2d::Constant(ErrorScaleOfNone));
     }
-  }
-
-  double Cost() const
-  {
-    double cost = 0.0;
-    for (std::size_t i = 0; i < points_.size(); ++i)
-      cost += weights_[i] * errors_[i].squaredNorm();
-    const VectorXd from = FromStart();
-    return cost + from.dot(PriorInformation() * from);
   }
 
   VectorXd FromStart() const
@@ -529,7 +564,7 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
       const double squared = error.dot(SolveSymmetric(spread, error).col(0));
       result.sigmas.push_back(squared >= 0.0 ? std::sqrt(squared) : ErrorScaleOfNone); // one that alone decides something
     }
-    const double scale = std::max(Median(result.sigmas) / MedianOfTwo, LeastScale);
+    const double scale = std::max(Median(result.sigmas) / MedianOfTwo, isKnown ? 1.0 : LeastScale);
     bool changed = false;
     for (std::size_t i = 0; i < points.size(); ++i) {
       result.sigmas[i] /= scale;
@@ -552,7 +587,8 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
       const CameraState before = problem.State();
       problem.SetResidual({});
       problem.SetLensPrior(start.lens, 1.0);
-      problem.SetMisfit(std::max(problem.MedianError(), 1.0));
+      result.misfit = std::max(problem.MedianError(), 1.0);
+      problem.SetMisfit(result.misfit);
       problem.SetState({before.lens, VectorXd(), before.poses});
       if (!problem.Descend(false, result.isInlier, 300))
         FailToConverge(points.size());
@@ -563,15 +599,18 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
         const CameraState alone = problem.State();
         problem.SetResidual(ThinPlate::Over(pixels, centres)); // seen pixels are near enough to those of the lens
         problem.SetState({alone.lens, problem.State().bend, alone.poses});
+        problem.SetLensPrior(alone.lens, WidthBesideResidual);
+        problem.SetMisfit(1.0);
         problem.Descend(false, result.isInlier, 0);
         result.smoothness = problem.ChooseSmoothness(result.residualFreedoms);
         if (std::isinf(result.smoothness)) {
           problem.SetResidual({});
+          problem.SetLensPrior(start.lens, 1.0);
+          problem.SetMisfit(result.misfit);
           problem.SetState(alone);
         } else {
           problem.SetSmoothness(result.smoothness);
-          problem.SetLensPrior(alone.lens, WidthBesideResidual);
-          problem.SetMisfit(1.0);
+          result.misfit = 1.0;
         }
       }
     }
@@ -590,12 +629,17 @@ CameraFitResult FitCamera(const std::vector<SeenPoint>& points, const CameraOpti
   const auto used = std::count(result.isInlier.begin(), result.isInlier.end(), true);
   for (std::size_t i = 0; i < points.size(); ++i)
     squares += result.isInlier[i] ? problem.Errors()[i].squaredNorm() : 0.0;
-  // Of what is not known before; with a prior on everything every point is one more.
+  // Of what is not known before; with a prior on everything every point is one more, and what contradicts it counts.
   const double unknowns = isKnown ? 0.0
                                   : static_cast<double>(PerLens + PerPose * static_cast<Index>(problem.State().poses.size())) +
                                         result.residualFreedoms;
   const double rest = 2.0 * static_cast<double>(used) - unknowns;
-  result.noiseScale = rest > 4.0 ? std::sqrt(squares / rest) : 1.0;
+  if (isKnown && used > 0) {
+    squares = problem.Cost();
+    const double spread = 2.0 / (9.0 * rest); // chi squared as a normal number (Wilson and Hilferty 1931)
+    result.contradiction = (std::cbrt(squares / rest) - 1.0 + spread) / std::sqrt(spread);
+  }
+  result.noiseScale = rest > (isKnown ? 0.0 : 4.0) ? std::sqrt(squares / rest) : 1.0;
   // How well a hand places lights is a guess, and many observations know better; few do not, and what is known of a lens stays.
   const double scale = std::max(result.noiseScale, isKnown || rest < 100.0 ? 1.0 : LeastScale);
   result.covariance = problem.Widen(InverseOfSymmetric(information) * scale * scale);
@@ -611,6 +655,7 @@ CameraFitResult RefitCamera(const std::vector<SeenPoint>& points, const CameraOp
   CameraFitResult refit = result;
   CameraProblem problem(points, {start.lens, isKnown ? start.residual : result.optics.residual}, cameraToPoints, settings);
   problem.SetSmoothness(std::isinf(result.smoothness) ? 0.0 : result.smoothness);
+  problem.SetMisfit(result.misfit);
   if (!isKnown && !result.optics.residual.IsNone())
     problem.SetLensPrior(result.optics.lens, WidthBesideResidual);
   problem.SetState({result.optics.lens, problem.BendOf(result.optics.residual), result.poses});

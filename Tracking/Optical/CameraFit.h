@@ -63,8 +63,10 @@ struct CameraFitResult {
   std::vector<bool> isInlier;      ///< of each point
   double lensRms = 0.0, rms = 0.0; ///< of what is left over by the lens alone, and by all; px per axis, inliers
   double noiseScale = 1.0;         ///< what is left over per what the covariances say; standard deviations
+  double contradiction = 0.0;      ///< how much less likely than usual the points are by what was known, in standard deviations
   double smoothness = std::numeric_limits<double>::infinity(); ///< weight of the residual's energy; infinite: no residual
   double residualFreedoms = 0.0;                               ///< effective number
+  double misfit = 1.0; ///< what a fit without residual leaves over per what the covariances say, by which priors count more
 };
 
 /// The camera that saw \a points, from \a start. Those that nothing can explain are left out.

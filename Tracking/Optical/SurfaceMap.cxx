@@ -161,6 +161,8 @@ SurfaceMapReport Judge(const CameraFitResult& fit, const std::vector<SeenPoint>&
   report.lensPx = fit.lensRms;
   report.residualPx = fit.rms;
   report.residualFreedoms = fit.residualFreedoms;
+  report.contradiction = fit.contradiction;
+  report.isContradicted = fit.contradiction > p.outlierSigmas;
   // Of the lens alone: a soft residual would explain another mesh, too.
   if (fit.lensRms > p.mostResidualPx)
     throw Error(
@@ -197,12 +199,20 @@ void MeasureHeldOut(const std::vector<SeenPoint>& points, const std::vector<int>
     std::swap(order[i - 1], order[random.Below(i)]);
 
   std::vector<double> errors(points.size(), -1.0); // negative: none
-  std::vector<char> refused(points.size(), 0);
+  std::vector<char> refused(points.size(), 0), foldsLost(folds, 0);
   ParallelFor(p.folds, progress, [&](std::ptrdiff_t fold) {
     std::vector<bool> isLeftOut(points.size());
     for (std::size_t i = 0; i < points.size(); ++i)
       isLeftOut[i] = order[markOf[i]] % folds == static_cast<std::size_t>(fold);
-    const CameraFitResult refit = RefitCamera(points, start, startPoses, settings, fit, isLeftOut);
+    CameraFitResult refit;
+    try {
+      refit = RefitCamera(points, start, startPoses, settings, fit, isLeftOut);
+    } catch (const Error&) { // all others converged, and so did the whole
+      foldsLost[static_cast<std::size_t>(fold)] = 1;
+      for (std::size_t i = 0; i < points.size(); ++i)
+        refused[i] |= static_cast<char>(isLeftOut[i] && fit.isInlier[i]);
+      return;
+    }
     const PixelCoverage covered = PixelCoverage::Of(InlierPixels(points, refit.isInlier));
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!isLeftOut[i] || !fit.isInlier[i])
@@ -223,6 +233,7 @@ void MeasureHeldOut(const std::vector<SeenPoint>& points, const std::vector<int>
       }
     }
   });
+  report.foldsLost = static_cast<int>(std::count(foldsLost.begin(), foldsLost.end(), 1));
   report.heldOutRefused = static_cast<std::size_t>(std::count(refused.begin(), refused.end(), 1));
   errors.erase(std::remove_if(errors.begin(), errors.end(), [](double e) { return e < 0.0; }), errors.end());
   report.heldOut = errors.size();
@@ -365,6 +376,12 @@ std::string SurfaceMapReport::Text() const
   if (heldOut > 0)
     text += Format("observations left out of the fit: median %.3f mm, 95%% %.3f mm, most %.3f mm (%zu; without an answer: %zu)\n",
                    heldOutMedianMm, heldOut95Mm, heldOutMostMm, heldOut, heldOutRefused);
+  if (foldsLost > 0)
+    text += std::to_string(foldsLost) + " of the fits that left some out did not converge\n";
+  if (isContradicted)
+    text += Format("the observations contradict what is known of lens and mount, by %.1f standard deviations: another lens or "
+                   "shell, or a mount that is further off than MountMm and MountDegrees say?\n",
+                   contradiction);
   for (const SurfaceOutlier& outlier : outliers)
     text += NameOf(outlier.observation, outlier.mark) + Format(" does not fit: %.1f standard deviations\n", outlier.sigmas);
   return text;

@@ -106,6 +106,11 @@ struct SurfaceMapReport {
   /// how far their marks are from their rays.
   double heldOutMedianMm = 0.0, heldOut95Mm = 0.0, heldOutMostMm = 0.0;
   std::size_t heldOut = 0, heldOutRefused = 0; ///< measured; without an answer, as most at the border have none
+  int foldsLost = 0;                           ///< fits without some observations that did not converge
+  /// Of a placed camera: how much less likely than usual the observations are, by what is known of lens and mount; standard
+  /// deviations. Beyond OutlierSigmas both cannot be right, and the map's uncertainty is wider by what they differ.
+  double contradiction = 0.0;
+  bool isContradicted = false;
 
   std::string Text() const; ///< lines for people
 };

@@ -15,6 +15,8 @@ using Eigen::Vector2d;
 
 namespace {
 
+constexpr double SamePx = 1.0; // nearer observations are of one mark
+
 double PlateKernel(double squared) // r^2 log r
 {
   return squared > 0.0 ? 0.5 * squared * std::log(squared) : 0.0;
@@ -119,8 +121,11 @@ ThinPlate ThinPlate::Over(const std::vector<Vector2d>& pixels, int count)
 Eigen::MatrixXd ThinPlate::Freedoms() const
 {
   const auto count = static_cast<Eigen::Index>(centres.size());
-  if (count < 4)
-    return Eigen::MatrixXd::Zero(count + 3, 0);
+  if (count < 4) { // no bend; without centres there is nothing at all
+    Eigen::MatrixXd affine = Eigen::MatrixXd::Zero(count + 3, IsNone() ? 0 : 3);
+    affine.bottomRows<3>().setIdentity();
+    return affine;
+  }
   Eigen::MatrixXd kernel(count, count + 3);
   for (Eigen::Index i = 0; i < count; ++i)
     kernel.row(i) = Basis(centres[static_cast<std::size_t>(i)]).transpose();
@@ -129,15 +134,30 @@ Eigen::MatrixXd ThinPlate::Freedoms() const
   const Eigen::MatrixXd energy = q.transpose() * kernel.leftCols(count) * q;
   const Eigen::LLT<Eigen::MatrixXd> factor(energy);
   Eigen::MatrixXd freedoms = Eigen::MatrixXd::Zero(count + 3, count);
-  freedoms.topLeftCorner(count, count - 3) = factor.matrixL().solve(q.transpose()).transpose();
+  const Eigen::MatrixXd bends = factor.matrixL().solve(q.transpose()).transpose();
+  // Turned such that the last three take what squares of the coordinates have at the centres.
+  Eigen::MatrixXd squares(count, 3);
+  const auto x = kernel.col(count + 1).array(), y = kernel.col(count + 2).array();
+  squares << x * x, x * y, y * y;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> turn(Eigen::MatrixXd(bends.transpose() * squares));
+  freedoms.topLeftCorner(count, count - 3) =
+      (bends * (turn.householderQ() * Eigen::MatrixXd::Identity(count - 3, count - 3))).rowwise().reverse();
   freedoms.bottomRightCorner<3, 3>().setIdentity();
   return freedoms;
 }
 
-PixelCoverage PixelCoverage::Of(std::vector<Vector2d> pixels)
+Eigen::Index ThinPlate::LowOrders() const
+{
+  return IsNone() ? 0 : std::clamp<Eigen::Index>(static_cast<Eigen::Index>(centres.size()), 3, 6);
+}
+
+PixelCoverage PixelCoverage::Of(const std::vector<Vector2d>& pixels)
 {
   PixelCoverage covered;
-  covered.pixels = std::move(pixels);
+  for (const Vector2d& pixel : pixels) // a mark that was seen again is no neighbour
+    if (std::none_of(covered.pixels.begin(), covered.pixels.end(),
+                     [&pixel](const Vector2d& other) { return (other - pixel).squaredNorm() < SamePx * SamePx; }))
+      covered.pixels.push_back(pixel);
   const std::size_t count = covered.pixels.size(), neighbours = std::min<std::size_t>(6, count > 0 ? count - 1 : 0);
   std::vector<double> squares(count);
   for (const Vector2d& pixel : covered.pixels) {
@@ -151,7 +171,7 @@ PixelCoverage PixelCoverage::Of(std::vector<Vector2d> pixels)
     for (double& reach : covered.reach)
       reach = std::min(reach, most);
   }
-  covered.hull = ConvexHull(covered.pixels);
+  covered.hull = ConvexHull(pixels);
   return covered;
 }
 

@@ -23,18 +23,20 @@ struct ThinPlate {
   /// A plate without weights: at most \a count centres, out of \a pixels, far from each other.
   static ThinPlate Over(const std::vector<Eigen::Vector2d>& pixels, int count);
   /// Columns are independent changes of one component's weights which are alike in size: the sum of the squares of their factors
-  /// is the bending energy plus that of the affine part. Weights are sums of such columns and nothing else.
+  /// is the bending energy plus that of the affine part. Weights are sums of such columns and nothing else. The last ones,
+  /// LowOrders() of them, are what is nearest to squares and products of x and y, and the affine part itself.
   Eigen::MatrixXd Freedoms() const;
+  Eigen::Index LowOrders() const; ///< 6; fewer of a plate of few centres
 };
 
 /// The part of a picture that observations say something about.
 struct PixelCoverage {
-  std::vector<Eigen::Vector2d> pixels; ///< of the observations
+  std::vector<Eigen::Vector2d> pixels; ///< of the observations, each mark once
   std::vector<double> reach;           ///< of each: how far other pixels may be from it
   std::vector<Eigen::Vector2d> hull;   ///< convex, counter-clockwise with x to the right and y upwards
 
   /// A pixel's reach is the distance to its sixth nearest neighbour, at most twice the median of those.
-  static PixelCoverage Of(std::vector<Eigen::Vector2d> pixels);
+  static PixelCoverage Of(const std::vector<Eigen::Vector2d>& pixels);
   /// Within the reach of the nearest observation, and at most half of that outside of their hull.
   bool Holds(const Eigen::Vector2d& pixel) const;
   double HullArea() const; ///< pixels squared
