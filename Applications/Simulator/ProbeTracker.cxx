@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ProbeTracker.h"
 #include "Controls.h"
+#include "Core/Geometry/TransformGraph.h"
 #include "NeedleTool.h"
 #include "Scan.h"
 #include "TrackerState.h"
@@ -52,6 +53,7 @@ ProbeTracker::ProbeTracker(Scan* scan, NeedleTool* needle, QWidget* parent) : QW
   tool_ = ChoiceField(this, "trackerTool",
                       tr("The tool that is the probe: its origin is the middle of the face, z looks into the body"),
                       std::vector<std::string>());
+  connect(tool_, QOverload<int>::of(&QComboBox::activated), this, [this] { isToolChosen_ = true; });
   needleTool_ = ChoiceField(this, "trackerNeedle",
                             tr("The tool that is the needle, if there is one: its origin is the tip, z the way it goes in"),
                             std::vector<std::string>());
@@ -123,7 +125,7 @@ void ProbeTracker::ConnectOrNot()
     scan_->StopFollowing();
   } else {
     tracker_->SetDevice(Device().toUtf8());
-    hasSeen_ = false;
+    hasSeen_ = isToolChosen_ = false;
     trackerToBody_ = Pose::Identity();
     slide_.invalidate();
     sinceSeen_.start();
@@ -221,14 +223,17 @@ void ProbeTracker::Step()
     tracker_->SetPlace(at[0], at[1], at[2], normal[0], normal[1], normal[2]);
   }
   tracker_->Update();
-  const std::string tool = ChosenTool(tool_, tracker_);
+  const std::string tool = ProbeTool();
   StepNeedle();
   QString state = StateOf(tracker_);
   const vtkNew<vtkMatrix4x4> matrix;
-  const bool isSeen = !tool.empty() && tracker_->GetTransform(tool.c_str(), matrix) == 0;
+  const auto status =
+      tool.empty() ? TransformStatus::Missing : static_cast<TransformStatus>(tracker_->GetTransform(tool.c_str(), matrix));
+  const bool isSeen = status == TransformStatus::Valid, isAway = status == TransformStatus::OutOfRange,
+             isRunning = tracker_->GetState() == "running";
   const Eigen::Matrix4d toTracker = MatrixOf(matrix);
   // Of a recording at its end the last pose stays valid: it is no news.
-  if (isSeen && (tracker_->GetState() == "running" || !hasSeen_ || toTracker != seen_.matrix())) {
+  if (isSeen && (isRunning || !hasSeen_ || toTracker != seen_.matrix())) {
     seen_.matrix() = toTracker;
     hasSeen_ = true;
     sinceSeen_.start();
@@ -239,13 +244,27 @@ void ProbeTracker::Step()
     state += tr("; %1 poses a second").arg(tracker_->GetRate(tool.c_str()), 0, 'f', 0);
   } else if (!hasSeen_) {
     if (!isFused_)
-      state += tr("; the tool has not been seen yet");
+      state += isAway ? tr("; the tool is off the skin, or out of reach") : tr("; the tool has not been seen yet");
   } else if (1e-3 * static_cast<double>(sinceSeen_.elapsed()) > StoppedSeconds) {
-    scan_->SetStopped(1e-3 * static_cast<double>(sinceSeen_.elapsed()));
-    state += tr("; the tool is not seen");
+    scan_->SetStopped(1e-3 * static_cast<double>(sinceSeen_.elapsed()),
+                      !isRunning ? QString()
+                      : isAway   ? tr("The probe is off the skin, or out of the tracker's reach")
+                                 : tr("The tracker does not see the probe"));
+    state += isAway ? tr("; the tool is off the skin, or out of reach") : tr("; the tool is not seen");
   }
   if (state_->text() != state)
     state_->setText(state);
+}
+
+// The one that a person chose; until then one that is called so, wherever it is in the list.
+std::string ProbeTracker::ProbeTool()
+{
+  const std::string tool = ChosenTool(tool_, tracker_);
+  const int named = isToolChosen_ ? -1 : tool_->findText("Probe", Qt::MatchStartsWith);
+  if (named < 0 || named == tool_->currentIndex())
+    return tool;
+  tool_->setCurrentIndex(named);
+  return tool_->currentText().toStdString();
 }
 
 // Another tool of the same tracker; nobody, until a person says which.

@@ -37,6 +37,7 @@ private:
   void GiveNormals();
   void ShowHeading();
   void Step();
+  std::string ProbeTool();
   void StepNeedle();
 
   Scan* scan_;
@@ -44,7 +45,7 @@ private:
   vtkNew<vtkUltrasoundTrackerSource> tracker_;
   Pose trackerToBody_ = Pose::Identity();
   Pose seen_ = Pose::Identity();
-  bool hasSeen_ = false;
+  bool hasSeen_ = false, isToolChosen_ = false; ///< since it was connected
   QElapsedTimer sinceSeen_;
   bool isFused_ = false, isAlone_ = false; ///< with an orientation of its own; with no more than that
   QElapsedTimer slide_;

@@ -264,10 +264,12 @@ void Scan::StopFollowing()
   emit StateChanged();
 }
 
-void Scan::SetStopped(double seconds)
+void Scan::SetStopped(double seconds, const QString& why)
 {
-  const bool changed = (seconds >= 0.0) != (stoppedSeconds_ >= 0.0) || std::fabs(seconds - stoppedSeconds_) > 0.05;
+  const bool changed =
+      why != whyStopped_ || (seconds >= 0.0) != (stoppedSeconds_ >= 0.0) || std::fabs(seconds - stoppedSeconds_) > 0.05;
   stoppedSeconds_ = seconds;
+  whyStopped_ = why;
   if (changed)
     emit StateChanged();
 }
@@ -500,7 +502,9 @@ QString Scan::State() const
     return failure_;
   if (!isFrozen_) {
     if (stoppedSeconds_ >= 0.0)
-      return tr("The tracker has stopped: this was %1 s ago").arg(stoppedSeconds_, 0, 'f', 1);
+      return tr("%1: this was %2 s ago")
+          .arg(whyStopped_.isEmpty() ? tr("The tracker has stopped") : whyStopped_)
+          .arg(stoppedSeconds_, 0, 'f', 1);
     if (!badPose_.isEmpty())
       return badPose_;
     if (Now() - jumpAt_ < JumpShownSeconds)

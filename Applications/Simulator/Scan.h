@@ -76,8 +76,8 @@ public:
   void StopFollowing();
   bool IsFollowing() const { return isFollowing_; }
   bool IsTurned() const { return turned_.has_value(); }
-  /// No pose has come for so many seconds: the image is of then. Below 0: poses come.
-  void SetStopped(double seconds);
+  /// No pose has come for so many seconds, and why ("": the tracker has stopped): the image is of then. Below 0: poses come.
+  void SetStopped(double seconds, const QString& why = {});
   ///@}
 
   /// A needle in the image, from now on; none: there is none.
@@ -161,7 +161,7 @@ private:
   std::optional<Needle> needle_;
   bool isFollowing_ = false, isFrozen_ = false, isFlipped_ = false;
   double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;
-  QString badPose_, failure_, shownState_;
+  QString whyStopped_, badPose_, failure_, shownState_;
 
   Redraw* redraw_;
   QElapsedTimer clock_;

@@ -63,8 +63,9 @@ inline double Level(const Eigen::Vector3d& at) ///< 1 on the skin
   return at.cwiseQuotient(HalfAxes).norm();
 }
 
-/// Writes a MetaImage of bytes; \a grey says what is inside.
-inline QString Write(const QDir& folder, const QString& name, const std::function<double(const Eigen::Vector3d&)>& grey)
+/// Writes a MetaImage of bytes; \a grey says what is inside. \param scale how much larger everything is, \a grey is not told
+inline QString Write(const QDir& folder, const QString& name, const std::function<double(const Eigen::Vector3d&)>& grey,
+                     double scale = 1.0)
 {
   constexpr int side = 68;
   constexpr double spacing = 1.5, first = -0.5 * (side - 1) * spacing;
@@ -81,7 +82,8 @@ inline QString Write(const QDir& folder, const QString& name, const std::functio
   QFile file(path);
   if (!file.open(QIODevice::WriteOnly))
     qFatal("cannot write %s", qPrintable(path));
-  const QByteArray size = QByteArray::number(side), corner = QByteArray::number(first), mm = QByteArray::number(spacing);
+  const QByteArray size = QByteArray::number(side), corner = QByteArray::number(scale * first),
+                   mm = QByteArray::number(scale * spacing);
   file.write("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
              "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = " +
              corner + " " + corner + " " + corner + "\nElementSpacing = " + mm + " " + mm + " " + mm + "\nDimSize = " + size +
