@@ -3,9 +3,12 @@
 """echorama calibrate surface: a whole calibration by a simulated hand in a simulated camera, and whether it still holds."""
 import json
 import pathlib
+import queue
+import re
 import shutil
 import subprocess
 import tempfile
+import threading
 import unittest
 
 import numpy
@@ -56,14 +59,69 @@ def tearDownModule():
 told = {}
 
 
-def calibrate(name, hand):
+def calibrate(name, hand, shell=("--shell", "belly-1")):
     done = run("calibrate", "surface", f"{CAMERA}&{hand}", "--mesh", work / "belly.stl", "--marks", work / "points.csv", "-o", work / f"{name}.json",
-               "--shell", "belly-1", *ROUGH, "--json")
+               *shell, *ROUGH, "--json")
     told[name] = (done.returncode, json.loads(done.stdout), done.stderr)
 
 
-def check(camera=CAMERA):
-    done = run("calibrate", "surface", f"{camera}&placementMm=0.1&handSeed=9", "--check", work / "first.json", "--rest-frames", 12, "--json")
+def typed(camera, folder, text, *options):
+    """With all of the text to be read at the start."""
+    arguments = ("calibrate", "surface", camera, "--mesh", work / "belly.stl", "--marks", work / "points.csv", "-o", f"{folder}/typed.json", *ROUGH, *options)
+    return subprocess.run([PROGRAM, *map(str, arguments)], input=text, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=300)
+
+
+def asked(messages):
+    return [int(mark) for mark in re.findall(r"mark (\d+), please", messages)]
+
+
+class Person:
+    """Who reads what the program says, and types."""
+
+    def __init__(self, camera, folder):
+        arguments = ("calibrate", "surface", camera, "--mesh", work / "belly.stl", "--marks", work / "points.csv", "-o", f"{folder}/typed.json", *ROUGH)
+        self.program = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.lines = queue.Queue()
+        self.read = []
+        self.reader = threading.Thread(target=self.listen)
+        self.reader.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.program.kill()
+        self.program.wait()
+        self.reader.join()
+        self.program.stdin.close()
+        self.program.stderr.close()
+
+    def listen(self):
+        for line in self.program.stderr:
+            self.lines.put(line)
+
+    def type(self, line):
+        self.program.stdin.write(line + "\n")
+        self.program.stdin.flush()
+
+    def wait_for(self, pattern):
+        """What it says from now on, until it says this."""
+        while True:
+            try:
+                line = self.lines.get(timeout=60)
+            except queue.Empty:
+                raise AssertionError(f"{pattern!r} was not said in a minute, but:\n" + "".join(self.read[-20:])) from None
+            self.read.append(line)
+            if found := re.search(pattern, line):
+                return found
+
+    def end(self):
+        return self.program.wait(60)
+
+
+def check(camera=CAMERA, calibration="first"):
+    done = run("calibrate", "surface", f"{camera}&placementMm=0.1&handSeed=9", "--check", work / f"{calibration}.json", "--rest-frames", 12,
+               "--json")
     return done.returncode, json.loads(done.stdout), done.stderr
 
 
@@ -95,6 +153,38 @@ class Surface(unittest.TestCase):
         self.assertEqual(status, 0, messages)
         self.assertEqual(result["verdict"], "holds")
         self.assertGreater(result["chance"], 0.001)
+        self.assertIn("no shell's marker is seen", messages)
+        self.assertNotIn("mounted", result)
+
+    def test_the_marker_says_which_shell_is_mounted(self):
+        marked = f"{CAMERA}&marker=0A1B2C"
+        calibrate("marked", "placementMm=0.1&marker=0A1B2C", shell=())
+        status, result, messages = told["marked"]
+        self.assertEqual(status, 0, messages)
+        self.assertIn("the marker of the mounted shell says 0A1B2C", messages)
+        self.assertEqual(result["mounted"], "0A1B2C")
+        self.assertEqual(json.loads((work / "marked.json").read_text())["shell"], "0A1B2C")
+        status, result, messages = check(marked, "marked")
+        self.assertEqual((status, result["verdict"], result["mounted"]), (0, "holds", "0A1B2C"), messages)
+        # Another one: by a check, whatever the file calls its own, and by a calibration that was told otherwise.
+        before = snapshot(work)
+        for calibration, its in (("marked", "0A1B2C"), ("first", "belly-1")):
+            done = run("calibrate", "surface", f"{CAMERA}&marker=FF0102", "--check", work / f"{calibration}.json")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(f'{work / calibration}.json: it was made in the shell "{its}", and "FF0102" is mounted', done.stderr)
+        done = run("calibrate", "surface", marked, "--mesh", work / "belly.stl", "--marks", work / "points.csv", "-o", work / "no.json", "--shell",
+                   "0A1B2D", *ROUGH)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("--shell says 0A1B2D, and the marker of the mounted shell says 0A1B2C: nothing is calibrated", done.stderr)
+        self.assertEqual(snapshot(work), before)
+        # A file that does not say whose it is holds for any.
+        unnamed = json.loads((work / "marked.json").read_text())
+        unnamed["shell"] = ""
+        (work / "unnamed.json").write_text(json.dumps(unnamed))
+        status, result, messages = check(marked, "unnamed")
+        self.assertEqual((status, result["mounted"]), (0, "0A1B2C"), messages)
+        self.assertIn("it does not say which shell it was made in", messages)
+        (work / "unnamed.json").unlink()
 
     def test_a_camera_that_moved_is_noticed(self):
         status, result, messages = check(CAMERA.replace("cameraMm=2 -3", "cameraMm=3.2 -3"))
@@ -111,15 +201,55 @@ class Surface(unittest.TestCase):
 
     def test_a_person_may_type_what_comes_next(self):
         with tempfile.TemporaryDirectory() as folder:
-            arguments = ("calibrate", "surface", CAMERA, "--mesh", work / "belly.stl", "--marks", work / "points.csv", "-o", f"{folder}/no.json", *ROUGH)
-            done = subprocess.run([PROGRAM, *map(str, arguments)], input="s\ng 99\nwhat?\ng 7\ne\n", stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                  text=True, timeout=300)
+            done = typed(CAMERA, folder, "s\ng 99\nwhat?\ng 7\nb\ng\ne\n")
             self.assertIn("there is no mark 99; there are 1 to 90", done.stderr)
-            self.assertIn("s: skip this mark, b: the last one again", done.stderr)
-            self.assertIn("mark 7, please (0 of 90 taken)", done.stderr)
+            self.assertEqual(done.stderr.count("s: skip this mark, b: the last one again"), 2)  # no gap is known yet
+            self.assertEqual(asked(done.stderr), [1, 5, 7])  # and with no mark taken b asks for none
             self.assertIn("no mark has been taken", done.stderr)
             self.assertEqual(done.returncode, 1)
             self.assertEqual(list(pathlib.Path(folder).iterdir()), [])
+
+    def test_a_mark_that_is_skipped_comes_last(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = typed(CAMERA + "&placementMm=0.1", folder, "s\ns\ng 30", "--all")  # the last line lacks its end
+            self.assertEqual(done.returncode, 0, done.stderr)
+            marks = asked(done.stderr)
+            self.assertEqual(marks[:5], [1, 5, 9, 30, 9])
+            self.assertEqual(marks[-2:], [1, 5])
+            self.assertEqual(sorted(marks), sorted([*range(1, 91), 1, 5, 9]))  # 30 is not asked for again
+
+    def test_the_last_mark_is_done_again_and_the_largest_gap_is_gone_to(self):
+        with tempfile.TemporaryDirectory() as folder, Person(CAMERA.replace("speed=0", "speed=2") + "&handSeed=3&placementMm=0.1", folder) as person:
+            person.wait_for(r"mark 9, please \(2 of 90 taken\)")
+            person.type("b")
+            person.wait_for(r"mark 5, please \(1 of 90 taken\)")
+            person.wait_for(r"mark 5 taken")
+            person.wait_for(r"mark 9, please \(2 of 90 taken\)")
+            gap = person.wait_for(r"the largest gap, \d+ px, is about mark (\d+)")[1]
+            person.type("g")
+            person.wait_for(rf"mark {gap}, please")
+            person.wait_for(rf"mark {gap} taken")
+            person.type("e")
+            self.assertEqual(person.end(), 0)
+            accuracy = json.loads((pathlib.Path(folder) / "typed.json").read_text())["accuracy"]
+            self.assertLess(accuracy["marks"], 60)
+
+    def test_what_is_typed_is_heard_while_no_frames_come(self):
+        with tempfile.TemporaryDirectory() as folder:
+            dark = pathlib.Path(folder) / "dark.igs.mhd"
+            header = ["ObjectType = Image", "NDims = 3", "DimSize = 640 480 2", "ElementType = MET_UCHAR", "ElementSpacing = 1 1 1", "CameraRate = 90",
+                      "CameraExposureMs = 8"]
+            header += [f"Seq_Frame{i:04}_Timestamp = {at}" for i, at in enumerate((0, 600))]  # ten minutes later
+            dark.write_text("\n".join([*header, "ElementDataFile = dark.igs.raw"]) + "\n")
+            dark.with_suffix(".raw").write_bytes(bytes(2 * 640 * 480))
+            with Person(f"recording:{dark}", folder) as person:
+                person.wait_for("mark 1, please")
+                person.wait_for("no frame has come for 2 s")
+                for line, answer in (("s", "mark 5, please"), ("g 17", "mark 17, please"), ("g 99", "there is no mark 99")):
+                    person.type(line)
+                    person.wait_for(answer)
+                person.type("e")
+                self.assertEqual(person.end(), 1)
 
     def test_wrong_shell_picture_and_files_are_refused(self):
         before = snapshot(work)

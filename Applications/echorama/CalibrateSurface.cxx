@@ -9,6 +9,7 @@
 #include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Tracking/Cameras/SimulatedSource.h"
+#include "Tracking/Devices/MountedShell.h"
 #include "Tracking/Optical/SimulatedHand.h"
 #include "Tracking/Optical/SurfaceCalibration.h"
 #include "Tracking/Optical/SurfaceFile.h"
@@ -70,16 +71,29 @@ public:
 
   CameraSource& Source() { return *source_; }
   bool IsSimulated() const { return hand_ != nullptr; }
-  // A mark is asked for, after the newest frame.
-  void Ask(int mark, const CameraFrame& newest)
+  // A mark is asked for; a hand hears of it after the newest frame, or the first.
+  void Ask(int mark)
   {
-    if (!hand_)
-      return;
-    const double sourceTime = simulation_.speed > 0.0 ? (newest.begin - simulated_->Start()) * simulation_.speed : newest.begin;
-    hand_->GoTo(static_cast<std::size_t>(mark) - 1, sourceTime + 1.0 / simulation_.camera.frameRate);
+    asked_ = mark;
+    TellHand();
+  }
+  void Saw(const CameraFrame& newest)
+  {
+    newest_ = newest.begin;
+    TellHand();
   }
 
 private:
+  void TellHand()
+  {
+    if (!hand_ || !newest_ || asked_ == 0)
+      return;
+    const double sourceTime = simulation_.speed > 0.0 ? (*newest_ - simulated_->Start()) * simulation_.speed : *newest_;
+    hand_->GoTo(static_cast<std::size_t>(std::exchange(asked_, 0)) - 1, sourceTime + 1.0 / simulation_.camera.frameRate);
+  }
+
+  std::optional<double> newest_; // begin of that frame
+  int asked_ = 0;                // what the hand has not been told
   SimulatedSourceParameters simulation_;
   std::shared_ptr<SimulatedHand> hand_;
   SimulatedSource* simulated_ = nullptr; // source_, when it is one
@@ -100,10 +114,10 @@ public:
         text_.append(block, static_cast<std::size_t>(count));
     }
     const std::size_t end = text_.find('\n');
-    if (end == std::string::npos)
+    if (end == std::string::npos && (!ended_ || text_.empty())) // the last line may lack its end
       return {};
     const std::string line = text_.substr(0, end);
-    text_.erase(0, end + 1);
+    text_.erase(0, end == std::string::npos ? end : end + 1);
     return line;
   }
 
@@ -118,9 +132,10 @@ void Tell(const std::string& line)
 }
 
 // Runs frames through \a tracker until \a take says that it is enough. \a take is asked about every frame; \a idle after a while
-// in which no light was at rest.
-template <class Take, class Idle>
-void Watch(Session& session, Stage& stage, LightTracker& tracker, const std::string& camera, const Take& take, const Idle& idle)
+// in which no light was at rest; \a obey all the time, also while no frames come.
+template <class Obey, class Take, class Idle>
+void Watch(Session& session, Stage& stage, LightTracker& tracker, const std::string& camera, const Obey& obey, const Take& take,
+           const Idle& idle)
 {
   CameraFrame frame;
   FrameState state = FrameState::Good;
@@ -129,6 +144,8 @@ void Watch(Session& session, Stage& stage, LightTracker& tracker, const std::str
   session.Work("watch", camera, [&](const Progress& progress) {
     for (;;) {
       progress(0.0);
+      if (!obey())
+        return;
       CameraSource::Outcome outcome = CameraSource::Outcome::Nothing;
       try { // a plug that comes loose for a moment does not end what takes ten minutes
         if (isBroken && ClockNow() - heard > 1.0) {
@@ -158,6 +175,7 @@ void Watch(Session& session, Stage& stage, LightTracker& tracker, const std::str
       }
       isSilent = false;
       heard = ClockNow();
+      stage.Saw(frame);
       tracker.Update(frame.grey, frame.begin);
       if (tracker.Spots().state != state) {
         state = tracker.Spots().state;
@@ -167,13 +185,13 @@ void Watch(Session& session, Stage& stage, LightTracker& tracker, const std::str
       if (quietSince < 0.0)
         quietSince = frame.begin;
       bool isRest = false;
-      if (!take(frame, isRest))
+      if (!take(frame.grey, isRest))
         return;
       if (isRest)
         quietSince = frame.begin;
       else if (frame.begin - quietSince > PatienceSeconds) {
         quietSince = frame.begin;
-        if (!idle(frame))
+        if (!idle())
           return;
       }
     }
@@ -234,6 +252,19 @@ nlohmann::ordered_json JsonOf(const SurfaceAccuracy& accuracy)
   return {{"marks", accuracy.marks},    {"inliers", accuracy.inliers},  {"median_mm", accuracy.medianMm},
           {"mm95", accuracy.mm95},      {"most_mm", accuracy.mostMm},   {"scatter_mm", accuracy.scatterMm},
           {"own_mm95", accuracy.ownMm}, {"coverage", accuracy.coverage}};
+}
+
+// Which shell is mounted, if it says so; before it was read: nothing has been seen of it.
+void TellMarker(Session& session, const ShellMarkerReading& marker)
+{
+  if (marker.status == ShellMarkerReading::Status::Read) {
+    Tell("the marker of the mounted shell says " + ShellNameOf(marker));
+    session.result["mounted"] = ShellNameOf(marker);
+  } else {
+    Tell(marker.status == ShellMarkerReading::Status::Unclear
+             ? "a shell's marker is seen, but cannot be read: is it covered, or the room too dark?"
+             : "no shell's marker is seen");
+  }
 }
 
 // What a person may type while marks are taken. \returns whether it goes on
@@ -305,17 +336,44 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
   int asked = 0;
   std::size_t reported = 0;
   std::set<int> passedOver; // by a simulated hand, since the last mark that was taken
-  bool isEnded = false;
-  const auto askNext = [&](const CameraFrame& frame) {
+  const int turnFrames = MountedShell::TurnFrames(code, result.tracks.slotMs, result.tracks.frameMs);
+  std::optional<MountedShell> mounted(std::in_place, lens, turnFrames); // and again, once the lens is known
+  bool isMarkerTold = false, isLensKnown = false;
+  const auto askNext = [&] {
     asked = calibration.Next();
     if (asked > 0) {
       Tell(Format("mark %d, please (%d of %d taken)", asked, calibration.Status().taken, calibration.Status().marks));
-      stage.Ask(asked, frame);
+      stage.Ask(asked);
     }
   };
+  askNext();
   Watch(
       session, stage, tracker, options.camera,
-      [&](const CameraFrame& frame, bool& isRest) {
+      [&] {
+        while (const auto line = typed.Next()) {
+          if (!Obey(*line, calibration))
+            return false;
+          if (asked != calibration.Next())
+            askNext();
+        }
+        return true;
+      },
+      [&](const GreyFrame& frame, bool& isRest) {
+        const auto marker = mounted->Add(frame);
+        const bool isRead = marker && marker->status == ShellMarkerReading::Status::Read;
+        if (isRead && !options.shell.empty() && !IsNameOf(options.shell, *marker))
+          throw Error(Error::Kind::BadInput, "--shell says " + options.shell + ", and the marker of the mounted shell says " +
+                                                 ShellNameOf(*marker) + ": nothing is calibrated");
+        if (isRead || (marker && isLensKnown)) {
+          TellMarker(session, *marker);
+          isMarkerTold = true;
+        }
+        if (isRead)
+          result.shell = ShellNameOf(*marker);
+        if (!isMarkerTold && !isLensKnown && calibration.Status().hasMap) {
+          isLensKnown = true;
+          mounted.emplace(calibration.Fitted().map.State().optics.lens, turnFrames);
+        }
         const CalibrationStep step = calibration.Update(HeldLight(tracker, options.light));
         isRest = step.event != CalibrationStep::Event::None;
         if (isRest) {
@@ -330,23 +388,25 @@ void MakeCalibration(Session& session, const SurfaceOptions& options)
           if (status.isEnough && !options.all)
             return false;
         }
-        while (const auto line = typed.Next())
-          isEnded = isEnded || !Obey(*line, calibration);
-        if (isRest || asked != calibration.Next())
-          askNext(frame);
-        return !isEnded && asked > 0;
+        if (isRest)
+          askNext();
+        return asked > 0;
       },
-      [&](const CameraFrame& frame) {
+      [&] {
         Tell(WhatIsSeen(tracker, options.light));
         if (stage.IsSimulated()) {
           if (!passedOver.insert(asked).second)
             return false; // nothing is left that it could do
           calibration.Skip();
-          askNext(frame);
+          askNext();
         }
         return true;
       });
   stage.Source().Close();
+  if (!isMarkerTold)
+    TellMarker(session, {});
+  if (result.shell.empty())
+    Tell("the calibration does not say which shell it is of; --shell may say it");
 
   session.Work("calibrate", options.output, [&](const Progress& progress) {
     try {
@@ -416,17 +476,27 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
   std::set<int> refused; // once: whoever insists is believed
   LightRest rest(options.calibration.rest);
   SurfaceDrift drift;
-  bool isJudged = false, isRepeated = false, isFirst = true;
-  const auto ask = [&](const CameraFrame& frame) {
+  bool isJudged = false, isRepeated = false;
+  MountedShell mounted(surface.map.State().optics.lens,
+                       MountedShell::TurnFrames(surface.lights.Code(), surface.tracks.slotMs, surface.tracks.frameMs));
+  bool isMarkerTold = false;
+  const auto ask = [&] {
     Tell(Format("mark %d, please (%d to go)", remaining.front(), static_cast<int>(remaining.size())));
-    stage.Ask(remaining.front(), frame);
+    stage.Ask(remaining.front());
   };
+  ask();
   Watch(
-      session, stage, tracker, options.camera,
-      [&](const CameraFrame& frame, bool& isRest) {
-        if (isFirst)
-          ask(frame);
-        isFirst = false;
+      session, stage, tracker, options.camera, [] { return true; },
+      [&](const GreyFrame& frame, bool& isRest) {
+        if (const auto marker = mounted.Add(frame)) {
+          const bool isRead = marker->status == ShellMarkerReading::Status::Read;
+          if (isRead && !surface.shell.empty() && !IsNameOf(surface.shell, *marker))
+            surface.CheckShell(ShellNameOf(*marker), options.check);
+          TellMarker(session, *marker);
+          isMarkerTold = true;
+          if (isRead && surface.shell.empty())
+            Tell(options.check + ": it does not say which shell it was made in");
+        }
         const auto resting = rest.Update(HeldLight(tracker, options.light), Touch::Unknown);
         if (!resting)
           return true;
@@ -437,7 +507,7 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
                       "and put it "
                       "there again",
                       mark));
-          ask(frame);
+          ask();
           return true;
         }
         seen[mark] = {resting->position, resting->covariance, surface.marks[static_cast<std::size_t>(mark) - 1], mark};
@@ -454,14 +524,16 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
           isRepeated = true;
           remaining = {drift.mark};
         }
-        ask(frame);
+        ask();
         return true;
       },
-      [&](const CameraFrame&) {
+      [&] {
         Tell(WhatIsSeen(tracker, options.light));
         return !stage.IsSimulated();
       });
   stage.Source().Close();
+  if (!isMarkerTold)
+    TellMarker(session, {});
   if (!isJudged)
     throw Error(Error::Kind::NotPossible, options.camera + Format(": it ended before %d marks were visited", options.checkMarks));
   const char* verdicts[] = {"holds", "moved", "wrong mark", "changed"};
@@ -491,7 +563,8 @@ Command CalibrateSurfaceCommand(CLI::App& calibrate)
   options->add_option("-o,--output", values->output, "Calibration to write (.json; the mesh goes beside it as .stl)");
   options->add_option("--check", values->check, "See whether this calibration still holds, by some of its marks");
   options->add_option("--check-marks", values->checkMarks, "How many")->check(CLI::Range(4, 100))->capture_default_str();
-  options->add_option("--shell", values->shell, "What the marker in the shell says; a check refuses another one");
+  options->add_option("--shell", values->shell,
+                      "What the marker in the shell says, where the camera does not see it; another one is refused");
   options->add_option("--wall-mm", values->wallMm, "From the mesh to what the camera sees of it: thickness, where that matters")
       ->check(CLI::Range(0.0, 50.0));
   options

@@ -11,6 +11,7 @@
 #include "Core/Base/JoinedText.h"
 #include "Tracking/Cameras/RecordedSource.h"
 #include "Tracking/Cameras/SimulatedSource.h"
+#include "Tracking/Devices/MountedShell.h"
 #include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/ImageStream.h"
@@ -144,15 +145,25 @@ struct OpticalTracker::View {
   OpticalView* given;
   CameraFormat format;
   std::unique_ptr<LightTracker> lights;
-  double heard = 0.0, lag = 0.0; // our clock; from the middle of an exposure to when it was worked on
-  double newest = -1e300;        // begin of the newest frame
-  double blindSince = -1.0;      // begin of a frame; below 0: it is not blind
-  double brokenSince = -1.0;     // our clock
+  std::unique_ptr<MountedShell> mounted; // nullptr: the calibration does not say which shell it is of
+  double heard = 0.0, lag = 0.0;         // our clock; from the middle of an exposure to when it was worked on
+  double newest = -1e300;                // begin of the newest frame
+  double blindSince = -1.0;              // begin of a frame; below 0: it is not blind
+  double brokenSince = -1.0;             // our clock
   bool hasEnded = false;
   std::int64_t frames = 0;
   std::string broken;
 
   double Exposure() const { return 1e-3 * given->surface.tracks.exposureMs; }
+  void BeginAnew()
+  {
+    const CalibratedSurface& surface = given->surface;
+    lights = std::make_unique<LightTracker>(surface.MakeTracker());
+    if (!surface.shell.empty())
+      mounted = std::make_unique<MountedShell>(
+          surface.map.State().optics.lens,
+          MountedShell::TurnFrames(surface.lights.Code(), surface.tracks.slotMs, surface.tracks.frameMs));
+  }
 };
 
 // One light, and what is told of it.
@@ -236,7 +247,7 @@ void OpticalTracker::OpenViews()
     if (view->format.exposureMs > 0.0)
       tracks.exposureMs = view->format.exposureMs;
     tracks.rowUs = view->format.rowUs;
-    view->lights = std::make_unique<LightTracker>(given.surface.MakeTracker());
+    view->BeginAnew();
     view->heard = ClockNow();
     if (parameters_.truth && !dynamic_cast<const SimulatedSource*>(given.camera.get()))
       throw Error(Error::Kind::InvalidParameter, given.name + ": truth=on needs a simulated camera: nobody knows it of others");
@@ -313,7 +324,7 @@ void OpticalTracker::Run(const Worker::Signal& signal, PoseStream& poses)
           view->brokenSince = ClockNow();
           view->format = camera.Open();
           view->brokenSince = -1.0;
-          view->lights = std::make_unique<LightTracker>(view->given->surface.MakeTracker());
+          view->BeginAnew(); // perhaps in another shell
         }
         if (view->hasEnded)
           continue;
@@ -369,7 +380,11 @@ void OpticalTracker::Use(View& view, const CameraFrame& frame, PoseStream& poses
     shown_ = frame.begin;
     images_->Add(PictureOf(frame));
   }
-  const double period = 1e-3 * view.given->surface.tracks.frameMs;
+  const CalibratedSurface& surface = view.given->surface;
+  if (const auto marker = view.mounted ? view.mounted->Add(frame.grey) : std::nullopt;
+      marker && marker->status == ShellMarkerReading::Status::Read && !IsNameOf(surface.shell, *marker))
+    surface.CheckShell(ShellNameOf(*marker), view.given->name);
+  const double period = 1e-3 * surface.tracks.frameMs;
   const std::vector<TrackedLight>& lights = view.lights->Update(frame.grey, frame.begin);
   view.newest = frame.begin;
   view.heard = ClockNow();

@@ -12,13 +12,16 @@
 //
 // With a rolling shutter row r is exposed r row times later than the first: by the place that the light then has.
 #include "SimulatedCamera.h"
+#include "Core/Base/Angles.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "Tracking/Optical/MarkerPattern.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string>
 
 namespace echorama {
 
@@ -41,6 +44,9 @@ ParameterList Describe(SimulatedCameraParameters& p)
         Parameter("HotPixels", p.hotPixels, {0, 100000}, "", "Half of them blink."),
         Parameter("Vignetting", p.vignetting, {0, 4}, "",
                   "The lens darkens with this power of the angle's cosine (halved angle)."),
+        Parameter("Marker", p.marker,
+                  "What a marker around the skin's foot says, six hexadecimal digits; its dark cells let 0.7 of the light of the "
+                  "room in. None: there is no marker."),
         Parameter("SpotMm", p.spotMm, {0.1, 50}, "mm", "Standard deviation of a touching light on the skin."),
         Parameter("SpreadPerMm", p.spreadPerMm, {0, 10}, "", "How fast that grows with the distance from the skin."),
         Parameter("FadeMm", p.fadeMm, {0.1, 1000}, "mm", "Distance at which half of the light meets the skin."),
@@ -104,6 +110,25 @@ ECHORAMA_HOT void Develop(const float* grey, const float* normal, int count, flo
   }
 }
 
+constexpr float MarkerShade = 0.7f;
+
+std::optional<MarkerPattern> PatternNamed(const std::string& marker)
+{
+  if (marker.empty())
+    return std::nullopt;
+  if (marker.size() > 6 || marker.find_first_not_of("0123456789abcdefABCDEF") != std::string::npos)
+    throw Error(Error::Kind::InvalidParameter, "marker: " + marker + " is no number of six hexadecimal digits");
+  return MarkerPattern::Of(static_cast<std::uint32_t>(std::stoul(marker, nullptr, 16)));
+}
+
+// Its cells are directions of the camera's frame.
+bool IsDark(const MarkerPattern& marker, const Eigen::Vector3d& direction)
+{
+  const auto cell = [](double degrees) { return static_cast<int>(std::floor(degrees / MarkerPattern::cellDegrees)); };
+  return marker.IsDark(cell(std::asin(std::clamp(direction.z(), -1.0, 1.0)) * DegreesPerRadian - MarkerPattern::lowestDegrees),
+                       cell(std::atan2(direction.y(), direction.x()) * DegreesPerRadian));
+}
+
 constexpr std::uint64_t HotPixelItem = 1, LossItem = 2; // streams of one seed that are no frame's noise
 constexpr std::uint64_t OtherStreams = 0x5eed0000c0de0000u;
 
@@ -125,6 +150,7 @@ SimulatedCamera::SimulatedCamera(const SimulatedCameraParameters& parameters, co
   falloff_.assign(size, 0.0f);
   ambient_.assign(size, static_cast<float>(parameters.dark));
   std::vector<float> towardsSun(size, -2.0f);
+  const std::optional<MarkerPattern> marker = PatternNamed(parameters.marker);
   const Eigen::Vector3d sun = Eigen::Vector3d(0.6, 0.35, 0.7).normalized();
   ParallelRanges(height, 8, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
@@ -139,8 +165,9 @@ SimulatedCamera::SimulatedCamera(const SimulatedCameraParameters& parameters, co
         points_[index] = hit->point.cast<float>();
         falloff_[index] = static_cast<float>(std::pow(0.5 * (1.0 + direction->z()), parameters_.vignetting));
         towardsSun[index] = static_cast<float>(-hit->normal.dot(sun));
-        ambient_[index] += falloff_[index] * static_cast<float>(parameters_.ambient) +
-                           static_cast<float>(parameters_.slope * (x - parameters_.lens.centreX));
+        const float ofRoom = falloff_[index] * static_cast<float>(parameters_.ambient) +
+                             static_cast<float>(parameters_.slope * (x - parameters_.lens.centreX));
+        ambient_[index] += marker && IsDark(*marker, *direction) ? MarkerShade * ofRoom : ofRoom;
       }
   });
   if (std::none_of(falloff_.begin(), falloff_.end(), [](float f) { return f > 0.0f; }))

@@ -7,6 +7,7 @@
 #include "Tracking/Optical/SeenSurface.h"
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace echorama {
@@ -23,6 +24,7 @@ struct SimulatedCameraParameters {
   double sunShare = 0.0, sunEdge = 0.05;
   int hotPixels = 30;
   double vignetting = 0.5;
+  std::string marker;
   double spotMm = 1.2, spreadPerMm = 0.6, fadeMm = 4.0, halo = 0.05;
   std::uint64_t seed = 1;
 };

@@ -376,6 +376,23 @@ TEST(OpticalTracker, AnotherSizeOfPicturesAndAnotherShellAreRefused)
   echorama::testing::ExpectRefused([&] { other.Start(stream, nullptr); }, Error::Kind::BadInput, "belly.json", "head-2");
 }
 
+// By the marker that its camera sees, without being told.
+TEST(OpticalTracker, AShellWithAnotherMarkerIsRefusedOnceThatIsRead)
+{
+  for (const auto& [calibrated, isRefused] : {std::pair<const char*, bool>{"0A1B2D", true}, {"0a1b2c", false}, {"", false}}) {
+    Rig rig;
+    rig.source = SimulatedSourceParameters::Of(TrackerAddress::Parse("simulated:?speed=0&frames=100&marker=0A1B2C"));
+    std::vector<OpticalView> views = Views(rig.View());
+    views.front().surface.shell = calibrated;
+    OpticalTracker tracker({}, std::move(views));
+    const Told told = Listen(tracker);
+    EXPECT_EQ(told.state, isRefused ? DeviceState::Failed : DeviceState::Ended) << told.message;
+    if (isRefused) {
+      EXPECT_SAYS(told.message, "belly.json: it was made in the shell \"0A1B2D\", and \"0A1B2C\" is mounted");
+    }
+  }
+}
+
 class OpticalTrackerFiles : public echorama::testing::TemporaryFolder {};
 
 TEST_F(OpticalTrackerFiles, AFilmGivesTheSamePosesAgain)

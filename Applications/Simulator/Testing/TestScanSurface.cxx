@@ -20,8 +20,8 @@
 #include <vtkMatrix4x4.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
-#include <vtkSTLWriter.h>
 #include <vtkSphereSource.h>
+#include <vtkSTLWriter.h>
 #include <vtkUltrasoundTrackerSource.h>
 
 using namespace echorama;
@@ -30,7 +30,8 @@ namespace {
 
 constexpr double Scale = 2.4; // of the body of all tests: as large as a belly
 // The camera looks at the front, which is -y. Neither it nor its lens are quite as they should be.
-const QString Camera = "width=320&height=240&cameraMm=2 16 -3&cameraTurn=91 2 1&focal=75&centreX=161&centreY=118&k1=-0.026&k2=0.002";
+const QString Camera =
+    "width=320&height=240&cameraMm=2 16 -3&cameraTurn=91 2 1&focal=75&centreX=161&centreY=118&k1=-0.026&k2=0.002";
 
 double Grey(const Eigen::Vector3d& at)
 {
@@ -101,16 +102,32 @@ void TestScanSurface::initTestCase()
   for (int i = 0; i < count; i++) { // along a spiral from the middle of the front outwards
     const double height = 1.0 - 0.85 * (i + 0.5) / count, across = std::sqrt(1.0 - height * height), angle = 2.399963 * i;
     const Eigen::Vector3d at =
-        Scale *
-        Eigen::Vector3d(across * std::cos(angle), -height, across * std::sin(angle)).cwiseProduct(body::HalfAxes);
+        Scale * Eigen::Vector3d(across * std::cos(angle), -height, across * std::sin(angle)).cwiseProduct(body::HalfAxes);
     marks.write(QString("%1,%2,%3,%4\n").arg(i + 1).arg(at.x()).arg(at.y()).arg(at.z()).toUtf8());
   }
   marks.close();
   QProcess program;
-  program.start(ECHORAMA_PROGRAM,
-                {"calibrate", "surface", "simulated:?speed=0&placementMm=0.1&moveSeconds=0.3&liftMm=8&" + Camera, "--mesh", At("belly.stl"),
-                 "--marks", At("points.csv"), "-o", At("belly.json"), "--up", "0", "-1", "0", "--camera-position", "0", "20", "0", "--focal",
-                 "72", "--rest-frames", "12"});
+  program.start(ECHORAMA_PROGRAM, {"calibrate",
+                                   "surface",
+                                   "simulated:?speed=0&placementMm=0.1&moveSeconds=0.3&liftMm=8&" + Camera,
+                                   "--mesh",
+                                   At("belly.stl"),
+                                   "--marks",
+                                   At("points.csv"),
+                                   "-o",
+                                   At("belly.json"),
+                                   "--up",
+                                   "0",
+                                   "-1",
+                                   "0",
+                                   "--camera-position",
+                                   "0",
+                                   "20",
+                                   "0",
+                                   "--focal",
+                                   "72",
+                                   "--rest-frames",
+                                   "12"});
   QVERIFY(program.waitForFinished(120000));
   QVERIFY2(program.exitStatus() == QProcess::NormalExit && program.exitCode() == 0, program.readAllStandardError());
   QFile calibration(At("belly.json"));
@@ -144,7 +161,8 @@ void TestScanSurface::theProbeFollowsAHandOnThePrintedSkin()
       return Eigen::Vector3d(matrix->GetElement(0, 3), matrix->GetElement(1, 3), matrix->GetElement(2, 3));
     };
     connect(&window.Scan(), &Scan::ProbeMoved, &window.Scan(), [&] {
-      const auto probe = placeOf("ProbeTruthToTracker"), needle = placeOf("NeedleTruthToTracker"), told = placeOf("ProbeToTracker");
+      const auto probe = placeOf("ProbeTruthToTracker"), needle = placeOf("NeedleTruthToTracker"),
+                 told = placeOf("ProbeToTracker");
       truth.reset();
       if (probe && needle && told && *told == window.Place())
         truth = Moment{*probe, *needle};
@@ -182,7 +200,8 @@ void TestScanSurface::theProbeFollowsAHandOnThePrintedSkin()
     qInfo("%d poses, %.0f mm: probe %.2f mm off in the median, %.2f mm in 95%%; needle %.2f, %.2f mm; axis %.2f degrees "
           "in 95%%; grey levels %.1f in the median, %.1f in 95%%; the calibration says %.2f mm in 95%%, the tracker: %s",
           static_cast<int>(probe.size()), travelled, Quantile(probe, 0.5), Quantile(probe, 0.95), Quantile(needle, 0.5),
-          Quantile(needle, 0.95), Quantile(tilted, 0.95), Quantile(grey, 0.5), Quantile(grey, 0.95), calibratedMm_, qPrintable(state));
+          Quantile(needle, 0.95), Quantile(tilted, 0.95), Quantile(grey, 0.5), Quantile(grey, 0.95), calibratedMm_,
+          qPrintable(state));
     // What both say of themselves: the calibration in 95%, the predictions as their root mean square.
     const double statedMm = calibratedMm_ + 2.0 * predictedMm;
     QVERIFY(predictedMm > 0.0 && statedMm < 3.0);
@@ -215,7 +234,8 @@ void TestScanSurface::whatTheCameraDoesNotSeeIsSaid()
   QTRY_VERIFY(window.Scan().IsFollowing());
   connection->click();
   Connect(window, "&path=still&peak=70");
-  QTRY_VERIFY2(state().contains("Probe hovers") && state().endsWith("the tool is off the skin, or out of reach"), qPrintable(state()));
+  QTRY_VERIFY2(state().contains("Probe hovers") && state().endsWith("the tool is off the skin, or out of reach"),
+               qPrintable(state()));
   QVERIFY(!window.Scan().IsFollowing());
   connection->click();
 
