@@ -290,10 +290,8 @@ void vtkUltrasoundAlignmentRepresentation::Start(double position[2], bool turn)
     drag.kind = constraint.kind == MotionConstraint::Kind::Axis ? DragKind::AlongAxis : DragKind::InPlane;
   }
   parts.Mouse.emplace(view, drag, Vector2d(position));
-  if (!parts.MovesCentre) {
-    const bool turns = drag.kind == DragKind::AboutAxis || drag.kind == DragKind::Trackball;
-    parts.BeginEdit(turns ? "Turn" : "Move");
-  }
+  const bool turns = drag.kind == DragKind::AboutAxis || drag.kind == DragKind::Trackball;
+  parts.BeginEdit(parts.MovesCentre ? "Move the centre of" : turns ? "Turn" : "Move");
 }
 
 //----------------------------------------------------------------------------
@@ -318,9 +316,7 @@ void vtkUltrasoundAlignmentRepresentation::EndWidgetInteraction(double position[
   Internals& parts = *this->Parts;
   if (parts.Hand) {
     this->WidgetInteraction(position);
-    if (!parts.MovesCentre) {
-      parts.Hand->Session->EndEdit();
-    }
+    parts.Hand->Session->EndEdit();
   }
   parts.Hand.reset();
   parts.Mouse.reset();
@@ -331,16 +327,7 @@ void vtkUltrasoundAlignmentRepresentation::CancelInteraction()
 {
   Internals& parts = *this->Parts;
   if (parts.Hand) {
-    vtkUltrasoundAlignmentSession* session = parts.Hand->Session;
-    if (!parts.MovesCentre) {
-      session->CancelEdit();
-    }
-    if (parts.Hand->isCentreChosen) {
-      const Vector3d centre = parts.Hand->centre;
-      session->SetCentreOfRotation(centre.x(), centre.y(), centre.z());
-    } else if (parts.MovesCentre) {
-      session->ResetCentreOfRotation();
-    }
+    parts.Hand->Session->CancelEdit();
   }
   parts.Hand.reset();
   parts.Mouse.reset();

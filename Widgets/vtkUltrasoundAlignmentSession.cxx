@@ -8,19 +8,11 @@
 // images.
 #include "vtkUltrasoundAlignmentSession.h"
 
-#include "Core/Geometry/MatrixRows.h"
-#include "vtkDoubleArray.h"
 #include "vtkImageData.h"
 #include "vtkIntArray.h"
-#include "vtkMatrix4x4.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
-#include "vtkPointData.h"
-#include "vtkPoints.h"
-#include "vtkPolyData.h"
-#include "vtkSmartPointer.h"
-#include "vtkStringArray.h"
 #include "vtkUltrasoundSessionImages.h"
+#include "vtkUltrasoundSessionTables.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -38,48 +30,9 @@ constexpr std::ptrdiff_t GreySamples = 50000; // per volume
 constexpr int ScorePoints = 2000;             // per volume
 constexpr std::uint64_t ScoreSeed = 1;
 
-Pose PoseOf(vtkMatrix4x4* matrix, const char* what)
-{
-  if (!matrix) {
-    throw Error(Error::Kind::InvalidParameter, std::string("there is no ") + what);
-  }
-  return FromRows<Pose>(matrix->GetData());
-}
-
-bool Take(const Pose* pose, vtkMatrix4x4* matrix)
-{
-  if (pose && matrix) {
-    Eigen::Map<MatrixRows>(matrix->GetData()) = pose->matrix();
-    matrix->Modified();
-  }
-  return pose && matrix;
-}
-
 std::string TextOf(const char* text)
 {
   return text ? text : "";
-}
-
-int Tell(const std::vector<Backup>& backups, vtkStringArray* paths, vtkStringArray* labels, vtkDoubleArray* times)
-{
-  for (vtkAbstractArray* array :
-       {static_cast<vtkAbstractArray*>(paths), static_cast<vtkAbstractArray*>(labels), static_cast<vtkAbstractArray*>(times)}) {
-    if (array) {
-      array->Initialize();
-    }
-  }
-  for (const Backup& backup : backups) {
-    if (paths) {
-      paths->InsertNextValue(backup.path);
-    }
-    if (labels) {
-      labels->InsertNextValue(backup.readable ? backup.label : "damaged");
-    }
-    if (times) {
-      times->InsertNextValue(static_cast<double>(backup.time));
-    }
-  }
-  return static_cast<int>(backups.size());
 }
 } // namespace
 
@@ -157,11 +110,17 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentSession::AddVolume(vtkImageData* image, const char* file, const char* name)
 {
+  SessionVolume volume;
+  volume.file = ResolvedPath(TextOf(file));
+  volume.name = name && *name ? name : fs::path(volume.file).stem().string();
+  return this->AddNew(image, std::move(volume));
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAlignmentSession::AddNew(vtkImageData* image, SessionVolume volume)
+{
   int id = 0;
   this->Change([&]() {
-    SessionVolume volume;
-    volume.file = ResolvedPath(TextOf(file));
-    volume.name = name && *name ? name : fs::path(volume.file).stem().string();
     const std::string called = volume.name.empty() ? "the volume" : volume.name;
     if (!image) {
       throw Error(Error::Kind::BadInput, called + ": there is no image");
@@ -201,6 +160,74 @@ int vtkUltrasoundAlignmentSession::OpenVolume(const char* file)
     image = ReadImages({file}).front();
   };
   return this->Change(read) ? this->AddVolume(image, file) : 0;
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundAlignmentSession::RecordSources(vtkIntArray* volumes, const char* options)
+{
+  std::string record;
+  this->Change([&]() {
+    std::vector<int> ids;
+    for (vtkIdType i = 0; volumes && i < volumes->GetNumberOfValues(); ++i) {
+      ids.push_back(volumes->GetValue(i));
+    }
+    MadeOf madeOf = echorama::RecordSources(this->Session.State(), ids, {});
+    if (options && *options) {
+      madeOf.options = OptionsOfText(options, "the options");
+    }
+    record = echorama::TextOf(madeOf);
+  });
+  return record;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundAlignmentSession::AddResult(vtkImageData* image, const char* name, const char* record)
+{
+  SessionVolume volume;
+  volume.name = name && *name ? name : "result";
+  const auto read = [&]() { volume.madeOf = std::make_shared<const MadeOf>(MadeOfText(TextOf(record), "the record")); };
+  return this->Change(read) ? this->AddNew(image, std::move(volume)) : 0;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::RemakeResult(int id, vtkImageData* image, const char* record)
+{
+  return this->Change([&]() {
+    if (!image) {
+      throw Error(Error::Kind::BadInput, this->GetName(id) + ": there is no image");
+    }
+    if (this->Images->GetBrushed() == id) {
+      throw Error(Error::Kind::NotPossible, this->GetName(id) + ": a stroke on it has not ended");
+    }
+    vtkUltrasoundVolume::CheckInput(nullptr, image, this->GetName(id));
+    this->Session.Remake(id, vtkUltrasoundVolume::GeometryOf(image), MadeOfText(TextOf(record), "the record"),
+                         [&](const SessionVolume& volume) { this->Images->Hold(volume, image); });
+  });
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::GetUnpainted(int id, vtkImageData* image)
+{
+  return this->Change([&]() {
+    if (this->Images->GetBrushed() == id) {
+      throw Error(Error::Kind::NotPossible, this->GetName(id) + ": a stroke on it has not ended");
+    }
+    image->ShallowCopy(this->Images->At(id).Unpainted());
+  });
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::SetFile(int id, const char* file)
+{
+  const auto set = [&]() {
+    const std::string path = ResolvedPath(TextOf(file));
+    if (!fs::is_regular_file(path)) {
+      throw Error(Error::Kind::FileSystem, (path.empty() ? "a volume's file" : path) + ": there is no such file");
+    }
+    this->Session.SetFile(id, path);
+    this->Images->At(id).Known.file = path;
+  };
+  return this->Change(set, "Save " + this->GetName(id));
 }
 
 //----------------------------------------------------------------------------
@@ -348,13 +375,14 @@ std::vector<std::string> vtkUltrasoundAlignmentSession::Folders() const
 //----------------------------------------------------------------------------
 Project vtkUltrasoundAlignmentSession::Now() const
 {
-  return {this->Images->State(), this->Truth.File(), this->Comment};
+  return {this->Images->State(), this->Truth.File(), this->Comment, this->Truth.ByHand(this->Session.State())};
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockDataSet* blocks)
 {
   const std::string name = TextOf(path);
+  std::map<std::string, Pose> truths;
   const auto open = [&]() {
     BackupStamp stamp;
     const std::size_t fingerprint = SessionStorage::FingerprintOf(name);
@@ -373,6 +401,7 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
     for (std::size_t i = 0; i < images.size(); ++i) {
       this->Images->Hold(this->Session.State().volumes[i], images[i]);
     }
+    truths = project.truths;
     this->Comment = project.comment;
     this->Truth = {};
     this->Truth.SetFile(project.truth);
@@ -384,18 +413,25 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
   };
   const bool opened = this->Change(open, "Open");
   const std::string truth = this->Truth.File();
-  if (opened && !truth.empty()) {
+  if (opened && !truth.empty()) { // without truths the project is open all the same
     const std::string found = FindVolume(this->GetProjectPath(), truth, this->Folders());
-    this->ReadTruth(found.empty() ? truth.c_str() : found.c_str()); // without it the project is open all the same
-    this->Storage.SetSavedTruth(this->Truth.File());
+    this->ReadTruth(found.empty() ? truth.c_str() : found.c_str());
+  }
+  for (const SessionVolume& volume : this->Session.State().volumes) {
+    if (const auto byHand = truths.find(volume.name); opened && byHand != truths.end()) {
+      this->DoTruth([&] { this->Truth.SetByHand(volume, byHand->second, this->PointsOf); });
+    }
+  }
+  if (opened) {
+    this->Storage.SetSavedTruth(this->Truth.File(), this->Truth.ByHand(this->Session.State()));
   }
   return opened;
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::SaveProject(const char* path)
+bool vtkUltrasoundAlignmentSession::SaveProject(const char* path, bool withoutUnsavedResults)
 {
-  return this->Change([&]() { this->Warn(this->Storage.Save(TextOf(path), this->Now())); }, "Save");
+  return this->Change([&]() { this->Warn(this->Storage.Save(TextOf(path), this->Now(), withoutUnsavedResults)); }, "Save");
 }
 
 //----------------------------------------------------------------------------
@@ -433,7 +469,8 @@ void vtkUltrasoundAlignmentSession::AddSearchFolder(const char* folder)
 bool vtkUltrasoundAlignmentSession::GetModifiedSinceSave() const
 {
   const Project& saved = this->Storage.Saved();
-  return this->Session.State() != saved.state || this->Truth.File() != saved.truth || this->Comment != saved.comment;
+  return this->Session.State() != saved.state || this->Truth.File() != saved.truth || this->Comment != saved.comment ||
+         !SameTruths(this->Truth.ByHand(this->Session.State()), saved.truths);
 }
 
 //----------------------------------------------------------------------------
@@ -506,14 +543,7 @@ int vtkUltrasoundAlignmentSession::GetBackupsIn(const char* folder, vtkStringArr
 //----------------------------------------------------------------------------
 int vtkUltrasoundAlignmentSession::GetAbandonedSessions(vtkStringArray* folders)
 {
-  const std::vector<std::string> found = SessionStorage::Abandoned();
-  if (folders) {
-    folders->Initialize();
-    for (const std::string& folder : found) {
-      folders->InsertNextValue(folder);
-    }
-  }
-  return static_cast<int>(found.size());
+  return Tell(SessionStorage::Abandoned(), folders);
 }
 
 //----------------------------------------------------------------------------
@@ -542,7 +572,7 @@ bool vtkUltrasoundAlignmentSession::SetTruth(int id, vtkMatrix4x4* volumeToWorld
 {
   return this->DoTruth([&] {
     this->Images->At(id); // throws when it is not there
-    this->Truth.Set(*this->Find(id), PoseOf(volumeToWorld, "truth"), this->PointsOf);
+    this->Truth.SetByHand(*this->Find(id), PoseOf(volumeToWorld, "truth"), this->PointsOf);
   });
 }
 
@@ -555,29 +585,7 @@ bool vtkUltrasoundAlignmentSession::GetTruth(int id, vtkMatrix4x4* volumeToWorld
 //----------------------------------------------------------------------------
 void vtkUltrasoundAlignmentSession::GetErrorVectors(vtkPolyData* vectors, int pointsPerVolume) const
 {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkDoubleArray> errors;
-  errors->SetName("Error");
-  errors->SetNumberOfComponents(3);
-  vtkNew<vtkIntArray> ids;
-  ids->SetName("Volume");
-  const LiveScoreResult* score = this->Truth.Score(this->Session.State());
-  for (std::size_t i = 0; score && i < score->volumes.size(); ++i) {
-    const VolumeScore& volume = score->volumes[i];
-    const std::size_t count = std::min(volume.points.size(), static_cast<std::size_t>(std::max(pointsPerVolume, 0)));
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::size_t at = k * volume.points.size() / count; // spread over all: they come in the order of their voxels
-      points->InsertNextPoint(volume.points[at].data());
-      errors->InsertNextTuple(volume.errors[at].data());
-      ids->InsertNextValue(score->ids[i]);
-    }
-  }
-  vectors->Initialize();
-  vectors->SetPoints(points);
-  vectors->GetPointData()->AddArray(errors);
-  vectors->GetPointData()->AddArray(ids);
-  vectors->GetPointData()->SetActiveVectors("Error");
+  TellErrors(this->Truth.Score(this->Session.State()), vectors, pointsPerVolume);
 }
 
 //----------------------------------------------------------------------------

@@ -41,6 +41,7 @@
 
 class vtkDoubleArray;
 class vtkImageData;
+class vtkIntArray;
 class vtkMatrix4x4;
 class vtkMultiBlockDataSet;
 class vtkPolyData;
@@ -82,6 +83,40 @@ public:
   void GetVolumes(vtkMultiBlockDataSet* blocks, bool onlyVisible = false) const;
   /** The same for one volume: as it is now, whatever is painted later. For jobs beside the work. */
   bool GetSnapshot(int id, vtkImageData* image) const;
+  ///@}
+
+  ///@{
+  /** Results: volumes that were made of others of the session, and stay linked to them. RecordSources takes down what the sources
+   * are now (ids; as JSON), with \a options, an object of texts, for whoever makes it again; call it before the work begins.
+   * AddResult takes what came of it; RemakeResult gives a result other voxels: looks stay, strokes and landmarks stay where they
+   * are in the world. GetSourcesChanged: what has become of the sources since ("A was moved; B is gone"); empty: nothing, or it
+   * is no result. GetSource: an id, 0: gone. Pose files leave results out. */
+  std::string RecordSources(vtkIntArray* volumes, const char* options = nullptr);
+  int AddResult(vtkImageData* image, const char* name, const char* record);
+  bool RemakeResult(int id, vtkImageData* image, const char* record);
+  bool IsResult(int id) const { return this->Of(id, &echorama::SessionVolume::madeOf) != nullptr; }
+  std::string GetSourcesChanged(int id) const
+  {
+    return this->IsResult(id) ? echorama::ChangesSince(this->GetKernel().State(), *this->Find(id)) : std::string();
+  }
+  int GetNumberOfSources(int id) const
+  {
+    return this->IsResult(id) ? static_cast<int>(this->Find(id)->madeOf->sources.size()) : 0;
+  }
+  int GetSource(int id, int index) const
+  {
+    const bool isThere = index >= 0 && index < this->GetNumberOfSources(id);
+    return isThere ? echorama::SourcesOf(this->GetKernel().State(), *this->Find(id)->madeOf)[static_cast<std::size_t>(index)] : 0;
+  }
+  /** Empty: it has no such. */
+  std::string GetResultOption(int id, const char* name) const
+  {
+    return this->IsResult(id) && name ? echorama::OptionOf(*this->Find(id)->madeOf, name) : std::string();
+  }
+  /** A volume that is in no file, for saving: as it was given, without strokes (a project keeps those), and where it stood.
+   * SetFile says in which file that is now. It is no edit. */
+  bool GetUnpainted(int id, vtkImageData* image);
+  bool SetFile(int id, const char* file);
   ///@}
 
   ///@{
@@ -138,6 +173,7 @@ public:
     return this->Do(&Kernel::MoveSelection, echorama::Pose(Eigen::Translation3d(x, y, z)));
   }
   bool RotateSelection(double x, double y, double z) { return this->Do(&Kernel::RotateSelection, {x, y, z}); }
+  /** Choosing the centre of rotation is an edit. */
   void GetCentreOfRotation(double centre[3]) const { Eigen::Map<Eigen::Vector3d>{centre} = this->Session.CentreOfRotation(); }
   void SetCentreOfRotation(double x, double y, double z) { this->Do(&Kernel::SetCentreOfRotation, Eigen::Vector3d(x, y, z)); }
   /** The middle of what is selected. */
@@ -200,10 +236,11 @@ public:
    * saved. \a volumes: read already (blocks with NAME() the file as GetProjectFiles tells), so that a window need not wait.
    * Without, files are read side by side. A backup opens without its volumes that were in no file, with a warning that names
    * them; the backups of an abandoned session become those of the session that opens one. Saving is atomic; volumes that are in
-   * no file cannot be saved. When somebody else has changed the project file since it was opened or saved here, saving is
-   * refused once; saving again replaces it. A file of one of the volumes is never replaced. */
+   * no file cannot be saved; \a withoutUnsavedResults leaves such results out, and they count as not saved. When somebody else
+   * has changed the project file since it was opened or saved here, saving is refused once; saving again replaces it. A file of
+   * one of the volumes is never replaced. */
   bool OpenProject(const char* path, vtkMultiBlockDataSet* volumes = nullptr);
-  bool SaveProject(const char* path);
+  bool SaveProject(const char* path, bool withoutUnsavedResults = false);
   /** The files a project needs, where they are now; an empty string for one that is nowhere. */
   bool GetProjectFiles(const char* path, vtkStringArray* files);
   /** Where else volumes of projects are looked for. */
@@ -348,6 +385,7 @@ private:
     this->InvokeEvent(PosesChangedEvent, nullptr);
     return done;
   }
+  int AddNew(vtkImageData* image, echorama::SessionVolume volume);
   void BackUpInTheBackground(const std::string& label);
   void TellTrouble(const std::string& trouble);
   void Warn(const std::string& text); ///< unless it is empty

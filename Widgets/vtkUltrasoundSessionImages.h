@@ -118,7 +118,7 @@ public:
 
   void Hold(const SessionVolume& volume, vtkImageData* image)
   {
-    this->Volumes.insert_or_assign(volume.id, SessionVoxels(volume, image));
+    this->Volumes.insert_or_assign(KeyOf(volume), SessionVoxels(volume, image));
   }
 
   /** What has changed since a state, and of which volume: 0 of none, -1 of several. */
@@ -136,10 +136,14 @@ public:
     const std::vector<SessionVolume>& after = this->Session.State().volumes;
     for (const SessionVolume& volume : after) {
       const SessionVolume* old = before.Find(volume.id);
-      SessionVoxels& voxels = this->Volumes.at(volume.id);
-      if (!old || old->volumeToWorld.matrix() != volume.volumeToWorld.matrix()) {
+      SessionVoxels& voxels = this->Of(volume);
+      const bool hasOthers = old && old->edition != volume.edition;
+      if (!old || hasOthers || old->volumeToWorld.matrix() != volume.volumeToWorld.matrix()) {
         voxels.Place(volume.volumeToWorld);
         add(changes.Poses, volume.id);
+      }
+      if (hasOthers) {
+        add(changes.Voxels, volume.id);
       }
       try {
         if (voxels.GoTo(volume.strokes)) {
@@ -149,7 +153,8 @@ public:
         changes.Unpainted.push_back(volume.name);
       }
       if (!old || old->name != volume.name || old->group != volume.group || old->colour != volume.colour ||
-          old->opacity != volume.opacity || old->visible != volume.visible || !(old->landmarks == volume.landmarks)) {
+          old->opacity != volume.opacity || old->visible != volume.visible || !(old->landmarks == volume.landmarks) ||
+          old->file != volume.file || old->madeOf != volume.madeOf) {
         add(changes.Volumes, volume.id);
       }
     }
@@ -163,24 +168,25 @@ public:
   void Forget()
   {
     for (auto each = this->Volumes.begin(); each != this->Volumes.end();) {
-      each = this->Session.Remembers(each->first) ? std::next(each) : this->Volumes.erase(each);
+      each = this->Session.Remembers(each->first.first, each->first.second) ? std::next(each) : this->Volumes.erase(each);
     }
   }
 
   /** Of a volume that is in the session. Throws Error(InvalidParameter) when there is none. */
   SessionVoxels& At(int id)
   {
-    if (!this->Session.State().Find(id)) {
+    const SessionVolume* volume = this->Session.State().Find(id);
+    if (!volume) {
       throw Error(Error::Kind::InvalidParameter, "there is no volume " + std::to_string(id));
     }
-    return this->Volumes.at(id);
+    return this->Of(*volume);
   }
 
   /** All volumes as they came. */
   std::vector<SessionVolume> Known() const
   {
     std::vector<SessionVolume> known;
-    for (const auto& [id, voxels] : this->Volumes) {
+    for (const auto& [key, voxels] : this->Volumes) {
       known.push_back(voxels.Known);
     }
     return known;
@@ -191,7 +197,7 @@ public:
   {
     std::vector<double> levels;
     for (const SessionVolume& volume : this->Session.State().volumes) {
-      this->Volumes.at(volume.id).SampleGreyLevels(samplesPerVolume, levels);
+      this->Of(volume).SampleGreyLevels(samplesPerVolume, levels);
     }
     if (levels.empty()) {
       return {0.0, 255.0};
@@ -224,7 +230,7 @@ public:
   bool ExtendStroke(const Eigen::Vector3d& world)
   {
     const Eigen::Vector3d point = this->Session.State().Find(this->Brushed)->volumeToWorld.inverse() * world;
-    const bool changed = this->Volumes.at(this->Brushed).Extend(point);
+    const bool changed = this->At(this->Brushed).Extend(point);
     this->Drawn.pathMm.push_back(point);
     return changed;
   }
@@ -240,11 +246,11 @@ public:
     const int id = std::exchange(this->Brushed, 0);
     try {
       this->Session.AddStroke(id, this->Drawn);
-      this->Volumes.at(id).End(this->Session.State().Find(id)->strokes);
+      this->At(id).End(this->Session.State().Find(id)->strokes);
     } catch (...) // no memory: what was painted goes, and the edit ends all the same
     {
       this->Session.Cancel();
-      this->Volumes.at(id).TakeBack();
+      this->At(id).TakeBack();
       throw;
     }
     this->Session.End();
@@ -252,8 +258,12 @@ public:
   /** Takes back what was drawn of a stroke in the making. Returns whether voxels have changed. */
   bool DropStroke()
   {
-    const auto voxels = this->Volumes.find(std::exchange(this->Brushed, 0));
-    return voxels != this->Volumes.end() && voxels->second.TakeBack();
+    bool changed = false; // its volume may be gone
+    const int id = std::exchange(this->Brushed, 0);
+    for (auto each = this->Volumes.lower_bound({id, 0}); each != this->Volumes.end() && each->first.first == id; ++each) {
+      changed = each->second.TakeBack() || changed;
+    }
+    return changed;
   }
   /** The same when its edit has ended, or its volume has gone. */
   bool DropLostStroke()
@@ -277,8 +287,12 @@ public:
   ///@}
 
 private:
+  using Key = std::pair<int, int>; ///< a volume's id, and the edition of its voxels
+  static Key KeyOf(const SessionVolume& volume) { return {volume.id, volume.edition}; }
+  SessionVoxels& Of(const SessionVolume& volume) { return this->Volumes.at(KeyOf(volume)); }
+
   AlignmentSession& Session;
-  std::map<int, SessionVoxels> Volumes; ///< also those that undo could bring back
+  std::map<Key, SessionVoxels> Volumes; ///< also those that undo could bring back
   int Brushed = 0;
   Stroke Drawn; ///< on it
 };

@@ -44,6 +44,24 @@ public:
   /** As the file stands, with what was painted. */
   vtkImageData* GetBase() const { return this->Base; }
 
+  /** As the file would have it: without strokes. */
+  vtkSmartPointer<vtkImageData> Unpainted()
+  {
+    const auto copy = vtkSmartPointer<vtkImageData>::New();
+    const StrokeChain chain = this->At;
+    if (chain) {
+      this->Edits->GoTo(nullptr);
+    }
+    copy->ShallowCopy(this->Base);
+    if (this->Edits) {
+      SetArrays(copy, CopyOf(this->Intensity), CopyOf(this->Valid));
+    }
+    if (chain) {
+      this->Edits->GoTo(chain);
+    }
+    return copy;
+  }
+
   /** Brings the voxels to a chain of strokes. Returns whether any has changed. */
   bool GoTo(const StrokeChain& chain)
   {

@@ -4,11 +4,21 @@
 #include "Widgets/Painting/Stroke.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
+#include <cstring>
 
 namespace echorama {
 namespace {
 
 const std::vector<std::string> modeNames{"paint", "carve", "restore"}; // in their order
+
+// FNV-1a, eight bytes at a time; the shift lets high bits reach low ones.
+void Add(std::uint64_t& digest, double number)
+{
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &number, sizeof bits);
+  digest = (digest ^ bits) * 1099511628211u;
+  digest ^= digest >> 32;
+}
 
 } // namespace
 
@@ -46,6 +56,19 @@ bool operator==(const Brush& a, const Brush& b)
 bool operator==(const Stroke& a, const Stroke& b)
 {
   return a.brush == b.brush && a.pathMm == b.pathMm;
+}
+
+StrokeNode::StrokeNode(Stroke s, std::shared_ptr<const StrokeNode> b)
+  : stroke(std::move(s)), before(std::move(b)), count(before ? before->count + 1 : 1),
+    digest(before ? before->digest : 14695981039346656037u)
+{
+  const Brush& brush = stroke.brush;
+  for (const double number : {static_cast<double>(brush.mode), brush.radiusMm, brush.intensity, brush.opacity, brush.hardness,
+                              brush.insideValid ? 1.0 : 0.0, static_cast<double>(stroke.pathMm.size())})
+    Add(digest, number);
+  for (const Eigen::Vector3d& point : stroke.pathMm)
+    for (int axis = 0; axis < 3; ++axis)
+      Add(digest, point[axis]);
 }
 
 StrokeNode::~StrokeNode()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Parameters.h"
+#include <cstdint>
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
@@ -48,11 +49,9 @@ bool operator==(const Stroke&, const Stroke&); ///< exact
 struct StrokeNode {
   Stroke stroke;
   std::shared_ptr<const StrokeNode> before;
-  int count = 1; ///< of strokes up to and with this one
-  StrokeNode(Stroke s, std::shared_ptr<const StrokeNode> b)
-    : stroke(std::move(s)), before(std::move(b)), count(before ? before->count + 1 : 1)
-  {
-  }
+  int count = 1;            ///< of strokes up to and with this one
+  std::uint64_t digest = 0; ///< of all of them: chains that say the same have the same one
+  StrokeNode(Stroke s, std::shared_ptr<const StrokeNode> b);
   ~StrokeNode(); ///< not recursive: chains are long
 };
 using StrokeChain = std::shared_ptr<const StrokeNode>;

@@ -26,6 +26,9 @@ constexpr std::array<std::array<double, 3>, 7> Tints{{{1.0, 1.0, 1.0},
                                                       {0.92, 0.90, 0.42},
                                                       {0.70, 0.64, 1.0}}};
 
+// Of results: another one than any of the tints, and as light.
+constexpr std::array<double, 3> ResultTint{0.62, 1.0, 0.88};
+
 [[noreturn]] void Refuse(const std::string& reason)
 {
   throw Error(Error::Kind::InvalidParameter, reason);
@@ -55,6 +58,24 @@ bool Named(const SessionState& state, const std::string& name, int except = 0)
 {
   return std::any_of(state.volumes.begin(), state.volumes.end(),
                      [&](const SessionVolume& volume) { return volume.id != except && volume.name == name; });
+}
+
+void CheckCentre(const std::optional<Eigen::Vector3d>& centre)
+{
+  if (centre && !centre->allFinite())
+    Refuse("the centre of rotation is not finite");
+}
+
+// Strokes of one physical space in another.
+StrokeChain Moved(const StrokeChain& chain, const Pose& motion)
+{
+  StrokeChain moved;
+  for (Stroke& stroke : StrokesOf(chain)) {
+    for (Eigen::Vector3d& point : stroke.pathMm)
+      point = motion * point;
+    moved = Append(moved, std::move(stroke));
+  }
+  return moved;
 }
 
 // Products of many rotations drift; long before anybody sees it they are made orthonormal again.
@@ -208,7 +229,9 @@ int AlignmentSession::Add(SessionVolume volume)
     const std::string wanted = volume.name;
     for (int copy = 2; Named(state_, volume.name); ++copy)
       volume.name = wanted + " (" + std::to_string(copy) + ")";
-    if (volume.colour == White) {
+    if (volume.colour == White && volume.madeOf) {
+      volume.colour = ResultTint;
+    } else if (volume.colour == White) {
       // The first tint that is the rarest among the others: white for the first volume.
       const auto uses = [this](const std::array<double, 3>& tint) {
         return std::count_if(state_.volumes.begin(), state_.volumes.end(),
@@ -218,6 +241,7 @@ int AlignmentSession::Add(SessionVolume volume)
           *std::min_element(Tints.begin(), Tints.end(), [&](const auto& a, const auto& b) { return uses(a) < uses(b); });
     }
     volume.id = nextId_++;
+    volume.edition = 0;
     volume.group = 0;
     if (depth_ == 1)
       label_ = "Add " + volume.name;
@@ -230,6 +254,49 @@ void AlignmentSession::Remove(int id)
 {
   EditOne("Remove", id,
           [this](SessionVolume& volume) { state_.volumes.erase(state_.volumes.begin() + (&volume - state_.volumes.data())); });
+}
+
+void AlignmentSession::Remake(int id, const ImageGeometry& geometry, MadeOf madeOf,
+                              const std::function<void(const SessionVolume&)>& hold)
+{
+  const SessionVolume& before = Volume(id);
+  if (!before.madeOf)
+    Refuse(before.name + ": it was not made of other volumes");
+  geometry.Check(before.name);
+  for (const MadeOf::Source& source : madeOf.sources)
+    if (source.name == before.name)
+      Refuse(before.name + ": it cannot be made of itself");
+  EditOne("Make", id, [&](SessionVolume& volume) {
+    const Pose motion = std::exchange(volume.volumeToWorld, Pose::Identity());
+    if (motion.matrix() != Eigen::Matrix4d::Identity()) {
+      volume.strokes = Moved(volume.strokes, motion);
+      for (Landmark& landmark : volume.landmarks)
+        landmark.position = motion * landmark.position;
+    }
+    volume.geometry = geometry;
+    volume.file.clear();
+    volume.madeOf = std::make_shared<const MadeOf>(std::move(madeOf));
+    volume.edition = ++lastEdition_;
+    if (hold)
+      hold(volume);
+  });
+}
+
+void AlignmentSession::SetFile(int id, const std::string& file)
+{
+  const int edition = Volume(id).edition;
+  for (const SessionVolume& other : state_.volumes)
+    if (other.id != id && !file.empty() && other.file == file)
+      Refuse(file + ": it is the file of " + other.name);
+  const auto tell = [&](SessionState& state) {
+    if (SessionVolume* volume = state.Find(id); volume && volume->edition == edition)
+      volume->file = file;
+  };
+  tell(state_);
+  tell(start_);
+  for (std::vector<Entry>* entries : {&done_, &undone_})
+    for (Entry& entry : *entries)
+      tell(entry.state);
 }
 
 void AlignmentSession::SetPose(int id, const Pose& volumeToWorld)
@@ -263,7 +330,17 @@ void AlignmentSession::SetName(int id, const std::string& name)
     Refuse("a volume needs a name");
   if (Named(state_, name, id))
     Refuse("another volume has the name " + name);
-  EditOne("Rename", id, [&](SessionVolume& volume) { volume.name = name; });
+  EditOne("Rename", id, [&](SessionVolume& volume) {
+    const std::string before = std::exchange(volume.name, name);
+    for (SessionVolume& result : state_.volumes) { // results know their sources by name
+      const auto isIt = [&before](const MadeOf::Source& source) { return source.name == before; };
+      if (!result.madeOf || std::none_of(result.madeOf->sources.begin(), result.madeOf->sources.end(), isIt))
+        continue;
+      MadeOf renamed = *result.madeOf;
+      std::find_if(renamed.sources.begin(), renamed.sources.end(), isIt)->name = name;
+      result.madeOf = std::make_shared<const MadeOf>(std::move(renamed));
+    }
+  });
 }
 
 void AlignmentSession::SetColour(int id, const std::array<double, 3>& rgb)
@@ -288,69 +365,6 @@ void AlignmentSession::AddStroke(int id, Stroke stroke)
   const std::string verb = VerbOf(stroke.brush.mode);
   const StrokeChain longer = Append(Volume(id).strokes, std::move(stroke));
   EditOne(verb, id, [&](SessionVolume& volume) { volume.strokes = longer; });
-}
-
-void AlignmentSession::SetLandmark(int id, const std::string& label, const Eigen::Vector3d& place)
-{
-  if (label.empty())
-    Refuse("a landmark needs a label");
-  if (!place.allFinite())
-    Refuse("the place of a landmark is not finite");
-  EditOne("Mark " + label + " in", id, [&](SessionVolume& volume) {
-    const Eigen::Vector3d position = volume.volumeToWorld.inverse(Eigen::Isometry) * place;
-    for (Landmark& landmark : volume.landmarks)
-      if (landmark.label == label) {
-        landmark.position = position;
-        return;
-      }
-    volume.landmarks.push_back({label, position});
-  });
-}
-
-void AlignmentSession::RemoveLandmark(const std::string& label)
-{
-  Edit("Remove landmark " + label, [&] {
-    for (SessionVolume& volume : state_.volumes)
-      volume.landmarks.erase(std::remove_if(volume.landmarks.begin(), volume.landmarks.end(),
-                                            [&label](const Landmark& landmark) { return landmark.label == label; }),
-                             volume.landmarks.end());
-  });
-}
-
-void AlignmentSession::ClearLandmarks()
-{
-  Edit("Remove all landmarks", [this] {
-    for (SessionVolume& volume : state_.volumes)
-      volume.landmarks.clear();
-  });
-}
-
-std::optional<Eigen::Vector3d> AlignmentSession::PlaceOfLandmark(int id, const std::string& label) const
-{
-  if (const SessionVolume* volume = state_.Find(id))
-    for (const Landmark& landmark : volume->landmarks)
-      if (landmark.label == label)
-        return volume->volumeToWorld * landmark.position;
-  return std::nullopt;
-}
-
-std::string AlignmentSession::NextLandmarkLabel(int id) const
-{
-  std::set<std::string> own, all;
-  for (const SessionVolume& volume : state_.volumes)
-    for (const Landmark& landmark : volume.landmarks) {
-      all.insert(landmark.label);
-      if (volume.id == id)
-        own.insert(landmark.label);
-    }
-  for (const SessionVolume& volume : state_.volumes)
-    for (const Landmark& landmark : volume.landmarks)
-      if (own.count(landmark.label) == 0)
-        return landmark.label;
-  int number = 1;
-  while (all.count(std::to_string(number)) > 0)
-    ++number;
-  return std::to_string(number);
 }
 
 void AlignmentSession::Select(int id, bool on, bool alone)
@@ -409,7 +423,7 @@ std::string AlignmentSession::LabelOf(const char* verb) const
 
 AlignmentSession::Grip AlignmentSession::TakeHold() const
 {
-  Grip grip{{}, CentreOfRotation(), centre_.has_value()};
+  Grip grip{{}, CentreOfRotation(), state_.centre.has_value()};
   for (const SessionVolume& volume : state_.volumes)
     if (selection_.count(volume.id) != 0)
       grip.volumes.emplace_back(volume.id, volume.volumeToWorld);
@@ -424,9 +438,9 @@ void AlignmentSession::MoveHeld(const Grip& grip, const Pose& motion)
         volume->volumeToWorld = Composed(motion, start);
         CheckRigid(volume->volumeToWorld, "pose");
       }
+    if (grip.isCentreChosen)
+      SetCentreOfRotation(motion * grip.centre);
   });
-  if (grip.isCentreChosen)
-    SetCentreOfRotation(motion * grip.centre);
 }
 
 void AlignmentSession::RotateSelection(const Eigen::Vector3d& degrees)
@@ -468,8 +482,8 @@ void AlignmentSession::UngroupSelection()
 
 Eigen::Vector3d AlignmentSession::CentreOfRotation() const
 {
-  if (centre_)
-    return *centre_;
+  if (state_.centre)
+    return *state_.centre;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
   for (const SessionVolume& volume : state_.volumes)
@@ -482,9 +496,8 @@ Eigen::Vector3d AlignmentSession::CentreOfRotation() const
 
 void AlignmentSession::SetCentreOfRotation(const std::optional<Eigen::Vector3d>& centre)
 {
-  if (centre && !centre->allFinite())
-    Refuse("the centre of rotation is not finite");
-  centre_ = centre;
+  CheckCentre(centre);
+  Edit("Choose the centre of rotation", [&] { state_.centre = centre; });
 }
 
 void AlignmentSession::ForgetHistory()
@@ -502,14 +515,16 @@ void AlignmentSession::Reset(SessionState state)
 {
   for (const SessionVolume& volume : state.volumes)
     CheckNew(volume);
-  for (SessionVolume& volume : state.volumes)
+  CheckCentre(state.centre);
+  for (SessionVolume& volume : state.volumes) {
     volume.id = nextId_++;
+    volume.edition = 0;
+  }
   depth_ = 0;
   start_ = {};
   done_.clear();
   undone_.clear();
   selection_.clear();
-  centre_.reset();
   state_ = std::move(state);
   ++version_;
 }
@@ -518,18 +533,26 @@ void AlignmentSession::Replace(SessionState state, const std::string& label)
 {
   for (const SessionVolume& volume : state.volumes)
     CheckNew(volume);
+  CheckCentre(state.centre);
   for (SessionVolume& volume : state.volumes) {
-    if (volume.id == 0)
+    if (volume.id == 0) {
       volume.id = nextId_++;
+      volume.edition = 0;
+    }
     nextId_ = std::max(nextId_, volume.id + 1);
+    lastEdition_ = std::max(lastEdition_, volume.edition);
   }
   Edit(label, [&] { state_ = std::move(state); });
 }
 
-bool AlignmentSession::Remembers(int id) const
+bool AlignmentSession::Remembers(int id, int edition) const
 {
-  const auto within = [id](const Entry& entry) { return entry.state.Find(id) != nullptr; };
-  return state_.Find(id) || start_.Find(id) || std::any_of(done_.begin(), done_.end(), within) ||
+  const auto has = [id, edition](const SessionState& state) {
+    const SessionVolume* volume = state.Find(id);
+    return volume && volume->edition == edition;
+  };
+  const auto within = [&has](const Entry& entry) { return has(entry.state); };
+  return has(state_) || has(start_) || std::any_of(done_.begin(), done_.end(), within) ||
          std::any_of(undone_.begin(), undone_.end(), within);
 }
 

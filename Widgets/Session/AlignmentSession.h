@@ -57,6 +57,14 @@ public:
   /// that is not rigid, or looks out of range.
   int Add(SessionVolume volume);
   void Remove(int id);
+  /// A result takes other voxels, of \a geometry, and lies where they were made. Looks stay; strokes and landmarks stay where
+  /// they are in the world; it is in no file any more. \a hold is called with the volume as it is then, to put the voxels in
+  /// their place; when it throws, nothing has changed. \throws Error(InvalidParameter) for a volume that is no result, an
+  /// impossible geometry, and for one that would be its own source.
+  void Remake(int id, const ImageGeometry& geometry, MadeOf madeOf, const std::function<void(const SessionVolume&)>& hold = {});
+  /// Says in which file its voxels are, without strokes. That is a fact and no edit: earlier states know it, too.
+  /// \throws Error(InvalidParameter) when another volume is that file.
+  void SetFile(int id, const std::string& file);
   void SetPose(int id, const Pose& volumeToWorld); ///< Error(InvalidParameter) when not rigid
   /// Numbers that are as PlacementOf tells leave the last bits alone.
   void SetPlacement(int id, const Placement& placement);
@@ -103,15 +111,15 @@ public:
   /// Where rotations turn about, world: what the user chose, else the middle of what is selected, else of all. The middle is the
   /// mean of the volumes' centres: it stays where it is while they turn about it.
   Eigen::Vector3d CentreOfRotation() const;
-  const std::optional<Eigen::Vector3d>& ChosenCentre() const { return centre_; }
-  void SetCentreOfRotation(const std::optional<Eigen::Vector3d>& centre); ///< Error(InvalidParameter) when not finite
+  const std::optional<Eigen::Vector3d>& ChosenCentre() const { return state_.centre; }
+  void SetCentreOfRotation(const std::optional<Eigen::Vector3d>& centre); ///< an edit; Error(InvalidParameter) when not finite
 
   /// Takes over a state whole (a project that was opened): no undo beyond it. Volumes get new ids, in the order of the state.
   void Reset(SessionState state);
   /// Takes over a state as one edit (a backup that was restored). Volumes keep their ids; those with id 0 get one.
   void Replace(SessionState state, const std::string& label);
-  /// Whether a volume is here, or could come back by undo or redo.
-  bool Remembers(int id) const;
+  /// Whether these voxels of a volume are here, or could come back by undo or redo.
+  bool Remembers(int id, int edition = 0) const;
 
 private:
   struct Entry {
@@ -126,10 +134,9 @@ private:
   SessionState state_, start_;
   std::vector<Entry> done_, undone_;
   std::string label_;
-  int depth_ = 0, nextId_ = 1;
+  int depth_ = 0, nextId_ = 1, lastEdition_ = 0;
   long long version_ = 0;
   std::set<int> selection_;
-  std::optional<Eigen::Vector3d> centre_;
 };
 
 } // namespace echorama

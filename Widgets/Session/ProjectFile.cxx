@@ -9,6 +9,7 @@
 #include "Core/Base/TextFile.h"
 #include "Core/Geometry/PoseJson.h"
 #include "Widgets/Session/Checksum.h"
+#include "Widgets/Session/MadeOfJson.h"
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -182,6 +183,8 @@ SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path
     volume.strokes = ToStrokes(*strokes, place);
   if (const Json* landmarks = given("landmarks"))
     volume.landmarks = ToLandmarks(*landmarks, place.In("landmarks"));
+  if (const Json* madeOf = given("madeOf"))
+    volume.madeOf = std::make_shared<const MadeOf>(MadeOfJson::ToMadeOf(*madeOf, place.In("madeOf")));
   return volume;
 }
 
@@ -242,9 +245,16 @@ std::string ResolvedPath(const std::string& path)
   return (error ? whole.lexically_normal() : resolved).string();
 }
 
+bool SameTruths(const std::map<std::string, Pose>& a, const std::map<std::string, Pose>& b)
+{
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& left, const auto& right) {
+    return left.first == right.first && left.second.matrix() == right.second.matrix();
+  });
+}
+
 bool operator==(const Project& a, const Project& b)
 {
-  return a.state == b.state && a.truth == b.truth && a.comment == b.comment;
+  return a.state == b.state && a.truth == b.truth && a.comment == b.comment && SameTruths(a.truths, b.truths);
 }
 
 Project ReadProject(const std::string& path, BackupStamp* stamp)
@@ -277,8 +287,12 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
     const std::string wanted = volume.name;
     for (int copy = 2; !names.insert(volume.name).second; ++copy)
       volume.name = wanted + " (" + std::to_string(copy) + ")";
+    if (value.contains("TrueVolumeToWorld"))
+      project.truths[volume.name] = PoseJson::ToPose(value["TrueVolumeToWorld"], place.In("TrueVolumeToWorld"));
     project.state.volumes.push_back(std::move(volume));
   }
+  if (root.contains("centreOfRotation"))
+    project.state.centre = file.In("centreOfRotation").Vector<3>(root["centreOfRotation"]);
   if (root.contains("truth")) {
     const std::string truth = file.In("truth").Text(root["truth"]);
     project.truth = truth.empty() ? truth : Resolved(Located(truth, folder, beside)).string();
@@ -313,6 +327,10 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
                        {"group", volume.group},
                        {"strokes", std::move(strokes)},
                        {"landmarks", std::move(landmarks)}});
+    if (volume.madeOf)
+      volumes.back()["madeOf"] = MadeOfJson::Of(*volume.madeOf);
+    if (const auto truth = project.truths.find(volume.name); truth != project.truths.end())
+      volumes.back()["TrueVolumeToWorld"] = JsonPlace::RowsOf(truth->second.matrix());
   }
   Json root{{"schema", Schema},
             {"unit", "mm"},
@@ -320,6 +338,8 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
             {"volumes", std::move(volumes)},
             {"truth", Relative(project.truth, folder)},
             {"comment", project.comment}};
+  if (project.state.centre)
+    root["centreOfRotation"] = JsonPlace::ListOf(*project.state.centre);
   std::string text;
   try {
     if (stamp) {

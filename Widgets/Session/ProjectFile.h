@@ -2,6 +2,7 @@
 #pragma once
 #include "Widgets/Session/SessionState.h"
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -12,12 +13,14 @@ std::string ResolvedPath(const std::string& path);
 
 /// What a project file holds.
 struct Project {
-  SessionState state;  ///< after reading: ids from 1, in order
-  std::string truth;   ///< pose file of the ground truth, absolute, or empty
-  std::string comment; ///< for people: who, what
+  SessionState state;                   ///< after reading: ids from 1, in order
+  std::string truth;                    ///< pose file of the ground truth, absolute, or empty
+  std::string comment;                  ///< for people: who, what
+  std::map<std::string, Pose> truths{}; ///< of volumes, by name, that were set by hand: they count more than the file's
 };
 
 bool operator==(const Project&, const Project&); ///< exact: to the last bit
+bool SameTruths(const std::map<std::string, Pose>& a, const std::map<std::string, Pose>& b);
 
 /// What a backup knows beside its project.
 struct BackupStamp {
@@ -28,8 +31,8 @@ struct BackupStamp {
 
 /// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "path",
 /// "geometry", "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [{"mode", "radiusMm", "intensity", "opacity",
-/// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}]}], "truth", "comment"}.
-/// Documentation/session.md tells of each.
+/// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}], "madeOf", "TrueVolumeToWorld"}],
+/// "truth", "comment", "centreOfRotation"}. Documentation/session.md tells of each.
 ///
 /// A project is a pose file too (ReadPoses reads it): the same fields with the same meaning, plus what a session knows. And a
 /// pose file ("echorama-poses-1") is a project whose volumes have default looks: all keys of a volume but "file" and

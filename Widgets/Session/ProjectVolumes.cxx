@@ -18,6 +18,12 @@ std::string FileNameOf(const SessionVolume& volume)
   return fs::path(volume.file).filename().string();
 }
 
+bool SameVoxels(const SessionVolume& a, const SessionVolume& b)
+{
+  return a.geometry.AgreesWith(b.geometry) && !a.madeOf == !b.madeOf &&
+         (!a.madeOf || FingerprintOf(*a.madeOf) == FingerprintOf(*b.madeOf));
+}
+
 } // namespace
 
 std::optional<Pose> PoseAmong(const std::vector<VolumePose>& poses, const SessionVolume& volume)
@@ -45,6 +51,8 @@ void WritePosesOf(const SessionState& state, const std::string& path)
 {
   std::vector<VolumePose> poses;
   for (const SessionVolume& volume : state.volumes) {
+    if (volume.madeOf)
+      continue; // whoever stitches by these poses makes one anew
     if (volume.file.empty())
       throw Error(Error::Kind::InvalidParameter, volume.name + ": it is in no file; poses are written of files");
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
@@ -63,13 +71,14 @@ void CheckIsNoVolume(const std::string& path, const SessionState& state)
 
 bool SameWork(const SessionState& a, const SessionState& b)
 {
-  return std::equal(a.volumes.begin(), a.volumes.end(), b.volumes.begin(), b.volumes.end(),
-                    [](const SessionVolume& left, SessionVolume right) {
-                      if (left.geometry.AgreesWith(right.geometry))
-                        right.geometry = left.geometry;
-                      right.id = left.id;
-                      return left == right;
-                    });
+  const auto same = [](const SessionVolume& left, SessionVolume right) {
+    if (left.geometry.AgreesWith(right.geometry))
+      right.geometry = left.geometry;
+    right.id = left.id;
+    right.edition = left.edition;
+    return left == right;
+  };
+  return a.centre == b.centre && std::equal(a.volumes.begin(), a.volumes.end(), b.volumes.begin(), b.volumes.end(), same);
 }
 
 void Recognize(std::vector<SessionVolume>& volumes, const std::vector<SessionVolume>& known,
@@ -79,9 +88,10 @@ void Recognize(std::vector<SessionVolume>& volumes, const std::vector<SessionVol
   const auto take = [&](SessionVolume& volume, const std::function<bool(const SessionVolume&)>& same) {
     const SessionVolume* found = nullptr;
     for (const SessionVolume& each : known)
-      if (taken.count(each.id) == 0 && same(each) && each.geometry.AgreesWith(volume.geometry) && (!found || shown(each.id)))
+      if (taken.count(each.id) == 0 && same(each) && SameVoxels(each, volume) && (!found || shown(each.id)))
         found = &each;
     volume.id = found ? found->id : 0;
+    volume.edition = found ? found->edition : 0;
     if (found) {
       taken.insert(found->id);
       volume.file = found->file;

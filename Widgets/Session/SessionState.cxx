@@ -10,7 +10,7 @@ namespace {
 bool SameStrokes(const StrokeChain& a, const StrokeChain& b)
 {
   const StrokeNode *left = a.get(), *right = b.get();
-  if ((left ? left->count : 0) != (right ? right->count : 0))
+  if ((left ? left->count : 0) != (right ? right->count : 0) || (left && left->digest != right->digest))
     return false;
   for (; left != right; left = left->before.get(), right = right->before.get()) // what they share is the same from there on
     if (!(left->stroke == right->stroke))
@@ -18,12 +18,17 @@ bool SameStrokes(const StrokeChain& a, const StrokeChain& b)
   return true;
 }
 
+bool SameMaking(const std::shared_ptr<const MadeOf>& a, const std::shared_ptr<const MadeOf>& b)
+{
+  return a == b || (a && b && *a == *b);
+}
+
+} // namespace
+
 bool SameGeometry(const ImageGeometry& a, const ImageGeometry& b)
 {
   return a.dimensions == b.dimensions && a.origin == b.origin && a.spacing == b.spacing && a.direction == b.direction;
 }
-
-} // namespace
 
 const SessionVolume* SessionState::Find(int id) const
 {
@@ -40,12 +45,13 @@ bool operator==(const SessionVolume& a, const SessionVolume& b)
 {
   return a.id == b.id && a.name == b.name && a.file == b.file && SameGeometry(a.geometry, b.geometry) &&
          a.volumeToWorld.matrix() == b.volumeToWorld.matrix() && a.colour == b.colour && a.opacity == b.opacity &&
-         a.visible == b.visible && a.group == b.group && a.landmarks == b.landmarks && SameStrokes(a.strokes, b.strokes);
+         a.visible == b.visible && a.group == b.group && a.landmarks == b.landmarks && a.edition == b.edition &&
+         SameMaking(a.madeOf, b.madeOf) && SameStrokes(a.strokes, b.strokes);
 }
 
 bool operator==(const SessionState& a, const SessionState& b)
 {
-  return a.volumes == b.volumes;
+  return a.centre == b.centre && a.volumes == b.volumes;
 }
 
 } // namespace echorama

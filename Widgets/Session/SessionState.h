@@ -3,7 +3,10 @@
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Geometry/Landmark.h"
 #include "Widgets/Painting/Stroke.h"
+#include "Widgets/Session/MadeOf.h"
 #include <array>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,11 +25,15 @@ struct SessionVolume {
   int group = 0;                   ///< volumes of one group are selected together; 0: none
   StrokeChain strokes;             ///< painted and carved
   std::vector<Landmark> landmarks; ///< in the physical space of the file as it stands; each label once
+  /// A result: a volume that was made of others. Aligners leave it alone, and it is no source unless asked. nullptr: no result.
+  std::shared_ptr<const MadeOf> madeOf;
+  int edition = 0; ///< which of its voxels, when it was made again; never given twice to a volume
 };
 
 /// All that undo brings back. Cheap to copy. The selection is not part of it: choosing is not an edit.
 struct SessionState {
-  std::vector<SessionVolume> volumes; ///< in the user's order; the first is the gauge of pose files
+  std::vector<SessionVolume> volumes;      ///< in the user's order; the first is the gauge of pose files
+  std::optional<Eigen::Vector3d> centre{}; ///< about which rotations turn, world; none: the middle of what is selected
   const SessionVolume* Find(int id) const;
   SessionVolume* Find(int id);
   /// -1: there are not so many.
@@ -36,7 +43,8 @@ struct SessionState {
   }
 };
 
-bool operator==(const SessionVolume&, const SessionVolume&); ///< exact: to the last bit
+bool SameGeometry(const ImageGeometry&, const ImageGeometry&); ///< exact: to the last bit
+bool operator==(const SessionVolume&, const SessionVolume&);   ///< exact as well
 bool operator==(const SessionState&, const SessionState&);
 inline bool operator!=(const SessionState& a, const SessionState& b)
 {

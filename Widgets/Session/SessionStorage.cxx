@@ -44,21 +44,29 @@ void SessionStorage::Recovered(const std::string& path)
   isUnfinished_ = false;
 }
 
-void SessionStorage::SetSavedTruth(const std::string& truth)
+void SessionStorage::SetSavedTruth(const std::string& truth, const std::map<std::string, Pose>& truths)
 {
-  if (!path_.empty())
-    saved_.truth = truth;
+  if (path_.empty())
+    return;
+  saved_.truth = truth;
+  saved_.truths = truths;
 }
 
-std::string SessionStorage::Save(const std::string& given, const Project& project)
+std::string SessionStorage::Save(const std::string& given, Project project, bool withoutUnsavedResults)
 {
   const std::string path = ResolvedPath(given);
+  std::vector<SessionVolume>& volumes = project.state.volumes;
+  if (withoutUnsavedResults)
+    volumes.erase(std::remove_if(volumes.begin(), volumes.end(),
+                                 [](const SessionVolume& each) { return each.madeOf && each.file.empty(); }),
+                  volumes.end());
   if (path.empty())
     throw Error(Error::Kind::InvalidParameter, "a project needs a file name");
   for (const SessionVolume& volume : project.state.volumes)
     if (volume.file.empty())
-      throw Error(Error::Kind::InvalidParameter,
-                  path + ": the volume " + volume.name + " is in no file; write it to one and add that instead");
+      throw Error(Error::Kind::InvalidParameter, path + ": the volume " + volume.name +
+                                                     " is in no file; write it to one and add that instead" +
+                                                     (volume.madeOf ? ", or leave results that are not saved out" : ""));
   CheckIsNoVolume(path, project.state);
   const std::size_t there = FingerprintOf(path);
   if (path_ == path && there != 0 && there != std::exchange(fingerprint_, there))

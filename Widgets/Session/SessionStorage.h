@@ -22,12 +22,13 @@ public:
   /// The same for a backup, which goes on as a session that was never saved. When it is of an abandoned session, its backups
   /// become those of this one.
   void Recovered(const std::string& path);
-  /// Its truth is known by another path than the project had.
-  void SetSavedTruth(const std::string& truth);
+  /// The truth that came of it: its path may be another than the project had.
+  void SetSavedTruth(const std::string& truth, const std::map<std::string, Pose>& truths);
   /// Writes the project file; backups lie beside it from then on. \returns why earlier ones stay where they are, or nothing.
   /// \throws Error(InvalidParameter) for a project without name or with volumes that are in no file, or when \a path is the file
   /// of one; Error(NotPossible), once, when somebody else has changed the file; Error(FileSystem).
-  std::string Save(const std::string& path, const Project& project);
+  /// \param withoutUnsavedResults leaves results that are in no file out of the project; they are not saved then.
+  std::string Save(const std::string& path, Project project, bool withoutUnsavedResults = false);
   /// What a project file says, to notice that somebody else has written it. 0: it cannot be read.
   static std::size_t FingerprintOf(const std::string& path);
 

@@ -37,6 +37,21 @@ void SessionTruth::Set(const SessionVolume& volume, const Pose& volumeToWorld, c
   Outdate();
 }
 
+void SessionTruth::SetByHand(const SessionVolume& volume, const Pose& volumeToWorld, const PointsOf& pointsOf)
+{
+  Set(volume, volumeToWorld, pointsOf);
+  byHand_.insert(volume.id);
+}
+
+std::map<std::string, Pose> SessionTruth::ByHand(const SessionState& state) const
+{
+  std::map<std::string, Pose> truths;
+  for (const SessionVolume& volume : state.volumes)
+    if (byHand_.count(volume.id) != 0)
+      truths[volume.name] = *Find(volume.id);
+  return truths;
+}
+
 void SessionTruth::Clear()
 {
   const int fixed = fixed_;

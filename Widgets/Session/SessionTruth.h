@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,10 @@ public:
   void Match(const SessionVolume& volume, const PointsOf& pointsOf);
   /// \throws Error(InvalidParameter) when it is not rigid, Error(BadInput) when the volume has no points.
   void Set(const SessionVolume& volume, const Pose& volumeToWorld, const PointsOf& pointsOf);
+  /// The same by hand: no file has it, so the project must. A file that is read later takes its place.
+  void SetByHand(const SessionVolume& volume, const Pose& volumeToWorld, const PointsOf& pointsOf);
+  /// Those of the volumes of \a state, by name.
+  std::map<std::string, Pose> ByHand(const SessionState& state) const;
   void Clear(); ///< which volume is fixed stays chosen
   /// The file that is read, absolute; empty: none. Another project: its file is named before it is read.
   const std::string& File() const { return file_; }
@@ -50,6 +55,7 @@ public:
 private:
   std::string file_;
   std::map<int, Pose> truths_;
+  std::set<int> byHand_;
   std::vector<VolumePose> poses_; ///< of the file, also of volumes that may still come
   LiveScore score_;
   int fixed_ = -1;

@@ -17,7 +17,7 @@ import unittest
 
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkStringArray
+from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkIntArray, vtkStringArray
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkImageData, vtkMultiBlockDataSet, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
@@ -250,7 +250,10 @@ class Session(unittest.TestCase):
         tells("Volumes History", session.SetLandmark, one, "apex", 1, 2, 3)
         tells("", session.SetLandmark, one, "apex", 1, 2, 3)
         tells("Volumes History", session.Undo)
-        tells("Selection", session.SetCentreOfRotation, 1, 2, 3)
+        tells("Selection History", session.SetCentreOfRotation, 1, 2, 3)
+        tells("", session.SetCentreOfRotation, 1, 2, 3)
+        tells("Selection History", session.Undo)
+        tells("Selection History", session.Redo)
         tells("Selection", session.InvertSelection)
         tells("", session.BeginStroke, one, "carve", 3, 0, 1, 0.5, True)
         middle = placement(session, one)[0]
@@ -1042,7 +1045,7 @@ session.TranslateSelection(3, 0, 0)
         self.errors.clear()
         session.SetFixedVolume(three)
         self.assertIn("no truth", self.errors[0])
-        session.SetTruth(three, shift(0))
+        session.SetTruth(three, shift(2))
         self.assertFalse(math.isnan(session.GetVolumeScore(three)))
 
         # Saved with the project; a volume that comes later is found in it.
@@ -1051,11 +1054,17 @@ session.TranslateSelection(3, 0, 0)
         self.assertTrue(again.OpenProject(str(self.folder / "p.json")))
         self.assertTrue(again.HasTruth())
         self.assertFalse(again.GetModifiedSinceSave())
+        found = vtkMatrix4x4()
+        self.assertTrue(again.GetTruth(ids(again)[2], found), "what was set by hand as well")
+        self.assertEqual([found.GetElement(0, 3), again.GetTruth(ids(again)[0], found)], [2, True])
+        again.SetTruth(ids(again)[2], shift(1))
+        self.assertTrue(again.GetModifiedSinceSave())
         again.ClearTruth()
         self.assertTrue(math.isnan(again.GetScore()))
         (self.folder / "truth.json").rename(self.folder / "hidden")
         self.assertTrue(again.OpenProject(str(self.folder / "p.json")), "without the truth it opens all the same")
-        self.assertFalse(again.HasTruth() or again.GetModifiedSinceSave())
+        self.assertFalse(again.GetModifiedSinceSave())
+        self.assertEqual([again.GetTruth(i, found) for i in ids(again)], [False, False, True], "but for what was set by hand")
         again.SaveProject(str(self.folder / "p.json"))
         (self.folder / "hidden").rename(self.folder / "truth.json")
         again.OpenProject(str(self.folder / "p.json"))
@@ -1066,6 +1075,120 @@ session.TranslateSelection(3, 0, 0)
         self.assertTrue(math.isnan(later.GetScore()), "of one volume alone")
         later.OpenVolume(str(self.folder / "v1.mha"))
         self.assertAlmostEqual(later.GetScore(), 4.0, 12)
+
+    # ------------------------------------------------------------------------------------------------------------- results
+
+    def result(self, session, sources, value=100, name="result", **options):
+        """What a filter would make: a volume of one grey level."""
+        listed = vtkIntArray()
+        for source in sources:
+            listed.InsertNextValue(source)
+        record = session.RecordSources(listed, json.dumps(options) if options else None)
+        image = volume(3, (-5, 1, 2))
+        image.GetPointData().GetArray("Intensity").Fill(value)
+        return image, record
+
+    def test_a_result_is_a_volume_that_knows_its_sources(self):
+        session = self.opened(3)
+        one, two, three = ids(session)
+        image, record = self.result(session, [one, two], Method="membrane")
+        result = session.AddResult(image, "whole", record)
+        self.assertEqual([session.IsResult(i) for i in ids(session)], [False, False, False, True])
+        self.assertEqual([session.GetSource(result, i) for i in range(-1, 3)], [0, one, two, 0])
+        self.assertEqual((session.GetResultOption(result, "Method"), session.GetResultOption(result, "x")), ("membrane", ""))
+        self.assertEqual(session.GetSourcesChanged(result), "")
+        colours = []
+        for i in ids(session):
+            colours.append([0.0] * 3)
+            session.GetColour(i, colours[-1])
+        self.assertNotIn(colours[3], colours[:3], "a colour of its own")
+        session.Select(one, True, True)
+        session.TranslateSelection(1, 0, 0)
+        self.assertEqual(session.GetSourcesChanged(result), "v0 was moved")
+        session.RemoveVolume(two)
+        self.assertEqual(session.GetSourcesChanged(result), "v0 was moved; v1 is gone")
+        session.Undo()
+
+        # Made again: other voxels in its place, what was painted on it still there; undone to the bit.
+        session.SetColour(result, 1, 0, 0)
+        at = placement(session, result)[0]
+        session.BeginStroke(result, "paint", 3, 250, 1, 1, False)
+        session.ExtendStroke(*at)
+        session.EndStroke()
+        painted = session.GetVoxelAt(result, at)
+        before = voxels(session.GetImage(result)).copy()
+        self.assertEqual((before[painted], before[-1]), (250, 100))
+        other, record = self.result(session, [one, two], 60)
+        told = []
+        session.AddObserver(vtkUltrasoundAlignmentSession.VoxelsChangedEvent, lambda *_: told.append("voxels"))
+        self.assertTrue(session.RemakeResult(result, other, record))
+        self.assertTrue(told)
+        self.assertEqual((voxels(session.GetImage(result))[painted], voxels(session.GetImage(result))[-1]), (250, 60))
+        self.assertEqual(session.GetSourcesChanged(result), "")
+        session.Undo()
+        np.testing.assert_array_equal(voxels(session.GetImage(result)), before)
+        self.assertEqual(session.GetSourcesChanged(result), "v0 was moved")
+        session.Redo()
+        self.assertEqual(voxels(session.GetImage(result))[-1], 60)
+        colour = [0.0] * 3
+        session.GetColour(result, colour)
+        self.assertEqual(colour, [1, 0, 0])
+
+        # What is given to a filter stays, and what is refused changes nothing.
+        session.BeginStroke(result, "carve", 3, 0, 1, 1, False)
+        self.refuses(session, "has not ended", session.RemakeResult, result, other, record)
+        session.EndStroke()
+        self.refuses(session, "not made of other volumes", session.RemakeResult, one, other, record)
+        self.refuses(session, "no image", session.RemakeResult, result, None, record)
+        self.refuses(session, "the record", session.AddResult, other, "x", "{}")
+        self.refuses(session, "the record", session.AddResult, other, "x", None)
+        listed = vtkIntArray()
+        self.errors.clear()
+        self.assertEqual(session.RecordSources(listed, None), "")
+        self.assertIn("at least one source", self.errors[0])
+
+    def test_a_result_is_saved_with_its_link(self):
+        session = self.opened(2)
+        one, two = ids(session)
+        image, record = self.result(session, [one, two], 100, Method="membrane")
+        result = session.AddResult(image, "whole", record)
+        session.SelectAll()
+        session.TranslateSelection(0, 4, 0)  # all together: that changes nothing
+        at = placement(session, result)[0]
+        session.BeginStroke(result, "paint", 3, 250, 1, 1, False)
+        session.ExtendStroke(*at)
+        session.EndStroke()
+        seen = voxels(session.GetImage(result)).copy()
+        project, file = str(self.folder / "p.json"), str(self.folder / "whole.mha")
+        self.refuses(session, ("whole", "in no file"), session.SaveProject, project)
+        self.assertTrue(session.WritePoses(str(self.folder / "poses.json")), "it is left out of poses")
+        self.assertEqual(len(json.loads((self.folder / "poses.json").read_text())["volumes"]), 2)
+        self.assertTrue(session.SaveProject(project, True))
+        self.assertTrue(session.GetModifiedSinceSave(), "what was left out is not saved")
+        self.assertEqual(len(json.loads((self.folder / "p.json").read_text())["volumes"]), 2)
+
+        unpainted = vtkImageData()
+        self.assertTrue(session.GetUnpainted(result, unpainted))
+        self.assertTrue((voxels(unpainted) == 100).all())
+        np.testing.assert_array_equal(voxels(session.GetImage(result)), seen)
+        self.refuses(session, "no such file", session.SetFile, result, file)
+        write(unpainted, file)
+        self.refuses(session, "is the file of v0", session.SetFile, result, str(self.folder / "v0.mha"))
+        entries = session.GetUndoCount()
+        self.assertTrue(session.SetFile(result, file))
+        self.assertEqual(session.GetUndoCount(), entries)
+        self.assertTrue(session.SaveProject(project), self.errors)
+        self.assertFalse(session.GetModifiedSinceSave())
+
+        again = self.session()
+        self.assertTrue(again.OpenProject(project), self.errors)
+        whole = ids(again)[2]
+        self.assertTrue(again.IsResult(whole))
+        np.testing.assert_array_equal(voxels(again.GetImage(whole)), seen)
+        self.assertEqual(again.GetSourcesChanged(whole), "")
+        self.assertEqual(again.GetResultOption(whole, "Method"), "membrane")
+        again.SetVolumeToWorld(ids(again)[0], shift(1))
+        self.assertEqual(again.GetSourcesChanged(whole), "v0 was moved")
 
     # ------------------------------------------------------------------------------------------------------------ the page
 
