@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "FileActions.h"
 #include "Controls.h"
+#include "ResultFile.h"
 #include "Workbench.h"
 #include <memory>
 #include <QAction>
@@ -260,15 +261,32 @@ bool FileActions::Save()
   return false;
 }
 
-bool FileActions::SaveTo(const QString& path)
+bool FileActions::SaveTo(const QString& path, bool withoutUnsavedResults)
 {
+  if (const QVector<int> unsaved = UnsavedResults(bench_->Session()); !unsaved.isEmpty() && !withoutUnsavedResults) {
+    AskForResults(path, unsaved);
+    return false;
+  }
   const auto then = std::exchange(afterSave_, nullptr);
-  if (!bench_->Session()->SaveProject(path.toUtf8().constData()))
+  if (!bench_->Session()->SaveProject(path.toUtf8().constData(), withoutUnsavedResults))
     return false;
   bench_->Note(tr("Saved %1").arg(path));
   if (then)
     then();
   return true;
+}
+
+// A project names files, and a result that was just made is in none.
+void FileActions::AskForResults(const QString& path, const QVector<int>& unsaved)
+{
+  const int id = unsaved.first();
+  const QString file = FreeFileFor(bench_->Session(), id, QFileInfo(path).absolutePath());
+  const auto saveThere = [this, path, id, file] { SaveResult(bench_->Shared(), this, id, file, [this, path] { SaveTo(path); }); };
+  bench_->Ask(tr("%1 is in no file yet, and a project holds files. Save it beside the project, as %2?")
+                  .arg(bench_->NameOf(id), QFileInfo(file).fileName()),
+              {{tr("Save it there"), saveThere},
+               {tr("Leave it out"), [this, path] { SaveTo(path, true); }},
+               {tr("Cancel"), [this] { afterSave_ = nullptr; }}});
 }
 
 bool FileActions::HasUnsavedWork() const

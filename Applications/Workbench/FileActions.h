@@ -38,7 +38,7 @@ public:
   void OpenAbandoned(const QString& backup);
   /// Returns false when it did not work, or a name has to be asked for first.
   bool Save();
-  bool SaveTo(const QString& path);
+  bool SaveTo(const QString& path, bool withoutUnsavedResults = false);
 
   /// Whether anything would be lost that a person did: moved, painted, grouped, renamed, taken out. Volumes that were only opened
   /// are not work.
@@ -58,6 +58,7 @@ private:
   void TakeProject(const QString& path, const QString& saveAs, const std::vector<ReadVolume>& volumes,
                    const std::function<void()>& then);
   void OfferLaterBackup();
+  void AskForResults(const QString& path, const QVector<int>& unsaved);
   void AskOpen(const QString& title, const QString& filter, bool several);
   void AskSave();
   void ShowHistory();

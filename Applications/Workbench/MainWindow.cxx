@@ -13,6 +13,7 @@
 #include "LandmarkBox.h"
 #include "MessageBar.h"
 #include "Messages.h"
+#include "PanelScroll.h"
 #include "PosePanel.h"
 #include "Recovery.h"
 #include "RegistrationPanel.h"
@@ -36,7 +37,6 @@
 #include <QLabel>
 #include <QMenuBar>
 #include <QPointer>
-#include <QScrollArea>
 #include <QSettings>
 #include <QStatusBar>
 #include <QTimer>
@@ -130,7 +130,8 @@ void MainWindow::MakePanels()
 {
   setDockOptions(QMainWindow::AnimatedDocks | QMainWindow::AllowTabbedDocks);
   setTabPosition(Qt::RightDockWidgetArea, QTabWidget::East); // all of their names can be read
-  AddLeft(new VolumePanel(bench_, this), tr("Volumes"));
+  auto* volumes = new VolumePanel(bench_, this);
+  AddLeft(volumes, tr("Volumes"));
   AddLeft(new PosePanel(bench_, this), tr("Pose"));
   AddPanel(new ViewPanel(bench_, this), tr("View"));
   AddPanel(new BrushPanel(bench_, this), tr("Brush"));
@@ -148,10 +149,11 @@ void MainWindow::MakePanels()
       ->addAction(MakeAction(this, "alignAllAction", tr("Align &all"), "Shift+R",
                              tr("Align all volumes to the first; can be undone"), [registration] { registration->AlignAll(); }));
   auto* result = new ResultPanel(workspace, this);
-  auto* resultBench = new Workbench(result->Result(), result);
-  resultBench->SetTool(Tool::Look);
-  result->SetView(new SlicePane(resultBench, "resultSlice", "z", result));
   AddPanel(result, tr("Stitch"));
+  for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::VoxelsChanged,
+                       &Workbench::HistoryChanged, &Workbench::SelectionChanged})
+    connect(bench_, changed, result, &ResultPanel::ShowResults);
+  connect(volumes, &VolumePanel::MakeAgain, result, &ResultPanel::MakeAgain);
   Menu(Place::Stitch)
       ->addAction(MakeAction(this, "stitchAction", tr("&Stitch and embed"), "",
                              tr("Make one volume of those that are shown: the panel Stitch"), [result] {
@@ -159,6 +161,10 @@ void MainWindow::MakePanels()
                                dock->show();
                                dock->raise();
                              }));
+  Menu(Place::Stitch)
+      ->addAction(MakeAction(this, "compareAction", tr("&Compare with sources"), "T",
+                             tr("Show the result alone, and then its sources instead, in all views"),
+                             [result] { result->Compare(); }));
   auto* training = new TrainingPanel(bench_, this);
   AddPanel(training, tr("Train"));
   auto* score = new QLabel(this);
@@ -185,13 +191,7 @@ void MainWindow::AddLeft(QWidget* panel, const QString& title)
 
 void MainWindow::AddPanel(QWidget* panel, const QString& title)
 {
-  auto* scroll = new QScrollArea(this); // at 800 lines of screen some panels are longer than the window
-  scroll->setWidgetResizable(true);
-  scroll->setFocusPolicy(Qt::NoFocus); // keys are for the views
-  scroll->setFrameShape(QFrame::NoFrame);
-  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
-  scroll->setWidget(panel);
-  scroll->setMinimumWidth(210);
+  auto* scroll = new PanelScroll(panel, this);
   QDockWidget* dock = AddDock(Qt::RightDockWidgetArea, panel, title, scroll);
   if (!lastPanel_) {
     lastPanel_ = dock;

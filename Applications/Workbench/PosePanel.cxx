@@ -6,6 +6,7 @@
 #include "vtkUltrasoundAlignmentSession.h"
 #include "Workbench.h"
 #include <QDoubleSpinBox>
+#include <QEvent>
 #include <QGridLayout>
 #include <QLabel>
 #include <QPushButton>
@@ -43,10 +44,10 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
 {
   setObjectName("posePanel");
   auto* layout = new QVBoxLayout(this);
-  layout->setContentsMargins(6, 4, 6, 4);
+  layout->setContentsMargins(4, 4, 4, 4);
   layout->setSpacing(4);
   auto* grid = new QGridLayout;
-  grid->setHorizontalSpacing(3);
+  grid->setHorizontalSpacing(2);
   grid->setVerticalSpacing(3);
   layout->addWidget(of_);
   layout->addLayout(grid);
@@ -107,7 +108,7 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
                   bench->Setter(&Handling::rotationStepDegrees));
   grid->addWidget(mmStep_, 5, 1);
   grid->addWidget(degreeStep_, 5, 2);
-  grid->addWidget(new QLabel(tr("Mouse speed"), this), 6, 0);
+  grid->addWidget(new QLabel(tr("Mouse\nspeed"), this), 6, 0, 2, 1, Qt::AlignTop); // beside the two rows that tell of what
   mmSensitivity_ = NumberField(
       this, {"translationSensitivity", tr("How far volumes move: 1 with the mouse, 0.1 for fine work"), 0.01, 10.0, 2, 0.1, {}},
       bench->Setter(&Handling::translationSensitivity));
@@ -132,9 +133,28 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
   }
   connect(bench, &Workbench::ScoredChanged, this, &PosePanel::ShowPose);
   connect(bench, &Workbench::HandChanged, this, &PosePanel::ShowHand);
+  FitNumbers();
   ShowPose();
   ShowCentre();
   ShowHand();
+}
+
+void PosePanel::changeEvent(QEvent* event)
+{
+  QWidget::changeEvent(event);
+  if (event->type() == QEvent::FontChange)
+    FitNumbers();
+}
+
+// Three columns share the panel: none may be so narrow that a number of three digits is cut off.
+void PosePanel::FitNumbers()
+{
+  constexpr int Frame = 7, Arrows = 18;
+  for (QDoubleSpinBox* field : findChildren<QDoubleSpinBox*>()) {
+    const bool hasArrows = field->buttonSymbols() != QAbstractSpinBox::NoButtons;
+    const QString longest = hasArrows ? QStringLiteral("00.00\u00b0") : QStringLiteral("-000.00");
+    field->setMinimumWidth(field->fontMetrics().horizontalAdvance(longest) + Frame + (hasArrows ? Arrows : 0));
+  }
 }
 
 void PosePanel::ShowPose()

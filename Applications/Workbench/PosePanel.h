@@ -17,7 +17,11 @@ class PosePanel : public QWidget {
 public:
   explicit PosePanel(Workbench* bench, QWidget* parent = nullptr);
 
+protected:
+  void changeEvent(QEvent* event) override;
+
 private:
+  void FitNumbers();
   void ShowPose();
   void ShowCentre();
   void ShowHand();

@@ -165,7 +165,8 @@ std::vector<int> RegistrationPanel::AllIds() const
 {
   std::vector<int> ids;
   for (int i = 0; i < workspace_.session->GetNumberOfVolumes(); ++i)
-    ids.push_back(workspace_.session->GetVolumeId(i));
+    if (const int id = workspace_.session->GetVolumeId(i); !workspace_.session->IsResult(id)) // it lies where its sources lie
+      ids.push_back(id);
   return ids;
 }
 
@@ -173,13 +174,18 @@ void RegistrationPanel::Refine()
 {
   vtkUltrasoundAlignmentSession* session = workspace_.session;
   std::vector<int> ids, held;
-  const int selected = session->GetNumberOfSelected(), count = session->GetNumberOfVolumes();
-  const bool some = selected > 0 && selected < count;
+  const std::vector<int> all = AllIds();
+  const auto selected =
+      static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [session](int id) { return session->IsSelected(id); }));
+  if (selected == 0 && session->GetNumberOfSelected() > 0) {
+    Tell(Message::Warning, tr("Refine: what is selected was made of other volumes and lies where they lie; select one of those"));
+    return;
+  }
+  const bool some = selected > 0 && selected < all.size();
   // Those that stay come first: the first one is the fixed volume.
   for (const bool moves : {false, true})
-    for (int i = 0; i < count; ++i) {
-      const int id = session->GetVolumeId(i);
-      if ((some ? session->IsSelected(id) : i > 0) == moves) {
+    for (const int id : all) {
+      if ((some ? session->IsSelected(id) : id != all.front()) == moves) {
         if (!moves && !ids.empty())
           held.push_back(static_cast<int>(ids.size()));
         ids.push_back(id);

@@ -60,7 +60,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   score_->setToolTip(
       tr("Mean distance of points of the volumes from where they belong, seen from the first volume that has a truth"));
   live_ = CheckField(evaluation, "showScore", tr("Show the score"), {}, [this](bool) { ShowScore(); });
-  vectors_ = CheckField(evaluation, "showErrors", tr("Show the errors as arrows"),
+  vectors_ = CheckField(evaluation, "showErrors", tr("Show error arrows"),
                         tr("In the 3D view: arrows from where points are to where they belong"), [this](bool) { ShowState(); });
   form->addRow(tr("Truth"), truth_);
   form->addRow(choose);
@@ -114,6 +114,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
 
   table_ = TableField(this, "attempts", tr("All attempts, the last one first"),
                       {tr("When"), tr("Trainee"), tr("Score, mm"), tr("From, mm"), tr("Time"), tr("Help")});
+  table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   layout->addWidget(table_, 1);
 
   clock_ = new QTimer(this);
@@ -200,7 +201,7 @@ void TrainingPanel::Scatter()
   session->BeginEdit("Scatter volumes");
   for (int i = 0; i < session->GetNumberOfVolumes(); ++i) {
     const int id = session->GetVolumeId(i);
-    if (id == (session->GetFixedVolume() > 0 ? session->GetFixedVolume() : session->GetVolumeId(0)))
+    if (session->IsResult(id) || id == (session->GetFixedVolume() > 0 ? session->GetFixedVolume() : session->GetVolumeId(0)))
       continue;
     Random random(static_cast<std::uint64_t>(seed_->value()), static_cast<std::uint64_t>(i));
     const SessionVolume& volume = *session->GetKernel().State().Find(id);

@@ -4,10 +4,13 @@
 #include "VolumeTable.h"
 #include "vtkUltrasoundAlignmentSession.h"
 #include "Workbench.h"
+#include <algorithm>
 #include <QColorDialog>
+#include <QEvent>
 #include <QHBoxLayout>
 #include <QHeaderView>
 #include <QItemSelectionModel>
+#include <QLabel>
 #include <QPushButton>
 #include <QScopedValueRollback>
 #include <QTableView>
@@ -29,16 +32,13 @@ VolumePanel::VolumePanel(Workbench* bench, QWidget* parent)
   view_->setTabKeyNavigation(false);
   view_->setEditTriggers(QAbstractItemView::DoubleClicked | QAbstractItemView::EditKeyPressed); // letters are shortcuts
   view_->verticalHeader()->hide();
-  view_->verticalHeader()->setDefaultSectionSize(24);
   QHeaderView* header = view_->horizontalHeader();
   header->setMinimumSectionSize(20);
   header->setSectionResizeMode(VolumeTable::Name, QHeaderView::Stretch);
-  const int widths[] = {42, 26, 0, 54, 44};
   for (int column = 0; column < VolumeTable::Columns; column++)
-    if (column != VolumeTable::Name) {
+    if (column != VolumeTable::Name)
       header->setSectionResizeMode(column, QHeaderView::Fixed);
-      header->resizeSection(column, widths[column]);
-    }
+  FitColumns();
   connect(view_, &QTableView::doubleClicked, this, &VolumePanel::ChooseColour);
 
   auto* session = bench->Session();
@@ -56,10 +56,59 @@ VolumePanel::VolumePanel(Workbench* bench, QWidget* parent)
   layout->addLayout(row);
   for (auto* button : findChildren<QPushButton*>())
     button->setMinimumWidth(20);
+  changed_ = TextField(this, "sourcesChanged");
+  again_ = Button(this, "makeAgain", tr("Make again"), tr("Makes the result of its sources as they are now"),
+                  [this] { emit MakeAgain(again_->property("of").toInt()); });
+  layout->addWidget(changed_);
+  layout->addWidget(again_);
 
   connect(view_->selectionModel(), &QItemSelectionModel::selectionChanged, this, &VolumePanel::TakeSelection);
   connect(bench, &Workbench::SelectionChanged, this, &VolumePanel::ShowSelection);
   connect(table_, &VolumeTable::modelReset, this, &VolumePanel::ShowSelection);
+  connect(table_, &VolumeTable::LinksChanged, this, &VolumePanel::ShowChanged);
+  ShowChanged();
+}
+
+void VolumePanel::changeEvent(QEvent* event)
+{
+  QWidget::changeEvent(event);
+  if (event->type() == QEvent::FontChange)
+    FitColumns();
+}
+
+// As wide as what is in them, whatever the font; the names get the rest.
+void VolumePanel::FitColumns()
+{
+  const QFontMetrics font = view_->fontMetrics();
+  const int row = font.height() + 8;
+  QHeaderView* header = view_->horizontalHeader();
+  QFont bold = header->font();
+  bold.setBold(true); // as headers of selected columns are
+  int sum = 0;
+  for (int column = 0; column < VolumeTable::Columns; column++) {
+    if (column == VolumeTable::Name)
+      continue;
+    const QString title = table_->headerData(column, Qt::Horizontal, Qt::DisplayRole).toString();
+    const int text = std::max(QFontMetrics(bold).horizontalAdvance(title),
+                              column == VolumeTable::Opacity ? font.horizontalAdvance("100 %") : 0);
+    header->resizeSection(column, std::max(row, text + 10));
+    sum += header->sectionSize(column);
+  }
+  view_->verticalHeader()->setDefaultSectionSize(row);
+  view_->setMinimumWidth(sum + font.horizontalAdvance("name of it") + 8);
+}
+
+void VolumePanel::ShowChanged()
+{
+  int id = 0;
+  for (const int each : bench_->Volumes())
+    if (id == 0 && !bench_->Session()->GetSourcesChanged(each).empty())
+      id = each;
+  changed_->setVisible(id > 0);
+  again_->setVisible(id > 0);
+  again_->setProperty("of", id);
+  if (id > 0)
+    changed_->setText(tr("%1: sources changed").arg(bench_->NameOf(id)));
 }
 
 void VolumePanel::TakeSelection()

@@ -3,13 +3,18 @@
 #include "vtkUltrasoundAlignmentSession.h"
 #include "Workbench.h"
 #include <algorithm>
+#include <QApplication>
 #include <QColor>
+#include <QFont>
+#include <QStyle>
 
 namespace echorama {
 
 VolumeTable::VolumeTable(Workbench* bench, QObject* parent) : QAbstractTableModel(parent), bench_(bench), ids_(bench->Volumes())
 {
   connect(bench, &Workbench::VolumesChanged, this, &VolumeTable::Follow);
+  for (auto changed : {&Workbench::PosesChanged, &Workbench::VoxelsChanged, &Workbench::HistoryChanged})
+    connect(bench, changed, this, &VolumeTable::FollowLinks);
 }
 
 // Rows keep their place where they can, so that a selection or an open editor survives a change of colour.
@@ -23,6 +28,19 @@ void VolumeTable::Follow()
   } else if (!ids_.isEmpty()) {
     emit dataChanged(index(0, 0), index(ids_.size() - 1, Columns - 1));
   }
+  FollowLinks();
+}
+
+void VolumeTable::FollowLinks()
+{
+  QStringList links;
+  for (const int id : ids_)
+    links.append(QString::fromStdString(bench_->Session()->GetSourcesChanged(id)));
+  if (links == links_)
+    return;
+  links_ = links;
+  emit dataChanged(index(0, Name), index(ids_.size() - 1, Name));
+  emit LinksChanged();
 }
 
 int VolumeTable::rowCount(const QModelIndex& parent) const
@@ -42,8 +60,16 @@ QVariant VolumeTable::data(const QModelIndex& index, int role) const
   if (!session->HasVolume(id))
     return {};
   if (role == Qt::ToolTipRole) {
-    const std::string file = session->GetFile(id);
-    return file.empty() ? tr("Not from a file") : QString::fromStdString(file);
+    const QString file = QString::fromStdString(session->GetFile(id));
+    if (!session->IsResult(id))
+      return file.isEmpty() ? tr("Not from a file") : file;
+    QStringList sources;
+    for (const MadeOf::Source& source : session->GetKernel().State().Find(id)->madeOf->sources)
+      sources.append(QString::fromStdString(source.name));
+    const QString link = links_.value(index.row());
+    return tr("Made of %1. %2. %3")
+        .arg(sources.join(", "), link.isEmpty() ? tr("Its sources are as they were") : tr("Sources changed: %1").arg(link),
+             file.isEmpty() ? tr("It is in no file yet") : file);
   }
   switch (index.column()) {
   case Visible:
@@ -60,6 +86,15 @@ QVariant VolumeTable::data(const QModelIndex& index, int role) const
   case Name:
     if (role == Qt::DisplayRole || role == Qt::EditRole)
       return bench_->NameOf(id);
+    if (role == Qt::DecorationRole && !links_.value(index.row()).isEmpty())
+      return QApplication::style()->standardIcon(QStyle::SP_MessageBoxWarning);
+    if (role == Qt::AccessibleDescriptionRole && !links_.value(index.row()).isEmpty())
+      return tr("Sources changed: %1").arg(links_.value(index.row()));
+    if (role == Qt::FontRole && session->IsResult(id)) {
+      QFont font = QApplication::font();
+      font.setItalic(true);
+      return font;
+    }
     break;
   case Opacity: {
     const int percent = qRound(100.0 * session->GetOpacity(id));

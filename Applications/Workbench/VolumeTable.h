@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <QAbstractTableModel>
+#include <QStringList>
 #include <QVector>
 
 namespace echorama {
@@ -26,11 +27,16 @@ public:
   QVariant headerData(int section, Qt::Orientation orientation, int role) const override;
   Qt::ItemFlags flags(const QModelIndex& index) const override;
 
+signals:
+  void LinksChanged(); ///< whether sources of results are as they were
+
 private:
   void Follow();
+  void FollowLinks();
 
   Workbench* bench_;
   QVector<int> ids_;
+  QStringList links_; ///< what has become of the sources of each
 };
 
 } // namespace echorama
