@@ -102,6 +102,7 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
   tell(VolumesChangedEvent, changes.Volumes);
   tell(PosesChangedEvent, changes.Poses);
   tell(VoxelsChangedEvent, changes.Voxels);
+  tell(MeasurementsChangedEvent, before.measurements == this->Session.State().measurements ? 0 : -1);
   tell(SelectionChangedEvent, selected ? -1 : 0);
   tell(HistoryChangedEvent, history || modified != this->GetModifiedSinceSave() ? -1 : 0);
   return done;

@@ -18,6 +18,7 @@
  * | PosesChangedEvent      | at every step of a drag                                                  |
  * | SelectionChangedEvent  | the selection, or the centre of rotation                                 |
  * | VoxelsChangedEvent     | painted, carved                                                         |
+ * | MeasurementsChangedEvent | measurements came, went or moved                                       |
  * | HistoryChangedEvent    | there is an entry more or less to undo or redo, or the project was saved |
  *
  * Source: dissertation 4.3, 4.4.
@@ -63,7 +64,8 @@ public:
     PosesChangedEvent,
     SelectionChangedEvent,
     VoxelsChangedEvent,
-    HistoryChangedEvent
+    HistoryChangedEvent,
+    MeasurementsChangedEvent
   };
 
   ///@{
@@ -221,6 +223,26 @@ public:
   ///@}
 
   ///@{
+  /** Measurements: distances of two points of the world and angles of three (at the second), mm and degrees. They stay where they
+   * are when volumes move. SetDistance and SetAngle add one, or change the one with that number. By index: the number (0: there
+   * are not so many) and the value. */
+  bool SetDistance(int number, const double from[3], const double to[3])
+  {
+    return this->SetMeasurement({number, {Eigen::Vector3d(from), Eigen::Vector3d(to)}});
+  }
+  bool SetAngle(int number, const double from[3], const double at[3], const double to[3])
+  {
+    return this->SetMeasurement({number, {Eigen::Vector3d(from), Eigen::Vector3d(at), Eigen::Vector3d(to)}});
+  }
+  bool RemoveMeasurement(int number) { return this->Do(&Kernel::RemoveMeasurement, number); }
+  bool ClearMeasurements() { return this->Do(&Kernel::ClearMeasurements); }
+  int GetNextMeasurementNumber() const { return this->GetKernel().NextMeasurementNumber(); }
+  int GetNumberOfMeasurements() const { return static_cast<int>(this->GetKernel().State().measurements.size()); }
+  int GetMeasurementNumber(int index) const { return this->MeasurementAt(index).number; }
+  double GetMeasurementValue(int index) const { return this->MeasurementAt(index).Value(); }
+  ///@}
+
+  ///@{
   /** A stroke of the brush: Begin (mode "paint", "carve" or "restore"), then points of the world, then End: one entry of undo. */
   bool BeginStroke(int id, const char* mode, double radiusMm, double intensity, double opacity, double hardness,
                    bool insideValid);
@@ -338,6 +360,10 @@ public:
   {
     return this->Do(&Kernel::SetPose, id, pose);
   }
+  bool SetMeasurement(const echorama::Measurement& measurement)
+  {
+    return this->Do(&Kernel::SetMeasurement, measurement);
+  }
   /** As GetTruth; none: nothing is known. */
   std::optional<echorama::Pose> GetTruthOf(int id) const
   {
@@ -355,6 +381,11 @@ private:
   const echorama::SessionVolume* Find(int id) const
   {
     return this->GetKernel().State().Find(id);
+  }
+  echorama::Measurement MeasurementAt(int index) const
+  {
+    const auto& all = this->GetKernel().State().measurements;
+    return index >= 0 && index < static_cast<int>(all.size()) ? all[static_cast<std::size_t>(index)] : echorama::Measurement();
   }
   template <class T>
   T Of(int id, T echorama::SessionVolume::*what) const

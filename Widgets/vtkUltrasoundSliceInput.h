@@ -12,7 +12,20 @@
 
 namespace echorama {
 
-inline std::vector<SliceLayer> LayersOf(vtkUltrasoundAlignmentSession* session, SliceShown shown)
+inline AnyPosedVolume PosedVolumeOf(vtkUltrasoundAlignmentSession* session, int id)
+{
+  vtkUltrasoundVolume::Input input;
+  input.Image = session->GetImage(id);
+  input.Intensity = vtkUltrasoundVolume::GetIntensity(input.Image);
+  input.ValidRegion = vtkUltrasoundVolume::GetValidRegion(input.Image);
+  AnyPosedVolume volume;
+  vtkUltrasoundVolume::Dispatch(input.Intensity,
+                                [&](auto type) { volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input); });
+  return volume;
+}
+
+/** \param only the ids of those that are drawn, whatever is visible or shown; none: all that are */
+inline std::vector<SliceLayer> LayersOf(vtkUltrasoundAlignmentSession* session, SliceShown shown, const std::vector<int>& only)
 {
   std::vector<SliceLayer> layers;
   if (!session) {
@@ -25,15 +38,11 @@ inline std::vector<SliceLayer> LayersOf(vtkUltrasoundAlignmentSession* session, 
   layer.white = window[1];
   for (const SessionVolume& volume : session->GetKernel().State().volumes) {
     layer.selected = session->IsSelected(volume.id);
-    if (!volume.visible || (shown != SliceShown::All && layer.selected != (shown == SliceShown::Selected))) {
+    const bool isShown = volume.visible && (shown == SliceShown::All || layer.selected == (shown == SliceShown::Selected));
+    if (only.empty() ? !isShown : std::find(only.begin(), only.end(), volume.id) == only.end()) {
       continue;
     }
-    vtkUltrasoundVolume::Input input;
-    input.Image = session->GetImage(volume.id);
-    input.Intensity = vtkUltrasoundVolume::GetIntensity(input.Image);
-    input.ValidRegion = vtkUltrasoundVolume::GetValidRegion(input.Image);
-    vtkUltrasoundVolume::Dispatch(input.Intensity,
-                                  [&](auto type) { layer.volume = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input); });
+    layer.volume = PosedVolumeOf(session, volume.id);
     layer.colour = volume.colour;
     layer.opacity = volume.opacity;
     layers.push_back(layer);

@@ -7,20 +7,20 @@
 // picture.
 #include "vtkUltrasoundSliceView.h"
 
-#include "Core/Base/FormatText.h"
 #include "vtkCamera.h"
 #include "vtkImageData.h"
 #include "vtkObjectFactory.h"
 #include "vtkSmartPointer.h"
 #include "vtkUltrasoundAlignmentSession.h"
-#include "vtkUltrasoundLandmarkCrosses.h"
 #include "vtkUltrasoundSliceInput.h"
+#include "vtkUltrasoundSliceLines.h"
 #include "vtkUltrasoundViewProps.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 using namespace echorama;
 using Eigen::Vector2d;
@@ -55,8 +55,6 @@ struct vtkUltrasoundSliceView::Internals {
   SliceFrame& Frame;
   vtkSmartPointer<vtkUltrasoundAlignmentSession> Session;
   std::vector<unsigned long> Observers;
-  Vector3d Brush = Vector3d::Zero();
-  double BrushMm = 0.0; ///< 0: no brush
   double FullSeconds = 0.0;
 
   // What is out of date: drawing the picture, or the lines and the camera alone.
@@ -66,10 +64,9 @@ struct vtkUltrasoundSliceView::Internals {
   vtkNew<vtkCamera> Camera;
   vtkNew<vtkImageData> Picture;
   PlanePicture Laid;
-  ScreenLines Overlay;
-  vtkNew<vtkTextActor> ScaleText;
-  std::array<vtkNew<vtkTextActor>, 4> Letters;
-  LandmarkCrosses Landmarks;
+  SliceLines Lines{Renderer};
+  vtkSmartPointer<vtkImageData> Shifts; ///< a map that is laid over the picture
+  double ShiftsMm = 1.0;
 
   explicit Internals(vtkUltrasoundSliceView* view) : View(view), Frame(view->Frame)
   {
@@ -78,12 +75,6 @@ struct vtkUltrasoundSliceView::Internals {
     this->Laid.Actor->VisibilityOff();
     this->Renderer->SetActiveCamera(this->Camera);
     this->Renderer->AddActor(this->Laid.Actor);
-    this->Renderer->AddActor2D(this->Overlay.Actor);
-    SetUpText(this->ScaleText, this->Renderer, 12, {0.9, 0.9, 0.9}, -1, -1);
-    constexpr int Across[4] = {-1, 1, 0, 0}, Along[4] = {0, 0, -1, 1};
-    for (int side = 0; side < 4; ++side) {
-      SetUpText(this->Letters[static_cast<std::size_t>(side)], this->Renderer, 13, {0.65, 0.65, 0.65}, Across[side], Along[side]);
-    }
   }
 
   int StepNow() const
@@ -114,8 +105,15 @@ struct vtkUltrasoundSliceView::Internals {
       this->Picture->AllocateScalars(VTK_UNSIGNED_CHAR, 4);
     }
     const auto start = std::chrono::steady_clock::now();
-    DrawSlice(LayersOf(this->Session, this->View->Shown), plane, parameters,
-              static_cast<std::uint8_t*>(this->Picture->GetScalarPointer()));
+    auto* pixels = static_cast<std::uint8_t*>(this->Picture->GetScalarPointer());
+    DrawSlice(LayersOf(this->Session, this->View->Shown, this->View->Only), plane, parameters, pixels);
+    if (this->Shifts) {
+      vtkUltrasoundVolume::Input input;
+      input.Image = this->Shifts;
+      input.Intensity = this->Shifts->GetPointData()->GetScalars();
+      LayShifts(vtkUltrasoundVolume::PosedVolumeOf<float>(input), this->ShiftsMm, this->Lines.IsLegendStale ? 0.2 : 0.55, plane,
+                pixels);
+    }
     this->View->PictureSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     this->FullSeconds = this->View->PictureSeconds * parameters.step * parameters.step;
     this->Picture->GetPointData()->GetScalars()->Modified();
@@ -140,61 +138,16 @@ struct vtkUltrasoundSliceView::Internals {
     this->Laid.Place(corners[0].data());
   }
 
-  void DrawLinkedPlanes()
-  {
-    constexpr double gap = 8.0; // pixels around the cursor that stay free
-    const Vector2d cursor = this->Frame.PixelOf(this->Frame.cursor);
-    for (const vtkUltrasoundSliceView* other : *this->View->Linked) {
-      const auto line = this->Frame.CutBy(other->Frame);
-      if (!line) {
-        continue;
-      }
-      const Vector2d direction = ((*line)[1] - (*line)[0]).normalized();
-      for (const double side : {-1.0, 1.0}) {
-        const Vector2d near = cursor + side * gap * direction;
-        const Vector2d& end = (*line)[side < 0.0 ? 0 : 1];
-        if (side * (end - near).dot(direction) > 0.0) {
-          this->Overlay.Add({near, end}, other->Colour.value_or(SliceAxes()[other->Frame.axis].colour), 110);
-        }
-      }
-    }
-  }
-
-  void DrawScaleBar()
-  {
-    const double length = this->Frame.ScaleBarMm(), pixels = length / this->Frame.mmPerPixel;
-    const double left = 12.0, bottom = 12.0, tick = 4.0, grey = 230 / 255.0;
-    this->Overlay.Add({{left, bottom + tick}, {left, bottom}, {left + pixels, bottom}, {left + pixels, bottom + tick}},
-                      {grey, grey, grey}, 220);
-    this->ScaleText->SetInput(Format("%g mm", length).c_str());
-    this->ScaleText->SetPosition(left, bottom + tick + 2.0);
-  }
-
   void DrawLines()
   {
-    this->Overlay.Clear();
-    const double width = this->Frame.width, height = this->Frame.height;
-    const bool room = this->View->Annotated && width >= 64 && height >= 64;
-    if (this->View->Annotated && this->View->IsLinked()) {
-      this->DrawLinkedPlanes();
+    std::vector<OtherPlane> others;
+    if (this->View->Annotated) {
+      for (const vtkUltrasoundSliceView* other : *this->View->Linked) {
+        others.push_back({&other->Frame, other->Colour.value_or(SliceAxes()[other->Frame.axis].colour)});
+      }
     }
-    if (const std::vector<Vector2d> brush = this->Frame.CutOf(this->Brush, this->BrushMm); !brush.empty()) {
-      this->Overlay.Add(brush, {1.0, 1.0, 1.0}, 200);
-    }
-    this->Landmarks.Draw(this->Session, this->Frame, this->Overlay, this->Renderer);
-    if (room) {
-      this->DrawScaleBar();
-    }
-    this->Overlay.Done();
-    this->ScaleText->SetVisibility(room);
-    const double x[4] = {6.0, width - 6.0, 0.5 * width, 0.5 * width};
-    const double y[4] = {0.5 * height, 0.5 * height, 6.0, height - 6.0};
-    for (std::size_t side = 0; side < 4; ++side) {
-      const char* letter = SliceAxes()[this->Frame.axis].sides[side];
-      this->Letters[side]->SetVisibility(room && *letter);
-      this->Letters[side]->SetInput(letter);
-      this->Letters[side]->SetPosition(x[side], y[side]);
-    }
+    this->Lines.LegendMm = this->Shifts ? this->ShiftsMm : 0.0;
+    this->Lines.Draw(this->Session, this->Frame, others, this->View->Annotated);
   }
 };
 
@@ -296,9 +249,12 @@ vtkUltrasoundAlignmentSession* vtkUltrasoundSliceView::GetSession() const
 void vtkUltrasoundSliceView::OnSession(vtkObject*, unsigned long event, void*)
 {
   const bool selectionShows = this->Shown != SliceShown::All || this->Parameters.mode != SliceMode::Blend;
-  if (event == vtkUltrasoundAlignmentSession::VolumesChangedEvent || event == vtkUltrasoundAlignmentSession::PosesChangedEvent ||
-      event == vtkUltrasoundAlignmentSession::VoxelsChangedEvent ||
-      (event == vtkUltrasoundAlignmentSession::SelectionChangedEvent && selectionShows)) {
+  if (event == vtkUltrasoundAlignmentSession::MeasurementsChangedEvent) {
+    this->OutdateLines();
+  } else if (event == vtkUltrasoundAlignmentSession::VolumesChangedEvent ||
+             event == vtkUltrasoundAlignmentSession::PosesChangedEvent ||
+             event == vtkUltrasoundAlignmentSession::VoxelsChangedEvent ||
+             (event == vtkUltrasoundAlignmentSession::SelectionChangedEvent && selectionShows)) {
     this->Outdate();
   }
 }
@@ -542,16 +498,53 @@ void vtkUltrasoundSliceView::SetBrush(double x, double y, double z, double radiu
 {
   EchoramaRequire(Finite(x, y, z) && radiusMm > 0.0 && std::isfinite(radiusMm),
                   "the brush of a slice view is at a point that is not finite, or its radius is not above 0");
-  this->Parts->Brush = {x, y, z};
-  this->Parts->BrushMm = radiusMm;
+  this->Parts->Lines.Brush = {x, y, z};
+  this->Parts->Lines.BrushMm = radiusMm;
   this->OutdateLines();
 }
 
 void vtkUltrasoundSliceView::HideBrush()
 {
-  if (this->Parts->BrushMm > 0.0) {
-    this->Parts->BrushMm = 0.0;
+  if (this->Parts->Lines.BrushMm > 0.0) {
+    this->Parts->Lines.BrushMm = 0.0;
     this->OutdateLines();
+  }
+}
+
+void vtkUltrasoundSliceView::SetPointer(double x, double y, double z)
+{
+  EchoramaRequire(Finite(x, y, z), "the pointer of a slice view must be finite");
+  this->Parts->Lines.Pointer = Vector3d(x, y, z);
+  this->OutdateLines();
+}
+
+void vtkUltrasoundSliceView::HidePointer()
+{
+  if (std::exchange(this->Parts->Lines.Pointer, std::nullopt)) {
+    this->OutdateLines();
+  }
+}
+
+void vtkUltrasoundSliceView::SetDraft(const std::vector<Vector3d>& points)
+{
+  if (this->Parts->Lines.Draft != points) {
+    this->Parts->Lines.Draft = points;
+    this->OutdateLines();
+  }
+}
+
+void vtkUltrasoundSliceView::SetShifts(vtkImageData* map, double mostMm, bool stale)
+{
+  EchoramaRequire(!map || (mostMm > 0.0 && std::isfinite(mostMm)),
+                  "the scale of a map of shifts ends at " << mostMm << " mm; it must be above 0");
+  EchoramaRequire(!map || vtkFloatArray::SafeDownCast(map->GetPointData()->GetScalars()),
+                  "a map of shifts needs floats, of which those that are NaN are not known");
+  Internals& parts = *this->Parts;
+  if (map != parts.Shifts || (map && (mostMm != parts.ShiftsMm || stale != parts.Lines.IsLegendStale))) {
+    parts.Shifts = map;
+    parts.ShiftsMm = mostMm;
+    parts.Lines.IsLegendStale = stale;
+    this->Outdate();
   }
 }
 

@@ -20,7 +20,8 @@
  * Linked views have the zoom and the cursor in common, a point of the world that all their planes go through; each shows where
  * the others' planes cut its own. Pixels count from the lower left one, (0, 0), whose middle that is.
  *
- * Landmarks of the session that lie within 5 mm of the plane are crosses with labels, the fainter the farther.
+ * Landmarks of the session that lie within 5 mm of the plane are crosses with labels, the fainter the farther; measurements are
+ * drawn as far as they lie so near.
  *
  * Names that are none and numbers out of range are reported as errors, and change nothing.
  *
@@ -141,6 +142,20 @@ public:
   ///@}
 
   ///@{
+  /** These volumes alone, whatever is visible or shown: to look at some without an edit. None (default): all. */
+  void AddOnly(int id)
+  {
+    this->Only.push_back(id);
+    this->Outdate();
+  }
+  void ClearOnly()
+  {
+    this->Only.clear();
+    this->Outdate();
+  }
+  ///@}
+
+  ///@{
   /** "blend", "difference" or "checkerboard": of the selected against the others. Where all or none are selected, of the first
    * against the others. Default "blend". */
   void SetMode(const char* mode);
@@ -174,6 +189,17 @@ public:
   void SetBrush(double x, double y, double z, double radiusMm);
   void HideBrush();
   ///@}
+
+  ///@{
+  /** A cross at a point of the world, where the plane is nearest to it, the fainter the farther: where the mouse is in another
+   * view. Default: none. */
+  void SetPointer(double x, double y, double z);
+  void HidePointer();
+  ///@}
+
+  /** Lays a map of lengths in mm (one float per voxel, NaN: not known) over the picture, with a legend from 0 to \a mostMm;
+   * stale: faint, and the legend says so. nullptr: none. */
+  void SetShifts(vtkImageData* map, double mostMm = 1.0, bool stale = false);
 
   ///@{
   /** Scale bar, letters of the body's sides (not in oblique planes), and the linked views' planes. Default on. */
@@ -224,12 +250,26 @@ private:
   bool NeverFitted = true;
   std::shared_ptr<std::vector<vtkUltrasoundSliceView*>> Linked; ///< with this view; one alone when it is not linked
   echorama::SliceShown Shown = echorama::SliceShown::All;
+  std::vector<int> Only;
   echorama::SliceParameters Parameters;
   bool Interactive = false, Annotated = true;
   int InteractiveStep = 0;
   double PictureSeconds = 0.0;
   struct Internals;
   std::unique_ptr<Internals> Parts;
+
+public:
+  /** Only these volumes, as AddOnly. */
+  void SetOnly(const std::vector<int>& ids)
+  {
+    this->Change(this->Only, ids);
+  }
+  /** A measurement that is being made: its points, world. */
+  void SetDraft(const std::vector<Eigen::Vector3d>& points);
+  const echorama::SliceFrame& GetFrame() const
+  {
+    return this->Frame;
+  }
 #endif
 };
 

@@ -218,7 +218,8 @@ std::vector<unsigned long> ObserveSession(vtkUltrasoundAlignmentSession* session
   std::vector<unsigned long> observers;
   for (const auto event :
        {vtkUltrasoundAlignmentSession::VolumesChangedEvent, vtkUltrasoundAlignmentSession::PosesChangedEvent,
-        vtkUltrasoundAlignmentSession::SelectionChangedEvent, vtkUltrasoundAlignmentSession::VoxelsChangedEvent}) {
+        vtkUltrasoundAlignmentSession::SelectionChangedEvent, vtkUltrasoundAlignmentSession::VoxelsChangedEvent,
+        vtkUltrasoundAlignmentSession::MeasurementsChangedEvent}) {
     observers.push_back(session->AddObserver(event, view, method));
   }
   return observers;

@@ -2,6 +2,7 @@
 #include "MainWindow.h"
 #include "AlignmentHandles.h"
 #include "BrushPanel.h"
+#include "CheckPanel.h"
 #include "Controls.h"
 #include "DroppedFiles.h"
 #include "EditActions.h"
@@ -81,8 +82,6 @@ MainWindow::MainWindow(Workspace& workspace, QWidget* parent)
   MakePanels();
   statusBar()->addWidget(readout_, 1);
   statusBar()->addPermanentWidget(jobs_);
-  for (SlicePane* pane : views_->Slices())
-    connect(pane->Canvas(), &SliceCanvas::CursorAt, readout_, &StatusReadout::ShowAt);
   for (auto changed : {&Workbench::HistoryChanged, &Workbench::VolumesChanged})
     connect(bench_, changed, this, &MainWindow::ShowTitle);
   ShowTitle();
@@ -148,6 +147,7 @@ void MainWindow::MakePanels()
   Menu(Place::Align)
       ->addAction(MakeAction(this, "alignAllAction", tr("Align &all"), "Shift+R",
                              tr("Align all volumes to the first; can be undone"), [registration] { registration->AlignAll(); }));
+  AddPanel(new CheckPanel(bench_, this), tr("Check"));
   auto* result = new ResultPanel(workspace, this);
   AddPanel(result, tr("Stitch"));
   for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::VoxelsChanged,

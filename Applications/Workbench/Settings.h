@@ -6,7 +6,7 @@
 namespace echorama {
 
 /// What the left mouse button does in a slice.
-enum class Tool { Look, Align, Paint, Carve, Restore, Mark };
+enum class Tool { Look, Align, Paint, Carve, Restore, Mark, Measure, Angle };
 
 /// The brush of Paint, Carve and Restore; see echorama::Brush.
 struct BrushSettings {

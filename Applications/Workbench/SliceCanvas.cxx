@@ -3,6 +3,7 @@
 // rest is the same with every tool and is done here.
 #include "SliceCanvas.h"
 #include "AlignmentHandles.h"
+#include "MeasureTool.h"
 #include "Redraw.h"
 #include "vtkUltrasoundAlignmentSession.h"
 #include "vtkUltrasoundSliceView.h"
@@ -21,6 +22,8 @@ namespace echorama {
 namespace {
 
 constexpr int SliceWatchingMs = 60; ///< how often a slice redraws while something is dragged in another view
+constexpr int PointerMs = 15;       ///< and while the mouse points at something there
+constexpr double Reach = 8.0;       ///< of points that are dragged, pixels
 
 const char* BrushModeOf(Tool tool)
 {
@@ -30,6 +33,11 @@ const char* BrushModeOf(Tool tool)
 bool IsBrush(Tool tool)
 {
   return tool == Tool::Paint || tool == Tool::Carve || tool == Tool::Restore;
+}
+
+bool IsMeasure(Tool tool)
+{
+  return tool == Tool::Measure || tool == Tool::Angle;
 }
 
 } // namespace
@@ -55,6 +63,10 @@ SliceCanvas::SliceCanvas(Workbench* bench, QWidget* parent)
   connect(bench, &Workbench::ToolChanged, this, [this] { view_->HideBrush(); });
   connect(bench, &Workbench::HandChanged, this, &SliceCanvas::Ask); // the axis that motions keep to is drawn
   connect(bench, &Workbench::LookChanged, this, &SliceCanvas::Look);
+  connect(bench, &Workbench::OnlyChanged, this, &SliceCanvas::Look);
+  connect(bench, &Workbench::PointerChanged, this, &SliceCanvas::ShowPointer);
+  connect(bench, &Workbench::MeasurementsChanged, this, &SliceCanvas::Ask);
+  connect(bench->Measuring(), &MeasureTool::Changed, this, &SliceCanvas::ShowDraft);
   connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {
     view_->SetInteractive(on);
     Ask();
@@ -76,6 +88,8 @@ void SliceCanvas::Look()
   view_->SetMode(look.mode.toUtf8().constData());
   view_->SetLinear(look.linear);
   view_->SetSquarePixels(look.squarePixels);
+  const QVector<int>& only = bench_->OnlyInSlices();
+  view_->SetOnly({only.begin(), only.end()});
   Ask();
 }
 
@@ -83,6 +97,27 @@ void SliceCanvas::Ask()
 {
   const bool isWatching = bench_->Interacting() && drag_ == Drag::None;
   redraw_->Ask(isWatching ? SliceWatchingMs : 0);
+}
+
+// While something is dragged nobody looks at where the mouse is in other views.
+void SliceCanvas::ShowPointer()
+{
+  const auto& place = bench_->Pointer();
+  const bool isWanted = place && bench_->PointerIn() != this && !bench_->Interacting();
+  if (!isWanted && !isPointed_)
+    return;
+  isPointed_ = isWanted;
+  if (isWanted)
+    view_->SetPointer(place->x(), place->y(), place->z());
+  else
+    view_->HidePointer();
+  redraw_->Ask(PointerMs);
+}
+
+void SliceCanvas::ShowDraft()
+{
+  view_->SetDraft(bench_->Measuring()->Draft());
+  Ask();
 }
 
 void SliceCanvas::DrawNow()
@@ -196,6 +231,9 @@ void SliceCanvas::mousePressEvent(QMouseEvent* event)
     BeginStroke(point);
   } else if (event->button() == Qt::LeftButton && bench_->CurrentTool() == Tool::Mark) {
     BeginLandmark(pixel, point);
+  } else if (event->button() == Qt::LeftButton && IsMeasure(bench_->CurrentTool())) {
+    drag_ = Drag::Measure;
+    bench_->Measuring()->Press(view_, pixel, Reach * devicePixelRatioF());
   } else if (event->button() == Qt::LeftButton) {
     drag_ = Drag::Cursor;
     view_->SetCursor(point[0], point[1], point[2]);
@@ -223,13 +261,12 @@ int SliceCanvas::VolumeToChange(const QString& toSelectOne)
 // A press beside a landmark of the volume takes hold of it, any other makes a new one. Until the release it is one edit.
 void SliceCanvas::BeginLandmark(const QPointF& pixel, const double point[3])
 {
-  constexpr double reach = 8.0; // pixels
   auto* session = bench_->Session();
   const int id = VolumeToChange(tr("Select the one volume to mark in."));
   if (id == 0)
     return;
   landmark_ = {id, session->GetNextLandmarkLabel(id)};
-  double nearest = reach * devicePixelRatioF();
+  double nearest = Reach * devicePixelRatioF();
   for (int i = 0; i < session->GetNumberOfLandmarks(id); ++i) {
     const std::string label = session->GetLandmarkLabel(id, i);
     double place[3] = {0.0, 0.0, 0.0}, at[2], shown[3];
@@ -290,6 +327,9 @@ void SliceCanvas::mouseMoveEvent(QMouseEvent* event)
   case Drag::Landmark:
     DragLandmark(point);
     break;
+  case Drag::Measure:
+    bench_->Measuring()->Move(view_, pixel);
+    break;
   case Drag::Pan:
     view_->Pan(by.x() * ratio, -by.y() * ratio);
     ChangePlane();
@@ -301,12 +341,16 @@ void SliceCanvas::mouseMoveEvent(QMouseEvent* event)
   case Drag::Window:
     ChangeWindow(by);
     break;
+  case Drag::None:
+    if (!bench_->Measuring()->Draft().empty())
+      bench_->Measuring()->Move(view_, pixel);
+    break;
   default:
     break;
   }
   last_ = now;
   ShowBrush(point);
-  emit CursorAt(point[0], point[1], point[2]);
+  bench_->SetPointer(Eigen::Vector3d(point), this);
 }
 
 void SliceCanvas::ShowBrush(const double point[3])
@@ -341,6 +385,10 @@ void SliceCanvas::EndDrag()
     bench_->Session()->EndStroke();
   if (drag == Drag::Landmark)
     bench_->Session()->EndEdit();
+  if (drag == Drag::Measure) {
+    const QPointF pixel = PixelOf(last_);
+    bench_->Measuring()->Release(view_, pixel);
+  }
   if (drag == Drag::Stroke || drag == Drag::Window)
     bench_->SetInteracting(false);
   Ask();
@@ -356,7 +404,8 @@ void SliceCanvas::CancelStroke()
 void SliceCanvas::mouseDoubleClickEvent(QMouseEvent* event)
 {
   event->accept();
-  if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool()) || bench_->CurrentTool() == Tool::Mark) {
+  if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool()) || bench_->CurrentTool() == Tool::Mark ||
+      IsMeasure(bench_->CurrentTool())) {
     mousePressEvent(event); // dabs in quick succession
     return;
   }
@@ -411,8 +460,8 @@ void SliceCanvas::leaveEvent(QEvent* event)
 {
   QVTKOpenGLNativeWidget::leaveEvent(event);
   view_->HideBrush();
+  bench_->SetPointer(std::nullopt, this);
   Ask();
-  emit CursorLeft();
 }
 
 void SliceCanvas::keyPressEvent(QKeyEvent* event)
@@ -420,6 +469,15 @@ void SliceCanvas::keyPressEvent(QKeyEvent* event)
   if (event->key() == Qt::Key_Escape && (drag_ == Drag::Stroke || drag_ == Drag::Landmark)) {
     event->accept();
     CancelStroke();
+    return;
+  }
+  if (event->key() == Qt::Key_Escape && bench_->Measuring()->Cancel()) {
+    event->accept();
+    drag_ = drag_ == Drag::Measure ? Drag::None : drag_;
+    return;
+  }
+  if (event->key() == Qt::Key_Escape && drag_ == Drag::None && bench_->BringBack()) {
+    event->accept();
     return;
   }
   // The alignment widget has had it; arrows must not wander off to the next field.

@@ -18,13 +18,13 @@ class Workbench;
 ///
 /// | mouse                 | does                                                                            |
 /// | --------------------- | ------------------------------------------------------------------------------- |
-/// | left                  | what the tool in hand does: moves volumes, paints, carves, restores, marks, points |
+/// | left                  | what the tool in hand does: moves volumes, paints, carves, restores, marks, measures, points |
 /// | wheel                 | goes through the slices, by one voxel (Shift: ten)                              |
 /// | Ctrl + wheel          | zooms at the mouse                                                              |
 /// | middle drag           | moves the picture; with Shift: turns the plane, which becomes oblique           |
 /// | right drag            | grey levels: contrast to the sides, brightness up and down                      |
 /// | double click          | makes the view large, and back                                                  |
-/// | Escape while painting | takes the stroke back; so with a landmark while it is dragged                   |
+/// | Escape                | takes a drag back: a stroke, a landmark, a measurement; else brings back all volumes |
 class SliceCanvas : public QVTKOpenGLNativeWidget {
   Q_OBJECT
 
@@ -45,8 +45,6 @@ public:
 signals:
   void PlaneChanged();
   void Drawn();
-  void CursorAt(double x, double y, double z);
-  void CursorLeft();
   void LargeAsked();
 
 protected:
@@ -62,7 +60,7 @@ protected:
   void keyPressEvent(QKeyEvent* event) override;
 
 private:
-  enum class Drag { None, Widget, Cursor, Stroke, Landmark, Pan, Turn, Window };
+  enum class Drag { None, Widget, Cursor, Stroke, Landmark, Measure, Pan, Turn, Window };
 
   bool IsForHandles(QEvent* event) const;
   void Look();
@@ -72,6 +70,8 @@ private:
   void BeginLandmark(const QPointF& pixel, const double point[3]);
   void DragLandmark(const double point[3]);
   void CancelStroke();
+  void ShowPointer();
+  void ShowDraft();
   Qt::MouseButton ButtonOfDrag() const;
   void EndDrag();
   void ShowBrush(const double point[3]);
@@ -87,7 +87,7 @@ private:
   QPointF last_;
   QVector<int> selected_;                ///< before the last press
   std::pair<int, std::string> landmark_; ///< that is dragged: volume and label
-  bool isPlaced_ = false;
+  bool isPlaced_ = false, isPointed_ = false;
 };
 
 } // namespace echorama

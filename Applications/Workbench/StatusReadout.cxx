@@ -1,36 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "StatusReadout.h"
+#include "GreyLevels.h"
 #include "Workbench.h"
+#include <algorithm>
 #include <QStringList>
-#include <vtkDataArray.h>
-#include <vtkImageData.h>
-#include <vtkUltrasoundVolume.h>
 
 namespace echorama {
 
 StatusReadout::StatusReadout(Workbench* bench, QWidget* parent) : QLabel(parent), bench_(bench)
 {
   setObjectName("readout");
+  setTextFormat(Qt::RichText);
+  setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred); // a long text must not widen the window
   setToolTip(tr("Position under the mouse in mm (left, posterior, superior), and the grey level of each volume there"));
+  connect(bench, &Workbench::PointerChanged, this, &StatusReadout::Show);
 }
 
-void StatusReadout::ShowAt(double x, double y, double z)
+void StatusReadout::Show()
 {
-  const double world[3] = {x, y, z};
-  QString text = QString("%1  %2  %3 mm").arg(x, 0, 'f', 1).arg(y, 0, 'f', 1).arg(z, 0, 'f', 1);
-  const auto* session = bench_->Session();
-  QStringList levels;
-  for (bool selected : {true, false})
-    for (int id : bench_->Volumes()) {
-      const vtkIdType voxel = session->GetVoxelAt(id, world);
-      if (session->IsSelected(id) == selected && session->GetVisible(id) && levels.size() < 3 && voxel >= 0)
-        levels.append(QString("%1: %2")
-                          .arg(bench_->NameOf(id))
-                          .arg(vtkUltrasoundVolume::GetIntensity(session->GetImage(id))->GetComponent(voxel, 0), 0, 'g', 5));
-    }
-  if (!levels.isEmpty())
-    text += "    " + levels.join("    ");
-  setText(text);
+  constexpr int most = 5;
+  if (!bench_->Pointer() || bench_->Interacting())
+    return; // what was read last can still be read
+  const Eigen::Vector3d& at = *bench_->Pointer();
+  QStringList parts{QString("%1&nbsp; %2&nbsp; %3 mm").arg(at.x(), 0, 'f', 1).arg(at.y(), 0, 'f', 1).arg(at.z(), 0, 'f', 1)};
+  std::vector<GreyLevel> levels = GreyLevelsAt(*bench_, at);
+  if (static_cast<int>(levels.size()) > most)
+    std::stable_partition(levels.begin(), levels.end(), [](const GreyLevel& level) { return level.value.has_value(); });
+  for (std::size_t i = 0; i < levels.size() && i < most; ++i)
+    parts.append(QString("<span style='color:%1'>&#9632;</span>&nbsp;%2: %3")
+                     .arg(levels[i].colour.name(), levels[i].name.toHtmlEscaped(), levels[i].Text()));
+  if (static_cast<int>(levels.size()) > most)
+    parts.append(tr("and %1 more").arg(static_cast<int>(levels.size()) - most));
+  setText(parts.join("&nbsp;&nbsp;&nbsp; "));
 }
 
 } // namespace echorama

@@ -6,15 +6,17 @@ namespace echorama {
 
 class Workbench;
 
-/// In the status bar: where the mouse points, and the grey level of the volume there (the selected one first).
+/// In the status bar: where the mouse points, and the grey level there of each volume that is shown (the selected ones first),
+/// with its colour. Of many volumes those that have a grey level there come first, and how many more there are is said.
 class StatusReadout : public QLabel {
   Q_OBJECT
 
 public:
   explicit StatusReadout(Workbench* bench, QWidget* parent = nullptr);
-  void ShowAt(double x, double y, double z);
 
 private:
+  void Show();
+
   Workbench* bench_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ViewActions.h"
 #include "Controls.h"
+#include "Flicker.h"
 #include "SlicePane.h"
 #include "ViewGrid.h"
 #include "Workbench.h"
@@ -35,6 +36,10 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   addTool("toolMark", tr("&Mark"), "6",
           tr("Mark landmarks in the selected volume: the same places in two volumes help to align them; drag one to move it"),
           Tool::Mark);
+  addTool("toolMeasure", tr("M&easure"), "7", tr("Measure a distance: click on both ends, or drag; the panel Check lists it"),
+          Tool::Measure);
+  addTool("toolAngle", tr("A&ngle"), "8", tr("Measure an angle: click on its three points, the second where its arms meet"),
+          Tool::Angle);
 
   const auto addShown = [&](const char* name, const QString& label, const char* key, const QString& help, const QString& word) {
     addTo(shown_, name, label, key, help, word, [this, word] { bench_->Set(&SliceLook::shown, word); });
@@ -45,6 +50,13 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   switch_ = MakeAction(this, "showSwitch", tr("S&witch selected and others"), "Space",
                        tr("Flicker: back and forth between the selected volumes and the others"),
                        [this] { bench_->Set(&SliceLook::shown, bench_->Slices().shown == "selected" ? "others" : "selected"); });
+
+  flicker_ = MakeAction(this, "flicker", tr("&Flicker"), "Shift+Space",
+                        tr("Back and forth by itself between two sides (panel Check: which, and how fast); ends when something "
+                           "is dragged"),
+                        [this] { bench_->Flickering()->Toggle(); });
+  flicker_->setCheckable(true);
+  connect(bench->Flickering(), &Flicker::Changed, this, &ViewActions::ShowLook);
 
   const auto addMode = [&](const char* name, const QString& label, const char* key, const QString& help, const QString& word) {
     addTo(modes_, name, label, key, help, word, [this, word] { bench_->Set(&SliceLook::mode, word); });
@@ -86,7 +98,7 @@ void ViewActions::AddTools(QMenu* menu, QToolBar* bar)
 void ViewActions::AddTo(QMenu* menu, QToolBar* bar)
 {
   menu->addActions(shown_->actions());
-  menu->addAction(switch_);
+  menu->addActions({switch_, flicker_});
   menu->addSeparator();
   menu->addActions(modes_->actions());
   menu->addSeparator();
@@ -108,6 +120,7 @@ void ViewActions::ShowLook()
   check(shown_, bench_->Slices().shown);
   check(modes_, bench_->Slices().mode);
   linear_->setChecked(bench_->Slices().linear);
+  flicker_->setChecked(bench_->Flickering()->IsOn());
 }
 
 void ViewActions::ChangeBrush(double factor)

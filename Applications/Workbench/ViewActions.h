@@ -31,7 +31,7 @@ private:
   ViewGrid* views_;
   QActionGroup *tools_, *shown_, *modes_;
   QVector<QAction*> more_, brush_;
-  QAction *switch_, *linear_, *linked_;
+  QAction *switch_, *flicker_, *linear_, *linked_;
 };
 
 } // namespace echorama

@@ -113,7 +113,7 @@ void VolumePane::AddSlice(SliceCanvas* slice)
   const int i = slices_.size();
   slices_.append({slice->View()});
   connect(slice, &SliceCanvas::Drawn, this, [this, i] {
-    if (TakePlane(i))
+    if (bench_->OnlyInSlices() == bench_->Only() && TakePlane(i)) // planes do not flicker
       Ask();
   });
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Workbench.h"
+#include "Flicker.h"
+#include "MeasureTool.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,11 +17,13 @@ constexpr std::pair<unsigned long, void (Workbench::*)()> Signals[] = {
     {vtkUltrasoundAlignmentSession::PosesChangedEvent, &Workbench::PosesChanged},
     {vtkUltrasoundAlignmentSession::SelectionChangedEvent, &Workbench::SelectionChanged},
     {vtkUltrasoundAlignmentSession::VoxelsChangedEvent, &Workbench::VoxelsChanged},
-    {vtkUltrasoundAlignmentSession::HistoryChangedEvent, &Workbench::HistoryChanged}};
+    {vtkUltrasoundAlignmentSession::HistoryChangedEvent, &Workbench::HistoryChanged},
+    {vtkUltrasoundAlignmentSession::MeasurementsChangedEvent, &Workbench::MeasurementsChanged}};
 
 } // namespace
 
-Workbench::Workbench(Workspace& workspace, QObject* parent) : QObject(parent), workspace_(workspace)
+Workbench::Workbench(Workspace& workspace, QObject* parent)
+  : QObject(parent), workspace_(workspace), measuring_(new MeasureTool(this)), flicker_(new Flicker(this))
 {
   // Errors are not observed here: what VTK classes report comes through Messages.
   for (const auto& [event, changed] : Signals)
@@ -125,6 +129,42 @@ void Workbench::SetInteracting(bool on)
     return;
   interacting_ = on;
   emit InteractingChanged(on);
+}
+
+void Workbench::SetPointer(const std::optional<Eigen::Vector3d>& place, const QObject* in)
+{
+  if (place == pointer_ && in == pointerIn_)
+    return;
+  pointer_ = place;
+  pointerIn_ = in;
+  emit PointerChanged();
+}
+
+void Workbench::SetOnly(const QVector<int>& ids)
+{
+  flicker_->Stop();
+  if (ids == only_)
+    return;
+  only_ = onlyInSlices_ = ids;
+  emit OnlyChanged();
+}
+
+void Workbench::SetOnlyInSlices(const QVector<int>& ids)
+{
+  if (ids == onlyInSlices_)
+    return;
+  onlyInSlices_ = ids;
+  emit OnlyChanged();
+}
+
+bool Workbench::BringBack()
+{
+  const bool was = flicker_->IsOn() || !only_.isEmpty();
+  if (flicker_->IsOn())
+    flicker_->Stop();
+  else
+    SetOnly({});
+  return was;
 }
 
 void Workbench::Note(const QString& text)

@@ -3,12 +3,17 @@
 #include "Message.h"
 #include "Settings.h"
 #include "Workspace.h"
+#include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <QObject>
 #include <QString>
 #include <QVector>
 
 namespace echorama {
+
+class Flicker;
+class MeasureTool;
 
 /// What the panels, views and actions of one window share: the session, the tool in hand, and how things are shown. It turns the
 /// session's VTK events into Qt signals. It knows no widget.
@@ -66,6 +71,23 @@ public:
   bool Interacting() const { return interacting_; }
   void SetInteracting(bool on);
 
+  ///@{ What the mouse points at, world: shown in all views but the one that it is in.
+  void SetPointer(const std::optional<Eigen::Vector3d>& place, const QObject* in);
+  const std::optional<Eigen::Vector3d>& Pointer() const { return pointer_; }
+  const QObject* PointerIn() const { return pointerIn_; }
+  ///@}
+
+  ///@{ To look at some volumes alone, without an edit; none: all. Slices may show others for a moment, while they flicker.
+  void SetOnly(const QVector<int>& ids);
+  void SetOnlyInSlices(const QVector<int>& ids);
+  const QVector<int>& Only() const { return only_; }
+  const QVector<int>& OnlyInSlices() const { return onlyInSlices_; }
+  /// What Escape does when nothing is dragged: ends flickering, then brings all volumes back. False: there was neither.
+  bool BringBack();
+  ///@}
+  MeasureTool* Measuring() const { return measuring_; }
+  Flicker* Flickering() const { return flicker_; }
+
   ///@{ An attempt that is scored: nothing that leads to the solution is shown, and help is refused, or counted.
   void BeginAttempt(bool isHelpAllowed);
   void EndAttempt();
@@ -85,6 +107,7 @@ signals:
   void SelectionChanged();
   void VoxelsChanged();
   void HistoryChanged();
+  void MeasurementsChanged();
 
   void ToolChanged();
   void BrushChanged();
@@ -92,6 +115,9 @@ signals:
   void HandChanged();
   void InteractingChanged(bool on);
   void ScoredChanged();
+  void PointerChanged();
+  void OnlyChanged();           ///< in slices, and perhaps in 3D
+  void PairAsked(int a, int b); ///< somebody wants to see where these overlap
 
   void Said(const Message& message);
 
@@ -110,6 +136,11 @@ private:
   Settings settings_;
   bool interacting_ = false, isScored_ = false, isHelpAllowed_ = false;
   int helpTaken_ = 0;
+  std::optional<Eigen::Vector3d> pointer_;
+  const QObject* pointerIn_ = nullptr;
+  QVector<int> only_, onlyInSlices_;
+  MeasureTool* measuring_;
+  Flicker* flicker_;
 };
 
 } // namespace echorama

@@ -84,6 +84,14 @@ public:
   /// For the next one in a volume: the first label that others have and it has not; else a number that none has.
   std::string NextLandmarkLabel(int id) const;
   ///@}
+  ///@{ Measurements: see Measurement.
+  /// Adds one, or takes the place of the one with its number. Error(InvalidParameter) for a number below 1, points that are not
+  /// two or three, or not finite.
+  void SetMeasurement(const Measurement& measurement);
+  void RemoveMeasurement(int number); ///< Error(InvalidParameter) when there is none
+  void ClearMeasurements();
+  int NextMeasurementNumber() const; ///< above all there are
+  ///@}
   ///@{ Selection: no edits.
   const std::set<int>& Selection() const { return selection_; }
   void Select(int id, bool on, bool alone = false); ///< with all of its group; \a alone: nothing else

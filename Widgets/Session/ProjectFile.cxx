@@ -10,6 +10,7 @@
 #include "Core/Geometry/PoseJson.h"
 #include "Widgets/Session/Checksum.h"
 #include "Widgets/Session/MadeOfJson.h"
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -188,6 +189,29 @@ SessionVolume ToVolume(const Json& value, const JsonPlace& place, const fs::path
   return volume;
 }
 
+std::vector<Measurement> ToMeasurements(const Json& value, const JsonPlace& place)
+{
+  if (!value.is_array())
+    place.Fail("a list is needed");
+  std::vector<Measurement> measurements;
+  for (const Json& each : value) {
+    const JsonPlace here = place.In("measurement " + std::to_string(measurements.size() + 1)), points = here.In("points");
+    Measurement measurement;
+    measurement.number = Count(here.Member(each, "number"), here.In("number"));
+    const bool isTaken = std::any_of(measurements.begin(), measurements.end(),
+                                     [&](const Measurement& other) { return other.number == measurement.number; });
+    if (measurement.number < 1 || isTaken)
+      here.In("number").Fail("a number, from 1, that no other measurement has is needed");
+    const Json& places = here.Member(each, "points");
+    if (!places.is_array() || (places.size() != 2 && places.size() != 3))
+      points.Fail("two or three points are needed");
+    for (const Json& point : places)
+      measurement.points.push_back(points.Vector<3>(point));
+    measurements.push_back(std::move(measurement));
+  }
+  return measurements;
+}
+
 void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
 {
   Json& backup = root["backup"];
@@ -297,6 +321,8 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
     const std::string truth = file.In("truth").Text(root["truth"]);
     project.truth = truth.empty() ? truth : Resolved(Located(truth, folder, beside)).string();
   }
+  if (root.contains("measurements"))
+    project.state.measurements = ToMeasurements(root["measurements"], file.In("measurements"));
   if (root.contains("comment"))
     project.comment = file.In("comment").Text(root["comment"]);
   if (stamp)
@@ -332,10 +358,18 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
     if (const auto truth = project.truths.find(volume.name); truth != project.truths.end())
       volumes.back()["TrueVolumeToWorld"] = JsonPlace::RowsOf(truth->second.matrix());
   }
+  Json measurements = Json::array();
+  for (const Measurement& each : project.state.measurements) {
+    Json points = Json::array();
+    for (const Eigen::Vector3d& point : each.points)
+      points.push_back(Json::array({point.x(), point.y(), point.z()}));
+    measurements.push_back({{"number", each.number}, {"points", std::move(points)}});
+  }
   Json root{{"schema", Schema},
             {"unit", "mm"},
             {"frame", "LPS"},
             {"volumes", std::move(volumes)},
+            {"measurements", std::move(measurements)},
             {"truth", Relative(project.truth, folder)},
             {"comment", project.comment}};
   if (project.state.centre)

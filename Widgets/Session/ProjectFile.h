@@ -32,7 +32,8 @@ struct BackupStamp {
 /// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "path",
 /// "geometry", "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [{"mode", "radiusMm", "intensity", "opacity",
 /// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}], "madeOf", "TrueVolumeToWorld"}],
-/// "truth", "comment", "centreOfRotation"}. Documentation/session.md tells of each.
+/// "measurements": [{"number", "points": [[3], ...]}], "truth", "comment", "centreOfRotation"}. Documentation/session.md tells of
+/// each.
 ///
 /// A project is a pose file too (ReadPoses reads it): the same fields with the same meaning, plus what a session knows. And a
 /// pose file ("echorama-poses-1") is a project whose volumes have default looks: all keys of a volume but "file" and

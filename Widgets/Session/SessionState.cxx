@@ -51,7 +51,7 @@ bool operator==(const SessionVolume& a, const SessionVolume& b)
 
 bool operator==(const SessionState& a, const SessionState& b)
 {
-  return a.centre == b.centre && a.volumes == b.volumes;
+  return a.centre == b.centre && a.volumes == b.volumes && a.measurements == b.measurements;
 }
 
 } // namespace echorama

@@ -4,6 +4,7 @@
 #include "Core/Geometry/Landmark.h"
 #include "Widgets/Painting/Stroke.h"
 #include "Widgets/Session/MadeOf.h"
+#include "Widgets/Session/Measurement.h"
 #include <array>
 #include <memory>
 #include <optional>
@@ -33,6 +34,7 @@ struct SessionVolume {
 /// All that undo brings back. Cheap to copy. The selection is not part of it: choosing is not an edit.
 struct SessionState {
   std::vector<SessionVolume> volumes;      ///< in the user's order; the first is the gauge of pose files
+  std::vector<Measurement> measurements{}; ///< in the order in which they were made
   std::optional<Eigen::Vector3d> centre{}; ///< about which rotations turn, world; none: the middle of what is selected
   const SessionVolume* Find(int id) const;
   SessionVolume* Find(int id);

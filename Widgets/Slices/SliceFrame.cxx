@@ -101,6 +101,23 @@ std::optional<std::array<Vector2d, 2>> SliceFrame::CutBy(const SliceFrame& other
   return std::array<Vector2d, 2>{point + from * direction, point + to * direction};
 }
 
+std::optional<std::array<Vector2d, 2>> SliceFrame::PartNear(const Vector3d& from, const Vector3d& to, double depthMm) const
+{
+  const double a = DepthOf(from), b = DepthOf(to);
+  double begin = 0.0, end = 1.0; // of the way
+  if (a == b) {
+    if (!(std::fabs(a) <= depthMm))
+      return {};
+  } else {
+    const double one = (-depthMm - a) / (b - a), other = (depthMm - a) / (b - a);
+    begin = std::max(begin, std::min(one, other));
+    end = std::min(end, std::max(one, other));
+  }
+  if (!(begin <= end))
+    return {};
+  return std::array<Vector2d, 2>{PixelOf(from + begin * (to - from)), PixelOf(from + end * (to - from))};
+}
+
 std::vector<Vector2d> SliceFrame::CutOf(const Vector3d& middle, double radiusMm) const
 {
   constexpr int Sides = 64;

@@ -32,7 +32,8 @@ struct SliceFrame {
   double Position() const { return focus.dot(along); }
   Eigen::Vector3d WorldOf(double x, double y) const;
   Eigen::Vector2d PixelOf(const Eigen::Vector3d& world) const; ///< a point off the plane goes to where it is seen
-  std::array<Eigen::Vector3d, 4> Corners() const;              ///< outer ones: lower left, lower right, upper right, upper left
+  double DepthOf(const Eigen::Vector3d& world) const { return (world - focus).dot(Towards()); } ///< mm above the plane
+  std::array<Eigen::Vector3d, 4> Corners() const; ///< outer ones: lower left, lower right, upper right, upper left
   SlicePlane Plane() const;
 
   /// Moves the plane, not the view, so that it goes through the cursor.
@@ -46,6 +47,9 @@ struct SliceFrame {
   /// Where the plane of \a other, which goes through the cursor too, cuts this one: from end to end of the picture, in pixels.
   /// Nothing for a parallel plane, or when the line is not seen.
   std::optional<std::array<Eigen::Vector2d, 2>> CutBy(const SliceFrame& other) const;
+  /// The part of a line that lies within \a depthMm of the plane, in pixels; nothing when none does.
+  std::optional<std::array<Eigen::Vector2d, 2>> PartNear(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                                         double depthMm) const;
   /// Where the plane cuts a sphere: a closed path, in pixels; empty when it does not.
   std::vector<Eigen::Vector2d> CutOf(const Eigen::Vector3d& middle, double radiusMm) const;
   /// 1, 2 or 5 times a power of ten, at most a quarter of the width.
