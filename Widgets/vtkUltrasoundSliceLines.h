@@ -44,7 +44,8 @@ public:
     }
   }
 
-  void Draw(vtkUltrasoundAlignmentSession* session, const SliceFrame& frame, const std::vector<OtherPlane>& others, bool annotated)
+  void Draw(vtkUltrasoundAlignmentSession* session, const SliceFrame& frame, const std::vector<OtherPlane>& others,
+            bool annotated)
   {
     this->Lines.Clear();
     const double width = frame.width, height = frame.height;
@@ -107,7 +108,8 @@ private:
     const std::array<double, 3> colour{0.35, 0.95, 0.95};
     const double depth = std::min(std::abs(frame.DepthOf(*this->Pointer)), fadeMm);
     const Eigen::Vector2d at = frame.PixelOf(*this->Pointer);
-    for (const Eigen::Vector2d& way : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
+    for (const Eigen::Vector2d& way :
+         {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
       this->Lines.Add({at + gap * way, at + arm * way}, colour, static_cast<int>(255.0 - 145.0 * depth / fadeMm));
     }
   }

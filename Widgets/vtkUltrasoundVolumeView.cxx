@@ -9,6 +9,7 @@
 #include "vtkRenderWindow.h"
 #include "vtkUltrasoundAlignmentSession.h"
 #include "vtkUltrasoundErrorArrows.h"
+#include "vtkUltrasoundLineOfSight.h"
 #include "vtkUltrasoundParticleCloud.h"
 #include "vtkUltrasoundShownVolume.h"
 #include "vtkUltrasoundViewProps.h"
@@ -70,6 +71,12 @@ struct vtkUltrasoundVolumeView::Internals {
     this->Renderer->AddViewProp(this->Cloud.Actor);
   }
 
+  bool IsShown(const SessionVolume& volume) const
+  {
+    const std::vector<int>& only = this->View->Only;
+    return only.empty() ? volume.visible : std::find(only.begin(), only.end(), volume.id) != only.end();
+  }
+
   double KnownSeconds() const
   {
     const auto known = this->FullSeconds.find(this->View->Style);
@@ -102,9 +109,9 @@ struct vtkUltrasoundVolumeView::Internals {
     const int level = this->View->Detail.LevelFor(this->ExpectedSeconds());
     for (auto& [id, shown] : this->Volumes) {
       const SessionVolume* volume = this->Session ? this->Find(id) : nullptr;
-      if (volume && volume->visible && this->View->Style == "points") {
+      if (volume && this->IsShown(*volume) && this->View->Style == "points") {
         shown.ParticlesAt(level, *volume, this->Session->GetImage(id));
-      } else if (volume && volume->visible && this->View->Style == "volume") {
+      } else if (volume && this->IsShown(*volume) && this->View->Style == "volume") {
         shown.BytesAt(level, *volume, this->Session->GetImage(id));
       }
     }
@@ -151,7 +158,7 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
   this->Deferred = false;
   std::vector<int> visible;
   for (const SessionVolume& volume : this->State()) {
-    if (volume.visible) {
+    if (this->IsShown(volume)) {
       visible.push_back(volume.id);
     }
   }
@@ -179,9 +186,9 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
     } else if (looksOther) {
       this->FullSeconds.clear();
     }
-    shown.Box->SetVisibility(volume.visible && (this->View->Style == "outline" || this->Session->IsSelected(volume.id)));
+    shown.Box->SetVisibility(this->IsShown(volume) && (this->View->Style == "outline" || this->Session->IsSelected(volume.id)));
     shown.Box->GetProperty()->SetColor(volume.colour[0], volume.colour[1], volume.colour[2]);
-    shown.Volume->SetVisibility(volume.visible && this->View->Style == "volume");
+    shown.Volume->SetVisibility(this->IsShown(volume) && this->View->Style == "volume");
   }
   this->VisibleIds = visible;
   if (visible != before) {
@@ -303,6 +310,27 @@ void vtkUltrasoundVolumeView::OnSession(vtkObject*, unsigned long event, void* d
     }
   }
   this->Modified();
+}
+
+bool vtkUltrasoundVolumeView::SetOnly(const std::vector<int>& ids)
+{
+  if (this->Only == ids) {
+    return false;
+  }
+  this->Only = ids;
+  this->Parts->VolumesDirty = true;
+  this->Modified();
+  return true;
+}
+
+int vtkUltrasoundVolumeView::GetVolumeAt(double pixelX, double pixelY, int which)
+{
+  Internals& parts = *this->Parts;
+  const double least = this->Style == "outline" ? -1e300 : this->GetMinimum(),
+               most = this->Style == "outline" ? 1e300 : this->GetMaximum();
+  const auto ids = echorama::VolumesOnLine(parts.Session, parts.VisibleIds, echorama::LineOfSight(parts.Renderer, pixelX, pixelY),
+                                           least, most);
+  return which >= 0 && which < static_cast<int>(ids.size()) ? ids[static_cast<std::size_t>(which)] : 0;
 }
 
 void vtkUltrasoundVolumeView::Update()

@@ -60,6 +60,17 @@ public:
   void Fit();
 
   ///@{
+  /** These volumes alone, whatever is visible: to look at some without an edit. None (default): all that are. */
+  void AddOnly(int id)
+  {
+    std::vector<int> ids = this->Only;
+    ids.push_back(id);
+    this->SetOnly(ids);
+  }
+  void ClearOnly() { this->SetOnly({}); }
+  ///@}
+
+  ///@{
   /** "points", "volume" or "outline". Default "points". */
   bool SetStyle(const char* style);
   std::string GetStyle() const { return this->Style; }
@@ -139,6 +150,10 @@ public:
   bool GetShowPlanes() const { return this->ShowPlanes; }
   ///@}
 
+  /** The volumes on the line of sight of a pixel (from the lower left of the window), by where their first voxel lies that is
+   * bright and dark enough to be shown, the nearest first. 0: there are not so many. */
+  int GetVolumeAt(double pixelX, double pixelY, int which = 0);
+
   ///@{
   /** Arrows from where points of the volumes are to where they belong, coloured by their length, with a scale in mm. They are
    * there when the session has a truth. Default off. */
@@ -172,6 +187,7 @@ private:
   void OnStart();
   void OnEnd();
 
+  std::vector<int> Only;
   std::string Style = "points", DrawnBy = "automatic";
   echorama::ParticleParameters Parameters;
   double ParticleSize = 1.25;
@@ -180,6 +196,10 @@ private:
   double LastSeconds = 0.0;
   struct Internals;
   std::unique_ptr<Internals> Parts;
+
+public:
+  /** Only these volumes, as AddOnly. Returns whether others were shown. */
+  bool SetOnly(const std::vector<int>& ids);
 #endif
 };
 

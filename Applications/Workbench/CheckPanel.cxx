@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "CheckPanel.h"
 #include "Controls.h"
+#include "DisagreementBox.h"
 #include "Flicker.h"
 #include "GreyLevels.h"
 #include "MeasureTool.h"
@@ -49,6 +50,11 @@ CheckPanel::CheckPanel(Workbench* bench, QWidget* parent) : QWidget(parent), ben
   layout->setContentsMargins(6, 0, 6, 4);
   layout->addWidget(MeasureBox());
   layout->addWidget(FlickerBox());
+  auto* disagreement = new QGroupBox(tr("Disagreement"), this);
+  auto* inside = new QVBoxLayout(disagreement);
+  inside->setContentsMargins(0, 0, 0, 0);
+  inside->addWidget(new DisagreementBox(bench, disagreement));
+  layout->addWidget(disagreement);
   layout->addWidget(ReadoutBox());
   layout->addStretch(1);
   connect(bench, &Workbench::PointerChanged, this, &CheckPanel::ShowReadout);
@@ -96,8 +102,8 @@ QWidget* CheckPanel::MeasureBox()
   connect(profile_, &ProfilePlot::PointedAt, this, &CheckPanel::PointAlong);
   connect(profile_, &ProfilePlot::Left, this, [this] { bench_->SetPointer(std::nullopt, profile_); });
   auto* buttons = new QHBoxLayout;
-  buttons->addWidget(Button(box, "measureRemove", tr("Remove"), tr("Removes the measurements that are selected in the list (Delete)"),
-                            [this] { RemoveChosen(); }));
+  buttons->addWidget(Button(box, "measureRemove", tr("Remove"),
+                            tr("Removes the measurements that are selected in the list (Delete)"), [this] { RemoveChosen(); }));
   buttons->addWidget(Button(box, "measureClear", tr("Clear"), tr("Removes all measurements; can be undone"),
                             [this] { bench_->Session()->ClearMeasurements(); }));
   auto* layout = new QVBoxLayout(box);
@@ -119,12 +125,13 @@ QWidget* CheckPanel::FlickerBox()
   rate_ = NumberField(box, {"flickerRate", tr("Changes per second"), Flicker::SlowestHz, Flicker::FastestHz, 1, 0.5, tr(" /s")},
                       [this](double rate) { bench_->Flickering()->SetRate(rate); });
   Show(rate_, 2.0);
-  flickers_ = CheckField(box, "flickers", tr("Flicker (Shift+Space)"),
-                         tr("Shows both by turns in the slices: what does not agree jumps. Ends by itself when something is dragged"),
-                         [this](bool on) {
-                           on ? bench_->Flickering()->Start() : bench_->Flickering()->Stop();
-                           Show(flickers_, bench_->Flickering()->IsOn());
-                         });
+  flickers_ =
+      CheckField(box, "flickers", tr("Flicker (Shift+Space)"),
+                 tr("Shows both by turns in the slices: what does not agree jumps. Ends by itself when something is dragged"),
+                 [this](bool on) {
+                   on ? bench_->Flickering()->Start() : bench_->Flickering()->Stop();
+                   Show(flickers_, bench_->Flickering()->IsOn());
+                 });
   auto* form = new QFormLayout(box);
   form->setContentsMargins(2, 2, 2, 2);
   form->addRow(tr("Between"), one_);
@@ -173,7 +180,8 @@ void CheckPanel::ShowMeasurements()
   const auto& all = bench_->Session()->GetKernel().State().measurements;
   measures_->setRowCount(0);
   for (const Measurement& each : all) {
-    const QString value = QString("%1%2").arg(each.Value(), 0, 'f', each.IsAngle() ? 1 : 2).arg(each.IsAngle() ? tr("°") : tr(" mm"));
+    const QString value =
+        QString("%1%2").arg(each.Value(), 0, 'f', each.IsAngle() ? 1 : 2).arg(each.IsAngle() ? tr("°") : tr(" mm"));
     const int row = measures_->rowCount();
     InsertRow(measures_, row, {QString::number(each.number), each.IsAngle() ? tr("Angle") : tr("Distance"), value});
     if (each.number == bench_->Measuring()->Chosen())
@@ -196,7 +204,8 @@ void CheckPanel::ShowProfile()
   auto* session = bench_->Session();
   for (int id : bench_->Volumes())
     if (session->GetVisible(id))
-      curves.append({bench_->NameOf(id), ColourOf(*bench_, id), LineProfile(PosedVolumeOf(session, id), line[0], line[1], count)});
+      curves.append(
+          {bench_->NameOf(id), ColourOf(*bench_, id), LineProfile(PosedVolumeOf(session, id), line[0], line[1], count)});
   double window[2];
   session->GetGreyWindow(window);
   profile_->SetCurves(std::move(curves), length, window[0], window[1]);

@@ -132,11 +132,11 @@ void MainWindow::MakePanels()
   auto* volumes = new VolumePanel(bench_, this);
   AddLeft(volumes, tr("Volumes"));
   AddLeft(new PosePanel(bench_, this), tr("Pose"));
-  AddPanel(new ViewPanel(bench_, this), tr("View"));
+  AddPanel(new ViewPanel(bench_, views_, this), tr("View"));
   AddPanel(new BrushPanel(bench_, this), tr("Brush"));
   AddPanel(new HistoryPanel(bench_, this), tr("History"));
   Workspace& workspace = bench_->Shared();
-  auto* registration = new RegistrationPanel(workspace, this);
+  auto* registration = new RegistrationPanel(bench_, this);
   AddPanel(registration, tr("Align"));
   for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged})
     connect(bench_, changed, registration->Landmarks(), &LandmarkBox::ShowLandmarks);

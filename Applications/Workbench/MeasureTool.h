@@ -11,9 +11,9 @@ namespace echorama {
 
 class Workbench;
 
-/// Callipers and angles in the slices: clicks set the points one after the other, also in different slices; a distance can be drawn
-/// with one drag. A point of an old measurement is dragged. What is finished belongs to the session: undo, backups and projects
-/// have it.
+/// Callipers and angles in the slices: clicks set the points one after the other, also in different slices; a distance can be
+/// drawn with one drag. A point of an old measurement is dragged. What is finished belongs to the session: undo, backups and
+/// projects have it.
 class MeasureTool : public QObject {
   Q_OBJECT
 

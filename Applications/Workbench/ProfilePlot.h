@@ -9,8 +9,8 @@
 
 namespace echorama {
 
-/// Grey levels along a line, one curve per volume in its colour, over the way along it in mm. The mouse over it, or the arrow keys,
-/// point at a place of the line.
+/// Grey levels along a line, one curve per volume in its colour, over the way along it in mm. The mouse over it, or the arrow
+/// keys, point at a place of the line.
 class ProfilePlot : public QWidget {
   Q_OBJECT
 

@@ -7,6 +7,8 @@
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Registration/AlignPair.h"
 #include "LandmarkBox.h"
+#include "PairBox.h"
+#include "Workbench.h"
 #include "Workspace.h"
 #include <algorithm>
 #include <QCheckBox>
@@ -86,6 +88,27 @@ struct RegistrationPanel::Result {
     }
   };
   std::vector<Volume> volumes;
+  QVector<PairGraph::Edge> pairs;
+
+  void TakePairs(const AlignVolumesResult& found)
+  {
+    for (const PairOfVolumes& pair : found.pairs) {
+      const Volume &a = volumes[static_cast<std::size_t>(pair.fixed)], &b = volumes[static_cast<std::size_t>(pair.moving)];
+      const PairAlignment& its = pair.alignment;
+      QStringList lines{tr("%1% of the smaller volume overlap, similarity %2")
+                            .arg(100.0 * its.overlap, 0, 'f', 0)
+                            .arg(its.similarity, 0, 'f', 2)};
+      if (pair.verdict != Verdict::Failed)
+        lines.append(tr("predicted error %1 mm; %2 mm from where the volumes were placed")
+                         .arg(its.errorMm, 0, 'f', 2)
+                         .arg(pair.residualMm, 0, 'f', 2));
+      if (!pair.reason.empty())
+        lines.append(QString::fromStdString(pair.reason));
+      if (pair.votedDown)
+        lines.append(tr("other pairs disagreed with it"));
+      pairs.append({a.id, b.id, NameOf(pair.verdict), lines.join("\n"), pair.votedDown, pair.stands, its.errorMm});
+    }
+  }
 
   // The volumes as they are now, as blocks with their names; the first one is held.
   vtkSmartPointer<vtkMultiBlockDataSet> Take(vtkUltrasoundAlignmentSession* session, const std::vector<int>& ids)
@@ -105,7 +128,7 @@ struct RegistrationPanel::Result {
   }
 };
 
-RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : JobPanel(workspace, parent)
+RegistrationPanel::RegistrationPanel(Workbench* bench, QWidget* parent) : JobPanel(bench->Shared(), parent)
 {
   setObjectName("registrationPanel");
   refine_ =
@@ -136,11 +159,13 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : Jo
   place_ = Button(this, "placeByTracker", tr("&Place by tracker"),
                   tr("Puts all volumes beside the first as the tracker saw them"), [this] { PlaceByTracker(); });
   trackerForm->addRow(place_);
-  landmarks_ = new LandmarkBox(workspace, this);
+  landmarks_ = new LandmarkBox(workspace_, this);
+  pairs_ = new PairBox(bench, this);
   table_ = TableField(this, "alignResults", tr("What came out last; rest the mouse on an answer for its reason"),
                       {tr("Volume"), tr("Answer"), tr("Moved"), tr("Overlap")});
   table_->setSelectionMode(QAbstractItemView::NoSelection);
   table_->horizontalHeader()->setStretchLastSection(true);
+  table_->setMinimumHeight(130);
 
   auto* layout = new QVBoxLayout(this);
   auto* form = new QFormLayout;
@@ -150,9 +175,11 @@ RegistrationPanel::RegistrationPanel(Workspace& workspace, QWidget* parent) : Jo
   form->addRow(tr("Metric"), metric_);
   layout->addLayout(form);
   layout->addWidget(doubtful_);
+  layout->addWidget(table_);
+  layout->addWidget(pairs_);
   layout->addWidget(landmarks_);
   layout->addWidget(byTracker);
-  layout->addWidget(table_, 1);
+  layout->addStretch(1);
 }
 
 void RegistrationPanel::ShowState()
@@ -249,6 +276,7 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
       volume.overlap = aligner->GetOverlap(number);
       volume.SetMotion(motion);
     }
+    result->TakePairs(aligner->Result());
   };
   // Refining looks near where volumes are: what is farther away takes longer, and more of it looks alike.
   std::function<void()> farther;
@@ -306,6 +334,7 @@ void RegistrationPanel::Take(const QString& label, const Result& result, const s
       return;
     }
   }
+  pairs_->SetPairs(result.pairs);
   int moved = 0, left = 0, unsure = 0;
   QString why;
   table_->setRowCount(0);

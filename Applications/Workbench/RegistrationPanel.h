@@ -12,6 +12,8 @@ class QTableWidget;
 namespace echorama {
 
 class LandmarkBox;
+class PairBox;
+class Workbench;
 
 /// Automatic alignment of what is in the session: refining what is selected from where it is, aligning all volumes from scratch,
 /// or placing them as a tracker saw them. It runs in the background, tells what each answer is worth, and its result is one edit.
@@ -21,7 +23,7 @@ class RegistrationPanel : public JobPanel {
   Q_OBJECT
 
 public:
-  explicit RegistrationPanel(Workspace& workspace, QWidget* parent = nullptr);
+  explicit RegistrationPanel(Workbench* bench, QWidget* parent = nullptr);
 
   LandmarkBox* Landmarks() const { return landmarks_; }
 
@@ -47,6 +49,7 @@ private:
   QLineEdit *recording_, *tool_, *calibration_;
   QPushButton *refine_, *alignAll_, *place_;
   LandmarkBox* landmarks_;
+  PairBox* pairs_;
   QTableWidget* table_;
 };
 

@@ -66,6 +66,10 @@ SliceCanvas::SliceCanvas(Workbench* bench, QWidget* parent)
   connect(bench, &Workbench::OnlyChanged, this, &SliceCanvas::Look);
   connect(bench, &Workbench::PointerChanged, this, &SliceCanvas::ShowPointer);
   connect(bench, &Workbench::MeasurementsChanged, this, &SliceCanvas::Ask);
+  connect(bench, &Workbench::ShiftsChanged, this, [this] {
+    view_->SetShifts(bench_->Shifts().map, bench_->Shifts().mostMm, bench_->Shifts().isStale);
+    Ask();
+  });
   connect(bench->Measuring(), &MeasureTool::Changed, this, &SliceCanvas::ShowDraft);
   connect(bench, &Workbench::InteractingChanged, this, [this](bool on) {
     view_->SetInteractive(on);

@@ -12,7 +12,7 @@
 
 namespace echorama {
 
-ViewGrid::ViewGrid(Workbench* bench, QWidget* parent) : QWidget(parent)
+ViewGrid::ViewGrid(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
 {
   setObjectName("views");
   rows_ = new QSplitter(Qt::Vertical, this);
@@ -40,6 +40,7 @@ ViewGrid::ViewGrid(Workbench* bench, QWidget* parent) : QWidget(parent)
   }
   connect(volume_, &VolumePane::LargeAsked, this, [this] { ToggleLarge(volume_); });
   connect(bench, &Workbench::VolumesChanged, this, [this, bench] { FitToNew(bench->Session()->GetNumberOfVolumes()); });
+  connect(bench, &Workbench::PairAsked, this, &ViewGrid::CentreOnOverlap);
   SetLinked(true);
 }
 
@@ -53,6 +54,39 @@ void ViewGrid::FitToNew(int volumes)
     for (SlicePane* pane : slices_)
       pane->Fit();
   volumes_ = volumes;
+}
+
+// The middle of what both show; of volumes that do not overlap the middle between them.
+void ViewGrid::CentreOnOverlap(int a, int b)
+{
+  const auto& state = bench_->Session()->GetKernel().State();
+  const SessionVolume *one = state.Find(a), *other = state.Find(b);
+  if (!one || !other)
+    return;
+  constexpr int Places = 24; // along each axis
+  const ImageGeometry geometry = one->geometry.Moved(one->volumeToWorld);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (int n = 0; n < Places * Places * Places; ++n) {
+    Eigen::Vector3d index(n % Places, n / Places % Places, n / (Places * Places));
+    for (int axis = 0; axis < 3; ++axis)
+      index[axis] = (index[axis] + 0.5) / Places * geometry.dimensions[static_cast<std::size_t>(axis)] - 0.5;
+    const Eigen::Vector3d place = geometry.IndexToWorld() * index;
+    if (bench_->Session()->GetVoxelAt(a, place.data()) >= 0 && bench_->Session()->GetVoxelAt(b, place.data()) >= 0) {
+      sum += place;
+      ++count;
+    }
+  }
+  const Eigen::Vector3d middle =
+      count > 0 ? Eigen::Vector3d(sum / count)
+                : Eigen::Vector3d(0.5 * (geometry.Centre() + other->geometry.Moved(other->volumeToWorld).Centre()));
+  slices_[0]->Canvas()->View()->SetCursor(middle.x(), middle.y(), middle.z());
+  for (SlicePane* pane : slices_) {
+    pane->Canvas()->View()->SetFocus(middle.x(), middle.y(), middle.z());
+    pane->Canvas()->SetPlaced(true);
+    pane->ShowPlane();
+    pane->Canvas()->Ask();
+  }
 }
 
 QVector<QWidget*> ViewGrid::Views() const

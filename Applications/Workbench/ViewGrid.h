@@ -34,9 +34,11 @@ private:
   QVector<QWidget*> Views() const;
   void FollowSlice(SlicePane* changed);
   void FitToNew(int volumes);
+  void CentreOnOverlap(int a, int b);
 
   std::array<SlicePane*, 3> slices_;
   VolumePane* volume_;
+  Workbench* bench_;
   QSplitter *rows_, *above_, *below_;
   QWidget* large_ = nullptr;
   bool linked_ = false;

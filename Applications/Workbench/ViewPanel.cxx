@@ -1,25 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ViewPanel.h"
 #include "Controls.h"
+#include "SliceCanvas.h"
+#include "SlicePane.h"
+#include "ViewGrid.h"
 #include "vtkUltrasoundAlignmentSession.h"
+#include "vtkUltrasoundSliceView.h"
 #include "Workbench.h"
+#include <cmath>
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
 #include <QFormLayout>
 #include <QGroupBox>
+#include <QHBoxLayout>
 #include <QVBoxLayout>
 
 namespace echorama {
 
-ViewPanel::ViewPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
+ViewPanel::ViewPanel(Workbench* bench, ViewGrid* views, QWidget* parent) : QWidget(parent), bench_(bench), views_(views)
 {
   setObjectName("viewPanel");
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(6, 0, 6, 4);
   layout->addWidget(SliceControls());
+  layout->addWidget(ObliqueControls());
   layout->addWidget(VolumeControls());
   layout->addStretch(1);
+  for (SlicePane* pane : views->Slices())
+    for (auto changed : {&SliceCanvas::PlaneChanged, &SliceCanvas::Drawn}) // linked planes move without a word of their own
+      connect(pane->Canvas(), changed, this, &ViewPanel::ShowOblique);
   connect(bench, &Workbench::LookChanged, this, &ViewPanel::ShowLook);
   connect(bench, &Workbench::VolumesChanged, this, &ViewPanel::ShowWindow);
   ShowLook();
@@ -56,6 +66,73 @@ QWidget* ViewPanel::SliceControls()
   form->addRow(tr("Black"), black_);
   form->addRow(tr("White"), white_);
   return box;
+}
+
+QWidget* ViewPanel::ObliqueControls()
+{
+  auto* box = new QGroupBox(tr("Plane in numbers"), this);
+  auto* form = new QFormLayout(box);
+  form->setContentsMargins(2, 2, 2, 2);
+  obliqueIn_ = ChoiceField(box, "obliqueIn", tr("The slice whose plane this is"),
+                           {{"0", tr("Upper left")}, {"1", tr("Upper right")}, {"2", tr("Lower left")}},
+                           [this](const QString&) { ShowOblique(); });
+  const QString help =
+      tr("The direction that the slice is seen from (left, posterior, superior); any length. It becomes oblique. Shift "
+         "and middle drag in the slice turns it, too.");
+  auto* row = new QHBoxLayout;
+  row->setSpacing(2);
+  const char* const names[] = {"normalX", "normalY", "normalZ"};
+  for (int axis = 0; axis < 3; ++axis) {
+    normal_[axis] = NumberField(box, {names[axis], help, -1000.0, 1000.0, 4, 0.1, {}}, [this](double) { SetOblique(); });
+    normal_[axis]->setButtonSymbols(QAbstractSpinBox::NoButtons);
+    normal_[axis]->setMinimumWidth(40);
+    row->addWidget(normal_[axis]);
+  }
+  offset_ = NumberField(
+      box,
+      {"planeOffset", tr("How far the plane is from the origin of the world, along its normal"), -1e5, 1e5, 2, 1.0, tr(" mm")},
+      [this](double) { SetOblique(); });
+  form->addRow(tr("Of"), obliqueIn_);
+  form->addRow(tr("Normal"), row);
+  form->addRow(tr("Offset"), offset_);
+  ShowOblique();
+  return box;
+}
+
+// As the fields say. A plane along an axis stays one when only its offset changed.
+void ViewPanel::SetOblique()
+{
+  SlicePane* pane = views_->Slices()[static_cast<std::size_t>(obliqueIn_->currentIndex())];
+  vtkUltrasoundSliceView* view = pane->Canvas()->View();
+  const Eigen::Vector3d normal(normal_[0]->value(), normal_[1]->value(), normal_[2]->value());
+  const double offset = offset_->value(); // fields follow the plane
+  if (!(normal.norm() > 0.0)) {
+    bench_->Note(tr("A plane needs a normal that is not zero."));
+    return ShowOblique();
+  }
+  const SliceFrame before = view->GetFrame();
+  const Eigen::Vector3d unit = normal.normalized();
+  // Numbers that were only rounded are no other direction.
+  if ((unit - before.Towards()).norm() > 2e-4) {
+    // What is up stays up, unless it is the normal now.
+    const Eigen::Vector3d up = std::abs(before.up.dot(unit)) < 0.99 ? before.up : before.right;
+    view->SetNormalAndUp(unit.x(), unit.y(), unit.z(), up.x(), up.y(), up.z());
+  }
+  const SliceFrame& now = view->GetFrame();
+  const Eigen::Vector3d cursor = now.cursor + (offset - now.cursor.dot(now.Towards())) * now.Towards();
+  view->SetCursor(cursor.x(), cursor.y(), cursor.z());
+  pane->Canvas()->SetPlaced(true);
+  pane->Canvas()->Ask();
+  emit pane->Canvas()->PlaneChanged();
+}
+
+void ViewPanel::ShowOblique()
+{
+  const SliceFrame& frame = views_->Slices()[static_cast<std::size_t>(obliqueIn_->currentIndex())]->Canvas()->View()->GetFrame();
+  const Eigen::Vector3d normal = frame.Towards();
+  for (int axis = 0; axis < 3; ++axis)
+    Show(normal_[axis], normal[axis] + 0.0);
+  Show(offset_, frame.focus.dot(normal));
 }
 
 QWidget* ViewPanel::VolumeControls()

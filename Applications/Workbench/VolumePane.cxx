@@ -6,12 +6,15 @@
 #include "Controls.h"
 #include "Redraw.h"
 #include "SliceCanvas.h"
+#include "vtkUltrasoundAlignmentRepresentation.h"
 #include "vtkUltrasoundAlignmentSession.h"
+#include "vtkUltrasoundAlignmentWidget.h"
 #include "vtkUltrasoundSliceView.h"
 #include "vtkUltrasoundVolumeView.h"
 #include "Workbench.h"
 #include <QComboBox>
 #include <QHBoxLayout>
+#include <QLineF>
 #include <QMouseEvent>
 #include <QToolButton>
 #include <QVBoxLayout>
@@ -93,6 +96,11 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
     connect(bench, changed, this, &VolumePane::Ask);
   connect(bench, &Workbench::HandChanged, this, &VolumePane::Ask);
   connect(bench, &Workbench::LookChanged, this, &VolumePane::Look);
+  connect(bench, &Workbench::OnlyChanged, this, [this] {
+    const QVector<int>& only = bench_->Only();
+    if (view_->SetOnly({only.begin(), only.end()}))
+      Ask();
+  });
   connect(bench, &Workbench::VolumesChanged, this, &VolumePane::FitToNew);
   connect(bench, &Workbench::InteractingChanged, this, &VolumePane::Ask);
   Look();
@@ -199,8 +207,48 @@ void VolumePane::OnTurning(vtkObject*, unsigned long event, void*)
   Ask();
 }
 
+// The nearest; where it (or its group) is all that is selected, the next behind it.
+void VolumePane::SelectAt(const QPointF& position, bool add)
+{
+  auto* session = bench_->Session();
+  const double ratio = devicePixelRatioF();
+  const double x = position.x() * ratio, y = (canvas_->height() - position.y()) * ratio - 1.0;
+  QVector<int> ids;
+  for (int id = view_->GetVolumeAt(x, y); id > 0; id = view_->GetVolumeAt(x, y, ids.size()))
+    ids.append(id);
+  if (ids.isEmpty())
+    return;
+  int chosen = ids.first();
+  for (int i = 0; i < ids.size(); ++i) {
+    if (!add && session->IsSelected(ids[i]))
+      chosen = ids[(i + 1) % ids.size()];
+    if (add && !session->IsSelected(ids[i])) {
+      chosen = ids[i];
+      break;
+    }
+  }
+  session->Select(chosen, !add || !session->IsSelected(chosen), !add);
+}
+
 bool VolumePane::eventFilter(QObject* object, QEvent* event)
 {
+  constexpr double reach = 4.0; // pixels that a hand trembles in a click
+  const auto* mouse = static_cast<QMouseEvent*>(event);
+  if (event->type() == QEvent::MouseButtonPress) {
+    using Representation = vtkUltrasoundAlignmentRepresentation;
+    const bool onHandle = bench_->CurrentTool() == Tool::Align &&
+                          handles_->Widget()->GetAlignmentRepresentation()->GetInteractionState() != Representation::Outside;
+    isClick_ = mouse->button() == Qt::LeftButton && !onHandle && !(mouse->modifiers() & Qt::ShiftModifier);
+    pressed_ = mouse->localPos();
+  } else if (event->type() == QEvent::MouseMove) {
+    isClick_ = isClick_ && QLineF(pressed_, mouse->localPos()).length() <= reach;
+  } else if (event->type() == QEvent::MouseButtonRelease && mouse->button() == Qt::LeftButton && isClick_) {
+    isClick_ = false;
+    SelectAt(pressed_, mouse->modifiers() & Qt::ControlModifier);
+  } else if (event->type() == QEvent::KeyPress && static_cast<QKeyEvent*>(event)->key() == Qt::Key_Escape &&
+             bench_->BringBack()) {
+    return true;
+  }
   if (event->type() == QEvent::MouseButtonDblClick && static_cast<QMouseEvent*>(event)->button() == Qt::LeftButton) {
     emit LargeAsked();
     return true;

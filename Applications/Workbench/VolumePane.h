@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <array>
+#include <QPointF>
 #include <QVector>
 #include <QWidget>
 #include <vtkSmartPointer.h>
@@ -20,7 +21,7 @@ class SliceCanvas;
 class Workbench;
 
 /// The 3D view with its row of controls. The left button turns (on a handle of a volume: moves that), the middle one pans, the
-/// wheel and the right one zoom.
+/// wheel and the right one zoom. A click selects the volume there (Ctrl: beside the others), a second one that behind it.
 class VolumePane : public QWidget {
   Q_OBJECT
 
@@ -47,6 +48,7 @@ protected:
 private:
   void Look();
   void FitToNew();
+  void SelectAt(const QPointF& position, bool add);
   void OnTurning(vtkObject* style, unsigned long event, void* data);
   void Refine();
 
@@ -66,6 +68,8 @@ private:
   Redraw* redraw_;
   Redraw* refine_;
   bool turning_ = false;
+  QPointF pressed_; ///< where the left button went down beside all handles
+  bool isClick_ = false;
   bool isPlaced_ = false; ///< the camera was moved by hand
   int volumes_ = 0;
 };

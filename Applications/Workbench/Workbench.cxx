@@ -157,6 +157,14 @@ void Workbench::SetOnlyInSlices(const QVector<int>& ids)
   emit OnlyChanged();
 }
 
+void Workbench::SetShifts(const ShiftMap& shifts)
+{
+  if (shifts.map == shifts_.map && shifts.mostMm == shifts_.mostMm && shifts.isStale == shifts_.isStale)
+    return;
+  shifts_ = shifts;
+  emit ShiftsChanged();
+}
+
 bool Workbench::BringBack()
 {
   const bool was = flicker_->IsOn() || !only_.isEmpty();

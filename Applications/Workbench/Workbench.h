@@ -9,6 +9,9 @@
 #include <QObject>
 #include <QString>
 #include <QVector>
+#include <vtkSmartPointer.h>
+
+class vtkImageData;
 
 namespace echorama {
 
@@ -85,6 +88,14 @@ public:
   /// What Escape does when nothing is dragged: ends flickering, then brings all volumes back. False: there was neither.
   bool BringBack();
   ///@}
+  /// A map of shifts that slices lay over their pictures; see vtkUltrasoundSliceView::SetShifts.
+  struct ShiftMap {
+    vtkSmartPointer<vtkImageData> map; ///< nullptr: none
+    double mostMm = 1.0;
+    bool isStale = false;
+  };
+  void SetShifts(const ShiftMap& shifts);
+  const ShiftMap& Shifts() const { return shifts_; }
   MeasureTool* Measuring() const { return measuring_; }
   Flicker* Flickering() const { return flicker_; }
 
@@ -116,6 +127,7 @@ signals:
   void InteractingChanged(bool on);
   void ScoredChanged();
   void PointerChanged();
+  void ShiftsChanged();
   void OnlyChanged();           ///< in slices, and perhaps in 3D
   void PairAsked(int a, int b); ///< somebody wants to see where these overlap
 
@@ -139,6 +151,7 @@ private:
   std::optional<Eigen::Vector3d> pointer_;
   const QObject* pointerIn_ = nullptr;
   QVector<int> only_, onlyInSlices_;
+  ShiftMap shifts_;
   MeasureTool* measuring_;
   Flicker* flicker_;
 };

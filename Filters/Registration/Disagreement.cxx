@@ -10,14 +10,14 @@
 //
 // What is known. With correlation r, what one volume does not explain of the other has (1 - r^2) / r^2 of the variance of what
 // it does. Least squares then give the shift the covariance (1 - r^2) / (r^2 n) (-H)^-1, H the Hessian of log r, and n the number
-// of voxels with independent residuals: voxels over the correlation volume, for which the residuals' own correlation from voxel to
-// voxel is continued as a Gaussian. Eigenvectors with a small enough deviation are known.
+// of voxels with independent residuals: voxels over the correlation volume, for which the residuals' own correlation from voxel
+// to voxel is continued as a Gaussian. Eigenvectors with a small enough deviation are known.
 //
-// Chance. Fisher's transform z of a correlation varies by 1 / sqrt(n), whatever the correlation. For two fields that have nothing to
-// do with each other, n goes by the product of both autocorrelations; z must exceed that many times, because the best of hundreds of
-// shifts is taken. At two places that fit as well, z differs by sqrt(2 / n), n as for the residuals. So along a ridge log r goes up
-// and down by (1 - r^2) / (r sqrt(n)), which looks like a peak: how much its second differences are follows from the
-// autocorrelation of the residuals, and only directions in which the Hessian is several times larger are known.
+// Chance. Fisher's transform z of a correlation varies by 1 / sqrt(n), whatever the correlation. For two fields that have nothing
+// to do with each other, n goes by the product of both autocorrelations; z must exceed that many times, because the best of
+// hundreds of shifts is taken. At two places that fit as well, z differs by sqrt(2 / n), n as for the residuals. So along a ridge
+// log r goes up and down by (1 - r^2) / (r sqrt(n)), which looks like a peak: how much its second differences are follows from
+// the autocorrelation of the residuals, and only directions in which the Hessian is several times larger are known.
 #include "Disagreement.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
@@ -56,10 +56,10 @@ constexpr float NotSeen = std::numeric_limits<float>::quiet_NaN();
 
 // The fixed values of a cell and the moving ones that it meets, zero where not real.
 struct CellPatch {
-  int side = 0, reach = 0;     // of the cell and of the search, lattice points
-  int wide = 0;                // points of a row of the moving patch, with room for the last lanes
-  const float* fixed;          // side^3, NaN: not real
-  const float *m, *mm, *w;     // (side + 2 reach)^2 rows: values, squares, 1 where real
+  int side = 0, reach = 0; // of the cell and of the search, lattice points
+  int wide = 0;            // points of a row of the moving patch, with room for the last lanes
+  const float* fixed;      // side^3, NaN: not real
+  const float *m, *mm, *w; // (side + 2 reach)^2 rows: values, squares, 1 where real
 };
 
 // sums: ShiftSums numbers for each of the (2 reach + 1)^3 shifts, x fastest.
@@ -159,8 +159,8 @@ LatticeVolume ReadOnLattice(const PlacedVolume& volume, double stepMm, const std
   return read;
 }
 
-// How many voxels of an axis one counts for, whose correlation from voxel to voxel is r: the sum of a Gaussian autocorrelation, at
-// most all of them.
+// How many voxels of an axis one counts for, whose correlation from voxel to voxel is r: the sum of a Gaussian autocorrelation,
+// at most all of them.
 double CorrelatedVoxels(double r, int all)
 {
   constexpr double pi = 3.14159265358979323846;
@@ -193,7 +193,8 @@ public:
     moving_ = ReadOnLattice(moving, stepMm, movingFirst_, movingSize_);
   }
 
-  // Blocks are named by the cell of their highest corner: cell (i, j, k) and those before it. tell(first cell of the block, shift).
+  // Blocks are named by the cell of their highest corner: cell (i, j, k) and those before it. tell(first cell of the block,
+  // shift).
   template <class Tell>
   void ForEachBlock(const Progress& progress, const Tell& tell)
   {
@@ -269,11 +270,12 @@ private:
     return {place % count_ - reach_, place / count_ % count_ - reach_, place / (count_ * count_) - reach_};
   }
 
-  // What is left at a shift, by correlations from voxel to voxel along the axes: of the residuals, and the product of both volumes'
-  // own.
+  // What is left at a shift, by correlations from voxel to voxel along the axes: of the residuals, and the product of both
+  // volumes' own.
   struct Independent {
     double residuals = 1.0, chance = 1.0; ///< voxels
-    double roughness = 1.0; ///< second differences of what noise adds to the correlation, from shift to shift, in its own deviations
+    double roughness =
+        1.0; ///< second differences of what noise adds to the correlation, from shift to shift, in its own deviations
   };
 
   // The moving volume between lattice points, where all eight are real; else NaN.
@@ -368,8 +370,7 @@ private:
     std::vector<double> sums(static_cast<std::size_t>(ShiftSums * all), 0.0);
     for (int corner = 0; corner < 8; ++corner) {
       const auto& layer = corner & 4 ? above : below;
-      const std::vector<float>& cell =
-          layer[static_cast<std::size_t>((j + (corner >> 1 & 1)) * cells_[0] + i + (corner & 1))];
+      const std::vector<float>& cell = layer[static_cast<std::size_t>((j + (corner >> 1 & 1)) * cells_[0] + i + (corner & 1))];
       for (std::size_t s = 0; s < cell.size(); ++s)
         sums[s] += static_cast<double>(cell[s]);
     }
@@ -442,7 +443,7 @@ private:
   void Know(int i, int j, int k, const std::vector<double>& r, int best, LocalShift& result) const
   {
     constexpr double asGood = 0.7, nearlyAsGood = 3.0, clearlyWorse = 7.0; // by z, in its deviations
-    constexpr double clearPeak = 4.0;                                         // in deviations of its second differences
+    constexpr double clearPeak = 4.0;                                      // in deviations of its second differences
     const double top = std::min(r[static_cast<std::size_t>(best)], 1.0 - 1e-6);
     result.correlation = top;
     const Independent independent = IndependentAt(i, j, k, ShiftAt(best).cast<double>() + PeakAt(r, best).Beyond());
@@ -539,8 +540,9 @@ DisagreementMap Disagreement(const std::vector<PlacedVolume>& volumes, const Dis
   const int reach = std::max(2, static_cast<int>(std::ceil(parameters.searchMm / map.stepMm - 1e-9)) + 1);
   const int side = std::max(2, static_cast<int>(std::lround(0.5 * parameters.blockMm / map.stepMm)));
   if (reach > 24 || side > 24)
-    throw Error(Error::Kind::InvalidParameter, "StepMm is too small beside SearchMm or BlockMm: a search goes 23 steps at most, and "
-                                               "a block has 48 at most");
+    throw Error(Error::Kind::InvalidParameter,
+                "StepMm is too small beside SearchMm or BlockMm: a search goes 23 steps at most, and "
+                "a block has 48 at most");
   struct Told {
     std::array<int, 3> cell;
     LocalShift shift;
@@ -564,8 +566,8 @@ DisagreementMap Disagreement(const std::vector<PlacedVolume>& volumes, const Dis
     const double share = overlaps[p].volume() / std::max(work, 1e-300);
     const Progress part = progress.Part(done, std::min(1.0, done + share));
     part(0.0);
-    PairShifts pair(volumes[static_cast<std::size_t>(a)], volumes[static_cast<std::size_t>(b)], parameters, map.stepMm, side, reach,
-                    overlaps[p]);
+    PairShifts pair(volumes[static_cast<std::size_t>(a)], volumes[static_cast<std::size_t>(b)], parameters, map.stepMm, side,
+                    reach, overlaps[p]);
     pair.ForEachBlock(part, [&, a = a, b = b](const std::array<int, 3>& cell, const LocalShift& shift) {
       ++map.compared;
       map.known += shift.knownDirections > 0;
@@ -585,7 +587,8 @@ DisagreementMap Disagreement(const std::vector<PlacedVolume>& volumes, const Dis
   map.geometry.dimensions = {size[0], size[1], size[2]};
   map.geometry.spacing.setConstant(cellMm);
   // The middle of the block: between its two cells.
-  map.geometry.origin = cellMm * (cells.min().cast<double>() + Eigen::Vector3d::Ones()) - Eigen::Vector3d::Constant(0.5 * map.stepMm);
+  map.geometry.origin =
+      cellMm * (cells.min().cast<double>() + Eigen::Vector3d::Ones()) - Eigen::Vector3d::Constant(0.5 * map.stepMm);
   const std::size_t count = map.geometry.VoxelCount();
   map.shifts.assign(count, {});
   map.fixed.assign(count, -1);

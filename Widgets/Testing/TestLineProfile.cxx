@@ -100,8 +100,8 @@ TEST(ShiftColours, GrowBrighterWithTheShift)
 
 TEST(ShiftColours, LieOverWhatIsKnownAlone)
 {
-  // Two cells of 10 mm along x, the second not known; a plane of 30 x 9 pixels of 1 mm through their middle, on a grey picture whose
-  // lowest row is empty.
+  // Two cells of 10 mm along x, the second not known; a plane of 30 x 9 pixels of 1 mm through their middle, on a grey picture
+  // whose lowest row is empty.
   ImageGeometry geometry;
   geometry.dimensions = {2, 1, 1};
   geometry.spacing.setConstant(10.0);

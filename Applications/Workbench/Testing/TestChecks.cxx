@@ -3,14 +3,17 @@
 // flicker, the map of what disagrees, the graph of pairs, oblique planes in numbers. Real mouse and key events; what is asked is
 // what the session then holds and what the window shows.
 #include "CheckPanel.h"
+#include "DisagreementBox.h"
 #include "Flicker.h"
 #include "MeasureTool.h"
+#include "PairGraph.h"
 #include "ProfilePlot.h"
 #include "SliceCanvas.h"
 #include "SlicePane.h"
 #include "ViewGrid.h"
 #include "VolumePane.h"
 #include "vtkUltrasoundSliceView.h"
+#include "vtkUltrasoundVolumeView.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
 #include <cmath>
@@ -19,12 +22,14 @@
 #include <QDockWidget>
 #include <QDoubleSpinBox>
 #include <QLabel>
+#include <QPushButton>
 #include <QTableWidget>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
 #include <vtkDataArray.h>
 #include <vtkImageData.h>
 #include <vtkPointData.h>
+#include <vtkRenderer.h>
 #include <vtkUltrasoundVolume.h>
 
 using namespace echorama;
@@ -83,6 +88,10 @@ private slots:
   void theProfileShowsAShift();
   void flickerShowsBothSidesByTurns();
   void flickerEndsWhenSomethingIsDragged();
+  void disagreementIsFoundShownAndGoesStale();
+  void pairsAreAGraphAndOneIsLookedAtAlone();
+  void aClickIn3DSelectsAVolume();
+  void anObliquePlaneIsTyped();
 
 private:
   void Raise(WindowUnderTest& window, const char* panel)
@@ -156,8 +165,8 @@ void TestChecks::theReadoutTellsEveryVolume()
       const vtkIdType voxel = window.Session()->GetVoxelAt(id, world.data());
       const QString expected =
           voxel < 0 ? QString("outside")
-                    : QString::number(
-                          vtkUltrasoundVolume::GetIntensity(window.Session()->GetImage(id))->GetComponent(voxel, 0), 'g', 5);
+                    : QString::number(vtkUltrasoundVolume::GetIntensity(window.Session()->GetImage(id))->GetComponent(voxel, 0),
+                                      'g', 5);
       QCOMPARE(table->item(row, 1)->text(), expected);
       QVERIFY2(text.contains(QString::fromStdString(name) + ": " + expected), qPrintable(text));
       double rgb[3];
@@ -269,7 +278,8 @@ void TestChecks::whatWasMeasuredIsKept()
   {
     WindowUnderTest window;
     QVERIFY(window.Open(files));
-    made = DragDistance(window, window.Slice(2), window.Slice(2)->rect().center(), window.Slice(2)->rect().center() + QPoint(30, 40));
+    made = DragDistance(window, window.Slice(2), window.Slice(2)->rect().center(),
+                        window.Slice(2)->rect().center() + QPoint(30, 40));
     QVERIFY(window.Window().isWindowModified()); // closing asks
     QVERIFY(window.Session()->SaveProject(project.toUtf8()));
     window.Settle();
@@ -406,6 +416,217 @@ void TestChecks::flickerEndsWhenSomethingIsDragged()
   QVERIFY(window.Window().Bench()->OnlyInSlices().isEmpty());
   window.Release(slice, from + QPoint(16, 0));
   QVERIFY(window.Pose(2) != before);
+}
+
+// The anatomy twice, with a grain of its own each, 2 mm apart: the map says so, in colour and in numbers, and is stale once a
+// volume has moved.
+void TestChecks::disagreementIsFoundShownAndGoesStale()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({WriteVolume("one.mha", 1, {0, 0, 0}, 64), WriteVolume("two.mha", 2, {0, 0, 0}, 64)}));
+  Raise(window, "checkPanel");
+  window.Key(Qt::Key_1);
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(0.0, 2.0, 0.0);
+  SliceCanvas* slice = window.Slice(0);
+  slice->DrawNow();
+  const QByteArray plain = PictureOf(slice);
+  auto* button = window.Part<QPushButton>("findDisagreement");
+  QTest::mouseClick(button, Qt::LeftButton);
+  QVERIFY(!button->isEnabled());
+  QVERIFY(window.Wait());
+  QVERIFY(button->isEnabled());
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+  slice->DrawNow();
+  QVERIFY(PictureOf(slice) != plain);
+  auto* text = window.Part<QLabel>("disagreementText");
+  const QRegularExpressionMatch told =
+      QRegularExpression("(\\d+) of (\\d+) blocks.*Median ([0-9.]+) mm, 95% below ([0-9.]+) mm").match(text->text());
+  QVERIFY2(told.hasMatch(), qPrintable(text->text()));
+  QVERIFY2(told.captured(1).toInt() > 40, qPrintable(text->text()));
+  // Most of it is a shell, of which only the part across it is known: half of 2 mm in the mean, all of it at its poles.
+  QVERIFY2(std::abs(told.captured(3).toDouble() - 1.0) < 0.4, qPrintable(text->text()));
+  QVERIFY2(std::abs(told.captured(4).toDouble() - 2.0) < 0.3, qPrintable(text->text()));
+  QVERIFY(!text->text().contains("Stale"));
+  window.Screenshot("disagreement");
+  // Under the mouse, with its error; somewhere on the way across the shell.
+  bool isTold = false;
+  for (int x = -90; x <= 90 && !isTold; x += 15) {
+    window.Move(slice, slice->rect().center() + QPoint(x, 10));
+    isTold = window.Part<QLabel>("disagreementHere")->text().contains(QString::fromUtf8("\u00b1"));
+  }
+  QVERIFY(isTold);
+  // A move makes it stale, undo does not need to be told.
+  const QByteArray coloured = PictureOf(slice);
+  window.Session()->TranslateSelection(0.0, -1.0, 0.0);
+  window.Settle();
+  QVERIFY(text->text().contains("Stale"));
+  QVERIFY(window.Window().Bench()->Shifts().isStale);
+  window.Session()->Undo();
+  window.Settle();
+  QVERIFY(!text->text().contains("Stale"));
+  slice->DrawNow();
+  QVERIFY(PictureOf(slice) == coloured);
+  // Off: the plain picture.
+  window.Part<QCheckBox>("showDisagreement")->click();
+  slice->DrawNow();
+  QVERIFY(PictureOf(slice) == plain);
+}
+
+void TestChecks::pairsAreAGraphAndOneIsLookedAtAlone()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({WriteVolume("one.mha", 1, {0, 0, 0}, 64), WriteVolume("two.mha", 2, {8, 0, 0}, 64),
+                       WriteVolume("three.mha", 3, {0, 9, 3}, 64)}));
+  Raise(window, "registrationPanel");
+  window.Part<QComboBox>("alignStart")->setCurrentText("tracked");
+  QTest::mouseClick(window.Part<QPushButton>("alignAll"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  auto* graph = window.Part<PairGraph>("pairGraph");
+  auto* table = window.Part<QTableWidget>("pairTable");
+  QCOMPARE(graph->Nodes().size(), 3);
+  QCOMPARE(graph->Edges().size(), 3);
+  QCOMPARE(table->rowCount(), 3);
+  for (const PairGraph::Edge& edge : graph->Edges()) {
+    QVERIFY(edge.a != edge.b && edge.stands && !edge.votedDown);
+    QVERIFY2(edge.errorMm > 0.0 && edge.errorMm < 3.0, qPrintable(QString::number(edge.errorMm)));
+  }
+  // What is drawn: the edge in the colour of its verdict.
+  const QImage drawn = graph->grab().toImage();
+  int green = 0;
+  for (int y = 0; y < drawn.height(); ++y)
+    for (int x = 0; x < drawn.width(); ++x)
+      green += drawn.pixelColor(x, y) == PairGraph::ColourOf("aligned");
+  QVERIFY2(green > 100, qPrintable(QString::number(green)));
+  // A click on an edge shows its volumes alone, where they overlap, in slices and in 3D; nothing is an edit.
+  const int entries = window.Session()->GetUndoCount();
+  const int edge = 2;
+  const QVector<int> pair{graph->Edges()[edge].a, graph->Edges()[edge].b};
+  window.Click(graph, graph->MiddleOf(edge).toPoint());
+  QCOMPARE(window.Window().Bench()->Only(), pair);
+  QCOMPARE(graph->Chosen(), edge);
+  QCOMPARE(table->currentRow(), edge);
+  for (int i : {0, 1, 2}) {
+    double focus[3];
+    window.Slice(i)->View()->GetFocus(focus);
+    for (int id : pair)
+      QVERIFY(window.Session()->GetVoxelAt(id, focus) >= 0);
+  }
+  window.Screenshot("pair");
+  auto* volumes = window.Window().Views()->Volume()->View();
+  volumes->Update();
+  const int particles = volumes->GetNumberOfParticles();
+  // Again: all are back.
+  window.Click(graph, graph->MiddleOf(edge).toPoint());
+  QVERIFY(window.Window().Bench()->Only().isEmpty());
+  QCOMPARE(graph->Chosen(), -1);
+  QTRY_VERIFY(volumes->GetNumberOfParticles() > particles);
+  QCOMPARE(window.Session()->GetUndoCount(), entries);
+  // By keys, in the list; Escape brings all back, there and in a view.
+  table->setFocus();
+  table->setCurrentCell(0, 0);
+  window.Key(Qt::Key_Down);
+  QCOMPARE(window.Window().Bench()->Only(), (QVector<int>{graph->Edges()[1].a, graph->Edges()[1].b}));
+  window.Key(Qt::Key_Escape);
+  QVERIFY(window.Window().Bench()->Only().isEmpty());
+  window.Click(table->viewport(), table->visualItemRect(table->item(0, 0)).center());
+  QVERIFY(!window.Window().Bench()->Only().isEmpty());
+  window.Click(table->viewport(), table->visualItemRect(table->item(0, 0)).center());
+  QVERIFY(window.Window().Bench()->Only().isEmpty());
+  window.Click(graph, graph->MiddleOf(0).toPoint());
+  window.Slice(1)->setFocus();
+  window.Key(Qt::Key_Escape);
+  QVERIFY(window.Window().Bench()->Only().isEmpty());
+  // A volume that goes takes its pairs along.
+  window.Session()->RemoveVolume(3);
+  window.Settle();
+  QCOMPARE(graph->Edges().size(), 1);
+  QCOMPARE(table->rowCount(), 1);
+}
+
+void TestChecks::aClickIn3DSelectsAVolume()
+{
+  WindowUnderTest window;
+  // Side by side, as seen from the front.
+  QVERIFY(window.Open({WriteVolume("one.mha", 1, {-40, 0, 0}), WriteVolume("two.mha", 2, {40, 0, 0})}));
+  VolumePane* pane = window.Window().Views()->Volume();
+  vtkRenderer* renderer = pane->View()->GetRenderer();
+  const auto at = [&](int id) {
+    double middle[3], degrees[3];
+    window.Session()->GetPlacement(id, middle, degrees);
+    renderer->SetWorldPoint(middle[0], middle[1], middle[2], 1.0);
+    renderer->WorldToDisplay();
+    const double* place = renderer->GetDisplayPoint();
+    return QPoint(static_cast<int>(place[0]), pane->Canvas()->height() - 1 - static_cast<int>(place[1]));
+  };
+  window.Session()->SelectNone();
+  const auto click = [&](int id, Qt::KeyboardModifiers keys = {}) {
+    window.Move(pane->Canvas(), at(id) + QPoint(9, 14));
+    window.Press(pane->Canvas(), at(id) + QPoint(9, 14), Qt::LeftButton, keys);
+    window.Release(pane->Canvas(), at(id) + QPoint(9, 14), Qt::LeftButton, keys);
+    window.Settle();
+  };
+  for (const Qt::Key tool : {Qt::Key_1, Qt::Key_2}) {
+    window.Session()->SelectNone();
+    window.Key(tool);
+    click(1);
+    QVERIFY(window.Session()->IsSelected(1) && !window.Session()->IsSelected(2));
+    click(2);
+    QVERIFY(!window.Session()->IsSelected(1) && window.Session()->IsSelected(2));
+    click(1, Qt::ControlModifier);
+    QVERIFY(window.Session()->IsSelected(1) && window.Session()->IsSelected(2));
+    // A drag turns the view and selects nothing.
+    window.Session()->Select(1, true, true);
+    window.Drag(pane->Canvas(), QPoint(12, 12), QPoint(30, 20));
+    QVERIFY(window.Session()->IsSelected(1) && !window.Session()->IsSelected(2));
+    QCOMPARE(window.Session()->GetUndoCount(), 2);
+  }
+  // Beside all volumes a click changes nothing.
+  window.Click(pane->Canvas(), QPoint(8, 8));
+  QVERIFY(window.Session()->IsSelected(1) && !window.Session()->IsSelected(2));
+}
+
+void TestChecks::anObliquePlaneIsTyped()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  Raise(window, "viewPanel");
+  auto* view = window.Slice(0)->View();
+  const auto field = [&](const char* name) { return window.Part<QDoubleSpinBox>(name); };
+  QVERIFY(std::abs(field("normalZ")->value() + 1.0) < 1e-9); // axial: seen from the feet
+  window.Type(field("planeOffset"), "5.5");
+  QCOMPARE(view->GetAxis(), std::string("z"));
+  QVERIFY(std::abs(view->GetPosition() + 5.5) < 1e-9);
+  window.Type(field("normalX"), "0.6");
+  QCOMPARE(view->GetAxis(), std::string("oblique"));
+  Vector3d normal, focus;
+  view->GetNormal(normal.data());
+  QVERIFY2((normal - Vector3d(0.6, 0.0, -1.0).normalized()).norm() < 1e-3, qPrintable(QString::number(normal.x())));
+  view->GetFocus(focus.data());
+  QVERIFY(std::abs(focus.dot(normal) - 5.5) < 0.01);
+  // In step with the mouse, and with the choice of the slice.
+  window.Drag(window.Slice(0), window.Slice(0)->rect().center(), window.Slice(0)->rect().center() + QPoint(30, 20),
+              Qt::MiddleButton, Qt::ShiftModifier);
+  Vector3d turned;
+  view->GetNormal(turned.data());
+  QVERIFY((turned - normal).norm() > 0.1);
+  const char* const names[] = {"normalX", "normalY", "normalZ"};
+  for (int axis = 0; axis < 3; ++axis)
+    QVERIFY(std::abs(field(names[axis])->value() - turned[axis]) < 1e-4);
+  auto* which = window.Part<QComboBox>("obliqueIn");
+  which->setFocus();
+  window.Key(Qt::Key_Down);
+  QCOMPARE(which->currentIndex(), 1);
+  window.Slice(1)->View()->GetNormal(normal.data());
+  for (int axis = 0; axis < 3; ++axis)
+    QVERIFY(std::abs(field(names[axis])->value() - normal[axis]) < 1e-4);
+  // No direction: said, and nothing changes.
+  window.Type(field("normalY"), "0");
+  QVERIFY(window.HasMessage("normal"));
+  Vector3d after;
+  window.Slice(1)->View()->GetNormal(after.data());
+  QVERIFY(after == normal);
+  QVERIFY(std::abs(field("normalY")->value() - normal.y()) < 1e-4);
 }
 
 int main(int argc, char** argv)

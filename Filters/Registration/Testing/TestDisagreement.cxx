@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Known shifts between volumes that see one tissue, each with a grain of its own.
+#include "Core/Base/Error.h"
 #include "Filters/Registration/Disagreement.h"
 #include "LocalAlignScene.h"
-#include "Core/Base/Error.h"
 
 using namespace echorama;
 using namespace echorama::testing_scene;
@@ -67,7 +67,8 @@ Seen Look(const ImageGeometry& geometry, const std::function<double(const Vector
   const Eigen::Affine3d toIndex = geometry.WorldToIndex();
   return Seen(geometry, [&](const Vector3d& p) {
     const Vector3d at = toIndex * p;
-    return static_cast<float>(field(p)) + noise.View()(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())),
+    return static_cast<float>(field(p)) + noise.View()(static_cast<int>(std::lround(at.x())),
+                                                       static_cast<int>(std::lround(at.y())),
                                                        static_cast<int>(std::lround(at.z())));
   });
 }
@@ -90,7 +91,8 @@ TEST(Disagreement, AKnownShiftIsFoundBlockByBlock)
   const Tissue texture(3);
   const Vector3d shift(1.3, -0.8, 0.45);
   const Seen fixed = Look(Cube(56, 0.9, {0, 0, 0}, 0.4), texture, 1, 10.0);
-  const Seen moving = Look(Cube(60, 0.8, {6, 2, -3}, -0.2), [&](const Vector3d& p) { return 0.4 * texture(p - shift) + 60.0; }, 2, 4.0);
+  const Seen moving = Look(
+      Cube(60, 0.8, {6, 2, -3}, -0.2), [&](const Vector3d& p) { return 0.4 * texture(p - shift) + 60.0; }, 2, 4.0);
   const DisagreementMap map = MapOf(fixed, moving);
   EXPECT_GT(map.compared, 150);
   EXPECT_GT(ShareKnown(map), 0.9);
@@ -114,7 +116,8 @@ TEST(Disagreement, AKnownShiftIsFoundBlockByBlock)
 TEST(Disagreement, WhereVolumesAgreeItIsNothing)
 {
   const Tissue texture(5);
-  const Seen fixed = Look(Cube(56, 0.9, {0, 0, 0}), texture, 1, 10.0), moving = Look(Cube(56, 0.9, {5, 0, 0}, 0.3), texture, 2, 10.0);
+  const Seen fixed = Look(Cube(56, 0.9, {0, 0, 0}), texture, 1, 10.0),
+             moving = Look(Cube(56, 0.9, {5, 0, 0}, 0.3), texture, 2, 10.0);
   const DisagreementMap map = MapOf(fixed, moving);
   EXPECT_GT(ShareKnown(map), 0.9);
   double sum = 0.0;
@@ -129,7 +132,8 @@ TEST(Disagreement, AShiftThatVariesIsFollowed)
   const Tissue texture(7);
   const auto shiftAt = [](const Vector3d& p) { return Vector3d(0.0, 0.08 * p.x(), 0.0); };
   const Seen fixed = Look(Cube(64, 0.9, {0, 0, 0}), texture, 1, 6.0);
-  const Seen moving = Look(Cube(64, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return texture(p - shiftAt(p)); }, 2, 6.0);
+  const Seen moving = Look(
+      Cube(64, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return texture(p - shiftAt(p)); }, 2, 6.0);
   const DisagreementMap map = MapOf(fixed, moving);
   const auto& n = map.geometry.dimensions;
   double squares = 0.0, slope = 0.0, across = 0.0;
@@ -155,7 +159,8 @@ TEST(Disagreement, AnEdgeTellsItsNormalAlone)
   const Vector3d normal = Vector3d(2, 1, -1).normalized(), shift(1.5, 0.5, 1.0);
   const auto edge = [&](const Vector3d& p) { return 100.0 + 60.0 * std::tanh(normal.dot(p) / 2.0); };
   const Seen fixed = Look(Cube(48, 0.9, {0, 0, 0}), edge, 1, 4.0);
-  const Seen moving = Look(Cube(48, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return edge(p - shift); }, 2, 4.0);
+  const Seen moving = Look(
+      Cube(48, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return edge(p - shift); }, 2, 4.0);
   const DisagreementMap map = MapOf(fixed, moving);
   int single = 0, sideways = 0, off = 0;
   for (const LocalShift& each : map.shifts) {
@@ -178,7 +183,8 @@ TEST(Disagreement, WhereThereIsNothingToSeeNothingIsTold)
   const auto flat = [](const Vector3d&) { return 100.0; };
   // A corner differs, so that the volumes as a whole are not constant.
   const auto nearlyFlat = [](const Vector3d& p) { return p.minCoeff() > 18.0 ? 200.0 : 100.0; };
-  const Seen uniform = Look(Cube(48, 0.9, {0, 0, 0}), nearlyFlat, 1, 0.0), again = Look(Cube(48, 0.9, {2, 0, 0}), nearlyFlat, 2, 0.0);
+  const Seen uniform = Look(Cube(48, 0.9, {0, 0, 0}), nearlyFlat, 1, 0.0),
+             again = Look(Cube(48, 0.9, {2, 0, 0}), nearlyFlat, 2, 0.0);
   const DisagreementMap none = MapOf(uniform, again);
   EXPECT_GT(none.compared, 100);
   EXPECT_LE(none.known, 8) << "the corner";
@@ -195,8 +201,10 @@ TEST(Disagreement, WhereThereIsNothingToSeeNothingIsTold)
 // Two bodies that have nothing to do with each other agree nowhere, whatever the size of what they show.
 TEST(Disagreement, DifferentTissuesDoNotAgreeByChance)
 {
-  const DisagreementMap fine = MapOf(Look(Cube(64, 0.9, {0, 0, 0}), Tissue(21), 1, 5.0), Look(Cube(64, 0.9, {0, 0, 0}), Tissue(22), 2, 5.0));
-  const DisagreementMap coarse = MapOf(Look(Cube(64, 0.9, {0, 0, 0}), Texture(21), 1, 5.0), Look(Cube(64, 0.9, {0, 0, 0}), Texture(22), 2, 5.0));
+  const DisagreementMap fine =
+      MapOf(Look(Cube(64, 0.9, {0, 0, 0}), Tissue(21), 1, 5.0), Look(Cube(64, 0.9, {0, 0, 0}), Tissue(22), 2, 5.0));
+  const DisagreementMap coarse =
+      MapOf(Look(Cube(64, 0.9, {0, 0, 0}), Texture(21), 1, 5.0), Look(Cube(64, 0.9, {0, 0, 0}), Texture(22), 2, 5.0));
   EXPECT_LT(ShareKnown(fine), 0.05);
   EXPECT_LT(ShareKnown(coarse), 0.05);
 }
@@ -208,12 +216,15 @@ TEST(Disagreement, WhatIsAmbiguousOrTooFarIsNotTold)
     const double k = 2.0 * 3.14159265358979 / 6.0; // per mm: three periods fit into the search
     return 100.0 + 30.0 * std::sin(k * p.x()) * std::sin(k * p.y()) * std::sin(k * p.z());
   };
-  const DisagreementMap repeats = MapOf(Look(Cube(56, 0.9, {0, 0, 0}), waves, 1, 5.0), Look(Cube(56, 0.9, {0, 0, 0}), waves, 2, 5.0));
+  const DisagreementMap repeats =
+      MapOf(Look(Cube(56, 0.9, {0, 0, 0}), waves, 1, 5.0), Look(Cube(56, 0.9, {0, 0, 0}), waves, 2, 5.0));
   EXPECT_LT(ShareKnown(repeats), 0.02);
   const Tissue texture(9);
   const Vector3d far(14.0, 0.0, 0.0);
-  const DisagreementMap beyond = MapOf(Look(Cube(64, 0.9, {0, 0, 0}), texture, 1, 6.0),
-                                       Look(Cube(64, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return texture(p - far); }, 2, 6.0));
+  const DisagreementMap beyond =
+      MapOf(Look(Cube(64, 0.9, {0, 0, 0}), texture, 1, 6.0),
+            Look(
+                Cube(64, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return texture(p - far); }, 2, 6.0));
   int small = 0;
   for (const LocalShift& each : beyond.shifts)
     small += each.knownDirections == 3 && each.mm < 2.0;
@@ -234,7 +245,8 @@ TEST(Disagreement, ValidRegionsAreKeptAndTheWorstPairIsTold)
   };
   const Seen one = Look(Cube(56, 0.9, {0, 0, 0}), texture, 1, 6.0);
   const Seen two = cut(Look(Cube(56, 0.9, {0, 0, 0}), texture, 2, 6.0));
-  const Seen three = Look(Cube(56, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return texture(p - Vector3d(0, 2.0, 0)); }, 3, 6.0);
+  const Seen three = Look(
+      Cube(56, 0.9, {0, 0, 0}), [&](const Vector3d& p) { return texture(p - Vector3d(0, 2.0, 0)); }, 3, 6.0);
   const DisagreementMap cutMap = MapOf(one, two);
   EXPECT_GT(cutMap.known, 50);
   const auto& n = cutMap.geometry.dimensions;
