@@ -69,6 +69,19 @@ std::vector<std::string> CompanionPaths(const std::string& path)
   return files;
 }
 
+std::vector<std::string> FilesOfVolume(const std::string& path)
+{
+  std::vector<std::string> files;
+  std::error_code none;
+  if (!fs::exists(path, none))
+    return files;
+  for (const fs::path& file : FilesOfInput(path))
+    if (const std::string name = file.lexically_normal().string();
+        fs::is_regular_file(file, none) && std::find(files.begin(), files.end(), name) == files.end())
+      files.push_back(name);
+  return files;
+}
+
 bool IsCompanion(const std::string& file, const std::vector<std::string>& files)
 {
   const auto normal = [](const std::string& path) { return fs::path(path).lexically_normal(); };

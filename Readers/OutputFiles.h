@@ -12,6 +12,10 @@ std::vector<std::string> CompanionPaths(const std::string& path);
 /// Whether \a file is no volume of its own, but belongs to another one of \a files.
 bool IsCompanion(const std::string& file, const std::vector<std::string>& files);
 
+/// The files that hold the volume \a path and are there: it, its companions, the voxels beside a header; of a folder of slices
+/// all files in it. None: the volume is not there. Each once.
+std::vector<std::string> FilesOfVolume(const std::string& path);
+
 /// Refuses, before any work is done, what cannot become the output \a path: a folder, another thing that is not a file, a
 /// place in a folder that is missing or cannot be written in, and whatever would replace an input. Links are followed, and
 /// the files that belong to a volume (its valid region, its detached voxels) count, on both sides. Throws Error(FileSystem).

@@ -31,6 +31,7 @@
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
 #include "Widgets/Session/AlignmentSession.h"
+#include "Widgets/Session/ProjectFolder.h"
 #include "Widgets/Session/SessionStorage.h"
 #include "Widgets/Session/SessionTruth.h"
 #include <algorithm>
@@ -132,6 +133,9 @@ public:
     return volume && std::copy(volume->colour.begin(), volume->colour.end(), rgb) != rgb;
   }
   bool SetColour(int id, double r, double g, double b) { return this->Do(&Kernel::SetColour, id, {r, g, b}); }
+  /** The tints that volumes get: "many" (seven), "grey-amber" or "blue-orange" (three, that people who see no red or no green
+   * can tell apart). Those that wear one change, in one edit. */
+  bool SetTints(const char* set) { return this->Do(&Kernel::SetTints, set ? set : ""); }
   double GetOpacity(int id) const { return this->Of(id, &echorama::SessionVolume::opacity); }
   bool SetOpacity(int id, double opacity) { return this->Do(&Kernel::SetOpacity, id, opacity); }
   bool GetVisible(int id) const { return this->Of(id, &echorama::SessionVolume::visible); }
@@ -263,6 +267,12 @@ public:
    * one of the volumes is never replaced. */
   bool OpenProject(const char* path, vtkMultiBlockDataSet* volumes = nullptr);
   bool SaveProject(const char* path, bool withoutUnsavedResults = false);
+  /** The project with all that it needs in one new folder, which opens on another machine: FOLDER/NAME.json, FOLDER/volumes, and
+   * the truth. The session goes on where it is. */
+  bool CopyProject(const char* folder)
+  {
+    return this->Change([&] { echorama::CopyProject(this->Now(), folder ? folder : ""); });
+  }
   /** The files a project needs, where they are now; an empty string for one that is nowhere. */
   bool GetProjectFiles(const char* path, vtkStringArray* files);
   /** Where else volumes of projects are looked for. */
@@ -370,6 +380,8 @@ public:
     const echorama::Pose* truth = this->Truth.Find(id);
     return truth ? std::optional<echorama::Pose>(*truth) : std::nullopt;
   }
+  /** What SaveProject writes: for jobs beside the work. */
+  echorama::Project Now() const;
   /** For tools that drag: see AlignmentSession::MoveHeld. */
   bool MoveHeld(const echorama::AlignmentSession::Grip& grip, const echorama::Pose& motion)
   {
@@ -420,7 +432,6 @@ private:
   void BackUpInTheBackground(const std::string& label);
   void TellTrouble(const std::string& trouble);
   void Warn(const std::string& text); ///< unless it is empty
-  echorama::Project Now() const;
   std::vector<std::string> Folders() const;
 
   echorama::AlignmentSession Session;

@@ -8,6 +8,7 @@
 #include "Widgets/Session/AlignmentSession.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Widgets/Session/Tints.h"
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -16,15 +17,6 @@ namespace echorama {
 namespace {
 
 constexpr std::array<double, 3> White{1.0, 1.0, 1.0};
-
-// The tints of further volumes: far apart, and light enough that grey levels stay readable through them.
-constexpr std::array<std::array<double, 3>, 7> Tints{{{1.0, 1.0, 1.0},
-                                                      {1.0, 0.72, 0.38},
-                                                      {0.45, 0.78, 1.0},
-                                                      {0.60, 0.92, 0.50},
-                                                      {1.0, 0.58, 0.80},
-                                                      {0.92, 0.90, 0.42},
-                                                      {0.70, 0.64, 1.0}}};
 
 // Of results: another one than any of the tints, and as light.
 constexpr std::array<double, 3> ResultTint{0.62, 1.0, 0.88};
@@ -232,13 +224,14 @@ int AlignmentSession::Add(SessionVolume volume)
     if (volume.colour == White && volume.madeOf) {
       volume.colour = ResultTint;
     } else if (volume.colour == White) {
-      // The first tint that is the rarest among the others: white for the first volume.
+      // The first tint that is the rarest among the others.
+      const std::vector<Tint>& tints = TintSetOf(tints_).tints;
       const auto uses = [this](const std::array<double, 3>& tint) {
         return std::count_if(state_.volumes.begin(), state_.volumes.end(),
                              [&](const SessionVolume& other) { return other.colour == tint; });
       };
       volume.colour =
-          *std::min_element(Tints.begin(), Tints.end(), [&](const auto& a, const auto& b) { return uses(a) < uses(b); });
+          *std::min_element(tints.begin(), tints.end(), [&](const auto& a, const auto& b) { return uses(a) < uses(b); });
     }
     volume.id = nextId_++;
     volume.edition = 0;
@@ -347,6 +340,17 @@ void AlignmentSession::SetColour(int id, const std::array<double, 3>& rgb)
 {
   CheckColour(rgb);
   EditOne("Colour of", id, [&](SessionVolume& volume) { volume.colour = rgb; });
+}
+
+void AlignmentSession::SetTints(const std::string& set)
+{
+  const std::vector<Tint>&before = TintSetOf(tints_).tints, &after = TintSetOf(set).tints;
+  Edit("Colours", [&] {
+    for (SessionVolume& volume : state_.volumes)
+      if (const auto worn = std::find(before.begin(), before.end(), volume.colour); worn != before.end())
+        volume.colour = after[static_cast<std::size_t>(worn - before.begin()) % after.size()];
+  });
+  tints_ = set;
 }
 
 void AlignmentSession::SetOpacity(int id, double opacity)

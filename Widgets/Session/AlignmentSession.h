@@ -71,6 +71,9 @@ public:
   void SetName(int id, const std::string& name); ///< Error(InvalidParameter) when empty or another volume's
   void SetColour(int id, const std::array<double, 3>& rgb);
   void SetOpacity(int id, double opacity);
+  /// Volumes get the tints of this set (TintSets()) from now on; those that wear one of the set before get its counterpart, which
+  /// is one edit. \throws Error(InvalidParameter) for a name that none has.
+  void SetTints(const std::string& set);
   void SetVisible(int id, bool visible);
   void AddStroke(int id, Stroke stroke);
   ///@}
@@ -144,6 +147,7 @@ private:
   std::string label_;
   int depth_ = 0, nextId_ = 1, lastEdition_ = 0;
   long long version_ = 0;
+  std::string tints_ = "many";
   std::set<int> selection_;
 };
 
