@@ -113,6 +113,7 @@ QTableWidget* TableField(QWidget* parent, const char* name, const QString& help,
   table->setHorizontalHeaderLabels(headers);
   table->setEditTriggers(QAbstractItemView::NoEditTriggers);
   table->verticalHeader()->hide();
+  table->setTabKeyNavigation(false); // Tab leaves it
   return table;
 }
 

@@ -3,9 +3,14 @@
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QProgressBar>
+#include <QTimer>
 #include <QToolButton>
 
 namespace echorama {
+
+namespace {
+constexpr int ShowMs = 300;
+}
 
 JobBar::JobBar(QWidget* parent) : QWidget(parent)
 {
@@ -18,7 +23,7 @@ void JobBar::Watch(Job* job)
 {
   auto* row = new QWidget(this);
   auto* layout = new QHBoxLayout(row);
-  layout->setContentsMargins(0, 0, 0, 0);
+  layout->setContentsMargins(8, 0, 4, 0);
   auto* label = new QLabel(job->Label(), row);
   auto* bar = new QProgressBar(row);
   bar->setObjectName("jobProgress");
@@ -32,6 +37,8 @@ void JobBar::Watch(Job* job)
   layout->addWidget(bar);
   layout->addWidget(stop);
   this->layout()->addWidget(row);
+  row->hide(); // what is done before anybody could read of it does not make the window jump
+  QTimer::singleShot(ShowMs, row, &QWidget::show);
   jobs_.append(job);
   emit CountChanged(++count_);
 

@@ -15,8 +15,9 @@ struct Message {
     QString label;
     std::function<void()> action;
   };
-  QVector<Answer> answers; ///< one button each; a message without is closed by its cross, a note by itself
-  QString topic = {};      ///< takes the place of what was said of it before; none: stays beside all others
+  using Answers = QVector<Answer>;
+  Answers answers;    ///< one button each; a message without is closed by its cross, a note by itself
+  QString topic = {}; ///< takes the place of what was said of it before; none: stays beside all others
 };
 
 } // namespace echorama

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "MessageBar.h"
 #include "Message.h"
+#include "Theme.h"
 #include <exception>
+#include <QApplication>
+#include <QEvent>
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QPushButton>
@@ -15,16 +18,22 @@ namespace {
 
 constexpr int MostRows = 4, NoteMs = 6000;
 
-const char* StyleOf(Message::Kind kind)
+// What it is: a colour, and a sign for those who do not see it.
+struct Looks {
+  const char *dark, *light, *sign;
+};
+const Looks& LooksOf(int kind)
 {
-  switch (kind) {
-  case Message::Note:
-    return "#messageRow { background: #2f4a5f; border-radius: 3px; }";
-  case Message::Warning:
-    return "#messageRow { background: #6b3a34; border-radius: 3px; }";
-  default:
-    return "#messageRow { background: #62532a; border-radius: 3px; }";
-  }
+  static const Looks looks[] = {
+      {"#2f4a5f", "#cfe2f2", "i"}, {"#6b3a34", "#f6d3cd", "!"}, {"#62532a", "#f3e6bd", "?"}}; // as Message::Kind
+  return looks[kind];
+}
+
+void ApplyLooks(QWidget* row)
+{
+  const Looks& looks = LooksOf(row->property("kind").toInt());
+  row->setStyleSheet(QString("#messageRow { background: %1; border-radius: 3px; }")
+                         .arg(IsDark(QApplication::palette()) ? looks.dark : looks.light));
 }
 
 } // namespace
@@ -62,6 +71,14 @@ void MessageBar::Clear()
   }
 }
 
+void MessageBar::changeEvent(QEvent* event)
+{
+  QWidget::changeEvent(event);
+  if (event->type() == QEvent::PaletteChange)
+    for (auto* row : findChildren<QFrame*>("messageRow"))
+      ApplyLooks(row);
+}
+
 void MessageBar::Show(const Message& message)
 {
   if (!message.topic.isEmpty())
@@ -75,10 +92,11 @@ void MessageBar::Show(const Message& message)
   auto* row = new QFrame(this);
   row->setObjectName("messageRow");
   row->setProperty("topic", message.topic);
-  row->setProperty("isNote", message.kind == Message::Note);
-  row->setStyleSheet(StyleOf(message.kind));
+  row->setProperty("kind", static_cast<int>(message.kind));
+  ApplyLooks(row);
   auto* layout = new QHBoxLayout(row);
   layout->setContentsMargins(8, 3, 4, 3);
+  layout->addWidget(new QLabel(QString("<b>%1</b>").arg(LooksOf(message.kind).sign), row));
   auto* text = new QLabel(message.text, row);
   text->setObjectName("messageText");
   text->setTextFormat(Qt::PlainText);
@@ -127,7 +145,7 @@ void MessageBar::Show(const Message& message)
   for (auto* other : rows)
     shown += !other->isHidden();
   for (auto* other : rows)
-    if (shown > MostRows && !other->isHidden() && other != row && other->property("isNote").toBool()) {
+    if (shown > MostRows && !other->isHidden() && other != row && other->property("kind") == Message::Note) {
       other->hide();
       other->deleteLater();
       shown--;

@@ -20,6 +20,9 @@ public:
   QStringList Texts() const; ///< from the oldest to the newest
   void Clear();
 
+protected:
+  void changeEvent(QEvent* event) override;
+
 private:
   QWidget* RowOf(const QString& text) const;
 };

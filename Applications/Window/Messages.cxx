@@ -12,7 +12,7 @@ namespace {
 
 struct Gathered {
   int users = 0;
-  std::vector<std::string> errors;
+  std::vector<std::string> errors, warnings;
 };
 thread_local Gathered gathered;
 
@@ -34,8 +34,7 @@ private:
   {
     const std::string message = echorama::SentenceOfVtkMessage(text ? text : "");
     if (gathered.users > 0) {
-      if (isError)
-        gathered.errors.push_back(message);
+      (isError ? gathered.errors : gathered.warnings).push_back(message);
     } else if (show) {
       show(message, isError);
     }
@@ -55,7 +54,7 @@ void Messages::Install(std::function<void(const std::string&, bool)> show)
   vtkOutputWindow::SetInstance(window);
 }
 
-Messages::OfThread::OfThread() : begin_(gathered.errors.size())
+Messages::OfThread::OfThread() : begin_(gathered.errors.size()), beginOfWarnings_(gathered.warnings.size())
 {
   ++gathered.users;
 }
@@ -64,6 +63,12 @@ Messages::OfThread::~OfThread()
 {
   --gathered.users;
   gathered.errors.resize(begin_);
+  gathered.warnings.resize(beginOfWarnings_);
+}
+
+std::vector<std::string> Messages::OfThread::Warnings() const
+{
+  return {gathered.warnings.begin() + static_cast<std::ptrdiff_t>(beginOfWarnings_), gathered.warnings.end()};
 }
 
 std::string Messages::OfThread::Error() const

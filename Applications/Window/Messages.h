@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace echorama {
 
@@ -20,13 +21,14 @@ public:
     ~OfThread();
     OfThread(const OfThread&) = delete;
     OfThread& operator=(const OfThread&) = delete;
+    std::vector<std::string> Warnings() const;
     /// The first error that gives a reason; empty: none.
     std::string Error() const;
     /// Throws it as Error(BadInput), if there is one.
     void ThrowErrors() const;
 
   private:
-    std::size_t begin_; ///< of its errors, among those of the thread
+    std::size_t begin_, beginOfWarnings_; ///< of its errors and warnings, among those of the thread
   };
 };
 

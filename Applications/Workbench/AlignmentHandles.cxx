@@ -64,6 +64,8 @@ void AlignmentHandles::Follow()
 {
   const Handling& hand = bench_->Hand();
   isFollowing_ = true;
+  const auto* view = qobject_cast<const QWidget*>(parent()); // handles are as large for the eye on any screen
+  widget_->GetAlignmentRepresentation()->SetHandleScale(view ? view->devicePixelRatioF() : 1.0);
   widget_->SetTranslationSensitivity(hand.translationSensitivity);
   widget_->SetRotationSensitivity(hand.rotationSensitivity);
   widget_->SetTranslationStep(hand.translationStepMm);

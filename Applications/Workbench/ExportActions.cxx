@@ -4,6 +4,7 @@
 #include "Controls.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Geometry/PoseFile.h"
+#include "Messages.h"
 #include "Readers/OutputFiles.h"
 #include <filesystem>
 #include <QAction>
@@ -44,7 +45,7 @@ std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession*
     files.emplace_back(id, path);
   }
   if (files.empty())
-    throw Error(Error::Kind::NotPossible, "no volume is shown");
+    throw Error(Error::Kind::NotPossible, "no volume is shown; tick one in the list of volumes");
   return files;
 }
 
@@ -85,7 +86,7 @@ void ExportActions::ExportVolumes(const QString& folder, const QString& extensio
       workspace_.session->GetSnapshot(id, items.back().first); // it stays as it is, whatever the session does
     }
   } catch (const Error& error) {
-    workspace_.say(tr("Export volumes: %1").arg(error.what()), true);
+    Refuse("exportVolumes", tr("Export volumes: %1").arg(error.what()));
     return;
   }
   const int count = static_cast<int>(items.size());
@@ -98,8 +99,9 @@ void ExportActions::ExportVolumes(const QString& folder, const QString& extensio
       Run(writer, progress.Part(static_cast<double>(i) / of, static_cast<double>(i + 1) / of), [&] { writer->Write(); });
     }
   };
-  workspace_.Run(this, tr("Export volumes"), write,
-                 [this, folder, count] { workspace_.say(tr("Exported %1 volumes to %2").arg(count).arg(folder), false); });
+  workspace_.Run(this, tr("Export volumes"), write, [this, folder, count] {
+    workspace_.show({Message::Note, tr("Exported %1 volumes to %2").arg(count).arg(folder), {}, "exportVolumes"});
+  });
 }
 
 void ExportActions::ExportTransforms(const QString& folder)
@@ -108,16 +110,26 @@ void ExportActions::ExportTransforms(const QString& folder)
     const auto files = FilesFor(workspace_.session, folder, "tfm");
     for (const auto& [id, path] : files)
       WriteItkTransform(path, workspace_.session->GetKernel().State().Find(id)->volumeToWorld);
-    workspace_.say(tr("Exported %1 transforms to %2").arg(files.size()).arg(folder), false);
+    workspace_.show({Message::Note, tr("Exported %1 transforms to %2").arg(files.size()).arg(folder), {}, "exportTransforms"});
   } catch (const Error& error) {
-    workspace_.say(tr("Export transforms: %1").arg(error.what()), true);
+    Refuse("exportTransforms", tr("Export transforms: %1").arg(error.what()));
   }
 }
 
 void ExportActions::ExportPoses(const QString& path)
 {
-  if (workspace_.session->WritePoses(path.toUtf8())) // else it has said why
-    workspace_.say(tr("Exported poses to %1").arg(path), false);
+  const Messages::OfThread messages;
+  if (workspace_.session->WritePoses(path.toUtf8()))
+    workspace_.show({Message::Note, tr("Exported poses to %1").arg(path), {}, "exportPoses"});
+  else
+    Refuse("exportPoses", QString::fromUtf8(messages.Error().c_str()));
+}
+
+// \a action: that was not done, and can be done with another folder or name.
+void ExportActions::Refuse(const char* action, const QString& why)
+{
+  auto* again = findChild<QAction*>(action);
+  workspace_.show({Message::Warning, why, {{tr("Choose another place..."), [again] { again->trigger(); }}}, action});
 }
 
 } // namespace echorama

@@ -26,6 +26,8 @@ public:
   void ExportPoses(const QString& path);
 
 private:
+  void Refuse(const char* action, const QString& why);
+
   Workspace& workspace_;
 };
 

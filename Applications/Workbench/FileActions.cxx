@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "FileActions.h"
 #include "Controls.h"
+#include "Messages.h"
 #include "ResultFile.h"
 #include "Workbench.h"
 #include <memory>
@@ -93,12 +94,16 @@ void FileActions::Open(const QStringList& paths)
     const Kind kind = KindOf(path);
     (kind == Kind::Volume ? volumes : kind == Kind::Project ? projects : poses).append(QFileInfo(path).absoluteFilePath());
   }
+  for (const char* topic : {"volumes", "project", "poses"})
+    bench_->Forget(topic); // what could not be opened before
   if (projects.size() > 1)
-    bench_->Warn(tr("One project can be open at a time; %1 is opened.").arg(QFileInfo(projects.first()).fileName()));
+    bench_->Note(tr("One project can be open at a time: %1 is opened. Open the others one by one.")
+                     .arg(QFileInfo(projects.first()).fileName()));
   // One after the other: a project takes the place of what is there, and poses are for volumes that are there.
   const auto readPoses = [this, poses] {
     for (const QString& path : poses)
-      bench_->Session()->ReadPoses(path.toUtf8().constData());
+      bench_->Try("poses", [this, path] { return bench_->Session()->ReadPoses(path.toUtf8().constData()); },
+                  {{tr("Read another file..."), [this] { readPoses_->trigger(); }}});
   };
   const auto openVolumes = [this, volumes, readPoses] {
     if (volumes.isEmpty())
@@ -118,15 +123,21 @@ void FileActions::OpenVolumes(const QStringList& files, const std::function<void
   const QString label = volumes.size() == 1 ? tr("Reading %1").arg(QFileInfo(volumes.first()).fileName())
                                             : tr("Reading %1 volumes").arg(volumes.size());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
+  bench_->Forget("volumes");
   bench_->Shared().Run(
       this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
       [this, read, then] {
         auto* session = bench_->Session();
         const bool wasEmpty = session->GetNumberOfVolumes() == 0, wasUntouched = !HasUnsavedWork();
         int last = 0;
-        for (const ReadVolume& volume : *read)
-          if (volume.image)
-            last = session->AddVolume(volume.image, volume.file.toUtf8().constData());
+        for (ReadVolume& volume : *read)
+          if (volume.image) {
+            const Messages::OfThread messages;
+            if (const int id = session->AddVolume(volume.image, volume.file.toUtf8().constData()); id > 0)
+              last = id;
+            else
+              volume = {volume.file, nullptr, QString::fromUtf8(messages.Error().c_str())};
+          }
         WarnOfUnread(*read);
         if (wasUntouched)
           opened_ = session->GetKernel().State();
@@ -150,7 +161,7 @@ void FileActions::WarnOfUnread(const std::vector<ReadVolume>& volumes)
   if (errors.size() > most)
     errors = errors.mid(0, most) + QStringList(tr("and %1 more that cannot be read").arg(errors.size() - most));
   if (!errors.isEmpty())
-    bench_->Warn(errors.join('\n'));
+    bench_->Warn(errors.join('\n'), {{tr("Open other files..."), [this] { open_->trigger(); }}}, "volumes");
 }
 
 void FileActions::OpenProject(const QString& path, const std::function<void()>& then)
@@ -173,8 +184,10 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs, const 
 {
   auto* session = bench_->Session();
   vtkNew<vtkStringArray> files;
-  if (!session->GetProjectFiles(path.toUtf8().constData(), files))
-    return; // the session said why
+  const Message::Answers another{{tr("Open another project..."), [this] { openProject_->trigger(); }}};
+  if (!bench_->Try(
+          "project", [&] { return session->GetProjectFiles(path.toUtf8().constData(), files); }, another))
+    return;
   QStringList there;
   bool isMissing = false;
   for (vtkIdType i = 0; i < files->GetNumberOfValues(); i++) {
@@ -184,8 +197,10 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs, const 
       there.append(file);
   }
   if (isMissing) {
+    const Messages::OfThread messages;
     session->OpenProject(path.toUtf8().constData()); // names what is missing
-    bench_->Ask(tr("Files of %1 have moved. Where are they now?").arg(QFileInfo(path).fileName()),
+    bench_->Ask(tr("%1\nFiles of %2 have moved. Where are they now?")
+                    .arg(QString::fromUtf8(messages.Error().c_str()), QFileInfo(path).fileName()),
                 {{tr("Look in a folder..."),
                   [this, path, saveAs, then] {
                     auto* dialog = new QFileDialog(window_, tr("Where the volumes are"), QFileInfo(path).absolutePath());
@@ -198,7 +213,8 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs, const 
                     });
                     dialog->open();
                   }},
-                 {tr("Do not open it"), {}}});
+                 {tr("Do not open it"), {}}},
+                "project");
     return;
   }
   const QString label = tr("Opening %1").arg(QFileInfo(path).fileName());
@@ -228,7 +244,8 @@ void FileActions::TakeProject(const QString& path, const QString& saveAs, const 
     blocks->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), volume.file.toUtf8().constData());
   }
   auto* session = bench_->Session();
-  if (!session->OpenProject(path.toUtf8().constData(), blocks))
+  if (!bench_->Try("project", [&] { return session->OpenProject(path.toUtf8().constData(), blocks); },
+                   {{tr("Open another project..."), [this] { openProject_->trigger(); }}}))
     return;
   opened_ = {};
   emit Opened();
@@ -249,7 +266,8 @@ void FileActions::OfferLaterBackup()
   bench_->Ask(tr("This project has unsaved changes, last backed up at %1.")
                   .arg(QFileInfo(backup).lastModified().toString("yyyy-MM-dd hh:mm:ss")),
               {{tr("Restore them"), [this, backup] { bench_->Session()->RestoreBackup(backup.toUtf8().constData()); }},
-               {tr("Ignore them"), {}}});
+               {tr("Ignore them"), {}}},
+              "project");
 }
 
 bool FileActions::Save()
@@ -268,9 +286,18 @@ bool FileActions::SaveTo(const QString& path, bool withoutUnsavedResults)
     return false;
   }
   const auto then = std::exchange(afterSave_, nullptr);
-  if (!bench_->Session()->SaveProject(path.toUtf8().constData(), withoutUnsavedResults))
+  const auto again = [this, path, withoutUnsavedResults, then] {
+    afterSave_ = then;
+    SaveTo(path, withoutUnsavedResults);
+  };
+  const auto elsewhere = [this, then] {
+    afterSave_ = then;
+    AskSave();
+  };
+  if (!bench_->Try("save", [&] { return bench_->Session()->SaveProject(path.toUtf8().constData(), withoutUnsavedResults); },
+                   {{tr("Save as..."), elsewhere}, {tr("Try again"), again}}))
     return false;
-  bench_->Note(tr("Saved %1").arg(path));
+  bench_->Note(tr("Saved %1").arg(path), "save");
   if (then)
     then();
   return true;
@@ -303,17 +330,19 @@ void FileActions::WhenSaved(const QString& question, const std::function<void()>
     then();
     return;
   }
-  bench_->Ask(question, {{tr("Save"),
-                          [this, then] {
-                            afterSave_ = then;
-                            Save();
-                          }},
-                         {tr("Do not save"),
-                          [this, then] {
-                            bench_->Session()->ForgetUnsavedWork();
-                            then();
-                          }},
-                         {tr("Cancel"), {}}});
+  bench_->Ask(question,
+              {{tr("Save"),
+                [this, then] {
+                  afterSave_ = then;
+                  Save();
+                }},
+               {tr("Do not save"),
+                [this, then] {
+                  bench_->Session()->ForgetUnsavedWork();
+                  then();
+                }},
+               {tr("Cancel"), {}}},
+              "unsaved");
 }
 
 void FileActions::AskOpen(const QString& title, const QString& filter, bool several)

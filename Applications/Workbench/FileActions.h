@@ -25,6 +25,8 @@ public:
   FileActions(Workbench* bench, QWidget* window);
   void AddTo(QMenu* menu);
   QAction* OpenAction() const { return open_; }
+  QAction* OpenProjectAction() const { return openProject_; }
+  QAction* SaveAsAction() const { return saveAs_; }
   QAction* SaveAction() const { return save_; }
 
   /// Volumes, folders of slices, a project or poses, in any mixture: by drop, dialog or command line.

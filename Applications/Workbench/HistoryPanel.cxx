@@ -97,7 +97,7 @@ void HistoryPanel::ListBackups()
           read->push_back({paths->GetValue(i), labels->GetValue(i), times->GetValue(i)});
       },
       [this, read] { ShowBackups(*read); },
-      [this](const QString& error) { bench_->Warn(tr("Backups cannot be listed: %1").arg(error)); });
+      [this](const QString& error) { bench_->Warn(tr("Backups cannot be listed: %1").arg(error), {}, objectName()); });
   connect(job, &Job::Ended, this, [this] { isListing_ = false; });
 }
 
@@ -123,8 +123,11 @@ void HistoryPanel::ShowBackups(const std::vector<Line>& lines)
 void HistoryPanel::Restore(int row)
 {
   const QListWidgetItem* item = backups_->item(row);
-  if (item && item->flags().testFlag(Qt::ItemIsEnabled))
-    bench_->Session()->RestoreBackup(item->data(Qt::UserRole).toString().toUtf8().constData());
+  if (!item || !item->flags().testFlag(Qt::ItemIsEnabled))
+    return;
+  const QByteArray path = item->data(Qt::UserRole).toString().toUtf8();
+  bench_->Try(objectName(), [&] { return bench_->Session()->RestoreBackup(path.constData()); },
+              {{tr("Choose another backup"), [this] { backups_->setFocus(Qt::OtherFocusReason); }}});
 }
 
 } // namespace echorama

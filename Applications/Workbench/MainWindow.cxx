@@ -4,18 +4,24 @@
 #include "BrushPanel.h"
 #include "CheckPanel.h"
 #include "Controls.h"
-#include "DroppedFiles.h"
+#include "DropAnywhere.h"
 #include "EditActions.h"
+#include "EmptyPage.h"
 #include "ExportActions.h"
 #include "FileActions.h"
 #include "Focus.h"
+#include "FocusRing.h"
+#include "GuideBar.h"
 #include "HistoryPanel.h"
 #include "JobBar.h"
 #include "LandmarkBox.h"
 #include "MessageBar.h"
 #include "Messages.h"
+#include "Mnemonics.h"
 #include "PanelScroll.h"
 #include "PosePanel.h"
+#include "Preferences.h"
+#include "ProjectActions.h"
 #include "Recovery.h"
 #include "RegistrationPanel.h"
 #include "ResultPanel.h"
@@ -32,6 +38,9 @@
 #include "vtkUltrasoundAlignmentWidget.h"
 #include "Workbench.h"
 #include "WorkbenchKeys.h"
+#include <QApplication>
+#include <QCheckBox>
+#include <QClipboard>
 #include <QCloseEvent>
 #include <QDockWidget>
 #include <QFileInfo>
@@ -56,41 +65,58 @@ MainWindow::MainWindow(Workspace& workspace, QWidget* parent)
     edits_(new EditActions(bench_, this)), looks_(new ViewActions(bench_, views_, this))
 {
   setObjectName("workbench");
-  setAcceptDrops(true);
   auto* middle = new QWidget(this);
   auto* layout = new QVBoxLayout(middle);
   layout->setContentsMargins(2, 2, 2, 2);
   layout->setSpacing(2);
-  layout->addWidget(messages_);
+  auto* above = new QVBoxLayout; // without a gap, so that nothing takes no place
+  above->setSpacing(0);
+  above->addWidget(jobs_);
+  above->addWidget(messages_);
+  layout->addLayout(above);
   layout->addWidget(views_, 1);
   setCentralWidget(middle);
   workspace.jobs = jobs_;
   workspace.moveByTool = [this](vtkMatrix4x4* pose, bool grasping) {
     views_->Volume()->Handles()->Widget()->StepTool(pose, grasping);
   };
-  connect(bench_, &Workbench::Said, messages_, &MessageBar::Show);
+  connect(bench_, &Workbench::Said, this, &MainWindow::Say);
+  connect(jobs_, &JobBar::CountChanged, this, [this](int count) {
+    if (count == 0)
+      bench_->Forget("running");
+  });
   // VTK classes report on whatever thread they run.
   Messages::Install([bench = QPointer<Workbench>(bench_)](const std::string& text, bool isError) {
     const QString message = QString::fromUtf8(text.c_str());
     QMetaObject::invokeMethod(bench, [bench, message, isError] {
-      if (bench)
-        isError ? bench->Warn(message) : bench->Note(message);
+      if (!bench)
+        return;
+      if (!isError)
+        return bench->Note(message);
+      // Nobody here knows what was to be done, so the text is for somebody who may.
+      bench->Warn(message, {{tr("Copy the text"), [message] { QApplication::clipboard()->setText(message); }}});
     });
   });
 
   MakeMenus();
   MakePanels();
   statusBar()->addWidget(readout_, 1);
-  statusBar()->addPermanentWidget(jobs_);
   for (auto changed : {&Workbench::HistoryChanged, &Workbench::VolumesChanged})
     connect(bench_, changed, this, &MainWindow::ShowTitle);
   ShowTitle();
   RestoreLayout();
-  new Focus(this, views_->Slices()[0]->Canvas());
+  focus_ = new Focus(this, views_->Slices()[0]->Canvas());
+  new FocusRing(this);
+  Apply(Preferences::Kept(), bench_);
+  empty_ = new EmptyPage(views_, files_->OpenAction(), files_->OpenProjectAction(),
+                         [this](const Sample& sample) { OpenSample(sample); });
+  connect(bench_, &Workbench::VolumesChanged, this, &MainWindow::ShowEmpty);
+  new DropAnywhere(this, [this](const QStringList& paths) { files_->Open(paths); });
 }
 
 MainWindow::~MainWindow()
 {
+  jobs_->disconnect(this); // jobs end with their panels, when the parts that would be told are gone
   bench_->Shared().moveByTool = [](vtkMatrix4x4*, bool) {};
   Messages::Install({});
 }
@@ -115,10 +141,19 @@ void MainWindow::MakeMenus()
   edits_->RedoAction()->setIconText(tr("Redo"));
   bar->addSeparator();
   looks_->AddTools(Menu(Place::Tools), bar);
-  bar->addSeparator();
-  looks_->AddTo(Menu(Place::View), bar);
+  lookBar_ = addToolBar(tr("Looks"));
+  lookBar_->setObjectName("lookBar");
+  lookBar_->setMovable(false);
+  looks_->AddTo(Menu(Place::View), lookBar_);
   edits_->AddTo(Menu(Place::Edit));
+  Menu(Place::Edit)->addSeparator();
+  Menu(Place::Edit)
+      ->addAction(MakeAction(this, "preferencesAction", tr("&Preferences..."), "Ctrl+,",
+                             tr("Colours of volumes, light or dark, language"), [this] { ShowPreferences(this, bench_); }));
   files_->AddTo(Menu(Place::File));
+  auto* projects = new ProjectActions(bench_, this);
+  connect(projects, &ProjectActions::OpenAsked, this, [this](const QString& project) { files_->Open({project}); });
+  projects->AddTo(Menu(Place::File));
   (new ExportActions(bench_->Shared(), this))->AddTo(Menu(Place::File), this);
   Menu(Place::Help)
       ->addAction(MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"),
@@ -129,6 +164,9 @@ void MainWindow::MakePanels()
 {
   setDockOptions(QMainWindow::AnimatedDocks | QMainWindow::AllowTabbedDocks);
   setTabPosition(Qt::RightDockWidgetArea, QTabWidget::East); // all of their names can be read
+  Menu(Place::View)->addSeparator();
+  panels_ = Menu(Place::View)->addMenu(tr("&Go to panel"));
+  shownPanels_ = Menu(Place::View)->addMenu(tr("Panels that are sho&wn"));
   auto* volumes = new VolumePanel(bench_, this);
   AddLeft(volumes, tr("Volumes"));
   AddLeft(new PosePanel(bench_, this), tr("Pose"));
@@ -156,22 +194,76 @@ void MainWindow::MakePanels()
   connect(volumes, &VolumePanel::MakeAgain, result, &ResultPanel::MakeAgain);
   Menu(Place::Stitch)
       ->addAction(MakeAction(this, "stitchAction", tr("&Stitch and embed"), "",
-                             tr("Make one volume of those that are shown: the panel Stitch"), [result] {
-                               auto* dock = result->window()->findChild<QDockWidget*>(result->objectName() + "Dock");
-                               dock->show();
-                               dock->raise();
-                             }));
+                             tr("Make one volume of those that are shown: the panel Stitch"),
+                             [this, result] { ShowPanel(result); }));
   Menu(Place::Stitch)
       ->addAction(MakeAction(this, "compareAction", tr("&Compare with sources"), "T",
                              tr("Show the result alone, and then its sources instead, in all views"),
                              [result] { result->Compare(); }));
-  auto* training = new TrainingPanel(bench_, this);
-  AddPanel(training, tr("Train"));
+  training_ = new TrainingPanel(bench_, this);
+  AddPanel(training_, tr("Train"));
   auto* score = new QLabel(this);
   score->setObjectName("scoreReadout");
-  connect(training, &TrainingPanel::ScoreShown, score, &QLabel::setText);
+  connect(training_, &TrainingPanel::ScoreShown, score, &QLabel::setText);
   statusBar()->addPermanentWidget(score);
   AddPanel(new TrackerPanel(workspace, this), tr("Tracker"));
+
+  const auto make = [this, result](bool embedded) {
+    result->findChild<QCheckBox*>("embed")->setChecked(embedded);
+    ShowPanel(result);
+    result->Make(false);
+  };
+  const auto refine = [this, registration] {
+    ShowPanel(registration);
+    registration->Refine();
+  };
+  guide_ = new GuideBar(bench_,
+                        {[this] { files_->OpenAction()->trigger(); }, refine,
+                         [this] { bench_->Set(&SliceLook::mode, QString("difference")); }, [make] { make(false); },
+                         [make] { make(true); }, [this] { files_->Save(); }},
+                        this);
+  addToolBarBreak();
+  addToolBar(guide_);
+  QAction* shown = guide_->toggleViewAction();
+  shown->setText(tr("&Guide"));
+  shown->setStatusTip(tr("Six steps from volumes to one volume"));
+  Menu(Place::Help)->addAction(shown);
+  for (QMenu* menu : menus_)
+    AddMnemonics(menu);
+}
+
+void MainWindow::ShowPanel(QWidget* panel)
+{
+  auto* dock = findChild<QDockWidget*>(panel->objectName() + "Dock");
+  dock->show();
+  dock->raise();
+}
+
+void MainWindow::ShowEmpty()
+{
+  const int count = bench_->Session()->GetNumberOfVolumes();
+  if (count > 1 && volumes_ < 2)
+    bench_->Forget("registrationPanel"); // that there were too few
+  volumes_ = count;
+  const bool isEmpty = count == 0;
+  if (isEmpty == empty_->isVisibleTo(views_))
+    return;
+  const bool hadFocus = empty_->isAncestorOf(focusWidget());
+  empty_->setVisible(isEmpty);
+  if (hadFocus)
+    focus_->GiveBack();
+}
+
+void MainWindow::OpenSample(const Sample& sample)
+{
+  const auto open = [this, sample] {
+    files_->OpenVolumes(VolumesOf(sample), [this, sample] { training_->LoadTruth(TruthOf(sample)); });
+  };
+  if (IsThere(sample))
+    open();
+  else
+    bench_->Shared().Run(
+        this, tr("Making a sample"), [sample](const Progress& progress) { Make(sample, progress); }, open);
 }
 
 QDockWidget* MainWindow::AddDock(Qt::DockWidgetArea area, QWidget* panel, const QString& title, QWidget* content)
@@ -179,9 +271,28 @@ QDockWidget* MainWindow::AddDock(Qt::DockWidgetArea area, QWidget* panel, const 
   auto* dock = new QDockWidget(title, this);
   dock->setObjectName(panel->objectName() + "Dock");
   dock->setWidget(content);
+  dock->setAcceptDrops(true); // it may float
   addDockWidget(area, dock);
-  Menu(Place::View)->addAction(dock->toggleViewAction());
+  // The key brings it in front and goes into it; it is a mouse's work to close it, or the menu's.
+  const int number = panels_->actions().size() + 1;
+  panels_->addAction(MakeAction(this, ("goTo" + panel->objectName()).toLatin1(), title, QString("Ctrl+%1").arg(number),
+                                tr("Show the panel %1 and go into it").arg(title), [this, panel] {
+                                  ShowPanel(panel);
+                                  FocusFirstOf(panel);
+                                }));
+  shownPanels_->addAction(dock->toggleViewAction());
   return dock;
+}
+
+// What Tab would come to first in a panel.
+void MainWindow::FocusFirstOf(QWidget* panel)
+{
+  for (QWidget* part = panel->nextInFocusChain(); part != panel; part = part->nextInFocusChain())
+    if (panel->isAncestorOf(part) && (part->focusPolicy() & Qt::TabFocus) == Qt::TabFocus && part->isEnabled() &&
+        part->isVisibleTo(panel)) {
+      part->setFocus(Qt::TabFocusReason);
+      return;
+    }
 }
 
 void MainWindow::AddLeft(QWidget* panel, const QString& title)
@@ -209,6 +320,7 @@ void MainWindow::RestoreLayout()
   QSettings settings;
   restoreGeometry(settings.value("window/geometry").toByteArray());
   restoreState(settings.value("window/state").toByteArray(), LayoutVersion);
+  guide_->setVisible(settings.value("window/guide", true).toBool());
   bench_->SetShown(Remembered());
 }
 
@@ -232,6 +344,21 @@ void MainWindow::ShowTitle()
   setWindowTitle(name.isEmpty() ? QString("Echorama") : QString("%1[*] \u2014 Echorama").arg(name));
   setWindowFilePath(path);
   setWindowModified(files_->HasUnsavedWork());
+  if (!files_->HasUnsavedWork())
+    bench_->Forget("unsaved");
+}
+
+// A panel that could not do what it was asked for is where it can be asked for something else.
+void MainWindow::Say(const Message& message)
+{
+  Message said = message;
+  auto* panel = said.topic.isEmpty() ? nullptr : findChild<QWidget*>(said.topic);
+  auto* dock = findChild<QDockWidget*>(said.topic + "Dock");
+  if (said.text.startsWith("there is no new backup"))
+    said.answers = {{tr("Save as..."), [this] { files_->SaveAsAction()->trigger(); }}};
+  else if (said.kind == Message::Warning && said.answers.isEmpty() && panel && dock)
+    said.answers = {{tr("Show panel %1").arg(dock->windowTitle()), [this, panel] { ShowPanel(panel); }}};
+  messages_->Show(said);
 }
 
 // What runs comes first: it may make what is to be saved. No question stops the window.
@@ -245,10 +372,14 @@ bool MainWindow::AsksBeforeClosing()
         connect(jobs_, &JobBar::CountChanged, this, &MainWindow::CloseWhenDone, Qt::UniqueConnection);
     };
     bench_->Ask(tr("%1 is still running.").arg(jobs_->Labels().join(", ")),
-                {{tr("Stay"), {}}, {tr("Close when it is done"), closeThen}, {tr("Stop it and close"), [this, closeThen] {
-                                                                                jobs_->StopAll();
-                                                                                closeThen();
-                                                                              }}});
+                {{tr("Stay"), {}},
+                 {tr("Close when it is done"), closeThen},
+                 {tr("Stop it and close"),
+                  [this, closeThen] {
+                    jobs_->StopAll();
+                    closeThen();
+                  }}},
+                "running");
     return true;
   }
   if (mayClose_ || !files_->HasUnsavedWork())
@@ -269,6 +400,29 @@ void MainWindow::CloseWhenDone(int running)
   QTimer::singleShot(0, this, &QWidget::close); // the job that ended is not quite gone
 }
 
+// All that is on the tool bar is seen, in a second row when texts are large or the window is narrow.
+void MainWindow::FitToolBars()
+{
+  const auto* first = findChild<QToolBar*>("toolBar");
+  const bool isWide = first->sizeHint().width() + lookBar_->sizeHint().width() <= width();
+  if (isWide == !toolBarBreak(lookBar_))
+    return;
+  isWide ? removeToolBarBreak(lookBar_) : insertToolBarBreak(lookBar_);
+}
+
+void MainWindow::resizeEvent(QResizeEvent* event)
+{
+  QMainWindow::resizeEvent(event);
+  FitToolBars();
+}
+
+void MainWindow::changeEvent(QEvent* event)
+{
+  QMainWindow::changeEvent(event);
+  if (event->type() == QEvent::FontChange && lookBar_)
+    FitToolBars();
+}
+
 void MainWindow::closeEvent(QCloseEvent* event)
 {
   if (AsksBeforeClosing()) {
@@ -278,22 +432,9 @@ void MainWindow::closeEvent(QCloseEvent* event)
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState(LayoutVersion));
+  settings.setValue("window/guide", guide_->isVisible());
   Remember(bench_->Shown());
   event->accept();
-}
-
-void MainWindow::dragEnterEvent(QDragEnterEvent* event)
-{
-  LetDrop(event);
-}
-
-void MainWindow::dropEvent(QDropEvent* event)
-{
-  const QStringList paths = DroppedFiles(event);
-  if (paths.isEmpty())
-    return;
-  activateWindow();
-  files_->Open(paths);
 }
 
 } // namespace echorama

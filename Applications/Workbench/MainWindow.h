@@ -5,17 +5,24 @@
 
 class QDockWidget;
 class QMenu;
+class QToolBar;
 
 namespace echorama {
 
 class EditActions;
+class EmptyPage;
 class FileActions;
+class Focus;
+class GuideBar;
 class JobBar;
 class MessageBar;
 class StatusReadout;
+class TrainingPanel;
 class ViewActions;
 class ViewGrid;
 class Workbench;
+struct Message;
+struct Sample;
 struct Workspace;
 
 /// The window: it makes the parts and puts them together. What parts share is the Workbench.
@@ -45,18 +52,24 @@ public:
 
 protected:
   void closeEvent(QCloseEvent* event) override;
-  void dragEnterEvent(QDragEnterEvent* event) override;
-  void dropEvent(QDropEvent* event) override;
+  void resizeEvent(QResizeEvent* event) override;
+  void changeEvent(QEvent* event) override;
 
 private:
   void MakeMenus();
   void MakePanels();
   QDockWidget* AddDock(Qt::DockWidgetArea area, QWidget* panel, const QString& title, QWidget* content);
+  void FocusFirstOf(QWidget* panel);
   void AddLeft(QWidget* panel, const QString& title);
   void ShowTitle();
+  void Say(const Message& message);
+  void ShowPanel(QWidget* panel);
+  void ShowEmpty();
+  void OpenSample(const Sample& sample);
   bool AsksBeforeClosing();
   void CloseWhenDone(int running);
   void RestoreLayout();
+  void FitToolBars();
 
   Workbench* bench_;
   JobBar* jobs_;
@@ -67,7 +80,14 @@ private:
   EditActions* edits_;
   ViewActions* looks_;
   std::array<QMenu*, 7> menus_{};
+  QToolBar* lookBar_ = nullptr;
+  QMenu *panels_ = nullptr, *shownPanels_ = nullptr;
+  TrainingPanel* training_;
+  GuideBar* guide_;
+  EmptyPage* empty_ = nullptr;
+  Focus* focus_ = nullptr;
   QDockWidget* lastPanel_ = nullptr;
+  int volumes_ = 0;
   bool mayClose_ = false;
 };
 

@@ -45,7 +45,7 @@ void Offer(Workbench* bench, FileActions* files, QStringList folders)
       text += QObject::tr(" Earlier ones: %1.").arg(folders.size());
       answers.insert(1, {QObject::tr("Show the one before"), next});
     }
-    bench->Ask(text, answers);
+    bench->Ask(text, answers, "recovery");
     return;
   }
 }

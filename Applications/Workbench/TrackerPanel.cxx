@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrackerPanel.h"
 #include "Controls.h"
+#include "Messages.h"
 #include "TrackerState.h"
 #include <QComboBox>
 #include <QFormLayout>
@@ -53,7 +54,12 @@ void TrackerPanel::ConnectOrNot()
     tool_->clear();
   } else {
     tracker_->SetDevice(address_->text().trimmed().toUtf8());
-    if (tracker_->Start()) { // else it has said why
+    workspace_.show({Message::Note, {}, {}, objectName()}); // what the last try said
+    const Messages::OfThread messages;
+    const bool isStarted = tracker_->Start();
+    if (const std::string error = messages.Error(); !error.empty())
+      workspace_.show({Message::Warning, QString::fromUtf8(error.c_str()), {}, objectName()});
+    if (isStarted) {
       QSettings().setValue("tracker/address", address_->text());
       timer_->start();
     } else {

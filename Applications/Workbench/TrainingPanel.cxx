@@ -139,8 +139,8 @@ void TrainingPanel::ChooseTruth()
 
 bool TrainingPanel::LoadTruth(const QString& path)
 {
-  // The session reports what is wrong, and that goes to the message bar.
-  if (!bench_->Session()->ReadTruth(path.toUtf8()))
+  if (!bench_->Try("truth", [&] { return bench_->Session()->ReadTruth(path.toUtf8()); },
+                   {{tr("Load another truth..."), [this] { ChooseTruth(); }}}))
     return false;
   truth_->setText(QFileInfo(path).fileName());
   truth_->setToolTip(path);
@@ -165,7 +165,7 @@ bool TrainingPanel::SetHistory(const QString& path)
       ReadAttempts(path.toStdString());
   } catch (const Error& error) {
     historyPath_ = before;
-    bench_->Warn(error.what());
+    WarnOfHistory(error.what());
     return false;
   }
   QSettings().setValue("training/history", path);
@@ -187,15 +187,20 @@ void TrainingPanel::ShowHistory()
                  QString::number(attempt.help)});
     }
   } catch (const Error& error) {
-    bench_->Warn(error.what());
+    WarnOfHistory(error.what());
   }
+}
+
+void TrainingPanel::WarnOfHistory(const QString& why)
+{
+  bench_->Warn(why, {{tr("Keep attempts elsewhere..."), [this] { ChooseHistory(); }}}, "attempts");
 }
 
 void TrainingPanel::Scatter()
 {
   auto* session = bench_->Session();
   if (session->GetNumberOfVolumes() < 2) {
-    bench_->Warn(tr("Scatter: two volumes are needed"));
+    bench_->Warn(tr("Scatter: two volumes are needed; open another one"));
     return;
   }
   session->BeginEdit("Scatter volumes");
@@ -269,7 +274,7 @@ void TrainingPanel::Submit()
                      .arg(TimeText(attempt.seconds))
                      .arg(attempt.startMm, 0, 'f', 2));
   } catch (const Error& error) {
-    bench_->Warn(tr("The attempt (%1 mm) was not kept: %2").arg(attempt.scoreMm, 0, 'f', 2).arg(error.what()));
+    WarnOfHistory(tr("The attempt (%1 mm) was not kept: %2").arg(attempt.scoreMm, 0, 'f', 2).arg(error.what()));
   }
   ShowHistory();
 }

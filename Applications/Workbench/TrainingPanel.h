@@ -43,6 +43,7 @@ private:
   void ShowScore();
   void ShowState();
   void ShowHistory();
+  void WarnOfHistory(const QString& why);
 
   Workbench* bench_;
   QLabel *truth_, *score_, *time_;

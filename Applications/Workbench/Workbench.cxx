@@ -2,6 +2,7 @@
 #include "Workbench.h"
 #include "Flicker.h"
 #include "MeasureTool.h"
+#include "Messages.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -175,19 +176,31 @@ bool Workbench::BringBack()
   return was;
 }
 
-void Workbench::Note(const QString& text)
+void Workbench::Note(const QString& text, const QString& topic)
 {
-  emit Said({Message::Note, text, {}});
+  emit Said({Message::Note, text, {}, topic});
 }
 
-void Workbench::Warn(const QString& text)
+void Workbench::Warn(const QString& text, const Message::Answers& answers, const QString& topic)
 {
-  emit Said({Message::Warning, text, {}});
+  emit Said({Message::Warning, text, answers, topic});
 }
 
-void Workbench::Ask(const QString& text, const QVector<Message::Answer>& answers)
+void Workbench::Ask(const QString& text, const Message::Answers& answers, const QString& topic)
 {
-  emit Said({Message::Question, text, answers});
+  emit Said({Message::Question, text, answers, topic});
+}
+
+bool Workbench::Try(const QString& topic, const std::function<bool()>& act, const Message::Answers& answers)
+{
+  Forget(topic);
+  const Messages::OfThread messages;
+  const bool isDone = act();
+  for (const std::string& warning : messages.Warnings())
+    Note(QString::fromUtf8(warning.c_str()));
+  if (const std::string error = messages.Error(); !error.empty())
+    Warn(QString::fromUtf8(error.c_str()), answers, topic);
+  return isDone;
 }
 
 } // namespace echorama

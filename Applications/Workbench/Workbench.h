@@ -106,10 +106,15 @@ public:
   int HelpTaken() const { return helpTaken_; } ///< in this attempt or the last one
   ///@}
 
-  ///@{ To the message bar of the window.
-  void Note(const QString& text);
-  void Warn(const QString& text);
-  void Ask(const QString& text, const QVector<Message::Answer>& answers);
+  ///@{ To the message bar of the window. What is said takes the place of what was said before of the same topic.
+  void Note(const QString& text, const QString& topic = {});
+  /// A text without answers says itself what to do.
+  void Warn(const QString& text, const Message::Answers& answers = {}, const QString& topic = {});
+  void Ask(const QString& text, const Message::Answers& answers, const QString& topic = {});
+  /// What was said of it is of the past.
+  void Forget(const QString& topic) { emit Said({Message::Note, {}, {}, topic}); }
+  /// Does something with the session; when that fails, warns with the reason and \a answers. What was said of the topic goes.
+  bool Try(const QString& topic, const std::function<bool()>& act, const Message::Answers& answers);
   ///@}
 
 signals:

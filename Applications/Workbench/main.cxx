@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "MainWindow.h"
+#include "Preferences.h"
 #include "Theme.h"
+#include "Translation.h"
 #include "Workspace.h"
 #include <QApplication>
 #include <QCommandLineParser>
@@ -26,7 +28,9 @@ int main(int argc, char** argv)
   options.addPositionalArgument("VOLUME", "Volumes (or folders of slices, or poses) to open.", "[VOLUME...]");
   options.process(application);
 
-  echorama::ApplyTheme(application);
+  const echorama::Preferences preferences = echorama::Preferences::Kept();
+  echorama::InstallTranslation(application, preferences.language);
+  echorama::ApplyTheme(application, preferences.theme);
   echorama::Workspace workspace;
   echorama::MainWindow window(workspace);
   window.show();

@@ -7,6 +7,7 @@
 #include "VolumePane.h"
 #include <cmath>
 #include <QFile>
+#include <QSettings>
 #include <QtTest>
 #include <vtkMatrix4x4.h>
 
@@ -47,6 +48,13 @@ QImage WindowUnderTest::Screenshot(const QString& name)
   window_->Views()->Volume()->DrawNow();
   Settle();
   return Grab(name);
+}
+
+// Without the guide, which a person closes who knows the way: the views have its place.
+void WindowTest::init()
+{
+  FolderTest::init();
+  QSettings().setValue("window/guide", false);
 }
 
 QString WindowTest::WriteVolume(const QString& name, int seed, std::array<double, 3> middle, int side, bool repeats)

@@ -45,6 +45,7 @@ public:
   }
 
 protected:
+  void init() override;
   virtual QString A() { return WriteVolume("left.mha", 1, {0, 0, 0}); }
   virtual QString B() { return WriteVolume("right.mha", 2, {12, 4, 0}); }
   QString WriteVolume(const QString& name, int seed, std::array<double, 3> middle, int side = 48, bool repeats = false);

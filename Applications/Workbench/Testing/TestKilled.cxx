@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// 100 kill -9 at random moments of work in the real window: at most one second of work is lost, and never a file.
+#include "FileActions.h"
+#include "SliceCanvas.h"
+#include "WindowUnderTest.h"
+#include "Workbench.h"
+#include <csignal>
+#include <cstdio>
+#include <QApplication>
+#include <QCryptographicHash>
+#include <QElapsedTimer>
+#include <QProcess>
+#include <QtTest>
+#include <random>
+#include <vtkNew.h>
+#include <vtkStringArray.h>
+
+using namespace echorama;
+
+namespace {
+
+constexpr int Kills = 100;
+constexpr double MostSeconds = 1.0;
+
+// Where the second volume lies, exactly enough to know every state again.
+QString StateOf(vtkUltrasoundAlignmentSession* session)
+{
+  double middle[3] = {0, 0, 0}, degrees[3] = {0, 0, 0};
+  session->GetPlacement(session->GetVolumeId(1), middle, degrees);
+  QString text;
+  for (const double number : {middle[0], middle[1], middle[2], degrees[0], degrees[1], degrees[2]})
+    text += QString("%1,").arg(number, 0, 'f', 6);
+  return text;
+}
+
+// The child: works until it is killed, and says "seconds state" after each step. "begin" before it: what follows may have
+// happened without being said.
+class Worker {
+public:
+  Worker(const QStringList& arguments)
+  {
+    window_.Window().Start({}, arguments.mid(2, 2));
+    if (!QTest::qWaitFor([this] { return window_.Session()->GetNumberOfVolumes() == 2; }, 30000))
+      qFatal("the volumes do not come");
+    window_.Settle();
+    const bool isSaved = arguments.size() > 4;
+    if (isSaved && !window_.Window().Files()->SaveTo(arguments[4]))
+      qFatal("the project cannot be saved");
+    random_.seed(arguments[1].toUInt());
+    clock_.start();
+    Say();
+    for (int i = 0;; i++) {
+      switch (random_() % 5) {
+      case 0:
+        Keys();
+        break;
+      case 1:
+        Stroke();
+        break;
+      case 2:
+        if (window_.Session()->GetUndoCount() > 2)
+          Step([this] { window_.Key(Qt::Key_Z, Qt::ControlModifier); });
+        break;
+      default:
+        DragVolume();
+      }
+      if (isSaved && random_() % 3 == 0)
+        window_.Key(Qt::Key_S, Qt::ControlModifier);
+    }
+  }
+
+private:
+  void Say()
+  {
+    std::printf("%.3f %s\n", 0.001 * static_cast<double>(clock_.elapsed()), qPrintable(StateOf(window_.Session())));
+    std::fflush(stdout);
+  }
+  void Step(const std::function<void()>& step)
+  {
+    std::printf("begin\n");
+    std::fflush(stdout);
+    step();
+    Say();
+  }
+  void DragVolume()
+  {
+    SliceCanvas* slice = window_.Slice(static_cast<int>(random_() % 2));
+    const QPoint from = slice->rect().center() + QPoint(18, 34);
+    window_.Press(slice, from);
+    const int steps = 1 + static_cast<int>(random_() % 40), across = static_cast<int>(random_() % 30),
+              down = static_cast<int>(random_() % 20);
+    for (int i = 1; i <= steps; i++)
+      Step([&] {
+        window_.Move(slice, from + QPoint(across * i / steps - 10, down * i / steps - 8));
+        QTest::qWait(25);
+      });
+    Step([&] { window_.Release(slice, from + QPoint(across - 10, down - 8)); });
+  }
+  void Keys()
+  {
+    window_.Slice(0)->setFocus();
+    for (unsigned int i = 0; i < 1 + random_() % 6; i++)
+      Step([this] { window_.Key(random_() % 2 ? Qt::Key_Right : Qt::Key_Up); });
+  }
+  void Stroke()
+  {
+    window_.Window().Bench()->SetTool(Tool::Paint);
+    const QPoint from = window_.Slice(0)->rect().center();
+    window_.Drag(window_.Slice(0), from, from + QPoint(20, 5));
+    window_.Window().Bench()->SetTool(Tool::Align);
+  }
+
+  WindowUnderTest window_;
+  std::mt19937 random_;
+  QElapsedTimer clock_;
+};
+
+QByteArray Sum(const QString& path)
+{
+  QFile file(path);
+  if (!file.open(QIODevice::ReadOnly))
+    return "gone";
+  return QCryptographicHash::hash(file.readAll(), QCryptographicHash::Sha1);
+}
+
+} // namespace
+
+class TestKilled : public WindowTest {
+  Q_OBJECT
+
+private slots:
+  void aHundredKillsLoseAtMostASecond();
+
+private:
+  QStringList KillAt(const QStringList& arguments, bool fromStart, int milliseconds);
+  QString Recovered(const QString& project);
+};
+
+// Lets a child work, kills it so long after it began to work (or was started), and returns what it had said.
+QStringList TestKilled::KillAt(const QStringList& arguments, bool fromStart, int milliseconds)
+{
+  QProcess child;
+  child.start(QCoreApplication::applicationFilePath(), arguments);
+  if (!child.waitForStarted())
+    return {};
+  QByteArray said;
+  const auto read = [&](int wait) {
+    child.waitForReadyRead(wait);
+    said += child.readAllStandardOutput();
+  };
+  QElapsedTimer clock;
+  clock.start();
+  while (!fromStart && said.isEmpty() && clock.elapsed() < 60000)
+    read(50);
+  clock.start();
+  while (clock.elapsed() < milliseconds)
+    read(milliseconds - static_cast<int>(clock.elapsed()));
+  ::kill(static_cast<pid_t>(child.processId()), SIGKILL);
+  child.waitForFinished();
+  said += child.readAllStandardOutput();
+  QStringList lines = QString::fromUtf8(said).split('\n');
+  lines.removeLast(); // what follows the last end of a line, if anything, was not said whole
+  return lines;
+}
+
+// What the next start has, taking all that is offered; empty: nothing.
+QString TestKilled::Recovered(const QString& project)
+{
+  vtkNew<vtkUltrasoundAlignmentSession> session;
+  if (QFile::exists(project)) {
+    if (!session->OpenProject(project.toUtf8().constData()))
+      return "the project does not open";
+    const std::string later = session->GetLaterBackup();
+    if (!later.empty() && !session->RestoreBackup(later.c_str()))
+      return "the backup does not open";
+    return StateOf(session);
+  }
+  vtkNew<vtkStringArray> folders, paths, labels;
+  if (vtkUltrasoundAlignmentSession::GetAbandonedSessions(folders) == 0)
+    return {};
+  const int count = vtkUltrasoundAlignmentSession::GetBackupsIn(folders->GetValue(0).c_str(), paths, labels);
+  for (int i = 0; i < count; i++) {
+    if (labels->GetValue(i) == "damaged")
+      return "a backup is damaged";
+    if (i == 0 && !session->OpenProject(paths->GetValue(0).c_str()))
+      return "the backup does not open";
+  }
+  return count > 0 ? StateOf(session) : QString();
+}
+
+void TestKilled::aHundredKillsLoseAtMostASecond()
+{
+  std::mt19937 random(20);
+  double most = 0.0, sum = 0.0;
+  int measured = 0, saved = 0, early = 0;
+  for (int kill = 0; kill < Kills; kill++) {
+    QTemporaryDir place;
+    const QDir folder(place.path());
+    qputenv("XDG_DATA_HOME", folder.filePath("data").toLocal8Bit());
+    const QStringList volumes{::WriteVolume(folder, "left.mha", 1, {0, 0, 0}), ::WriteVolume(folder, "right.mha", 2, {12, 4, 0})};
+    const QByteArray sums = Sum(volumes[0]) + Sum(volumes[1]);
+    const QString project = folder.filePath("pair.json");
+    const unsigned int seed = random();
+    const bool hasProject = random() % 2 == 0, fromStart = random() % 10 == 0;
+    QStringList arguments{"--work", QString::number(seed), volumes[0], volumes[1]};
+    if (hasProject)
+      arguments.append(project);
+    const QStringList said = KillAt(arguments, fromStart, static_cast<int>(random() % (fromStart ? 1500 : 2500)));
+    const QString about = QString("kill %1, seed %2%3").arg(kill).arg(seed).arg(hasProject ? ", with a project" : "");
+    QVERIFY2(Sum(volumes[0]) + Sum(volumes[1]) == sums, qPrintable(about + ": a volume has changed"));
+
+    const QString kept = Recovered(project);
+    QVERIFY2(!kept.contains(' '), qPrintable(about + ": " + kept));
+    saved += QFile::exists(project);
+    double last = -1.0, keptTime = -1.0, first = -1.0;
+    for (const QString& line : said)
+      if (line != "begin") {
+        last = line.section(' ', 0, 0).toDouble();
+        if (first < 0.0)
+          first = last;
+        if (line.section(' ', 1) == kept)
+          keptTime = last;
+      }
+    if (last < 0.0) { // it was still opening its files
+      early++;
+      continue;
+    }
+    const bool mayBeUnsaid = said.last() == "begin";
+    if (kept.isEmpty()) // volumes that were opened and not moved are no work yet
+      keptTime = first;
+    else if (keptTime < 0.0 && mayBeUnsaid)
+      keptTime = last;
+    QVERIFY2(keptTime >= 0.0, qPrintable(QString("%1: %2 was never said").arg(about, kept)));
+    QVERIFY2(last - keptTime <= MostSeconds, qPrintable(QString("%1: %2 s are lost").arg(about).arg(last - keptTime)));
+    most = std::max(most, last - keptTime);
+    sum += last - keptTime;
+    measured++;
+  }
+  qInfo("%d kills during work lost %.3f s at most, %.3f s in the mean; %d before it; %d left a project", measured, most,
+        sum / std::max(1, measured), early, saved);
+  QVERIFY(measured > 70 && saved > 30);
+}
+
+int main(int argc, char** argv)
+{
+  return WindowTest::Run(argc, argv, [argc, argv] {
+    const QStringList arguments = QApplication::arguments();
+    if (arguments.value(1) == "--work")
+      Worker(arguments.mid(1));
+    TestKilled test;
+    return QTest::qExec(&test, argc, argv);
+  });
+}
+
+#include "TestKilled.moc"
