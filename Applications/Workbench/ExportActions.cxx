@@ -99,9 +99,10 @@ void ExportActions::ExportVolumes(const QString& folder, const QString& extensio
       Run(writer, progress.Part(static_cast<double>(i) / of, static_cast<double>(i + 1) / of), [&] { writer->Write(); });
     }
   };
-  workspace_.Run(this, tr("Export volumes"), write, [this, folder, count] {
+  const auto tell = [this, folder, count] {
     workspace_.show({Message::Note, tr("Exported %1 volumes to %2").arg(count).arg(folder), {}, "exportVolumes"});
-  });
+  };
+  workspace_.Run(this, tr("Export volumes"), write, tell, Elsewhere("exportVolumes"), "exportVolumes");
 }
 
 void ExportActions::ExportTransforms(const QString& folder)
@@ -128,8 +129,13 @@ void ExportActions::ExportPoses(const QString& path)
 // \a action: that was not done, and can be done with another folder or name.
 void ExportActions::Refuse(const char* action, const QString& why)
 {
+  workspace_.show({Message::Warning, why, Elsewhere(action), action});
+}
+
+Message::Answers ExportActions::Elsewhere(const char* action)
+{
   auto* again = findChild<QAction*>(action);
-  workspace_.show({Message::Warning, why, {{tr("Choose another place..."), [again] { again->trigger(); }}}, action});
+  return {{tr("Choose another place..."), [again] { again->trigger(); }}};
 }
 
 } // namespace echorama

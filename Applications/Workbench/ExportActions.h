@@ -27,6 +27,7 @@ public:
 
 private:
   void Refuse(const char* action, const QString& why);
+  Message::Answers Elsewhere(const char* action);
 
   Workspace& workspace_;
 };

@@ -83,6 +83,7 @@ GuideBar::GuideBar(Workbench* bench, Actions actions, QWidget* parent)
   for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::HistoryChanged})
     connect(bench, changed, this, &GuideBar::Follow);
   connect(bench, &Workbench::LookChanged, this, &GuideBar::NoteLook);
+  connect(bench, &Workbench::InteractingChanged, this, &GuideBar::Follow);
   Follow();
   ShowStep(Open);
 }
@@ -110,6 +111,8 @@ void GuideBar::NoteLook()
 
 void GuideBar::Follow()
 {
+  if (bench_->Interacting())
+    return; // at the end of the drag
   auto* session = bench_->Session();
   const SessionState& state = session->GetKernel().State();
   const SessionState sources = Essence(state);

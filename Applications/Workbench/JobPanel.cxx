@@ -5,11 +5,12 @@
 
 namespace echorama {
 
-Job* Workspace::Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done)
+Job* Workspace::Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done,
+                    const Message::Answers& answers, const QString& topic)
 {
   Job* job = Job::Start(owner, label, std::move(work), std::move(done),
-                        [this, label, topic = owner->objectName()](const QString& error) {
-                          show({Message::Warning, QString("%1: %2").arg(label, error), {}, topic});
+                        [this, label, answers, of = topic.isEmpty() ? owner->objectName() : topic](const QString& error) {
+                          show({Message::Warning, QString("%1: %2").arg(label, error), answers, of});
                         });
   jobs->Watch(job);
   return job;

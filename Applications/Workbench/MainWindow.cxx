@@ -256,6 +256,7 @@ void MainWindow::ShowEmpty()
 
 void MainWindow::OpenSample(const Sample& sample)
 {
+  bench_->Forget("sample");
   const auto open = [this, sample] {
     files_->OpenVolumes(VolumesOf(sample), [this, sample] { training_->LoadTruth(TruthOf(sample)); });
   };
@@ -263,7 +264,8 @@ void MainWindow::OpenSample(const Sample& sample)
     open();
   else
     bench_->Shared().Run(
-        this, tr("Making a sample"), [sample](const Progress& progress) { Make(sample, progress); }, open);
+        this, tr("Making a sample"), [sample](const Progress& progress) { Make(sample, progress); }, open,
+        {{tr("Try again"), [this, sample] { OpenSample(sample); }}}, "sample");
 }
 
 QDockWidget* MainWindow::AddDock(Qt::DockWidgetArea area, QWidget* panel, const QString& title, QWidget* content)

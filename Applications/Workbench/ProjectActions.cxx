@@ -67,27 +67,20 @@ void ProjectActions::ShowVolumes()
 
 void ProjectActions::CopyTo(const QString& folder)
 {
-  const auto made = std::make_shared<std::string>(), why = std::make_shared<std::string>();
-  const auto copy = [project = bench_->Session()->Now(), folder = folder.toStdString(), made, why](const Progress& progress) {
-    try {
-      *made = CopyProject(project, folder, progress);
-    } catch (const Error& error) {
-      if (error.GetKind() == Error::Kind::Cancelled)
-        throw;
-      *why = error.what();
-    }
+  const auto made = std::make_shared<std::string>();
+  const auto copy = [project = bench_->Session()->Now(), folder = folder.toStdString(), made](const Progress& progress) {
+    *made = CopyProject(project, folder, progress);
   };
-  bench_->Forget("copyProject");
-  bench_->Shared().Run(this, tr("Copying project and volumes"), copy, [this, made, why] {
-    if (!why->empty())
-      return bench_->Warn(QString::fromUtf8(why->c_str()), {{tr("Choose another place..."), [this] { copy_->trigger(); }}},
-                          "copyProject");
+  const auto tell = [this, made] {
     const QString path = QString::fromStdString(*made);
     emit bench_->Said({Message::Note,
                        tr("The project and its volumes are in %1").arg(QFileInfo(path).path()),
                        {{tr("Open the copy"), [this, path] { emit OpenAsked(path); }}},
                        "copyProject"});
-  });
+  };
+  bench_->Forget("copyProject");
+  bench_->Shared().Run(this, tr("Copying project and volumes"), copy, tell,
+                       {{tr("Choose another place..."), [this] { copy_->trigger(); }}}, "copyProject");
 }
 
 void ProjectActions::CompareWith(const QString& path)

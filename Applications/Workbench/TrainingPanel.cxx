@@ -200,7 +200,7 @@ void TrainingPanel::Scatter()
 {
   auto* session = bench_->Session();
   if (session->GetNumberOfVolumes() < 2) {
-    bench_->Warn(tr("Scatter: two volumes are needed; open another one"));
+    bench_->Warn(tr("Scatter: two volumes are needed; open another one"), {}, objectName());
     return;
   }
   session->BeginEdit("Scatter volumes");

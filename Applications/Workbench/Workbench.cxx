@@ -112,13 +112,14 @@ void Workbench::BeginAttempt(bool isHelpAllowed)
 void Workbench::EndAttempt()
 {
   isScored_ = false;
+  Forget("trainingPanel"); // what was refused during it
   emit ScoredChanged();
 }
 
 bool Workbench::MayHelp(const QString& what)
 {
   if (isScored_ && !isHelpAllowed_)
-    Warn(tr("%1: not during an attempt; give it up first, or allow it before the next one").arg(what));
+    Warn(tr("%1: not during an attempt; give it up first, or allow it before the next one").arg(what), {}, "trainingPanel");
   else if (isScored_)
     helpTaken_++;
   return !isScored_ || isHelpAllowed_;

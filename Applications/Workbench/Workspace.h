@@ -19,8 +19,10 @@ class JobBar;
 struct Workspace {
   vtkSmartPointer<vtkUltrasoundAlignmentSession> session = vtkSmartPointer<vtkUltrasoundAlignmentSession>::New();
   JobBar* jobs = nullptr;
-  /// A job that the job bar shows; what keeps it from being done is said. See Job::Start.
-  Job* Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done);
+  /// A job that the job bar shows; what keeps it from being done is said, with \a answers, of \a topic or the owner's name. See
+  /// Job::Start.
+  Job* Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done,
+           const Message::Answers& answers = {}, const QString& topic = {});
   std::function<void(const Message& message)> show = [](const Message&) {}; ///< in the window's message bar
   void say(const QString& text, bool isError) const { show({isError ? Message::Warning : Message::Note, text, {}}); }
   std::function<bool(const QString& what)> mayHelp = [](const QString&) { return true; }; ///< else it has said why not

@@ -74,6 +74,7 @@ private slots:
   void anEmptyWindowSaysHowToBegin();
   void aSampleIsOneClickAway();
   void aSampleThatIsStoppedIsMadeAgain();
+  void aSampleThatCannotBeMadeIsTriedAgain();
   void filesAreDroppedAnywhere();
   void aPathIsDroppedOnItsField();
   void theGuideTicksWhatHappened();
@@ -147,6 +148,21 @@ void TestFirstMinutes::aSampleThatIsStoppedIsMadeAgain()
   ClickIn(window, window.Part<QPushButton>("phantom-4"));
   QVERIFY(window.Wait());
   QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 4);
+}
+
+void TestFirstMinutes::aSampleThatCannotBeMadeIsTriedAgain()
+{
+  WindowUnderTest window;
+  QFile inTheWay(Folder().filePath("data"));
+  QVERIFY(inTheWay.open(QIODevice::WriteOnly)); // where the folder for samples would be
+  ClickIn(window, window.Part<QPushButton>("phantom-2"));
+  QVERIFY(window.Wait());
+  QVERIFY2(window.HasMessage("folder for samples cannot be made"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(inTheWay.remove());
+  QVERIFY(window.Answer("Try again"));
+  QVERIFY(window.Wait());
+  QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
 }
 
 void TestFirstMinutes::filesAreDroppedAnywhere()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the workbench says: each warning has a way out, errors and progress are in one place, and nothing stays that is no longer
 // so.
+#include "ExportActions.h"
 #include "FileActions.h"
 #include "HistoryPanel.h"
 #include "Job.h"
@@ -111,6 +112,15 @@ void TestMessages::everyWarningHasAWayOut()
   window.Part<QPushButton>("placeByTracker")->click();
   QVERIFY(window.Wait());
   QCOMPARE(expect("none.csv", {"Show panel Align"}), nothing);
+
+  window.Window().findChild<ExportActions*>()->ExportVolumes(Folder().path()); // where left.mha is
+  QVERIFY(window.Wait());
+  QCOMPARE(expect("choose another folder", {"Choose another place..."}), nothing);
+  window.Window().Bench()->BeginAttempt(false);
+  trigger("refineAction");
+  QCOMPARE(expect("not during an attempt", {"Show panel Train"}), nothing);
+  window.Window().Bench()->EndAttempt();
+  QCOMPARE(AnswersTo(window, "not during an attempt"), QStringList("none"));
 
   window.Session()->SetAutomaticBackups(true);
   QVERIFY(window.Session()->BackUp());
