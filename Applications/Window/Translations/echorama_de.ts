@@ -1045,6 +1045,10 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>Save what you did before the window closes?</source>
         <translation>Ihre Arbeit speichern, bevor das Fenster schließt?</translation>
     </message>
+    <message>
+        <source>Try again</source>
+        <translation>Noch einmal versuchen</translation>
+    </message>
 </context>
 <context>
     <name>echorama::MessageBar</name>
