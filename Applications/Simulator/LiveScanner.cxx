@@ -132,7 +132,7 @@ void LiveScanner::SetNeedle(const std::optional<Needle>& needle)
   }
 }
 
-double LiveScanner::AdvanceNeedle(const Needle& needle, double mm)
+double LiveScanner::AdvanceNeedle(const Needle& needle, double mm, double stepMm)
 {
   if (!OfNeedle().stops)
     return mm; // and a picture in the background goes on
@@ -140,7 +140,7 @@ double LiveScanner::AdvanceNeedle(const Needle& needle, double mm)
     beforeUse_();
   const Messages::OfThread messages;
   SetNeedle(needle);
-  const double moved = live_->AdvanceNeedle(mm);
+  const double moved = live_->AdvanceNeedle(mm, stepMm);
   messages.ThrowErrors();
   return moved;
 }

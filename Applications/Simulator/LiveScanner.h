@@ -36,8 +36,8 @@ public:
   void Make(const ScanFrame& frame);
 
   /// How far a needle can go on along its axis, at most \a mm, until bone stops it, if NeedleStops is on. Below 0: back out.
-  /// \throws Error(BadInput) when it cannot be told
-  double AdvanceNeedle(const Needle& needle, double mm);
+  /// What is thinner than \a stepMm may be missed. \throws Error(BadInput) when it cannot be told
+  double AdvanceNeedle(const Needle& needle, double mm, double stepMm = 0.25);
 
   ///@{ The same in three steps, for an image that takes longer than a window may wait. The second may run on another thread;
   /// until it has ended nothing may be set or made, and all below still tells of the image before.

@@ -18,6 +18,10 @@ constexpr double HubMm = 10.0;                    ///< that stays outside
 constexpr double GuideMm = 8.0;                   ///< of a guide from the array
 constexpr double AimShare = 0.45, LeastAimMm = 10.0, AimMmPerDegree = 1.0;
 constexpr double MostOblique = 80.0; ///< degrees from the skin's normal
+constexpr double SweepMm =
+    1.0; ///< of all that a moving needle meets, what is thinner may be missed: it is asked for with each pose
+constexpr int MostTries = 60;
+constexpr double OffBoneMm = 2.0; ///< when it no longer meets it
 
 Vector3d Turned(const Vector3d& direction, const Vector3d& axis, double degrees)
 {
@@ -41,8 +45,9 @@ NeedleTool::NeedleTool(Scan* scan) : QObject(scan), scan_(scan)
       Give();
   });
   connect(scan, &Scan::FrameMade, this, [this] {
-    if (isShown_ && guide_ != NeedleGuide::None && !isFollowing_ && !(scan_->Scanner().Probe() == guided_))
-      Give(); // another probe has another end
+    if (isShown_ && guide_ != NeedleGuide::None && !isFollowing_ &&
+        (!(scan_->Scanner().Probe() == guided_) || heldBy_.matrix() != scan_->ProbeToWorld().matrix()))
+      Give(); // another probe has another end; or bone could not be asked for while the image was made
   });
   connect(scan, &Scan::ControlsChanged, this, [this] {
     isBoneKnown_ = hasSaidWhy_ = false; // what stops it may be another
@@ -119,19 +124,60 @@ void NeedleTool::Give()
     emit Changed();
     return;
   }
-  if (guide_ != NeedleGuide::None && !isFollowing_)
+  if (guide_ != NeedleGuide::None && !isFollowing_) {
     ToGuide();
-  const Needle now = Now();
-  insideMm_ = depthMm_;
-  if (scan_->HasSkin()) { // which a guide or a tracker does not touch, or not where it says
-    constexpr double far = 400.0;
-    if (const auto hit = scan_->Body().mesh->FirstHit(now.tip - far * now.direction, now.direction))
-      insideMm_ = far - hit->distanceMm;
-    else
-      insideMm_ = OutMm;
+    SlideBack();
   }
+  const Needle now = Now();
+  insideMm_ = InsideOf(now);
   scan_->SetNeedle(now);
   emit Changed();
+}
+
+// How much of it is in the body: a guide or a tracker does not touch the skin, or not where it says.
+double NeedleTool::InsideOf(const Needle& needle) const
+{
+  if (!scan_->HasSkin())
+    return depthMm_;
+  constexpr double far = 400.0;
+  const auto hit = scan_->Body().mesh->FirstHit(needle.tip - far * needle.direction, needle.direction);
+  return hit ? far - hit->distanceMm : OutMm;
+}
+
+// A guide takes the needle along, and bone does not let it through. Neither bends: where bone is in the way of the needle, from
+// the guide to the tip, it slides back in its guide. That is tried all along the way of the probe, however far it went.
+void NeedleTool::SlideBack()
+{
+  const bool isOut = depthMm_ <= 0.0;
+  if (!isOut && (scan_->IsFrozen() || scan_->IsMaking())) // with the next image
+    return;
+  const Pose to = scan_->ProbeToWorld(), from = std::exchange(heldBy_, to);
+  if (isOut || from.matrix() == to.matrix())
+    return;
+  const Vector3d tip = entry_ + depthMm_ * direction_;
+  const double way = std::max((to * tip - from * tip).norm(), (to * entry_ - from * entry_).norm());
+  const int tries = std::clamp(static_cast<int>(std::ceil(way / SweepMm)), 1, MostTries);
+  try {
+    for (int i = 1; i <= tries; i++) {
+      const Pose probe = i < tries ? Interpolate(from, to, static_cast<double>(i) / tries) : to;
+      const double freeMm =
+          scan_->Scanner().AdvanceNeedle({probe * entry_, probe.linear() * direction_}, depthMm_ + OffBoneMm, SweepMm);
+      if (freeMm < depthMm_) {
+        depthMm_ = freeMm;
+        hasMetBone_ = true;
+      } else if (freeMm > depthMm_ + OffBoneMm - 1e-6) {
+        hasMetBone_ = false;
+      }
+    }
+  } catch (const Error& error) {
+    SayWhyBoneIsNotKnown(error);
+  }
+}
+
+void NeedleTool::SayWhyBoneIsNotKnown(const Error& error)
+{
+  if (!std::exchange(hasSaidWhy_, true)) // and not with each pose
+    Say(tr("Whether the needle meets bone is not known: %1").arg(QString::fromUtf8(error.what())));
 }
 
 void NeedleTool::SetGuide(NeedleGuide guide)
@@ -242,11 +288,12 @@ void NeedleTool::Follow(const Eigen::Matrix4d& matrix)
   entry_ = needle.tip;
   direction_ = needle.direction;
   depthMm_ = 0.0;
-  try { // nobody can stop a hand: it is told
-    hasMetBone_ = scan_->Scanner().AdvanceNeedle({needle.tip - needle.direction, needle.direction}, 1.0) < 0.999;
+  try {                                                       // nobody can stop a hand: it is told, and counted
+    const double way = std::max(InsideOf(needle), 0.0) + 1.0; // the tip may be beyond bone
+    hasMetBone_ =
+        scan_->Scanner().AdvanceNeedle({needle.tip - way * needle.direction, needle.direction}, way, SweepMm) < way - 1e-3;
   } catch (const Error& error) {
-    if (!std::exchange(hasSaidWhy_, true)) // and not with each pose
-      Say(tr("Whether the needle meets bone is not known: %1").arg(QString::fromUtf8(error.what())));
+    SayWhyBoneIsNotKnown(error);
   }
   Give();
 }

@@ -8,6 +8,7 @@
 
 namespace echorama {
 
+class Error;
 class Scan;
 
 /// What holds a needle.
@@ -75,6 +76,9 @@ private:
   bool IsInBody(const QString& why);
   bool IsFree(const Eigen::Vector3d& place);
   void ToGuide();
+  void SlideBack();
+  double InsideOf(const Needle& needle) const;
+  void SayWhyBoneIsNotKnown(const Error& error);
   double AimMm() const;
   void Give();
   void Say(const QString& text);
@@ -82,15 +86,16 @@ private:
   Scan* scan_;
   bool isShown_ = false, isFollowing_ = false, isBlind_ = false, isScored_ = false, hasMetBone_ = false, isLost_ = false;
   bool isBoneKnown_ = false; ///< of a tracked one: hasMetBone_ is of where it is, with the controls of now
-  bool hasSaidWhy_ = false;  ///< why that cannot be told
+  bool hasSaidWhy_ = false;  ///< why bone cannot be told
   NeedleGuide guide_ = NeedleGuide::InPlane;
   Eigen::Vector3d entry_ = Eigen::Vector3d::Zero(),
                   direction_ = Eigen::Vector3d::UnitZ(); ///< of the world; in a guide, of the probe
   double depthMm_ = 0.0;                                 ///< of the tip, from the entry
   double aimMm_ = 0.0;                                   ///< of a guide: where it crosses the middle of the image; 0: as usual
   double insideMm_ = 0.0;
-  ProbeGeometry guided_;          ///< the probe that the guide was made for
-  std::optional<bool> tipBefore_; ///< an attempt: whether it was marked, as it shall be again
+  Pose heldBy_ = Pose::Identity(); ///< a guide: where the probe was when bone was last asked for
+  ProbeGeometry guided_;           ///< the probe that the guide was made for
+  std::optional<bool> tipBefore_;  ///< an attempt: whether it was marked, as it shall be again
 };
 
 } // namespace echorama

@@ -438,6 +438,11 @@ void Scan::MakeSlowly(ScanFrame frame)
   });
 }
 
+bool Scan::IsMaking() const
+{
+  return slow_ != nullptr;
+}
+
 void Scan::StopSlow()
 {
   delete slow_; // waits until it has noticed

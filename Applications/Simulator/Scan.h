@@ -102,6 +102,8 @@ public:
   ///@{ Freeze, and what was seen in the last seconds.
   void SetFrozen(bool frozen);
   bool IsFrozen() const { return isFrozen_; }
+  /// Whether a picture is made in the background: what is asked of the scanner ends that.
+  bool IsMaking() const;
   /// Whether the newest image could not be made: what is shown is the one before.
   bool HasFailed() const { return !failure_.isEmpty(); }
   const CineLoop& Cine() const { return cine_; }

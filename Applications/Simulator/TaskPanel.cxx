@@ -358,9 +358,11 @@ QString TaskPanel::TellSubmitted(const ScanScore& score) const
   if (attempt_->What() == ScanAttempt::Kind::FindPlane)
     more = tr(" and %1\u00b0").arg(score.degrees, 0, 'f', 1);
   else if (track_)
-    more = tr(", %1, %2, %3 s of %4 s with the tip out of the plane")
+    more = tr(", %1, %2, %3%4 s of %5 s with the tip out of the plane")
                .arg(Counted(track_->Score().redirections, tr("redirection"), tr("redirections")))
                .arg(Counted(track_->Score().passes, tr("time in"), tr("times in")))
+               .arg(track_->Score().stops > 0 ? Counted(track_->Score().stops, tr("time at bone"), tr("times at bone")) + ", "
+                                              : QString())
                .arg(track_->Score().offPlaneSeconds, 0, 'f', 1)
                .arg(track_->Score().insideSeconds, 0, 'f', 1);
   return tr("%1: %2 mm off%3, after %4 s")

@@ -145,10 +145,10 @@ echorama::Needle vtkUltrasoundLiveImage::NeedleNow() const
 }
 
 //----------------------------------------------------------------------------
-double vtkUltrasoundLiveImage::AdvanceNeedle(double mm)
+double vtkUltrasoundLiveImage::AdvanceNeedle(double mm, double stepMm)
 {
   double moved = 0.0;
-  vtkUltrasoundVolume::Run(this, nullptr, [this, mm, &moved](const echorama::Progress&) {
+  vtkUltrasoundVolume::Run(this, nullptr, [this, mm, stepMm, &moved](const echorama::Progress&) {
     echorama::CheckRanges(this->Parameters());
     const echorama::Needle needle = this->NeedleNow();
     echorama::NeedleObstacle bone;
@@ -168,7 +168,7 @@ double vtkUltrasoundLiveImage::AdvanceNeedle(double mm)
         bone = scene->Hard();
       }
     }
-    moved = echorama::AdvanceTip(needle.tip, needle.tip + mm * needle.direction, bone).freeMm * (mm < 0.0 ? -1.0 : 1.0);
+    moved = echorama::AdvanceTip(needle.tip, needle.tip + mm * needle.direction, bone, stepMm).freeMm * (mm < 0.0 ? -1.0 : 1.0);
     this->NeedlePlace = needle.tip + moved * needle.direction;
     this->Modified();
   });

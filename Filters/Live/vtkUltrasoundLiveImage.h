@@ -77,9 +77,9 @@ public:
    * Moves the needle along its axis: NeedleTip becomes another. With NeedleStops it goes in (not out) no further than to bone: of
    * a scene to materials stiffer than 100 MPa, of volumes to what is brighter than NeedleStopLevel over 1.5 mm. The inputs are
    * brought up to date. Returns how far it went, in mm; less than was asked for when it was stopped, and 0 after an error event
-   * when it cannot be told.
+   * when it cannot be told. What is thinner than \a stepMm (0.01 to 10 mm) may be missed; time is in inverse proportion to it.
    */
-  double AdvanceNeedle(double mm);
+  double AdvanceNeedle(double mm, double stepMm = 0.25);
 
   /**
    * Takes the field data `ProbeGeometry` of \a data as the custom probe (of a probe that sweeps, its middle plane). Returns

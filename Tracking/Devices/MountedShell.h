@@ -32,9 +32,9 @@ private:
   FisheyeLens lens_;
   int turnFrames_, turns_;
   int frames_ = 0, tries_ = 0;
-  std::vector<std::uint8_t> darkest_;  // of this turn
-  std::vector<std::uint32_t> sum_;     // of those before
-  bool isUnclear_ = false;             // a marker was seen in one of the tries
+  std::vector<std::uint8_t> darkest_; // of this turn
+  std::vector<std::uint32_t> sum_;    // of those before
+  bool isUnclear_ = false;            // a marker was seen in one of the tries
 };
 
 /// What the marker says, as it is written in a calibration: "0A1B2C". For one that was read.

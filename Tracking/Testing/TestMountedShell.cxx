@@ -27,7 +27,8 @@ std::unique_ptr<SimulatedSource> Camera(const std::string& options)
   std::vector<SimulatedLight> lights;
   for (const int i : {0, 1})
     lights.push_back(p.Light(i, [i, skin, p](double time) {
-      const double azimuth = (i == 0 ? 19.0 + 15.0 * std::sin(6.0 * time) : 4.0) / DegreesPerRadian, elevation = 12.0 / DegreesPerRadian;
+      const double azimuth = (i == 0 ? 19.0 + 15.0 * std::sin(6.0 * time) : 4.0) / DegreesPerRadian,
+                   elevation = 12.0 / DegreesPerRadian;
       const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                                       std::sin(elevation));
       return LightOnSkin{skin->FirstHit(Eigen::Vector3d::Zero(), direction)->point, 0.0, p.peak};
