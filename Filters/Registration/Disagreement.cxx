@@ -481,6 +481,7 @@ private:
       const Eigen::Vector3d way = eigen.vectors.col(a);
       const double beyond = std::clamp(gradient.dot(way) / eigen.values[a], -1.0, 1.0);
       result.shift += (at.cast<double>().dot(way) + beyond) * stepMm_ * way;
+      result.known += way * way.transpose();
       knownBend += eigen.values[a] * way * way.transpose();
       variances += variance * stepMm_ * stepMm_;
       largest = std::max(largest, variance);
@@ -494,6 +495,7 @@ private:
     }
     if (result.knownDirections == 0) {
       result.shift.setZero();
+      result.known.setZero();
       return;
     }
     result.errorMm = std::sqrt(largest) * stepMm_;

@@ -21,9 +21,10 @@ ParameterList Describe(DisagreementParameters& p);
 struct LocalShift {
   /// Tissue that the fixed volume shows at x is shown by the moving one at x + shift, mm; the known part of it.
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-  int knownDirections =
-      0;                ///< how many directions of it are known: at an edge one, along an edge of two surfaces two; 0: nothing is
-  double errorMm = 0.0; ///< standard deviation in the least sure of the known directions
+  Eigen::Matrix3d known = Eigen::Matrix3d::Zero(); ///< projects any shift onto what is known of this one
+  /// How many directions are known: at an edge one, where two surfaces meet two; 0: nothing is.
+  int knownDirections = 0;
+  double errorMm = 0.0;     ///< standard deviation in the least sure of the known directions
   double correlation = 0.0; ///< of the block at that shift
   /// Length of the known part less what noise adds to it in the mean, mm.
   double mm = 0.0;

@@ -168,6 +168,8 @@ TEST(Disagreement, AnEdgeTellsItsNormalAlone)
     if (each.knownDirections == 0)
       continue;
     const double along = each.shift.dot(normal), across = (each.shift - along * normal).norm();
+    EXPECT_NEAR(each.known.trace(), each.knownDirections, 1e-9);
+    EXPECT_LT((each.known * each.shift - each.shift).norm(), 1e-9);
     sideways += each.knownDirections > 1 || across > 0.2 * std::abs(along) + 0.05;
     off += std::abs(along - shift.dot(normal)) > 3.0 * each.errorMm;
   }
