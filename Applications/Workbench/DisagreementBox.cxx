@@ -58,16 +58,19 @@ DisagreementBox::DisagreementBox(Workbench* bench, QWidget* parent) : JobPanel(b
     field->setValue(parameter.Number());
     return field;
   };
-  find_ = Button(this, "findDisagreement", tr("&Find disagreement"),
-                 tr("How far the volumes that are shown are from agreeing, block by block, in the background"), [this] { Find(); });
+  find_ =
+      Button(this, "findDisagreement", tr("&Find disagreement"),
+             tr("How far the volumes that are shown are from agreeing, block by block, in the background"), [this] { Find(); });
   shown_ = CheckField(this, "showDisagreement", tr("Show in slices"),
                       tr("Colours where something is known; where there is no colour, nothing is"), [this](bool) { ShowMap(); });
   shown_->setChecked(true);
   scale_ = NumberField(this, {"disagreementScale", tr("The shift that has the brightest colour"), 0.1, 100.0, 1, 0.5, tr(" mm")},
                        [this](double) { ShowMap(); });
   Show(scale_, 3.0);
-  search_ = number("disagreementSearch", "SearchMm", tr("Shifts are looked for so far; what is farther apart stays without colour"));
-  block_ = number("disagreementBlock", "BlockMm", tr("Side of the blocks that are compared: larger ones know more, and tell less of where"));
+  search_ =
+      number("disagreementSearch", "SearchMm", tr("Shifts are looked for so far; what is farther apart stays without colour"));
+  block_ = number("disagreementBlock", "BlockMm",
+                  tr("Side of the blocks that are compared: larger ones know more, and tell less of where"));
   text_ = TextField(this, "disagreementText");
   here_ = TextField(this, "disagreementHere", tr("Where the mouse points"));
   auto* layout = new QVBoxLayout(this);
@@ -117,7 +120,8 @@ void DisagreementBox::Find()
   }
   found->parameters.searchMm = search_->value();
   found->parameters.blockMm = block_->value();
-  Start(label, [found](const Progress& progress) { found->Run(progress); }, [this, found] { Take(found); });
+  Start(
+      label, [found](const Progress& progress) { found->Run(progress); }, [this, found] { Take(found); });
 }
 
 void DisagreementBox::Take(const std::shared_ptr<Found>& found)
@@ -145,7 +149,9 @@ void DisagreementBox::ShowMap()
       lengths.push_back(shift.mm);
   QString text = tr("%1 of %2 blocks tell something.").arg(map.known).arg(map.compared);
   if (!lengths.empty())
-    text += " " + tr("Median %1 mm, 95% below %2 mm.").arg(Percentile(lengths, 0.5), 0, 'f', 2).arg(Percentile(lengths, 0.95), 0, 'f', 2);
+    text +=
+        " " +
+        tr("Median %1 mm, 95% below %2 mm.").arg(Percentile(lengths, 0.5), 0, 'f', 2).arg(Percentile(lengths, 0.95), 0, 'f', 2);
   if (map.compared == 0)
     text = tr("The volumes do not overlap.");
   if (isStale)

@@ -125,7 +125,8 @@ void GuideBar::Follow()
   done_[Open] = sources.volumes.size() > 1;
   done_[Align] = done_[Open] && std::any_of(sources.volumes.begin(), sources.volumes.end(), isMoved);
   done_[Check] = done_[Align] && sources == checked_;
-  done_[Stitch] = std::any_of(volumes.begin(), volumes.end(), [&](const auto& volume) { return isResult(volume, "Preview", false); });
+  done_[Stitch] =
+      std::any_of(volumes.begin(), volumes.end(), [&](const auto& volume) { return isResult(volume, "Preview", false); });
   done_[Embed] = done_[Stitch] &&
                  std::any_of(volumes.begin(), volumes.end(), [&](const auto& volume) { return isResult(volume, "Embed", true); });
   done_[Save] = !state.volumes.empty() && !session->GetProjectPath().empty() && !session->GetModifiedSinceSave();

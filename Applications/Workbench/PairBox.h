@@ -9,8 +9,8 @@ namespace echorama {
 
 class Workbench;
 
-/// The pairs of the last alignment, as a graph and as a list. Choosing one shows its two volumes alone, with the views on where they
-/// overlap; choosing it again, or Escape, brings all back.
+/// The pairs of the last alignment, as a graph and as a list. Choosing one shows its two volumes alone, with the views on where
+/// they overlap; choosing it again, or Escape, brings all back.
 class PairBox : public QGroupBox {
   Q_OBJECT
 

@@ -41,7 +41,8 @@ QPointF PairGraph::PlaceOf(int id) const
   for (int i = 0; i < nodes_.size(); ++i)
     if (nodes_[i].id == id) {
       const double angle = 2.0 * M_PI * i / nodes_.size();
-      return {0.5 * width() - (0.5 * width() - 34.0) * std::cos(angle), 0.5 * height() - (0.5 * height() - 26.0) * std::sin(angle)};
+      return {0.5 * width() - (0.5 * width() - 34.0) * std::cos(angle),
+              0.5 * height() - (0.5 * height() - 26.0) * std::sin(angle)};
     }
   return {0.5 * width(), 0.5 * height()};
 }
@@ -92,7 +93,8 @@ void PairGraph::paintEvent(QPaintEvent*)
   }
   for (int i = 0; i < edges_.size(); ++i) {
     const Edge& edge = edges_[i];
-    const QString label = edge.verdict == "failed" ? tr("failed") : tr("%1 mm").arg(edge.errorMm, 0, 'f', edge.errorMm < 10 ? 1 : 0);
+    const QString label =
+        edge.verdict == "failed" ? tr("failed") : tr("%1 mm").arg(edge.errorMm, 0, 'f', edge.errorMm < 10 ? 1 : 0);
     QRectF box = painter.fontMetrics().boundingRect(label);
     box.moveCenter(MiddleOf(i));
     painter.setPen(Qt::NoPen);

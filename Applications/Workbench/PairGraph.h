@@ -23,7 +23,7 @@ public:
     int a = 0, b = 0;      ///< ids of volumes
     QString verdict, help; ///< "aligned", "ambiguous", "failed"; all that is known, for people
     bool votedDown = false, stands = false;
-    double errorMm = 0.0;  ///< predicted
+    double errorMm = 0.0; ///< predicted
   };
 
   explicit PairGraph(QWidget* parent = nullptr);

@@ -389,8 +389,10 @@ void ResultPanel::Begin(int target, const std::vector<int>& sources, const Resul
     return;
   vtkUltrasoundAlignmentSession* session = workspace_.session;
   if (sources.empty()) {
-    workspace_.say(
-        tr("Stitch: %1").arg(target > 0 ? tr("the sources of %1 are gone").arg(NameOf(target)) : tr("no volume is shown; tick one in the list of volumes")), true);
+    workspace_.say(tr("Stitch: %1")
+                       .arg(target > 0 ? tr("the sources of %1 are gone").arg(NameOf(target))
+                                       : tr("no volume is shown; tick one in the list of volumes")),
+                   true);
     return;
   }
   if (sources.size() < 2 && !recipe.isEmbedded) {

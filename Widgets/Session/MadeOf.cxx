@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Sources are known by their names, which are unique in a session and in its project file, so a state is whole in itself: undo,
 // a backup and a project bring the link back with the volumes. That a name means another volume by now is found by what is
-// compared: file, geometry, pose, strokes, and of a source that is a result itself, what that was made of. No voxels are looked at:
-// they follow from these.
+// compared: file, geometry, pose, strokes, and of a source that is a result itself, what that was made of. No voxels are looked
+// at: they follow from these.
 #include "Widgets/Session/MadeOf.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
@@ -121,9 +121,7 @@ MadeOf MadeOfJson::ToMadeOf(const Json& value, const JsonPlace& place)
   std::set<std::string> names;
   for (const Json& each : sources) {
     const JsonPlace here = place.In("source " + std::to_string(madeOf.sources.size() + 1));
-    const auto text = [&](const char* key) {
-      return each.contains(key) ? here.In(key).Text(each[key]) : std::string();
-    };
+    const auto text = [&](const char* key) { return each.contains(key) ? here.In(key).Text(each[key]) : std::string(); };
     MadeOf::Source source;
     source.name = here.In("name").Text(here.Member(each, "name"));
     if (source.name.empty() || !names.insert(source.name).second)
@@ -167,8 +165,8 @@ MadeOf RecordSources(const SessionState& state, const std::vector<int>& ids, std
       refuse("there is no volume " + std::to_string(id));
     if (!taken.insert(id).second)
       refuse(volume->name + ": a source is taken once");
-    madeOf.sources.push_back({volume->name, BareFileOf(*volume), volume->geometry, volume->volumeToWorld, StrokesText(*volume),
-                              MakingText(*volume)});
+    madeOf.sources.push_back(
+        {volume->name, BareFileOf(*volume), volume->geometry, volume->volumeToWorld, StrokesText(*volume), MakingText(*volume)});
   }
   madeOf.options = std::move(options);
   return madeOf;

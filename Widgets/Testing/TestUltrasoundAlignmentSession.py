@@ -281,6 +281,27 @@ class Session(unittest.TestCase):
         session.RemoveLandmark("apex")
         self.assertEqual(session.GetNumberOfLandmarks(one) + session.GetNumberOfLandmarks(two), 0)
 
+    def test_measurements_stay_in_the_world_and_are_edits(self):
+        session = self.session()
+        one = session.AddVolume(volume(), None)
+        told = []
+        session.AddObserver(session.MeasurementsChangedEvent, lambda *_: told.append(1))
+        number = session.GetNextMeasurementNumber()
+        self.assertTrue(session.SetDistance(number, (0, 0, 0), (3, 4, 0)))
+        self.assertTrue(session.SetAngle(number + 1, (1, 0, 0), (0, 0, 0), (0, 2, 0)))
+        session.Select(one)
+        session.TranslateSelection(10, 0, 0)
+        self.assertEqual([session.GetMeasurementNumber(i) for i in range(3)], [1, 2, 0])
+        self.assertEqual([session.GetMeasurementValue(i) for i in range(2)], [5.0, 90.0])
+        self.assertEqual(len(told), 2)
+        self.assertTrue(session.RemoveMeasurement(1))
+        session.Undo()
+        self.assertEqual((session.GetNumberOfMeasurements(), len(told)), (2, 4))
+        self.refuses(session, "measurement 7", session.RemoveMeasurement, 7)
+        self.refuses(session, "from 1", session.SetDistance, 0, (0, 0, 0), (1, 0, 0))
+        session.ClearMeasurements()
+        self.assertEqual(session.GetNumberOfMeasurements(), 0)
+
     # ------------------------------------------------------------------------------------------------------------ strokes
 
     def test_strokes_go_where_the_volume_goes_and_are_undone_to_the_bit(self):

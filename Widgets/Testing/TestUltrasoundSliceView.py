@@ -207,6 +207,72 @@ class SliceView(unittest.TestCase):
         view.SetSession(None)
         self.assertEqual(self.picture().max(), 0)
 
+    def test_pointer_and_measurements_are_drawn_without_the_picture(self):
+        view = self.view
+        self.picture()
+        window = window_of(view)
+        window.Render()
+        plain, time = rendered(window), view.GetPicture().GetMTime()
+
+        def differs():
+            self.assertTrue(view.Update())
+            self.assertEqual(view.GetPicture().GetMTime(), time)
+            window.Render()
+            return (rendered(window) != plain).any()
+
+        cursor = array_of(view.GetCursor, 3)
+        view.SetPointer(*(cursor + (3, 2, 0)))
+        self.assertTrue(differs())
+        view.HidePointer()
+        self.assertFalse(differs())
+        view.HidePointer()
+        self.assertFalse(view.Update())
+        self.assertTrue(self.session.SetDistance(1, cursor - (5, 0, 0), cursor + (5, 3, 0)))
+        self.assertTrue(differs())
+        self.assertTrue(self.session.SetDistance(1, cursor - (5, 0, 6), cursor + (5, 3, -6)), "beyond 5 mm it is not drawn")
+        self.assertFalse(differs())
+
+    def test_single_volumes_without_an_edit(self):
+        view = self.view
+        everything = self.picture()
+        view.SetShown("selected")
+        self.session.Select(self.a, True, True)
+        alone = self.picture()
+        view.SetShown("others")
+        self.session.SetVisible(self.a, False)
+        view.AddOnly(self.a)
+        np.testing.assert_array_equal(self.picture(), alone)
+        view.ClearOnly()
+        self.session.Undo()
+        view.SetShown("all")
+        np.testing.assert_array_equal(self.picture(), everything)
+
+    def test_shifts_are_laid_over_what_is_seen(self):
+        view = self.view
+        plain = self.picture()
+        shifts = vtkImageData()
+        shifts.SetDimensions(2, 1, 1)
+        shifts.SetSpacing(1000, 1000, 1000)
+        shifts.SetOrigin(-500, 0, 0)
+        shifts.GetPointData().SetScalars(numpy_to_vtk(np.array([1.0, np.nan], np.float32), deep=True))
+        view.SetShifts(shifts, 2.0)
+        laid = self.picture()
+        np.testing.assert_array_equal(laid[:, :, 3], plain[:, :, 3])
+        cell = np.array([[self.world(x, y)[0] < 0 for x in range(laid.shape[1])] for y in range(laid.shape[0])])
+        changed = (laid != plain).any(axis=2)
+        self.assertFalse(changed[:, 3:][~cell[:, 3:] & ~cell[:, :-3]].any(), "nothing is known there")
+        inside = cell[:, :-3] & cell[:, 3:] & (plain[:, :-3, 3] > 0)
+        self.assertGreater(changed[:, :-3][inside].mean(), 0.95 if inside.any() else -1)
+        view.SetShifts(shifts, 2.0, True)
+        self.assertLess(np.abs(self.picture().astype(int) - plain).sum(), np.abs(laid.astype(int) - plain).sum())
+        view.SetShifts(None)
+        np.testing.assert_array_equal(self.picture(), plain)
+
+    def world(self, x, y):
+        place = [0.0] * 3
+        self.view.PixelToWorld(x, y, place)
+        return place
+
     def test_what_is_shown(self):
         view = self.view
         view.SetPosition(5)
@@ -317,7 +383,8 @@ class SliceView(unittest.TestCase):
                            (lambda: view.SetPosition(nan), "position"), (lambda: view.SetFocus(nan, 0, 0), "focus"),
                            (lambda: view.SetCursor(0, nan, 0), "cursor"), (lambda: view.Zoom(-1, 0, 0), "factor"),
                            (lambda: view.SetNormalAndUp(1, 0, 0, 2, 0, 0), "parallel"),
-                           (lambda: view.SetBrush(0, 0, 0, -1), "brush"),
+                           (lambda: view.SetBrush(0, 0, 0, -1), "brush"), (lambda: view.SetPointer(0, nan, 0), "pointer"),
+                           (lambda: view.SetShifts(vtkImageData(), 1.0), "floats"), (lambda: view.SetShifts(vtkImageData(), 0.0), "scale"),
                            (lambda: view.SetColour(0, 2, 0), "colour"), (lambda: view.SetColour(0, nan, 0), "colour"),
                            (lambda: view.SetInteractiveStep(17), "step"), (lambda: view.Turn(nan, 0), "angles")):
             with Errors(view) as messages:

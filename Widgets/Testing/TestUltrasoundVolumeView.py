@@ -395,6 +395,45 @@ def test_processor_and_graphics_draw_the_same():
     check(not shown.view.SetDrawnBy("magic") and shown.errors and shown.view.GetDrawnBy() == "graphics", "others are refused")
 
 
+def test_which_volumes_are_on_a_line_of_sight():
+    session, view, window = scene_of_two_in_a_row()
+    front, back = session.GetVolumeId(0), session.GetVolumeId(1)
+    window.Render()
+    middle = (WIDTH / 2, HEIGHT / 2)
+    check([view.GetVolumeAt(*middle, i) for i in range(3)] == [front, back, 0], "the nearest comes first")
+    check(view.GetVolumeAt(3, 3) == 0, "beside all volumes there is none")
+    view.GetRenderer().GetActiveCamera().Azimuth(180)
+    check(view.GetVolumeAt(*middle) == back, "seen from behind")
+    view.AddOnly(front)
+    view.Update()
+    check([view.GetVolumeAt(*middle, i) for i in range(2)] == [front, 0], "the others are hidden")
+    view.ClearOnly()
+    view.Update()
+    check(view.GetVolumeAt(*middle) == back, "and are back")
+    view.SetMinimum(150)
+    check(view.GetVolumeAt(*middle) == front, "what is too dark to be seen is seen through")
+
+
+def scene_of_two_in_a_row():
+    session = vtkUltrasoundAlignmentSession()
+    for y, grey in ((-40, 200), (40, 100)):
+        session.AddVolume(volume(np.full((20, 20, 20), grey, np.uint8), (-10, y, -10)), None)
+    view = vtkUltrasoundVolumeView()
+    view.SetSession(session)
+    window = vtkRenderWindow()
+    window.SetOffScreenRendering(1)
+    window.SetSize(WIDTH, HEIGHT)
+    window.AddRenderer(view.GetRenderer())
+    view.Update()
+    view.Fit()
+    camera = view.GetRenderer().GetActiveCamera()
+    camera.SetFocalPoint(0, 9, 0)
+    camera.SetPosition(0, -300, 0)
+    camera.SetViewUp(0, 0, 1)
+    view.GetRenderer().ResetCameraClippingRange()
+    return session, view, window
+
+
 def test_error_vectors():
     shown = Shown(cube_at(0, 0), cube_at(20, 0))
     shown.view.SetOrientationMarker(False)

@@ -32,8 +32,8 @@ private:
     const Vector3d entry = needle.Entry(), direction = needle.Now().direction;
     return (entry + std::clamp(-entry.dot(direction), 0.0, needle.InsideMm()) * direction).norm();
   }
-  /// A needle in its guide, in the plane of the image, so deep that where the probe is at first it would go through the bone and on.
-  /// Now it is 14 mm beside it.
+  /// A needle in its guide, in the plane of the image, so deep that where the probe is at first it would go through the bone and
+  /// on. Now it is 14 mm beside it.
   static void PutBesideBone(SimulatorUnderTest& window, const char* stops)
   {
     window.Scan().SetControl("DepthMm", "78"); // a guide aims at 0.45 of it, which is where the bone is
@@ -167,7 +167,8 @@ void TestScanGuide::meetingBoneIsScored()
     QCOMPARE(needle.HasMetBone(), meets);
     window.Part<QPushButton>("submitTask")->click();
     const QString score = window.Part<QLabel>("taskScore")->text();
-    QVERIFY2(score.contains(QRegularExpression(", [1-3] times? at bone, ")) == meets && score.contains("bone") == meets, qPrintable(score));
+    QVERIFY2(score.contains(QRegularExpression(", [1-3] times? at bone, ")) == meets && score.contains("bone") == meets,
+             qPrintable(score));
     window.Key(Qt::Key_Space);
   }
 }

@@ -92,6 +92,7 @@ private slots:
   void pairsAreAGraphAndOneIsLookedAtAlone();
   void aClickIn3DSelectsAVolume();
   void anObliquePlaneIsTyped();
+  void thePictureOfTheManual();
 
 private:
   void Raise(WindowUnderTest& window, const char* panel)
@@ -627,6 +628,26 @@ void TestChecks::anObliquePlaneIsTyped()
   window.Slice(1)->View()->GetNormal(after.data());
   QVERIFY(after == normal);
   QVERIFY(std::abs(field("normalY")->value() - normal.y()) < 1e-4);
+}
+
+// Two volumes of a liver, one moved by 2 mm: where they disagree, and a profile.
+void TestChecks::thePictureOfTheManual()
+{
+  const QDir liver(ECHORAMA_SOURCE_DIR "/../shared/data/liver");
+  if (!liver.exists("liver_volume_A.mha"))
+    QSKIP("the liver pair is not there");
+  WindowUnderTest window;
+  QVERIFY(window.Open({liver.filePath("liver_volume_A.mha"), liver.filePath("liver_volume_B.mha")}));
+  Raise(window, "checkPanel");
+  window.Session()->Select(2, true, true);
+  window.Session()->TranslateSelection(2.0, 0.0, 0.0);
+  SliceCanvas* slice = window.Slice(1);
+  DragDistance(window, slice, slice->rect().center() + QPoint(-60, -20), slice->rect().center() + QPoint(60, -20));
+  QTest::mouseClick(window.Part<QPushButton>("findDisagreement"), Qt::LeftButton);
+  QVERIFY(window.Wait());
+  window.Key(Qt::Key_1);
+  window.Move(window.Part<QWidget>("volumes"), QPoint(40, 140));
+  ComparePicture(window.Screenshot("workbench-check"), "workbench-check");
 }
 
 int main(int argc, char** argv)

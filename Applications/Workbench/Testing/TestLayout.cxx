@@ -14,8 +14,8 @@
 #include <QScrollBar>
 #include <QStyleOptionComboBox>
 #include <QTabBar>
-#include <QtTest>
 #include <QToolButton>
+#include <QtTest>
 
 using namespace echorama;
 

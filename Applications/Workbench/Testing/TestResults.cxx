@@ -17,8 +17,8 @@
 #include <QPushButton>
 #include <QTableView>
 #include <QTableWidget>
-#include <QtTest>
 #include <QToolButton>
+#include <QtTest>
 #include <vtkDataArray.h>
 #include <vtkImageData.h>
 #include <vtkPointData.h>
@@ -152,8 +152,9 @@ void TestResults::changedSourcesAreSaidAndTheResultIsMadeAgain()
   auto* tableSays = window.Part<QLabel>("sourcesChanged");
   const auto says = [&](const QString& words) {
     window.Settle();
-    return words.isEmpty() ? !panelSays->isVisible() && !tableSays->isVisible() && !window.Part<QPushButton>("makeAgain")->isVisible()
-                           : panelSays->text().contains(words) && panelSays->isVisible() && tableSays->isVisible();
+    return words.isEmpty()
+               ? !panelSays->isVisible() && !tableSays->isVisible() && !window.Part<QPushButton>("makeAgain")->isVisible()
+               : panelSays->text().contains(words) && panelSays->isVisible() && tableSays->isVisible();
   };
   const int result = Make(window);
   QVERIFY2(says({}), qPrintable(panelSays->text() + '\n' + window.Messages().join('\n')));

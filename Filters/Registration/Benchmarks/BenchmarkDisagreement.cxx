@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How far volumes are from agreeing, block by block. With truth: neighbouring views of the phantom (1 mm voxels, 55% overlap, turned
-// against each other so that the speckle is partly different, different gain), where they belong and with one of them moved by a
-// known way. Error: of the known part of each block's shift, the median over blocks, and how many are off by more than three of the
-// deviations that are told. The same with two volumes of a liver that were made from one sweep, so that they share their speckle.
+// How far volumes are from agreeing, block by block. With truth: neighbouring views of the phantom (1 mm voxels, 55% overlap,
+// turned against each other so that the speckle is partly different, different gain), where they belong and with one of them
+// moved by a known way. Error: of the known part of each block's shift, the median over blocks, and how many are off by more than
+// three of the deviations that are told. The same with two volumes of a liver that were made from one sweep, so that they share
+// their speckle.
 #include "Core/Base/Percentile.h"
 #include "Core/Imaging/BorderZeros.h"
 #include "Filters/Phantoms/Phantom.h"
