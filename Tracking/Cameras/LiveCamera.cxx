@@ -23,6 +23,8 @@ ParameterList Describe(LiveCameraParameters& p)
       Parameter("Height", p.height, {16, 16384}, "pixels", "The same."),
       Parameter("FrameRate", p.frameRate, {1, 1000}, "Hz", "Frames per second."),
       Parameter("ExposureMs", p.exposureMs, {0.1, 1000}, "ms", "How long a row takes light; not longer than a frame."),
+      Parameter("FixedExposure", p.fixedExposure,
+                "Whether a camera without a control of its exposure is known to have ExposureMs, always."),
       Parameter("RowUs", p.rowUs, {0, 1000}, "us",
                 "How much later each row begins, from the sensor's data sheet: 0 is a global shutter."),
       Parameter("Gain", p.gain, {-1, 65535}, "", "In the camera's own unit; -1: as it is."),
@@ -88,8 +90,12 @@ double LiveCamera::FixedExposure()
   const auto ticks = static_cast<std::int64_t>(std::llround(10.0 * asked)); // of 0.1 ms
   device_.Set(CameraControl::Exposure, ticks);
   const auto took = device_.Get(CameraControl::Exposure);
-  if (!took) // a camera without the control is believed to be as the line says
+  if (!took) {
+    if (!parameters_.fixedExposure)
+      Refuse("the camera does not tell its exposure, which may be automatic; if it is known to be " + NumberText(asked) +
+             " ms, always, say so: fixedExposure=1");
     return asked;
+  }
   const double exposure = 0.1 * static_cast<double>(took->value);
   if (!(std::abs(exposure - asked) <= std::max(0.1, 0.1 * asked)))
     Refuse(Format("the exposure is %.3g ms, not the %.3g ms that it was set to; v4l2-ctl -d %s -L lists what it can be", exposure,

@@ -10,6 +10,7 @@ struct LiveCameraParameters {
   std::string device; ///< "/dev/video0"
   int width = 640, height = 480;
   double frameRate = 90.0, exposureMs = 8.0, rowUs = 0.0;
+  bool fixedExposure = false;
   int gain = -1;
   double stampMs = -1.0;
 

@@ -156,6 +156,9 @@ CameraFormat RecordedSource::Open()
 
 CameraSource::Outcome RecordedSource::Next(CameraFrame& frame, double seconds)
 {
+  std::int64_t number = number_ + 1;
+  for (; file_ && index_ < file_->Content().frames && !file_->Frame(index_).imageValid; ++index_)
+    ++number; // no image: as good as lost
   if (!file_ || index_ >= file_->Content().frames)
     return Outcome::Ended;
   const double time = TimeOf(index_);
@@ -170,11 +173,9 @@ CameraSource::Outcome RecordedSource::Next(CameraFrame& frame, double seconds)
   // One of another clock says nothing.
   if (double arrival = time; ReadField(said.fields, ArrivalOfFrame, arrival) && arrival >= time && arrival < time + LatestArrival)
     frame.arrival = arrival;
-  std::int64_t number = number_ + 1;
-  if (ReadField(said.fields, NumberField, number) && number > number_)
-    lost_ += number_ < 0 ? 0 : number - number_ - 1;
-  else
-    number = number_ + 1;
+  if (std::int64_t told = 0; ReadField(said.fields, NumberField, told) && told > number_)
+    number = told;
+  lost_ += number_ < 0 ? 0 : number - number_ - 1;
   frame.number = number_ = number;
   ++index_;
   return Outcome::Frame;

@@ -41,7 +41,8 @@ struct RecordedSourceParameters {
 };
 ParameterList Describe(RecordedSourceParameters& p);
 
-/// What CameraRecorder wrote, or any sequence of grey or coloured pictures with time stamps.
+/// What CameraRecorder wrote, or any sequence of grey or coloured pictures with time stamps. Frames whose image is said to be
+/// invalid are lost ones.
 class RecordedSource : public CameraSource {
 public:
   explicit RecordedSource(const RecordedSourceParameters& parameters);

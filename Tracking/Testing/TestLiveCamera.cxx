@@ -166,6 +166,11 @@ TEST(LiveCamera, WhatACameraTakesOtherwiseThanToldIsRefused)
   FakeCamera none;
   none.controls.erase(V4L2_CID_GAIN);
   EXPECT_SAYS(Refusal(none, "camera:4?gain=10"), "no gain");
+  FakeCamera silent; // it may do with its exposure what it likes
+  silent.controls.erase(V4L2_CID_EXPOSURE_ABSOLUTE);
+  EXPECT_SAYS(Refusal(silent), "does not tell its exposure");
+  EXPECT_SAYS(Refusal(silent), "fixedExposure=1");
+  EXPECT_EQ(Refusal(silent, "camera:4?fixedExposure=1"), "");
   FakeCamera size;
   size.mode.width = 800;
   EXPECT_SAYS(Refusal(size), "800 x 480 pixels, not 640 x 480");

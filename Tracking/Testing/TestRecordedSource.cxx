@@ -95,6 +95,56 @@ TEST_F(RecordedSourceTest, GivesBackFramesTimesNumbersAndWhatTheCameraWas)
   EXPECT_EQ(film->Next(b, 0.0), Outcome::Ended);
 }
 
+TEST_F(RecordedSourceTest, FramesWithoutAnImageAreLostOnes)
+{
+  Record();
+  const auto numbers = [this] {
+    const auto film = MakeCamera("recording:" + Path() + "?speed=0");
+    film->Open();
+    std::vector<std::int64_t> seen;
+    CameraFrame frame;
+    while (film->Next(frame, 0.0) == Outcome::Frame)
+      seen.push_back(frame.number);
+    EXPECT_EQ(film->Lost(), seen.back() - seen.front() + 1 - static_cast<std::int64_t>(seen.size()));
+    return seen;
+  };
+  for (const bool areNumbered : {true, false}) {
+    auto expected = numbers();
+    const auto text = ReadTextFile(Path());
+    Change("Seq_Frame0003_ImageStatus = OK", "Seq_Frame0003_ImageStatus = INVALID");
+    Change("Seq_Frame0004_ImageStatus = OK", "Seq_Frame0004_ImageStatus = INVALID");
+    expected.erase(expected.begin() + 3, expected.begin() + 5);
+    EXPECT_EQ(numbers(), expected);
+    WriteTextFile(Path(), text);
+    if (areNumbered)
+      Change("_FrameNumber", "_Elsewhere");
+  }
+}
+
+TEST_F(RecordedSourceTest, AnArrivalOfAnotherClockSaysNothing)
+{
+  Record();
+  const std::string text = ReadTextFile(Path());
+  const std::string key = "Seq_Frame0002_Arrival = ";
+  const std::size_t at = text.find(key) + key.size();
+  ASSERT_GT(at, key.size());
+  for (const auto& [after, isTaken] : {std::pair(0.5, true), std::pair(-0.5, false), std::pair(3600.0, false)}) {
+    const auto film = MakeCamera("recording:" + Path() + "?speed=0");
+    film->Open();
+    CameraFrame frame;
+    for (int i = 0; i < 3; ++i)
+      ASSERT_EQ(film->Next(frame, 0.0), Outcome::Frame);
+    std::string changed = text;
+    changed.replace(at, text.find('\n', at) - at, std::to_string(frame.begin + after));
+    WriteTextFile(Path(), changed);
+    film->Open();
+    for (int i = 0; i < 3; ++i)
+      ASSERT_EQ(film->Next(frame, 0.0), Outcome::Frame);
+    EXPECT_NEAR(frame.arrival, frame.begin + (isTaken ? after : 0.0), 1e-5) << after;
+    WriteTextFile(Path(), text);
+  }
+}
+
 TEST_F(RecordedSourceTest, IsReplayedInTheTimeItTook)
 {
   Record();
