@@ -200,10 +200,12 @@ std::string CalibrationRig::Text() const
   return text + Format("camera: at (%.3f, %.3f, %.3f) mm in the body's frame", camera.x(), camera.y(), camera.z());
 }
 
-CalibrationRig MakeRig(const BodySurface& given, const ShellParameters& shell, const RigParameters& rig, int points,
+CalibrationRig MakeRig(const BodySurface& given, const ShellParameters& parameters, const RigParameters& rig, int points,
                        const Progress& progress)
 {
-  shell.Check();
+  parameters.Check();
+  ShellParameters shell = parameters;
+  shell.marker = false; // domes fit under every skin of the base; whether one has room for its marker is no matter of theirs
   rig.Check();
   CalibrationRig made;
   made.bodyToShell = BodyToShell(shell, given.Surface());

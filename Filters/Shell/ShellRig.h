@@ -33,8 +33,8 @@ struct CalibrationRig {
 /// The foot of each dome is that of the skin: its wall up to a plate over the base's lip, its flange and its screws. On the plate
 /// stands the upper part of a sphere about the camera's optical centre, as thick as the skin. Marks are holes, or bumps where
 /// Marks says so, three times denser at the horizon than at the top, and as many as \a points, or as have room on the small dome.
-/// The result does not depend on the number of threads. \throws as MakeShell; Error(InvalidParameter) for domes that the base has
-/// no room for
+/// Domes carry no marker. The result does not depend on the number of threads. \throws as MakeShell; Error(InvalidParameter) for
+/// domes that the base has no room for
 CalibrationRig MakeRig(const BodySurface& body, const ShellParameters& shell, const RigParameters& rig, int points,
                        const Progress& progress = {});
 

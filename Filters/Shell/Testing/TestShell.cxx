@@ -5,6 +5,7 @@
 #include "Filters/Shell/Benchmarks/InventedAbdomen.h"
 #include "Filters/Shell/Shell.h"
 #include "Filters/Shell/ShellMarks.h"
+#include "Filters/Shell/Testing/Ball.h"
 #include "Filters/Tissue/Icosphere.h"
 #include "Testing/Sanitized.h"
 #include "Tracking/Optical/MarkerPattern.h"
@@ -20,16 +21,6 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double pi = 3.141592653589793;
-
-TriangleSurface Sphere(double radius, int level)
-{
-  const Icosphere sphere = Icosphere::Make(level);
-  TriangleSurface surface;
-  for (const Vector3d& point : sphere.points)
-    surface.points.push_back((radius * point).cast<float>());
-  surface.triangles = sphere.triangles;
-  return surface;
-}
 
 ShellParameters Plain(double resolution = 1.0)
 {
@@ -63,7 +54,7 @@ TEST(Shell, SkinOfASphereHasTheThicknessAndVolumeOfOne)
 {
   ECHORAMA_SKIP_SANITIZED();
   const double radius = 40.0, opening = 20.0;
-  const TriangleSurface ball = Sphere(radius, 6);
+  const TriangleSurface ball = Ball(radius, 6);
   const ShellParameters p = Plain();
   const Shell shell = MakeShell(BodySurface(ball), p);
   EXPECT_TRUE(shell.skin.check.IsSound()) << shell.skin.check.Faults();
@@ -97,7 +88,7 @@ TEST(Shell, ThicknessMayBeMeasuredToTheCamera)
   ECHORAMA_SKIP_SANITIZED();
   ShellParameters p = Plain();
   p.measured = ShellParameters::Thickness::Camera;
-  const Shell shell = MakeShell(BodySurface(Sphere(40.0, 6)), p);
+  const Shell shell = MakeShell(BodySurface(Ball(40.0, 6)), p);
   // In the middle of the opening, 20 mm below the centre; the lens 8 mm above a board that lies 2 mm above the base's lower side.
   EXPECT_NEAR((shell.camera - Vector3d(0.0, 0.0, -20.0 - 5.0 + 3.0 + 8.0)).norm(), 0.0, 1e-4);
   EXPECT_NEAR(shell.thickness.leastMm, 2.0, 0.05);
@@ -168,7 +159,7 @@ TEST(Shell, AbdomenHasItsWallBetweenTheMeshesThemselves)
 TEST(Shell, UpMayPointAnywhere)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const TriangleSurface ball = Sphere(30.0, 5);
+  const TriangleSurface ball = Ball(30.0, 5);
   ShellParameters p = Plain();
   const Shell upright = MakeShell(BodySurface(ball), p);
   p.up = Vector3d(0.0, -3.0, 0.0);
@@ -181,7 +172,7 @@ TEST(Shell, UpMayPointAnywhere)
 
 TEST(Shell, HolesGoThroughAtTheirMarksAndBumpsStandOut)
 {
-  const BodySurface body(Sphere(40.0, 5));
+  const BodySurface body(Ball(40.0, 5));
   std::vector<Vector3d> marks = DomeMarks(12, 41.0, 3.0, 10.0); // 1 mm above: they are moved down
   marks.emplace_back(0.0, 40.0, -19.5);                         // too near to the opening
   ShellParameters p = Plain();
@@ -218,7 +209,7 @@ TEST(Shell, HolesGoThroughAtTheirMarksAndBumpsStandOut)
 TEST(Shell, MarkerIsRaisedWhereTheCameraSeesItsCells)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const BodySurface body(Sphere(60.0, 5));
+  const BodySurface body(Ball(60.0, 5));
   ShellParameters p;
   p.openingMm = 30.0;
   p.marker = true;
@@ -259,20 +250,20 @@ TEST(Shell, MarkerIsRaisedWhereTheCameraSeesItsCells)
   EXPECT_EQ(reading.id, *shell.markerId);
   EXPECT_NEAR(reading.azimuthDegrees, 6.0, 0.6);
   // Another body, or another wall, has another number; where it is cut it has the same.
-  EXPECT_NE(MarkerIdOf(p, Sphere(60.0, 4)), *shell.markerId);
+  EXPECT_NE(MarkerIdOf(p, Ball(60.0, 4)), *shell.markerId);
   p.printerMm = Vector3d(150.0, 150.0, 150.0);
   EXPECT_EQ(MarkerIdOf(p, body.Surface()), *shell.markerId);
   p.thicknessMm = 2.2;
   EXPECT_NE(MarkerIdOf(p, body.Surface()), *shell.markerId);
   p.resolutionMm = 1.0;
-  EXPECT_NE(MessageOf(Sphere(60.0, 4), p).find("ResolutionMm is 1 mm; it must be at most a third of the marker's cells"),
+  EXPECT_NE(MessageOf(Ball(60.0, 4), p).find("ResolutionMm is 1 mm; it must be at most a third of the marker's cells"),
             std::string::npos)
-      << MessageOf(Sphere(60.0, 4), p);
+      << MessageOf(Ball(60.0, 4), p);
   p.resolutionMm = 0.5;
   p.baffleMm = 40.0;
-  EXPECT_NE(MessageOf(Sphere(60.0, 4), p).find("there is no place for the marker (Marker): it would lie behind the lip"),
+  EXPECT_NE(MessageOf(Ball(60.0, 4), p).find("there is no place for the marker (Marker): it would lie behind the lip"),
             std::string::npos)
-      << MessageOf(Sphere(60.0, 4), p);
+      << MessageOf(Ball(60.0, 4), p);
 }
 
 // Where it is cut as well: the marker lies in one part, off the seams.
@@ -283,7 +274,7 @@ TEST(Shell, MarkerKeepsOffTheSeams)
   p.openingMm = 40.0;
   p.resolutionMm = 0.8;
   p.marker = true;
-  const BodySurface body(Sphere(80.0, 5));
+  const BodySurface body(Ball(80.0, 5));
   p.printerMm = Vector3d(130.0, 130.0, 130.0);
   const Shell cut = MakeShell(body, p);
   p.marker = false;
@@ -298,7 +289,7 @@ TEST(Shell, MarkerKeepsOffTheSeams)
 TEST(Shell, DoesNotDependOnThreads)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const BodySurface body(Sphere(25.0, 4));
+  const BodySurface body(Ball(25.0, 4));
   ShellParameters p;
   p.resolutionMm = 1.0;
   const Shell all = MakeShell(body, p);
@@ -312,7 +303,7 @@ TEST(Shell, DoesNotDependOnThreads)
 
 TEST(Shell, WhatCannotBeMadeIsRefusedWithTheReason)
 {
-  const TriangleSurface ball = Sphere(30.0, 4);
+  const TriangleSurface ball = Ball(30.0, 4);
   ShellParameters p = Plain();
   p.resolutionMm = 1.5;
   EXPECT_NE(MessageOf(ball, p).find("ResolutionMm is 1.5 mm; it must be at most half of ThicknessMm, which is 2 mm"),
@@ -331,9 +322,9 @@ TEST(Shell, WhatCannotBeMadeIsRefusedWithTheReason)
       << MessageOf(ball, p);
   p = Plain();
   p.openingMm = 1.0;
-  EXPECT_NE(MessageOf(Sphere(1.9, 3), p).find("the body is too thin: a wall of ThicknessMm, 2 mm, leaves no room inside"),
+  EXPECT_NE(MessageOf(Ball(1.9, 3), p).find("the body is too thin: a wall of ThicknessMm, 2 mm, leaves no room inside"),
             std::string::npos)
-      << MessageOf(Sphere(1.9, 3), p);
+      << MessageOf(Ball(1.9, 3), p);
   p = Plain();
   p.up.setZero();
   EXPECT_NE(MessageOf(ball, p).find("Up has no length"), std::string::npos);
@@ -357,7 +348,7 @@ TEST(Shell, WhatCannotBeMadeIsRefusedWithTheReason)
 
 TEST(Shell, TwoBodiesAreRefused)
 {
-  TriangleSurface two = Sphere(20.0, 4);
+  TriangleSurface two = Ball(20.0, 4);
   const auto first = static_cast<std::uint32_t>(two.points.size());
   for (const Eigen::Vector3f& point : std::vector<Eigen::Vector3f>(two.points))
     two.points.push_back(point + Eigen::Vector3f(60.0f, 0.0f, 0.0f));
@@ -370,7 +361,7 @@ TEST(Shell, TwoBodiesAreRefused)
 TEST(Shell, CanBeStoppedAtAnyTime)
 {
   ECHORAMA_SKIP_SANITIZED();
-  const BodySurface body(Sphere(25.0, 4));
+  const BodySurface body(Ball(25.0, 4));
   ShellParameters p;
   p.resolutionMm = 1.0;
   for (const double last : {0.0, 0.3, 0.6, 0.9}) {
@@ -420,7 +411,7 @@ TEST(ShellMarks, OrderLeadsToANeighbour)
 
 TEST(ShellMarks, ProxyIsMeasured)
 {
-  const TriangleSurface ball = Sphere(50.0, 5), coarse = Sphere(50.0, 2);
+  const TriangleSurface ball = Ball(50.0, 5), coarse = Ball(50.0, 2);
   std::vector<Vector3d> marks;
   for (const Eigen::Vector3f& point : coarse.points)
     marks.push_back(point.cast<double>());

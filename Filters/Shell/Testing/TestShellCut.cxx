@@ -4,6 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Filters/Shell/Benchmarks/InventedAbdomen.h"
 #include "Filters/Shell/Shell.h"
+#include "Filters/Shell/Testing/Ball.h"
 #include "Filters/Tissue/Icosphere.h"
 #include "Testing/Sanitized.h"
 #include <algorithm>
@@ -16,16 +17,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 namespace {
-
-TriangleSurface Ball(double radius, int level)
-{
-  const Icosphere sphere = Icosphere::Make(level);
-  TriangleSurface surface;
-  for (const Vector3d& point : sphere.points)
-    surface.points.push_back((radius * point).cast<float>());
-  surface.triangles = sphere.triangles;
-  return surface;
-}
 
 TEST(ShellCut, PlanesAreTheFewestAndLeaveRoomForLaps)
 {
@@ -153,6 +144,48 @@ TEST(ShellCut, LapsHaveTheirPlaceBehindTheWall)
   EXPECT_GT(tongue, 500);
   for (const Eigen::Vector3f& point : skins[1]->part.surface.points)
     ASSERT_GT(point.x(), -3.0f - 0.1f);
+}
+
+TEST(ShellCut, PegsReachAcrossTheSeamsOfPlates)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  ShellParameters p;
+  p.resolutionMm = 0.8;
+  p.openingMm = 30.0;
+  p.printerMm = Vector3d(100.0, 200.0, 200.0);
+  const Shell shell = MakeShell(BodySurface(Ball(60.0, 5)), p);
+  const double foot = -60.0 + p.openingMm;
+  const struct {
+    char first;
+    double height, widthMm;
+    std::size_t least;
+  } plates[] = {{'s', foot + 0.5 * p.flangeThicknessMm, 0.4 * p.flangeMm, 2}, {'b', foot - 0.5 * p.baseMm, 8.0, 1}};
+  for (const auto& plate : plates) {
+    std::vector<BodySurface> parts;
+    for (const PrintedPart& printed : shell.cut)
+      if (printed.name[0] == plate.first)
+        parts.emplace_back(printed.part.surface);
+    ASSERT_EQ(parts.size(), 2u) << plate.first;
+    // The first one reaches into the second; the base's seam is where the second begins, that of the skin 3 mm below the middle.
+    const double seam = plate.first == 's' ? -0.5 * p.seamMm : parts[1].Bounds().min().x();
+    EXPECT_NEAR(parts[0].Bounds().max().x(), seam + p.seamMm, 0.1);
+    std::vector<double> widths;
+    bool wasWithin = false;
+    for (double y = -80.0; y < 80.0; y += 0.05) {
+      const Vector3d place(seam + 0.5 * p.seamMm, y, plate.height);
+      const bool isWithin = parts[0].Distance(place) < 0.0;
+      if (isWithin && !wasWithin)
+        widths.push_back(0.0);
+      if (isWithin) {
+        widths.back() += 0.05;
+        ASSERT_GT(parts[1].Distance(place), 0.5 * p.clearanceMm) << plate.first << " " << y; // its socket is there
+      }
+      wasWithin = isWithin;
+    }
+    EXPECT_GE(widths.size(), plate.least) << plate.first;
+    for (const double width : widths)
+      EXPECT_NEAR(width, plate.widthMm, 0.15) << plate.first;
+  }
 }
 
 TEST(ShellCut, AbdomenIsCutIntoFourWithItsCameraInOne)

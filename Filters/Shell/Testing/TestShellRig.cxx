@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Filters/Shell/ShellRig.h"
-#include "Filters/Tissue/Icosphere.h"
+#include "Filters/Shell/Testing/Ball.h"
 #include "Testing/Sanitized.h"
 #include <algorithm>
 #include <cmath>
@@ -11,16 +11,6 @@ using namespace echorama;
 using Eigen::Vector3d;
 
 namespace {
-
-TriangleSurface RigBody(double radius)
-{
-  const Icosphere sphere = Icosphere::Make(5);
-  TriangleSurface surface;
-  for (const Vector3d& point : sphere.points)
-    surface.points.push_back((radius * point).cast<float>());
-  surface.triangles = sphere.triangles;
-  return surface;
-}
 
 ShellParameters RigShell()
 {
@@ -35,7 +25,7 @@ ShellParameters RigShell()
 std::string WhyNot(const ShellParameters& shell, const RigParameters& rig, int points)
 {
   try {
-    MakeRig(BodySurface(RigBody(60.0)), shell, rig, points);
+    MakeRig(BodySurface(Ball(60.0, 5)), shell, rig, points);
   } catch (const Error& error) {
     return error.what();
   }
@@ -46,7 +36,7 @@ TEST(ShellRig, DomesAreSpheresAboutTheCameraWithHolesInTheSameDirections)
 {
   ECHORAMA_SKIP_SANITIZED();
   const ShellParameters p = RigShell();
-  const BodySurface body(RigBody(60.0));
+  const BodySurface body(Ball(60.0, 5));
   const CalibrationRig rig = MakeRig(body, p, {}, 80);
   const Vector3d camera = rig.bodyToCamera.inverse().translation();
   EXPECT_NEAR((camera - Vector3d(0.0, 0.0, -10.0 - 5.0 + 3.0 + 8.0)).norm(), 0.0, 1e-3);
@@ -85,7 +75,7 @@ TEST(ShellRig, StandsOnTheBaseOfTheShell)
 {
   ECHORAMA_SKIP_SANITIZED();
   const ShellParameters p = RigShell();
-  const BodySurface body(RigBody(60.0));
+  const BodySurface body(Ball(60.0, 5));
   const CalibrationRig rig = MakeRig(body, p, {}, 40);
   const Shell shell = MakeShell(body, p);
   const BodySurface skin(shell.skin.surface), base(shell.base.surface);
@@ -130,12 +120,24 @@ TEST(ShellRig, WhatTheBaseHasNoRoomForIsRefused)
   EXPECT_NE(WhyNot(RigShell(), rig, 40).find("LargeDomeMm is nan"), std::string::npos);
 }
 
+TEST(ShellRig, HasNoMarkerAndDoesNotAskWhetherTheSkinHasRoomForOne)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  const BodySurface body(Ball(60.0, 5));
+  ShellParameters marked = RigShell();
+  marked.marker = true;
+  EXPECT_THROW(MakeShell(body, marked), Error); // its cells would be too small for a lattice of 1 mm
+  const CalibrationRig rig = MakeRig(body, marked, {}, 30), plain = MakeRig(body, RigShell(), {}, 30);
+  for (std::size_t which = 0; which < 2; ++which)
+    EXPECT_TRUE(rig.domes[which].part.surface.points == plain.domes[which].part.surface.points);
+}
+
 TEST(ShellRig, IsCutWhereThePrinterIsTooSmall)
 {
   ECHORAMA_SKIP_SANITIZED();
   ShellParameters p = RigShell();
   p.printerMm = Vector3d(120.0, 160.0, 100.0);
-  const CalibrationRig rig = MakeRig(BodySurface(RigBody(60.0)), p, {}, 40);
+  const CalibrationRig rig = MakeRig(BodySurface(Ball(60.0, 5)), p, {}, 40);
   for (const auto& dome : rig.domes) {
     ASSERT_EQ(dome.cut.size(), 2u);
     double volume = 0.0;
