@@ -39,17 +39,6 @@ LightRest::LightRest(const LightRestParameters& parameters) : parameters_(parame
   CheckRanges(parameters);
 }
 
-void LightRest::Rearm()
-{
-  samples_.clear();
-  rested_.reset();
-}
-
-double LightRest::Progress() const
-{
-  return rested_ ? 1.0 : static_cast<double>(samples_.size()) / parameters_.frames;
-}
-
 std::optional<RestingLight> LightRest::Update(const TrackedLight& light, Touch touch)
 {
   if (light.status == TrackedLight::Status::Lost) {
@@ -64,7 +53,8 @@ std::optional<RestingLight> LightRest::Update(const TrackedLight& light, Touch t
   if (rested_) {
     if ((light.spot.position - *rested_).norm() <= parameters_.leavePx)
       return {};
-    Rearm();
+    samples_.clear();
+    rested_.reset();
   }
   if (touch == Touch::Hover) {
     samples_.clear();

@@ -34,11 +34,6 @@ public:
   /// The light in the newest frame. Frames in which it is off, or hidden for a moment, do not count.
   std::optional<RestingLight> Update(const TrackedLight& light, Touch touch);
 
-  /// It may be at rest again where it is.
-  void Rearm();
-  /// How much of the rest is there, in [0, 1]; 1 until it is moved.
-  double Progress() const;
-
 private:
   struct Sample {
     Eigen::Vector2d position;

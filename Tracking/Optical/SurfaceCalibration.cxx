@@ -145,10 +145,10 @@ int SurfaceCalibration::OwnerOf(const MappedPoint& mapped, int asked) const
   return (*nearest - mapped.point).norm() <= near ? MarkNumber(static_cast<std::size_t>(nearest - marks_.begin())) : 0;
 }
 
-CalibrationStep SurfaceCalibration::Update(const TrackedLight& light, Touch touch)
+CalibrationStep SurfaceCalibration::Update(const TrackedLight& light)
 {
   CalibrationStep step;
-  const auto rest = rest_.Update(light, touch);
+  const auto rest = rest_.Update(light, Touch::Unknown);
   const int asked = Next();
   if (!rest || asked == 0)
     return step;

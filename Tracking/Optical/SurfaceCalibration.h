@@ -79,7 +79,7 @@ public:
                      const Pose& cameraToShell, const SurfaceCalibrationParameters& parameters = {});
 
   /// The light in the newest frame.
-  CalibrationStep Update(const TrackedLight& light, Touch touch = Touch::Unknown);
+  CalibrationStep Update(const TrackedLight& light);
 
   /// The number of the mark to go to; 0: all were taken.
   int Next() const { return todo_.empty() ? 0 : todo_.front(); }

@@ -25,6 +25,27 @@ Vector3d FaceNormal(const std::vector<Eigen::Vector3f>& points,
   return (points[triangle[1]].cast<double>() - a).cross(points[triangle[2]].cast<double>() - a);
 }
 
+// Which side of a wall is its inner one, triangles say: of closed bodies, and of the upper parts of such.
+void FaceOutwards(TriangleSurface& skin)
+{
+  SurfaceCheckParameters edgesAlone;
+  edgesAlone.selfIntersections = false;
+  const SurfaceFault turned = CheckSurface(skin, edgesAlone).inconsistentEdges;
+  if (turned.count > 0)
+    throw Error(Error::Kind::BadInput, "the triangles of the skin face different sides, at " + std::to_string(turned.count) +
+                                           " edges: where the inner side of its wall is nobody knows; orient them");
+  Vector3d middle = Vector3d::Zero();
+  for (const auto& triangle : skin.triangles)
+    for (const std::uint32_t corner : triangle)
+      middle += skin.points[corner].cast<double>() / (3.0 * static_cast<double>(skin.triangles.size()));
+  double outwards = 0.0;
+  for (const auto& triangle : skin.triangles)
+    outwards += (skin.points[triangle[0]].cast<double>() - middle).dot(FaceNormal(skin.points, triangle));
+  if (outwards < 0.0)
+    for (auto& triangle : skin.triangles)
+      std::swap(triangle[1], triangle[2]);
+}
+
 } // namespace
 
 TrackedSkin::TrackedSkin(TriangleSurface skin, double wallMm) : skin_(std::move(skin)), wallMm_(wallMm)
@@ -41,6 +62,8 @@ TrackedSkin::TrackedSkin(TriangleSurface skin, double wallMm) : skin_(std::move(
       if (!skin_.points[corner].allFinite())
         throw Error(Error::Kind::BadInput, "point " + std::to_string(corner) + " of the skin is not finite");
     }
+  if (wallMm > 0.0)
+    FaceOutwards(skin_);
   std::vector<Vector3d> sums(skin_.points.size(), Vector3d::Zero());
   for (const auto& triangle : skin_.triangles)
     for (const std::uint32_t corner : triangle)

@@ -12,7 +12,8 @@ namespace echorama {
 class TrackedSkin : public SeenSurface {
 public:
   /// \param skin what tools touch; closed or not; its triangles may face either side, but all the same one when \a wallMm is not
-  /// 0 \throws Error(BadInput) for no triangles, triangles of points that are not there, or points that are not finite
+  /// 0: those of a body, or of its upper part, are then turned outwards \throws Error(BadInput) for no triangles, triangles of
+  /// points that are not there, points that are not finite, or a wall whose triangles face different sides
   explicit TrackedSkin(TriangleSurface skin, double wallMm = 0.0);
 
   struct Place {

@@ -259,7 +259,11 @@ TEST(HandMotion, IsTheIntegralOfAForgettingAcceleration)
     }
     EXPECT_LT((whole.step - step).norm(), 1e-9 * step.norm());
     for (int i = 0; i < 6; ++i)
-      EXPECT_NEAR(whole.noise(i, i), noise(i, i), 2e-2 * noise(i, i)) << seconds << " " << i;
+      for (int j = 0; j < 6; ++j)
+        EXPECT_NEAR(whole.noise(i, j), noise(i, j), 2e-2 * std::sqrt(noise(i, i) * noise(j, j)))
+            << seconds << " " << i << " " << j;
+    EXPECT_GT(noise(0, 2), 0.5 * std::sqrt(noise(0, 0) * noise(2, 2))); // a place that was pushed is on its way
+    EXPECT_GT(small.noise(0, 2), 0.5 * std::sqrt(small.noise(0, 0) * small.noise(2, 2)));
     EXPECT_GE((noise.block<2, 2>(0, 0)).determinant(), 0.0);
   }
   // Half a tenth of a second later exp(-0.5) of it is left.

@@ -141,6 +141,25 @@ TEST(ShellMarker, IsReadByACameraThatIsTurnedAndNotInItsPlace)
   }
 }
 
+TEST(ShellMarker, IsNotTakenForAnotherByACameraThatIsTiltedMore)
+{
+  int read = 0;
+  for (const double tilt : {-15.0, -6.0, -2.5, 4.0, 8.0})
+    for (const double azimuth : {6.0, 60.0}) { // higher or lower, and leaning
+      MarkedShell shell;
+      shell.tiltDegrees = tilt;
+      shell.azimuthDegrees = azimuth;
+      const ShellMarkerReading reading = Read(shell);
+      const bool isRead = reading.status == Status::Read;
+      EXPECT_TRUE(!isRead || reading.id == shell.id) << tilt << " " << azimuth;
+      read += isRead;
+      if (std::abs(tilt) > 9.5) {
+        EXPECT_FALSE(isRead) << tilt << " " << azimuth;
+      }
+    }
+  EXPECT_GE(read, 1);
+}
+
 TEST(ShellMarker, IsReadInLittleLightThroughBlurAndNoise)
 {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

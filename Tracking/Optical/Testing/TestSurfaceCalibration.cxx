@@ -323,4 +323,24 @@ TEST(SurfaceCalibration, MarksThatAreAllMistakenAreNoCalibration)
   EXPECT_FALSE(session.Status().complaint.empty());
 }
 
+// Somebody knocks the camera while marks are done again: no camera explains both. What was there before stays.
+TEST(SurfaceCalibration, TheMapStaysWhenMarksThatCameLaterFitNoCamera)
+{
+  Stage stage(60);
+  SurfaceCalibration session(stage.marks, stage.skin, stage.nominal, stage.nominalPlace);
+  stage.VisitAll(session);
+  session.Fit();
+  const Stage before = stage;
+  stage.place.translation() += Vector3d(25.0, 0.0, 0.0);
+  for (int mark = 1; mark <= 30; ++mark) {
+    session.GoTo(mark);
+    for (int visit = 0; visit < 2; ++visit) // insisted on
+      if (session.Next() == mark)
+        stage.VisitNext(session);
+  }
+  EXPECT_THROW(session.Fit(), Error);
+  EXPECT_TRUE(session.Status().hasMap);
+  EXPECT_LT(before.Error95(session.Fitted().map), 0.5);
+}
+
 } // namespace

@@ -546,6 +546,20 @@ TEST(SurfaceMap, LooksThroughTheWall)
     apart = std::max(apart, (straight->point - o.point).norm());
   }
   EXPECT_GT(apart, 0.5);
+  // Triangles that face inwards change nothing, of a whole body or of its upper part; some that do are refused.
+  for (const double above : {-2.0, 0.2}) {
+    TriangleSurface turned = Ellipsoid({150.0, 120.0, 110.0}, 4, above);
+    for (auto& triangle : turned.triangles)
+      std::swap(triangle[0], triangle[1]);
+    const Vector3d top(20.0, 10.0, 100.0);
+    const auto place = SkinOf(turned, 2.0)->NearestTo(top),
+               plain = SkinOf(Ellipsoid({150.0, 120.0, 110.0}, 4, above), 2.0)->NearestTo(top);
+    EXPECT_LT((place->seen - plain->seen).norm(), 1e-4);
+    EXPECT_NEAR(place->seen.norm() - place->point.norm(), -2.0, 0.3);
+    std::swap(turned.triangles[7][0], turned.triangles[7][1]);
+    EXPECT_NE(Complaint([&] { SkinOf(turned, 2.0); }, Error::Kind::BadInput).find("face different sides"), std::string::npos);
+    SkinOf(turned); // without a wall it does not matter
+  }
 }
 
 TEST(SurfaceMap, TwoDomesCalibrateForAnyShell)
