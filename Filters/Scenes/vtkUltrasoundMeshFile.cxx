@@ -4,8 +4,6 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/VtkMessage.h"
 #include "vtkCallbackCommand.h"
-#include "vtkCellArray.h"
-#include "vtkCellArrayIterator.h"
 #include "vtkCommand.h"
 #include "vtkCompositeDataIterator.h"
 #include "vtkCompositeDataSet.h"
@@ -17,7 +15,7 @@
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 #include "vtkSTLReader.h"
-#include "vtkTriangleFilter.h"
+#include "vtkUltrasoundTriangles.h"
 #include "vtkXMLPolyDataReader.h"
 
 #include <algorithm>
@@ -28,30 +26,6 @@
 using echorama::Error;
 
 namespace {
-
-void Append(echorama::TriangleSurface& surface, vtkPolyData* part)
-{
-  vtkNew<vtkTriangleFilter> triangles;
-  triangles->SetInputData(part);
-  triangles->PassLinesOff();
-  triangles->PassVertsOff();
-  triangles->Update();
-  vtkPolyData* mesh = triangles->GetOutput();
-  const auto first = static_cast<std::uint32_t>(surface.points.size());
-  for (vtkIdType i = 0; i < mesh->GetNumberOfPoints(); ++i) {
-    surface.points.push_back(Eigen::Vector3d(mesh->GetPoint(i)).cast<float>());
-  }
-  vtkIdType count = 0;
-  const vtkIdType* ids = nullptr;
-  for (auto cells = vtk::TakeSmartPointer(mesh->GetPolys()->NewIterator()); !cells->IsDoneWithTraversal();
-       cells->GoToNextCell()) {
-    cells->GetCurrentCell(count, ids);
-    if (count == 3) {
-      surface.triangles.push_back({first + static_cast<std::uint32_t>(ids[0]), first + static_cast<std::uint32_t>(ids[1]),
-                                   first + static_cast<std::uint32_t>(ids[2])});
-    }
-  }
-}
 
 // What a reader complains of becomes the reason of an error.
 template <class Reader>
@@ -109,11 +83,11 @@ echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
     const auto leaf = vtk::TakeSmartPointer(parts->NewIterator());
     for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
       if (auto* part = vtkPolyData::SafeDownCast(leaf->GetCurrentDataObject())) {
-        Append(surface, part);
+        echorama::AddTriangles(surface, part);
       }
     }
   } else if (auto* part = vtkPolyData::SafeDownCast(data)) {
-    Append(surface, part);
+    echorama::AddTriangles(surface, part);
   }
   if (surface.triangles.empty()) {
     throw Error(Error::Kind::BadFile, path + ": there are no triangles in it");

@@ -25,6 +25,7 @@
 #include "vtkPolyData.h"
 #include "vtkQuadricDecimation.h"
 #include "vtkTriangleFilter.h"
+#include "vtkUltrasoundTriangles.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -56,47 +57,6 @@ struct vtkUltrasoundShell::Settings {
 
 namespace {
 
-TriangleSurface SurfaceOf(vtkPolyData* data)
-{
-  vtkNew<vtkTriangleFilter> cut;
-  cut->SetInputData(data);
-  cut->PassVertsOff();
-  cut->PassLinesOff();
-  cut->Update();
-  vtkPolyData* mesh = cut->GetOutput();
-  TriangleSurface surface;
-  for (vtkIdType i = 0; i < mesh->GetNumberOfPoints(); ++i) {
-    Vector3d point;
-    mesh->GetPoint(i, point.data());
-    surface.points.push_back(point.cast<float>());
-  }
-  vtkIdType count;
-  const vtkIdType* ids;
-  for (vtkIdType i = 0; i < mesh->GetPolys()->GetNumberOfCells(); ++i) {
-    mesh->GetPolys()->GetCellAtId(i, count, ids);
-    surface.triangles.push_back(
-        {static_cast<std::uint32_t>(ids[0]), static_cast<std::uint32_t>(ids[1]), static_cast<std::uint32_t>(ids[2])});
-  }
-  return surface;
-}
-
-void Put(const TriangleSurface& surface, vtkPolyData* data)
-{
-  vtkNew<vtkPoints> points;
-  points->SetNumberOfPoints(static_cast<vtkIdType>(surface.points.size()));
-  for (std::size_t i = 0; i < surface.points.size(); ++i) {
-    const Eigen::Vector3f& point = surface.points[i];
-    points->SetPoint(static_cast<vtkIdType>(i), point.x(), point.y(), point.z());
-  }
-  vtkNew<vtkCellArray> triangles;
-  for (const auto& triangle : surface.triangles) {
-    const vtkIdType ids[3] = {triangle[0], triangle[1], triangle[2]};
-    triangles->InsertNextCell(3, ids);
-  }
-  data->SetPoints(points);
-  data->SetPolys(triangles);
-}
-
 // All of them, told apart by the cells' array.
 void PutPrints(const std::vector<echorama::PrintedBody>& prints, vtkPolyData* data)
 {
@@ -112,7 +72,7 @@ void PutPrints(const std::vector<echorama::PrintedBody>& prints, vtkPolyData* da
       numbers->InsertNextValue(static_cast<int>(n));
     }
   }
-  Put(all, data);
+  echorama::SetTriangles(data, all);
   data->GetCellData()->AddArray(numbers);
 }
 
@@ -143,7 +103,7 @@ std::string PutRig(const echorama::CalibrationRig& rig, vtkInformationVector* ou
   for (std::size_t which = 0; which < rig.domes.size(); ++which) {
     const auto& dome = rig.domes[which];
     vtkPolyData* data = vtkPolyData::GetData(outputs, static_cast<int>(which));
-    Put(dome.part.surface, data);
+    echorama::SetTriangles(data, dome.part.surface);
     PutField(data, "CameraPosition", rig.bodyToCamera.inverse().translation());
     PutField(data, "CameraDirection", rig.bodyToCamera.linear().transpose() * Vector3d::UnitZ());
     for (std::size_t i = 0; i < dome.marks.size(); ++i) {
@@ -173,7 +133,7 @@ std::string PutRig(const echorama::CalibrationRig& rig, vtkInformationVector* ou
 TriangleSurface Simplified(const TriangleSurface& body, const Vector3d& origin, const Vector3d& up, int wanted)
 {
   vtkNew<vtkPolyData> data;
-  Put(body, data);
+  echorama::SetTriangles(data, body);
   vtkNew<vtkPlane> plane;
   plane->SetOrigin(origin.data());
   plane->SetNormal(up.data());
@@ -197,7 +157,9 @@ TriangleSurface Simplified(const TriangleSurface& body, const Vector3d& origin, 
     }
     target *= wanted / points;
   }
-  return SurfaceOf(decimation->GetOutput());
+  TriangleSurface proxy;
+  echorama::AddTriangles(proxy, decimation->GetOutput());
+  return proxy;
 }
 
 } // namespace
@@ -261,7 +223,9 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs, &v](const echorama::Progress& progress) {
     echorama::CheckRanges(this->Parameters());
     v.shell.Check();
-    const echorama::BodySurface body(SurfaceOf(vtkPolyData::GetData(inputs[0])), progress.Part(0.0, 0.1));
+    TriangleSurface triangles;
+    echorama::AddTriangles(triangles, vtkPolyData::GetData(inputs[0]));
+    const echorama::BodySurface body(std::move(triangles), progress.Part(0.0, 0.1));
     const Vector3d up = v.shell.up.normalized();
     echorama::ShellParameters parameters = v.shell;
     parameters.cutToFit = parameters.cutToFit && v.fitPrinter;
@@ -316,8 +280,8 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
     }
     this->Report = shell.Text();
 
-    Put(shell.skin.surface, vtkPolyData::GetData(outputs, 0));
-    Put(shell.base.surface, vtkPolyData::GetData(outputs, 1));
+    echorama::SetTriangles(vtkPolyData::GetData(outputs, 0), shell.skin.surface);
+    echorama::SetTriangles(vtkPolyData::GetData(outputs, 1), shell.base.surface);
     PutField(vtkPolyData::GetData(outputs, 0), "CameraPosition", shell.camera);
     PutField(vtkPolyData::GetData(outputs, 0), "CameraDirection", up);
     if (shell.markerId) {
@@ -361,7 +325,7 @@ int vtkUltrasoundShell::RequestData(vtkInformation*, vtkInformationVector** inpu
         marksOfPoints->SetValue(static_cast<vtkIdType>(which), static_cast<int>(i) + 1);
         proxy.points[which] = onSkin[i].cast<float>();
       }
-      Put(proxy, simplified);
+      echorama::SetTriangles(simplified, proxy);
       simplified->GetPointData()->AddArray(marksOfPoints);
       const auto fit = echorama::MeasureProxy(body.Surface(), proxy, onSkin, up, up.dot(lowest), progress.Part(0.97, 1.0));
       this->Report +=
@@ -396,7 +360,7 @@ bool vtkUltrasoundShell::GetPrint(int print, vtkPolyData* data)
     return false;
   }
   data->Initialize();
-  Put(this->Values->prints[static_cast<std::size_t>(print)].surface, data);
+  echorama::SetTriangles(data, this->Values->prints[static_cast<std::size_t>(print)].surface);
   return true;
 }
 

@@ -21,8 +21,8 @@
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 #include "vtkStringArray.h"
-#include "vtkTriangleFilter.h"
 #include "vtkUltrasoundTissue.h"
+#include "vtkUltrasoundTriangles.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -163,34 +163,17 @@ std::vector<Body> BodiesOf(const std::string& entry, const Input& input)
   return bodies;
 }
 
-// Adds the triangles of a block, in mm and LPS.
-void AddBlock(vtkPolyData* data, double scale, MeshAxes axes, TriangleSurface& surface)
+// Into mm and LPS.
+Eigen::Affine3d ToPatient(double scale, MeshAxes axes)
 {
-  vtkNew<vtkTriangleFilter> cut;
-  cut->SetInputData(data);
-  cut->PassVertsOff();
-  cut->PassLinesOff();
-  cut->Update();
-  vtkPolyData* mesh = cut->GetOutput();
-  const auto firstPoint = static_cast<std::uint32_t>(surface.points.size());
-  for (vtkIdType i = 0; i < mesh->GetNumberOfPoints(); ++i) {
-    Eigen::Vector3d point;
-    mesh->GetPoint(i, point.data());
-    point *= scale;
-    if (axes == MeshAxes::YUp) {
-      point = Eigen::Vector3d(point.x(), -point.z(), point.y());
-    } else if (axes == MeshAxes::RAS) {
-      point = Eigen::Vector3d(-point.x(), -point.y(), point.z());
-    }
-    surface.points.push_back(point.cast<float>());
+  Eigen::Affine3d map = Eigen::Affine3d::Identity();
+  if (axes == MeshAxes::YUp) {
+    map.linear() << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0;
+  } else if (axes == MeshAxes::RAS) {
+    map.linear().diagonal() << -1.0, -1.0, 1.0;
   }
-  vtkIdType count;
-  const vtkIdType* ids;
-  for (vtkIdType i = 0; i < mesh->GetPolys()->GetNumberOfCells(); ++i) {
-    mesh->GetPolys()->GetCellAtId(i, count, ids);
-    surface.triangles.push_back({firstPoint + static_cast<std::uint32_t>(ids[0]), firstPoint + static_cast<std::uint32_t>(ids[1]),
-                                 firstPoint + static_cast<std::uint32_t>(ids[2])});
-  }
+  map.linear() *= scale;
+  return map;
 }
 
 std::array<const SurfaceFault*, 6> FaultsOf(const SurfaceReport& report)
@@ -403,7 +386,7 @@ int vtkUltrasoundTissueMeshes::RequestData(vtkInformation*, vtkInformationVector
         }
         TriangleSurface surface;
         for (const std::size_t block : bodies[j].Blocks) {
-          AddBlock(given[i].Blocks[block], v.scale, v.axes, surface);
+          echorama::AddTriangles(surface, given[i].Blocks[block], ToPatient(v.scale, v.axes));
         }
         const Findings findings = Mend(surface, v.mend, v.check, part(part(progress, i, given.size()), j, bodies.size()));
         collection.Add(bodies[j], std::move(surface), findings);
