@@ -42,6 +42,15 @@ void LiveScanner::SetInputs(const std::vector<vtkSmartPointer<vtkImageData>>& vo
   settings_.reset();
 }
 
+void LiveScanner::SetPressed(const std::vector<vtkSmartPointer<vtkImageData>>& states)
+{
+  if (beforeUse_)
+    beforeUse_();
+  live_->RemoveAllPressStates();
+  for (const auto& state : states)
+    live_->AddPressStateData(state);
+}
+
 void LiveScanner::Set(const char* name, const std::string& text)
 {
   if (beforeUse_)

@@ -21,6 +21,8 @@ public:
 
   /// Volumes; or tissue (vtkUltrasoundTissue), which is drawn live unless the acoustic model is asked for.
   void SetInputs(const std::vector<vtkSmartPointer<vtkImageData>>& volumes, vtkPolyData* tissue);
+  /// States of tissue that a probe presses, see vtkUltrasoundLiveImage; none: it does not give way.
+  void SetPressed(const std::vector<vtkSmartPointer<vtkImageData>>& states);
   bool IsAcoustic() const { return live_->GetSource() == vtkUltrasoundLiveImage::ACOUSTIC; }
   static constexpr int Refinements = ProgressiveSlice::levels; ///< of the acoustic model
   ParameterList Parameters() { return live_->Parameters(); }

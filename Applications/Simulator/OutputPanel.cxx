@@ -30,6 +30,10 @@ Subject OwnCopy(const Subject& subject)
     copy.volumes.push_back(vtkSmartPointer<vtkImageData>::New());
     copy.volumes.back()->ShallowCopy(volume);
   }
+  for (const auto& state : subject.pressed) {
+    copy.pressed.push_back(vtkSmartPointer<vtkImageData>::New());
+    copy.pressed.back()->ShallowCopy(state);
+  }
   if (subject.tissue) {
     copy.tissue = vtkSmartPointer<vtkPolyData>::New();
     copy.tissue->ShallowCopy(subject.tissue);
@@ -249,6 +253,7 @@ void OutputPanel::Compare(const ScanLog& log, const QString& name)
       [count, entries = log.entries, body = OwnCopy(scan_->Body())](const Progress& progress) {
         LiveScanner scanner;
         scanner.SetInputs(body.volumes, body.tissue);
+        scanner.SetPressed(body.pressed);
         for (std::size_t i = 0; i < entries.size(); i++) {
           const auto size = static_cast<double>(entries.size());
           const auto at = static_cast<double>(i);

@@ -3,7 +3,10 @@
 #include "Scan.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/NumberText.h"
+#include "Filters/Live/LiveProbe.h"
 #include "Job.h"
+#include "PressedStates.h"
 #include "Redraw.h"
 #include <algorithm>
 #include <cmath>
@@ -21,7 +24,9 @@ constexpr double LeastContact = 0.02;
 constexpr double LiftedMm = -0.5, FarMm = 2.0;     ///< off the skin: held there, or by what a tracker says
 constexpr double JumpMm = 40.0, JumpWithin = 0.25; ///< faster than a hand
 constexpr double JumpShownSeconds = 1.5;
-constexpr int RestMs = 30; ///< for what a hand wants meanwhile
+constexpr int RestMs = 30;                                                                   ///< for what a hand wants meanwhile
+constexpr double DepthStepMm = 10.0, LeastDepthMm = 20.0, BelowMm = 1.0, FarAwayMm = 2000.0; ///< of a depth that is chosen
+constexpr double TrackedPressMm = 0.1;                                                       ///< each is another set of controls
 constexpr double MostTilt = 60.0, MostPressMm = 20.0, MostLiftMm = -50.0;
 
 } // namespace
@@ -48,8 +53,11 @@ void Scan::SetSubject(Subject subject)
 {
   StopSlow();
   SetFrozen(false); // while the controls are still those of the body that was there
+  if (!subject_.pressed.empty())
+    scanner_.Set("PressMm", "0"); // what a hand pressed, and no person chose
   subject_ = std::move(subject);
   scanner_.SetInputs(subject_.volumes, subject_.tissue);
+  scanner_.SetPressed(subject_.pressed);
   cine_.Clear();
   cineIndex_ = -1;
   number_ = 0;
@@ -61,7 +69,65 @@ void Scan::SetSubject(Subject subject)
   if (subject_.IsEmpty())
     return;
   PutAtTop();
+  ChooseDepth();
   TakeTop();
+}
+
+void Scan::SetPressed(std::vector<vtkSmartPointer<vtkImageData>> states)
+{
+  StopSlow();
+  SetFrozen(false);
+  scanner_.Set("PressMm", "0");
+  subject_.pressed = std::move(states);
+  scanner_.SetPressed(subject_.pressed);
+  cine_.Clear(); // what was seen is not made again by other states
+  Straighten();
+  emit ControlsChanged();
+  Ask();
+}
+
+// The tissue follows the face: how deep that is below the skin is how far it is pressed, up to the deepest state.
+void Scan::PressTissue()
+{
+  if (subject_.pressed.empty())
+    return;
+  double mm = hold_.pressMm;
+  if (isFollowing_) {
+    const auto nearest = walk_ ? subject_.mesh->NearestTo(probeToWorld_.translation()) : std::nullopt;
+    const Eigen::Vector3d away =
+        nearest ? Eigen::Vector3d(probeToWorld_.translation() - subject_.mesh->PointAt(nearest->place)) : Eigen::Vector3d::Zero();
+    mm = nearest && away.dot(subject_.mesh->NormalAt(nearest->place)) < 0.0 ? away.norm() : 0.0;
+    mm = TrackedPressMm * std::round(mm / TrackedPressMm);
+  }
+  mm = std::clamp(mm, 0.0, PressMmOf(subject_.pressed.back()));
+  ParameterList parameters = scanner_.Parameters();
+  if (Named(parameters, "PressMm").Number() != mm)
+    SetControl("PressMm", NumberText(mm));
+}
+
+// Where less than half of the usual image would show body, it begins just below the body; unless a person has said how deep.
+void Scan::ChooseDepth()
+{
+  ParameterList parameters = scanner_.Parameters();
+  const double now = Named(parameters, "DepthMm").Number();
+  if (now != 0.0 && now != chosenDepthMm_)
+    return;
+  LiveProbeSettings probe;
+  probe.kind = static_cast<LiveProbe>(static_cast<int>(Named(parameters, "Probe").Number()));
+  const ProbeGeometry usual = GeometryOf(probe, 64);
+  double deepest = 0.0;
+  for (const double across : {-0.4, -0.2, 0.0, 0.2, 0.4}) {
+    if (!walk_)
+      break;
+    const Eigen::Vector3d face = StartPose() * PointOf(usual, {usual.depthMin, across, 0.0}),
+                          end = StartPose() * PointOf(usual, {usual.depthMax, across, 0.0}), beam = (end - face).normalized();
+    if (const auto hit = subject_.mesh->FirstHit(face + FarAwayMm * beam, -beam)) // where it leaves the body at last
+      deepest = std::max(deepest, FarAwayMm - hit->distanceMm);
+  }
+  const double wanted = std::max(LeastDepthMm, DepthStepMm * std::ceil((deepest + BelowMm) / DepthStepMm));
+  chosenDepthMm_ = deepest > 0.0 && wanted <= 0.5 * usual.depthMax && probe.kind != LiveProbe::Custom ? wanted : 0.0;
+  if (chosenDepthMm_ != now)
+    SetControl("DepthMm", NumberText(chosenDepthMm_));
 }
 
 // Where it was scanned from, if that is known; else in the middle of the side that is asked for, of a patient who lies on the
@@ -133,6 +199,8 @@ void Scan::Moved()
 void Scan::TakePose(const Pose& pose)
 {
   probeToWorld_ = pose;
+  if (!isFrozen_)
+    PressTissue();
   emit ProbeMoved();
   refinement_ = 0;
   if (!isFrozen_)
@@ -195,7 +263,9 @@ void Scan::Press(double mm)
 {
   if (!CanWalk())
     return;
-  hold_.pressMm = std::clamp(hold_.pressMm + mm, MostLiftMm, MostPressMm);
+  // Where tissue gives way, no deeper than is known how.
+  const double most = subject_.pressed.empty() ? MostPressMm : PressMmOf(subject_.pressed.back());
+  hold_.pressMm = std::clamp(hold_.pressMm + mm, MostLiftMm, most);
   Moved();
 }
 

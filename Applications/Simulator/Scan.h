@@ -23,6 +23,7 @@ struct Subject {
   QStringList files;
   std::vector<vtkSmartPointer<vtkImageData>> volumes; ///< where several are real, the first counts
   vtkSmartPointer<vtkPolyData> tissue;                ///< nullptr: volumes
+  std::vector<vtkSmartPointer<vtkImageData>> pressed; ///< states of it under a probe that presses (ReadPressedStates)
   vtkSmartPointer<vtkPolyData> skin;                  ///< nullptr: there is none
   std::shared_ptr<const SkinMesh> mesh;               ///< of the skin, to walk on
   QString whyNoSkin;
@@ -46,6 +47,8 @@ public:
   ~Scan() override;
 
   void SetSubject(Subject subject);
+  /// From now on the body gives way to a probe that is pressed in, as these states of it say; none: it does not.
+  void SetPressed(std::vector<vtkSmartPointer<vtkImageData>> states);
   const Subject& Body() const { return subject_; }
   bool HasSkin() const { return walk_ != nullptr; }
 
@@ -141,6 +144,7 @@ signals:
 
 private:
   void PutAtTop();
+  void ChooseDepth();
   void TakeTop();
   void Moved();
   void TakePose(const Pose& pose);
@@ -151,6 +155,7 @@ private:
   void Show(const ScanFrame& frame, bool isNew, const QString& failure, double askedAt);
   double Now() const { return 1e-9 * static_cast<double>(clock_.nsecsElapsed()); } ///< seconds
   bool IsInAir() const;
+  void PressTissue();
   bool CanWalk() const { return walk_ && !isFollowing_; }
 
   Subject subject_;
@@ -161,6 +166,7 @@ private:
   std::optional<Eigen::Matrix3d> turned_; ///< from outside
   Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
   std::optional<Needle> needle_;
+  double chosenDepthMm_ = 0.0; ///< for the body; 0: as usual for the probe
   bool isFollowing_ = false, isFrozen_ = false, isFlipped_ = false;
   double stoppedSeconds_ = -1.0, jumpMm_ = 0.0, jumpAt_ = -1e9, followedAt_ = -1e9;
   QString whyStopped_, badPose_, failure_, shownState_;

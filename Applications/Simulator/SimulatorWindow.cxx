@@ -18,6 +18,7 @@
 #include "NeedleTool.h"
 #include "OutputPanel.h"
 #include "ParameterPanel.h"
+#include "PressedStates.h"
 #include "ProbeTracker.h"
 #include "Scan.h"
 #include "Snapshot.h"
@@ -162,7 +163,8 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
             {{"Source", tr("Made from")},
              {"Speckle", tr("Speckle")},
              {"DarkeningDb", tr("Shadow a surface"), 0, 12},
-             {"PressMm", tr("Pressed"), 0, 20, {}, "scene"}}}, // volumes give way by pressed states, and none are opened
+             {"PressMm", tr("Pressed"), 0, 20, {}, "scene"}}}, // volumes give way by pressed states alone, and to the keys that
+                                                               // press
            {tr("Custom probe"), {{"FanAngle", tr("Fan angle"), 0, 180}, {"FanWidth", tr("Fan width"), 0, 100}}}}) {
     auto* label = new QLabel("<b>" + title + "</b>", controls);
     auto* panel = new ParameterPanel(source, list, set, controls);
@@ -338,10 +340,32 @@ void SimulatorWindow::MakeImageMenu(QMenu* menu)
 
 void SimulatorWindow::Open(const QStringList& files, const QString& skin, const Eigen::Vector3d& up)
 {
-  const auto subject = std::make_shared<Subject>();
+  const auto subject = std::make_shared<Subject>(scan_->Body()); // which states are held against, if nothing else is opened
+  const auto isBody = std::make_shared<bool>(false);
   Job* job = Job::Start(
-      this, tr("Reading"), [=](const Progress& progress) { *subject = ReadSubject(files, skin, progress); },
-      [this, subject, up] {
+      this, tr("Reading"),
+      [=](const Progress& progress) {
+        const QStringList states = PressedStatesAmong(files);
+        QStringList body = files;
+        for (const QString& state : states)
+          body.removeAll(state);
+        *isBody = !body.isEmpty();
+        if (*isBody)
+          *subject = ReadSubject(body, skin, progress.Part(0.0, states.isEmpty() ? 1.0 : 0.8));
+        if (!states.isEmpty())
+          subject->pressed = ReadPressedStates(states, *subject, progress.Part(*isBody ? 0.8 : 0.0, 1.0));
+      },
+      [this, subject, isBody, up] {
+        const QString pressed = subject->pressed.empty()
+                                    ? QString()
+                                    : tr("The body gives way to a probe that is pressed in (Page Down), by up to %1 mm")
+                                          .arg(PressMmOf(subject->pressed.back()));
+        if (!pressed.isEmpty())
+          messages_->Show({Message::Note, pressed, {}});
+        if (!*isBody) {
+          scan_->SetPressed(std::move(subject->pressed));
+          return;
+        }
         subject->up = up;
         scan_->SetSubject(std::move(*subject));
         QStringList names;

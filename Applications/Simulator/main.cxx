@@ -32,8 +32,10 @@ int main(int argc, char** argv)
                                "was scanned, if it says so, else the front of a patient, -y.",
                                "AXIS");
   options.addOption(top);
-  options.addPositionalArgument(
-      "FILE", "What is scanned: volumes (where several are real, the first counts), or a scene (.json).", "[FILE...]");
+  options.addPositionalArgument("FILE",
+                                "What is scanned: volumes (where several are real, the first counts), or a scene (.json); and "
+                                "states of it under a probe that presses (.vti).",
+                                "[FILE...]");
   options.process(application);
 
   const QString axis = options.value(top);
