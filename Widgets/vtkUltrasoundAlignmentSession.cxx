@@ -238,6 +238,12 @@ vtkImageData* vtkUltrasoundAlignmentSession::GetImage(int id) const
 }
 
 //----------------------------------------------------------------------------
+vtkImageData* vtkUltrasoundAlignmentSession::GetShownImage(int id) const
+{
+  return this->Find(id) ? this->Images->At(id).Shown() : nullptr;
+}
+
+//----------------------------------------------------------------------------
 vtkIdType vtkUltrasoundAlignmentSession::GetVoxelAt(int id, const double world[3]) const
 {
   return this->Find(id) ? this->Images->At(id).VoxelAt(Eigen::Vector3d(world)) : -1;
@@ -456,14 +462,6 @@ bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char* path, vtkStringA
       }
     }
   });
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::AddSearchFolder(const char* folder)
-{
-  if (folder && *folder) {
-    this->SearchFolders.push_back(ResolvedPath(folder));
-  }
 }
 
 //----------------------------------------------------------------------------

@@ -80,6 +80,9 @@ public:
   bool HasVolume(int id) const { return this->Find(id) != nullptr; }
   /** Where it lies now, with what was painted: not to be changed. nullptr: no such volume. */
   vtkImageData* GetImage(int id) const;
+  /** What views show of it. The same; of an embedded volume the background, too, which is invented and so not in its ValidRegion.
+   */
+  vtkImageData* GetShownImage(int id) const;
   /** The voxel (its point id) that is nearest to a point of the world; -1: none, or none that is real. */
   vtkIdType GetVoxelAt(int id, const double world[3]) const;
   /** All (or the visible) volumes as blocks with NAME(): for filters. Voxels are shared. */
@@ -276,7 +279,12 @@ public:
   /** The files a project needs, where they are now; an empty string for one that is nowhere. */
   bool GetProjectFiles(const char* path, vtkStringArray* files);
   /** Where else volumes of projects are looked for. */
-  void AddSearchFolder(const char* folder);
+  void AddSearchFolder(const char* folder)
+  {
+    if (folder && *folder) {
+      this->SearchFolders.push_back(echorama::ResolvedPath(folder));
+    }
+  }
   std::string GetProjectPath() const { return this->Storage.ProjectPath(); } ///< empty: never saved
   bool GetModifiedSinceSave() const;
   /** For people: who, what. Saved with the project. */

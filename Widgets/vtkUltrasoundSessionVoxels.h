@@ -44,6 +44,29 @@ public:
   /** As the file stands, with what was painted. */
   vtkImageData* GetBase() const { return this->Base; }
 
+  /** With the background that was invented around it as if it were real, for views. */
+  vtkImageData* Shown()
+  {
+    vtkDataArray* labels = this->Image->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName());
+    vtkDataArray* valid = vtkUltrasoundVolume::GetValidRegion(this->Image);
+    if (!labels || !valid || labels->GetDataType() != VTK_UNSIGNED_CHAR || labels->GetNumberOfComponents() != 1) {
+      return this->Image;
+    }
+    if (!this->ShownRegion || this->ShownOf != valid || this->ShownRegion->GetMTime() < valid->GetMTime()) {
+      constexpr unsigned char Invented = 3; // see vtkUltrasoundEmbedder
+      this->ShownRegion = CopyOf(valid);
+      this->ShownOf = valid;
+      const auto of = vtkUltrasoundVolume::ViewOf<const unsigned char>(labels, this->Image);
+      const auto shown = vtkUltrasoundVolume::ViewOf<unsigned char>(this->ShownRegion, this->Image);
+      std::transform(shown.begin(), shown.end(), of.begin(), shown.begin(),
+                     [](unsigned char real, unsigned char label) -> unsigned char { return real != 0 || label == Invented; });
+      this->ShownRegion->Modified();
+    }
+    this->ShownImage->ShallowCopy(this->Image);
+    this->ShownImage->GetPointData()->AddArray(this->ShownRegion);
+    return this->ShownImage;
+  }
+
   /** As the file would have it: without strokes. */
   vtkSmartPointer<vtkImageData> Unpainted()
   {
@@ -237,6 +260,9 @@ private:
   vtkSmartPointer<vtkImageData> Base = vtkSmartPointer<vtkImageData>::New();
   vtkSmartPointer<vtkDataArray> Intensity, Valid;         ///< our own, once painted
   vtkSmartPointer<vtkDataArray> KeptIntensity, KeptValid; ///< what was handed out last
+  vtkSmartPointer<vtkImageData> ShownImage = vtkSmartPointer<vtkImageData>::New();
+  vtkSmartPointer<vtkDataArray> ShownRegion; ///< of an embedded volume
+  vtkDataArray* ShownOf = nullptr;           ///< the region that it was made of
   std::unique_ptr<AnyVoxelEdits> Edits;
   StrokeChain At; ///< the strokes that the voxels have
 };

@@ -15,7 +15,7 @@ namespace echorama {
 inline AnyPosedVolume PosedVolumeOf(vtkUltrasoundAlignmentSession* session, int id)
 {
   vtkUltrasoundVolume::Input input;
-  input.Image = session->GetImage(id);
+  input.Image = session->GetShownImage(id);
   input.Intensity = vtkUltrasoundVolume::GetIntensity(input.Image);
   input.ValidRegion = vtkUltrasoundVolume::GetValidRegion(input.Image);
   AnyPosedVolume volume;

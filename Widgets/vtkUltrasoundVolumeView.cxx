@@ -110,9 +110,9 @@ struct vtkUltrasoundVolumeView::Internals {
     for (auto& [id, shown] : this->Volumes) {
       const SessionVolume* volume = this->Session ? this->Find(id) : nullptr;
       if (volume && this->IsShown(*volume) && this->View->Style == "points") {
-        shown.ParticlesAt(level, *volume, this->Session->GetImage(id));
+        shown.ParticlesAt(level, *volume, this->Session->GetShownImage(id));
       } else if (volume && this->IsShown(*volume) && this->View->Style == "volume") {
-        shown.BytesAt(level, *volume, this->Session->GetImage(id));
+        shown.BytesAt(level, *volume, this->Session->GetShownImage(id));
       }
     }
   }
@@ -182,7 +182,7 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
     }
     const bool takes = isNew || (shown.VoxelsDirty && !waits), looksOther = shown.SetLook(wanted);
     if (takes) {
-      shown.TakeVoxels(volume, this->Session->GetImage(volume.id));
+      shown.TakeVoxels(volume, this->Session->GetShownImage(volume.id));
     } else if (looksOther) {
       this->FullSeconds.clear();
     }
@@ -201,9 +201,9 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
   for (const int id : visible) {
     const SessionVolume& volume = *this->Find(id);
     if (this->View->Style == "volume") {
-      this->Volumes.at(id).CastRays(this->View->Detail.Level(), volume, this->Session->GetImage(id), this->OnProcessor);
+      this->Volumes.at(id).CastRays(this->View->Detail.Level(), volume, this->Session->GetShownImage(id), this->OnProcessor);
     } else if (this->View->Style == "points") {
-      const auto& particles = this->Volumes.at(id).ParticlesAt(this->View->Detail.Level(), volume, this->Session->GetImage(id));
+      const auto& particles = this->Volumes.at(id).ParticlesAt(this->View->Detail.Level(), volume, this->Session->GetShownImage(id));
       parts.push_back({{&particles, volume.colour, volume.opacity, volume.volumeToWorld}, id, {}});
     }
   }

@@ -108,7 +108,8 @@ QWidget* ParameterPanel::MakeNumber(const Parameter& parameter, const Control& c
   slider->setRange(0, isWhole ? static_cast<int>(high - low) : SliderSteps);
   slider->setMinimumWidth(60);
   const double perStep = (high - low) / std::max(1, slider->maximum());
-  const QString unit = parameter.unit.empty() ? QString() : " " + QString::fromStdString(parameter.unit);
+  const QString named = control.unit.isEmpty() ? QString::fromStdString(parameter.unit) : control.unit;
+  const QString unit = named.isEmpty() ? QString() : " " + named;
   auto* number = NumberField(
       both, {key.c_str(), help, std::max(parameter.range.low, -1e9), std::min(parameter.range.high, 1e9), digits, step, unit},
       [this, parameter](double typed) { Set(parameter, NumberText(typed)); });

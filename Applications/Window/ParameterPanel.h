@@ -23,6 +23,7 @@ public:
     double low = 0.0, high = 0.0;
     QString least = {};        ///< a word for the lowest value
     const char* onlyWhen = ""; ///< of the values that it matters with, the one that counts here; "": all
+    QString unit = {};         ///< where that of the parameter is too long
   };
 
   /// \param controls which, in this order

@@ -59,7 +59,7 @@ QFormLayout* NarrowForm(QWidget* parent = nullptr)
 {
   auto* form = parent ? new QFormLayout(parent) : new QFormLayout;
   form->setRowWrapPolicy(QFormLayout::WrapLongRows);
-  form->setFieldGrowthPolicy(QFormLayout::ExpandingFieldsGrow);
+  form->setFieldGrowthPolicy(QFormLayout::AllNonFixedFieldsGrow);
   if (parent)
     form->setContentsMargins(0, 0, 0, 0);
   return form;
@@ -142,14 +142,14 @@ QWidget* ResultPanel::MoreFields()
   using Controls = std::vector<ParameterPanel::Control>;
   stitchMore_ = new ParameterPanel(
       [this] { return recipe_.Stitching(); },
-      Controls{{"Sharpness", tr("Sharpness"), 0.0, 50.0},
+      Controls{{"Sharpness", tr("Sharpness"), 0.0, 19.0},
                {"DetailSharpness", tr("Sharpness of details"), 0.0, 64.0},
-               {"DetailScale", tr("Scale of details"), 1.0, 10.0},
+               {"DetailScale", tr("Scale of details"), 1.0, 10.0, {}, "", tr("voxels")},
                {"AllowDisjoint", tr("Allow gaps")}},
       [this](const char* name, const std::string& text) { SetParameter(recipe_.Stitching(), name, text); }, box);
   embedMore_ = new ParameterPanel(
       [this] { return recipe_.Embedding(); },
-      Controls{{"FeatherMm", tr("Feather"), 0.0, 20.0},
+      Controls{{"FeatherMm", tr("Feather"), 0.0, 15.0},
                {"KeepTexture", tr("Keep texture")},
                {"SmoothMm", tr("Smoothing"), 0.5, 20.0},
                {"MatchGrain", tr("Match grain")},

@@ -18,10 +18,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       volume.geometry.dimensions = {1, 1, 1}; // a pose file may leave the geometry to the file
       session.Add(volume);
     }
+    session.SetCentreOfRotation(project.state.centre);
     const SessionState before = session.State();
+    const int entries = session.UndoCount();
+    for (const SessionVolume& volume : before.volumes)
+      ChangesSince(before, volume);
     session.SelectAll();
     session.MoveSelection(Pose(Eigen::Translation3d(1.0, 2.0, 3.0)));
-    while (session.UndoCount() > static_cast<int>(before.volumes.size()))
+    while (session.UndoCount() > entries)
       session.Undo();
     if (session.State() != before)
       std::abort();

@@ -22,6 +22,11 @@ seeds = {
     "path": {**head, "volumes": [{**first, "strokes": [{**stroke, "pathMm": []}]}]},
     "twice": {**head, "volumes": [first, {**second, "name": "A"}]},
     "pipeline": {**head, "volumes": [{**first, "file": ""}]},
+    "result": {**head, "centreOfRotation": [1, 2, 3], "volumes": [
+        {**first, "TrueVolumeToWorld": unit}, {**second, "name": "B"},
+        {"name": "whole", "file": "", "geometry": geometry, "VolumeToWorld": turned, "madeOf": {"options": {"Stitch.Method": "membrane"}, "sources": [
+            {"name": "A", "file": "a.mha", "geometry": geometry, "VolumeToResult": turned, "strokes": "0123456789abcdef", "making": ""},
+            {"name": "B", "geometry": geometry, "VolumeToResult": unit}]}}]},
     "backup": {**head, "volumes": [second], "backup": {"number": 3, "time": 1700000000, "label": "Move A", "checksum": "0123456789abcdef"}},
 }
 for name, content in seeds.items():

@@ -146,6 +146,8 @@ void TestLayout::everyPanelFits()
   for (QDockWidget* dock : docks) {
     dock->show();
     dock->raise();
+    if (auto* more = dock->findChild<QToolButton*>("stitchMore"))
+      window.Click(more, more->rect().center());
     window.Settle();
     QVERIFY(dock->isVisible());
     complaints += Complaints(dock);

@@ -346,6 +346,13 @@ void TestResults::moreOptionsReachTheResult()
   const int result = Make(window);
   const std::vector<double> first = Voxels(session->GetImage(result));
   QCOMPARE(session->GetResultOption(result, "Embed.FeatherMm"), std::string("3"));
+  // The background is seen, though it is no data.
+  const std::vector<double> real = Voxels(session->GetImage(result), "ValidRegion");
+  const std::vector<double> shown = Voxels(session->GetShownImage(result), "ValidRegion");
+  const std::vector<double> labels = Voxels(session->GetImage(result), "Embedding");
+  QVERIFY(real != shown);
+  for (std::size_t i = 0; i < real.size(); ++i)
+    QVERIFY((shown[i] != 0.0) == (real[i] != 0.0 || labels[i] == 3.0));
   // The seed alone makes other noise around the same data.
   window.Type(window.Part<QDoubleSpinBox>("Seed"), "7");
   QCOMPARE(Make(window), result);
