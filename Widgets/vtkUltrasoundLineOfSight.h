@@ -3,6 +3,7 @@
 #ifndef vtkUltrasoundLineOfSight_h
 #define vtkUltrasoundLineOfSight_h
 
+#include "vtkCamera.h"
 #include "vtkDataArray.h"
 #include "vtkImageData.h"
 #include "vtkRenderer.h"
@@ -18,7 +19,8 @@
 
 namespace echorama {
 
-/** From the camera's near plane to its far plane, world. */
+/** From the camera, or with parallel rays its near plane, to a point beyond; world. It goes on: clipping ranges are not always
+ * those of the volumes. */
 inline std::array<Eigen::Vector3d, 2> LineOfSight(vtkRenderer* renderer, double pixelX, double pixelY)
 {
   std::array<Eigen::Vector3d, 2> line;
@@ -28,6 +30,9 @@ inline std::array<Eigen::Vector3d, 2> LineOfSight(vtkRenderer* renderer, double 
     renderer->DisplayToWorld();
     renderer->GetWorldPoint(place);
     line[static_cast<std::size_t>(end)] = Eigen::Vector3d(place) / place[3];
+  }
+  if (!renderer->GetActiveCamera()->GetParallelProjection()) {
+    renderer->GetActiveCamera()->GetPosition(line[0].data());
   }
   return line;
 }
@@ -47,7 +52,7 @@ inline std::vector<int> VolumesOnLine(vtkUltrasoundAlignmentSession* session, co
     const Eigen::Affine3d toIndex = geometry.WorldToIndex();
     const Eigen::Vector3d from = toIndex * line[0], way = toIndex * line[1] - from;
     // The part of the line in the box of the voxels.
-    double begin = 0.0, end = 1.0;
+    double begin = 0.0, end = std::numeric_limits<double>::max();
     for (int axis = 0; axis < 3; ++axis) {
       const double low = (-0.5 - from[axis]) / way[axis], high = (geometry.dimensions[axis] - 0.5 - from[axis]) / way[axis];
       if (std::isfinite(low) && std::isfinite(high)) {

@@ -212,13 +212,13 @@ class SliceView(unittest.TestCase):
         self.picture()
         window = window_of(view)
         window.Render()
-        plain, time = rendered(window), view.GetPicture().GetMTime()
+        plain, time = pixels(rendered(window)).copy(), view.GetPicture().GetMTime()
 
         def differs():
             self.assertTrue(view.Update())
             self.assertEqual(view.GetPicture().GetMTime(), time)
             window.Render()
-            return (rendered(window) != plain).any()
+            return (pixels(rendered(window)) != plain).any()
 
         cursor = array_of(view.GetCursor, 3)
         view.SetPointer(*(cursor + (3, 2, 0)))
