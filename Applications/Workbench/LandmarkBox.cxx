@@ -21,12 +21,13 @@ LandmarkBox::LandmarkBox(Workspace& workspace, QWidget* parent) : QGroupBox(pare
   table_ =
       TableField(this, "landmarkTable",
                  tr("Places that were marked (tool Mark, key 6), and how far apart the volumes put those of one label. Two or "
-                    "three in both volumes tell places apart that look alike."),
+                    "three in both volumes tell places apart that look alike. Choosing one brings the slices there."),
                  {tr("Label"), tr("In"), tr("Apart")});
   table_->setSelectionBehavior(QAbstractItemView::SelectRows);
   table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   table_->horizontalHeader()->setSectionResizeMode(1, QHeaderView::Stretch);
   table_->setFixedHeight(120);
+  connect(table_, &QTableWidget::itemSelectionChanged, this, &LandmarkBox::ShowPlace);
   AlignPairParameters defaults;
   ParameterList parameters = Describe(defaults);
   const Parameter& sigma = Named(parameters, "LandmarkSigmaMm");
@@ -79,6 +80,23 @@ void LandmarkBox::ShowLandmarks()
     InsertRow(table_, table_->rowCount(),
               {row.label, row.volumes.join(", "), row.places.size() > 1 ? tr("%1 mm").arg(apart, 0, 'f', 2) : QString()});
   }
+}
+
+void LandmarkBox::ShowPlace()
+{
+  const QTableWidgetItem* item = table_->item(table_->currentRow(), 0);
+  if (!item || !item->isSelected())
+    return;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const SessionVolume& volume : workspace_.session->GetKernel().State().volumes)
+    for (const Landmark& landmark : volume.landmarks)
+      if (QString::fromStdString(landmark.label) == item->text()) {
+        sum += volume.volumeToWorld * landmark.position;
+        ++count;
+      }
+  if (count > 0)
+    emit PlaceAsked(sum.x() / count, sum.y() / count, sum.z() / count);
 }
 
 void LandmarkBox::RemoveSelected()

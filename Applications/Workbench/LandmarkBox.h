@@ -21,7 +21,11 @@ public:
 public slots:
   void ShowLandmarks();
 
+signals:
+  void PlaceAsked(double x, double y, double z); ///< somebody chose a landmark: the middle of where its volumes put it
+
 private:
+  void ShowPlace();
   void RemoveSelected();
 
   Workspace& workspace_;

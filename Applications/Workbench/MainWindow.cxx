@@ -178,6 +178,9 @@ void MainWindow::MakePanels()
   AddPanel(registration, tr("Align"));
   for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged})
     connect(bench_, changed, registration->Landmarks(), &LandmarkBox::ShowLandmarks);
+  connect(registration->Landmarks(), &LandmarkBox::PlaceAsked, this, [this](double x, double y, double z) {
+    views_->CentreOn({x, y, z});
+  });
   Menu(Place::Align)
       ->addAction(MakeAction(this, "refineAction", tr("&Refine from here"), "R",
                              tr("Align the selected volumes to the others from where they are; can be undone"),

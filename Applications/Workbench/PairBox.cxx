@@ -85,6 +85,10 @@ void PairBox::ShowPair(int edge)
   const PairGraph::Edge& pair = graph_->Edges()[edge];
   bench_->SetOnly({pair.a, pair.b});
   emit bench_->PairAsked(pair.a, pair.b);
+  bench_->Shared().show({Message::Note,
+                         tr("%1 and %2 alone; Escape brings all back").arg(bench_->NameOf(pair.a), bench_->NameOf(pair.b)),
+                         {},
+                         objectName()});
 }
 
 void PairBox::Choose(int edge)

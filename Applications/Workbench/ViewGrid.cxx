@@ -80,9 +80,14 @@ void ViewGrid::CentreOnOverlap(int a, int b)
   const Eigen::Vector3d middle =
       count > 0 ? Eigen::Vector3d(sum / count)
                 : Eigen::Vector3d(0.5 * (geometry.Centre() + other->geometry.Moved(other->volumeToWorld).Centre()));
-  slices_[0]->Canvas()->View()->SetCursor(middle.x(), middle.y(), middle.z());
+  CentreOn(middle);
+}
+
+void ViewGrid::CentreOn(const Eigen::Vector3d& place)
+{
+  slices_[0]->Canvas()->View()->SetCursor(place.x(), place.y(), place.z());
   for (SlicePane* pane : slices_) {
-    pane->Canvas()->View()->SetFocus(middle.x(), middle.y(), middle.z());
+    pane->Canvas()->View()->SetFocus(place.x(), place.y(), place.z());
     pane->Canvas()->SetPlaced(true);
     pane->ShowPlane();
     pane->Canvas()->Ask();

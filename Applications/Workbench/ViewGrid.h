@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include <array>
+#include <Eigen/Core>
 #include <QVector>
 #include <QWidget>
 
@@ -27,6 +28,8 @@ public:
   /// Makes one view large, or, when it is, all four visible again.
   void ToggleLarge(QWidget* view);
   void Fit();
+  /// Brings a place of the world to the middle of all slices.
+  void CentreOn(const Eigen::Vector3d& place);
   void SetLinked(bool linked);
   bool Linked() const { return linked_; }
 

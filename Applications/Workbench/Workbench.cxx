@@ -29,6 +29,11 @@ Workbench::Workbench(Workspace& workspace, QObject* parent)
   // Errors are not observed here: what VTK classes report comes through Messages.
   for (const auto& [event, changed] : Signals)
     observers_.append(Session()->AddObserver(event, this, &Workbench::OnSessionEvent));
+  connect(this, &Workbench::VolumesChanged, this, [this] { // volumes that are looked at alone may go
+    const bool areThere = std::all_of(only_.begin(), only_.end(), [this](int id) { return session_->HasVolume(id); });
+    if (!areThere)
+      SetOnly({});
+  });
   // Either may go before the other.
   workspace_.mayHelp = [bench = QPointer<Workbench>(this)](const QString& what) { return !bench || bench->MayHelp(what); };
   workspace_.show = [bench = QPointer<Workbench>(this)](const Message& message) {

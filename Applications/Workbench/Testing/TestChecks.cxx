@@ -90,6 +90,7 @@ private slots:
   void flickerEndsWhenSomethingIsDragged();
   void disagreementIsFoundShownAndGoesStale();
   void pairsAreAGraphAndOneIsLookedAtAlone();
+  void aLandmarkIsFoundAgain();
   void aClickIn3DSelectsAVolume();
   void anObliquePlaneIsTyped();
   void thePictureOfTheManual();
@@ -538,11 +539,47 @@ void TestChecks::pairsAreAGraphAndOneIsLookedAtAlone()
   window.Slice(1)->setFocus();
   window.Key(Qt::Key_Escape);
   QVERIFY(window.Window().Bench()->Only().isEmpty());
-  // A volume that goes takes its pairs along.
+  // A volume that goes takes its pairs along, and what was looked at alone with it gives way to all.
+  window.Click(graph, graph->MiddleOf(2).toPoint());
+  QVERIFY(window.Window().Bench()->Only().contains(3));
   window.Session()->RemoveVolume(3);
   window.Settle();
+  QVERIFY(window.Window().Bench()->Only().isEmpty());
   QCOMPARE(graph->Edges().size(), 1);
   QCOMPARE(table->rowCount(), 1);
+}
+
+// Marked by clicks in two volumes, told apart in mm, and found again by the list.
+void TestChecks::aLandmarkIsFoundAgain()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  Raise(window, "registrationPanel");
+  window.Key(Qt::Key_6);
+  SliceCanvas* slice = window.Slice(0);
+  const QPoint here = slice->rect().center() + QPoint(20, -30);
+  const Vector3d place = WorldAt(slice, here);
+  window.Session()->Select(1, true, true);
+  window.Click(slice, here);
+  window.Session()->Select(2, true, true);
+  window.Click(slice, here + QPoint(12, 0));
+  auto* table = window.Part<QTableWidget>("landmarkTable");
+  QCOMPARE(table->rowCount(), 1);
+  const double mm = 12.0 * slice->View()->GetMillimetresPerPixel();
+  QVERIFY(std::abs(table->item(0, 2)->text().split(' ')[0].toDouble() - mm) < 0.01 + 1e-6);
+  window.Key(Qt::Key_F); // all of the volumes
+  window.Wheel(slice, 5);
+  table->setFocus();
+  table->selectRow(0);
+  window.Settle();
+  double right[3];
+  slice->View()->GetRight(right);
+  const Vector3d middle = place + 0.5 * mm * Vector3d(right);
+  for (int i : {0, 1, 2}) {
+    Vector3d focus;
+    window.Slice(i)->View()->GetFocus(focus.data());
+    QVERIFY((focus - middle).norm() < 1e-6);
+  }
 }
 
 void TestChecks::aClickIn3DSelectsAVolume()
