@@ -51,15 +51,15 @@ struct BackupWriter::Parts {
   void Write(const Item& item)
   {
     std::string reason;
+    const bool again = !lastFinished || (item.label == lastLabel && Since(lastTime) < Repeat);
+    lastTime = Clock::now(); // before: a disk that is slow does not put off the next one
     try {
-      const bool again = !lastFinished || (item.label == lastLabel && Since(lastTime) < Repeat);
       if (backups.Write(item.project, item.label, again))
         lastLabel = item.label;
       lastFinished = item.finished;
     } catch (const std::exception& error) {
       reason = error.what();
     }
-    lastTime = Clock::now();
     const std::lock_guard<std::mutex> lock(mutex);
     failure = reason;
     if (reason.empty())
