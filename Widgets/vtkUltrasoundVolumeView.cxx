@@ -203,7 +203,8 @@ void vtkUltrasoundVolumeView::Internals::UpdateVolumes()
     if (this->View->Style == "volume") {
       this->Volumes.at(id).CastRays(this->View->Detail.Level(), volume, this->Session->GetShownImage(id), this->OnProcessor);
     } else if (this->View->Style == "points") {
-      const auto& particles = this->Volumes.at(id).ParticlesAt(this->View->Detail.Level(), volume, this->Session->GetShownImage(id));
+      const auto& particles =
+          this->Volumes.at(id).ParticlesAt(this->View->Detail.Level(), volume, this->Session->GetShownImage(id));
       parts.push_back({{&particles, volume.colour, volume.opacity, volume.volumeToWorld}, id, {}});
     }
   }

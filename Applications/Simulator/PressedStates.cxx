@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A state does not name its body. What can be seen of it: the probe that pressed it lies in the body, about as deep below the skin
-// as it was pressed in, and what was displaced lies where the body is.
+// A state does not name its body. What can be seen of it: the probe that pressed it lies in the body, about as deep below the
+// skin as it was pressed in, and what was displaced lies where the body is.
 #include "PressedStates.h"
 #include "AlgorithmRun.h"
 #include "Core/Base/Error.h"
@@ -92,8 +92,8 @@ std::vector<vtkSmartPointer<vtkImageData>> ReadPressedStates(const QStringList& 
                                                              const Progress& progress)
 {
   if (body.IsEmpty())
-    throw Error(Error::Kind::BadInput, files.join(", ").toStdString() +
-                                           ": these are states of a body that is pressed: open that first, or with them");
+    throw Error(Error::Kind::BadInput,
+                files.join(", ").toStdString() + ": these are states of a body that is pressed: open that first, or with them");
   std::vector<std::pair<vtkSmartPointer<vtkImageData>, std::string>> read;
   for (int i = 0; i < files.size(); i++) {
     vtkNew<vtkXMLImageDataReader> reader;

@@ -23,9 +23,10 @@ private slots:
   void statesThatAreNoneOrOfAnotherBodyAreRefused();
 
 private:
-  /// Of a body whose front is pressed in by a probe that is at \a rest before, and whose back lies on a table 70 mm behind: it gives
-  /// way ever less. \param beside what else is put between probe and body
-  QString WriteState(const QString& name, const Pose& rest, double mm, const Vector3d& beside = Vector3d::Zero(), bool saysHow = true)
+  /// Of a body whose front is pressed in by a probe that is at \a rest before, and whose back lies on a table 70 mm behind: it
+  /// gives way ever less. \param beside what else is put between probe and body
+  QString WriteState(const QString& name, const Pose& rest, double mm, const Vector3d& beside = Vector3d::Zero(),
+                     bool saysHow = true)
   {
     const vtkNew<vtkImageData> state;
     state->SetDimensions(25, 21, 29);
@@ -108,7 +109,8 @@ void TestScanBodies::aBodyGivesWayAsItsStatesSay()
   const QString three = WriteState("three.vti", rest, 3.0), nine = WriteState("nine.vti", rest, 9.0);
   window.Drop({nine, three});
   QVERIFY(window.Wait());
-  QVERIFY2(window.HasMessage("gives way to a probe that is pressed in (Page Down), by up to 9 mm"), qPrintable(window.Messages().join('\n')));
+  QVERIFY2(window.HasMessage("gives way to a probe that is pressed in (Page Down), by up to 9 mm"),
+           qPrintable(window.Messages().join('\n')));
   QCOMPARE(window.Scan().Body().files, QStringList(body));
   window.Frame();
   QVERIFY(std::fabs(BallDepth(window) - before) < 0.3);
@@ -153,7 +155,8 @@ void TestScanBodies::statesThatAreNoneOrOfAnotherBodyAreRefused()
   const Pose rest = window.Scan().ProbeToWorld();
   const QString right = WriteState("right.vti", rest, 5.0);
   for (const auto& [files, words] : std::vector<std::pair<QStringList, QString>>{
-           {{WriteState("far.vti", rest, 5.0, Vector3d(0.0, -60.0, 0.0))}, "far.vti: the probe that was pressed in by 5 mm lies 5"},
+           {{WriteState("far.vti", rest, 5.0, Vector3d(0.0, -60.0, 0.0))},
+            "far.vti: the probe that was pressed in by 5 mm lies 5"},
            {{WriteState("mute.vti", rest, 5.0, Vector3d::Zero(), false)}, "mute.vti: it does not say how deep"},
            {{WriteState("none.vti", rest, 0.0)}, "none.vti: the probe was pressed in by 0 mm"},
            {{right, WriteState("again.vti", rest, 5.0)}, "again.vti: it is as deep as"}}) {
