@@ -128,7 +128,7 @@ int vtkUltrasoundAlignmentSession::AddNew(vtkImageData* image, SessionVolume vol
     }
     vtkUltrasoundVolume::CheckInput(nullptr, image, called);
     volume.geometry = vtkUltrasoundVolume::GeometryOf(image);
-    const bool unworked = this->Storage.IsUnworked(this->Session.State());
+    const bool unworked = !volume.madeOf && this->Storage.IsUnworked(this->Session.State()); // to make one is work
     const int added = this->Session.Add(std::move(volume));
     const SessionVolume& known = *this->Find(added);
     try {
