@@ -280,7 +280,7 @@ QDockWidget* MainWindow::AddDock(Qt::DockWidgetArea area, QWidget* panel, const 
   addDockWidget(area, dock);
   // The key brings it in front and goes into it; it is a mouse's work to close it, or the menu's.
   const int number = panels_->actions().size() + 1;
-  panels_->addAction(MakeAction(this, ("goTo" + panel->objectName()).toLatin1(), title, QString("Ctrl+%1").arg(number),
+  panels_->addAction(MakeAction(this, ("goTo" + panel->objectName()).toLatin1(), title, QString("Ctrl+%1").arg(number % 10),
                                 tr("Show the panel %1 and go into it").arg(title), [this, panel] {
                                   ShowPanel(panel);
                                   FocusFirstOf(panel);

@@ -79,13 +79,12 @@ QWidget* ViewPanel::ObliqueControls()
   const QString help =
       tr("The direction that the slice is seen from (left, posterior, superior); any length. It becomes oblique. Shift "
          "and middle drag in the slice turns it, too.");
-  auto* row = new QHBoxLayout;
+  auto* row = new QVBoxLayout; // one below the other: side by side they would be cut off
   row->setSpacing(2);
   const char* const names[] = {"normalX", "normalY", "normalZ"};
   for (int axis = 0; axis < 3; ++axis) {
     normal_[axis] = NumberField(box, {names[axis], help, -1000.0, 1000.0, 4, 0.1, {}}, [this](double) { SetOblique(); });
     normal_[axis]->setButtonSymbols(QAbstractSpinBox::NoButtons);
-    normal_[axis]->setMinimumWidth(40);
     row->addWidget(normal_[axis]);
   }
   offset_ = NumberField(

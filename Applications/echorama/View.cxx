@@ -85,6 +85,7 @@ vtkSmartPointer<vtkImageData> PartOf(vtkImageData* volume, vtkDataArray* labels,
   auto image = vtkSmartPointer<vtkImageData>::New();
   image->ShallowCopy(volume);
   image->GetPointData()->AddArray(valid);
+  image->GetPointData()->RemoveArray(vtkUltrasoundVolume::EmbeddingName()); // else the session shows all of the background
   return image;
 }
 

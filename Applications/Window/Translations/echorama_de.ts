@@ -103,10 +103,6 @@
         <translation>Links</translation>
     </message>
     <message>
-        <source>the tool in hand: move volumes, paint, carve, restore, mark, or point</source>
-        <translation>das gewählte Werkzeug: Volumen bewegen, malen, schnitzen, wiederherstellen, markieren oder zeigen</translation>
-    </message>
-    <message>
         <source>Shift + left (Align)</source>
         <translation>Umschalt + links (Ausrichten)</translation>
     </message>
@@ -227,16 +223,24 @@
         <translation>Escape</translation>
     </message>
     <message>
-        <source>take a drag back</source>
-        <translation>ein Ziehen zurücknehmen</translation>
-    </message>
-    <message>
         <source>Keys</source>
         <translation>Tasten</translation>
     </message>
     <message>
         <source>Keys and mouse</source>
         <translation>Tasten und Maus</translation>
+    </message>
+    <message>
+        <source>outside</source>
+        <translation>außerhalb</translation>
+    </message>
+    <message>
+        <source>the tool in hand: move volumes, paint, carve, restore, mark, measure, or point</source>
+        <translation>das gewählte Werkzeug: Volumen bewegen, malen, schnitzen, wiederherstellen, markieren, messen oder zeigen</translation>
+    </message>
+    <message>
+        <source>take a drag back, end flickering, or show all volumes again</source>
+        <translation>ein Ziehen zurücknehmen, das Wechselbild beenden oder wieder alle Volumen zeigen</translation>
     </message>
 </context>
 <context>
@@ -315,6 +319,224 @@
     <message>
         <source>Pick Paint (3), Carve (4) or Restore (5), then drag in a slice.</source>
         <translation>Malen (3), Schnitzen (4) oder Wiederherstellen (5) wählen, dann in einer Schicht ziehen.</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::CheckPanel</name>
+    <message>
+        <source>Disagreement</source>
+        <translation>Abweichung</translation>
+    </message>
+    <message>
+        <source>Under the mouse</source>
+        <translation>Unter der Maus</translation>
+    </message>
+    <message>
+        <source>Grey level of each volume where the mouse points</source>
+        <translation>Grauwert jedes Volumens dort, wohin die Maus zeigt</translation>
+    </message>
+    <message>
+        <source>Volume</source>
+        <translation>Volumen</translation>
+    </message>
+    <message>
+        <source>Grey level</source>
+        <translation>Grauwert</translation>
+    </message>
+    <message>
+        <source>Measurements</source>
+        <translation>Messungen</translation>
+    </message>
+    <message>
+        <source>Distances (tool Measure, key 7) and angles (tool Angle, key 8). Their points can be dragged in the slices. The profile is that of the selected distance.</source>
+        <translation>Strecken (Werkzeug Messen, Taste 7) und Winkel (Werkzeug Winkel, Taste 8). Ihre Punkte lassen sich in den Schichten ziehen. Das Profil ist das der gewählten Strecke.</translation>
+    </message>
+    <message>
+        <source>No.</source>
+        <translation>Nr.</translation>
+    </message>
+    <message>
+        <source>What</source>
+        <translation>Was</translation>
+    </message>
+    <message>
+        <source>Value</source>
+        <translation>Wert</translation>
+    </message>
+    <message>
+        <source>Remove</source>
+        <translation>Entfernen</translation>
+    </message>
+    <message>
+        <source>Removes the measurements that are selected in the list (Delete)</source>
+        <translation>Entfernt die Messungen, die in der Liste gewählt sind (Entf)</translation>
+    </message>
+    <message>
+        <source>Clear</source>
+        <translation>Leeren</translation>
+    </message>
+    <message>
+        <source>Removes all measurements; can be undone</source>
+        <translation>Entfernt alle Messungen; lässt sich rückgängig machen</translation>
+    </message>
+    <message>
+        <source>Flicker</source>
+        <translation>Wechselbild</translation>
+    </message>
+    <message>
+        <source>What is shown by turns with the other</source>
+        <translation>Was im Wechsel mit dem anderen gezeigt wird</translation>
+    </message>
+    <message>
+        <source>What is shown by turns with the first</source>
+        <translation>Was im Wechsel mit dem ersten gezeigt wird</translation>
+    </message>
+    <message>
+        <source>Changes per second</source>
+        <translation>Wechsel je Sekunde</translation>
+    </message>
+    <message>
+        <source> /s</source>
+        <translation> /s</translation>
+    </message>
+    <message>
+        <source>Flicker (Shift+Space)</source>
+        <translation>Wechselbild (Umschalt+Leertaste)</translation>
+    </message>
+    <message>
+        <source>Shows both by turns in the slices: what does not agree jumps. Ends by itself when something is dragged</source>
+        <translation>Zeigt beide im Wechsel in den Schichten: Was nicht übereinstimmt, springt. Endet von selbst, wenn etwas gezogen wird</translation>
+    </message>
+    <message>
+        <source>Between</source>
+        <translation>Zwischen</translation>
+    </message>
+    <message>
+        <source>and</source>
+        <translation>und</translation>
+    </message>
+    <message>
+        <source>Rate</source>
+        <translation>Tempo</translation>
+    </message>
+    <message>
+        <source>Selected</source>
+        <translation>Gewählte</translation>
+    </message>
+    <message>
+        <source>Others</source>
+        <translation>Andere</translation>
+    </message>
+    <message>
+        <source>°</source>
+        <translation>°</translation>
+    </message>
+    <message>
+        <source> mm</source>
+        <translation> mm</translation>
+    </message>
+    <message>
+        <source>Angle</source>
+        <translation>Winkel</translation>
+    </message>
+    <message>
+        <source>Distance</source>
+        <translation>Strecke</translation>
+    </message>
+    <message>
+        <source>Remove measurements</source>
+        <translation>Messungen entfernen</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::DisagreementBox</name>
+    <message>
+        <source> mm</source>
+        <translation> mm</translation>
+    </message>
+    <message>
+        <source>&amp;Find disagreement</source>
+        <translation>Abweichung &amp;finden</translation>
+    </message>
+    <message>
+        <source>How far the volumes that are shown are from agreeing, block by block, in the background</source>
+        <translation>Wie weit die gezeigten Volumen davon entfernt sind, übereinzustimmen, Block für Block, im Hintergrund</translation>
+    </message>
+    <message>
+        <source>Show in slices</source>
+        <translation>In Schichten zeigen</translation>
+    </message>
+    <message>
+        <source>Colours where something is known; where there is no colour, nothing is</source>
+        <translation>Farben, wo etwas bekannt ist; wo keine Farbe ist, ist nichts bekannt</translation>
+    </message>
+    <message>
+        <source>The shift that has the brightest colour</source>
+        <translation>Die Verschiebung, die die hellste Farbe hat</translation>
+    </message>
+    <message>
+        <source>Shifts are looked for so far; what is farther apart stays without colour</source>
+        <translation>So weit werden Verschiebungen gesucht; was weiter auseinander liegt, bleibt ohne Farbe</translation>
+    </message>
+    <message>
+        <source>Side of the blocks that are compared: larger ones know more, and tell less of where</source>
+        <translation>Kante der Blöcke, die verglichen werden: größere wissen mehr und sagen weniger genau, wo</translation>
+    </message>
+    <message>
+        <source>Where the mouse points</source>
+        <translation>Dort, wohin die Maus zeigt</translation>
+    </message>
+    <message>
+        <source>Search</source>
+        <translation>Suche</translation>
+    </message>
+    <message>
+        <source>Blocks</source>
+        <translation>Blöcke</translation>
+    </message>
+    <message>
+        <source>Scale to</source>
+        <translation>Skala bis</translation>
+    </message>
+    <message>
+        <source>Disagreement</source>
+        <translation>Abweichung</translation>
+    </message>
+    <message>
+        <source>%1: two volumes that are shown are needed</source>
+        <translation>%1: zwei gezeigte Volumen sind nötig</translation>
+    </message>
+    <message>
+        <source>%1 of %2 blocks tell something.</source>
+        <translation>%1 von %2 Blöcken sagen etwas aus.</translation>
+    </message>
+    <message>
+        <source>Median %1 mm, 95% below %2 mm.</source>
+        <translation>Median %1 mm, 95% unter %2 mm.</translation>
+    </message>
+    <message>
+        <source>The volumes do not overlap.</source>
+        <translation>Die Volumen überlappen nicht.</translation>
+    </message>
+    <message>
+        <source>Stale: volumes have changed since.</source>
+        <translation>Veraltet: Volumen haben sich seither geändert.</translation>
+    </message>
+    <message>
+        <source>Under the mouse: not known</source>
+        <translation>Unter der Maus: nicht bekannt</translation>
+    </message>
+    <message>
+        <source>, in two directions; the third is not known</source>
+        <translation>, in zwei Richtungen; die dritte ist nicht bekannt</translation>
+    </message>
+    <message>
+        <source>, across an edge; along it is not known</source>
+        <translation>, quer zu einer Kante; längs ist es nicht bekannt</translation>
+    </message>
+    <message>
+        <source>Under the mouse: %1 ± %2 mm, %3 and %4%5</source>
+        <translation>Unter der Maus: %1 ± %2 mm, %3 und %4%5</translation>
     </message>
 </context>
 <context>
@@ -662,6 +884,25 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>Projects (*.json)</source>
         <translation>Projekte (*.json)</translation>
     </message>
+    <message>
+        <source>%1 is in no file yet, and a project holds files. Save it beside the project, as %2?</source>
+        <translation>%1 ist noch in keiner Datei, und ein Projekt enthält Dateien. Neben dem Projekt speichern, als %2?</translation>
+    </message>
+    <message>
+        <source>Save it there</source>
+        <translation>Dort speichern</translation>
+    </message>
+    <message>
+        <source>Leave it out</source>
+        <translation>Weglassen</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::Flicker</name>
+    <message>
+        <source>Flicker: select one of the volumes, and leave another; or choose two in the panel Check.</source>
+        <translation>Wechselbild: Wählen Sie eines der Volumen, und lassen Sie ein anderes ungewählt; oder wählen Sie zwei in der Tafel Prüfen.</translation>
+    </message>
 </context>
 <context>
     <name>echorama::GuideBar</name>
@@ -706,10 +947,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>Zusammenfügen</translation>
     </message>
     <message>
-        <source>Make one volume of all that are shown; the panel Stitch shows it.</source>
-        <translation>Machen Sie ein Volumen aus allen, die gezeigt sind; die Tafel Zusammenfügen zeigt es.</translation>
-    </message>
-    <message>
         <source>Embed</source>
         <translation>Einbetten</translation>
     </message>
@@ -720,10 +957,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>Save</source>
         <translation>Speichern</translation>
-    </message>
-    <message>
-        <source>Keep the work as a project; the panel Stitch saves the stitched volume.</source>
-        <translation>Behalten Sie die Arbeit als Projekt; die Tafel Zusammenfügen speichert das Ergebnis.</translation>
     </message>
     <message>
         <source>Save...</source>
@@ -748,6 +981,14 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>All is done and saved.</source>
         <translation>Alles ist getan und gespeichert.</translation>
+    </message>
+    <message>
+        <source>Make one volume of all that are shown; it joins the others.</source>
+        <translation>Machen Sie ein Volumen aus allen, die gezeigt sind; es kommt zu den anderen.</translation>
+    </message>
+    <message>
+        <source>Keep the work as a project; the stitched volume is saved beside it.</source>
+        <translation>Behalten Sie die Arbeit als Projekt; das Ergebnis wird daneben gespeichert.</translation>
     </message>
 </context>
 <context>
@@ -811,10 +1052,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>Landmarken</translation>
     </message>
     <message>
-        <source>Places that were marked (tool Mark, key 6), and how far apart the volumes put those of one label. Two or three in both volumes tell places apart that look alike.</source>
-        <translation>Orte, die markiert wurden (Werkzeug Markieren, Taste 6), und wie weit auseinander die Volumen die einer Bezeichnung haben. Zwei oder drei in beiden Volumen unterscheiden Orte, die gleich aussehen.</translation>
-    </message>
-    <message>
         <source>Label</source>
         <translation>Bezeichnung</translation>
     </message>
@@ -861,6 +1098,10 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>Remove landmarks</source>
         <translation>Landmarken entfernen</translation>
+    </message>
+    <message>
+        <source>Places that were marked (tool Mark, key 6), and how far apart the volumes put those of one label. Two or three in both volumes tell places apart that look alike. Choosing one brings the slices there.</source>
+        <translation>Orte, die markiert wurden (Werkzeug Markieren, Taste 6), und wie weit auseinander die Volumen die einer Bezeichnung haben. Zwei oder drei in beiden Volumen unterscheiden Orte, die gleich aussehen. Eine zu wählen bringt die Schichten dorthin.</translation>
     </message>
 </context>
 <context>
@@ -1049,12 +1290,89 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>Try again</source>
         <translation>Noch einmal versuchen</translation>
     </message>
+    <message>
+        <source>Check</source>
+        <translation>Prüfen</translation>
+    </message>
+    <message>
+        <source>&amp;Compare with sources</source>
+        <translation>Mit &amp;Quellen vergleichen</translation>
+    </message>
+    <message>
+        <source>Show the result alone, and then its sources instead, in all views</source>
+        <translation>Das Ergebnis allein zeigen, dann stattdessen seine Quellen, in allen Ansichten</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::MeasureTool</name>
+    <message>
+        <source>Change measurement %1</source>
+        <translation>Messung %1 ändern</translation>
+    </message>
 </context>
 <context>
     <name>echorama::MessageBar</name>
     <message>
         <source>Close this message</source>
         <translation>Diese Meldung schließen</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::PairBox</name>
+    <message>
+        <source>Pairs</source>
+        <translation>Paare</translation>
+    </message>
+    <message>
+        <source>The pairs that were aligned, and the error that each predicts. Choosing one shows its volumes alone, where they overlap; a second click, or Escape, brings all back.</source>
+        <translation>Die Paare, die ausgerichtet wurden, und der Fehler, den jedes vorhersagt. Eines zu wählen zeigt nur seine Volumen, dort, wo sie überlappen; ein zweiter Klick oder Escape bringt alle zurück.</translation>
+    </message>
+    <message>
+        <source>Pair</source>
+        <translation>Paar</translation>
+    </message>
+    <message>
+        <source>Answer</source>
+        <translation>Antwort</translation>
+    </message>
+    <message>
+        <source>Error</source>
+        <translation>Fehler</translation>
+    </message>
+    <message>
+        <source>%1 – %2</source>
+        <translation>%1 – %2</translation>
+    </message>
+    <message>
+        <source>%1, voted down</source>
+        <translation>%1, überstimmt</translation>
+    </message>
+    <message>
+        <source>%1 mm</source>
+        <translation>%1 mm</translation>
+    </message>
+    <message>
+        <source>%1 and %2 alone; Escape brings all back</source>
+        <translation>Nur %1 und %2; Escape bringt alle zurück</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::PairGraph</name>
+    <message>
+        <source>Graph of the pairs that were aligned; the list below it says the same</source>
+        <translation>Graph der Paare, die ausgerichtet wurden; die Liste darunter sagt dasselbe</translation>
+    </message>
+    <message>
+        <source>After an alignment: which pairs of volumes were compared, and what each is worth.</source>
+        <translation>Nach einem Ausrichten: welche Paare von Volumen verglichen wurden, und was jedes wert ist.</translation>
+    </message>
+    <message>
+        <source>failed</source>
+        <translation>fehlgeschlagen</translation>
+    </message>
+    <message>
+        <source>%1 mm</source>
+        <translation>%1 mm</translation>
     </message>
 </context>
 <context>
@@ -1112,10 +1430,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>Eine Drehung der Tasten und der Knöpfe darüber</translation>
     </message>
     <message>
-        <source>Mouse speed</source>
-        <translation>Maustempo</translation>
-    </message>
-    <message>
         <source>How far volumes move: 1 with the mouse, 0.1 for fine work</source>
         <translation>Wie weit sich Volumen bewegen: 1 wie die Maus, 0.1 für Feinarbeit</translation>
     </message>
@@ -1154,6 +1468,31 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>%1 and %2 more, which move with it</source>
         <translation>%1 und %2 weitere, die sich mitbewegen</translation>
+    </message>
+    <message>
+        <source>Mouse
+speed</source>
+        <translation>Maus-
+tempo</translation>
+    </message>
+</context>
+<context>
+    <name>echorama::ProfilePlot</name>
+    <message>
+        <source>Profile: grey levels along the distance that was measured</source>
+        <translation>Profil: Grauwerte entlang der gemessenen Strecke</translation>
+    </message>
+    <message>
+        <source>Grey levels of each volume along the distance that was measured (tool Measure, key 7), over mm from its first end. Edges of the same tissue at different places are a shift. The mouse, or arrow keys, point at a place.</source>
+        <translation>Grauwerte jedes Volumens entlang der gemessenen Strecke (Werkzeug Messen, Taste 7), über mm von ihrem ersten Ende. Kanten desselben Gewebes an verschiedenen Orten sind eine Verschiebung. Die Maus oder die Pfeiltasten zeigen auf einen Ort.</translation>
+    </message>
+    <message>
+        <source>Measure a distance: grey levels along it are shown here.</source>
+        <translation>Messen Sie eine Strecke: Grauwerte entlang ihr werden hier gezeigt.</translation>
+    </message>
+    <message>
+        <source>mm</source>
+        <translation>mm</translation>
     </message>
 </context>
 <context>
@@ -1421,21 +1760,25 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>%1. Only places within %2 mm and %3° were looked at</source>
         <translation>%1. Nur Orte innerhalb von %2 mm und %3° wurden betrachtet</translation>
     </message>
+    <message>
+        <source>%1% of the smaller volume overlap, similarity %2</source>
+        <translation>%1% des kleineren Volumens überlappen, Ähnlichkeit %2</translation>
+    </message>
+    <message>
+        <source>predicted error %1 mm; %2 mm from where the volumes were placed</source>
+        <translation>vorhergesagter Fehler %1 mm; %2 mm von dort, wohin die Volumen gelegt wurden</translation>
+    </message>
+    <message>
+        <source>other pairs disagreed with it</source>
+        <translation>andere Paare widersprachen ihm</translation>
+    </message>
+    <message>
+        <source>Refine: what is selected was made of other volumes and lies where they lie; select one of those</source>
+        <translation>Verfeinern: Was gewählt ist, wurde aus anderen Volumen gemacht und liegt, wo sie liegen; wählen Sie eines von diesen</translation>
+    </message>
 </context>
 <context>
     <name>echorama::ResultPanel</name>
-    <message>
-        <source>How one volume goes over into the next</source>
-        <translation>Wie ein Volumen ins nächste übergeht</translation>
-    </message>
-    <message>
-        <source>What happens to speckle where volumes overlap: mixing blurs it, the others keep it</source>
-        <translation>Was mit Speckle geschieht, wo Volumen überlappen: Mischen verwischt es, die anderen erhalten es</translation>
-    </message>
-    <message>
-        <source>Side of the result&apos;s voxels</source>
-        <translation>Kante der Voxel des Ergebnisses</translation>
-    </message>
     <message>
         <source> mm</source>
         <translation> mm</translation>
@@ -1469,10 +1812,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>Legt das Ergebnis in den Fächer, der es fasst, in Rauschen seiner Helligkeit und Körnung</translation>
     </message>
     <message>
-        <source>How much larger than the data the background is</source>
-        <translation>Um wie viel der Hintergrund größer als die Daten ist</translation>
-    </message>
-    <message>
         <source>Pre&amp;view</source>
         <translation>&amp;Vorschau</translation>
     </message>
@@ -1501,14 +1840,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>Ergebnis speichern</translation>
     </message>
     <message>
-        <source>Volumes (*.mha *.mhd *.nrrd *.nhdr *.nii *.nii.gz *.vti *.vdb)</source>
-        <translation>Volumen (*.mha *.mhd *.nrrd *.nhdr *.nii *.nii.gz *.vti *.vdb)</translation>
-    </message>
-    <message>
-        <source>Stitches the volumes that are shown.</source>
-        <translation>Fügt die gezeigten Volumen zusammen.</translation>
-    </message>
-    <message>
         <source>Method</source>
         <translation>Methode</translation>
     </message>
@@ -1525,10 +1856,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>Rand</translation>
     </message>
     <message>
-        <source>Stitch: no volume is shown; tick one in the list of volumes</source>
-        <translation>Zusammenfügen: kein Volumen ist gezeigt; haken Sie eines in der Liste der Volumen an</translation>
-    </message>
-    <message>
         <source>Stitch and embed</source>
         <translation>Zusammenfügen und einbetten</translation>
     </message>
@@ -1541,20 +1868,208 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <translation>%1 (Vorschau)</translation>
     </message>
     <message>
-        <source>%1%2 × %3 × %4 voxels of %5 mm</source>
-        <translation>%1%2 × %3 × %4 Voxel von %5 mm</translation>
+        <source>&amp;Compare with sources</source>
+        <translation>Mit &amp;Quellen vergleichen</translation>
     </message>
     <message>
-        <source>Preview: </source>
-        <translation>Vorschau: </translation>
+        <source>Shows the result alone, and then its sources instead, in all views (T)</source>
+        <translation>Zeigt das Ergebnis allein, dann stattdessen seine Quellen, in allen Ansichten (T)</translation>
     </message>
     <message>
-        <source>Saved %1</source>
-        <translation>%1 gespeichert</translation>
+        <source>Volumes (%1)</source>
+        <translation>Volumen (%1)</translation>
     </message>
     <message>
-        <source>Saved %1. %2</source>
-        <translation>%1 gespeichert. %2</translation>
+        <source>What it will be made of</source>
+        <translation>Woraus es gemacht wird</translation>
+    </message>
+    <message>
+        <source>Make &amp;again</source>
+        <translation>&amp;Neu machen</translation>
+    </message>
+    <message>
+        <source>Of its sources as they are now, as it was made before. What was painted on it is painted again</source>
+        <translation>Aus seinen Quellen, wie sie jetzt sind, so, wie es vorher gemacht wurde. Was darauf gemalt wurde, wird wieder gemalt</translation>
+    </message>
+    <message>
+        <source>Result</source>
+        <translation>Ergebnis</translation>
+    </message>
+    <message>
+        <source>Which volume is made: a new one, or one that was made before takes other voxels</source>
+        <translation>Welches Volumen gemacht wird: ein neues, oder eines, das schon gemacht wurde, erhält andere Voxel</translation>
+    </message>
+    <message>
+        <source>More…</source>
+        <translation>Mehr…</translation>
+    </message>
+    <message>
+        <source>Further parameters of the stitching and of the background</source>
+        <translation>Weitere Parameter des Zusammenfügens und des Hintergrunds</translation>
+    </message>
+    <message>
+        <source>Results are sources, too</source>
+        <translation>Auch Ergebnisse sind Quellen</translation>
+    </message>
+    <message>
+        <source>Also takes volumes that were made of others, when they are shown</source>
+        <translation>Nimmt auch Volumen, die aus anderen gemacht wurden, wenn sie gezeigt sind</translation>
+    </message>
+    <message>
+        <source>Sharpness</source>
+        <translation>Schärfe</translation>
+    </message>
+    <message>
+        <source>Sharpness of details</source>
+        <translation>Schärfe der Details</translation>
+    </message>
+    <message>
+        <source>Scale of details</source>
+        <translation>Größe der Details</translation>
+    </message>
+    <message>
+        <source>voxels</source>
+        <translation>Voxel</translation>
+    </message>
+    <message>
+        <source>Allow gaps</source>
+        <translation>Lücken zulassen</translation>
+    </message>
+    <message>
+        <source>Feather</source>
+        <translation>Weicher Rand</translation>
+    </message>
+    <message>
+        <source>Keep texture</source>
+        <translation>Textur erhalten</translation>
+    </message>
+    <message>
+        <source>Smoothing</source>
+        <translation>Glättung</translation>
+    </message>
+    <message>
+        <source>Match grain</source>
+        <translation>Körnung angleichen</translation>
+    </message>
+    <message>
+        <source>Match contrast</source>
+        <translation>Kontrast angleichen</translation>
+    </message>
+    <message>
+        <source>Spread inside</source>
+        <translation>Ausbreitung innen</translation>
+    </message>
+    <message>
+        <source>Spread outside</source>
+        <translation>Ausbreitung außen</translation>
+    </message>
+    <message>
+        <source>Noise overlaps</source>
+        <translation>Rauschen überlappt um</translation>
+    </message>
+    <message>
+        <source>Seed</source>
+        <translation>Startzahl</translation>
+    </message>
+    <message>
+        <source>Outline</source>
+        <translation>Umriss</translation>
+    </message>
+    <message>
+        <source>The fan whose form the background has: the smallest that holds the data, or that of a source, which grows until it holds them</source>
+        <translation>Der Fächer, dessen Form der Hintergrund hat: der kleinste, der die Daten fasst, oder der einer Quelle, der wächst, bis er sie fasst</translation>
+    </message>
+    <message>
+        <source>Noise volumes</source>
+        <translation>Rauschvolumen</translation>
+    </message>
+    <message>
+        <source>noise is made</source>
+        <translation>Rauschen wird erzeugt</translation>
+    </message>
+    <message>
+        <source>Files of real noise, which are placed side by side and fill the background; several are parted by ;</source>
+        <translation>Dateien mit echtem Rauschen, die nebeneinander gelegt werden und den Hintergrund füllen; mehrere werden durch ; getrennt</translation>
+    </message>
+    <message>
+        <source>Chooses the files</source>
+        <translation>Wählt die Dateien</translation>
+    </message>
+    <message>
+        <source>Volumes (%1);;All files (*)</source>
+        <translation>Volumen (%1);;Alle Dateien (*)</translation>
+    </message>
+    <message>
+        <source>result</source>
+        <translation>Ergebnis</translation>
+    </message>
+    <message>
+        <source>found from the data</source>
+        <translation>aus den Daten gefunden</translation>
+    </message>
+    <message>
+        <source>fan of %1</source>
+        <translation>Fächer von %1</translation>
+    </message>
+    <message>
+        <source>a new volume</source>
+        <translation>ein neues Volumen</translation>
+    </message>
+    <message>
+        <source>No volume is shown.</source>
+        <translation>Kein Volumen ist gezeigt.</translation>
+    </message>
+    <message>
+        <source>Of %1</source>
+        <translation>Aus %1</translation>
+    </message>
+    <message>
+        <source>%1: sources changed: %2.</source>
+        <translation>%1: Quellen geändert: %2.</translation>
+    </message>
+    <message>
+        <source>The volume whose fan was the outline of %1 is gone: the fan is found from the data</source>
+        <translation>Das Volumen, dessen Fächer der Umriss von %1 war, ist nicht mehr da: der Fächer wird aus den Daten gefunden</translation>
+    </message>
+    <message>
+        <source>Stitch: %1</source>
+        <translation>Zusammenfügen: %1</translation>
+    </message>
+    <message>
+        <source>the sources of %1 are gone</source>
+        <translation>die Quellen von %1 sind nicht mehr da</translation>
+    </message>
+    <message>
+        <source>no volume is shown; tick one in the list of volumes</source>
+        <translation>kein Volumen ist gezeigt; haken Sie eines in der Liste der Volumen an</translation>
+    </message>
+    <message>
+        <source>Stitch: two volumes are needed, and there is %1 alone</source>
+        <translation>Zusammenfügen: zwei Volumen sind nötig, und es gibt nur %1</translation>
+    </message>
+    <message>
+        <source>Make a result</source>
+        <translation>Ein Ergebnis machen</translation>
+    </message>
+    <message>
+        <source>%1%2: %3 × %4 × %5 voxels of %6 mm</source>
+        <translation>%1%2: %3 × %4 × %5 Voxel von %6 mm</translation>
+    </message>
+    <message>
+        <source>Preview of </source>
+        <translation>Vorschau von </translation>
+    </message>
+    <message>
+        <source>Compare with sources: nothing was stitched yet</source>
+        <translation>Mit Quellen vergleichen: noch wurde nichts zusammengefügt</translation>
+    </message>
+    <message>
+        <source>Show %1</source>
+        <translation>%1 zeigen</translation>
+    </message>
+    <message>
+        <source>Show the sources of %1</source>
+        <translation>Die Quellen von %1 zeigen</translation>
     </message>
 </context>
 <context>
@@ -1628,6 +2143,10 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>Position under the mouse in mm (left, posterior, superior), and the grey level of each volume there</source>
         <translation>Ort unter der Maus in mm (links, hinten, oben) und der Grauwert jedes Volumens dort</translation>
+    </message>
+    <message>
+        <source>and %1 more</source>
+        <translation>und %1 weitere</translation>
     </message>
 </context>
 <context>
@@ -1710,10 +2229,6 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>Show the score</source>
         <translation>Die Punktzahl zeigen</translation>
-    </message>
-    <message>
-        <source>Show the errors as arrows</source>
-        <translation>Die Fehler als Pfeile zeigen</translation>
     </message>
     <message>
         <source>In the 3D view: arrows from where points are to where they belong</source>
@@ -1903,6 +2418,10 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>Hides score and errors, and starts the clock; what was done before can no longer be undone</source>
         <translation>Verbirgt Punktzahl und Fehler und startet die Uhr; was vorher getan wurde, lässt sich nicht mehr rückgängig machen</translation>
     </message>
+    <message>
+        <source>Show error arrows</source>
+        <translation>Fehlerpfeile zeigen</translation>
+    </message>
 </context>
 <context>
     <name>echorama::ViewActions</name>
@@ -2057,6 +2576,30 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>Larger brush</source>
         <translation>Größerer Pinsel</translation>
+    </message>
+    <message>
+        <source>M&amp;easure</source>
+        <translation>M&amp;essen</translation>
+    </message>
+    <message>
+        <source>Measure a distance: click on both ends, or drag; the panel Check lists it</source>
+        <translation>Eine Strecke messen: auf beide Enden klicken oder ziehen; die Tafel Prüfen führt sie auf</translation>
+    </message>
+    <message>
+        <source>A&amp;ngle</source>
+        <translation>Wi&amp;nkel</translation>
+    </message>
+    <message>
+        <source>Measure an angle: click on its three points, the second where its arms meet</source>
+        <translation>Einen Winkel messen: auf seine drei Punkte klicken, den zweiten dort, wo sich die Schenkel treffen</translation>
+    </message>
+    <message>
+        <source>&amp;Flicker</source>
+        <translation>Wechselbi&amp;ld</translation>
+    </message>
+    <message>
+        <source>Back and forth by itself between two sides (panel Check: which, and how fast); ends when something is dragged</source>
+        <translation>Von selbst hin und her zwischen zwei Seiten (Tafel Prüfen: welche und wie schnell); endet, wenn etwas gezogen wird</translation>
     </message>
 </context>
 <context>
@@ -2225,6 +2768,54 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>Hide above</source>
         <translation>Verbergen über</translation>
     </message>
+    <message>
+        <source>Plane in numbers</source>
+        <translation>Ebene in Zahlen</translation>
+    </message>
+    <message>
+        <source>The slice whose plane this is</source>
+        <translation>Die Schicht, deren Ebene dies ist</translation>
+    </message>
+    <message>
+        <source>Upper left</source>
+        <translation>Oben links</translation>
+    </message>
+    <message>
+        <source>Upper right</source>
+        <translation>Oben rechts</translation>
+    </message>
+    <message>
+        <source>Lower left</source>
+        <translation>Unten links</translation>
+    </message>
+    <message>
+        <source>The direction that the slice is seen from (left, posterior, superior); any length. It becomes oblique. Shift and middle drag in the slice turns it, too.</source>
+        <translation>Die Richtung, aus der die Schicht gesehen wird (links, hinten, oben); beliebige Länge. Sie wird schräg. Auch Umschalt und Ziehen mit der mittleren Taste in der Schicht dreht sie.</translation>
+    </message>
+    <message>
+        <source>How far the plane is from the origin of the world, along its normal</source>
+        <translation>Wie weit die Ebene vom Ursprung der Welt entfernt ist, entlang ihrer Normalen</translation>
+    </message>
+    <message>
+        <source> mm</source>
+        <translation> mm</translation>
+    </message>
+    <message>
+        <source>Of</source>
+        <translation>Von</translation>
+    </message>
+    <message>
+        <source>Normal</source>
+        <translation>Normale</translation>
+    </message>
+    <message>
+        <source>Offset</source>
+        <translation>Abstand</translation>
+    </message>
+    <message>
+        <source>A plane needs a normal that is not zero.</source>
+        <translation>Eine Ebene braucht eine Normale, die nicht null ist.</translation>
+    </message>
 </context>
 <context>
     <name>echorama::VolumePane</name>
@@ -2303,6 +2894,18 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
         <source>Tint of %1</source>
         <translation>Farbton von %1</translation>
     </message>
+    <message>
+        <source>Make again</source>
+        <translation>Neu machen</translation>
+    </message>
+    <message>
+        <source>Makes the result of its sources as they are now</source>
+        <translation>Macht das Ergebnis aus seinen Quellen, wie sie jetzt sind</translation>
+    </message>
+    <message>
+        <source>%1: sources changed</source>
+        <translation>%1: Quellen geändert</translation>
+    </message>
 </context>
 <context>
     <name>echorama::VolumeTable</name>
@@ -2345,6 +2948,22 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
     <message>
         <source>Volumes of one group are selected and moved together</source>
         <translation>Volumen einer Gruppe werden zusammen gewählt und bewegt</translation>
+    </message>
+    <message>
+        <source>Made of %1. %2. %3</source>
+        <translation>Gemacht aus %1. %2. %3</translation>
+    </message>
+    <message>
+        <source>Its sources are as they were</source>
+        <translation>Seine Quellen sind, wie sie waren</translation>
+    </message>
+    <message>
+        <source>Sources changed: %1</source>
+        <translation>Quellen geändert: %1</translation>
+    </message>
+    <message>
+        <source>It is in no file yet</source>
+        <translation>Es ist noch in keiner Datei</translation>
     </message>
 </context>
 <context>

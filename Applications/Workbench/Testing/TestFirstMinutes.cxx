@@ -23,6 +23,7 @@
 #include <QMenu>
 #include <QMimeData>
 #include <QPushButton>
+#include <QScrollArea>
 #include <QSettings>
 #include <QTableView>
 #include <QToolButton>
@@ -96,7 +97,7 @@ void TestFirstMinutes::anEmptyWindowSaysHowToBegin()
     if (way == 0) {
       ClickIn(window, open);
     } else {
-      for (int i = 0; i < 100 && QApplication::focusWidget() != open; i++)
+      for (int i = 0; i < 300 && QApplication::focusWidget() != open; i++)
         window.Key(Qt::Key_Tab);
       QCOMPARE(QApplication::focusWidget(), open);
       QTest::keyClick(open, Qt::Key_Return);
@@ -204,6 +205,7 @@ void TestFirstMinutes::aPathIsDroppedOnItsField()
   window.Settle();
   const QString file = Folder().filePath("recording.csv");
   auto* field = window.Part<QLineEdit>("placeRecording");
+  dock->findChild<QScrollArea*>()->ensureWidgetVisible(field);
   QVERIFY(DropOver(field, {file}));
   QCOMPARE(field->text(), file);
   QVERIFY(window.Wait() && window.Messages().isEmpty());
@@ -253,6 +255,7 @@ void TestFirstMinutes::theGuideTicksWhatHappened()
   QCOMPARE(window.Part<QLabel>("guideText")->text(), QString("All is done and saved."));
   window.Screenshot("guide");
   // What was overtaken is open again.
+  window.Session()->Select(2, true, true);
   window.Session()->TranslateSelection(1, 0, 0);
   QCOMPARE(done(), QString("xx...."));
   window.Key(Qt::Key_Z, Qt::ControlModifier);

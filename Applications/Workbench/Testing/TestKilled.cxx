@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// 100 kill -9 at random moments of work in the real window: at most one second of work is lost, and never a file.
+// kill -9 at random moments of work in the real window: at most one second of work is lost, and never a file. ECHORAMA_KILLS (25)
+// says how often.
 #include "FileActions.h"
 #include "SliceCanvas.h"
 #include "WindowUnderTest.h"
@@ -19,7 +20,6 @@ using namespace echorama;
 
 namespace {
 
-constexpr int Kills = 100;
 constexpr double MostSeconds = 1.0;
 
 // Where the second volume lies, exactly enough to know every state again.
@@ -129,7 +129,7 @@ class TestKilled : public WindowTest {
   Q_OBJECT
 
 private slots:
-  void aHundredKillsLoseAtMostASecond();
+  void killsLoseAtMostASecond();
 
 private:
   QStringList KillAt(const QStringList& arguments, bool fromStart, int milliseconds);
@@ -188,12 +188,14 @@ QString TestKilled::Recovered(const QString& project)
   return count > 0 ? StateOf(session) : QString();
 }
 
-void TestKilled::aHundredKillsLoseAtMostASecond()
+void TestKilled::killsLoseAtMostASecond()
 {
+  bool isNumber = false;
+  const int asked = qEnvironmentVariableIntValue("ECHORAMA_KILLS", &isNumber), kills = isNumber ? asked : 25;
   std::mt19937 random(20);
   double most = 0.0, sum = 0.0;
   int measured = 0, saved = 0, early = 0;
-  for (int kill = 0; kill < Kills; kill++) {
+  for (int kill = 0; kill < kills; kill++) {
     QTemporaryDir place;
     const QDir folder(place.path());
     qputenv("XDG_DATA_HOME", folder.filePath("data").toLocal8Bit());
@@ -240,12 +242,12 @@ void TestKilled::aHundredKillsLoseAtMostASecond()
   }
   qInfo("%d kills during work lost %.3f s at most, %.3f s in the mean; %d before it; %d left a project", measured, most,
         sum / std::max(1, measured), early, saved);
-  QVERIFY(measured > 70 && saved > 30);
+  QVERIFY(measured > 0.7 * kills && saved > 0.3 * kills);
 }
 
 int main(int argc, char** argv)
 {
-  qputenv("QTEST_FUNCTION_TIMEOUT", "2400000"); // ms; it is usually 5 minutes
+  qputenv("QTEST_FUNCTION_TIMEOUT", "2400000"); // ms; a hundred take some 5 minutes
   return WindowTest::Run(argc, argv, [argc, argv] {
     const QStringList arguments = QApplication::arguments();
     if (arguments.value(1) == "--work")
