@@ -5,7 +5,6 @@
 //    sorted, triangles turned to agree with their neighbours, and their holes measured.
 // 3. The sign of a shell's volume tells where its inside is, whatever the order of corners.
 #include "SceneShells.h"
-#include "Core/Base/JoinedSets.h"
 #include <algorithm>
 #include <Eigen/Geometry>
 #include <numeric>
@@ -33,6 +32,24 @@ std::uint64_t EdgeHash(std::uint32_t a, std::uint32_t b)
   const std::uint64_t hash = Mixed((static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b)) + 0x9e3779b97f4a7c15u);
   return a < b ? hash : 0u - hash;
 }
+
+// Union-find with path halving.
+struct Groups {
+  explicit Groups(std::size_t count) : parent(count) { std::iota(parent.begin(), parent.end(), 0u); }
+  std::uint32_t Root(std::uint32_t i)
+  {
+    while (parent[i] != i)
+      i = parent[i] = parent[parent[i]];
+    return i;
+  }
+  void Join(std::uint32_t a, std::uint32_t b)
+  {
+    a = Root(a);
+    b = Root(b);
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<std::uint32_t> parent;
+};
 
 } // namespace
 
@@ -95,7 +112,7 @@ SceneShells::SceneShells(const TissueSurface& surface) : triangles(surface.trian
 
 void SceneShells::Split(const TissueSurface& surface)
 {
-  JoinedSets<std::uint32_t> groups(points.size());
+  Groups groups(points.size());
   for (const auto& [a, b, c] : triangles) {
     groups.Join(a, b);
     groups.Join(b, c);
@@ -105,7 +122,7 @@ void SceneShells::Split(const TissueSurface& surface)
   std::vector<Shell> found;
   shellOf.resize(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    std::int32_t& shell = shellOfRoot[groups.Of(triangles[i][0])];
+    std::int32_t& shell = shellOfRoot[groups.Root(triangles[i][0])];
     if (shell < 0) {
       shell = static_cast<std::int32_t>(found.size());
       found.emplace_back();
@@ -231,14 +248,14 @@ void SceneShells::Mend(std::int32_t shell, const std::vector<std::uint32_t>& mem
     local.try_emplace(edge.low, static_cast<std::uint32_t>(local.size()));
     local.try_emplace(edge.high, static_cast<std::uint32_t>(local.size()));
   }
-  JoinedSets<std::uint32_t> loops(local.size());
+  Groups loops(local.size());
   for (const Edge& edge : border)
     loops.Join(local[edge.low], local[edge.high]);
   std::vector<Eigen::Vector3d> areas(local.size(), Eigen::Vector3d::Zero());
   const Eigen::Vector3d origin = Point(border[0].low);
   for (const Edge& edge : border) {
     const Eigen::Vector3d normal = (Point(edge.low) - origin).cross(Point(edge.high) - origin);
-    areas[loops.Of(local[edge.low])] += edge.up != (turned[edge.triangle] == 1) ? normal : Eigen::Vector3d(-normal);
+    areas[loops.Root(local[edge.low])] += edge.up != (turned[edge.triangle] == 1) ? normal : Eigen::Vector3d(-normal);
   }
   double hole = 0.0, area = 0.0;
   for (const Eigen::Vector3d& vector : areas)

@@ -11,7 +11,6 @@
 // over the unknowns are fused (MembraneLevels::Sweep): a round reads and writes the finest level about four times.
 #include "Membrane.h"
 #include "Core/Base/ElapsedTime.h"
-#include "Core/Base/JoinedSets.h"
 #include "Core/Base/Multiversion.h"
 #include "MembraneLanes.h"
 #include "MembraneLevels.h"
@@ -150,6 +149,17 @@ public:
   std::vector<Run> runs;
   const Run& Root(std::size_t run) const { return runs[static_cast<std::size_t>(runs[run].parent)]; }
   int y0, z0, ny, nz;
+
+private:
+  std::int32_t Find(std::int32_t run)
+  {
+    while (runs[static_cast<std::size_t>(run)].parent != run) {
+      auto& parent = runs[static_cast<std::size_t>(run)].parent;
+      parent = runs[static_cast<std::size_t>(parent)].parent;
+      run = parent;
+    }
+    return run;
+  }
 };
 
 Components::Components(const Frame& frame, const GridBox& box, const RowField<unsigned char>& kinds,
@@ -215,13 +225,16 @@ Components::Components(const Frame& frame, const GridBox& box, const RowField<un
   runs.reserve(static_cast<std::size_t>(rowStart.back()));
   for (const auto& slice : slices)
     runs.insert(runs.end(), slice.begin(), slice.end());
-  JoinedSets<std::int32_t> components(runs.size());
+  for (std::size_t run = 0; run < runs.size(); ++run)
+    runs[run].parent = static_cast<std::int32_t>(run);
   const auto join = [&](std::size_t row, std::size_t other) {
     std::int32_t a = rowStart[row], b = rowStart[other];
     while (a < rowStart[row + 1] && b < rowStart[other + 1]) {
       const Run &mine = runs[static_cast<std::size_t>(a)], &theirs = runs[static_cast<std::size_t>(b)];
-      if (mine.begin < theirs.end && theirs.begin < mine.end)
-        components.Join(a, b);
+      if (mine.begin < theirs.end && theirs.begin < mine.end) {
+        const std::int32_t p = Find(a), q = Find(b);
+        runs[static_cast<std::size_t>(std::max(p, q))].parent = std::min(p, q);
+      }
       mine.end < theirs.end ? ++a : ++b;
     }
   };
@@ -232,7 +245,7 @@ Components::Components(const Frame& frame, const GridBox& box, const RowField<un
       join(row, row - static_cast<std::size_t>(ny));
   }
   for (std::size_t run = 0; run < runs.size(); ++run) {
-    const std::int32_t root = components.Of(static_cast<std::int32_t>(run));
+    const std::int32_t root = Find(static_cast<std::int32_t>(run));
     runs[run].parent = root;
     Run& of = runs[static_cast<std::size_t>(root)];
     of.least = std::min(of.least, runs[run].least);

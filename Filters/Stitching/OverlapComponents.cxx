@@ -3,8 +3,8 @@
 // (union-find). Then every volume looks which runs it reaches: within them, or by a face, because a volume that only touches
 // a piece is a boundary of it.
 #include "OverlapComponents.h"
-#include "Core/Base/JoinedSets.h"
 #include <algorithm>
+#include <numeric>
 
 namespace echorama {
 
@@ -12,12 +12,17 @@ OverlapComponents::OverlapComponents(const RegionMap& regions, VolumeView<const 
   : rows_(coverage.Dimensions()[1])
 {
   const auto& n = coverage.Dimensions();
-  JoinedSets<int> pieces;
+  std::vector<int> parents;
+  const auto rootOf = [&parents](int piece) {
+    while (parents[piece] != piece)
+      piece = parents[piece] = parents[parents[piece]];
+    return piece;
+  };
   const auto join = [&](std::size_t row, std::size_t other) {
     for (std::size_t a = starts_[row]; a < runs_.size(); ++a)
       for (std::size_t b = starts_[other]; b < starts_[other + 1]; ++b)
         if (runs_[b].begin < runs_[a].end && runs_[a].begin < runs_[b].end)
-          pieces.Join(runs_[a].piece, runs_[b].piece);
+          parents[rootOf(runs_[a].piece)] = rootOf(runs_[b].piece);
   };
   starts_.push_back(0);
   for (int k = 0; k < n[2]; ++k)
@@ -29,7 +34,8 @@ OverlapComponents::OverlapComponents(const RegionMap& regions, VolumeView<const 
         const int begin = i;
         while (i < n[0] && covered[i] > 1)
           ++i;
-        runs_.push_back({begin, i, pieces.Add()});
+        runs_.push_back({begin, i, static_cast<int>(parents.size())});
+        parents.push_back(static_cast<int>(parents.size()));
       }
       const std::size_t row = starts_.size() - 1;
       if (j > 0)
@@ -39,9 +45,9 @@ OverlapComponents::OverlapComponents(const RegionMap& regions, VolumeView<const 
       starts_.push_back(runs_.size());
     }
   // Pieces get numbers without gaps, in the order of their first voxels.
-  std::vector<int> numbers(runs_.size(), -1);
+  std::vector<int> numbers(parents.size(), -1);
   for (auto& run : runs_) {
-    int& number = numbers[pieces.Of(run.piece)];
+    int& number = numbers[rootOf(run.piece)];
     if (number < 0) {
       number = Count();
       first_.push_back(-1);
