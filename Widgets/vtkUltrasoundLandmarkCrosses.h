@@ -5,7 +5,7 @@
 
 #include "vtkSmartPointer.h"
 #include "vtkUltrasoundViewProps.h"
-#include "Widgets/Slices/SliceFrame.h"
+#include "Widgets/Pictures/SliceFrame.h"
 
 namespace echorama {
 

@@ -6,7 +6,7 @@
 #include "Core/Base/FormatText.h"
 #include "vtkSmartPointer.h"
 #include "vtkUltrasoundViewProps.h"
-#include "Widgets/Slices/SliceFrame.h"
+#include "Widgets/Pictures/SliceFrame.h"
 
 namespace echorama {
 

@@ -4,7 +4,7 @@
 #define vtkUltrasoundParticleCloud_h
 
 #include "vtkNew.h"
-#include "Widgets/Particles/Splat.h"
+#include "Widgets/Pictures/Splat.h"
 
 #include <vector>
 

@@ -12,7 +12,7 @@
 #include "vtkUltrasoundViewProps.h"
 #include "vtkUltrasoundVolume.h"
 #include "vtkVolumeProperty.h"
-#include "Widgets/Particles/DetailLevel.h"
+#include "Widgets/Pictures/DetailLevel.h"
 
 #include <algorithm>
 #include <cmath>

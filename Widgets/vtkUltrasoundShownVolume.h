@@ -7,7 +7,7 @@
 #include "vtkNew.h"
 #include "vtkSmartPointer.h"
 #include "vtkVolume.h"
-#include "Widgets/Particles/Particles.h"
+#include "Widgets/Pictures/Particles.h"
 #include "Widgets/Session/SessionState.h"
 
 #include <map>

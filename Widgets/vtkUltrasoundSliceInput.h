@@ -5,7 +5,7 @@
 
 #include "vtkUltrasoundAlignmentSession.h"
 #include "vtkUltrasoundVolume.h"
-#include "Widgets/Slices/SlicePicture.h"
+#include "Widgets/Pictures/SlicePicture.h"
 
 #include <algorithm>
 #include <vector>

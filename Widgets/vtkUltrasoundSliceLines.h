@@ -7,7 +7,7 @@
 #include "vtkUltrasoundLandmarkCrosses.h"
 #include "vtkUltrasoundMeasureLines.h"
 #include "vtkUltrasoundViewProps.h"
-#include "Widgets/Slices/ShiftColours.h"
+#include "Widgets/Pictures/ShiftColours.h"
 
 #include <algorithm>
 #include <array>

@@ -33,7 +33,7 @@
 #include "EchoramaWidgetsModule.h"
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
-#include "Widgets/Slices/SliceFrame.h"
+#include "Widgets/Pictures/SliceFrame.h"
 #include <memory>
 #endif
 #include <string>

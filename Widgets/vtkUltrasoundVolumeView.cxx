@@ -44,9 +44,9 @@ struct vtkUltrasoundVolumeView::Internals {
   std::chrono::steady_clock::time_point Begin, DrawBegin;
 
   bool VolumesDirty = true, PosesDirty = true;
-  vtkWeakPointer<vtkRenderWindow> Window; ///< that was asked last what draws it
-  bool Software = true, OnProcessor = true;
-  bool Remade = false; ///< this frame began with new particles: its time says nothing about the next
+  vtkWeakPointer<vtkRenderWindow> Window;   ///< that was asked last what draws it
+  bool Software = true, OnProcessor = true; ///< what it answered, and what follows
+  bool Remade = false;                      ///< this frame began with new particles: its time says nothing about the next
   std::map<int, ShownVolume> Volumes;
   std::map<int, echorama::FramedPicture> Planes;
   ParticleCloud Cloud;
@@ -489,11 +489,9 @@ bool vtkUltrasoundVolumeView::SetDrawnBy(const char* who)
     vtkErrorMacro("the view is drawn by \"" << name << "\"; it must be \"automatic\", \"processor\" or \"graphics\"");
     return false;
   }
-  if (name != this->DrawnBy) {
-    this->DrawnBy = name;
-    this->Parts->FullSeconds.clear();
-    this->Modified();
-  }
+  this->DrawnBy = name;
+  this->Parts->FullSeconds.clear();
+  this->Modified();
   return true;
 }
 
@@ -586,8 +584,7 @@ void vtkUltrasoundVolumeView::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Session: " << this->GetSession() << "\n";
-  os << indent << "Style: " << this->Style << "\n";
-  os << indent << "DrawnBy: " << this->DrawnBy << "\n";
+  os << indent << "Style: " << this->Style << "\n" << indent << "DrawnBy: " << this->DrawnBy << "\n";
   os << indent << "Downsampling: " << this->Parameters.downsampling << "\n";
   os << indent << "Budget: " << this->Parameters.budget << "\n";
   os << indent << "ParticleSize: " << this->ParticleSize << "\n";

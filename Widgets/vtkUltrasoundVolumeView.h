@@ -27,8 +27,8 @@
 #include "EchoramaWidgetsModule.h"
 #include "vtkObject.h"
 #ifndef __VTK_WRAP__
-#include "Widgets/Particles/DetailLevel.h"
-#include "Widgets/Particles/Particles.h"
+#include "Widgets/Pictures/DetailLevel.h"
+#include "Widgets/Pictures/Particles.h"
 #include <memory>
 #endif
 #include <string>

@@ -7,7 +7,7 @@
 #include "MeasureTool.h"
 #include "ProfilePlot.h"
 #include "vtkUltrasoundSliceInput.h"
-#include "Widgets/Slices/LineProfile.h"
+#include "Widgets/Pictures/LineProfile.h"
 #include "Workbench.h"
 #include <algorithm>
 #include <cmath>

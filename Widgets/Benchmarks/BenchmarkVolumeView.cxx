@@ -4,7 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Testing/Benchmark.h"
-#include "Widgets/Particles/Particles.h"
+#include "Widgets/Pictures/Particles.h"
 #include "Widgets/Session/LiveScore.h"
 #include <array>
 #include <cmath>

@@ -10,8 +10,8 @@
 #include "Core/Imaging/ValidPoints.h"
 #include "Testing/Benchmark.h"
 #include "Widgets/Painting/VoxelEdits.h"
+#include "Widgets/Pictures/SlicePicture.h"
 #include "Widgets/Session/LiveScore.h"
-#include "Widgets/Slices/SlicePicture.h"
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

@@ -371,48 +371,6 @@ void AlignmentSession::AddStroke(int id, Stroke stroke)
   EditOne(verb, id, [&](SessionVolume& volume) { volume.strokes = longer; });
 }
 
-void AlignmentSession::SetMeasurement(const Measurement& measurement)
-{
-  const auto& points = measurement.points;
-  if (measurement.number < 1)
-    Refuse("measurements count from 1");
-  if (points.size() != 2 && points.size() != 3)
-    Refuse("a measurement needs two points, or three for an angle");
-  if (!std::all_of(points.begin(), points.end(), [](const Eigen::Vector3d& point) { return point.allFinite(); }))
-    Refuse("a point of a measurement is not finite");
-  Edit("Measurement " + std::to_string(measurement.number), [&] {
-    for (Measurement& each : state_.measurements)
-      if (each.number == measurement.number) {
-        each = measurement;
-        return;
-      }
-    state_.measurements.push_back(measurement);
-  });
-}
-
-void AlignmentSession::RemoveMeasurement(int number)
-{
-  auto& all = state_.measurements;
-  const auto isIt = [number](const Measurement& each) { return each.number == number; };
-  if (std::none_of(all.begin(), all.end(), isIt))
-    Refuse("there is no measurement " + std::to_string(number));
-  Edit("Remove measurement " + std::to_string(number),
-       [&] { all.erase(std::remove_if(all.begin(), all.end(), isIt), all.end()); });
-}
-
-void AlignmentSession::ClearMeasurements()
-{
-  Edit("Remove all measurements", [this] { state_.measurements.clear(); });
-}
-
-int AlignmentSession::NextMeasurementNumber() const
-{
-  int number = 1;
-  for (const Measurement& each : state_.measurements)
-    number = std::max(number, each.number + 1);
-  return number;
-}
-
 void AlignmentSession::Select(int id, bool on, bool alone)
 {
   const SessionVolume& chosen = Volume(id);

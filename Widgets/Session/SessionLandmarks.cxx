@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The landmarks of an alignment session. They lie in the space of their volume's file, and so go where it goes.
+// The landmarks of an alignment session, which lie in the space of their volume's file and so go where it goes; and what was
+// measured, which stays where it is.
 #include "Core/Base/Error.h"
 #include "Widgets/Session/AlignmentSession.h"
 #include <algorithm>
@@ -67,6 +68,48 @@ std::string AlignmentSession::NextLandmarkLabel(int id) const
   while (all.count(std::to_string(number)) > 0)
     ++number;
   return std::to_string(number);
+}
+
+void AlignmentSession::SetMeasurement(const Measurement& measurement)
+{
+  const auto& points = measurement.points;
+  if (measurement.number < 1)
+    throw Error(Error::Kind::InvalidParameter, "measurements count from 1");
+  if (points.size() != 2 && points.size() != 3)
+    throw Error(Error::Kind::InvalidParameter, "a measurement needs two points, or three for an angle");
+  if (!std::all_of(points.begin(), points.end(), [](const Eigen::Vector3d& point) { return point.allFinite(); }))
+    throw Error(Error::Kind::InvalidParameter, "a point of a measurement is not finite");
+  Edit("Measurement " + std::to_string(measurement.number), [&] {
+    for (Measurement& each : state_.measurements)
+      if (each.number == measurement.number) {
+        each = measurement;
+        return;
+      }
+    state_.measurements.push_back(measurement);
+  });
+}
+
+void AlignmentSession::RemoveMeasurement(int number)
+{
+  auto& all = state_.measurements;
+  const auto isIt = [number](const Measurement& each) { return each.number == number; };
+  if (std::none_of(all.begin(), all.end(), isIt))
+    throw Error(Error::Kind::InvalidParameter, "there is no measurement " + std::to_string(number));
+  Edit("Remove measurement " + std::to_string(number),
+       [&] { all.erase(std::remove_if(all.begin(), all.end(), isIt), all.end()); });
+}
+
+void AlignmentSession::ClearMeasurements()
+{
+  Edit("Remove all measurements", [this] { state_.measurements.clear(); });
+}
+
+int AlignmentSession::NextMeasurementNumber() const
+{
+  int number = 1;
+  for (const Measurement& each : state_.measurements)
+    number = std::max(number, each.number + 1);
+  return number;
 }
 
 } // namespace echorama

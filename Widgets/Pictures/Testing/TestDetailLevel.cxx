@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
-#include "Widgets/Particles/DetailLevel.h"
+#include "Widgets/Pictures/DetailLevel.h"
 #include <gtest/gtest.h>
 
 namespace echorama {

@@ -3,7 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/Sampling.h"
-#include "Widgets/Slices/SlicePicture.h"
+#include "Widgets/Pictures/SlicePicture.h"
 #include <cmath>
 #include <cstdlib>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Widgets/Slices/SliceFrame.h"
+#include "Widgets/Pictures/SliceFrame.h"
 #include <gtest/gtest.h>
 
 namespace echorama {

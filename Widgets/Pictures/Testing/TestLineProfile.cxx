@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
-#include "Widgets/Slices/LineProfile.h"
-#include "Widgets/Slices/ShiftColours.h"
-#include "Widgets/Slices/SliceFrame.h"
+#include "Widgets/Pictures/LineProfile.h"
+#include "Widgets/Pictures/ShiftColours.h"
+#include "Widgets/Pictures/SliceFrame.h"
 #include <cmath>
 #include <gtest/gtest.h>
 

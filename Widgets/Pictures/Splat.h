@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Geometry/RigidTransform.h"
-#include "Widgets/Particles/Particles.h"
+#include "Widgets/Pictures/Particles.h"
 #include <array>
 
 namespace echorama {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Widgets/Slices/SlicePicture.h"
+#include "Widgets/Pictures/SlicePicture.h"
 #include <vector>
 
 namespace echorama {

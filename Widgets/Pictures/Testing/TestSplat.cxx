@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Widgets/Particles/Splat.h"
+#include "Widgets/Pictures/Splat.h"
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numeric>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Widgets/Particles/Particles.h"
+#include "Widgets/Pictures/Particles.h"
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>

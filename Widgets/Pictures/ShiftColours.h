@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Imaging/VolumeView.h"
-#include "Widgets/Slices/SlicePicture.h"
+#include "Widgets/Pictures/SlicePicture.h"
 #include <array>
 #include <cstdint>
 
