@@ -32,7 +32,7 @@ namespace echorama {
 
 namespace {
 constexpr int VolumeWatchingMs = 80; ///< how often 3D redraws while something is dragged in a slice
-constexpr int RefineMs = 300;        ///< how long nothing must happen before the picture becomes finer
+constexpr int RefineMs = 120;        ///< how long nothing must happen before the picture becomes finer
 constexpr int StepMs = 20;           ///< between its steps
 
 /// Turns and pans. VTK's own keys (wireframe, stereo, leaving the program) would come between those of the workbench.
