@@ -9,6 +9,7 @@
 #include "Core/Geometry/PoseJson.h"
 #include "Widgets/Session/Checksum.h"
 #include "Widgets/Session/MadeOfJson.h"
+#include "Widgets/Session/PoseComparison.h"
 #include "Widgets/Session/SessionState.h"
 #include <algorithm>
 #include <filesystem>
@@ -43,20 +44,6 @@ const SessionVolume* NamedVolume(const SessionState& state, const std::string& n
   return found == state.volumes.end() ? nullptr : &*found;
 }
 
-// How far two poses put the corners of a volume apart at most, mm.
-double Apart(const ImageGeometry& geometry, const Pose& a, const Pose& b)
-{
-  double farthest = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d index;
-    for (int axis = 0; axis < 3; ++axis)
-      index[axis] = (corner >> axis & 1) != 0 ? geometry.dimensions[static_cast<std::size_t>(axis)] - 1.0 : 0.0;
-    const Eigen::Vector3d place = geometry.IndexToWorld() * index;
-    farthest = std::max(farthest, (a * place - b * place).norm());
-  }
-  return farthest;
-}
-
 std::string ChangesOf(const MadeOf::Source& source, const SessionVolume* now, const Pose& result)
 {
   if (!now)
@@ -68,7 +55,7 @@ std::string ChangesOf(const MadeOf::Source& source, const SessionVolume* now, co
   const auto add = [&changes](const char* change) { changes += (changes.empty() ? "" : ", ") + std::string(change); };
   if (source.making != MakingText(*now))
     add("was made again");
-  if (!(Apart(now->geometry, source.pose, result.inverse(Eigen::Isometry) * now->volumeToWorld) <= SamePlaceMm))
+  if (!(FarthestCornerMm(now->geometry, source.pose, result.inverse(Eigen::Isometry) * now->volumeToWorld) <= SamePlaceMm))
     add("was moved");
   if (source.strokes != StrokesText(*now))
     add("was painted or carved");

@@ -2,7 +2,6 @@
 #include "Widgets/Session/PoseComparison.h"
 #include "Core/Base/Angles.h"
 #include "Core/Geometry/RigidTransform.h"
-#include <algorithm>
 
 namespace echorama {
 
@@ -23,15 +22,9 @@ std::vector<PoseDifference> ComparePoses(const SessionState& state, const std::m
       difference.isKnown = true;
       const Pose &here = volume.volumeToWorld, there = together * found->second;
       const ImageGeometry& geometry = volume.geometry;
-      const auto apart = [&](const Eigen::Vector3d& point) { return (here * point - there * point).norm(); };
-      difference.middleMm = apart(geometry.Centre());
+      difference.middleMm = (here * geometry.Centre() - there * geometry.Centre()).norm();
       difference.degrees = RotationAngle(here * there.inverse()) * DegreesPerRadian;
-      for (int corner = 0; corner < 8; ++corner) {
-        Eigen::Vector3d index;
-        for (int axis = 0; axis < 3; ++axis)
-          index[axis] = (corner >> axis & 1) * (geometry.dimensions[static_cast<std::size_t>(axis)] - 1);
-        difference.mostMm = std::max(difference.mostMm, apart(geometry.IndexToWorld() * index));
-      }
+      difference.mostMm = FarthestCornerMm(geometry, here, there);
     }
     differences.push_back(difference);
   }

@@ -1,10 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Widgets/Session/SessionState.h"
+#include <algorithm>
 #include <map>
 #include <vector>
 
 namespace echorama {
+
+/// How far two poses put that corner of a volume apart that they put apart most, mm.
+inline double FarthestCornerMm(const ImageGeometry& geometry, const Pose& a, const Pose& b)
+{
+  double farthest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d index;
+    for (int axis = 0; axis < 3; ++axis)
+      index[axis] = (corner >> axis & 1) * (geometry.dimensions[static_cast<std::size_t>(axis)] - 1);
+    const Eigen::Vector3d place = geometry.IndexToWorld() * index;
+    farthest = std::max(farthest, (a * place - b * place).norm());
+  }
+  return farthest;
+}
 
 /// How differently two sessions place a volume.
 struct PoseDifference {

@@ -5,12 +5,8 @@
 // three of the deviations that are told. The same with two volumes of a liver that were made from one sweep, so that they share
 // their speckle.
 #include "Core/Base/Percentile.h"
-#include "Core/Imaging/BorderZeros.h"
-#include "Filters/Phantoms/Phantom.h"
-#include "Filters/Phantoms/PhantomViews.h"
+#include "Filters/Registration/Benchmarks/SeenVolumes.h"
 #include "Filters/Registration/Disagreement.h"
-#include "Readers/ImageHeader.h"
-#include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"
 #include <filesystem>
 #include <limits>
@@ -19,43 +15,8 @@ using namespace echorama;
 
 namespace {
 
-struct Seen {
-  ImageGeometry geometry;
-  Volume<unsigned char> voxels, valid;
-  std::vector<PyramidLevel> pyramid;
-  void Prepare() { pyramid = BuildPyramid<unsigned char>({voxels.View(), valid.View(), geometry}); }
-};
-
-Seen View(const PhantomView& view)
-{
-  PhantomParameters p;
-  p.probeToWorld = view.probeToWorld;
-  p.gainDb = view.gainDb;
-  Seen seen;
-  seen.geometry = PhantomGeometry(p);
-  seen.voxels = Volume<unsigned char>(seen.geometry.dimensions);
-  seen.valid = Volume<unsigned char>(seen.geometry.dimensions);
-  MakePhantom(p, seen.voxels.View(), seen.valid.View());
-  seen.Prepare();
-  return seen;
-}
-
-Seen Liver(const std::string& path)
-{
-  const ImageHeader header = ReadImageHeader(path);
-  CheckVolume(header);
-  Seen seen;
-  seen.geometry = header.geometry;
-  seen.voxels = Volume<unsigned char>(seen.geometry.dimensions);
-  seen.valid = Volume<unsigned char>(seen.geometry.dimensions);
-  ReadVoxels(header, seen.voxels.View().Data());
-  ValidFromBorderZeros<unsigned char>(seen.voxels.View(), seen.valid.View());
-  seen.Prepare();
-  return seen;
-}
-
 // The moving volume lies where it belongs, but for a known way.
-void Run(const std::string& name, const Seen& fixed, const Seen& moving, const Eigen::Vector3d& by)
+void Run(const std::string& name, const SeenVolume& fixed, const SeenVolume& moving, const Eigen::Vector3d& by)
 {
   Pose moved = Pose::Identity();
   moved.translation() = by;
@@ -86,7 +47,7 @@ void Run(const std::string& name, const Seen& fixed, const Seen& moving, const E
 int main()
 {
   const std::vector<PhantomView> views = PhantomViews(PhantomParameters().probe, 2, 0.55);
-  const Seen one = View(views[0]), two = View(views[1]);
+  const SeenVolume one = SeenPhantom(views[0]), two = SeenPhantom(views[1]);
   for (const Eigen::Vector3d& by : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1.2, -0.8, 0.6), Eigen::Vector3d(-2.5, 1.5, 2.0)})
     Run("phantom, moved by " + std::to_string(by.norm()).substr(0, 3) + " mm", one, two, by);
   const std::filesystem::path folder = std::filesystem::path(ECHORAMA_SOURCE_DIR) / ".." / "shared" / "data" / "liver";
@@ -94,7 +55,7 @@ int main()
     std::cerr << "skipped: there are no liver volumes in " << folder << "\n";
     return 0;
   }
-  const Seen a = Liver((folder / "liver_volume_A.mha").string()), b = Liver((folder / "liver_volume_B.mha").string());
+  const SeenVolume a = SeenFile((folder / "liver_volume_A.mha").string()), b = SeenFile((folder / "liver_volume_B.mha").string());
   for (const double mm : {0.0, 2.0})
     Run("liver, moved by " + std::to_string(static_cast<int>(mm)) + " mm", a, b, {mm, 0, 0});
   return 0;

@@ -5,14 +5,10 @@
 // of points of its valid region from where they belong, the median over trials. Peer: the search of the dissertation.
 // Arguments: metrics to run (default: all); --trials N.
 #include "Core/Base/Random.h"
-#include "Core/Imaging/BorderZeros.h"
 #include "Core/Imaging/ValidPoints.h"
-#include "Filters/Phantoms/Phantom.h"
-#include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/Benchmarks/AlignSearch.h"
+#include "Filters/Registration/Benchmarks/SeenVolumes.h"
 #include "Filters/Registration/LocalAlign.h"
-#include "Readers/ImageHeader.h"
-#include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"
 #include <algorithm>
 #include <filesystem>
@@ -22,16 +18,12 @@ using namespace echorama;
 
 namespace {
 
-struct Seen {
-  ImageGeometry geometry;
-  Volume<unsigned char> voxels, valid;
-  std::vector<PyramidLevel> pyramid;
+struct Seen : SeenVolume {
   Eigen::Vector3d centre;
   std::vector<Eigen::Vector3d> points; // of the valid region, in the world
 
-  void Prepare()
+  explicit Seen(SeenVolume volume) : SeenVolume(std::move(volume))
   {
-    pyramid = BuildPyramid<unsigned char>({voxels.View(), valid.View(), geometry});
     std::ptrdiff_t count = 0;
     const Eigen::Affine3d toWorld = geometry.IndexToWorld();
     centre = toWorld * ValidCentroid<unsigned char>(voxels.View(), valid.View(), count);
@@ -47,34 +39,6 @@ struct Seen {
     return sum / static_cast<double>(points.size());
   }
 };
-
-Seen View(const PhantomView& view)
-{
-  PhantomParameters p;
-  p.probeToWorld = view.probeToWorld;
-  p.gainDb = view.gainDb;
-  Seen seen;
-  seen.geometry = PhantomGeometry(p);
-  seen.voxels = Volume<unsigned char>(seen.geometry.dimensions);
-  seen.valid = Volume<unsigned char>(seen.geometry.dimensions);
-  MakePhantom(p, seen.voxels.View(), seen.valid.View());
-  seen.Prepare();
-  return seen;
-}
-
-Seen Liver(const std::string& path)
-{
-  const ImageHeader header = ReadImageHeader(path);
-  CheckVolume(header);
-  Seen seen;
-  seen.geometry = header.geometry;
-  seen.voxels = Volume<unsigned char>(seen.geometry.dimensions);
-  seen.valid = Volume<unsigned char>(seen.geometry.dimensions);
-  ReadVoxels(header, seen.voxels.View().Data());
-  ValidFromBorderZeros<unsigned char>(seen.voxels.View(), seen.valid.View());
-  seen.Prepare();
-  return seen;
-}
 
 double Quantile(std::vector<double> numbers, double q)
 {
@@ -159,7 +123,7 @@ int main(int argc, char** argv)
     metrics = MetricNames();
 
   const std::vector<PhantomView> views = PhantomViews(PhantomParameters().probe, 3, 0.55);
-  const std::vector<Seen> phantom{View(views[0]), View(views[1]), View(views[2])};
+  const std::vector<Seen> phantom{Seen(SeenPhantom(views[0])), Seen(SeenPhantom(views[1])), Seen(SeenPhantom(views[2]))};
   RunAll("phantom", {{&phantom[0], &phantom[1]}, {&phantom[1], &phantom[2]}}, metrics, {{5, 5}, {10, 15}, {15, 20}}, trials, 1.0,
          isAll);
 
@@ -168,7 +132,7 @@ int main(int argc, char** argv)
     std::cerr << "skipped: there are no liver volumes in " << folder << "\n";
     return 0;
   }
-  const Seen a = Liver((folder / "liver_volume_A.mha").string()), b = Liver((folder / "liver_volume_B.mha").string());
+  const Seen a(SeenFile((folder / "liver_volume_A.mha").string())), b(SeenFile((folder / "liver_volume_B.mha").string()));
   RunAll("liver", {{&a, &b}}, metrics, {{6, 10}, {10, 15}}, std::max(trials / 2, 1), a.geometry.spacing.x(), isAll);
   return 0;
 }
