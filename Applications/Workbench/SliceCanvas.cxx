@@ -21,9 +21,10 @@ namespace echorama {
 
 namespace {
 
-constexpr int SliceWatchingMs = 60; ///< how often a slice redraws while something is dragged in another view
-constexpr int PointerMs = 15;       ///< and while the mouse points at something there
-constexpr double Reach = 8.0;       ///< of points that are dragged, pixels
+constexpr int SliceWatchingMs = 1; ///< while something is dragged in another view: that one is drawn first
+constexpr int WatchingStep = 2;    ///< and with every other pixel
+constexpr int PointerMs = 15;      ///< and while the mouse points at something there
+constexpr double Reach = 8.0;      ///< of points that are dragged, pixels
 
 const char* BrushModeOf(Tool tool)
 {
@@ -52,6 +53,7 @@ SliceCanvas::SliceCanvas(Workbench* bench, QWidget* parent)
   window->SetMultiSamples(0);
   setRenderWindow(window);
   interactor()->SetInteractorStyle(nullptr);
+  interactor()->AddObserver(vtkCommand::RenderEvent, this, &SliceCanvas::OnRenderAsked);
   view_->SetSession(bench->Session());
   window->AddRenderer(view_->GetRenderer());
   redraw_ = new Redraw(this, [this] { DrawNow(); });
@@ -97,10 +99,14 @@ void SliceCanvas::Look()
   Ask();
 }
 
+bool SliceCanvas::IsWatching() const
+{
+  return bench_->Interacting() && drag_ == Drag::None;
+}
+
 void SliceCanvas::Ask()
 {
-  const bool isWatching = bench_->Interacting() && drag_ == Drag::None;
-  redraw_->Ask(isWatching ? SliceWatchingMs : 0);
+  redraw_->Ask(IsWatching() ? SliceWatchingMs : 0);
 }
 
 // While something is dragged nobody looks at where the mouse is in other views.
@@ -128,6 +134,7 @@ void SliceCanvas::DrawNow()
 {
   if (!isVisible())
     return;
+  view_->SetInteractiveStep(IsWatching() ? WatchingStep : 0);
   view_->Update();
   renderWindow()->Render();
   emit Drawn();
@@ -197,13 +204,25 @@ bool SliceCanvas::event(QEvent* event)
   case QEvent::Enter:
   case QEvent::Leave:
   case QEvent::ContextMenu:
-    if (!IsForHandles(event))
-      return QOpenGLWidget::event(event);
-    break;
+    return IsForHandles(event) ? HandleEvent(event) : QOpenGLWidget::event(event);
   default:
-    break;
+    return QVTKOpenGLNativeWidget::event(event);
   }
-  return QVTKOpenGLNativeWidget::event(event);
+}
+
+void SliceCanvas::OnRenderAsked()
+{
+  if (!interactor()->GetEnableRender())
+    Ask();
+}
+
+// The widget draws at once whatever it does; here one picture a frame will do, with what the session has told besides.
+bool SliceCanvas::HandleEvent(QEvent* event)
+{
+  interactor()->EnableRenderOff();
+  const bool isTaken = QVTKOpenGLNativeWidget::event(event);
+  interactor()->EnableRenderOn();
+  return isTaken;
 }
 
 void SliceCanvas::resizeEvent(QResizeEvent* event)

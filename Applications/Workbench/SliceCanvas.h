@@ -63,6 +63,9 @@ private:
   enum class Drag { None, Widget, Cursor, Stroke, Landmark, Measure, Pan, Turn, Window };
 
   bool IsForHandles(QEvent* event) const;
+  bool HandleEvent(QEvent* event);
+  void OnRenderAsked();
+  bool IsWatching() const; ///< something is dragged in another view
   void Look();
   /// The volume that a tool changes; 0, and says so, when it is not clear which.
   int VolumeToChange(const QString& toSelectOne);

@@ -31,7 +31,8 @@
 namespace echorama {
 
 namespace {
-constexpr int VolumeWatchingMs = 80; ///< how often 3D redraws while something is dragged in a slice
+constexpr int VolumeWatchingMs = 2;  ///< while something is dragged: slices are drawn first, for 3D shows their pictures
+constexpr double FrameBudgetMs = 20; ///< of the 33 of all four views, while something is dragged
 constexpr int RefineMs = 120;        ///< how long nothing must happen before the picture becomes finer
 constexpr int StepMs = 20;           ///< between its steps
 
@@ -60,6 +61,7 @@ VolumePane::VolumePane(Workbench* bench, QWidget* parent)
   window->SetMultiSamples(0);
   canvas_->setRenderWindow(window);
   view_->SetSession(bench->Session());
+  view_->SetFrameBudget(FrameBudgetMs);
   window->AddRenderer(view_->GetRenderer());
   vtkNew<CameraStyle> style;
   style->SetDefaultRenderer(view_->GetRenderer());

@@ -62,6 +62,8 @@ private:
 /// each Refine, as far as the time of a frame at rest allows.
 class FrameDetail {
 public:
+  static constexpr double AtOnceSeconds = 0.1; ///< nobody feels that the mouse waits so long
+
   double restSeconds = 1.0; ///< what a frame of Refine may take to draw
 
   double Budget() const { return drag_.Budget(); }
@@ -105,7 +107,8 @@ public:
   /// The drag is over, and its level stays.
   void Stay() { refined_ = Level(); }
 
-  /// As Stay, one level finer. \param fullSeconds: what the full picture took last; 0: not known.
+  /// As Stay, one level finer; at once the full picture where that is known to take no longer than AtOnceSeconds.
+  /// \param fullSeconds: what the full picture took last; 0: not known.
   /// \returns false, and does nothing, at level 0 or when the frame would take too long: as much more as the last step took; of
   /// the first step what is known of levels.
   bool Refine(double fullSeconds)
@@ -115,7 +118,7 @@ public:
     if (level == 0 || (level == 1 && fullSeconds > 0.0 ? fullSeconds : growth * drawn_) > restSeconds)
       return false;
     coarser_ = drawn_;
-    refined_ = level - 1;
+    refined_ = fullSeconds > 0.0 && fullSeconds <= AtOnceSeconds ? 0 : level - 1;
     return true;
   }
 

@@ -69,11 +69,9 @@ void TestWorkbenchPace::everyViewFollowsTheMouse()
   emit styles->activated(styles->currentIndex());
   window.Key(Qt::Key_F);
   VolumePane* volume = window.Window().Views()->Volume();
-  const auto isWhole = [&] { return !volume->View()->GetInteractive() && volume->View()->GetDetailLevel() == 0; };
-  QTRY_VERIFY_WITH_TIMEOUT(isWhole(), 60000);
   window.Settle();
 
-  // When each view has last drawn.
+  // How often each view has drawn.
   std::array<vtkRenderWindow*, 4> views{};
   std::array<int, 4> drawn{};
   for (std::size_t i = 0; i < 3; i++)
@@ -86,6 +84,21 @@ void TestWorkbenchPace::everyViewFollowsTheMouse()
     ended->SetCallback([](vtkObject*, unsigned long, void* count, void*) { ++*static_cast<int*>(count); });
     tags[i] = views[i]->AddObserver(vtkCommand::EndEvent, ended);
   }
+
+  // When the last of the pictures was there that come without a move of the mouse, and how fine the 3D view is then.
+  const auto untilNothingIsDrawn = [&] {
+    Clock::time_point last = Clock::now();
+    for (auto before = drawn; SecondsSince(last) < 1.5;) {
+      QApplication::processEvents(QEventLoop::AllEvents, 1);
+      if (drawn != before) {
+        last = Clock::now();
+        before = drawn;
+      }
+    }
+    return last;
+  };
+  untilNothingIsDrawn();
+  const int rest = volume->View()->GetDetailLevel();
 
   SliceCanvas* slice = window.Slice(0);
   const QPoint middle = slice->rect().center() + QPoint(18, 34); // off the middle, where the handles are
@@ -113,19 +126,17 @@ void TestWorkbenchPace::everyViewFollowsTheMouse()
   }
   const double processorMs = 1e3 * static_cast<double>(std::clock() - processors) / CLOCKS_PER_SEC / steps;
   const int level = volume->View()->GetDetailLevel();
-  const std::string detail = QString("level %1 of the 3D view").arg(level).toStdString();
   window.Release(slice, at);
-  while (!(isWhole() && !slice->View()->GetInteractive()) && SecondsSince(moved) < 10.0)
-    QApplication::processEvents(QEventLoop::AllEvents, 1);
-  const double whole = SecondsSince(moved);
-  qInfo("%s, five volumes of %d^3: a frame of all four views takes %s; %.1f ms of processors; %s; the whole picture %.0f ms "
-        "after the last move",
-        qPrintable(style), side, qPrintable(Spread(frames)), processorMs, detail.c_str(), 1e3 * whole);
+  const double whole = std::chrono::duration<double>(untilNothingIsDrawn() - moved).count();
+  qInfo("%s, five volumes of %d^3: a frame of all four views takes %s; %.1f ms of processors; level %d of the 3D view; that of "
+        "rest, %d, is there %.0f ms after the last move",
+        qPrintable(style), side, qPrintable(Spread(frames)), processorMs, level, volume->View()->GetDetailLevel(), 1e3 * whole);
   for (std::size_t i = 0; i < 4; i++)
     views[i]->RemoveObserver(tags[i]);
   QVERIFY(places() != before);
   QVERIFY2(*std::max_element(frames.begin(), frames.end()) < 5.0, "a view was not drawn again");
-  QVERIFY(isWhole());
+  QCOMPARE(volume->View()->GetDetailLevel(), rest);
+  QVERIFY(!slice->View()->GetInteractive());
 }
 
 int main(int argc, char** argv)

@@ -89,6 +89,22 @@ TEST(FrameDetail, RefinesStepByStep)
   EXPECT_GT(detail.Level(), 1);
 }
 
+// Steps are for pictures that a person would wait for: one that is known to be quick comes at once, whatever was between.
+TEST(FrameDetail, RefinesAtOnceWhatIsKnownToBeQuick)
+{
+  FrameDetail detail;
+  detail.SetBudget(0.01);
+  for (const double full : {FrameDetail::AtOnceSeconds, 1.01 * FrameDetail::AtOnceSeconds}) {
+    detail.SetInteractive(true, full);
+    const int level = detail.Level();
+    ASSERT_GT(level, 1);
+    detail.Measure(0.005, 0.005, true);
+    ASSERT_TRUE(detail.Refine(full));
+    EXPECT_EQ(detail.Level(), full > FrameDetail::AtOnceSeconds ? level - 1 : 0);
+    detail.SetInteractive(false, full);
+  }
+}
+
 // A step is taken when going by the last one, or by what the full picture took, it will not take too long.
 TEST(FrameDetail, RefinesNoFurtherThanTheTimeAllows)
 {
