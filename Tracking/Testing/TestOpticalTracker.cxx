@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // From frames of simulated cameras, whose truth is known, to poses of tools.
+#include "Testing/Sanitized.h"
 #include "Testing/TemporaryFolder.h"
 #include "Tracking/Cameras/RecordedSource.h"
 #include "Tracking/Cameras/SimulatedSource.h"
@@ -533,6 +534,7 @@ TEST(OpticalTracker, OfTwoCamerasEitherWillDo)
 
 TEST(OpticalTracker, OfTwoCamerasPlacesAreAveragedByTheirVariances)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const auto shifted = [](double millimetres, double sigma) {
     Rig left, right;
     right.mapError = {millimetres, 0.0, 0.0};

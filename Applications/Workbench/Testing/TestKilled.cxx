@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// kill -9 at random moments of work in the real window: at most one second of work is lost, and never a file. ECHORAMA_KILLS (25)
+// kill -9 at random moments of work in the real window: at most one second of work is lost, and never a file. ECHORAMA_KILLS (12)
 // says how often.
 #include "FileActions.h"
 #include "SliceCanvas.h"
@@ -191,7 +191,7 @@ QString TestKilled::Recovered(const QString& project)
 void TestKilled::killsLoseAtMostASecond()
 {
   bool isNumber = false;
-  const int asked = qEnvironmentVariableIntValue("ECHORAMA_KILLS", &isNumber), kills = isNumber ? asked : 25;
+  const int asked = qEnvironmentVariableIntValue("ECHORAMA_KILLS", &isNumber), kills = isNumber ? asked : 12;
   std::mt19937 random(20);
   double most = 0.0, sum = 0.0;
   int measured = 0, saved = 0, early = 0;
