@@ -202,6 +202,13 @@ class Score(Several):
             filter.AddInputDataObject(1, copy_of(image))
 
 
+class Disagreement(Several):
+    """A map of blocks, which is no volume."""
+
+    output = "points"
+    same_grid = False
+
+
 class LandmarkError(Several):
     output = "points"
     same_grid = False
@@ -634,6 +641,7 @@ Special = {
     "vtkUltrasoundPoseEditor": PoseEditor,
     "vtkUltrasoundStitcher": Stitcher,
     "vtkUltrasoundEmbedder": Embedder,
+    "vtkUltrasoundDisagreement": Disagreement,
     "vtkUltrasoundEmbedQuality": EmbedQuality,
     "vtkUltrasoundFeather": Feather,
     "vtkUltrasoundGel": Gel,

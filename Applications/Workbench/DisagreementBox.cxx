@@ -2,22 +2,17 @@
 #include "DisagreementBox.h"
 #include "Controls.h"
 #include "Core/Base/Percentile.h"
-#include "Filters/Registration/Disagreement.h"
 #include "Workbench.h"
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <QCheckBox>
 #include <QDoubleSpinBox>
 #include <QFormLayout>
 #include <QLabel>
 #include <QPushButton>
 #include <QVBoxLayout>
-#include <vtkFloatArray.h>
 #include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkUltrasoundVolume.h>
+#include <vtkUltrasoundDisagreement.h>
 
 namespace echorama {
 
@@ -30,19 +25,10 @@ struct DisagreementBox::Found {
 
   void Run(const Progress& progress)
   {
-    std::vector<std::vector<PyramidLevel>> pyramids(images.size());
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      const double share = 0.3 / static_cast<double>(images.size());
-      const auto input = vtkUltrasoundVolume::CheckInput(nullptr, images[i], names[i]);
-      vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
-        pyramids[i] = BuildPyramid(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), {},
-                                   progress.Part(share * static_cast<double>(i), share * static_cast<double>(i + 1)));
-      });
-    }
-    std::vector<PlacedVolume> placed; // a session's volumes have their poses in their geometry
+    std::vector<vtkUltrasoundVolume::Input> volumes;
     for (std::size_t i = 0; i < images.size(); ++i)
-      placed.push_back({&pyramids[i], Pose::Identity(), names[i]});
-    map = Disagreement(placed, parameters, progress.Part(0.3, 1.0));
+      volumes.push_back(vtkUltrasoundVolume::CheckInput(nullptr, images[i], names[i]));
+    map = vtkUltrasoundDisagreement::Compare(volumes, parameters, progress);
     images.clear();
   }
 };
@@ -128,11 +114,7 @@ void DisagreementBox::Take(const std::shared_ptr<Found>& found)
 {
   found_ = found;
   picture_ = vtkSmartPointer<vtkImageData>::New();
-  vtkUltrasoundVolume::SetGeometry(picture_, found->map.geometry);
-  vtkNew<vtkFloatArray> lengths;
-  for (const LocalShift& shift : found->map.shifts)
-    lengths->InsertNextValue(shift.knownDirections > 0 ? static_cast<float>(shift.mm) : std::numeric_limits<float>::quiet_NaN());
-  picture_->GetPointData()->SetScalars(lengths);
+  vtkUltrasoundDisagreement::PutOut(found->map, found->map.geometry, picture_);
   ShowMap();
 }
 

@@ -509,9 +509,8 @@ private:
   LatticeVolume fixed_, moving_;
 };
 
-Eigen::AlignedBox3d WorldBoxOf(const PlacedVolume& volume)
+Eigen::AlignedBox3d WorldBoxOf(const ImageGeometry& geometry)
 {
-  const ImageGeometry geometry = volume.pyramid->front().geometry.Moved(volume.volumeToWorld);
   Eigen::AlignedBox3d box;
   for (int corner = 0; corner < 8; ++corner) {
     Eigen::Vector3d index;
@@ -522,54 +521,100 @@ Eigen::AlignedBox3d WorldBoxOf(const PlacedVolume& volume)
   return box;
 }
 
+// On what lattice which volumes are compared.
+struct ComparedPairs {
+  struct Pair {
+    int fixed, moving;
+    Eigen::AlignedBox3d overlap;
+  };
+  double stepMm = 0.0;
+  int reach = 0, side = 0; // of the search and of a cell, lattice points
+  std::vector<Pair> pairs;
+
+  ComparedPairs(const std::vector<ImageGeometry>& volumes, const DisagreementParameters& p)
+  {
+    if (volumes.size() < 2)
+      throw Error(Error::Kind::BadInput, "volumes that disagree are at least two");
+    std::vector<Eigen::AlignedBox3d> boxes;
+    double coarsest = 0.0;
+    for (const ImageGeometry& volume : volumes) {
+      boxes.push_back(WorldBoxOf(volume));
+      coarsest = std::max(coarsest, std::cbrt(volume.spacing.prod()));
+    }
+    stepMm = p.stepMm > 0.0 ? p.stepMm : std::max(coarsest, p.searchMm / 6.0);
+    reach = std::max(2, static_cast<int>(std::ceil(p.searchMm / stepMm - 1e-9)) + 1);
+    side = std::max(2, static_cast<int>(std::lround(0.5 * p.blockMm / stepMm)));
+    if (reach > 24 || side > 24)
+      throw Error(Error::Kind::InvalidParameter,
+                  "StepMm is too small beside SearchMm or BlockMm: a search goes 23 steps at most, and "
+                  "a block has 48 at most");
+    for (std::size_t a = 0; a < boxes.size(); ++a)
+      for (std::size_t b = a + 1; b < boxes.size(); ++b)
+        if (const Eigen::AlignedBox3d box = boxes[a].intersection(boxes[b]); !box.isEmpty())
+          pairs.push_back({static_cast<int>(a), static_cast<int>(b), box});
+  }
+
+  double CellMm() const { return side * stepMm; }
+
+  // Of blocks named by their first cells; of one block when there is none.
+  ImageGeometry GridOf(const Eigen::AlignedBox3i& cells) const
+  {
+    const Eigen::Vector3i first = cells.isEmpty() ? Eigen::Vector3i(0, 0, 0) : cells.min();
+    const Eigen::Vector3i size =
+        cells.isEmpty() ? Eigen::Vector3i(1, 1, 1) : Eigen::Vector3i((cells.max() - cells.min()).array() + 1);
+    ImageGeometry grid;
+    grid.dimensions = {size[0], size[1], size[2]};
+    grid.spacing.setConstant(CellMm());
+    // The middle of the block: between its two cells.
+    grid.origin = CellMm() * (first.cast<double>() + Eigen::Vector3d::Ones()) - Eigen::Vector3d::Constant(0.5 * stepMm);
+    return grid;
+  }
+};
+
 } // namespace
+
+ImageGeometry DisagreementGrid(const std::vector<ImageGeometry>& volumes, const DisagreementParameters& parameters)
+{
+  CheckRanges(parameters);
+  const ComparedPairs compared(volumes, parameters);
+  Eigen::AlignedBox3i cells;
+  for (const ComparedPairs::Pair& pair : compared.pairs) {
+    // As PairShifts has them: whole cells that hold the overlap, and blocks of two along each axis.
+    const Eigen::Vector3i first = (pair.overlap.min() / compared.CellMm()).array().floor().cast<int>();
+    const Eigen::Vector3i last = (pair.overlap.max() / compared.CellMm()).array().floor().cast<int>() - 1;
+    if ((last.array() >= first.array()).all())
+      cells.extend(Eigen::AlignedBox3i(first, last));
+  }
+  return compared.GridOf(cells);
+}
 
 DisagreementMap Disagreement(const std::vector<PlacedVolume>& volumes, const DisagreementParameters& parameters,
                              const Progress& progress)
 {
   CheckRanges(parameters);
-  if (volumes.size() < 2)
-    throw Error(Error::Kind::BadInput, "volumes that disagree are at least two");
-  std::vector<Eigen::AlignedBox3d> boxes;
-  double coarsest = 0.0;
+  std::vector<ImageGeometry> geometries;
   for (const PlacedVolume& volume : volumes) {
     CheckPlacedVolume(volume);
-    boxes.push_back(WorldBoxOf(volume));
-    coarsest = std::max(coarsest, std::cbrt(volume.pyramid->front().geometry.spacing.prod()));
+    geometries.push_back(volume.pyramid->front().geometry.Moved(volume.volumeToWorld));
   }
+  const ComparedPairs compared(geometries, parameters);
   DisagreementMap map;
-  map.stepMm = parameters.stepMm > 0.0 ? parameters.stepMm : std::max(coarsest, parameters.searchMm / 6.0);
-  const int reach = std::max(2, static_cast<int>(std::ceil(parameters.searchMm / map.stepMm - 1e-9)) + 1);
-  const int side = std::max(2, static_cast<int>(std::lround(0.5 * parameters.blockMm / map.stepMm)));
-  if (reach > 24 || side > 24)
-    throw Error(Error::Kind::InvalidParameter,
-                "StepMm is too small beside SearchMm or BlockMm: a search goes 23 steps at most, and "
-                "a block has 48 at most");
+  map.stepMm = compared.stepMm;
   struct Told {
     std::array<int, 3> cell;
     LocalShift shift;
     int fixed, moving;
   };
   std::vector<Told> told;
-  std::vector<std::array<int, 2>> pairs;
   double work = 0.0, done = 0.0;
-  std::vector<Eigen::AlignedBox3d> overlaps;
-  for (int a = 0; a < static_cast<int>(volumes.size()); ++a)
-    for (int b = a + 1; b < static_cast<int>(volumes.size()); ++b) {
-      const Eigen::AlignedBox3d box = boxes[static_cast<std::size_t>(a)].intersection(boxes[static_cast<std::size_t>(b)]);
-      if (box.isEmpty())
-        continue;
-      pairs.push_back({a, b});
-      overlaps.push_back(box);
-      work += box.volume();
-    }
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const auto [a, b] = pairs[p];
-    const double share = overlaps[p].volume() / std::max(work, 1e-300);
+  for (const ComparedPairs::Pair& pair : compared.pairs)
+    work += pair.overlap.volume();
+  for (const auto& [a, b, overlap] : compared.pairs) {
+    const double share = overlap.volume() / std::max(work, 1e-300);
     const Progress part = progress.Part(done, std::min(1.0, done + share));
     part(0.0);
-    PairShifts pair(volumes[static_cast<std::size_t>(a)], volumes[static_cast<std::size_t>(b)], parameters, map.stepMm, side,
-                    reach, overlaps[p]);
+    PairShifts pair(volumes[static_cast<std::size_t>(a)], volumes[static_cast<std::size_t>(b)], parameters, map.stepMm,
+                    compared.side, compared.reach, overlap);
     pair.ForEachBlock(part, [&, a = a, b = b](const std::array<int, 3>& cell, const LocalShift& shift) {
       ++map.compared;
       map.known += shift.knownDirections > 0;
@@ -582,22 +627,15 @@ DisagreementMap Disagreement(const std::vector<PlacedVolume>& volumes, const Dis
   Eigen::AlignedBox3i cells;
   for (const Told& each : told)
     cells.extend(Eigen::Vector3i(each.cell[0], each.cell[1], each.cell[2]));
-  if (told.empty())
-    cells.extend(Eigen::Vector3i::Zero());
-  const double cellMm = side * map.stepMm;
-  const Eigen::Vector3i size = cells.max() - cells.min() + Eigen::Vector3i::Ones();
-  map.geometry.dimensions = {size[0], size[1], size[2]};
-  map.geometry.spacing.setConstant(cellMm);
-  // The middle of the block: between its two cells.
-  map.geometry.origin =
-      cellMm * (cells.min().cast<double>() + Eigen::Vector3d::Ones()) - Eigen::Vector3d::Constant(0.5 * map.stepMm);
+  map.geometry = compared.GridOf(cells);
   const std::size_t count = map.geometry.VoxelCount();
   map.shifts.assign(count, {});
   map.fixed.assign(count, -1);
   map.moving.assign(count, -1);
   for (const Told& each : told) {
     const Eigen::Vector3i at = Eigen::Vector3i(each.cell[0], each.cell[1], each.cell[2]) - cells.min();
-    const std::size_t place = static_cast<std::size_t>((at[2] * size[1] + at[1]) * size[0] + at[0]);
+    const auto& n = map.geometry.dimensions;
+    const std::size_t place = static_cast<std::size_t>((at[2] * n[1] + at[1]) * n[0] + at[0]);
     if (map.fixed[place] < 0 || each.shift.mm > map.shifts[place].mm) {
       map.shifts[place] = each.shift;
       map.fixed[place] = static_cast<std::int16_t>(each.fixed);

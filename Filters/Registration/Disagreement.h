@@ -39,6 +39,10 @@ struct DisagreementMap {
   double stepMm = 0.0;                     ///< of the lattice on which volumes were compared
 };
 
+/// All blocks that Disagreement() may tell of, whatever the volumes hold: its map is a part of this grid. \param volumes where
+/// they are taken to be. \throws Error(InvalidParameter), and Error(BadInput) for fewer than two volumes, as Disagreement().
+ImageGeometry DisagreementGrid(const std::vector<ImageGeometry>& volumes, const DisagreementParameters& parameters = {});
+
 /// Estimates the shift that is left between overlapping volumes, on blocks of the world, block by block for itself.
 ///
 /// Both volumes are read on one lattice, and each block is correlated with the other volume at every whole shift of the search

@@ -309,6 +309,42 @@ TEST(Disagreement, DoesNotDependOnThreadsAndCanBeStopped)
   }
 }
 
+// Where blocks can be follows from geometries alone: each map is a part of it at whole blocks, and the whole of it is needed.
+TEST(Disagreement, TheGridHoldsEveryMap)
+{
+  const Tissue texture(19);
+  const Seen one = Look(Cube(40, 0.9, {0, 0, 0}, 0.4), texture, 1, 2.0),
+             two = Look(Cube(44, 0.8, {7, 3, -4}, -0.3), texture, 2, 2.0);
+  DisagreementParameters p;
+  p.blockMm = 7.0;
+  const DisagreementMap map = MapOf(one, two, p);
+  const ImageGeometry grid = DisagreementGrid({one.geometry, two.geometry}, p);
+  ASSERT_GT(map.known, 50);
+  const Vector3d offset = (map.geometry.origin - grid.origin).cwiseQuotient(grid.spacing);
+  EXPECT_EQ(map.geometry.spacing, grid.spacing);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    EXPECT_NEAR(offset[axis], std::round(offset[axis]), 1e-9);
+    EXPECT_GE(offset[axis], -1e-9);
+    EXPECT_LE(std::round(offset[axis]) + map.geometry.dimensions[a], grid.dimensions[a]);
+    // No wider than the overlap: its volumes are 36 mm wide, 62 mm at most across their corners.
+    EXPECT_LE(grid.dimensions[a] * grid.spacing[axis], 62.0);
+  }
+  // Volumes that fill their grids along the world's axes tell something in all but blocks at the end, half of which nobody sees.
+  const Seen first = Look(Cube(40, 0.9, {0, 0, 0}), texture, 1, 2.0), second = Look(Cube(40, 0.9, {0, 0, 0}), texture, 2, 2.0);
+  const DisagreementMap full = MapOf(first, second, p);
+  const ImageGeometry whole = DisagreementGrid({first.geometry, second.geometry}, p);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_LE(full.geometry.dimensions[axis], whole.dimensions[axis]);
+    EXPECT_GE(full.geometry.dimensions[axis], whole.dimensions[axis] - 2);
+  }
+  // None: one block, as of the map.
+  EXPECT_EQ(DisagreementGrid({one.geometry, Cube(24, 0.9, {200, 0, 0})}).VoxelCount(), 1u);
+  EXPECT_THROW(DisagreementGrid({one.geometry}), Error);
+  p.stepMm = 0.01;
+  EXPECT_THROW(DisagreementGrid({one.geometry, two.geometry}, p), Error);
+}
+
 TEST(Disagreement, RefusesWhatItCannotDo)
 {
   const Tissue texture(15);
