@@ -21,6 +21,7 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundLandmarkField.h"
 
 #include <cstring>
 #include <new>
@@ -100,6 +101,7 @@ void vtkUltrasoundVolume::Move(vtkImageData* volume, const echorama::Pose& pose)
   if (const auto image = vtkUltrasoundAcquisition::ImageToWorldOf(volume)) {
     vtkUltrasoundAcquisition::SetImageToWorld(volume, pose * *image);
   }
+  vtkUltrasoundLandmarkField::Move(volume, pose);
 }
 
 //----------------------------------------------------------------------------

@@ -9,6 +9,7 @@
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkUltrasoundAcquisition.h"
+#include "vtkUltrasoundLandmarkField.h"
 
 #include <algorithm>
 #include <chrono>
@@ -117,7 +118,11 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
   this->Found = {};
   echorama::CheckRanges(this->Parameters());
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
-  const auto landmarks = this->Landmarks.Lists(static_cast<int>(volumes.size()));
+  auto landmarks = this->Landmarks.Lists(static_cast<int>(volumes.size()));
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const auto carried = vtkUltrasoundLandmarkField::Of(volumes[i].Image);
+    landmarks[i].insert(landmarks[i].end(), carried.begin(), carried.end());
+  }
 
   // 1. the resolutions of each volume
   const auto begin = std::chrono::steady_clock::now();

@@ -25,10 +25,12 @@
  * |                       | the fixed volume                                                                              |
  * | AlignmentCentre       | 3 doubles: the point of the world about which that rotation turns, mm                            |
  *
+ * Landmarks that volumes carry (vtkUltrasoundLandmarks) count as those that are given here.
+ *
  * Fails with a message when there are fewer than two volumes, or one is not three-dimensional, constant or nearly empty.
  * The whole of every volume is needed: under MPI each rank computes and holds the whole result.
  *
- * @sa vtkUltrasoundAlignmentScore, vtkUltrasoundLandmarkError
+ * @sa vtkUltrasoundAlignmentScore, vtkUltrasoundLandmarkError, vtkUltrasoundLandmarks
  */
 #ifndef vtkUltrasoundAligner_h
 #define vtkUltrasoundAligner_h

@@ -82,9 +82,8 @@ echorama::DisagreementMap vtkUltrasoundDisagreement::Compare(const std::vector<v
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const double share = 0.3 / static_cast<double>(volumes.size());
     vtkUltrasoundVolume::Dispatch(volumes[i].Intensity, [&](auto type) {
-      pyramids[i] =
-          echorama::BuildPyramid(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volumes[i]), {},
-                                 progress.Part(share * static_cast<double>(i), share * static_cast<double>(i + 1)));
+      pyramids[i] = echorama::BuildPyramid(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volumes[i]), {},
+                                           progress.Part(share * static_cast<double>(i), share * static_cast<double>(i + 1)));
     });
     placed.push_back({&pyramids[i], echorama::Pose::Identity(), volumes[i].Name}); // their poses are in their geometry
   }

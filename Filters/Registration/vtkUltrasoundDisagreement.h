@@ -96,7 +96,8 @@ public:
    * on \a grid, which holds map.geometry at whole blocks.
    */
   static echorama::DisagreementMap Compare(const std::vector<vtkUltrasoundVolume::Input>& volumes,
-                                           const echorama::DisagreementParameters& parameters, const echorama::Progress& progress);
+                                           const echorama::DisagreementParameters& parameters,
+                                           const echorama::Progress& progress);
   static void PutOut(const echorama::DisagreementMap& map, const echorama::ImageGeometry& grid, vtkImageData* output);
   ///@}
 #endif

@@ -19,6 +19,7 @@
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAligner.h"
 #include "vtkUltrasoundDisplacement.h"
+#include "vtkUltrasoundLandmarkField.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -123,6 +124,12 @@ std::vector<echorama::LandmarkList> vtkUltrasoundLandmarkError::Lists(vtkInforma
       }
     } else if (index < this->Landmarks.files.size() && !this->Landmarks.files[index].empty()) {
       list.name = this->Landmarks.files[index];
+    }
+    if (!aligned.empty()) { // those that the volume carries lie where the alignment put it
+      const echorama::Pose worldToVolume = list.volumeToWorld.inverse();
+      for (const echorama::Landmark& carried : vtkUltrasoundLandmarkField::Of(aligned[index].Image)) {
+        list.landmarks.push_back({carried.label, worldToVolume * carried.position});
+      }
     }
     if (const auto pose = this->Poses.find(i); pose != this->Poses.end()) {
       list.volumeToWorld = pose->second;

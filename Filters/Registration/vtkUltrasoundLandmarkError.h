@@ -11,6 +11,8 @@
  * (vtkUltrasoundDisplacement) of what these poses leave over, one per volume in the same order; blocks with a name must be that
  * volume's. Landmarks are then compared where they belong at rest.
  *
+ * Landmarks that the volumes of input 0 carry (vtkUltrasoundLandmarks) count, too.
+ *
  * Output: vtkPolyData with a vertex for each label and pair of volumes, where the alignment put it in the first of them.
  *
  * | array (point data)         | values                                                                            |
