@@ -3,6 +3,7 @@
 
 #include "Core/Geometry/MatrixRows.h"
 #include "Core/Imaging/ValidPoints.h"
+#include "vtkBoundingBox.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
@@ -103,6 +104,50 @@ int vtkUltrasoundPoseEditor::FillInputPortInformation(int port, vtkInformation* 
 }
 
 //----------------------------------------------------------------------------
+std::vector<bool> vtkUltrasoundPoseEditor::Moves(int count) const
+{
+  std::vector<bool> moves(static_cast<std::size_t>(count), false);
+  for (const int volume : this->Volumes) {
+    if (volume < 0 || volume >= count) {
+      throw Error(Error::Kind::InvalidParameter,
+                  "there is no volume " + std::to_string(volume) + "; there are " + std::to_string(count) + ", counted from 0");
+    }
+    moves[static_cast<std::size_t>(volume)] = true;
+  }
+  for (int volume = 0; this->Volumes.empty() && volume < count; ++volume) {
+    moves[static_cast<std::size_t>(volume)] = count == 1 || volume != this->Values.score.fixedVolume;
+  }
+  return moves;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundPoseEditor::PlaceBox(const std::vector<vtkUltrasoundVolume::Input>& volumes, const std::vector<bool>& moves)
+{
+  vtkBoundingBox box;
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    if (moves[i]) {
+      box.AddBounds(volumes[i].Image->GetBounds());
+    }
+  }
+  if (box.IsValid()) {
+    box.GetBounds(this->BoxBounds);
+  }
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundPoseEditor::RequestInformation(vtkInformation* request, vtkInformationVector** inputs,
+                                                vtkInformationVector* outputs)
+{
+  // The handle is there before anything is moved. What is wrong with the input, or with the choice, Execute tells.
+  try {
+    const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
+    this->PlaceBox(volumes, this->Moves(static_cast<int>(volumes.size())));
+  } catch (const Error&) {
+  }
+  return this->Superclass::RequestInformation(request, inputs, outputs);
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformationVector* outputs,
                                       const echorama::Progress& progress)
 {
@@ -114,17 +159,8 @@ void vtkUltrasoundPoseEditor::Execute(vtkInformationVector** inputs, vtkInformat
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
   const auto truth = vtkUltrasoundVolume::CollectInputs(this, inputs[1]);
   const int count = static_cast<int>(volumes.size());
-  std::vector<bool> moves(volumes.size(), false);
-  for (const int volume : this->Volumes) {
-    if (volume < 0 || volume >= count) {
-      throw Error(Error::Kind::InvalidParameter,
-                  "there is no volume " + std::to_string(volume) + "; there are " + std::to_string(count) + ", counted from 0");
-    }
-    moves[static_cast<std::size_t>(volume)] = true;
-  }
-  for (int volume = 0; this->Volumes.empty() && volume < count; ++volume) {
-    moves[static_cast<std::size_t>(volume)] = count == 1 || volume != this->Values.score.fixedVolume;
-  }
+  const std::vector<bool> moves = this->Moves(count);
+  this->PlaceBox(volumes, moves);
 
   // 2. the motion
   echorama::PoseEdit edit = this->Values.edit;

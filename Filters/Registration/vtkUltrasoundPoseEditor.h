@@ -5,7 +5,8 @@
  *
  * Input 0 (repeatable): volumes (vtkImageData, or the image leaves of vtkDataObjectTree). Output: a vtkMultiBlockDataSet with the
  * same volumes in the same order, one block each, with the same NAME(). Voxels are shared, nothing is resampled; of the chosen
- * volumes geometry, `ProbeToWorld` and `ImageToWorld` are new. In ParaView a box in the 3D view is the handle.
+ * volumes geometry, `ProbeToWorld` and `ImageToWorld` are new. In ParaView a box in the 3D view, around these volumes, is the
+ * handle.
  *
  * The motion is the rotation (about the world's y, then x, then z, as vtkProp3D::SetOrientation has it) about the centre, then
  * the translation.
@@ -106,6 +107,12 @@ public:
   /** The score of the last update, mm. NaN without truth or when it failed. */
   double GetScore() const { return this->Score; }
 
+  /**
+   * The box of the volumes that are moved, along the axes of the world, where the input has them, mm: xmin, xmax, ymin, ymax,
+   * zmin, zmax. It is known as soon as the input is made; before that (0, 1, 0, 1, 0, 1).
+   */
+  vtkGetVector6Macro(BoxBounds, double);
+
   /** The motion of the last update: from where the input was to where the output is. Identity before the first. */
   void GetMotion(vtkMatrix4x4* motion) const;
 
@@ -118,6 +125,7 @@ protected:
   ~vtkUltrasoundPoseEditor() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 #ifndef __VTK_WRAP__
   void Execute(vtkInformationVector** inputs, vtkInformationVector* outputs, const echorama::Progress& progress) override;
 #endif
@@ -127,6 +135,9 @@ private:
   void operator=(const vtkUltrasoundPoseEditor&) = delete;
 
 #ifndef __VTK_WRAP__
+  std::vector<bool> Moves(int count) const;
+  void PlaceBox(const std::vector<vtkUltrasoundVolume::Input>& volumes, const std::vector<bool>& moves);
+
   std::vector<int> Volumes;
   struct Settings {
     enum class Centre { WorldOrigin, Middle, Given } rotateAbout = Centre::WorldOrigin;
@@ -140,6 +151,7 @@ private:
   using DrawnFrom = std::array<unsigned long long, 4>;
   std::map<DrawnFrom, std::vector<Eigen::Vector3d>> Drawn;
 #endif
+  double BoxBounds[6] = {0.0, 1.0, 0.0, 1.0, 0.0, 1.0};
 };
 
 #endif

@@ -56,3 +56,42 @@ assert len(box) == 1 and all(box[0].GetProperty(function) for function in ("Posi
 assert box[0].GetProperty("Scale") is None, "a pose does not scale"
 Show(editor, CreateView("RenderView"))
 Render()
+
+# The box lies around the volumes that are moved: as a property, and as the widget that the panel makes of the group.
+c = UltrasoundPhantom(SpacingMm=2.0, Position=[0.0, 90.0, 0.0])
+bounds = []
+for volume in (a, b, c):
+    volume.UpdatePipeline()
+    bounds.append(numpy.array(volume.GetDataInformation().GetBounds()))
+third = UltrasoundPoseEditor(Input=[a, b, c])
+joined = lambda *parts: [(min if i % 2 == 0 else max)(part[i] for part in parts) for i in range(6)]
+box = [third.SMProxy.GetPropertyGroup(i) for i in range(third.SMProxy.GetNumberOfPropertyGroups())]
+box = next(group for group in box if group.GetPanelWidget() == "InteractiveBox")
+widget = servermanager.ProxyManager().SMProxyManager.NewProxy("representations", "BoxWidgetRepresentation")
+widget.LinkProperties(third.SMProxy, box)
+whole = joined(*bounds)
+widget.GetProperty("PlaceWidget").SetElements(whole)  # as the panel does, around its first input
+
+
+def drawn():
+    widget.UpdateVTKObjects()
+    return widget.GetClientSideObject().GetRepresentation().GetBounds()
+
+
+first = [third.SMProxy.GetProperty("BoxBounds").GetElement(i) for i in range(6)]
+assert numpy.allclose(first, joined(bounds[1], bounds[2])), "before it has run: all but the fixed one"
+for chosen, expected in (([0], bounds[0]), ([1], bounds[1]), ([2], bounds[2]), ([0, 1], joined(bounds[0], bounds[1])),
+                         ([], joined(bounds[1], bounds[2]))):
+    third.Volumes = chosen
+    third.UpdatePipeline()
+    third.UpdatePropertyInformation()
+    told = [third.SMProxy.GetProperty("BoxBounds").GetElement(i) for i in range(6)]
+    assert numpy.allclose(told, expected), (chosen, told, expected)
+    assert numpy.allclose(drawn(), expected), (chosen, drawn(), expected)
+third.Volumes, third.Translation = [1], [7.0, 0.0, -3.0]
+third.UpdatePipeline()
+third.UpdatePropertyInformation()
+moved = numpy.array(servermanager.Fetch(third).GetBlock(1).GetBounds())
+assert numpy.allclose(drawn(), moved) and numpy.allclose(moved, bounds[1] + [7, 7, 0, 0, -3, -3]), "and it is where they are now"
+third.BoxFollows = 0
+assert numpy.allclose(drawn(), numpy.array(whole) + [7, 7, 0, 0, -3, -3]), "as the panel placed it"

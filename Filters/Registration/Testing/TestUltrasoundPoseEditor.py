@@ -156,6 +156,25 @@ editor.Update()
 score.Update()
 assert abs(score.GetScore() - editor.GetScore()) < 1e-12 and not editor.messages
 
+# The box of those that are moved, where the input has them: before it has run, whatever they are moved by; turned volumes, too.
+editor = editor_of(a, b, c)
+assert editor.GetBoxBounds() == (0, 1, 0, 1, 0, 1)
+editor.SetTranslation(50.0, 0.0, 0.0)
+editor.UpdateInformation()
+assert editor.GetBoxBounds() == (0, 18, 0, 40, 0, 11), editor.GetBoxBounds()
+for chosen, box in ((2, (0, 8, 20, 40, 5, 11)), (1, (10, 18, 0, 20, 0, 6)), (0, (0, 8, 0, 20, 0, 6))):
+    editor.ClearVolumes()
+    editor.AddVolume(chosen)
+    editor.Update()
+    assert editor.GetBoxBounds() == box, (chosen, editor.GetBoxBounds())
+turned = editor_of(a)
+turned.SetRotation(0, 0, 90)
+turned.Update()
+editor = editor_of(turned.GetOutput(), b)
+editor.AddVolume(0)
+editor.Update()
+assert np.allclose(editor.GetBoxBounds(), (-20, 0, 0, 8, 0, 6), atol=1e-9), editor.GetBoxBounds()
+
 # What is not there is said, and nothing half-made is put out.
 for spoil, words in ((lambda e: e.AddVolume(2), "no volume 2"), (lambda e: e.SetTranslation(math.nan, 0, 0), "Translation is (nan 0 0) mm; it must be finite"),
                      (lambda e: e.AddTruthData(c), "3 true ones"), (lambda e: e.RemoveAllTruths(), None)):
