@@ -981,7 +981,7 @@ def algorithms():
 
 
 source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
-furnished = {path.stem for room in ("Core", "Readers", "Tracking", "Filters") for path in (source / room).rglob("vtk*.xml")}
+furnished = {path.stem for room in ("Core", "Readers", "Tracking", "Filters", "Widgets") for path in (source / room).rglob("vtk*.xml")}
 check(furnished, "there is nothing to test")
 for current in sorted((furnished | set(Special)) - {name for name, _ in algorithms()}):
     check(False, "the package has no such algorithm, or it cannot be made")

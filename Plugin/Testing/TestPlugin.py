@@ -16,7 +16,7 @@ source = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
 complaints = []
 count = 0
 
-for path in sorted(p for room in ("Core", "Readers", "Tracking", "Filters") for p in (source / room).rglob("vtk*.xml")):
+for path in sorted(p for room in ("Core", "Readers", "Tracking", "Filters", "Widgets") for p in (source / room).rglob("vtk*.xml")):
     for group in tree.parse(path).getroot().iter("ProxyGroup"):
         for element in group:
             if element.tag not in ("SourceProxy", "WriterProxy"):
