@@ -19,7 +19,7 @@ count = 0
 for path in sorted(p for room in ("Core", "Readers", "Tracking", "Filters", "Widgets") for p in (source / room).rglob("vtk*.xml")):
     for group in tree.parse(path).getroot().iter("ProxyGroup"):
         for element in group:
-            if element.tag not in ("SourceProxy", "WriterProxy"):
+            if element.tag not in ("SourceProxy", "UltrasoundSourceProxy", "WriterProxy"):
                 continue
             count += 1
             name, label = element.get("name"), element.get("label")

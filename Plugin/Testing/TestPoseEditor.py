@@ -84,13 +84,11 @@ for chosen, expected in (([0], bounds[0]), ([1], bounds[1]), ([2], bounds[2]), (
                          ([], joined(bounds[1], bounds[2]))):
     third.Volumes = chosen
     third.UpdatePipeline()
-    third.UpdatePropertyInformation()
     told = [third.SMProxy.GetProperty("BoxBounds").GetElement(i) for i in range(6)]
     assert numpy.allclose(told, expected), (chosen, told, expected)
     assert numpy.allclose(drawn(), expected), (chosen, drawn(), expected)
 third.Volumes, third.Translation = [1], [7.0, 0.0, -3.0]
 third.UpdatePipeline()
-third.UpdatePropertyInformation()
 moved = numpy.array(servermanager.Fetch(third).GetBlock(1).GetBounds())
 assert numpy.allclose(drawn(), moved) and numpy.allclose(moved, bounds[1] + [7, 7, 0, 0, -3, -3]), "and it is where they are now"
 third.BoxFollows = 0
