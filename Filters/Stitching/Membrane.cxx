@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Components first: those that touch one value, or none, have their answer, and the equations of all others have exactly one.
 //
-// Set-up lays out the unknowns (MembraneLevels), and solves A v = 1 roughly: v turns the largest residual into a bound of
-// the largest error. It is the time that heat spends in the overlap before it finds a known voxel, 100 to 10000, so that
-// weights right to 1/512 need residuals near 1e-7: floats cannot carry the solution. It is kept in doubles; corrections, which
-// only need to be right to some per cent, and residuals are floats.
+// Set-up lays out the unknowns (MembraneLevels). The solution of A v = 1 is the time that heat spends in the overlap before it
+// finds a known voxel, 100 to 10000: a residual that is the same everywhere is an error so many times larger. Floats cannot
+// carry a solution with such small residuals; it is kept in doubles. Corrections, which only need to be right to some per cent,
+// residuals, and what bounds the error (MembraneBound.cxx) are floats.
 //
 // The first guess comes from all coarser levels. Each round then is one V-cycle on the residual, and the best step along its
 // result and the step before (conjugate gradients: a cycle alone is slow where the border of the overlap is rough). Passes
@@ -253,6 +253,9 @@ Components::Components(const Frame& frame, const GridBox& box, const RowField<un
   }
 }
 
+// Where heat spends longer in the overlap, the floats of MembraneLevels::SpreadFinely carry no bound: A w is rounded by too much.
+constexpr double SlowestOfFloats = 3e5;
+
 // The equations A u = 0 of the unknowns that two or more different values touch, solved for values scaled to [0, 1].
 class Multigrid {
 public:
@@ -267,13 +270,16 @@ private:
   void ForRows(const Body& body) const;
   void BoundErrors(const Progress& progress);
   double Improve(bool first);
+  double Step(float alongE, float alongP);
+  double Bound(double residual, double goal, bool last);
 
   std::unique_ptr<MembraneLevels> levels_;
   std::vector<double> solution_;
   std::vector<float> direction_;
   double load_ = 0.0; // the right side at every unknown
   double lowest_ = 0.0, span_ = 1.0;
-  double amplification_ = std::numeric_limits<double>::infinity(); // no error is larger than this times the largest residual
+  double slowest_ = 0.0;       // about the largest v where A v = 1: the longest time that heat spends in the overlap
+  double amplification_ = 0.0; // if not 0, no error is larger than this times the largest residual
 };
 
 bool IsSolved(const Run& root)
@@ -368,7 +374,9 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
   levels_ = std::make_unique<MembraneLevels>(std::move(rows), std::move(codes),
                                              frame.swapped ? Eigen::Vector3d(spacing[0], spacing[2], spacing[1]) : spacing,
                                              progress.Part(0.0, 0.5));
-  BoundErrors(progress);
+  slowest_ = std::max(1.0, levels_->SpreadCoarsely(1.0f));
+  if (slowest_ > SlowestOfFloats)
+    BoundErrors(progress);
 
   // 3. the known values
   const MembraneRows& stored = Rows();
@@ -398,6 +406,7 @@ void Multigrid::BoundErrors(const Progress& progress)
 {
   constexpr int MostCycles = 30;
   load_ = 1.0;
+  amplification_ = std::numeric_limits<double>::infinity();
   Improve(true);
   levels_->Spread();
   for (int cycle = 0; cycle <= MostCycles; ++cycle) {
@@ -418,8 +427,7 @@ void Multigrid::BoundErrors(const Progress& progress)
 }
 
 // solution += the best combination of the cycle's correction and the direction before: conjugate gradients, which do not
-// mind that a cycle is not quite the same operator each time. right := what the new solution leaves; returns its largest
-// magnitude.
+// mind that a cycle is not quite the same operator each time. Returns what Step does.
 double Multigrid::Improve(bool first)
 {
   const MembraneRows& rows = Rows();
@@ -455,15 +463,26 @@ double Multigrid::Improve(bool first)
       alongP = static_cast<float>((s.pr * s.eAe - s.er * s.eAp) / determinant);
     }
   }
-  std::vector<std::int32_t> parts(slices, 0);
-  MembraneLevels::Sweep(rows, 2, [&](int stage, int z) {
+  return Step(alongE, alongP);
+}
+
+// solution += the steps along the correction and the direction; right := what that leaves. \returns its largest magnitude
+double Multigrid::Step(float alongE, float alongP)
+{
+  const MembraneRows& rows = Rows();
+  const Eigen::Vector3d& w = levels_->Weights();
+  auto& finest = levels_->Finest();
+  const unsigned char* codes = levels_->Codes().data();
+  const bool moves = alongE != 0.0f || alongP != 0.0f;
+  std::vector<std::int32_t> parts(static_cast<std::size_t>(rows.size[1]), 0);
+  MembraneLevels::Sweep(rows, moves ? 2 : 1, [&](int stage, int z) {
     std::int32_t& part = parts[static_cast<std::size_t>(z - rows.low[1])];
     for (int y = rows.low[0]; y < rows.low[0] + rows.size[0]; ++y) {
       const auto& row = rows.At(y, z);
       if (row.begin >= row.end)
         continue;
       double* u = solution_.data();
-      if (stage == 0) {
+      if (moves && stage == 0) {
         Advance(u + row.at, direction_.data() + row.at, finest.value.data() + row.at, alongE, alongP, row.begin, row.end);
       } else {
         part = std::max(part, ResidualOf(u + row.at, u + rows.At(y - 1, z).at, u + rows.At(y + 1, z).at, u + rows.At(y, z - 1).at,
@@ -475,6 +494,24 @@ double Multigrid::Improve(bool first)
   return static_cast<double>(OfBits(*std::max_element(parts.begin(), parts.end())));
 }
 
+// How far the solution can be from the exact one, or infinity where that is surely, or probably, too far: finding out costs
+// nearly as much as a cycle. The last time it is found out in any case.
+double Multigrid::Bound(double residual, double goal, bool last)
+{
+  if (amplification_ > 0.0)
+    return amplification_ * residual;
+  if (!last && 2.0 * residual > goal)
+    return std::numeric_limits<double>::infinity();
+  const auto floor = static_cast<float>(std::max({0.25 * goal / slowest_, (last ? 1e-2 : 3e-4) * residual, 1e-30}));
+  const double about = levels_->SpreadCoarsely(floor);
+  if (!last && about > 0.8 * goal)
+    return std::numeric_limits<double>::infinity();
+  const double bound = levels_->SpreadFinely(floor, std::clamp(1.1 * about / goal, 0.3, 0.8));
+  if (!(bound <= goal) && !last)
+    Step(0.0f, 0.0f);
+  return bound;
+}
+
 void Multigrid::Solve(const MembraneParameters& parameters, const Progress& progress, MembraneReport& report)
 {
   // What is added to the bound: the sums of six rounded terms above, and the rounding of the result.
@@ -484,9 +521,11 @@ void Multigrid::Solve(const MembraneParameters& parameters, const Progress& prog
   for (report.cycles = 0;; ++report.cycles) {
     progress(std::min(1.0, report.cycles / 10.0));
     const double residual = Improve(report.cycles == 0) * (1.0 + 1e-6) + 1e-14;
-    report.bound = amplification_ * residual * span_ + rounding;
+    const bool last = report.cycles >= parameters.maximumCycles;
+    const double goal = std::max(parameters.tolerance - rounding / span_, 0.1 * parameters.tolerance);
+    report.bound = Bound(residual, goal, last) * span_ + rounding;
     report.certified = report.bound <= parameters.tolerance * span_;
-    if (report.certified || report.cycles >= parameters.maximumCycles)
+    if (report.certified || last)
       return;
   }
 }

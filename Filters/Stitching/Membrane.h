@@ -23,7 +23,7 @@ struct MembraneParameters {
 struct MembraneReport {
   std::ptrdiff_t unknowns = 0;
   int cycles = 0;
-  double bound = 0.0;     ///< no value is further than this from the exact solution, in the unit of the values
+  double bound = 0.0;     ///< no value is further than this from the exact solution, in the unit of the values (may be infinite)
   bool certified = false; ///< bound <= tolerance times the span
   double setupSeconds = 0.0, solveSeconds = 0.0;
 };
@@ -35,8 +35,8 @@ struct MembraneReport {
 /// value gets exactly that value. All others lie within the range of the known values that their component touches.
 /// The bound holds for the floats that are returned: it includes their rounding, so it cannot fall below 6e-8 times the
 /// largest known value. Same result on any number of threads. Cost: one cycle is about fifteen sweeps over the unknowns, and
-/// the number of cycles hardly depends on theirs; 25 to 30 bytes per stored voxel (a row is stored from its first to its last
-/// unknown, and a little around).
+/// the number of cycles hardly depends on theirs; the bound is about one cycle more; 25 to 30 bytes per stored voxel (a row is
+/// stored from its first to its last unknown, and a little around).
 /// \param kinds MembraneVoxel per voxel of the spans; voxels outside of the spans are void
 /// \param values of the same spans: boundary values at known voxels; receives the solution at unknown ones
 /// \throws Error InvalidParameter: a parameter out of range, spans that differ, or a spacing that is not positive;

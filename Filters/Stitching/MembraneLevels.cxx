@@ -267,21 +267,10 @@ void MembraneLevels::RelaxSlice(int number, int z, int colour, bool fromZero)
 void MembraneLevels::Aggregate(int number, float factor)
 {
   const Level& fine = levels_[static_cast<std::size_t>(number)];
-  Level& coarse = levels_[static_cast<std::size_t>(number) + 1];
-  const auto& halved = fine.halved;
-  ForRowsOf(coarse.rows, [&](int Y, int Z, const MembraneRows::Row& cell) {
-    float* to = coarse.right.data() + cell.at;
-    std::fill(to + cell.begin, to + cell.end, 0.0f);
-    for (int z = halved[2] ? 2 * Z : Z; z <= (halved[2] ? 2 * Z + 1 : Z); ++z)
-      for (int y = halved[1] ? 2 * Y : Y; y <= (halved[1] ? 2 * Y + 1 : Y); ++y) {
-        if (z < fine.rows.low[1] || z >= fine.rows.low[1] + fine.rows.size[1] || y < fine.rows.low[0] ||
-            y >= fine.rows.low[0] + fine.rows.size[0])
-          continue;
-        const auto& row = fine.rows.At(y, z);
-        const float* from = fine.right.data() + row.at;
-        for (int i = row.begin; i < row.end; ++i)
-          to[CellOf(i, halved[0])] += factor * from[i];
-      }
+  SumUp(number, [&](const MembraneRows::Row& row, float* to) {
+    const float* from = fine.right.data() + row.at;
+    for (int i = row.begin; i < row.end; ++i)
+      to[CellOf(i, fine.halved[0])] += factor * from[i];
   });
 }
 

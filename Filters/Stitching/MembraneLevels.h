@@ -102,11 +102,18 @@ public:
   void Guess();
   /// The same where right is a source in space, and known values are 0; followed by a cycle on the finest level too.
   void Spread();
+  /// Solves A w = |right| + floor about, on all levels but the finest. \returns the largest w
+  double SpreadCoarsely(float floor);
+  /// After it: on the finest level, with A w >= part (|right| + floor), so that no error that leaves the residual right is
+  /// larger than w / part. right becomes |right| + floor, value w. \returns the largest w / part, infinity if that is not found
+  double SpreadFinely(float floor, double part);
 
 private:
   void BuildCoarse(int fine);
   void BuildFills(int level, const std::vector<unsigned char>& kinds);
   void BuildCoarsest();
+  template <class AddRow>
+  void SumUp(int fine, const AddRow& add);
   void Aggregate(int fine, float factor);
   void RelaxSlice(int level, int z, int colour, bool fromZero);
   void RestrictSlice(int level, int z);
@@ -115,6 +122,11 @@ private:
   void ProlongSlice(int level, int z, bool add);
   void Prolong(int fine, bool solution);
   void SolveCoarsest();
+  struct Place {
+    int x, y, z;
+  };
+  double Lack(const Place& place, double part) const;
+  bool Mend(std::vector<Place> places, double part, double& largest);
   void Cycle(int level, bool improve, const std::function<void(int z)>& then);
 
   std::vector<Level> levels_;
@@ -125,6 +137,28 @@ private:
   std::vector<std::ptrdiff_t> coarsest_;  // the unknowns of the coarsest level
   std::vector<double> factor_;            // its Cholesky factor, by rows
 };
+
+/// right of the next coarser level := what add(row, to) adds for the rows of a level, to by cells.
+template <class AddRow>
+void MembraneLevels::SumUp(int number, const AddRow& add)
+{
+  const Level& fine = levels_[static_cast<std::size_t>(number)];
+  Level& coarse = levels_[static_cast<std::size_t>(number) + 1];
+  const auto& halved = fine.halved;
+  ParallelRanges(coarse.rows.size[1], coarse.rows.Grain(), Progress(), [&](std::ptrdiff_t first, std::ptrdiff_t last) {
+    for (int Z = coarse.rows.low[1] + static_cast<int>(first); Z < coarse.rows.low[1] + static_cast<int>(last); ++Z)
+      for (int Y = coarse.rows.low[0]; Y < coarse.rows.low[0] + coarse.rows.size[0]; ++Y) {
+        const auto& cell = coarse.rows.At(Y, Z);
+        float* to = coarse.right.data() + cell.at;
+        std::fill(to + cell.begin, to + cell.end, 0.0f);
+        for (int z = halved[2] ? 2 * Z : Z; z <= (halved[2] ? 2 * Z + 1 : Z); ++z)
+          for (int y = halved[1] ? 2 * Y : Y; y <= (halved[1] ? 2 * Y + 1 : Y); ++y)
+            if (z >= fine.rows.low[1] && z < fine.rows.low[1] + fine.rows.size[1] && y >= fine.rows.low[0] &&
+                y < fine.rows.low[0] + fine.rows.size[0])
+              add(fine.rows.At(y, z), to);
+      }
+  });
+}
 
 template <class Body>
 void MembraneLevels::Sweep(const MembraneRows& rows, int stages, const Body& body)
