@@ -3,6 +3,7 @@
 // lattice. All volumes are averaged over the same blocks of the output: a lattice of each volume's own would be cheaper, but
 // what aliases would differ from volume to volume, and a place that all see alike would not come out as it is.
 #include "LowPass.h"
+#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,31 +17,54 @@ constexpr int deviationRounds = 4;
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
-// (1 2 1) / 4 along one axis; a neighbour that is not there is taken to be as the block itself, and a block that is not
-// there becomes the mean of those of its neighbours that are.
-void Smooth(Volume<float>& volume, int axis)
+// (1 2 1) / 4; a neighbour that is not there is taken to be as the block itself, and a block that is not there becomes the
+// mean of those of its neighbours that are.
+ECHORAMA_HOT void SmoothRow(const float* before, const float* at, const float* behind, int count, float* __restrict to)
 {
-  const Volume<float> before = volume;
-  const auto from = before.View();
+  for (int i = 0; i < count; ++i) {
+    const float below = before[i], own = at[i], above = behind[i];
+    const float beside = std::isnan(below) ? above : below, here = std::isnan(own) ? beside : own;
+    const float a = std::isnan(below) ? here : below, b = std::isnan(above) ? here : above;
+    to[i] = std::isnan(own) ? here + 0.5f * (b - here) : here + 0.25f * ((a - here) + (b - here));
+  }
+}
+
+// The same in place along rows that lie \a stride apart, \a steps of them.
+class RowSmoother {
+public:
+  explicit RowSmoother(int count) : none_(static_cast<std::size_t>(count), nothing), before_(none_), own_(none_) {}
+  void Along(float* row, std::ptrdiff_t stride, int steps)
+  {
+    const std::size_t count = none_.size();
+    std::copy(none_.begin(), none_.end(), before_.begin());
+    for (int step = 0; step < steps; ++step, row += stride) {
+      std::copy(row, row + count, own_.begin());
+      SmoothRow(before_.data(), own_.data(), step + 1 < steps ? row + stride : none_.data(), static_cast<int>(count), row);
+      std::swap(before_, own_);
+    }
+  }
+
+private:
+  std::vector<float> none_, before_, own_;
+};
+
+void Smooth(Volume<float>& volume)
+{
   const auto to = volume.View();
-  const auto& n = from.Dimensions();
-  if (n[axis] == 1)
-    return;
-  const std::ptrdiff_t stride = axis == 0 ? 1 : axis == 1 ? from.RowStride() : from.SliceStride();
+  const auto& n = to.Dimensions();
   ParallelFor(n[2], [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
-    for (int j = 0; j < n[1]; ++j)
-      for (int i = 0; i < n[0]; ++i) {
-        const int position = axis == 0 ? i : axis == 1 ? j : k;
-        const float* const at = from.Row(j, k) + i;
-        const float below = position > 0 ? at[-stride] : nothing, above = position + 1 < n[axis] ? at[stride] : nothing;
-        const float here = std::isnan(*at) ? (std::isnan(below) ? above : below) : *at;
-        if (std::isnan(here))
-          continue;
-        const float a = std::isnan(below) ? here : below, b = std::isnan(above) ? here : above;
-        to(i, j, k) = std::isnan(*at) ? here + 0.5f * (b - here) : here + 0.25f * ((a - here) + (b - here));
-      }
+    std::vector<float> padded(static_cast<std::size_t>(n[0]) + 2, nothing);
+    for (int j = 0; j < n[1] && n[0] > 1; ++j) {
+      std::copy(to.Row(j, k), to.Row(j, k) + n[0], padded.begin() + 1);
+      SmoothRow(padded.data(), padded.data() + 1, padded.data() + 2, n[0], to.Row(j, k));
+    }
+    if (n[1] > 1)
+      RowSmoother(n[0]).Along(to.Row(0, k), to.RowStride(), n[1]);
   });
+  if (n[2] > 1)
+    ParallelFor(n[1],
+                [&](std::ptrdiff_t row) { RowSmoother(n[0]).Along(to.Row(static_cast<int>(row), 0), to.SliceStride(), n[2]); });
 }
 
 } // namespace
@@ -133,8 +157,7 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
     }
   });
   const Volume<float> means = low.values;
-  for (int axis = 0; axis < 3; ++axis)
-    Smooth(low.values, axis);
+  Smooth(low.values);
   // Around the smooth part, not around the means: what the filter took from these belongs to the details.
   auto square = part.deviation.values.View();
   for (std::ptrdiff_t block = 0; block < square.Size(); ++block) {
@@ -142,8 +165,7 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
     square[block] += beside * beside;
   }
   for (int round = 0; round < deviationRounds; ++round)
-    for (int axis = 0; axis < 3; ++axis)
-      Smooth(part.deviation.values, axis);
+    Smooth(part.deviation.values);
   for (float& value : square)
     value = std::sqrt(value);
   return part;
