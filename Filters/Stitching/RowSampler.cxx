@@ -141,6 +141,13 @@ void RowSampler<T>::Inside(int j, int k, unsigned char* inside) const
       inside[i] = sampler_.IsReal(first + i);
     return;
   }
+  if (line.step[1] == 0.0 && line.step[2] == 0.0 && begin < end) {
+    const std::ptrdiff_t row = std::min(static_cast<int>(line.start[2] + 0.5), n[2] - 1) * intensity_.SliceStride() +
+                               std::min(static_cast<int>(line.start[1] + 0.5), n[1] - 1) * intensity_.RowStride();
+    for (int i = begin; i < end; ++i)
+      inside[i] = sampler_.IsReal(row + std::min(static_cast<int>(line.start[0] + i * line.step[0] + 0.5), n[0] - 1));
+    return;
+  }
   for (int i = begin; i < end; ++i) {
     const double x = line.start[0] + i * line.step[0], y = line.start[1] + i * line.step[1], z = line.start[2] + i * line.step[2];
     // Where a step is all but zero, rounding could reach the next voxel.
@@ -230,6 +237,19 @@ void RowSampler<T>::Values(int j, int k, const unsigned char* inside, A* values)
           values[i] = precise(i);
       begin = to;
     }
+  }
+  if (line.step[1] == 0.0 && line.step[2] == 0.0) { // voxels of another size along the same row
+    const Neighbours y(line.start[1], n[1], intensity_.RowStride()), z(line.start[2], n[2], intensity_.SliceStride());
+    for (int i = begin; i < end; ++i) {
+      if (!(inside[i] & 1))
+        continue;
+      const Neighbours x(line.start[0] + i * line.step[0], n[0], 1);
+      const std::ptrdiff_t first = x.first + y.first + z.first;
+      values[i] = mixed(first, x.step, x.fraction, y, z);
+      if (!allReal(first, x.step, y, z, values[i]))
+        values[i] = precise(i);
+    }
+    return;
   }
   for (int i = begin; i < end; ++i) {
     if (!(inside[i] & 1))
