@@ -274,8 +274,8 @@ private:
   double Bound(double residual, double goal, bool last);
 
   std::unique_ptr<MembraneLevels> levels_;
-  std::vector<double> solution_;
-  std::vector<float> direction_;
+  Zeroed<double> solution_;
+  Zeroed<float> direction_;
   double load_ = 0.0; // the right side at every unknown
   double lowest_ = 0.0, span_ = 1.0;
   double slowest_ = 0.0;       // about the largest v where A v = 1: the longest time that heat spends in the overlap
@@ -334,8 +334,8 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
   MembraneRows rows({components.y0 + low[0], components.z0 + low[1]}, {high[0] - low[0], high[1] - low[1]}, inside);
 
   // 2. what is stored: unknown, known, void
-  solution_.assign(static_cast<std::size_t>(rows.count), 0.0);
-  std::vector<unsigned char> kind(static_cast<std::size_t>(rows.count), 0);
+  solution_ = Zeroed<double>(static_cast<std::size_t>(rows.count));
+  Zeroed<unsigned char> kind(static_cast<std::size_t>(rows.count));
   ParallelRanges(rows.size[1] + 2, rows.Grain(), Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (int z = rows.low[1] - 1 + static_cast<int>(begin); z < rows.low[1] - 1 + static_cast<int>(end); ++z)
       for (int y = rows.low[0] - 1; y <= rows.low[0] + rows.size[0]; ++y) {
@@ -355,7 +355,7 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
             std::fill(to + components.runs[n].begin, to + components.runs[n].end, static_cast<unsigned char>(1));
       }
   });
-  std::vector<unsigned char> codes(static_cast<std::size_t>(rows.count), 0);
+  Zeroed<unsigned char> codes(static_cast<std::size_t>(rows.count));
   ParallelRanges(rows.size[1] + 2, rows.Grain(), Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (int z = rows.low[1] - 1 + static_cast<int>(begin); z < rows.low[1] - 1 + static_cast<int>(end); ++z)
       for (int y = rows.low[0] - 1; y <= rows.low[0] + rows.size[0]; ++y) {
@@ -370,11 +370,11 @@ Multigrid::Multigrid(const Frame& frame, const RowField<unsigned char>& kinds, c
       }
   });
   kind = {};
-  direction_.assign(static_cast<std::size_t>(rows.count), 0.0f);
+  direction_ = Zeroed<float>(static_cast<std::size_t>(rows.count));
   levels_ = std::make_unique<MembraneLevels>(std::move(rows), std::move(codes),
                                              frame.swapped ? Eigen::Vector3d(spacing[0], spacing[2], spacing[1]) : spacing,
                                              progress.Part(0.0, 0.5));
-  slowest_ = std::max(1.0, levels_->SpreadCoarsely(1.0f));
+  slowest_ = std::max(1.0, levels_->SpreadCoarsely(1.0f, 2));
   if (slowest_ > SlowestOfFloats)
     BoundErrors(progress);
 

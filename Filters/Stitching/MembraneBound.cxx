@@ -57,30 +57,33 @@ ECHORAMA_HOT int CountLacking(const float* w, const float* below, const float* a
 
 } // namespace
 
-double MembraneLevels::SpreadCoarsely(float floor)
+double MembraneLevels::SpreadCoarsely(float floor, int finest)
 {
-  Level& finest = levels_.front();
+  Level& level = levels_.front();
+  const auto largest = [](const Zeroed<float>& value) {
+    return static_cast<double>(*std::max_element(value.begin(), value.end()));
+  };
   if (Count() == 1) {
-    const std::vector<float> residuals = finest.right;
-    RaiseRow(finest.right.data(), codes_.data(), floor, 0, static_cast<int>(finest.right.size()));
+    const Zeroed<float> residuals = level.right;
+    RaiseRow(level.right.data(), codes_.data(), floor, 0, static_cast<int>(level.right.size()));
     SolveCoarsest();
-    finest.right = residuals;
-    return static_cast<double>(*std::max_element(finest.value.begin(), finest.value.end()));
+    level.right = residuals;
+    return largest(level.value);
   }
   SumUp(0, [&](const MembraneRows::Row& row, float* to) {
-    const float* r = finest.right.data() + row.at;
+    const float* r = level.right.data() + row.at;
     const unsigned char* codes = codes_.data() + row.at;
     for (int i = row.begin; i < row.end; ++i)
-      to[CellOf(i, finest.halved[0])] += Raised(r[i], codes[i], floor);
+      to[CellOf(i, level.halved[0])] += Raised(r[i], codes[i], floor);
   });
-  for (int level = 1; level + 1 < Count(); ++level)
-    Aggregate(level, 1.0f);
+  for (int number = 1; number + 1 < Count(); ++number)
+    Aggregate(number, 1.0f);
   SolveCoarsest();
-  for (int level = Count() - 2; level > 0; --level) {
-    Prolong(level, false);
-    Cycle(level, true, {});
+  for (int number = Count() - 2; number >= finest; --number) {
+    Prolong(number, false);
+    Cycle(number, true, {});
   }
-  return static_cast<double>(*std::max_element(levels_[1].value.begin(), levels_[1].value.end()));
+  return largest(levels_[static_cast<std::size_t>(std::min(finest, Count() - 1))].value);
 }
 
 double MembraneLevels::SpreadFinely(float floor, double part)
@@ -180,8 +183,8 @@ bool MembraneLevels::Mend(std::vector<Place> places, double part, double& larges
     largest = std::max(largest, static_cast<double>(w));
     if (Lack(place, part) > 0.0) // the step was rounded away
       return false;
-    for (const Place& near : {Place{x - 1, y, z}, Place{x + 1, y, z}, Place{x, y - 1, z}, Place{x, y + 1, z},
-                              Place{x, y, z - 1}, Place{x, y, z + 1}})
+    for (const Place& near :
+         {Place{x - 1, y, z}, Place{x + 1, y, z}, Place{x, y - 1, z}, Place{x, y + 1, z}, Place{x, y, z - 1}, Place{x, y, z + 1}})
       if (Lack(near, part) > 0.0)
         places.push_back(near);
   }

@@ -46,7 +46,7 @@ std::ptrdiff_t MembraneRows::Grain() const
   return std::max<std::ptrdiff_t>(1, CellsOfOneTask * size[1] / std::max<std::ptrdiff_t>(1, count));
 }
 
-MembraneLevels::MembraneLevels(MembraneRows rows, std::vector<unsigned char> codes, const Eigen::Vector3d& spacing,
+MembraneLevels::MembraneLevels(MembraneRows rows, Zeroed<unsigned char> codes, const Eigen::Vector3d& spacing,
                                const Progress& progress)
   : codes_(std::move(codes))
 {
@@ -56,8 +56,8 @@ MembraneLevels::MembraneLevels(MembraneRows rows, std::vector<unsigned char> cod
   levels_.emplace_back();
   Level& finest = levels_.front();
   finest.rows = std::move(rows);
-  finest.value.assign(static_cast<std::size_t>(finest.rows.count), 0.0f);
-  finest.right.assign(static_cast<std::size_t>(finest.rows.count), 0.0f);
+  finest.value = Zeroed<float>(static_cast<std::size_t>(finest.rows.count));
+  finest.right = Zeroed<float>(static_cast<std::size_t>(finest.rows.count));
   finest.unknowns = ParallelSum<std::ptrdiff_t>(finest.rows.count, CellsOfOneTask, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     std::ptrdiff_t count = 0;
     for (std::ptrdiff_t at = begin; at < end; ++at)
@@ -119,19 +119,19 @@ void MembraneLevels::BuildCoarse(int number)
   if (cells > std::numeric_limits<std::uint32_t>::max())
     throw Error(Error::Kind::TooLarge, "the membrane has too many unknowns");
   for (auto& tie : coarse.tie)
-    tie.assign(cells, 0.0f);
-  coarse.inverse.assign(cells, 0.0f);
-  coarse.value.assign(cells, 0.0f);
-  coarse.right.assign(cells, 0.0f);
-  std::vector<float> known(cells, 0.0f);
-  std::vector<unsigned char> kinds(cells, 0);
+    tie = Zeroed<float>(cells);
+  coarse.inverse = Zeroed<float>(cells);
+  coarse.value = Zeroed<float>(cells);
+  coarse.right = Zeroed<float>(cells);
+  Zeroed<float> known(cells);
+  Zeroed<unsigned char> kinds(cells);
 
   // 2. ties of the cells: sums of those of their voxels
   const unsigned char* codes = codes_.data();
   const bool finest = number == 0;
   const float wx = static_cast<float>(weights_[0]), wy = static_cast<float>(weights_[1]), wz = static_cast<float>(weights_[2]);
   const float scale[3] = {halved[0] ? 0.5f : 1.0f, halved[1] ? 0.5f : 1.0f, halved[2] ? 0.5f : 1.0f};
-  const std::vector<unsigned char>& fineKinds = finest ? codes_ : kinds_;
+  const Zeroed<unsigned char>& fineKinds = finest ? codes_ : kinds_;
   ParallelRanges(to.size[1] + 2, to.Grain(), Progress(), [&](std::ptrdiff_t zBegin, std::ptrdiff_t zEnd) {
     for (int Z = to.low[1] - 1 + static_cast<int>(zBegin); Z < to.low[1] - 1 + static_cast<int>(zEnd); ++Z)
       for (int z = halved[2] ? 2 * Z : Z; z <= (halved[2] ? 2 * Z + 1 : Z); ++z) {
@@ -220,11 +220,11 @@ void MembraneLevels::BuildCoarse(int number)
   BuildFills(number + 1, kinds_);
 }
 
-void MembraneLevels::BuildFills(int number, const std::vector<unsigned char>& kinds)
+void MembraneLevels::BuildFills(int number, const Zeroed<unsigned char>& kinds)
 {
   Level& level = levels_[static_cast<std::size_t>(number)];
   const MembraneRows& rows = level.rows;
-  const std::vector<float>& known = known_.back();
+  const Zeroed<float>& known = known_.back();
   level.voids.start.push_back(0);
   level.knowns.start.push_back(0);
   for (int z = rows.low[1] - 1; z <= rows.low[1] + rows.size[1]; ++z)

@@ -203,7 +203,7 @@ void ForRowsOf(const MembraneRows& rows, const Body& body)
   });
 }
 
-Around AroundRow(const MembraneRows& rows, std::vector<float>& value, int y, int z)
+Around AroundRow(const MembraneRows& rows, Zeroed<float>& value, int y, int z)
 {
   float* data = value.data();
   return {data + rows.At(y, z).at, data + rows.At(y - 1, z).at, data + rows.At(y + 1, z).at, data + rows.At(y, z - 1).at,
@@ -330,7 +330,7 @@ void MembraneLevels::FoldFills(int number)
 
 namespace {
 
-void ApplyFill(const MembraneLevels::Level::Fill& fill, const std::vector<float>& source, std::vector<float>& value)
+void ApplyFill(const MembraneLevels::Level::Fill& fill, const Zeroed<float>& source, Zeroed<float>& value)
 {
   ParallelRanges(static_cast<std::ptrdiff_t>(fill.cell.size()), 4096, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (auto n = static_cast<std::size_t>(begin); n < static_cast<std::size_t>(end); ++n) {
@@ -404,7 +404,7 @@ void MembraneLevels::Cycle(int number, bool improve, const std::function<void(in
     return;
   }
   const int halves = 2 * Sweeps;
-  std::vector<float>& right = levels_[static_cast<std::size_t>(number) + 1].right;
+  Zeroed<float>& right = levels_[static_cast<std::size_t>(number) + 1].right;
   std::fill(right.begin(), right.end(), 0.0f);
   Sweep(rows, halves + 1, [&](int stage, int z) {
     if (stage < halves)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Parallel.h"
+#include "Filters/Stitching/ZeroedMemory.h"
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -54,9 +55,9 @@ public:
     MembraneRows rows;
     std::array<bool, 3> halved{false, false, false}; ///< the axes along which the next level is coarser
     std::ptrdiff_t unknowns = 0;
-    std::vector<float> value, right; ///< e and r
+    Zeroed<float> value, right; ///< e and r
     // Coarse levels: ties to the lower neighbour along x, y and z, and one over their sum (0: not an unknown).
-    std::vector<float> tie[3], inverse;
+    Zeroed<float> tie[3], inverse;
     // Coarse cells without unknowns that interpolation looks at: they take a weighted sum of unknowns nearby.
     struct Fill {
       std::vector<std::uint32_t> cell, from; ///< the voxels from[start[n]] ... take part in cell[n]
@@ -81,10 +82,10 @@ public:
   static constexpr float KnownTie = 0.75f; ///< see BuildCoarse
 
   /// \param rows, codes of the finest level; there is at least one unknown, each is connected to a known voxel
-  MembraneLevels(MembraneRows rows, std::vector<unsigned char> codes, const Eigen::Vector3d& spacing, const Progress& progress);
+  MembraneLevels(MembraneRows rows, Zeroed<unsigned char> codes, const Eigen::Vector3d& spacing, const Progress& progress);
 
   const MembraneRows& Rows() const { return levels_.front().rows; }
-  const std::vector<unsigned char>& Codes() const { return codes_; }
+  const Zeroed<unsigned char>& Codes() const { return codes_; }
   const Eigen::Vector3d& Weights() const { return weights_; } ///< (least spacing / spacing)^2
   Level& Finest() { return levels_.front(); }
   int Count() const { return static_cast<int>(levels_.size()); }
@@ -102,15 +103,16 @@ public:
   void Guess();
   /// The same where right is a source in space, and known values are 0; followed by a cycle on the finest level too.
   void Spread();
-  /// Solves A w = |right| + floor about, on all levels but the finest. \returns the largest w
-  double SpreadCoarsely(float floor);
+  /// Solves A w = |right| + floor about, on the level \a finest (or the coarsest, if that is finer) and all coarser ones.
+  /// \returns the largest w
+  double SpreadCoarsely(float floor, int finest = 1);
   /// After it: on the finest level, with A w >= part (|right| + floor), so that no error that leaves the residual right is
   /// larger than w / part. right becomes |right| + floor, value w. \returns the largest w / part, infinity if that is not found
   double SpreadFinely(float floor, double part);
 
 private:
   void BuildCoarse(int fine);
-  void BuildFills(int level, const std::vector<unsigned char>& kinds);
+  void BuildFills(int level, const Zeroed<unsigned char>& kinds);
   void BuildCoarsest();
   template <class AddRow>
   void SumUp(int fine, const AddRow& add);
@@ -130,12 +132,12 @@ private:
   void Cycle(int level, bool improve, const std::function<void(int z)>& then);
 
   std::vector<Level> levels_;
-  std::vector<unsigned char> codes_;
+  Zeroed<unsigned char> codes_;
   Eigen::Vector3d weights_;
-  std::vector<std::vector<float>> known_; // per level while it is built: ties to known voxels
-  std::vector<unsigned char> kinds_;      // of the level built last
-  std::vector<std::ptrdiff_t> coarsest_;  // the unknowns of the coarsest level
-  std::vector<double> factor_;            // its Cholesky factor, by rows
+  std::vector<Zeroed<float>> known_;     // per level while it is built: ties to known voxels
+  Zeroed<unsigned char> kinds_;          // of the level built last
+  std::vector<std::ptrdiff_t> coarsest_; // the unknowns of the coarsest level
+  std::vector<double> factor_;           // its Cholesky factor, by rows
 };
 
 /// right of the next coarser level := what add(row, to) adds for the rows of a level, to by cells.

@@ -352,7 +352,7 @@ TEST(Membrane, WhatBoundsErrorsLacksNothing)
     });
     const MembraneRows rows({0, 0}, {scene.size[1], scene.size[2]}, spans);
     const auto place = [&rows](int i, int j, int k) { return static_cast<std::size_t>(rows.At(j, k).at + i); };
-    std::vector<unsigned char> codes(static_cast<std::size_t>(rows.count), 0);
+    Zeroed<unsigned char> codes(static_cast<std::size_t>(rows.count));
     for (int k = -1; k <= scene.size[2]; ++k)
       for (int j = -1; j <= scene.size[1]; ++j)
         for (int i = rows.At(j, k).first; i < rows.At(j, k).last; ++i) {
