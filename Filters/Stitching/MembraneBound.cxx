@@ -19,15 +19,10 @@ namespace {
 constexpr int SpreadSweeps = 3;
 constexpr float Upwards = 1.0f + 1e-6f; // more than a float is rounded by
 
-[[gnu::always_inline]] inline float Raised(float r, int code, float floor)
-{
-  return (code & MembraneCounts) != 0 ? std::abs(r) * Upwards + floor : 0.0f;
-}
-
 ECHORAMA_HOT void RaiseRow(float* r, const unsigned char* codes, float floor, int begin, int end)
 {
   for (int i = begin; i < end; ++i)
-    r[i] = Raised(r[i], codes[i], floor);
+    r[i] = (codes[i] & MembraneCounts) != 0 ? std::abs(r[i]) * Upwards + floor : 0.0f;
 }
 
 // How many unknowns of a row have A w < part s (some may count twice), and their largest w.
@@ -71,10 +66,11 @@ double MembraneLevels::SpreadCoarsely(float floor, int finest)
     return largest(level.value);
   }
   SumUp(0, [&](const MembraneRows::Row& row, float* to) {
-    const float* r = level.right.data() + row.at;
-    const unsigned char* codes = codes_.data() + row.at;
-    for (int i = row.begin; i < row.end; ++i)
-      to[CellOf(i, level.halved[0])] += Raised(r[i], codes[i], floor);
+    thread_local std::vector<float> raised;
+    raised.assign(level.right.begin() + row.at + row.begin, level.right.begin() + row.at + row.end);
+    float* from = raised.data() - row.begin;
+    RaiseRow(from, codes_.data() + row.at, floor, row.begin, row.end);
+    AddToCells(from, 1.0f, row.begin, row.end, level.halved[0], to);
   });
   for (int number = 1; number + 1 < Count(); ++number)
     Aggregate(number, 1.0f);

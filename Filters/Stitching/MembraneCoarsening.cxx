@@ -4,6 +4,7 @@
 // summed in the cell; KnownTie is what is left of them one level up, for they end at the known voxel and not at a cell's
 // centre (between 5/8 and 1 in one dimension, depending on how cells fall; smaller makes cycles overshoot there).
 #include "Core/Base/Error.h"
+#include "Core/Base/Multiversion.h"
 #include "MembraneLevels.h"
 #include <algorithm>
 #include <cmath>
@@ -15,7 +16,59 @@ namespace {
 constexpr std::ptrdiff_t CellsOfOneTask = 32768;
 constexpr std::ptrdiff_t CoarsestUnknowns = 200; // solved directly
 
+// Ties of a row of the finest level to lower neighbours, and to known voxels; 0 where there is no unknown.
+ECHORAMA_HOT void TiesOfVoxels(const unsigned char* code, const unsigned char* below, const unsigned char* above,
+                               const unsigned char* before, const unsigned char* behind, float wx, float wy, float wz, int begin,
+                               int end, float* __restrict x, float* __restrict y, float* __restrict z, float* __restrict known)
+{
+  const auto is = [](unsigned char c) { return (c & MembraneCounts) != 0 ? 1 : 0; };
+  for (int i = begin; i < end; ++i) {
+    const int own = is(code[i]), left = is(code[i - 1]), down = is(below[i]), front = is(before[i]);
+    x[i] = wx * static_cast<float>(own & left);
+    y[i] = wy * static_cast<float>(own & down);
+    z[i] = wz * static_cast<float>(own & front);
+    known[i] = static_cast<float>(own) * (wx * static_cast<float>((code[i] & 3) - left - is(code[i + 1])) +
+                                          wy * static_cast<float>(((code[i] >> 2) & 3) - down - is(above[i])) +
+                                          wz * static_cast<float>(((code[i] >> 4) & 3) - front - is(behind[i])));
+  }
+}
+
+// As AddToCells, but of each cell's voxels only the lower one.
+ECHORAMA_HOT void AddLower(const float* from, float factor, int begin, int end, float* __restrict to)
+{
+  for (int cell = (begin + 1) >> 1; cell < (end + 1) >> 1; ++cell)
+    to[cell] += factor * from[2 * cell];
+}
+
+ECHORAMA_HOT void JoinKinds(const unsigned char* kind, int begin, int end, bool halved, unsigned char* __restrict to)
+{
+  for (int i = begin; i < end && !halved; ++i)
+    to[i] |= kind[i];
+  if (!halved || begin >= end)
+    return;
+  if (begin & 1)
+    to[begin >> 1] |= kind[begin];
+  for (int cell = (begin + 1) >> 1; cell < end >> 1; ++cell)
+    to[cell] |= kind[2 * cell] | kind[2 * cell + 1];
+  if (end & 1)
+    to[end >> 1] |= kind[end - 1];
+}
+
 } // namespace
+
+ECHORAMA_HOT void AddToCells(const float* from, float factor, int begin, int end, bool halved, float* __restrict to)
+{
+  for (int i = begin; i < end && !halved; ++i)
+    to[i] += factor * from[i];
+  if (!halved || begin >= end)
+    return;
+  if (begin & 1)
+    to[begin >> 1] += factor * from[begin];
+  for (int cell = (begin + 1) >> 1; cell < end >> 1; ++cell)
+    to[cell] = (to[cell] + factor * from[2 * cell]) + factor * from[2 * cell + 1];
+  if (end & 1)
+    to[end >> 1] += factor * from[end - 1];
+}
 
 MembraneRows::MembraneRows(std::array<int, 2> lowest, std::array<int, 2> extent, const std::vector<std::array<int, 2>>& unknowns)
   : low(lowest), size(extent), rows(static_cast<std::size_t>(extent[0] + 2) * static_cast<std::size_t>(extent[1] + 2))
@@ -133,6 +186,7 @@ void MembraneLevels::BuildCoarse(int number)
   const float scale[3] = {halved[0] ? 0.5f : 1.0f, halved[1] ? 0.5f : 1.0f, halved[2] ? 0.5f : 1.0f};
   const Zeroed<unsigned char>& fineKinds = finest ? codes_ : kinds_;
   ParallelRanges(to.size[1] + 2, to.Grain(), Progress(), [&](std::ptrdiff_t zBegin, std::ptrdiff_t zEnd) {
+    std::vector<float> ofVoxels;
     for (int Z = to.low[1] - 1 + static_cast<int>(zBegin); Z < to.low[1] - 1 + static_cast<int>(zEnd); ++Z)
       for (int z = halved[2] ? 2 * Z : Z; z <= (halved[2] ? 2 * Z + 1 : Z); ++z) {
         if (z < from.low[1] - 1 || z > from.low[1] + from.size[1])
@@ -147,53 +201,32 @@ void MembraneLevels::BuildCoarse(int number)
           const int last = std::min(row.last, halved[0] ? 2 * cell.last : cell.last);
           const unsigned char* kind = fineKinds.data() + row.at;
           unsigned char* cellKind = kinds.data() + cell.at;
-          for (int i = first; i < last; ++i)
-            cellKind[CellOf(i, halved[0])] |= kind[i];
+          JoinKinds(kind, first, last, halved[0], cellKind);
           if (row.begin >= row.end)
             continue;
-          const bool crossY = !halved[1] || (y & 1) == 0, crossZ = !halved[2] || (z & 1) == 0;
-          float* tieX = coarse.tie[0].data() + cell.at;
-          float* tieY = coarse.tie[1].data() + cell.at;
-          float* tieZ = coarse.tie[2].data() + cell.at;
-          float* tieKnown = known.data() + cell.at;
+          const float* ties[4]; // to the lower neighbours along x, y and z, and to known voxels
           if (finest) {
-            const unsigned char* code = codes + row.at;
-            const unsigned char* below = codes + from.At(y - 1, z).at;
-            const unsigned char* above = codes + from.At(y + 1, z).at;
-            const unsigned char* before = codes + from.At(y, z - 1).at;
-            const unsigned char* behind = codes + from.At(y, z + 1).at;
-            const auto is = [](unsigned char c) { return (c & MembraneCounts) != 0 ? 1 : 0; };
-            for (int i = row.begin; i < row.end; ++i) {
-              if (!is(code[i]))
-                continue;
-              const int I = CellOf(i, halved[0]);
-              const int left = is(code[i - 1]), down = is(below[i]), front = is(before[i]);
-              if (!halved[0] || (i & 1) == 0)
-                tieX[I] += scale[0] * wx * static_cast<float>(left);
-              if (crossY)
-                tieY[I] += scale[1] * wy * static_cast<float>(down);
-              if (crossZ)
-                tieZ[I] += scale[2] * wz * static_cast<float>(front);
-              tieKnown[I] += KnownTie * (wx * static_cast<float>((code[i] & 3) - left - is(code[i + 1])) +
-                                         wy * static_cast<float>(((code[i] >> 2) & 3) - down - is(above[i])) +
-                                         wz * static_cast<float>(((code[i] >> 4) & 3) - front - is(behind[i])));
-            }
+            const auto count = static_cast<std::size_t>(row.end - row.begin);
+            ofVoxels.resize(4 * count);
+            float* own[4];
+            for (std::size_t n = 0; n < 4; ++n)
+              ties[n] = own[n] = ofVoxels.data() + n * count - row.begin;
+            TiesOfVoxels(codes + row.at, codes + from.At(y - 1, z).at, codes + from.At(y + 1, z).at, codes + from.At(y, z - 1).at,
+                         codes + from.At(y, z + 1).at, wx, wy, wz, row.begin, row.end, own[0], own[1], own[2], own[3]);
           } else {
-            const float* x = fine.tie[0].data() + row.at;
-            const float* yy = fine.tie[1].data() + row.at;
-            const float* zz = fine.tie[2].data() + row.at;
-            const float* d = known_.back().data() + row.at;
-            for (int i = row.begin; i < row.end; ++i) {
-              const int I = CellOf(i, halved[0]);
-              if (!halved[0] || (i & 1) == 0)
-                tieX[I] += scale[0] * x[i];
-              if (crossY)
-                tieY[I] += scale[1] * yy[i];
-              if (crossZ)
-                tieZ[I] += scale[2] * zz[i];
-              tieKnown[I] += KnownTie * d[i];
-            }
+            for (std::size_t axis = 0; axis < 3; ++axis)
+              ties[axis] = fine.tie[axis].data() + row.at;
+            ties[3] = known_.back().data() + row.at;
           }
+          if (halved[0])
+            AddLower(ties[0], scale[0], row.begin, row.end, coarse.tie[0].data() + cell.at);
+          else
+            AddToCells(ties[0], scale[0], row.begin, row.end, false, coarse.tie[0].data() + cell.at);
+          if (!halved[1] || (y & 1) == 0)
+            AddToCells(ties[1], scale[1], row.begin, row.end, halved[0], coarse.tie[1].data() + cell.at);
+          if (!halved[2] || (z & 1) == 0)
+            AddToCells(ties[2], scale[2], row.begin, row.end, halved[0], coarse.tie[2].data() + cell.at);
+          AddToCells(ties[3], KnownTie, row.begin, row.end, halved[0], known.data() + cell.at);
         }
       }
   });

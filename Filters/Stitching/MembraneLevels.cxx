@@ -268,9 +268,7 @@ void MembraneLevels::Aggregate(int number, float factor)
 {
   const Level& fine = levels_[static_cast<std::size_t>(number)];
   SumUp(number, [&](const MembraneRows::Row& row, float* to) {
-    const float* from = fine.right.data() + row.at;
-    for (int i = row.begin; i < row.end; ++i)
-      to[CellOf(i, fine.halved[0])] += factor * from[i];
+    AddToCells(fine.right.data() + row.at, factor, row.begin, row.end, fine.halved[0], to);
   });
 }
 

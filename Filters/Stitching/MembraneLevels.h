@@ -140,6 +140,9 @@ private:
   std::vector<double> factor_;           // its Cholesky factor, by rows
 };
 
+/// Adds factor from[i] to the cells of the voxels [begin, end) of a row, voxel after voxel.
+void AddToCells(const float* from, float factor, int begin, int end, bool halved, float* __restrict to);
+
 /// right of the next coarser level := what add(row, to) adds for the rows of a level, to by cells.
 template <class AddRow>
 void MembraneLevels::SumUp(int number, const AddRow& add)

@@ -65,12 +65,21 @@ public:
   {
     ::new (static_cast<void*>(where)) U(std::forward<From>(from)...);
   }
-  bool operator==(const ZeroedMemory&) const { return true; }
-  bool operator!=(const ZeroedMemory&) const { return false; }
+  bool operator==(const ZeroedMemory&) const
+  {
+    return true;
+  }
+  bool operator!=(const ZeroedMemory&) const
+  {
+    return false;
+  }
 
 private:
   static constexpr std::size_t HugePage = std::size_t(1) << 21, Large = 2 * HugePage, Page = 4096;
-  static std::size_t Bytes(std::size_t count) { return (count * sizeof(T) + Page - 1) / Page * Page; }
+  static std::size_t Bytes(std::size_t count)
+  {
+    return (count * sizeof(T) + Page - 1) / Page * Page;
+  }
 };
 
 /// An array of numbers, made with so many zeros: Zeroed<float> array(count).
