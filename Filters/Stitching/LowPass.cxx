@@ -87,7 +87,7 @@ BlockLattice BlocksOf(const ImageGeometry& grid, double scale)
 }
 
 SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, VolumeView<const unsigned char> coverage, int step,
-                   const Progress& progress)
+                   const Progress& progress, const Boxed<unsigned char>* mask)
 {
   const GridBox& own = volume.Box();
   SmoothPart part;
@@ -107,7 +107,9 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
     std::vector<unsigned char> inside(count);
     std::vector<float> values(count);
     std::vector<double> sums(across), squares(across), bases(across);
-    std::vector<int> counts(across);
+    std::vector<int> counts(across), blockOf(count);
+    for (int i = 0; i < own.size[0]; ++i)
+      blockOf[static_cast<std::size_t>(i)] = (own.first[0] + i) / blocks.size[0] - low.box.first[0];
     for (std::ptrdiff_t row = begin; row < end; ++row) {
       const int bj = low.box.first[1] + static_cast<int>(row % low.box.size[1]);
       const int bk = low.box.first[2] + static_cast<int>(row / low.box.size[1]);
@@ -131,14 +133,17 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
             --to;
           if (from == to)
             continue;
-          volume.Inside(j, k, inside.data());
+          if (mask)
+            std::copy_n(mask->Row(j, k), count, inside.begin());
+          else
+            volume.Inside(j, k, inside.data());
           for (int i = 0; i < own.size[0]; ++i)
-            inside[i] = static_cast<unsigned char>(inside[i] & (i >= from && i < to && shared(own.first[0] + i)));
+            inside[i] = static_cast<unsigned char>(inside[i] & 1 & (i >= from && i < to && shared(own.first[0] + i)));
           volume.Values(j, k, inside.data(), values.data());
           for (int i = from; i < to; ++i) {
             if (!inside[i])
               continue;
-            const int b = (own.first[0] + i) / blocks.size[0] - low.box.first[0];
+            const int b = blockOf[static_cast<std::size_t>(i)];
             // Differences from the first: the mean of equal values is that value.
             if (counts[b]++ == 0)
               bases[b] = static_cast<double>(values[i]);

@@ -25,7 +25,8 @@ struct SmoothPart {
 /// smooth parts, up to the border. Read with linear interpolation it is what is left after a Gaussian with a standard deviation
 /// of about the size of a block. A constant stays that constant, and has no deviation. Cost: the volume is sampled once in the
 /// overlap. \param coverage how many volumes cover every step-th voxel of the grid (Coarsened)
+/// \param mask where the volume is (bit 0), in its box, if that is known already
 SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, VolumeView<const unsigned char> coverage, int step,
-                   const Progress& progress = {});
+                   const Progress& progress = {}, const Boxed<unsigned char>* mask = nullptr);
 
 } // namespace echorama

@@ -42,6 +42,7 @@ public:
 
   /// Whether a volume covers each voxel of its row (bit 0 of the bytes), from Box(volume).first[0] on.
   const unsigned char* MaskRow(int volume, int j, int k) const { return masks_[volume].Row(j, k); }
+  const Boxed<unsigned char>& Mask(int volume) const { return masks_[volume]; }
 
   /// Gives every volume that is wholly covered by others a core, which stands for its pure region: the voxels that lie at
   /// least as far from its empty region (as deep inside the border that others reach beyond) as any other volume's voxels

@@ -194,7 +194,8 @@ void StitchPlan::Parts::FindScales(const Progress& progress)
     for (std::size_t v = 0; v < inputs.size(); ++v)
       lows.push_back(
           LowPass(samplers[v], blocks, covered, factor,
-                  progress.Part(0.85 + 0.15 * static_cast<double>(v) / n, 0.85 + 0.15 * static_cast<double>(v + 1) / n)));
+                  progress.Part(0.85 + 0.15 * static_cast<double>(v) / n, 0.85 + 0.15 * static_cast<double>(v + 1) / n),
+                  factor == 1 ? &regions.Mask(static_cast<int>(v)) : nullptr));
   }
   if (factor == 1 || method == StitchMethod::Average || method == StitchMethod::Maximum)
     return;
