@@ -62,14 +62,14 @@ DisagreementBox::DisagreementBox(Workbench* bench, QWidget* parent) : JobPanel(b
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(2, 2, 2, 2);
   layout->addWidget(find_);
+  layout->addWidget(text_); // what is told is seen without scrolling, also in a small window
+  layout->addWidget(here_);
   auto* form = new QFormLayout;
   form->addRow(tr("Search"), search_);
   form->addRow(tr("Blocks"), block_);
   form->addRow(shown_);
   form->addRow(tr("Scale to"), scale_);
   layout->addLayout(form);
-  layout->addWidget(text_);
-  layout->addWidget(here_);
   for (auto changed : {&Workbench::VolumesChanged, &Workbench::PosesChanged, &Workbench::VoxelsChanged})
     connect(bench, changed, this, &DisagreementBox::ShowMap);
   connect(bench, &Workbench::PointerChanged, this, &DisagreementBox::ShowHere);
