@@ -47,10 +47,14 @@ EmptyPage::EmptyPage(QWidget* views, QAction* open, QAction* openProject, const 
   addText(tr("or drop files anywhere on this window"), "emptyDrop");
   layout->addSpacing(24);
   addText(tr("No volumes at hand? Samples are made here, in seconds:"), "emptySamples");
-  auto* samples = addRow();
-  for (const Sample& sample : Samples())
-    addButton(samples, Button(this, sample.name, sample.label, sample.help, [sample, openSample] { openSample(sample); }));
-  samples->addStretch(1);
+  constexpr int most = 3; // in a row, also where texts are large
+  const QVector<Sample> samples = Samples();
+  for (int i = 0; i < samples.size(); i += most) {
+    auto* row = addRow();
+    for (const Sample& sample : samples.mid(i, most))
+      addButton(row, Button(this, sample.name, sample.label, sample.help, [sample, openSample] { openSample(sample); }));
+    row->addStretch(1);
+  }
   layout->addStretch(3);
   views->installEventFilter(this);
   setGeometry(views->rect());

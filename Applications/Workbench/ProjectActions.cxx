@@ -3,6 +3,7 @@
 #include "Controls.h"
 #include "Core/Base/Error.h"
 #include "FocusRing.h"
+#include "ResultFile.h"
 #include "Widgets/Session/PoseComparison.h"
 #include "Widgets/Session/ProjectFolder.h"
 #include "Widgets/Session/ProjectVolumes.h"
@@ -65,8 +66,21 @@ void ProjectActions::ShowVolumes()
   compare_->setEnabled(any && !bench_->IsScored()); // the other may be the solution
 }
 
+// What is copied are files, and a result that was just made is in none.
+void ProjectActions::AskForResult(int id, const QString& folder)
+{
+  const QString file = FreeFileFor(bench_->Session(), id, QFileInfo(folder).absolutePath());
+  bench_->Ask(tr("%1 is in no file yet, and what is copied are files. Save it first, as %2?").arg(bench_->NameOf(id), file),
+              {{tr("Save it there"),
+                [this, id, file, folder] { SaveResult(bench_->Shared(), this, id, file, [this, folder] { CopyTo(folder); }); }},
+               {tr("Cancel"), {}}},
+              "copyProject");
+}
+
 void ProjectActions::CopyTo(const QString& folder)
 {
+  if (const QVector<int> unsaved = UnsavedResults(bench_->Session()); !unsaved.isEmpty())
+    return AskForResult(unsaved.first(), folder);
   const auto made = std::make_shared<std::string>();
   const auto copy = [project = bench_->Session()->Now(), folder = folder.toStdString(), made](const Progress& progress) {
     *made = CopyProject(project, folder, progress);

@@ -29,6 +29,7 @@ signals:
 
 private:
   void ShowVolumes();
+  void AskForResult(int id, const QString& folder);
 
   Workbench* bench_;
   QWidget* window_;

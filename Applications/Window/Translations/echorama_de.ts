@@ -261,6 +261,30 @@
         <source>Four overlapping volumes in a row, of which three lie wrong</source>
         <translation>Vier überlappende Volumen hintereinander, von denen drei falsch liegen</translation>
     </message>
+    <message>
+        <source>Two far &amp;apart</source>
+        <translation>Zwei weit aus&amp;einander</translation>
+    </message>
+    <message>
+        <source>Two volumes of one body with three metal clips, 70 mm apart</source>
+        <translation>Zwei Volumen eines Körpers mit drei Metallklammern, 70 mm auseinander</translation>
+    </message>
+    <message>
+        <source>Five pairs, one &amp;wrong</source>
+        <translation>Fünf Paare, eines &amp;falsch</translation>
+    </message>
+    <message>
+        <source>Six volumes in a row that were aligned, but for one joint</source>
+        <translation>Sechs ausgerichtete Volumen in einer Reihe, nur an einer Fuge nicht</translation>
+    </message>
+    <message>
+        <source>Stone with a &amp;shadow</source>
+        <translation>Stein mit &amp;Schatten</translation>
+    </message>
+    <message>
+        <source>Two volumes with a metal clip each; a stone casts a shadow in the first one</source>
+        <translation>Zwei Volumen mit je einer Metallklammer; im ersten wirft ein Stein einen Schatten</translation>
+    </message>
 </context>
 <context>
     <name>echorama::BrushPanel</name>
@@ -1584,6 +1608,18 @@ tempo</translation>
     <message>
         <source>Copy &amp;table</source>
         <translation>&amp;Tabelle kopieren</translation>
+    </message>
+    <message>
+        <source>%1 is in no file yet, and what is copied are files. Save it first, as %2?</source>
+        <translation>%1 ist noch in keiner Datei, und kopiert werden Dateien. Zuerst speichern, als %2?</translation>
+    </message>
+    <message>
+        <source>Save it there</source>
+        <translation>Dort speichern</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
     </message>
 </context>
 <context>

@@ -2,6 +2,7 @@
 // Projects that travel: with their volumes to another machine, after their files moved, and beside another session.
 #include "FileActions.h"
 #include "ProjectActions.h"
+#include "ResultPanel.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
 #include <QAction>
@@ -23,6 +24,7 @@ class TestProjects : public WindowTest {
 private slots:
   void aProjectGoesToAnotherMachineWithItsVolumes();
   void aCopyThatCannotBeMadeSaysWhere();
+  void aResultInNoFileIsSavedBeforeTheCopy();
   void afterFilesMovedAFolderIsAskedFor();
   void twoSessionsAreCompared();
 };
@@ -77,6 +79,27 @@ void TestProjects::aCopyThatCannotBeMadeSaysWhere()
   QVERIFY(window.Answer("Do not save") || true); // volumes that were only opened are no work
   QVERIFY(window.Wait());
   QTRY_COMPARE(QString::fromStdString(window.Session()->GetProjectPath()), Folder().filePath("copy/copy.json"));
+}
+
+// A result that was just made is in no file, and a copy holds files: it says so, and leads on.
+void TestProjects::aResultInNoFileIsSavedBeforeTheCopy()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  window.Part<ResultPanel>("resultPanel")->Make(true);
+  QVERIFY(window.Wait());
+  QCOMPARE(window.Session()->GetNumberOfVolumes(), 3);
+  auto* actions = window.Window().findChild<ProjectActions*>();
+  const QString folder = Folder().filePath("copy");
+  actions->CopyTo(folder);
+  QVERIFY2(window.HasMessage("result is in no file yet"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.Answer("Cancel"));
+  QVERIFY(window.Wait());
+  QVERIFY(!QFile::exists(folder) && !QFile::exists(Folder().filePath("result.mha")));
+  actions->CopyTo(folder);
+  QVERIFY(window.Answer("Save it there"));
+  QTRY_VERIFY(window.HasMessage("are in " + folder));
+  QVERIFY(QFile::exists(Folder().filePath("copy/volumes/result.mha")));
 }
 
 void TestProjects::afterFilesMovedAFolderIsAskedFor()
