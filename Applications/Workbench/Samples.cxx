@@ -84,8 +84,9 @@ Recipe InARow(const ProbeGeometry& probe)
 Recipe RecipeOf(const Sample& sample, vtkUltrasoundPhantomSource* source)
 {
   const QString name = sample.name;
-  if (name == "phantom-6") { // six of the usual width would reach beyond the body
-    source->SetFanAngle(38.0);
+  if (name == "phantom-6") { // narrow ones, so that six stay in the body and only neighbours overlap
+    source->SetFanAngle(24.0);
+    source->SetFanRadius(70.0);
     source->SetSweepAngle(34.0);
     source->SetDepthMax(80.0);
     source->SetSpacingMm(1.5);
