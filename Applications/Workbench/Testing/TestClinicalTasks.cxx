@@ -30,7 +30,7 @@
 #include <QProcess>
 #include <QRegularExpression>
 #include <QScrollArea>
-#include <QSettings>
+#include <QSet>
 #include <QTabBar>
 #include <QTableView>
 #include <QTableWidget>
@@ -74,8 +74,8 @@ Vector3d PlaceOf(vtkImageData* image, std::size_t voxel)
   Vector3d place;
   const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(image);
   const auto nx = static_cast<std::size_t>(geometry.dimensions[0]), ny = static_cast<std::size_t>(geometry.dimensions[1]);
-  return geometry.IndexToWorld() * Vector3d(static_cast<double>(voxel % nx), static_cast<double>(voxel / nx % ny),
-                                            static_cast<double>(voxel / nx / ny));
+  return geometry.IndexToWorld() *
+         Vector3d(static_cast<double>(voxel % nx), static_cast<double>(voxel / nx % ny), static_cast<double>(voxel / nx / ny));
 }
 
 /// Somebody at the workbench who has the page and nothing else.
@@ -91,6 +91,7 @@ public:
   ///@{ Controls by what is written on them. They say why when that is not possible.
   bool Press(const char* where, const QString& label, Qt::KeyboardModifiers keys = {})
   {
+    used_ << label;
     for (auto* button : Place(where)->findChildren<QAbstractButton*>())
       if (Plain(button->text()) == label && button->isVisible())
         return ClickOn(button, button->inherits("QCheckBox") ? QPoint(8, button->height() / 2) : button->rect().center(), keys);
@@ -99,6 +100,7 @@ public:
   }
   bool GoTo(const QString& panel)
   {
+    used_ << panel;
     for (auto* tabs : Window().findChildren<QTabBar*>())
       for (int i = 0; i < tabs->count(); ++i)
         if (tabs->isVisible() && tabs->tabText(i) == panel)
@@ -108,6 +110,7 @@ public:
   }
   bool Choose(const QString& menu, const QString& entry)
   {
+    used_ << menu << entry;
     QMenuBar* bar = Window().menuBar();
     for (QAction* title : bar->actions())
       if (Plain(title->text()) == menu)
@@ -125,6 +128,7 @@ public:
   }
   bool Fill(const char* where, const QString& label, const QString& text)
   {
+    used_ << label;
     for (auto* form : Place(where)->findChildren<QFormLayout*>())
       for (int row = 0; row < form->rowCount(); ++row) {
         QLayoutItem *name = form->itemAt(row, QFormLayout::LabelRole), *field = form->itemAt(row, QFormLayout::FieldRole);
@@ -161,6 +165,7 @@ public:
   }
   bool Pick(const QString& volume, Qt::KeyboardModifiers keys = {})
   {
+    used_ << volume;
     auto* table = Part<QTableView>("volumes");
     for (int row = 0; row < table->model()->rowCount(); ++row)
       if (const QModelIndex index = table->model()->index(row, 2); index.data() == volume)
@@ -168,6 +173,9 @@ public:
     return false;
   }
   ///@}
+
+  /// All that was named so far, by any reader.
+  static QSet<QString> Used() { return used_; }
 
   bool OpenSample(const QString& label)
   {
@@ -300,6 +308,7 @@ private:
   }
 
   int wheelSign_ = 1;
+  inline static QSet<QString> used_;
 };
 
 /// What a sample was made of, for the truth of it.
@@ -331,6 +340,7 @@ private slots:
   void findTheWrongPair();
   void aCaseFromShadowToColleague();
   void runAnExercise();
+  void whatWasUsedIsOnThePage();
 
 protected:
   // Samples are made once for all, and the guide is there as for anybody who comes for the first time.
@@ -350,7 +360,7 @@ private:
   void HandOver(Reader& hand);
 
   QTemporaryDir samples_;
-  double expectedMm_ = 0.0; ///< from clip to clip
+  double expectedMm_ = 0.0;         ///< from clip to clip
   std::vector<std::size_t> shadow_; ///< voxels of the first volume
   std::vector<double> clean_;       ///< the first volume without it
 };
@@ -403,7 +413,8 @@ void TestClinicalTasks::lookThroughAVolume()
   QVERIFY(hand.Slice(Axial)->isVisible());
   hand.Key(Qt::Key_F);
   QVERIFY(hand.MmPerPixel(Coronal) > 0.8 * mm);
-  QCOMPARE(hand.Session()->GetKernel().State().volumes[1].volumeToWorld.matrix(), Pose::Identity().matrix()); // looking moved nothing
+  QCOMPARE(hand.Session()->GetKernel().State().volumes[1].volumeToWorld.matrix(),
+           Pose::Identity().matrix()); // looking moved nothing
 }
 
 // Task 2.
@@ -554,7 +565,6 @@ void TestClinicalTasks::aCaseFromShadowToColleague()
     if (QTest::currentTestFailed())
       return;
   }
-
 }
 
 // Task 6.
@@ -624,9 +634,8 @@ void TestClinicalTasks::Carve(Reader& hand)
       continue;
     ++gone;
     const Vector3d place = PlaceOf(hand.Image(1), i);
-    beside += std::none_of(shadow_.begin(), shadow_.end(), [&](std::size_t s) {
-      return (PlaceOf(hand.Image(1), s) - place).squaredNorm() < 25.0;
-    });
+    beside += std::none_of(shadow_.begin(), shadow_.end(),
+                           [&](std::size_t s) { return (PlaceOf(hand.Image(1), s) - place).squaredNorm() < 25.0; });
   }
   qInfo("of %zu voxels in the shadow %zu are left; %zu are gone, %zu of them farther than 5 mm from it", shadow_.size(), left,
         gone, beside);
@@ -720,7 +729,8 @@ void TestClinicalTasks::Embed(Reader& hand)
     if (kinds[i] != 1.0)
       continue;
     const Eigen::Array3d index = (geometry.WorldToIndex() * PlaceOf(hand.Image(3), i)).array().round();
-    const auto at = static_cast<std::size_t>((index.z() * geometry.dimensions[1] + index.y()) * geometry.dimensions[0] + index.x());
+    const auto at =
+        static_cast<std::size_t>((index.z() * geometry.dimensions[1] + index.y()) * geometry.dimensions[0] + index.x());
     ++kept;
     changed += valid[at] == 0.0 || before[at] != greys[i];
   }
@@ -841,6 +851,16 @@ void TestClinicalTasks::runAnExercise()
   QVERIFY(attempts[0].trainee == "Anna" && std::abs(attempts[0].scoreMm - score) < 0.01 && attempts[0].help == 0);
   table->setColumnHidden(0, true); // when it was is another time in each picture
   hand.Show("task-12-exercise");
+}
+
+// Nothing was needed that the page does not name.
+void TestClinicalTasks::whatWasUsedIsOnThePage()
+{
+  QFile file(ECHORAMA_SOURCE_DIR "/Documentation/clinical-tasks.md");
+  QVERIFY(file.open(QIODevice::ReadOnly));
+  const QString page = QString::fromUtf8(file.readAll());
+  for (const QString& label : Reader::Used())
+    QVERIFY2(page.contains('*' + label + '*'), qPrintable(label));
 }
 
 int main(int argc, char** argv)
