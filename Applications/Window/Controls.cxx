@@ -4,12 +4,14 @@
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
+#include <QFocusEvent>
 #include <QHeaderView>
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
 #include <QSignalBlocker>
 #include <QTableWidget>
+#include <QTimer>
 #include <QToolButton>
 
 namespace echorama {
@@ -27,9 +29,25 @@ void Describe(QWidget* widget, const char* name, const QString& help)
 
 } // namespace
 
+namespace {
+/// A click into a number selects it, as Tab does: what is typed next takes its place. A second click sets the cursor.
+class ClickedNumber : public QDoubleSpinBox {
+public:
+  using QDoubleSpinBox::QDoubleSpinBox;
+
+protected:
+  void focusInEvent(QFocusEvent* event) override
+  {
+    QDoubleSpinBox::focusInEvent(event);
+    if (event->reason() == Qt::MouseFocusReason)
+      QTimer::singleShot(0, this, &QAbstractSpinBox::selectAll); // the press comes after the focus, and sets the cursor
+  }
+};
+} // namespace
+
 QDoubleSpinBox* NumberField(QWidget* parent, const Number& number, const std::function<void(double)>& edited)
 {
-  auto* field = new QDoubleSpinBox(parent);
+  auto* field = new ClickedNumber(parent);
   Describe(field, number.name, number.help);
   field->setRange(number.least, number.most);
   field->setDecimals(number.digits);

@@ -39,6 +39,8 @@ void FocusRing::Follow()
     setGeometry(QRect(part->mapTo(parentWidget(), QPoint(0, 0)), part->size())
                     .adjusted(-around, -around, around, around)
                     .intersected(parentWidget()->rect()));
+    // Views are windows of their own, so this becomes one over them: what is within the frame must be no part of it.
+    setMask(QRegion(rect()).subtracted(rect().adjusted(Width, Width, -Width, -Width)));
     raise();
   }
   setVisible(isShown);

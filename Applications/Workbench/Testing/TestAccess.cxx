@@ -21,11 +21,13 @@
 #include <QComboBox>
 #include <QDialog>
 #include <QDockWidget>
+#include <QDoubleSpinBox>
 #include <QLabel>
 #include <QLineEdit>
 #include <QMenu>
 #include <QMenuBar>
 #include <QPushButton>
+#include <QScreen>
 #include <QSettings>
 #include <QTabBar>
 #include <QToolBar>
@@ -80,6 +82,7 @@ private slots:
   void tabReachesEveryControl();
   void everyPanelHasAKey();
   void whatHasTheKeysIsSeen();
+  void aClickedNumberIsReplaced();
   void everyMenuEntryHasAKey();
   void everyControlHasAName();
   void coloursAreChosenAndKept();
@@ -153,9 +156,34 @@ void TestAccess::whatHasTheKeysIsSeen()
       window.Key(Qt::Key_Tab);
     QCOMPARE(QApplication::focusWidget(), static_cast<QWidget*>(window.Slice(0)));
     QVERIFY(ring->geometry().contains(QRect(window.Slice(0)->mapTo(&window.Window(), QPoint(0, 0)), window.Slice(0)->size())));
+    // And the picture is still seen on the screen, where views are windows of their own: nothing lies over it.
+    window.Settle();
+    const QRect slice(window.Slice(0)->mapToGlobal(QPoint(0, 0)), window.Slice(0)->size());
+    const auto onScreen = [&] {
+      return QApplication::primaryScreen()->grabWindow(0, slice.x(), slice.y(), slice.width(), slice.height()).toImage();
+    };
+    const auto brightness = [](const QImage& image) {
+      return image.scaled(1, 1, {}, Qt::SmoothTransformation).pixelColor(0, 0).value();
+    };
+    QTRY_VERIFY(brightness(onScreen()) > 10);
     window.Click(window.Part<QPushButton>("selectAll"), {5, 5});
     QVERIFY(!ring->isVisible());
   }
+}
+
+// As everywhere: who clicks into a number and types means the new number.
+void TestAccess::aClickedNumberIsReplaced()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A()}));
+  auto* field = window.Part<QDoubleSpinBox>("translationStep");
+  auto* text = field->findChild<QLineEdit*>();
+  window.Click(text, {3, text->height() / 2}); // at the left of it, where digits would be put before
+  QTest::keyClicks(QApplication::focusWidget(), "8");
+  QTest::keyClick(QApplication::focusWidget(), Qt::Key_Return);
+  QCOMPARE(field->value(), 8.0);
+  window.Click(text, {text->width() - 12, text->height() / 2}); // a second click, beside digits that stay
+  QCOMPARE(field->value(), 8.0);
 }
 
 void TestAccess::everyMenuEntryHasAKey()
