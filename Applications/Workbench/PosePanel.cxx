@@ -132,6 +132,7 @@ PosePanel::PosePanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench
     connect(bench, changed, this, &PosePanel::ShowCentre);
   }
   connect(bench, &Workbench::ScoredChanged, this, &PosePanel::ShowPose);
+  connect(bench, &Workbench::ScoredChanged, this, &PosePanel::ShowCentre);
   connect(bench, &Workbench::HandChanged, this, &PosePanel::ShowHand);
   FitNumbers();
   ShowPose();
@@ -179,8 +180,12 @@ void PosePanel::ShowCentre()
 {
   double centre[3];
   bench_->Session()->GetCentreOfRotation(centre);
-  for (int axis = 0; axis < 3; axis++)
+  for (int axis = 0; axis < 3; axis++) {
     Show(centre_[axis], centre[axis]);
+    centre_[axis]->setEnabled(!bench_->IsScored());
+    if (bench_->IsScored())
+      centre_[axis]->clear(); // it is the middle of the volume
+  }
 }
 
 void PosePanel::ShowHand()

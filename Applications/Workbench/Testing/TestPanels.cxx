@@ -568,6 +568,7 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QCOMPARE(window.Part<QLabel>("score")->text(), QString("hidden until you submit"));
   // Nothing that leads to the solution: neither the numbers, nor what was there before, nor the aligner.
   QCOMPARE(window.Part<QDoubleSpinBox>("middleX")->text(), QString());
+  QCOMPARE(window.Part<QDoubleSpinBox>("centreX")->text(), QString());
   QVERIFY(!window.Part<QDoubleSpinBox>("degreesZ")->isEnabled());
   QVERIFY(!window.Part<QListWidget>("backups")->isEnabled());
   QVERIFY(!window.Part<QPushButton>("scatter")->isEnabled());
