@@ -155,6 +155,10 @@ void MainWindow::MakeMenus()
   connect(projects, &ProjectActions::OpenAsked, this, [this](const QString& project) { files_->Open({project}); });
   projects->AddTo(Menu(Place::File));
   (new ExportActions(bench_->Shared(), this))->AddTo(Menu(Place::File), this);
+  Menu(Place::File)->addSeparator();
+  Menu(Place::File)
+      ->addAction(MakeAction(this, "quit", tr("&Quit"), "Ctrl+Q", tr("Ends the program; asks first when something is not saved"),
+                             [this] { close(); }));
   Menu(Place::Help)
       ->addAction(MakeAction(this, "keys", tr("&Keys and mouse"), "F1", tr("What keys and mouse buttons do"),
                              [this] { ShowKeysPage(this, WorkbenchKeys()); }));

@@ -1131,6 +1131,14 @@ Dateien von %2 sind nicht mehr an ihrem Ort. Wo sind sie jetzt?</translation>
 <context>
     <name>echorama::MainWindow</name>
     <message>
+        <source>&amp;Quit</source>
+        <translation>&amp;Beenden</translation>
+    </message>
+    <message>
+        <source>Ends the program; asks first when something is not saved</source>
+        <translation>Beendet das Programm; fragt vorher, wenn etwas nicht gespeichert ist</translation>
+    </message>
+    <message>
         <source>Copy the text</source>
         <translation>Den Text kopieren</translation>
     </message>
