@@ -40,6 +40,8 @@ void BlockRows::Row(int j, int k, int first, int end, double* const* values) con
   thread_local std::vector<double> line;
   line.resize(static_cast<std::size_t>(to - from + 2));
   for (std::size_t c = 0; c < channels_.size(); ++c) {
+    if (!values[c])
+      continue;
     const double *a = channels_[c].Row(j0, k0), *b = channels_[c].Row(j1, k0);
     const double *d = channels_[c].Row(j0, k1), *e = channels_[c].Row(j1, k1);
     // Of the form v0 + t (v1 - v0), so that a constant stays that constant.

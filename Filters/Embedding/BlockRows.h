@@ -29,7 +29,7 @@ public:
   /// \param channels views of blocks.count; they must outlive this
   BlockRows(const Blocks& blocks, std::vector<VolumeView<const double>> channels);
 
-  /// Channel c of voxel i of row (j, k), for i in [first, end), goes to values[c][i - first].
+  /// Channel c of voxel i of row (j, k), for i in [first, end), goes to values[c][i - first]; nullptr: it is not asked for.
   void Row(int j, int k, int first, int end, double* const* values) const;
 
 private:

@@ -156,14 +156,14 @@ ParameterList Describe(EmbedParameters& p)
 double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
 {
   const double voxels = static_cast<double>(grid.VoxelCount());
-  const auto lattice = [&](double sigmaMm) { // three sums per block, see LocalStatistics
+  const auto lattice = [&](double sigmaMm, double sums) { // see LocalStatistics
     const Blocks blocks(grid.dimensions, grid.spacing, sigmaMm / 1.5);
-    return 24.0 * blocks.count[0] * blocks.count[1] * blocks.count[2];
+    return 8.0 * sums * blocks.count[0] * blocks.count[1] * blocks.count[2];
   };
   // Noise and weights are floats; form, valid region, labels and what shows background a byte each. Of lattices there are a
   // coarse and a fine one at a time, or two coarse ones. Made noise is held along its beams, in some 16 million samples at most.
-  return 12.0 * voxels + lattice(parameters.smoothMm) +
-         std::max(lattice(parameters.smoothMm), lattice(0.5 * parameters.smoothMm)) +
+  return 12.0 * voxels + lattice(parameters.smoothMm, 3.0) +
+         std::max(lattice(parameters.smoothMm, 3.0), lattice(0.5 * parameters.smoothMm, 2.0)) +
          60.0 * std::min(voxels, static_cast<double>(parameters.diffusionVoxels)) + 0.3e9;
 }
 

@@ -82,13 +82,13 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
 
   std::optional<LocalStatistics> own, others;
   if (parameters.keepTexture && parameters.featherMm > 0.0) {
-    own.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3));
-    others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6));
+    own.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3), nullptr, true);
+    others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6), nullptr, true);
   }
   ParallelFor(n[2], progress.Part(own ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
-    std::vector<float> rows(3 * static_cast<std::size_t>(n[0]));
-    float *mean = rows.data(), *otherMean = mean + n[0], *unused = otherMean + n[0];
+    std::vector<float> rows(2 * static_cast<std::size_t>(n[0]));
+    float *mean = rows.data(), *otherMean = mean + n[0];
     for (int j = 0; j < n[1]; ++j) {
       const std::ptrdiff_t row = intensity.SliceStride() * k + intensity.RowStride() * j;
       // 1. labels, and where this row blends
@@ -107,8 +107,8 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
       }
       // 2. the blend
       if (own && first < end) {
-        own->Row(j, k, first, end, mean + first, unused);
-        others->Row(j, k, first, end, otherMean + first, unused);
+        own->Row(j, k, first, end, mean + first, nullptr);
+        others->Row(j, k, first, end, otherMean + first, nullptr);
       }
       for (int i = first; i < end; ++i) {
         const std::ptrdiff_t at = row + i;

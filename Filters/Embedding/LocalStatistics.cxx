@@ -3,28 +3,47 @@
 // Sums of 1, v and v^2 over blocks, a Gaussian over the blocks, and a quotient of linear interpolations. Block, Gaussian and
 // interpolation together have the variance that was asked for: a block of n voxels has (n^2 - 1) / 12, the interpolation n^2 / 6.
 // Values are taken relative to the mean of the whole, so that a large offset costs the variance no digits.
+//
+// A slice of blocks is summed and smoothed along x and y before it is written, so the lattice, which may be as fine as the
+// voxels, is written once, and read and written once more along z. Rows and columns without a voxel that counts are left out.
 #include "LocalStatistics.h"
+#include "BlockWindow.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <cmath>
+#include <numeric>
 
 namespace echorama {
 
 struct LocalStatistics::Lattice {
-  Lattice(const Blocks& where)
-    : blocks(where), weight(where.count), first(where.count), second(where.count),
-      rows(where, {weight.View(), first.View(), second.View()})
+  Lattice(const Blocks& where, std::size_t kept)
+    : blocks(where), size(static_cast<std::ptrdiff_t>(where.count[0]) * where.count[1] * where.count[2]), channels(kept),
+      sums(new double[kept * static_cast<std::size_t>(size)]), rows(where, Views())
   {
   }
   Lattice(const Lattice&) = delete;
   Lattice& operator=(const Lattice&) = delete;
 
+  VolumeView<double> Channel(std::size_t c) const { return {sums.get() + static_cast<std::ptrdiff_t>(c) * size, blocks.count}; }
+
   Blocks blocks;
-  Volume<double> weight, first, second; // sums of 1, v - mean and (v - mean)^2, or (v - trend)^2
+  std::ptrdiff_t size;
+  std::size_t channels;
+  std::unique_ptr<double[]> sums; // of 1, v - mean and, with three channels, (v - mean)^2 or (v - trend)^2
   BlockRows rows;
   bool fromTrend = false;
   double mean = 0.0, variance = 0.0; // of the whole
+
+private:
+  std::vector<VolumeView<const double>> Views() const
+  {
+    std::vector<VolumeView<const double>> views;
+    for (std::size_t c = 0; c < channels; ++c)
+      views.push_back(Channel(c));
+    return views;
+  }
 };
 
 namespace {
@@ -49,38 +68,36 @@ bool IsCounted(T value)
     return true;
 }
 
-// A Gaussian along one axis, over all lines of it. Beyond the ends there is nothing.
-void Smooth(VolumeView<double> values, std::size_t axis, double sigma)
+// A row of sums with room for a window before and after it.
+struct PaddedRow {
+  PaddedRow(int count, int before) : room(before), numbers(static_cast<std::size_t>(count + 2 * before)) {}
+  double* First() { return numbers.data() + room; }
+  int room;
+  std::vector<double> numbers;
+};
+
+ECHORAMA_HOT void Means(const double* __restrict weight, const double* __restrict first, int count, double whole,
+                        float* __restrict mean)
 {
-  const auto& n = values.Dimensions();
-  const int count = n[axis];
-  if (count == 1 || !(sigma > 0.0))
-    return;
-  std::vector<double> kernel(static_cast<std::size_t>(std::ceil(3.0 * sigma)) + 1);
-  for (std::size_t i = 0; i < kernel.size(); ++i)
-    kernel[i] = std::exp(-0.5 * static_cast<double>(i * i) / (sigma * sigma));
-  const std::ptrdiff_t stride = axis == 0 ? 1 : axis == 1 ? values.RowStride() : values.SliceStride();
-  const int across = axis == 0 ? n[1] : n[0], slices = axis == 2 ? n[1] : n[2];
-  const std::ptrdiff_t acrossStride = axis == 0 ? values.RowStride() : 1;
-  const std::ptrdiff_t sliceStride = axis == 2 ? values.RowStride() : values.SliceStride();
-  ParallelFor(slices, [&](std::ptrdiff_t slice) {
-    std::vector<double> line(static_cast<std::size_t>(count));
-    for (int a = 0; a < across; ++a) {
-      double* at = values.Data() + slice * sliceStride + a * acrossStride;
-      for (int i = 0; i < count; ++i)
-        line[static_cast<std::size_t>(i)] = at[i * stride];
-      for (int i = 0; i < count; ++i) {
-        double sum = kernel[0] * line[static_cast<std::size_t>(i)];
-        const int reach = static_cast<int>(kernel.size()) - 1;
-        for (int d = 1; d <= reach; ++d) {
-          const double before = i - d >= 0 ? line[static_cast<std::size_t>(i - d)] : 0.0;
-          const double after = i + d < count ? line[static_cast<std::size_t>(i + d)] : 0.0;
-          sum += kernel[static_cast<std::size_t>(d)] * (before + after);
-        }
-        at[i * stride] = sum;
-      }
-    }
-  });
+  for (int i = 0; i < count; ++i) {
+    const double scale = weight[i] > 0.0 ? 1.0 / weight[i] : 0.0;
+    mean[i] = static_cast<float>(whole + first[i] * scale);
+  }
+}
+
+ECHORAMA_HOT void Deviations(const double* __restrict weight, const double* __restrict first, const double* __restrict second,
+                             int count, double whole, double variance, bool fromTrend, float* __restrict deviation)
+{
+  const double taken = fromTrend ? 0.0 : 1.0;
+  for (int i = 0; i < count; ++i) {
+    const bool reached = weight[i] > 0.0;
+    const double scale = reached ? 1.0 / weight[i] : 0.0;
+    const double m = first[i] * scale, square = second[i] * scale;
+    const double v = reached ? square - taken * (m * m) : variance;
+    // What rounding leaves of the variance of a constant is no deviation.
+    const double root = std::sqrt(v > 0.0 ? v : 0.0);
+    deviation[i] = static_cast<float>(v > 1e-14 * (square + whole * whole) ? root : 0.0);
+  }
 }
 
 } // namespace
@@ -88,15 +105,16 @@ void Smooth(VolumeView<double> values, std::size_t axis, double sigma)
 template <class T>
 LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
                                  const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress,
-                                 const LocalStatistics* trend)
+                                 const LocalStatistics* trend, bool meansAlone)
 {
   if (intensity.Empty() || (!region.Empty() && region.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "local statistics: the region does not have the size of the volume");
   if (!(sigmaMm >= 0.0) || !std::isfinite(sigmaMm))
     throw Error(Error::Kind::InvalidParameter, "sigmaMm must be a number from 0 on");
-  const auto lattice = std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5));
+  const auto lattice = std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5), meansAlone ? 2 : 3);
   lattice->fromTrend = trend != nullptr;
   const Blocks& blocks = lattice->blocks;
+  const auto& count = blocks.count;
   const auto real = [&](std::ptrdiff_t at) { return (region.Empty() || region[at]) && IsCounted(intensity[at]); };
 
   // 1. the whole
@@ -111,49 +129,95 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
   });
   lattice->mean = whole.weight > 0.0 ? whole.first / whole.weight : 0.0;
 
-  // 2. blocks
-  ParallelFor(blocks.count[2], progress.Part(0.2, 0.8), [&](std::ptrdiff_t block) {
-    const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
-    std::vector<float> around(trend ? static_cast<std::size_t>(blocks.voxels[0]) : 0), unused(around.size());
-    for (int k = K * blocks.size[2]; k < kEnd; ++k)
-      for (int j = 0; j < blocks.voxels[1]; ++j) {
-        if (trend)
-          trend->Row(j, k, 0, blocks.voxels[0], around.data(), unused.data());
-        const std::ptrdiff_t row = intensity.SliceStride() * k + intensity.RowStride() * j;
-        const int J = j / blocks.size[1];
-        double *weight = lattice->weight.View().Row(J, K), *first = lattice->first.View().Row(J, K),
-               *second = lattice->second.View().Row(J, K);
-        for (int I = 0, i = 0; I < blocks.count[0]; ++I) {
-          Moments sum;
-          for (const int end = std::min((I + 1) * blocks.size[0], blocks.voxels[0]); i < end; ++i)
-            if (real(row + i)) {
-              const double value = static_cast<double>(intensity[row + i]);
-              const double from = value - (trend ? static_cast<double>(around[static_cast<std::size_t>(i)]) : lattice->mean);
-              sum += {1.0, value - lattice->mean, from * from};
-            }
-          weight[I] += sum.weight;
-          first[I] += sum.first;
-          second[I] += sum.second;
-        }
-      }
-  });
-  const double squares = ParallelSum<double>(lattice->second.View().Size(), 4096, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    double sum = 0.0;
-    for (std::ptrdiff_t at = begin; at < end; ++at)
-      sum += lattice->second.View()[at];
-    return sum;
-  });
-  lattice->variance = whole.weight > 0.0 ? squares / whole.weight : 0.0;
-
-  // 3. the window
+  // 2. blocks, and the window along x and y
+  std::array<std::vector<double>, 3> windows;
+  std::array<int, 3> reach{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double size = blocks.size[axis], voxels = sigmaMm / spacing[static_cast<Eigen::Index>(axis)];
     const double variance = voxels * voxels - (size * size - 1.0) / 12.0 - (size > 1.0 ? size * size / 6.0 : 0.0);
-    const double sigma = variance > 0.0 ? std::sqrt(variance) / size : 0.0;
-    for (Volume<double>* sums : {&lattice->weight, &lattice->first, &lattice->second})
-      Smooth(sums->View(), axis, sigma);
-    progress(0.8 + 0.2 * static_cast<double>(axis + 1) / 3.0);
+    windows[axis] = HalfWindow(variance > 0.0 && count[axis] > 1 ? std::sqrt(variance) / size : 0.0);
+    reach[axis] = static_cast<int>(windows[axis].size()) - 1;
   }
+  const std::size_t channels = lattice->channels;
+  std::vector<SliceExtent> extents(static_cast<std::size_t>(count[2]));
+  std::vector<double> squares(extents.size(), 0.0);
+  ParallelFor(count[2], progress.Part(0.2, 0.8), [&](std::ptrdiff_t block) {
+    const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
+    std::vector<float> around(trend ? static_cast<std::size_t>(blocks.voxels[0]) : 0);
+    std::vector<PaddedRow> raw(3, PaddedRow(count[0], reach[0]));
+    const std::size_t rowSize = static_cast<std::size_t>(count[0]);
+    const std::size_t rows = static_cast<std::size_t>(count[1] + 2 * reach[1]);
+    std::vector<double> smoothed(channels * rows * rowSize); // along x, with room for a window along y
+    const auto row = [&](std::size_t c, int J) {
+      return smoothed.data() + (c * rows + static_cast<std::size_t>(J + reach[1])) * rowSize;
+    };
+    SliceExtent extent;
+    extent.begin = {count[0], count[1]};
+    for (int J = 0; J < count[1]; ++J) {
+      int first = count[0], last = -1;
+      for (int k = K * blocks.size[2]; k < kEnd; ++k)
+        for (int j = J * blocks.size[1]; j < std::min((J + 1) * blocks.size[1], blocks.voxels[1]); ++j) {
+          const std::ptrdiff_t voxels = intensity.SliceStride() * k + intensity.RowStride() * j;
+          int begin = 0, end = blocks.voxels[0];
+          while (begin < end && !real(voxels + begin))
+            ++begin;
+          while (begin < end && !real(voxels + end - 1))
+            --end;
+          if (begin == end)
+            continue;
+          if (last < 0)
+            for (PaddedRow& sums : raw)
+              std::fill(sums.numbers.begin(), sums.numbers.end(), 0.0);
+          if (trend)
+            trend->Row(j, k, begin, end, around.data() + begin, nullptr);
+          first = std::min(first, begin / blocks.size[0]);
+          last = std::max(last, (end - 1) / blocks.size[0]);
+          for (int I = begin / blocks.size[0], i = begin; i < end; ++I) {
+            Moments sum;
+            for (const int next = std::min((I + 1) * blocks.size[0], end); i < next; ++i)
+              if (real(voxels + i)) {
+                const double value = static_cast<double>(intensity[voxels + i]);
+                const double from = value - (trend ? static_cast<double>(around[static_cast<std::size_t>(i)]) : lattice->mean);
+                sum += {1.0, value - lattice->mean, from * from};
+              }
+            raw[0].First()[I] += sum.weight;
+            raw[1].First()[I] += sum.first;
+            raw[2].First()[I] += sum.second;
+          }
+        }
+      if (last < 0)
+        continue;
+      for (int I = first; I <= last; ++I)
+        squares[static_cast<std::size_t>(K)] += raw[2].First()[I];
+      const int from = std::max(0, first - reach[0]), to = std::min(count[0], last + 1 + reach[0]);
+      for (std::size_t c = 0; c < channels; ++c)
+        SumWindow(windows[0], raw[c].First() + from, 1, to - from, row(c, J) + from);
+      extent.begin = {std::min(extent.begin[0], from), std::min(extent.begin[1], J)};
+      extent.end = {std::max(extent.end[0], to), J + 1};
+    }
+    const int from = std::max(0, extent.begin[1] - reach[1]), to = std::min(count[1], extent.end[1] + reach[1]);
+    for (std::size_t c = 0; c < channels; ++c) {
+      const VolumeView<double> sums = lattice->Channel(c);
+      std::fill(sums.Row(0, K), sums.Row(0, K) + sums.SliceStride(), 0.0);
+      if (!extent.Empty())
+        for (int J = from; J < to; ++J)
+          SumWindow(windows[1], row(c, J) + extent.begin[0], count[0], extent.end[0] - extent.begin[0],
+                    sums.Row(J, K) + extent.begin[0]);
+    }
+    if (!extent.Empty()) {
+      extent.begin[1] = from;
+      extent.end[1] = to;
+      extents[static_cast<std::size_t>(K)] = extent;
+    }
+  });
+  const double all = std::accumulate(squares.begin(), squares.end(), 0.0);
+  lattice->variance = whole.weight > 0.0 ? all / whole.weight : 0.0;
+
+  // 3. the window along z
+  ParallelFor(count[1], progress.Part(0.8, 1.0), [&](std::ptrdiff_t J) {
+    for (std::size_t c = 0; c < channels; ++c)
+      SumWindowAlongZ(windows[2], count, extents, static_cast<int>(J), lattice->Channel(c).Data());
+  });
   lattice_ = lattice;
 }
 
@@ -161,26 +225,22 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
 {
   if (first >= end)
     return;
+  if (deviation && lattice_->channels < 3)
+    throw Error(Error::Kind::InvalidParameter, "local statistics: deviations of means alone");
   const std::size_t count = static_cast<std::size_t>(end - first);
   thread_local std::vector<double> sums;
   sums.resize(3 * count);
-  double* const rows[3] = {sums.data(), sums.data() + count, sums.data() + 2 * count};
+  double* const rows[3] = {sums.data(), sums.data() + count, deviation ? sums.data() + 2 * count : nullptr};
   lattice_->rows.Row(j, k, first, end, rows);
-  const double whole = lattice_->mean, variance = lattice_->variance;
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool reached = rows[0][i] > 0.0;
-    const double scale = reached ? 1.0 / rows[0][i] : 0.0;
-    const double m = rows[1][i] * scale, square = rows[2][i] * scale;
-    const double v = !reached ? variance : lattice_->fromTrend ? square : square - m * m;
-    mean[i] = static_cast<float>(whole + m);
-    // What rounding leaves of the variance of a constant is no deviation.
-    deviation[i] = static_cast<float>(v > 1e-14 * (square + whole * whole) ? std::sqrt(v) : 0.0);
-  }
+  Means(rows[0], rows[1], static_cast<int>(count), lattice_->mean, mean);
+  if (deviation)
+    Deviations(rows[0], rows[1], rows[2], static_cast<int>(count), lattice_->mean, lattice_->variance, lattice_->fromTrend,
+               deviation);
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template LocalStatistics::LocalStatistics(VolumeView<const T>, VolumeView<const unsigned char>, const Eigen::Vector3d&,        \
-                                            double, const Progress&, const LocalStatistics*);
+                                            double, const Progress&, const LocalStatistics*, bool);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -17,14 +17,15 @@ public:
   /// \param region where voxels count (not 0); empty: everywhere. Voxels that are not finite never count.
   /// \param sigmaMm standard deviation of the window, mm, >= 0; below a voxel it is the voxel's block alone
   /// \param trend nullptr: deviations are those from the mean of the window; else from the local means of these statistics, of
-  /// the same volume with a smaller window, so that slopes and edges of the scene are no part of them \throws Error(BadInput) for
+  /// the same volume with a smaller window, so that slopes and edges of the scene are no part of them
+  /// \param meansAlone deviations are never asked for: two thirds of the work \throws Error(BadInput) for
   /// views of different shape, Error(InvalidParameter), Error(Cancelled)
   template <class T>
   LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                  double sigmaMm, const Progress& progress = {}, const LocalStatistics* trend = nullptr);
+                  double sigmaMm, const Progress& progress = {}, const LocalStatistics* trend = nullptr, bool meansAlone = false);
 
   /// Of voxels [first, end) of row (j, k). Where no window reaches (3 standard deviations) they are those of the whole volume; of
-  /// an empty region both are 0.
+  /// an empty region both are 0. \param deviation nullptr: means alone
   void Row(int j, int k, int first, int end, float* mean, float* deviation) const;
 
 private:
@@ -38,7 +39,7 @@ template <class T>
 LocalStatistics GrainStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
                                 const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress = {})
 {
-  const LocalStatistics trend(intensity, region, spacing, 0.5 * sigmaMm, progress.Part(0.0, 0.4));
+  const LocalStatistics trend(intensity, region, spacing, 0.5 * sigmaMm, progress.Part(0.0, 0.4), nullptr, true);
   return LocalStatistics(intensity, region, spacing, sigmaMm, progress.Part(0.4, 1.0), &trend);
 }
 

@@ -138,6 +138,20 @@ TEST(LocalStatistics, APartOfARowIsThatPart)
   }
 }
 
+TEST(LocalStatistics, MeansAloneAreTheSameMeans)
+{
+  Volume<float> volume({41, 23, 19});
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
+    volume.View()[at] = static_cast<float>(50.0 + 10.0 * Random(3, static_cast<std::uint64_t>(at)).Normal());
+  const VolumeView<const float> view = volume.View();
+  const LocalStatistics both(view, {}, unit, 2.5), alone(view, {}, unit, 2.5, {}, nullptr, true);
+  std::vector<float> mean(41), deviation(41), meanAlone(41);
+  both.Row(9, 8, 0, 41, mean.data(), deviation.data());
+  alone.Row(9, 8, 0, 41, meanAlone.data(), nullptr);
+  EXPECT_EQ(meanAlone, mean);
+  EXPECT_THROW(alone.Row(9, 8, 0, 41, meanAlone.data(), deviation.data()), Error);
+}
+
 TEST(LocalStatistics, WhatIsOutsideOrNoNumberDoesNotCount)
 {
   Volume<float> volume({20, 20, 20}, 7.0f);
