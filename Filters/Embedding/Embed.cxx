@@ -4,8 +4,9 @@
 // its values are those measured in the data alone at the middle of each block, and both channels share their weights. Only blocks
 // near voxels that show background are worked out. Between blocks values are interpolated.
 //
-// Cost: two passes over the volume for the distance map and the statistics of the data, four over the noise to flatten it, one to
-// give it its new mean and contrast, three for the overlay; the diffusion depends on the blocks alone.
+// Cost: two passes over the volume for the distance map and the statistics of the data, three over the noise to flatten it, one
+// where it shows to flatten it again and one to give it its new mean and contrast, two for the overlay; the diffusion depends on
+// the blocks alone.
 #include "Embed.h"
 #include "BlockRows.h"
 #include "Core/Base/Error.h"
@@ -16,8 +17,10 @@
 #include "ToneMapping.h"
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace echorama {
 
@@ -37,19 +40,30 @@ Blocks BlocksFor(const EmbedParameters& parameters, const std::array<int, 3>& di
   }
 }
 
-// Calls visit(I, J, K, at) for every voxel, slices of blocks in parallel.
-template <class Visit>
-void ForVoxelsByBlock(const Blocks& blocks, const Progress& progress, const Visit& visit)
+// Blocks in which some voxel of each mask is not 0.
+std::vector<Volume<unsigned char>> BlocksWith(const Blocks& blocks, const std::vector<VolumeView<const unsigned char>>& masks,
+                                              const Progress& progress)
 {
+  std::vector<Volume<unsigned char>> some(masks.size(), Volume<unsigned char>(blocks.count));
+  const auto& n = blocks.voxels;
   ParallelFor(blocks.count[2], progress, [&](std::ptrdiff_t block) {
-    const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
-    for (int k = K * blocks.size[2]; k < kEnd; ++k)
-      for (int j = 0; j < blocks.voxels[1]; ++j) {
-        const std::ptrdiff_t row = (static_cast<std::ptrdiff_t>(k) * blocks.voxels[1] + j) * blocks.voxels[0];
-        for (int i = 0; i < blocks.voxels[0]; ++i)
-          visit(i / blocks.size[0], j / blocks.size[1], K, row + i);
+    const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], n[2]);
+    std::vector<unsigned char> row(static_cast<std::size_t>(n[0])); // all rows of a row of blocks
+    for (std::size_t mask = 0; mask < masks.size(); ++mask)
+      for (int J = 0; J < blocks.count[1]; ++J) {
+        std::fill(row.begin(), row.end(), static_cast<unsigned char>(0));
+        for (int k = K * blocks.size[2]; k < kEnd; ++k)
+          for (int j = J * blocks.size[1]; j < std::min((J + 1) * blocks.size[1], n[1]); ++j) {
+            const unsigned char* const at = masks[mask].Row(j, k);
+            std::transform(at, at + n[0], row.begin(), row.begin(), std::bit_or<unsigned char>());
+          }
+        unsigned char* const to = some[mask].View().Row(J, K);
+        for (int i = 0; i < n[0]; ++i)
+          if (row[static_cast<std::size_t>(i)])
+            to[i / blocks.size[0]] = 1;
       }
   });
+  return some;
 }
 
 // What is not 0, and all that touches it.
@@ -77,22 +91,15 @@ struct SpreadStatistics {
 };
 
 SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics& statistics,
-                        VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<const float> weights,
-                        VolumeView<const unsigned char> form, double roundedVariance, const Progress& progress)
+                        VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
+                        VolumeView<const unsigned char> shown, VolumeView<const unsigned char> bare, double roundedVariance,
+                        const Progress& progress)
 {
   SpreadStatistics spread;
   const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
-  Volume<unsigned char> held(blocks.count), shown(blocks.count), border(blocks.count);
-  ForVoxelsByBlock(blocks, progress.Part(0.0, 0.2), [&](int I, int J, int K, std::ptrdiff_t at) {
-    if (region[at])
-      held.View()(I, J, K) = 1;
-    if (form.Empty() || form[at]) {
-      if (weights[at] < 1.0f)
-        shown.View()(I, J, K) = 1;
-      if (!region[at])
-        border.View()(I, J, K) = 1;
-    }
-  });
+  std::vector<Volume<unsigned char>> some = BlocksWith(blocks, {region, shown, bare}, progress.Part(0.0, 0.2));
+  const Volume<unsigned char>&held = some[0], &showing = some[1];
+  Volume<unsigned char>& border = some[2];
   // The surface of the blocks, and whatever block holds both: the walls of holes that are smaller than a block.
   const auto outer = SurfaceOf(held.View());
   for (const auto& at : outer)
@@ -120,7 +127,7 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
     sources.values[s] = std::log(std::max(sources.values[s], least));
   const Eigen::Vector3d step = spacing.cwiseProduct(Eigen::Vector3d(blocks.size[0], blocks.size[1], blocks.size[2]));
   Volume<float> mean(blocks.count), deviation(blocks.count);
-  const Volume<unsigned char> wanted = Grown(shown.View());
+  const Volume<unsigned char> wanted = Grown(showing.View());
   Diffuse(parameters.diffusion, sources, step, held.View(), wanted.View(), {mean.View(), deviation.View()},
           progress.Part(0.2, 1.0));
   spread.mean = Volume<double>(blocks.count);
@@ -160,9 +167,10 @@ double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
     const Blocks blocks(grid.dimensions, grid.spacing, sigmaMm / 1.5);
     return 8.0 * sums * blocks.count[0] * blocks.count[1] * blocks.count[2];
   };
-  // Noise and weights are floats; form, valid region, labels and what shows background a byte each. Of lattices there are a
-  // coarse and a fine one at a time, or two coarse ones. Made noise is held along its beams, in some 16 million samples at most.
-  return 12.0 * voxels + lattice(parameters.smoothMm, 3.0) +
+  // Noise and weights are floats; form, valid region, labels and two masks of what shows background a byte each. Of lattices
+  // there are a coarse and a fine one at a time, or two coarse ones. Made noise is held along its beams, in some 16 million
+  // samples at most.
+  return 13.0 * voxels + lattice(parameters.smoothMm, 3.0) +
          std::max(lattice(parameters.smoothMm, 3.0), lattice(0.5 * parameters.smoothMm, 2.0)) +
          60.0 * std::min(voxels, static_cast<double>(parameters.diffusionVoxels)) + 0.3e9;
 }
@@ -183,34 +191,51 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   Volume<float> weights(n);
   FeatherWeights(parameters, region, form, spacing, weights.View(), progress.Part(0.0, 0.15));
 
+  // where background shows, and where nothing else does
+  Volume<unsigned char> shown(n), bare(n);
+  ParallelRanges(region.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t at = begin; at < end; ++at) {
+      const bool inside = form.Empty() || form[at];
+      shown.View()[at] = inside && weights.View()[at] < 1.0f;
+      bare.View()[at] = inside && !region[at];
+    }
+  });
+
   // 1. what the data are like at their surface, everywhere
   const LocalStatistics statistics =
       GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
   const double rounded = std::is_integral_v<T> ? 1.0 / 12.0 : 0.0; // the variance that rounding adds to data and result alike
-  const SpreadStatistics spread =
-      Spread(parameters, statistics, region, spacing, weights.View(), form, rounded, progress.Part(0.25, 0.5));
+  const SpreadStatistics spread = Spread(parameters, statistics, region, spacing, std::as_const(shown).View(),
+                                         std::as_const(bare).View(), rounded, progress.Part(0.25, 0.5));
 
   // 2. noise of that kind
   const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};
-  ExtractGrain(tone, noise, form, spacing, noise, progress.Part(0.5, 0.75));
+  ExtractGrain(tone, noise, form, spacing, noise, progress.Part(0.5, 0.75), std::as_const(shown).View());
   const BlockRows rows(spread.blocks, {spread.mean.View(), spread.deviation.View()});
   ParallelFor(n[2], progress.Part(0.75, 0.8), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     std::vector<double> values(2 * static_cast<std::size_t>(n[0]));
     double* const local[2] = {values.data(), values.data() + n[0]};
     for (int j = 0; j < n[1]; ++j) {
-      rows.Row(j, k, 0, n[0], local);
-      float* grain = noise.Row(j, k);
-      const float* weight = weights.View().Row(j, k);
-      for (int i = 0; i < n[0]; ++i)
-        grain[i] = weight[i] < 1.0f ? ApplyGrain(parameters.matchContrast, grain[i], static_cast<float>(local[0][i]),
-                                                 static_cast<float>(local[1][i]))
-                                    : std::numeric_limits<float>::quiet_NaN(); // nobody sees it, and it was not worked out
+      const unsigned char* const shows = shown.View().Row(j, k);
+      float* const grain = noise.Row(j, k);
+      int first = 0, last = n[0];
+      while (first < last && !shows[first])
+        ++first;
+      while (first < last && !shows[last - 1])
+        --last;
+      rows.Row(j, k, first, last, local);
+      std::fill(grain, grain + first, std::numeric_limits<float>::quiet_NaN()); // nobody sees it, and it was not worked out
+      std::fill(grain + last, grain + n[0], std::numeric_limits<float>::quiet_NaN());
+      for (int i = first; i < last; ++i)
+        grain[i] = shows[i] ? ApplyGrain(parameters.matchContrast, grain[i], static_cast<float>(local[0][i - first]),
+                                         static_cast<float>(local[1][i - first]))
+                            : std::numeric_limits<float>::quiet_NaN();
     }
   });
 
   // 3. the data over it
-  Feather<T>(parameters, weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0));
+  Feather<T>(parameters, weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0), &statistics);
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \

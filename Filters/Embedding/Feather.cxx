@@ -69,7 +69,7 @@ void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsign
 template <class T>
 void Feather(const FeatherParameters& parameters, VolumeView<const float> weights, VolumeView<const unsigned char> region,
              VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,
-             VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress)
+             VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress, const LocalStatistics* own)
 {
   CheckRanges(parameters);
   const auto& n = intensity.Dimensions();
@@ -80,12 +80,14 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
   if (!backgroundRegion.Empty())
     CheckShape(n, backgroundRegion.Dimensions(), "background's region");
 
-  std::optional<LocalStatistics> own, others;
-  if (parameters.keepTexture && parameters.featherMm > 0.0) {
-    own.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3), nullptr, true);
+  const bool mixes = parameters.keepTexture && parameters.featherMm > 0.0;
+  std::optional<LocalStatistics> measured, others;
+  if (mixes && !own)
+    own = &measured.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3),
+                            nullptr, true);
+  if (mixes)
     others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6), nullptr, true);
-  }
-  ParallelFor(n[2], progress.Part(own ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
+  ParallelFor(n[2], progress.Part(mixes ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     std::vector<float> rows(2 * static_cast<std::size_t>(n[0]));
     float *mean = rows.data(), *otherMean = mean + n[0];
@@ -106,7 +108,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
         labels[at] = static_cast<unsigned char>(label);
       }
       // 2. the blend
-      if (own && first < end) {
+      if (mixes && first < end) {
         own->Row(j, k, first, end, mean + first, nullptr);
         others->Row(j, k, first, end, otherMean + first, nullptr);
       }
@@ -117,7 +119,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
         const double w = static_cast<double>(weights[at]), a = static_cast<double>(intensity[at]),
                      b = static_cast<double>(background[at]);
         double value = b + w * (a - b);
-        if (own) {
+        if (mixes) {
           const double base =
               static_cast<double>(otherMean[i]) + w * (static_cast<double>(mean[i]) - static_cast<double>(otherMean[i]));
           value = base + (value - base) / std::sqrt(w * w + (1.0 - w) * (1.0 - w));
@@ -131,7 +133,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
 #define EchoramaInstantiate(T)                                                                                                   \
   template void Feather(const FeatherParameters&, VolumeView<const float>, VolumeView<const unsigned char>,                      \
                         VolumeView<const float>, VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<T>,         \
-                        VolumeView<unsigned char>, const Progress&);
+                        VolumeView<unsigned char>, const Progress&, const LocalStatistics*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

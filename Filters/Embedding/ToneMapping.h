@@ -19,11 +19,12 @@ ParameterList Describe(ToneMappingParameters& p);
 /// deviation 1 around every voxel. Else it is I / B, of mean 1 (dissertation 6.5). Both are measured once more on the result and
 /// corrected, because the mean of a quotient is not the quotient of means: left alone, that is a step in brightness at the seam.
 /// Where there is nothing to divide by (B or S below a thousandth of that of the whole) there is no grain: 0, or 1. Outside of
-/// the region it is that too. \param region where voxels count (not 0); empty: everywhere \throws Error(BadInput) for views of
-/// different shape, Error(InvalidParameter), Error(Cancelled)
+/// the region it is that too. \param region where voxels count (not 0); empty: everywhere
+/// \param wanted the part of the region whose grain is asked for (not 0), elsewhere it is that of the first round; empty: all
+/// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
 void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const float> intensity,
                   VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> grain,
-                  const Progress& progress = {});
+                  const Progress& progress = {}, VolumeView<const unsigned char> wanted = {});
 
 /// The reverse, for one voxel: grain on a local mean, and with matchDeviation of a local deviation (dissertation 6.6).
 inline float ApplyGrain(bool matchDeviation, float grain, float mean, float deviation)

@@ -3,6 +3,7 @@
 #include "Core/Base/Random.h"
 #include "Filters/Embedding/Feather.h"
 #include "Filters/Embedding/LocalStatistics.h"
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
@@ -124,6 +125,25 @@ TEST(Feather, ConstantsMeetInARampAndStayConstant)
   EXPECT_EQ(result.View()(19, 3, 3), 40);
   EXPECT_EQ(result.View()(29, 3, 3), 60);
   EXPECT_EQ(result.View()(39, 3, 3), 80);
+}
+
+TEST(Feather, LocalMeansThatAreKnownAreTakenAndNotMeasured)
+{
+  Scene scene;
+  const FeatherParameters parameters{4.0, true, 3.0};
+  const Volume<unsigned char> measured = scene.Run(parameters);
+  const auto with = [&](VolumeView<const unsigned char> seen) {
+    Volume<unsigned char> result = scene.data;
+    const LocalStatistics own(seen, scene.region.View(), spacing, 3.0);
+    Feather<unsigned char>(parameters, scene.weights.View(), scene.region.View(), scene.background.View(), scene.form.View(),
+                           spacing, result.View(), scene.labels.View(), {}, &own);
+    return result;
+  };
+  const auto same = [&](const Volume<unsigned char>& result) {
+    return std::equal(result.View().begin(), result.View().end(), measured.View().begin());
+  };
+  EXPECT_TRUE(same(with(scene.data.View())));
+  EXPECT_FALSE(same(with(Volume<unsigned char>(size, 20).View())));
 }
 
 // The closed form, voxel by voxel, with local means that are measured over whole rows. Labels of an earlier run say nothing.

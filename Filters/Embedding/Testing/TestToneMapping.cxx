@@ -57,6 +57,31 @@ TEST(ToneMapping, AQuotientHasMeanOneEverywhere)
   }
 }
 
+// Rows with nothing, a part and all of it wanted.
+TEST(ToneMapping, WhatIsWantedIsTheSameAsWithoutAsking)
+{
+  const Volume<float> volume = Noise();
+  Volume<unsigned char> region(volume.Dimensions()), wanted(volume.Dimensions());
+  for (int k = 0; k < 48; ++k)
+    for (int j = 2; j < 60; ++j)
+      for (int i = 5; i < 70; ++i) {
+        region.View()(i, j, k) = i + j > 20;
+        wanted.View()(i, j, k) = i + j > 20 && k > 10 && (k > 40 || (i > 20 && i < 60 && i % 3 != 0));
+      }
+  for (const bool matchDeviation : {true, false}) {
+    Volume<float> all(volume.Dimensions()), some(volume.Dimensions());
+    ExtractGrain({3.0, matchDeviation}, volume.View(), region.View(), spacing, all.View());
+    ExtractGrain({3.0, matchDeviation}, volume.View(), region.View(), spacing, some.View(), {}, wanted.View());
+    for (std::ptrdiff_t at = 0; at < all.View().Size(); ++at)
+      if (wanted.View()[at]) {
+        ASSERT_EQ(some.View()[at], all.View()[at]);
+      }
+  }
+  Volume<float> grain(volume.Dimensions());
+  const Volume<unsigned char> other({3, 3, 3});
+  EXPECT_THROW(ExtractGrain({3.0, true}, volume.View(), {}, spacing, grain.View(), {}, other.View()), Error);
+}
+
 TEST(ToneMapping, ThereAndBackIsTheLevelThatIsGiven)
 {
   EXPECT_EQ(ApplyGrain(true, 1.5f, 40.0f, 10.0f), 55.0f);
