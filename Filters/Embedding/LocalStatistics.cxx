@@ -12,32 +12,35 @@
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
+#include "Filters/Stitching/ZeroedMemory.h"
 #include <cmath>
+#include <cstdint>
 #include <numeric>
+#include <type_traits>
 
 namespace echorama {
 
 struct LocalStatistics::Lattice {
   Lattice(const Blocks& where, std::size_t kept)
     : blocks(where), size(static_cast<std::ptrdiff_t>(where.count[0]) * where.count[1] * where.count[2]), channels(kept),
-      sums(new double[kept * static_cast<std::size_t>(size)]), rows(where, Views())
+      sums(kept * static_cast<std::size_t>(size)), rows(where, Views())
   {
   }
   Lattice(const Lattice&) = delete;
   Lattice& operator=(const Lattice&) = delete;
 
-  VolumeView<double> Channel(std::size_t c) const { return {sums.get() + static_cast<std::ptrdiff_t>(c) * size, blocks.count}; }
+  VolumeView<double> Channel(std::size_t c) { return {sums.data() + static_cast<std::ptrdiff_t>(c) * size, blocks.count}; }
 
   Blocks blocks;
   std::ptrdiff_t size;
   std::size_t channels;
-  std::unique_ptr<double[]> sums; // of 1, v - mean and, with three channels, (v - mean)^2 or (v - trend)^2
+  Zeroed<double> sums; // of 1, v - mean and, with three channels, (v - mean)^2 or (v - trend)^2
   BlockRows rows;
   bool fromTrend = false;
   double mean = 0.0, variance = 0.0; // of the whole
 
 private:
-  std::vector<VolumeView<const double>> Views() const
+  std::vector<VolumeView<const double>> Views()
   {
     std::vector<VolumeView<const double>> views;
     for (std::size_t c = 0; c < channels; ++c)
@@ -118,14 +121,16 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
   const auto real = [&](std::ptrdiff_t at) { return (region.Empty() || region[at]) && IsCounted(intensity[at]); };
 
   // 1. the whole
+  // Whole numbers are summed as such, which vector instructions do; of bytes and shorts no sum is rounded, so it is the same.
+  using Sum = std::conditional_t<std::is_integral_v<T>, std::int64_t, double>;
   const auto whole = ParallelSum<Moments>(intensity.Size(), 1 << 16, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    Moments sum;
-    for (std::ptrdiff_t at = begin; at < end; ++at)
-      if (real(at)) {
-        sum.weight += 1.0;
-        sum.first += static_cast<double>(intensity[at]);
-      }
-    return sum;
+    Sum weight = 0, first = 0;
+    for (std::ptrdiff_t at = begin; at < end; ++at) {
+      const bool counts = real(at);
+      weight += counts ? Sum(1) : Sum(0);
+      first += counts ? static_cast<Sum>(intensity[at]) : Sum(0);
+    }
+    return Moments{static_cast<double>(weight), static_cast<double>(first), 0.0};
   });
   lattice->mean = whole.weight > 0.0 ? whole.first / whole.weight : 0.0;
 
@@ -144,6 +149,8 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
   ParallelFor(count[2], progress.Part(0.2, 0.8), [&](std::ptrdiff_t block) {
     const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
     std::vector<float> around(trend ? static_cast<std::size_t>(blocks.voxels[0]) : 0);
+    std::vector<double> ofVoxels(3 * static_cast<std::size_t>(blocks.voxels[0]));
+    double* const own[3] = {ofVoxels.data(), ofVoxels.data() + blocks.voxels[0], ofVoxels.data() + 2 * blocks.voxels[0]};
     std::vector<PaddedRow> raw(3, PaddedRow(count[0], reach[0]));
     const std::size_t rowSize = static_cast<std::size_t>(count[0]);
     const std::size_t rows = static_cast<std::size_t>(count[1] + 2 * reach[1]);
@@ -172,17 +179,22 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
             trend->Row(j, k, begin, end, around.data() + begin, nullptr);
           first = std::min(first, begin / blocks.size[0]);
           last = std::max(last, (end - 1) / blocks.size[0]);
-          for (int I = begin / blocks.size[0], i = begin; i < end; ++I) {
-            Moments sum;
-            for (const int next = std::min((I + 1) * blocks.size[0], end); i < next; ++i)
-              if (real(voxels + i)) {
-                const double value = static_cast<double>(intensity[voxels + i]);
-                const double from = value - (trend ? static_cast<double>(around[static_cast<std::size_t>(i)]) : lattice->mean);
-                sum += {1.0, value - lattice->mean, from * from};
-              }
-            raw[0].First()[I] += sum.weight;
-            raw[1].First()[I] += sum.first;
-            raw[2].First()[I] += sum.second;
+          for (int i = begin; i < end; ++i) {
+            const bool counts = real(voxels + i);
+            const double value = static_cast<double>(intensity[voxels + i]);
+            const double from = value - (trend ? static_cast<double>(around[static_cast<std::size_t>(i)]) : lattice->mean);
+            own[0][i] = counts ? 1.0 : 0.0;
+            own[1][i] = counts ? value - lattice->mean : 0.0;
+            own[2][i] = counts ? from * from : 0.0;
+          }
+          for (std::size_t c = 0; c < 3; ++c) {
+            double* const to = raw[c].First();
+            for (int I = begin / blocks.size[0], i = begin; i < end; ++I) {
+              double sum = 0.0;
+              for (const int next = std::min((I + 1) * blocks.size[0], end); i < next; ++i)
+                sum += own[c][i];
+              to[I] += sum;
+            }
           }
         }
       if (last < 0)
@@ -198,7 +210,6 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
     const int from = std::max(0, extent.begin[1] - reach[1]), to = std::min(count[1], extent.end[1] + reach[1]);
     for (std::size_t c = 0; c < channels; ++c) {
       const VolumeView<double> sums = lattice->Channel(c);
-      std::fill(sums.Row(0, K), sums.Row(0, K) + sums.SliceStride(), 0.0);
       if (!extent.Empty())
         for (int J = from; J < to; ++J)
           SumWindow(windows[1], row(c, J) + extent.begin[0], count[0], extent.end[0] - extent.begin[0],
