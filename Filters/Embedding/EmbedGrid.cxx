@@ -89,6 +89,13 @@ void CopyToGrid(const EmbedGrid& grid, const std::array<int, 3>& size, std::size
         continue;
       const char* source = static_cast<const char*>(data) +
                            bytes * static_cast<std::size_t>((static_cast<std::ptrdiff_t>(k) * size[1] + j) * size[0]);
+      if (grid.factor == 1) { // a row as it is
+        const int first = std::max(0, -grid.DataIndex(0, 0)), i = grid.DataIndex(first, 0);
+        if (const int count = std::min(n[0] - first, size[0] - i); count > 0)
+          std::copy_n(source + bytes * static_cast<std::size_t>(i), bytes * static_cast<std::size_t>(count),
+                      row + bytes * static_cast<std::size_t>(first));
+        continue;
+      }
       for (int I = 0; I < n[0]; ++I) {
         const int i = grid.DataIndex(I, 0);
         if (i >= 0 && i < size[0])
