@@ -17,6 +17,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
+#include "Filters/Stitching/ZeroedMemory.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -276,7 +277,7 @@ void Check(const BeamNoiseParameters& p, const ProbeGeometry& geometry)
 // The real and the imaginary part of a row or of many.
 struct Field {
   explicit Field(std::size_t count) : real(count), imaginary(count) {}
-  std::vector<float> real, imaginary;
+  Zeroed<float> real, imaginary;
 };
 
 // Filters across rows that lie \a stride apart, the first of the taps at \a first.
