@@ -16,15 +16,22 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 #include <type_traits>
+#include <utility>
 
 namespace echorama {
 
 struct LocalStatistics::Lattice {
-  Lattice(const Blocks& where, std::size_t kept)
+  Lattice(const Blocks& where, std::size_t kept, Zeroed<double>&& memory)
     : blocks(where), size(static_cast<std::ptrdiff_t>(where.count[0]) * where.count[1] * where.count[2]), channels(kept),
-      sums(kept * static_cast<std::size_t>(size)), rows(where, Views())
+      sums(std::move(memory)), zero(sums.size() < kept * static_cast<std::size_t>(size))
   {
+    if (zero) {
+      sums = Zeroed<double>(); // before there is another
+      sums = Zeroed<double>(kept * static_cast<std::size_t>(size));
+    }
+    rows.emplace(where, Views());
   }
   Lattice(const Lattice&) = delete;
   Lattice& operator=(const Lattice&) = delete;
@@ -35,7 +42,8 @@ struct LocalStatistics::Lattice {
   std::ptrdiff_t size;
   std::size_t channels;
   Zeroed<double> sums; // of 1, v - mean and, with three channels, (v - mean)^2 or (v - trend)^2
-  BlockRows rows;
+  bool zero;           // as they begin, and not what was left there
+  std::optional<BlockRows> rows;
   bool fromTrend = false;
   double mean = 0.0, variance = 0.0; // of the whole
 
@@ -108,13 +116,19 @@ ECHORAMA_HOT void Deviations(const double* __restrict weight, const double* __re
 template <class T>
 LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
                                  const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress,
-                                 const LocalStatistics* trend, bool meansAlone)
+                                 const LocalStatistics* trend, bool meansAlone, LocalStatistics* spent)
 {
   if (intensity.Empty() || (!region.Empty() && region.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "local statistics: the region does not have the size of the volume");
   if (!(sigmaMm >= 0.0) || !std::isfinite(sigmaMm))
     throw Error(Error::Kind::InvalidParameter, "sigmaMm must be a number from 0 on");
-  const auto lattice = std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5), meansAlone ? 2 : 3);
+  Zeroed<double> memory;
+  if (spent && spent->lattice_ && spent->lattice_.use_count() == 1)
+    memory.swap(spent->lattice_->sums);
+  if (spent)
+    spent->lattice_.reset();
+  const auto lattice =
+      std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5), meansAlone ? 2 : 3, std::move(memory));
   lattice->fromTrend = trend != nullptr;
   const Blocks& blocks = lattice->blocks;
   const auto& count = blocks.count;
@@ -154,10 +168,19 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
     std::vector<PaddedRow> raw(3, PaddedRow(count[0], reach[0]));
     const std::size_t rowSize = static_cast<std::size_t>(count[0]);
     const std::size_t rows = static_cast<std::size_t>(count[1] + 2 * reach[1]);
-    std::vector<double> smoothed(channels * rows * rowSize); // along x, with room for a window along y
+    thread_local std::vector<double> smoothed; // along x, with room for a window along y
+    smoothed.resize(channels * rows * rowSize);
     const auto row = [&](std::size_t c, int J) {
       return smoothed.data() + (c * rows + static_cast<std::size_t>(J + reach[1])) * rowSize;
     };
+    const auto clear = [&](int J, int begin, int end) {
+      for (std::size_t c = 0; c < channels; ++c)
+        std::fill(row(c, J) + begin, row(c, J) + end, 0.0);
+    };
+    for (int J = 1; J <= reach[1]; ++J) {
+      clear(-J, 0, count[0]);
+      clear(count[1] - 1 + J, 0, count[0]);
+    }
     SliceExtent extent;
     extent.begin = {count[0], count[1]};
     for (int J = 0; J < count[1]; ++J) {
@@ -189,6 +212,11 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
           }
           for (std::size_t c = 0; c < 3; ++c) {
             double* const to = raw[c].First();
+            if (blocks.size[0] == 1) {
+              for (int i = begin; i < end; ++i)
+                to[i] += own[c][i];
+              continue;
+            }
             for (int I = begin / blocks.size[0], i = begin; i < end; ++I) {
               double sum = 0.0;
               for (const int next = std::min((I + 1) * blocks.size[0], end); i < next; ++i)
@@ -197,11 +225,15 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
             }
           }
         }
-      if (last < 0)
+      if (last < 0) {
+        clear(J, 0, count[0]);
         continue;
+      }
       for (int I = first; I <= last; ++I)
         squares[static_cast<std::size_t>(K)] += raw[2].First()[I];
       const int from = std::max(0, first - reach[0]), to = std::min(count[0], last + 1 + reach[0]);
+      clear(J, 0, from);
+      clear(J, to, count[0]);
       for (std::size_t c = 0; c < channels; ++c)
         SumWindow(windows[0], raw[c].First() + from, 1, to - from, row(c, J) + from);
       extent.begin = {std::min(extent.begin[0], from), std::min(extent.begin[1], J)};
@@ -210,6 +242,8 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
     const int from = std::max(0, extent.begin[1] - reach[1]), to = std::min(count[1], extent.end[1] + reach[1]);
     for (std::size_t c = 0; c < channels; ++c) {
       const VolumeView<double> sums = lattice->Channel(c);
+      if (!lattice->zero)
+        std::fill(sums.Row(0, K), sums.Row(0, K) + sums.SliceStride(), 0.0);
       if (!extent.Empty())
         for (int J = from; J < to; ++J)
           SumWindow(windows[1], row(c, J) + extent.begin[0], count[0], extent.end[0] - extent.begin[0],
@@ -242,7 +276,7 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
   thread_local std::vector<double> sums;
   sums.resize(3 * count);
   double* const rows[3] = {sums.data(), sums.data() + count, deviation ? sums.data() + 2 * count : nullptr};
-  lattice_->rows.Row(j, k, first, end, rows);
+  lattice_->rows->Row(j, k, first, end, rows);
   Means(rows[0], rows[1], static_cast<int>(count), lattice_->mean, mean);
   if (deviation)
     Deviations(rows[0], rows[1], rows[2], static_cast<int>(count), lattice_->mean, lattice_->variance, lattice_->fromTrend,
@@ -251,7 +285,7 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template LocalStatistics::LocalStatistics(VolumeView<const T>, VolumeView<const unsigned char>, const Eigen::Vector3d&,        \
-                                            double, const Progress&, const LocalStatistics*, bool);
+                                            double, const Progress&, const LocalStatistics*, bool, LocalStatistics*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -18,11 +18,14 @@ public:
   /// \param sigmaMm standard deviation of the window, mm, >= 0; below a voxel it is the voxel's block alone
   /// \param trend nullptr: deviations are those from the mean of the window; else from the local means of these statistics, of
   /// the same volume with a smaller window, so that slopes and edges of the scene are no part of them
-  /// \param meansAlone deviations are never asked for: two thirds of the work \throws Error(BadInput) for
-  /// views of different shape, Error(InvalidParameter), Error(Cancelled)
+  /// \param meansAlone deviations are never asked for: two thirds of the work
+  /// \param spent statistics that nobody reads any more: their memory is used again where it is enough. The system takes as long
+  /// to bring in as much memory as a lattice as fine as the voxels takes to be worked out \throws Error(BadInput) for views of
+  /// different shape, Error(InvalidParameter), Error(Cancelled)
   template <class T>
   LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                  double sigmaMm, const Progress& progress = {}, const LocalStatistics* trend = nullptr, bool meansAlone = false);
+                  double sigmaMm, const Progress& progress = {}, const LocalStatistics* trend = nullptr, bool meansAlone = false,
+                  LocalStatistics* spent = nullptr);
 
   /// Of voxels [first, end) of row (j, k). Where no window reaches (3 standard deviations) they are those of the whole volume; of
   /// an empty region both are 0. \param deviation nullptr: means alone
@@ -30,7 +33,7 @@ public:
 
 private:
   struct Lattice;
-  std::shared_ptr<const Lattice> lattice_;
+  std::shared_ptr<Lattice> lattice_;
 };
 
 /// The local mean of data, and the local deviation of their grain: of what a window of half the standard deviation does not

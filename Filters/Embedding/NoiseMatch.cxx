@@ -21,6 +21,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 
 namespace echorama {
@@ -111,10 +112,11 @@ public:
   float Greatest() const { return greatest_; }
   VolumeView<const float> View() const { return scores_.View(); }
 
-  /// \param window standard deviations in samples
-  void Standardise(const Eigen::Vector3d& window, const Progress& progress)
+  /// \param window standard deviations in samples \param local those of the last time, and then of this one
+  void Standardise(const Eigen::Vector3d& window, std::optional<LocalStatistics>& local, const Progress& progress)
   {
-    const LocalStatistics local(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4));
+    local = LocalStatistics(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4), nullptr, false,
+                            local ? &*local : nullptr);
     const auto& n = beams_.Dimensions();
     const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(n[1]) * n[2];
     const VolumeView<float> scores = scores_.View();
@@ -128,7 +130,7 @@ public:
       }
     };
     const auto forRow = [&](std::ptrdiff_t row, std::vector<float>& mean, std::vector<float>& deviation) {
-      local.Row(static_cast<int>(row % n[1]), static_cast<int>(row / n[1]), 0, n[0], mean.data(), deviation.data());
+      local->Row(static_cast<int>(row % n[1]), static_cast<int>(row / n[1]), 0, n[0], mean.data(), deviation.data());
       return row * n[0];
     };
     const Squares squares = ParallelSum<Squares>(rows, 64, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -380,10 +382,11 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
 
   Scores scores(beams, valid);
   Eigen::Vector3d window = 0.5 * widest;
-  const auto standardise = [&window, &n](Scores& some, const Progress& part) {
+  std::optional<LocalStatistics> local;
+  const auto standardise = [&window, &local, &n](Scores& some, const Progress& part) {
     for (int axis = 0; axis < 3; ++axis)
       window[axis] = std::min(std::max(window[axis], 2.0), static_cast<double>(n[static_cast<std::size_t>(axis)]));
-    some.Standardise(window, part);
+    some.Standardise(window, local, part);
     if (some.Used() < leastSamples)
       FailForWantOfTexture("only " + std::to_string(some.Used()) + " samples of the fan are real and not flat");
   };
