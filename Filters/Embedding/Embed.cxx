@@ -167,11 +167,14 @@ double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
     const Blocks blocks(grid.dimensions, grid.spacing, sigmaMm / 1.5);
     return 8.0 * sums * blocks.count[0] * blocks.count[1] * blocks.count[2];
   };
+  // Of the fine lattice no more than 90 slices of blocks are there at a time.
+  const Blocks fine(grid.dimensions, grid.spacing, 0.5 * parameters.smoothMm / 1.5);
+  const double part = std::min(1.0, 90.0 / fine.count[2]);
   // Noise and weights are floats; form, valid region, labels and two masks of what shows background a byte each. Of lattices
-  // there are a coarse and a fine one at a time, or two coarse ones. Made noise is held along its beams, in some 16 million
-  // samples at most.
+  // there are a coarse and a part of a fine one at a time, or two coarse ones. Made noise is held along its beams, in some 16
+  // million samples at most.
   return 13.0 * voxels + lattice(parameters.smoothMm, 3.0) +
-         std::max(lattice(parameters.smoothMm, 3.0), lattice(0.5 * parameters.smoothMm, 2.0)) +
+         std::max(lattice(parameters.smoothMm, 3.0), part * lattice(0.5 * parameters.smoothMm, 2.0)) +
          60.0 * std::min(voxels, static_cast<double>(parameters.diffusionVoxels)) + 0.3e9;
 }
 

@@ -83,10 +83,10 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
   const bool mixes = parameters.keepTexture && parameters.featherMm > 0.0;
   std::optional<LocalStatistics> measured, others;
   if (mixes && !own)
-    own = &measured.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3),
-                            nullptr, true);
+    own = &measured.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3), 0.0,
+                            true);
   if (mixes)
-    others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6), nullptr, true);
+    others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6), 0.0, true);
   ParallelFor(n[2], progress.Part(mixes ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     std::vector<float> rows(2 * static_cast<std::size_t>(n[0]));

@@ -79,6 +79,23 @@ bool IsCounted(T value)
     return true;
 }
 
+// The window along one axis, over blocks.
+std::vector<double> WindowAlong(std::size_t axis, const Blocks& blocks, const Eigen::Vector3d& spacing, double sigmaMm)
+{
+  const double size = blocks.size[axis], voxels = sigmaMm / spacing[static_cast<Eigen::Index>(axis)];
+  const double variance = voxels * voxels - (size * size - 1.0) / 12.0 - (size > 1.0 ? size * size / 6.0 : 0.0);
+  return HalfWindow(variance > 0.0 && blocks.count[axis] > 1 ? std::sqrt(variance) / size : 0.0);
+}
+
+// Slices [first, end) of a volume.
+template <class T>
+VolumeView<const T> SlicesOf(VolumeView<const T> volume, int first, int end)
+{
+  if (volume.Empty())
+    return volume;
+  return {volume.Row(0, first), {volume.Dimensions()[0], volume.Dimensions()[1], end - first}};
+}
+
 // A row of sums with room for a window before and after it.
 struct PaddedRow {
   PaddedRow(int count, int before) : room(before), numbers(static_cast<std::size_t>(count + 2 * before)) {}
@@ -115,13 +132,13 @@ ECHORAMA_HOT void Deviations(const double* __restrict weight, const double* __re
 
 template <class T>
 LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
-                                 const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress,
-                                 const LocalStatistics* trend, bool meansAlone, LocalStatistics* spent)
+                                 const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress, double trendMm,
+                                 bool meansAlone, LocalStatistics* spent, const double* mean)
 {
   if (intensity.Empty() || (!region.Empty() && region.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "local statistics: the region does not have the size of the volume");
-  if (!(sigmaMm >= 0.0) || !std::isfinite(sigmaMm))
-    throw Error(Error::Kind::InvalidParameter, "sigmaMm must be a number from 0 on");
+  if (!(sigmaMm >= 0.0) || !std::isfinite(sigmaMm) || !(trendMm >= 0.0) || !std::isfinite(trendMm))
+    throw Error(Error::Kind::InvalidParameter, "sigmaMm and trendMm must be numbers from 0 on");
   Zeroed<double> memory;
   if (spent && spent->lattice_ && spent->lattice_.use_count() == 1)
     memory.swap(spent->lattice_->sums);
@@ -129,7 +146,7 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
     spent->lattice_.reset();
   const auto lattice =
       std::make_shared<Lattice>(Blocks(intensity.Dimensions(), spacing, sigmaMm / 1.5), meansAlone ? 2 : 3, std::move(memory));
-  lattice->fromTrend = trend != nullptr;
+  lattice->fromTrend = trendMm > 0.0;
   const Blocks& blocks = lattice->blocks;
   const auto& count = blocks.count;
   const auto real = [&](std::ptrdiff_t at) { return (region.Empty() || region[at]) && IsCounted(intensity[at]); };
@@ -137,31 +154,32 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
   // 1. the whole
   // Whole numbers are summed as such, which vector instructions do; of bytes and shorts no sum is rounded, so it is the same.
   using Sum = std::conditional_t<std::is_integral_v<T>, std::int64_t, double>;
-  const auto whole = ParallelSum<Moments>(intensity.Size(), 1 << 16, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    Sum weight = 0, first = 0;
-    for (std::ptrdiff_t at = begin; at < end; ++at) {
-      const bool counts = real(at);
-      weight += counts ? Sum(1) : Sum(0);
-      first += counts ? static_cast<Sum>(intensity[at]) : Sum(0);
-    }
-    return Moments{static_cast<double>(weight), static_cast<double>(first), 0.0};
-  });
-  lattice->mean = whole.weight > 0.0 ? whole.first / whole.weight : 0.0;
+  const Moments whole =
+      mean ? Moments{} : ParallelSum<Moments>(intensity.Size(), 1 << 16, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+        Sum weight = 0, first = 0;
+        for (std::ptrdiff_t at = begin; at < end; ++at) {
+          const bool counts = real(at);
+          weight += counts ? Sum(1) : Sum(0);
+          first += counts ? static_cast<Sum>(intensity[at]) : Sum(0);
+        }
+        return Moments{static_cast<double>(weight), static_cast<double>(first), 0.0};
+      });
+  lattice->mean = mean ? *mean : whole.weight > 0.0 ? whole.first / whole.weight : 0.0;
 
   // 2. blocks, and the window along x and y
   std::array<std::vector<double>, 3> windows;
   std::array<int, 3> reach{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double size = blocks.size[axis], voxels = sigmaMm / spacing[static_cast<Eigen::Index>(axis)];
-    const double variance = voxels * voxels - (size * size - 1.0) / 12.0 - (size > 1.0 ? size * size / 6.0 : 0.0);
-    windows[axis] = HalfWindow(variance > 0.0 && count[axis] > 1 ? std::sqrt(variance) / size : 0.0);
+    windows[axis] = WindowAlong(axis, blocks, spacing, sigmaMm);
     reach[axis] = static_cast<int>(windows[axis].size()) - 1;
   }
   const std::size_t channels = lattice->channels;
   std::vector<SliceExtent> extents(static_cast<std::size_t>(count[2]));
   std::vector<double> squares(extents.size(), 0.0);
-  ParallelFor(count[2], progress.Part(0.2, 0.8), [&](std::ptrdiff_t block) {
-    const int K = static_cast<int>(block), kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
+  std::optional<LocalStatistics> trend;
+  int trendFirst = 0; // the slice that it begins with
+  const auto sumSlice = [&](int K) {
+    const int kEnd = std::min((K + 1) * blocks.size[2], blocks.voxels[2]);
     std::vector<float> around(trend ? static_cast<std::size_t>(blocks.voxels[0]) : 0);
     std::vector<double> ofVoxels(3 * static_cast<std::size_t>(blocks.voxels[0]));
     double* const own[3] = {ofVoxels.data(), ofVoxels.data() + blocks.voxels[0], ofVoxels.data() + 2 * blocks.voxels[0]};
@@ -199,7 +217,7 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
             for (PaddedRow& sums : raw)
               std::fill(sums.numbers.begin(), sums.numbers.end(), 0.0);
           if (trend)
-            trend->Row(j, k, begin, end, around.data() + begin, nullptr);
+            trend->Row(j, k - trendFirst, begin, end, around.data() + begin, nullptr);
           first = std::min(first, begin / blocks.size[0]);
           last = std::max(last, (end - 1) / blocks.size[0]);
           for (int i = begin; i < end; ++i) {
@@ -254,9 +272,26 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
       extent.end[1] = to;
       extents[static_cast<std::size_t>(K)] = extent;
     }
-  });
+  };
+  // The trend may be as fine as the voxels: it is worked out for some slices at a time, with as many beyond as they depend on.
+  const Blocks fine(blocks.voxels, spacing, trendMm / 1.5);
+  const int beyond = (static_cast<int>(WindowAlong(2, fine, spacing, trendMm).size()) + 1) * fine.size[2];
+  const int together = trendMm > 0.0 ? std::max(1, 8 * beyond / blocks.size[2]) : count[2];
+  for (int first = 0; first < count[2]; first += together) {
+    const int end = std::min(first + together, count[2]);
+    const Progress part = progress.Part(0.2 + 0.6 * first / count[2], 0.2 + 0.6 * end / count[2]);
+    if (trendMm > 0.0) {
+      trendFirst = std::max(0, first * blocks.size[2] - beyond) / fine.size[2] * fine.size[2];
+      const int after = end * blocks.size[2] + beyond;
+      const int trendEnd = std::min((after + fine.size[2] - 1) / fine.size[2] * fine.size[2], blocks.voxels[2]);
+      trend = LocalStatistics(SlicesOf(intensity, trendFirst, trendEnd), SlicesOf(region, trendFirst, trendEnd), spacing, trendMm,
+                              part.Part(0.0, 0.5), 0.0, true, trend ? &*trend : nullptr, &lattice->mean);
+    }
+    ParallelFor(end - first, part.Part(trendMm > 0.0 ? 0.5 : 0.0, 1.0),
+                [&](std::ptrdiff_t block) { sumSlice(first + static_cast<int>(block)); });
+  }
   const double all = std::accumulate(squares.begin(), squares.end(), 0.0);
-  lattice->variance = whole.weight > 0.0 ? all / whole.weight : 0.0;
+  lattice->variance = whole.weight > 0.0 ? all / whole.weight : 0.0; // not asked for where the mean was given
 
   // 3. the window along z
   ParallelFor(count[1], progress.Part(0.8, 1.0), [&](std::ptrdiff_t J) {
@@ -285,7 +320,7 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template LocalStatistics::LocalStatistics(VolumeView<const T>, VolumeView<const unsigned char>, const Eigen::Vector3d&,        \
-                                            double, const Progress&, const LocalStatistics*, bool, LocalStatistics*);
+                                            double, const Progress&, double, bool, LocalStatistics*, const double*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -16,16 +16,17 @@ class LocalStatistics {
 public:
   /// \param region where voxels count (not 0); empty: everywhere. Voxels that are not finite never count.
   /// \param sigmaMm standard deviation of the window, mm, >= 0; below a voxel it is the voxel's block alone
-  /// \param trend nullptr: deviations are those from the mean of the window; else from the local means of these statistics, of
-  /// the same volume with a smaller window, so that slopes and edges of the scene are no part of them
+  /// \param trendMm 0: deviations are those from the mean of the window; else from local means of the same volume in a smaller
+  /// window, of this standard deviation, so that slopes and edges of the scene are no part of them
   /// \param meansAlone deviations are never asked for: two thirds of the work
   /// \param spent statistics that nobody reads any more: their memory is used again where it is enough. The system takes as long
-  /// to bring in as much memory as a lattice as fine as the voxels takes to be worked out \throws Error(BadInput) for views of
-  /// different shape, Error(InvalidParameter), Error(Cancelled)
+  /// to bring in as much memory as a lattice as fine as the voxels takes to be worked out \param mean of all voxels that count,
+  /// where it is known already (nullptr: it is not) \throws Error(BadInput) for views of different shape,
+  /// Error(InvalidParameter), Error(Cancelled)
   template <class T>
   LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                  double sigmaMm, const Progress& progress = {}, const LocalStatistics* trend = nullptr, bool meansAlone = false,
-                  LocalStatistics* spent = nullptr);
+                  double sigmaMm, const Progress& progress = {}, double trendMm = 0.0, bool meansAlone = false,
+                  LocalStatistics* spent = nullptr, const double* mean = nullptr);
 
   /// Of voxels [first, end) of row (j, k). Where no window reaches (3 standard deviations) they are those of the whole volume; of
   /// an empty region both are 0. \param deviation nullptr: means alone
@@ -42,8 +43,7 @@ template <class T>
 LocalStatistics GrainStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
                                 const Eigen::Vector3d& spacing, double sigmaMm, const Progress& progress = {})
 {
-  const LocalStatistics trend(intensity, region, spacing, 0.5 * sigmaMm, progress.Part(0.0, 0.4), nullptr, true);
-  return LocalStatistics(intensity, region, spacing, sigmaMm, progress.Part(0.4, 1.0), &trend);
+  return LocalStatistics(intensity, region, spacing, sigmaMm, progress, 0.5 * sigmaMm);
 }
 
 } // namespace echorama

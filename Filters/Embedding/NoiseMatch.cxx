@@ -115,7 +115,7 @@ public:
   /// \param window standard deviations in samples \param local those of the last time, and then of this one
   void Standardise(const Eigen::Vector3d& window, std::optional<LocalStatistics>& local, const Progress& progress)
   {
-    local = LocalStatistics(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4), nullptr, false,
+    local = LocalStatistics(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4), 0.0, false,
                             local ? &*local : nullptr);
     const auto& n = beams_.Dimensions();
     const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(n[1]) * n[2];

@@ -107,10 +107,10 @@ void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const floa
       (!wanted.Empty() && wanted.Dimensions() != intensity.Dimensions()))
     throw Error(Error::Kind::BadInput, "tone mapping: the volumes do not have one size");
   const bool meansAlone = !parameters.matchDeviation;
-  const LocalStatistics first(intensity, region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3), nullptr, meansAlone);
+  const LocalStatistics first(intensity, region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3), 0.0, meansAlone);
   Normalise(parameters.matchDeviation, first, intensity, region, {}, grain, progress.Part(0.3, 0.5));
-  const LocalStatistics second(VolumeView<const float>(grain), region, spacing, parameters.smoothMm, progress.Part(0.5, 0.8),
-                               nullptr, meansAlone);
+  const LocalStatistics second(VolumeView<const float>(grain), region, spacing, parameters.smoothMm, progress.Part(0.5, 0.8), 0.0,
+                               meansAlone);
   Normalise(parameters.matchDeviation, second, grain, region, wanted, grain, progress.Part(0.8, 1.0));
 }
 

@@ -144,7 +144,7 @@ TEST(LocalStatistics, MeansAloneAreTheSameMeans)
   for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
     volume.View()[at] = static_cast<float>(50.0 + 10.0 * Random(3, static_cast<std::uint64_t>(at)).Normal());
   const VolumeView<const float> view = volume.View();
-  const LocalStatistics both(view, {}, unit, 2.5), alone(view, {}, unit, 2.5, {}, nullptr, true);
+  const LocalStatistics both(view, {}, unit, 2.5), alone(view, {}, unit, 2.5, {}, 0.0, true);
   std::vector<float> mean(41), deviation(41), meanAlone(41);
   both.Row(9, 8, 0, 41, mean.data(), deviation.data());
   alone.Row(9, 8, 0, 41, meanAlone.data(), nullptr);
@@ -205,6 +205,52 @@ TEST(LocalStatistics, TheDeviationOfGrainLeavesSlopesOut)
   EXPECT_NEAR(plain.deviation.View()(30, 20, 20), std::hypot(4.0, 5.0 * 4.0), 1.5);
   EXPECT_NEAR(grain.deviation.View()(30, 20, 20), 4.0, 0.4);
   EXPECT_EQ(grain.mean.View()(30, 20, 20), plain.mean.View()(30, 20, 20));
+}
+
+// The trend is worked out for some slices at a time: where one such part follows another nothing may be seen of it, whether its
+// blocks are as thin as a voxel or not. Held against the squares about a trend of the whole volume, averaged over the window.
+TEST(LocalStatistics, TheTrendOfATallVolumeHasNoJoints)
+{
+  Volume<float> volume({11, 9, 700});
+  Volume<unsigned char> region(volume.Dimensions());
+  for (int k = 0; k < 700; ++k)
+    for (std::ptrdiff_t at = 0; at < 99; ++at) {
+      const std::ptrdiff_t voxel = 99 * k + at;
+      volume.View()[voxel] =
+          static_cast<float>(100.0 + 40.0 * std::sin(0.1 * k) + 5.0 * Random(9, static_cast<std::uint64_t>(voxel)).Normal());
+      region.View()[voxel] = (k / 9 + at / 11) % 4 != 0;
+    }
+  const VolumeView<const float> view = volume.View();
+  for (const double sigma : {3.0, 9.0}) {
+    const Values trend = All(LocalStatistics(view, region.View(), unit, 0.5 * sigma), volume);
+    Volume<float> squares(volume.Dimensions());
+    for (std::ptrdiff_t at = 0; at < view.Size(); ++at)
+      squares.View()[at] = std::pow(view[at] - trend.mean.View()[at], 2.0f);
+    const Values wanted = All(LocalStatistics(VolumeView<const float>(squares.View()), region.View(), unit, sigma), volume);
+    const Values got = All(GrainStatistics(view, region.View(), unit, sigma), volume);
+    for (std::ptrdiff_t at = 0; at < view.Size(); ++at)
+      ASSERT_NEAR(got.deviation.View()[at], std::sqrt(wanted.mean.View()[at]), 1e-4f) << sigma << " " << at / 99;
+  }
+}
+
+TEST(LocalStatistics, WhatSpentStatisticsLeaveInTheirMemoryIsNotSeen)
+{
+  Volume<float> volume({70, 50, 60});
+  Volume<unsigned char> region(volume.Dimensions());
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at)
+    volume.View()[at] = static_cast<float>(Random(4, static_cast<std::uint64_t>(at)).Normal());
+  for (int k = 20; k < 30; ++k)
+    for (int j = 10; j < 25; ++j)
+      for (int i = 12; i < 40; ++i)
+        region.View()(i, j, k) = 1;
+  const VolumeView<const float> view = volume.View();
+  LocalStatistics everywhere(view, {}, unit, 1.0);
+  const Values fresh = All(LocalStatistics(view, region.View(), unit, 2.0), volume);
+  const Values again = All(LocalStatistics(view, region.View(), unit, 2.0, {}, 0.0, false, &everywhere), volume);
+  for (std::ptrdiff_t at = 0; at < view.Size(); ++at) {
+    ASSERT_EQ(again.mean.View()[at], fresh.mean.View()[at]);
+    ASSERT_EQ(again.deviation.View()[at], fresh.deviation.View()[at]);
+  }
 }
 
 TEST(LocalStatistics, DoesNotDependOnThreads)
