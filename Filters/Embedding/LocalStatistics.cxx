@@ -74,9 +74,32 @@ template <class T>
 bool IsCounted(T value)
 {
   if constexpr (std::is_floating_point_v<T>)
-    return std::isfinite(value);
+    return value - value == T(0); // which vector instructions do
   else
     return true;
+}
+
+// Of voxels [begin, end) of a row: 1, v - mean and (v - mean)^2, or (v - trend)^2; 0 of those that do not count.
+template <class T>
+void MomentsOfVoxels(const T* __restrict voxels, const unsigned char* __restrict region, int begin, int end, double mean,
+                     const float* __restrict trend, double* const* to)
+{
+  double* __restrict weight = to[0], * __restrict first = to[1], * __restrict second = to[2];
+  for (int i = begin; i < end; ++i)
+    weight[i] = IsCounted(voxels[i]) ? 1.0 : 0.0;
+  if (region)
+    for (int i = begin; i < end; ++i)
+      weight[i] = region[i] ? weight[i] : 0.0;
+  for (int i = begin; i < end; ++i) {
+    const double from = static_cast<double>(voxels[i]) - mean;
+    first[i] = weight[i] > 0.0 ? from : 0.0;
+    second[i] = weight[i] > 0.0 ? from * from : 0.0;
+  }
+  if (trend)
+    for (int i = begin; i < end; ++i) {
+      const double from = static_cast<double>(voxels[i]) - static_cast<double>(trend[i]);
+      second[i] = weight[i] > 0.0 ? from * from : 0.0;
+    }
 }
 
 // The window along one axis, over blocks.
@@ -220,14 +243,8 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
             trend->Row(j, k - trendFirst, begin, end, around.data() + begin, nullptr);
           first = std::min(first, begin / blocks.size[0]);
           last = std::max(last, (end - 1) / blocks.size[0]);
-          for (int i = begin; i < end; ++i) {
-            const bool counts = real(voxels + i);
-            const double value = static_cast<double>(intensity[voxels + i]);
-            const double from = value - (trend ? static_cast<double>(around[static_cast<std::size_t>(i)]) : lattice->mean);
-            own[0][i] = counts ? 1.0 : 0.0;
-            own[1][i] = counts ? value - lattice->mean : 0.0;
-            own[2][i] = counts ? from * from : 0.0;
-          }
+          MomentsOfVoxels(intensity.Data() + voxels, region.Empty() ? nullptr : region.Data() + voxels, begin, end, lattice->mean,
+                          trend ? around.data() : nullptr, own);
           for (std::size_t c = 0; c < 3; ++c) {
             double* const to = raw[c].First();
             if (blocks.size[0] == 1) {

@@ -116,7 +116,7 @@ public:
   void Standardise(const Eigen::Vector3d& window, std::optional<LocalStatistics>& local, const Progress& progress)
   {
     local = LocalStatistics(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4), 0.0, false,
-                            local ? &*local : nullptr);
+                            local ? &*local : nullptr, &mean_);
     const auto& n = beams_.Dimensions();
     const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(n[1]) * n[2];
     const VolumeView<float> scores = scores_.View();
