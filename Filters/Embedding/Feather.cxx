@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The depth of a voxel in its region is a distance map (Core); its ramp is the weight. The overlay is one pass, row by row; with
-// keepTexture the local means of both sides are measured before (LocalStatistics), which is one pass over each.
+// The depth of a voxel in its region is a distance map, as far as the ramp is long (NearDistance); the ramp is the weight. The
+// overlay is one pass, row by row; with keepTexture the local means of both sides are measured before (LocalStatistics), which is
+// one pass over each.
 #include "Feather.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
-#include "Core/Imaging/DistanceMap.h"
 #include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "LocalStatistics.h"
+#include "NearDistance.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -58,7 +59,7 @@ void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsign
       for (std::ptrdiff_t at = begin; at < end; ++at)
         shown.View()[at] = !region[at] && (backgroundRegion.Empty() || backgroundRegion[at]);
     });
-    SquaredDistanceMap(shown.View(), spacing, weights, progress.Part(0.1, 0.9));
+    NearSquaredDistances(shown.View(), spacing, parameters.featherMm, weights, progress.Part(0.1, 0.9));
   }
   ParallelRanges(region.Size(), 1 << 16, progress.Part(0.9, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (std::ptrdiff_t at = begin; at < end; ++at)
