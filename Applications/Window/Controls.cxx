@@ -27,9 +27,6 @@ void Describe(QWidget* widget, const char* name, const QString& help)
   widget->setToolTip(help);
 }
 
-} // namespace
-
-namespace {
 /// A click into a number selects it, as Tab does: what is typed next takes its place. A second click sets the cursor.
 class ClickedNumber : public QDoubleSpinBox {
 public:

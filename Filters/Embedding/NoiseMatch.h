@@ -49,7 +49,7 @@ struct NoiseMatch {
 /// are given the Rayleigh distribution that speckle has, whose autocorrelation is a known function of the power's. Its half is
 /// found between lags as that of a Gaussian. What is smooth over the window is no grain; edges of the scene that are as sharp as
 /// the grain are taken for it.
-/// Cost: about 0.15 microseconds of one core per sample.
+/// Cost: proportional to the samples, with the lattices of local statistics; `./run bench noise` measures it.
 /// \throws Error(NotPossible) when there are less than 1000 samples with some texture around them, Error(BadInput) for
 /// views that do not agree or are no beam volume, Error(InvalidParameter), Error(Cancelled)
 NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned char> valid, const ProbeGeometry& geometry,

@@ -75,7 +75,8 @@ public:
   }
 
 private:
-  static constexpr std::size_t HugePage = std::size_t(1) << 21, Large = 2 * HugePage, Page = 4096;
+  static constexpr std::size_t HugePage = std::size_t(1) << 21, Large = 2 * HugePage;
+  static constexpr std::size_t Page = std::size_t(1) << 16; // the largest of any system: what is given back begins with a page
   static std::size_t Bytes(std::size_t count)
   {
     return (count * sizeof(T) + Page - 1) / Page * Page;
