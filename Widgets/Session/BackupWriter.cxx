@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The thread lives only while something waits to be written: an idle session wakes nobody.
+// The threads live only while something waits for them: an idle session wakes nobody.
 #include "Widgets/Session/BackupWriter.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
@@ -35,16 +35,17 @@ struct BackupWriter::Parts {
 
   std::mutex mutex; // of what follows
   std::deque<Item> queue;
-  bool active = false; // the thread will look at the queue again
-  std::string failure;
-  bool told = false; // of the failure; until something is written
+  bool active = false;                    // the thread will look at the queue again
+  bool syncing = false, unsynced = false; // the other thread will look at this again: whether something waits for the disk
+  std::string failure, diskFailure;
+  bool told = false; // of a failure; until there is none
 
   // Touched only by who writes: the thread, or its owner when there is none.
   std::string lastLabel;
   bool lastFinished = true;
   Clock::time_point lastTime = Clock::now() - std::chrono::hours(1);
 
-  Worker worker; // the last member: it ends before the others go
+  Worker disk, worker; // the last members: they end before the others go
 
   Parts(const std::string& folder, double seconds, int keep) : backups(folder, keep), interval(seconds) {}
 
@@ -60,11 +61,49 @@ struct BackupWriter::Parts {
     } catch (const std::exception& error) {
       reason = error.what();
     }
-    const std::lock_guard<std::mutex> lock(mutex);
-    failure = reason;
-    if (reason.empty())
-      told = false;
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      Note(failure, reason);
+      if (!reason.empty())
+        return;
+      unsynced = true;
+      if (std::exchange(syncing, true))
+        return;
+    }
+    try {
+      disk.Start([this](const Worker::Signal&) { Sync(); });
+    } catch (const std::exception&) { // the system has no thread to give
+      Sync();
+    }
   }
+
+  void Sync()
+  {
+    for (;;) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (!std::exchange(unsynced, false)) {
+          syncing = false;
+          return;
+        }
+      }
+      std::string reason;
+      try {
+        backups.Sync();
+      } catch (const std::exception& error) {
+        reason = error.what();
+      }
+      const std::lock_guard<std::mutex> lock(mutex);
+      Note(diskFailure, reason);
+    }
+  }
+
+  void Note(std::string& trouble, const std::string& reason)
+  {
+    trouble = reason;
+    told = told && !Failure().empty();
+  }
+  const std::string& Failure() const { return failure.empty() ? diskFailure : failure; }
 
   void Run(const Worker::Signal& signal)
   {
@@ -141,19 +180,20 @@ void BackupWriter::Wait()
 void BackupWriter::Flush()
 {
   Wait();
+  parts_->disk.Stop(); // it ends when nothing waits
   const std::lock_guard<std::mutex> lock(parts_->mutex);
-  if (!parts_->failure.empty()) {
+  if (!parts_->Failure().empty()) {
     parts_->told = true;
-    throw Error(Error::Kind::FileSystem, parts_->failure);
+    throw Error(Error::Kind::FileSystem, parts_->Failure());
   }
 }
 
 std::string BackupWriter::TakeFailure()
 {
   const std::lock_guard<std::mutex> lock(parts_->mutex);
-  if (parts_->failure.empty() || std::exchange(parts_->told, true))
+  if (parts_->Failure().empty() || std::exchange(parts_->told, true))
     return {};
-  return parts_->failure;
+  return parts_->Failure();
 }
 
 void BackupWriter::MarkSaved()

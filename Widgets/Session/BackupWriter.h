@@ -6,7 +6,8 @@
 
 namespace echorama {
 
-/// Writes backups beside the work: a post costs a copy of the state, the disk is waited for by a thread of its own.
+/// Writes backups beside the work: a post costs a copy of the state. One thread writes, another waits for the disk; so neither
+/// work nor the next backup is held up by a disk that is slow or hangs.
 ///
 /// What is posted as finished is written at once; what is not (a drag that goes on) once per \a interval, and then it takes the
 /// place of what was written of it before. Finished edits of the same label that follow each other within a second are one:
@@ -21,9 +22,9 @@ public:
 
   const std::string& Folder() const;
   void Post(Project project, const std::string& label, bool finished);
-  /// Waits until all that was posted is on the disk, or could not be written.
+  /// Waits until all that was posted is written, or could not be: Backups::List tells of it.
   void Wait();
-  /// Wait(). \throws what writing the last threw.
+  /// Waits until it is on the disk. \throws what writing the last threw.
   void Flush();
   /// Why a backup could not be written: told once, until one could be written again; empty: all is well.
   std::string TakeFailure();

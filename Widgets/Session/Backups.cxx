@@ -211,22 +211,49 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
   try {
     do
       path = (fs::path(folder_) / FileName(stamp.number, stamp.time)).string();
-    while (!WriteProject(path, project, &stamp, false) && ++stamp.number); // another session took the number
-  } catch (const Error& error) {                                           // the same reason has the same words
+    while (!WriteBackup(path, project, stamp) && ++stamp.number); // another session took the number
+  } catch (const Error& error) {                                  // the same reason has the same words
     std::string reason = error.what();
     for (std::size_t at = 0; (at = reason.find(path)) != std::string::npos;)
       reason.replace(at, path.size(), folder_);
     throw Error(error.GetKind(), reason);
   }
-  if (inPlaceOfLast && !lastPath_.empty()) {
-    std::error_code ignored;
-    fs::remove(lastPath_, ignored);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (inPlaceOfLast && !unsynced_.empty() && unsynced_.back() == lastPath_) { // on a slow disk these do not pile up
+      std::error_code ignored;
+      fs::remove(lastPath_, ignored);
+      unsynced_.pop_back();
+    } else if (inPlaceOfLast && !lastPath_.empty())
+      replaced_.push_back(lastPath_);
+    unsynced_.push_back(path);
   }
   last_ = project;
   lastPath_ = path;
   unsaved_.push_back(path);
   ThinOut(folder_, keep_);
   return true;
+}
+
+void Backups::Sync()
+{
+  std::vector<std::string> paths, replaced;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    paths.swap(unsynced_);
+    replaced.swap(replaced_);
+  }
+  try {
+    BringToDisk(paths);
+  } catch (...) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    unsynced_.insert(unsynced_.begin(), paths.begin(), paths.end());
+    replaced_.insert(replaced_.begin(), replaced.begin(), replaced.end());
+    throw;
+  }
+  std::error_code ignored;
+  for (const std::string& path : replaced)
+    fs::remove(path, ignored);
 }
 
 std::vector<Backup> Backups::List(const std::string& folder)
@@ -314,8 +341,10 @@ void Backups::Move(const std::string& from, const std::string& to)
         const Project project = ReadProject(backup.path, &stamp);
         stamp.number = number - 1;
         std::error_code ignored;
-        if (WriteProject(path.string(), project, &stamp, false))
+        if (WriteBackup(path.string(), project, stamp)) {
+          BringToDisk({path.string()});
           fs::remove(backup.path, ignored);
+        }
         continue;
       } catch (const Error& reason) {
         if (reason.GetKind() == Error::Kind::FileSystem)

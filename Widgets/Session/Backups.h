@@ -2,6 +2,7 @@
 #pragma once
 #include "Widgets/Session/ProjectFile.h"
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,9 +18,10 @@ struct Backup {
   bool readable = true;  ///< false: damaged; it is kept, listed and not opened
 };
 
-/// A folder of numbered project files. Each is written under a temporary name, brought to the disk and renamed: a kill at any
-/// moment leaves every earlier one and nothing half-made. Old ones are thinned out: the last \a keep stay; of those before, the
-/// last of every hour for a day before the newest, and the last of every day before that.
+/// A folder of numbered project files. Each is written under a temporary name and renamed: a kill at any moment leaves every
+/// earlier one and nothing half-made. Sync() brings them to the disk: after a loss of power, the last that it brought there can
+/// be read. Old ones are thinned out: the last \a keep stay; of those before, the last of every hour for a day before the newest,
+/// and the last of every day before that.
 ///
 /// Who has one of these holds a lock (flock) on the folder's file "lock". The system lets go of it when the process ends, however
 /// it ends; so whether a session is alive never depends on a process number that another process may have by now.
@@ -32,10 +34,13 @@ public:
   Backups& operator=(const Backups&) = delete;
 
   const std::string& Folder() const { return folder_; }
-  /// Writes the next one, unless it would say what the last said that was written here. \a inPlaceOfLast: that one goes
-  /// afterwards (a drag that goes on). \returns whether there is a new one. \throws Error(FileSystem) (full disk): earlier ones
-  /// stay.
+  /// Writes the next one, unless it would say what the last said that was written here. Does not wait for the disk.
+  /// \a inPlaceOfLast: that one goes once this one is on the disk (a drag that goes on). \returns whether there is a new one.
+  /// \throws Error(FileSystem) (full disk): earlier ones stay.
   bool Write(const Project& project, const std::string& label, bool inPlaceOfLast = false);
+  /// Waits until what was written is on the disk, and removes what it took the place of. Another thread may call this while
+  /// one writes. \throws Error(FileSystem): all stay, and the next call tries again.
+  void Sync();
   /// What was written here is in the project file now; DiscardUnsaved() leaves it.
   void MarkSaved() { unsaved_.clear(); }
   /// Removes what was written here since the last MarkSaved().
@@ -72,6 +77,8 @@ private:
   std::optional<Project> last_;
   std::string lastPath_;
   std::vector<std::string> unsaved_;
+  std::mutex mutex_; ///< of what follows
+  std::vector<std::string> unsynced_, replaced_;
 };
 
 } // namespace echorama

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A file counts as written when its bytes and its name are on the disk: write, fsync, rename, fsync of the folder. Everything
+// A project counts as written when its bytes and its name are on the disk: write, fsync, rename, fsync of the folder. Everything
 // is checked on reading, with the place in the file in the message, because people and scripts write projects too.
 //
 // Nobody edits a backup, so it can carry a checksum: of the JSON as it is printed without it. A flipped digit is found that
@@ -228,8 +228,12 @@ void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
     file.Fail("it is damaged: it is not as it was written");
 }
 
-// All of the text is on the disk when this returns.
-void WriteThrough(const std::string& path, const std::string& text, const std::string& shown)
+[[noreturn]] void FailToWrite(const std::string& path, int problem)
+{
+  throw Error(Error::Kind::FileSystem, path + ": it cannot be written (" + std::strerror(problem) + ")");
+}
+
+void WriteText(const std::string& path, const std::string& text, const std::string& shown, bool toDisk)
 {
   const int file = open(path.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC);
   int problem = file < 0 ? errno : 0;
@@ -240,12 +244,12 @@ void WriteThrough(const std::string& path, const std::string& text, const std::s
     else if (count == 0 || errno != EINTR)
       problem = count == 0 ? ENOSPC : errno;
   }
-  if (problem == 0 && fsync(file) != 0 && errno != EINVAL) // EINVAL: a file system without fsync
+  if (problem == 0 && toDisk && fsync(file) != 0 && errno != EINVAL) // EINVAL: a file system without fsync
     problem = errno;
   if (file >= 0 && close(file) != 0 && problem == 0)
     problem = errno;
   if (problem != 0)
-    throw Error(Error::Kind::FileSystem, shown + ": it cannot be written (" + std::strerror(problem) + ")");
+    FailToWrite(shown, problem);
 }
 
 void SyncFolder(const fs::path& folder)
@@ -330,7 +334,9 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
   return project;
 }
 
-bool WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp, bool replace)
+namespace {
+
+std::string TextOf(const Project& project, const std::string& path, const BackupStamp* stamp)
 {
   const fs::path folder = Resolved(path).parent_path();
   Json volumes = Json::array();
@@ -374,27 +380,57 @@ bool WriteProject(const std::string& path, const Project& project, const BackupS
             {"comment", project.comment}};
   if (project.state.centre)
     root["centreOfRotation"] = JsonPlace::ListOf(*project.state.centre);
-  std::string text;
   try {
     if (stamp) {
       root["backup"] = {{"number", stamp->number}, {"time", stamp->time}, {"label", stamp->label}};
       root["backup"]["checksum"] = TextChecksum(root.dump());
     }
-    text = root.dump(stamp ? -1 : 1) + '\n';
+    return root.dump(stamp ? -1 : 1) + '\n';
   } catch (const nlohmann::json::exception&) {
     throw Error(Error::Kind::InvalidParameter, path + ": a name in it is not UTF-8");
   }
+}
 
+} // namespace
+
+void WriteProject(const std::string& path, const Project& project)
+{
+  const std::string text = TextOf(project, path, nullptr);
+  FileReplacement replacement;
+  WriteText(replacement.Stage(path), text, path, true);
+  replacement.Commit();
+  SyncFolder(Resolved(path).parent_path());
+}
+
+bool WriteBackup(const std::string& path, const Project& project, const BackupStamp& stamp)
+{
+  const std::string text = TextOf(project, path, &stamp);
   FileReplacement replacement;
   const std::string staged = replacement.Stage(path);
-  WriteThrough(staged, text, path);
-  const bool linked = !replace && link(staged.c_str(), path.c_str()) == 0;
-  if (!replace && !linked && errno == EEXIST)
+  WriteText(staged, text, path, false);
+  if (link(staged.c_str(), path.c_str()) == 0)
+    return true;
+  if (errno == EEXIST)
     return false;
-  if (!linked) // also on a file system without links
-    replacement.Commit();
-  SyncFolder(folder);
+  replacement.Commit(); // a file system without links
   return true;
+}
+
+void BringToDisk(const std::vector<std::string>& paths)
+{
+  std::set<fs::path> folders;
+  for (const std::string& path : paths) {
+    const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (file < 0)
+      continue;
+    const int problem = fsync(file) != 0 && errno != EINVAL ? errno : 0;
+    close(file);
+    if (problem != 0)
+      FailToWrite(path, problem);
+    folders.insert(fs::path(path).parent_path());
+  }
+  for (const fs::path& folder : folders)
+    SyncFolder(folder);
 }
 
 std::string FindVolume(const std::string& projectPath, const std::string& file, const std::vector<std::string>& folders)

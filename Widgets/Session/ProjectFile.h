@@ -50,10 +50,17 @@ struct BackupStamp {
 /// \throws Error(FileSystem), Error(BadFile) that names file, volume and field; also for a backup that is not as it was written.
 Project ReadProject(const std::string& path, BackupStamp* stamp = nullptr);
 
-/// Atomic, and on the disk when it returns. Numbers come back to the last bit. \param stamp makes it a backup: with a checksum,
-/// on one line. \throws Error(FileSystem), Error(InvalidParameter) for a name that is not UTF-8; what was there before then
-/// stays. \param replace false: leaves a file alone that is there already. \returns whether it was written.
-bool WriteProject(const std::string& path, const Project& project, const BackupStamp* stamp = nullptr, bool replace = true);
+/// Atomic, and on the disk when it returns. Numbers come back to the last bit.
+/// \throws Error(FileSystem), Error(InvalidParameter) for a name that is not UTF-8; what was there before then stays.
+void WriteProject(const std::string& path, const Project& project);
+
+/// The same as a backup, on one line with a checksum. It does not wait for the disk: any process reads it from now on, also when
+/// this one is killed; a loss of power may leave it damaged until BringToDisk(). A file that is there already is left alone.
+/// \returns whether it was written. \throws as WriteProject.
+bool WriteBackup(const std::string& path, const Project& project, const BackupStamp& stamp);
+
+/// Waits until the files are on the disk, and their names. Those that are not there are passed over. \throws Error(FileSystem).
+void BringToDisk(const std::vector<std::string>& paths);
 
 /// Where a volume of a project is now: at \a file, else under the same name in the project's folder (for a backup: in the folder
 /// of its project), else in one of \a folders. Empty when nowhere.

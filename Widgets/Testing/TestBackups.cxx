@@ -3,14 +3,19 @@
 #include "SomeProject.h"
 #include "Widgets/Session/Backups.h"
 #include "Widgets/Session/BackupWriter.h"
+#include <cerrno>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <cstdlib>
 #include <limits>
+#include <mutex>
 #include <set>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <thread>
+#include <unistd.h>
 
 using namespace echorama;
 namespace fs = std::filesystem;
@@ -33,7 +38,7 @@ protected:
   void PutOld(int number, std::int64_t time) const
   {
     const BackupStamp stamp{number, time, "old"};
-    WriteProject(Path(Backups::FileName(number, time)), Step(number), &stamp);
+    WriteBackup(Path(Backups::FileName(number, time)), Step(number), stamp);
   }
   std::set<int> Numbers() const
   {
@@ -42,6 +47,58 @@ protected:
       numbers.insert(backup.number);
     return numbers;
   }
+};
+
+/// While this lives, this process waits for the disk until GoOn(), or fails.
+class HangingDisk {
+public:
+  HangingDisk() { Set(Hangs); }
+  ~HangingDisk() { Set(Works); }
+  void GoOn() const { Set(Works); }
+  void Fail() const { Set(Fails); }
+  bool IsWaitedFor() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return waiting_ > 0;
+  }
+  int Synced() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return synced_;
+  }
+  /// What fsync does here.
+  static int Sync(int file)
+  {
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      ++waiting_;
+      changed_.wait(lock, [] { return state_ != Hangs; });
+      --waiting_;
+      if (state_ == Fails) {
+        errno = EIO;
+        return -1;
+      }
+      ++synced_;
+    }
+    return static_cast<int>(syscall(SYS_fsync, file));
+  }
+
+private:
+  enum State { Works, Hangs, Fails };
+  static void Set(State state)
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      state_ = state;
+      if (state == Hangs)
+        synced_ = 0;
+    }
+    changed_.notify_all();
+  }
+  static inline std::mutex mutex_;
+  static inline std::condition_variable changed_;
+  static inline State state_ = Works;
+  static inline int waiting_ = 0, synced_ = 0;
 };
 
 /// The writing of this process fails as on a full disk while this lives.
@@ -67,6 +124,12 @@ private:
 
 } // namespace
 
+// Takes the place of the system's, for all libraries of this program.
+extern "C" __attribute__((visibility("default"))) int fsync(int file)
+{
+  return HangingDisk::Sync(file);
+}
+
 TEST_F(BackupFolder, NumberedTheNewestFirst)
 {
   Backups backups(Path());
@@ -75,18 +138,24 @@ TEST_F(BackupFolder, NumberedTheNewestFirst)
   EXPECT_FALSE(backups.Write(Step(1), "nothing new"));
   EXPECT_TRUE(backups.Write(Step(2), "two"));
   EXPECT_TRUE(backups.Write(Step(3), "three"));
+  backups.Sync();
   EXPECT_TRUE(backups.Write(Step(4), "three, going on", true));
+  EXPECT_EQ(backups.List().size(), 4u) << "what is on the disk stays until the one in its place is, too";
+  EXPECT_TRUE(backups.Write(Step(5), "three, going on", true));
+  EXPECT_EQ(backups.List().size(), 4u) << "what is not goes at once";
+  EXPECT_TRUE(backups.Write(Step(4), "three, going on", true));
+  backups.Sync();
   const std::vector<Backup> list = backups.List();
   ASSERT_EQ(list.size(), 3u);
   EXPECT_EQ(list[0].label, "three, going on");
-  EXPECT_EQ(list[0].number, 4);
+  EXPECT_EQ(list[0].number, 6);
   EXPECT_EQ(list[2].label, "one");
   EXPECT_EQ(StepOf(ReadProject(list[0].path)), 4);
   EXPECT_EQ(StepOf(ReadProject(list[1].path)), 2);
   EXPECT_LE(std::abs(static_cast<double>(list[0].time - std::time(nullptr))), 30.0);
   Backups later(Path());
-  later.Write(Step(5), "of another session");
-  EXPECT_EQ(later.List().front().number, 5);
+  later.Write(Step(6), "of another session");
+  EXPECT_EQ(later.List().front().number, 7);
   EXPECT_THROW(Backups("/dev/null/backups"), Error);
   EXPECT_TRUE(Backups::List(Path("nowhere")).empty());
 }
@@ -110,7 +179,7 @@ TEST_F(BackupFolder, TwoSessionsNeverReplaceEachOthers)
   for (const Backup& backup : all)
     EXPECT_TRUE(backup.readable) << backup.path;
   const BackupStamp stamp{all.front().number, all.front().time, "taken"};
-  EXPECT_FALSE(WriteProject(all.front().path, Step(5), &stamp, false));
+  EXPECT_FALSE(WriteBackup(all.front().path, Step(5), stamp));
   EXPECT_NE(StepOf(ReadProject(all.front().path)), 5);
 }
 
@@ -231,6 +300,54 @@ TEST_F(BackupFolder, ADragIsOnTheDiskWithinASecondOfEachStep)
   EXPECT_TRUE(written) << "without anybody asking";
 }
 
+TEST_F(BackupFolder, ADiskThatHangsHoldsUpNeitherWorkNorBackups)
+{
+  BackupWriter writer(Path(), 0.02);
+  const HangingDisk disk;
+  writer.Post(Step(1), "one", true);
+  const auto newest = [&] {
+    const std::vector<Backup> list = Backups::List(Path());
+    return list.empty() ? std::string() : list.front().label;
+  };
+  for (int i = 0; i < 1000 && !disk.IsWaitedFor(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_TRUE(disk.IsWaitedFor());
+  for (int step = 2; step <= 40; ++step) { // each is there for who comes after a kill
+    const std::string label = "drag " + std::to_string(step);
+    writer.Post(Step(step), label, false);
+    for (int i = 0; i < 1000 && newest() != label; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ASSERT_EQ(newest(), label);
+  }
+  writer.Post(Step(50), "end of the drag", true);
+  writer.Wait();
+  EXPECT_EQ(newest(), "end of the drag");
+  EXPECT_EQ(writer.TakeFailure(), "");
+  EXPECT_EQ(disk.Synced(), 0) << "nothing is on the disk yet";
+  EXPECT_EQ(Numbers().size(), 2u) << "the drag is one";
+  disk.GoOn();
+  writer.Flush();
+  EXPECT_GE(disk.Synced(), 3) << "all files are, and their folder";
+  EXPECT_EQ(Numbers().size(), 2u);
+}
+
+TEST_F(BackupFolder, ADiskThatFailsIsTold)
+{
+  BackupWriter writer(Path());
+  const HangingDisk disk;
+  disk.Fail();
+  writer.Post(Step(1), "one", true);
+  EXPECT_THROW(writer.Flush(), Error);
+  writer.Post(Step(2), "two", true);
+  EXPECT_THROW(writer.Flush(), Error) << "also when the file itself could be written";
+  EXPECT_EQ(writer.TakeFailure(), "") << "it was told";
+  EXPECT_EQ(StepOf(ReadProject(Backups::List(Path()).front().path)), 2);
+  disk.GoOn();
+  writer.Post(Step(3), "three", true);
+  EXPECT_NO_THROW(writer.Flush());
+  EXPECT_GE(disk.Synced(), 4) << "those that could not be brought there before are, too";
+}
+
 TEST_F(BackupFolder, AKillLeavesEveryBackupWhole)
 {
   int made = 0;
@@ -239,7 +356,8 @@ TEST_F(BackupFolder, AKillLeavesEveryBackupWhole)
     if (child == 0) {
       Backups backups(Path(), 30);
       for (int step = 1;; ++step)
-        backups.Write(Step(step), "step " + std::to_string(step), step % 3 == 0);
+        if (backups.Write(Step(step), "step " + std::to_string(step), step % 3 == 0) && step % 2 == 0)
+          backups.Sync();
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20 + 13 * (round % 12)));
     kill(child, SIGKILL);

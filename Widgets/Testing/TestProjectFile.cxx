@@ -153,7 +153,7 @@ TEST_F(ProjectFile, RefusesWhatIsNotAProject)
 TEST_F(ProjectFile, AChangedBackupIsFoundOut)
 {
   const BackupStamp stamp{7, 1700000000, "Move a"};
-  WriteProject(Path("good.json"), SomeProject(5, Path()), &stamp);
+  WriteBackup(Path("good.json"), SomeProject(5, Path()), stamp);
   BackupStamp back;
   EXPECT_TRUE(ReadProject(Path("good.json"), &back).state == SomeProject(5, Path()).state);
   EXPECT_EQ(back.number, 7);
