@@ -9,6 +9,8 @@
 // all above are over, the limit drops by a tenth, and what is missing is drawn below it: so a packing ends after few such
 // steps whatever is asked for.
 //
+// A size that keeps missing is tried at thousands of places, nearly all of them taken: a bitmap tells most of those at once.
+//
 // EmptySpace: the way to the nearest surface is looked for from the coarsest grid on, and what is found narrows the search
 // in the finer ones, where most spheres are.
 //
@@ -30,6 +32,7 @@ namespace {
 using Eigen::Vector3d;
 using Parameters = SpherePackingParameters;
 
+constexpr double missesToMark = 20.0;               // of a sphere; until then marking would cost more than it saves
 constexpr double sphereVolume = 4.1887902047863905; // of radius 1
 
 double VolumeOf(double radius)
@@ -180,25 +183,113 @@ private:
   std::vector<std::int32_t> next_;
 };
 
-// Where spheres may lie.
+// Voxels in which no centre can lie any more, however small its sphere: a quick no, and never a wrong one.
+class TakenVoxels {
+public:
+  TakenVoxels() = default;
+  explicit TakenVoxels(const Parameters& p)
+    : min_(p.boxMin), keptFromAll_(p.radiusMin + p.gapMm), edge_(0.6 * p.radiusMin + 0.3 * p.gapMm)
+  {
+    constexpr double mostVoxels = 1 << 27; // 16 MiB, a bit each
+    const Vector3d size = p.boxMax - p.boxMin;
+    for (;; edge_ *= 1.25) {
+      const Eigen::Array3d count = (size / edge_).array().floor() + 1.0,
+                           whole{64.0 * std::ceil(count.x() / 64.0), count.y(), count.z()};
+      voxels_ = count.min(mostVoxels).cast<std::ptrdiff_t>();
+      if (whole.prod() <= mostVoxels)
+        break;
+    }
+    perEdge_ = 1.0 / edge_;
+    rowWords_ = (voxels_.x() + 63) / 64;
+    taken_.assign(static_cast<std::size_t>(rowWords_ * voxels_.y() * voxels_.z()), 0);
+  }
+
+  bool AreKnown() const { return !taken_.empty(); }
+  bool Has(const Vector3d& place) const
+  {
+    const Voxel voxel = VoxelOf(place);
+    return (*Word(voxel) >> (voxel.x() % 64) & 1) != 0;
+  }
+  // What Has(place) will read.
+  void Fetch(const Vector3d& place) const { __builtin_prefetch(Word(VoxelOf(place))); }
+
+  // Those that lie wholly within reach of the sphere.
+  void Add(const Sphere& sphere)
+  {
+    const double reach = (sphere.radius + keptFromAll_) * (1.0 - 1e-6); // rounding takes none too many
+    const Vector3d centre = sphere.centre - min_;
+    const auto farther = [&](std::ptrdiff_t voxel, int axis) {
+      const double from = static_cast<double>(voxel) * edge_ - centre[axis];
+      return std::max(std::abs(from), std::abs(from + edge_));
+    };
+    const auto first = [&](double place, int axis) {
+      return std::clamp(static_cast<std::ptrdiff_t>(std::ceil(place / edge_)), std::ptrdiff_t{0}, voxels_[axis]);
+    };
+    const auto behind = [&](double place, int axis) {
+      return std::clamp(static_cast<std::ptrdiff_t>(std::floor(place / edge_)), std::ptrdiff_t{0}, voxels_[axis]);
+    };
+    for (std::ptrdiff_t z = first(centre.z() - reach, 2); z < behind(centre.z() + reach, 2); ++z)
+      for (std::ptrdiff_t y = first(centre.y() - reach, 1); y < behind(centre.y() + reach, 1); ++y) {
+        const double left = reach * reach - farther(z, 2) * farther(z, 2) - farther(y, 1) * farther(y, 1);
+        if (left <= 0.0)
+          continue;
+        const double half = std::sqrt(left);
+        const std::ptrdiff_t to = behind(centre.x() + half, 0);
+        for (std::ptrdiff_t x = first(centre.x() - half, 0); x < to;) {
+          const std::ptrdiff_t start = x % 64, bits = std::min<std::ptrdiff_t>(64 - start, to - x);
+          taken_[IndexOf({x, y, z})] |= ~std::uint64_t{0} >> (64 - bits) << start;
+          x += bits;
+        }
+      }
+  }
+
+private:
+  using Voxel = Eigen::Array<std::ptrdiff_t, 3, 1>;
+
+  Voxel VoxelOf(const Vector3d& place) const
+  {
+    return ((place - min_) * perEdge_).array().cast<std::ptrdiff_t>().min(voxels_ - 1).max(0);
+  }
+  std::size_t IndexOf(const Voxel& voxel) const
+  {
+    return static_cast<std::size_t>(voxel.x() / 64 + rowWords_ * (voxel.y() + voxels_.y() * voxel.z()));
+  }
+  const std::uint64_t* Word(const Voxel& voxel) const { return &taken_[IndexOf(voxel)]; }
+
+  Vector3d min_ = Vector3d::Zero();
+  double keptFromAll_ = 0.0, edge_ = 0.0, perEdge_ = 0.0;
+  Voxel voxels_{0, 0, 0};
+  std::ptrdiff_t rowWords_ = 0;
+  std::vector<std::uint64_t> taken_;
+};
+
+// Where spheres may lie: random places of one stream, known some tries before their turn, so that memory can be asked for them.
 class Site {
 public:
   explicit Site(const Parameters& p)
     : ball_(p.region == Parameters::Region::Ball), min_(p.boxMin), max_(p.boxMax), middle_(0.5 * (p.boxMin + p.boxMax)),
-      radius_(0.5 * (p.boxMax - p.boxMin).minCoeff())
+      radius_(0.5 * (p.boxMax - p.boxMin).minCoeff()), random_(p.seed, 1)
   {
+    for (std::size_t i = 0; i < ahead_.size(); ++i)
+      Next(0.0);
   }
 
-  // A centre, uniform among those whose spheres of a radius lie wholly inside.
-  Vector3d Place(Random& random, double radius) const
+  // The next centre, uniform among those whose spheres of a radius lie wholly inside.
+  Vector3d Next(double radius)
   {
-    if (ball_)
-      return middle_ + (radius_ - radius) * std::cbrt(random.Uniform()) * random.Direction();
-    Vector3d place;
-    for (int axis = 0; axis < 3; ++axis)
-      place[axis] = min_[axis] + radius + (max_[axis] - min_[axis] - 2.0 * radius) * random.Uniform();
+    Draw& draw = ahead_[next_];
+    next_ = (next_ + 1) % ahead_.size();
+    const Vector3d place = PlaceOf(draw, radius);
+    if (ball_) {
+      draw.fromMiddle = std::cbrt(random_.Uniform());
+      draw.direction = random_.Direction();
+    } else
+      for (int axis = 0; axis < 3; ++axis)
+        draw.direction[axis] = random_.Uniform();
     return place;
   }
+  // That which is farthest ahead.
+  Vector3d Later(double radius) const { return PlaceOf(ahead_[(next_ + ahead_.size() - 1) % ahead_.size()], radius); }
 
   // How far it is to the border.
   double Room(const Vector3d& place) const
@@ -209,9 +300,27 @@ public:
   }
 
 private:
+  struct Draw {
+    Vector3d direction = Vector3d::Zero(); // in a box: each part of 1
+    double fromMiddle = 0.0;
+  };
+
+  Vector3d PlaceOf(const Draw& draw, double radius) const
+  {
+    if (ball_)
+      return middle_ + (radius_ - radius) * draw.fromMiddle * draw.direction;
+    Vector3d place;
+    for (int axis = 0; axis < 3; ++axis)
+      place[axis] = min_[axis] + radius + (max_[axis] - min_[axis] - 2.0 * radius) * draw.direction[axis];
+    return place;
+  }
+
   bool ball_;
   Vector3d min_, max_, middle_;
   double radius_;
+  Random random_;
+  std::array<Draw, 16> ahead_;
+  std::size_t next_ = 0;
 };
 
 // A radius between least and most, by the inverse of the distribution's sum.
@@ -230,7 +339,7 @@ double DrawRadius(const Parameters& p, double least, double most, Random& random
 class Packing {
 public:
   Packing(const Parameters& p, const Progress& progress)
-    : p_(p), site_(p), neighbours_(p), progress_(progress), wanted_(p.fillFraction * p.Volume()), places_(p.seed, 1)
+    : p_(p), site_(p), neighbours_(p), progress_(progress), wanted_(p.fillFraction * p.Volume())
   {
   }
 
@@ -255,7 +364,7 @@ public:
       if (missed == p_.misses)
         return Finish(true);
       Report();
-      const Vector3d place = site_.Place(places_, p_.radiusMin);
+      const Vector3d place = site_.Next(p_.radiusMin);
       const double most = std::min(p_.radiusMax, LargestFor(wanted_ - filled_));
       const double radius = neighbours_.Room(place, p_.radiusMin, std::clamp(site_.Room(place), p_.radiusMin, most));
       if (radius < p_.radiusMin) {
@@ -294,13 +403,28 @@ private:
   {
     for (int tried = 0; tried < p_.misses; ++tried) {
       Report();
-      const Vector3d place = site_.Place(places_, radius);
+      const Vector3d place = site_.Next(radius);
+      if (taken_.AreKnown()) {
+        taken_.Fetch(site_.Later(radius));
+        if (taken_.Has(place))
+          continue;
+      }
       if (neighbours_.Fits(place, radius)) {
         Keep({place, radius});
+        misses_ += 0.01 * (tried - misses_);
+        if (!taken_.AreKnown() && misses_ > missesToMark)
+          MarkTaken();
         return true;
       }
     }
     return false;
+  }
+
+  void MarkTaken()
+  {
+    taken_ = TakenVoxels(p_);
+    for (const Sphere& sphere : neighbours_.Spheres())
+      taken_.Add(sphere);
   }
 
   void Keep(const Sphere& sphere)
@@ -308,6 +432,8 @@ private:
     if (neighbours_.Spheres().size() == Parameters::mostSpheres)
       RefuseMore();
     neighbours_.Add(sphere);
+    if (taken_.AreKnown())
+      taken_.Add(sphere);
     filled_ += VolumeOf(sphere.radius);
   }
 
@@ -339,13 +465,14 @@ private:
   }
 
   const Parameters& p_;
-  const Site site_;
+  Site site_;
   Neighbourhood neighbours_;
+  TakenVoxels taken_;   // empty until sizes miss often
+  double misses_ = 0.0; // of a sphere, in the mean of the last hundred
   const Progress& progress_;
   const double wanted_;
   double filled_ = 0.0;
   std::int64_t tries_ = 0;
-  echorama::Random places_;
 };
 
 } // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/Random.h"
 #include "Filters/Tissue/SpherePacking.h"
 #include <algorithm>
 #include <cmath>
@@ -187,6 +188,48 @@ TEST(SpherePacking, SaturationEnds)
   EXPECT_TRUE(packing.saturated);
   EXPECT_GT(packing.fillFraction, 0.27);
   EXPECT_LT(packing.fillFraction, 0.384);
+}
+
+// What tells quickly that there is no room must never be wrong: each sphere lies where a plain search finds room first.
+TEST(SpherePacking, TheFirstPlaceWithRoomIsTaken)
+{
+  for (const auto region : {Parameters::Region::Box, Parameters::Region::Ball})
+    for (const double gap : {0.0, 0.25})
+      for (const double radiusMin : {0.8, 0.5}) { // equal ones, and some sizes
+        Parameters p = Small();
+        p.region = region;
+        p.radii = Parameters::Radii::Uniform;
+        p.radiusMin = radiusMin;
+        p.radiusMax = 0.8;
+        p.gapMm = gap;
+        p.misses = 4000;
+        p.fillFraction = radiusMin == p.radiusMax ? 0.4 : gap > 0.0 ? 0.19 : 0.32; // no size may be given up on the way
+        const SpherePacking packing = PackSpheres(p);
+        ASSERT_EQ(packing.saturated, radiusMin == p.radiusMax);
+        EXPECT_GT(packing.tries, 15 * static_cast<std::int64_t>(packing.spheres.size())) << "near saturation";
+        Random random(p.seed, 1);
+        const Vector3d middle = 0.5 * (p.boxMin + p.boxMax);
+        std::vector<Sphere> plain;
+        for (const Sphere& sphere : packing.spheres) {
+          const double r = sphere.radius;
+          for (bool free = false; !free;) {
+            Vector3d place;
+            if (region == Parameters::Region::Ball) {
+              const double share = std::cbrt(random.Uniform());
+              place = middle + (0.5 * (p.boxMax - p.boxMin).minCoeff() - r) * share * random.Direction();
+            } else
+              for (int axis = 0; axis < 3; ++axis)
+                place[axis] = p.boxMin[axis] + r + (p.boxMax[axis] - p.boxMin[axis] - 2.0 * r) * random.Uniform();
+            free = std::none_of(plain.begin(), plain.end(), [&](const Sphere& other) {
+              const double reach = r + gap + other.radius;
+              return (other.centre - place).squaredNorm() < reach * reach;
+            });
+            if (free)
+              plain.push_back({place, r});
+          }
+          ASSERT_EQ(plain.back().centre, sphere.centre) << "sphere " << plain.size();
+        }
+      }
 }
 
 TEST(SpherePacking, FewAndNone)
