@@ -122,7 +122,7 @@ void MessageBar::Show(const Message& message)
         Show({Message::Warning, QString::fromUtf8(error.what()), {}});
       }
     });
-    if (&answer == &message.answers.first())
+    if (message.kind != Message::Note && &answer == &message.answers.first()) // keys go on where they were after good news
       QTimer::singleShot(0, button, [button] { button->setFocus(); });
   }
   if (message.kind != Message::Question) {
