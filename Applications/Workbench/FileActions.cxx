@@ -169,6 +169,15 @@ void FileActions::OpenProject(const QString& path, const std::function<void()>& 
   WhenSaved(QuestionBefore(path), [this, path, then] { ReadProject(path, path, then); });
 }
 
+void FileActions::OpenCopy(const QString& path, const Project& project)
+{
+  if (!(bench_->Session()->Now() == project))
+    return OpenProject(path);
+  bench_->Forget("project");
+  bench_->Session()->ForgetUnsavedWork(); // it is all in the copy
+  ReadProject(path, path, {});
+}
+
 QString FileActions::QuestionBefore(const QString& path)
 {
   return tr("Save what you did before %1 is opened?").arg(QFileInfo(path).fileName());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "VolumeReading.h"
-#include "Widgets/Session/SessionState.h"
+#include "Widgets/Session/ProjectFile.h"
 #include <functional>
 #include <QObject>
 #include <QStringList>
@@ -36,6 +36,8 @@ public:
   /// Asks first when there is unsaved work, and again when there is new work once its files are read.
   /// \a then: when it is open; not when it is not.
   void OpenProject(const QString& path, const std::function<void()>& then = {});
+  /// The copy of \a project, which was this one: asks only when something has been done since.
+  void OpenCopy(const QString& path, const Project& project);
   /// A project that a session left that ended without being saved.
   void OpenAbandoned(const QString& backup);
   /// Returns false when it did not work, or a name has to be asked for first.

@@ -152,7 +152,7 @@ void MainWindow::MakeMenus()
                              tr("Colours of volumes, light or dark, language"), [this] { ShowPreferences(this, bench_); }));
   files_->AddTo(Menu(Place::File));
   auto* projects = new ProjectActions(bench_, this);
-  connect(projects, &ProjectActions::OpenAsked, this, [this](const QString& project) { files_->Open({project}); });
+  connect(projects, &ProjectActions::OpenAsked, files_, &FileActions::OpenCopy);
   projects->AddTo(Menu(Place::File));
   (new ExportActions(bench_->Shared(), this))->AddTo(Menu(Place::File), this);
   Menu(Place::File)->addSeparator();

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ProjectActions.h"
+#include "AlgorithmRun.h"
 #include "Controls.h"
 #include "Core/Base/Error.h"
 #include "FocusRing.h"
-#include "ResultFile.h"
 #include "Widgets/Session/PoseComparison.h"
 #include "Widgets/Session/ProjectFolder.h"
 #include "Widgets/Session/ProjectVolumes.h"
 #include "Workbench.h"
+#include <map>
 #include <memory>
 #include <QAction>
 #include <QApplication>
@@ -23,6 +24,8 @@
 #include <QPushButton>
 #include <QTableWidget>
 #include <QVBoxLayout>
+#include <vtkImageData.h>
+#include <vtkUltrasoundWriter.h>
 
 namespace echorama {
 
@@ -35,6 +38,7 @@ ProjectActions::ProjectActions(Workbench* bench, QWidget* window) : QObject(wind
                        dialog->setAttribute(Qt::WA_DeleteOnClose);
                        dialog->setAcceptMode(QFileDialog::AcceptSave);
                        dialog->setOption(QFileDialog::DontConfirmOverwrite); // nothing is overwritten
+                       dialog->setLabelText(QFileDialog::FileName, tr("New &folder:"));
                        dialog->selectFile("alignment");
                        connect(dialog, &QFileDialog::fileSelected, this, &ProjectActions::CopyTo);
                        dialog->open();
@@ -66,30 +70,35 @@ void ProjectActions::ShowVolumes()
   compare_->setEnabled(any && !bench_->IsScored()); // the other may be the solution
 }
 
-// What is copied are files, and a result that was just made is in none.
-void ProjectActions::AskForResult(int id, const QString& folder)
-{
-  const QString file = FreeFileFor(bench_->Session(), id, QFileInfo(folder).absolutePath());
-  bench_->Ask(tr("%1 is in no file yet, and what is copied are files. Save it first, as %2?").arg(bench_->NameOf(id), file),
-              {{tr("Save it there"),
-                [this, id, file, folder] { SaveResult(bench_->Shared(), this, id, file, [this, folder] { CopyTo(folder); }); }},
-               {tr("Cancel"), {}}},
-              "copyProject");
-}
-
+// A result that is in no file is written into the copy, and stays in no file here: this project would miss it when the folder
+// is given away.
 void ProjectActions::CopyTo(const QString& folder)
 {
-  if (const QVector<int> unsaved = UnsavedResults(bench_->Session()); !unsaved.isEmpty())
-    return AskForResult(unsaved.first(), folder);
-  const auto made = std::make_shared<std::string>();
-  const auto copy = [project = bench_->Session()->Now(), folder = folder.toStdString(), made](const Progress& progress) {
-    *made = CopyProject(project, folder, progress);
+  auto* session = bench_->Session();
+  std::map<int, vtkSmartPointer<vtkImageData>> unfiled;
+  for (int id : bench_->Volumes())
+    if (session->GetFile(id).empty()) {
+      unfiled[id] = vtkSmartPointer<vtkImageData>::New();
+      if (!bench_->Try("copyProject", [&] { return session->GetUnpainted(id, unfiled[id]); },
+                       {{tr("Try again"), [this, folder] { CopyTo(folder); }}}))
+        return;
+    }
+  const auto write = [unfiled](const SessionVolume& volume, const std::string& file, const Progress& progress) {
+    const auto writer = vtkSmartPointer<vtkUltrasoundWriter>::New();
+    writer->SetInputDataObject(unfiled.at(volume.id));
+    writer->SetFileName(file.c_str());
+    Run(writer, progress, [&] { writer->Write(); });
   };
-  const auto tell = [this, made] {
+  const auto made = std::make_shared<std::string>();
+  const Project project = session->Now();
+  const auto copy = [project, write, folder = folder.toStdString(), made](const Progress& progress) {
+    *made = CopyProject(project, folder, progress, write);
+  };
+  const auto tell = [this, made, project] {
     const QString path = QString::fromStdString(*made);
     emit bench_->Said({Message::Note,
                        tr("The project and its volumes are in %1").arg(QFileInfo(path).path()),
-                       {{tr("Open the copy"), [this, path] { emit OpenAsked(path); }}},
+                       {{tr("Open the copy"), [this, path, project] { emit OpenAsked(path, project); }}},
                        "copyProject"});
   };
   bench_->Forget("copyProject");

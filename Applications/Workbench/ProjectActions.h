@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Widgets/Session/ProjectFile.h"
 #include <QObject>
 
 class QAction;
@@ -19,17 +20,16 @@ public:
   ProjectActions(Workbench* bench, QWidget* window);
   void AddTo(QMenu* menu);
 
-  /// Copies project and volumes into a new folder, in the background.
+  /// Copies project and volumes into a new folder, in the background; there also what is in no file here.
   void CopyTo(const QString& folder);
   /// Shows in a table how differently a project, a backup or a pose file places the volumes.
   void CompareWith(const QString& path);
 
 signals:
-  void OpenAsked(const QString& project); ///< the copy that was made
+  void OpenAsked(const QString& copy, const Project& project); ///< the copy that was made, and what is in it
 
 private:
   void ShowVolumes();
-  void AskForResult(int id, const QString& folder);
 
   Workbench* bench_;
   QWidget* window_;

@@ -106,6 +106,45 @@ TEST_F(CopiedProject, HoldsAllThatTheProjectNeedsAndOpensElsewhere)
   EXPECT_TRUE(fs::exists(known[1].file)) << known[1].file;
 }
 
+// Under its own name, in the folder alone; two that want one name are told apart, and files keep theirs.
+TEST_F(CopiedProject, HoldsVolumesThatAreInNoFileWrittenIntoIt)
+{
+  Project project = Some();
+  for (const char* name : {"both/livers", "other"}) {
+    project.state.volumes.push_back(project.state.volumes[0]);
+    project.state.volumes.back().name = name;
+    project.state.volumes.back().file.clear();
+  }
+  project.state.volumes[1].file = (root / "data/one/other.mha").string();
+  const auto write = [](const SessionVolume& volume, const std::string& file, const Progress& progress) {
+    progress(0.5);
+    std::ofstream(file) << "voxels of " << volume.name;
+    std::ofstream(file.substr(0, file.size() - 4) + ".ValidRegion.mha") << "valid";
+  };
+  double told = 0.0;
+  bool goesOn = true;
+  const Progress progress([&](double fraction) { return goesOn = goesOn && fraction >= told, told = fraction, true; });
+  const std::string path = CopyProject(project, (root / "copy").string(), progress, write);
+  EXPECT_TRUE(goesOn && told <= 1.0 && told > 0.5);
+  const auto files = FilesIn(root / "copy");
+  EXPECT_EQ(std::count(files.begin(), files.end(), "volumes/other.mha"), 1); // the one that was a file
+  EXPECT_EQ(Read(root / "copy/volumes/other.mha"), "not of the project");
+  EXPECT_EQ(Read(root / "copy/volumes/both_livers.mha"), "voxels of both/livers");
+  EXPECT_EQ(Read(root / "copy/volumes/2/other.mha"), "voxels of other");
+  const Project there = ReadProject(path);
+  ASSERT_EQ(there.state.volumes.size(), 5u);
+  EXPECT_EQ(FindVolume(path, there.state.volumes[3].file), (root / "copy/volumes/both_livers.mha").string());
+  EXPECT_EQ(FindVolume(path, there.state.volumes[4].file), (root / "copy/volumes/2/other.mha").string());
+
+  // One that cannot be written leaves nothing.
+  const auto fails = [](const SessionVolume&, const std::string& file, const Progress&) {
+    throw Error(Error::Kind::FileSystem, file + ": the disk is full");
+  };
+  EXPECT_THROW(CopyProject(project, (root / "second").string(), {}, fails), Error);
+  for (const auto& entry : fs::directory_iterator(root))
+    EXPECT_TRUE(entry.path().filename() == "data" || entry.path().filename() == "copy") << entry.path();
+}
+
 TEST_F(CopiedProject, IsRefusedWithTheReasonAndNothingIsLeft)
 {
   const Project project = Some();

@@ -1566,6 +1566,10 @@ tempo</translation>
         <translation>Einen anderen Ort wählen...</translation>
     </message>
     <message>
+        <source>New &amp;folder:</source>
+        <translation>Neuer &amp;Ordner:</translation>
+    </message>
+    <message>
         <source>The project and its volumes are in %1</source>
         <translation>Das Projekt und seine Volumen sind in %1</translation>
     </message>
@@ -1618,16 +1622,8 @@ tempo</translation>
         <translation>&amp;Tabelle kopieren</translation>
     </message>
     <message>
-        <source>%1 is in no file yet, and what is copied are files. Save it first, as %2?</source>
-        <translation>%1 ist noch in keiner Datei, und kopiert werden Dateien. Zuerst speichern, als %2?</translation>
-    </message>
-    <message>
-        <source>Save it there</source>
-        <translation>Dort speichern</translation>
-    </message>
-    <message>
-        <source>Cancel</source>
-        <translation>Abbrechen</translation>
+        <source>Try again</source>
+        <translation>Noch einmal versuchen</translation>
     </message>
 </context>
 <context>

@@ -3,6 +3,7 @@
 #include "FileActions.h"
 #include "ProjectActions.h"
 #include "ResultPanel.h"
+#include "SliceCanvas.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
 #include <QAction>
@@ -10,11 +11,15 @@
 #include <QCheckBox>
 #include <QClipboard>
 #include <QDialog>
+#include <QDirIterator>
 #include <QFileDialog>
 #include <QLineEdit>
 #include <QPushButton>
 #include <QTableWidget>
 #include <QtTest>
+#include <vtkDataArray.h>
+#include <vtkImageData.h>
+#include <vtkUltrasoundVolume.h>
 
 using namespace echorama;
 
@@ -24,10 +29,40 @@ class TestProjects : public WindowTest {
 private slots:
   void aProjectGoesToAnotherMachineWithItsVolumes();
   void aCopyThatCannotBeMadeSaysWhere();
-  void aResultInNoFileIsSavedBeforeTheCopy();
+  void aResultInNoFileIsInTheCopyAlone();
+  void openingTheCopyAsksOnlyForWorkThatIsNotInIt();
   void afterFilesMovedAFolderIsAskedFor();
   void twoSessionsAreCompared();
+
+private:
+  // By the menu's dialog, into a folder of that name.
+  bool Copy(WindowUnderTest& window, const QString& name)
+  {
+    window.Part<QAction>("copyProject")->trigger();
+    if (!QTest::qWaitFor([&window] { return window.Window().findChild<QFileDialog*>("copyDialog") != nullptr; }))
+      return false;
+    auto* dialog = window.Part<QFileDialog>("copyDialog");
+    dialog->setDirectory(Folder());
+    auto* line = dialog->findChild<QLineEdit*>();
+    line->setText(name);
+    QTest::keyClick(line, Qt::Key_Return);
+    const QString said = "are in " + Folder().filePath(name);
+    return window.Wait() && QTest::qWaitFor([&] { return window.HasMessage(said); });
+  }
 };
+
+namespace {
+
+std::vector<double> GreysOf(const WindowUnderTest& window, int id)
+{
+  vtkDataArray* greys = vtkUltrasoundVolume::GetIntensity(window.Session()->GetImage(id));
+  std::vector<double> values;
+  for (vtkIdType i = 0; i < greys->GetNumberOfTuples(); ++i)
+    values.push_back(greys->GetComponent(i, 0));
+  return values;
+}
+
+} // namespace
 
 void TestProjects::aProjectGoesToAnotherMachineWithItsVolumes()
 {
@@ -37,15 +72,7 @@ void TestProjects::aProjectGoesToAnotherMachineWithItsVolumes()
     QVERIFY(window.Open({A(), B()}));
     window.Session()->SetPlacement(2, 10, -3, 5, 10, 20, 30);
     pose = window.Pose(2);
-    window.Part<QAction>("copyProject")->trigger();
-    QTRY_VERIFY(window.Window().findChild<QFileDialog*>("copyDialog"));
-    auto* dialog = window.Part<QFileDialog>("copyDialog");
-    dialog->setDirectory(Folder());
-    auto* name = dialog->findChild<QLineEdit*>();
-    name->setText("travels");
-    QTest::keyClick(name, Qt::Key_Return);
-    QVERIFY(window.Wait());
-    QVERIFY2(window.HasMessage("are in " + Folder().filePath("travels")), qPrintable(window.Messages().join('\n')));
+    QVERIFY2(Copy(window, "travels"), qPrintable(window.Messages().join('\n')));
     window.Screenshot("copied-project");
     QVERIFY(window.Session()->GetProjectPath().empty()); // the session goes on where it is
     QVERIFY(window.Window().Files()->HasUnsavedWork());
@@ -76,30 +103,70 @@ void TestProjects::aCopyThatCannotBeMadeSaysWhere()
   actions->CopyTo(Folder().filePath("copy"));
   QVERIFY(window.Wait());
   QVERIFY(window.Answer("Open the copy"));
-  QVERIFY(window.Answer("Do not save") || true); // volumes that were only opened are no work
   QVERIFY(window.Wait());
   QTRY_COMPARE(QString::fromStdString(window.Session()->GetProjectPath()), Folder().filePath("copy/copy.json"));
 }
 
-// A result that was just made is in no file, and a copy holds files: it says so, and leads on.
-void TestProjects::aResultInNoFileIsSavedBeforeTheCopy()
+// A copy holds files, and a result that was just made is in none: it is written into the copy, and nowhere else.
+void TestProjects::aResultInNoFileIsInTheCopyAlone()
 {
   WindowUnderTest window;
   QVERIFY(window.Open({A(), B()}));
   window.Part<ResultPanel>("resultPanel")->Make(true);
   QVERIFY(window.Wait());
   QCOMPARE(window.Session()->GetNumberOfVolumes(), 3);
-  auto* actions = window.Window().findChild<ProjectActions*>();
-  const QString folder = Folder().filePath("copy");
-  actions->CopyTo(folder);
-  QVERIFY2(window.HasMessage("result is in no file yet"), qPrintable(window.Messages().join('\n')));
-  QVERIFY(window.Answer("Cancel"));
+  const std::vector<double> made = GreysOf(window, 3);
+  QVERIFY(Copy(window, "copy"));
+  QStringList files;
+  for (QDirIterator each(Folder().path(), {"result*"}, QDir::Files, QDirIterator::Subdirectories); each.hasNext();)
+    files.append(Folder().relativeFilePath(each.next()));
+  files.sort();
+  QVERIFY(files.contains("copy/volumes/result.mha"));
+  for (const QString& file : files) // with what belongs to it, and no other
+    QVERIFY2(file.startsWith("copy/volumes/result.") && !file.endsWith(".part"), qPrintable(file));
+  QVERIFY(window.Session()->GetFile(3).empty()); // the folder may be given away: what is here does not need it
+  QVERIFY(window.Answer("Open the copy"));
   QVERIFY(window.Wait());
-  QVERIFY(!QFile::exists(folder) && !QFile::exists(Folder().filePath("result.mha")));
-  actions->CopyTo(folder);
-  QVERIFY(window.Answer("Save it there"));
-  QTRY_VERIFY(window.HasMessage("are in " + folder));
-  QVERIFY(QFile::exists(Folder().filePath("copy/volumes/result.mha")));
+  QTRY_COMPARE(QString::fromStdString(window.Session()->GetProjectPath()), Folder().filePath("copy/copy.json"));
+  const int id = window.Session()->GetVolumeId(2);
+  QVERIFY(window.Session()->IsResult(id) && window.Session()->GetSourcesChanged(id).empty());
+  QVERIFY(GreysOf(window, id) == made);
+}
+
+// What was copied is in the copy; only what was done since would be lost.
+void TestProjects::openingTheCopyAsksOnlyForWorkThatIsNotInIt()
+{
+  WindowUnderTest window;
+  window.Window().Start({}, {A(), B()}); // with backups
+  QTRY_COMPARE(window.Session()->GetNumberOfVolumes(), 2);
+  const auto press = [&window](Qt::Key key) {
+    window.Move(window.Slice(0), window.Slice(0)->rect().center() + QPoint(5, 50));
+    window.Key(key);
+  };
+  press(Qt::Key_Right);
+  QVERIFY(window.Window().Files()->HasUnsavedWork());
+  QVERIFY(Copy(window, "one"));
+  const auto earlier = window.Pose(2);
+  press(Qt::Key_Up); // not in the copy
+  QVERIFY(window.Pose(2) != earlier);
+  const auto later = window.Pose(2);
+  QVERIFY(window.Answer("Open the copy"));
+  QVERIFY2(window.HasMessage("Save what you did"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.Answer("Cancel"));
+  QVERIFY(window.Session()->GetProjectPath().empty());
+  QCOMPARE(window.Pose(2), later);
+
+  QVERIFY(Copy(window, "two"));
+  QVERIFY(window.Answer("Open the copy"));
+  QVERIFY(window.Wait());
+  QTRY_COMPARE(QString::fromStdString(window.Session()->GetProjectPath()), Folder().filePath("two/two.json"));
+  QVERIFY2(window.Messages().isEmpty(), qPrintable(window.Messages().join('\n')));
+  QCOMPARE(window.Pose(window.Session()->GetVolumeId(1)), later);
+  QVERIFY(!window.Window().Files()->HasUnsavedWork());
+  // And the session that it was is not offered at the next start.
+  WindowUnderTest next;
+  next.Window().Start({}, {});
+  QVERIFY2(next.Messages().isEmpty(), qPrintable(next.Messages().join('\n')));
 }
 
 void TestProjects::afterFilesMovedAFolderIsAskedFor()
