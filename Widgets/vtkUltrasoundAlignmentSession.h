@@ -147,6 +147,14 @@ public:
   /** Grey levels drawn black and white: by default the 0.1 and 99.9 percentile of all volumes. Not an edit. */
   void GetGreyWindow(double window[2]) const;
   void SetGreyWindow(double black, double white);
+  /** By default again. */
+  void ResetGreyWindow()
+  {
+    this->GreyWindow.reset();
+    this->GreyWindowChosen = false;
+    this->Modified();
+    this->InvokeEvent(VolumesChangedEvent);
+  }
   ///@}
 
   ///@{

@@ -430,6 +430,8 @@ void SliceCanvas::mouseDoubleClickEvent(QMouseEvent* event)
   if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool()) || bench_->CurrentTool() == Tool::Mark ||
       IsMeasure(bench_->CurrentTool())) {
     mousePressEvent(event); // dabs in quick succession
+  if (event->button() == Qt::RightButton)
+    bench_->Session()->ResetGreyWindow();
     return;
   }
   // Its first click was meant as no choice of a volume.

@@ -77,6 +77,9 @@ ViewActions::ViewActions(Workbench* bench, ViewGrid* views, QObject* parent)
   more_ = {MakeAction(this, "nextAxis", tr("Ne&xt axis"), "V", tr("Axial, coronal, sagittal: of the view under the mouse"),
                       [this] { views_->CurrentSlice()->NextAxis(); }),
            MakeAction(this, "fit", tr("&Fit"), "F", tr("Show everything in all views"), [this] { views_->Fit(); }),
+           MakeAction(this, "resetGreys", tr("Reset &grey levels"), "G",
+                      tr("Brightness and contrast as they were at first, before a right drag changed them"),
+                      [this] { bench_->Session()->ResetGreyWindow(); }),
            MakeAction(this, "large", tr("&Make view large"), "M", tr("Make the view under the mouse large, and back"),
                       [this] { views_->ToggleLarge(views_->CurrentView()); })};
   brush_ = {MakeAction(this, "brushSmaller", tr("Smaller brush"), "[", tr("Smaller brush"), [this] { ChangeBrush(1.0 / 1.25); }),

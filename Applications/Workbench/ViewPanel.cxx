@@ -53,12 +53,24 @@ QWidget* ViewPanel::SliceControls()
   squares_ = NumberField(box, {"squares", tr("Side of the squares of the checkerboard, pixels"), 4.0, 400.0, 0, 10.0, " px"},
                          bench_->Setter(&SliceLook::squarePixels));
   const auto setWindow = [this](double) { bench_->Session()->SetGreyWindow(black_->value(), white_->value()); };
-  black_ = NumberField(
-      box, {"black", tr("Grey level that is drawn black (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
-      setWindow);
-  white_ = NumberField(
-      box, {"white", tr("Grey level that is drawn white (right drag in a slice changes both)"), -1e6, 1e6, 0, 5.0, {}},
-      setWindow);
+  black_ = NumberField(box,
+                       {"black",
+                        tr("Grey level that is drawn black (right drag in a slice changes both, G brings them back)"),
+                        -1e6,
+                        1e6,
+                        0,
+                        5.0,
+                        {}},
+                       setWindow);
+  white_ = NumberField(box,
+                       {"white",
+                        tr("Grey level that is drawn white (right drag in a slice changes both, G brings them back)"),
+                        -1e6,
+                        1e6,
+                        0,
+                        5.0,
+                        {}},
+                       setWindow);
   form->addRow(tr("Show"), shown_);
   form->addRow(tr("Mode"), mode_);
   form->addRow(tr("Voxels"), interpolation_);

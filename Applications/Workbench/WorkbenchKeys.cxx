@@ -16,6 +16,7 @@ QVector<KeysOf> WorkbenchKeys()
            {QObject::tr("Middle"), QObject::tr("move the picture")},
            {QObject::tr("Shift + middle"), QObject::tr("turn the plane of the slice")},
            {QObject::tr("Right"), QObject::tr("contrast (sideways) and brightness (up and down)")},
+           {QObject::tr("Right, double click"), QObject::tr("brightness and contrast as they were at first")},
            {QObject::tr("Double click"), QObject::tr("make a view large, and back")},
        }},
       {QObject::tr("Moving volumes (tool Align)"),

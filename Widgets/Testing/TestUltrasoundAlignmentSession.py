@@ -215,6 +215,9 @@ class Session(unittest.TestCase):
         session.AddVolume(volume(1), None)
         session.GetGreyWindow(window)
         self.assertEqual(window, [5, 50])
+        session.ResetGreyWindow()
+        session.GetGreyWindow(window)
+        self.assertTrue(window[0] < 25 and window[1] > 190, window)
         session.SetGreyWindow(7, 7)
         self.assertIn("black must be below white", self.errors[0])
 

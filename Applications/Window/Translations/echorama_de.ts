@@ -159,6 +159,30 @@
         <translation>eine Ansicht groß machen, und zurück</translation>
     </message>
     <message>
+        <source>Right, double click</source>
+        <translation>Rechts, Doppelklick</translation>
+    </message>
+    <message>
+        <source>brightness and contrast as they were at first</source>
+        <translation>Helligkeit und Kontrast wie am Anfang</translation>
+    </message>
+    <message>
+        <source>Typing in a field</source>
+        <translation>In ein Feld tippen</translation>
+    </message>
+    <message>
+        <source>Return</source>
+        <translation>Eingabetaste</translation>
+    </message>
+    <message>
+        <source>takes what was typed, and gives the keys back to the views</source>
+        <translation>übernimmt, was getippt wurde, und gibt die Tasten den Ansichten zurück</translation>
+    </message>
+    <message>
+        <source>brings back what was there before, and gives the keys back to the views</source>
+        <translation>bringt zurück, was vorher da war, und gibt die Tasten den Ansichten zurück</translation>
+    </message>
+    <message>
         <source>Moving volumes (tool Align)</source>
         <translation>Volumen bewegen (Werkzeug Ausrichten)</translation>
     </message>
@@ -2606,6 +2630,14 @@ tempo</translation>
         <translation>Ansicht g&amp;roß machen</translation>
     </message>
     <message>
+        <source>Reset &amp;grey levels</source>
+        <translation>&amp;Grauwerte zurücksetzen</translation>
+    </message>
+    <message>
+        <source>Brightness and contrast as they were at first, before a right drag changed them</source>
+        <translation>Helligkeit und Kontrast wie am Anfang, bevor sie durch Ziehen mit der rechten Taste geändert wurden</translation>
+    </message>
+    <message>
         <source>Make the view under the mouse large, and back</source>
         <translation>Die Ansicht unter der Maus groß machen, und zurück</translation>
     </message>
@@ -2697,12 +2729,12 @@ tempo</translation>
         <translation>Kante der Felder des Schachbretts, Pixel</translation>
     </message>
     <message>
-        <source>Grey level that is drawn black (right drag in a slice changes both)</source>
-        <translation>Grauwert, der schwarz gezeichnet wird (rechts ziehen in einer Schicht ändert beide)</translation>
+        <source>Grey level that is drawn black (right drag in a slice changes both, G brings them back)</source>
+        <translation>Grauwert, der schwarz gezeichnet wird (rechts ziehen in einer Schicht ändert beide, G bringt sie zurück)</translation>
     </message>
     <message>
-        <source>Grey level that is drawn white (right drag in a slice changes both)</source>
-        <translation>Grauwert, der weiß gezeichnet wird (rechts ziehen in einer Schicht ändert beide)</translation>
+        <source>Grey level that is drawn white (right drag in a slice changes both, G brings them back)</source>
+        <translation>Grauwert, der weiß gezeichnet wird (rechts ziehen in einer Schicht ändert beide, G bringt sie zurück)</translation>
     </message>
     <message>
         <source>Show</source>

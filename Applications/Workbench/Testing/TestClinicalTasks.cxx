@@ -409,6 +409,14 @@ void TestClinicalTasks::lookThroughAVolume()
   hand.Drag(Coronal, middle, middle + QPoint(0, -40), Qt::RightButton);
   hand.Session()->GetGreyWindow(now);
   QVERIFY(now[1] < greys[1] - 5.0);
+  hand.Key(Qt::Key_G);
+  hand.Session()->GetGreyWindow(now);
+  QVERIFY(now[0] == greys[0] && now[1] == greys[1]);
+  hand.Drag(Coronal, middle, middle + QPoint(30, 40), Qt::RightButton);
+  QTest::mouseDClick(coronal, Qt::RightButton, {}, middle);
+  hand.Settle();
+  hand.Session()->GetGreyWindow(now);
+  QVERIFY(now[0] == greys[0] && now[1] == greys[1]);
   // Large, and back; all is seen again.
   QTest::mouseDClick(coronal, Qt::LeftButton, {}, here);
   hand.Settle();
