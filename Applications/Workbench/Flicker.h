@@ -10,7 +10,8 @@ namespace echorama {
 class Workbench;
 
 /// Shows one side and the other in the slices by turns: what does not agree jumps. A side is "selected", "others", or a volume by
-/// its id. It ends by itself when something is dragged or painted, another tool is taken, or nothing of a side is left.
+/// its id. It ends by itself when something is dragged or painted, the picture too, another tool is taken, or nothing of a side
+/// is left.
 class Flicker : public QObject {
   Q_OBJECT
 

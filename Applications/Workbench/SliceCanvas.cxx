@@ -3,6 +3,7 @@
 // rest is the same with every tool and is done here.
 #include "SliceCanvas.h"
 #include "AlignmentHandles.h"
+#include "Flicker.h"
 #include "MeasureTool.h"
 #include "Redraw.h"
 #include "vtkUltrasoundAlignmentSession.h"
@@ -354,10 +355,12 @@ void SliceCanvas::mouseMoveEvent(QMouseEvent* event)
     bench_->Measuring()->Move(view_, pixel);
     break;
   case Drag::Pan:
+    bench_->Flickering()->Stop();
     view_->Pan(by.x() * ratio, -by.y() * ratio);
     ChangePlane();
     break;
   case Drag::Turn:
+    bench_->Flickering()->Stop();
     view_->Turn(-0.4 * by.y(), 0.4 * by.x());
     ChangePlane();
     break;
@@ -427,11 +430,11 @@ void SliceCanvas::CancelStroke()
 void SliceCanvas::mouseDoubleClickEvent(QMouseEvent* event)
 {
   event->accept();
+  if (event->button() == Qt::RightButton)
+    bench_->Session()->ResetGreyWindow();
   if (event->button() != Qt::LeftButton || IsBrush(bench_->CurrentTool()) || bench_->CurrentTool() == Tool::Mark ||
       IsMeasure(bench_->CurrentTool())) {
     mousePressEvent(event); // dabs in quick succession
-  if (event->button() == Qt::RightButton)
-    bench_->Session()->ResetGreyWindow();
     return;
   }
   // Its first click was meant as no choice of a volume.
