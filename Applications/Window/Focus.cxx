@@ -3,15 +3,18 @@
 // key and wheel of the window, also those of panels that are written later.
 #include "Focus.h"
 #include "MessageBar.h"
+#include <algorithm>
 #include <QAbstractButton>
 #include <QAbstractItemView>
 #include <QAbstractSlider>
 #include <QAbstractSpinBox>
 #include <QApplication>
 #include <QComboBox>
+#include <QDoubleSpinBox>
 #include <QKeyEvent>
 #include <QLineEdit>
 #include <QPlainTextEdit>
+#include <QSpinBox>
 #include <QTextEdit>
 #include <QTimer>
 
@@ -61,6 +64,23 @@ bool IsInMessage(const QWidget* widget)
   return false;
 }
 
+bool IsInTable(const QWidget* field)
+{
+  const QWidget* viewport = field->parentWidget();
+  return viewport && qobject_cast<const QAbstractItemView*>(viewport->parentWidget());
+}
+
+// A number is what it was when it was last taken over; \a before: the text of any other field.
+void BringBack(QWidget* field, const QString& before)
+{
+  if (auto* number = qobject_cast<QDoubleSpinBox*>(field))
+    number->setValue(number->value());
+  else if (auto* whole = qobject_cast<QSpinBox*>(field))
+    whole->setValue(whole->value());
+  else if (auto* line = qobject_cast<QLineEdit*>(field))
+    line->setText(before);
+}
+
 bool IsReturn(const QKeyEvent* event)
 {
   return event->key() == Qt::Key_Return || event->key() == Qt::Key_Enter;
@@ -73,6 +93,8 @@ Focus::Focus(QWidget* window, QWidget* view) : QObject(window), window_(window),
   connect(qApp, &QApplication::focusChanged, this, [this](QWidget*, QWidget* now) {
     if (now && IsHere(now) && IsView(now))
       view_ = now;
+    if (const auto* line = qobject_cast<QLineEdit*>(now))
+      before_ = line->text();
   });
   qApp->installEventFilter(this);
   view->setFocus();
@@ -91,6 +113,13 @@ bool Focus::IsInPopup(const QWidget* widget) const
 
 void Focus::GiveBack()
 {
+  if (!view_ || !view_->isVisible()) { // another one is large now
+    const QList<QWidget*> all = window_->findChildren<QWidget*>();
+    const auto shown =
+        std::find_if(all.begin(), all.end(), [](const QWidget* each) { return IsView(each) && each->isVisible(); });
+    if (shown != all.end())
+      view_ = *shown;
+  }
   if (view_ && view_->isVisible())
     view_->setFocus(Qt::OtherFocusReason);
 }
@@ -118,6 +147,15 @@ bool Focus::eventFilter(QObject* object, QEvent* event)
       QTimer::singleShot(0, this, [this, clicked = QPointer<QWidget>(widget)] { AfterRelease(clicked); });
     break;
   case QEvent::KeyPress:
+    if (IsHere(widget) && IsTypedIn(widget) && static_cast<QKeyEvent*>(event)->key() == Qt::Key_Escape) {
+      if (IsInTable(widget)) { // the table knows what to do
+        QTimer::singleShot(0, this, [this] { GiveBack(); });
+        break;
+      }
+      BringBack(widget, before_);
+      GiveBack();
+      return true;
+    }
     if (IsHere(widget) && IsReturn(static_cast<QKeyEvent*>(event)) && (IsTypedIn(widget) || IsInMessage(widget)) &&
         !IsText(widget))
       QTimer::singleShot(0, this, [this] { GiveBack(); });

@@ -81,6 +81,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   seed_ = new QSpinBox(training);
   seed_->setObjectName("scatterSeed");
   seed_->setRange(1, 1000000);
+  seed_->setKeyboardTracking(false);
   seed_->setToolTip(tr("The same number scatters the same volumes in the same way"));
   scatter_ = Button(training, "scatter", tr("Scatter volumes"),
                     tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "

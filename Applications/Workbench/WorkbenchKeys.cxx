@@ -31,6 +31,11 @@ QVector<KeysOf> WorkbenchKeys()
            {QObject::tr("c"), QObject::tr("put the centre of rotation where the mouse is")},
            {QObject::tr("Shift + c"), QObject::tr("put it back in the middle of what is selected")},
            {QObject::tr("Escape"), QObject::tr("take a drag back, end flickering, or show all volumes again")},
+       }},
+      {QObject::tr("Typing in a field"),
+       {
+           {QObject::tr("Return"), QObject::tr("takes what was typed, and gives the keys back to the views")},
+           {QObject::tr("Escape"), QObject::tr("brings back what was there before, and gives the keys back to the views")},
        }}};
 }
 
