@@ -9,6 +9,7 @@
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
+#include <QRegularExpression>
 #include <QSignalBlocker>
 #include <QTableWidget>
 #include <QTimer>
@@ -93,6 +94,25 @@ void Show(QComboBox* field, const QString& word)
 {
   const QSignalBlocker quiet(field);
   field->setCurrentIndex(field->findData(word));
+}
+
+void MayBeLong(QComboBox* field)
+{
+  field->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
+  field->setMinimumContentsLength(8);
+  for (int i = 0; i < field->count(); ++i)
+    field->setItemData(i, field->itemText(i), Qt::ToolTipRole);
+}
+
+QString Breakable(const QString& text)
+{
+  constexpr int longest = 16; // letters of a word that stays whole
+  static const QRegularExpression joints("([_./\\\\-])");
+  QStringList words = text.split(' ');
+  for (QString& word : words)
+    if (word.size() > longest)
+      word.replace(joints, QString("\\1") + QChar(0x200b));
+  return words.join(' ');
 }
 
 QCheckBox* CheckField(QWidget* parent, const char* name, const QString& label, const QString& help,

@@ -51,6 +51,12 @@ QCheckBox* CheckField(QWidget* parent, const char* name, const QString& label, c
                       const std::function<void(bool)>& toggled = {});
 void Show(QCheckBox* field, bool on);
 
+/// A choice among volumes: their names may be long, and make neither it nor its window wide.
+void MayBeLong(QComboBox* field);
+
+/// A text in which lines may also end inside long names of volumes and files, after _ . - and /.
+QString Breakable(const QString& text);
+
 /// Text that is shown; long lines are broken.
 QLabel* TextField(QWidget* parent, const char* name, const QString& help = {});
 

@@ -151,6 +151,7 @@ void CheckPanel::ShowSides()
     side->addItem(tr("Others"), "others");
     for (int id : bench_->Volumes())
       side->addItem(bench_->NameOf(id), QString::number(id));
+    MayBeLong(side);
     const int place = side->findData(before);
     side->setCurrentIndex(place >= 0 ? place : side == one_ ? 0 : 1);
   }

@@ -18,7 +18,15 @@ namespace echorama {
 
 namespace {
 constexpr int ListMs = 1000; ///< after the last edit: by then its backup is on the disk
+
+// What does not fit ends in dots; the button's tip has it whole.
+void Elide(QPushButton* button, const QString& text)
+{
+  constexpr int margins = 16;
+  button->setText(button->fontMetrics().elidedText(text, Qt::ElideRight, button->width() - margins));
 }
+
+} // namespace
 
 HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
 {
@@ -33,6 +41,11 @@ HistoryPanel::HistoryPanel(Workbench* bench, QWidget* parent) : QWidget(parent),
   backups_->setObjectName("backups");
   backups_->setAccessibleName(tr("Backups, the newest first"));
   backups_->setAlternatingRowColors(true);
+  backups_->setWordWrap(true); // names of volumes can be long
+  backups_->setTextElideMode(Qt::ElideNone);
+  backups_->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  backups_->setVerticalScrollBarPolicy(Qt::ScrollBarAlwaysOn); // heights of lines are found as if it were there
+  backups_->setResizeMode(QListView::Adjust);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(6, 4, 6, 4);
   layout->addWidget(undo_);
@@ -61,7 +74,13 @@ void HistoryPanel::paintEvent(QPaintEvent* event)
   ListBackups();
 }
 
-void HistoryPanel::ShowHistory()
+void HistoryPanel::resizeEvent(QResizeEvent* event)
+{
+  QWidget::resizeEvent(event);
+  ShowButtons();
+}
+
+void HistoryPanel::ShowButtons()
 {
   const auto* session = bench_->Session();
   const auto label = [](const QString& verb, const std::string& what) {
@@ -69,8 +88,16 @@ void HistoryPanel::ShowHistory()
   };
   undo_->setEnabled(session->GetUndoCount() > 0);
   redo_->setEnabled(session->GetRedoCount() > 0);
-  undo_->setText(label(tr("Undo"), session->GetUndoLabel()));
-  redo_->setText(label(tr("Redo"), session->GetRedoLabel()));
+  const QString undo = label(tr("Undo"), session->GetUndoLabel()), redo = label(tr("Redo"), session->GetRedoLabel());
+  undo_->setToolTip(undo + '\n' + tr("Takes the last edit back (Ctrl+Z)"));
+  redo_->setToolTip(redo + '\n' + tr("Makes it again (Ctrl+Shift+Z)"));
+  Elide(undo_, undo);
+  Elide(redo_, redo);
+}
+
+void HistoryPanel::ShowHistory()
+{
+  ShowButtons();
   if (visibleRegion().isEmpty())
     isOld_ = true;
   else
@@ -111,10 +138,10 @@ void HistoryPanel::ShowBackups(const std::vector<Line>& lines)
     const QString path = QString::fromStdString(line.path), label = QString::fromStdString(line.label);
     const QDateTime time = QDateTime::fromMSecsSinceEpoch(static_cast<qint64>(1000.0 * line.time));
     const bool isToday = time.date() == QDate::currentDate();
-    auto* item =
-        new QListWidgetItem(QString("%1  %2").arg(time.toString(isToday ? "hh:mm:ss" : "yyyy-MM-dd hh:mm"), label), backups_);
+    auto* item = new QListWidgetItem(
+        QString("%1  %2").arg(time.toString(isToday ? "hh:mm:ss" : "yyyy-MM-dd hh:mm"), Breakable(label)), backups_);
     item->setData(Qt::UserRole, path);
-    item->setToolTip(path);
+    item->setToolTip(label + '\n' + path);
     if (label == "damaged")
       item->setFlags(Qt::NoItemFlags);
   }

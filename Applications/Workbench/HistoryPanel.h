@@ -21,6 +21,7 @@ public:
 
 protected:
   void paintEvent(QPaintEvent* event) override;
+  void resizeEvent(QResizeEvent* event) override;
 
 private:
   struct Line {
@@ -29,6 +30,7 @@ private:
     bool operator==(const Line& other) const { return path == other.path && label == other.label && time == other.time; }
   };
   void ShowHistory();
+  void ShowButtons();
   void ListBackups();
   void ShowBackups(const std::vector<Line>& lines);
   void Restore(int row);

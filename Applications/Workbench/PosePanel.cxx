@@ -171,9 +171,10 @@ void PosePanel::ShowPose()
       if (bench_->IsScored())
         field->clear(); // who knows the numbers of the solution needs no eyes
     }
+  const QString name = Breakable(bench_->NameOf(id));
   of_->setText(id == 0      ? tr("Select a volume to move it.")
-               : count == 1 ? bench_->NameOf(id)
-                            : tr("%1 and %2 more, which move with it").arg(bench_->NameOf(id)).arg(count - 1));
+               : count == 1 ? name
+                            : tr("%1 and %2 more, which move with it").arg(name).arg(count - 1));
 }
 
 void PosePanel::ShowCentre()

@@ -260,6 +260,7 @@ void ResultPanel::SetTarget(int id)
     ShowFields();
     const int form = recipe_.form > 0 ? workspace_.session->GetSource(id, recipe_.form - 1) : 0;
     ShowForms();
+    MayBeLong(form_);
     form_->setCurrentIndex(std::max(0, form_->findData(form)));
   }
   ShowResults();
@@ -328,18 +329,20 @@ void ResultPanel::ShowResults()
     if (!session->GetSourcesChanged(id).empty() && (changed == 0 || id == target_))
       changed = id;
   }
+  MayBeLong(into_);
   into_->setCurrentIndex(std::max(0, into_->findData(target_)));
   ShowForms();
   QStringList names;
   for (const int id : Sources(target_))
-    names.append(NameOf(id));
+    names.append(Breakable(NameOf(id)));
   of_->setText(names.isEmpty() ? tr("No volume is shown.") : tr("Of %1").arg(names.join(", ")));
   changed_->setVisible(changed > 0);
   again_->setVisible(changed > 0);
   again_->setProperty("of", changed);
   if (changed > 0)
     changed_->setText(
-        tr("%1: sources changed: %2.").arg(NameOf(changed), QString::fromStdString(session->GetSourcesChanged(changed))));
+        tr("%1: sources changed: %2.")
+            .arg(Breakable(NameOf(changed)), Breakable(QString::fromStdString(session->GetSourcesChanged(changed)))));
   ShowState();
 }
 

@@ -35,7 +35,8 @@ SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis,
   slider_->setObjectName(name + "Slider");
   slider_->setRange(0, SliderSteps);
   slider_->setToolTip(tr("Where the slice is; the wheel over the picture goes by single voxels"));
-  position_ = NumberField(this, {"position", tr("Where the slice is, along its axis"), -1e5, 1e5, 1, 1.0, " mm"},
+  slider_->setMinimumWidth(1); // before anything is cut off
+  position_ = NumberField(this, {"position", tr("Where the slice is, along its axis, mm"), -1e5, 1e5, 1, 1.0, " mm"},
                           [this](double mm) { SetPosition(mm); });
   position_->setButtonSymbols(QAbstractSpinBox::NoButtons);
   auto* fit = SmallButton(this, name + "Fit", tr("Fit"), tr("Show everything (F)"));
@@ -43,8 +44,8 @@ SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis,
       SmallButton(this, name + "Large", QString(QChar(0x2922)), tr("Make this view large, and back (M, or a double click)"));
 
   auto* row = new QHBoxLayout;
-  row->setContentsMargins(2, 0, 2, 0);
-  row->setSpacing(3);
+  row->setContentsMargins(1, 0, 1, 0);
+  row->setSpacing(2);
   row->addWidget(axes_);
   row->addWidget(slider_, 1);
   row->addWidget(position_);
@@ -66,6 +67,7 @@ SlicePane::SlicePane(Workbench* bench, const QString& name, const QString& axis,
   connect(canvas_, &SliceCanvas::LargeAsked, this, &SlicePane::LargeAsked);
   connect(canvas_, &SliceCanvas::PlaneChanged, this, &SlicePane::ShowPlane);
   connect(canvas_, &SliceCanvas::Drawn, this, &SlicePane::ShowPlane); // a view fits itself when the first volumes come
+  FitPosition();
   SetAxis(axis);
 }
 
@@ -96,6 +98,36 @@ void SlicePane::SetPosition(double mm)
   canvas_->SetPlaced(true);
   canvas_->Ask();
   emit canvas_->PlaneChanged();
+}
+
+int SlicePane::WidthOf(const QString& text) const
+{
+  const QString longest = position_->textFromValue(position_->minimum()) + position_->suffix();
+  return position_->minimumSizeHint().width() + position_->fontMetrics().horizontalAdvance(text) -
+         position_->fontMetrics().horizontalAdvance(longest);
+}
+
+// A position in a body is shown whole (that of any number would take the slider's place): with its unit where there is room.
+void SlicePane::FitPosition()
+{
+  const QString number = position_->textFromValue(-888.8), unit = QStringLiteral(" mm");
+  position_->setMinimumWidth(WidthOf(number));
+  const bool hasRoom = width() >= layout()->totalMinimumSize().width() + WidthOf(number + unit) - WidthOf(number);
+  if (hasRoom == position_->suffix().isEmpty())
+    position_->setSuffix(hasRoom ? unit : QString());
+}
+
+void SlicePane::resizeEvent(QResizeEvent* event)
+{
+  QWidget::resizeEvent(event);
+  FitPosition();
+}
+
+void SlicePane::changeEvent(QEvent* event)
+{
+  QWidget::changeEvent(event);
+  if (event->type() == QEvent::FontChange && layout())
+    FitPosition();
 }
 
 // From the view, which others move too: what is linked to it, and a plane that was turned.

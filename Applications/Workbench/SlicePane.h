@@ -30,7 +30,13 @@ public:
 signals:
   void LargeAsked();
 
+protected:
+  void changeEvent(QEvent* event) override;
+  void resizeEvent(QResizeEvent* event) override;
+
 private:
+  int WidthOf(const QString& text) const; ///< in the field of the position
+  void FitPosition();
   void SetPosition(double mm);
 
   SliceCanvas* canvas_;

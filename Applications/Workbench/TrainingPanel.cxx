@@ -114,7 +114,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   layout->addWidget(training);
 
   table_ = TableField(this, "attempts", tr("All attempts, the last one first"),
-                      {tr("When"), tr("Trainee"), tr("Score, mm"), tr("From, mm"), tr("Time"), tr("Help")});
+                      {tr("Score,\nmm"), tr("From,\nmm"), tr("Time"), tr("Help"), tr("Trainee"), tr("When")});
   table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   layout->addWidget(table_, 1);
 
@@ -174,6 +174,15 @@ bool TrainingPanel::SetHistory(const QString& path)
   return true;
 }
 
+// For columns that are farther right than the panel is wide.
+QString TrainingPanel::Told(const QStringList& row) const
+{
+  QStringList lines;
+  for (int column = 0; column < row.size(); ++column)
+    lines.append(QString("%1: %2").arg(table_->horizontalHeaderItem(column)->text().replace('\n', ' '), row[column]));
+  return lines.join('\n');
+}
+
 void TrainingPanel::ShowHistory()
 {
   history_->setText(historyPath_);
@@ -182,10 +191,13 @@ void TrainingPanel::ShowHistory()
     return;
   try {
     for (const Attempt& attempt : ReadAttempts(historyPath_.toStdString())) {
-      InsertRow(table_, 0,
-                {QString::fromStdString(attempt.time), QString::fromStdString(attempt.trainee),
-                 QString::number(attempt.scoreMm, 'f', 2), QString::number(attempt.startMm, 'f', 2), TimeText(attempt.seconds),
-                 QString::number(attempt.help)});
+      const QStringList row{QString::number(attempt.scoreMm, 'f', 2),
+                            QString::number(attempt.startMm, 'f', 2),
+                            TimeText(attempt.seconds),
+                            QString::number(attempt.help),
+                            QString::fromStdString(attempt.trainee),
+                            QString::fromStdString(attempt.time)};
+      InsertRow(table_, 0, row, Told(row));
     }
   } catch (const Error& error) {
     WarnOfHistory(error.what());

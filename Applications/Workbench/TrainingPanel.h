@@ -42,6 +42,7 @@ private:
   void Submit();
   void ShowScore();
   void ShowState();
+  QString Told(const QStringList& row) const;
   void ShowHistory();
   void WarnOfHistory(const QString& why);
 

@@ -1566,6 +1566,10 @@ tempo</translation>
         <translation>Benennen Sie einen neuen Ordner für das Projekt und seine Volumen</translation>
     </message>
     <message>
+        <source>New &amp;folder:</source>
+        <translation>Neuer &amp;Ordner:</translation>
+    </message>
+    <message>
         <source>&amp;Compare with a project or poses...</source>
         <translation>Mit einem Projekt oder Lagen ver&amp;gleichen...</translation>
     </message>
@@ -1588,10 +1592,6 @@ tempo</translation>
     <message>
         <source>Choose another place...</source>
         <translation>Einen anderen Ort wählen...</translation>
-    </message>
-    <message>
-        <source>New &amp;folder:</source>
-        <translation>Neuer &amp;Ordner:</translation>
     </message>
     <message>
         <source>The project and its volumes are in %1</source>
@@ -2186,8 +2186,8 @@ tempo</translation>
         <translation>Wo die Schicht ist; das Rad über dem Bild geht um einzelne Voxel</translation>
     </message>
     <message>
-        <source>Where the slice is, along its axis</source>
-        <translation>Wo die Schicht ist, entlang ihrer Achse</translation>
+        <source>Where the slice is, along its axis, mm</source>
+        <translation>Wo die Schicht ist, entlang ihrer Achse, mm</translation>
     </message>
     <message>
         <source>Fit</source>
@@ -2403,12 +2403,16 @@ tempo</translation>
         <translation>Wann</translation>
     </message>
     <message>
-        <source>Score, mm</source>
-        <translation>Punktzahl, mm</translation>
+        <source>Score,
+mm</source>
+        <translation>Punkte,
+mm</translation>
     </message>
     <message>
-        <source>From, mm</source>
-        <translation>Von, mm</translation>
+        <source>From,
+mm</source>
+        <translation>Von,
+mm</translation>
     </message>
     <message>
         <source>Help</source>
@@ -2626,16 +2630,16 @@ tempo</translation>
         <translation>In allen Ansichten alles zeigen</translation>
     </message>
     <message>
-        <source>&amp;Make view large</source>
-        <translation>Ansicht g&amp;roß machen</translation>
-    </message>
-    <message>
         <source>Reset &amp;grey levels</source>
         <translation>&amp;Grauwerte zurücksetzen</translation>
     </message>
     <message>
         <source>Brightness and contrast as they were at first, before a right drag changed them</source>
         <translation>Helligkeit und Kontrast wie am Anfang, bevor sie durch Ziehen mit der rechten Taste geändert wurden</translation>
+    </message>
+    <message>
+        <source>&amp;Make view large</source>
+        <translation>Ansicht g&amp;roß machen</translation>
     </message>
     <message>
         <source>Make the view under the mouse large, and back</source>

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Every panel can be read and used as a whole: on a small and on a large screen, with the usual and with larger text.
+#include "SliceCanvas.h"
+#include "SlicePane.h"
+#include "ViewGrid.h"
+#include "vtkUltrasoundSliceView.h"
 #include "WindowUnderTest.h"
 #include <QAbstractButton>
 #include <QAbstractSpinBox>
@@ -83,7 +87,9 @@ QStringList Complaints(QDockWidget* dock)
       continue;
     if (auto* header = qobject_cast<QHeaderView*>(part); header && header->orientation() == Qt::Horizontal)
       for (int column = 0; column < header->count(); ++column) {
-        const int text = header->fontMetrics().horizontalAdvance(header->model()->headerData(column, Qt::Horizontal).toString());
+        int text = 0;
+        for (const QString& line : header->model()->headerData(column, Qt::Horizontal).toString().split('\n'))
+          text = std::max(text, header->fontMetrics().horizontalAdvance(line));
         if (text > header->sectionSize(column) - 2)
           complain(part, QString("column %1: %2 pixels in %3").arg(column).arg(text).arg(header->sectionSize(column)));
       }
@@ -158,6 +164,16 @@ void TestLayout::everyPanelFits()
         complaints.append(dock->objectName() + ": it lies under the tabs");
     window.Grab(QString("layout-%1-%2-%3").arg(dock->objectName()).arg(size.width()).arg(points));
   }
+  // The row above each slice, when it is far from the origin.
+  for (SlicePane* pane : window.Window().Views()->Slices()) {
+    pane->Canvas()->View()->SetPosition(-123.4);
+    pane->ShowPlane();
+    for (QWidget* part : pane->findChildren<QWidget*>())
+      if (const auto [text, room] = TextOf(part); part->isVisible() && text > room)
+        complaints.append(
+            QString("%1: %2 has a text of %3 pixels in %4").arg(pane->objectName(), NameOf(part)).arg(text).arg(room));
+  }
+  window.Grab(QString("layout-slices-%1-%2").arg(size.width()).arg(points));
   QVERIFY2(complaints.isEmpty(), qPrintable(complaints.join('\n')));
 }
 
