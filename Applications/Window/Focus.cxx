@@ -14,7 +14,6 @@
 #include <QKeyEvent>
 #include <QLineEdit>
 #include <QPlainTextEdit>
-#include <QSpinBox>
 #include <QTextEdit>
 #include <QTimer>
 
@@ -75,8 +74,6 @@ void BringBack(QWidget* field, const QString& before)
 {
   if (auto* number = qobject_cast<QDoubleSpinBox*>(field))
     number->setValue(number->value());
-  else if (auto* whole = qobject_cast<QSpinBox*>(field))
-    whole->setValue(whole->value());
   else if (auto* line = qobject_cast<QLineEdit*>(field))
     line->setText(before);
 }

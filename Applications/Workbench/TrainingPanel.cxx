@@ -78,11 +78,8 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   scatterMm_->setValue(15.0);
   scatterDegrees_ = NumberField(training, {"scatterDegrees", tr("How far volumes are turned"), 0.0, 180.0, 2, 1.0, tr("°")});
   scatterDegrees_->setValue(15.0);
-  seed_ = new QSpinBox(training);
-  seed_->setObjectName("scatterSeed");
-  seed_->setRange(1, 1000000);
-  seed_->setKeyboardTracking(false);
-  seed_->setToolTip(tr("The same number scatters the same volumes in the same way"));
+  seed_ = NumberField(
+      training, {"scatterSeed", tr("The same number scatters the same volumes in the same way"), 1.0, 1000000.0, 0, 1.0, {}}, {});
   scatter_ = Button(training, "scatter", tr("Scatter volumes"),
                     tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "
                        "without truth, from where it is). Can be undone."),

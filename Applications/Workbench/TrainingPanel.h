@@ -8,7 +8,6 @@ class QDoubleSpinBox;
 class QLabel;
 class QLineEdit;
 class QPushButton;
-class QSpinBox;
 class QTableWidget;
 class QTimer;
 
@@ -50,8 +49,7 @@ private:
   QLabel *truth_, *score_, *time_;
   QCheckBox *live_, *vectors_, *help_;
   QLineEdit *trainee_, *history_;
-  QDoubleSpinBox *scatterMm_, *scatterDegrees_;
-  QSpinBox* seed_;
+  QDoubleSpinBox *scatterMm_, *scatterDegrees_, *seed_;
   QPushButton *scatter_, *start_, *submit_;
   QTableWidget* table_;
   QTimer* clock_;

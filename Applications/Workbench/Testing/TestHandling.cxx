@@ -141,12 +141,16 @@ void TestHandling::escapeInOtherFieldsBringsTheirTextBack()
   window.Key(Qt::Key_Escape);
   QCOMPARE(trainee->text(), QString("Anna"));
   QVERIFY(view->hasFocus());
-  auto* seed = window.Part<QSpinBox>("scatterSeed");
+  auto* seed = window.Part<QDoubleSpinBox>("scatterSeed");
+  ClickInWindow(window, seed, seed->rect().center());
+  QTest::keyClicks(QApplication::focusWidget(), "3"); // takes the place of what was there
+  window.Key(Qt::Key_Return);
+  QCOMPARE(seed->text(), QString("3"));
   TypeInto(window, seed, "42");
   QCOMPARE(seed->text(), QString("42"));
   window.Key(Qt::Key_Escape);
-  QCOMPARE(seed->text(), QString("1"));
-  QCOMPARE(seed->value(), 1);
+  QCOMPARE(seed->text(), QString("3"));
+  QCOMPARE(seed->value(), 3.0);
   QVERIFY(view->hasFocus());
 }
 

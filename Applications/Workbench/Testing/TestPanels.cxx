@@ -23,7 +23,6 @@
 #include <QLineEdit>
 #include <QListWidget>
 #include <QPushButton>
-#include <QSpinBox>
 #include <QTableWidget>
 #include <QToolButton>
 #include <QtTest>
@@ -550,7 +549,7 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QVERIFY(std::abs(std::hypot(put[0] - at[0], put[1] - at[1], put[2] - at[2]) - 9.0) < 1e-6);
   QVERIFY(std::abs(window.Session()->GetRotationError(2) - 4.0) < 1e-4);
   QCOMPARE(window.Pose(1), fixed);
-  window.Part<QSpinBox>("scatterSeed")->setValue(2);
+  window.Part<QDoubleSpinBox>("scatterSeed")->setValue(2);
   QTest::mouseClick(window.Part<QPushButton>("scatter"), Qt::LeftButton);
   QVERIFY(Distance(window.Pose(2), scattered) > 0.1);
   const double start = window.Session()->GetScore(); // the mean over both volumes
