@@ -80,6 +80,7 @@ TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent
   scatterDegrees_->setValue(15.0);
   seed_ = NumberField(
       training, {"scatterSeed", tr("The same number scatters the same volumes in the same way"), 1.0, 1000000.0, 0, 1.0, {}}, {});
+  seed_->setMinimumWidth(seed_->minimumSizeHint().width()); // the largest is seen whole
   scatter_ = Button(training, "scatter", tr("Scatter volumes"),
                     tr("Moves every volume but the fixed one, in a random direction, by so much from where it belongs (or, "
                        "without truth, from where it is). Can be undone."),
