@@ -7,7 +7,7 @@
 // 2. Scatterers: tasks of a fixed number of blocks. One hash (Philox) per cell gives place, rank and sign; where it lies is asked
 // for the whole task at once. What is kept goes to the memory of the task, so that nothing is copied
 //    and the order does not depend on the threads.
-// 3. A grid of the centres of the bricks answers which lie near a line.
+// 3. A grid of the centres of the bricks answers which lie beside a line; bricks are kept in its order.
 //
 // A block gives the same brick whoever asks for it: see ScattererCache.
 //
@@ -29,7 +29,6 @@
 namespace echorama {
 namespace {
 
-constexpr int lanes = 16;                // lists are padded to a multiple: whole vectors
 constexpr double farthest = 1e7;         // mm
 constexpr float outside = 1e9f;          // mm, of padding
 constexpr double cellsPerTask = 32768.0; // asked for at once
@@ -37,6 +36,7 @@ constexpr double maxBlocks = 134217728.0;
 
 std::uint32_t Padded(std::size_t count)
 {
+  constexpr std::size_t lanes = Scatterers::lanes;
   return static_cast<std::uint32_t>((count + lanes - 1) / lanes * lanes);
 }
 
@@ -507,8 +507,8 @@ Scatterers Scatterers::At(const std::vector<Eigen::Vector3d>& points, const std:
 
 std::size_t Scatterers::MemoryBytes() const
 {
-  std::size_t bytes = bricks_.capacity() * sizeof(Brick) + (starts_.capacity() + list_.capacity()) * sizeof(std::uint32_t) +
-                      listCentres_.capacity() * sizeof(Eigen::Vector3f);
+  std::size_t bytes = bricks_.capacity() * sizeof(Brick) + starts_.capacity() * sizeof(std::uint32_t) +
+                      centres_.capacity() * sizeof(Eigen::Vector3f);
   for (const auto& part : parts_)
     bytes += part->capacity() * sizeof(float) + sizeof(*part);
   return bytes;
@@ -546,39 +546,47 @@ void Scatterers::MakeGrid(double cell)
     ++starts_[cellOf(brick) + 1];
   for (std::size_t i = 0; i < cells; ++i)
     starts_[i + 1] += starts_[i];
-  list_.resize(bricks_.size());
   std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
-  listCentres_.resize(bricks_.size());
-  for (std::size_t i = 0; i < bricks_.size(); ++i) {
-    const std::uint32_t place = next[cellOf(bricks_[i])]++;
-    list_[place] = static_cast<std::uint32_t>(i);
-    listCentres_[place] = (bricks_[i].centre - gridFirst_).cast<float>();
+  std::vector<Brick> sorted(bricks_.size());
+  centres_.resize(bricks_.size());
+  for (const Brick& brick : bricks_) {
+    const std::uint32_t place = next[cellOf(brick)]++;
+    sorted[place] = brick;
+    centres_[place] = (brick.centre - gridFirst_).cast<float>();
   }
+  bricks_ = std::move(sorted);
 }
 
-void Scatterers::FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, const RadiusAlong& radius,
-                          std::vector<std::uint32_t>& found) const
+void Scatterers::FindBeside(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length,
+                            const RadiusAlong& radius, std::vector<std::uint32_t>& found) const
 {
   if (bricks_.empty() || !(length >= 0.0))
     return;
   // Layer by layer across the axis along which the line runs most. There, what is within reach of the line is an ellipse about
-  // where the line passes.
+  // where the line passes. Cells that follow each other along the first of the other axes follow each other in memory, but
+  // where that axis is the second.
   int main = 0;
   direction.cwiseAbs().maxCoeff(&main);
-  const int axes[2] = {(main + 1) % 3, (main + 2) % 3};
+  const int axes[2] = {main == 0 ? 1 : 0, main == 2 ? 1 : 2};
+  const bool together = axes[0] == 0;
   const Eigen::Vector3d start = from - gridFirst_;
   const Eigen::Vector3f startFloat = start.cast<float>(), directionFloat = direction.cast<float>();
-  const double slope = direction[main], largest = radius(0.0, length) + largestRadius_;
-  const double slant = std::sqrt(std::max(0.0, 1.0 - slope * slope)) / std::abs(slope);
+  const double slope = direction[main], widest = radius(0.0, length) + largestRadius_;
+  const double sine = std::sqrt(std::max(0.0, 1.0 - slope * slope)), slant = sine / std::abs(slope);
   const auto cellOf = [&](double x, int axis) {
     return static_cast<int>(std::clamp(std::floor(x / gridCell_), -1.0, static_cast<double>(gridSize_[axis])));
   };
-  const double a = start[main], b = start[main] + length * slope;
-  const int firstLayer = std::max(0, cellOf(std::min(a, b) - largest, main));
-  const int lastLayer = std::min(gridSize_[main] - 1, cellOf(std::max(a, b) + largest, main));
+  const double a = start[main], b = start[main] + length * slope, pad = sine * widest + std::abs(slope) * largestRadius_;
+  const int firstLayer = std::max(0, cellOf(std::min(a, b) - pad, main));
+  const int lastLayer = std::min(gridSize_[main] - 1, cellOf(std::max(a, b) + pad, main));
+  const std::size_t strides[3] = {1, static_cast<std::size_t>(gridSize_.x()),
+                                  static_cast<std::size_t>(gridSize_.x()) * static_cast<std::size_t>(gridSize_.y())};
+  // Single precision must not lose one.
+  const double slack = 1e-6 * ((gridSize_.cast<double>() * gridCell_).matrix().norm() + start.norm()) + largestRadius_;
+  const auto least = static_cast<float>(-slack), most = static_cast<float>(length + slack);
   for (int layer = firstLayer; layer <= lastLayer; ++layer) {
     const double enter = (layer * gridCell_ - start[main]) / slope, leave = ((layer + 1) * gridCell_ - start[main]) / slope;
-    const double begin = std::min(enter, leave) - slant * largest, end = std::max(enter, leave) + slant * largest;
+    const double begin = std::min(enter, leave) - slant * widest, end = std::max(enter, leave) + slant * widest;
     const double reach = radius(std::clamp(begin, 0.0, length), std::clamp(end, 0.0, length)) + largestRadius_;
     int low[2], high[2];
     for (int n = 0; n < 2; ++n) {
@@ -588,22 +596,29 @@ void Scatterers::FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& di
       low[n] = std::max(0, cellOf(std::min(p, q) - wide, axis));
       high[n] = std::min(gridSize_[axis] - 1, cellOf(std::max(p, q) + wide, axis));
     }
+    if (low[0] > high[0])
+      continue;
     const auto reachSquared = static_cast<float>(reach * reach);
-    Eigen::Array3i at;
-    at[main] = layer;
-    for (at[axes[1]] = low[1]; at[axes[1]] <= high[1]; ++at[axes[1]])
-      for (at[axes[0]] = low[0]; at[axes[0]] <= high[0]; ++at[axes[0]]) {
-        const std::size_t cell =
-            (static_cast<std::size_t>(at.z()) * static_cast<std::size_t>(gridSize_.y()) + static_cast<std::size_t>(at.y())) *
-                static_cast<std::size_t>(gridSize_.x()) +
-            static_cast<std::size_t>(at.x());
-        for (std::uint32_t i = starts_[cell]; i < starts_[cell + 1]; ++i) {
-          const Eigen::Vector3f place = listCentres_[i] - startFloat;
-          const float along = place.dot(directionFloat), all = place.squaredNorm();
-          if (all - along * along <= reachSquared + 1e-6f * all) // single precision must not lose one
-            found.push_back(list_[i]);
-        }
+    const auto look = [&](std::size_t firstCell, std::size_t lastCell) {
+      const std::uint32_t first = starts_[firstCell], last = starts_[lastCell + 1];
+      std::size_t count = found.size();
+      found.resize(count + (last - first));
+      for (std::uint32_t i = first; i < last; ++i) {
+        const Eigen::Vector3f place = centres_[i] - startFloat;
+        const float along = place.dot(directionFloat), all = place.squaredNorm();
+        found[count] = i;
+        count += (all - along * along <= reachSquared + 1e-6f * all) & (along >= least) & (along <= most);
       }
+      found.resize(count);
+    };
+    for (int i = low[1]; i <= high[1]; ++i) {
+      const std::size_t row = static_cast<std::size_t>(layer) * strides[main] + static_cast<std::size_t>(i) * strides[axes[1]];
+      if (together)
+        look(row + static_cast<std::size_t>(low[0]), row + static_cast<std::size_t>(high[0]));
+      else
+        for (int j = low[0]; j <= high[0]; ++j)
+          look(row + static_cast<std::size_t>(j) * strides[1], row + static_cast<std::size_t>(j) * strides[1]);
+    }
   }
 }
 

@@ -56,6 +56,9 @@ ParameterList Describe(ScattererParameters& p);
 /// single precision (1e-6 mm, however far away the world is).
 class Scatterers {
 public:
+  /// Lists of a brick are padded to a multiple of this, for whole vectors, with silent points far from everything.
+  static constexpr int lanes = 16;
+
   /// One brick: x, y, z and amplitude of \a count scatterers, one list after the other, each \a stride floats long.
   struct Brick {
     Eigen::Vector3d centre;   ///< mm, world
@@ -92,10 +95,11 @@ public:
   /// How far from a line bricks are looked for: the radius (mm) that serves all of it from \a begin to \a end mm.
   using RadiusAlong = std::function<double(double begin, double end)>;
 
-  /// Appends the bricks that may reach within a radius of the line from \a from along \a direction (unit vector), \a length
-  /// mm long: always the same in the same order, each once; also some that do not.
-  void FindNear(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, const RadiusAlong& radius,
-                std::vector<std::uint32_t>& found) const;
+  /// Appends the bricks that may hold scatterers beside the line from \a from along \a direction (unit vector), \a length
+  /// mm long: within the radius of it, and not before its beginning or behind its end. Always the same in the same order, each
+  /// once; also some that do not.
+  void FindBeside(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length, const RadiusAlong& radius,
+                  std::vector<std::uint32_t>& found) const;
 
 private:
   friend class ScattererCache;
@@ -107,13 +111,13 @@ private:
   std::vector<Brick> bricks_;
   std::size_t count_ = 0;
 
-  // Bricks by where their centre lies: those of a cell are listed from starts_[cell] to starts_[cell + 1].
+  // Bricks by where their centre lies: those of a cell are starts_[cell] to starts_[cell + 1].
   Eigen::Vector3d gridFirst_ = Eigen::Vector3d::Zero();
   Eigen::Array3i gridSize_ = Eigen::Array3i::Zero();
   double gridCell_ = 1.0;
   double largestRadius_ = 0.0; // of a brick about its centre
-  std::vector<std::uint32_t> starts_, list_;
-  std::vector<Eigen::Vector3f> listCentres_; // from the grid's first point, mm
+  std::vector<std::uint32_t> starts_;
+  std::vector<Eigen::Vector3f> centres_; // of the bricks, from the grid's first point, mm
 };
 
 } // namespace echorama

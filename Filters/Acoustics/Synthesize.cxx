@@ -191,18 +191,22 @@ public:
       segments.insert(end, on);
   }
 
-  void Sum(const BeamWays& ways, const Scatterers& scatterers, Complex* row) const
+  EchoSum Summer(const Scatterers& scatterers) const { return {scatterers, p_.transducer, axis_}; }
+
+  void Sum(const BeamWays& ways, EchoSum& echoes, Complex* row) const
   {
     // The direct way comes first.
-    const auto reflected =
-        std::find_if(ways.segments.begin(), ways.segments.end(), [](const SoundSegment& segment) { return segment.bounces > 0; });
-    for (auto segment = ways.segments.begin(); segment != reflected; ++segment)
-      AddSegmentEchoes(*segment, scatterers, p_.transducer, axis_, row);
-    if (!ways.directAmplitude.empty())
+    auto segment = ways.segments.begin();
+    for (; segment != ways.segments.end() && segment->bounces == 0; ++segment)
+      echoes.Add(*segment);
+    if (!ways.directAmplitude.empty()) {
+      echoes.MoveTo(row);
       for (std::size_t i = 0; i < ways.directAmplitude.size(); ++i)
         row[i] *= ways.directAmplitude[i];
-    for (auto segment = reflected; segment != ways.segments.end(); ++segment)
-      AddSegmentEchoes(*segment, scatterers, p_.transducer, axis_, row);
+    }
+    for (; segment != ways.segments.end(); ++segment)
+      echoes.Add(*segment);
+    echoes.MoveTo(row);
     const double mirror = std::pow(10.0, p_.mirrorDb / 20.0);
     for (const SurfaceEcho& echo : ways.echoes)
       AddSurfaceEcho(echo, p_.transducer, axis_, row, mirror);
@@ -470,9 +474,9 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
     const Stopwatch watch(&spent.echoesSeconds);
     const VolumeView<Complex> rows = echoes.baseband.View();
     ParallelRanges(wanted, beamsPerRange, progress.Part(0.4, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      EchoSum sum = beams.Summer(scatterers);
       for (std::ptrdiff_t i = first + begin; i < first + end; ++i)
-        beams.Sum(ways[static_cast<std::size_t>(i)], scatterers,
-                  rows.Row(static_cast<int>(i % n[1]), static_cast<int>(i / n[1])));
+        beams.Sum(ways[static_cast<std::size_t>(i)], sum, rows.Row(static_cast<int>(i % n[1]), static_cast<int>(i / n[1])));
     });
   }
   spent.bytes = bytes + static_cast<std::size_t>(samples) * sizeof(Complex);

@@ -28,7 +28,7 @@ Sums PlainEchoes(const SoundSegment& segment, const Scatterers& scatterers, cons
   const double sigma = transducer.PulseSigmaMm();
   const Eigen::Vector3d up = segment.direction.cross(segment.across);
   std::vector<std::uint32_t> near;
-  scatterers.FindNear(
+  scatterers.FindBeside(
       segment.from, segment.direction, segment.length, [reach](double, double) { return 4.0 * reach; }, near);
   for (const std::uint32_t index : near) {
     const Scatterers::Brick& brick = scatterers.Bricks()[index];

@@ -76,6 +76,32 @@ TEST(EchoSum, PiecesOfAWayMakeTheWhole)
   EXPECT_LT(RelativeDifference(sum, RowOf(whole, scatterers, transducer, axis)), 0.005);
 }
 
+TEST(EchoSum, RowsOfBeamsKnowNothingOfEachOther)
+{
+  const Transducer transducer;
+  // Two pieces far apart, one beyond the axis, then another beam: what was moved out is gone.
+  const SoundSegment first = Beam(Vector3d::Zero(), {0.1, 0.2, 1.0}, 31.0, 4.0),
+                     second = Beam({3.0, 0.0, 0.0}, {0.1, 0.2, 1.0}, 60.0, 20.0),
+                     other = Beam({1.0, -2.0, 0.0}, {-0.1, 0.1, 1.0}, 25.0, 30.0);
+  const Scatterers scatterers = HeardBy({first, second, other}, transducer, Tissue(2.0));
+  EchoSum sum(scatterers, transducer, axis);
+  for (int round = 0; round < 2; ++round) {
+    Row both(static_cast<std::size_t>(axis.count)), apart = both, one = both;
+    sum.Add(first);
+    sum.Add(second);
+    sum.MoveTo(both.data());
+    AddSegmentEchoes(first, scatterers, transducer, axis, apart.data());
+    AddSegmentEchoes(second, scatterers, transducer, axis, apart.data());
+    EXPECT_LT(RelativeDifference(both, apart), 1e-6);
+    sum.Add(other);
+    sum.MoveTo(one.data());
+    EXPECT_EQ(one, RowOf(other, scatterers, transducer, axis));
+    const Row before = one;
+    sum.MoveTo(one.data());
+    EXPECT_EQ(one, before);
+  }
+}
+
 TEST(EchoSum, KeepsItsPhaseFarFromTheOrigin)
 {
   Transducer transducer;

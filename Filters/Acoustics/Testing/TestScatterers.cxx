@@ -219,27 +219,43 @@ TEST(Scatterers, OnlyWantedBricksAreMade)
   EXPECT_LT(some.MemoryBytes(), 40 * some.Count());
 }
 
-TEST(Scatterers, FindNearMissesNone)
+TEST(Scatterers, FindBesideMissesNone)
 {
   const Scatterers all = InBox(Tissue(8.0));
-  const Vector3d from(-6.0, 2.0, 18.0), direction = Vector3d(0.5, -0.3, 0.8).normalized();
-  constexpr double radius = 2.5, length = 25.0;
-  std::vector<std::uint32_t> found;
-  all.FindNear(
-      from, direction, length, [](double, double) { return radius; }, found);
-  const std::set<std::uint32_t> set(found.begin(), found.end());
-  EXPECT_EQ(set.size(), found.size()) << "each once";
-  EXPECT_LT(set.size(), all.Bricks().size() / 2);
-  for (std::uint32_t b = 0; b < all.Bricks().size(); ++b) {
-    if (set.count(b))
-      continue;
-    const Scatterers::Brick& brick = all.Bricks()[b];
-    for (std::uint32_t i = 0; i < brick.count; ++i) {
-      const Vector3d place = brick.centre - from +
-                             Vector3d(static_cast<double>(all.X(brick)[i]), static_cast<double>(all.Y(brick)[i]),
-                                      static_cast<double>(all.Z(brick)[i]));
-      const double s = std::clamp(place.dot(direction), 0.0, length);
-      ASSERT_GT((place - s * direction).norm(), radius);
+  constexpr double radius = 2.5;
+  double largest = 0.0; // of the bricks
+  for (const Scatterers::Brick& brick : all.Bricks())
+    largest = std::max(largest, static_cast<double>(brick.halfSize.norm()));
+  struct Line {
+    Vector3d from, direction;
+    double length;
+  };
+  for (const Line& line : {Line{{-6.0, 2.0, 18.0}, {0.5, -0.3, 0.8}, 25.0}, Line{{7.0, 1.0, 27.0}, {-0.9, 0.2, 0.3}, 14.0},
+                           Line{{-2.0, -6.0, 30.0}, {0.3, 0.9, -0.2}, 0.5}}) {
+    const Vector3d direction = line.direction.normalized();
+    std::vector<std::uint32_t> found;
+    all.FindBeside(
+        line.from, direction, line.length, [](double, double) { return radius; }, found);
+    const std::set<std::uint32_t> set(found.begin(), found.end());
+    EXPECT_EQ(set.size(), found.size()) << "each once";
+    EXPECT_LT(set.size(), all.Bricks().size() / 2);
+    for (std::uint32_t b = 0; b < all.Bricks().size(); ++b) {
+      const Scatterers::Brick& brick = all.Bricks()[b];
+      const Vector3d centre = brick.centre - line.from;
+      if (set.count(b)) { // nor is much more found
+        EXPECT_LT((centre - centre.dot(direction) * direction).norm(), radius + largest + 1e-3);
+        EXPECT_GT(centre.dot(direction), -largest - 1e-3);
+        EXPECT_LT(centre.dot(direction), line.length + largest + 1e-3);
+        continue;
+      }
+      for (std::uint32_t i = 0; i < brick.count; ++i) {
+        const Vector3d place = centre + Vector3d(static_cast<double>(all.X(brick)[i]), static_cast<double>(all.Y(brick)[i]),
+                                                 static_cast<double>(all.Z(brick)[i]));
+        const double s = place.dot(direction);
+        if (s >= 0.0 && s <= line.length) {
+          ASSERT_GT((place - s * direction).norm(), radius);
+        }
+      }
     }
   }
 }
@@ -252,7 +268,7 @@ TEST(Scatterers, EmptyScenesAreEmpty)
   EXPECT_EQ(Scatterers::Make({}, {}, AllFirst, smallBox).Count(), 0u);
   EXPECT_EQ(Scatterers::At({}, {}).Count(), 0u);
   std::vector<std::uint32_t> found;
-  Scatterers().FindNear(
+  Scatterers().FindBeside(
       Vector3d::Zero(), Vector3d::UnitZ(), 10.0, [](double, double) { return 1.0; }, found);
   EXPECT_TRUE(found.empty());
 }
