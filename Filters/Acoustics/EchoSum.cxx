@@ -18,6 +18,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
+#include "VectorMath.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -50,20 +51,6 @@ struct BrickView {
 struct Sieved {
   alignas(64) float late[batch], exponent[batch], amplitude[batch];
 };
-
-// e^x for x in [-80, 80], to 1e-7.
-inline float Exponential(float x)
-{
-  const float y = x * 1.44269504f;
-  const float whole = std::floor(y);
-  const float f = y - whole;
-  const float power =
-      1.0f + f * (0.693147577f + f * (0.240206874f + f * (0.0556586641f + f * (0.0091968022f + f * 0.00178966497f))));
-  const int bits = (static_cast<int>(whole) + 127) << 23;
-  float scale;
-  std::memcpy(&scale, &bits, sizeof scale);
-  return power * scale;
-}
 
 // Depth and exponent of those scatterers that are in the tube, in their order. \returns how many.
 ECHORAMA_HOT int Sieve(const BrickView& v, const float* __restrict px, const float* __restrict py, const float* __restrict pz,
@@ -115,15 +102,10 @@ ECHORAMA_HOT void AddEchoes(const BrickView& v, const Sieved& in, int count, flo
     for (int i = 0; i < lanes; ++i) {
       const float late = in.late[begin + i];
       const float size = in.amplitude[begin + i] * Exponential(std::min(std::max(in.exponent[begin + i], -80.0f), 80.0f));
-      // Sine and cosine of half the angle, then of the whole.
-      const float turn = startTurn + turnsPerMm * late;
-      const float half = turn - std::floor(turn + 0.5f);
-      const float q = half * half;
-      const float sine = half * (3.14159264f + q * (-5.16771008f + q * (2.55007752f + q * (-0.598291286f + q * 0.0776576603f))));
-      const float cosine =
-          1.0f + q * (-4.9348022f + q * (4.05871142f + q * (-1.33523998f + q * (0.235074509f + q * -0.0246274055f))));
-      re[i] = size * (cosine * cosine - sine * sine);
-      im[i] = size * (-2.0f * sine * cosine);
+      float cosine, sine;
+      CosineAndSine(startTurn + turnsPerMm * late, cosine, sine);
+      re[i] = size * cosine;
+      im[i] = size * -sine;
       const float fine = startFine + finePerMm * late;
       const float whole = std::floor(fine);
       fraction[i] = fine - whole;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // One row of samples (a beam) after the other, in parallel: noise, envelope, gain and decimation in a buffer of the row,
-// then compression. Cost: two logarithms and a sine per sample with noise, one logarithm per grey value.
+// then compression. Noise is made in vectors of single precision (3e-7 of itself; the numbers are those of Random). Cost: a
+// logarithm per grey value, and some 10 ns per sample with noise.
 #include "Receiver.h"
-#include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
-#include "Core/Base/Random.h"
+#include "Core/Base/RandomBlocks.h"
+#include "VectorMath.h"
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -23,11 +25,43 @@ struct Window {
   std::vector<float> weights;
 };
 
+constexpr int noiseBatch = 64;
+
+// The envelope of samples with noise of power noise^2, which is that of a row's samples from \a first on.
+ECHORAMA_HOT void DetectWithNoise(const std::complex<float>* samples, std::uint64_t seed, std::uint64_t row, std::uint32_t first,
+                                  int count, float noise, float* envelope)
+{
+  std::uint32_t bits[4][noiseBatch];
+  for (int i = 0; i < noiseBatch; ++i) { // Random(seed, row): a block of four words for every sample
+    bits[0][i] = first + static_cast<std::uint32_t>(i);
+    bits[1][i] = 0;
+    bits[2][i] = static_cast<std::uint32_t>(row);
+    bits[3][i] = static_cast<std::uint32_t>(row >> 32);
+  }
+  RandomBlocks(bits, {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)});
+  float re[noiseBatch], im[noiseBatch];
+  const auto uniform = [](std::uint32_t high, std::uint32_t low) { // as Random::Uniform()
+    return (static_cast<std::int32_t>(high >> 5) * 67108864.0 + static_cast<std::int32_t>(low >> 6)) / 9007199254740992.0;
+  };
+  for (int i = 0; i < noiseBatch; ++i) {
+    // Of a complex Gaussian number, the square of the size is exponentially distributed and the angle uniformly.
+    const float size = noise * std::sqrt(MinusLogOfRest(uniform(bits[0][i], bits[1][i])));
+    float cosine, sine;
+    CosineAndSine(static_cast<float>(uniform(bits[2][i], bits[3][i])), cosine, sine);
+    re[i] = size * cosine;
+    im[i] = size * sine;
+  }
+  for (int i = 0; i < count; ++i) {
+    const float x = samples[i].real() + re[i], y = samples[i].imag() + im[i];
+    envelope[i] = std::sqrt(x * x + y * y);
+  }
+}
+
 class RowDetector {
 public:
   RowDetector(const BeamEchoes& echoes, const Receiver& receiver, int samples)
     : echoes_(echoes), receiver_(receiver), count_(echoes.baseband.Dimensions()[0]),
-      noise_(receiver.noiseDb > Receiver::noNoiseDb ? std::pow(10.0, 0.05 * receiver.noiseDb) : 0.0)
+      noise_(receiver.noiseDb > Receiver::noNoiseDb ? static_cast<float>(std::pow(10.0, 0.05 * receiver.noiseDb)) : 0.0f)
   {
     const double step = (echoes.probe.depthMax - echoes.probe.depthMin) / (count_ - 1.0);
     for (int i = 0; i < count_; ++i)
@@ -56,18 +90,16 @@ public:
     const std::complex<float>* samples = baseband.Row(beam, plane);
     const auto row = static_cast<std::uint64_t>(plane) * static_cast<std::uint64_t>(baseband.Dimensions()[1]) +
                      static_cast<std::uint64_t>(beam);
-    Random random(receiver_.noiseSeed, row);
     fine.resize(static_cast<std::size_t>(count_));
-    for (int i = 0; i < count_; ++i) {
-      std::complex<double> value = samples[i];
-      if (noise_ > 0.0) {
-        // Of a complex Gaussian number, the square of the size is exponentially distributed and the angle uniformly.
-        const double size = noise_ * std::sqrt(-std::log1p(-random.Uniform())), angle = 2.0 * Pi * random.Uniform();
-        value += std::complex<double>(size * std::cos(angle), size * std::sin(angle));
-      }
-      const auto k = static_cast<std::size_t>(i);
-      fine[k] = gains_[k] * static_cast<float>(std::sqrt(std::norm(value)));
-    }
+    if (noise_ > 0.0f)
+      for (int i = 0; i < count_; i += noiseBatch)
+        DetectWithNoise(samples + i, receiver_.noiseSeed, row, static_cast<std::uint32_t>(i), std::min(noiseBatch, count_ - i),
+                        noise_, fine.data() + i);
+    else
+      for (int i = 0; i < count_; ++i)
+        fine[static_cast<std::size_t>(i)] = static_cast<float>(std::sqrt(std::norm(std::complex<double>(samples[i]))));
+    for (std::size_t i = 0; i < fine.size(); ++i)
+      fine[i] *= gains_[i];
     if (windows_.empty()) {
       std::copy(fine.begin(), fine.end(), envelope);
       return;
@@ -84,7 +116,7 @@ private:
   const BeamEchoes& echoes_;
   const Receiver& receiver_;
   int count_;
-  double noise_;
+  float noise_;
   std::vector<float> gains_;
   std::vector<Window> windows_; // empty: as many samples out as in
 };

@@ -145,6 +145,25 @@ TEST(Receiver, NoiseHasItsPowerBeforeAllGain)
   EXPECT_NE(other.View()(3, 0, 0), envelope.View()(3, 0, 0));
 }
 
+TEST(Receiver, NoiseIsMadeOfTheNumbersOfItsRow)
+{
+  Receiver receiver;
+  receiver.noiseDb = -6.0;
+  receiver.noiseSeed = 0x123456789abcu;
+  const double noise = std::pow(10.0, 0.05 * receiver.noiseDb);
+  const BeamEchoes echoes = Constant(0.25f);
+  const Volume<float> envelope = Envelope(echoes, receiver);
+  for (int plane = 0; plane < 2; ++plane)
+    for (int beam = 0; beam < 3; ++beam) {
+      Random random(receiver.noiseSeed, static_cast<std::uint64_t>(3 * plane + beam));
+      for (int i = 0; i < 101; ++i) {
+        const double size = noise * std::sqrt(-std::log1p(-random.Uniform())), angle = 6.283185307179586 * random.Uniform();
+        const double expected = std::hypot(0.15 + size * std::cos(angle), -0.2 + size * std::sin(angle));
+        ASSERT_NEAR(static_cast<double>(envelope.View()(i, beam, plane)), expected, 2e-6) << i;
+      }
+    }
+}
+
 TEST(Receiver, FewerSamplesAreMeansOfTheFiner)
 {
   BeamEchoes echoes = Constant(0.0f);
