@@ -11,14 +11,16 @@
 //
 // A block gives the same brick whoever asks for it: see ScattererCache.
 //
-// Cost: a hash per cell (some 50 ns with all that follows), 64 control points per cell where it is displaced; 16 bytes per
+// Cost: a hash per cell (in vectors), 64 control points per cell where it is displaced; 16 bytes per
 // scatterer.
 #include "Scatterers.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
+#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/RandomBlocks.h"
 #include "ScattererCache.h"
 #include <algorithm>
 #include <array>
@@ -171,17 +173,24 @@ struct CellHash {
   float sign;
 };
 
-CellHash HashOf(const Eigen::Array3i& cell, const std::array<std::uint32_t, 2>& key)
+constexpr int hashedAtOnce = 64;
+
+// Bits of cells: words begin as the cells' indices.
+ECHORAMA_HOT void HashCells(std::uint32_t (&words)[4][hashedAtOnce], std::uint32_t seedLow, std::uint32_t seedHigh)
 {
-  const auto bits = Random::Block(
-      {static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y()), static_cast<std::uint32_t>(cell.z()), 0x5ca7u},
-      key);
+  for (int i = 0; i < hashedAtOnce; ++i)
+    words[3][i] = 0x5ca7u;
+  RandomBlocks(words, {seedLow, seedHigh});
+}
+
+CellHash HashOf(const std::uint32_t (&words)[4][hashedAtOnce], int i)
+{
   constexpr double part32 = 1.0 / 4294967296.0;
   CellHash hash;
   for (int axis = 0; axis < 3; ++axis)
-    hash.place[axis] = (bits[static_cast<std::size_t>(axis)] + 0.5) * part32;
-  hash.rank = (bits[3] & ~1u) * part32;
-  hash.sign = (bits[3] & 1u) != 0 ? 1.0f : -1.0f;
+    hash.place[axis] = (words[axis][i] + 0.5) * part32;
+  hash.rank = (words[3][i] & ~1u) * part32;
+  hash.sign = (words[3][i] & 1u) != 0 ? 1.0f : -1.0f;
   return hash;
 }
 
@@ -260,17 +269,28 @@ public:
   template <class Use>
   void ForEach(const Eigen::Array3i& block, const Use& use) const
   {
-    for (int k = 0; k < edge_; ++k)
-      for (int j = 0; j < edge_; ++j)
-        for (int i = 0; i < edge_; ++i) {
-          const Eigen::Array3i cell = edge_ * block + Eigen::Array3i(i, j, k);
-          CellHash hash = HashOf(cell, key_);
-          change_.Apply(cell, hash);
-          Eigen::Vector3d point = (cell_ * (cell.cast<double>() + hash.place)).matrix();
-          if (displacement_)
-            point += displacement_->At(point);
-          use(point, hash);
-        }
+    const int all = CellsPerBlock();
+    Eigen::Array3i cells[hashedAtOnce], local(0, 0, 0);
+    std::uint32_t words[4][hashedAtOnce] = {};
+    for (int begin = 0; begin < all; begin += hashedAtOnce) {
+      const int count = std::min(hashedAtOnce, all - begin);
+      for (int n = 0; n < count; ++n) {
+        cells[n] = edge_ * block + local;
+        for (int axis = 0; axis < 3; ++axis)
+          words[axis][n] = static_cast<std::uint32_t>(cells[n][axis]);
+        for (int axis = 0; axis < 3 && ++local[axis] == edge_; ++axis)
+          local[axis] = 0;
+      }
+      HashCells(words, key_[0], key_[1]);
+      for (int n = 0; n < count; ++n) {
+        CellHash hash = HashOf(words, n);
+        change_.Apply(cells[n], hash);
+        Eigen::Vector3d point = (cell_ * (cells[n].cast<double>() + hash.place)).matrix();
+        if (displacement_)
+          point += displacement_->At(point);
+        use(point, hash);
+      }
+    }
   }
 
 private:
@@ -368,6 +388,11 @@ std::vector<Made> MakeBlocks(const Lattice& lattice, const std::vector<Eigen::Ar
     std::vector<Eigen::Vector3d> places;
     std::vector<Eigen::Vector3f> points;
     std::vector<float> ranks, signs;
+    const std::size_t cells = (end - begin) * static_cast<std::size_t>(lattice.CellsPerBlock());
+    places.reserve(cells);
+    points.reserve(cells);
+    ranks.reserve(cells);
+    signs.reserve(cells);
     for (std::size_t block = begin; block < end; ++block)
       lattice.ForEach(blocks[block], [&](const Eigen::Vector3d& place, const CellHash& hash) {
         places.push_back(place);
