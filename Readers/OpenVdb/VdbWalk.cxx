@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The walk costs one pass over the file. What remains: damage within voxels that were compressed with Blosc (behind the header
 // of their chunk), or not at all, is not noticed, as in every format without checksums.
-#include "Readers/VdbWalk.h"
+#include "Readers/OpenVdb/VdbWalk.h"
 #include "Core/Base/Error.h"
 #include <algorithm>
 #include <array>
