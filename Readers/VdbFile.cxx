@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// OpenVDB takes longer to load than all else that reads a volume. So what needs it is a library of its own, Readers/OpenVdb,
+// which lies beside this one and is loaded with the first of its files.
 #include "Readers/VdbFile.h"
-#include "Core/Base/LoadedLibrary.h"
-#include "Readers/OpenVdb/VdbLibrary.h"
+#include "Core/Base/Error.h"
+#include <dlfcn.h>
 
 namespace echorama {
 namespace {
 
 const VdbLibrary& Library(const std::string& path)
 {
-  const auto library = LoadedFunction<decltype(EchoramaVdbLibrary)>("libEchoramaOpenVdb.so", "EchoramaVdbLibrary", path);
-  return *library();
+  void* const library = dlopen(ECHORAMA_VDB_LIBRARY, RTLD_NOW | RTLD_LOCAL); // it stays
+  const auto functions =
+      library ? reinterpret_cast<decltype(&EchoramaVdbLibrary)>(dlsym(library, "EchoramaVdbLibrary")) : nullptr;
+  if (!functions)
+    throw Error(Error::Kind::NotPossible, path + ": what reads and writes OpenVDB cannot be loaded (" + dlerror() +
+                                              "); install Echorama again, with all that it depends on");
+  return *functions();
 }
 
 } // namespace

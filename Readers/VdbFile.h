@@ -28,4 +28,12 @@ std::unique_ptr<VolumeSource> OpenVdb(const std::string& path);
 void WriteVdb(const std::string& path, const ImageHeader& header, const void* voxels, const unsigned char* valid, bool compress,
               FileReplacement& files, const Progress& progress = {});
 
+/// What Readers/OpenVdb does for these two.
+struct VdbLibrary {
+  decltype(&OpenVdb) open;
+  decltype(&WriteVdb) write;
+};
+
 } // namespace echorama
+
+extern "C" const echorama::VdbLibrary* EchoramaVdbLibrary();

@@ -10,8 +10,8 @@
 #include "Core/Base/Parallel.h"
 #include "Readers/AffinePose.h"
 #include "Readers/DataFile.h"
-#include "Readers/OpenVdb/VdbLibrary.h"
 #include "Readers/OpenVdb/VdbWalk.h"
+#include "Readers/VdbFile.h"
 #include <algorithm>
 #include <cmath>
 #include <fstream>
