@@ -185,12 +185,11 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
 
 } // namespace
 
-Command AlignCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<AlignOptions>();
   const auto aligner = vtkSmartPointer<vtkUltrasoundAligner>::New();
   const auto deformer = vtkSmartPointer<vtkUltrasoundDeformableAligner>::New();
-  CLI::App* options = program.add_subcommand("align", "Find where overlapping volumes belong");
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output,
                       std::string("Pose file to write (default: ") + DefaultOutput + ", unless it is there)");
@@ -220,7 +219,7 @@ Command AlignCommand(CLI::App& program)
           ->excludes("--tracker-only");
   for (const char* name : {"ControlSpacingMm", "BendingWeight", "MinimumGain"})
     AddParameter(options, deformer, name)->needs(deformable);
-  return {options, [values, aligner, deformer](Session& session) { Align(session, *values, aligner, deformer); }};
+  action = [values, aligner, deformer](Session& session) { Align(session, *values, aligner, deformer); };
 }
 
 } // namespace echorama

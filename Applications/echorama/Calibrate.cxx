@@ -5,21 +5,19 @@
 
 namespace echorama {
 
-Command CalibrateCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
-  CLI::App* options = program.add_subcommand(
-      "calibrate", "Find how sensor, volume, tip and clocks of a tracked probe belong together, or a camera and a skin");
   options->require_subcommand(1);
-  const std::vector<Command> kinds = {CalibrateHandEyeCommand(*options), CalibratePivotCommand(*options),
-                                      CalibrateTemporalCommand(*options), CalibrateRigCommand(*options),
-                                      CalibrateSurfaceCommand(*options)};
-  for (const Command& kind : kinds)
+  const std::vector<CalibrateKind> kinds = {CalibrateHandEyeCommand(*options), CalibratePivotCommand(*options),
+                                            CalibrateTemporalCommand(*options), CalibrateRigCommand(*options),
+                                            CalibrateSurfaceCommand(*options)};
+  for (const CalibrateKind& kind : kinds)
     kind.options->fallthrough(); // --json and --threads are ours
-  return {options, [kinds](Session& session) {
-            for (const Command& kind : kinds)
-              if (kind.options->parsed())
-                kind.run(session);
-          }};
+  action = [kinds](Session& session) {
+    for (const CalibrateKind& kind : kinds)
+      if (kind.options->parsed())
+        kind.run(session);
+  };
 }
 
 } // namespace echorama

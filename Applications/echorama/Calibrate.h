@@ -4,11 +4,17 @@
 
 namespace echorama {
 
-// Each adds one subcommand to echorama calibrate; they lie in files of their own.
-Command CalibrateHandEyeCommand(CLI::App& calibrate);
-Command CalibratePivotCommand(CLI::App& calibrate);
-Command CalibrateTemporalCommand(CLI::App& calibrate);
-Command CalibrateRigCommand(CLI::App& calibrate);
-Command CalibrateSurfaceCommand(CLI::App& calibrate);
+/// A subcommand of echorama calibrate.
+struct CalibrateKind {
+  CLI::App* options = nullptr;
+  Action run;
+};
+
+// Each adds one; they lie in files of their own.
+CalibrateKind CalibrateHandEyeCommand(CLI::App& calibrate);
+CalibrateKind CalibratePivotCommand(CLI::App& calibrate);
+CalibrateKind CalibrateTemporalCommand(CLI::App& calibrate);
+CalibrateKind CalibrateRigCommand(CLI::App& calibrate);
+CalibrateKind CalibrateSurfaceCommand(CLI::App& calibrate);
 
 } // namespace echorama

@@ -208,7 +208,7 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
 
 } // namespace
 
-Command CalibrateHandEyeCommand(CLI::App& calibrate)
+CalibrateKind CalibrateHandEyeCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<HandEyeOptions>();
   CLI::App* options = calibrate.add_subcommand("hand-eye", "Where a volume is in the frame of the sensor on its probe");

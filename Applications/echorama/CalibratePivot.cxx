@@ -52,7 +52,7 @@ void CalibrateTip(Session& session, const PivotOptions& options)
 
 } // namespace
 
-Command CalibratePivotCommand(CLI::App& calibrate)
+CalibrateKind CalibratePivotCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<PivotOptions>();
   CLI::App* options = calibrate.add_subcommand("pivot", "Where the tip of a tracked tool is, from turning it about its tip");

@@ -102,7 +102,7 @@ void MakeRig(Session& session, const RigOptions& options, vtkUltrasoundPrintable
 
 } // namespace
 
-Command CalibrateRigCommand(CLI::App& calibrate)
+CalibrateKind CalibrateRigCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<RigOptions>();
   const auto clip = vtkSmartPointer<vtkUltrasoundPrintableSource>::New();

@@ -551,7 +551,7 @@ void CheckCalibration(Session& session, const SurfaceOptions& options)
 
 } // namespace
 
-Command CalibrateSurfaceCommand(CLI::App& calibrate)
+CalibrateKind CalibrateSurfaceCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<SurfaceOptions>();
   CLI::App* options =

@@ -46,7 +46,7 @@ void CalibrateClocks(Session& session, const TemporalOptions& options)
 
 } // namespace
 
-Command CalibrateTemporalCommand(CLI::App& calibrate)
+CalibrateKind CalibrateTemporalCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<TemporalOptions>();
   CLI::App* options = calibrate.add_subcommand("temporal", "The offset between the clocks of two recordings of one motion");

@@ -8,12 +8,9 @@
 
 namespace echorama {
 
-/// A subcommand: its options, and what it does when it was chosen. It reports failure by throwing; an Error of the kind
+/// What a subcommand does when its options have been read. It reports failure by throwing; an Error of the kind
 /// InvalidParameter means wrong usage.
-struct Command {
-  CLI::App* options = nullptr;
-  std::function<void(Session&)> run;
-};
+using Action = std::function<void(Session&)>;
 
 /// Throws Error(InvalidParameter).
 [[noreturn]] inline void Misused(const std::string& reason)
@@ -21,22 +18,10 @@ struct Command {
   throw Error(Error::Kind::InvalidParameter, reason);
 }
 
-// Each adds one subcommand to the program; they lie in files of their own.
-Command InfoCommand(CLI::App& program);
-Command ConvertCommand(CLI::App& program);
-Command ReconstructCommand(CLI::App& program);
-Command AlignCommand(CLI::App& program);
-Command CalibrateCommand(CLI::App& program);
-Command MotionCommand(CLI::App& program);
-Command TrackCommand(CLI::App& program);
-Command ScoreCommand(CLI::App& program);
-Command StitchCommand(CLI::App& program);
-Command EmbedCommand(CLI::App& program);
-Command NoiseCommand(CLI::App& program);
-Command ProbeFitCommand(CLI::App& program);
-Command PhantomCommand(CLI::App& program);
-Command SynthesizeCommand(CLI::App& program);
-Command ShellCommand(CLI::App& program);
-Command ViewCommand(CLI::App& program);
+/// Each subcommand is a library of its own, libEchoramaCommand-NAME.so, which the program loads when the command was chosen:
+/// whoever asks info what a file holds does not wait for what draws, deforms and registers. This is the function that each of
+/// them defines: it adds the options of the command, and tells what is done with them. Name and help of the command lie in
+/// main.cxx, which lists them without loading any.
+extern "C" ECHORAMA_PROGRAM_EXPORT void EchoramaCommand(CLI::App* options, Action& action);
 
 } // namespace echorama

@@ -119,11 +119,9 @@ void Convert(Session& session, const ConvertOptions& options)
 
 } // namespace
 
-Command ConvertCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ConvertOptions>();
-  CLI::App* options =
-      program.add_subcommand("convert", "Write a volume, a tracked sequence or transforms in another file format");
   options->add_option("input", values->input, "Volume of any format (a file, or a folder of slices), sequence or transforms")
       ->required();
   options->add_option("output", values->output, "File to write; its extension names the format")->required();
@@ -136,7 +134,7 @@ Command ConvertCommand(CLI::App& program)
   AddParameter(options, Describe(values->reading.parameters), "StackSpacingMm", "--stack-spacing");
   options->add_option("--frames", values->frames,
                       "Frames of a sequence, from 0: a list of single ones and FROM:TO:STEP, both included");
-  return {options, [values](Session& session) { Convert(session, *values); }};
+  action = [values](Session& session) { Convert(session, *values); };
 }
 
 } // namespace echorama

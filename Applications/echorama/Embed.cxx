@@ -91,11 +91,10 @@ void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder*
 
 } // namespace
 
-Command EmbedCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<EmbedOptions>();
   const auto embedder = vtkSmartPointer<vtkUltrasoundEmbedder>::New();
-  CLI::App* options = program.add_subcommand("embed", "Put a stitched volume into a background, so that it looks as one scan");
   options->add_option("volume", values->file, "Volume of any format")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
   options->add_option("--noise", values->noise, "Real noise volumes for the background (default: noise is made)");
@@ -111,7 +110,7 @@ Command EmbedCommand(CLI::App& program)
   AddParameter(options, embedder, "OverlapDegrees", "--overlap");
   AddParameter(options, embedder, "Seed");
   AddParameter(options, embedder, "PreviewFactor", "--preview");
-  return {options, [values, embedder](Session& session) { Embed(session, *values, embedder); }};
+  action = [values, embedder](Session& session) { Embed(session, *values, embedder); };
 }
 
 } // namespace echorama

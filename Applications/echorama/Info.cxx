@@ -99,19 +99,18 @@ Json DescribeTransforms(Session& session, const std::string& file)
   return json;
 }
 
-Command InfoCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto files = std::make_shared<std::vector<std::string>>();
-  CLI::App* options = program.add_subcommand("info", "Tell what files hold: volumes, tracked sequences, poses, transforms");
   options
       ->add_option("file", *files,
                    "Volumes of any format, tracked sequences, pose files (.json), transforms (.json, .xml of Plus)")
       ->required();
-  return {options, [files](Session& session) {
-            session.result["files"] = Json::array();
-            for (const std::string& file : *files)
-              session.result["files"].push_back(Describe(session, file));
-          }};
+  action = [files](Session& session) {
+    session.result["files"] = Json::array();
+    for (const std::string& file : *files)
+      session.result["files"].push_back(Describe(session, file));
+  };
 }
 
 } // namespace echorama

@@ -86,10 +86,9 @@ void ResampleMotion(Session& session, const MotionOptions& options)
 
 } // namespace
 
-Command MotionCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<MotionOptions>();
-  CLI::App* options = program.add_subcommand("motion", "Smooth and resample a recorded motion");
   options->add_option("recording", values->log, "Recording of a tracker: a sequence or a table")->required();
   options->add_option("-o,--output", values->output, "Sequence to write (.igs.mha)")->required();
   options->add_option("--tool", values->tool, "The tool, as the recording calls it (default: its only one)");
@@ -99,7 +98,7 @@ Command MotionCommand(CLI::App& program)
   AddParameter(options, Describe(values->smoothing), "LongestGapSeconds", "--gap");
   options->add_option("--from", values->from, "Begin at this time of the recording, in seconds");
   options->add_option("--to", values->to, "End at this time");
-  return {options, [values](Session& session) { ResampleMotion(session, *values); }};
+  action = [values](Session& session) { ResampleMotion(session, *values); };
 }
 
 } // namespace echorama

@@ -82,11 +82,10 @@ void MakeNoise(Session& session, const NoiseOptions& options, vtkUltrasoundNoise
 
 } // namespace
 
-Command NoiseCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<NoiseOptions>();
   const Source source = vtkSmartPointer<vtkUltrasoundNoiseSource>::New();
-  CLI::App* options = program.add_subcommand("noise", "Make noise as an ultrasound machine does, in the fan of a probe");
   options->add_option("-o,--output", values->output, "Volume to write")->required();
   options->add_option("--match", values->match, "Volume whose grain and intensities the noise shall have");
   options->add_option("--form", values->form,
@@ -100,7 +99,7 @@ Command NoiseCommand(CLI::App& program)
   AddParameter(options, source, "WindowMm", "--window");
   AddParameter(options, source, "SpacingMm", "--spacing");
   AddParameters(options, source, {"FanAngle", "FanWidth", "SweepAngle", "SweepWidth", "DepthMin", "DepthMax"});
-  return {options, [values, source](Session& session) { MakeNoise(session, *values, source); }};
+  action = [values, source](Session& session) { MakeNoise(session, *values, source); };
 }
 
 } // namespace echorama

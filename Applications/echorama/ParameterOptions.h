@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Parameters.h"
+#include "ProgramExport.h"
 #include <any>
 #include <CLI/App.hpp>
 #include <string>
@@ -10,7 +11,7 @@ namespace echorama {
 /// An option that sets \a parameter, whose description gives its help, unit, range, choices and default. A switch that is off is
 /// turned on by its flag, one that is on is turned off by "--no-...". \a flag is the parameter's own when it is empty. What the
 /// parameter lies in must live as long as \a options: \a owner keeps it.
-CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, std::any owner);
+ECHORAMA_PROGRAM_EXPORT CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, std::any owner);
 
 /// The same for one of a struct that outlives \a options: AddParameter(options, Describe(values->smoothing), "WindowSeconds").
 inline CLI::Option* AddParameter(CLI::App* options, ParameterList parameters, const std::string& name, std::string flag = {})

@@ -59,12 +59,10 @@ void Phantom(Session& session, const PhantomOptions& options, vtkUltrasoundPhant
 
 } // namespace
 
-Command PhantomCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<PhantomOptions>();
   const auto source = vtkSmartPointer<vtkUltrasoundPhantomSource>::New();
-  CLI::App* options =
-      program.add_subcommand("phantom", "Make overlapping volumes of an invented body, out of place by a known amount");
   options->add_option("-o,--output", values->folder, "Folder for the volumes and truth.json, the poses that put them back")
       ->required();
   options->add_option("--count", values->count, "How many volumes")->check(CLI::Range(1, 50))->capture_default_str();
@@ -91,7 +89,7 @@ Command PhantomCommand(CLI::App& program)
   butTheFirst("RibShare", "--rib");
   butTheFirst("Jets", "--jets");
   AddSetOptions(*options, values->landmarks, values->format);
-  return {options, [values, source](Session& session) { Phantom(session, *values, source); }};
+  action = [values, source](Session& session) { Phantom(session, *values, source); };
 }
 
 } // namespace echorama

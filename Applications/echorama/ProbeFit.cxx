@@ -65,17 +65,16 @@ void FitProbe(Session& session, const ProbeFitOptions& options, vtkUltrasoundPro
 
 } // namespace
 
-Command ProbeFitCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ProbeFitOptions>();
   const auto filter = vtkSmartPointer<vtkUltrasoundProbeFit>::New();
-  CLI::App* options = program.add_subcommand("probe-fit", "Find the geometry of the probe from a volume's valid region");
   options->add_option("volume", values->file, "Volume of any format")->required();
   options->add_option("-o,--output", values->output, "Also write the volume with the geometry and pose of the probe");
   AddParameters(options, filter, {"MinimumOverlap", "MaximumDistance"});
   CLI::Option* enclose = AddParameter(options, filter, "EncloseRegion", "--enclose");
   AddParameter(options, filter, "MarginMm", "--margin")->needs(enclose);
-  return {options, [values, filter](Session& session) { FitProbe(session, *values, filter); }};
+  action = [values, filter](Session& session) { FitProbe(session, *values, filter); };
 }
 
 } // namespace echorama

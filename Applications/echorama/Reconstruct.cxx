@@ -184,11 +184,10 @@ void Reconstruct(Session& session, const ReconstructOptions& options, Reconstruc
 
 } // namespace
 
-Command ReconstructCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ReconstructOptions>();
   const auto reconstructor = vtkSmartPointer<Reconstructor>::New();
-  CLI::App* options = program.add_subcommand("reconstruct", "Make a volume of a tracked sequence of 2D images");
   options->add_option("sequence", values->sequence, "Tracked sequence (.igs.mha .seq.mha .mhd .seq.nrrd .nhdr)")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
   options->add_option(
@@ -217,7 +216,7 @@ Command ReconstructCommand(CLI::App& program)
   options->add_option("--memory", values->memoryGb, "Refuse what needs more memory than this, GB (0: what is free)")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  return {options, [values, reconstructor](Session& session) { Reconstruct(session, *values, reconstructor); }};
+  action = [values, reconstructor](Session& session) { Reconstruct(session, *values, reconstructor); };
 }
 
 } // namespace echorama

@@ -95,11 +95,10 @@ void Score(Session& session, const ScoreOptions& options, vtkUltrasoundAlignment
 
 } // namespace
 
-Command ScoreCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ScoreOptions>();
   const auto score = vtkSmartPointer<vtkUltrasoundAlignmentScore>::New();
-  CLI::App* options = program.add_subcommand("score", "Tell how far poses are from the truth");
   options->add_option("poses", values->poses, "Pose file to score; with --truth its volumes are read")->required();
   options->add_option("--truth", values->truth, "Pose file that says where the volumes belong");
   AddLandmarksOption(options, values->landmarks, "Landmarks to compare the poses with");
@@ -107,7 +106,7 @@ Command ScoreCommand(CLI::App& program)
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   AddParameter(options, score, "Points");
-  return {options, [values, score](Session& session) { Score(session, *values, score); }};
+  action = [values, score](Session& session) { Score(session, *values, score); };
 }
 
 } // namespace echorama

@@ -2,6 +2,7 @@
 #pragma once
 #include "Core/Base/Error.h"
 #include "Core/Base/Progress.h"
+#include "ProgramExport.h"
 #include <chrono>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -19,7 +20,7 @@ namespace echorama {
 /// go to standard error. What VTK classes report as errors and warnings is gathered and becomes a thrown Error and notes.
 /// SIGINT, SIGTERM and SIGHUP ask the running stage to stop; it ends with Error(Cancelled), and destructors clean up.
 /// There is one session per process.
-class Session {
+class ECHORAMA_PROGRAM_EXPORT Session {
 public:
   Session(const std::string& command, bool json);
   ~Session();
@@ -88,6 +89,6 @@ private:
 };
 
 /// "1.23", with \a digits after the point.
-std::string Fixed(double value, int digits);
+ECHORAMA_PROGRAM_EXPORT std::string Fixed(double value, int digits);
 
 } // namespace echorama

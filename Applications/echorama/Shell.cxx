@@ -117,16 +117,14 @@ void MakeShellFiles(Session& session, const ShellOptions& options, vtkUltrasound
 
 } // namespace
 
-Command ShellCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ShellOptions>();
   const auto filter = vtkSmartPointer<vtkUltrasoundShell>::New();
-  CLI::App* options =
-      program.add_subcommand("shell", "Make a body's surface into a skin to print, with a base for a camera (STL, 3MF)");
   options->add_option("body", values->body, "A closed surface in mm (.stl, .ply, .obj, .vtp, .glb)")->required();
   options->add_option("-o,--output", values->folder, "Folder for the files")->required();
   AddParametersBut(options, filter, {});
-  return {options, [values, filter](Session& session) { MakeShellFiles(session, *values, filter); }};
+  action = [values, filter](Session& session) { MakeShellFiles(session, *values, filter); };
 }
 
 } // namespace echorama

@@ -217,11 +217,10 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
 
 } // namespace
 
-Command StitchCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<StitchOptions>();
   const auto stitcher = vtkSmartPointer<vtkUltrasoundStitcher>::New();
-  CLI::App* options = program.add_subcommand("stitch", "Blend overlapping volumes into one");
   options->add_option("volume", values->files, "Two or more volumes")->required();
   options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
   options->add_option("--poses", values->poses,
@@ -238,7 +237,7 @@ Command StitchCommand(CLI::App& program)
   AddParameter(options, stitcher, "MaximumMemoryGb", "--memory")
       ->description("Memory beside the volumes, GB (0: three quarters of the machine's); a larger result is made slab by slab");
   options->add_flag("--dry-run", values->dryRun, "Tell the size of the result and the memory that it needs, and write nothing");
-  return {options, [values, stitcher](Session& session) { Stitch(session, *values, stitcher); }};
+  action = [values, stitcher](Session& session) { Stitch(session, *values, stitcher); };
 }
 
 } // namespace echorama

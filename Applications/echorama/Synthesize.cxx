@@ -109,11 +109,9 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
 
 } // namespace
 
-Command SynthesizeCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<SynthesizeOptions>();
-  CLI::App* options = program.add_subcommand(
-      "synthesize", "Make overlapping volumes of a scene by simulating ultrasound, out of place by a known amount");
   options->add_option("scene", values->scene, "The scene, JSON (see Documentation/scenes.md)")->required();
   options
       ->add_option("-o,--output", values->folder,
@@ -125,7 +123,7 @@ Command SynthesizeCommand(CLI::App& program)
   options->add_option("--data", values->data,
                       "Folder of the meshes and recordings that the scene names, whatever folder it says");
   AddSetOptions(*options, values->landmarks, values->format);
-  return {options, [values](Session& session) { Synthesize(session, *values); }};
+  action = [values](Session& session) { Synthesize(session, *values); };
 }
 
 } // namespace echorama

@@ -193,10 +193,9 @@ void Track(Session& session, TrackOptions options)
 
 } // namespace
 
-Command TrackCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<TrackOptions>();
-  CLI::App* options = program.add_subcommand("track", "Follow a tracker: what it sees, recorded, and passed on over OpenIGTLink");
   options
       ->add_option(
           "tracker", values->tracker,
@@ -214,7 +213,7 @@ Command TrackCommand(CLI::App& program)
       ->capture_default_str();
   options->add_option("--seconds", values->seconds, "End after this time (default: at the recording's end, or when interrupted)")
       ->check(CLI::Range(0.0, 1e7));
-  return {options, [values](Session& session) { Track(session, *values); }};
+  action = [values](Session& session) { Track(session, *values); };
 }
 
 } // namespace echorama

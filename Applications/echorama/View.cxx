@@ -535,10 +535,9 @@ void View(Session& session, ViewOptions options)
 
 } // namespace
 
-Command ViewCommand(CLI::App& program)
+void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ViewOptions>();
-  CLI::App* options = program.add_subcommand("view", "Show volumes: three slices and the volumes in 3D");
   options->add_option("file", values->files, "Volumes of any format")->required();
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong");
   options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window");
@@ -548,7 +547,7 @@ Command ViewCommand(CLI::App& program)
       ->expected(2)
       ->check(CLI::Range(64, 8192))
       ->capture_default_str();
-  return {options, [values](Session& session) { View(session, *values); }};
+  action = [values](Session& session) { View(session, *values); };
 }
 
 } // namespace echorama

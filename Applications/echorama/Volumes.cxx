@@ -2,10 +2,7 @@
 #include "Volumes.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/JsonPlace.h"
-
 #include "Readers/OutputFiles.h"
-#include "Widgets/Session/ProjectFile.h"
-#include "Widgets/vtkUltrasoundSessionVoxels.h"
 #include <sstream>
 #include <vtkCompositeDataSet.h>
 #include <vtkInformation.h>
@@ -93,27 +90,6 @@ const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string
     return PoseFor(poses, volume.file, volume.geometry);
   } catch (const Error& error) {
     throw Error(error.GetKind(), path + ": " + error.what());
-  }
-}
-
-void ApplyPoses(Session& session, std::vector<LoadedVolume>& volumes, const std::string& path)
-{
-  if (path.empty())
-    return;
-  const std::vector<VolumePose> poses = ReadPoses(path);
-  const std::vector<SessionVolume> known = ReadProject(path).state.volumes; // the same ones, in the same order
-  for (LoadedVolume& volume : volumes) {
-    const VolumePose& pose = PoseIn(poses, path, volume);
-    const StrokeChain strokes = known[static_cast<std::size_t>(&pose - poses.data())].strokes;
-    if (strokes) {
-      SessionVolume asRead;
-      asRead.geometry = volume.geometry;
-      SessionVoxels voxels(asRead, volume.image);
-      voxels.GoTo(strokes);
-      volume.image = voxels.GetBase();
-      session.Note(volume.file + ": painted and carved with the " + std::to_string(strokes->count) + " strokes of " + path);
-    }
-    MoveVolume(volume, pose.volumeToWorld);
   }
 }
 

@@ -1,33 +1,68 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// echorama: the program for the command line. One subcommand per file; see Documentation/command-line.md.
+// echorama: the program for the command line. Each subcommand is a library, loaded when it was chosen; see
+// Documentation/command-line.md.
 #include "Commands.h"
-
 #include "Core/Base/Parallel.h"
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <cstring>
-#include <iostream>
+#include <dlfcn.h>
 #include <vtkSMPTools.h>
 
 using namespace echorama;
 
 namespace {
 
-constexpr int ExitDone = 0, ExitFailed = 1, ExitMisused = 2;
+constexpr int ExitFailed = 1, ExitMisused = 2;
 
-int Run(const Command& command, bool json, int threads)
+// In the order in which a user needs them. Their libraries are in Applications/CMakeLists.txt.
+constexpr struct {
+  const char *name, *help;
+} Commands[] = {
+    {"info", "Tell what files hold: volumes, tracked sequences, poses, transforms"},
+    {"convert", "Write a volume, a tracked sequence or transforms in another file format"},
+    {"reconstruct", "Make a volume of a tracked sequence of 2D images"},
+    {"align", "Find where overlapping volumes belong"},
+    {"score", "Tell how far poses are from the truth"},
+    {"stitch", "Blend overlapping volumes into one"},
+    {"embed", "Put a stitched volume into a background, so that it looks as one scan"},
+    {"noise", "Make noise as an ultrasound machine does, in the fan of a probe"},
+    {"probe-fit", "Find the geometry of the probe from a volume's valid region"},
+    {"phantom", "Make overlapping volumes of an invented body, out of place by a known amount"},
+    {"synthesize", "Make overlapping volumes of a scene by simulating ultrasound, out of place by a known amount"},
+    {"view", "Show volumes: three slices and the volumes in 3D"},
+    {"calibrate", "Find how sensor, volume, tip and clocks of a tracked probe belong together, or a camera and a skin"},
+    {"track", "Follow a tracker: what it sees, recorded, and passed on over OpenIGTLink"},
+    {"motion", "Smooth and resample a recorded motion"},
+    {"shell", "Make a body's surface into a skin to print, with a base for a camera (STL, 3MF)"},
+};
+
+// The library of a command lies beside the others that the program needs, and is found as they are.
+void Load(CLI::App* options, Action& action)
 {
-  Session session(command.options->get_name(), json);
+  const std::string name = options->get_name();
+  // Lazily: of what it brings with it little is called.
+  void* const library = dlopen(("libEchoramaCommand-" + name + ".so").c_str(), RTLD_LAZY | RTLD_LOCAL); // it stays
+  const auto add = library ? reinterpret_cast<decltype(&EchoramaCommand)>(dlsym(library, "EchoramaCommand")) : nullptr;
+  if (!add)
+    throw Error(Error::Kind::NotPossible, name + ": what this command needs cannot be loaded (" + dlerror() +
+                                              "); install Echorama again, with all that it depends on");
+  add(options, action);
+}
+
+int Run(const std::string& command, const Action& action, bool json, int threads)
+{
+  Session session(command, json);
   try {
     const ThreadLimit limit(threads);
     vtkSMPTools::Initialize(threads);
-    command.run(session);
+    action(session);
     return session.Finish();
   } catch (const Error& error) {
     return session.Fail(error.what(), error.GetKind() == Error::Kind::InvalidParameter ? ExitMisused : ExitFailed);
   } catch (const std::bad_alloc&) {
-    return session.Fail(command.options->get_name() + ": there is not enough memory", ExitFailed);
+    return session.Fail(command + ": there is not enough memory", ExitFailed);
   } catch (const std::exception& error) {
     return session.Fail(error.what(), ExitFailed);
   }
@@ -46,38 +81,38 @@ int main(int argc, char** argv)
 
   bool json = false;
   int threads = 0;
-  const Command commands[] = {
-      InfoCommand(program),      ConvertCommand(program), ReconstructCommand(program), AlignCommand(program),
-      ScoreCommand(program),     StitchCommand(program),  EmbedCommand(program),       NoiseCommand(program),
-      ProbeFitCommand(program),  PhantomCommand(program), SynthesizeCommand(program),  ViewCommand(program),
-      CalibrateCommand(program), TrackCommand(program),   MotionCommand(program),      ShellCommand(program)};
-  for (const Command& command : commands) {
-    command.options->add_flag("--json", json, "Print one JSON object of results and seconds on standard output");
-    command.options->add_option("--threads", threads, "Number of threads (0: as many as there are cores)")
-        ->check(CLI::Range(0, 1024))
-        ->capture_default_str();
+  Action action; // of the command that was chosen
+  for (const auto& command : Commands) {
+    CLI::App* options = program.add_subcommand(command.name, command.help);
+    options->preparse_callback([&, options](std::size_t) { // before its options are read
+      Load(options, action);
+      options->add_flag("--json", json, "Print one JSON object of results and seconds on standard output");
+      options->add_option("--threads", threads, "Number of threads (0: as many as there are cores)")
+          ->check(CLI::Range(0, 1024))
+          ->capture_default_str();
+    });
   }
 
+  const auto fail = [&](const std::string& name, const std::string& reason, int status) {
+    // The parser may have stopped before it came to --json.
+    for (int i = 1; i < argc; ++i)
+      json = json || std::strcmp(argv[i], "--json") == 0;
+    return Session(name, json).Fail(reason, status);
+  };
+  const auto chosen = [&program] { return program.get_subcommands().empty() ? nullptr : program.get_subcommands().front(); };
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
-      return program.exit(error); // --help, --version
-    // The parser may have stopped before it came to --json.
-    for (int i = 1; i < argc; ++i)
-      json = json || std::strcmp(argv[i], "--json") == 0;
-    const auto chosen = program.get_subcommands();
-    const std::string name = chosen.empty() ? "" : chosen.front()->get_name();
+      return program.exit(error);   // --help, --version
     std::string path = "echorama "; // to the help that lists the options, of "calibrate rig", not of "calibrate"
-    for (const CLI::App* app = chosen.empty() ? nullptr : chosen.front(); app;
-         app = app->get_subcommands().empty() ? nullptr : app->get_subcommands().front())
+    for (const CLI::App* app = chosen(); app; app = app->get_subcommands().empty() ? nullptr : app->get_subcommands().front())
       path += app->get_name() + " ";
-    const bool unknown = chosen.empty() && argc > 1 && argv[1][0] != '-';
+    const bool unknown = !chosen() && argc > 1 && argv[1][0] != '-';
     const std::string reason = unknown ? argv[1] + std::string(": there is no such command") : error.what();
-    return Session(name, json).Fail(reason + " (see " + path + "--help)", ExitMisused);
+    return fail(chosen() ? chosen()->get_name() : "", reason + " (see " + path + "--help)", ExitMisused);
+  } catch (const Error& error) { // it cannot be loaded
+    return fail(chosen()->get_name(), error.what(), ExitFailed);
   }
-  for (const Command& command : commands)
-    if (command.options->parsed())
-      return Run(command, json, threads);
-  return ExitMisused; // not reached: the parser requires a subcommand
+  return Run(chosen()->get_name(), action, json, threads);
 }
