@@ -75,6 +75,8 @@ endmacro()
 
 macro(_echorama_add_classes name)
   vtk_module_add_module(Echorama::${name} CLASSES ${room_CLASSES} NOWRAP_CLASSES ${room_UNWRAPPED})
+  list(TRANSFORM room_CLASSES REPLACE ".*/" "" OUTPUT_VARIABLE wrapped)
+  set_property(GLOBAL PROPERTY ECHORAMA_CLASSES_OF_${name} ${wrapped}) # for the Python package
   vtk_module_link(Echorama::${name} PUBLIC Echorama::${name}Kernels PRIVATE ${room_VTK_LIBRARIES})
   # Classes may lie in subfolders (Core/Pipeline); they are included by their bare names all the same. Installed, they lie in
   # one folder.

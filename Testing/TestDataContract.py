@@ -7,6 +7,7 @@ is not cubic, whose extent does not begin at 0, and which carry every array and 
 volume and puts out one on the same grid needs nothing in here. Anything else is named in the table Special, which says how
 to feed it and what to expect.
 """
+import inspect
 import json
 import os
 import pathlib
@@ -971,7 +972,7 @@ def check_missing_input(feed):
 
 def algorithms():
     """Every class of the package that can be made and is an algorithm."""
-    for name, kind in sorted(vars(echorama).items()):
+    for name, kind in inspect.getmembers(echorama):
         if isinstance(kind, type) and issubclass(kind, vtkAlgorithm) and kind.__name__ == name:
             try:
                 kind()

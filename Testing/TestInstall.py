@@ -3,6 +3,7 @@
 """What a stranger does: install, build a project of their own against the install tree, run it, import the Python package."""
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -57,6 +58,22 @@ with tempfile.TemporaryDirectory() as folder:
 
     program = prefix / "bin" / "echorama"
     check("echorama" in run(program, "--version"), "the installed program does not say its version")
+    commands = re.findall(r"^  ([a-z][a-z-]*) ", run(program, "--help"), re.MULTILINE)
+    check(len(commands) > 10, f"the installed program has the commands {commands}")
+    for command in commands:
+        check("--threads" in run(program, command, "--help"), f"echorama {command} does not explain itself")
+    for end in ("vdb", "mha"):
+        run(program, "convert", "stitched.vti", f"stitched.{end}", cwd=example)
+    check("OpenVDB" in run(program, "info", "stitched.vdb", cwd=example), "the installed program does not read OpenVDB")
+    # What is missing (so it was this one that was loaded, none of the build tree) is named; what does not need it goes on.
+    for pattern, words, start in (("libEchoramaCommand-view.so", ("view", "stitched.mha"), "echorama: view: "),
+                                  ("libEchoramaReadersOpenVdbKernels.so.*", ("info", "stitched.vdb"), "echorama: stitched.vdb: ")):
+        for gone in [*prefix.rglob(pattern)]:
+            gone.unlink()
+        done = subprocess.run([program, *words], cwd=example, capture_output=True, text=True)
+        check(done.returncode == 1 and done.stderr.startswith(start) and gone.name.split(".so")[0] in done.stderr and "install" in done.stderr
+              and done.stderr.count("\n") == 1, f"without {pattern} it ends with status {done.returncode} and says {done.stderr!r}")
+        check("MetaImage" in run(program, "info", "stitched.mha", cwd=example), f"without {pattern} nothing is read")
 
     lights = run(prefix / "bin" / "echorama-leds", "--line", "17", "--dry-run")
     check("light 0" in lights, f"echorama-leds said {lights!r}")
